@@ -1,0 +1,45 @@
+# Works on a fresh machine that has Python >= 3.11, pip and make.
+PYTHON ?= python3
+VENV   := .venv
+BIN    := $(VENV)/bin
+RUN    := $(VENV)/.run-installed
+DEV    := $(VENV)/.dev-installed
+
+.PHONY: help install demo test check bench docs clean
+help:  ## show this list
+	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
+
+$(BIN)/python:
+	$(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --upgrade "pip>=25.1"
+
+$(RUN): pyproject.toml constraints.txt | $(BIN)/python
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e .
+	@touch $@
+
+$(DEV): pyproject.toml constraints.txt | $(BIN)/python
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e . --group dev
+	@touch $(RUN) $@
+
+install: $(DEV)  ## everything a developer needs, in .venv
+
+demo: $(RUN)  ## a stimulus, a sensor, its parameters found, a page to look at
+	$(BIN)/hmpim demo
+
+test: $(DEV)  ## the whole test suite
+	$(BIN)/python -m pytest -n auto
+
+check: $(DEV)  ## ruff, mypy strict, import-linter
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+
+bench: $(DEV)  ## speed, against a hand-written fit in the same run
+	$(BIN)/python benchmarks/identification_speed.py
+
+docs: $(DEV)  ## every figure and table of the paper, into docs/build
+	$(BIN)/hmpim paper --out docs/build
+
+clean:  ## remove .venv and what the commands made
+	rm -rf $(VENV) docs/build out

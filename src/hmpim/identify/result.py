@@ -1,0 +1,316 @@
+"""What an identification says: estimates with error bars, side by side with the paper's."""
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from os import PathLike
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hmpim.errors import FormatError, RecordError
+from hmpim.record import Finding, Intersample, Record
+
+__all__ = [
+    "SCHEMA",
+    "Candidate",
+    "Estimate",
+    "FrequencyResponse",
+    "Identification",
+    "PairIdentification",
+    "PaperEstimates",
+    "Parameters",
+    "RecordSummary",
+    "Verdict",
+]
+
+SCHEMA = "hmpim/identification/1"
+Verdict = Literal["ok", "doubtful", "not_identifiable"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Estimate:
+    """A value, its standard deviation, and its 95 % interval, all in `unit`."""
+
+    value: float
+    std: float
+    ci95: tuple[float, float]
+    unit: str = ""
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the estimate as plain JSON values."""
+        return {
+            "value": self.value,
+            "std": self.std,
+            "ci95": [self.ci95[0], self.ci95[1]],
+            "unit": self.unit,
+        }
+
+    @classmethod
+    def from_dict(cls, data: Mapping[str, Any]) -> "Estimate":
+        """Read back what `to_dict` wrote."""
+        low, high = data["ci95"]
+        return cls(value=data["value"], std=data["std"], ci95=(low, high), unit=data["unit"])
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Parameters:
+    """Every parameter of one input-output pair; None where the record cannot tell.
+
+    Frequencies in Hz, times in s, the rest in the channels' own units (`scale_factor`
+    in output unit per input unit; `damping_ratio` without unit; `peak_gain_db` in dB).
+    """
+
+    delay: Estimate | None = None
+    delay_correlation: Estimate | None = None
+    delay_low_frequency: Estimate | None = None
+    scale_factor: Estimate | None = None
+    bias: Estimate | None = None
+    noise_std: Estimate | None = None
+    natural_frequency: Estimate | None = None
+    damping_ratio: Estimate | None = None
+    time_constant: Estimate | None = None
+    bandwidth_phase90: Estimate | None = None
+    bandwidth_phase90_without_delay: Estimate | None = None
+    bandwidth_3db: Estimate | None = None
+    peak_gain_db: Estimate | None = None
+    hold_period: Estimate | None = None
+    saturation_low: Estimate | None = None
+    saturation_high: Estimate | None = None
+    quantization_step: Estimate | None = None
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return name to estimate, null where there is none."""
+        out: dict[str, Any] = {}
+        for field in fields(self):
+            estimate = getattr(self, field.name)
+            out[field.name] = None if estimate is None else estimate.to_dict()
+        return out
+
+    @classmethod
+    def from_dict(cls, data: Mapping[str, Any]) -> "Parameters":
+        """Read back what `to_dict` wrote."""
+        return cls(
+            **{name: None if d is None else Estimate.from_dict(d) for name, d in data.items()}
+        )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PaperEstimates:
+    """The figures that section IV of the paper gives when done step by step, as printed.
+
+    Times in s, frequencies in Hz, bias and noise in the output's unit; None where the
+    step has no answer on this record.
+    """
+
+    delay: float | None = None
+    bias: float | None = None
+    scale_factor: float | None = None
+    noise_std: float | None = None
+    natural_frequency: float | None = None
+    damping_ratio: float | None = None
+    bandwidth_phase90: float | None = None
+    bandwidth_3db: float | None = None
+    peak_gain_db: float | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class FrequencyResponse:
+    """Measured frequency response, output over input, with its error at each frequency.
+
+    Parameters
+    ----------
+    frequency : ndarray, shape (m,)
+        Hz, increasing.
+    response : complex ndarray, shape (m,)
+        Output unit per input unit, e^(+jωt) convention; delay included.
+    std : ndarray, shape (m,)
+        Standard deviation of |error|: sqrt(E|Ĝ-G|²), same unit as the response.
+    coherence : ndarray, shape (m,), or None
+        None where it means nothing, as with a single segment.
+    """
+
+    frequency: NDArray[np.float64]
+    response: NDArray[np.complex128]
+    std: NDArray[np.float64]
+    coherence: NDArray[np.float64] | None = None
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the response as plain JSON values."""
+        return {
+            "frequency": self.frequency.tolist(),
+            "real": self.response.real.tolist(),
+            "imag": self.response.imag.tolist(),
+            "std": self.std.tolist(),
+            "coherence": None if self.coherence is None else self.coherence.tolist(),
+        }
+
+    @classmethod
+    def from_dict(cls, data: Mapping[str, Any]) -> "FrequencyResponse":
+        """Read back what `to_dict` wrote."""
+        coherence = data["coherence"]
+        return cls(
+            frequency=np.asarray(data["frequency"], dtype=float),
+            response=np.asarray(data["real"], dtype=float) + 1j * np.asarray(data["imag"]),
+            std=np.asarray(data["std"], dtype=float),
+            coherence=None if coherence is None else np.asarray(coherence, dtype=float),
+        )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Candidate:
+    """One structure that was tried: how well it fits and what its fit costs.
+
+    `criterion` is the Bayesian information criterion, lower is better; `fit_percent` is
+    100 (1 - ||y - ŷ|| / ||y - mean y||).
+    """
+
+    structure: str
+    intersample: Intersample
+    criterion: float
+    fit_percent: float
+    chosen: bool = False
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class PairIdentification:
+    """Everything found between one input and one output.
+
+    `dynamics` holds the rational dynamics that were fitted, without delay and with unit
+    gain at DC: numerator and denominator coefficients in powers of s (rad/s), highest
+    first. `prediction` and `residual` (shape (n,), the output's unit) are on the record's
+    own uniform clock `time`; they are not part of the JSON.
+    """
+
+    input: str
+    output: str
+    structure: str
+    intersample: Intersample
+    fit_percent: float
+    parameters: Parameters
+    paper: PaperEstimates
+    frequency_response: FrequencyResponse
+    numerator: tuple[float, ...]
+    denominator: tuple[float, ...]
+    candidates: tuple[Candidate, ...]
+    verdict: Verdict
+    warnings: tuple[Finding, ...]
+    time: NDArray[np.float64] | None = None
+    prediction: NDArray[np.float64] | None = None
+    residual: NDArray[np.float64] | None = None
+
+    def __getattr__(self, name: str) -> Estimate | None:
+        """Return a parameter by its name: ``pair.delay`` is ``pair.parameters.delay``."""
+        if name in Parameters.__dataclass_fields__:
+            value: Estimate | None = getattr(self.parameters, name)
+            return value
+        raise AttributeError(f"{type(self).__name__!r} has no attribute {name!r}")
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the pair as plain JSON values (DESIGN.md, Result JSON)."""
+        return {
+            "input": self.input,
+            "output": self.output,
+            "structure": self.structure,
+            "intersample": self.intersample,
+            "fit_percent": self.fit_percent,
+            "parameters": self.parameters.to_dict(),
+            "paper": {f.name: getattr(self.paper, f.name) for f in fields(self.paper)},
+            "frequency_response": self.frequency_response.to_dict(),
+            "dynamics": {
+                "numerator": list(self.numerator),
+                "denominator": list(self.denominator),
+            },
+            "candidates": [
+                {f.name: getattr(c, f.name) for f in fields(c)} for c in self.candidates
+            ],
+            "verdict": self.verdict,
+            "warnings": [{"code": w.code, "message": w.message} for w in self.warnings],
+        }
+
+    @classmethod
+    def from_dict(cls, data: Mapping[str, Any]) -> "PairIdentification":
+        """Read back what `to_dict` wrote."""
+        return cls(
+            input=data["input"],
+            output=data["output"],
+            structure=data["structure"],
+            intersample=data["intersample"],
+            fit_percent=data["fit_percent"],
+            parameters=Parameters.from_dict(data["parameters"]),
+            paper=PaperEstimates(**data["paper"]),
+            frequency_response=FrequencyResponse.from_dict(data["frequency_response"]),
+            numerator=tuple(data["dynamics"]["numerator"]),
+            denominator=tuple(data["dynamics"]["denominator"]),
+            candidates=tuple(Candidate(**c) for c in data["candidates"]),
+            verdict=data["verdict"],
+            warnings=tuple(Finding(**w) for w in data["warnings"]),
+        )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RecordSummary:
+    """Which record was identified."""
+
+    fs: float
+    samples: int
+    sha256: str
+    source: str = ""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Identification:
+    """The result of `hmpim.identify`: one `PairIdentification` for each input and output.
+
+    Index it output first, as in a transfer matrix: ``result["y", "u"].delay``.
+    `data` is the record itself, kept for pictures; it is not part of the JSON.
+    """
+
+    record: RecordSummary
+    pairs: tuple[PairIdentification, ...]
+    data: Record | None = None
+
+    def __getitem__(self, key: tuple[str, str]) -> PairIdentification:
+        output, input_ = key
+        for pair in self.pairs:
+            if (pair.output, pair.input) == (output, input_):
+                return pair
+        known = ", ".join(f"({p.output!r}, {p.input!r})" for p in self.pairs)
+        raise RecordError(f"there is no pair ({output!r}, {input_!r}); the result has {known}")
+
+    @property
+    def verdict(self) -> Verdict:
+        """The worst verdict of all pairs."""
+        order: tuple[Verdict, ...] = ("ok", "doubtful", "not_identifiable")
+        return max((pair.verdict for pair in self.pairs), key=order.index)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the result as plain JSON values, `schema` first."""
+        return {
+            "schema": SCHEMA,
+            "record": {f.name: getattr(self.record, f.name) for f in fields(self.record)},
+            "pairs": [pair.to_dict() for pair in self.pairs],
+        }
+
+    @classmethod
+    def from_dict(cls, data: Mapping[str, Any]) -> "Identification":
+        """Read back what `to_dict` wrote.
+
+        Raises
+        ------
+        FormatError
+            If `data` is not of schema hmpim/identification/1.
+        """
+        if data.get("schema") != SCHEMA:
+            raise FormatError(f"schema is {data.get('schema')!r}; {SCHEMA!r} is needed")
+        return cls(
+            record=RecordSummary(**data["record"]),
+            pairs=tuple(PairIdentification.from_dict(pair) for pair in data["pairs"]),
+        )
+
+    def save(self, path: str | PathLike[str]) -> None:
+        """Write the result to `path` as JSON."""
+        text = json.dumps(self.to_dict(), indent=1, allow_nan=False)
+        Path(path).write_text(text + "\n", encoding="utf-8")

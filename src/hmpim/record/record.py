@@ -1,0 +1,270 @@
+"""A record: what went in, what came out, and when."""
+
+import hashlib
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from hmpim.errors import ArgumentError, RecordError
+from hmpim.units import check_unit
+
+__all__ = ["Channel", "Intersample", "Record"]
+
+Intersample = Literal["zoh", "foh", "bandlimited"]
+"""What an input does between its samples: held, linear, or band-limited."""
+
+
+def _frozen(name: str, values: ArrayLike) -> NDArray[np.float64]:
+    try:
+        array = np.array(values, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise RecordError(f"channel {name!r} is not numeric ({error}); give real numbers") from None
+    if array.ndim != 1:
+        raise RecordError(
+            f"channel {name!r} has shape {array.shape}; give one dimension of samples, shape (n,)"
+        )
+    array.setflags(write=False)
+    return array
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Channel:
+    """One measured signal on its own clock.
+
+    Parameters
+    ----------
+    name : str
+        Name of the channel, unique in its record.
+    time : ndarray, shape (n,)
+        Time stamps in seconds, strictly increasing.
+    values : ndarray, shape (n,)
+        Samples, in `unit`.
+    unit : str
+        Unit of the values; empty for none.
+
+    Raises
+    ------
+    RecordError
+        For NaN or infinite values, unequal lengths, or time that does not increase.
+    """
+
+    name: str
+    time: NDArray[np.float64]
+    values: NDArray[np.float64]
+    unit: str = ""
+
+    def __post_init__(self) -> None:
+        check_unit(self.unit)
+        time = _frozen(f"{self.name} (time)", self.time)
+        values = _frozen(self.name, self.values)
+        object.__setattr__(self, "time", time)
+        object.__setattr__(self, "values", values)
+        if time.size != values.size:
+            raise RecordError(
+                f"channel {self.name!r} has {values.size} samples and {time.size} time stamps; "
+                "they must be as many"
+            )
+        if values.size < 2:
+            raise RecordError(f"channel {self.name!r} has {values.size} samples; at least 2 needed")
+        for label, array in ((self.name, values), (f"{self.name} (time)", time)):
+            bad = np.flatnonzero(~np.isfinite(array))
+            if bad.size:
+                raise RecordError(
+                    f"channel {label!r} holds {array[bad[0]]} at sample {bad[0]} "
+                    f"({bad.size} such in all); cut them out or fill them before identifying"
+                )
+        step = np.diff(time)
+        if not np.all(step > 0):
+            k = int(np.argmin(step > 0))
+            raise RecordError(
+                f"time of channel {self.name!r} does not increase at sample {k + 1}: "
+                f"{time[k]:.9g} s is followed by {time[k + 1]:.9g} s; sort the record or cut it there"
+            )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Record:
+    """Inputs and outputs of one test, time-stamped.
+
+    Parameters
+    ----------
+    inputs, outputs : tuple of Channel
+        At least one of each, names unique throughout.
+    fs : float
+        Nominal sampling rate in Hz.
+    band : tuple of float or None
+        Excited band in Hz, where known.
+    intersample : {'zoh', 'foh', 'bandlimited'} or None
+        What the inputs do between samples, where known.
+    source : str
+        Where the record comes from, for people.
+
+    Raises
+    ------
+    RecordError
+        If there is no input or no output, or two channels share a name.
+    """
+
+    inputs: tuple[Channel, ...]
+    outputs: tuple[Channel, ...]
+    fs: float
+    band: tuple[float, float] | None = None
+    intersample: Intersample | None = None
+    source: str = ""
+
+    def __post_init__(self) -> None:
+        if not self.inputs or not self.outputs:
+            raise RecordError(
+                f"a record needs at least one input and one output; "
+                f"this one has {len(self.inputs)} and {len(self.outputs)}"
+            )
+        names = [c.name for c in (*self.inputs, *self.outputs)]
+        twice = sorted({name for name in names if names.count(name) > 1})
+        if twice:
+            raise RecordError(f"channel name {twice[0]!r} is used twice; names must be unique")
+        _check_rate(self.fs)
+
+    @classmethod
+    def from_arrays(
+        cls,
+        inputs: Mapping[str, ArrayLike],
+        outputs: Mapping[str, ArrayLike],
+        *,
+        fs: float | None = None,
+        time: ArrayLike | None = None,
+        units: Mapping[str, str] | None = None,
+        band: tuple[float, float] | None = None,
+        intersample: Intersample | None = None,
+    ) -> "Record":
+        """Make a record of arrays that share one clock.
+
+        Parameters
+        ----------
+        inputs, outputs : mapping of str to array_like, shape (n,)
+            Samples by channel name.
+        fs : float, optional
+            Sampling rate in Hz. Give this or `time`.
+        time : array_like, shape (n,), optional
+            Time stamps in seconds. With both, `fs` is the nominal rate.
+        units : mapping of str to str, optional
+            Unit by channel name; a channel not named has none.
+        band : tuple of float, optional
+            Excited band in Hz.
+        intersample : {'zoh', 'foh', 'bandlimited'}, optional
+            What the inputs do between samples, if known.
+
+        Raises
+        ------
+        RecordError
+            For unequal lengths, NaN, or time that does not increase.
+        ArgumentError
+            If neither `fs` nor `time` is given, or `fs` is not positive.
+
+        Examples
+        --------
+        >>> record = Record.from_arrays({"u": [0, 1, 0]}, {"y": [0, 0, 1]}, fs=10.0)
+        >>> record.duration
+        0.3
+        """
+        if fs is None and time is None:
+            raise ArgumentError("neither fs nor time is given; one of them is needed")
+        if fs is not None:
+            _check_rate(fs)
+        named = {**inputs, **outputs}
+        arrays = {name: _frozen(name, values) for name, values in named.items()}
+        lengths = {name: a.size for name, a in arrays.items()}
+        if len(set(lengths.values())) > 1:
+            raise RecordError(
+                "channels have unequal lengths ("
+                + ", ".join(f"{name}: {n}" for name, n in lengths.items())
+                + "); give channels of one length, or each with its own time"
+            )
+        if not arrays:
+            raise RecordError("a record needs at least one input and one output; this one has none")
+        n = next(iter(lengths.values()))
+        if time is None:
+            assert fs is not None
+            stamps = np.arange(n) / fs
+        else:
+            stamps = _frozen("time", time)
+        units = units or {}
+        unknown = sorted(set(units) - set(named))
+        if unknown:
+            raise RecordError(f"a unit is given for {unknown[0]!r}, which is not a channel")
+
+        def channels(names: Mapping[str, ArrayLike]) -> tuple[Channel, ...]:
+            return tuple(
+                Channel(name=k, time=stamps, values=arrays[k], unit=units.get(k, "")) for k in names
+            )
+
+        made_inputs, made_outputs = channels(inputs), channels(outputs)
+        rate = float(fs) if fs is not None else (n - 1) / float(stamps[-1] - stamps[0])
+        return cls(
+            inputs=made_inputs, outputs=made_outputs, fs=rate, band=band, intersample=intersample
+        )
+
+    @property
+    def duration(self) -> float:
+        """Length in seconds: samples of the first input divided by the rate."""
+        return self.inputs[0].values.size / self.fs
+
+    @property
+    def samples(self) -> int:
+        """Number of samples of the first input."""
+        return self.inputs[0].values.size
+
+    @property
+    def sha256(self) -> str:
+        """Digest over names, units, time stamps and values of every channel."""
+        digest = hashlib.sha256()
+        for kind, channels in (("input", self.inputs), ("output", self.outputs)):
+            for c in channels:
+                digest.update(f"{kind}\0{c.name}\0{c.unit}\0".encode())
+                digest.update(np.ascontiguousarray(c.time, dtype="<f8").tobytes())
+                digest.update(np.ascontiguousarray(c.values, dtype="<f8").tobytes())
+        return digest.hexdigest()
+
+    def channel(self, name: str) -> Channel:
+        """Return the channel called `name`.
+
+        Raises
+        ------
+        RecordError
+            If there is none; the message lists those there are.
+        """
+        for c in (*self.inputs, *self.outputs):
+            if c.name == name:
+                return c
+        known = ", ".join(c.name for c in (*self.inputs, *self.outputs))
+        raise RecordError(f"there is no channel {name!r}; the record has {known}")
+
+    def between(self, start: float, stop: float) -> "Record":
+        """Return the part with start <= time < stop, in seconds of the record's own clock.
+
+        Raises
+        ------
+        RecordError
+            If fewer than two samples of a channel are in that span.
+        """
+
+        def cut(c: Channel) -> Channel:
+            keep = (c.time >= start) & (c.time < stop)
+            if np.count_nonzero(keep) < 2:
+                raise RecordError(
+                    f"channel {c.name!r} has fewer than 2 samples between {start:g} s and {stop:g} s"
+                )
+            return replace(c, time=c.time[keep], values=c.values[keep])
+
+        return replace(
+            self,
+            inputs=tuple(cut(c) for c in self.inputs),
+            outputs=tuple(cut(c) for c in self.outputs),
+        )
+
+
+def _check_rate(fs: float) -> None:
+    if not (np.isfinite(fs) and fs > 0):
+        raise ArgumentError(f"fs = {fs} Hz is not a sampling rate; it must be positive and finite")
