@@ -13,7 +13,7 @@ __all__ = ["check_unit", "conversion_factor", "rate_unit"]
 
 
 @cache
-def _registry() -> pint.UnitRegistry:
+def _registry() -> "pint.UnitRegistry[float]":
     return pint.UnitRegistry()
 
 
