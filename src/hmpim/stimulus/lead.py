@@ -1,0 +1,399 @@
+"""From rest into a waveform and back to rest, never beyond the limits.
+
+The printed sweep starts with a velocity step and ends wherever it happens to be. Here a
+polynomial of fifth degree carries the axis from rest at 0 to the waveform's own position,
+velocity and acceleration, and another carries it back to rest at 0, so that all three are
+continuous and each is the derivative of the one before. The waveform keeps its gain,
+extinction and phase.
+
+Where to join: for 0 < n < 1 the acceleration (7) is unbounded as t → 0. The sweep is
+joined at the first instant from which its acceleration stays within that of its first
+full cycle; this is a few hundredths of a radian into the sweep. How long: among all
+durations, the one whose position, velocity and acceleration stay furthest inside those of
+the cycle it adjoins, so a lead is as gentle as its neighbour and excites nothing above
+the band. Should that not fit the limits, the sweep is joined later (up to its first
+turning point) or left earlier (back to its last one), where it stands still for an instant.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from hmpim.errors import LimitsError
+from hmpim.stimulus.limits import Limits
+from hmpim.stimulus.motion import FloatArray, Motion, Peaks, Waveform
+from hmpim.stimulus.peaks import true_peaks
+from hmpim.stimulus.sweep import Sweep
+
+__all__ = ["Quintic", "RestToRest", "join_time", "rest_to_rest"]
+
+_CHOICES = 64  # durations tried for one lead
+_STEPS = 16  # instants tried for joining or leaving
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Quintic:
+    """Polynomial of fifth degree in (t - start)/duration, between two states of motion.
+
+    Parameters
+    ----------
+    start, duration : float
+        Seconds.
+    coefficients : tuple of float, 6 of them
+        Position at share s of the duration is sum of coefficients[k] s^k.
+    """
+
+    start: float
+    duration: float
+    coefficients: tuple[float, ...]
+
+    @property
+    def end(self) -> float:
+        """Time in seconds at which it ends."""
+        return self.start + self.duration
+
+    def motion(self, time: FloatArray) -> Motion:
+        """Position, velocity and acceleration at `time` (s, shape (n,)), the formula only.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> q = between(np.zeros(3), np.array([1.0, 0.0, 0.0]), start=0.0, duration=2.0)
+        >>> q.motion(np.array([0.0, 1.0, 2.0])).position.tolist()
+        [0.0, 0.5, 1.0]
+        """
+        s = (time - self.start) / self.duration
+        c0, c1, c2, c3, c4, c5 = self.coefficients
+        position = c0 + s * (c1 + s * (c2 + s * (c3 + s * (c4 + s * c5))))
+        velocity = c1 + s * (2 * c2 + s * (3 * c3 + s * (4 * c4 + s * 5 * c5)))
+        acceleration = 2 * c2 + s * (6 * c3 + s * (12 * c4 + s * 20 * c5))
+        return Motion(
+            time=time,
+            position=position,
+            velocity=velocity / self.duration,
+            acceleration=acceleration / self.duration**2,
+        )
+
+    @property
+    def peaks(self) -> Peaks:
+        """True peaks, from the roots of the derivatives."""
+        c = np.array(self.coefficients)
+        largest = []
+        for order in range(3):
+            p = np.polynomial.polynomial.polyder(c, order) if order else c
+            slope = np.trim_zeros(np.polynomial.polynomial.polyder(p), "b")
+            roots = np.polynomial.polynomial.polyroots(slope) if slope.size > 1 else np.empty(0)
+            # a double root may come out as a pair just off the axis: its real part will do
+            at = np.concatenate(([0.0, 1.0], np.clip(roots.real, 0.0, 1.0)))
+            size = np.abs(np.polynomial.polynomial.polyval(at, p)).max()
+            largest.append(float(size) / self.duration**order)
+        return Peaks(position=largest[0], velocity=largest[1], acceleration=largest[2])
+
+
+def between(first: FloatArray, last: FloatArray, *, start: float, duration: float) -> Quintic:
+    """Quintic from state `first` to state `last` (position, velocity, acceleration).
+
+    Parameters
+    ----------
+    first, last : ndarray, shape (3,)
+        States at the two ends.
+    start, duration : float
+        Seconds.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> q = between(np.zeros(3), np.array([1.0, 0.0, 0.0]), start=0.0, duration=1.0)
+    >>> [round(c) for c in q.coefficients]
+    [0, 0, 0, 10, -15, 6]
+    """
+    x0, v0, a0 = first
+    x1, v1, a1 = last
+    T = duration
+    c = (x0, v0 * T, 0.5 * a0 * T * T)
+    d = x1 - c[0] - c[1] - c[2]
+    e = v1 * T - c[1] - 2 * c[2]
+    f = a1 * T * T - 2 * c[2]
+    rest = (10 * d - 4 * e + 0.5 * f, -15 * d + 7 * e - f, 6 * d - 3 * e + 0.5 * f)
+    return Quintic(start=start, duration=T, coefficients=tuple(float(v) for v in (*c, *rest)))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RestToRest:
+    """A waveform with a lead-in from rest and a lead-out to rest, both at position 0.
+
+    Parameters
+    ----------
+    core : Waveform
+        The waveform inside; its time 0 is at `sweep_start`.
+    sweep_start : float
+        Seconds from the start of the record.
+    join, leave : float
+        Where the core takes over and is left, in seconds of the core's own time.
+    lead_in, lead_out : Quintic
+        In the record's time.
+    duration : float
+        Whole length in seconds; at rest from the end of `lead_out`.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> sweep = Sweep(band=(0.1, 10.0), duration=10.0, gain=37.3, extinction=0.0)
+    >>> led = rest_to_rest(sweep, limits=Limits(position=10, velocity=1000), fs=500.0)
+    >>> ends = led.motion(np.array([0.0, led.duration]))
+    >>> ends.position.tolist(), ends.velocity.tolist(), ends.acceleration.tolist()
+    ([0.0, 0.0], [0.0, 0.0], [0.0, 0.0])
+    """
+
+    core: Waveform
+    sweep_start: float
+    join: float
+    leave: float
+    lead_in: Quintic
+    lead_out: Quintic
+    duration: float
+
+    @property
+    def band(self) -> tuple[float, float] | None:
+        """Band of the core, in Hz."""
+        return self.core.band
+
+    @property
+    def breaks(self) -> tuple[float, ...]:
+        """Times in seconds at which one piece hands over to the next."""
+        return (
+            self.lead_in.start,
+            self.sweep_start + self.join,
+            self.sweep_start + self.leave,
+            self.lead_out.end,
+        )
+
+    def motion(self, time: FloatArray) -> Motion:
+        """Position, velocity and acceleration at `time`.
+
+        Parameters
+        ----------
+        time : ndarray, shape (n,)
+            Seconds from the start of the record; at rest outside.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> sweep = Sweep(band=(0.1, 10.0), duration=10.0, gain=37.3, extinction=0.0)
+        >>> led = rest_to_rest(sweep, limits=Limits(position=10), fs=500.0)
+        >>> bool(led.motion(np.array([led.sweep_start + 3.0])).position[0]
+        ...      == sweep.motion(np.array([3.0])).position[0])
+        True
+        """
+        t = np.asarray(time, dtype=np.float64)
+        motion = np.zeros((3, *t.shape))
+        begin, joined, left, end = self.breaks
+        for piece, offset, inside in (
+            (self.lead_in, 0.0, (t >= begin) & (t < joined)),
+            (self.core, self.sweep_start, (t >= joined) & (t <= left)),
+            (self.lead_out, 0.0, (t > left) & (t < end)),
+        ):
+            part = piece.motion(t[inside] - offset)
+            motion[0, inside] = part.position
+            motion[1, inside] = part.velocity
+            motion[2, inside] = part.acceleration
+        return Motion(time=t, position=motion[0], velocity=motion[1], acceleration=motion[2])
+
+
+def join_time(sweep: Sweep) -> float:
+    """First instant from which the acceleration stays within that of the first full cycle.
+
+    Parameters
+    ----------
+    sweep : Sweep
+        Of at least one cycle.
+
+    Returns
+    -------
+    float
+        Seconds; 0 where the sweep starts gently, as with n = 0.
+
+    Examples
+    --------
+    >>> join_time(Sweep(band=(0.1, 10.0), duration=10.0, extinction=0.0))
+    0.0
+    >>> 0.0 < join_time(Sweep(band=(0.1, 40.0), duration=10.0, extinction=0.8)) < 0.1
+    True
+    """
+    total = 2.0 * math.pi * sweep.cycles
+    quarter = sweep.time_of_phase(0.5 * math.pi)
+    around = np.linspace(quarter, sweep.time_of_phase(min(2.5 * math.pi, total)), 512)
+    level = float(np.abs(sweep.motion(around).acceleration).max())
+    early = quarter * np.concatenate((np.geomspace(1e-12, 1.0, 512), np.linspace(0.01, 1.0, 100)))
+    early = np.unique(np.concatenate(([0.0], early)))
+    beyond = np.abs(sweep.motion(early).acceleration) > level
+    singular = 0.0 < sweep.extinction < 1.0
+    if not singular and not beyond.any():
+        return 0.0
+    last = int(np.flatnonzero(beyond)[-1]) if beyond.any() else 0
+    low, high = float(early[last]), float(early[min(last + 1, early.size - 1)])
+    while high - low > 1e-9 * quarter:
+        middle = 0.5 * (low + high)
+        over = abs(float(sweep.motion(np.array([middle])).acceleration[0])) > level
+        low, high = (middle, high) if over else (low, middle)
+    return high
+
+
+def rest_to_rest(
+    core: Waveform, *, limits: Limits, fs: float, longest: float = math.inf
+) -> RestToRest:
+    """Put a lead-in and a lead-out around `core`, inside `limits`.
+
+    Parameters
+    ----------
+    core : Waveform
+        The motion in the middle, itself inside the limits.
+    limits : Limits
+        In the core's unit.
+    fs : float
+        Sampling rate in Hz; the core starts on a sample, and the last sample is at rest.
+    longest : float
+        Time allowed for each lead, in seconds outside the core.
+
+    Returns
+    -------
+    RestToRest
+        Starting and ending at rest at position 0.
+
+    Raises
+    ------
+    LimitsError
+        If no lead of that length fits; the message says what would do.
+
+    Examples
+    --------
+    >>> sweep = Sweep(band=(0.1, 10.0), duration=10.0, gain=37.3, extinction=0.0)
+    >>> led = rest_to_rest(sweep, limits=Limits(position=10, acceleration=40000), fs=500.0)
+    >>> led.join, led.leave
+    (0.0, 10.0)
+    """
+    joins, leaves, first, last = _handovers(core)
+    start_peaks = true_peaks(core, start=joins[0], stop=first)
+    end_peaks = true_peaks(core, start=last, stop=leaves[0])
+    rest = np.zeros(3)
+    entry = exit_ = None
+    for join in joins.tolist():
+        state = _state(core, join)
+        entry = _gentlest(rest, state, start_peaks, limits, longest + join)
+        if entry is not None:
+            break
+    for leave in leaves.tolist():
+        state = _state(core, leave)
+        exit_ = _gentlest(state, rest, end_peaks, limits, longest + core.duration - leave)
+        if exit_ is not None:
+            break
+    if entry is None or exit_ is None:
+        which = "in" if entry is None else "out"
+        raise LimitsError(_no_lead(core, which, limits, longest, fs))
+    outside = max(entry.duration - join, 0.0) if math.isinf(longest) else longest
+    sweep_start = math.ceil(outside * fs - 1e-9) / fs
+    lead_in = between(
+        rest,
+        _state(core, join),
+        start=sweep_start + join - entry.duration,
+        duration=entry.duration,
+    )
+    lead_out = between(
+        _state(core, leave), rest, start=sweep_start + leave, duration=exit_.duration
+    )
+    after = lead_out.end if math.isinf(longest) else sweep_start + core.duration + longest
+    return RestToRest(
+        core=core,
+        sweep_start=sweep_start,
+        join=join,
+        leave=leave,
+        lead_in=lead_in,
+        lead_out=lead_out,
+        duration=(math.ceil(after * fs - 1e-9) + 1) / fs,
+    )
+
+
+def _no_lead(core: Waveform, which: str, limits: Limits, longest: float, fs: float) -> str:
+    if math.isinf(longest):
+        return (
+            f"no lead-{which} of any length keeps the limits around a waveform of "
+            f"{core.duration:g} s; let it make more cycles, or take lead=0 for the printed one"
+        )
+    try:
+        fits = rest_to_rest(core, limits=limits, fs=fs)
+    except LimitsError as error:
+        return str(error)
+    needed = max(
+        fits.lead_in.duration - fits.join, fits.lead_out.end - fits.sweep_start - core.duration
+    )
+    return (
+        f"lead = {longest:g} s is too short to keep the limits; "
+        f"lead = {math.ceil(needed * fs) / fs:.6g} s would do, or lead='auto'"
+    )
+
+
+def _state(waveform: Waveform, time: float) -> FloatArray:
+    at = waveform.motion(np.array([time]))
+    return np.array([at.position[0], at.velocity[0], at.acceleration[0]])
+
+
+def _handovers(core: Waveform) -> tuple[FloatArray, FloatArray, float, float]:
+    """Instants to join and to leave, best first, and the spans that a lead is compared with."""
+    T = core.duration
+    if isinstance(core, Sweep):
+        total = 2.0 * math.pi * core.cycles
+        earliest = join_time(core)
+        first = core.time_of_phase(min(2.5 * math.pi, total))
+        last = core.time_of_phase(max(total - 2.0 * math.pi, 0.0))
+    else:
+        low, high = core.band if core.band is not None else (4.0 / T, 4.0 / T)
+        earliest, first, last = 0.0, min(1.0 / low, T), max(T - 1.0 / high, 0.0)
+    turn_in = _turning(core, np.linspace(earliest, max(first, earliest), 1024), 0)
+    turn_out = _turning(core, np.linspace(last, T, 1024), -1)
+    share = np.linspace(0.0, 1.0, _STEPS + 1)
+    return earliest + (turn_in - earliest) * share, T + (turn_out - T) * share, first, last
+
+
+def _turning(core: Waveform, times: FloatArray, which: int) -> float:
+    velocity = core.motion(times).velocity
+    flips = np.flatnonzero(velocity[:-1] * velocity[1:] <= 0.0)
+    if flips.size == 0:
+        return float(times[which and 0])
+    low, high = float(times[flips[which]]), float(times[flips[which] + 1])
+    sign = float(velocity[flips[which]])
+    for _ in range(50):
+        middle = 0.5 * (low + high)
+        same = float(core.motion(np.array([middle])).velocity[0]) * sign > 0.0
+        low, high = (middle, high) if same else (low, middle)
+    return 0.5 * (low + high)
+
+
+def _gentlest(
+    first: FloatArray, last: FloatArray, beside: Peaks, limits: Limits, longest: float
+) -> Quintic | None:
+    """The quintic that stays furthest inside its neighbour's peaks, if it keeps the limits."""
+    scales = [
+        a / b
+        for a, b in (
+            (beside.position, beside.velocity),
+            (beside.velocity, beside.acceleration),
+        )
+        if b > 0
+    ]
+    if not scales or max(scales) == 0.0:
+        return between(first, last, start=0.0, duration=1e-3)
+    durations = np.geomspace(0.3 * min(scales), 20.0 * max(scales), _CHOICES)
+    durations = np.unique(np.minimum(durations, longest))
+    gentlest: list[tuple[float, Quintic]] = []
+    for duration in durations[durations > 0.0]:
+        candidate = between(first, last, start=0.0, duration=float(duration))
+        peaks = candidate.peaks
+        if limits.use(peaks) <= 1.0 + 1e-12:
+            share = max(
+                peaks.position / beside.position,
+                peaks.velocity / beside.velocity,
+                peaks.acceleration / beside.acceleration,
+            )
+            gentlest.append((share, candidate))
+    return min(gentlest, key=lambda pair: pair[0])[1] if gentlest else None

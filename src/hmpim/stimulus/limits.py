@@ -1,0 +1,92 @@
+"""What an axis may do (Fig. 3): bounds on position, velocity and acceleration."""
+
+import math
+from dataclasses import dataclass
+
+from hmpim.errors import ArgumentError
+from hmpim.stimulus.motion import Peaks
+from hmpim.units import check_unit, conversion_factor, rate_unit
+
+__all__ = ["Limits"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Limits:
+    """Largest magnitudes allowed, measured from the position at rest.
+
+    Parameters
+    ----------
+    position, velocity, acceleration : float
+        In `unit`, `unit`/s and `unit`/s². Infinite where nothing bounds.
+    unit : str
+        Unit of the position; empty for none.
+
+    Raises
+    ------
+    ArgumentError
+        If one of them is NaN, zero or negative, or not a number.
+    UnitError
+        If the unit is not known.
+
+    Examples
+    --------
+    >>> limits = Limits(position=10, velocity=1000, acceleration=40000, unit="deg")
+    >>> round(limits.to("rad").position, 6)
+    0.174533
+    """
+
+    position: float = math.inf
+    velocity: float = math.inf
+    acceleration: float = math.inf
+    unit: str = ""
+
+    def __post_init__(self) -> None:
+        check_unit(self.unit)
+        for order, name in enumerate(("position", "velocity", "acceleration")):
+            given = getattr(self, name)
+            try:
+                value = float(given)
+            except (TypeError, ValueError):
+                value = math.nan
+            if isinstance(given, (str, bytes, bool)) or not value > 0:
+                unit = rate_unit(self.unit, order)
+                raise ArgumentError(
+                    f"{name} limit = {given!r} {unit} bounds nothing that could move; "
+                    "give a positive number, or leave it out for no limit"
+                )
+            object.__setattr__(self, name, value)
+
+    def to(self, unit: str) -> "Limits":
+        """Return the same limits in another unit.
+
+        Raises
+        ------
+        UnitError
+            If the unit is unknown or of another dimension.
+
+        Examples
+        --------
+        >>> round(Limits(velocity=1.0, unit="rad").to("deg").velocity, 3)
+        57.296
+        """
+        factor = conversion_factor(self.unit, to=unit)
+        return Limits(
+            position=self.position * factor,
+            velocity=self.velocity * factor,
+            acceleration=self.acceleration * factor,
+            unit=unit,
+        )
+
+    def use(self, peaks: Peaks) -> float:
+        """Largest share of a limit that `peaks` take, 1 being the limit itself.
+
+        Examples
+        --------
+        >>> Limits(velocity=4.0).use(Peaks(position=9.0, velocity=1.0, acceleration=9.0))
+        0.25
+        """
+        return max(
+            peaks.position / self.position,
+            peaks.velocity / self.velocity,
+            peaks.acceleration / self.acceleration,
+        )
