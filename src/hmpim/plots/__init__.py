@@ -1,1 +1,35 @@
-"""To be filled."""
+"""Pictures: one function for each, taking arrays or results, returning a matplotlib Figure."""
+
+from hmpim.plots.bode import Mark, bode, draw_bode, pair_bode
+from hmpim.plots.candidates import candidates
+from hmpim.plots.correlation import cross_correlation, error_autocorrelation
+from hmpim.plots.curves import BodeCurve, measured_curve, model_curve
+from hmpim.plots.envelope import envelope
+from hmpim.plots.histories import (
+    input_output,
+    model_over_measurement,
+    residuals,
+    time_histories,
+)
+from hmpim.plots.spectra import draw_spectrum, shade_band, spectra
+
+__all__ = [
+    "BodeCurve",
+    "Mark",
+    "bode",
+    "candidates",
+    "cross_correlation",
+    "draw_bode",
+    "draw_spectrum",
+    "envelope",
+    "error_autocorrelation",
+    "input_output",
+    "measured_curve",
+    "model_curve",
+    "model_over_measurement",
+    "pair_bode",
+    "residuals",
+    "shade_band",
+    "spectra",
+    "time_histories",
+]

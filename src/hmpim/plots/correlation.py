@@ -1,0 +1,99 @@
+"""Correlations of section IV: the delay's (8) and the error's own (10)."""
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hmpim.plots.style import (
+    axis_label,
+    draw_legend,
+    draw_level,
+    draw_line,
+    draw_mark,
+    finish_axes,
+    new_figure,
+)
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+__all__ = ["cross_correlation", "error_autocorrelation"]
+
+
+def cross_correlation(
+    lags: NDArray[np.float64],
+    correlation: NDArray[np.float64],
+    *,
+    peak: float | None = None,
+    delay: float | None = None,
+    unit: str = "",
+) -> "Figure":
+    """Draw the cross-correlation of input and output (Eq. 8, Fig. 8).
+
+    Parameters
+    ----------
+    lags : ndarray, shape (m,)
+        Seconds by which the output is later.
+    correlation : ndarray, shape (m,)
+        In `unit`.
+    peak : float, optional
+        Where the peak is, in seconds: the paper's delay.
+    delay : float, optional
+        The pure delay of the joint fit, in seconds, marked beside it.
+    unit : str
+        Product of the two channels' units.
+
+    Examples
+    --------
+    >>> lags = np.linspace(-1.0, 1.0, 201)
+    >>> figure = cross_correlation(lags, np.exp(-(lags - 0.15) ** 2), peak=0.15, unit="deg²")
+    >>> figure.axes[0].get_ylabel()
+    'Cross-correlation (deg²)'
+    """
+    figure, (axes,) = new_figure(1, height=2.4)
+    draw_line(axes, lags, correlation, colour="input")
+    finish_axes(axes, x="Lag of the output (s)", y=axis_label("Cross-correlation", unit))
+    if peak is not None:
+        draw_mark(axes, peak, label=f"peak at {peak:.4g} s", colour="output")
+    if delay is not None:
+        draw_mark(axes, delay, label=f"pure delay {delay:.4g} s", colour="ink", text_at=0.85)
+    return figure
+
+
+def error_autocorrelation(
+    lags: NDArray[np.float64],
+    correlation: NDArray[np.float64],
+    *,
+    bias: float | None = None,
+    unit: str = "",
+) -> "Figure":
+    """Draw the autocorrelation of the time-corrected error (Eqs 9 to 11, Figs 9 and 11).
+
+    Parameters
+    ----------
+    lags : ndarray, shape (m,)
+        Seconds.
+    correlation : ndarray, shape (m,)
+        In the square of `unit`.
+    bias : float, optional
+        The joint fit's bias in `unit`; its square is drawn as the level that a bias alone
+        would give.
+    unit : str
+        Unit of the output.
+
+    Examples
+    --------
+    >>> lags = np.linspace(-1.0, 1.0, 201)
+    >>> figure = error_autocorrelation(lags, 0.36 * np.ones(201), bias=0.6, unit="deg")
+    >>> figure.axes[0].get_ylabel()
+    'Autocorrelation of the error (deg²)'
+    """
+    figure, (axes,) = new_figure(1, height=2.4)
+    draw_line(axes, lags, correlation, colour="output")
+    if bias is not None:
+        draw_level(axes, (bias**2,), label="square of the jointly fitted bias", colour="ink")
+        draw_legend(axes)
+    squared = f"{unit}²" if unit else ""
+    finish_axes(axes, x="Lag (s)", y=axis_label("Autocorrelation of the error", squared))
+    return figure
