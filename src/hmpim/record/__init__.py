@@ -1,6 +1,21 @@
 """Records: time-stamped channels, each with its unit, and the quality of the data."""
 
-from hmpim.record.quality import Finding, inspect_timing
+from hmpim.record.align import Aligned, Signal, uniform
+from hmpim.record.clock import Clock, fit_clock
+from hmpim.record.quality import Finding, inspect_record, inspect_timing, inspect_values
 from hmpim.record.record import Channel, Intersample, Record
 
-__all__ = ["Channel", "Finding", "Intersample", "Record", "inspect_timing"]
+__all__ = [
+    "Aligned",
+    "Channel",
+    "Clock",
+    "Finding",
+    "Intersample",
+    "Record",
+    "Signal",
+    "fit_clock",
+    "inspect_record",
+    "inspect_timing",
+    "inspect_values",
+    "uniform",
+]

@@ -5,7 +5,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Finding", "inspect_timing"]
+from hmpim.record.clock import Clock, fit_clock
+from hmpim.record.record import Channel, Record
+
+__all__ = ["Finding", "clock_findings", "inspect_record", "inspect_timing", "inspect_values"]
+
+STUCK_SHARE = 0.05
+"""Share of a record over which an output may stand still while the input moves."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -25,5 +31,196 @@ class Finding:
 
 
 def inspect_timing(time: NDArray[np.float64], fs: float) -> tuple[Finding, ...]:
-    """Placeholder docstring; see the issue."""
-    return ()
+    """Say what is odd about time stamps.
+
+    Parameters
+    ----------
+    time : ndarray, shape (n,)
+        Strictly increasing time stamps in s.
+    fs : float
+        Stated rate in Hz.
+
+    Returns
+    -------
+    tuple of Finding
+        Codes 'gaps' (samples are missing), 'jitter' (stamps stray from a uniform clock by more
+        than 1 % of the interval, see `hmpim.record.clock`), 'rate' (the stamps run at another
+        rate than stated). Empty for a clean clock, and for one whose stamps are only rounded.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> [f.code for f in inspect_timing(np.array([0.0, 0.1, 0.2, 0.5, 0.6]), 10.0)]
+    ['gaps']
+    """
+    return clock_findings(fit_clock(time, nominal=fs), time, stated=fs)
+
+
+def clock_findings(
+    clock: Clock, time: NDArray[np.float64], *, stated: float | None = None, name: str = ""
+) -> tuple[Finding, ...]:
+    """Say what is odd about a clock that was laid through `time` (shape (n,), s).
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> time = np.array([0.0, 0.1, 0.2, 0.35, 0.4, 0.5])
+    >>> clock_findings(fit_clock(time), time)[0].code
+    'jitter'
+    """
+    of = f" of {name!r}" if name else ""
+    findings = []
+    gaps = clock.gaps
+    if gaps.size:
+        missing = np.diff(clock.index)[gaps] - 1
+        worst = int(np.argmax(missing))
+        start, stop = time[gaps[worst]], time[gaps[worst] + 1]
+        findings.append(
+            Finding(
+                code="gaps",
+                message=(
+                    f"{int(missing.sum())} of {clock.length} samples{of} are missing, in "
+                    f"{gaps.size} {'gap' if gaps.size == 1 else 'gaps'}; the longest lasts "
+                    f"{stop - start:.4g} s from {start:.6g} s; the output is left out there, and "
+                    "the input is filled in: repeat the test if the gap lies where the input moves"
+                ),
+            )
+        )
+    if clock.jittered:
+        share = 100 * clock.fs
+        rms = float(np.sqrt(np.mean(clock.deviation**2)))
+        most = float(np.abs(clock.deviation).max())
+        findings.append(
+            Finding(
+                code="jitter",
+                message=(
+                    f"time stamps{of} stray from a uniform clock of {clock.fs:.6g} Hz by "
+                    f"{share * rms:.2g} % of the interval (r.m.s.), {share * most:.2g} % at most; "
+                    "the samples are interpolated; record with a hardware clock if errors "
+                    "at high frequency matter"
+                ),
+            )
+        )
+    if stated is not None and abs(clock.fs / stated - 1) > 0.01:
+        findings.append(
+            Finding(
+                code="rate",
+                message=(
+                    f"time stamps{of} run at {clock.fs:.6g} Hz where {stated:.6g} Hz is stated; "
+                    "the stamps are believed: correct the rate, or the unit of the time column"
+                ),
+            )
+        )
+    return tuple(findings)
+
+
+def inspect_values(record: Record) -> tuple[Finding, ...]:
+    """Say what is odd about the values of a record's channels.
+
+    Parameters
+    ----------
+    record : Record
+        The record to look at.
+
+    Returns
+    -------
+    tuple of Finding
+        Codes 'dead_channel' (one value throughout), 'stuck' (an output stands still for over
+        5 % of the record, not at either end of its range, while an input moves), and
+        'repeated_samples' (over half of an output's samples repeat the one before).
+
+    Examples
+    --------
+    >>> record = Record.from_arrays({"u": [0, 1, 0]}, {"y": [3, 3, 3]}, fs=10.0)
+    >>> inspect_values(record)[0].code
+    'dead_channel'
+    """
+    findings = []
+    dead = set()
+    for channel in (*record.inputs, *record.outputs):
+        if _still(channel.values):
+            dead.add(channel.name)
+            findings.append(
+                Finding(
+                    code="dead_channel",
+                    message=(
+                        f"channel {channel.name!r} reads {channel.values[0]:.6g} from end to end; "
+                        "check its cable, its range and its column"
+                    ),
+                )
+            )
+    for output in record.outputs:
+        if output.name in dead:
+            continue
+        stuck = _stuck(output, record.inputs)
+        if stuck is not None:
+            findings.append(stuck)
+        same = np.diff(output.values) == 0
+        share = float(np.mean(same))
+        if share > 0.5:
+            every = 1 / (1 - share)
+            findings.append(
+                Finding(
+                    code="repeated_samples",
+                    message=(
+                        f"{100 * share:.0f} % of the samples of {output.name!r} repeat the one "
+                        f"before, a new value about every {every:.2g} samples: the unit updates "
+                        "more slowly than it is recorded, or its quantisation is coarse"
+                    ),
+                )
+            )
+    return tuple(findings)
+
+
+def inspect_record(record: Record) -> tuple[Finding, ...]:
+    """Say what is odd about a record: its clocks first, then its values.
+
+    Examples
+    --------
+    >>> inspect_record(Record.from_arrays({"u": [0, 1, 0]}, {"y": [0, 0, 1]}, fs=10.0))
+    ()
+    """
+    findings: list[Finding] = []
+    seen: list[NDArray[np.float64]] = []
+    for channel in (*record.outputs, *record.inputs):
+        if any(channel.time is t or np.array_equal(channel.time, t) for t in seen):
+            continue
+        clock = fit_clock(channel.time, nominal=record.fs)
+        stated = record.fs if not seen else None  # the stated rate is that of the first clock
+        name = channel.name if seen else ""
+        findings.extend(clock_findings(clock, channel.time, stated=stated, name=name))
+        seen.append(channel.time)
+    return (*findings, *inspect_values(record))
+
+
+def _still(values: NDArray[np.float64]) -> bool:
+    # Rounding in a logger's own scaling may leave the last bits alive.
+    return float(np.ptp(values)) <= 1e-12 * float(np.abs(values).max())
+
+
+def _stuck(output: Channel, inputs: tuple[Channel, ...]) -> Finding | None:
+    """Longest stretch of one value, if it is suspicious."""
+    values = output.values
+    edges = np.concatenate(([0], np.flatnonzero(np.diff(values) != 0) + 1, [values.size]))
+    lengths = np.diff(edges)
+    # The ends of the range are left to the search for saturation.
+    inner = (values[edges[:-1]] > values.min()) & (values[edges[:-1]] < values.max())
+    if not inner.any():
+        return None
+    k = int(np.argmax(np.where(inner, lengths, 0)))
+    length = int(lengths[k])
+    if length < max(20, STUCK_SHARE * values.size):
+        return None
+    start, stop = output.time[edges[k]], output.time[edges[k + 1] - 1]
+    for u in inputs:
+        within = u.values[(u.time >= start) & (u.time <= stop)]
+        if within.size and np.ptp(within) > 0.05 * np.ptp(u.values):
+            return Finding(
+                code="stuck",
+                message=(
+                    f"{output.name!r} stands still at {values[edges[k]]:.6g} from {start:.6g} s to "
+                    f"{stop:.6g} s ({length} samples) while {u.name!r} moves; check the unit, or "
+                    "cut that part out"
+                ),
+            )
+    return None

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from hmpim.errors import ArgumentError, RecordError
+from hmpim.record.clock import fit_clock
 from hmpim.units import check_unit
 
 __all__ = ["Channel", "Intersample", "Record"]
@@ -81,7 +82,8 @@ class Channel:
             k = int(np.argmin(step > 0))
             raise RecordError(
                 f"time of channel {self.name!r} does not increase at sample {k + 1}: "
-                f"{time[k]:.9g} s is followed by {time[k + 1]:.9g} s; sort the record or cut it there"
+                f"{time[k]:.9g} s is followed by {time[k + 1]:.9g} s; sort the record, "
+                "or cut it there"
             )
 
 
@@ -201,7 +203,7 @@ class Record:
             )
 
         made_inputs, made_outputs = channels(inputs), channels(outputs)
-        rate = float(fs) if fs is not None else (n - 1) / float(stamps[-1] - stamps[0])
+        rate = float(fs) if fs is not None else fit_clock(made_inputs[0].time).fs
         return cls(
             inputs=made_inputs, outputs=made_outputs, fs=rate, band=band, intersample=intersample
         )
@@ -254,7 +256,8 @@ class Record:
             keep = (c.time >= start) & (c.time < stop)
             if np.count_nonzero(keep) < 2:
                 raise RecordError(
-                    f"channel {c.name!r} has fewer than 2 samples between {start:g} s and {stop:g} s"
+                    f"channel {c.name!r} has fewer than 2 samples between {start:g} s and "
+                    f"{stop:g} s; widen the span"
                 )
             return replace(c, time=c.time[keep], values=c.values[keep])
 
