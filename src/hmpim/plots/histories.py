@@ -178,9 +178,7 @@ def residuals(
     """
     figure, axes = new_figure(2, height=1.9, share_x=False)
     draw_line(axes[0], time, residual, colour="output", width=0.8)
-    finish_axes(
-        axes[0], x="Time (s)", y=axis_label(f"Residual of {output_name}", unit), title="Residual"
-    )
+    finish_axes(axes[0], x="Time (s)", y=axis_label(f"Residual of {output_name}", unit))
     step = float(np.median(np.diff(time)))
     most = min(residual.size - 1, 100)
     lags = np.arange(1, most + 1) * step

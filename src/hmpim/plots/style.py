@@ -6,6 +6,7 @@ settings changed. matplotlib is imported when the first picture is drawn, not be
 
 from collections.abc import Iterable
 from typing import TYPE_CHECKING, Literal
+from unicodedata import category
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,6 +29,7 @@ __all__ = [
     "finish_axes",
     "new_figure",
     "plain",
+    "printable",
 ]
 
 Colour = Literal["paper", "ink", "muted", "grid", "input", "output", "model", "limit", "other"]
@@ -59,10 +61,23 @@ def plain(text: str) -> str:
     >>> plain("a\x00b")
     'a�b'
     """
-    shown = "".join(c if c.isprintable() else "\N{REPLACEMENT CHARACTER}" for c in text)
+    shown = printable(text)
     if len(shown) > LONGEST_NAME:
         shown = shown[: LONGEST_NAME - 1] + "…"
     return shown.replace("$", r"\$")
+
+
+def printable(text: str) -> str:
+    r"""Replace what no page or picture may hold: controls, direction marks, half characters.
+
+    Examples
+    --------
+    >>> printable("a\x1b[31m\u202eb")
+    'a�[31m�b'
+    """
+    return "".join(
+        "\N{REPLACEMENT CHARACTER}" if category(c) in ("Cc", "Cf", "Cs") else c for c in text
+    )
 
 
 def axis_label(quantity: str, unit: str) -> str:

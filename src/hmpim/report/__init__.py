@@ -1,1 +1,18 @@
-"""To be filled."""
+"""Reports: one HTML page for a browser, one table for a terminal."""
+
+from hmpim.report.files import replacing
+from hmpim.report.html import render, report
+from hmpim.report.numbers import format_estimate, format_interval, format_number, plus_minus
+from hmpim.report.text import parameter_table, print_result
+
+__all__ = [
+    "format_estimate",
+    "format_interval",
+    "format_number",
+    "parameter_table",
+    "plus_minus",
+    "print_result",
+    "render",
+    "replacing",
+    "report",
+]

@@ -1,0 +1,186 @@
+"""The pictures of a report, each with a caption and words for those who cannot see it."""
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hmpim import plots
+from hmpim.identify import Identification, PairIdentification
+from hmpim.record import Record
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from hmpim.stimulus import Stimulus
+
+__all__ = ["Picture", "pair_pictures", "stimulus_picture"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Picture:
+    """A figure of a report: its heading, its caption, and what is seen, in words."""
+
+    key: str
+    title: str
+    caption: str
+    description: str
+    figure: "Figure"
+
+
+def stimulus_picture(stimulus: "Stimulus") -> Picture:
+    """Return the picture of a designed stimulus inside its limits.
+
+    Examples
+    --------
+    >>> from hmpim.stimulus import Limits, design
+    >>> limits = Limits(position=10, velocity=1000, acceleration=40000, unit="deg")
+    >>> stimulus_picture(design(band=(0.1, 10), duration=5, fs=500, limits=limits)).key
+    'stimulus'
+    """
+    peaks = stimulus.peaks
+    unit = stimulus.unit
+    reached = (
+        f"Peaks: {peaks.position:.4g} {unit}, {peaks.velocity:.4g} {unit}/s, "
+        f"{peaks.acceleration:.4g} {unit}/s²."
+    )
+    return Picture(
+        key="stimulus",
+        title="Stimulus and its limits",
+        caption=f"What is sent to the unit under test, with its derivatives. {reached}",
+        description=f"Position, velocity and acceleration over {stimulus.duration:g} s. {reached}",
+        figure=plots.time_histories(stimulus),
+    )
+
+
+def pair_pictures(result: Identification, pair: PairIdentification) -> list[Picture]:
+    """Return all pictures that can be drawn of a pair, in the order of section IV.
+
+    Without the record (``result.data`` is None) that is the Bode plot and the candidates.
+
+    Parameters
+    ----------
+    result : Identification
+        The whole result, for its record.
+    pair : PairIdentification
+        One of its pairs.
+
+    Examples
+    --------
+    >>> from hmpim.identify import FrequencyResponse, PaperEstimates, Parameters, RecordSummary
+    >>> none = np.empty(0)
+    >>> pair = PairIdentification(
+    ...     input="u", output="y", structure="static", intersample="zoh", fit_percent=0.0,
+    ...     parameters=Parameters(), paper=PaperEstimates(), candidates=(),
+    ...     frequency_response=FrequencyResponse(frequency=none, response=none, std=none),
+    ...     numerator=(), denominator=(), verdict="doubtful", warnings=())
+    >>> summary = RecordSummary(fs=200.0, samples=2000, sha256="")
+    >>> pair_pictures(Identification(record=summary, pairs=(pair,)), pair)
+    []
+    """
+    pictures: list[Picture] = []
+    record = result.data
+    if record is not None:
+        pictures += _signal_pictures(record, pair)
+    units = ("", "") if record is None else _units(record, pair)
+    if np.any(pair.frequency_response.frequency > 0):
+        pictures.append(_bode_picture(pair, units))
+    if record is not None and pair.time is not None:
+        pictures += _model_pictures(pair, units[1])
+    if pair.candidates:
+        pictures.append(_candidates_picture(pair))
+    return pictures
+
+
+def _units(record: Record, pair: PairIdentification) -> tuple[str, str]:
+    return record.channel(pair.input).unit, record.channel(pair.output).unit
+
+
+def _signal_pictures(record: Record, pair: PairIdentification) -> list[Picture]:
+    source, sink = record.channel(pair.input), record.channel(pair.output)
+    time = sink.time
+    u: NDArray[np.float64] = np.interp(time, source.time, source.values)
+    span = f"{time[0]:g} to {time[-1]:g} s"
+    return [
+        Picture(
+            key="signals",
+            title="Stimulus and response",
+            caption="What went in and what came out.",
+            description=(
+                f"Input {pair.input} between {u.min():.4g} and {u.max():.4g} {source.unit}, "
+                f"output {pair.output} between {sink.values.min():.4g} and "
+                f"{sink.values.max():.4g} {sink.unit}, over {span}."
+            ),
+            figure=plots.input_output(
+                time,
+                u,
+                sink.values,
+                input_name=pair.input,
+                output_name=pair.output,
+                input_unit=source.unit,
+                output_unit=sink.unit,
+            ),
+        )
+    ]
+
+
+def _bode_picture(pair: PairIdentification, units: tuple[str, str]) -> Picture:
+    seen = pair.frequency_response.frequency
+    marks = []
+    if pair.parameters.bandwidth_phase90 is not None:
+        marks.append(f"phase −90° at {pair.parameters.bandwidth_phase90.value:.4g} Hz")
+    if pair.parameters.bandwidth_3db is not None:
+        marks.append(f"magnitude −3 dB at {pair.parameters.bandwidth_3db.value:.4g} Hz")
+    if pair.parameters.natural_frequency is not None:
+        marks.append(f"natural frequency {pair.parameters.natural_frequency.value:.4g} Hz")
+    return Picture(
+        key="bode",
+        title="Bode plot",
+        caption="Frequency response as measured, with the band that holds it with 95 % at each "
+        "frequency, and the fitted model over it.",
+        description=f"Magnitude and phase of {pair.output} over {pair.input} from "
+        f"{seen.min():.4g} to {seen.max():.4g} Hz: {', '.join(marks) or 'no marks'}.",
+        figure=plots.pair_bode(pair, input_unit=units[0], output_unit=units[1]),
+    )
+
+
+def _model_pictures(pair: PairIdentification, unit: str) -> list[Picture]:
+    if pair.time is None or pair.prediction is None or pair.residual is None:
+        return []
+    measured = pair.prediction + pair.residual
+    spread = float(np.std(pair.residual))
+    return [
+        Picture(
+            key="model",
+            title="Model over measurement",
+            caption="The model's output over the measured one; the fit is "
+            f"{pair.fit_percent:.2f} %.",
+            description=f"Measured and modelled {pair.output} lie over each other; the fit is "
+            f"{pair.fit_percent:.2f} %.",
+            figure=plots.model_over_measurement(
+                pair.time, measured, pair.prediction, output_name=pair.output, unit=unit
+            ),
+        ),
+        Picture(
+            key="residual",
+            title="Residual",
+            caption="What the model leaves over, and its autocorrelation. White noise stays "
+            "inside the dashed lines 19 times of 20; what does not has been left unexplained.",
+            description=f"Residual of {pair.output} with standard deviation {spread:.4g} {unit}, "
+            "and its autocorrelation.",
+            figure=plots.residuals(pair.time, pair.residual, output_name=pair.output, unit=unit),
+        ),
+    ]
+
+
+def _candidates_picture(pair: PairIdentification) -> Picture:
+    return Picture(
+        key="candidates",
+        title="Structures tried",
+        caption="How far each structure stands behind the best, by the Bayesian information "
+        "criterion; ten or more is decisive.",
+        description=f"{len(pair.candidates)} structures; "
+        f"{pair.structure.replace('_', ' ')} was chosen.",
+        figure=plots.candidates(pair.candidates),
+    )

@@ -1,0 +1,128 @@
+"""The result on a terminal: a table of estimates, the verdict, the warnings."""
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+from hmpim.identify import Identification, PairIdentification
+from hmpim.plots.style import printable
+from hmpim.report.numbers import format_interval, format_number, plus_minus
+from hmpim.report.words import (
+    GLOSSARY,
+    VERDICTS,
+    headline,
+    off_by,
+    pair_sentence,
+    paper_value,
+    untold,
+)
+
+if TYPE_CHECKING:
+    from rich.console import Console
+    from rich.table import Table
+
+__all__ = ["parameter_table", "print_result"]
+
+_COLOURS = {"ok": "green", "doubtful": "yellow", "not_identifiable": "red"}
+
+
+def parameter_table(
+    pair: PairIdentification, *, truth: Mapping[str, float] | None = None
+) -> "Table":
+    """Return a pair's estimates as a table for a terminal.
+
+    Parameters
+    ----------
+    pair : PairIdentification
+        What was found.
+    truth : mapping of str to float, optional
+        True values by parameter name, where they are known; shown beside the estimates.
+
+    Examples
+    --------
+    >>> from hmpim.identify import Estimate, FrequencyResponse, PaperEstimates, Parameters
+    >>> import numpy as np
+    >>> none = np.empty(0)
+    >>> delay = Estimate(value=0.15, std=0.0001, ci95=(0.1498, 0.1502), unit="s")
+    >>> pair = PairIdentification(
+    ...     input="u", output="y", structure="static", intersample="zoh", fit_percent=100.0,
+    ...     parameters=Parameters(delay=delay), paper=PaperEstimates(delay=0.17), candidates=(),
+    ...     frequency_response=FrequencyResponse(frequency=none, response=none, std=none),
+    ...     numerator=(1.0,), denominator=(1.0,), verdict="ok", warnings=())
+    >>> table = parameter_table(pair, truth={"delay": 0.15})
+    >>> [str(next(column.cells)) for column in table.columns][:2]
+    ['Delay, pure', '0.15000 ± 0.00010']
+    """
+    from rich.box import SIMPLE_HEAD
+    from rich.table import Table
+    from rich.text import Text
+
+    table = Table(box=SIMPLE_HEAD, pad_edge=False)
+    table.add_column("Parameter")
+    table.add_column("Value ± std", justify="right")
+    table.add_column("Unit")
+    table.add_column("95 % interval", justify="right")
+    table.add_column("Paper's steps", justify="right")
+    if truth is not None:
+        table.add_column("Truth", justify="right")
+        table.add_column("Off by", justify="right")
+    for words in GLOSSARY:
+        estimate = getattr(pair.parameters, words.name)
+        paper = paper_value(pair, words.name)
+        known = None if truth is None else truth.get(words.name)
+        if estimate is None and paper is None and known is None:
+            continue
+        cells = [words.label]
+        if estimate is None:
+            cells += ["–", "", ""]
+        else:
+            cells += [
+                plus_minus(estimate.value, estimate.std),
+                estimate.unit,
+                format_interval(estimate),
+            ]
+        cells.append(format_number(paper) if words.differs else "")
+        if truth is not None:
+            cells.append("" if known is None else format_number(known))
+            cells.append("" if known is None or estimate is None else off_by(estimate, known))
+        table.add_row(*(Text(cell) for cell in cells))
+    return table
+
+
+def print_result(
+    result: Identification, console: "Console", *, truth: Mapping[str, float] | None = None
+) -> None:
+    """Print the verdict, and for each pair its table and its warnings.
+
+    Parameters
+    ----------
+    result : Identification
+        What was found.
+    console : rich.console.Console
+        Where to.
+    truth : mapping of str to float, optional
+        True values by parameter name, where they are known.
+
+    Examples
+    --------
+    >>> from rich.console import Console
+    >>> from hmpim.identify import RecordSummary
+    >>> summary = RecordSummary(fs=200.0, samples=2000, sha256="")
+    >>> print_result(Identification(record=summary, pairs=()), Console())
+    Nothing was identified.
+    """
+    from rich.text import Text
+
+    if len(result.pairs) != 1:
+        console.print(Text(headline(result), style="bold"))
+    for pair in result.pairs:
+        title = Text(printable(f"{pair.input} → {pair.output}"), style="bold")
+        colour = _COLOURS[pair.verdict]
+        sentence = Text.assemble(
+            (f"{VERDICTS[pair.verdict]}: ", f"bold {colour}"), pair_sentence(pair)
+        )
+        console.print(title, sentence, parameter_table(pair, truth=truth), sep="\n")
+        for warning in pair.warnings:
+            console.print(Text.assemble(("Warning: ", "bold yellow"), printable(warning.message)))
+        missing = untold(pair)
+        if missing:
+            console.print(Text(f"No figure for: {missing}.", style="dim"))

@@ -1,0 +1,257 @@
+"""The words of a report: what each parameter is, what each verdict means, why figures differ."""
+
+from dataclasses import dataclass
+
+from hmpim.identify import Estimate, Identification, PairIdentification, Verdict
+from hmpim.plots.candidates import INTERSAMPLE_WORDS
+from hmpim.report.numbers import format_number
+
+__all__ = [
+    "GLOSSARY",
+    "VERDICTS",
+    "ParameterWords",
+    "headline",
+    "paper_value",
+    "remark",
+    "structure_words",
+    "untold",
+]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ParameterWords:
+    """A parameter's name in the result, for people, its meaning, and why the paper's differs.
+
+    `differs` is empty where the paper gives no figure.
+    """
+
+    name: str
+    label: str
+    meaning: str
+    differs: str = ""
+
+
+GLOSSARY: tuple[ParameterWords, ...] = (
+    ParameterWords(
+        name="delay",
+        label="Delay, pure",
+        meaning="Time by which everything comes later, whatever its frequency: transport, "
+        "processing, waiting for the next sample. The lag of the dynamics is not in it.",
+        differs="the peak of the cross-correlation (8) is the delay plus what the dynamics add, "
+        "and falls on a whole sample",
+    ),
+    ParameterWords(
+        name="delay_correlation",
+        label="Delay, by correlation",
+        meaning="Where the cross-correlation of input and output has its peak, equation (8): the "
+        "pure delay plus what the dynamics add for this input.",
+    ),
+    ParameterWords(
+        name="delay_low_frequency",
+        label="Delay, of slow motion",
+        meaning="Slope of the phase towards zero frequency: by how much a slow movement is late, "
+        "dynamics included.",
+    ),
+    ParameterWords(
+        name="scale_factor",
+        label="Scale factor",
+        meaning="Output per input when both stand still, bias left aside.",
+        differs="equation (13) divides samples of the slow beginning, and takes the bias of (11), "
+        "which is too large, off first",
+    ),
+    ParameterWords(
+        name="bias",
+        label="Bias",
+        meaning="What the output shows when the input is zero.",
+        differs="equation (11) is the r.m.s. error: noise, and all that the dynamics leave over, "
+        "are in it, and it has no sign",
+    ),
+    ParameterWords(
+        name="noise_std",
+        label="Noise",
+        meaning="Standard deviation of what the model cannot predict.",
+        differs="equation (14) counts what scale factor and dynamics leave over as noise",
+    ),
+    ParameterWords(
+        name="natural_frequency",
+        label="Natural frequency",
+        meaning="Undamped natural frequency of second-order dynamics, where they alone turn the "
+        "phase by 90°.",
+        differs="it is read off a noisy phase from which (25) takes the delay of (8), which is "
+        "too long",
+    ),
+    ParameterWords(
+        name="damping_ratio",
+        label="Damping ratio",
+        meaning="Damping of second-order dynamics over critical damping: below 0.7 the magnitude "
+        "has a hump, above 1 nothing swings.",
+        differs="it is read off the hump of a noisy, windowed magnitude",
+    ),
+    ParameterWords(
+        name="time_constant",
+        label="Time constant",
+        meaning="Time in which first-order dynamics go 63 % of the way after a step.",
+    ),
+    ParameterWords(
+        name="bandwidth_phase90",
+        label="Bandwidth, −90°",
+        meaning="Frequency at which the output is 90° late in all, delay included: the paper's "
+        "measure of merit.",
+        differs="it is read off one noisy, windowed ratio of spectra",
+    ),
+    ParameterWords(
+        name="bandwidth_phase90_without_delay",
+        label="Bandwidth, −90° without delay",
+        meaning="Frequency at which the dynamics alone turn the phase by 90°.",
+    ),
+    ParameterWords(
+        name="bandwidth_3db",
+        label="Bandwidth, −3 dB",
+        meaning="Frequency at which the magnitude has fallen 3 dB below that at standstill.",
+        differs="it is read off one noisy, windowed ratio of spectra",
+    ),
+    ParameterWords(
+        name="peak_gain_db",
+        label="Peak gain",
+        meaning="Height of the magnitude's hump over its value at standstill.",
+        differs="noise and window change the height of a hump",
+    ),
+    ParameterWords(
+        name="hold_period",
+        label="Hold period",
+        meaning="Interval at which the output is renewed and then held.",
+    ),
+    ParameterWords(
+        name="saturation_low",
+        label="Saturation, low",
+        meaning="Value below which the output does not go.",
+    ),
+    ParameterWords(
+        name="saturation_high",
+        label="Saturation, high",
+        meaning="Value above which the output does not go.",
+    ),
+    ParameterWords(
+        name="quantization_step",
+        label="Quantisation step",
+        meaning="Smallest step of the output.",
+    ),
+)
+
+VERDICTS: dict[Verdict, str] = {
+    "ok": "The record tells the model",
+    "doubtful": "Use with care",
+    "not_identifiable": "This record cannot tell",
+}
+
+_STRUCTURES = {
+    "static": "no dynamics",
+    "first_order": "first order",
+    "second_order": "second order",
+    "second_order_zero": "second order with a zero",
+    "two_modes": "two modes",
+}
+
+
+def structure_words(structure: str) -> str:
+    """Return a structure's name in plain words.
+
+    Examples
+    --------
+    >>> structure_words("second_order"), structure_words("fourth_order")
+    ('second order', 'fourth order')
+    """
+    return _STRUCTURES.get(structure, structure.replace("_", " "))
+
+
+def headline(result: Identification) -> str:
+    """Say in one sentence what came of it, the worst pair deciding.
+
+    Examples
+    --------
+    >>> from hmpim.identify import RecordSummary
+    >>> summary = RecordSummary(fs=200.0, samples=2000, sha256="")
+    >>> headline(Identification(record=summary, pairs=()))
+    'Nothing was identified.'
+    """
+    if not result.pairs:
+        return "Nothing was identified."
+    pairs = len(result.pairs)
+    if pairs == 1:
+        return f"{VERDICTS[result.verdict]}: {pair_sentence(result.pairs[0])}"
+    trusted = sum(pair.verdict == "ok" for pair in result.pairs)
+    return f"{VERDICTS[result.verdict]}: {trusted} of {pairs} pairs can be trusted as they stand."
+
+
+def pair_sentence(pair: PairIdentification) -> str:
+    """Say in one sentence what model was found and what it explains."""
+    warned = len(pair.warnings)
+    if pair.verdict == "not_identifiable":
+        reason = pair.warnings[0].message if warned else "no model describes the output."
+        return reason[:1].lower() + reason[1:]
+    dynamics = structure_words(pair.structure)
+    delay = pair.parameters.delay
+    late = "" if delay is None else " and a delay"
+    text = f"{dynamics}{late} explain {pair.fit_percent:.1f} % of the output"
+    if pair.verdict == "doubtful" and warned:
+        return f"{text}, but there {'is a warning' if warned == 1 else f'are {warned} warnings'}."
+    between = INTERSAMPLE_WORDS[pair.intersample]
+    return f"{text}, the input taken as {between} between its samples."
+
+
+def paper_value(pair: PairIdentification, name: str) -> float | None:
+    """Return the paper's figure for the parameter called `name`, if it has one."""
+    value: float | None = getattr(pair.paper, name, None)
+    return value
+
+
+def remark(words: ParameterWords, estimate: Estimate | None, paper: float | None) -> str:
+    """Say how the paper's figure compares with the estimate, and if it differs, why.
+
+    Parameters
+    ----------
+    words : ParameterWords
+        Of the parameter.
+    estimate : Estimate or None
+        By the joint fit.
+    paper : float or None
+        By the paper's steps.
+
+    Examples
+    --------
+    >>> bias = next(words for words in GLOSSARY if words.name == "bias")
+    >>> estimate = Estimate(value=0.6, std=0.01, ci95=(0.58, 0.62))
+    >>> remark(bias, estimate, 0.61)
+    'The two agree.'
+    >>> remark(bias, estimate, 0.68)[:31]
+    '0.08 above: equation (11) is th'
+    """
+    if not words.differs:
+        return ""
+    if paper is None:
+        return "The paper's step has no answer on this record."
+    if estimate is None:
+        return ""
+    gap = paper - estimate.value
+    if abs(gap) <= max(2.0 * estimate.std, 0.002 * abs(estimate.value)):
+        return "The two agree."
+    return f"{abs(gap):.2g} {'above' if gap > 0 else 'below'}: {words.differs}."
+
+
+def untold(pair: PairIdentification) -> str:
+    """List the parameters that have no estimate, for people; empty if all have one."""
+    missing = [w.label for w in GLOSSARY if getattr(pair.parameters, w.name) is None]
+    return "; ".join(label[:1].lower() + label[1:] for label in missing)
+
+
+def off_by(estimate: Estimate, truth: float) -> str:
+    """Say how far an estimate is from a known truth, in its own standard deviations.
+
+    Examples
+    --------
+    >>> off_by(Estimate(value=10.06, std=0.03, ci95=(10.0, 10.12)), 10.0)
+    '+2.0 std'
+    """
+    if estimate.std <= 0.0:
+        return format_number(estimate.value - truth)
+    return f"{(estimate.value - truth) / estimate.std:+.1f} std"
