@@ -1,0 +1,274 @@
+"""Maximum likelihood for one structure: delay, dynamics, scale factor and bias together.
+
+With white Gaussian noise the likelihood is greatest where the sum of squares of the
+residual is least. Delay and denominator enter nonlinearly, numerator and bias linearly;
+the linear ones are solved exactly at each step (variable projection: G. H. Golub and
+V. Pereyra, SIAM J. Numer. Anal. 10, 1973), the others by Levenberg-Marquardt.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hmpim.model.dynamics import Structure, denominator_of
+from hmpim.model.sampled import SampledInput, delayed_response
+
+__all__ = ["Fit", "Problem", "fit_structure", "jacobian"]
+
+_STEP = 1e-5
+"""Step of the derivatives, in samples for the delay and relative for the coefficients."""
+
+_CONVERGED = 1e-5
+"""Stop when a step would lower the sum of squares by less than this, in units of σ²."""
+
+_LONGEST_TIME_CONSTANT = 2.0
+"""In record lengths; a slower pole cannot be told from an integrator."""
+
+_SHORTEST_TIME_CONSTANT = 0.02
+"""In samples; a faster pole cannot be told from none."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Problem:
+    """One input, one output, and which samples of the output count.
+
+    Parameters
+    ----------
+    source : SampledInput
+        The prepared input.
+    y : ndarray, shape (n,)
+        Output samples.
+    valid : ndarray of bool, shape (n,), or None
+        Samples that count; None when all do.
+    longest_delay : float
+        Greatest delay to try, in samples.
+    """
+
+    source: SampledInput
+    y: NDArray[np.float64]
+    valid: NDArray[np.bool_] | None
+    longest_delay: float
+
+    @property
+    def counted(self) -> int:
+        """How many samples count."""
+        return self.y.size if self.valid is None else int(np.count_nonzero(self.valid))
+
+    def masked(self, rows: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return `rows`, shape (k, n) or (n,), with the samples that do not count set to 0."""
+        return rows if self.valid is None else rows * self.valid
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Fit:
+    """Where a fit ended.
+
+    Parameters
+    ----------
+    structure : Structure
+        What was fitted.
+    theta : ndarray, shape (1 + order,)
+        Delay in samples, then the logarithms of the denominator's coefficients (in samples).
+    linear : ndarray, shape (zeros + 2,)
+        Numerator coefficients by rising power of s (the first is the scale factor), bias.
+    prediction : ndarray, shape (n,)
+        Output of the fitted model.
+    residual : ndarray, shape (n,)
+        Output less prediction; 0 where a sample does not count.
+    cost : float
+        Sum of squares of the residual.
+    converged : bool
+        Whether the last step was negligible.
+    """
+
+    structure: Structure
+    theta: NDArray[np.float64]
+    linear: NDArray[np.float64]
+    prediction: NDArray[np.float64]
+    residual: NDArray[np.float64]
+    cost: float
+    converged: bool
+
+    @property
+    def delay(self) -> float:
+        """Pure delay in samples."""
+        return float(self.theta[0])
+
+    @property
+    def denominator(self) -> NDArray[np.float64]:
+        """A(s) by rising powers of s per sample, shape (order + 1,)."""
+        return denominator_of(self.structure, np.exp(self.theta[1:]))
+
+
+def _basis(
+    problem: Problem, structure: Structure, theta: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Responses that the linear parameters multiply, shape (zeros + 1, n)."""
+    rows = delayed_response(
+        problem.source,
+        delay=float(theta[0]),
+        denominator=denominator_of(structure, np.exp(theta[1:])),
+        powers=structure.zeros + 1,
+    )
+    rows[0] += problem.source.first
+    return rows
+
+
+def _solve_linear(
+    problem: Problem, structure: Structure, theta: NDArray[np.float64]
+) -> tuple[Fit, NDArray[np.float64]]:
+    """Best numerator and bias at given delay and denominator."""
+    basis = _basis(problem, structure, theta)
+    rows = np.vstack([basis, np.ones(problem.y.size)])
+    counted = problem.masked(rows)
+    y = problem.masked(problem.y)
+    linear = _least_squares(counted @ counted.T, counted @ y)
+    prediction = linear @ rows
+    residual = problem.masked(problem.y - prediction)
+    fit = Fit(
+        structure=structure,
+        theta=theta,
+        linear=linear,
+        prediction=prediction,
+        residual=residual,
+        cost=float(residual @ residual),
+        converged=False,
+    )
+    return fit, basis
+
+
+def _least_squares(
+    gram: NDArray[np.float64], moment: NDArray[np.float64], damping: float = 0.0
+) -> NDArray[np.float64]:
+    """Solve normal equations, scaled to unit diagonal; directions without content stay 0."""
+    scale = np.sqrt(np.maximum(np.diag(gram), np.finfo(float).tiny))
+    scaled = gram / np.outer(scale, scale)
+    values, vectors = np.linalg.eigh(scaled)
+    keep = values > 1e-13 * values[-1]
+    projected = (vectors.T @ (moment / scale))[keep] / (values[keep] + damping)
+    return np.asarray(vectors[:, keep] @ projected / scale)
+
+
+def jacobian(problem: Problem, fit: Fit) -> NDArray[np.float64]:
+    """Derivatives of the prediction with respect to theta, then to the linear parameters.
+
+    Returns
+    -------
+    ndarray, shape (1 + order + zeros + 2, n)
+        Zero where a sample does not count.
+    """
+    basis = _basis(problem, fit.structure, fit.theta)
+    return _jacobian(problem, fit, basis)
+
+
+def _jacobian(problem: Problem, fit: Fit, basis: NDArray[np.float64]) -> NDArray[np.float64]:
+    weights = fit.linear[:-1]
+    here = weights @ basis
+    rows = np.empty((fit.theta.size + fit.linear.size, problem.y.size))
+    for i in range(fit.theta.size):
+        moved = fit.theta.copy()
+        moved[i] += _STEP
+        rows[i] = (weights @ _basis(problem, fit.structure, moved) - here) / _STEP
+    rows[fit.theta.size : -1] = basis
+    rows[-1] = 1.0
+    return problem.masked(rows)
+
+
+def _bounded(
+    problem: Problem, theta: NDArray[np.float64], shortest_delay: float
+) -> NDArray[np.float64]:
+    """Keep delay and time constants where the record can tell them."""
+    bounded = theta.copy()
+    bounded[0] = np.clip(theta[0], shortest_delay, problem.longest_delay)
+    if theta.size > 1:
+        longest = np.log(_LONGEST_TIME_CONSTANT * problem.y.size)
+        shortest = np.log(_SHORTEST_TIME_CONSTANT)
+        bounded[1:] = np.clip(theta[1:], 2 * shortest, 2 * longest)
+    return bounded
+
+
+def fit_structure(
+    problem: Problem,
+    structure: Structure,
+    theta: NDArray[np.float64],
+    *,
+    iterations: int = 40,
+    shortest_delay: float = -4.0,
+) -> Fit:
+    """Fit one structure from one start.
+
+    Parameters
+    ----------
+    problem : Problem
+        The data.
+    structure : Structure
+        What to fit.
+    theta : ndarray, shape (1 + order,)
+        Start: delay in samples, logarithms of the denominator's coefficients.
+    iterations : int
+        At most so many steps.
+    shortest_delay : float
+        Least delay to try, in samples; below 0 an input column stamped late shows.
+
+    Returns
+    -------
+    Fit
+        `converged` is False if the steps ran out.
+    """
+    fit, basis = _solve_linear(problem, structure, _bounded(problem, theta, shortest_delay))
+    damping = 1e-4
+    unknown = fit.theta.size
+    freedom = max(problem.counted - unknown - fit.linear.size, 1)
+    for _ in range(iterations):
+        rows = _jacobian(problem, fit, basis)
+        gram, moment = rows @ rows.T, rows @ fit.residual
+        accepted = False
+        while damping < 1e8:
+            step = _damped_step(gram, moment, unknown, damping)
+            largest = np.max(np.abs(step[1:]), initial=0.0)
+            if largest > 1.0:  # no coefficient grows by more than e at once
+                step = step / largest
+            gain = 2 * float(step @ moment[:unknown])
+            trial, trial_basis = _solve_linear(
+                problem, structure, _bounded(problem, fit.theta + step, shortest_delay)
+            )
+            if trial.cost <= fit.cost:
+                accepted = True
+                damping = max(damping / 10, 1e-9)
+                break
+            if gain < _CONVERGED * fit.cost / freedom:
+                break
+            damping *= 10
+        if not accepted:
+            return _mark_converged(fit)
+        fell = fit.cost - trial.cost
+        fit, basis = trial, trial_basis
+        if fell < _CONVERGED * fit.cost / freedom:
+            return _mark_converged(fit)
+    return fit
+
+
+def _damped_step(
+    gram: NDArray[np.float64], moment: NDArray[np.float64], unknown: int, damping: float
+) -> NDArray[np.float64]:
+    """Levenberg-Marquardt step of the nonlinear parameters, the linear ones projected out."""
+    nonlinear, mixed, linear = (
+        gram[:unknown, :unknown],
+        gram[:unknown, unknown:],
+        gram[unknown:, unknown:],
+    )
+    projected = nonlinear - mixed @ np.linalg.lstsq(linear, mixed.T, rcond=None)[0]
+    return _least_squares(projected, moment[:unknown], damping)
+
+
+def _mark_converged(fit: Fit) -> Fit:
+    return Fit(
+        structure=fit.structure,
+        theta=fit.theta,
+        linear=fit.linear,
+        prediction=fit.prediction,
+        residual=fit.residual,
+        cost=fit.cost,
+        converged=True,
+    )

@@ -1,0 +1,105 @@
+"""From an identification to a model, and the model against data it has not seen."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hmpim.errors import RecordError
+from hmpim.identify.result import PairIdentification
+from hmpim.model import Model, simulate
+from hmpim.record import Record, uniform
+
+__all__ = ["Prediction", "predict", "to_model"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Prediction:
+    """A model's output beside the measured one.
+
+    Parameters
+    ----------
+    time, measured, predicted : ndarray, shape (n,)
+        Seconds; the output's unit.
+    scored : ndarray of bool, shape (n,)
+        Samples on which `fit_percent` is counted.
+    fit_percent : float
+        100 (1 - ‖measured - predicted‖ / ‖measured - mean‖) over the scored samples.
+    """
+
+    time: NDArray[np.float64]
+    measured: NDArray[np.float64]
+    predicted: NDArray[np.float64]
+    scored: NDArray[np.bool_]
+    fit_percent: float
+
+
+def to_model(pair: PairIdentification) -> Model:
+    """Model that simulates what was identified.
+
+    Raises
+    ------
+    RecordError
+        If the pair was not identifiable: there is no model then.
+    """
+    p = pair.parameters
+    if p.delay is None or p.scale_factor is None or p.bias is None or p.noise_std is None:
+        raise RecordError(
+            f"{pair.output!r} from {pair.input!r} was not identifiable, so there is no model: "
+            + "; ".join(w.message for w in pair.warnings)
+        )
+    return Model(
+        delay=p.delay.value,
+        scale_factor=p.scale_factor.value,
+        numerator=pair.numerator,
+        denominator=pair.denominator,
+        bias=p.bias.value,
+        noise_std=p.noise_std.value,
+        input=pair.input,
+        output=pair.output,
+        output_unit=p.bias.unit,
+    )
+
+
+def predict(pair: PairIdentification, record: Record, *, start: float | None = None) -> Prediction:
+    """Simulate the identified model on a record and score it.
+
+    Parameters
+    ----------
+    pair : PairIdentification
+        What was identified, perhaps on another record.
+    record : Record
+        Holds channels of the pair's names.
+    start : float, optional
+        Time in s from which to score; by default from when the model has forgotten what
+        came before the record: the delay and five of its slowest time constants.
+
+    Raises
+    ------
+    RecordError
+        If a channel is missing, or nothing is left to score.
+    """
+    model = to_model(pair)
+    aligned = uniform(record)
+    u, y = aligned.signal(pair.input), aligned.signal(pair.output)
+    predicted = simulate(model, u.values, fs=aligned.fs, intersample=pair.intersample)
+    if start is None:
+        slowest = 0.0
+        if len(model.denominator) > 1:
+            slowest = float(np.max(-1.0 / np.roots(model.denominator).real))
+        start = aligned.start + max(model.delay, 0.0) + 5.0 * slowest
+    scored = y.valid & (aligned.time >= start)
+    if np.count_nonzero(scored) < 2:
+        raise RecordError(
+            f"no samples are left to score from {start:.4g} s on; give a longer record"
+        )
+    measured = y.values[scored]
+    error = measured - predicted[scored]
+    spread = float(np.linalg.norm(measured - measured.mean()))
+    return Prediction(
+        time=aligned.time,
+        measured=y.values,
+        predicted=predicted,
+        scored=scored,
+        fit_percent=100.0 * (1.0 - float(np.linalg.norm(error)) / spread) if spread else 0.0,
+    )

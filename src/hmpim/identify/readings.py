@@ -1,0 +1,214 @@
+"""What is read off a fitted model: each parameter of the result, with its error bar."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hmpim.identify.fit import Fit, jacobian
+from hmpim.identify.joint import JointFit
+from hmpim.identify.result import Estimate, Parameters
+from hmpim.identify.uncertainty import covariance, estimate, gradient, noise_estimate
+from hmpim.identify.whiteness import is_white
+from hmpim.model.dynamics import Structure, denominator_of
+from hmpim.model.response import (
+    RationalDelay,
+    bandwidth_3db,
+    bandwidth_phase,
+    dominant_time_constant,
+    peak_gain,
+    phase,
+    response,
+)
+
+__all__ = ["Readings", "read_parameters", "system_of"]
+
+_Vector = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Readings:
+    """The parameters, the system they stand for, and the covariance behind them.
+
+    Parameters
+    ----------
+    parameters : Parameters
+        Estimates.
+    system : RationalDelay
+        In seconds, the scale factor included.
+    vector : ndarray, shape (p,)
+        Delay in samples, logarithms of the denominator's coefficients in samples, numerator,
+        bias.
+    covariance : ndarray, shape (p, p)
+        Of `vector`.
+    white : bool
+        Whether the residual passed for white.
+    """
+
+    parameters: Parameters
+    system: RationalDelay
+    vector: _Vector
+    covariance: _Vector
+    white: bool
+
+    def variance(self, function: Callable[[_Vector], float]) -> float:
+        """Variance of a function of `vector`, to first order."""
+        slope = gradient(function, self.vector)
+        return float(slope @ self.covariance @ slope)
+
+
+def system_of(structure: Structure, vector: _Vector, fs: float) -> RationalDelay:
+    """Build the system in seconds that a fit's vector stands for."""
+    order = structure.order
+    denominator = denominator_of(structure, np.exp(vector[1 : 1 + order]))
+    numerator = vector[1 + order : -1]
+    return RationalDelay(
+        delay=float(vector[0]) / fs,
+        numerator=numerator / fs ** np.arange(numerator.size),
+        denominator=denominator / fs ** np.arange(denominator.size),
+    )
+
+
+def read_parameters(
+    joint: JointFit,
+    *,
+    fs: float,
+    highest: float,
+    delay_correlation: float | None,
+    input_unit: str,
+    output_unit: str,
+) -> Readings:
+    """Turn the chosen fit into estimates.
+
+    Parameters
+    ----------
+    joint : JointFit
+        From `hmpim.identify.joint.joint_fit`.
+    fs : float
+        Rate in Hz.
+    highest : float
+        Frequency in Hz beyond which no bandwidth is read off: the end of the excited band.
+    delay_correlation : float or None
+        The paper's delay (eq. 8), in s.
+    input_unit, output_unit : str
+        Units of the channels.
+    """
+    fit = joint.best.fit
+    structure = fit.structure
+    vector = np.concatenate([fit.theta, fit.linear])
+    counted = joint.problem.counted
+    freedom = max(counted - vector.size, 1)
+    residual = fit.residual
+    white = is_white(residual if joint.problem.valid is None else residual[joint.problem.valid])
+    cov = _covariance(joint, fit, freedom=freedom, white=white)
+    effective = freedom * joint.effective_share
+    system = system_of(structure, vector, fs)
+
+    def explicit(function: Callable[[_Vector], float], unit: str) -> Estimate:
+        slope = gradient(function, vector)
+        return estimate(function(vector), float(slope @ cov @ slope), freedom=effective, unit=unit)
+
+    def root(
+        value: float | None,
+        equation: Callable[[float, _Vector], float],
+    ) -> Estimate | None:
+        """Frequency in Hz that solves equation(frequency, vector) = 0."""
+        if value is None:
+            return None
+        slope = gradient(lambda v: equation(value, v), vector)
+        step = 1e-5 * value
+        rate = (equation(value + step, vector) - equation(value - step, vector)) / (2 * step)
+        return estimate(value, float(slope @ cov @ slope) / rate**2, freedom=effective, unit="Hz")
+
+    def phase_at(f: float, v: _Vector, delay: bool) -> float:
+        return float(phase(system_of(structure, v, fs), np.array([f]), delay=delay)[0])
+
+    def gain_at(f: float, v: _Vector) -> float:
+        here = system_of(structure, v, fs)
+        return float(np.abs(response(here, np.array([f]))[0] / here.numerator[0]))
+
+    def peak_at(v: _Vector) -> float:
+        return peak_gain(system_of(structure, v, fs), highest=highest)
+
+    order = structure.order
+    second = structure.name == "second_order"
+    slow = dominant_time_constant(system)
+    gain_unit = _ratio(output_unit, input_unit)
+    dynamic = order > 0
+    low_frequency = None
+    if dynamic:
+
+        def slope_at_dc(v: _Vector) -> float:
+            here = system_of(structure, v, fs)
+            lead = here.numerator[1] / here.numerator[0] if here.numerator.size > 1 else 0.0
+            return float(here.delay + here.denominator[1] - lead)
+
+        low_frequency = explicit(slope_at_dc, "s")
+    parameters = Parameters(
+        delay=explicit(lambda v: float(v[0]) / fs, "s"),
+        delay_correlation=_from_lag(delay_correlation, fs),
+        delay_low_frequency=low_frequency or explicit(lambda v: float(v[0]) / fs, "s"),
+        scale_factor=explicit(lambda v: float(v[1 + order]), gain_unit),
+        bias=explicit(lambda v: float(v[-1]), output_unit),
+        noise_std=noise_estimate(
+            fit.cost, freedom=freedom, share=joint.effective_share, unit=output_unit
+        ),
+        natural_frequency=explicit(lambda v: float(np.exp(-v[2] / 2)) * fs / (2 * np.pi), "Hz")
+        if second
+        else None,
+        damping_ratio=explicit(lambda v: float(np.exp(v[1] - v[2] / 2)) / 2, "")
+        if second
+        else None,
+        time_constant=explicit(
+            lambda v: dominant_time_constant(system_of(structure, v, fs)) or float("nan"), "s"
+        )
+        if slow is not None
+        else None,
+        bandwidth_phase90=root(
+            bandwidth_phase(system, highest=highest),
+            lambda f, v: phase_at(f, v, True) + np.pi / 2,
+        ),
+        bandwidth_phase90_without_delay=root(
+            bandwidth_phase(system, highest=highest, delay=False),
+            lambda f, v: phase_at(f, v, False) + np.pi / 2,
+        )
+        if dynamic
+        else None,
+        bandwidth_3db=root(
+            bandwidth_3db(system, highest=highest),
+            lambda f, v: gain_at(f, v) - 1 / np.sqrt(2),
+        )
+        if dynamic
+        else None,
+        peak_gain_db=explicit(peak_at, "dB") if dynamic else None,
+    )
+    return Readings(
+        parameters=parameters, system=system, vector=vector, covariance=cov, white=white
+    )
+
+
+def _covariance(joint: JointFit, fit: Fit, *, freedom: int, white: bool) -> _Vector:
+    """Covariance of theta and linear; a held, static system moves in whole samples only."""
+    rows = jacobian(joint.problem, fit)
+    if fit.structure.order == 0 and joint.best.intersample == "zoh":
+        inner = covariance(rows[1:], fit.residual, freedom=freedom, white=white)
+        full = np.zeros((rows.shape[0], rows.shape[0]))
+        full[1:, 1:] = inner
+        full[0, 0] = 1.0 / 12.0  # uniform over the sample in which the delay ends
+        return full
+    return covariance(rows, fit.residual, freedom=freedom, white=white)
+
+
+def _from_lag(delay: float | None, fs: float) -> Estimate | None:
+    """The paper's delay is a whole number of samples: uniform over one sample."""
+    if delay is None:
+        return None
+    half = 0.5 / fs
+    return Estimate(value=delay, std=half / np.sqrt(3), ci95=(delay - half, delay + half), unit="s")
+
+
+def _ratio(output_unit: str, input_unit: str) -> str:
+    if output_unit == input_unit:
+        return ""
+    return f"{output_unit or '1'}/{input_unit}" if input_unit else output_unit

@@ -1,0 +1,214 @@
+"""Starting values from the data alone: delay and denominator, for any structure.
+
+1. The lag of the greatest cross-correlation gives delay plus what the dynamics add.
+2. With the output moved back by that lag, both records are tapered and their spectra
+   divided: a response nearly free of leakage.
+3. For every delay at once, the denominator that makes ``G e^(jωτ) A(jω)`` constant is a small
+   linear least-squares problem (E. C. Levy, IRE Trans. Autom. Control 4, 1959) whose only
+   terms that depend on the delay are inverse Fourier transforms. Reweighting by the last
+   denominator (C. K. Sanathanan and J. Koerner, IEEE TAC 8, 1963) removes its bias.
+4. The few delays at which the output error is least locally are the starts.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.fft import irfft, next_fast_len, rfft
+
+from hmpim.model.dynamics import Structure
+
+__all__ = ["RoughResponse", "rough_response", "starting_values"]
+
+_TAPER = 0.1
+"""Share of the record tapered at either end."""
+
+_FLOOR = 1e-3
+"""Bins whose input amplitude is below this share of the greatest are not looked at."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class RoughResponse:
+    """Spectra with the coarse delay removed, on uniform bins.
+
+    Parameters
+    ----------
+    lag : int
+        Samples by which the output was moved back.
+    length : int
+        Length of the transform.
+    bins : ndarray of int, shape (m,)
+        Bins with excitation.
+    omega : ndarray, shape (m,)
+        Radians per sample at those bins.
+    response : complex ndarray, shape (m,)
+        Output over input.
+    weight : ndarray, shape (m,)
+        Power of the input, largest 1.
+    """
+
+    lag: int
+    length: int
+    bins: NDArray[np.intp]
+    omega: NDArray[np.float64]
+    response: NDArray[np.complex128]
+    weight: NDArray[np.float64]
+
+
+def _tapered(x: NDArray[np.float64]) -> NDArray[np.float64]:
+    n = x.size
+    edge = max(int(_TAPER * n), 1)
+    window = np.ones(n)
+    ramp = np.sin(0.5 * np.pi * (np.arange(edge) + 0.5) / edge) ** 2
+    window[:edge] = ramp
+    window[n - edge :] = ramp[::-1]
+    return np.asarray(window * (x - window @ x / window.sum()))
+
+
+def coarse_lag(u: NDArray[np.float64], y: NDArray[np.float64], longest: int) -> int:
+    """Lag in samples, 0..longest, of the greatest magnitude of the cross-correlation."""
+    length = next_fast_len(u.size + longest + 1, real=True)
+    spectrum = np.conj(rfft(u - u.mean(), length)) * rfft(y - y.mean(), length)
+    correlation = irfft(spectrum, length)[: longest + 1]
+    return int(np.argmax(np.abs(correlation)))
+
+
+def rough_response(
+    u: NDArray[np.float64], y: NDArray[np.float64], *, longest_delay: int
+) -> RoughResponse:
+    """Divide tapered spectra, the output first moved back by the coarse delay.
+
+    Parameters
+    ----------
+    u, y : ndarray, shape (n,)
+        Uniform samples.
+    longest_delay : int
+        Greatest lag to look at, in samples.
+    """
+    lag = coarse_lag(u, y, longest_delay)
+    overlap = u.size - lag
+    length = next_fast_len(u.size, real=True)
+    spectrum_u = rfft(_tapered(u[:overlap]), length)
+    spectrum_y = rfft(_tapered(y[lag:]), length)
+    power = np.abs(spectrum_u) ** 2
+    power[0] = 0.0
+    bins = np.flatnonzero(power > _FLOOR**2 * power.max())
+    weight = power[bins] / power.max()
+    return RoughResponse(
+        lag=lag,
+        length=length,
+        bins=bins,
+        omega=2 * np.pi * bins / length,
+        response=spectrum_y[bins] / spectrum_u[bins],
+        weight=weight,
+    )
+
+
+def starting_values(
+    rough: RoughResponse, structure: Structure, *, earliest: int, count: int = 3
+) -> list[NDArray[np.float64]]:
+    """Starts for `hmpim.identify.fit.fit_structure`, the most promising first.
+
+    Parameters
+    ----------
+    rough : RoughResponse
+        From `rough_response`.
+    structure : Structure
+        What will be fitted.
+    earliest : int
+        Least pure delay to look at, in samples.
+    count : int
+        At most so many.
+
+    Returns
+    -------
+    list of ndarray, shape (1 + order,)
+        Delay in samples, logarithms of the section coefficients.
+    """
+    shifts = np.arange(min(earliest - rough.lag, 0), 3)
+    order = structure.order
+    if order == 0:
+        cost, _ = _levy(rough, shifts, 0, rough.weight)
+        best = int(np.argmin(cost))
+        return [np.array([float(rough.lag + shifts[best])])]
+    scale = float(np.sqrt(rough.weight @ rough.omega**2 / rough.weight.sum()))
+    found: list[tuple[float, NDArray[np.float64]]] = []
+    cost, coefficients = _levy(rough, shifts, order, rough.weight, scale)
+    for i in _local_minima(cost, count + 2):
+        shift, a = int(shifts[i]), coefficients[i]
+        for _ in range(3):  # Sanathanan-Koerner: reweight, look for the delay nearby again
+            weight = rough.weight / np.abs(_polynomial(a, rough.omega / scale)) ** 2
+            near = shifts[np.abs(shifts - shift) <= max(3, shifts.size // 8)]
+            local, solved = _levy(rough, near, order, weight, scale)
+            best = int(np.argmin(local))
+            shift, a = int(near[best]), solved[best]
+        physical = _stable(a, order)
+        error = _output_error(rough, shift, physical, scale)
+        theta = np.concatenate(
+            [[float(rough.lag + shift)], np.log(physical / scale ** np.arange(1, order + 1))]
+        )
+        found.append((error, theta))
+    found.sort(key=lambda item: item[0])
+    starts: list[NDArray[np.float64]] = []
+    for _, theta in found:
+        if all(np.max(np.abs(theta - other)) > 0.3 for other in starts):
+            starts.append(theta)
+    return starts[:count]
+
+
+def _polynomial(a: NDArray[np.float64], x: NDArray[np.float64]) -> NDArray[np.complex128]:
+    """1 + a1 s + a2 s² + … at s = jx."""
+    return np.asarray(np.polynomial.polynomial.polyval(1j * x, np.concatenate([[1.0], a])))
+
+
+def _levy(
+    rough: RoughResponse,
+    shifts: NDArray[np.intp],
+    order: int,
+    weight: NDArray[np.float64],
+    scale: float = 1.0,
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Solve at each shift; return costs, shape (k,), and coefficients, shape (k, order)."""
+    s = 1j * rough.omega / scale
+    powers = s[None, :] ** np.arange(order + 1)[:, None]
+    terms = powers * rough.response  # multiplied by e^(jω shift), these should sum to a constant
+    gram = ((terms * weight) @ terms.conj().T).real
+    spectrum = np.zeros((order + 1, rough.length // 2 + 1), dtype=complex)
+    spectrum[:, rough.bins] = terms * weight
+    if rough.length % 2 == 0:
+        spectrum[:, -1] = 0.0
+    # irfft carries 2/length for each bin and its mirror
+    cross = irfft(spectrum, rough.length, axis=1)[:, shifts % rough.length] * rough.length / 2
+    total = weight.sum()
+    # Eliminate the constant K = sum_j a_j cross_j / total, a_0 = 1.
+    reduced = gram[None, :, :] - cross.T[:, :, None] * cross.T[:, None, :] / total
+    if order == 0:
+        return reduced[:, 0, 0], np.zeros((shifts.size, 0))
+    inner = reduced[:, 1:, 1:] + 1e-9 * np.trace(gram) * np.eye(order)
+    a = np.linalg.solve(inner, -reduced[:, 1:, :1])[:, :, 0]
+    full = np.concatenate([np.ones((shifts.size, 1)), a], axis=1)
+    cost = np.einsum("ki,kij,kj->k", full, reduced, full)
+    # An unstable denominator fits by running time backwards.
+    return np.where(np.all(a > 0, axis=1), cost, cost + gram[0, 0]), a
+
+
+def _local_minima(cost: NDArray[np.float64], count: int) -> list[int]:
+    inside = np.concatenate([[np.inf], cost, [np.inf]])
+    low = np.flatnonzero((inside[1:-1] <= inside[:-2]) & (inside[1:-1] <= inside[2:]))
+    return [int(i) for i in low[np.argsort(cost[low])][:count]]
+
+
+def _stable(a: NDArray[np.float64], order: int) -> NDArray[np.float64]:
+    """Nearest positive coefficients."""
+    floor = 1e-2 ** np.arange(1, order + 1)
+    return np.asarray(np.maximum(a, floor))
+
+
+def _output_error(rough: RoughResponse, shift: int, a: NDArray[np.float64], scale: float) -> float:
+    """Weighted squared error of the response itself, gain solved."""
+    target = rough.response * np.exp(1j * rough.omega * shift)
+    model = 1.0 / _polynomial(a, rough.omega / scale)
+    gain = (rough.weight * model.conj() * target).sum().real / (
+        rough.weight * np.abs(model) ** 2
+    ).sum()
+    return float((rough.weight * np.abs(target - gain * model) ** 2).sum())

@@ -1,0 +1,117 @@
+"""Error bars: the covariance of a fit, and how it carries over to what is read off it.
+
+With white noise the covariance of a maximum-likelihood fit is the Cramér-Rao bound,
+σ² (JᵀJ)⁻¹. With coloured noise the same fit scatters as the sandwich
+(JᵀJ)⁻¹ JᵀRJ (JᵀJ)⁻¹ (Söderström and Stoica, System Identification, 1989, ch. 7), R from an
+autoregression fitted to the residual. What follows from the parameters gets its error by
+first-order propagation, implicit where it is the root of an equation.
+"""
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.fft import next_fast_len, rfft
+from scipy.stats import chi2
+from scipy.stats import t as student
+
+from hmpim.identify.result import Estimate
+from hmpim.identify.whiteness import autoregressive_spectrum
+
+__all__ = ["covariance", "estimate", "gradient", "noise_estimate"]
+
+
+def covariance(
+    rows: NDArray[np.float64], residual: NDArray[np.float64], *, freedom: int, white: bool
+) -> NDArray[np.float64]:
+    """Covariance of the parameters of a least-squares fit.
+
+    Parameters
+    ----------
+    rows : ndarray, shape (p, n)
+        Derivatives of the prediction.
+    residual : ndarray, shape (n,)
+        What is left over.
+    freedom : int
+        Samples that counted less parameters.
+    white : bool
+        Whether the residual is white.
+
+    Returns
+    -------
+    ndarray, shape (p, p)
+        Infinite on the diagonal of a direction that the record does not see.
+    """
+    scale = np.sqrt(np.maximum(np.sum(rows**2, axis=1), np.finfo(float).tiny))
+    scaled = rows / scale[:, None]
+    q, r = np.linalg.qr(scaled.T)
+    diagonal = np.abs(np.diag(r))
+    if diagonal.min() < 1e-10 * diagonal.max():
+        return np.full((scale.size, scale.size), np.inf)
+    inverse = np.linalg.inv(r)
+    if white:
+        inner = np.eye(scale.size) * float(residual @ residual) / freedom
+    else:
+        length = next_fast_len(2 * residual.size, real=True)
+        spectra = rfft(q.T, length)
+        omega = 2 * np.pi * np.arange(spectra.shape[1]) / length
+        power = autoregressive_spectrum(residual, omega) * residual.size / freedom
+        power[1 : (length + 1) // 2] *= 2.0  # both signs of frequency
+        inner = ((spectra * power) @ spectra.conj().T).real / length
+    return np.asarray(inverse @ inner @ inverse.T / np.outer(scale, scale))
+
+
+def gradient(
+    function: Callable[[NDArray[np.float64]], float], at: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Derivative of a scalar function by central differences, shape (p,)."""
+    out = np.empty(at.size)
+    for i in range(at.size):
+        step = 1e-6 * max(abs(at[i]), 1e-3)
+        up, down = at.copy(), at.copy()
+        up[i] += step
+        down[i] -= step
+        out[i] = (function(up) - function(down)) / (2 * step)
+    return out
+
+
+def estimate(value: float, variance: float, *, freedom: float, unit: str = "") -> Estimate:
+    """Value with its standard deviation and 95 % interval (Student's t).
+
+    Examples
+    --------
+    >>> estimate(1.0, 0.01, freedom=1e9).ci95[1].__round__(3)
+    1.196
+    """
+    std = float(np.sqrt(max(variance, 0.0)))
+    half = float(student.ppf(0.975, max(freedom, 1.0))) * std
+    return Estimate(
+        value=float(value), std=std, ci95=(float(value - half), float(value + half)), unit=unit
+    )
+
+
+def noise_estimate(
+    sum_of_squares: float, *, freedom: int, share: float, unit: str = ""
+) -> Estimate:
+    """Standard deviation of the noise, its own error, and its interval (chi-squared).
+
+    Parameters
+    ----------
+    sum_of_squares : float
+        Of the residual.
+    freedom : int
+        Samples that counted less parameters.
+    share : float
+        Independent samples per sample, 1 for white noise.
+    unit : str
+        Of the output.
+    """
+    sigma = float(np.sqrt(sum_of_squares / freedom))
+    effective = max(freedom * share, 1.0)
+    low, high = float(chi2.ppf(0.975, effective)), float(chi2.ppf(0.025, effective))
+    return Estimate(
+        value=sigma,
+        std=sigma / float(np.sqrt(2 * effective)),
+        ci95=(sigma * (effective / low) ** 0.5, sigma * (effective / high) ** 0.5),
+        unit=unit,
+    )

@@ -1,0 +1,206 @@
+"""Can the result be trusted? Warnings in plain sentences, and one verdict."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from hmpim.identify.joint import CLEARLY, JointFit
+from hmpim.identify.readings import Readings
+from hmpim.identify.result import Estimate, Verdict
+from hmpim.identify.whiteness import Misfit
+from hmpim.record import Finding
+
+__all__ = ["Judgement", "is_unrelated", "judge"]
+
+_RELATED = 40.0
+"""Log-likelihood by which a model must beat "the output is constant": looking at thousands
+of delays and dynamics, pure noise reaches about 15."""
+
+_TOLERATED_MISFIT = 0.03
+"""Misfit, over the output's own r.m.s., beyond which a result is doubtful."""
+
+_LOOSE = 0.3
+"""Relative standard deviation beyond which a parameter is not known."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Judgement:
+    """A verdict and the sentences that support it."""
+
+    verdict: Verdict
+    findings: tuple[Finding, ...]
+
+
+def is_unrelated(joint: JointFit) -> bool:
+    """Whether a constant explains the output as well as the input does."""
+    problem = joint.problem
+    y = problem.y if problem.valid is None else problem.y[problem.valid]
+    spread = float(np.sum((y - y.mean()) ** 2))
+    if joint.best.fit.cost <= 0:
+        return spread == 0
+    gain = 0.5 * y.size * joint.effective_share * np.log(spread / joint.best.fit.cost)
+    return bool(gain < _RELATED)
+
+
+def judge(
+    joint: JointFit,
+    readings: Readings,
+    misfit: Misfit,
+    *,
+    fs: float,
+    band: tuple[float, float],
+    fit_percent: float,
+) -> Judgement:
+    """Weigh the residual, the error bars and the band against each other.
+
+    Parameters
+    ----------
+    joint, readings, misfit
+        The fit, what was read off it, and what the residual still owes to the input.
+    fs : float
+        Rate in Hz.
+    band : tuple of float
+        Excited band in Hz.
+    fit_percent : float
+        100 (1 - ‖residual‖ / ‖deviation of the output‖).
+    """
+    notes: list[tuple[Finding, bool]] = []  # a finding, and whether it casts doubt
+
+    def note(code: str, message: str, *, doubt: bool) -> None:
+        notes.append((Finding(code=code, message=message), doubt))
+
+    p = readings.parameters
+    fit = joint.best.fit
+    unexplained = 1.0 - fit_percent / 100.0
+    if joint.forgotten:
+        note(
+            "initial_transient",
+            f"The record does not begin at rest; its first {joint.forgotten / fs:.4g} s were "
+            "left out. Begin the record before the stimulus to keep them.",
+            doubt=False,
+        )
+    owed = float(np.sqrt(misfit.share)) * unexplained
+    if misfit.probability < 1e-4:
+        note(
+            "lack_of_fit",
+            f"The residual still follows the input: about {100 * owed:.2g} % of the output "
+            f"(r.m.s.) is not described by the {fit.structure.name} model. Look at the Bode plot where "
+            "model and measurement part.",
+            doubt=owed > _TOLERATED_MISFIT,
+        )
+    if not readings.white:
+        note(
+            "coloured_noise",
+            "The residual is not white (one independent sample in "
+            f"{1 / joint.effective_share:.3g}); the error bars are widened for it.",
+            doubt=unexplained > 0.5 and misfit.probability < 1e-4,
+        )
+    if not fit.converged:
+        note(
+            "not_converged",
+            "The fit stopped before its last step was negligible. "
+            "Try a longer record, or one with more excitation.",
+            doubt=True,
+        )
+    for name, spread in _loose(readings):
+        note(
+            "weak_excitation",
+            f"The record hardly tells the {name}: its standard deviation is {100 * spread:.0f} % "
+            "of its value. Excite more around the natural frequency, or longer.",
+            doubt=True,
+        )
+    natural = p.natural_frequency
+    if natural is not None and natural.value > 1.2 * band[1]:
+        note(
+            "extrapolated",
+            f"The natural frequency of {natural.value:.4g} Hz lies beyond the excited band, which "
+            f"ends at {band[1]:.4g} Hz. Sweep to at least {1.5 * natural.value:.3g} Hz.",
+            doubt=True,
+        )
+    missing = [
+        words
+        for words, estimate in (
+            ("-90° frequency", p.bandwidth_phase90),
+            ("-90° frequency without delay", p.bandwidth_phase90_without_delay),
+            ("-3 dB frequency", p.bandwidth_3db),
+        )
+        if estimate is None and not (fit.structure.order == 0 and words != "-90° frequency")
+    ]
+    if fit.structure.name == "first_order" and "-90° frequency without delay" in missing:
+        missing.remove("-90° frequency without delay")  # a first-order lag never gets there
+    if missing:
+        note(
+            "beyond_band",
+            f"Not reached within the excited band, which ends at {band[1]:.4g} Hz: "
+            + ", ".join(missing)
+            + ". Sweep higher to measure it.",
+            doubt=False,
+        )
+    rival = _rival(joint)
+    if rival is not None:
+        note("intersample", rival, doubt=False)
+    settle = _settling(readings)
+    length = joint.problem.y.size / fs
+    if settle > 0.5 * length:
+        note(
+            "short_record",
+            f"The record of {length:.4g} s is short against the system's settling time of "
+            f"{settle:.4g} s. Record at least {2 * settle:.3g} s.",
+            doubt=True,
+        )
+    if p.delay is not None and p.delay.ci95[1] < 0:
+        note(
+            "negative_delay",
+            f"The delay is negative ({p.delay.value:.4g} s): the output moves before the input. "
+            "Check that the input column is not stamped late, and which column is which.",
+            doubt=True,
+        )
+    verdict: Verdict = "doubtful" if any(doubt for _, doubt in notes) else "ok"
+    return Judgement(verdict=verdict, findings=tuple(finding for finding, _ in notes))
+
+
+def _loose(readings: Readings) -> list[tuple[str, float]]:
+    p = readings.parameters
+    named: tuple[tuple[str, Estimate | None], ...] = (
+        ("scale factor", p.scale_factor),
+        ("natural frequency", p.natural_frequency),
+        ("damping ratio", p.damping_ratio),
+        ("time constant", p.time_constant if p.natural_frequency is None else None),
+    )
+    loose = []
+    for name, estimate in named:
+        if estimate is None:
+            continue
+        spread = estimate.std / abs(estimate.value) if estimate.value else float("inf")
+        if not spread <= _LOOSE:
+            loose.append((name, min(spread, 99.0)))
+    return loose
+
+
+def _rival(joint: JointFit) -> str | None:
+    """Sentence on another assumption between the samples that fits as well, if there is one."""
+    best = joint.best
+    words = {"zoh": "held", "foh": "linear", "bandlimited": "band-limited"}
+    for trial in joint.trials:
+        if trial.intersample == best.intersample or (
+            trial.fit.structure.name != best.fit.structure.name
+        ):
+            continue
+        apart = abs(trial.fit.delay - best.fit.delay)
+        if trial.criterion - best.criterion < 2 * CLEARLY and apart > 0.25:
+            return (
+                f"Whether the input is {words[best.intersample]} or {words[trial.intersample]} "
+                "between its samples, this record cannot tell. "
+                f"{words[best.intersample].capitalize()} is assumed; the other would move the delay by "
+                f"{trial.fit.delay - best.fit.delay:+.2f} samples. State it with intersample=."
+            )
+    return None
+
+
+def _settling(readings: Readings) -> float:
+    """Delay and five times the slowest time constant, in s."""
+    denominator = readings.system.denominator
+    slowest = 0.0
+    if denominator.size > 1:
+        slowest = float(np.max(-1.0 / np.roots(denominator[::-1]).real))
+    return max(readings.system.delay, 0.0) + 5.0 * slowest

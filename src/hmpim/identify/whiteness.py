@@ -1,0 +1,177 @@
+"""What is left over: whether it is white, whether it follows the input, and its spectrum."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.fft import irfft, next_fast_len, rfft
+from scipy.linalg import solve_toeplitz
+from scipy.stats import chi2
+
+__all__ = [
+    "Misfit",
+    "autocovariance",
+    "autoregressive_spectrum",
+    "effective_share",
+    "is_white",
+    "misfit",
+]
+
+_LAGS = 25
+_LONGEST_AUTOREGRESSION = 30
+
+
+def autocovariance(residual: NDArray[np.float64], lags: int) -> NDArray[np.float64]:
+    """Biased autocovariance at lags 0..lags, shape (lags + 1,), the unit of residual squared.
+
+    Examples
+    --------
+    >>> autocovariance(np.array([1.0, -1.0, 1.0, -1.0]), 1).round(6).tolist()
+    [1.0, -0.75]
+    """
+    n = residual.size
+    if lags <= 60 and n < 1_000_000:
+        full = [float(residual[: n - k] @ residual[k:]) for k in range(lags + 1)]
+        return np.array(full) / n
+    length = next_fast_len(n + lags + 1, real=True)
+    return np.asarray(irfft(np.abs(rfft(residual, length)) ** 2, length)[: lags + 1] / n)
+
+
+def is_white(residual: NDArray[np.float64], *, level: float = 1e-3) -> bool:
+    """Ljung-Box test (Biometrika 65, 1978) over 25 lags.
+
+    Parameters
+    ----------
+    residual : ndarray, shape (n,)
+        With samples that do not count left out or 0.
+    level : float
+        Chance of calling white noise coloured.
+    """
+    lags = min(_LAGS, residual.size // 4)
+    r = autocovariance(residual, lags)
+    if r[0] == 0 or lags == 0:
+        return True
+    rho = r[1:] / r[0]
+    n = residual.size
+    statistic = n * (n + 2) * np.sum(rho**2 / (n - np.arange(1, lags + 1)))
+    return bool(chi2.sf(statistic, lags) > level)
+
+
+def effective_share(residual: NDArray[np.float64]) -> float:
+    """Independent samples per sample: 1 for white noise, less for coloured.
+
+    1 / (1 + 2 Σ ρ²), the share that holds for estimates of power (Bartlett, 1946), over
+    the lags at which the correlation stands out of its own scatter.
+    """
+    lags = min(200, residual.size // 4)
+    if is_white(residual) or lags < 1:
+        return 1.0
+    r = autocovariance(residual, lags)
+    rho = r[1:] / r[0]
+    rho = rho[np.abs(rho) > 3.0 / np.sqrt(residual.size)]
+    return float(1.0 / (1.0 + 2.0 * np.sum(rho**2)))
+
+
+def autoregressive_spectrum(
+    residual: NDArray[np.float64], omega: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Power spectrum of the residual from an autoregression fitted to it (Yule-Walker).
+
+    Parameters
+    ----------
+    residual : ndarray, shape (n,)
+        White or coloured noise.
+    omega : ndarray, shape (m,)
+        Radians per sample.
+
+    Returns
+    -------
+    ndarray, shape (m,)
+        Equal to the variance at every frequency if the noise is white. The order is chosen
+        by Akaike's criterion, at most 30 (Kay, Modern Spectral Estimation, ch. 7).
+    """
+    n = residual.size
+    longest = min(_LONGEST_AUTOREGRESSION, n // 10)
+    r = autocovariance(residual, longest)
+    best = (n * np.log(r[0]), r[0], np.zeros(0))
+    for order in range(1, longest + 1):
+        coefficients = solve_toeplitz(r[:order], r[1 : order + 1])
+        variance = float(r[0] - coefficients @ r[1 : order + 1])
+        if variance <= 0:
+            break
+        criterion = n * np.log(variance) + 2 * order
+        if criterion < best[0]:
+            best = (criterion, variance, coefficients)
+    _, variance, coefficients = best
+    steps = np.arange(1, coefficients.size + 1)
+    transfer = 1.0 - np.exp(-1j * np.outer(omega, steps)) @ coefficients
+    return np.asarray(variance / np.abs(transfer) ** 2)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Misfit:
+    """How much of the residual still follows the input.
+
+    Parameters
+    ----------
+    share : float
+        Share of the residual's in-band power that a smooth response to the input explains,
+        beyond what noise would; 0 when none.
+    probability : float
+        Chance of seeing so much, or more, were the model right.
+    """
+
+    share: float
+    probability: float
+
+
+def misfit(
+    u: NDArray[np.float64],
+    residual: NDArray[np.float64],
+    *,
+    delay: float,
+    band: tuple[float, float],
+    groups: int = 24,
+) -> Misfit:
+    """Test whether the residual is still coherent with the input.
+
+    The residual's spectrum is divided into groups of neighbouring bins; in each, one
+    complex gain from the input is fitted. Under a right model the power that it takes up
+    is that of two degrees of freedom of the noise of the same group, so colour does no harm.
+
+    Parameters
+    ----------
+    u, residual : ndarray, shape (n,)
+        Input and residual.
+    delay : float
+        Delay in samples; the input is moved by it so that the gain is smooth over a group.
+    band : tuple of float
+        Excited band, in cycles per sample.
+    groups : int
+        How many groups to cut the band into, at most.
+    """
+    n = u.size
+    spectrum_u, spectrum_e = rfft(u - u.mean()), rfft(residual)
+    first = max(int(np.ceil(band[0] * n)), 1)
+    last = min(int(band[1] * n), spectrum_u.size - 1)
+    bins = np.arange(first, last + 1)
+    width = max(bins.size // groups, 4)
+    groups = bins.size // width
+    if groups == 0:
+        return Misfit(share=0.0, probability=1.0)
+    bins = bins[: groups * width]
+    shifted = spectrum_u[bins] * np.exp(-2j * np.pi * bins * delay / n)
+    U = shifted.reshape(groups, width)
+    E = spectrum_e[bins].reshape(groups, width)
+    power = np.sum(np.abs(U) ** 2, axis=1)
+    power = np.where(power > 0, power, 1.0)
+    taken = np.abs(np.sum(U.conj() * E, axis=1)) ** 2 / power
+    total = np.sum(np.abs(E) ** 2, axis=1)
+    noise = (total - taken) / (width - 1)
+    if not np.all(noise > 0):
+        return Misfit(share=0.0, probability=1.0)
+    # Fisher's sum over groups: each ratio is F(2, 2 width - 2), whose tail is closed.
+    tail = (1.0 + taken / noise / (width - 1)) ** (-(width - 1.0))
+    statistic = -2.0 * np.sum(np.log(np.maximum(tail, 1e-300)))
+    beyond = float(np.sum(taken - noise) / np.sum(total))
+    return Misfit(share=max(beyond, 0.0), probability=float(chi2.sf(statistic, 2 * groups)))

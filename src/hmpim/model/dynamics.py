@@ -1,0 +1,111 @@
+"""Structures of dynamics: which rational functions of s a fit may try.
+
+Every structure is ``B(s) / A(s)`` with B(0) = A(0) = 1 after the scale factor is taken out.
+A(s) is a product of sections ``1 + c1 s`` and ``1 + c1 s + c2 s²`` with positive
+coefficients, so that every model tried is stable.
+"""
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+__all__ = [
+    "STRUCTURES",
+    "Structure",
+    "StructureName",
+    "denominator_of",
+    "second_order_coefficients",
+]
+
+StructureName = Literal["static", "first_order", "second_order"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Structure:
+    """A family of rational dynamics.
+
+    Parameters
+    ----------
+    name : str
+        As in the result.
+    sections : tuple of int
+        Orders, 1 or 2, of the sections of the denominator.
+    zeros : int
+        Degree of the numerator, less than that of the denominator.
+    """
+
+    name: StructureName
+    sections: tuple[int, ...]
+    zeros: int = 0
+
+    @property
+    def order(self) -> int:
+        """Degree of the denominator: how many coefficients are not linear in the output."""
+        return sum(self.sections)
+
+    @property
+    def parameters(self) -> int:
+        """How many parameters a fit has: delay, denominator, numerator, bias, and noise."""
+        return 1 + self.order + (self.zeros + 1) + 2
+
+
+STRUCTURES: dict[StructureName, Structure] = {
+    s.name: s
+    for s in (
+        Structure(name="static", sections=()),
+        Structure(name="first_order", sections=(1,)),
+        Structure(name="second_order", sections=(2,)),
+    )
+}
+
+
+def denominator_of(structure: Structure, coefficients: ArrayLike) -> NDArray[np.float64]:
+    """Multiply the sections out: A(s) by rising powers of s.
+
+    Parameters
+    ----------
+    structure : Structure
+        Which sections.
+    coefficients : array_like, shape (order,)
+        c1 (and c2) of each section in turn, positive, in s and s².
+
+    Returns
+    -------
+    ndarray, shape (order + 1,)
+
+    Examples
+    --------
+    >>> denominator_of(STRUCTURES["second_order"], [0.5, 0.25]).tolist()
+    [1.0, 0.5, 0.25]
+    """
+    values = np.asarray(coefficients, dtype=np.float64)
+    product = np.ones(1)
+    start = 0
+    for order in structure.sections:
+        section = np.concatenate([[1.0], values[start : start + order]])
+        product = np.convolve(product, section)
+        start += order
+    return product
+
+
+def second_order_coefficients(
+    natural_frequency: float, damping_ratio: float
+) -> NDArray[np.float64]:
+    """Coefficients c1 = 2ζ/ω, c2 = 1/ω² of the section 1 + c1 s + c2 s², time in seconds.
+
+    Parameters
+    ----------
+    natural_frequency : float
+        Undamped natural frequency in Hz.
+    damping_ratio : float
+        Damping ratio ζ.
+
+    Examples
+    --------
+    >>> second_order_coefficients(1 / (2 * np.pi), 0.5).tolist()
+    [1.0, 1.0]
+    """
+    omega = 2 * np.pi * natural_frequency
+    return np.array([2 * damping_ratio / omega, 1 / omega**2])

@@ -1,0 +1,154 @@
+"""Frequency response of a rational system with delay, and the figures read off it.
+
+Coefficients here are in seconds: numerator and denominator by rising powers of s.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import brentq
+
+__all__ = [
+    "RationalDelay",
+    "bandwidth_3db",
+    "bandwidth_phase",
+    "dominant_time_constant",
+    "peak_gain",
+    "phase",
+    "response",
+]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class RationalDelay:
+    """``e^(-s τ) B(s) / A(s)``.
+
+    Parameters
+    ----------
+    delay : float
+        τ in seconds.
+    numerator, denominator : ndarray, shapes (m + 1,) and (n + 1,)
+        B and A by rising powers of s, in seconds; A(0) = 1.
+    """
+
+    delay: float
+    numerator: NDArray[np.float64]
+    denominator: NDArray[np.float64]
+
+
+def response(system: RationalDelay, frequency: NDArray[np.float64]) -> NDArray[np.complex128]:
+    """Complex response at `frequency` in Hz, shape (m,); output unit per input unit.
+
+    Examples
+    --------
+    >>> lag = RationalDelay(delay=0.0, numerator=np.ones(1), denominator=np.array([1.0, 1.0]))
+    >>> abs(response(lag, np.array([1 / (2 * np.pi)]))).round(6).tolist()
+    [0.707107]
+    """
+    s = 2j * np.pi * np.asarray(frequency, dtype=np.float64)
+    polyval = np.polynomial.polynomial.polyval
+    ratio = polyval(s, system.numerator) / polyval(s, system.denominator)
+    return np.asarray(ratio * np.exp(-s * system.delay))
+
+
+def _turn(coefficients: NDArray[np.float64], omega: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Continuous phase of a polynomial in jω, zero at ω = 0, in radians."""
+    turned = np.zeros_like(omega)
+    trimmed = np.trim_zeros(coefficients, "b")
+    if trimmed.size < 2:
+        return turned
+    for root in np.roots(trimmed[::-1]):
+        away = -root.real if root.real != 0 else np.finfo(float).tiny
+        turned += np.arctan((omega - root.imag) / away) - np.arctan(-root.imag / away)
+    return turned
+
+
+def phase(
+    system: RationalDelay, frequency: NDArray[np.float64], *, delay: bool = True
+) -> NDArray[np.float64]:
+    """Phase in radians relative to DC, continuous from 0 Hz on, however often it wraps.
+
+    Parameters
+    ----------
+    system : RationalDelay
+        The system; the sign of its gain does not matter here.
+    frequency : ndarray, shape (m,)
+        Hz.
+    delay : bool
+        Whether the pure delay's lag is included (paper, eq. 25, takes it out).
+    """
+    omega = 2 * np.pi * np.asarray(frequency, dtype=np.float64)
+    lag = omega * system.delay if delay else 0.0
+    return _turn(system.numerator, omega) - _turn(system.denominator, omega) - lag
+
+
+def _first_crossing(frequency: NDArray[np.float64], values: NDArray[np.float64]) -> int | None:
+    """Index before the first change from positive to not positive."""
+    below = np.flatnonzero((values[:-1] > 0) & (values[1:] <= 0))
+    return int(below[0]) if below.size else None
+
+
+def _grid(highest: float) -> NDArray[np.float64]:
+    return np.concatenate([[0.0], np.geomspace(highest * 1e-5, highest, 400)])
+
+
+def bandwidth_phase(
+    system: RationalDelay, *, highest: float, lag: float = np.pi / 2, delay: bool = True
+) -> float | None:
+    """Lowest frequency in Hz at which the phase lags by `lag` rad; None beyond `highest` Hz."""
+    grid = _grid(highest)
+
+    def margin(f: NDArray[np.float64]) -> NDArray[np.float64]:
+        return phase(system, f, delay=delay) + lag
+
+    i = _first_crossing(grid, margin(grid))
+    if i is None:
+        return None
+    return float(brentq(lambda f: float(margin(np.array([f]))[0]), grid[i], grid[i + 1]))
+
+
+def bandwidth_3db(system: RationalDelay, *, highest: float) -> float | None:
+    """Lowest frequency in Hz at which the gain is 1/√2 of that at DC; None beyond `highest` Hz."""
+    if system.numerator[0] == 0:
+        return None
+    grid = _grid(highest)
+
+    def margin(f: NDArray[np.float64]) -> NDArray[np.float64]:
+        return np.asarray(np.abs(response(system, f) / system.numerator[0]) ** 2 - 0.5)
+
+    i = _first_crossing(grid, margin(grid))
+    if i is None:
+        return None
+    return float(brentq(lambda f: float(margin(np.array([f]))[0]), grid[i], grid[i + 1]))
+
+
+def peak_gain(system: RationalDelay, *, highest: float) -> float:
+    """Greatest gain up to `highest` Hz over the gain at DC, in dB; 0 without a hump.
+
+    For a second-order lag this is -20 lg(2ζ√(1-ζ²)) (paper, Fig. 16; Ogata, Modern Control
+    Engineering, 1970, ch. 9).
+    """
+    grid = _grid(highest)
+    gain = np.abs(response(system, grid) / system.numerator[0])
+    i = int(np.argmax(gain))
+    if i == 0:
+        return 0.0
+    low, high = grid[max(i - 1, 0)], grid[min(i + 1, grid.size - 1)]
+    for _ in range(3):
+        fine = np.linspace(low, high, 21)
+        gain = np.abs(response(system, fine) / system.numerator[0])
+        i = int(np.argmax(gain))
+        low, high = fine[max(i - 1, 0)], fine[min(i + 1, 20)]
+    return float(20 * np.log10(gain.max()))
+
+
+def dominant_time_constant(system: RationalDelay) -> float | None:
+    """Slowest time constant in seconds where the slowest pole is real, else None."""
+    if system.denominator.size < 2:
+        return None
+    poles = np.roots(system.denominator[::-1])
+    slowest = poles[np.argmax(poles.real)]
+    if abs(slowest.imag) > 1e-9 * abs(slowest):
+        return None
+    return float(-1.0 / slowest.real)
