@@ -1,1 +1,1 @@
-"""To be filled."""
+"""The command line: each command parses, calls the library, and shows; no mathematics."""

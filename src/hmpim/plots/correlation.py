@@ -8,7 +8,6 @@ from numpy.typing import NDArray
 from hmpim.plots.style import (
     axis_label,
     draw_legend,
-    draw_level,
     draw_line,
     draw_mark,
     finish_axes,
@@ -55,9 +54,9 @@ def cross_correlation(
     draw_line(axes, lags, correlation, colour="input")
     finish_axes(axes, x="Lag of the output (s)", y=axis_label("Cross-correlation", unit))
     if peak is not None:
-        draw_mark(axes, peak, label=f"peak at {peak:.4g} s", colour="output")
+        draw_mark(axes, peak, label=f"peak at {peak:.4g} s", colour="output", side="right")
     if delay is not None:
-        draw_mark(axes, delay, label=f"pure delay {delay:.4g} s", colour="ink", text_at=0.85)
+        draw_mark(axes, delay, label=f"pure delay {delay:.4g} s", colour="ink", side="left")
     return figure
 
 
@@ -66,6 +65,7 @@ def error_autocorrelation(
     correlation: NDArray[np.float64],
     *,
     bias: float | None = None,
+    duration: float | None = None,
     unit: str = "",
 ) -> "Figure":
     """Draw the autocorrelation of the time-corrected error (Eqs 9 to 11, Figs 9 and 11).
@@ -77,8 +77,10 @@ def error_autocorrelation(
     correlation : ndarray, shape (m,)
         In the square of `unit`.
     bias : float, optional
-        The joint fit's bias in `unit`; its square is drawn as the level that a bias alone
-        would give.
+        The joint fit's bias in `unit`; what it alone would give is drawn beside the curve.
+    duration : float, optional
+        Length of the error in s. Equation (10) divides every lag by the same number of
+        samples, so that even a constant falls off in proportion to the lag.
     unit : str
         Unit of the output.
 
@@ -92,7 +94,9 @@ def error_autocorrelation(
     figure, (axes,) = new_figure(1, height=2.4)
     draw_line(axes, lags, correlation, colour="output")
     if bias is not None:
-        draw_level(axes, (bias**2,), label="square of the jointly fitted bias", colour="ink")
+        fall = np.ones_like(lags) if duration is None else 1.0 - np.abs(lags) / duration
+        words = "what the jointly fitted bias alone would give"
+        draw_line(axes, lags, bias**2 * fall, label=words, colour="ink", dashes="--")
         draw_legend(axes)
     squared = f"{unit}²" if unit else ""
     finish_axes(axes, x="Lag (s)", y=axis_label("Autocorrelation of the error", squared))

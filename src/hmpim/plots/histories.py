@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from hmpim.identify.correlation import autocorrelation
 from hmpim.plots.style import (
     COLOURS,
     axis_label,
@@ -22,6 +23,8 @@ if TYPE_CHECKING:
     from hmpim.stimulus import Stimulus
 
 __all__ = ["input_output", "model_over_measurement", "residuals", "time_histories"]
+
+MOST_LAGS = 100  # of the residual's autocorrelation; more cannot be told apart on a page
 
 
 def time_histories(stimulus: "Stimulus") -> "Figure":
@@ -180,9 +183,10 @@ def residuals(
     draw_line(axes[0], time, residual, colour="output", width=0.8)
     finish_axes(axes[0], x="Time (s)", y=axis_label(f"Residual of {output_name}", unit))
     step = float(np.median(np.diff(time)))
-    most = min(residual.size - 1, 100)
+    most = min(residual.size - 1, MOST_LAGS)
+    whole = autocorrelation(residual - residual.mean()).value[residual.size - 1 :]
+    correlation = whole[1 : most + 1] / (whole[0] or 1.0)
     lags = np.arange(1, most + 1) * step
-    correlation = autocorrelation(residual, most)[1:]
     axes[1].vlines(lags, 0.0, correlation, colors=COLOURS["output"], linewidth=1.2)
     axes[1].axhline(0.0, color=COLOURS["muted"], linewidth=0.8)
     bound = 1.96 / np.sqrt(residual.size)
@@ -191,39 +195,6 @@ def residuals(
     draw_legend(axes[1])
     figure.align_ylabels(axes)
     return figure
-
-
-def autocorrelation(values: NDArray[np.float64], most: int) -> NDArray[np.float64]:
-    """Return the autocorrelation at lags 0 to `most`, the mean removed, 1 at lag 0.
-
-    Parameters
-    ----------
-    values : ndarray, shape (n,)
-        The signal.
-    most : int
-        Largest lag in samples.
-
-    Returns
-    -------
-    ndarray, shape (most + 1,)
-        All zeros after lag 0 if the signal is constant.
-
-    Examples
-    --------
-    >>> autocorrelation(np.array([1.0, -1.0, 1.0, -1.0]), 1)
-    array([ 1.  , -0.75])
-    """
-    from scipy.signal import correlate
-
-    centred = values - values.mean()
-    whole = correlate(centred, centred, mode="full", method="auto")
-    half = np.asarray(whole[values.size - 1 : values.size + most], dtype=np.float64)
-    if half[0] <= 0.0:
-        half = np.zeros_like(half)
-        half[0] = 1.0
-        return half
-    scaled: NDArray[np.float64] = half / half[0]
-    return scaled
 
 
 def _busiest_tenth(values: NDArray[np.float64]) -> tuple[int, int]:

@@ -251,7 +251,13 @@ def draw_level(
 
 
 def draw_mark(
-    axes: "Axes", x: float, *, label: str, colour: Colour = "limit", text_at: float = 0.97
+    axes: "Axes",
+    x: float,
+    *,
+    label: str,
+    colour: Colour = "limit",
+    text_at: float = 0.97,
+    side: Literal["auto", "left", "right"] = "auto",
 ) -> None:
     """Draw a vertical line at `x` with words beside it.
 
@@ -267,6 +273,8 @@ def draw_mark(
         A name of `COLOURS`.
     text_at : float
         Height of the words as a share of the axes; they hang below it.
+    side : {'auto', 'left', 'right'}
+        Where the words stand; 'auto' is right, unless the line is near the right end.
 
     Examples
     --------
@@ -281,13 +289,14 @@ def draw_mark(
         late = low > 0 and x > 0 and np.log(x / low) > 0.7 * np.log(high / low)
     else:
         late = x - low > 0.7 * (high - low)
+    left = late if side == "auto" else side == "left"
     axes.annotate(
         label,
         xy=(x, text_at),
         xycoords=axes.get_xaxis_transform(),
-        xytext=(-4 if late else 4, 0),
+        xytext=(-4 if left else 4, 0),
         textcoords="offset points",
-        ha="right" if late else "left",
+        ha="right" if left else "left",
         va="top",
         fontsize=FONT_SIZE - 1,
         color=COLOURS[colour],

@@ -4,11 +4,12 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hmpim import plots
 from hmpim.identify import Identification, PairIdentification
-from hmpim.record import Record
+from hmpim.identify.paper import PaperAnalysis, paper_analysis
+from hmpim.record import Record, Signal, uniform
+from hmpim.report.numbers import format_number
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -98,30 +99,92 @@ def _units(record: Record, pair: PairIdentification) -> tuple[str, str]:
 
 
 def _signal_pictures(record: Record, pair: PairIdentification) -> list[Picture]:
-    source, sink = record.channel(pair.input), record.channel(pair.output)
-    time = sink.time
-    u: NDArray[np.float64] = np.interp(time, source.time, source.values)
-    span = f"{time[0]:g} to {time[-1]:g} s"
+    aligned = uniform(record)
+    u, y = aligned.signal(pair.input), aligned.signal(pair.output)
+    signals = Picture(
+        key="signals",
+        title="Stimulus and response",
+        caption="What went in and what came out.",
+        description=(
+            f"Input {pair.input} between {u.values.min():.4g} and {u.values.max():.4g} {u.unit}, "
+            f"output {pair.output} between {y.values.min():.4g} and {y.values.max():.4g} "
+            f"{y.unit}, over {aligned.time[0]:g} to {aligned.time[-1]:g} s."
+        ),
+        figure=plots.input_output(
+            aligned.time,
+            u.values,
+            y.values,
+            input_name=pair.input,
+            output_name=pair.output,
+            input_unit=u.unit,
+            output_unit=y.unit,
+        ),
+    )
+    if np.ptp(y.values) == 0 or np.ptp(u.values) == 0:
+        return [signals]
+    analysis = paper_analysis(u.values, y.values, aligned.fs, band=record.band)
+    return [signals, *_paper_pictures(analysis, pair, u, y)]
+
+
+def _paper_pictures(
+    analysis: PaperAnalysis, pair: PairIdentification, u: Signal, y: Signal
+) -> list[Picture]:
+    found = pair.parameters
+    peak = analysis.estimates.delay
+    reach = max(1.0, 4.0 * abs(peak or 0.0))  # seconds of lag worth showing
+    near = np.abs(analysis.lag) <= reach
+    squared = f"{y.unit}²" if u.unit == y.unit and y.unit else f"{u.unit} {y.unit}".strip()
+    root_mean_square = float(np.sqrt(np.mean(analysis.error**2)))
+    low, high = analysis.band
     return [
         Picture(
-            key="signals",
-            title="Stimulus and response",
-            caption="What went in and what came out.",
-            description=(
-                f"Input {pair.input} between {u.min():.4g} and {u.max():.4g} {source.unit}, "
-                f"output {pair.output} between {sink.values.min():.4g} and "
-                f"{sink.values.max():.4g} {sink.unit}, over {span}."
+            key="correlation",
+            title="Cross-correlation",
+            caption="Equation (8). Its peak is the paper's delay: the pure delay and what the "
+            "dynamics add.",
+            description=f"Cross-correlation of {pair.input} and {pair.output} over the lag, "
+            f"peak at {format_number(peak)} s.",
+            figure=plots.cross_correlation(
+                analysis.lag[near],
+                analysis.cross_correlation[near],
+                peak=peak,
+                delay=None if found.delay is None else found.delay.value,
+                unit=squared,
             ),
-            figure=plots.input_output(
-                time,
-                u,
-                sink.values,
+        ),
+        Picture(
+            key="error",
+            title="Autocorrelation of the error",
+            caption="Equations (9) and (10): the error that is left when the delay of (8) is "
+            "taken out. The root of its middle is the paper's bias (11).",
+            description=f"Autocorrelation of the time-corrected error, whose root mean square "
+            f"is {root_mean_square:.4g} {y.unit}.",
+            figure=plots.error_autocorrelation(
+                analysis.error_lag,
+                analysis.error_autocorrelation,
+                bias=None if found.bias is None else found.bias.value,
+                duration=analysis.error.size / analysis.fs,
+                unit=y.unit,
+            ),
+        ),
+        Picture(
+            key="spectra",
+            title="Spectra",
+            caption=f"Equation (17), without and with the {analysis.window} window, which "
+            "lessens leakage and costs level at both ends of the sweep.",
+            description=f"Spectra of {pair.input} and {pair.output} in dB, without and with "
+            f"window; the excited band is {low:.4g} to {high:.4g} Hz.",
+            figure=plots.spectra(
+                analysis.frequency,
+                input_plain=analysis.input_db,
+                input_windowed=analysis.input_windowed_db,
+                output_plain=analysis.output_db,
+                output_windowed=analysis.output_windowed_db,
+                band=analysis.band,
                 input_name=pair.input,
                 output_name=pair.output,
-                input_unit=source.unit,
-                output_unit=sink.unit,
             ),
-        )
+        ),
     ]
 
 

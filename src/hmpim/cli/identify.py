@@ -1,0 +1,130 @@
+"""``hmpim identify``: a measured record in, a table, a JSON file and a page out."""
+
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from hmpim.cli.terminal import check_target, output_console, say, working
+from hmpim.errors import ArgumentError
+
+if TYPE_CHECKING:
+    from hmpim.identify import Identification
+    from hmpim.record import Record
+    from hmpim.stimulus import Stimulus
+
+__all__ = ["Between", "identify", "write_result"]
+
+
+class Between(StrEnum):
+    """What the input does between its samples."""
+
+    AUTO = "auto"
+    ZOH = "zoh"
+    FOH = "foh"
+    BANDLIMITED = "bandlimited"
+
+
+def identify(
+    record: Annotated[
+        Path, typer.Argument(help="File with the record, such as a CSV file with a header.")
+    ],
+    input_: Annotated[
+        list[str] | None,
+        typer.Option("--input", metavar="NAME", help="Column of an input; may be repeated."),
+    ] = None,
+    output: Annotated[
+        list[str] | None,
+        typer.Option("--output", metavar="NAME", help="Column of an output; may be repeated."),
+    ] = None,
+    fs: Annotated[
+        float | None,
+        typer.Option("--fs", metavar="HZ", help="Sampling rate, if there is no time column."),
+    ] = None,
+    time: Annotated[
+        str | None, typer.Option("--time", metavar="NAME", help="Column of the time in seconds.")
+    ] = None,
+    intersample: Annotated[
+        Between,
+        typer.Option(
+            "--intersample",
+            help="What the input does between samples: held, linear, band-limited, or found.",
+        ),
+    ] = Between.AUTO,
+    holdout: Annotated[
+        float | None,
+        typer.Option(
+            "--holdout",
+            metavar="FRACTION",
+            help="Fit on the first part only, and predict this share at the end.",
+        ),
+    ] = None,
+    json: Annotated[
+        Path | None, typer.Option("--json", metavar="FILE", help="Write the result as JSON.")
+    ] = None,
+    report: Annotated[
+        Path | None, typer.Option("--report", metavar="FILE", help="Write one HTML page.")
+    ] = None,
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print no table.")] = False,
+) -> None:
+    """Find every parameter of a measured record, each with its error bar."""
+    check_target(json, "--json")
+    check_target(report, "--report")
+    if holdout is not None and not 0.0 < holdout < 1.0:
+        raise ArgumentError(f"--holdout {holdout:g} is not a share between 0 and 1; give 0.5, say")
+
+    from hmpim.formats import read
+    from hmpim.identify.identify import identify as find
+    from hmpim.report import print_result
+
+    with working(f"Reading {record}"):
+        data = read(record, inputs=input_ or None, outputs=output or None, fs=fs, time=time)
+    part, split = (data, None) if holdout is None else _first_part(data, holdout)
+    with working("Identifying"):
+        result = find(part, intersample=intersample.value)
+    if not quiet:
+        print_result(result, output_console())
+        if split is not None:
+            _print_prediction(result, data, split)
+    write_result(result, json=json, report=report)
+
+
+def write_result(
+    result: "Identification",
+    *,
+    json: Path | None,
+    report: Path | None,
+    stimulus: "Stimulus | None" = None,
+) -> None:
+    """Write a result to the files that are wanted, each as a whole or not at all."""
+    from hmpim.report import replacing
+    from hmpim.report import report as write_page
+
+    if json is not None:
+        with replacing(json) as place:
+            result.save(place)
+    if report is not None:
+        with working("Drawing the page"):
+            write_page(result, report, stimulus=stimulus)
+
+
+def _first_part(data: "Record", holdout: float) -> tuple["Record", float]:
+    """Cut off the end that is to be predicted; return the rest, and when the end begins."""
+    start = min(float(c.time[0]) for c in (*data.inputs, *data.outputs))
+    stop = max(float(c.time[-1]) for c in (*data.inputs, *data.outputs))
+    split = stop - holdout * (stop - start)
+    return data.between(start, split), split
+
+
+def _print_prediction(result: "Identification", data: "Record", split: float) -> None:
+    """Say how well each model predicts what it was not fitted on."""
+    from hmpim.identify.predict import predict
+
+    for pair in result.pairs:
+        name = f"{pair.input} → {pair.output}"
+        if pair.parameters.scale_factor is None:
+            say(f"Held out, {name}: no model to predict with.")
+            continue
+        fit = predict(pair, data, start=split).fit_percent
+        say(f"Held out, {name}: predicted from {split:.4g} s on with a fit of {fit:.2f} %.")

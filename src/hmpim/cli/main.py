@@ -1,0 +1,124 @@
+"""The command line: ``hmpim COMMAND``.
+
+Exit code 0: done. 1: a check or specification is not met. 2: bad input, said in one line on
+standard error. 130: stopped from the keyboard.
+"""
+
+import sys
+from collections.abc import Sequence
+from typing import Annotated, Any
+
+import typer
+from typer.core import TyperGroup
+
+from hmpim.cli.demo import demo
+from hmpim.cli.identify import identify
+from hmpim.errors import HmpimError
+
+__all__ = ["app", "main"]
+
+BAD_INPUT = 2
+INTERRUPTED = 130
+
+
+class CommandGroup(TyperGroup):
+    """Commands whose failures are one line, with no traceback."""
+
+    def main(
+        self,
+        args: Sequence[str] | None = None,
+        prog_name: str | None = None,
+        complete_var: str | None = None,
+        standalone_mode: bool = True,
+        windows_expand_args: bool = True,
+        **extra: Any,  # the signature is Typer's
+    ) -> Any:
+        """Run; turn what is wrong with the input into a line and an exit code."""
+        try:
+            code = super().main(
+                args=args,
+                prog_name=prog_name,
+                complete_var=complete_var,
+                standalone_mode=False,
+                windows_expand_args=windows_expand_args,
+                **extra,
+            )
+        except (HmpimError, OSError) as error:
+            code = _failed(_described(error))
+        except (KeyboardInterrupt, typer.Abort):
+            code = INTERRUPTED
+        except Exception as error:
+            if not hasattr(error, "format_message"):  # a defect, not bad input: show it whole
+                raise
+            code = _failed(_usage(error))
+        code = code if isinstance(code, int) else 0
+        if not standalone_mode:
+            return code
+        sys.exit(code)
+
+
+def _failed(message: str) -> int:
+    print(f"hmpim: {' '.join(message.split())}", file=sys.stderr)
+    return BAD_INPUT
+
+
+def _described(error: Exception) -> str:
+    """One line for an error; an operating system's with the file it is about."""
+    if isinstance(error, OSError) and error.strerror:
+        about = f"{error.filename}: " if error.filename else ""
+        return f"{about}{error.strerror}"
+    return str(error) or type(error).__name__
+
+
+def _usage(error: Any) -> str:
+    """One line for a mistake on the command line, and where to read on."""
+    context = getattr(error, "ctx", None)
+    path = context.command_path if context is not None else "hmpim"
+    message = error.format_message().rstrip().rstrip(".")
+    return f"{message}; see {path} --help"
+
+
+app = typer.Typer(
+    name="hmpim",
+    cls=CommandGroup,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+
+
+def _show_version(wanted: bool) -> None:
+    if wanted:
+        from importlib.metadata import version
+
+        print(f"hmpim {version('hmpim')}")
+        raise typer.Exit
+
+
+@app.callback(invoke_without_command=True)
+def _start(
+    context: typer.Context,
+    version: Annotated[
+        bool,
+        typer.Option("--version", callback=_show_version, is_eager=True, help="Show the version."),
+    ] = False,
+) -> None:
+    """One short, safe excitation; every parameter of a model; an error bar on each.
+
+    Start with: hmpim demo
+    """
+    if context.invoked_subcommand is None:
+        print(context.get_help())
+
+
+# Add a command here: its module imports what is heavy inside the function, so that
+# ``hmpim --help`` stays quick.
+app.command(epilog="Example: hmpim identify test.csv --input u --output y --report r.html")(
+    identify
+)
+app.command(epilog="Example: hmpim demo --out out/demo --seed 7")(demo)
+
+
+def main() -> None:
+    """Run the command line; this is what ``hmpim`` starts."""
+    app()

@@ -1,0 +1,92 @@
+"""What the command line says: results to standard output, the rest to standard error."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from hmpim.errors import ArgumentError
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+__all__ = ["check_target", "output_console", "say", "working"]
+
+_WIDTH_OF_FILES = 120  # columns where the output is no terminal, so that no row is cut
+
+
+def output_console() -> "Console":
+    """Return the console for results.
+
+    Examples
+    --------
+    >>> output_console().print("delay 0.15 s")
+    delay 0.15 s
+    """
+    from rich.console import Console
+
+    console = Console(highlight=False, soft_wrap=False)
+    if not console.is_terminal:
+        console = Console(highlight=False, width=_WIDTH_OF_FILES)
+    return console
+
+
+def say(text: str) -> None:
+    """Print one line of plain text, such as where a file went.
+
+    Examples
+    --------
+    >>> say("Page: r.html")
+    Page: r.html
+    """
+    print(text)
+
+
+@contextmanager
+def working(what: str) -> Iterator[None]:
+    """Show on a terminal that something is under way; say nothing in a pipe or a log.
+
+    Examples
+    --------
+    >>> with working("Fitting"):
+    ...     pass
+    """
+    from rich.console import Console
+
+    console = Console(stderr=True)
+    if not console.is_terminal:
+        yield
+        return
+    with console.status(f"{what} …"):
+        yield
+
+
+def check_target(path: Path | None, option: str) -> None:
+    """Refuse a file that cannot be written, before the work rather than after it.
+
+    Parameters
+    ----------
+    path : Path or None
+        The file; None if none is wanted.
+    option : str
+        Name of the option, for the message.
+
+    Raises
+    ------
+    ArgumentError
+        If the folder is missing, or a folder stands where the file should.
+
+    Examples
+    --------
+    >>> check_target(Path("r.json"), "--json")
+    >>> check_target(Path("/no/such/folder/r.json"), "--json")
+    Traceback (most recent call last):
+    ...
+    hmpim.errors.ArgumentError: --json: folder /no/such/folder does not exist; make it first
+    """
+    if path is None:
+        return
+    if path.is_dir():
+        raise ArgumentError(f"{option}: {path} is a folder; name a file in it")
+    if not path.parent.is_dir():
+        raise ArgumentError(f"{option}: folder {path.parent} does not exist; make it first")
