@@ -84,8 +84,8 @@ def judge(
         note(
             "lack_of_fit",
             f"The residual still follows the input: about {100 * owed:.2g} % of the output "
-            f"(r.m.s.) is not described by the {fit.structure.name} model. Look at the Bode plot where "
-            "model and measurement part.",
+            f"(r.m.s.) is not described by the {fit.structure.name} model. "
+            "Look at the Bode plot where model and measurement part.",
             doubt=owed > _TOLERATED_MISFIT,
         )
     if not readings.white:
@@ -191,8 +191,9 @@ def _rival(joint: JointFit) -> str | None:
             return (
                 f"Whether the input is {words[best.intersample]} or {words[trial.intersample]} "
                 "between its samples, this record cannot tell. "
-                f"{words[best.intersample].capitalize()} is assumed; the other would move the delay by "
-                f"{trial.fit.delay - best.fit.delay:+.2f} samples. State it with intersample=."
+                f"{words[best.intersample].capitalize()} is assumed; the other would "
+                f"move the delay by {trial.fit.delay - best.fit.delay:+.2f} samples. "
+                "State it with intersample=."
             )
     return None
 

@@ -52,7 +52,7 @@ class Model:
     def __post_init__(self) -> None:
         if not self.denominator or self.denominator[-1] == 0:
             raise ArgumentError(
-                f"denominator {self.denominator} has no finite gain at DC; end it with a number not 0"
+                f"denominator {self.denominator} has no finite gain at DC; its last must not be 0"
             )
         if len(self.numerator) > max(len(self.denominator) - 1, 1):
             raise ArgumentError(

@@ -1,0 +1,96 @@
+"""Bandwidths and peaks against closed forms."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from hmpim.errors import ArgumentError
+from hmpim.model import (
+    Model,
+    RationalDelay,
+    bandwidth_3db,
+    bandwidth_phase,
+    dominant_time_constant,
+    frequency_response,
+    peak_gain,
+    phase,
+    response,
+    second_order_coefficients,
+    simulate,
+)
+
+
+def second_order(natural_frequency: float, damping_ratio: float, delay: float = 0.0, gain=1.0):
+    return RationalDelay(
+        delay=delay,
+        numerator=np.array([gain]),
+        denominator=np.concatenate(
+            [[1.0], second_order_coefficients(natural_frequency, damping_ratio)]
+        ),
+    )
+
+
+def test_the_stated_system_of_fig_17_lags_by_90_degrees_at_1_534_hz():
+    system = second_order(10.0, 0.4, delay=0.15)
+    assert bandwidth_phase(system, highest=20.0) == pytest.approx(1.534, abs=5e-4)
+    assert bandwidth_phase(system, highest=20.0, delay=False) == pytest.approx(10.0)
+
+
+def test_a_pure_delay_lags_by_90_degrees_at_a_quarter_of_its_inverse():
+    system = RationalDelay(delay=0.15, numerator=np.ones(1), denominator=np.ones(1))
+    assert bandwidth_phase(system, highest=20.0) == pytest.approx(1 / 0.6)
+
+
+@given(zeta=st.floats(0.05, 2.0), gain=st.floats(-3, 3).filter(lambda g: abs(g) > 0.01))
+def test_second_order_figures(zeta, gain):
+    system = second_order(10.0, zeta, gain=gain)
+    w2 = 1 - 2 * zeta**2 + np.sqrt((1 - 2 * zeta**2) ** 2 + 1)
+    assert bandwidth_3db(system, highest=100.0) == pytest.approx(10 * np.sqrt(w2), rel=1e-9)
+    hump = -20 * np.log10(2 * zeta * np.sqrt(1 - zeta**2)) if zeta < np.sqrt(0.5) else 0.0
+    assert peak_gain(system, highest=100.0) == pytest.approx(hump, abs=1e-4)
+
+
+def test_phase_is_continuous_through_many_turns():
+    system = second_order(10.0, 0.3, delay=0.5)
+    f = np.linspace(0, 50, 4001)
+    unwrapped = np.unwrap(np.angle(response(system, f)))
+    np.testing.assert_allclose(phase(system, f), unwrapped, atol=1e-9)
+
+
+def test_no_bandwidth_beyond_what_was_looked_at():
+    assert bandwidth_3db(second_order(10.0, 0.4), highest=5.0) is None
+    assert bandwidth_phase(second_order(10.0, 0.4), highest=5.0) is None
+
+
+def test_dominant_time_constant_of_two_real_poles():
+    system = RationalDelay(
+        delay=0.0, numerator=np.ones(1), denominator=np.convolve([1.0, 0.3], [1.0, 0.02])
+    )
+    assert dominant_time_constant(system) == pytest.approx(0.3)
+    assert dominant_time_constant(second_order(1.0, 0.3)) is None
+
+
+def test_simulation_of_a_sine_meets_the_frequency_response():
+    model = Model(
+        delay=0.0123,
+        scale_factor=-2.0,
+        numerator=(0.01, 1.0),
+        denominator=(1e-4, 5e-3, 1.0),
+        bias=0.3,
+    )
+    t = np.arange(3000) / 1000
+    u = np.minimum(t, 1.0) ** 3 * np.sin(2 * np.pi * 12 * t)
+    y = simulate(model, u, fs=1000.0, intersample="bandlimited")
+    gain = frequency_response(model, np.array([12.0]))[0]
+    expected = 0.3 + np.imag(gain * np.exp(2j * np.pi * 12 * t))
+    np.testing.assert_allclose(y[1500:2900], expected[1500:2900], atol=1e-4)
+
+
+def test_unstable_or_improper_models_are_refused():
+    with pytest.raises(ArgumentError, match="has a pole at 1"):
+        Model(delay=0.0, scale_factor=1.0, denominator=(1.0, -1.0))
+    with pytest.raises(ArgumentError, match="not strictly proper"):
+        Model(delay=0.0, scale_factor=1.0, numerator=(1.0, 1.0), denominator=(1.0, 1.0))
+    with pytest.raises(ArgumentError, match="no finite gain at DC"):
+        Model(delay=0.0, scale_factor=1.0, denominator=(1.0, 0.0))
