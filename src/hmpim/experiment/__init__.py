@@ -1,1 +1,5 @@
-"""To be filled."""
+"""Run a stimulus on a rig, safely."""
+
+from hmpim.experiment.run import run
+
+__all__ = ["run"]

@@ -1,1 +1,7 @@
-"""To be filled."""
+"""Section II: units under test, simulated or real, behind one protocol."""
+
+from hmpim.rigs.function import FunctionRig
+from hmpim.rigs.protocol import Rig
+from hmpim.rigs.sensor import Quantity, Sensor
+
+__all__ = ["FunctionRig", "Quantity", "Rig", "Sensor"]

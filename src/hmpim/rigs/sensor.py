@@ -1,0 +1,329 @@
+"""The sensor of Fig. 1, stepped in time.
+
+The chain, from the true motion to the number that is read::
+
+    motion ─► delay ─► dynamics ─► × scale factor, + bias ─► + noise ─► saturation
+           ─► data hold ─► quantisation ─► output
+
+Up to the noise all is continuous. The unit takes one reading at each instant of its own clock:
+that of the data hold if there is one, else that of the record. Noise is drawn once per reading,
+so a held value carries its noise along, and an AR(1) coefficient counts readings. Quantisation
+acts on the held value as it would on the reading.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.signal import lfilter
+
+from hmpim.errors import ArgumentError
+from hmpim.record import Channel, Intersample, Record
+from hmpim.rigs.between import ContinuousInput, between_samples
+from hmpim.rigs.dynamics import Poles, first_order, respond, second_order
+from hmpim.stimulus import Limits, Stimulus
+from hmpim.units import check_unit, rate_unit
+
+__all__ = ["Quantity", "Sensor"]
+
+FloatArray = NDArray[np.float64]
+Quantity = Literal["position", "velocity", "acceleration"]
+"""Which quantity of the motion a sensor measures."""
+
+_GRACE = 1e-9  # of an interval: an instant that falls on an update takes the new value
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Sensor:
+    """A simulated sensor, hardware and software (Fig. 1).
+
+    Parameters
+    ----------
+    delay : float
+        Pure delay in s; any fraction of a sample.
+    hold_period : float or None
+        Interval in s at which the output is updated; None for at every sample.
+    hold_phase : float
+        Time in s of one of the updates.
+    natural_frequency, damping_ratio : float or None
+        Second-order dynamics ωn²/(s² + 2ζωn s + ωn²); Hz, and no unit.
+    time_constant : float or None
+        First-order dynamics 1/(1 + sT) in s; not together with the second-order ones.
+    scale_factor : float
+        Output unit per input unit.
+    bias : float
+        In the output's unit.
+    noise_std : float
+        Standard deviation of the noise, whatever its colour, in the output's unit.
+    noise_colour : float
+        AR(1) coefficient between one reading and the next; 0 is white.
+    saturation_low, saturation_high : float or None
+        Range of the output, in its unit; None where it is open.
+    quantization_step : float or None
+        The output is rounded to whole steps of this size, in its unit.
+    output_unit : str or None
+        None takes the input's.
+    measures : {'position', 'velocity', 'acceleration'}
+        Which quantity of the motion goes in.
+    command : {'continuous', 'zoh', 'foh'}
+        What goes in: the motion itself, or its samples, held or joined linearly.
+    name, input_name, output_name : str
+        Name of the rig, and of its record's channels.
+    limits : Limits or None
+        What the unit bears; None for anything.
+
+    Raises
+    ------
+    ArgumentError
+        If a value is outside what it may be.
+
+    Examples
+    --------
+    The system of the paper's Fig. 17, with a plain sweep:
+
+    >>> from hmpim.stimulus import Chirp, Stimulus
+    >>> sensor = Sensor(delay=0.15, natural_frequency=10, damping_ratio=0.4, bias=0.6)
+    >>> stimulus = Stimulus(waveform=Chirp(band=(0.1, 20), duration=10), fs=200, unit="deg")
+    >>> record = sensor.play(stimulus, rng=np.random.default_rng(0))
+    >>> record.samples, record.outputs[0].unit, record.outputs[0].values[:30].tolist() == [0.6] * 30
+    (2000, 'deg', True)
+    """
+
+    delay: float = 0.0
+    hold_period: float | None = None
+    hold_phase: float = 0.0
+    natural_frequency: float | None = None
+    damping_ratio: float | None = None
+    time_constant: float | None = None
+    scale_factor: float = 1.0
+    bias: float = 0.0
+    noise_std: float = 0.0
+    noise_colour: float = 0.0
+    saturation_low: float | None = None
+    saturation_high: float | None = None
+    quantization_step: float | None = None
+    output_unit: str | None = None
+    measures: Quantity = "position"
+    command: Literal["continuous", "zoh", "foh"] = "continuous"
+    name: str = "sensor"
+    input_name: str = "u"
+    output_name: str = "y"
+    limits: Limits | None = None
+
+    def __post_init__(self) -> None:
+        for field in ("hold_phase", "scale_factor", "bias"):
+            _check(field, getattr(self, field))
+        for field in ("delay", "noise_std"):
+            _check(field, getattr(self, field), above=0.0, or_equal=True)
+        for field in ("hold_period", "natural_frequency", "damping_ratio", "time_constant"):
+            _check(field, getattr(self, field), above=0.0)
+        _check("quantization_step", self.quantization_step, above=0.0)
+        _check("saturation_low", self.saturation_low)
+        _check("saturation_high", self.saturation_high)
+        _check("noise_colour", self.noise_colour)
+        if abs(self.noise_colour) >= 1.0:
+            raise ArgumentError(
+                f"noise_colour = {self.noise_colour!r} makes noise that grows without end; "
+                "give a coefficient between -1 and 1"
+            )
+        if (self.natural_frequency is None) != (self.damping_ratio is None):
+            raise ArgumentError(
+                f"natural_frequency = {self.natural_frequency!r} and damping_ratio = "
+                f"{self.damping_ratio!r} belong together; give both or neither"
+            )
+        if self.time_constant is not None and self.natural_frequency is not None:
+            raise ArgumentError(
+                f"time_constant = {self.time_constant!r} s and natural_frequency = "
+                f"{self.natural_frequency!r} Hz are two kinds of dynamics; give one of them"
+            )
+        low, high = self.saturation_low, self.saturation_high
+        if low is not None and high is not None and low >= high:
+            raise ArgumentError(
+                f"saturation_low = {low!r} is not below saturation_high = {high!r}; swap them"
+            )
+        if self.output_unit is not None:
+            check_unit(self.output_unit)
+        for field, known in (
+            ("measures", ("position", "velocity", "acceleration")),
+            ("command", ("continuous", "zoh", "foh")),
+        ):
+            if getattr(self, field) not in known:
+                raise ArgumentError(
+                    f"{field} = {getattr(self, field)!r} is not known; use one of {known}"
+                )
+
+    def play(self, stimulus: Stimulus, *, rng: np.random.Generator) -> Record:
+        """Measure the stimulus's motion, and record it with what was read.
+
+        Parameters
+        ----------
+        stimulus : Stimulus
+            The motion. Before its time 0 the sensor is at rest.
+        rng : numpy.random.Generator
+            Source of the noise; not touched without noise.
+
+        Returns
+        -------
+        Record
+            Input and output at the stimulus's sample times; `intersample` says what went in
+            between them: 'bandlimited' for the motion itself.
+
+        Examples
+        --------
+        >>> from hmpim.stimulus import Ramp, Stimulus
+        >>> ramp = Stimulus(waveform=Ramp(duration=1.0), fs=4.0)
+        >>> record = Sensor(delay=0.1).play(ramp, rng=np.random.default_rng(0))
+        >>> record.outputs[0].values.round(9).tolist()
+        [0.0, 0.15, 0.4, 0.65]
+        """
+        order = ("position", "velocity", "acceleration").index(self.measures)
+        commanded: FloatArray = getattr(stimulus, self.measures)
+        intersample: Intersample
+        if self.command == "continuous":
+            intersample = "bandlimited"
+
+            def motion(t: FloatArray) -> FloatArray:
+                return np.asarray(getattr(stimulus.motion(t), self.measures))
+
+            u = ContinuousInput(
+                at=motion, rest=float(motion(np.array([-1.0]))[0]), breaks=np.zeros(1)
+            )
+        else:
+            intersample = self.command
+            u = between_samples(commanded, stimulus.fs, self.command)
+        read = self._read(u, fs=stimulus.fs, count=stimulus.samples, rng=rng)
+        in_unit = rate_unit(stimulus.unit, order)
+        out_unit = in_unit if self.output_unit is None else self.output_unit
+        return Record(
+            inputs=(
+                Channel(name=self.input_name, time=stimulus.time, values=commanded, unit=in_unit),
+            ),
+            outputs=(
+                Channel(name=self.output_name, time=stimulus.time, values=read, unit=out_unit),
+            ),
+            fs=stimulus.fs,
+            band=stimulus.band,
+            intersample=intersample,
+            source=f"simulated {self.name}",
+        )
+
+    def respond(
+        self,
+        values: ArrayLike,
+        *,
+        fs: float,
+        intersample: Intersample = "bandlimited",
+        rng: np.random.Generator | int | None = None,
+    ) -> FloatArray:
+        """Measure any sampled signal.
+
+        Parameters
+        ----------
+        values : array_like, shape (n,)
+            The input at k/fs; at rest at its first value before that.
+        fs : float
+            Rate in Hz.
+        intersample : {'bandlimited', 'foh', 'zoh'}
+            What the input does between its samples: smooth, linear, held.
+        rng : numpy.random.Generator, int or None
+            Source of the noise, or its seed.
+
+        Returns
+        -------
+        ndarray, shape (n,)
+            What is read at k/fs, in the output's unit.
+
+        Raises
+        ------
+        ArgumentError
+            If the values are not finite numbers of shape (n,), n >= 2, or `fs` is not positive.
+
+        Examples
+        --------
+        >>> Sensor(scale_factor=2.0, delay=0.5).respond([0, 1, 2], fs=1.0, intersample="foh")
+        array([0., 1., 3.])
+        """
+        try:
+            samples = np.asarray(values, dtype=np.float64)
+        except (TypeError, ValueError):
+            raise ArgumentError("the input holds something that is not a number") from None
+        if samples.ndim != 1 or samples.size < 2 or not np.all(np.isfinite(samples)):
+            raise ArgumentError(
+                f"the input has shape {samples.shape} and {np.count_nonzero(~np.isfinite(samples))}"
+                " values that are not finite; give two or more finite samples, shape (n,)"
+            )
+        _check("fs", fs, above=0.0)
+        if intersample not in ("zoh", "foh", "bandlimited"):
+            raise ArgumentError(
+                f"intersample = {intersample!r} is not known; use 'zoh', 'foh' or 'bandlimited'"
+            )
+        u = between_samples(samples, fs, intersample)
+        return self._read(u, fs=fs, count=samples.size, rng=np.random.default_rng(rng))
+
+    @property
+    def poles(self) -> Poles | None:
+        """Poles of the dynamics, None for a static sensor."""
+        if self.time_constant is not None:
+            return first_order(self.time_constant)
+        if self.natural_frequency is not None and self.damping_ratio is not None:
+            return second_order(self.natural_frequency, self.damping_ratio)
+        return None
+
+    def _read(
+        self, u: ContinuousInput, *, fs: float, count: int, rng: np.random.Generator
+    ) -> FloatArray:
+        """What is read at k/fs, k = 0 ... count - 1."""
+        start, step, readings = 0.0, 1.0 / fs, count
+        if self.hold_period is not None:
+            step = self.hold_period
+            if step * fs < 0.02:
+                raise ArgumentError(
+                    f"hold_period = {step!r} s is less than a fiftieth of the sampling interval "
+                    f"{1 / fs:.6g} s and makes no difference; leave it None"
+                )
+            first = math.floor(-self.hold_phase / step + _GRACE)
+            last = math.floor(((count - 1) / fs - self.hold_phase) / step + _GRACE)
+            start = self.hold_phase + first * step
+            readings = last - first + 1
+        poles = self.poles
+        if poles is None:
+            moved = u.at(np.asarray(start - self.delay + np.arange(readings) * step))
+        else:
+            moved = respond(poles, u, start=start, step=step, count=readings, delay=self.delay)
+        reading = self.scale_factor * moved + self.bias
+        if self.noise_std > 0.0:
+            reading = reading + self._noise(readings, rng)
+        if self.saturation_low is not None or self.saturation_high is not None:
+            reading = np.clip(reading, self.saturation_low, self.saturation_high)
+        if self.hold_period is not None:
+            index = np.floor((np.arange(count) / fs - start) / step + _GRACE).astype(np.int64)
+            reading = reading[index]
+        if self.quantization_step is not None:
+            reading = self.quantization_step * np.rint(reading / self.quantization_step)
+        return np.asarray(reading)
+
+    def _noise(self, count: int, rng: np.random.Generator) -> FloatArray:
+        """Stationary AR(1) noise of standard deviation `noise_std`, shape (count,)."""
+        white = rng.standard_normal(count)
+        c = self.noise_colour
+        if c == 0.0:
+            return self.noise_std * white
+        fed = math.sqrt(1.0 - c * c) * white
+        fed[0] = white[0]  # starts in its steady state
+        return np.asarray(self.noise_std * lfilter([1.0], [1.0, -c], fed))
+
+
+def _check(
+    field: str, value: float | None, *, above: float | None = None, or_equal: bool = False
+) -> None:
+    """Refuse what is not a finite number, or not above a bound; None passes."""
+    if value is None:
+        return
+    number = isinstance(value, (int, float, np.integer, np.floating))
+    if not number or isinstance(value, bool) or not math.isfinite(value):
+        raise ArgumentError(f"{field} = {value!r} is not a finite number; give one")
+    if above is not None and not (value > above or (or_equal and value == above)):
+        least = "at least" if or_equal else "more than"
+        raise ArgumentError(f"{field} = {value!r} is out of range; it must be {least} {above:g}")
