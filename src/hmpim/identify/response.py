@@ -1,0 +1,317 @@
+"""Reading a frequency response: magnitude, phase, bandwidths, damping (equations 19-25, Fig. 16).
+
+Phases are in degrees here, as in the paper's figures, and lag is negative.
+"""
+
+import math
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from hmpim.errors import ArgumentError
+
+__all__ = [
+    "bandwidth_3db",
+    "bandwidth_phase90",
+    "damping_from_hump",
+    "delay_phase",
+    "falling_crossing",
+    "magnitude",
+    "natural_frequency",
+    "near_dc",
+    "peak_gain",
+    "phase",
+    "phase_without_delay",
+]
+
+# "Near DC" is the lowest twentieth of the excited band.
+_NEAR_DC = 0.05
+
+
+def magnitude(response: ArrayLike) -> NDArray[np.float64]:
+    """Return |G| by equation (24), |G|² = R² + I², with R and I of equations (19)-(21).
+
+    Parameters
+    ----------
+    response : array_like of complex, shape (m,)
+        G(jω) = R(jω) + jI(jω).
+
+    Returns
+    -------
+    ndarray, shape (m,)
+        Magnitude, in the response's unit.
+
+    Examples
+    --------
+    >>> magnitude([3 + 4j, -2])
+    array([5., 2.])
+    """
+    g = np.asarray(response, dtype=np.complex128)
+    return np.hypot(g.real, g.imag)
+
+
+def phase(response: ArrayLike, *, inverted: bool = False) -> NDArray[np.float64]:
+    """Return the phase φ of equation (23), tan φ = I/R, in degrees and without jumps.
+
+    The arctangent takes the quadrant from the signs of R and I, and the phase is followed
+    from the first frequency upwards, whole turns added so that no step exceeds 180°. Pass
+    the excited band only: outside it the phase is noise, and would carry false turns in. The
+    turns are set so that the lowest twentieth of the band lies, in the median, within 180°
+    of zero.
+
+    Parameters
+    ----------
+    response : array_like of complex, shape (m,)
+        G(jω) inside the excited band, frequency increasing, all finite.
+    inverted : bool
+        True for a device that turns the sign: the phase is then that of -G.
+
+    Returns
+    -------
+    ndarray, shape (m,)
+        Phase in degrees.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> phase(np.exp(-1j * np.radians([10, 110, 210, 310, 410]))).round(6)
+    array([ -10., -110., -210., -310., -410.])
+    """
+    g = np.asarray(response, dtype=np.complex128)
+    if inverted:
+        g = -g
+    if g.size == 0:
+        return np.zeros(0)
+    turning = np.degrees(np.unwrap(np.angle(g)))
+    start = float(np.median(turning[: near_dc(g.size)]))
+    return turning - 360.0 * round(start / 360.0)
+
+
+def near_dc(bins: int) -> int:
+    """Return how many of a band's bins count as near DC: the lowest twentieth, at least one.
+
+    Examples
+    --------
+    >>> near_dc(800)
+    40
+    """
+    return max(math.ceil(_NEAR_DC * bins), 1)
+
+
+def delay_phase(frequency: ArrayLike, delay: float) -> NDArray[np.float64]:
+    """Return the phase of a pure delay by equation (25): -ω δ, in degrees.
+
+    Parameters
+    ----------
+    frequency : array_like, shape (m,)
+        Hz.
+    delay : float
+        δ in s.
+
+    Returns
+    -------
+    ndarray, shape (m,)
+        Degrees: -360 f δ.
+
+    Examples
+    --------
+    >>> delay_phase([0.0, 1.0, 2.0], 0.125)
+    array([ -0., -45., -90.])
+    """
+    return -360.0 * np.asarray(frequency, dtype=np.float64) * delay
+
+
+def phase_without_delay(
+    frequency: ArrayLike, phase: ArrayLike, delay: float
+) -> NDArray[np.float64]:
+    """Return the phase with the delay's part (25) taken out, as in Fig. 16.
+
+    Parameters
+    ----------
+    frequency, phase : array_like, shape (m,)
+        Hz, and degrees without jumps.
+    delay : float
+        Delay in s; in the paper the one from the cross-correlation.
+
+    Returns
+    -------
+    ndarray, shape (m,)
+        Degrees.
+
+    Examples
+    --------
+    >>> phase_without_delay([1.0, 2.0], [-46.0, -93.0], 0.125)
+    array([-1., -3.])
+    """
+    return np.asarray(phase, dtype=np.float64) - delay_phase(frequency, delay)
+
+
+def falling_crossing(frequency: ArrayLike, curve: ArrayLike, level: float) -> float | None:
+    """Return the first frequency at which a curve falls through a level, between the bins too.
+
+    Parameters
+    ----------
+    frequency : array_like, shape (m,)
+        Increasing, in Hz.
+    curve : array_like, shape (m,)
+        Finite values.
+    level : float
+        In the curve's unit.
+
+    Returns
+    -------
+    float or None
+        Hz, interpolated linearly; None if the curve starts below the level or never falls
+        through it.
+
+    Raises
+    ------
+    ArgumentError
+        If `frequency` and `curve` differ in shape.
+
+    Examples
+    --------
+    >>> falling_crossing([1.0, 2.0, 3.0], [0.0, -80.0, -120.0], -90.0)
+    2.25
+    """
+    f = np.asarray(frequency, dtype=np.float64)
+    c = np.asarray(curve, dtype=np.float64)
+    if f.shape != c.shape or f.ndim != 1:
+        raise ArgumentError(
+            f"frequency has shape {f.shape} and the curve {c.shape}; give both as (m,)"
+        )
+    above = c >= level
+    if c.size < 2 or not above[0]:
+        return None
+    falls = np.flatnonzero(above[:-1] & ~above[1:])
+    if falls.size == 0:
+        return None
+    k = int(falls[0])
+    return float(f[k] + (f[k + 1] - f[k]) * (c[k] - level) / (c[k] - c[k + 1]))
+
+
+def bandwidth_phase90(frequency: ArrayLike, phase: ArrayLike) -> float | None:
+    """Return the effective bandwidth: where the phase, delay included, falls through -90°.
+
+    The paper's basic measure of merit (Fig. 15).
+
+    Parameters
+    ----------
+    frequency, phase : array_like, shape (m,)
+        Hz, and degrees without jumps, inside the excited band.
+
+    Returns
+    -------
+    float or None
+        Hz; None if the phase does not pass -90° inside the band.
+
+    Examples
+    --------
+    >>> bandwidth_phase90([1.0, 2.0, 3.0], [-45.0, -90.0, -135.0])
+    2.0
+    """
+    return falling_crossing(frequency, phase, -90.0)
+
+
+def bandwidth_3db(frequency: ArrayLike, magnitude: ArrayLike, dc_gain: float) -> float | None:
+    """Return where the magnitude falls to 1/√2 of the gain at DC (-3.01 dB).
+
+    Parameters
+    ----------
+    frequency, magnitude : array_like, shape (m,)
+        Hz, and |G| inside the excited band.
+    dc_gain : float
+        |G| at DC, same unit.
+
+    Returns
+    -------
+    float or None
+        Hz; None if the magnitude does not fall that far inside the band.
+
+    Examples
+    --------
+    >>> round(bandwidth_3db([1.0, 2.0, 3.0], [1.0, 0.8, 0.6], 1.0), 3)
+    2.464
+    """
+    return falling_crossing(frequency, magnitude, dc_gain / math.sqrt(2))
+
+
+def natural_frequency(frequency: ArrayLike, phase_without_delay: ArrayLike) -> float | None:
+    """Return the natural frequency of a quadratic lag: -90° once the delay is out (Fig. 16).
+
+    Parameters
+    ----------
+    frequency, phase_without_delay : array_like, shape (m,)
+        Hz, and degrees, from `phase_without_delay`.
+
+    Returns
+    -------
+    float or None
+        Hz; None if the remaining phase does not pass -90° inside the band.
+
+    Examples
+    --------
+    >>> natural_frequency([8.0, 12.0], [-80.0, -100.0])
+    10.0
+    """
+    return falling_crossing(frequency, phase_without_delay, -90.0)
+
+
+def peak_gain(magnitude: ArrayLike) -> float | None:
+    """Return the hump of Fig. 16: the greatest magnitude relative to the gain near DC.
+
+    The gain near DC is the median over the lowest twentieth of the band.
+
+    Parameters
+    ----------
+    magnitude : array_like, shape (m,)
+        |G| inside the excited band, frequency increasing.
+
+    Returns
+    -------
+    float or None
+        Ratio above 1; None if there is no hump: the greatest magnitude is at either end of
+        the band, or no more than what is found near DC.
+
+    Examples
+    --------
+    >>> peak_gain([1.0, 1.1, 1.4, 0.9])
+    1.4
+    """
+    g = np.asarray(magnitude, dtype=np.float64)
+    if g.size < 3:
+        return None
+    start = near_dc(g.size)
+    top = int(np.argmax(g))
+    gain = float(np.median(g[:start]))
+    if top < start or top == g.size - 1 or gain <= 0:
+        return None
+    return float(g[top]) / gain
+
+
+def damping_from_hump(peak: float) -> float | None:
+    """Return the damping ratio of a quadratic lag from its hump (Fig. 16).
+
+    |G|max/|G(0)| = 1/(2ζ√(1-ζ²)) is solved for the ζ below 1/√2, beyond which there is no
+    hump.
+
+    Parameters
+    ----------
+    peak : float
+        Greatest magnitude relative to DC.
+
+    Returns
+    -------
+    float or None
+        ζ, 0 to 0.707; None if `peak` is not above 1.
+
+    Examples
+    --------
+    >>> round(damping_from_hump(1.3639), 3)
+    0.4
+    """
+    if not peak > 1 or not math.isfinite(peak):
+        return None
+    # ζ² = (1 - √(1 - 1/p²))/2, in the form that does not cancel for sharp resonances.
+    inverse = 1.0 / (peak * peak)
+    return math.sqrt(inverse / (2.0 * (1.0 + math.sqrt(1.0 - inverse))))

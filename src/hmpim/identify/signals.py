@@ -1,0 +1,103 @@
+"""What may be analysed: finite real samples, as many in as out, at a positive rate."""
+
+import math
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from hmpim.errors import ArgumentError, RecordError
+
+__all__ = ["as_pair", "as_signal", "check_band", "check_rate"]
+
+_FEWEST_SAMPLES = 4
+
+
+def as_signal(name: str, values: ArrayLike) -> NDArray[np.float64]:
+    """Return `values` as finite samples of shape (n,), n >= 4; no copy where none is needed.
+
+    Raises
+    ------
+    RecordError
+        For the wrong shape, fewer than four samples, NaN or infinity.
+
+    Examples
+    --------
+    >>> as_signal("u", [0, 1, 2, 3])
+    array([0., 1., 2., 3.])
+    """
+    try:
+        array = np.asarray(values, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise RecordError(f"{name} is not numeric ({error}); give real numbers") from None
+    if array.ndim != 1:
+        raise RecordError(f"{name} has shape {array.shape}; give one dimension, shape (n,)")
+    if array.size < _FEWEST_SAMPLES:
+        raise RecordError(
+            f"{name} has {array.size} samples; give at least {_FEWEST_SAMPLES}, "
+            "better thousands over 5 to 10 s"
+        )
+    # One pass: a sum is finite only if no sample is NaN or infinite (or if it overflows).
+    if not math.isfinite(float(array.sum())):
+        bad = np.flatnonzero(~np.isfinite(array))
+        if bad.size:
+            raise RecordError(
+                f"{name} holds {array[bad[0]]} at sample {bad[0]}; cut it out or fill it first"
+            )
+    return array
+
+
+def as_pair(u: ArrayLike, y: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return input and output as samples of the same shape (n,).
+
+    Raises
+    ------
+    RecordError
+        As `as_signal`, and for unequal lengths.
+
+    Examples
+    --------
+    >>> u, y = as_pair([0, 1, 2, 3], [0, 2, 4, 6])
+    >>> y
+    array([0., 2., 4., 6.])
+    """
+    first, second = as_signal("u", u), as_signal("y", y)
+    if first.size != second.size:
+        raise RecordError(
+            f"u has {first.size} samples and y has {second.size}; cut them to the same span"
+        )
+    return first, second
+
+
+def check_rate(fs: float) -> None:
+    """Refuse a sampling rate that is not a positive number of Hz.
+
+    Raises
+    ------
+    ArgumentError
+        If `fs` is zero, negative, NaN or infinite.
+
+    Examples
+    --------
+    >>> check_rate(200.0)
+    """
+    if not (math.isfinite(fs) and fs > 0):
+        raise ArgumentError(f"fs is {fs}; give the sampling rate as a positive number of Hz")
+
+
+def check_band(band: tuple[float, float], fs: float) -> None:
+    """Refuse a band that is not 0 <= low < high <= fs/2, in Hz.
+
+    Raises
+    ------
+    ArgumentError
+        If the band is empty, negative, NaN or beyond the Nyquist frequency.
+
+    Examples
+    --------
+    >>> check_band((0.1, 20.0), 200.0)
+    """
+    low, high = band
+    if not (0 <= low < high <= fs / 2):
+        raise ArgumentError(
+            f"band is ({low}, {high}) Hz; give 0 <= low < high <= fs/2 = {fs / 2:g} Hz"
+        )

@@ -1,0 +1,274 @@
+"""Windowed, padded spectra and their ratio (paper, section IV.D, equations 17-18)."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy import fft
+
+from hmpim.errors import ArgumentError, RecordError
+from hmpim.identify.signals import as_pair, as_signal, check_rate
+from hmpim.identify.windows import WindowName, window_samples
+
+__all__ = [
+    "Spectrum",
+    "TransferFunction",
+    "decibel",
+    "excited_band",
+    "padding",
+    "spectrum",
+    "transfer_function",
+]
+
+_SMALLEST = 1e-300  # keeps the logarithm of an exact zero finite: -6000 dB
+_EDGE = 10 ** (-12 / 20)
+_DEEPEST = 10 ** (-50 / 20)
+_TOP_IS_SIGNAL = 10 ** (-30 / 20)
+_ABOVE_FLOOR = 10 ** (12 / 20)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Spectrum:
+    """Discrete Fourier transform of a real signal, its non-negative frequencies.
+
+    Parameters
+    ----------
+    frequency : ndarray, shape (m,)
+        Hz, from 0 to at most fs/2.
+    value : complex ndarray, shape (m,)
+        X of equation (17), in the signal's unit, not divided by the number of samples.
+    """
+
+    frequency: NDArray[np.float64]
+    value: NDArray[np.complex128]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class TransferFunction:
+    """Ratio of response to stimulus over frequency.
+
+    Parameters
+    ----------
+    frequency : ndarray, shape (m,)
+        Hz, increasing.
+    response : complex ndarray, shape (m,)
+        G(jω), output unit per input unit; NaN where the stimulus has nothing at all.
+    """
+
+    frequency: NDArray[np.float64]
+    response: NDArray[np.complex128]
+
+
+def padding(samples: int) -> int:
+    """Return the number of zeros that fills a record to about four times its length.
+
+    Four times resolves the spectrum between its bins (the paper's picket fence, IV.D.3); the
+    length is one that the FFT does fast.
+
+    Examples
+    --------
+    >>> padding(2000)
+    6000
+    """
+    return int(fft.next_fast_len(4 * samples, real=True)) - samples
+
+
+def spectrum(
+    x: ArrayLike,
+    fs: float,
+    *,
+    window: WindowName = "gaussian",
+    alpha: float = 1.5,
+    pad: int | None = None,
+) -> Spectrum:
+    """Return the transform of equation (17) of the windowed signal, zeros padded after it.
+
+    X(k) = Σ x(j) ω_N^((j-1)(k-1)), j = 1 … N, with ω_N = exp(-2πi/N) and N the padded length.
+    The window covers the true signal only; the zeros come after it and are never windowed.
+
+    Parameters
+    ----------
+    x : array_like, shape (n,)
+        Signal.
+    fs : float
+        Sampling rate, Hz.
+    window : str
+        Name of the window, see `WindowName`.
+    alpha : float
+        Shape of the Gaussian window.
+    pad : int or None
+        Number of zeros after the signal; None takes `padding`.
+
+    Returns
+    -------
+    Spectrum
+        At (n + pad)//2 + 1 frequencies from 0 to at most fs/2.
+
+    Raises
+    ------
+    RecordError
+        For fewer than four samples, NaN or infinity.
+    ArgumentError
+        For an `fs` that is not positive, a negative `pad`, or a window that is not known.
+
+    Examples
+    --------
+    >>> x = spectrum([1.0, 1.0, 1.0, 1.0], fs=4.0, window="rectangular", pad=4)
+    >>> x.frequency
+    array([0. , 0.5, 1. , 1.5, 2. ])
+    >>> abs(x.value[0]).item()
+    4.0
+    """
+    array = as_signal("x", x)
+    check_rate(fs)
+    zeros = padding(array.size) if pad is None else pad
+    if zeros < 0:
+        raise ArgumentError(f"pad is {zeros}; give the number of zeros to add, 0 or more")
+    length = array.size + zeros
+    tapered = array * window_samples(window, array.size, alpha=alpha)
+    return Spectrum(
+        frequency=np.asarray(fft.rfftfreq(length, 1 / fs), dtype=np.float64),
+        value=np.asarray(fft.rfft(tapered, length)),
+    )
+
+
+def decibel(value: ArrayLike) -> NDArray[np.float64]:
+    """Return 20 log10 |value|; an exact zero becomes -6000 dB.
+
+    Examples
+    --------
+    >>> decibel([1.0, -10.0])
+    array([ 0., 20.])
+    """
+    level = 20 * np.log10(np.maximum(np.abs(np.asarray(value)), _SMALLEST))
+    return np.asarray(level, dtype=np.float64)
+
+
+def transfer_function(
+    u: ArrayLike,
+    y: ArrayLike,
+    fs: float,
+    *,
+    window: WindowName = "gaussian",
+    alpha: float = 1.5,
+    pad: int | None = None,
+) -> TransferFunction:
+    """Return the paper's transfer function, equation (18): FFT(response) / FFT(stimulus).
+
+    Both signals get the same window and the same zeros, see `spectrum`. Nothing is averaged
+    and nothing is removed first. It is meaningful only where the stimulus has content, see
+    `excited_band`; a late response stands elsewhere under the window than its stimulus, which
+    a window makes worse, not better.
+
+    Parameters
+    ----------
+    u, y : array_like, shape (n,)
+        Stimulus and response on one clock.
+    fs : float
+        Sampling rate, Hz.
+    window, alpha, pad
+        As in `spectrum`.
+
+    Returns
+    -------
+    TransferFunction
+        At (n + pad)//2 + 1 frequencies from 0 to at most fs/2.
+
+    Raises
+    ------
+    RecordError
+        For unequal lengths, fewer than four samples, NaN or infinity.
+    ArgumentError
+        As `spectrum`.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> u = np.sin(np.arange(200) ** 2 / 500)
+    >>> g = transfer_function(u, -2 * u, fs=100.0)
+    >>> bool(np.allclose(g.response, -2))
+    True
+    """
+    stimulus, response = as_pair(u, y)
+    below = spectrum(stimulus, fs, window=window, alpha=alpha, pad=pad)
+    above = spectrum(response, fs, window=window, alpha=alpha, pad=pad)
+    return TransferFunction(frequency=below.frequency, response=ratio(above.value, below.value))
+
+
+def ratio(y: NDArray[np.complex128], u: NDArray[np.complex128]) -> NDArray[np.complex128]:
+    """Return y / u, NaN where u is zero.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> ratio(np.array([2 + 0j, 1]), np.array([1 + 0j, 0]))
+    array([ 2. +0.j, nan+nanj])
+    """
+    out = np.full(y.shape, complex(np.nan, np.nan))
+    np.divide(y, u, out=out, where=u != 0)
+    return out
+
+
+def excited_band(u: ArrayLike, fs: float) -> tuple[float, float]:
+    """Return the band that a stimulus excites, found from its spectrum.
+
+    Lowest frequency: the first at which |U| is within 12 dB of its greatest. Highest: the
+    last at which the velocity spectrum |f U| is within 12 dB of its greatest. A sweep's
+    position spectrum falls with its extinction, 1/f for n = 1, while its velocity spectrum
+    stays level up to the end of the sweep: so the end shows in the velocity, the start in
+    the position. The spectrum is that of the whole record without its mean, its power
+    averaged over five bins. Left out are bins more than 50 dB below the greatest, and, unless
+    the top twentieth of the spectrum is itself within 30 dB of the greatest, bins less than
+    12 dB above the median there, which is what noise on a measured stimulus leaves.
+
+    Parameters
+    ----------
+    u : array_like, shape (n,)
+        Stimulus.
+    fs : float
+        Sampling rate, Hz.
+
+    Returns
+    -------
+    low, high : float
+        Hz, with 0 < low < high <= fs/2, on the bins of the record (multiples of fs/n).
+
+    Raises
+    ------
+    RecordError
+        If the stimulus is constant, or for fewer than four samples, NaN or infinity.
+    ArgumentError
+        If `fs` is not positive.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> t = np.arange(2000) / 200
+    >>> low, high = excited_band(np.sin(2 * np.pi * (2 * t + 0.5 * t**2)), fs=200.0)  # 2 to 12 Hz
+    >>> 1.5 < low < 2 < 12 < high < 12.7
+    True
+    """
+    array = as_signal("u", u)
+    check_rate(fs)
+    centred = array - array.mean()
+    if not np.any(np.abs(centred) > 1e-12 * np.max(np.abs(array))):
+        raise RecordError(f"u is constant at {array[0]:g}; a stimulus must move")
+    n = array.size
+    length = int(fft.next_fast_len(n, real=True))
+    power = np.abs(fft.rfft(centred, length)) ** 2
+    power[0] = 0.0
+    # A running sum of the power, so that lines of a multisine and ripples do not matter.
+    running = np.concatenate(([0.0], np.cumsum(np.concatenate(([0, 0], power, [0, 0])))))
+    level = np.sqrt(np.maximum(running[5:] - running[:-5], 0.0))
+    level[0] = 0.0
+    frequency = np.arange(level.size) * (fs / length)
+    top = float(level.max())
+    floor = _DEEPEST * top
+    ceiling = float(np.median(level[-max(level.size // 20, 1) :]))
+    if ceiling < _TOP_IS_SIGNAL * top:
+        floor = max(floor, _ABOVE_FLOOR * ceiling)
+    velocity = np.where(level >= floor, level * frequency, 0.0)
+    low = int(np.argmax(level >= _EDGE * top))
+    high = int(np.flatnonzero(velocity >= _EDGE * velocity.max())[-1])
+    high = max(high, low + 1)
+    return float(frequency[low]), min(float(frequency[high]), fs / 2)

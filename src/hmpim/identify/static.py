@@ -1,0 +1,187 @@
+"""Scale factor and bias, the paper's way (equations 9 and 11 to 13)."""
+
+import math
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from hmpim.errors import ArgumentError
+from hmpim.identify.signals import as_pair, as_signal
+
+__all__ = [
+    "bias_by_autocorrelation",
+    "initial_period",
+    "scale_factor_near_dc",
+    "time_corrected_error",
+]
+
+# Equation (13) divides by the excitation: only points above this part of the peak count.
+_NONZERO = 0.5
+# A crossing of zero counts once the excitation has gone this part of its peak beyond it.
+_HYSTERESIS = 0.05
+
+
+def time_corrected_error(u: ArrayLike, y: ArrayLike, lag: int) -> NDArray[np.float64]:
+    """Return the time-corrected measurement error of equation (9): truth minus measurement.
+
+    ε_meas(n) = u(n) - y(n + lag), for the n at which both exist. The paper writes n - δ; the
+    measurement is late, so that its sample to compare with u(n) stands δ later in the record.
+
+    Parameters
+    ----------
+    u, y : array_like, shape (n,)
+        True and measured signal, in one unit.
+    lag : int
+        Processing delay in samples, 0 <= lag <= n - 4.
+
+    Returns
+    -------
+    ndarray, shape (n - lag,)
+        Error, in the unit of `u` and `y`.
+
+    Raises
+    ------
+    RecordError
+        For unequal lengths, fewer than four samples, NaN or infinity.
+    ArgumentError
+        If `lag` is negative or leaves fewer than four samples.
+
+    Examples
+    --------
+    >>> time_corrected_error([1, 2, 3, 4, 5], [9, 0, 1, 2, 3], lag=1)
+    array([1., 1., 1., 1.])
+    """
+    truth, measured = as_pair(u, y)
+    if not 0 <= lag <= truth.size - 4:
+        raise ArgumentError(f"lag is {lag} samples; give 0 to {truth.size - 4} for this record")
+    return truth[: truth.size - lag] - measured[lag:]
+
+
+def bias_by_autocorrelation(error: ArrayLike) -> float:
+    """Return the paper's measurement bias K_C of equation (11): the r.m.s. error.
+
+    K_C = √R(0), with R the autocorrelation (10) of the time-corrected error. This is the bias
+    only if there is nothing else in the error; noise, and all that the dynamics leave over,
+    are in it too (0.68 for the true 0.6 of the paper's Fig. 17). The root has two signs: the
+    one taken is that of the mean of measurement minus truth, as read off Fig. 10.
+
+    Parameters
+    ----------
+    error : array_like, shape (n,)
+        Time-corrected error of equation (9), truth minus measurement.
+
+    Returns
+    -------
+    float
+        Bias of the measurement, in the unit of the error.
+
+    Raises
+    ------
+    RecordError
+        For fewer than four samples, NaN or infinity.
+
+    Examples
+    --------
+    >>> bias_by_autocorrelation([-0.6, -0.6, -0.6, -0.6])
+    0.6
+    """
+    array = as_signal("error", error)
+    # R(0) alone needs no transform: it is the mean square, see `autocorrelation`.
+    rms = math.sqrt(float(array @ array) / array.size)
+    return -rms if array.mean() > 0 else rms
+
+
+def initial_period(u: ArrayLike) -> int:
+    """Return how many samples the first full cycle of the excitation takes.
+
+    The sweep begins near DC, so its first cycle is the "initial period" from which the paper
+    reads the scale factor. The cycle ends where the excitation crosses zero for the second
+    time; crossings within 5 % of the peak are not counted, so that noise on a measured
+    excitation does not end the cycle early. An excitation that never completes a cycle, such
+    as a step, is taken whole.
+
+    Parameters
+    ----------
+    u : array_like, shape (n,)
+        Excitation.
+
+    Returns
+    -------
+    int
+        Number of samples, 1 to n.
+
+    Raises
+    ------
+    RecordError
+        For fewer than four samples, NaN or infinity.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> initial_period(np.sin(2 * np.pi * np.arange(500) / 100 - 1e-9))
+    101
+    """
+    excitation = as_signal("u", u)
+    threshold = _HYSTERESIS * float(np.max(np.abs(excitation)))
+    side = np.where(excitation > threshold, 1, np.where(excitation < -threshold, -1, 0))
+    beyond = np.flatnonzero(side)
+    if beyond.size == 0:
+        return excitation.size
+    turns = beyond[1:][np.diff(side[beyond]) != 0]
+    if turns.size < 2:
+        return excitation.size
+    # From the sample that proves the second crossing back to the crossing itself.
+    proof = int(turns[1])
+    same_side = excitation[: proof + 1] * excitation[proof] > 0
+    return proof - int(np.argmin(same_side[::-1])) + 1
+
+
+def scale_factor_near_dc(u: ArrayLike, y: ArrayLike, lag: int, bias: float) -> float | None:
+    """Return the paper's scale factor K_ε of equations (12) and (13).
+
+    y(n + lag) = u(n) K_ε + K_C (12) is solved for K_ε at the non-zero points of the initial
+    period (13): those at least half as far from zero as the peak on their side. The mean
+    over the points above zero and the mean over those below count alike, so that what is
+    wrong with `bias` cancels between the two half-cycles.
+
+    Parameters
+    ----------
+    u, y : array_like, shape (n,)
+        Excitation and measurement.
+    lag : int
+        Processing delay in samples, 0 <= lag <= n - 4.
+    bias : float
+        K_C, in the unit of `y`.
+
+    Returns
+    -------
+    float or None
+        Scale factor, unit of `y` per unit of `u`; None if the excitation is zero throughout.
+
+    Raises
+    ------
+    RecordError
+        For unequal lengths, fewer than four samples, NaN or infinity.
+    ArgumentError
+        If `lag` is negative or leaves fewer than four samples.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> u = np.sin(2 * np.pi * np.arange(300) / 100)
+    >>> round(scale_factor_near_dc(u, 1.02 * u + 0.6, lag=0, bias=0.6), 9)
+    1.02
+    """
+    truth, measured = as_pair(u, y)
+    if not 0 <= lag <= truth.size - 4:
+        raise ArgumentError(f"lag is {lag} samples; give 0 to {truth.size - 4} for this record")
+    count = min(initial_period(truth), truth.size - lag)
+    excitation = truth[:count]
+    corrected = measured[lag : lag + count]
+    means = []
+    for side in (excitation, -excitation):
+        top = float(side.max())
+        if top > 0:
+            used = side >= _NONZERO * top
+            means.append(float(np.mean((corrected[used] - bias) / excitation[used])))
+    return sum(means) / len(means) if means else None
