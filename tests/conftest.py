@@ -14,7 +14,9 @@ DATA = Path(__file__).parents[2] / "shared" / "data"
 def measured():
     """Folder of measured records; the test is skipped where it is absent."""
     if not DATA.is_dir():
-        pytest.skip(f"measured records are not here: no folder ../shared/data beside {DATA.parents[1].name}")
+        pytest.skip(
+            f"measured records are not here: no folder ../shared/data beside {DATA.parents[1].name}"
+        )
     return DATA
 
 
@@ -70,7 +72,5 @@ def field_record():
     Second order 10 Hz, ζ 0.4, delay 150 ms, bias 0.6, 10 s at 200 Hz.
     """
     time = np.arange(2000) / 200.0
-    y = second_order_lag(
-        time, field_chirp, delay=0.15, natural_frequency=10.0, damping_ratio=0.4
-    )
+    y = second_order_lag(time, field_chirp, delay=0.15, natural_frequency=10.0, damping_ratio=0.4)
     return time, field_chirp(time), y + 0.6

@@ -1,1 +1,68 @@
-"""One short, safe excitation; every parameter of a simulation model; an honest error bar on each."""
+"""One short, safe excitation; every parameter a simulation needs; an honest error bar on each.
+
+>>> import hmpim
+>>> limits = hmpim.Limits(position=10, velocity=1000, acceleration=40000, unit="deg")
+>>> stimulus = hmpim.design(band=(0.1, 20), duration=10, fs=200, limits=limits)
+>>> sensor = hmpim.Sensor(delay=0.15, natural_frequency=10, damping_ratio=0.4, noise_std=0.1)
+>>> result = hmpim.identify(hmpim.run(sensor, stimulus, rng=1))
+>>> round(result["y", "u"].delay.value, 3)
+0.15
+"""
+
+from hmpim.errors import HmpimError
+from hmpim.experiment import run
+from hmpim.formats import read
+from hmpim.identify import (
+    Estimate,
+    Identification,
+    identify,
+    paper_analysis,
+    predict,
+    to_model,
+)
+from hmpim.model import Model, frequency_response, simulate
+from hmpim.record import Channel, Record
+from hmpim.report import report
+from hmpim.rigs import FunctionRig, Sensor
+from hmpim.stimulus import (
+    Chirp,
+    Limits,
+    Ramp,
+    Sine,
+    Step,
+    Stimulus,
+    SumOfSines,
+    Sweep,
+    design,
+)
+
+__version__ = "0.1.0"
+
+__all__ = [
+    "Channel",
+    "Chirp",
+    "Estimate",
+    "FunctionRig",
+    "HmpimError",
+    "Identification",
+    "Limits",
+    "Model",
+    "Ramp",
+    "Record",
+    "Sensor",
+    "Sine",
+    "Step",
+    "Stimulus",
+    "SumOfSines",
+    "Sweep",
+    "design",
+    "frequency_response",
+    "identify",
+    "paper_analysis",
+    "predict",
+    "read",
+    "report",
+    "run",
+    "simulate",
+    "to_model",
+]

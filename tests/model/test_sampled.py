@@ -25,7 +25,9 @@ def test_held_input_through_a_lag_is_a_sum_of_exponentials(delay, time_constant,
     expected = np.zeros(u.size)
     for i, jump in enumerate(np.diff(u), start=1):
         since = k - delay - i
-        expected += np.where(since > 0, jump * (1 - np.exp(-np.maximum(since, 0) / time_constant)), 0)
+        expected += np.where(
+            since > 0, jump * (1 - np.exp(-np.maximum(since, 0) / time_constant)), 0
+        )
     np.testing.assert_allclose(y, expected, atol=1e-10)
 
 
@@ -55,9 +57,7 @@ def test_held_step_through_a_second_order_lag(damping_ratio):
     else:
         root = np.sqrt(complex(zeta * zeta - 1))
         decay = np.exp(-zeta * omega * t)
-        expected = 1 - decay * (
-            np.cosh(omega * root * t) + zeta / root * np.sinh(omega * root * t)
-        )
+        expected = 1 - decay * (np.cosh(omega * root * t) + zeta / root * np.sinh(omega * root * t))
     np.testing.assert_allclose(y, np.real(expected), atol=1e-10)
 
 
@@ -77,7 +77,7 @@ def test_band_limited_sine_meets_the_frequency_response(frequency, tolerance):
 
 
 def test_band_limited_sweep_agrees_with_time_stepped_physics(field_record):
-    time, u, stepped = field_record
+    _, u, stepped = field_record
     y = delayed_response(
         prepare_input(u, "bandlimited"),
         delay=0.15 * 200,
@@ -85,7 +85,9 @@ def test_band_limited_sweep_agrees_with_time_stepped_physics(field_record):
             [[1.0], second_order_coefficients(10.0, 0.4) * np.array([200.0, 200.0**2])]
         ),
     )[0]
-    np.testing.assert_allclose(y + 0.6, stepped, atol=1e-4)  # the sweep's kink at t = 0 is not band-limited
+    np.testing.assert_allclose(
+        y + 0.6, stepped, atol=1e-4
+    )  # the sweep's kink at t = 0 is not band-limited
 
 
 def test_powers_are_derivatives():
@@ -93,7 +95,7 @@ def test_powers_are_derivatives():
     u = np.cumsum(rng.standard_normal(400))
     denominator = np.array([1.0, 6.0, 30.0])
     held = prepare_input(u, "zoh")
-    y, rate = delayed_response(held, delay=2.3, denominator=denominator, powers=2)
+    _, rate = delayed_response(held, delay=2.3, denominator=denominator, powers=2)
     step = 1e-5
     ahead = delayed_response(held, delay=2.3 - step, denominator=denominator)[0]
     behind = delayed_response(held, delay=2.3 + step, denominator=denominator)[0]

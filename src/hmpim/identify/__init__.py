@@ -1,5 +1,9 @@
 """Identification: from a record to every parameter, each with its error bar (paper, section IV)."""
 
+from hmpim.identify.identify import identify
+from hmpim.identify.local import local_polynomial_response
+from hmpim.identify.paper import PaperAnalysis, paper_analysis
+from hmpim.identify.predict import Prediction, predict, to_model
 from hmpim.identify.result import (
     Candidate,
     Estimate,
@@ -11,6 +15,7 @@ from hmpim.identify.result import (
     RecordSummary,
     Verdict,
 )
+from hmpim.identify.spectrum import excited_band
 
 __all__ = [
     "Candidate",
@@ -18,8 +23,16 @@ __all__ = [
     "FrequencyResponse",
     "Identification",
     "PairIdentification",
+    "PaperAnalysis",
     "PaperEstimates",
     "Parameters",
+    "Prediction",
     "RecordSummary",
     "Verdict",
+    "excited_band",
+    "identify",
+    "local_polynomial_response",
+    "paper_analysis",
+    "predict",
+    "to_model",
 ]

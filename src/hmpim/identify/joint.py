@@ -5,7 +5,7 @@ criterion (G. Schwarz, Annals of Statistics 6, 1978) chooses, with the number of
 counted down for a residual that is not white. The assumption between the samples is
 chosen by likelihood alone, since none costs a parameter. For an input that is smooth
 against the rate and a system that filters it, held, linear and band-limited differ
-by little more than half a sample of delay, which no likelihood sees; a smooth input is then
+by little more than half a sample of delay, which no likelihood sees; the input is then
 taken as band-limited unless the record speaks clearly against it.
 """
 
@@ -18,7 +18,7 @@ from hmpim.identify.fit import Fit, Problem, fit_structure
 from hmpim.identify.start import RoughResponse, rough_response, starting_values
 from hmpim.identify.whiteness import effective_share
 from hmpim.model.dynamics import STRUCTURES, StructureName
-from hmpim.model.sampled import SampledInput, prepare_input
+from hmpim.model.sampled import prepare_input
 from hmpim.record import Intersample
 
 __all__ = ["CLEARLY", "JointFit", "Trial", "joint_fit"]
@@ -26,9 +26,9 @@ __all__ = ["CLEARLY", "JointFit", "Trial", "joint_fit"]
 CLEARLY = 6.0
 """Difference in log-likelihood that decides against the natural assumption (odds of 400)."""
 
-_HOPELESS = 0.5
-"""Criterion per sample, above the least, from which a structure is not tried again under the
-other assumptions: its residual is 1.3 times as large, far more than they can change."""
+_HOPELESS = 2.0
+"""A structure whose sum of squares is this many times the least is not tried again at once
+under the other assumptions."""
 
 _INTERSAMPLES: tuple[Intersample, ...] = ("bandlimited", "zoh", "foh")
 
@@ -114,18 +114,21 @@ def joint_fit(
         counted[:forgotten] = False
         valid = counted
         fits = [_refit(problem_for(first, valid), fit) for fit in fits]
-    share = effective_share(min(fits, key=lambda fit: fit.cost).residual)
-    count = problem_for(first, valid).counted * share
-    trials = [_trial(first, fit, count) for fit in fits]
-    lowest = min(trial.criterion for trial in trials)
-    leading = [trial for trial in trials if trial.criterion - lowest < _HOPELESS * count]
+    fitted: list[tuple[Intersample, Fit]] = [(first, fit) for fit in fits]
+    least = min(fit.cost for fit in fits)
+    leading = [fit for fit in fits if fit.cost < _HOPELESS * least]
     for mode in modes[1:]:
-        for trial in leading:
-            theta = trial.fit.theta.copy()
-            theta[0] += _DELAY_SHIFT[mode] - _DELAY_SHIFT[first]
-            moved = fit_structure(problem_for(mode, valid), trial.fit.structure, theta)
-            trials.append(_trial(mode, moved, count))
-    best = _chosen(trials, sources)
+        problem = problem_for(mode, valid)
+        fitted += [(mode, _moved(problem, fit, first, mode)) for fit in leading]
+    likeliest, _ = min(fitted, key=lambda item: item[1].cost)
+    if likeliest != first:  # what was hopeless under a wrong assumption may not be so now
+        for mode in modes[1:]:
+            problem = problem_for(mode, valid)
+            fitted += [(mode, _moved(problem, f, first, mode)) for f in fits if f not in leading]
+    share = effective_share(min(fitted, key=lambda item: item[1].cost)[1].residual)
+    count = problem_for(first, valid).counted * share
+    trials = [_trial(mode, fit, count) for mode, fit in fitted]
+    best = _chosen(trials)
     return JointFit(
         problem=problem_for(best.intersample, valid),
         best=best,
@@ -152,6 +155,13 @@ def _fit_all(
         best = min(tried, key=lambda fit: fit.cost)
         fits.append(_refit(problem, best))
     return fits
+
+
+def _moved(problem: Problem, fit: Fit, origin: Intersample, mode: Intersample) -> Fit:
+    """Fit the same structure under another assumption, from where the first one ended."""
+    theta = fit.theta.copy()
+    theta[0] += _DELAY_SHIFT[mode] - _DELAY_SHIFT[origin]
+    return fit_structure(problem, fit.structure, theta)
 
 
 def _refit(problem: Problem, fit: Fit) -> Fit:
@@ -185,11 +195,10 @@ def _trial(mode: Intersample, fit: Fit, count: float) -> Trial:
     return Trial(intersample=mode, fit=fit, criterion=float(criterion))
 
 
-def _chosen(trials: list[Trial], sources: dict[Intersample, SampledInput]) -> Trial:
+def _chosen(trials: list[Trial]) -> Trial:
     best = min(trials, key=lambda trial: trial.criterion)
-    natural = sources.get("bandlimited")
-    if natural is None or natural.oversampling > 1 or best.intersample == "bandlimited":
-        return best
     smooth = [trial for trial in trials if trial.intersample == "bandlimited"]
+    if not smooth or best in smooth:
+        return best
     rival = min(smooth, key=lambda trial: trial.criterion)
     return best if rival.criterion - best.criterion > 2 * CLEARLY else rival
