@@ -12,6 +12,7 @@ import typer
 from typer.core import TyperGroup
 
 from hmpim.cli.demo import demo
+from hmpim.cli.design import design
 from hmpim.cli.identify import identify
 from hmpim.errors import HmpimError
 
@@ -113,6 +114,7 @@ def _start(
 
 # Add a command here: its module imports what is heavy inside the function, so that
 # ``hmpim --help`` stays quick.
+app.command()(design)
 app.command(epilog="Example: hmpim identify test.csv --input u --output y --report r.html")(
     identify
 )

@@ -1,9 +1,9 @@
 """Pictures: one function for each, taking arrays or results, returning a matplotlib Figure."""
 
-from hmpim.plots.bode import Mark, bode, draw_bode, pair_bode
+from hmpim.plots.bode import Mark, bode, draw_bode, pair_bode, pair_deviation
 from hmpim.plots.candidates import candidates
 from hmpim.plots.correlation import cross_correlation, error_autocorrelation
-from hmpim.plots.curves import BodeCurve, measured_curve, model_curve
+from hmpim.plots.curves import BodeCurve, deviation_curve, measured_curve, model_curve
 from hmpim.plots.envelope import envelope
 from hmpim.plots.histories import (
     input_output,
@@ -19,6 +19,7 @@ __all__ = [
     "bode",
     "candidates",
     "cross_correlation",
+    "deviation_curve",
     "draw_bode",
     "draw_spectrum",
     "envelope",
@@ -28,6 +29,7 @@ __all__ = [
     "model_curve",
     "model_over_measurement",
     "pair_bode",
+    "pair_deviation",
     "residuals",
     "shade_band",
     "spectra",

@@ -5,8 +5,11 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
-from hmpim.plots.curves import BodeCurve, measured_curve, model_curve
+from hmpim.errors import ArgumentError
+from hmpim.plots.candidates import INTERSAMPLE_WORDS
+from hmpim.plots.curves import BodeCurve, deviation_curve, measured_curve, model_curve
 from hmpim.plots.style import (
     COLOURS,
     Colour,
@@ -24,7 +27,7 @@ if TYPE_CHECKING:
 
     from hmpim.identify import PairIdentification
 
-__all__ = ["Mark", "bode", "draw_bode", "pair_bode"]
+__all__ = ["Mark", "bode", "draw_bode", "pair_bode", "pair_deviation"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -150,12 +153,16 @@ def draw_bode(
 
 
 def pair_bode(
-    pair: "PairIdentification", *, input_unit: str = "", output_unit: str = ""
+    pair: "PairIdentification",
+    *,
+    input_unit: str = "",
+    output_unit: str = "",
+    fs: float | None = None,
 ) -> "Figure":
     """Draw all that is known of a pair's frequency response.
 
-    The measured response with its 95 % band, the fitted model over it with and without its
-    delay, and marks at the -90° and -3 dB bandwidths and the natural frequency.
+    The measured response with its 95 % band, the fitted model over it, the model's phase
+    without its delay, and marks at the -90° and -3 dB bandwidths and the natural frequency.
 
     Parameters
     ----------
@@ -163,6 +170,9 @@ def pair_bode(
         What was found.
     input_unit, output_unit : str
         Units of the two channels.
+    fs : float, optional
+        Sampling rate in Hz; with it, the model is seen through the samples as the measurement
+        is, an input that is held between them included.
 
     Examples
     --------
@@ -183,12 +193,14 @@ def pair_bode(
     curves: list[tuple[str, Colour, BodeCurve]] = []
     grid = np.geomspace(0.1, 10.0, 400)
     if positive.size:
-        near = model_curve(pair, positive)
+        near = model_curve(pair, positive, fs=fs)
         curves.append(("measured", "input", measured_curve(response, near=near)))
         grid = np.geomspace(positive[0], positive[-1], 400)
-    whole = model_curve(pair, grid)
+    whole = model_curve(pair, grid, fs=fs)
     if whole is not None:
-        curves.append(("model", "model", whole))
+        held = fs is not None and pair.intersample != "bandlimited"
+        word = f"model, input {INTERSAMPLE_WORDS[pair.intersample]}" if held else "model"
+        curves.append((word, "model", whole))
     ratio = "" if input_unit == output_unit else f"{output_unit or '1'}/{input_unit or '1'}"
     figure = bode(curves, marks=_marks(pair), magnitude_unit=ratio)
     bare = model_curve(pair, grid, with_delay=False)
@@ -197,6 +209,72 @@ def pair_bode(
         draw_line(phase, grid, bare.phase, colour="other", label="model without delay", dashes="-.")
         draw_legend(phase)
     return figure
+
+
+def pair_deviation(pair: "PairIdentification", *, fs: float | None = None) -> "Figure":
+    """Draw the measured response over the model's, where the 95 % band can be seen.
+
+    Parameters
+    ----------
+    pair : PairIdentification
+        What was found; it must have a model and a measured response.
+    fs : float, optional
+        Sampling rate in Hz, as in `pair_bode`.
+
+    Raises
+    ------
+    ArgumentError
+        If there is no model to compare with.
+
+    Examples
+    --------
+    >>> from hmpim.identify import Estimate, FrequencyResponse, PairIdentification
+    >>> from hmpim.identify import PaperEstimates, Parameters
+    >>> f = np.geomspace(0.1, 10.0, 50)
+    >>> one = Estimate(value=1.0, std=0.0, ci95=(1.0, 1.0))
+    >>> response = FrequencyResponse(frequency=f, response=1.02 + 0j * f, std=0.1 + 0 * f)
+    >>> pair = PairIdentification(
+    ...     input="u", output="y", structure="static", intersample="zoh", fit_percent=0.0,
+    ...     parameters=Parameters(scale_factor=one), paper=PaperEstimates(), candidates=(),
+    ...     frequency_response=response, numerator=(1.0,), denominator=(1.0,), verdict="ok",
+    ...     warnings=())
+    >>> [axes.get_ylabel() for axes in pair_deviation(pair).axes]
+    ['Magnitude over model (dB)', 'Phase over model (deg)']
+    """
+    response = pair.frequency_response
+    positive = response.frequency[response.frequency > 0]
+    model = model_curve(pair, positive, fs=fs)
+    if model is None or not positive.size:
+        raise ArgumentError(
+            f"pair {pair.input!r} → {pair.output!r} has no model or no measured response to compare"
+        )
+    curve = deviation_curve(measured_curve(response, near=model), model)
+    figure, (magnitude, phase) = new_figure(2, height=1.7)
+    draw_bode(magnitude, phase, curve, label="measured over model", colour="input")
+    for axes, low, high in (
+        (magnitude, curve.magnitude_low, curve.magnitude_high),
+        (phase, curve.phase_low, curve.phase_high),
+    ):
+        axes.axhline(0.0, color=COLOURS["model"], linewidth=1.2, linestyle="--")
+        if low is not None and high is not None:
+            reach = _common_reach(low, high)
+            axes.set_ylim(-reach, reach)
+    if positive.size > 1:
+        magnitude.set_xlim(float(positive[0]), float(positive[-1]))
+    finish_axes(magnitude, y="Magnitude over model (dB)", log_x=True)
+    finish_axes(phase, x="Frequency (Hz)", y="Phase over model (deg)", log_x=True)
+    draw_legend(magnitude)
+    figure.align_ylabels([magnitude, phase])
+    return figure
+
+
+def _common_reach(low: NDArray[np.float64], high: NDArray[np.float64]) -> float:
+    """How far a band reaches from 0, but for the tenth of it that is widest."""
+    ends = np.maximum(np.abs(low), np.abs(high))
+    ends = ends[np.isfinite(ends)]
+    if not ends.size:
+        return 20.0
+    return max(1.3 * float(np.quantile(ends, 0.9, method="lower")), 1e-3)
 
 
 def _marks(pair: "PairIdentification") -> list[Mark]:

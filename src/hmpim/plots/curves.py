@@ -11,8 +11,9 @@ from hmpim.model.response import RationalDelay, phase, response
 if TYPE_CHECKING:
     from hmpim.identify import FrequencyResponse, PairIdentification
 
-__all__ = ["BodeCurve", "measured_curve", "model_curve"]
+__all__ = ["BodeCurve", "deviation_curve", "measured_curve", "model_curve"]
 
+ALIASES = 60  # on either side; what is left out is below 0.3 % even without dynamics
 Z95 = 1.959963984540054  # 97.5 % point of the normal distribution
 
 
@@ -44,12 +45,20 @@ class BodeCurve:
 
 
 def model_curve(
-    pair: "PairIdentification", frequency: NDArray[np.float64], *, with_delay: bool = True
+    pair: "PairIdentification",
+    frequency: NDArray[np.float64],
+    *,
+    with_delay: bool = True,
+    fs: float | None = None,
 ) -> BodeCurve | None:
     """Return the fitted model's curve, or None where no model was found.
 
     The model is K · num(s)/den(s) · exp(-s·delay) at s = jω; the phase is -360° f · delay
     (Eq. 25) plus that of the dynamics, and 180° less for a negative scale factor.
+
+    With `fs` it is what a ratio of sampled spectra shows: an input that is held or joined
+    linearly between its samples adds the hold's own response, and folds at fs/2 (K. J. Åström
+    and B. Wittenmark, Computer-Controlled Systems, 3rd ed., 1997, section 2.4).
 
     Parameters
     ----------
@@ -59,6 +68,8 @@ def model_curve(
         Hz, positive.
     with_delay : bool
         False leaves the delay's phase out.
+    fs : float, optional
+        Sampling rate in Hz, to see the model as the samples do.
 
     Examples
     --------
@@ -87,11 +98,35 @@ def model_curve(
         denominator=np.array(pair.denominator[::-1]),
     )
     lag = np.degrees(phase(system, frequency, delay=with_delay))
+    values = response(system, frequency)
+    if fs is not None and with_delay and pair.intersample != "bandlimited":
+        values = _as_sampled(system, frequency, fs=fs, linear=pair.intersample == "foh")
+        held = lag if pair.intersample == "foh" else lag - 180.0 * frequency / fs
+        lag = _near(np.degrees(np.angle(values)), held)
     return BodeCurve(
         frequency=frequency,
-        magnitude_db=decibels(scale.value * response(system, frequency)),
+        magnitude_db=decibels(scale.value * values),
         phase=lag - 180.0 if scale.value < 0.0 else lag,
     )
+
+
+def _as_sampled(
+    system: RationalDelay, frequency: NDArray[np.float64], *, fs: float, linear: bool
+) -> NDArray[np.complex128]:
+    """Response from samples to samples, the input held or joined linearly between them."""
+    folded = frequency[:, np.newaxis] + fs * np.arange(-ALIASES, ALIASES + 1)
+    turn = 2j * np.pi * folded / fs
+    hold = (1.0 - np.exp(-turn)) / turn
+    if linear:
+        hold = hold**2 * np.exp(turn)
+    each = response(system, folded.ravel()).reshape(folded.shape)
+    return np.asarray((each * hold).sum(axis=1))
+
+
+def _near(angle: NDArray[np.float64], phase: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Add to each angle (degrees) the whole turns that bring it next to `phase`."""
+    nearest: NDArray[np.float64] = angle + 360.0 * np.round((phase - angle) / 360.0)
+    return nearest
 
 
 def measured_curve(measured: "FrequencyResponse", *, near: BodeCurve | None = None) -> BodeCurve:
@@ -122,8 +157,7 @@ def measured_curve(measured: "FrequencyResponse", *, near: BodeCurve | None = No
     values = measured.response[positive]
     angle = np.angle(values)
     if near is not None and near.phase.size == angle.size:
-        turns = np.round((near.phase - np.degrees(angle)) / 360.0)
-        angles = np.degrees(angle) + 360.0 * turns
+        angles = _near(np.degrees(angle), near.phase)
     else:
         angles = np.degrees(np.unwrap(angle))
     size = np.abs(values)
@@ -138,6 +172,39 @@ def measured_curve(measured: "FrequencyResponse", *, near: BodeCurve | None = No
         magnitude_high=decibels(size + reach),
         phase_low=angles - swing,
         phase_high=angles + swing,
+    )
+
+
+def deviation_curve(measured: BodeCurve, model: BodeCurve) -> BodeCurve:
+    """Return what a measured curve has over a model's, its band carried along.
+
+    Parameters
+    ----------
+    measured, model : BodeCurve
+        At the same frequencies.
+
+    Examples
+    --------
+    >>> f = np.array([1.0, 2.0])
+    >>> model = BodeCurve(frequency=f, magnitude_db=-f, phase=-90.0 * f)
+    >>> measured = BodeCurve(frequency=f, magnitude_db=1 - f, phase=2 - 90.0 * f)
+    >>> deviation_curve(measured, model).phase.tolist()
+    [2.0, 2.0]
+    """
+
+    def less(
+        values: NDArray[np.float64] | None, base: NDArray[np.float64]
+    ) -> NDArray[np.float64] | None:
+        return None if values is None else np.asarray(values - base)
+
+    return BodeCurve(
+        frequency=measured.frequency,
+        magnitude_db=measured.magnitude_db - model.magnitude_db,
+        phase=measured.phase - model.phase,
+        magnitude_low=less(measured.magnitude_low, model.magnitude_db),
+        magnitude_high=less(measured.magnitude_high, model.magnitude_db),
+        phase_low=less(measured.phase_low, model.phase),
+        phase_high=less(measured.phase_high, model.phase),
     )
 
 

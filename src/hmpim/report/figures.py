@@ -8,7 +8,7 @@ import numpy as np
 from hmpim import plots
 from hmpim.identify import Identification, PairIdentification
 from hmpim.identify.paper import PaperAnalysis, paper_analysis
-from hmpim.record import Record, Signal, uniform
+from hmpim.record import Intersample, Record, Signal, uniform
 from hmpim.report.numbers import format_number
 
 if TYPE_CHECKING:
@@ -17,6 +17,9 @@ if TYPE_CHECKING:
     from hmpim.stimulus import Stimulus
 
 __all__ = ["Picture", "pair_pictures", "stimulus_picture"]
+
+
+_BETWEEN: dict[Intersample, str] = {"zoh": "held between", "foh": "joined linearly between"}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -86,7 +89,7 @@ def pair_pictures(result: Identification, pair: PairIdentification) -> list[Pict
         pictures += _signal_pictures(record, pair)
     units = ("", "") if record is None else _units(record, pair)
     if np.any(pair.frequency_response.frequency > 0):
-        pictures.append(_bode_picture(pair, units))
+        pictures += _response_pictures(pair, units, result.record.fs)
     if record is not None and pair.time is not None:
         pictures += _model_pictures(pair, units[1])
     if pair.candidates:
@@ -188,24 +191,48 @@ def _paper_pictures(
     ]
 
 
-def _bode_picture(pair: PairIdentification, units: tuple[str, str]) -> Picture:
+def _response_pictures(
+    pair: PairIdentification, units: tuple[str, str], fs: float
+) -> list[Picture]:
     seen = pair.frequency_response.frequency
-    marks = []
-    if pair.parameters.bandwidth_phase90 is not None:
-        marks.append(f"phase −90° at {pair.parameters.bandwidth_phase90.value:.4g} Hz")
-    if pair.parameters.bandwidth_3db is not None:
-        marks.append(f"magnitude −3 dB at {pair.parameters.bandwidth_3db.value:.4g} Hz")
-    if pair.parameters.natural_frequency is not None:
-        marks.append(f"natural frequency {pair.parameters.natural_frequency.value:.4g} Hz")
-    return Picture(
-        key="bode",
-        title="Bode plot",
-        caption="Frequency response as measured, with the band that holds it with 95 % at each "
-        "frequency, and the fitted model over it.",
-        description=f"Magnitude and phase of {pair.output} over {pair.input} from "
-        f"{seen.min():.4g} to {seen.max():.4g} Hz: {', '.join(marks) or 'no marks'}.",
-        figure=plots.pair_bode(pair, input_unit=units[0], output_unit=units[1]),
+    found = pair.parameters
+    span = f"{seen[seen > 0].min():.4g} to {seen.max():.4g} Hz"
+    named = (
+        ("phase −90°", found.bandwidth_phase90),
+        ("magnitude −3 dB", found.bandwidth_3db),
+        ("natural frequency", found.natural_frequency),
     )
+    marks = [f"{words} at {f.value:.4g} Hz" for words, f in named if f is not None]
+    between = ""
+    if found.scale_factor is not None and pair.intersample != "bandlimited":
+        between = (
+            f" The model is seen as the samples see it, its input {_BETWEEN[pair.intersample]} "
+            "them; the marks are of the system itself."
+        )
+    pictures = [
+        Picture(
+            key="bode",
+            title="Bode plot",
+            caption="Frequency response as measured, with the band that holds it with 95 % at "
+            f"each frequency, and the fitted model over it.{between}",
+            description=f"Magnitude and phase of {pair.output} over {pair.input} from {span}: "
+            f"{', '.join(marks) or 'no marks'}.",
+            figure=plots.pair_bode(pair, input_unit=units[0], output_unit=units[1], fs=fs),
+        )
+    ]
+    if found.scale_factor is not None:
+        pictures.append(
+            Picture(
+                key="deviation",
+                title="Measured response against the model",
+                caption="The same, divided by the model: where the model is right, the band "
+                "holds the dashed line at 19 frequencies of 20.",
+                description=f"Magnitude and phase of the measured response over the model's, "
+                f"from {span}, with the 95 % band around them.",
+                figure=plots.pair_deviation(pair, fs=fs),
+            )
+        )
+    return pictures
 
 
 def _model_pictures(pair: PairIdentification, unit: str) -> list[Picture]:

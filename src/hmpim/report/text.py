@@ -82,7 +82,7 @@ def parameter_table(
             ]
         cells.append(format_number(paper) if words.differs else "")
         if truth is not None:
-            cells.append("" if known is None else format_number(known))
+            cells.append("" if known is None else f"{known:.5g}")
             cells.append("" if known is None or estimate is None else off_by(estimate, known))
         table.add_row(*(Text(cell) for cell in cells))
     return table
