@@ -45,6 +45,7 @@ def bode(
     marks: Sequence[Mark] = (),
     magnitude_unit: str = "",
     band: tuple[float, float] | None = None,
+    phase_level: float | None = None,
 ) -> "Figure":
     """Draw magnitude and phase of some curves (Figs 15 to 17, 19 to 21).
 
@@ -58,6 +59,8 @@ def bode(
         Output unit per input unit, that 0 dB stands for; empty if they are the same.
     band : tuple of float, optional
         Frequencies to show, in Hz.
+    phase_level : float, optional
+        Phase in degrees at which a thin line is drawn, such as -90.
 
     Examples
     --------
@@ -80,8 +83,8 @@ def bode(
     reference = f"dB re 1 {plain(magnitude_unit)}" if magnitude_unit else "dB"
     finish_axes(magnitude, y=f"Magnitude ({reference})", log_x=True)
     finish_axes(phase, x="Frequency (Hz)", y="Phase (deg)", log_x=True)
-    if any(mark.axes == "phase" for mark in marks):
-        phase.axhline(-90.0, color=COLOURS["muted"], linewidth=0.8, linestyle=(0, (1, 2)))
+    if phase_level is not None:
+        phase.axhline(phase_level, color=COLOURS["muted"], linewidth=0.8, linestyle=(0, (1, 2)))
     height = {"magnitude": 0.1, "phase": 0.1}  # below the curves of all that lags
     for mark in marks:
         if shown is None or shown[0] <= mark.frequency <= shown[1]:
@@ -202,7 +205,9 @@ def pair_bode(
         word = f"model, input {INTERSAMPLE_WORDS[pair.intersample]}" if held else "model"
         curves.append((word, "model", whole))
     ratio = "" if input_unit == output_unit else f"{output_unit or '1'}/{input_unit or '1'}"
-    figure = bode(curves, marks=_marks(pair), magnitude_unit=ratio)
+    scale = pair.parameters.scale_factor
+    level = -90.0 if scale is None or scale.value > 0.0 else -270.0  # 90° later than at DC
+    figure = bode(curves, marks=_marks(pair), magnitude_unit=ratio, phase_level=level)
     bare = model_curve(pair, grid, with_delay=False)
     if bare is not None and pair.parameters.delay is not None:
         phase = figure.axes[1]
@@ -239,7 +244,7 @@ def pair_deviation(pair: "PairIdentification", *, fs: float | None = None) -> "F
     ...     frequency_response=response, numerator=(1.0,), denominator=(1.0,), verdict="ok",
     ...     warnings=())
     >>> [axes.get_ylabel() for axes in pair_deviation(pair).axes]
-    ['Magnitude over model (dB)', 'Phase over model (deg)']
+    ['Magnitude (dB)', 'Phase (deg)']
     """
     response = pair.frequency_response
     positive = response.frequency[response.frequency > 0]
@@ -261,8 +266,8 @@ def pair_deviation(pair: "PairIdentification", *, fs: float | None = None) -> "F
             axes.set_ylim(-reach, reach)
     if positive.size > 1:
         magnitude.set_xlim(float(positive[0]), float(positive[-1]))
-    finish_axes(magnitude, y="Magnitude over model (dB)", log_x=True)
-    finish_axes(phase, x="Frequency (Hz)", y="Phase over model (deg)", log_x=True)
+    finish_axes(magnitude, y="Magnitude (dB)", log_x=True)
+    finish_axes(phase, x="Frequency (Hz)", y="Phase (deg)", log_x=True)
     draw_legend(magnitude)
     figure.align_ylabels([magnitude, phase])
     return figure

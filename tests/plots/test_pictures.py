@@ -1,0 +1,220 @@
+"""What the pictures say: units on every axis, limits and marks where they belong."""
+
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from hmpim import plots
+from hmpim.identify import Candidate
+from hmpim.plots.envelope import MOST_POINTS
+from hmpim.plots.style import COLOURS, axis_label, plain
+from hmpim.stimulus import Limits, design
+
+T = np.arange(2000) / 200.0
+F = np.geomspace(0.1, 100.0, 300)
+
+
+def every_figure():
+    noise = np.random.default_rng(1).standard_normal(T.size)
+    stimulus = design(band=(0.1, 20), duration=5, fs=200, limits=Limits(position=10, unit="deg"))
+    curve = plots.BodeCurve(frequency=F, magnitude_db=-F, phase=-54.0 * F)
+    return {
+        "time_histories": plots.time_histories(stimulus),
+        "input_output": plots.input_output(T, np.sin(T), noise, input_unit="V", output_unit="m"),
+        "one_unit": plots.input_output(T, np.sin(T), noise, input_unit="V", output_unit="V"),
+        "model": plots.model_over_measurement(T, noise, np.sin(T), unit="deg"),
+        "residuals": plots.residuals(T, noise, unit="deg"),
+        "cross_correlation": plots.cross_correlation(T, noise, peak=0.17, delay=0.15, unit="deg²"),
+        "error": plots.error_autocorrelation(T, noise, bias=0.6, duration=10.0, unit="deg"),
+        "spectra": plots.spectra(F, input_plain=-F, input_windowed=-F, band=(0.1, 20.0)),
+        "bode": plots.bode([("a", "model", curve)]),
+    }
+
+
+@pytest.fixture(scope="module")
+def figures():
+    return every_figure()
+
+
+def test_every_axis_has_a_unit(figures):
+    for name, figure in figures.items():
+        for axes in figure.axes:
+            assert axes.get_ylabel().endswith(")"), name
+        assert figure.axes[-1].get_xlabel() in (
+            "Time (s)",
+            "Lag (s)",
+            "Lag of the output (s)",
+            "Frequency (Hz)",
+        ), name
+
+
+def test_both_signs_of_each_limit_are_drawn_and_the_signal_is_between():
+    limits = Limits(position=10, velocity=70, acceleration=8500, unit="deg")
+    stimulus = design(band=(0.1, 20), duration=10, fs=200, limits=limits)
+    figure = plots.time_histories(stimulus)
+    for axes, limit in zip(figure.axes, (10, 70, 8500), strict=True):
+        drawn = [line.get_ydata() for line in axes.lines]
+        levels = sorted(float(y[0]) for y in drawn if len(y) == 2)
+        assert levels == [-limit, limit]
+        assert np.abs(max(drawn, key=len)).max() <= limit
+
+
+def test_without_limits_none_are_drawn(figures):
+    assert len(figures["time_histories"].axes[1].lines) == 1
+
+
+def test_a_long_record_is_drawn_with_few_points_and_keeps_its_peak():
+    n = 300_000
+    y = np.zeros(n)
+    y[123_456] = 7.0
+    figure = plots.input_output(np.arange(n) / 1000.0, y, y, input_unit="V", output_unit="deg")
+    line = figure.axes[1].lines[0]
+    assert len(line.get_xdata()) <= MOST_POINTS
+    peak = int(np.argmax(line.get_ydata()))
+    assert line.get_ydata()[peak] == 7.0
+    assert line.get_xdata()[peak] == pytest.approx(123.456)
+
+
+def test_the_close_up_is_where_the_output_moves_most():
+    moving = np.where((T > 6.0) & (T < 6.5), np.sin(100 * T), 0.0)
+    figure = plots.model_over_measurement(T, moving, moving)
+    shown = figure.axes[1].lines[0].get_xdata()
+    assert shown[0] <= 6.0
+    assert shown[-1] >= 6.49
+    assert len(shown) == T.size // 10
+
+
+def share_inside_bounds(residual):
+    axes = plots.residuals(np.arange(residual.size) / 200.0, residual).axes[1]
+    levels = {abs(float(line.get_ydata()[0])) for line in axes.lines} - {0.0}
+    bound = levels.pop()
+    assert not levels
+    assert bound == pytest.approx(1.96 / np.sqrt(residual.size))
+    segments = axes.collections[0].get_segments()
+    return np.mean([max(abs(a[1]), abs(b[1])) < bound for a, b in segments])
+
+
+def test_the_residual_of_white_noise_stays_inside_its_bounds():
+    noise = np.random.default_rng(3).standard_normal(2000)
+    assert share_inside_bounds(noise) >= 0.88  # of 100 lags; three standard errors below 0.95
+    assert share_inside_bounds(np.convolve(noise, np.ones(20), mode="same")) < 0.6
+
+
+def test_marks_stand_at_their_frequencies_and_only_inside_the_band():
+    curve = plots.BodeCurve(frequency=F, magnitude_db=-F, phase=-F)
+    marks = (
+        plots.Mark(frequency=1.5, label="in"),
+        plots.Mark(frequency=500.0, label="out"),
+        plots.Mark(frequency=3.0, label="other axes", axes="magnitude"),
+    )
+    figure = plots.bode([("a", "model", curve)], marks=marks)
+    magnitude, phase = figure.axes
+    assert [text.get_text() for text in phase.texts] == ["in"]
+    assert [text.get_text() for text in magnitude.texts] == ["other axes"]
+    assert any(list(line.get_xdata()) == [1.5, 1.5] for line in phase.lines)
+
+
+def test_a_band_that_reaches_nothing_does_not_squash_the_picture():
+    curve = plots.BodeCurve(
+        frequency=F,
+        magnitude_db=np.zeros(F.size),
+        phase=np.zeros(F.size),
+        magnitude_low=np.full(F.size, -np.inf),
+        magnitude_high=np.full(F.size, 3.0),
+        phase_low=np.full(F.size, -180.0),
+        phase_high=np.full(F.size, 180.0),
+    )
+    low, high = plots.bode([("a", "input", curve)]).axes[0].get_ylim()
+    assert -10 < low < high < 10
+
+
+def test_candidates_stand_in_order_and_the_chosen_one_is_named():
+    tried = [
+        Candidate(structure="static", intersample="zoh", criterion=900.0, fit_percent=40.0),
+        Candidate(
+            structure="second_order",
+            intersample="foh",
+            criterion=-5.0,
+            fit_percent=99.0,
+            chosen=True,
+        ),
+    ]
+    axes = plots.candidates(tried).axes[0]
+    names = [label.get_text() for label in axes.get_yticklabels()]
+    assert names == ["second order, linear", "static, held"]
+    assert [bar.get_width() for bar in axes.patches] == [0.0, 905.0]
+    assert axes.texts[0].get_text() == "fit 99.00 %, chosen"
+
+
+@pytest.mark.parametrize("name", [r"$\frac{", "_hidden", "a$b$c", "\x00\x1b[2J", "x" * 500, "角度"])
+def test_no_name_breaks_a_picture(name, tmp_path):
+    import warnings
+
+    figure = plots.input_output(T, np.sin(T), np.cos(T), input_name=name, output_name="y")
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", message="Glyph")
+        figure.savefig(tmp_path / "a.png", dpi=30)
+    assert len(figure.axes[0].get_ylabel()) < 100
+
+
+def test_a_constant_signal_can_be_drawn(tmp_path):
+    still = np.zeros(T.size)
+    plots.residuals(T, still).savefig(tmp_path / "a.png", dpi=30)
+    plots.input_output(T, still, still).savefig(tmp_path / "b.png", dpi=30)
+
+
+def test_labels_state_the_unit_or_that_there_is_none():
+    assert axis_label("Position", "deg") == "Position (deg)"
+    assert axis_label("u", "") == "u (–)"
+    assert plain("50$") == r"50\$"
+
+
+def _linear(colour):
+    part = np.array([int(colour[k : k + 2], 16) for k in (1, 3, 5)]) / 255.0
+    return np.where(part <= 0.04045, part / 12.92, ((part + 0.055) / 1.055) ** 2.4)
+
+
+def test_every_colour_of_a_line_stands_out_from_the_paper():
+    """Contrast of at least 3 to 1, as WCAG 2.2 asks of graphics (1.4.11)."""
+    weights = np.array([0.2126, 0.7152, 0.0722])
+    for name in ("ink", "muted", "input", "output", "model", "limit", "other"):
+        contrast = 1.05 / (weights @ _linear(COLOURS[name]) + 0.05)
+        assert contrast >= 3.0, name
+
+
+def test_curves_drawn_together_differ_without_red_or_green():
+    """Seen by a deuteranope and a protanope (Machado, Oliveira and Fernandes, 2009)."""
+    matrices = {
+        "deutan": [
+            [0.367322, 0.860646, -0.227968],
+            [0.280085, 0.672501, 0.047413],
+            [-0.011820, 0.042940, 0.968881],
+        ],
+        "protan": [
+            [0.152286, 1.052583, -0.204868],
+            [0.114503, 0.786281, 0.099216],
+            [-0.003882, -0.048116, 1.051998],
+        ],
+    }
+    together = [("input", "output"), ("input", "model"), ("output", "model"), ("other", "model")]
+    for matrix in matrices.values():
+        for first, second in together:
+            seen = (
+                np.array(matrix) @ np.array([_linear(COLOURS[first]), _linear(COLOURS[second])]).T
+            )
+            assert np.linalg.norm(seen[:, 0] - seen[:, 1]) > 0.15, (first, second)
+
+
+def test_nothing_global_is_touched():
+    code = (
+        "import io, sys, matplotlib as m; before = m.rcParams.copy()\n"
+        "import numpy as np\nfrom hmpim import plots\n"
+        "t = np.arange(100) / 10.0\n"
+        "plots.residuals(t, np.cos(t)).savefig(io.BytesIO())\n"
+        "assert 'matplotlib.pyplot' not in sys.modules\n"
+        "assert m.rcParams.copy() == before\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
