@@ -111,3 +111,24 @@ def test_an_offset_or_another_unit_of_time_changes_nothing_else(seed, amount, of
     assert (a.jittered, a.uniform) == (b.jittered, b.uniform)
     assert b.fs * scale == pytest.approx(a.fs, rel=1e-9)
     assert b.start == pytest.approx(scale * (a.start + offset), abs=1e-9 * scale)
+
+
+@settings(max_examples=64, deadline=None)
+@given(
+    seed=st.integers(0, 2**32 - 1),
+    dropped=st.sets(st.integers(1, 38).map(lambda k: 5 * k), max_size=4),
+)
+def test_dropped_samples_are_told_from_late_ones_under_strong_jitter(seed, dropped):
+    rng = np.random.default_rng(seed)
+    keep = np.setdiff1d(np.arange(200), list(dropped))
+    time = (keep + 0.1 * rng.uniform(-1, 1, keep.size)) / 100
+    clock = fit_clock(time)
+    assert clock.index.tolist() == keep.tolist()
+    assert clock.jittered
+
+
+def test_thirty_percent_of_jitter_makes_no_gap():
+    rng = np.random.default_rng(0)
+    for _ in range(20):
+        time = (np.arange(4000) + 0.3 * rng.uniform(-1, 1, 4000)) / 200
+        assert fit_clock(time).gaps.size == 0

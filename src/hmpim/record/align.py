@@ -264,11 +264,13 @@ def _inside_gaps(
     time: NDArray[np.float64], clock: Clock, grid: NDArray[np.float64]
 ) -> NDArray[np.bool_]:
     """Instants more than half an interval from both edges of a gap, inside it."""
-    inside = np.zeros(grid.size, dtype=np.bool_)
+    long = np.zeros(time.size + 1, dtype=np.bool_)
+    long[clock.gaps + 1] = True  # the interval that ends at each stamp; open at both ends
+    after = np.searchsorted(time, grid)
+    left = time[np.maximum(after - 1, 0)]
+    right = time[np.minimum(after, time.size - 1)]
     half = 0.5 / clock.fs
-    for k in clock.gaps:
-        inside |= (grid > time[k] + half) & (grid < time[k + 1] - half)
-    return inside
+    return np.asarray(long[after] & (grid > left + half) & (grid < right - half))
 
 
 def _interpolated(
@@ -285,10 +287,10 @@ def _interpolated(
     edges = np.concatenate(([0], clock.gaps + 1, [time.size]))
     # A segment answers for its own span and half a gap beyond, where instants lie within half
     # an interval of its end; the spline is carried on that far.
-    owner = np.searchsorted(0.5 * (time[edges[1:-1] - 1] + time[edges[1:-1]]), at)
-    for k in np.unique(owner):
-        part = slice(edges[k], edges[k + 1])
-        mine = owner == k
+    middles = 0.5 * (time[edges[1:-1] - 1] + time[edges[1:-1]])
+    bounds = np.concatenate(([0], np.searchsorted(at, middles), [at.size]))
+    for k in np.flatnonzero(np.diff(bounds)):
+        part, mine = slice(edges[k], edges[k + 1]), slice(bounds[k], bounds[k + 1])
         if edges[k + 1] - edges[k] == 1:
             out[mine] = values[part]
         else:

@@ -62,16 +62,17 @@ class Clock:
     @property
     def rounding(self) -> float:
         """Distance in s below which two instants of this clock cannot be told apart."""
-        span = abs(self.start) + self.length / self.fs
-        return max(self.resolution, 8 * float(np.spacing(span)))
+        noise = 8 * float(np.spacing(abs(self.start) + self.length / self.fs))
+        return noise if self.jittered else noise + float(np.abs(self.deviation).max())
 
 
 def fit_clock(time: NDArray[np.float64], *, nominal: float | None = None) -> Clock:
     """Lay a uniform clock through increasing time stamps.
 
     Stamps that are a uniform clock rounded to a decimal step (0.0016384 k printed with six
-    digits, or 400 Hz printed in whole milliseconds) are uniform. Otherwise an interval of more
-    than 1.5 medians is a gap, unless a neighbouring interval is short by as much.
+    digits, or 400 Hz printed in whole milliseconds) are uniform. Else samples are missing
+    where an interval is long and the stamps stay late after it; where they catch up, the one
+    stamp was late.
 
     Parameters
     ----------
@@ -94,32 +95,29 @@ def fit_clock(time: NDArray[np.float64], *, nominal: float | None = None) -> Clo
     n = time.size
     since = time - time[0]
     resolution = _decimal_step(since, float(np.abs(time).max()))
-    steps = np.diff(since)
-    median = float(np.median(steps))
-    long = _long_steps(steps, median)
+    missing = _missing(since)
     # A dropped sample bends the stamps by a whole interval; rounding bends them by one
     # decimal step at most. Where the decimal step is nearly an interval, the two look alike,
     # and only many "gaps" speak for rounding.
     every = np.arange(n)
     mean_step = _step(since, every)
-    bend = float(np.ptp(since - every * mean_step))
-    slack = resolution + 8 * float(np.spacing(np.abs(time).max()))
-    by_rounding = bend <= 1.05 * slack and (
-        resolution <= 0.6 * mean_step or np.count_nonzero(long) > 0.05 * n
+    noise = 8 * float(np.spacing(np.abs(time).max()))
+    bend = 1.05 * (resolution + noise)
+    by_rounding = float(np.ptp(since - every * mean_step)) <= bend and (
+        resolution <= 0.6 * mean_step or np.count_nonzero(missing) > max(3, 0.05 * n)
     )
-    index = every if by_rounding else _places(steps, long, median)
+    index = every if by_rounding else every + np.concatenate(([0], np.cumsum(missing)))
     step = _step(since, index)
     deviation = since - index * step
-    # Three and a half standard deviations of a slope fitted through strayed stamps.
-    unsure = slack + 12 * float(np.std(deviation)) / np.sqrt(n)
+    rounded = by_rounding or float(np.ptp(deviation)) <= bend
+    # Rounding may tilt the fit by what it shows; strayed stamps by 3.5 standard deviations.
+    tilt = float(np.ptp(deviation)) if rounded else 12 * float(np.std(deviation)) / np.sqrt(n)
     fs = 1 / step
-    if nominal is not None and abs(1 / nominal - step) * index[-1] <= unsure:
+    if nominal is not None and abs(1 / nominal - step) * index[-1] <= noise + tilt:
         fs, step = float(nominal), 1 / nominal
         deviation = since - index * step
     # The first stamp may stray as any other: the clock starts where they agree on the whole.
-    jittered = not by_rounding and float(np.abs(deviation).max()) > max(
-        JITTER_THRESHOLD * step, slack
-    )
+    jittered = not rounded and float(np.abs(deviation).max()) > JITTER_THRESHOLD * step
     shift = float(np.median(deviation)) if jittered else 0.0
     return Clock(
         start=float(time[0]) + shift,
@@ -131,21 +129,47 @@ def fit_clock(time: NDArray[np.float64], *, nominal: float | None = None) -> Clo
     )
 
 
-def _long_steps(steps: NDArray[np.float64], median: float) -> NDArray[np.bool_]:
-    """Intervals in which a sample is missing, not merely late."""
-    before = np.concatenate(([np.inf], steps[:-1])) + steps
-    after = steps + np.concatenate((steps[1:], [np.inf]))
-    return (steps > 1.5 * median) & (before > 2.5 * median) & (after > 2.5 * median)
-
-
-def _places(
-    steps: NDArray[np.float64], long: NDArray[np.bool_], median: float
-) -> NDArray[np.int64]:
+def _missing(since: NDArray[np.float64]) -> NDArray[np.int64]:
+    """Number of samples missing in each interval; shape (n - 1,)."""
+    steps = np.diff(since)
+    ruler = float(np.median(steps))
+    sure = steps >= 1.9 * ruler
     # The mean of the whole intervals is a finer ruler for the long ones than the median is.
-    short = steps[~long]
-    ruler = float(short.mean()) if short.size else median
-    jumps = np.where(long, np.maximum(np.rint(steps / ruler), 2), 1).astype(np.int64)
-    return np.concatenate((np.zeros(1, dtype=np.int64), np.cumsum(jumps)))
+    if not sure.all():
+        ruler = float(np.mean(steps[~sure]))
+    missing = np.where(sure, np.maximum(np.rint(steps / ruler) - 1, 1), 0).astype(np.int64)
+    doubtful = np.flatnonzero((steps > 1.3 * ruler) & ~sure)
+    while doubtful.size:
+        closed = since - ruler * np.concatenate(([0], np.cumsum(missing)))
+        late = _lateness(closed, doubtful) / ruler
+        # Neighbours see the same gap; the one that sees most of it holds it.
+        found = doubtful[(late > 0.5) & (late >= _largest_near(doubtful, late))]
+        if not found.size:
+            break
+        missing[found] += 1
+        doubtful = np.setdiff1d(doubtful, found)
+    return missing
+
+
+_WINDOW = 5  # stamps on either side that say whether a delay stays
+
+
+def _lateness(since: NDArray[np.float64], at: NDArray[np.int64]) -> NDArray[np.float64]:
+    """How much later (s) the stamps after each interval are than those before it foretell."""
+    n = since.size
+    ruler = float(np.median(np.diff(since)))
+    total = np.concatenate(([0.0], np.cumsum(since)))
+    low, high = np.maximum(at + 1 - _WINDOW, 0), np.minimum(at + 1 + _WINDOW, n)
+    before = (total[at + 1] - total[low]) / (at + 1 - low)
+    after = (total[high] - total[at + 1]) / (high - at - 1)
+    return np.asarray(after - before - 0.5 * (high - low) * ruler)
+
+
+def _largest_near(at: NDArray[np.int64], late: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Largest lateness among the intervals within a window of each."""
+    first = np.searchsorted(at, at - _WINDOW)
+    last = np.searchsorted(at, at + _WINDOW, side="right")
+    return np.array([late[a:b].max() for a, b in zip(first, last, strict=True)])
 
 
 def _step(since: NDArray[np.float64], index: NDArray[np.int64]) -> float:

@@ -155,8 +155,12 @@ def inspect_values(record: Record) -> tuple[Finding, ...]:
         stuck = _stuck(output, record.inputs)
         if stuck is not None:
             findings.append(stuck)
-        same = np.diff(output.values) == 0
-        share = float(np.mean(same))
+        # A clipped output repeats its limits; that is told as saturation.
+        values = output.values[:-1]
+        inner = (values > output.values.min()) & (values < output.values.max())
+        if not inner.any():
+            continue
+        share = float(np.mean(np.diff(output.values)[inner] == 0))
         if share > 0.5:
             every = 1 / (1 - share)
             findings.append(
