@@ -1,0 +1,210 @@
+"""The page: well formed, self-contained, readable by all, and not to be broken by a name."""
+
+import importlib
+import re
+from dataclasses import replace
+from html.parser import HTMLParser
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from hmpim.identify import Identification
+from hmpim.identify.identify import identify
+from hmpim.record import Record
+from hmpim.report import render, report
+from hmpim.stimulus import Limits, design
+
+VOID = {"meta", "link", "br", "hr", "img", "input"}
+PICTURES = (
+    "signals",
+    "correlation",
+    "error",
+    "spectra",
+    "bode",
+    "deviation",
+    "model",
+    "residual",
+    "candidates",
+)
+
+
+class Page(HTMLParser):
+    """Elements of a page, checked for nesting as they come."""
+
+    def __init__(self, text):
+        super().__init__()
+        self.open, self.elements, self.text = [], [], {}
+        self.feed(text)
+        self.close()
+        assert self.open == [], "elements left open"
+
+    def handle_starttag(self, tag, attrs):
+        self.elements.append((tag, dict(attrs)))
+        assert len(dict(attrs)) == len(attrs), f"an attribute of <{tag}> is given twice"
+        if tag not in VOID:
+            self.open.append((tag, dict(attrs).get("id")))
+
+    def handle_startendtag(self, tag, attrs):
+        self.elements.append((tag, dict(attrs)))
+
+    def handle_endtag(self, tag):
+        assert self.open, f"</{tag}> closes nothing"
+        assert self.open[-1][0] == tag, f"</{tag}> closes <{self.open[-1][0]}>"
+        self.open.pop()
+
+    def handle_data(self, data):
+        if self.open:
+            place = self.open[-1]
+            self.text[place] = self.text.get(place, "") + data
+
+    def all(self, tag):
+        return [attrs for name, attrs in self.elements if name == tag]
+
+    @property
+    def ids(self):
+        return [attrs["id"] for _, attrs in self.elements if "id" in attrs]
+
+
+@pytest.fixture(scope="module")
+def page_text(found):
+    return render(found)
+
+
+@pytest.fixture(scope="module")
+def page(page_text):
+    return Page(page_text)
+
+
+def check_sound(text):
+    """What holds for every page, whatever it shows."""
+    page = Page(text)
+    assert len(page.ids) == len(set(page.ids)), "an id is used twice"
+    for _, attrs in page.elements:
+        for name in ("href", "clip-path", "style", "aria-labelledby"):
+            for target in re.findall(r"url\(#([^)]*)\)", attrs.get(name) or ""):
+                assert target in page.ids
+        if (attrs.get("href") or "").startswith("#"):
+            assert attrs["href"][1:] in page.ids
+    for svg in page.all("svg"):
+        assert svg["role"] == "img"
+        title, description = svg["aria-labelledby"].split()
+        assert page.text["title", title].strip()
+        assert len(page.text["desc", description]) > 20
+    return page
+
+
+def test_the_page_is_sound_and_has_every_picture(page_text):
+    page = check_sound(page_text)
+    keys = [svg["aria-labelledby"].split()[0] for svg in page.all("svg")]
+    assert keys == [f"pair-1-{key}-title" for key in PICTURES]
+
+
+def test_the_page_needs_nothing_from_anywhere(page_text, page):
+    assert "://" not in page_text
+    assert "@import" not in page_text
+    for tag, attrs in page.elements:
+        assert tag not in ("script", "link", "iframe", "object", "embed", "base", "image")
+        assert "src" not in attrs
+        assert (attrs.get("href") or "#").startswith("#")
+
+
+def test_headings_step_down_by_one(page):
+    levels = [int(tag[1]) for tag, _ in page.elements if re.fullmatch("h[1-6]", tag)]
+    assert levels[0] == 1
+    assert levels.count(1) == 1
+    assert all(after - before <= 1 for before, after in pairwise(levels))
+
+
+def test_colours_follow_the_page_so_that_it_can_be_dark(page_text):
+    pictures = page_text[page_text.index("<svg") :]
+    assert "var(--input)" in pictures
+    left = set(re.findall(r"(?:fill|stroke): (#[0-9a-f]{3,6})", pictures))
+    assert left == set()
+
+
+def test_estimates_and_the_papers_figures_stand_beside_each_other(found, page_text):
+    pair = found["y", "u"]
+    assert f"{pair.delay.value:.6f}"[:6] in page_text
+    assert "the peak of the cross-correlation (8) is the delay plus what the dynamics add" in (
+        page_text
+    )
+    assert found.record.sha256 in page_text
+
+
+def test_every_warning_is_shown(found):
+    from hmpim.record import Finding
+
+    warned = replace(
+        found.pairs[0], warnings=(Finding(code="jitter", message="Stamps stray by 4 %."),)
+    )
+    text = render(replace(found, pairs=(warned,)))
+    assert "Stamps stray by 4 %." in text
+    assert "jitter" in text
+
+
+def test_hostile_names_are_shown_as_text(hostile):
+    text = render(hostile)
+    page = check_sound(text)
+    assert page.all("script") == []
+    assert "&lt;script&gt;alert(" in text
+    assert "{{ 7*7 }}" in text
+    assert not re.search(r"[\x00-\x08\x0b-\x1f\x7f\ud800-\udfff]", text)
+
+
+def test_a_result_read_back_has_its_tables_and_bode_plot_and_says_so(found):
+    read_back = Identification.from_dict(found.to_dict())
+    text = render(read_back)
+    page = check_sound(text)
+    assert len(page.all("svg")) == 3  # Bode, against the model, candidates
+    assert "The record itself is not part of it" in text
+    assert "The record itself" not in render(found)
+
+
+def test_the_stimulus_is_shown_in_its_limits(found):
+    limits = Limits(position=10, velocity=70, acceleration=8500, unit="deg")
+    text = render(found, stimulus=design(band=(0.1, 20), duration=10, fs=200, limits=limits))
+    assert check_sound(text).all("svg")[0]["aria-labelledby"].startswith("stimulus-title")
+    assert "Peaks: 10 deg" in text
+
+
+def test_several_pairs_each_have_their_section_and_a_dead_one_its_reason(field_record):
+    _, u, y = field_record
+    record = Record.from_arrays({"u": u}, {"y": y, "dead": np.full(y.size, 3.0)}, fs=200.0)
+    text = render(identify(record))
+    page = check_sound(text)
+    assert {"pair-1", "pair-2"} <= set(page.ids)
+    assert "1 of 2 pairs can be trusted" in text
+    assert "is constant at 3" in text
+
+
+def test_units_of_a_gain_are_on_the_bode_plot(field_record):
+    _, u, y = field_record
+    record = Record.from_arrays({"u": u}, {"y": y}, fs=200.0, units={"u": "deg", "y": "V"})
+    assert "Magnitude (dB re 1 V/deg)" in render(identify(record))
+
+
+def test_a_long_record_makes_a_page_of_few_megabytes(found):
+    n = 200_000
+    u, noise = np.random.default_rng(0).standard_normal((2, n))
+    record = Record.from_arrays({"u": u}, {"y": u + noise}, fs=1000.0)
+    pair = replace(found.pairs[0], time=np.arange(n) / 1000.0, prediction=u, residual=noise)
+    assert len(render(replace(found, pairs=(pair,), data=record))) < 4_000_000
+
+
+def test_the_file_is_replaced_whole_or_not_at_all(found, tmp_path, monkeypatch):
+    path = tmp_path / "r.html"
+    path.write_text("old")
+    page = importlib.import_module("hmpim.report.html")
+    monkeypatch.setattr(page, "render", lambda *_, **__: "half \ud800")
+    with pytest.raises(UnicodeEncodeError):
+        report(found, path)
+    assert path.read_text() == "old"
+    assert [p.name for p in tmp_path.iterdir()] == ["r.html"]
+
+
+def test_the_page_is_written_where_it_is_wanted(found, tmp_path, page_text):
+    report(found, tmp_path / "r.html")
+    written = (tmp_path / "r.html").read_text(encoding="utf-8")
+    assert written.startswith("<!DOCTYPE html>")
+    assert len(written) == pytest.approx(len(page_text), abs=20)

@@ -1,0 +1,75 @@
+import math
+import re
+
+import pytest
+from hypothesis import assume, given
+from hypothesis import strategies as st
+
+from hmpim.identify import Estimate
+from hmpim.report.numbers import format_estimate, format_interval, format_number, plus_minus
+
+values = st.floats(-1e12, 1e12)
+errors = st.floats(1e-12, 1e9)
+PATTERN = re.compile(r"\(?(-?[\d.]+) ± ([\d.]+)\)?(?:e([+-]\d+))?$")
+
+
+def parts(text):
+    match = PATTERN.fullmatch(text)
+    assert match, text
+    return match[1], match[2], 10.0 ** int(match[3] or 0)
+
+
+@given(value=values, std=errors)
+def test_the_error_keeps_two_digits_and_the_value_as_many_places(value, std):
+    assume(std > 1e-9 * abs(value))  # 64-bit numbers hold no more
+    shown, error, power = parts(plus_minus(value, std))
+    assert float(error) * power == pytest.approx(std, rel=0.051)
+    # Half of the error's last digit at most is lost of the value.
+    assert abs(float(shown) * power - value) <= 0.051 * std
+    assert len(shown.partition(".")[2]) == len(error.partition(".")[2])
+
+
+@given(value=values, std=errors)
+def test_no_number_is_longer_than_a_table_can_show(value, std):
+    assume(std > 1e-9 * abs(value))
+    assert len(plus_minus(value, std)) <= 36
+
+
+@pytest.mark.parametrize(
+    ("value", "std", "text"),
+    [
+        (0.150021, 0.0000952, "0.150021 ± 0.000095"),
+        (9.99712, 0.0996, "10.00 ± 0.10"),
+        (9.99712, 0.0299, "9.997 ± 0.030"),
+        (-0.0001, 0.5, "0.00 ± 0.50"),
+        (1234567.0, 8900.0, "1234600 ± 8900"),
+        (2.5e9, 1e7, "(2.500 ± 0.010)e+09"),
+        (0.0, 1e-9, "(0.0 ± 1.0)e-09"),
+        (3.0, 0.0, "3 ± 0"),
+        (3.0, math.inf, "3 ± ?"),
+        (3.0, math.nan, "3 ± ?"),
+    ],
+)
+def test_known_numbers(value, std, text):
+    assert plus_minus(value, std) == text
+
+
+def test_the_unit_follows_where_there_is_one():
+    with_unit = Estimate(value=1.0, std=0.01, ci95=(0.98, 1.02), unit="deg")
+    without = Estimate(value=1.0, std=0.01, ci95=(0.98, 1.02))
+    assert format_estimate(with_unit) == "1.000 ± 0.010 deg"
+    assert format_estimate(without) == "1.000 ± 0.010"
+
+
+@given(value=st.floats(-1e6, 1e6), std=st.floats(1e-6, 1e5))
+def test_the_interval_reads_back(value, std):
+    interval = (value - 1.96 * std, value + 1.96 * std)
+    text = format_interval(Estimate(value=value, std=std, ci95=interval))
+    low, high = (float(part) for part in text.split(" to "))
+    assert low == pytest.approx(interval[0], abs=0.06 * std + 1e-5 * abs(value))
+    assert high == pytest.approx(interval[1], abs=0.06 * std + 1e-5 * abs(value))
+
+
+def test_no_number_is_a_dash():
+    assert format_number(None) == "–"
+    assert format_number(0.31234) == "0.3123"

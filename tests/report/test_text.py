@@ -1,0 +1,53 @@
+import io
+from dataclasses import replace
+
+from rich.console import Console
+
+from hmpim.record import Finding
+from hmpim.report import plus_minus, print_result
+from hmpim.report.words import GLOSSARY, off_by
+
+
+def printed(result, *, truth=None, width=120):
+    stream = io.StringIO()
+    print_result(result, Console(file=stream, width=width), truth=truth)
+    return stream.getvalue()
+
+
+def test_each_estimate_is_printed_with_its_error_and_the_papers_figure(found):
+    pair = found.pairs[0]
+    text = printed(found)
+    for words in GLOSSARY:
+        estimate = getattr(pair.parameters, words.name)
+        if estimate is not None:
+            row = next(line for line in text.splitlines() if words.label in line)
+            assert plus_minus(estimate.value, estimate.std) in row
+    assert f"{pair.paper.bias:.4g}" in text
+    assert "Truth" not in text
+
+
+def test_a_known_truth_stands_beside_with_the_miss_in_standard_deviations(found):
+    text = printed(found, truth={"delay": 0.15})
+    row = next(line for line in text.splitlines() if "Delay, pure" in line)
+    assert row.split()[-2:] == [f"{off_by(found.pairs[0].delay, 0.15).split()[0]}", "std"]
+    assert "0.15" in row.split()
+
+
+def test_no_row_is_cut_at_80_columns(found):
+    text = printed(found, truth={"delay": 0.15}, width=80)
+    assert "…" not in text
+    assert max(len(line) for line in text.splitlines()) <= 80
+
+
+def test_markup_and_escapes_in_a_warning_are_printed_as_text(found):
+    warning = Finding(code="x", message="[red]not markup[/red] \x1b[2J [link=a]")
+    pair = replace(found.pairs[0], warnings=(warning,))
+    text = printed(replace(found, pairs=(pair,)))
+    assert "[red]not markup[/red]" in text
+    assert "\x1b" not in text
+
+
+def test_hostile_names_do_not_reach_the_terminal(hostile):
+    text = printed(hostile)
+    assert "\x1b" not in text
+    assert "<script>" in text

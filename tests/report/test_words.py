@@ -1,0 +1,50 @@
+from dataclasses import fields, replace
+
+import pytest
+
+from hmpim.identify import Estimate, PaperEstimates, Parameters
+from hmpim.record import Finding
+from hmpim.report.words import GLOSSARY, headline, remark, untold
+
+
+def test_every_parameter_is_explained_and_every_figure_of_the_paper_has_its_reason():
+    assert [w.name for w in GLOSSARY] == [f.name for f in fields(Parameters)]
+    reasons = {w.name for w in GLOSSARY if w.differs}
+    assert reasons == {f.name for f in fields(PaperEstimates)}
+
+
+def bias():
+    return next(words for words in GLOSSARY if words.name == "bias")
+
+
+@pytest.mark.parametrize(
+    ("paper", "begins"),
+    [
+        (0.6, "The two agree"),
+        (0.6 + 0.019, "The two agree"),
+        (0.6 + 0.021, "0.021 above: equation (11)"),
+        (0.5, "0.1 below: equation (11)"),
+        (None, "The paper's step has no answer"),
+    ],
+)
+def test_two_figures_agree_within_two_standard_deviations_and_else_say_why(paper, begins):
+    estimate = Estimate(value=0.6, std=0.01, ci95=(0.58, 0.62))
+    assert remark(bias(), estimate, paper).startswith(begins)
+
+
+def test_the_headline_is_the_verdict_of_the_worst_pair(found):
+    pair = found.pairs[0]
+    assert headline(found).startswith("The record tells the model: second order and a delay")
+    reason = Finding(code="unrelated", message="Output 'y' does not follow input 'u'.")
+    lost = replace(pair, verdict="not_identifiable", warnings=(reason,))
+    assert headline(replace(found, pairs=(lost,))) == (
+        "This record cannot tell: output 'y' does not follow input 'u'."
+    )
+    warned = replace(pair, verdict="doubtful", warnings=(reason, reason))
+    assert "but there are 2 warnings" in headline(replace(found, pairs=(warned,)))
+    assert "1 of 2 pairs can be trusted" in headline(replace(found, pairs=(pair, lost)))
+
+
+def test_what_has_no_figure_is_listed(found):
+    assert "hold period" in untold(found.pairs[0])
+    assert "delay, pure" not in untold(found.pairs[0])
