@@ -24,13 +24,13 @@ class ContinuousInput:
         Values at times (s, shape (n,)).
     rest : float
         Value before time 0.
-    breaks : ndarray, shape (m,)
-        Times in s at which it jumps or bends, where known; rising.
+    breaks : ndarray, shape (m,), or None
+        All times in s at which it jumps or bends, rising; None where they are not known.
     """
 
     at: Callable[[FloatArray], FloatArray]
     rest: float
-    breaks: FloatArray
+    breaks: FloatArray | None
 
 
 def between_samples(values: FloatArray, fs: float, intersample: Intersample) -> ContinuousInput:
@@ -44,7 +44,8 @@ def between_samples(values: FloatArray, fs: float, intersample: Intersample) -> 
         Rate in Hz.
     intersample : {'zoh', 'foh', 'bandlimited'}
         Held, joined linearly, or smooth. 'bandlimited' is a spline of degree 7 through the
-        samples; it errs by less than 1e-6 of the amplitude up to an eighth of the rate.
+        samples; it errs by less than 1e-6 of the amplitude up to an eighth of the rate,
+        some samples away from either end.
 
     Examples
     --------

@@ -187,9 +187,8 @@ class Sensor:
             def motion(t: FloatArray) -> FloatArray:
                 return np.asarray(getattr(stimulus.motion(t), self.measures))
 
-            u = ContinuousInput(
-                at=motion, rest=float(motion(np.array([-1.0]))[0]), breaks=np.zeros(1)
-            )
+            rest = float(motion(np.array([-1.0]))[0])
+            u = ContinuousInput(at=motion, rest=rest, breaks=None)
         else:
             intersample = self.command
             u = between_samples(commanded, stimulus.fs, self.command)
