@@ -6,7 +6,7 @@ the linear ones are solved exactly at each step (variable projection: G. H. Golu
 V. Pereyra, SIAM J. Numer. Anal. 10, 1973), the others by Levenberg-Marquardt.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,10 +17,7 @@ from hmpim.model.sampled import SampledInput, delayed_response
 __all__ = ["Fit", "Problem", "fit_structure", "jacobian"]
 
 _STEP = 1e-5
-"""Step of the derivatives, in samples for the delay and relative for the coefficients."""
-
-_CONVERGED = 1e-5
-"""Stop when a step would lower the sum of squares by less than this, in units of σ²."""
+"""Relative step of the derivatives by the coefficients; of the delay in samples, if static."""
 
 _LONGEST_TIME_CONSTANT = 2.0
 """In record lengths; a slower pole cannot be told from an integrator."""
@@ -105,19 +102,24 @@ def _basis(
     problem: Problem, structure: Structure, theta: NDArray[np.float64]
 ) -> NDArray[np.float64]:
     """Responses that the linear parameters multiply, shape (zeros + 1, n)."""
+    return _responses(problem, structure, theta, structure.zeros + 1)
+
+
+def _responses(
+    problem: Problem, structure: Structure, theta: NDArray[np.float64], powers: int
+) -> NDArray[np.float64]:
+    """Responses of s^i e^(-sτ) / A(s), the level before the record included."""
     rows = delayed_response(
         problem.source,
         delay=float(theta[0]),
         denominator=denominator_of(structure, np.exp(theta[1:])),
-        powers=structure.zeros + 1,
+        powers=powers,
     )
     rows[0] += problem.source.first
     return rows
 
 
-def _solve_linear(
-    problem: Problem, structure: Structure, theta: NDArray[np.float64]
-) -> tuple[Fit, NDArray[np.float64]]:
+def _solve_linear(problem: Problem, structure: Structure, theta: NDArray[np.float64]) -> Fit:
     """Best numerator and bias at given delay and denominator."""
     basis = _basis(problem, structure, theta)
     rows = np.vstack([basis, np.ones(problem.y.size)])
@@ -126,7 +128,7 @@ def _solve_linear(
     linear = _least_squares(counted @ counted.T, counted @ y)
     prediction = linear @ rows
     residual = problem.masked(problem.y - prediction)
-    fit = Fit(
+    return Fit(
         structure=structure,
         theta=theta,
         linear=linear,
@@ -135,7 +137,6 @@ def _solve_linear(
         cost=float(residual @ residual),
         converged=False,
     )
-    return fit, basis
 
 
 def _least_squares(
@@ -158,19 +159,22 @@ def jacobian(problem: Problem, fit: Fit) -> NDArray[np.float64]:
     ndarray, shape (1 + order + zeros + 2, n)
         Zero where a sample does not count.
     """
-    basis = _basis(problem, fit.structure, fit.theta)
-    return _jacobian(problem, fit, basis)
-
-
-def _jacobian(problem: Problem, fit: Fit, basis: NDArray[np.float64]) -> NDArray[np.float64]:
-    weights = fit.linear[:-1]
+    weights, theta, structure = fit.linear[:-1], fit.theta, fit.structure
+    rows = np.empty((theta.size + fit.linear.size, problem.y.size))
+    # d/dτ of e^(-sτ) is -s: one more power of s, whose responses come at little cost.
+    responses = _responses(
+        problem, structure, theta, structure.zeros + (2 if theta.size > 1 else 1)
+    )
+    basis = responses[: weights.size]
     here = weights @ basis
-    rows = np.empty((fit.theta.size + fit.linear.size, problem.y.size))
-    for i in range(fit.theta.size):
-        moved = fit.theta.copy()
+    for i in range(theta.size):
+        if i == 0 and theta.size > 1:
+            rows[0] = -(weights @ responses[1:])
+            continue
+        moved = theta.copy()
         moved[i] += _STEP
-        rows[i] = (weights @ _basis(problem, fit.structure, moved) - here) / _STEP
-    rows[fit.theta.size : -1] = basis
+        rows[i] = (weights @ _basis(problem, structure, moved) - here) / _STEP
+    rows[theta.size : -1] = basis
     rows[-1] = 1.0
     return problem.masked(rows)
 
@@ -194,6 +198,7 @@ def fit_structure(
     theta: NDArray[np.float64],
     *,
     iterations: int = 40,
+    precision: float = 1e-2,
     shortest_delay: float = -4.0,
 ) -> Fit:
     """Fit one structure from one start.
@@ -208,6 +213,9 @@ def fit_structure(
         Start: delay in samples, logarithms of the denominator's coefficients.
     iterations : int
         At most so many steps.
+    precision : float
+        Stop when a step lowers the sum of squares by less than this, in units of σ²; a
+        parameter then is within about the root of it, in standard deviations.
     shortest_delay : float
         Least delay to try, in samples; below 0 an input column stamped late shows.
 
@@ -216,36 +224,33 @@ def fit_structure(
     Fit
         `converged` is False if the steps ran out.
     """
-    fit, basis = _solve_linear(problem, structure, _bounded(problem, theta, shortest_delay))
+    fit = _solve_linear(problem, structure, _bounded(problem, theta, shortest_delay))
     damping = 1e-4
     unknown = fit.theta.size
     freedom = max(problem.counted - unknown - fit.linear.size, 1)
     for _ in range(iterations):
-        rows = _jacobian(problem, fit, basis)
+        rows = jacobian(problem, fit)
         gram, moment = rows @ rows.T, rows @ fit.residual
-        accepted = False
-        while damping < 1e8:
+        negligible = precision * fit.cost / freedom
+        while True:
             step = _damped_step(gram, moment, unknown, damping)
             largest = np.max(np.abs(step[1:]), initial=0.0)
             if largest > 1.0:  # no coefficient grows by more than e at once
                 step = step / largest
-            gain = 2 * float(step @ moment[:unknown])
-            trial, trial_basis = _solve_linear(
+            if float(step @ moment[:unknown]) < 0.5 * negligible:
+                return replace(fit, converged=True)
+            trial = _solve_linear(
                 problem, structure, _bounded(problem, fit.theta + step, shortest_delay)
             )
             if trial.cost <= fit.cost:
-                accepted = True
                 damping = max(damping / 10, 1e-9)
                 break
-            if gain < _CONVERGED * fit.cost / freedom:
-                break
+            if damping > 1e8:
+                return replace(fit, converged=True)
             damping *= 10
-        if not accepted:
-            return _mark_converged(fit)
-        fell = fit.cost - trial.cost
-        fit, basis = trial, trial_basis
-        if fell < _CONVERGED * fit.cost / freedom:
-            return _mark_converged(fit)
+        fell, fit = fit.cost - trial.cost, trial
+        if fell < negligible:
+            return replace(fit, converged=True)
     return fit
 
 
@@ -260,15 +265,3 @@ def _damped_step(
     )
     projected = nonlinear - mixed @ np.linalg.lstsq(linear, mixed.T, rcond=None)[0]
     return _least_squares(projected, moment[:unknown], damping)
-
-
-def _mark_converged(fit: Fit) -> Fit:
-    return Fit(
-        structure=fit.structure,
-        theta=fit.theta,
-        linear=fit.linear,
-        prediction=fit.prediction,
-        residual=fit.residual,
-        cost=fit.cost,
-        converged=True,
-    )

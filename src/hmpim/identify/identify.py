@@ -20,6 +20,7 @@ from hmpim.identify.result import (
     RecordSummary,
 )
 from hmpim.identify.spectrum import excited_band
+from hmpim.identify.threads import one_thread
 from hmpim.identify.uncertainty import estimate, noise_estimate
 from hmpim.identify.verdict import is_unrelated, judge
 from hmpim.identify.whiteness import misfit
@@ -99,11 +100,12 @@ def identify(
             f"output {dead[0].name!r} is constant at {dead[0].values[0]:g}; the sensor is dead, "
             "stuck or not connected, or the wrong column is taken as output"
         )
-    pairs = tuple(
-        _identify_pair(aligned, u, y, record=record, intersample=chosen, structures=names)
-        for y in aligned.outputs
-        for u in aligned.inputs
-    )
+    with one_thread():
+        pairs = tuple(
+            _identify_pair(aligned, u, y, record=record, intersample=chosen, structures=names)
+            for y in aligned.outputs
+            for u in aligned.inputs
+        )
     return Identification(
         record=RecordSummary(
             fs=aligned.fs, samples=record.samples, sha256=record.sha256, source=record.source

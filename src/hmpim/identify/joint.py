@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from hmpim.identify.fit import Fit, Problem, fit_structure
 from hmpim.identify.start import RoughResponse, rough_response, starting_values
-from hmpim.identify.whiteness import effective_share
+from hmpim.identify.whiteness import effective_share, is_white
 from hmpim.model.dynamics import STRUCTURES, StructureName
 from hmpim.model.sampled import prepare_input
 from hmpim.record import Intersample
@@ -34,6 +34,9 @@ _INTERSAMPLES: tuple[Intersample, ...] = ("bandlimited", "zoh", "foh")
 
 _DELAY_SHIFT: dict[Intersample, float] = {"zoh": -0.5, "foh": 0.0, "bandlimited": 0.0}
 """Samples by which the fitted delay moves when held, against the other two."""
+
+_FINAL_PRECISION = 1e-6
+"""Precision of the chosen fit, see `fit_structure`."""
 
 _SETTLED = 5.0
 """Time constants after which what came before the record is forgotten (0.7 % left)."""
@@ -113,7 +116,7 @@ def joint_fit(
         counted = np.ones(y.size, dtype=bool) if valid is None else valid.copy()
         counted[:forgotten] = False
         valid = counted
-        fits = [_refit(problem_for(first, valid), fit) for fit in fits]
+        fits = [fit_structure(problem_for(first, valid), f.structure, f.theta) for f in fits]
     fitted: list[tuple[Intersample, Fit]] = [(first, fit) for fit in fits]
     least = min(fit.cost for fit in fits)
     leading = [fit for fit in fits if fit.cost < _HOPELESS * least]
@@ -128,9 +131,15 @@ def joint_fit(
     share = effective_share(min(fitted, key=lambda item: item[1].cost)[1].residual)
     count = problem_for(first, valid).counted * share
     trials = [_trial(mode, fit, count) for mode, fit in fitted]
-    best = _chosen(trials)
+    chosen = _chosen(trials)
+    problem = problem_for(chosen.intersample, valid)
+    polished = fit_structure(
+        problem, chosen.fit.structure, chosen.fit.theta, precision=_FINAL_PRECISION
+    )
+    best = _trial(chosen.intersample, polished, count)
+    trials = [best if trial is chosen else trial for trial in trials]
     return JointFit(
-        problem=problem_for(best.intersample, valid),
+        problem=problem,
         best=best,
         trials=tuple(trials),
         forgotten=forgotten,
@@ -147,13 +156,20 @@ def _bridged(y: NDArray[np.float64], valid: NDArray[np.bool_]) -> NDArray[np.flo
 def _fit_all(
     problem: Problem, rough: RoughResponse, structures: tuple[StructureName, ...]
 ) -> list[Fit]:
-    fits = []
-    for name in structures:
+    """Fit each structure, the richest first: what it leaves tells which others are hopeless."""
+    fits: list[Fit] = []
+    for name in sorted(structures, key=lambda name: -STRUCTURES[name].order):
         structure = STRUCTURES[name]
         starts = starting_values(rough, structure, earliest=-2)
-        tried = [fit_structure(problem, structure, theta, iterations=3) for theta in starts]
-        best = min(tried, key=lambda fit: fit.cost)
-        fits.append(_refit(problem, best))
+        enough = _HOPELESS * min((fit.cost for fit in fits), default=0.0)
+        fit = fit_structure(problem, structure, starts[0], iterations=3 if enough else 40)
+        for theta in starts[1:]:
+            if enough < fit.cost and not is_white(fit.residual):
+                other = fit_structure(problem, structure, theta, iterations=3)
+                fit = min(fit, other, key=lambda f: f.cost)
+        if not fit.converged and (enough == 0.0 or fit.cost < enough):
+            fit = fit_structure(problem, structure, fit.theta)
+        fits.append(fit)
     return fits
 
 

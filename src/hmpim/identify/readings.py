@@ -109,6 +109,12 @@ def read_parameters(
         slope = gradient(function, vector)
         return estimate(function(vector), float(slope @ cov @ slope), freedom=effective, unit=unit)
 
+    def linear(value: float, slope: _Vector, unit: str) -> Estimate:
+        """An estimate whose derivatives are known in closed form."""
+        return estimate(value, float(slope @ cov @ slope), freedom=effective, unit=unit)
+
+    axis = np.eye(vector.size)
+
     def root(
         value: float | None,
         equation: Callable[[float, _Vector], float],
@@ -145,21 +151,21 @@ def read_parameters(
             return float(here.delay + here.denominator[1] - lead)
 
         low_frequency = explicit(slope_at_dc, "s")
+    natural = damping = 0.0
+    if second:  # 1 + c1 s + c2 s²: ω = c2^(-1/2), ζ = c1 ω / 2
+        natural = float(np.exp(-vector[2] / 2)) * fs / (2 * np.pi)
+        damping = float(np.exp(vector[1] - vector[2] / 2)) / 2
     parameters = Parameters(
-        delay=explicit(lambda v: float(v[0]) / fs, "s"),
+        delay=linear(vector[0] / fs, axis[0] / fs, "s"),
         delay_correlation=_from_lag(delay_correlation, fs),
-        delay_low_frequency=low_frequency or explicit(lambda v: float(v[0]) / fs, "s"),
-        scale_factor=explicit(lambda v: float(v[1 + order]), gain_unit),
-        bias=explicit(lambda v: float(v[-1]), output_unit),
+        delay_low_frequency=low_frequency or linear(vector[0] / fs, axis[0] / fs, "s"),
+        scale_factor=linear(vector[1 + order], axis[1 + order], gain_unit),
+        bias=linear(vector[-1], axis[-1], output_unit),
         noise_std=noise_estimate(
             fit.cost, freedom=freedom, share=joint.effective_share, unit=output_unit
         ),
-        natural_frequency=explicit(lambda v: float(np.exp(-v[2] / 2)) * fs / (2 * np.pi), "Hz")
-        if second
-        else None,
-        damping_ratio=explicit(lambda v: float(np.exp(v[1] - v[2] / 2)) / 2, "")
-        if second
-        else None,
+        natural_frequency=linear(natural, -0.5 * natural * axis[2], "Hz") if second else None,
+        damping_ratio=linear(damping, damping * (axis[1] - 0.5 * axis[2]), "") if second else None,
         time_constant=explicit(
             lambda v: dominant_time_constant(system_of(structure, v, fs)) or float("nan"), "s"
         )

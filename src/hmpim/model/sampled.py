@@ -161,25 +161,44 @@ def _spline_taps(
     for i in range(1, taps):
         truncated[i] = state[:n]
         state = step @ state
-    signs = _spline_signs(degree)
-    answer = np.zeros((taps, n))
-    for j, sign in enumerate(signs[:taps]):
-        answer[j:] += sign * truncated[: taps - j]
-    recursion = np.atleast_1d(np.poly(step[:n, :n])).real
-    numerators = np.stack([np.convolve(recursion, answer[:, i])[:taps] for i in range(n)])
-    return numerators, recursion
+    recursion = _characteristic(step[:n, :n])
+    # Differences make the spline of the truncated powers, the recursion makes it finite.
+    weights = np.zeros(taps)
+    both = np.convolve(_spline_signs(degree), recursion)
+    weights[: both.size] = both[:taps]
+    numerators = (weights[_lower(taps)] * np.tri(taps)) @ truncated
+    return np.ascontiguousarray(numerators.T), recursion
 
 
 @cache
+def _lower(taps: int) -> NDArray[np.intp]:
+    """Index i - j of a lower triangular Toeplitz matrix, 0 above the diagonal."""
+    i = np.arange(taps)
+    return np.asarray(np.maximum(i[:, None] - i[None, :], 0))
+
+
+def _characteristic(step: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Characteristic polynomial of the transition matrix, highest power first."""
+    if step.shape == (1, 1):
+        return np.array([1.0, -step[0, 0]])
+    if step.shape == (2, 2):
+        return np.array(
+            [
+                1.0,
+                -step[0, 0] - step[1, 1],
+                step[0, 0] * step[1, 1] - step[0, 1] * step[1, 0],
+            ]
+        )
+    return np.asarray(np.poly(step).real)
+
+
 def _spline_at(lag: float, degree: int) -> NDArray[np.float64]:
     """One B-spline itself, sampled at i - lag: the answer of a system without dynamics."""
     i = np.arange(degree + 2)
     answer = np.zeros(degree + 2)
     for j, sign in enumerate(_spline_signs(degree)):
         t = i - lag - j
-        power = np.where(t > 0, 1.0, 0.0) if degree == 0 else np.maximum(t, 0.0) ** degree
-        if degree == 0:
-            power = np.where(t >= 0, 1.0, 0.0)
+        power = np.where(t >= 0, 1.0, 0.0) if degree == 0 else np.maximum(t, 0.0) ** degree
         answer += sign * power / factorial(degree)
     return answer
 
@@ -203,7 +222,8 @@ def delayed_response(
     denominator : ndarray, shape (n + 1,)
         A(s) by rising powers of s per sample, stable; A = [1] is a system without dynamics.
     powers : int
-        How many responses, at most max(n, 1).
+        How many responses, at most n + 1; the last of these is fed through, and with n = 0
+        it is the delayed input itself.
 
     Returns
     -------
@@ -223,26 +243,27 @@ def delayed_response(
     whole = floor(offset)
     lag = offset - whole
     n = denominator.size - 1
-    if n == 0:
-        numerators, recursion = _spline_at(lag, source.degree)[None, :], np.ones(1)
-    else:
-        fine = denominator * float(factor) ** np.arange(n + 1)
-        numerators, recursion = _spline_taps(fine, lag, source.degree)
-        numerators = numerators * (float(factor) ** np.arange(n))[:, None]
-    begin = factor * _MARGIN - whole
-    length = factor * source.samples
-    # The filter runs from the first coefficient, so that nothing before the record is cut.
-    stop = begin + length
+    begin = factor * _MARGIN - whole  # where in the filtered coefficients the record begins
+    stop = begin + factor * source.samples
     c = source.coefficients[: max(stop, 0)]
     if stop > source.coefficients.size:
         c = np.concatenate([c, np.full(stop - source.coefficients.size, c[-1])])
-    out = np.zeros((powers, source.samples))
-    for i in range(powers):
-        y = lfilter(numerators[i], recursion, c)
-        if begin >= 0:
-            out[i] = y[begin::factor][: source.samples]
-        else:
-            lead = -begin
-            padded = np.concatenate([np.zeros(lead), y]) if lead < length else np.zeros(length)
-            out[i] = padded[::factor][: source.samples]
+
+    def filtered(
+        numerator: NDArray[np.float64], recursion: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        y = lfilter(numerator, recursion, c)
+        if begin < 0:
+            y = np.concatenate([np.zeros(min(-begin, factor * source.samples)), y])
+        return np.asarray(y[max(begin, 0) :: factor][: source.samples])
+
+    out = np.empty((powers, source.samples))
+    if n:
+        scale = float(factor) ** np.arange(n + 1)
+        numerators, recursion = _spline_taps(denominator * scale, lag, source.degree)
+        for i in range(min(powers, n)):
+            out[i] = filtered(numerators[i] * scale[i], recursion)
+    if powers > n:
+        fed = filtered(_spline_at(lag, source.degree), np.ones(1))
+        out[n] = (fed - denominator[:-1] @ out[:n]) / denominator[-1] if n else fed
     return out

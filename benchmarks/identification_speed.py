@@ -1,0 +1,91 @@
+"""Speed of one identification against a hand-written scipy fit with a good start.
+
+Both see the same record in the same process, turn by turn, so that a busy machine slows both.
+The hand-written fit is given the structure, and starts within 10 % of the truth; the package
+is given nothing. Run with `make bench`.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import time
+from pathlib import Path
+
+import numpy as np
+from scipy.optimize import least_squares
+
+import hmpim
+
+
+def field_record(fs: float, seed: int = 0) -> tuple[np.ndarray, np.ndarray]:
+    """Second order 10 Hz, ζ 0.4, delay 150 ms, bias 0.6, noise 0.1, chirp 0.1-20 Hz, 10 s."""
+    stimulus = hmpim.Stimulus(
+        waveform=hmpim.Chirp(band=(0.1, 20.0), duration=10.0, amplitude=1.0), fs=fs
+    )
+    sensor = hmpim.Sensor(
+        delay=0.15, natural_frequency=10.0, damping_ratio=0.4, bias=0.6, noise_std=0.1
+    )
+    record = hmpim.run(sensor, stimulus, rng=seed)
+    return record.inputs[0].values, record.outputs[0].values
+
+
+def hand_written(u: np.ndarray, y: np.ndarray, fs: float) -> np.ndarray:
+    """Fit delay, natural frequency, damping, gain and bias, each start 10 % off."""
+    n = u.size
+    length = 2 * n
+    spectrum = np.fft.rfft(u, length)
+    s = 2j * np.pi * np.fft.rfftfreq(length, 1 / fs)
+
+    def residual(p: np.ndarray) -> np.ndarray:
+        delay, natural, zeta, gain, bias = p
+        w = 2 * np.pi * natural
+        response = gain * w**2 / (s**2 + 2 * zeta * w * s + w**2) * np.exp(-s * delay)
+        return np.fft.irfft(response * spectrum, length)[:n] + bias - y
+
+    start = np.array([0.165, 9.0, 0.44, 0.9, 0.55])
+    return least_squares(residual, start, x_scale=[0.01, 1.0, 0.1, 1.0, 1.0], method="trf").x
+
+
+def timed(function, *arguments) -> float:
+    begin = time.perf_counter()
+    function(*arguments)
+    return time.perf_counter() - begin
+
+
+def compare(fs: float, turns: int) -> dict[str, float]:
+    u, y = field_record(fs)
+    record = hmpim.Record.from_arrays({"u": u}, {"y": y}, fs=fs)
+    hand_written(u, y, fs)
+    hmpim.identify(record)
+    ours, theirs = [], []
+    for _ in range(turns):
+        theirs.append(timed(hand_written, u, y, fs))
+        ours.append(timed(hmpim.identify, record))
+    return {
+        "fs": fs,
+        "samples": u.size,
+        "hand_written_ms": 1e3 * float(np.median(theirs)),
+        "identify_ms": 1e3 * float(np.median(ours)),
+        "ratio": float(np.median(np.array(ours) / np.array(theirs))),
+    }
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--turns", type=int, default=30)
+    parser.add_argument("--json", type=Path)
+    options = parser.parse_args()
+    rows = [compare(fs, options.turns) for fs in (200.0, 1000.0)]
+    print(f"{'rate':>8} {'samples':>8} {'hand-written':>14} {'identify':>10} {'ratio':>6}")
+    for row in rows:
+        print(
+            f"{row['fs']:6.0f}Hz {row['samples']:8d} {row['hand_written_ms']:11.1f} ms "
+            f"{row['identify_ms']:7.1f} ms {row['ratio']:6.2f}"
+        )
+    if options.json:
+        options.json.write_text(json.dumps(rows, indent=1) + "\n")
+
+
+if __name__ == "__main__":
+    main()
