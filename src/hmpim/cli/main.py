@@ -51,7 +51,7 @@ class CommandGroup(TyperGroup):
         except Exception as error:
             if not hasattr(error, "format_message"):  # a defect, not bad input: show it whole
                 raise
-            code = _failed(_usage(error))
+            code = _failed(_usage(error, sys.argv[1:] if args is None else args))
         code = code if isinstance(code, int) else 0
         if not standalone_mode:
             return code
@@ -71,12 +71,26 @@ def _described(error: Exception) -> str:
     return str(error) or type(error).__name__
 
 
-def _usage(error: Any) -> str:
-    """One line for a mistake on the command line, and where to read on."""
+def _usage(error: Any, arguments: Sequence[str]) -> str:
+    """One line for a mistake on the command line: the bad value, and where to read on."""
     context = getattr(error, "ctx", None)
     path = context.command_path if context is not None else "hmpim"
     message = error.format_message().rstrip().rstrip(".")
+    given = _given(getattr(error, "param", None), arguments)
+    if given is not None and given not in message:
+        message = f"{message} (it is {given!r})"
     return f"{message}; see {path} --help"
+
+
+def _given(parameter: Any, arguments: Sequence[str]) -> str | None:
+    """Return what stands after an option on the command line, if the mistake is in one."""
+    for option in getattr(parameter, "opts", ()):
+        for place, word in enumerate(arguments):
+            if word == option and place + 1 < len(arguments):
+                return arguments[place + 1]
+            if word.startswith(f"{option}="):
+                return word.removeprefix(f"{option}=")
+    return None
 
 
 app = typer.Typer(
@@ -124,3 +138,7 @@ app.command(epilog="Example: hmpim demo --out out/demo --seed 7")(demo)
 def main() -> None:
     """Run the command line; this is what ``hmpim`` starts."""
     app()
+
+
+if __name__ == "__main__":
+    main()

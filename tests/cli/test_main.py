@@ -1,0 +1,79 @@
+"""The frame of the command line: version, help, usage, interruption, speed of its start."""
+
+import subprocess
+import sys
+from importlib.metadata import version
+
+import pytest
+from typer.testing import CliRunner
+
+from hmpim.cli.main import app
+
+RUNNER = CliRunner()
+
+
+def test_the_version_is_the_installed_one():
+    done = RUNNER.invoke(app, ["--version"])
+    assert (done.exit_code, done.stdout.strip()) == (0, f"hmpim {version('hmpim')}")
+
+
+def test_no_command_shows_the_commands():
+    done = RUNNER.invoke(app, [])
+    assert done.exit_code == 0
+    assert "identify" in done.stdout
+
+
+@pytest.mark.parametrize("command", [info.callback.__name__ for info in app.registered_commands])
+def test_every_command_explains_itself_with_an_example(command):
+    done = RUNNER.invoke(app, [command, "--help"])
+    assert done.exit_code == 0
+    assert "Example" in done.stdout
+    assert f"hmpim {command}" in done.stdout.partition("Example")[2]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "reason"),
+    [
+        (["indentify"], "No such command 'indentify'. Did you mean 'identify'?; see hmpim --help"),
+        (["identify"], "see hmpim identify --help"),
+        (["--nonsense"], "see hmpim --help"),
+        (["demo", "--seed", "-1"], "see hmpim demo --help"),
+    ],
+)
+def test_a_mistake_on_the_command_line_is_one_line(arguments, reason):
+    done = RUNNER.invoke(app, arguments)
+    assert done.exit_code == 2
+    assert done.stdout == ""
+    assert done.stderr.startswith("hmpim: ")
+    assert done.stderr.count("\n") == 1
+    assert done.stderr.rstrip().endswith(reason)
+
+
+def test_stopping_from_the_keyboard_ends_with_130(tmp_path, monkeypatch):
+    def stop(*_, **__):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("hmpim.formats.read", stop)
+    done = RUNNER.invoke(app, ["identify", str(tmp_path / "a.csv")])
+    assert done.exit_code == 130
+    assert "Traceback" not in done.stderr
+
+
+def test_a_defect_is_not_hidden(tmp_path, monkeypatch):
+    def broken(*_, **__):
+        raise ZeroDivisionError("a defect")
+
+    monkeypatch.setattr("hmpim.formats.read", broken)
+    done = RUNNER.invoke(app, ["identify", str(tmp_path / "a.csv")])
+    assert isinstance(done.exception, ZeroDivisionError)
+
+
+def test_help_loads_nothing_that_draws():
+    code = (
+        "import sys\nfrom hmpim.cli.main import app\n"
+        "try:\n    app(['--help'])\nexcept SystemExit: pass\n"
+        "heavy = {'matplotlib', 'jinja2'} & set(sys.modules)\n"
+        "assert not heavy, heavy\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
