@@ -21,13 +21,16 @@ __all__ = ["local_polynomial_response"]
 
 _FEWEST_SAMPLES = 16
 _RIDGE = 1e-13
+# Power of U, relative to its greatest, that counts as none.
+_NOTHING = 1e-24
 # Products of bins held at once, about 80 MB.
 _CHUNK = 1_000_000
-# The prediction error of a width is averaged over this many neighbours on either side.
-_NEIGHBOURS = 15
-# A wider window must predict this much better than a narrower one: what it gains in noise it
-# may lose in curvature, which the stated error does not hold.
-_TOLERANCE = 0.01
+# The prediction error of a fit is averaged over this many neighbours on either side.
+_NEIGHBOURS = 30
+# Fits that predict within this of the best count as equally good.
+_TOLERANCE = 0.03
+# The next narrower window is taken unless the square of its error is this much greater.
+_DEAREST = 2.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -41,11 +44,32 @@ class _Spectra:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Normal:
+    """Normal equations around c centres: first the columns of G, then those of T."""
+
+    gram: NDArray[np.complex128]
+    right: NDArray[np.complex128]
+    row: NDArray[np.complex128]
+    here: NDArray[np.float64]
+    size: NDArray[np.float64]
+    power: NDArray[np.float64]
+    y: NDArray[np.complex128]
+    window: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class _Local:
-    """One window width: response, its variance, and the error of predicting each bin."""
+    """One fit at every centre.
+
+    The variance of `response` is `spread` times `noise`, the variance of a bin of Y; `power` is
+    the mean |U|² in the window; `prediction_error` is the square of what the fit without a
+    bin misses there.
+    """
 
     response: NDArray[np.complex128]
-    variance: NDArray[np.float64]
+    spread: NDArray[np.float64]
+    noise: NDArray[np.float64]
+    power: NDArray[np.float64]
     prediction_error: NDArray[np.float64]
 
 
@@ -66,7 +90,9 @@ def local_polynomial_response(
     no response to the stimulus lies beyond the end of the record, and the rest by its phase;
     it is put back at the end. The bias lies in the bin at DC, which is not used. The number of
     neighbours is chosen at each frequency from the data: the one that best predicts bins from
-    their neighbours alone (cross-validation), averaged over 31 frequencies.
+    their neighbours alone (cross-validation), averaged over 61 frequencies, weighed against the
+    variance of G. Where G without T predicts as well, T is left out: a sweep passes the ends of
+    its band so early or late that the two can hardly be told apart there.
 
     Parameters
     ----------
@@ -89,13 +115,14 @@ def local_polynomial_response(
     Returns
     -------
     FrequencyResponse
-        At bins of the record inside the band; `std` from the residual around each frequency,
-        `coherence` None: there is one segment only.
+        At bins of the record inside the band. `std` is from the residual around each frequency
+        and, where no fit is without one, from what the best fit lacks. `coherence` is None:
+        there is one segment only.
 
     Raises
     ------
     RecordError
-        For unequal lengths, fewer than 16 samples, NaN or infinity.
+        For unequal lengths, fewer than 16 samples, NaN or infinity, or a constant `u`.
     ArgumentError
         For a rate, band, delay, order, width or number of points that cannot be, or a band
         without a bin of the record.
@@ -114,6 +141,8 @@ def local_polynomial_response(
     check_rate(fs)
     check_band(band, fs)
     _check_options(first.size, delay=delay, order=order, widths=widths, points=points)
+    if np.ptp(first) == 0:
+        raise RecordError(f"u is constant at {first[0]:g}; an input must move")
     spectra = _spectra(first, second, fs, delay)
     bins = spectra.frequency.size
     step = float(spectra.frequency[0])
@@ -128,13 +157,14 @@ def local_polynomial_response(
     # Each polynomial has order + 1 coefficients, and residuals must be left over.
     order = min(order, max((bins - 2) // 4 - 1, 0))
     tried = [
-        _fit(spectra, centre, width, order)
+        fit
         for width in _widths(high - low + 1, bins, order, widths)
+        for fit in _fits(spectra, centre, width, order)
     ]
-    chosen = _choice(np.stack([trial.prediction_error for trial in tried]))
+    chosen, bent = _choice(tried)
     rows = np.arange(centre.size)
-    response = np.stack([trial.response for trial in tried])[chosen, rows]
-    variance = np.stack([trial.variance for trial in tried])[chosen, rows]
+    response = np.stack([fit.response for fit in tried])[chosen, rows]
+    variance = np.stack([fit.spread * fit.noise for fit in tried])[chosen, rows] + bent
     frequency = spectra.frequency[centre]
     return FrequencyResponse(
         frequency=frequency,
@@ -170,7 +200,6 @@ def _spectra(u: NDArray[np.float64], y: NDArray[np.float64], fs: float, delay: f
     spectrum_y = np.asarray(fft.rfft(y[lag:]))[1 : count + 1]
     rest = delay - lag / fs
     spectrum_y = spectrum_y * np.exp(2j * np.pi * frequency * rest)
-    # Scaled so that the columns of G and T weigh alike in the sums below.
     products = np.stack(
         (
             np.abs(spectrum_u) ** 2 + 0j,
@@ -201,8 +230,10 @@ def _widths(excited: int, bins: int, order: int, widths: tuple[int, ...] | None)
     return tuple(sorted({min(max(width, order + 1), most) for width in widths}))
 
 
-def _fit(spectra: _Spectra, centre: NDArray[np.int64], width: int, order: int) -> _Local:
-    """Fit G and T around each centre over 2 width + 1 bins.
+def _fits(
+    spectra: _Spectra, centre: NDArray[np.int64], width: int, order: int
+) -> tuple[_Local, _Local]:
+    """Fit G and T, and G alone, around each centre over 2 width + 1 bins.
 
     The normal equations are made of moments Σ A x^p over the window, x = -1 … 1, of five
     products A; so all frequencies share one matrix of powers. Near the ends of the spectrum
@@ -213,52 +244,88 @@ def _fit(spectra: _Spectra, centre: NDArray[np.int64], width: int, order: int) -
     start = np.clip(centre - width, 0, bins - window)
     x = np.linspace(-1.0, 1.0, window)
     powers = x[:, None] ** np.arange(2 * order + 1)
-    at = x[centre - start]
     views = sliding_window_view(spectra.products, window, axis=1)
     chunk = max(_CHUNK // window, 1)
     moments = np.concatenate(
         [views[:, start[k : k + chunk]] @ powers for k in range(0, centre.size, chunk)], axis=1
     )
-    # Power of U and number of bins in the window scale the two kinds of columns to one.
-    size = np.sqrt(np.maximum(moments[0, :, 0].real / window, np.finfo(float).tiny))
     terms = order + 1
     pair = np.add.outer(np.arange(terms), np.arange(terms))
+    # G's columns are scaled to the size of T's, whatever the unit of U; where there is no U at
+    # all, G comes out as zero with a huge error.
+    floor = _NOTHING * float(spectra.products[0].real.max())
+    size = np.sqrt(np.maximum(moments[0, :, 0].real / window, floor))
     gram = np.empty((centre.size, 2 * terms, 2 * terms), dtype=np.complex128)
     gram[:, :terms, :terms] = moments[0][:, pair] / (size**2)[:, None, None]
     cross = moments[1][:, pair] / size[:, None, None]
     gram[:, :terms, terms:] = cross
     gram[:, terms:, :terms] = np.conj(cross.swapaxes(1, 2))
     gram[:, terms:, terms:] = powers.sum(axis=0)[pair]
-    diagonal = np.arange(2 * terms)
-    gram[:, diagonal, diagonal] += _RIDGE * window
+    gram[:, np.arange(2 * terms), np.arange(2 * terms)] += _RIDGE * window
     right = np.concatenate((moments[2][:, :terms] / size[:, None], moments[3][:, :terms]), axis=1)
-    inverse = np.linalg.inv(gram)
-    theta = (inverse @ right[:, :, None])[:, :, 0]
-    here = at[:, None] ** np.arange(terms)
-    response = np.sum(here * theta[:, :terms], axis=1)
-    total = moments[4, :, 0].real
-    left = total - np.sum(np.conj(right) * theta, axis=1).real
-    # The difference of two nearly equal sums cannot be less than its rounding.
-    left = np.maximum(left, 1e-15 * total)
-    noise = left / max(window - 2 * terms, 1)
-    spread = np.einsum("cp,cpq,cq->c", here, inverse[:, :terms, :terms], here).real
+    here = x[centre - start][:, None] ** np.arange(terms)
     row = np.concatenate((here * (spectra.u[centre] / size)[:, None], here + 0j), axis=1)
-    leverage = np.einsum("cp,cpq,cq->c", row, inverse, np.conj(row)).real
-    missed = spectra.y[centre] - np.sum(row * theta, axis=1)
+    problem = _Normal(
+        gram=gram,
+        right=right,
+        row=row,
+        here=here,
+        size=size,
+        power=moments[4, :, 0].real,
+        y=spectra.y[centre],
+        window=window,
+    )
+    return _solve(problem, 2 * terms), _solve(problem, terms)
+
+
+def _solve(problem: _Normal, columns: int) -> _Local:
+    """Solve the normal equations of the first `columns` columns."""
+    terms = problem.here.shape[1]
+    right = problem.right[:, :columns]
+    row = problem.row[:, :columns]
+    inverse = np.linalg.inv(problem.gram[:, :columns, :columns])
+    theta = (inverse @ right[:, :, None])[:, :, 0]
+    left = problem.power - np.sum(np.conj(right) * theta, axis=1).real
+    # The difference of two nearly equal sums is never less than its rounding.
+    left = np.maximum(left, 1e-15 * problem.power)
+    noise = left / max(problem.window - columns, 1)
+    here = problem.here[:, :, None]
+    spread = (here.swapaxes(1, 2) @ inverse[:, :terms, :terms] @ here)[:, 0, 0].real
+    leverage = (row[:, None, :] @ inverse @ np.conj(row[:, :, None]))[:, 0, 0].real
+    missed = problem.y - np.sum(row * theta, axis=1)
     return _Local(
-        response=response / size,
-        variance=noise * np.maximum(spread, 0.0) / size**2,
+        response=np.sum(problem.here * theta[:, :terms], axis=1) / problem.size,
+        spread=np.maximum(spread, 0.0) / problem.size**2,
+        noise=noise,
+        power=problem.size**2,
         prediction_error=np.abs(missed / np.maximum(1.0 - leverage, 1e-6)) ** 2,
     )
 
 
-def _choice(error: NDArray[np.float64]) -> NDArray[np.int64]:
-    """Return, at each frequency, the narrowest window that predicts about as well as any."""
-    reach = min(_NEIGHBOURS, error.shape[1] // 2)
-    padded = np.pad(np.cumsum(error, axis=1), ((0, 0), (1, 0)))
-    position = np.arange(error.shape[1])
-    begin = np.maximum(position - reach, 0)
-    end = np.minimum(position + reach + 1, error.shape[1])
-    mean = (padded[:, end] - padded[:, begin]) / (end - begin)
-    good = mean <= (1 + _TOLERANCE) * mean.min(axis=0)
-    return np.asarray(np.argmax(good, axis=0), dtype=np.int64)
+def _choice(tried: list[_Local]) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """Return which fit to take at each frequency, and the square of the error it leaves in.
+
+    Prediction alone does not see that G and T cannot be told apart in a narrow window, nor
+    variance that a wide one is bent. So the error of G is weighed: its variance, plus what a
+    fit predicts worse than the best of them, referred to G through the power of U. Then the
+    next narrower window is taken, if it costs little, so that what curvature leaves over is
+    small beside the stated error (undersmoothing).
+    """
+    missed = np.stack([fit.prediction_error for fit in tried])
+    count = missed.shape[1]
+    reach = min(_NEIGHBOURS, count // 2)
+    total = np.pad(np.cumsum(missed, axis=1), ((0, 0), (1, 0)))
+    position = np.arange(count)
+    begin, end = np.maximum(position - reach, 0), np.minimum(position + reach + 1, count)
+    mean = (total[:, end] - total[:, begin]) / (end - begin)
+    least = mean.min(axis=0)
+    spread = np.stack([fit.spread for fit in tried])
+    power = np.stack([fit.power for fit in tried])
+    bent = np.maximum(mean - (1 + _TOLERANCE) * least, 0.0) / power
+    cost = spread * least + bent
+    best = np.argmin(cost, axis=0)
+    # Fits come in pairs, with and without T: the same kind one width down stands two before.
+    narrower = np.where(best >= 2, best - 2, best)
+    cheap = cost[narrower, position] <= _DEAREST * cost[best, position]
+    chosen = np.asarray(np.where(cheap, narrower, best), dtype=np.int64)
+    return chosen, bent[chosen, position]

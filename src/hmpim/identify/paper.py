@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import fft
 
-from hmpim.errors import RecordError
+from hmpim.errors import ArgumentError, RecordError
 from hmpim.identify import response as reading
 from hmpim.identify.correlation import (
     Correlation,
@@ -176,7 +176,10 @@ def paper_analysis(
     span = _band(stimulus, fs, band)
     time = _time_steps(stimulus, measured)
     n = stimulus.size
-    length = n + (padding(n) if pad is None else pad)
+    zeros = padding(n) if pad is None else pad
+    if zeros < 0:
+        raise ArgumentError(f"pad is {zeros}; give the number of zeros to add, 0 or more")
+    length = n + zeros
     taper = window_samples(window, n, alpha=alpha)
     # Both signals, without and with the window, in one transform.
     plain = np.stack((stimulus, measured))

@@ -20,6 +20,7 @@ __all__ = [
     "transfer_function",
 ]
 
+_LONG = 100_000
 _SMALLEST = 1e-300  # keeps the logarithm of an exact zero finite: -6000 dB
 _EDGE = 10 ** (-12 / 20)
 _DEEPEST = 10 ** (-50 / 20)
@@ -62,15 +63,16 @@ class TransferFunction:
 def padding(samples: int) -> int:
     """Return the number of zeros that fills a record to about four times its length.
 
-    Four times resolves the spectrum between its bins (the paper's picket fence, IV.D.3); the
-    length is one that the FFT does fast.
+    Four times resolves the spectrum between its bins (the paper's picket fence, IV.D.3); from
+    100 000 samples on it is twice, since memory counts. The length is one that the FFT does
+    fast.
 
     Examples
     --------
     >>> padding(2000)
     6000
     """
-    return int(fft.next_fast_len(4 * samples, real=True)) - samples
+    return int(fft.next_fast_len((4 if samples < _LONG else 2) * samples, real=True)) - samples
 
 
 def spectrum(

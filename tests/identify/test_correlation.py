@@ -1,0 +1,125 @@
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as npst
+
+from hmpim.errors import ArgumentError, RecordError
+from hmpim.identify.correlation import (
+    Correlation,
+    autocorrelation,
+    correlation_peak,
+    cross_correlation,
+    delay_by_correlation,
+)
+
+FS = 200.0
+PAIRS = st.integers(4, 40).flatmap(
+    lambda n: npst.arrays(float, (2, n), elements=st.floats(-100, 100, width=32))
+)
+
+
+def sweep(samples: int = 2000, top: float = 20.0) -> np.ndarray:
+    t = np.arange(samples) / FS
+    duration = samples / FS
+    return np.sin(2 * np.pi * (0.1 * t + (top - 0.1) * t**2 / (2 * duration)))
+
+
+def shifted(x: np.ndarray, k: int) -> np.ndarray:
+    return np.concatenate((np.zeros(k), x[: x.size - k]))
+
+
+@given(PAIRS)
+def test_equation_8_as_printed(pair: np.ndarray) -> None:
+    x, y = pair
+    big_n = x.size
+    r = cross_correlation(x, y)
+    for k, value in zip(r.lag, r.value, strict=True):
+        printed = sum(x[n] * y[n - k] for n in range(big_n) if 0 <= n - k < big_n) / big_n
+        assert value == pytest.approx(printed, abs=1e-9)
+
+
+@given(PAIRS)
+def test_equation_10_is_equation_8_of_a_signal_with_itself(pair: np.ndarray) -> None:
+    x = pair[0]
+    r = autocorrelation(x)
+    np.testing.assert_allclose(r.value, cross_correlation(x, x).value, atol=1e-12)
+    np.testing.assert_allclose(r.value, r.value[::-1], atol=1e-9)
+    at_zero = r.value[r.lag == 0].item()
+    assert at_zero == pytest.approx(np.mean(x**2), abs=1e-9)
+    assert np.all(np.abs(r.value) <= at_zero + 1e-9)
+
+
+@given(PAIRS)
+def test_swapping_the_signals_turns_the_lags(pair: np.ndarray) -> None:
+    x, y = pair
+    there, back = cross_correlation(x, y), cross_correlation(y, x)
+    np.testing.assert_allclose(there.value, back.value[::-1], atol=1e-9)
+
+
+def test_means_are_not_removed() -> None:
+    r = autocorrelation(np.full(5, 2.0))
+    np.testing.assert_allclose(r.value, 4 * np.array([1, 2, 3, 4, 5, 4, 3, 2, 1]) / 5)
+
+
+@given(st.integers(0, 400), st.floats(0.2, 5.0))
+def test_a_delayed_copy_is_found_to_the_sample(k: int, scale: float) -> None:
+    u = sweep()
+    assert delay_by_correlation(u, scale * shifted(u, k), FS) == k / FS
+
+
+@given(st.integers(0, 300), st.integers(0, 100))
+def test_shifting_the_output_by_k_samples_adds_k_over_fs(first: int, more: int) -> None:
+    u = sweep()
+    y = shifted(u, first) + 0.01 * np.random.default_rng(first).standard_normal(u.size)
+    before = delay_by_correlation(u, y, FS)
+    assert delay_by_correlation(u, shifted(y, more), FS) == pytest.approx(before + more / FS)
+
+
+def test_a_sinusoid_is_delayed_by_its_phase() -> None:
+    t = np.arange(4000) / FS
+    u, y = np.sin(2 * np.pi * t), np.sin(2 * np.pi * t - np.pi / 4)
+    assert delay_by_correlation(u, y, FS) == pytest.approx(0.125, abs=1 / FS)
+
+
+def test_a_device_that_turns_the_sign_is_found_at_the_trough() -> None:
+    u = sweep()
+    peak = correlation_peak(cross_correlation(-2 * shifted(u, 25), u))
+    assert peak.lag == 25
+    assert peak.value < 0
+
+
+def test_polarity_can_be_said() -> None:
+    r = Correlation(lag=np.arange(-3, 4), value=np.array([0, 0, 0, 1.0, 0, -3.0, 0]))
+    assert correlation_peak(r, polarity="positive").lag == 0
+    assert correlation_peak(r, polarity="negative").lag == 2
+    assert correlation_peak(r).lag == 2
+
+
+def test_a_trough_hardly_deeper_than_the_peak_does_not_count() -> None:
+    r = Correlation(lag=np.arange(-3, 4), value=np.array([0, 0, 0, 1.0, 0, -1.2, 0]))
+    assert correlation_peak(r) == correlation_peak(r, polarity="positive")
+
+
+def test_an_output_before_its_input_is_not_searched() -> None:
+    u = sweep()
+    early = np.concatenate((u[50:], np.zeros(50)))
+    assert delay_by_correlation(u, early, FS) != 50 / FS
+    assert delay_by_correlation(u, early, FS) >= 0
+
+
+def test_dead_signals_are_refused() -> None:
+    with pytest.raises(RecordError, match="zero at every lag"):
+        delay_by_correlation(sweep(), np.zeros(2000), FS)
+
+
+def test_unknown_polarity_is_refused() -> None:
+    with pytest.raises(ArgumentError, match="polarity is 'up'"):
+        delay_by_correlation(sweep(), sweep(), FS, polarity="up")  # type: ignore[arg-type]
+
+
+def test_rate_and_lengths_are_checked() -> None:
+    with pytest.raises(ArgumentError, match="fs is -1"):
+        delay_by_correlation(sweep(), sweep(), -1.0)
+    with pytest.raises(RecordError, match="u has 2000 samples and y has 1999"):
+        delay_by_correlation(sweep(), sweep()[:-1], FS)
