@@ -1,5 +1,7 @@
 """Run a stimulus on a rig: limits first, then motion."""
 
+import math
+
 import numpy as np
 
 from hmpim.errors import ArgumentError, HmpimError, LimitsError, RigError, UnitError
@@ -116,5 +118,11 @@ def check_limits(stimulus: Stimulus, limits: Limits, *, name: str = "rig") -> No
     if share > 1.0 + _ROUNDING:
         raise LimitsError(
             f"peak {quantity} {peak:.6g} {unit} is beyond the limit {limit:.6g} {unit} of "
-            f"{name!r}; scale the stimulus by {1 / share:.4g}, or design it within this limit"
+            f"{name!r}; scale the stimulus by {_down(1 / share):.4g}, or design it within this limit"
         )
+
+
+def _down(value: float) -> float:
+    """Four digits of `value`, cut and not rounded, so that the advice does."""
+    place = 10.0 ** (3 - math.floor(math.log10(value)))
+    return math.floor(value * place) / place
