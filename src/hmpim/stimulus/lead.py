@@ -6,19 +6,21 @@ velocity and acceleration, and another carries it back to rest at 0, so that all
 continuous and each is the derivative of the one before. The waveform keeps its gain,
 extinction and phase.
 
-Where to join: for 0 < n < 1 the acceleration (7) is unbounded as t → 0. The sweep is
-joined at the first instant from which its acceleration stays within that of its first
-full cycle; this is a few hundredths of a radian into the sweep. How long: among all
-durations, the one whose position, velocity and acceleration stay furthest inside those of
-the cycle it adjoins, so a lead is as gentle as its neighbour and excites nothing above
-the band. Should that not fit the limits, the sweep is joined later (up to its first
-turning point) or left earlier (back to its last one), where it stands still for an instant.
+Where to join: with extinction the jerk, and for 0 < n < 1 the acceleration (7) too, is
+unbounded as t → 0. Such a sweep is joined a hundredth of a cycle after its start, or at the
+later instant from which its acceleration stays within that of its first full cycle.
+Without extinction it is joined at its start. How long: of all durations the one with the
+least sum of squares of peak position, velocity and acceleration, each relative to the cycle
+the lead adjoins, so a lead is as gentle as its neighbour and excites nothing above the
+band. Should that not fit the limits, the sweep is joined later (up to its first turning
+point) or left earlier (back to its last one), where it stands still for an instant.
 """
 
 import math
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.optimize import minimize_scalar
 
 from hmpim.errors import LimitsError
 from hmpim.stimulus.limits import Limits
@@ -30,6 +32,7 @@ __all__ = ["Quintic", "RestToRest", "join_time", "rest_to_rest"]
 
 _CHOICES = 64  # durations tried for one lead
 _STEPS = 16  # instants tried for joining or leaving
+_BEYOND = 1e12  # harsher than any lead inside the limits
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -202,7 +205,10 @@ class RestToRest:
 
 
 def join_time(sweep: Sweep) -> float:
-    """First instant from which the acceleration stays within that of the first full cycle.
+    """Where a lead may hand over to the sweep: past its singular start.
+
+    The first instant from which the acceleration stays within that of the first full
+    cycle, with extinction a hundredth of a cycle after the start at the earliest.
 
     Parameters
     ----------
@@ -228,16 +234,16 @@ def join_time(sweep: Sweep) -> float:
     early = quarter * np.concatenate((np.geomspace(1e-12, 1.0, 512), np.linspace(0.01, 1.0, 100)))
     early = np.unique(np.concatenate(([0.0], early)))
     beyond = np.abs(sweep.motion(early).acceleration) > level
-    singular = 0.0 < sweep.extinction < 1.0
-    if not singular and not beyond.any():
-        return 0.0
-    last = int(np.flatnonzero(beyond)[-1]) if beyond.any() else 0
+    earliest = 0.0 if sweep.extinction == 0.0 else sweep.time_of_phase(0.02 * math.pi)
+    if not beyond.any():
+        return earliest
+    last = int(np.flatnonzero(beyond)[-1])
     low, high = float(early[last]), float(early[min(last + 1, early.size - 1)])
     while high - low > 1e-9 * quarter:
         middle = 0.5 * (low + high)
         over = abs(float(sweep.motion(np.array([middle])).acceleration[0])) > level
         low, high = (middle, high) if over else (low, middle)
-    return high
+    return max(high, earliest)
 
 
 def rest_to_rest(
@@ -372,7 +378,7 @@ def _turning(core: Waveform, times: FloatArray, which: int) -> float:
 def _gentlest(
     first: FloatArray, last: FloatArray, beside: Peaks, limits: Limits, longest: float
 ) -> Quintic | None:
-    """The quintic that stays furthest inside its neighbour's peaks, if it keeps the limits."""
+    """The gentlest quintic beside its neighbour's peaks, of those that keep the limits."""
     scales = [
         a / b
         for a, b in (
@@ -383,17 +389,27 @@ def _gentlest(
     ]
     if not scales or max(scales) == 0.0:
         return between(first, last, start=0.0, duration=1e-3)
-    durations = np.geomspace(0.3 * min(scales), 20.0 * max(scales), _CHOICES)
-    durations = np.unique(np.minimum(durations, longest))
-    gentlest: list[tuple[float, Quintic]] = []
-    for duration in durations[durations > 0.0]:
-        candidate = between(first, last, start=0.0, duration=float(duration))
+
+    def harshness(log_duration: float) -> float:
+        candidate = between(first, last, start=0.0, duration=math.exp(log_duration))
         peaks = candidate.peaks
-        if limits.use(peaks) <= 1.0 + 1e-12:
-            share = max(
-                peaks.position / beside.position,
-                peaks.velocity / beside.velocity,
-                peaks.acceleration / beside.acceleration,
-            )
-            gentlest.append((share, candidate))
-    return min(gentlest, key=lambda pair: pair[0])[1] if gentlest else None
+        use = limits.use(peaks)
+        if use > 1.0 + 1e-12:
+            return _BEYOND * use
+        return (
+            (peaks.position / beside.position) ** 2
+            + (peaks.velocity / beside.velocity) ** 2
+            + (peaks.acceleration / beside.acceleration) ** 2
+        )
+
+    low = math.log(0.3 * min(scales))
+    high = min(math.log(20.0 * max(scales)), math.log(longest))
+    grid = np.linspace(min(low, high - 1e-3), high, _CHOICES)
+    found = [harshness(float(g)) for g in grid]
+    best = int(np.argmin(found))
+    if found[best] >= _BEYOND:
+        return None
+    around = (float(grid[max(best - 1, 0)]), float(grid[min(best + 1, grid.size - 1)]))
+    finer = minimize_scalar(harshness, bounds=around, method="bounded", options={"xatol": 1e-9})
+    log_duration = float(finer.x) if finer.fun <= found[best] else float(grid[best])
+    return between(first, last, start=0.0, duration=math.exp(log_duration))

@@ -49,9 +49,9 @@ class Limits:
             except (TypeError, ValueError):
                 value = math.nan
             if isinstance(given, (str, bytes, bool)) or not value > 0:
-                unit = rate_unit(self.unit, order)
+                shown = f"{given!r} {rate_unit(self.unit, order)}".rstrip()
                 raise ArgumentError(
-                    f"{name} limit = {given!r} {unit} bounds nothing that could move; "
+                    f"{name} limit = {shown} bounds nothing that could move; "
                     "give a positive number, or leave it out for no limit"
                 )
             object.__setattr__(self, name, value)

@@ -4,7 +4,7 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.optimize import brentq, minimize_scalar
+from scipy.optimize import minimize_scalar
 
 from hmpim.errors import LimitsError
 from hmpim.stimulus.lead import join_time
@@ -14,7 +14,7 @@ from hmpim.stimulus.peaks import true_peaks
 from hmpim.stimulus.sweep import Sweep
 from hmpim.units import rate_unit
 
-__all__ = ["largest_gain", "smallest_extinction", "sweep_peaks"]
+__all__ = ["largest_gain", "smallest_extinction", "sweep_peaks", "three_digits"]
 
 STEP = 0.001  # extinction is solved to this
 LARGEST = 2.0  # from here on the acceleration falls along the sweep, so more n buys nothing
@@ -148,38 +148,49 @@ def smallest_extinction(
 
 
 def _first_root(search: _Search, low: float, high: float) -> float:
-    root = float(brentq(search.excess, low, high, xtol=0.01 * STEP)) if low < high else high
-    n = round(math.ceil(root / STEP - 0.02) * STEP, 9)
-    while search.excess(n) > 0.0 and n < high + 2 * STEP:
-        n = round(n + STEP, 9)
-    return n
+    """Smallest n that fits between `low`, which does not, and `high`, which does."""
+    while high - low > 0.01 * STEP:
+        middle = 0.5 * (low + high)
+        low, high = (low, middle) if search.excess(middle) <= 0.0 else (middle, high)
+    for rounded in (math.floor(high / STEP), math.ceil(high / STEP)):
+        n = round(rounded * STEP, 9)
+        if search.excess(n) <= 0.0:
+            return n
+    return high  # a dip narrower than the step
 
 
 def _what_would_do(search: _Search, n: float) -> str:
     limits, unit = search.limits, search.limits.unit
+    gap = " " if unit else ""
     position = limits.position * math.exp(-search.excess(n))
     peaks = search.peaks(n)
     gain = limits.position / peaks.position
     velocity, acceleration = gain * peaks.velocity, gain * peaks.acceleration
     needs = []
     if velocity > limits.velocity:
-        needs.append(
-            f"{_digits(velocity, up=True)} {rate_unit(unit, 1)} (limit {limits.velocity:g})"
-        )
+        needs.append(_need(velocity, limits.velocity, rate_unit(unit, 1)))
     if acceleration > limits.acceleration:
-        needs.append(
-            f"{_digits(acceleration, up=True)} {rate_unit(unit, 2)} (limit {limits.acceleration:g})"
-        )
+        needs.append(_need(acceleration, limits.acceleration, rate_unit(unit, 2)))
     return (
         f"limits are too tight for {search.band[0]:g} to {search.band[1]:g} Hz in "
-        f"{search.duration:g} s: an amplitude of {limits.position:g} {unit} needs at least "
+        f"{search.duration:g} s: the amplitude {limits.position:g}{gap}{unit} needs at least "
         f"{' and '.join(needs)}; allow that, or lower the position limit to "
-        f"{_digits(position, up=False)} {unit}"
+        f"{three_digits(position, up=False)}{gap}{unit}"
     )
 
 
-def _digits(value: float, *, up: bool) -> str:
-    """Three significant digits, rounded so that the number still does."""
+def _need(needed: float, limit: float, unit: str) -> str:
+    return f"{three_digits(needed, up=True)} {unit} (the limit is {limit:g})"
+
+
+def three_digits(value: float, *, up: bool) -> str:
+    """Write `value` with three significant digits, rounded so that the number still does.
+
+    Examples
+    --------
+    >>> three_digits(0.12345, up=True), three_digits(6789.0, up=False)
+    ('0.124', '6780')
+    """
     scale = 10.0 ** (math.floor(math.log10(value)) - 2)
     rounded = (math.ceil(value / scale) if up else math.floor(value / scale)) * scale
     return f"{rounded:.6g}"

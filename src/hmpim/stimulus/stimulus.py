@@ -11,7 +11,7 @@ from hmpim.stimulus.lead import RestToRest, rest_to_rest
 from hmpim.stimulus.limits import Limits
 from hmpim.stimulus.motion import FloatArray, Motion, Peaks, Waveform
 from hmpim.stimulus.peaks import true_peaks
-from hmpim.stimulus.solve import largest_gain, smallest_extinction, sweep_peaks
+from hmpim.stimulus.solve import largest_gain, smallest_extinction, sweep_peaks, three_digits
 from hmpim.stimulus.sweep import Sweep, check_band, check_positive
 from hmpim.units import check_unit, rate_unit
 
@@ -153,8 +153,9 @@ def _keep(peaks: Peaks, limits: Limits) -> None:
         peak, limit = getattr(peaks, name), getattr(limits, name)
         if peak > limit * (1.0 + 1e-9):
             unit = rate_unit(limits.unit, order)
+            bound = f"{limit:g} {unit}".rstrip()
             raise LimitsError(
-                f"peak {name} {peak:.6g} {unit} is beyond the limit {limit:g} {unit}; "
+                f"peak {name} {peak:.6g} is beyond the limit {bound}; "
                 f"scale the waveform by {limit / peak:.4g} or raise the limit"
             )
 
@@ -223,10 +224,11 @@ def design(
             f"fs = {rate:g} Hz; sample faster than {2.0 * high:g} Hz, or end the band below "
             f"{0.5 * rate:g} Hz"
         )
-    if 0.5 * (low + high) * length < 1.0:
+    cycles = 0.5 * (low + high) * length
+    if cycles < 1.0 - 1e-9:
         raise LimitsError(
-            f"band = ({low:g}, {high:g}) Hz makes {0.5 * (low + high) * length:.3g} cycles in "
-            f"{length:g} s, and one is needed; a duration of {2.0 / (low + high):.4g} s would do"
+            f"band = ({low:g}, {high:g}) Hz makes {cycles:.3g} cycles in {length:g} s, "
+            f"and one is needed; a duration of {three_digits(length / cycles, up=True)} s would do"
         )
     if not isinstance(limits, Limits):
         raise ArgumentError(f"limits = {limits!r} is not a Limits; write Limits(position=10, ...)")
@@ -238,8 +240,10 @@ def design(
     start = 1.0 / rate if ahead == 0.0 else None
     if extinction == "auto":
         n = smallest_extinction((low, high), length, limits, start=start)
+    elif isinstance(extinction, str):
+        raise ArgumentError(f"extinction = {extinction!r} must be 'auto' or a number")
     else:
-        n = float(extinction) if not isinstance(extinction, str) else math.nan
+        n = extinction
     sweep = Sweep(band=(low, high), duration=length, gain=1.0, extinction=n)
     sweep = largest_gain(sweep, limits, start=start)
     waveform: Waveform = sweep

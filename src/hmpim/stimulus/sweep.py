@@ -20,6 +20,7 @@ from hmpim.stimulus.motion import FloatArray, Motion, at_rest_outside
 __all__ = ["Sweep", "check_band", "check_positive"]
 
 LARGEST_EXTINCTION = 10.0
+_INSTANT = 1e-30  # seconds; earlier is time 0, and t^(n-2) cannot overflow
 
 
 def check_positive(name: str, value: float, unit: str) -> float:
@@ -40,7 +41,8 @@ def check_positive(name: str, value: float, unit: str) -> float:
     except (TypeError, ValueError):
         number = math.nan
     if not (math.isfinite(number) and number > 0) or isinstance(value, (str, bool)):
-        raise ArgumentError(f"{name} = {value!r} {unit} must be a positive, finite number")
+        shown = f"{value!r} {unit}".rstrip()
+        raise ArgumentError(f"{name} = {shown} must be a positive, finite number")
     return number
 
 
@@ -120,7 +122,10 @@ class Sweep:
         object.__setattr__(self, "band", check_band(self.band))
         object.__setattr__(self, "duration", check_positive("duration", self.duration, "s"))
         object.__setattr__(self, "gain", check_positive("gain", self.gain, ""))
-        if isinstance(self.extinction, str) or not 0 <= self.extinction <= LARGEST_EXTINCTION:
+        if (
+            isinstance(self.extinction, (str, bool))
+            or not 0 <= self.extinction <= LARGEST_EXTINCTION
+        ):
             raise ArgumentError(
                 f"extinction = {self.extinction!r} must lie between 0 (none) and "
                 f"{LARGEST_EXTINCTION:g}; 2 already holds the acceleration level"
@@ -181,8 +186,8 @@ class Sweep:
         omega = b + a * t
         phase = t * (b + 0.5 * a * t)
         sine, cosine = np.sin(phase), np.cos(phase)
-        # powers of 0 are replaced below; 1 keeps them harmless
-        started = t > 0.0
+        # at time 0 powers of t may be infinite: they are put at 1 here and replaced below
+        started = t > _INSTANT
         safe = np.where(started, t, 1.0)
         power = safe**n
         sigma = b + 0.5 * a * np.where(started, power, 1.0 if n == 0.0 else 0.0)

@@ -1,0 +1,98 @@
+"""`hmpim design`: a stimulus inside limits, as CSV for the rig and JSON for the record."""
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+import typer
+
+from hmpim.errors import ArgumentError
+
+__all__ = ["design"]
+
+
+def _number_or_auto(option: str, text: str) -> float | Literal["auto"]:
+    if text == "auto":
+        return "auto"
+    try:
+        return float(text)
+    except ValueError:
+        raise ArgumentError(f"{option} {text!r} is neither 'auto' nor a number") from None
+
+
+def design(
+    band: Annotated[
+        tuple[float, float],
+        typer.Option(metavar="F1 F2", help="First and last frequency, Hz."),
+    ],
+    duration: Annotated[float, typer.Option(help="Length of the sweep, seconds.")],
+    fs: Annotated[float, typer.Option(help="Sampling rate, Hz.")],
+    amplitude: Annotated[float, typer.Option(help="Position limit, in the unit.")],
+    max_rate: Annotated[float, typer.Option(help="Velocity limit, unit per second.")] = float(
+        "inf"
+    ),
+    max_acceleration: Annotated[
+        float, typer.Option(help="Acceleration limit, unit per second squared.")
+    ] = float("inf"),
+    extinction: Annotated[
+        str, typer.Option(metavar="auto|N", help="Extinction factor n; auto: the smallest.")
+    ] = "auto",
+    lead: Annotated[
+        str,
+        typer.Option(
+            metavar="auto|0|S",
+            help="Seconds for coming from rest and going back; 0: the printed waveform.",
+        ),
+    ] = "auto",
+    tail: Annotated[
+        str, typer.Option(metavar="auto|S", help="Seconds at rest appended at the end.")
+    ] = "auto",
+    unit: Annotated[str, typer.Option(help="Unit of the position, such as deg.")] = "",
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", help="CSV of the samples.")
+    ] = None,
+    json_file: Annotated[
+        Path | None, typer.Option("--json", help="JSON of gain, extinction, peaks and the rest.")
+    ] = None,
+    plot: Annotated[Path | None, typer.Option(help="Picture of the time histories, PNG.")] = None,
+) -> None:
+    """Design a stimulus inside position, rate and acceleration limits.
+
+    The amplitude is taken to its limit, then the extinction factor is raised until rate
+    and acceleration fit. The axis starts and ends at rest.
+
+    Example:
+
+    hmpim design --band 0.1 10 --duration 10 --fs 500 --amplitude 10 --max-rate 1000
+    --max-acceleration 40000 --unit deg -o s.csv --json s.json
+    """
+    from hmpim.formats.stimulus import save_stimulus_csv, save_stimulus_json
+    from hmpim.stimulus import Limits
+    from hmpim.stimulus import design as design_stimulus
+    from hmpim.units import rate_unit
+
+    limits = Limits(position=amplitude, velocity=max_rate, acceleration=max_acceleration, unit=unit)
+    stimulus = design_stimulus(
+        band=band,
+        duration=duration,
+        fs=fs,
+        limits=limits,
+        extinction=_number_or_auto("--extinction", extinction),
+        lead=_number_or_auto("--lead", lead),
+        tail=_number_or_auto("--tail", tail),
+    )
+    if output is not None:
+        save_stimulus_csv(stimulus, output)
+    if json_file is not None:
+        save_stimulus_json(stimulus, json_file)
+    if plot is not None:
+        from hmpim.plots import time_histories
+
+        time_histories(stimulus).savefig(plot, dpi=150)
+    typer.echo(
+        f"{stimulus.samples} samples at {stimulus.fs:g} Hz, {stimulus.duration:g} s, "
+        f"of which the sweep {stimulus.sweep_duration:g} s from {stimulus.sweep_start:g} s"
+    )
+    typer.echo(f"gain {stimulus.gain:.6g}, extinction n = {stimulus.extinction:g}")
+    for order, name in enumerate(("position", "velocity", "acceleration")):
+        peak, limit = getattr(stimulus.peaks, name), getattr(limits, name)
+        typer.echo(f"peak {name:<12} {peak:>10.5g} of {limit:g} {rate_unit(unit, order)}".rstrip())

@@ -1,0 +1,44 @@
+"""Limits: units, shares, refusals."""
+
+import math
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from hmpim.errors import ArgumentError, UnitError
+from hmpim.stimulus import Limits, Peaks
+
+sizes = st.floats(1e-3, 1e6)
+
+
+@given(p=sizes, v=sizes, a=sizes)
+def test_units_there_and_back(p, v, a):
+    limits = Limits(position=p, velocity=v, acceleration=a, unit="deg")
+    rad = limits.to("rad")
+    assert rad.velocity == pytest.approx(math.radians(v), rel=1e-12)
+    back = rad.to("deg")
+    assert (back.position, back.velocity, back.acceleration) == pytest.approx((p, v, a), rel=1e-12)
+
+
+def test_no_limit_stays_no_limit_in_any_unit():
+    assert Limits(position=1.0, unit="m").to("mm").velocity == math.inf
+
+
+@given(p=sizes, v=sizes, a=sizes)
+def test_use_is_the_largest_share(p, v, a):
+    limits = Limits(position=2.0, velocity=3.0, acceleration=4.0)
+    use = limits.use(Peaks(position=p, velocity=v, acceleration=a))
+    assert use == max(p / 2.0, v / 3.0, a / 4.0)
+
+
+@pytest.mark.parametrize("value", [math.nan, 0.0, -1.0, -math.inf, "10", None, True])
+@pytest.mark.parametrize("name", ["position", "velocity", "acceleration"])
+def test_what_bounds_nothing_is_refused(name, value):
+    with pytest.raises(ArgumentError, match=f"{name} limit = .* give a positive number"):
+        Limits(**{name: value, "unit": "deg"})
+
+
+def test_units_must_go_together():
+    with pytest.raises(UnitError, match="'deg' cannot be turned into 'm'"):
+        Limits(position=1.0, unit="deg").to("m")
