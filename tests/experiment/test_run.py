@@ -11,7 +11,7 @@ from hmpim.errors import ArgumentError, LimitsError, RigError, UnitError
 from hmpim.experiment import run
 from hmpim.record import Record
 from hmpim.rigs import Sensor
-from hmpim.stimulus import Limits, Sine, Stimulus, design
+from hmpim.stimulus import Limits, Sine, Step, Stimulus, design
 
 SINE = Stimulus(waveform=Sine(amplitude=2.0, frequency=1.0, duration=2.0), fs=100.0, unit="deg")
 RATE, ACCELERATION = 4 * np.pi, 8 * np.pi**2  # peaks of SINE
@@ -42,7 +42,7 @@ class Spy:
         (Limits(position=1.0, unit="deg"), "peak position 2 deg is beyond the limit 1 deg of 'p"),
         (Limits(velocity=6.0, unit="deg"), "peak velocity 12.5664 deg/s is beyond the limit 6 deg"),
         (
-            Limits(acceleration=7.8956, unit="deg"),
+            Limits(acceleration=7.9, unit="deg"),
             "peak acceleration 78.9568 deg/s² .* of 'pitch'; scale the stimulus by 0.1,",
         ),
         (Limits(position=0.02, unit="rad"), "peak position 0.0349066 rad is beyond the limit 0.02"),
@@ -93,6 +93,29 @@ def test_peaks_between_samples_count():
     assert np.abs(blind.position).max() < 1e-12
     with pytest.raises(LimitsError, match="peak position 2 deg"):
         run(Spy(limits=Limits(position=1.0, unit="deg")), blind)
+
+
+@pytest.mark.parametrize("start", [0.0, 0.503])
+def test_a_jump_is_beyond_any_limit_of_velocity_or_acceleration(start):
+    step = Stimulus(waveform=Step(duration=1.0, start=start), fs=100.0, unit="deg")
+    with pytest.raises(LimitsError, match="peak velocity 100 deg/s"):
+        run(Spy(limits=Limits(velocity=99.0, unit="deg")), step)
+    spy = Spy(limits=Limits(position=1.0, unit="deg"))
+    run(spy, step)  # nothing bounds the velocity
+    assert len(spy.moved) == 1
+
+
+@pytest.mark.parametrize("lead", [0.0, "auto"])
+@pytest.mark.parametrize("extinction", [0.0, 0.3, 0.83, 1.1])
+@pytest.mark.parametrize("fs", [100.0, 5000.0])
+def test_what_is_designed_inside_limits_never_counts_as_a_jump(lead, extinction, fs):
+    limits = Limits(position=10, velocity=300, acceleration=5000, unit="deg")
+    stimulus = design(
+        band=(0.1, 20), duration=4, fs=fs, limits=limits, lead=lead, extinction=extinction
+    )
+    spy = Spy(limits=limits)
+    run(spy, stimulus)
+    assert len(spy.moved) == 1
 
 
 def test_a_stimulus_designed_onto_the_limits_of_a_rig_is_played_by_it():

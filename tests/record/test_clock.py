@@ -1,11 +1,15 @@
 """The uniform clock behind time stamps: rate, jitter, gaps, rounding."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hmpim.record import fit_clock, inspect_timing
+
+DATA = Path(__file__).resolve().parents[2].parent / "shared" / "data"
 
 
 def test_rate_of_printed_stamps_is_not_spoilt_by_their_rounding():
@@ -132,3 +136,17 @@ def test_thirty_percent_of_jitter_makes_no_gap():
     for _ in range(20):
         time = (np.arange(4000) + 0.3 * rng.uniform(-1, 1, 4000)) / 200
         assert fit_clock(time).gaps.size == 0
+
+
+@pytest.mark.real_data
+def test_measured_stamps_are_uniform_as_they_are_and_as_printed():
+    path = DATA / "silverbox" / "snls80mv.npz"
+    if not path.exists():
+        pytest.skip(f"no measured record at {path}")
+    with np.load(path) as stored:
+        time = stored["time"]
+    for stamps in (time, np.round(time, 6)):
+        clock = fit_clock(stamps)
+        assert clock.uniform
+        assert clock.fs == pytest.approx(610.3515625, rel=1e-8)
+        assert inspect_timing(stamps, 610.3515625) == ()

@@ -81,7 +81,8 @@ def check_limits(stimulus: Stimulus, limits: Limits, *, name: str = "rig") -> No
     Parameters
     ----------
     stimulus : Stimulus
-        Its true peaks are looked at, between the samples too.
+        Its true peaks are looked at, between the samples too, and the jumps that its samples
+        command.
     limits : Limits
         What the rig bears.
     name : str
@@ -110,16 +111,34 @@ def check_limits(stimulus: Stimulus, limits: Limits, *, name: str = "rig") -> No
         )
     factor = conversion_factor(stimulus.unit, to=limits.unit)
     shares = []
+    commanded = _commanded_peaks(stimulus)
     for order, quantity in enumerate(("position", "velocity", "acceleration")):
-        peak = factor * getattr(stimulus.peaks, quantity)
+        peak = factor * max(getattr(stimulus.peaks, quantity), commanded[order])
         limit = getattr(limits, quantity)
         shares.append((peak / limit, quantity, peak, limit, rate_unit(limits.unit, order)))
     share, quantity, peak, limit, unit = max(shares)
     if share > 1.0 + _ROUNDING:
         raise LimitsError(
             f"peak {quantity} {peak:.6g} {unit} is beyond the limit {limit:.6g} {unit} of "
-            f"{name!r}; scale the stimulus by {_down(1 / share):.4g}, or design it within this limit"
+            f"{name!r}; scale the stimulus by {_down(1 / share):.4g}, or design it within "
+            "this limit"
         )
+
+
+def _commanded_peaks(stimulus: Stimulus) -> tuple[float, float, float]:
+    """Peaks that the samples alone command: largest value and differences.
+
+    The mean velocity between samples is never above the true peak, unless the motion jumps,
+    as a step does, whose derivative is 0 wherever it has one. The first interval is left out of
+    the second differences: the printed sweep (lead 0) starts there with a velocity step.
+    """
+    x = stimulus.position
+    fs = stimulus.fs
+    before = stimulus.motion(np.array([-1.0 / fs])).position
+    noise = 4 * float(np.spacing(np.abs(x).max()))  # of a difference of rounded samples
+    velocity = np.abs(np.diff(np.concatenate((before, x)))).max() - noise
+    bend = np.abs(np.diff(x[1:], 2)).max() - 2 * noise if x.size > 3 else 0.0
+    return float(np.abs(x).max()), float(velocity * fs), float(bend * fs * fs)
 
 
 def _down(value: float) -> float:
