@@ -227,6 +227,29 @@ def test_a_band_between_two_bins_leaves_the_frequency_figures_open() -> None:
     assert found.peak_gain_db is None
 
 
+@pytest.mark.parametrize("seed", range(4))
+def test_notches_of_a_random_sequence_make_no_hump(seed: int) -> None:
+    # First order, 28.6 Hz, at 1 kHz: neither hump nor turn may come from a notch in |U|.
+    u = np.random.default_rng(seed).choice([-1.0, 1.0], 4000)
+    pole = np.exp(-2 * np.pi * 28.6 / 1000)
+    y = signal.lfilter([0, 1 - pole], [1, -pole], u)
+    found = paper_analysis(u, y, 1000.0, band=(1.0, 150.0))
+    assert found.estimates.peak_gain_db is None or found.estimates.peak_gain_db < 3
+    assert found.estimates.bandwidth_3db == pytest.approx(28.6, rel=0.25)
+    # the filter's own phase at 150 Hz, about -100°, without a turn on the way
+    z = np.exp(2j * np.pi * found.band_frequency / 1000)
+    true = np.degrees(np.unwrap(np.angle((1 - pole) / (z - pole))))
+    assert np.median(np.abs(found.phase - true)) < 15
+    assert np.max(np.abs(found.phase - true)) < 185
+
+
+def test_a_numpy_rate_gives_plain_floats() -> None:
+    u, y = figure_17(linear_chirp, 0)
+    found = paper_estimates(u, y, np.float64(FS))
+    for field in fields(PaperEstimates):
+        assert type(getattr(found, field.name)) in (float, type(None)), field.name
+
+
 @pytest.mark.parametrize("u", [np.zeros(100), np.full(100, 0.1)])
 @pytest.mark.parametrize("band", [None, BAND])
 def test_a_constant_input_is_refused(u: np.ndarray, band: tuple[float, float] | None) -> None:

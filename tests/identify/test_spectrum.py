@@ -12,6 +12,7 @@ from hmpim.identify.spectrum import (
     ratio,
     spectrum,
     transfer_function,
+    well_excited,
 )
 from hmpim.identify.windows import gaussian_window
 
@@ -152,3 +153,20 @@ def test_a_stimulus_that_does_not_move_is_refused(level: float) -> None:
 def test_negative_padding_is_refused() -> None:
     with pytest.raises(ArgumentError, match="pad is -1"):
         spectrum(np.ones(8), 10.0, pad=-1)
+
+
+@given(st.integers(0, 199), st.floats(0.0, 0.25), st.floats(1e-6, 1e6))
+def test_a_notch_is_left_out_and_nothing_else(k: int, depth: float, size: float) -> None:
+    u = size * np.exp(1j * np.arange(200.0) ** 2)
+    u[k] *= depth
+    expected = np.ones(200, dtype=bool)
+    expected[k] = False
+    np.testing.assert_array_equal(well_excited(u), expected)
+
+
+def test_a_spectrum_that_falls_as_1_over_f_has_no_notch() -> None:
+    assert well_excited(1 / np.arange(4.0, 800.0)).all()
+
+
+def test_no_stimulus_at_all_is_nowhere_excited() -> None:
+    assert not well_excited(np.zeros(5, dtype=complex)).any()

@@ -17,7 +17,7 @@ from hmpim.identify.correlation import (
 from hmpim.identify.noise import noise_by_autocorrelation
 from hmpim.identify.result import PaperEstimates
 from hmpim.identify.signals import as_pair, check_band, check_rate
-from hmpim.identify.spectrum import decibel, excited_band, padding, ratio
+from hmpim.identify.spectrum import decibel, excited_band, padding, ratio, well_excited
 from hmpim.identify.static import (
     bias_by_autocorrelation,
     scale_factor_near_dc,
@@ -104,9 +104,10 @@ class _TimeSteps:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class _FrequencySteps:
-    """What section IV.D gives, inside the band."""
+    """What section IV.D gives inside the band; figures are read off the bins of `read`."""
 
     inside: slice
+    read: NDArray[np.bool_]
     response: NDArray[np.complex128]
     magnitude: NDArray[np.float64]
     phase: NDArray[np.float64]
@@ -130,10 +131,11 @@ def paper_analysis(
     correlation's delay contains what the dynamics add, and with it the error, the bias, the
     noise and the natural frequency. They are the paper's figures, kept beside better ones.
 
-    One step is ours: before the transforms of section IV.D, of which the paper says nothing
+    Two steps are ours. Before the transforms of section IV.D, of which the paper says nothing
     either way, each signal's mean is taken off. Otherwise the measurement's bias fills the
     lowest bins, and at an amplitude near the bias the first -90° is found there, at 0.17 Hz
-    instead of 1.53 Hz. `remove_mean=False` leaves it in.
+    instead of 1.53 Hz. `remove_mean=False` leaves it in. And figures are read off only those
+    bins that are `well_excited`.
 
     Parameters
     ----------
@@ -173,6 +175,7 @@ def paper_analysis(
     """
     stimulus, measured = as_pair(u, y)
     check_rate(fs)
+    fs = float(fs)
     span = _band(stimulus, fs, band)
     time = _time_steps(stimulus, measured)
     n = stimulus.size
@@ -256,6 +259,7 @@ def paper_estimates(
     """
     stimulus, measured = as_pair(u, y)
     check_rate(fs)
+    fs = float(fs)
     span = _band(stimulus, fs, band)
     if np.ptp(measured) == 0:
         return PaperEstimates()
@@ -314,10 +318,18 @@ def _frequency_steps(
     inside = slice(first, max(last + 1, first))
     response = ratio(y[inside], u[inside])
     response = np.where(np.isfinite(response), response, 0.0)
-    phase = reading.phase(response, inverted=time.inverted)
     frequency = np.arange(inside.start, inside.stop) * step
+    read = well_excited(u[inside])
+    phase = np.zeros(response.size)
+    phase[read] = reading.phase(response[read], inverted=time.inverted)
+    if not read.all() and read.any():
+        # In a notch the angle is chance: it must not carry a turn into the bins beyond.
+        near = np.interp(frequency, frequency[read], phase[read])
+        angle = np.degrees(np.angle(-response if time.inverted else response))
+        phase[~read] = (near + (angle - near + 180.0) % 360.0 - 180.0)[~read]
     return _FrequencySteps(
         inside=inside,
+        read=read,
         response=response,
         magnitude=reading.magnitude(response),
         phase=phase,
@@ -328,18 +340,19 @@ def _frequency_steps(
 def _estimates(
     time: _TimeSteps, steps: _FrequencySteps, frequency: NDArray[np.float64], fs: float
 ) -> PaperEstimates:
-    hump = reading.peak_gain(steps.magnitude)
-    natural = reading.natural_frequency(frequency, steps.phase_without_delay)
-    low = steps.magnitude[: reading.near_dc(steps.magnitude.size)]
+    frequency, magnitude = frequency[steps.read], steps.magnitude[steps.read]
+    hump = reading.peak_gain(magnitude)
+    low = magnitude[: reading.near_dc(magnitude.size)]
     gain = float(np.median(low)) if low.size else 0.0
+    remaining = steps.phase_without_delay[steps.read]
     return PaperEstimates(
         delay=time.lag / fs,
         bias=time.bias,
         scale_factor=time.scale_factor,
         noise_std=time.noise_std,
-        natural_frequency=natural,
+        natural_frequency=reading.natural_frequency(frequency, remaining),
         damping_ratio=None if hump is None else reading.damping_from_hump(hump),
-        bandwidth_phase90=reading.bandwidth_phase90(frequency, steps.phase),
-        bandwidth_3db=reading.bandwidth_3db(frequency, steps.magnitude, gain),
+        bandwidth_phase90=reading.bandwidth_phase90(frequency, steps.phase[steps.read]),
+        bandwidth_3db=reading.bandwidth_3db(frequency, magnitude, gain),
         peak_gain_db=None if hump is None else float(decibel(hump)),
     )

@@ -18,9 +18,12 @@ __all__ = [
     "padding",
     "spectrum",
     "transfer_function",
+    "well_excited",
 ]
 
 _LONG = 100_000
+_NOTCH_REACH = 20
+_NOTCH_DEPTH = 0.1
 _SMALLEST = 1e-300  # keeps the logarithm of an exact zero finite: -6000 dB
 _EDGE = 10 ** (-12 / 20)
 _DEEPEST = 10 ** (-50 / 20)
@@ -209,6 +212,40 @@ def ratio(y: NDArray[np.complex128], u: NDArray[np.complex128]) -> NDArray[np.co
     out = np.full(y.shape, complex(np.nan, np.nan))
     np.divide(y, u, out=out, where=u != 0)
     return out
+
+
+def well_excited(u: NDArray[np.complex128]) -> NDArray[np.bool_]:
+    """Return which bins of a stimulus's spectrum are no notch between better ones.
+
+    Between the lines of a multisine, at the clock's multiples of a held sequence, and at
+    chance in a random one, the stimulus has next to nothing, and the ratio (18) there is noise
+    and leakage. Kept are the bins whose power is at least a tenth of the mean power of the
+    neighbours: a fortieth of all bins on either side, at least 20.
+
+    Parameters
+    ----------
+    u : complex ndarray, shape (m,)
+        Spectrum of the stimulus on consecutive bins.
+
+    Returns
+    -------
+    ndarray of bool, shape (m,)
+        True where a ratio to `u` can be relied on.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> well_excited(np.array([1.0, 1j, 0.01, -1.0, 1.0]))
+    array([ True,  True, False,  True,  True])
+    """
+    power = np.abs(u) ** 2
+    total = np.concatenate(([0.0], np.cumsum(power)))
+    position = np.arange(power.size)
+    reach = max(_NOTCH_REACH, power.size // 40)
+    begin = np.maximum(position - reach, 0)
+    end = np.minimum(position + reach + 1, power.size)
+    mean = (total[end] - total[begin]) / (end - begin)
+    return np.asarray((power > 0) & (power >= _NOTCH_DEPTH * mean), dtype=np.bool_)
 
 
 def excited_band(u: ArrayLike, fs: float) -> tuple[float, float]:
