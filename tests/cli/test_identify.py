@@ -113,11 +113,12 @@ def test_without_a_time_column_the_rate_is_needed_and_used(good, tmp_path):
 
 
 def test_holdout_fits_the_first_part_and_scores_the_rest(good, tmp_path):
-    saved = tmp_path / "r.json"
-    done = run("identify", good, *NAMED, "--holdout", "0.5", "--json", saved)
+    saved, page = tmp_path / "r.json", tmp_path / "r.html"
+    done = run("identify", good, *NAMED, "--holdout", "0.5", "--json", saved, "--report", page)
     assert done.exit_code == 0, done.stderr
     assert json.loads(saved.read_text())["record"]["samples"] == 300
     line = next(line for line in done.stdout.splitlines() if line.startswith("Held out"))
+    assert line in page.read_text(encoding="utf-8")
     fit = float(re.search(r"fit of ([\d.]+) %", line)[1])
     # Noise of 0.01 on an output of about 1.4 r.m.s. leaves 99.3 %.
     assert 98.5 < fit < 99.6

@@ -34,7 +34,9 @@ def test_two_figures_agree_within_two_standard_deviations_and_else_say_why(paper
 
 def test_the_headline_is_the_verdict_of_the_worst_pair(found):
     pair = found.pairs[0]
-    assert headline(found).startswith("The record tells the model: second order and a delay")
+    assert headline(found).startswith(
+        "The record tells the model: second-order dynamics and a delay"
+    )
     reason = Finding(code="unrelated", message="Output 'y' does not follow input 'u'.")
     lost = replace(pair, verdict="not_identifiable", warnings=(reason,))
     assert headline(replace(found, pairs=(lost,))) == (
@@ -43,6 +45,13 @@ def test_the_headline_is_the_verdict_of_the_worst_pair(found):
     warned = replace(pair, verdict="doubtful", warnings=(reason, reason))
     assert "but there are 2 warnings" in headline(replace(found, pairs=(warned,)))
     assert "1 of 2 pairs can be trusted" in headline(replace(found, pairs=(pair, lost)))
+
+
+def test_a_unit_without_dynamics_is_not_said_to_have_any(found):
+    still = replace(found.pairs[0], structure="static", parameters=Parameters(), fit_percent=97.0)
+    assert headline(replace(found, pairs=(still,))).startswith(
+        "The record tells the model: a scale factor explains 97.0 % of the output"
+    )
 
 
 def test_what_has_no_figure_is_listed(found):

@@ -37,7 +37,7 @@ def demo(
     The sensor is that of the paper's Fig. 17, so the truth is known and shown beside.
     """
     from hmpim.experiment import run
-    from hmpim.identify.identify import identify
+    from hmpim.identify import identify
     from hmpim.report import print_result
     from hmpim.rigs import Sensor
     from hmpim.stimulus import Limits, design

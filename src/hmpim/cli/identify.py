@@ -1,5 +1,6 @@
 """``hmpim identify``: a measured record in, a table, a JSON file and a page out."""
 
+from collections.abc import Sequence
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -75,7 +76,7 @@ def identify(
         raise ArgumentError(f"--holdout {holdout:g} is not a share between 0 and 1; give 0.5, say")
 
     from hmpim.formats import read
-    from hmpim.identify.identify import identify as find
+    from hmpim.identify import identify as find
     from hmpim.report import print_result
 
     with working(f"Reading {record}"):
@@ -83,11 +84,12 @@ def identify(
     part, split = (data, None) if holdout is None else _first_part(data, holdout)
     with working("Identifying"):
         result = find(part, intersample=intersample.value)
+    notes = [] if split is None else _predictions(result, data, split)
     if not quiet:
         print_result(result, output_console())
-        if split is not None:
-            _print_prediction(result, data, split)
-    write_result(result, json=json, report=report)
+        for note in notes:
+            say(note)
+    write_result(result, json=json, report=report, notes=notes)
 
 
 def write_result(
@@ -96,6 +98,7 @@ def write_result(
     json: Path | None,
     report: Path | None,
     stimulus: "Stimulus | None" = None,
+    notes: Sequence[str] = (),
 ) -> None:
     """Write a result to the files that are wanted, each as a whole or not at all."""
     from hmpim.report import replacing
@@ -106,7 +109,7 @@ def write_result(
             result.save(place)
     if report is not None:
         with working("Drawing the page"):
-            write_page(result, report, stimulus=stimulus)
+            write_page(result, report, stimulus=stimulus, notes=notes)
 
 
 def _first_part(data: "Record", holdout: float) -> tuple["Record", float]:
@@ -117,14 +120,16 @@ def _first_part(data: "Record", holdout: float) -> tuple["Record", float]:
     return data.between(start, split), split
 
 
-def _print_prediction(result: "Identification", data: "Record", split: float) -> None:
-    """Say how well each model predicts what it was not fitted on."""
-    from hmpim.identify.predict import predict
+def _predictions(result: "Identification", data: "Record", split: float) -> list[str]:
+    """Say for each pair how well its model predicts what it was not fitted on."""
+    from hmpim.identify import predict
 
+    notes = []
     for pair in result.pairs:
-        name = f"{pair.input} → {pair.output}"
+        name = f"Held out, {pair.input} → {pair.output}"
         if pair.parameters.scale_factor is None:
-            say(f"Held out, {name}: no model to predict with.")
+            notes.append(f"{name}: no model to predict with.")
             continue
         fit = predict(pair, data, start=split).fit_percent
-        say(f"Held out, {name}: predicted from {split:.4g} s on with a fit of {fit:.2f} %.")
+        notes.append(f"{name}: predicted from {split:.4g} s on with a fit of {fit:.2f} %.")
+    return notes

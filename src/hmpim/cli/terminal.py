@@ -39,7 +39,9 @@ def say(text: str) -> None:
     >>> say("Page: r.html")
     Page: r.html
     """
-    print(text)
+    from hmpim.plots.style import printable
+
+    print(printable(text))
 
 
 @contextmanager

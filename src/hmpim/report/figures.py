@@ -134,7 +134,7 @@ def _paper_pictures(
 ) -> list[Picture]:
     found = pair.parameters
     peak = analysis.estimates.delay
-    reach = max(1.0, 4.0 * abs(peak or 0.0))  # seconds of lag worth showing
+    reach = max(10.0 * abs(peak or 0.0), 60.0 / analysis.fs)  # seconds of lag worth showing
     near = np.abs(analysis.lag) <= reach
     squared = f"{y.unit}²" if u.unit == y.unit and y.unit else f"{u.unit} {y.unit}".strip()
     root_mean_square = float(np.sqrt(np.mean(analysis.error**2)))

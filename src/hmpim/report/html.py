@@ -1,5 +1,6 @@
 """One page, one file: what was found, how sure it is, and every picture of section IV."""
 
+from collections.abc import Sequence
 from datetime import UTC, datetime
 from importlib.metadata import version
 from os import PathLike
@@ -34,6 +35,7 @@ def report(
     path: str | PathLike[str],
     *,
     stimulus: "Stimulus | None" = None,
+    notes: Sequence[str] = (),
 ) -> None:
     """Write a result as one HTML page that needs no other file and no network.
 
@@ -46,6 +48,9 @@ def report(
         The file to write; replaced as a whole, or not at all.
     stimulus : Stimulus, optional
         What was sent, to be shown inside its limits.
+    notes : sequence of str
+        Plain sentences to be shown under the verdict, such as how a held-out part was
+        predicted.
 
     Raises
     ------
@@ -64,12 +69,17 @@ def report(
     ...     page.read_text(encoding="utf-8")[:15]
     '<!DOCTYPE html>'
     """
-    text = render(result, stimulus=stimulus)
+    text = render(result, stimulus=stimulus, notes=notes)
     with replacing(path) as place:
         place.write_text(text, encoding="utf-8")
 
 
-def render(result: Identification, *, stimulus: "Stimulus | None" = None) -> str:
+def render(
+    result: Identification,
+    *,
+    stimulus: "Stimulus | None" = None,
+    notes: Sequence[str] = (),
+) -> str:
     """Return the page of `report` as text.
 
     Parameters
@@ -78,6 +88,8 @@ def render(result: Identification, *, stimulus: "Stimulus | None" = None) -> str
         What was found.
     stimulus : Stimulus, optional
         What was sent.
+    notes : sequence of str
+        Plain sentences under the verdict.
 
     Examples
     --------
@@ -109,6 +121,7 @@ def render(result: Identification, *, stimulus: "Stimulus | None" = None) -> str
         title=_title(result),
         headline=headline(result),
         verdict=result.verdict if result.pairs else "not_identifiable",
+        notes=notes,
         facts=_facts(result),
         pairs=[_pair_view(result, pair) for pair in result.pairs],
         stimulus=None if stimulus is None else stimulus_picture(stimulus),

@@ -64,7 +64,7 @@ GLOSSARY: tuple[ParameterWords, ...] = (
         label="Bias",
         meaning="What the output shows when the input is zero.",
         differs="equation (11) is the r.m.s. error: noise, and all that the dynamics leave over, "
-        "are in it, and it has no sign",
+        "are in it",
     ),
     ParameterWords(
         name="noise_std",
@@ -152,6 +152,13 @@ _STRUCTURES = {
     "two_modes": "two modes",
 }
 
+_PARTS = {
+    "static": "a scale factor",
+    "first_order": "first-order dynamics",
+    "second_order": "second-order dynamics",
+    "second_order_zero": "second-order dynamics with a zero",
+}
+
 
 def structure_words(structure: str) -> str:
     """Return a structure's name in plain words.
@@ -189,10 +196,11 @@ def pair_sentence(pair: PairIdentification) -> str:
     if pair.verdict == "not_identifiable":
         reason = pair.warnings[0].message if warned else "no model describes the output."
         return reason[:1].lower() + reason[1:]
-    dynamics = structure_words(pair.structure)
-    delay = pair.parameters.delay
-    late = "" if delay is None else " and a delay"
-    text = f"{dynamics}{late} explain {pair.fit_percent:.1f} % of the output"
+    model = [_PARTS.get(pair.structure, f"{structure_words(pair.structure)} dynamics")]
+    if pair.parameters.delay is not None:
+        model.append("a delay")
+    verb = "explain" if len(model) > 1 or pair.structure not in _PARTS else "explains"
+    text = f"{' and '.join(model)} {verb} {pair.fit_percent:.1f} % of the output"
     if pair.verdict == "doubtful" and warned:
         return f"{text}, but there {'is a warning' if warned == 1 else f'are {warned} warnings'}."
     between = INTERSAMPLE_WORDS[pair.intersample]
@@ -231,7 +239,7 @@ def remark(words: ParameterWords, estimate: Estimate | None, paper: float | None
     if paper is None:
         return "The paper's step has no answer on this record."
     if estimate is None:
-        return ""
+        return "The chosen model has none."
     gap = paper - estimate.value
     if abs(gap) <= max(2.0 * estimate.std, 0.002 * abs(estimate.value)):
         return "The two agree."
