@@ -126,6 +126,7 @@ def test_a_spoilt_cell_in_a_column_that_is_not_asked_for_does_no_harm(file):
         ("time,u,y,u\n0,1,2,3\n1,3,4,5\n", "has two columns 'u'"),
         ("time,u [deg],u [rad],y\n0,1,2,3\n1,3,4,5\n", "has two columns 'u'"),
         ("time u y\n0 1 2\n", "no comma, semicolon, tab stands between columns"),
+        ('time,u,y\n0,1,"2,' + 200000 * "2", "cannot be cut into cells"),
         (b"\x7fELF\x00\x00\x01\x02time,u,y\n", "is a binary file"),
         (b"time,u,y\n0,1,\xff\xfe\n", "line 2 holds the byte 0xff, which is not UTF-8"),
         ("time,u,y\n0,1,2\n".encode("utf-16"), "is UTF-16 text"),

@@ -233,7 +233,10 @@ def split_row(row: str, delimiter: str) -> list[str]:
     """
     if '"' not in row:
         return row.split(delimiter)
-    return next(csv.reader([row], delimiter=delimiter, skipinitialspace=True))
+    try:
+        return next(csv.reader([row], delimiter=delimiter, skipinitialspace=True))
+    except csv.Error as error:  # such as a quote that opens and is never closed in a long row
+        raise FormatError(f"the row {row[:40]!r}... cannot be cut into cells: {error}") from None
 
 
 def _delimiter(heading: str, name: str) -> str:
