@@ -56,6 +56,8 @@ def test_picture(tmp_path):
         (("--amplitude", "nan"), ArgumentError, "position limit = nan deg"),
         (("--extinction", "lots"), ArgumentError, "--extinction 'lots' is neither"),
         (("--lead", "-1"), ArgumentError, "lead = -1.0 must be"),
+        (("--plot", "s.foo"), ArgumentError, "--plot s.foo does not end in .png"),
+        (("--json", "no/such/s.json"), ArgumentError, "--json: folder no/such does not exist"),
         (("--unit", "parsnips"), ArgumentError, "unit 'parsnips' is not known"),
     ],
 )

@@ -10,7 +10,17 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from hmpim.errors import ArgumentError, LimitsError
-from hmpim.stimulus import Limits, RestToRest, Stimulus, Sweep, design, true_peaks
+from hmpim.stimulus import (
+    Limits,
+    RestToRest,
+    Step,
+    Stimulus,
+    SumOfSines,
+    Sweep,
+    design,
+    rest_to_rest,
+    true_peaks,
+)
 from hmpim.stimulus.solve import sweep_peaks
 
 FIG_12 = Limits(position=10, velocity=1000, acceleration=40000, unit="deg")
@@ -211,6 +221,40 @@ def test_led_derivatives_agree_and_pieces_meet(wish, n):
         size = getattr(peaks, slope)
         rounding = 1e-14 * getattr(peaks, values) / h * stimulus.core.cycles
         assert np.abs(numerical - getattr(here, slope)).max() < 1e-7 * size + rounding
+
+
+@settings(max_examples=25, deadline=None)
+@given(
+    frequency=st.floats(0.2, 5.0),
+    ratio=st.floats(1.2, 6.0),
+    phases=st.tuples(st.floats(-3.0, 3.0), st.floats(-3.0, 3.0)),
+    cycles=st.floats(2.0, 20.0),
+)
+def test_any_waveform_with_a_band_can_be_led(frequency, ratio, phases, cycles):
+    core = SumOfSines(
+        amplitudes=(1.0, 0.5),
+        frequencies=(frequency, ratio * frequency),
+        phases=phases,
+        duration=cycles / frequency,
+    )
+    peaks = true_peaks(core)
+    limits = Limits(
+        position=peaks.position, velocity=peaks.velocity, acceleration=peaks.acceleration
+    )
+    fs = 50.0 * frequency
+    led = Stimulus(waveform=rest_to_rest(core, limits=limits, fs=fs), fs=fs, limits=limits)
+    assert led.position[0] == led.velocity[0] == led.acceleration[0] == 0.0
+    assert led.position[-1] == led.velocity[-1] == led.acceleration[-1] == 0.0
+    middle = np.array([0.5 * core.duration])
+    shifted = led.motion(middle + led.sweep_start).velocity
+    assert shifted == pytest.approx(core.motion(middle).velocity, abs=1e-9 * peaks.velocity)
+    at = led.motion(oversampled(led))
+    assert np.abs(at.velocity).max() <= peaks.velocity * (1 + 1e-9)
+
+
+def test_a_step_cannot_be_led():
+    with pytest.raises(ArgumentError, match="a Step jumps within itself"):
+        rest_to_rest(Step(duration=1.0), limits=Limits(position=2.0), fs=100.0)
 
 
 def test_lead_removes_the_singular_start():

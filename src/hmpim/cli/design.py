@@ -5,6 +5,7 @@ from typing import Annotated, Literal
 
 import typer
 
+from hmpim.cli.terminal import check_target
 from hmpim.errors import ArgumentError
 
 __all__ = ["design"]
@@ -70,6 +71,11 @@ def design(
     from hmpim.stimulus import design as design_stimulus
     from hmpim.units import rate_unit
 
+    check_target(output, "--output")
+    check_target(json_file, "--json")
+    check_target(plot, "--plot")
+    if plot is not None and plot.suffix.lower() != ".png":
+        raise ArgumentError(f"--plot {plot} does not end in .png, the one picture made here")
     limits = Limits(position=amplitude, velocity=max_rate, acceleration=max_acceleration, unit=unit)
     stimulus = design_stimulus(
         band=band,

@@ -46,7 +46,7 @@ def stimulus_to_dict(stimulus: Stimulus) -> dict[str, Any]:
         "duration": stimulus.duration,
         "fs": stimulus.fs,
         "lead": before,
-        "lead_out": stimulus.waveform.duration - before - stimulus.sweep_duration,
+        "lead_out": round(stimulus.waveform.duration - before - stimulus.sweep_duration, 12),
         "tail": stimulus.tail,
         "sweep_start": before,
         "sweep_duration": stimulus.sweep_duration,

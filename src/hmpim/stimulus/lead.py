@@ -22,104 +22,18 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import minimize_scalar
 
-from hmpim.errors import LimitsError
-from hmpim.stimulus.limits import Limits
+from hmpim.errors import ArgumentError, LimitsError
+from hmpim.stimulus.limits import Limits, three_digits
 from hmpim.stimulus.motion import FloatArray, Motion, Peaks, Waveform
 from hmpim.stimulus.peaks import true_peaks
+from hmpim.stimulus.quintic import Quintic, between
 from hmpim.stimulus.sweep import Sweep
 
-__all__ = ["Quintic", "RestToRest", "join_time", "rest_to_rest"]
+__all__ = ["RestToRest", "join_time", "rest_to_rest"]
 
 _CHOICES = 64  # durations tried for one lead
 _STEPS = 16  # instants tried for joining or leaving
 _BEYOND = 1e12  # harsher than any lead inside the limits
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Quintic:
-    """Polynomial of fifth degree in (t - start)/duration, between two states of motion.
-
-    Parameters
-    ----------
-    start, duration : float
-        Seconds.
-    coefficients : tuple of float, 6 of them
-        Position at share s of the duration is sum of coefficients[k] s^k.
-    """
-
-    start: float
-    duration: float
-    coefficients: tuple[float, ...]
-
-    @property
-    def end(self) -> float:
-        """Time in seconds at which it ends."""
-        return self.start + self.duration
-
-    def motion(self, time: FloatArray) -> Motion:
-        """Position, velocity and acceleration at `time` (s, shape (n,)), the formula only.
-
-        Examples
-        --------
-        >>> import numpy as np
-        >>> q = between(np.zeros(3), np.array([1.0, 0.0, 0.0]), start=0.0, duration=2.0)
-        >>> q.motion(np.array([0.0, 1.0, 2.0])).position.tolist()
-        [0.0, 0.5, 1.0]
-        """
-        s = (time - self.start) / self.duration
-        c0, c1, c2, c3, c4, c5 = self.coefficients
-        position = c0 + s * (c1 + s * (c2 + s * (c3 + s * (c4 + s * c5))))
-        velocity = c1 + s * (2 * c2 + s * (3 * c3 + s * (4 * c4 + s * 5 * c5)))
-        acceleration = 2 * c2 + s * (6 * c3 + s * (12 * c4 + s * 20 * c5))
-        return Motion(
-            time=time,
-            position=position,
-            velocity=velocity / self.duration,
-            acceleration=acceleration / self.duration**2,
-        )
-
-    @property
-    def peaks(self) -> Peaks:
-        """True peaks, from the roots of the derivatives."""
-        c = np.array(self.coefficients)
-        largest = []
-        for order in range(3):
-            p = np.polynomial.polynomial.polyder(c, order) if order else c
-            slope = np.trim_zeros(np.polynomial.polynomial.polyder(p), "b")
-            roots = np.polynomial.polynomial.polyroots(slope) if slope.size > 1 else np.empty(0)
-            # a double root may come out as a pair just off the axis: its real part will do
-            at = np.concatenate(([0.0, 1.0], np.clip(roots.real, 0.0, 1.0)))
-            size = np.abs(np.polynomial.polynomial.polyval(at, p)).max()
-            largest.append(float(size) / self.duration**order)
-        return Peaks(position=largest[0], velocity=largest[1], acceleration=largest[2])
-
-
-def between(first: FloatArray, last: FloatArray, *, start: float, duration: float) -> Quintic:
-    """Quintic from state `first` to state `last` (position, velocity, acceleration).
-
-    Parameters
-    ----------
-    first, last : ndarray, shape (3,)
-        States at the two ends.
-    start, duration : float
-        Seconds.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> q = between(np.zeros(3), np.array([1.0, 0.0, 0.0]), start=0.0, duration=1.0)
-    >>> [round(c) for c in q.coefficients]
-    [0, 0, 0, 10, -15, 6]
-    """
-    x0, v0, a0 = first
-    x1, v1, a1 = last
-    T = duration
-    c = (x0, v0 * T, 0.5 * a0 * T * T)
-    d = x1 - c[0] - c[1] - c[2]
-    e = v1 * T - c[1] - 2 * c[2]
-    f = a1 * T * T - 2 * c[2]
-    rest = (10 * d - 4 * e + 0.5 * f, -15 * d + 7 * e - f, 6 * d - 3 * e + 0.5 * f)
-    return Quintic(start=start, duration=T, coefficients=tuple(float(v) for v in (*c, *rest)))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -271,6 +185,8 @@ def rest_to_rest(
     ------
     LimitsError
         If no lead of that length fits; the message says what would do.
+    ArgumentError
+        If the core has no band, as a step.
 
     Examples
     --------
@@ -335,7 +251,7 @@ def _no_lead(core: Waveform, which: str, limits: Limits, longest: float, fs: flo
     )
     return (
         f"lead = {longest:g} s is too short to keep the limits; "
-        f"lead = {math.ceil(needed * fs) / fs:.6g} s would do, or lead='auto'"
+        f"lead = {three_digits(needed, up=True)} s would do, or lead='auto'"
     )
 
 
@@ -352,8 +268,13 @@ def _handovers(core: Waveform) -> tuple[FloatArray, FloatArray, float, float]:
         earliest = join_time(core)
         first = core.time_of_phase(min(2.5 * math.pi, total))
         last = core.time_of_phase(max(total - 2.0 * math.pi, 0.0))
+    elif core.band is None:
+        raise ArgumentError(
+            f"a {type(core).__name__} jumps within itself, which no lead can smooth; "
+            "take a waveform that has a band"
+        )
     else:
-        low, high = core.band if core.band is not None else (4.0 / T, 4.0 / T)
+        low, high = core.band
         earliest, first, last = 0.0, min(1.0 / low, T), max(T - 1.0 / high, 0.0)
     turn_in = _turning(core, np.linspace(earliest, max(first, earliest), 1024), 0)
     turn_out = _turning(core, np.linspace(last, T, 1024), -1)
@@ -365,7 +286,7 @@ def _turning(core: Waveform, times: FloatArray, which: int) -> float:
     velocity = core.motion(times).velocity
     flips = np.flatnonzero(velocity[:-1] * velocity[1:] <= 0.0)
     if flips.size == 0:
-        return float(times[which and 0])
+        return float(times[-1 if which == 0 else 0])
     low, high = float(times[flips[which]]), float(times[flips[which] + 1])
     sign = float(velocity[flips[which]])
     for _ in range(50):
@@ -379,16 +300,7 @@ def _gentlest(
     first: FloatArray, last: FloatArray, beside: Peaks, limits: Limits, longest: float
 ) -> Quintic | None:
     """The gentlest quintic beside its neighbour's peaks, of those that keep the limits."""
-    scales = [
-        a / b
-        for a, b in (
-            (beside.position, beside.velocity),
-            (beside.velocity, beside.acceleration),
-        )
-        if b > 0
-    ]
-    if not scales or max(scales) == 0.0:
-        return between(first, last, start=0.0, duration=1e-3)
+    scales = (beside.position / beside.velocity, beside.velocity / beside.acceleration)
 
     def harshness(log_duration: float) -> float:
         candidate = between(first, last, start=0.0, duration=math.exp(log_duration))

@@ -7,7 +7,7 @@ from hmpim.errors import ArgumentError
 from hmpim.stimulus.motion import Peaks
 from hmpim.units import check_unit, conversion_factor, rate_unit
 
-__all__ = ["Limits"]
+__all__ = ["Limits", "three_digits"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -90,3 +90,16 @@ class Limits:
             peaks.velocity / self.velocity,
             peaks.acceleration / self.acceleration,
         )
+
+
+def three_digits(value: float, *, up: bool) -> str:
+    """Write `value` with three significant digits, rounded so that the number still does.
+
+    Examples
+    --------
+    >>> three_digits(0.12345, up=True), three_digits(6789.0, up=False)
+    ('0.124', '6780')
+    """
+    scale = 10.0 ** (math.floor(math.log10(value)) - 2)
+    rounded = (math.ceil(value / scale) if up else math.floor(value / scale)) * scale
+    return f"{rounded:.6g}"

@@ -8,13 +8,13 @@ from scipy.optimize import minimize_scalar
 
 from hmpim.errors import LimitsError
 from hmpim.stimulus.lead import join_time
-from hmpim.stimulus.limits import Limits
+from hmpim.stimulus.limits import Limits, three_digits
 from hmpim.stimulus.motion import Peaks
 from hmpim.stimulus.peaks import true_peaks
 from hmpim.stimulus.sweep import Sweep
 from hmpim.units import rate_unit
 
-__all__ = ["largest_gain", "smallest_extinction", "sweep_peaks", "three_digits"]
+__all__ = ["largest_gain", "smallest_extinction", "sweep_peaks"]
 
 STEP = 0.001  # extinction is solved to this
 LARGEST = 2.0  # from here on the acceleration falls along the sweep, so more n buys nothing
@@ -181,16 +181,3 @@ def _what_would_do(search: _Search, n: float) -> str:
 
 def _need(needed: float, limit: float, unit: str) -> str:
     return f"{three_digits(needed, up=True)} {unit} (the limit is {limit:g})"
-
-
-def three_digits(value: float, *, up: bool) -> str:
-    """Write `value` with three significant digits, rounded so that the number still does.
-
-    Examples
-    --------
-    >>> three_digits(0.12345, up=True), three_digits(6789.0, up=False)
-    ('0.124', '6780')
-    """
-    scale = 10.0 ** (math.floor(math.log10(value)) - 2)
-    rounded = (math.ceil(value / scale) if up else math.floor(value / scale)) * scale
-    return f"{rounded:.6g}"

@@ -8,10 +8,10 @@ import numpy as np
 
 from hmpim.errors import ArgumentError, LimitsError
 from hmpim.stimulus.lead import RestToRest, rest_to_rest
-from hmpim.stimulus.limits import Limits
+from hmpim.stimulus.limits import Limits, three_digits
 from hmpim.stimulus.motion import FloatArray, Motion, Peaks, Waveform
 from hmpim.stimulus.peaks import true_peaks
-from hmpim.stimulus.solve import largest_gain, smallest_extinction, sweep_peaks, three_digits
+from hmpim.stimulus.solve import largest_gain, smallest_extinction, sweep_peaks
 from hmpim.stimulus.sweep import Sweep, check_band, check_positive
 from hmpim.units import check_unit, rate_unit
 

@@ -1,0 +1,96 @@
+"""A polynomial of fifth degree from one state of motion to another."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from hmpim.stimulus.motion import FloatArray, Motion, Peaks
+
+__all__ = ["Quintic", "between"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Quintic:
+    """Polynomial of fifth degree in (t - start)/duration, between two states of motion.
+
+    Parameters
+    ----------
+    start, duration : float
+        Seconds.
+    coefficients : tuple of float, 6 of them
+        Position at share s of the duration is sum of coefficients[k] s^k.
+    """
+
+    start: float
+    duration: float
+    coefficients: tuple[float, ...]
+
+    @property
+    def end(self) -> float:
+        """Time in seconds at which it ends."""
+        return self.start + self.duration
+
+    def motion(self, time: FloatArray) -> Motion:
+        """Position, velocity and acceleration at `time` (s, shape (n,)), the formula only.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> q = between(np.zeros(3), np.array([1.0, 0.0, 0.0]), start=0.0, duration=2.0)
+        >>> q.motion(np.array([0.0, 1.0, 2.0])).position.tolist()
+        [0.0, 0.5, 1.0]
+        """
+        s = (time - self.start) / self.duration
+        c0, c1, c2, c3, c4, c5 = self.coefficients
+        position = c0 + s * (c1 + s * (c2 + s * (c3 + s * (c4 + s * c5))))
+        velocity = c1 + s * (2 * c2 + s * (3 * c3 + s * (4 * c4 + s * 5 * c5)))
+        acceleration = 2 * c2 + s * (6 * c3 + s * (12 * c4 + s * 20 * c5))
+        return Motion(
+            time=time,
+            position=position,
+            velocity=velocity / self.duration,
+            acceleration=acceleration / self.duration**2,
+        )
+
+    @property
+    def peaks(self) -> Peaks:
+        """True peaks, from the roots of the derivatives."""
+        c = np.array(self.coefficients)
+        largest = []
+        for order in range(3):
+            p = np.polynomial.polynomial.polyder(c, order) if order else c
+            slope = np.trim_zeros(np.polynomial.polynomial.polyder(p), "b")
+            roots = np.polynomial.polynomial.polyroots(slope) if slope.size > 1 else np.empty(0)
+            # a double root may come out as a pair just off the axis: its real part will do
+            at = np.concatenate(([0.0, 1.0], np.clip(roots.real, 0.0, 1.0)))
+            size = np.abs(np.polynomial.polynomial.polyval(at, p)).max()
+            largest.append(float(size) / self.duration**order)
+        return Peaks(position=largest[0], velocity=largest[1], acceleration=largest[2])
+
+
+def between(first: FloatArray, last: FloatArray, *, start: float, duration: float) -> Quintic:
+    """Quintic from state `first` to state `last` (position, velocity, acceleration).
+
+    Parameters
+    ----------
+    first, last : ndarray, shape (3,)
+        States at the two ends.
+    start, duration : float
+        Seconds.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> q = between(np.zeros(3), np.array([1.0, 0.0, 0.0]), start=0.0, duration=1.0)
+    >>> [round(c) for c in q.coefficients]
+    [0, 0, 0, 10, -15, 6]
+    """
+    x0, v0, a0 = first
+    x1, v1, a1 = last
+    T = duration
+    c = (x0, v0 * T, 0.5 * a0 * T * T)
+    d = x1 - c[0] - c[1] - c[2]
+    e = v1 * T - c[1] - 2 * c[2]
+    f = a1 * T * T - 2 * c[2]
+    rest = (10 * d - 4 * e + 0.5 * f, -15 * d + 7 * e - f, 6 * d - 3 * e + 0.5 * f)
+    return Quintic(start=start, duration=T, coefficients=tuple(float(v) for v in (*c, *rest)))
