@@ -1,0 +1,91 @@
+"""Limits are law: what is refused before anything moves."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hmpim.errors import LimitsError, UnitError
+from hmpim.rigs.table.axes import AXES, AxisSpec
+from hmpim.stimulus import Limits, Stimulus
+from hmpim.units import conversion_factor, rate_unit
+
+__all__ = ["check_axis", "check_torques"]
+
+FloatArray = NDArray[np.float64]
+
+_ROUNDING = 1e-9  # a stimulus solved onto a limit may stand a rounding error beyond it
+
+
+def check_axis(stimulus: Stimulus, limits: Limits, *, axis: str) -> None:
+    """Refuse a stimulus that goes beyond an axis's position, rate or acceleration.
+
+    Parameters
+    ----------
+    stimulus : Stimulus
+        Its true peaks are looked at, between the samples too.
+    limits : Limits
+        Of the axis, from where it stands.
+    axis : str
+        Its name, for the message.
+
+    Raises
+    ------
+    LimitsError
+        If a peak is beyond a limit.
+    UnitError
+        If the stimulus is in no unit of angle.
+
+    Examples
+    --------
+    >>> from hmpim.stimulus import Ramp
+    >>> ramp = Stimulus(waveform=Ramp(rate=2.0, duration=1.0), fs=10.0, unit="deg")
+    >>> check_axis(ramp, Limits(velocity=1.0, unit="deg"), axis="yaw")
+    Traceback (most recent call last):
+    hmpim.errors.LimitsError: peak velocity 2 deg/s is beyond the limit 1 deg/s of yaw; ...
+    """
+    if stimulus.unit == "":
+        raise UnitError(f"the stimulus for {axis} has no unit; a table takes 'deg' or 'rad'")
+    factor = conversion_factor(stimulus.unit, to=limits.unit)
+    for order, quantity in enumerate(("position", "velocity", "acceleration")):
+        peak = factor * getattr(stimulus.peaks, quantity)
+        limit = getattr(limits, quantity)
+        if peak > limit * (1.0 + _ROUNDING):
+            unit = rate_unit(limits.unit, order)
+            raise LimitsError(
+                f"peak {quantity} {peak:.6g} {unit} is beyond the limit {limit:.6g} {unit} of "
+                f"{axis}; scale the stimulus by {limit / peak:.4g}, or design it within this limit"
+            )
+
+
+def check_torques(time: FloatArray, torque: FloatArray, axes: tuple[AxisSpec, ...]) -> None:
+    """Refuse a motion of all axes together that takes more torque than an axis has.
+
+    Parameters
+    ----------
+    time : ndarray, shape (n,)
+        Seconds.
+    torque : ndarray, shape (n, 5)
+        What the motion takes, N·m, in the order of `AXES`.
+    axes : tuple of AxisSpec
+        With their torque limits.
+
+    Raises
+    ------
+    LimitsError
+        If the torque of an axis is beyond its limit; the message says when and by how much.
+
+    Examples
+    --------
+    >>> from hmpim.rigs.table.axes import FIG_4
+    >>> check_torques(np.zeros(1), np.full((1, 5), 400.0), FIG_4)
+    Traceback (most recent call last):
+    hmpim.errors.LimitsError: at 0.000 s the motion of all axes together takes 400 N·m of roll, ...
+    """
+    allowed = np.array([axis.torque_limit for axis in axes])
+    share = np.abs(torque) / allowed
+    k, i = np.unravel_index(int(np.argmax(share)), share.shape)
+    if share[k, i] > 1.0 + _ROUNDING:
+        raise LimitsError(
+            f"at {time[k]:.3f} s the motion of all axes together takes {abs(torque[k, i]):.4g} N·m "
+            f"of {AXES[i]}, beyond its limit {allowed[i]:g} N·m; scale the stimuli by "
+            f"{1.0 / share[k, i]:.3g} or so, or run fewer axes at once"
+        )

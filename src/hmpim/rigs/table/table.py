@@ -1,0 +1,407 @@
+"""A five-axis flight motion simulator (section II, Fig. 4) as a rig."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hmpim.errors import ArgumentError, LimitsError
+from hmpim.record import Channel, Record
+from hmpim.rigs.table.axes import AXES, FIG_4, AxisName, AxisSpec, CommandMode, TablePosition
+from hmpim.rigs.table.bodies import Base, LoadName, Rigid, load_named
+from hmpim.rigs.table.checks import check_axis, check_torques
+from hmpim.rigs.table.plant import Plant, build
+from hmpim.rigs.table.servo import Gains
+from hmpim.rigs.table.simulate import History, Timing, simulate
+from hmpim.rigs.table.tuning import tune
+from hmpim.stimulus import Limits, Stimulus
+from hmpim.units import conversion_factor
+
+__all__ = ["MotionTable"]
+
+FloatArray = NDArray[np.float64]
+
+_MIDDLE = TablePosition()
+_BLOCK = Base()
+_TUNED_AT = 1000.0  # Hz, the command rate at which Fig. 4's bandwidths hold
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MotionTable:
+    """A simulated five-axis motion table: rigid bodies in MuJoCo, a digital servo on each axis.
+
+    Commands come at the stimulus's rate and are held in between. Roll, yaw and pitch carry the
+    unit under test, azimuth and elevation the target; both sets stand on one base.
+
+    Parameters
+    ----------
+    axes : tuple of AxisSpec
+        The five axes in the order of `AXES`; those of Fig. 4 by default.
+    uut_load, target_load : str or Rigid
+        What the inner and the outer axes carry: 'acceptance', 'none', 'bracket' (inner only),
+        'projector' (outer only), or a body of your own.
+    mode : {'P', 'PV', 'PVA'}
+        Which commands are sent: position; and velocity; and acceleration.
+    friction : bool
+        False takes dry and viscous friction away.
+    start : TablePosition
+        Where the axes stand before a run; stimuli count from there.
+    base : Base
+        The block underneath.
+    controller_rate : float
+        Ticks of the servos per second, Hz; the stimulus's rate must divide it.
+    delay : float
+        Transport of a command to the servo, s; it takes force at the next tick.
+    encoder_resolution : float
+        Step of the encoders, deg.
+    encoder_noise_std : float
+        White noise of each encoder before it is rounded, deg.
+    realtime : bool
+        True keeps pace with the clock on the wall.
+    name : str
+        Name of the rig.
+
+    Raises
+    ------
+    ArgumentError
+        If a value is out of range.
+    MissingExtraError
+        On use, if MuJoCo is not installed.
+
+    Examples
+    --------
+    >>> from hmpim.stimulus import design
+    >>> table = MotionTable(mode="PV")
+    >>> limits = table.limits_of("pitch", travel=2.0)
+    >>> sweep = design(band=(0.5, 30), duration=1, fs=500, limits=limits)
+    >>> record = table.play({"pitch": sweep}, rng=np.random.default_rng(0))
+    >>> record.inputs[0].name, record.outputs[0].name, record.intersample
+    ('pitch.command', 'pitch.position', 'zoh')
+    """
+
+    axes: tuple[AxisSpec, ...] = FIG_4
+    uut_load: LoadName | Rigid = "acceptance"
+    target_load: LoadName | Rigid = "acceptance"
+    mode: CommandMode = "P"
+    friction: bool = True
+    start: TablePosition = _MIDDLE
+    base: Base = _BLOCK
+    controller_rate: float = 2000.0
+    delay: float = 1e-3
+    encoder_resolution: float = 0.003
+    encoder_noise_std: float = 0.001
+    realtime: bool = False
+    name: str = "table"
+
+    def __post_init__(self) -> None:
+        names = tuple(axis.name for axis in self.axes)
+        if names != AXES:
+            raise ArgumentError(f"axes are {names}; give the five of {AXES}, in this order")
+        if self.mode not in ("P", "PV", "PVA"):
+            raise ArgumentError(f"mode = {self.mode!r} is not known; use 'P', 'PV' or 'PVA'")
+        for field in ("controller_rate", "encoder_resolution"):
+            value = getattr(self, field)
+            if not (math.isfinite(value) and value > 0.0):
+                raise ArgumentError(f"{field} = {value!r} must be positive and finite")
+        for field in ("delay", "encoder_noise_std"):
+            value = getattr(self, field)
+            if not (math.isfinite(value) and value >= 0.0):
+                raise ArgumentError(f"{field} = {value!r} must be 0 or positive, and finite")
+        load_named("uut", self.uut_load)
+        load_named("target", self.target_load)
+        for axis in AXES:
+            self.limits_of(axis)
+
+    @property
+    def limits(self) -> Limits | None:
+        """None: each axis has its own, see `limits_of`; `play` checks them all itself."""
+        return None
+
+    def limits_of(
+        self, axis: AxisName, *, travel: float | None = None, share: float = 1.0
+    ) -> Limits:
+        """What an axis may be commanded, from where it starts; what a stimulus is designed in.
+
+        Parameters
+        ----------
+        axis : str
+            One of `AXES`.
+        travel : float or None
+            Largest position wanted, deg; None for all that is left. A sweep that has to fill
+            the whole travel is seldom possible within the rate limit.
+        share : float
+            Share of the rate and acceleration limits to use, at most 1.
+
+        Raises
+        ------
+        ArgumentError
+            If there is no such axis, or a share above 1.
+        LimitsError
+            If the start leaves no travel, or less than wanted.
+
+        Examples
+        --------
+        >>> MotionTable(start=TablePosition(yaw=30.0)).limits_of("yaw").position
+        25.0
+        >>> MotionTable().limits_of("elevation", travel=3.0, share=0.5).acceleration
+        450.0
+        """
+        limits = self.axes[_place(axis)].limits.to("deg")
+        at = getattr(self.start, axis)
+        left = limits.position - abs(at)
+        if left <= 0.0 or (travel is not None and travel > left):
+            wanted = "" if travel is None else f", less than the {travel:g} deg wanted"
+            raise LimitsError(
+                f"start of {axis} = {at:g} deg leaves {max(left, 0.0):g} deg of travel within "
+                f"±{limits.position:g} deg{wanted}; start nearer the middle"
+            )
+        if not 0.0 < share <= 1.0:
+            raise ArgumentError(f"share = {share!r} must be more than 0 and at most 1")
+        return Limits(
+            position=left if travel is None else travel,
+            velocity=share * limits.velocity,
+            acceleration=share * limits.acceleration,
+            unit="deg",
+        )
+
+    @property
+    def gains(self) -> Gains:
+        """What the servos are tuned to: with the acceptance loads, at 1000 commands a second.
+
+        Examples
+        --------
+        >>> bool(MotionTable().gains.position[0] > MotionTable().gains.position[4])
+        True
+        """
+        hold = max(1, round(self.controller_rate / _TUNED_AT))
+        timing = self.timing(self.controller_rate / hold)
+        return tune(self.axes, base=self.base, tick=timing.tick, hold=timing.hold, late=timing.late)
+
+    @property
+    def plant(self) -> Plant:
+        """The mechanics with its loads, compiled once."""
+        return build(
+            self.axes,
+            uut=load_named("uut", self.uut_load),
+            target=load_named("target", self.target_load),
+            base=self.base,
+            friction=self.friction,
+            timestep=1.0 / self.controller_rate,
+        )
+
+    @property
+    def start_angles(self) -> FloatArray:
+        """Where the axes stand before a run, rad, shape (5,)."""
+        return np.radians([getattr(self.start, axis) for axis in AXES])
+
+    def timing(self, fs: float) -> Timing:
+        """Hold and delay in ticks, for commands at `fs` (Hz).
+
+        Raises
+        ------
+        ArgumentError
+            If `fs` does not divide the controller's rate.
+
+        Examples
+        --------
+        >>> MotionTable().timing(500.0).hold
+        4
+        """
+        hold = round(self.controller_rate / fs) if fs > 0.0 else 0
+        if hold < 1 or abs(hold * fs / self.controller_rate - 1.0) > 1e-9:
+            raise ArgumentError(
+                f"fs = {fs:g} Hz does not divide the controller's rate "
+                f"{self.controller_rate:g} Hz; command at 500 or 1000 Hz, for instance"
+            )
+        return Timing(
+            tick=1.0 / self.controller_rate,
+            hold=hold,
+            late=math.ceil(self.delay * self.controller_rate - 1e-9),
+            realtime=self.realtime,
+        )
+
+    def check(self, stimuli: Stimulus | Mapping[AxisName, Stimulus]) -> FloatArray:
+        """Refuse what the table may not do; nothing moves.
+
+        Position, rate and acceleration of each axis first, then the torque that the motion of
+        all axes together takes of each (inverse dynamics of what is commanded).
+
+        Returns
+        -------
+        ndarray, shape (n, 5)
+            That torque, N·m, in the order of `AXES`.
+
+        Raises
+        ------
+        LimitsError
+            Names axis, value, limit, and for a torque the time.
+        UnitError
+            If a stimulus is in no unit of angle.
+        ArgumentError
+            If an axis is not known, or the stimuli differ in rate.
+
+        Examples
+        --------
+        >>> from hmpim.stimulus import Sine, Stimulus
+        >>> shake = Stimulus(waveform=Sine(frequency=9.0, duration=1.0), fs=500.0, unit="deg")
+        >>> MotionTable().check({"elevation": shake})
+        Traceback (most recent call last):
+        hmpim.errors.LimitsError: peak acceleration 3197.75 deg/s² is beyond the limit ...
+        """
+        named = _by_axis(stimuli)
+        for axis, stimulus in named.items():
+            check_axis(stimulus, self.limits_of(axis), axis=axis)
+        time, command = self._command(named)
+        torque = self.plant.torques(*command)
+        check_torques(time, torque, self.axes)
+        return torque
+
+    def simulate(
+        self, stimuli: Stimulus | Mapping[AxisName, Stimulus], *, rng: np.random.Generator
+    ) -> History:
+        """Play stimuli and return what all five axes did; limits are checked first.
+
+        Parameters
+        ----------
+        stimuli : Stimulus or mapping of axis to Stimulus
+            As for `play`.
+        rng : numpy.random.Generator
+            Source of the encoders' noise.
+
+        Raises
+        ------
+        LimitsError
+            As `check`.
+        RigError
+            If an axis runs away.
+        """
+        self.check(stimuli)
+        named = _by_axis(stimuli)
+        timing = self.timing(_rate(named))
+        _, command = self._command(named)
+        noise = None
+        if self.encoder_noise_std > 0.0:
+            ticks = command[0].shape[0] * timing.hold
+            noise = math.radians(self.encoder_noise_std) * rng.standard_normal((ticks, 5))
+        return simulate(
+            self.plant,
+            self.axes,
+            self.gains,
+            command=command,
+            mode=self.mode,
+            timing=timing,
+            resolution=math.radians(self.encoder_resolution),
+            noise=noise,
+        )
+
+    def play(
+        self,
+        stimulus: Stimulus | Mapping[AxisName, Stimulus],
+        *,
+        rng: np.random.Generator,
+        observe: tuple[AxisName, ...] | None = None,
+    ) -> Record:
+        """Move one axis, or several at once, and record commands and encoders.
+
+        Parameters
+        ----------
+        stimulus : Stimulus or mapping of axis to Stimulus
+            One, for the axis it names in `Stimulus.axis`, or one for each axis that moves. All
+            have one rate, that of the commands; a shorter one waits at rest for the others.
+            Axes without a stimulus are held where they start.
+        rng : numpy.random.Generator
+            Source of the encoders' noise.
+        observe : tuple of str or None
+            Axes whose encoders are recorded; None for those that move.
+
+        Returns
+        -------
+        Record
+            Inputs ``roll.command`` and so on, outputs ``roll.position``, both from the start
+            position, in the stimulus's unit (outputs of axes held: deg), held between samples.
+
+        Raises
+        ------
+        LimitsError
+            If an axis would leave its limits, or all together take too much torque of one;
+            nothing has moved then.
+        RigError
+            If an axis runs away.
+
+        Examples
+        --------
+        >>> from hmpim.stimulus import design
+        >>> table = MotionTable()
+        >>> limits = table.limits_of("roll", travel=5.0)
+        >>> sweep = design(band=(1, 50), duration=1, fs=1000, limits=limits, axis="roll")
+        >>> table.play(sweep, rng=np.random.default_rng(0)).outputs[0].unit
+        'deg'
+        """
+        named = _by_axis(stimulus)
+        seen = tuple(named) if observe is None else observe
+        for axis in seen:
+            _place(axis)
+        history = self.simulate(named, rng=rng)
+
+        def channel(axis: AxisName, quantity: str, name: str) -> Channel:
+            unit = named[axis].unit if axis in named else "deg"
+            moved = history.of(axis, quantity) - getattr(self.start, axis)
+            return Channel(
+                name=f"{axis}.{name}",
+                time=history.time,
+                values=moved * conversion_factor("deg", to=unit),
+                unit=unit,
+            )
+
+        bands = [s.band for s in named.values() if s.band is not None]
+        return Record(
+            inputs=tuple(channel(axis, "command", "command") for axis in named),
+            outputs=tuple(channel(axis, "encoder", "position") for axis in seen),
+            fs=_rate(named),
+            band=(min(b[0] for b in bands), max(b[1] for b in bands)) if bands else None,
+            intersample="zoh",
+            source=f"simulated {self.name}, {self.mode}",
+        )
+
+    def _command(
+        self, named: Mapping[AxisName, Stimulus]
+    ) -> tuple[FloatArray, tuple[FloatArray, FloatArray, FloatArray]]:
+        """Times, and position, velocity, acceleration of all axes in rad, shape (n, 5)."""
+        count = max(stimulus.samples for stimulus in named.values())
+        time = np.arange(count) / _rate(named)
+        position = np.tile(self.start_angles, (count, 1))
+        velocity, acceleration = np.zeros((count, 5)), np.zeros((count, 5))
+        for axis, stimulus in named.items():
+            i, factor = _place(axis), conversion_factor(stimulus.unit, to="rad")
+            motion = stimulus.motion(time)
+            position[:, i] += factor * motion.position
+            velocity[:, i] = factor * motion.velocity
+            acceleration[:, i] = factor * motion.acceleration
+        return time, (position, velocity, acceleration)
+
+
+def _place(axis: str) -> int:
+    if axis not in AXES:
+        raise ArgumentError(f"axis {axis!r} is not known; use one of {AXES}")
+    return AXES.index(axis)
+
+
+def _by_axis(stimuli: Stimulus | Mapping[AxisName, Stimulus]) -> dict[AxisName, Stimulus]:
+    """Stimulus by axis, in the order of `AXES`."""
+    if isinstance(stimuli, Stimulus):
+        stimuli = {AXES[_place(stimuli.axis)]: stimuli}
+    if not stimuli:
+        raise ArgumentError("no stimulus is given; give at least one axis something to do")
+    for axis in stimuli:
+        _place(axis)
+    named = {axis: stimuli[axis] for axis in AXES if axis in stimuli}
+    rates = {axis: stimulus.fs for axis, stimulus in named.items()}
+    if len(set(rates.values())) > 1:
+        raise ArgumentError(f"stimuli have different rates, {rates} Hz; design all at one rate")
+    return named
+
+
+def _rate(named: Mapping[AxisName, Stimulus]) -> float:
+    return next(iter(named.values())).fs
