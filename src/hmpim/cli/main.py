@@ -14,6 +14,7 @@ from typer.core import TyperGroup
 from hmpim.cli.demo import demo
 from hmpim.cli.design import design
 from hmpim.cli.identify import identify
+from hmpim.cli.paper import paper
 from hmpim.errors import HmpimError
 
 __all__ = ["app", "main"]
@@ -133,6 +134,7 @@ app.command(epilog="Example: hmpim identify test.csv --input u --output y --repo
     identify
 )
 app.command(epilog="Example: hmpim demo --out out/demo --seed 7")(demo)
+app.command(epilog="Example: hmpim paper --out docs/build --figures 12 13")(paper)
 
 
 def main() -> None:

@@ -1,0 +1,266 @@
+"""Figs 2 and 7 to 11: a sensor with no dynamics, on which the paper's steps are right."""
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hmpim.experiment import run
+from hmpim.identify import PaperAnalysis, paper_analysis
+from hmpim.identify.static import initial_period
+from hmpim.plots import cross_correlation, error_autocorrelation, input_output
+from hmpim.plots.style import (
+    COLOURS,
+    draw_legend,
+    draw_level,
+    draw_line,
+    draw_mark,
+    finish_axes,
+    new_figure,
+)
+from hmpim.record import Record
+from hmpim.report.figures import Picture
+from hmpim.report.paper.chapter import Chapter
+from hmpim.report.paper.panels import response_axes
+from hmpim.report.paper.rows import Row, agreement
+from hmpim.rigs import Sensor
+from hmpim.stimulus import Limits, design
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+__all__ = ["sensor_chapter"]
+
+SEED = 8
+SENSOR = Sensor(delay=0.15, scale_factor=0.98, bias=0.6, noise_std=0.1)
+SERVO = Sensor(delay=0.02, natural_frequency=8.0, damping_ratio=0.35, noise_std=0.01)
+
+
+def sensor_chapter() -> Chapter:
+    """Make Figs 2 and 7 to 11.
+
+    Examples
+    --------
+    >>> chapter = sensor_chapter()
+    >>> chapter.rows[0].quantity, chapter.rows[0].value
+    ('Delay of an example, from the cross-correlation', 150.0)
+    """
+    record = _record(SENSOR, last=20.0, duration=10.0, amplitude=5.0)
+    u, y = record.inputs[0].values, record.outputs[0].values
+    fs = 200.0
+    analysis = paper_analysis(u, y, fs, band=record.band)
+    found = analysis.estimates
+    lag = round((found.delay or 0.0) * fs)
+    cycle = initial_period(u)
+    unit = (
+        f"a sensor with {1e3 * SENSOR.delay:g} ms delay, scale factor {SENSOR.scale_factor:g}, "
+        f"bias {SENSOR.bias:g} deg, noise {SENSOR.noise_std:g} deg and no dynamics"
+    )
+    near = np.abs(analysis.lag) <= 1.0
+    root = float(np.sqrt(analysis.error_autocorrelation[analysis.error.size - 1]))
+    pictures = {
+        2: _picture_2(),
+        7: Picture(
+            key="fig07",
+            title="Example excitation with HMPIM and measured output",
+            caption=f"A sweep from 0.1 to 20 Hz with n = 1, and what {unit}, makes of it.",
+            description="The output follows the input, later and higher by a constant.",
+            figure=_seen(
+                input_output(record.inputs[0].time, u, y, input_unit="deg", output_unit="deg")
+            ),
+        ),
+        8: Picture(
+            key="fig08",
+            title="Cross-correlation of HMPIM and measured output",
+            caption="Equation (8). Where there are no dynamics, its peak is the pure delay.",
+            description=f"A peak at {found.delay:g} s.",
+            figure=cross_correlation(
+                analysis.lag[near], analysis.cross_correlation[near], peak=found.delay, unit="deg²"
+            ),
+        ),
+        9: Picture(
+            key="fig09",
+            title="Example of autocorrelation of measurement error",
+            caption="Equation (10), of the time-corrected error (9). The root of its middle is "
+            f"the paper's bias (11): {root:.4g} deg. Dashed: what the true bias alone would give; "
+            "it falls off because (10) divides every lag by the same N.",
+            description="A triangle, with a narrow peak in its middle that is the noise.",
+            figure=_relabelled(
+                error_autocorrelation(
+                    analysis.error_lag,
+                    analysis.error_autocorrelation,
+                    bias=SENSOR.bias,
+                    duration=analysis.error.size / fs,
+                    unit="deg",
+                )
+            ),
+        ),
+        10: Picture(
+            key="fig10",
+            title="Scale factor computation example",
+            caption="The first cycle of the sweep and the measurement, time-corrected: at the "
+            "excitation's zero crossings stands the bias, at the non-zero points equation (13) "
+            f"gives the scale factor, {found.scale_factor:.4g}.",
+            description="Measurement over excitation: a straight line above the origin.",
+            figure=_figure_10(u[:cycle], y[lag : lag + cycle], analysis, fs),
+        ),
+        11: Picture(
+            key="fig11",
+            title="Autocorrelation of measurement error (noise)",
+            caption="Equation (14): R(0) is the mean square, R(∞) the square of the mean; their "
+            f"difference is the noise, σ = {found.noise_std:.4g} deg. The slope on both sides is "
+            "(10)'s division of every lag by the same N.",
+            description="A single peak at lag 0 on a slow slope.",
+            figure=_figure_11(analysis),
+        ),
+    }
+    return Chapter(pictures=pictures, rows=_rows(analysis))
+
+
+def _record(rig: Sensor, *, last: float, duration: float, amplitude: float) -> Record:
+    limits = Limits(position=amplitude, unit="deg")
+    stimulus = design(
+        band=(0.1, last), duration=duration, fs=200.0, limits=limits, extinction=1.0, lead=0
+    )
+    return run(rig, stimulus, rng=SEED)
+
+
+def _rows(analysis: PaperAnalysis) -> tuple[Row, ...]:
+    found = analysis.estimates
+    delay = None if found.delay is None else 1e3 * found.delay
+    return (
+        Row(
+            figure=8,
+            where="Fig. 8",
+            quantity="Delay of an example, from the cross-correlation",
+            paper="~150 ms",
+            value=delay,
+            truth=1e3 * SENSOR.delay,
+            unit="ms",
+            why=agreement(delay, 150.0, within=5.0, because="no dynamics add to it here"),
+        ),
+        Row(
+            figure=9,
+            where="Fig. 9, (11)",
+            quantity="Bias of the example",
+            value=found.bias,
+            truth=SENSOR.bias,
+            unit="deg",
+            why="Not printed. It is the r.m.s. error: the noise is in it, and what the scale "
+            "factor leaves over.",
+        ),
+        Row(
+            figure=10,
+            where="Fig. 10, (13)",
+            quantity="Scale factor of the example",
+            value=found.scale_factor,
+            truth=SENSOR.scale_factor,
+            why="Not printed.",
+        ),
+        Row(
+            figure=11,
+            where="Fig. 11, (14)",
+            quantity="Noise of the example, 1σ",
+            value=found.noise_std,
+            truth=SENSOR.noise_std,
+            unit="deg",
+            why="Not printed. What the scale factor leaves over counts as noise.",
+        ),
+    )
+
+
+def _seen(figure: "Figure") -> "Figure":
+    axes = figure.axes[0]
+    axes.set_ylabel("Angle (deg)")
+    return figure
+
+
+def _relabelled(figure: "Figure") -> "Figure":
+    """Name the dashed line by what it is here, where the truth is known."""
+    axes = figure.axes[0]
+    axes.lines[1].set_label("what the true bias alone would give")
+    draw_legend(axes)
+    return figure
+
+
+def _picture_2() -> Picture:
+    record = _record(SERVO, last=20.0, duration=5.0, amplitude=10.0)
+    u, y = record.inputs[0], record.outputs[0]
+    analysis = paper_analysis(u.values, y.values, 200.0, band=record.band)
+    figure, axes = new_figure(3, height=1.8, share_x=False)
+    draw_line(axes[0], u.time, u.values, colour="input", label="stimulus")
+    draw_line(axes[0], y.time, y.values, colour="output", label="measured output", width=0.9)
+    finish_axes(axes[0], x="Time (s)", y="Angle (deg)")
+    draw_legend(axes[0])
+    response_axes(figure, axes[1], axes[2], analysis)
+    axes[1].tick_params(labelbottom=False)
+    found = analysis.estimates.bandwidth_phase90
+    if found is not None:
+        draw_mark(axes[2], found, label=f"−90° at {found:.3g} Hz", text_at=0.45, side="left")
+    figure.align_ylabels(axes)
+    made = (
+        f"a servo of {SERVO.natural_frequency:g} Hz with damping ratio {SERVO.damping_ratio:g}, "
+        f"{1e3 * SERVO.delay:g} ms delay and {SERVO.noise_std:g} deg noise"
+    )
+    return Picture(
+        key="fig02",
+        title="Example of input stimulus, measured output, and resultant frequency response",
+        caption=f"A sweep of 5 s, the answer of {made}, and the ratio of their windowed "
+        "transforms, equation (18).",
+        description=f"Stimulus and output over 5 s, magnitude and phase of {made}.",
+        figure=figure,
+    )
+
+
+def _figure_10(
+    excitation: NDArray[np.float64],
+    corrected: NDArray[np.float64],
+    analysis: PaperAnalysis,
+    fs: float,
+) -> "Figure":
+    found = analysis.estimates
+    figure, (over_time, straight) = new_figure(2, height=2.2, share_x=False)
+    time = np.arange(excitation.size) / fs
+    draw_line(over_time, time, excitation, colour="input", label="excitation")
+    draw_line(
+        over_time, time, corrected, colour="output", label="measurement, time-corrected", width=0.9
+    )
+    over_time.axhline(0.0, color=COLOURS["muted"], linewidth=0.8)
+    finish_axes(over_time, x="Time (s)", y="Angle (deg)")
+    draw_legend(over_time)
+    straight.plot(
+        excitation,
+        corrected,
+        linestyle="none",
+        marker=".",
+        markersize=3,
+        color=COLOURS["output"],
+        label="samples",
+    )
+    if found.scale_factor is not None and found.bias is not None:
+        ends = np.array([excitation.min(), excitation.max()])
+        draw_line(
+            straight,
+            ends,
+            found.scale_factor * ends + found.bias,
+            colour="model",
+            dashes="--",
+            label=f"{found.scale_factor:.4f} × excitation + {found.bias:.3f} deg",
+        )
+    finish_axes(straight, x="Excitation (deg)", y="Measurement (deg)")
+    draw_legend(straight)
+    figure.align_ylabels([over_time, straight])
+    return figure
+
+
+def _figure_11(analysis: PaperAnalysis) -> "Figure":
+    mean_square = float(np.mean(analysis.error**2))
+    squared_mean = float(np.mean(analysis.error)) ** 2
+    near = np.abs(analysis.error_lag) <= 0.5
+    figure, (axes,) = new_figure(1, height=2.4)
+    draw_line(axes, analysis.error_lag[near], analysis.error_autocorrelation[near], colour="output")
+    draw_level(axes, (mean_square,), label=f"R(0) = {mean_square:.4f} deg²", colour="ink")
+    draw_level(axes, (squared_mean,), label=f"R(∞) = {squared_mean:.4f} deg²")
+    finish_axes(axes, x="Lag (s)", y="Autocorrelation of the error (deg²)")
+    draw_legend(axes)
+    return figure

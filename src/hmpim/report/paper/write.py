@@ -1,0 +1,139 @@
+"""A study in a folder: pictures, the table three ways, and one page with all of it."""
+
+import json
+import warnings
+from collections.abc import Callable
+from os import PathLike
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from hmpim.report.files import replacing
+from hmpim.report.paper.rows import COLUMNS, cells, markdown_table, table_dict
+from hmpim.report.paper.study import Study
+from hmpim.report.svg import inline_svg
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+__all__ = ["render_page", "write_study"]
+
+DPI = 150
+
+
+def write_study(
+    study: Study,
+    folder: str | PathLike[str],
+    *,
+    tick: Callable[[str], None] | None = None,
+) -> None:
+    """Write ``figNN.png``, ``figNN.svg``, ``table.md``, ``table.json`` and ``index.html``.
+
+    Each file is replaced as a whole or not at all; other files in the folder stay.
+
+    Parameters
+    ----------
+    study : Study
+        What was made.
+    folder : path-like
+        Where to; made if it is missing.
+    tick : callable, optional
+        Told of each figure written and of each other file, by its name.
+
+    Raises
+    ------
+    OSError
+        If the folder cannot be made or written to.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from pathlib import Path
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     write_study(Study(pictures={}, rows=()), folder)
+    ...     sorted(path.name for path in Path(folder).iterdir())
+    ['index.html', 'table.json', 'table.md']
+    """
+    place = Path(folder)
+    place.mkdir(parents=True, exist_ok=True)
+    for picture in study.pictures.values():
+        _save(picture.figure, place / f"{picture.key}.png", "png")
+        _save(picture.figure, place / f"{picture.key}.svg", "svg")
+        if tick is not None:
+            tick(f"{picture.key}.png")
+    data = {
+        **table_dict(study.rows),
+        "figures": [
+            {
+                "figure": number,
+                "title": picture.title,
+                "caption": picture.caption,
+                "files": [f"{picture.key}.png", f"{picture.key}.svg"],
+            }
+            for number, picture in study.pictures.items()
+        ],
+    }
+    for name, text in (
+        ("table.md", markdown_table(study.rows)),
+        ("table.json", json.dumps(data, indent=1, ensure_ascii=False, allow_nan=False) + "\n"),
+        ("index.html", render_page(study)),
+    ):
+        with replacing(place / name) as path:
+            path.write_text(text, encoding="utf-8")
+        if tick is not None:
+            tick(name)
+
+
+def render_page(study: Study) -> str:
+    """Return one HTML page with every figure and the table; it needs no other file.
+
+    Examples
+    --------
+    >>> render_page(Study(pictures={}, rows=()))[:15]
+    '<!DOCTYPE html>'
+    """
+    from jinja2 import Environment, PackageLoader, StrictUndefined
+    from markupsafe import Markup
+
+    environment = Environment(
+        loader=PackageLoader("hmpim.report.paper"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    figures: list[dict[str, Any]] = [
+        {
+            "number": number,
+            "key": picture.key,
+            "title": picture.title,
+            "caption": picture.caption,
+            # made by an XML writer, which has escaped it
+            "svg": Markup(
+                inline_svg(
+                    picture.figure,
+                    key=picture.key,
+                    title=picture.title,
+                    description=picture.description,
+                )
+            ),
+        }
+        for number, picture in study.pictures.items()
+    ]
+    rows = [
+        {"cells": cells(row), "figure": row.figure if row.figure in study.pictures else None}
+        for row in study.rows
+    ]
+    return environment.get_template("paper.html.j2").render(
+        figures=figures, rows=rows, columns=COLUMNS
+    )
+
+
+def _save(figure: "Figure", path: Path, kind: str) -> None:
+    """Save a figure so that the same study gives the same bytes."""
+    import matplotlib as mpl
+
+    settings: dict[Any, Any] = {"svg.hashsalt": path.name, "svg.fonttype": "path"}
+    metadata = {"Date": None} if kind == "svg" else {"Software": None}
+    with replacing(path) as place, mpl.rc_context(settings), warnings.catch_warnings():
+        warnings.filterwarnings("ignore", message="Glyph .* missing from")
+        figure.savefig(place, format=kind, dpi=DPI, metadata=metadata)

@@ -1,0 +1,140 @@
+"""The table against what is known of the paper."""
+
+import numpy as np
+import pytest
+
+from hmpim.errors import ArgumentError
+from hmpim.report.paper import FIGURES, make_study
+
+
+@pytest.fixture(scope="module")
+def study():
+    return make_study()
+
+
+@pytest.fixture(scope="module")
+def value(study):
+    def of(figure, words):
+        rows = [r for r in study.rows if r.figure == figure and r.quantity.startswith(words)]
+        assert len(rows) == 1, [r.quantity for r in rows]
+        return rows[0].value
+
+    return of
+
+
+def test_every_figure_that_needs_no_motion_table_is_made(study):
+    assert tuple(study.pictures) == FIGURES == (2, 3, 5, *range(7, 18), 23)
+
+
+def test_no_panel_is_empty_or_without_its_unit(study):
+    for number, picture in study.pictures.items():
+        for axes in picture.figure.axes:
+            drawn = [line for line in axes.lines if np.ptp(line.get_xdata()) > 0]
+            assert drawn, number
+            assert axes.get_ylabel().endswith(")"), number
+            lower, upper = axes.get_ylim()
+            assert any(
+                np.any((line.get_ydata() > lower) & (line.get_ydata() < upper)) for line in drawn
+            ), number
+
+
+def test_equation_7_has_a_plus(study):
+    (row,) = [r for r in study.rows if r.where == "Eq. (7)"]
+    assert (row.paper, row.text) == ("−", "+")
+
+
+def test_only_the_chirp_is_persistent(value):
+    assert value(5, "Share") > 95.0
+
+
+def test_steps_are_right_where_there_are_no_dynamics(value):
+    assert value(8, "Delay") == 150.0
+    assert value(9, "Bias") == pytest.approx(0.6, rel=0.03)
+    assert value(10, "Scale") == pytest.approx(0.98, rel=0.01)
+    assert value(11, "Noise") == pytest.approx(0.1, rel=0.1)
+
+
+@pytest.mark.parametrize(("T", "decibels"), [("5", 50.6), ("10", 53.0)])
+def test_fig_12(value, T, decibels):
+    assert value(12, f"Extinction factor n, T = {T} s") == 0.0
+    assert value(12, f"Level at 10 Hz with the window, T = {T} s") == pytest.approx(
+        decibels, abs=0.1
+    )
+    assert value(12, f"Peak position, T = {T}") == pytest.approx(10.0)
+    assert value(12, f"Peak velocity, T = {T}") == pytest.approx(628.0, rel=0.01)
+    assert value(12, f"Peak acceleration, T = {T}") == pytest.approx(39400.0, rel=0.01)
+
+
+@pytest.mark.parametrize(("T", "n"), [("10", 0.83), ("12", 0.81)])
+def test_fig_13(value, T, n):
+    found = value(13, f"Smallest extinction factor n, T = {T} s")
+    assert found == pytest.approx(n, abs=0.005)
+    assert 0.80 <= found <= 0.84
+    assert value(13, f"Level at 40 Hz with the window, T = {T} s") == pytest.approx(23.0, abs=1.0)
+
+
+def test_amplitude_at_the_end_of_fig_13(value):
+    # acceleration is ω² times the amplitude there, and it is the acceleration that binds
+    assert value(13, "Amplitude at 40 Hz") == pytest.approx(
+        40000.0 / (2 * np.pi * 40.0) ** 2, rel=0.005
+    )
+
+
+@pytest.mark.parametrize("figure", [12, 13])
+def test_twice_the_rate_gives_6_db(value, figure):
+    assert value(figure, "Level gained") == pytest.approx(20 * np.log10(2), abs=0.05)
+
+
+def test_seeker_lags_a_quarter_turn_at_about_1_8_hz(value):
+    assert value(15, "Bandwidth") == pytest.approx(1.8, abs=0.05)
+
+
+def test_fig_17_step_by_step(value):
+    assert value(17, "Delay, by") == pytest.approx(170.0, abs=1e-9)
+    assert value(17, "Bias, by") == pytest.approx(0.68, abs=0.01)
+    assert value(17, "Noise, 1σ, by") == pytest.approx(0.31, abs=0.02)
+    assert value(17, "Natural frequency, by") is None
+    assert value(17, "Hump above DC, by") == pytest.approx(2.7, abs=0.3)
+    assert value(17, "Bandwidth (−90°), by") == pytest.approx(1.534, abs=0.05)
+
+
+def test_fig_17_jointly(study):
+    rows = {r.quantity: r for r in study.rows if r.quantity.endswith(", joint fit")}
+    assert len(rows) == 8
+    for row in rows.values():
+        assert row.std == pytest.approx(row.bound, rel=0.1), row.quantity
+        assert abs(row.value - row.truth) < 3.5 * row.bound, row.quantity
+    bandwidth = rows["Bandwidth (−90°), joint fit"]
+    assert bandwidth.truth == pytest.approx(1.534, abs=5e-4)
+    assert bandwidth.value == pytest.approx(1.534, abs=0.01)
+    assert rows["Hump above DC, joint fit"].truth == pytest.approx(2.695, abs=1e-3)
+
+
+def test_a_quarter_turn_below_the_pure_delay_is_the_natural_frequency(value):
+    assert value(16, "Natural frequency") == pytest.approx(10.0, abs=0.15)
+
+
+def test_picket_fence(value):
+    for rate in ("500 Hz", "1000 Hz"):
+        assert value(23, f"Spacing of the bins, {rate}") == pytest.approx(0.2)
+        assert 0.1 < value(23, f"Peak missed by the bins, {rate}") < 1.0
+    # a held command is late by half a sample: half as much at twice the rate
+    phases = [value(23, f"Phase at 22 Hz, commands at {rate}") for rate in ("500", "1000")]
+    assert phases[1] - phases[0] == pytest.approx(180 * 22 * (1 / 500 - 1 / 1000), abs=0.3)
+
+
+def test_a_part_has_its_own_rows_only():
+    part = make_study([13, 12])
+    assert list(part.pictures) == [12, 13]
+    assert {row.figure for row in part.rows} == {12, 13}
+
+
+def test_a_figure_of_the_motion_table_is_refused():
+    with pytest.raises(ArgumentError, match=r"figure 24 is not made here; choose of 2, 3, 5"):
+        make_study([12, 24])
+
+
+def test_each_figure_is_told():
+    told = []
+    make_study([3, 5], tick=told.append)
+    assert told == ["Fig. 3", "Fig. 5"]
