@@ -11,10 +11,12 @@ from hmpim.identify.verdict import is_unrelated
 from hmpim.model import (
     STRUCTURES,
     Model,
+    coefficients_of,
     denominator_of,
     prepare_input,
     second_order_coefficients,
     simulate,
+    theta_of,
 )
 
 FS = 200.0
@@ -30,7 +32,12 @@ TRUTH = {
 
 def true_theta() -> np.ndarray:
     return np.concatenate(
-        [[0.15 * FS], np.log(second_order_coefficients(10.0, 0.4) * np.array([FS, FS**2]))]
+        [
+            [0.15 * FS],
+            theta_of(
+                STRUCTURES["second_order"], second_order_coefficients(10.0, 0.4) * [FS, FS**2]
+            ),
+        ]
     )
 
 
@@ -69,7 +76,7 @@ def test_jacobian_agrees_with_central_differences(field_record):
     rows = jacobian(problem(u, y), fit)
 
     def output(vector):
-        denominator = denominator_of(fit.structure, np.exp(vector[1:3]))
+        denominator = denominator_of(fit.structure, coefficients_of(fit.structure, vector[1:3]))
         model = Model(
             delay=vector[0] / FS,
             scale_factor=vector[3],
@@ -91,8 +98,9 @@ def cramer_rao(u, y) -> dict[str, float]:
     fit = fit_structure(problem(u, y), STRUCTURES["second_order"], true_theta())
     rows = jacobian(problem(u, y), fit)
     cov = 0.01 * np.linalg.inv(rows @ rows.T)
-    frequency_slope = np.array([0, 0, -0.5 * 10.0, 0, 0])
-    damping_slope = np.array([0, 0.4, -0.2, 0, 0])
+    # θ1 = ln(2ζ/ω), θ2 = 1/(4ζ²)
+    frequency_slope = np.array([0, -10.0, -10.0 * 2 * 0.4**2, 0, 0])
+    damping_slope = np.array([0, 0, -2 * 0.4**3, 0, 0])
     return {
         "delay": np.sqrt(cov[0, 0]) / FS,
         "scale_factor": np.sqrt(cov[3, 3]),

@@ -11,19 +11,23 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from hmpim.model.dynamics import Structure, denominator_of
+from hmpim.model.dynamics import Structure, coefficients_of, denominator_of
 from hmpim.model.sampled import SampledInput, delayed_response
 
 __all__ = ["Fit", "Problem", "fit_structure", "jacobian"]
 
-_STEP = 1e-5
-"""Relative step of the derivatives by the coefficients; of the delay in samples, if static."""
+_STEP = 1e-6
+"""Step of the derivatives, relative to a parameter above 1: its square is below rounding."""
 
 _LONGEST_TIME_CONSTANT = 2.0
 """In record lengths; a slower pole cannot be told from an integrator."""
 
 _SHORTEST_TIME_CONSTANT = 0.02
 """In samples; a faster pole cannot be told from none."""
+
+
+_SHAPES = (1e-4, 1e6)
+"""Bounds of 1 / (4ζ²): from a second pole 10 000 times as fast as the first, to ζ = 0.0005."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -66,7 +70,8 @@ class Fit:
     structure : Structure
         What was fitted.
     theta : ndarray, shape (1 + order,)
-        Delay in samples, then the logarithms of the denominator's coefficients (in samples).
+        Delay in samples, then the parameters of the denominator's sections (`coefficients_of`),
+        time in samples.
     linear : ndarray, shape (zeros + 2,)
         Numerator coefficients by rising power of s (the first is the scale factor), bias.
     prediction : ndarray, shape (n,)
@@ -95,7 +100,7 @@ class Fit:
     @property
     def denominator(self) -> NDArray[np.float64]:
         """A(s) by rising powers of s per sample, shape (order + 1,)."""
-        return denominator_of(self.structure, np.exp(self.theta[1:]))
+        return denominator_of(self.structure, coefficients_of(self.structure, self.theta[1:]))
 
 
 def _basis(
@@ -112,7 +117,7 @@ def _responses(
     rows = delayed_response(
         problem.source,
         delay=float(theta[0]),
-        denominator=denominator_of(structure, np.exp(theta[1:])),
+        denominator=denominator_of(structure, coefficients_of(structure, theta[1:])),
         powers=powers,
     )
     rows[0] += problem.source.first
@@ -172,24 +177,43 @@ def jacobian(problem: Problem, fit: Fit) -> NDArray[np.float64]:
             rows[0] = -(weights @ responses[1:])
             continue
         moved = theta.copy()
-        moved[i] += _STEP
-        rows[i] = (weights @ _basis(problem, structure, moved) - here) / _STEP
+        step = _STEP * max(1.0, abs(theta[i]))
+        moved[i] += step
+        rows[i] = (weights @ _basis(problem, structure, moved) - here) / step
     rows[theta.size : -1] = basis
     rows[-1] = 1.0
     return problem.masked(rows)
 
 
 def _bounded(
-    problem: Problem, theta: NDArray[np.float64], shortest_delay: float
+    problem: Problem,
+    structure: Structure,
+    theta: NDArray[np.float64],
+    shortest_delay: float,
 ) -> NDArray[np.float64]:
     """Keep delay and time constants where the record can tell them."""
     bounded = theta.copy()
     bounded[0] = np.clip(theta[0], shortest_delay, problem.longest_delay)
-    if theta.size > 1:
+    start = 1
+    for order in structure.sections:
         longest = np.log(_LONGEST_TIME_CONSTANT * problem.y.size)
-        shortest = np.log(_SHORTEST_TIME_CONSTANT)
-        bounded[1:] = np.clip(theta[1:], 2 * shortest, 2 * longest)
+        bounded[start] = np.clip(theta[start], np.log(_SHORTEST_TIME_CONSTANT), longest)
+        if order == 2:
+            bounded[start + 1] = np.clip(theta[start + 1], *_SHAPES)
+        start += order
     return bounded
+
+
+def _limited(structure: Structure, theta: NDArray[np.float64], step: NDArray[np.float64]) -> float:
+    """Share of a step to take so that no coefficient changes beyond recognition."""
+    share, start = 1.0, 1
+    for order in structure.sections:
+        share = min(share, 1.0 / max(abs(step[start]), 1e-300))
+        if order == 2:
+            room = max(1.0, theta[start + 1])
+            share = min(share, room / max(abs(step[start + 1]), 1e-300))
+        start += order
+    return share
 
 
 def fit_structure(
@@ -210,7 +234,7 @@ def fit_structure(
     structure : Structure
         What to fit.
     theta : ndarray, shape (1 + order,)
-        Start: delay in samples, logarithms of the denominator's coefficients.
+        Start: delay in samples, parameters of the denominator's sections.
     iterations : int
         At most so many steps.
     precision : float
@@ -224,7 +248,7 @@ def fit_structure(
     Fit
         `converged` is False if the steps ran out.
     """
-    fit = _solve_linear(problem, structure, _bounded(problem, theta, shortest_delay))
+    fit = _solve_linear(problem, structure, _bounded(problem, structure, theta, shortest_delay))
     damping = 1e-4
     unknown = fit.theta.size
     freedom = max(problem.counted - unknown - fit.linear.size, 1)
@@ -232,24 +256,25 @@ def fit_structure(
         rows = jacobian(problem, fit)
         gram, moment = rows @ rows.T, rows @ fit.residual
         negligible = precision * fit.cost / freedom
+        undamped = _damped_step(gram, moment, unknown, 0.0)
+        if float(undamped @ moment[:unknown]) < negligible:  # Newton's decrement
+            return replace(fit, converged=True)
         while True:
             step = _damped_step(gram, moment, unknown, damping)
-            largest = np.max(np.abs(step[1:]), initial=0.0)
-            if largest > 1.0:  # no coefficient grows by more than e at once
-                step = step / largest
-            if float(step @ moment[:unknown]) < 0.5 * negligible:
-                return replace(fit, converged=True)
+            step = _limited(structure, fit.theta, step) * step
             trial = _solve_linear(
-                problem, structure, _bounded(problem, fit.theta + step, shortest_delay)
+                problem,
+                structure,
+                _bounded(problem, structure, fit.theta + step, shortest_delay),
             )
-            if trial.cost <= fit.cost:
+            if trial.cost < fit.cost:
                 damping = max(damping / 10, 1e-9)
                 break
-            if damping > 1e8:
+            if damping > 1e6:  # no way down: a kink, a bound, or the arithmetic's own floor
                 return replace(fit, converged=True)
             damping *= 10
         fell, fit = fit.cost - trial.cost, trial
-        if fell < negligible:
+        if fell < negligible and damping < 1e-3:
             return replace(fit, converged=True)
     return fit
 

@@ -155,7 +155,10 @@ def _identify_pair(
             "The sensor is dead, stuck or not connected.",
         )
         return _untold(aligned, source, output, band, dead)
-    joint = joint_fit(u, y, valid=valid, intersample=intersample, structures=structures)
+    known = None if bool(source.valid.all()) else np.asarray(source.valid)
+    joint = joint_fit(
+        u, y, valid=valid, known=known, intersample=intersample, structures=structures
+    )
     if is_unrelated(joint):
         unrelated = Finding(
             code="unrelated",

@@ -6,7 +6,8 @@ counted down for a residual that is not white. The assumption between the sample
 chosen by likelihood alone, since none costs a parameter. For an input that is smooth
 against the rate and a system that filters it, held, linear and band-limited differ
 by little more than half a sample of delay, which no likelihood sees; the input is then
-taken as band-limited unless the record speaks clearly against it.
+taken as band-limited, or as held if it mostly stands still and jumps, unless the record speaks
+clearly against it.
 """
 
 from dataclasses import dataclass
@@ -30,10 +31,19 @@ _HOPELESS = 2.0
 """A structure whose sum of squares is this many times the least is not tried again at once
 under the other assumptions."""
 
+_TASTE = 4
+"""Steps taken from each start before the best one is followed to its end."""
+
+_FALLING = 10.0
+"""After so many steps a structure is given up if its sum of squares is this far from hopeful."""
+
 _INTERSAMPLES: tuple[Intersample, ...] = ("bandlimited", "zoh", "foh")
 
 _DELAY_SHIFT: dict[Intersample, float] = {"zoh": -0.5, "foh": 0.0, "bandlimited": 0.0}
 """Samples by which the fitted delay moves when held, against the other two."""
+
+_JUMP = 0.05
+"""Share of its range by which a held input jumps at least once."""
 
 _FINAL_PRECISION = 1e-6
 """Precision of the chosen fit, see `fit_structure`."""
@@ -81,6 +91,7 @@ def joint_fit(
     y: NDArray[np.float64],
     *,
     valid: NDArray[np.bool_] | None = None,
+    known: NDArray[np.bool_] | None = None,
     intersample: Intersample | None = None,
     structures: tuple[StructureName, ...] = ("static", "first_order", "second_order"),
 ) -> JointFit:
@@ -92,6 +103,9 @@ def joint_fit(
         Uniform samples of input and output.
     valid : ndarray of bool, shape (n,), optional
         Output samples that count; all if None.
+    known : ndarray of bool, shape (n,), optional
+        Input samples that were measured, not filled in; what the output does until it has
+        forgotten the others does not count. All if None.
     intersample : {'zoh', 'foh', 'bandlimited'}, optional
         What the input does between samples; chosen by likelihood if None.
     structures : tuple of str
@@ -112,9 +126,13 @@ def joint_fit(
     first = modes[0]
     fits = _fit_all(problem_for(first, valid), rough, structures)
     forgotten = _forgotten(fits, valid)
-    if forgotten:
+    ahead = _ahead(fits)
+    if forgotten or ahead or known is not None:
         counted = np.ones(y.size, dtype=bool) if valid is None else valid.copy()
         counted[:forgotten] = False
+        counted[y.size - ahead :] = False
+        if known is not None:
+            counted &= _unaffected(known, _memory(fits))
         valid = counted
         fits = [fit_structure(problem_for(first, valid), f.structure, f.theta) for f in fits]
     fitted: list[tuple[Intersample, Fit]] = [(first, fit) for fit in fits]
@@ -131,7 +149,7 @@ def joint_fit(
     share = effective_share(min(fitted, key=lambda item: item[1].cost)[1].residual)
     count = problem_for(first, valid).counted * share
     trials = [_trial(mode, fit, count) for mode, fit in fitted]
-    chosen = _chosen(trials)
+    chosen = _chosen(trials, "zoh" if _looks_held(u) else "bandlimited")
     problem = problem_for(chosen.intersample, valid)
     polished = fit_structure(
         problem, chosen.fit.structure, chosen.fit.theta, precision=_FINAL_PRECISION
@@ -156,21 +174,38 @@ def _bridged(y: NDArray[np.float64], valid: NDArray[np.bool_]) -> NDArray[np.flo
 def _fit_all(
     problem: Problem, rough: RoughResponse, structures: tuple[StructureName, ...]
 ) -> list[Fit]:
-    """Fit each structure, the richest first: what it leaves tells which others are hopeless."""
+    """Fit each structure from its own starts, and from where the next simpler one ended."""
     fits: list[Fit] = []
-    for name in sorted(structures, key=lambda name: -STRUCTURES[name].order):
+    for name in sorted(structures, key=lambda name: STRUCTURES[name].order):
         structure = STRUCTURES[name]
         starts = starting_values(rough, structure, earliest=-2)
-        enough = _HOPELESS * min((fit.cost for fit in fits), default=0.0)
-        fit = fit_structure(problem, structure, starts[0], iterations=3 if enough else 40)
-        for theta in starts[1:]:
-            if enough < fit.cost and not is_white(fit.residual):
-                other = fit_structure(problem, structure, theta, iterations=3)
-                fit = min(fit, other, key=lambda f: f.cost)
-        if not fit.converged and (enough == 0.0 or fit.cost < enough):
-            fit = fit_structure(problem, structure, fit.theta)
+        fit = fit_structure(problem, structure, starts[0], iterations=_TASTE)
+        more = [] if is_white(fit.residual) else starts[1:]
+        for theta in [*more, *(_nested(other) for other in fits if _nests(other, fit))]:
+            rival = fit_structure(problem, structure, theta, iterations=_TASTE)
+            fit = min(fit, rival, key=lambda f: f.cost)
         fits.append(fit)
-    return fits
+    least = min(fit.cost for fit in fits)
+    return [
+        fit
+        if fit.converged or fit.cost > _FALLING * least
+        else fit_structure(problem, fit.structure, fit.theta)
+        for fit in fits
+    ]
+
+
+def _nests(simple: Fit, rich: Fit) -> bool:
+    """Whether the simpler structure, fitted better, is a start for the richer one."""
+    return (
+        simple.structure.name == "first_order"
+        and rich.structure.name == "second_order"
+        and simple.cost <= rich.cost
+    )
+
+
+def _nested(first_order: Fit) -> NDArray[np.float64]:
+    """First order as second: a quarter of its time constant moved into a second pole."""
+    return np.concatenate([first_order.theta, [0.1875]])  # (1 + 3/4 Ts)(1 + 1/4 Ts)
 
 
 def _moved(problem: Problem, fit: Fit, origin: Intersample, mode: Intersample) -> Fit:
@@ -184,16 +219,34 @@ def _refit(problem: Problem, fit: Fit) -> Fit:
     return fit_structure(problem, fit.structure, fit.theta)
 
 
+def _memory(fits: list[Fit]) -> int:
+    """Samples after which the output has forgotten its input, by the best fit so far."""
+    fit = min(fits, key=lambda f: f.cost)
+    slowest = 0.0
+    if fit.structure.order:
+        slowest = float(np.max(-1.0 / np.roots(fit.denominator[::-1]).real))
+    span = int(np.ceil(max(fit.delay, 0.0) + _SETTLED * slowest)) + 2
+    return min(span, fit.residual.size // 4)
+
+
+def _ahead(fits: list[Fit]) -> int:
+    """Samples at the end that depend on input after the record, if the delay is negative."""
+    delay = min(fits, key=lambda f: f.cost).delay
+    return int(np.ceil(-delay)) + 3 if delay < 0 else 0
+
+
+def _unaffected(known: NDArray[np.bool_], memory: int) -> NDArray[np.bool_]:
+    """Samples whose output depends on measured input alone."""
+    unknown = np.concatenate([[0], np.cumsum(~known)])
+    index = np.arange(known.size)
+    return np.asarray(unknown[index + 1] == unknown[np.maximum(index - memory, 0)])
+
+
 def _forgotten(fits: list[Fit], valid: NDArray[np.bool_] | None) -> int:
     """Samples at the start that a system at rest cannot explain, to be left out."""
     fit = min(fits, key=lambda f: f.cost)
     n = fit.residual.size
-    slowest = 0.0
-    if fit.structure.order:
-        poles = np.roots(fit.denominator[::-1])
-        slowest = float(np.max(-1.0 / poles.real))
-    span = int(np.ceil(max(fit.delay, 0.0) + _SETTLED * slowest)) + 2
-    span = min(span, n // 4)
+    span = _memory(fits)
     counted = np.ones(n, dtype=bool) if valid is None else valid
     early, late = fit.residual[:span][counted[:span]], fit.residual[span:][counted[span:]]
     if early.size == 0 or late.size == 0:
@@ -211,10 +264,17 @@ def _trial(mode: Intersample, fit: Fit, count: float) -> Trial:
     return Trial(intersample=mode, fit=fit, criterion=float(criterion))
 
 
-def _chosen(trials: list[Trial]) -> Trial:
+def _looks_held(u: NDArray[np.float64]) -> bool:
+    """Whether an input stands still most of the time and then jumps, as a held one does."""
+    jumps = np.abs(np.diff(u))
+    moving = jumps[jumps > 0]
+    return bool(moving.size < 0.5 * jumps.size and moving.max() > _JUMP * np.ptp(u))
+
+
+def _chosen(trials: list[Trial], natural: Intersample) -> Trial:
     best = min(trials, key=lambda trial: trial.criterion)
-    smooth = [trial for trial in trials if trial.intersample == "bandlimited"]
-    if not smooth or best in smooth:
+    rivals = [trial for trial in trials if trial.intersample == natural]
+    if not rivals or best in rivals:
         return best
-    rival = min(smooth, key=lambda trial: trial.criterion)
+    rival = min(rivals, key=lambda trial: trial.criterion)
     return best if rival.criterion - best.criterion > 2 * CLEARLY else rival

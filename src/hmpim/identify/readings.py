@@ -11,7 +11,7 @@ from hmpim.identify.joint import JointFit
 from hmpim.identify.result import Estimate, Parameters
 from hmpim.identify.uncertainty import covariance, estimate, gradient, noise_estimate
 from hmpim.identify.whiteness import is_white
-from hmpim.model.dynamics import Structure, denominator_of
+from hmpim.model.dynamics import Structure, coefficients_of, denominator_of
 from hmpim.model.response import (
     RationalDelay,
     bandwidth_3db,
@@ -38,7 +38,7 @@ class Readings:
     system : RationalDelay
         In seconds, the scale factor included.
     vector : ndarray, shape (p,)
-        Delay in samples, logarithms of the denominator's coefficients in samples, numerator,
+        Delay in samples, parameters of the denominator's sections in samples, numerator,
         bias.
     covariance : ndarray, shape (p, p)
         Of `vector`.
@@ -61,7 +61,7 @@ class Readings:
 def system_of(structure: Structure, vector: _Vector, fs: float) -> RationalDelay:
     """Build the system in seconds that a fit's vector stands for."""
     order = structure.order
-    denominator = denominator_of(structure, np.exp(vector[1 : 1 + order]))
+    denominator = denominator_of(structure, coefficients_of(structure, vector[1 : 1 + order]))
     numerator = vector[1 + order : -1]
     return RationalDelay(
         delay=float(vector[0]) / fs,
@@ -153,8 +153,8 @@ def read_parameters(
         low_frequency = explicit(slope_at_dc, "s")
     natural = damping = 0.0
     if second:  # 1 + c1 s + c2 s²: ω = c2^(-1/2), ζ = c1 ω / 2
-        natural = float(np.exp(-vector[2] / 2)) * fs / (2 * np.pi)
-        damping = float(np.exp(vector[1] - vector[2] / 2)) / 2
+        damping = 0.5 / float(np.sqrt(vector[2]))  # vector[2] is c2 / c1²
+        natural = 2 * damping * float(np.exp(-vector[1])) * fs / (2 * np.pi)
     parameters = Parameters(
         delay=linear(vector[0] / fs, axis[0] / fs, "s"),
         delay_correlation=_from_lag(delay_correlation, fs),
@@ -164,8 +164,10 @@ def read_parameters(
         noise_std=noise_estimate(
             fit.cost, freedom=freedom, share=joint.effective_share, unit=output_unit
         ),
-        natural_frequency=linear(natural, -0.5 * natural * axis[2], "Hz") if second else None,
-        damping_ratio=linear(damping, damping * (axis[1] - 0.5 * axis[2]), "") if second else None,
+        natural_frequency=linear(natural, -natural * (axis[1] + axis[2] / (2 * vector[2])), "Hz")
+        if second
+        else None,
+        damping_ratio=linear(damping, -damping * axis[2] / (2 * vector[2]), "") if second else None,
         time_constant=explicit(
             lambda v: dominant_time_constant(system_of(structure, v, fs)) or float("nan"), "s"
         )

@@ -3,10 +3,11 @@
 1. The lag of the greatest cross-correlation gives delay plus what the dynamics add.
 2. With the output moved back by that lag, both records are tapered and their spectra
    divided: a response nearly free of leakage.
-3. For every delay at once, the denominator that makes ``G e^(jωτ) A(jω)`` constant is a small
-   linear least-squares problem (E. C. Levy, IRE Trans. Autom. Control 4, 1959) whose only
-   terms that depend on the delay are inverse Fourier transforms. Reweighting by the last
-   denominator (C. K. Sanathanan and J. Koerner, IEEE TAC 8, 1963) removes its bias.
+3. For every delay at once, and a few guesses of the corner frequency, the denominator that
+   makes ``G e^(jωτ) A(jω)`` constant is a small linear least-squares problem (E. C. Levy, IRE
+   Trans. Autom. Control 4, 1959) whose only terms that depend on the delay are inverse Fourier
+   transforms. Reweighting by the last denominator (C. K. Sanathanan and J. Koerner, IEEE TAC 8,
+   1963) removes its bias.
 4. The few delays at which the output error is least locally are the starts.
 """
 
@@ -16,12 +17,19 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import irfft, next_fast_len, rfft
 
-from hmpim.model.dynamics import Structure
+from hmpim.model.dynamics import Structure, theta_of
 
 __all__ = ["RoughResponse", "rough_response", "starting_values"]
 
 _TAPER = 0.1
 """Share of the record tapered at either end."""
+
+_PHASE_STEP = 0.3
+"""Steps of the delay looked at turn the highest frequency by no more than this, in rad."""
+
+_CORNERS = (0.08, 0.25, 1.0)
+"""Where, over the highest frequency, the first weight begins to roll off as 1/A would: above
+the system's own corner the response is noise, which an unweighted fit takes at face value."""
 
 _FLOOR = 1e-3
 """Bins whose input amplitude is below this share of the greatest are not looked at."""
@@ -123,31 +131,37 @@ def starting_values(
     Returns
     -------
     list of ndarray, shape (1 + order,)
-        Delay in samples, logarithms of the section coefficients.
+        Delay in samples, parameters of the denominator's sections.
     """
-    shifts = np.arange(min(earliest - rough.lag, 0), 3)
+    finer = int(np.clip(np.ceil(rough.omega[-1] / _PHASE_STEP), 1, 8))
+    shifts = np.arange(min(earliest - rough.lag, 0) * finer, 2 * finer + 1)
     order = structure.order
     if order == 0:
-        cost, _ = _levy(rough, shifts, 0, rough.weight)
-        best = int(np.argmin(cost))
-        return [np.array([float(rough.lag + shifts[best])])]
+        cost, _ = _levy(rough, shifts, finer, 0, rough.weight)
+        return [np.array([rough.lag + shifts[int(np.argmin(cost))] / finer])]
     scale = float(np.sqrt(rough.weight @ rough.omega**2 / rough.weight.sum()))
     found: list[tuple[float, NDArray[np.float64]]] = []
-    cost, coefficients = _levy(rough, shifts, order, rough.weight, scale)
-    for i in _local_minima(cost, count + 2):
-        shift, a = int(shifts[i]), coefficients[i]
-        for _ in range(3):  # Sanathanan-Koerner: reweight, look for the delay nearby again
-            weight = rough.weight / np.abs(_polynomial(a, rough.omega / scale)) ** 2
-            near = shifts[np.abs(shifts - shift) <= max(3, shifts.size // 8)]
-            local, solved = _levy(rough, near, order, weight, scale)
-            best = int(np.argmin(local))
-            shift, a = int(near[best]), solved[best]
-        physical = _stable(a, order)
-        error = _output_error(rough, shift, physical, scale)
-        theta = np.concatenate(
-            [[float(rough.lag + shift)], np.log(physical / scale ** np.arange(1, order + 1))]
-        )
-        found.append((error, theta))
+    for corner in _CORNERS:
+        roll_off = 1.0 + (rough.omega / (corner * rough.omega[-1])) ** 2
+        first = rough.weight / roll_off ** min(order, 2)
+        cost, coefficients = _levy(rough, shifts, finer, order, first, scale)
+        for i in _local_minima(cost, 2):
+            shift, a = shifts[i], coefficients[i]
+            for _ in range(2):  # Sanathanan-Koerner: reweight, look nearby for the delay again
+                weight = rough.weight / np.abs(_polynomial(a, rough.omega / scale)) ** 2
+                near = shifts[np.abs(shifts - shift) <= max(3, shifts.size // 8)]
+                local, solved = _levy(rough, near, finer, order, weight, scale)
+                best = int(np.argmin(local))
+                shift, a = near[best], solved[best]
+            physical = _stable(a, order)
+            error = _output_error(rough, shift / finer, physical, scale)
+            theta = np.concatenate(
+                [
+                    [rough.lag + shift / finer],
+                    theta_of(structure, physical / scale ** np.arange(1, order + 1)),
+                ]
+            )
+            found.append((error, theta))
     found.sort(key=lambda item: item[0])
     starts: list[NDArray[np.float64]] = []
     for _, theta in found:
@@ -164,21 +178,21 @@ def _polynomial(a: NDArray[np.float64], x: NDArray[np.float64]) -> NDArray[np.co
 def _levy(
     rough: RoughResponse,
     shifts: NDArray[np.intp],
+    finer: int,
     order: int,
     weight: NDArray[np.float64],
     scale: float = 1.0,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Solve at each shift; return costs, shape (k,), and coefficients, shape (k, order)."""
+    """Solve at each shift, in samples / finer; return costs, (k,), and coefficients, (k, order)."""
     s = 1j * rough.omega / scale
     powers = s[None, :] ** np.arange(order + 1)[:, None]
     terms = powers * rough.response  # multiplied by e^(jω shift), these should sum to a constant
     gram = ((terms * weight) @ terms.conj().T).real
-    spectrum = np.zeros((order + 1, rough.length // 2 + 1), dtype=complex)
+    length = rough.length * finer
+    spectrum = np.zeros((order + 1, length // 2 + 1), dtype=complex)
     spectrum[:, rough.bins] = terms * weight
-    if rough.length % 2 == 0:
-        spectrum[:, -1] = 0.0
-    # irfft carries 2/length for each bin and its mirror
-    cross = irfft(spectrum, rough.length, axis=1)[:, shifts % rough.length] * rough.length / 2
+    # irfft adds each bin's mirror and divides by the length.
+    cross = irfft(spectrum, length, axis=1)[:, shifts % length] * length / 2
     total = weight.sum()
     # Eliminate the constant K = sum_j a_j cross_j / total, a_0 = 1.
     reduced = gram[None, :, :] - cross.T[:, :, None] * cross.T[:, None, :] / total
@@ -204,7 +218,9 @@ def _stable(a: NDArray[np.float64], order: int) -> NDArray[np.float64]:
     return np.asarray(np.maximum(a, floor))
 
 
-def _output_error(rough: RoughResponse, shift: int, a: NDArray[np.float64], scale: float) -> float:
+def _output_error(
+    rough: RoughResponse, shift: float, a: NDArray[np.float64], scale: float
+) -> float:
     """Weighted squared error of the response itself, gain solved."""
     target = rough.response * np.exp(1j * rough.omega * shift)
     model = 1.0 / _polynomial(a, rough.omega / scale)

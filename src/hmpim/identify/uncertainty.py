@@ -12,8 +12,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import next_fast_len, rfft
-from scipy.stats import chi2
-from scipy.stats import t as student
+from scipy.special import chdtri, stdtrit
 
 from hmpim.identify.result import Estimate
 from hmpim.identify.whiteness import autoregressive_spectrum
@@ -84,7 +83,7 @@ def estimate(value: float, variance: float, *, freedom: float, unit: str = "") -
     1.196
     """
     std = float(np.sqrt(max(variance, 0.0)))
-    half = float(student.ppf(0.975, max(freedom, 1.0))) * std
+    half = float(stdtrit(max(freedom, 1.0), 0.975)) * std
     return Estimate(
         value=float(value), std=std, ci95=(float(value - half), float(value + half)), unit=unit
     )
@@ -108,7 +107,7 @@ def noise_estimate(
     """
     sigma = float(np.sqrt(sum_of_squares / freedom))
     effective = max(freedom * share, 1.0)
-    low, high = float(chi2.ppf(0.975, effective)), float(chi2.ppf(0.025, effective))
+    low, high = float(chdtri(effective, 0.025)), float(chdtri(effective, 0.975))
     return Estimate(
         value=sigma,
         std=sigma / float(np.sqrt(2 * effective)),

@@ -23,6 +23,14 @@ _LOOSE = 0.3
 """Relative standard deviation beyond which a parameter is not known."""
 
 
+_AMBIGUOUS = 5.0
+"""Criterion by which another structure may be worse and still be worth naming: where first
+order is right, second order comes this near in one record of ten."""
+
+_DISAGREES = 4.0
+"""Standard deviations by which its delay must differ to cast doubt."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Judgement:
     """A verdict and the sentences that support it."""
@@ -136,6 +144,9 @@ def judge(
             + ". Sweep higher to measure it.",
             doubt=False,
         )
+    other = _other_structure(joint, readings)
+    if other is not None:
+        note("structure", other, doubt=True)
     rival = _rival(joint)
     if rival is not None:
         note("intersample", rival, doubt=False)
@@ -175,6 +186,27 @@ def _loose(readings: Readings) -> list[tuple[str, float]]:
         if not spread <= _LOOSE:
             loose.append((name, min(spread, 99.0)))
     return loose
+
+
+def _other_structure(joint: JointFit, readings: Readings) -> str | None:
+    """Sentence on another structure that fits hardly worse and says another delay."""
+    best = joint.best
+    std = float(np.sqrt(readings.covariance[0, 0]))
+    for trial in joint.trials:
+        if (
+            trial.intersample != best.intersample
+            or trial.fit.structure.name == best.fit.structure.name
+            or trial.criterion - best.criterion > _AMBIGUOUS
+        ):
+            continue
+        apart = abs(trial.fit.delay - best.fit.delay)
+        if apart > _DISAGREES * std:
+            return (
+                f"A {trial.fit.structure.name} model fits about as well as the "
+                f"{best.fit.structure.name} one and puts the delay {apart / std:.0f} standard "
+                "deviations away. Lower the noise, or sweep higher, to tell them apart."
+            )
+    return None
 
 
 def _rival(joint: JointFit) -> str | None:

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import irfft, next_fast_len, rfft
 from scipy.linalg import solve_toeplitz
-from scipy.stats import chi2
+from scipy.special import chdtrc
 
 __all__ = [
     "Misfit",
@@ -54,7 +54,7 @@ def is_white(residual: NDArray[np.float64], *, level: float = 1e-3) -> bool:
     rho = r[1:] / r[0]
     n = residual.size
     statistic = n * (n + 2) * np.sum(rho**2 / (n - np.arange(1, lags + 1)))
-    return bool(chi2.sf(statistic, lags) > level)
+    return bool(chdtrc(lags, statistic) > level)
 
 
 def effective_share(residual: NDArray[np.float64]) -> float:
@@ -174,4 +174,4 @@ def misfit(
     tail = (1.0 + taken / noise / (width - 1)) ** (-(width - 1.0))
     statistic = -2.0 * np.sum(np.log(np.maximum(tail, 1e-300)))
     beyond = float(np.sum(taken - noise) / np.sum(total))
-    return Misfit(share=max(beyond, 0.0), probability=float(chi2.sf(statistic, 2 * groups)))
+    return Misfit(share=max(beyond, 0.0), probability=float(chdtrc(2 * groups, statistic)))

@@ -4,8 +4,10 @@ from hmpim.model.dynamics import (
     STRUCTURES,
     Structure,
     StructureName,
+    coefficients_of,
     denominator_of,
     second_order_coefficients,
+    theta_of,
 )
 from hmpim.model.model import Model, frequency_response, simulate
 from hmpim.model.response import (
@@ -28,6 +30,7 @@ __all__ = [
     "StructureName",
     "bandwidth_3db",
     "bandwidth_phase",
+    "coefficients_of",
     "delayed_response",
     "denominator_of",
     "dominant_time_constant",
@@ -38,4 +41,5 @@ __all__ = [
     "response",
     "second_order_coefficients",
     "simulate",
+    "theta_of",
 ]

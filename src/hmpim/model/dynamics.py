@@ -15,8 +15,10 @@ __all__ = [
     "STRUCTURES",
     "Structure",
     "StructureName",
+    "coefficients_of",
     "denominator_of",
     "second_order_coefficients",
+    "theta_of",
 ]
 
 StructureName = Literal["static", "first_order", "second_order"]
@@ -88,6 +90,53 @@ def denominator_of(structure: Structure, coefficients: ArrayLike) -> NDArray[np.
         product = np.convolve(product, section)
         start += order
     return product
+
+
+def coefficients_of(structure: Structure, theta: ArrayLike) -> NDArray[np.float64]:
+    """Section coefficients from the parameters that a fit moves.
+
+    A section 1 + c1 s has the parameter ln c1. A section 1 + c1 s + c2 s² has ln c1 and
+    c2 / c1² = 1 / (4ζ²), which is 0 where the section turns into one of first order: there the
+    output still has a slope in it, as it would not have in ln c2.
+
+    Parameters
+    ----------
+    structure : Structure
+        Which sections.
+    theta : array_like, shape (order,)
+        Parameters of each section in turn.
+
+    Examples
+    --------
+    >>> coefficients_of(STRUCTURES["second_order"], [0.0, 0.25]).tolist()
+    [1.0, 0.25]
+    """
+    values = np.array(theta, dtype=np.float64)
+    start = 0
+    for order in structure.sections:
+        values[start] = np.exp(values[start])
+        if order == 2:
+            values[start + 1] *= values[start] ** 2
+        start += order
+    return values
+
+
+def theta_of(structure: Structure, coefficients: ArrayLike) -> NDArray[np.float64]:
+    """Parameters that a fit moves, from section coefficients; undoes `coefficients_of`.
+
+    Examples
+    --------
+    >>> theta_of(STRUCTURES["second_order"], [1.0, 0.25]).tolist()
+    [0.0, 0.25]
+    """
+    values = np.array(coefficients, dtype=np.float64)
+    start = 0
+    for order in structure.sections:
+        if order == 2:
+            values[start + 1] /= values[start] ** 2
+        values[start] = np.log(values[start])
+        start += order
+    return values
 
 
 def second_order_coefficients(
