@@ -148,7 +148,7 @@ def test_at_the_bound_with_honest_intervals(field_record, seeds):
 @pytest.mark.parametrize("mode", ["zoh", "foh", "bandlimited"])
 def test_a_rough_input_tells_what_lies_between_its_samples(mode):
     rng = np.random.default_rng(11)
-    u = np.repeat(rng.uniform(-1, 1, 300), 4)
+    u = rng.uniform(-1, 1, 1200)
     model = Model(delay=0.0317, scale_factor=1.5, denominator=(0.02, 1.0), bias=0.1)
     y = simulate(model, u, fs=FS, intersample=mode) + 0.005 * rng.standard_normal(u.size)
     joint = joint_fit(u, y)

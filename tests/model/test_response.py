@@ -48,7 +48,10 @@ def test_second_order_figures(zeta, gain):
     w2 = 1 - 2 * zeta**2 + np.sqrt((1 - 2 * zeta**2) ** 2 + 1)
     assert bandwidth_3db(system, highest=100.0) == pytest.approx(10 * np.sqrt(w2), rel=1e-9)
     hump = -20 * np.log10(2 * zeta * np.sqrt(1 - zeta**2)) if zeta < np.sqrt(0.5) else 0.0
-    assert peak_gain(system, highest=100.0) == pytest.approx(hump, abs=1e-4)
+    peak = peak_gain(system, highest=100.0)
+    assert peak.gain_db == pytest.approx(hump, abs=1e-4)
+    there = 10 * np.sqrt(max(1 - 2 * zeta**2, 0.0))
+    assert peak.frequency == pytest.approx(there, abs=0.02)
 
 
 def test_phase_is_continuous_through_many_turns():

@@ -174,17 +174,30 @@ def _bridged(y: NDArray[np.float64], valid: NDArray[np.bool_]) -> NDArray[np.flo
 def _fit_all(
     problem: Problem, rough: RoughResponse, structures: tuple[StructureName, ...]
 ) -> list[Fit]:
-    """Fit each structure from its own starts, and from where the next simpler one ended."""
+    """Fit each structure, the richest first, from its own starts and then from the simpler ones.
+
+    A residual that is white needs no other start, and tells which simpler structures are
+    hopeless: those get one start and few steps.
+    """
     fits: list[Fit] = []
-    for name in sorted(structures, key=lambda name: STRUCTURES[name].order):
+    settled = False
+    for name in sorted(structures, key=lambda name: -STRUCTURES[name].order):
         structure = STRUCTURES[name]
-        starts = starting_values(rough, structure, earliest=-2)
+        starts = starting_values(rough, structure, earliest=-2, thorough=not settled)
         fit = fit_structure(problem, structure, starts[0], iterations=_TASTE)
-        more = [] if is_white(fit.residual) else starts[1:]
-        for theta in [*more, *(_nested(other) for other in fits if _nests(other, fit))]:
-            rival = fit_structure(problem, structure, theta, iterations=_TASTE)
-            fit = min(fit, rival, key=lambda f: f.cost)
+        hopeful = min((f.cost for f in fits), default=np.inf) * _HOPELESS
+        white = fit.cost < hopeful and is_white(fit.residual)
+        if not white:
+            for theta in starts[1:] if fit.cost < _FALLING * hopeful else []:
+                rival = fit_structure(problem, structure, theta, iterations=_TASTE)
+                fit = min(fit, rival, key=lambda f: f.cost)
+        settled = settled or white
         fits.append(fit)
+    for i, fit in enumerate(fits):
+        for other in fits:
+            if _nests(other, fit):
+                rival = fit_structure(problem, fit.structure, _nested(other), iterations=_TASTE)
+                fits[i] = min(fits[i], rival, key=lambda f: f.cost)
     least = min(fit.cost for fit in fits)
     return [
         fit
@@ -195,11 +208,11 @@ def _fit_all(
 
 
 def _nests(simple: Fit, rich: Fit) -> bool:
-    """Whether the simpler structure, fitted better, is a start for the richer one."""
+    """Whether the simpler structure is a start for a richer one that may have missed its best."""
     return (
         simple.structure.name == "first_order"
         and rich.structure.name == "second_order"
-        and simple.cost <= rich.cost
+        and (simple.cost <= rich.cost or not is_white(rich.residual))
     )
 
 

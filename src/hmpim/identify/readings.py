@@ -18,7 +18,6 @@ from hmpim.model.response import (
     bandwidth_phase,
     dominant_time_constant,
     peak_gain,
-    phase,
     response,
 )
 
@@ -127,15 +126,24 @@ def read_parameters(
         rate = (equation(value + step, vector) - equation(value - step, vector)) / (2 * step)
         return estimate(value, float(slope @ cov @ slope) / rate**2, freedom=effective, unit="Hz")
 
-    def phase_at(f: float, v: _Vector, delay: bool) -> float:
-        return float(phase(system_of(structure, v, fs), np.array([f]), delay=delay)[0])
+    def phase_from(f: float, v: _Vector, delay: bool) -> float:
+        """Phase at f less that of the fitted system where the lag is 90°."""
+        here = system_of(structure, v, fs)
+        there = np.array([f])
+        turned = response(here, there)[0] / here.numerator[0]
+        if not delay:
+            turned *= np.exp(2j * np.pi * f * here.delay)
+        return float(np.angle(turned * 1j))
 
     def gain_at(f: float, v: _Vector) -> float:
         here = system_of(structure, v, fs)
         return float(np.abs(response(here, np.array([f]))[0] / here.numerator[0]))
 
+    peak = peak_gain(system, highest=highest)
+
     def peak_at(v: _Vector) -> float:
-        return peak_gain(system_of(structure, v, fs), highest=highest)
+        # At a maximum the frequency's own shift does not count.
+        return 20.0 * float(np.log10(gain_at(peak.frequency, v)))
 
     order = structure.order
     second = structure.name == "second_order"
@@ -175,11 +183,11 @@ def read_parameters(
         else None,
         bandwidth_phase90=root(
             bandwidth_phase(system, highest=highest),
-            lambda f, v: phase_at(f, v, True) + np.pi / 2,
+            lambda f, v: phase_from(f, v, True),
         ),
         bandwidth_phase90_without_delay=root(
             bandwidth_phase(system, highest=highest, delay=False),
-            lambda f, v: phase_at(f, v, False) + np.pi / 2,
+            lambda f, v: phase_from(f, v, False),
         )
         if dynamic
         else None,

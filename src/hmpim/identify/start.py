@@ -113,7 +113,12 @@ def rough_response(
 
 
 def starting_values(
-    rough: RoughResponse, structure: Structure, *, earliest: int, count: int = 3
+    rough: RoughResponse,
+    structure: Structure,
+    *,
+    earliest: int,
+    count: int = 3,
+    thorough: bool = True,
 ) -> list[NDArray[np.float64]]:
     """Starts for `hmpim.identify.fit.fit_structure`, the most promising first.
 
@@ -127,6 +132,8 @@ def starting_values(
         Least pure delay to look at, in samples.
     count : int
         At most so many.
+    thorough : bool
+        Try several guesses of the corner frequency; one if False.
 
     Returns
     -------
@@ -141,7 +148,7 @@ def starting_values(
         return [np.array([rough.lag + shifts[int(np.argmin(cost))] / finer])]
     scale = float(np.sqrt(rough.weight @ rough.omega**2 / rough.weight.sum()))
     found: list[tuple[float, NDArray[np.float64]]] = []
-    for corner in _CORNERS:
+    for corner in _CORNERS if thorough else _CORNERS[1:2]:
         roll_off = 1.0 + (rough.omega / (corner * rough.omega[-1])) ** 2
         first = rough.weight / roll_off ** min(order, 2)
         cost, coefficients = _levy(rough, shifts, finer, order, first, scale)

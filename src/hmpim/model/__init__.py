@@ -11,6 +11,7 @@ from hmpim.model.dynamics import (
 )
 from hmpim.model.model import Model, frequency_response, simulate
 from hmpim.model.response import (
+    PeakGain,
     RationalDelay,
     bandwidth_3db,
     bandwidth_phase,
@@ -24,6 +25,7 @@ from hmpim.model.sampled import SampledInput, delayed_response, prepare_input
 __all__ = [
     "STRUCTURES",
     "Model",
+    "PeakGain",
     "RationalDelay",
     "SampledInput",
     "Structure",

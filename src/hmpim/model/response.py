@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq
 
 __all__ = [
+    "PeakGain",
     "RationalDelay",
     "bandwidth_3db",
     "bandwidth_phase",
@@ -123,8 +124,16 @@ def bandwidth_3db(system: RationalDelay, *, highest: float) -> float | None:
     return float(brentq(lambda f: float(margin(np.array([f]))[0]), grid[i], grid[i + 1]))
 
 
-def peak_gain(system: RationalDelay, *, highest: float) -> float:
-    """Greatest gain up to `highest` Hz over the gain at DC, in dB; 0 without a hump.
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PeakGain:
+    """Greatest gain over the gain at DC, in dB, and the frequency in Hz where it is."""
+
+    gain_db: float
+    frequency: float
+
+
+def peak_gain(system: RationalDelay, *, highest: float) -> PeakGain:
+    """Greatest gain up to `highest` Hz over the gain at DC; 0 dB at 0 Hz without a hump.
 
     For a second-order lag this is -20 lg(2ζ√(1-ζ²)) (paper, Fig. 16; Ogata, Modern Control
     Engineering, 1970, ch. 9).
@@ -133,14 +142,14 @@ def peak_gain(system: RationalDelay, *, highest: float) -> float:
     gain = np.abs(response(system, grid) / system.numerator[0])
     i = int(np.argmax(gain))
     if i == 0:
-        return 0.0
+        return PeakGain(gain_db=0.0, frequency=0.0)
     low, high = grid[max(i - 1, 0)], grid[min(i + 1, grid.size - 1)]
     for _ in range(3):
         fine = np.linspace(low, high, 21)
         gain = np.abs(response(system, fine) / system.numerator[0])
         i = int(np.argmax(gain))
         low, high = fine[max(i - 1, 0)], fine[min(i + 1, 20)]
-    return float(20 * np.log10(gain.max()))
+    return PeakGain(gain_db=float(20 * np.log10(gain[i])), frequency=float(fine[i]))
 
 
 def dominant_time_constant(system: RationalDelay) -> float | None:

@@ -1,0 +1,109 @@
+"""All that the README shows is executed here; the table of contents is pinned."""
+
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import hmpim
+
+ROOT = Path(__file__).parents[2]
+README = (ROOT / "README.md").read_text(encoding="utf-8")
+
+
+def blocks(language: str) -> list[str]:
+    return re.findall(rf"```{language}\n(.*?)```", README, flags=re.DOTALL)
+
+
+def test_the_lines_of_python_run(capsys):
+    (code,) = blocks("python")
+    exec(compile(code, "README.md", "exec"), {})
+    assert "Estimate(value=0.1" in capsys.readouterr().out
+
+
+def test_it_is_five_lines():
+    (code,) = blocks("python")
+    body = [line for line in code.splitlines() if line and not line.startswith("import")]
+    assert len(body) == 5
+
+
+def test_the_make_targets_exist():
+    shell = "\n".join(blocks("sh"))
+    makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
+    targets = re.findall(r"^make (\w+)", shell, flags=re.MULTILINE)
+    assert targets == ["demo", "test"]
+    for target in targets:
+        assert re.search(rf"^{target}:", makefile, flags=re.MULTILINE)
+
+
+def test_the_identify_command_runs(tmp_path):
+    (command,) = [
+        line for block in blocks("sh") for line in block.splitlines() if line.startswith("hmpim")
+    ]
+    stimulus = hmpim.Stimulus(waveform=hmpim.Chirp(band=(0.1, 20), duration=10), fs=200)
+    sensor = hmpim.Sensor(delay=0.05, time_constant=0.05, noise_std=0.02)
+    record = hmpim.run(sensor, stimulus, rng=1)
+    from hmpim.formats import write_csv
+
+    write_csv(record, tmp_path / "test.csv")
+    program = Path(sys.executable).with_name("hmpim")
+    done = subprocess.run(
+        [str(program), *command.split()[1:]],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        check=False,
+        env={**os.environ, "COLUMNS": "160"},
+    )
+    assert done.returncode == 0, done.stderr
+    assert "Time constant" in done.stdout
+    assert (tmp_path / "report.html").stat().st_size > 50_000
+    assert (tmp_path / "result.json").is_file()
+
+
+@pytest.mark.parametrize("target", sorted(set(re.findall(r"\]\(([^)#]+)\)", README))))
+def test_every_link_leads_somewhere(target):
+    assert target.startswith("https://") or (ROOT / target).is_file()
+
+
+def test_the_public_names():
+    assert sorted(hmpim.__all__) == [
+        "Channel",
+        "Chirp",
+        "Estimate",
+        "FunctionRig",
+        "HmpimError",
+        "Identification",
+        "Limits",
+        "Model",
+        "Ramp",
+        "Record",
+        "Sensor",
+        "Sine",
+        "Step",
+        "Stimulus",
+        "SumOfSines",
+        "Sweep",
+        "design",
+        "frequency_response",
+        "identify",
+        "paper_analysis",
+        "predict",
+        "read",
+        "report",
+        "run",
+        "simulate",
+        "to_model",
+    ]
+    assert all(hasattr(hmpim, name) for name in hmpim.__all__)
+    assert callable(hmpim.identify)
+    assert callable(hmpim.report)
+
+
+@pytest.mark.parametrize("document", sorted((ROOT / "docs").rglob("*.md")), ids=lambda p: p.name)
+def test_links_between_documents_lead_somewhere(document):
+    for target in re.findall(r"\]\(([^)#]+)\)", document.read_text(encoding="utf-8")):
+        assert target.startswith("https://") or (document.parent / target).exists(), target
