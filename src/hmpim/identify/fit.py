@@ -120,7 +120,15 @@ def _responses(
         denominator=denominator_of(structure, coefficients_of(structure, theta[1:])),
         powers=powers,
     )
-    rows[0] += problem.source.first
+    level = problem.source.first
+    if structure.integrators and level:
+        # What the level before the record adds up to from its first sample on.
+        since = np.maximum(np.arange(problem.y.size) - float(theta[0]), 0.0)
+        rows[0] += level * since
+        if powers > 1:
+            rows[1] += level * (since > 0)
+    else:
+        rows[0] += level
     return rows
 
 
@@ -167,13 +175,12 @@ def jacobian(problem: Problem, fit: Fit) -> NDArray[np.float64]:
     weights, theta, structure = fit.linear[:-1], fit.theta, fit.structure
     rows = np.empty((theta.size + fit.linear.size, problem.y.size))
     # d/dτ of e^(-sτ) is -s: one more power of s, whose responses come at little cost.
-    responses = _responses(
-        problem, structure, theta, structure.zeros + (2 if theta.size > 1 else 1)
-    )
+    dynamic = structure.order + structure.integrators > 0
+    responses = _responses(problem, structure, theta, structure.zeros + (2 if dynamic else 1))
     basis = responses[: weights.size]
     here = weights @ basis
     for i in range(theta.size):
-        if i == 0 and theta.size > 1:
+        if i == 0 and dynamic:
             rows[0] = -(weights @ responses[1:])
             continue
         moved = theta.copy()

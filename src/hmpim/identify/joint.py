@@ -11,15 +11,25 @@ clearly against it.
 """
 
 from dataclasses import dataclass
+from typing import get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
+from hmpim.identify.enrich import (
+    INTEGRATING,
+    PLAIN,
+    RICH,
+    integrator_starts,
+    members,
+    rich_starts,
+)
 from hmpim.identify.fit import Fit, Problem, fit_structure
 from hmpim.identify.start import RoughResponse, rough_response, starting_values
-from hmpim.identify.whiteness import effective_share, is_white
-from hmpim.model.dynamics import STRUCTURES, StructureName
-from hmpim.model.sampled import prepare_input
+from hmpim.identify.whiteness import effective_share, is_white, misfit
+from hmpim.model.dynamics import STRUCTURES, Structure, StructureName
+from hmpim.model.response import slowest_time_constant
+from hmpim.model.sampled import SampledInput, prepare_input
 from hmpim.record import Intersample
 
 __all__ = ["CLEARLY", "JointFit", "Trial", "joint_fit"]
@@ -31,13 +41,20 @@ _HOPELESS = 2.0
 """A structure whose sum of squares is this many times the least is not tried again at once
 under the other assumptions."""
 
+_MATERIAL = 0.02
+"""Share of the output (r.m.s.) below which a misfit is reported but not modelled."""
+
+_POOR = 0.2
+"""Share of the output's power left over, in colour, that asks for a richer structure anyway."""
+
+_LONG_TASTE = 12
+"""Steps from each start of a richer structure, whose valleys are longer."""
+
 _TASTE = 4
 """Steps taken from each start before the best one is followed to its end."""
 
 _FALLING = 10.0
 """After so many steps a structure is given up if its sum of squares is this far from hopeful."""
-
-_INTERSAMPLES: tuple[Intersample, ...] = ("bandlimited", "zoh", "foh")
 
 _DELAY_SHIFT: dict[Intersample, float] = {"zoh": -0.5, "foh": 0.0, "bandlimited": 0.0}
 """Samples by which the fitted delay moves when held, against the other two."""
@@ -93,7 +110,7 @@ def joint_fit(
     valid: NDArray[np.bool_] | None = None,
     known: NDArray[np.bool_] | None = None,
     intersample: Intersample | None = None,
-    structures: tuple[StructureName, ...] = ("static", "first_order", "second_order"),
+    structures: tuple[StructureName, ...] = (*PLAIN, *RICH, *INTEGRATING),
 ) -> JointFit:
     """Fit every structure and keep the one that the record supports.
 
@@ -115,54 +132,112 @@ def joint_fit(
     -------
     JointFit
     """
-    longest = u.size // 2
-    rough = rough_response(u, y if valid is None else _bridged(y, valid), longest_delay=longest)
-    modes = _INTERSAMPLES if intersample is None else (intersample,)
-    sources = {mode: prepare_input(u, mode) for mode in modes}
-
-    def problem_for(mode: Intersample, counted: NDArray[np.bool_] | None) -> Problem:
-        return Problem(source=sources[mode], y=y, valid=counted, longest_delay=float(longest + 2))
-
-    first = modes[0]
-    fits = _fit_all(problem_for(first, valid), rough, structures)
-    forgotten = _forgotten(fits, valid)
-    ahead = _ahead(fits)
-    if forgotten or ahead or known is not None:
-        counted = np.ones(y.size, dtype=bool) if valid is None else valid.copy()
-        counted[:forgotten] = False
-        counted[y.size - ahead :] = False
-        if known is not None:
-            counted &= _unaffected(known, _memory(fits))
-        valid = counted
-        fits = [fit_structure(problem_for(first, valid), f.structure, f.theta) for f in fits]
-    fitted: list[tuple[Intersample, Fit]] = [(first, fit) for fit in fits]
-    least = min(fit.cost for fit in fits)
-    leading = [fit for fit in fits if fit.cost < _HOPELESS * least]
-    for mode in modes[1:]:
-        problem = problem_for(mode, valid)
-        fitted += [(mode, _moved(problem, fit, first, mode)) for fit in leading]
-    likeliest, _ = min(fitted, key=lambda item: item[1].cost)
-    if likeliest != first:  # what was hopeless under a wrong assumption may not be so now
-        for mode in modes[1:]:
-            problem = problem_for(mode, valid)
-            fitted += [(mode, _moved(problem, f, first, mode)) for f in fits if f not in leading]
+    natural: Intersample = "zoh" if _looks_held(u) else "bandlimited"
+    if intersample is not None:
+        natural = intersample
+    data = _Data(
+        u=u,
+        y=y,
+        sources={natural: prepare_input(u, natural)},
+        rough=rough_response(
+            u, y if valid is None else _bridged(y, valid), longest_delay=u.size // 2
+        ),
+    )
+    plain = tuple(name for name in structures if name in PLAIN)
+    fits = _fit_all(data.problem(natural, valid), data.rough, plain or PLAIN)
+    everything = valid
+    forgotten = _forgotten(fits, everything)
+    valid = _counted(fits, everything, forgotten, known)
+    if valid is not everything:
+        fits = [_refit(data.problem(natural, valid), f) for f in fits]
+    others = tuple(name for name in structures if name not in PLAIN)
+    richer = _enriched(data, data.problem(natural, valid), fits, others, forced=not plain)
+    fits = [*fits, *richer] if plain else richer or fits
+    if richer and forgotten and not _forgotten(fits, everything):
+        forgotten = 0  # it was the structure that was wrong, not the beginning
+        valid = _counted(fits, everything, forgotten, known)
+        fits = [_refit(data.problem(natural, valid), f) for f in fits]
+    fitted: list[tuple[Intersample, Fit]] = [(natural, fit) for fit in fits]
+    if intersample is None:
+        fitted += _under_other_assumptions(data, natural, fits, valid)
     share = effective_share(min(fitted, key=lambda item: item[1].cost)[1].residual)
-    count = problem_for(first, valid).counted * share
+    count = data.problem(natural, valid).counted * share
     trials = [_trial(mode, fit, count) for mode, fit in fitted]
-    chosen = _chosen(trials, "zoh" if _looks_held(u) else "bandlimited")
-    problem = problem_for(chosen.intersample, valid)
+    chosen = _chosen(trials, natural)
+    problem = data.problem(chosen.intersample, valid)
     polished = fit_structure(
         problem, chosen.fit.structure, chosen.fit.theta, precision=_FINAL_PRECISION
     )
     best = _trial(chosen.intersample, polished, count)
-    trials = [best if trial is chosen else trial for trial in trials]
     return JointFit(
         problem=problem,
         best=best,
-        trials=tuple(trials),
+        trials=tuple(best if trial is chosen else trial for trial in trials),
         forgotten=forgotten,
         effective_share=share,
     )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Data:
+    """What every trial shares; inputs are prepared for an assumption when first asked for."""
+
+    u: NDArray[np.float64]
+    y: NDArray[np.float64]
+    sources: dict[Intersample, SampledInput]
+    rough: RoughResponse
+
+    def problem(self, mode: Intersample, valid: NDArray[np.bool_] | None) -> Problem:
+        if mode not in self.sources:
+            self.sources[mode] = prepare_input(self.u, mode)
+        return Problem(
+            source=self.sources[mode], y=self.y, valid=valid, longest_delay=self.y.size // 2 + 2.0
+        )
+
+
+def _counted(
+    fits: list[Fit],
+    valid: NDArray[np.bool_] | None,
+    forgotten: int,
+    known: NDArray[np.bool_] | None,
+) -> NDArray[np.bool_] | None:
+    """Samples that count once it is known how long the system remembers."""
+    ahead = _ahead(fits)
+    if not (forgotten or ahead or known is not None):
+        return valid
+    counted = np.ones(fits[0].residual.size, dtype=bool) if valid is None else valid.copy()
+    counted[:forgotten] = False
+    counted[counted.size - ahead :] = False
+    if known is not None:
+        counted &= _unaffected(known, _memory(fits))
+    return counted
+
+
+def _refit(problem: Problem, fit: Fit) -> Fit:
+    return fit_structure(problem, fit.structure, fit.theta)
+
+
+def _under_other_assumptions(
+    data: _Data, natural: Intersample, fits: list[Fit], valid: NDArray[np.bool_] | None
+) -> list[tuple[Intersample, Fit]]:
+    """Fit again as if the input did something else between its samples."""
+    least = min(fit.cost for fit in fits)
+    leading = [fit for fit in fits if fit.cost < _HOPELESS * least]
+    trailing = [fit for fit in fits if fit not in leading]
+    others = [mode for mode in get_args(Intersample) if mode != natural]
+    fitted = [
+        (mode, _moved(data.problem(mode, valid), fit, natural, mode))
+        for mode in others
+        for fit in leading
+    ]
+    if min(fit.cost for _, fit in fitted) < least:
+        # What was hopeless under a wrong assumption may not be so now.
+        fitted += [
+            (mode, _moved(data.problem(mode, valid), fit, natural, mode))
+            for mode in others
+            for fit in trailing
+        ]
+    return fitted
 
 
 def _bridged(y: NDArray[np.float64], valid: NDArray[np.bool_]) -> NDArray[np.float64]:
@@ -207,6 +282,50 @@ def _fit_all(
     ]
 
 
+def _enriched(
+    data: _Data,
+    problem: Problem,
+    fits: list[Fit],
+    structures: tuple[StructureName, ...],
+    *,
+    forced: bool,
+) -> list[Fit]:
+    """Fits of richer structures, if the best plain one leaves something worth explaining."""
+    best = min(fits, key=lambda fit: fit.cost)
+    if not (forced or _worth_explaining(problem, best, data)):
+        return []
+    integrating = members(structures, INTEGRATING)
+    found: list[Fit] = []
+    if integrating:
+        added = np.cumsum(data.u - data.u[0])
+        rough = rough_response(added, data.y, longest_delay=data.y.size // 2)
+        found = [_best_of(problem, s, integrator_starts(rough, s)) for s in integrating]
+        if is_white(min(found, key=lambda fit: fit.cost).residual):
+            return found
+    return found + [
+        _best_of(problem, structure, rich_starts(data.rough, structure, best))
+        for structure in members(structures, RICH)
+    ]
+
+
+def _best_of(problem: Problem, structure: Structure, starts: list[NDArray[np.float64]]) -> Fit:
+    tried = [fit_structure(problem, structure, theta, iterations=_LONG_TASTE) for theta in starts]
+    best = min(tried, key=lambda fit: fit.cost)
+    return best if best.converged else fit_structure(problem, structure, best.theta)
+
+
+def _worth_explaining(problem: Problem, fit: Fit, data: _Data) -> bool:
+    """Whether the residual follows the input by more than a small share of the output."""
+    omega = data.rough.omega
+    band = (omega[0] / (2 * np.pi), omega[-1] / (2 * np.pi))
+    left = misfit(data.u, fit.residual, delay=fit.delay, band=band)
+    spread = float(np.sum((problem.masked(problem.y - problem.y.mean())) ** 2))
+    owed = float(np.sqrt(left.share * fit.cost / spread)) if spread else 0.0
+    return (left.probability < 1e-4 and owed > _MATERIAL) or (
+        fit.cost > _POOR * spread and not is_white(fit.residual)
+    )
+
+
 def _nests(simple: Fit, rich: Fit) -> bool:
     """Whether the simpler structure is a start for a richer one that may have missed its best."""
     return (
@@ -228,16 +347,10 @@ def _moved(problem: Problem, fit: Fit, origin: Intersample, mode: Intersample) -
     return fit_structure(problem, fit.structure, theta)
 
 
-def _refit(problem: Problem, fit: Fit) -> Fit:
-    return fit_structure(problem, fit.structure, fit.theta)
-
-
 def _memory(fits: list[Fit]) -> int:
     """Samples after which the output has forgotten its input, by the best fit so far."""
     fit = min(fits, key=lambda f: f.cost)
-    slowest = 0.0
-    if fit.structure.order:
-        slowest = float(np.max(-1.0 / np.roots(fit.denominator[::-1]).real))
+    slowest = slowest_time_constant(fit.denominator)
     span = int(np.ceil(max(fit.delay, 0.0) + _SETTLED * slowest)) + 2
     return min(span, fit.residual.size // 4)
 

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from hmpim.errors import RecordError
 from hmpim.identify.result import PairIdentification
-from hmpim.model import Model, simulate
+from hmpim.model import Model, simulate, slowest_time_constant
 from hmpim.record import Record, uniform
 
 __all__ = ["Prediction", "predict", "to_model"]
@@ -84,9 +84,7 @@ def predict(pair: PairIdentification, record: Record, *, start: float | None = N
     u, y = aligned.signal(pair.input), aligned.signal(pair.output)
     predicted = simulate(model, u.values, fs=aligned.fs, intersample=pair.intersample)
     if start is None:
-        slowest = 0.0
-        if len(model.denominator) > 1:
-            slowest = float(np.max(-1.0 / np.roots(model.denominator).real))
+        slowest = slowest_time_constant(np.asarray(model.denominator[::-1]))
         start = aligned.start + max(model.delay, 0.0) + 5.0 * slowest
     scored = y.valid & (aligned.time >= start)
     if np.count_nonzero(scored) < 2:

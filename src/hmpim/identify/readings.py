@@ -61,11 +61,11 @@ def system_of(structure: Structure, vector: _Vector, fs: float) -> RationalDelay
     """Build the system in seconds that a fit's vector stands for."""
     order = structure.order
     denominator = denominator_of(structure, coefficients_of(structure, vector[1 : 1 + order]))
-    numerator = vector[1 + order : -1]
+    numerator = vector[1 + order : -1] * fs**structure.integrators
     return RationalDelay(
         delay=float(vector[0]) / fs,
         numerator=numerator / fs ** np.arange(numerator.size),
-        denominator=denominator / fs ** np.arange(denominator.size),
+        denominator=denominator / fs ** (np.arange(denominator.size) - structure.integrators),
     )
 
 
@@ -139,17 +139,21 @@ def read_parameters(
         here = system_of(structure, v, fs)
         return float(np.abs(response(here, np.array([f]))[0] / here.numerator[0]))
 
-    peak = peak_gain(system, highest=highest)
+    order = structure.order
+    steady = structure.integrators == 0  # an integrator has no gain at DC to compare with
+    dynamic = order > 0 and steady
+    peak = peak_gain(system, highest=highest) if dynamic else None
 
     def peak_at(v: _Vector) -> float:
         # At a maximum the frequency's own shift does not count.
-        return 20.0 * float(np.log10(gain_at(peak.frequency, v)))
+        return 20.0 * float(np.log10(gain_at(peak.frequency if peak else 0.0, v)))
 
-    order = structure.order
-    second = structure.name == "second_order"
+    mode = _lowest_mode(structure, vector)
     slow = dominant_time_constant(system)
     gain_unit = _ratio(output_unit, input_unit)
-    dynamic = order > 0
+    gain_rate = 1.0 if steady else fs
+    if not steady:
+        gain_unit = f"{gain_unit or '1'}/s"
     low_frequency = None
     if dynamic:
 
@@ -160,22 +164,24 @@ def read_parameters(
 
         low_frequency = explicit(slope_at_dc, "s")
     natural = damping = 0.0
-    if second:  # 1 + c1 s + c2 s²: ω = c2^(-1/2), ζ = c1 ω / 2
-        damping = 0.5 / float(np.sqrt(vector[2]))  # vector[2] is c2 / c1²
-        natural = 2 * damping * float(np.exp(-vector[1])) * fs / (2 * np.pi)
+    stretch = np.zeros(vector.size)
+    if mode is not None:  # 1 + c1 s + c2 s²: ω = c2^(-1/2), ζ = c1 ω / 2
+        damping = 0.5 / float(np.sqrt(vector[mode + 1]))  # it holds c2 / c1²
+        natural = 2 * damping * float(np.exp(-vector[mode])) * fs / (2 * np.pi)
+        stretch = axis[mode + 1] / (2 * vector[mode + 1])
     parameters = Parameters(
         delay=linear(vector[0] / fs, axis[0] / fs, "s"),
         delay_correlation=_from_lag(delay_correlation, fs),
         delay_low_frequency=low_frequency or linear(vector[0] / fs, axis[0] / fs, "s"),
-        scale_factor=linear(vector[1 + order], axis[1 + order], gain_unit),
+        scale_factor=linear(gain_rate * vector[1 + order], gain_rate * axis[1 + order], gain_unit),
         bias=linear(vector[-1], axis[-1], output_unit),
         noise_std=noise_estimate(
             fit.cost, freedom=freedom, share=joint.effective_share, unit=output_unit
         ),
-        natural_frequency=linear(natural, -natural * (axis[1] + axis[2] / (2 * vector[2])), "Hz")
-        if second
+        natural_frequency=linear(natural, -natural * (axis[mode] + stretch), "Hz")
+        if mode is not None
         else None,
-        damping_ratio=linear(damping, -damping * axis[2] / (2 * vector[2]), "") if second else None,
+        damping_ratio=linear(damping, -damping * stretch, "") if mode is not None else None,
         time_constant=explicit(
             lambda v: dominant_time_constant(system_of(structure, v, fs)) or float("nan"), "s"
         )
@@ -184,7 +190,9 @@ def read_parameters(
         bandwidth_phase90=root(
             bandwidth_phase(system, highest=highest),
             lambda f, v: phase_from(f, v, True),
-        ),
+        )
+        if steady
+        else None,
         bandwidth_phase90_without_delay=root(
             bandwidth_phase(system, highest=highest, delay=False),
             lambda f, v: phase_from(f, v, False),
@@ -204,10 +212,21 @@ def read_parameters(
     )
 
 
+def _lowest_mode(structure: Structure, vector: _Vector) -> int | None:
+    """Index in `vector` of the second-order section with the lowest natural frequency."""
+    found, start = [], 1
+    for order in structure.sections:
+        if order == 2:
+            omega = np.exp(-vector[start]) / np.sqrt(vector[start + 1])
+            found.append((float(omega), start))
+        start += order
+    return min(found)[1] if found else None
+
+
 def _covariance(joint: JointFit, fit: Fit, *, freedom: int, white: bool) -> _Vector:
     """Covariance of theta and linear; a held, static system moves in whole samples only."""
     rows = jacobian(joint.problem, fit)
-    if fit.structure.order == 0 and joint.best.intersample == "zoh":
+    if fit.structure.name == "static" and joint.best.intersample == "zoh":
         inner = covariance(rows[1:], fit.residual, freedom=freedom, white=white)
         full = np.zeros((rows.shape[0], rows.shape[0]))
         full[1:, 1:] = inner

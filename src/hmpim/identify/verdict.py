@@ -8,6 +8,7 @@ from hmpim.identify.joint import CLEARLY, JointFit
 from hmpim.identify.readings import Readings
 from hmpim.identify.result import Estimate, Verdict
 from hmpim.identify.whiteness import Misfit
+from hmpim.model import slowest_time_constant
 from hmpim.record import Finding
 
 __all__ = ["Judgement", "is_unrelated", "judge"]
@@ -125,17 +126,20 @@ def judge(
             f"ends at {band[1]:.4g} Hz. Sweep to at least {1.5 * natural.value:.3g} Hz.",
             doubt=True,
         )
-    missing = [
-        words
-        for words, estimate in (
-            ("-90° frequency", p.bandwidth_phase90),
-            ("-90° frequency without delay", p.bandwidth_phase90_without_delay),
-            ("-3 dB frequency", p.bandwidth_3db),
+    asked = [("-90° frequency", p.bandwidth_phase90)]
+    if fit.structure.order > 1:  # a first-order lag alone never gets to -90°
+        asked.append(("-90° frequency without delay", p.bandwidth_phase90_without_delay))
+    if fit.structure.order > 0:
+        asked.append(("-3 dB frequency", p.bandwidth_3db))
+    missing = [words for words, estimate in asked if estimate is None]
+    if fit.structure.integrators:
+        note(
+            "integrator",
+            "The output integrates the input: it has no gain at DC to measure bandwidths from, "
+            "and the scale factor is the output's rate per input.",
+            doubt=False,
         )
-        if estimate is None and not (fit.structure.order == 0 and words != "-90° frequency")
-    ]
-    if fit.structure.name == "first_order" and "-90° frequency without delay" in missing:
-        missing.remove("-90° frequency without delay")  # a first-order lag never gets there
+        missing = []
     if missing:
         note(
             "beyond_band",
@@ -232,8 +236,5 @@ def _rival(joint: JointFit) -> str | None:
 
 def _settling(readings: Readings) -> float:
     """Delay and five times the slowest time constant, in s."""
-    denominator = readings.system.denominator
-    slowest = 0.0
-    if denominator.size > 1:
-        slowest = float(np.max(-1.0 / np.roots(denominator[::-1]).real))
+    slowest = slowest_time_constant(readings.system.denominator)
     return max(readings.system.delay, 0.0) + 5.0 * slowest

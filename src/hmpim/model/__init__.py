@@ -19,6 +19,7 @@ from hmpim.model.response import (
     peak_gain,
     phase,
     response,
+    slowest_time_constant,
 )
 from hmpim.model.sampled import SampledInput, delayed_response, prepare_input
 
@@ -43,5 +44,6 @@ __all__ = [
     "response",
     "second_order_coefficients",
     "simulate",
+    "slowest_time_constant",
     "theta_of",
 ]

@@ -1,8 +1,8 @@
 """Structures of dynamics: which rational functions of s a fit may try.
 
-Every structure is ``B(s) / A(s)`` with B(0) = A(0) = 1 after the scale factor is taken out.
-A(s) is a product of sections ``1 + c1 s`` and ``1 + c1 s + c2 s²`` with positive
-coefficients, so that every model tried is stable.
+Every structure is ``B(s) / A(s)`` with B(0) = A(0) = 1 after the scale factor is taken out;
+an integrator has s A(s) below instead. A(s) is a product of sections ``1 + c1 s`` and
+``1 + c1 s + c2 s²`` with positive coefficients, so that every model tried is stable.
 """
 
 from dataclasses import dataclass
@@ -21,7 +21,17 @@ __all__ = [
     "theta_of",
 ]
 
-StructureName = Literal["static", "first_order", "second_order"]
+StructureName = Literal[
+    "static",
+    "first_order",
+    "second_order",
+    "second_order_zero",
+    "third_order",
+    "fourth_order",
+    "two_modes",
+    "integrator",
+    "integrator_first_order",
+]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -36,15 +46,18 @@ class Structure:
         Orders, 1 or 2, of the sections of the denominator.
     zeros : int
         Degree of the numerator, less than that of the denominator.
+    integrators : int
+        Poles at zero, 0 or 1. With one, the scale factor is the output's rate per input.
     """
 
     name: StructureName
     sections: tuple[int, ...]
     zeros: int = 0
+    integrators: int = 0
 
     @property
     def order(self) -> int:
-        """Degree of the denominator: how many coefficients are not linear in the output."""
+        """How many coefficients of the denominator are not linear in the output."""
         return sum(self.sections)
 
     @property
@@ -59,6 +72,12 @@ STRUCTURES: dict[StructureName, Structure] = {
         Structure(name="static", sections=()),
         Structure(name="first_order", sections=(1,)),
         Structure(name="second_order", sections=(2,)),
+        Structure(name="second_order_zero", sections=(2,), zeros=1),
+        Structure(name="third_order", sections=(2, 1)),
+        Structure(name="fourth_order", sections=(2, 2)),
+        Structure(name="two_modes", sections=(2, 2), zeros=2),
+        Structure(name="integrator", sections=(), integrators=1),
+        Structure(name="integrator_first_order", sections=(1,), integrators=1),
     )
 }
 
@@ -75,7 +94,7 @@ def denominator_of(structure: Structure, coefficients: ArrayLike) -> NDArray[np.
 
     Returns
     -------
-    ndarray, shape (order + 1,)
+    ndarray, shape (integrators + order + 1,)
 
     Examples
     --------
@@ -83,7 +102,7 @@ def denominator_of(structure: Structure, coefficients: ArrayLike) -> NDArray[np.
     [1.0, 0.5, 0.25]
     """
     values = np.asarray(coefficients, dtype=np.float64)
-    product = np.ones(1)
+    product = np.concatenate([np.zeros(structure.integrators), [1.0]])
     start = 0
     for order in structure.sections:
         section = np.concatenate([[1.0], values[start : start + order]])

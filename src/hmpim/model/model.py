@@ -22,9 +22,10 @@ class Model:
     delay : float
         Pure delay in s.
     scale_factor : float
-        Output at DC per input, bias aside.
+        Output at DC per input, bias aside; with an integrator, the output's rate per input.
     numerator, denominator : tuple of float
         Dynamics without delay and with unit gain at DC, in powers of s (rad/s), highest first.
+        A denominator that ends in 0 integrates.
     bias : float
         Output at zero input.
     noise_std : float
@@ -50,9 +51,10 @@ class Model:
     output_unit: str = ""
 
     def __post_init__(self) -> None:
-        if not self.denominator or self.denominator[-1] == 0:
+        if not any(self.denominator[-2:]):
             raise ArgumentError(
-                f"denominator {self.denominator} has no finite gain at DC; its last must not be 0"
+                f"denominator {self.denominator} integrates more than once; one of its last two "
+                "coefficients must not be 0"
             )
         if len(self.numerator) > max(len(self.denominator) - 1, 1):
             raise ArgumentError(
@@ -60,7 +62,7 @@ class Model:
                 f"{len(self.denominator) - 1} is not strictly proper; leave out its highest power"
             )
         poles = np.roots(self.denominator)
-        if np.any(poles.real >= 0):
+        if np.any(poles[np.abs(poles) > 0].real >= 0):
             raise ArgumentError(
                 f"denominator {self.denominator} has a pole at {poles[np.argmax(poles.real)]:.4g}; "
                 "only stable dynamics can be simulated"
@@ -68,8 +70,8 @@ class Model:
 
 
 def _rational(model: Model) -> RationalDelay:
-    """Rising powers of s, scale factor included, A(0) = 1."""
-    constant = model.denominator[-1]
+    """Rising powers of s, scale factor included, the first that is not 0 of A made 1."""
+    constant = model.denominator[-1] or model.denominator[-2]
     return RationalDelay(
         delay=model.delay,
         numerator=model.scale_factor * np.asarray(model.numerator[::-1]) / constant,
@@ -132,7 +134,10 @@ def simulate(
         powers=powers,
     )
     weights = system.numerator * fs ** np.arange(powers)
-    y = weights @ rows + model.scale_factor * source.first + model.bias
+    level: float | NDArray[np.float64] = model.scale_factor * source.first
+    if system.denominator[0] == 0:
+        level = level * np.maximum(np.arange(source.samples) / fs - system.delay, 0.0)
+    y = weights @ rows + level + model.bias
     if rng is not None:
         y = y + model.noise_std * rng.standard_normal(y.size)
     return np.asarray(y)

@@ -18,6 +18,7 @@ __all__ = [
     "peak_gain",
     "phase",
     "response",
+    "slowest_time_constant",
 ]
 
 
@@ -152,11 +153,39 @@ def peak_gain(system: RationalDelay, *, highest: float) -> PeakGain:
     return PeakGain(gain_db=float(20 * np.log10(gain[i])), frequency=float(fine[i]))
 
 
+def _moving_poles(denominator: NDArray[np.float64]) -> NDArray[np.complex128]:
+    """Poles other than those at zero, which belong to an integrator."""
+    poles = np.roots(np.trim_zeros(denominator, "f")[::-1])
+    return np.asarray(poles, dtype=np.complex128)
+
+
+def slowest_time_constant(denominator: NDArray[np.float64]) -> float:
+    """Time after which the slowest mode has fallen to 1/e; 0 without dynamics.
+
+    Parameters
+    ----------
+    denominator : ndarray, shape (n + 1,)
+        A by rising powers of s; poles at zero do not count.
+
+    Returns
+    -------
+    float
+        In the unit of 1/s.
+
+    Examples
+    --------
+    >>> slowest_time_constant(np.array([1.0, 0.25]))
+    0.25
+    """
+    poles = _moving_poles(denominator)
+    return float(np.max(-1.0 / poles.real)) if poles.size else 0.0
+
+
 def dominant_time_constant(system: RationalDelay) -> float | None:
     """Slowest time constant in seconds where the slowest pole is real, else None."""
-    if system.denominator.size < 2:
+    poles = _moving_poles(system.denominator)
+    if not poles.size:
         return None
-    poles = np.roots(system.denominator[::-1])
     slowest = poles[np.argmax(poles.real)]
     if abs(slowest.imag) > 1e-9 * abs(slowest):
         return None
