@@ -1,0 +1,192 @@
+"""Windows of neighbouring bins of a record's transform, which every local method fits over.
+
+The bins are those of the unwindowed transform, negative frequencies included: there the
+transforms are the conjugates, so a window may reach through DC. The bin at DC itself holds the
+bias and counts nowhere. For circular noise, whose square has no mean, the mirrored bins bring
+no correlation into E|error|², so least squares and its variances hold as they stand.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
+from numpy.typing import NDArray
+from scipy import fft
+
+__all__ = ["LocalFit", "Spectra", "Windows", "centres_in_band", "transform", "windows_around"]
+
+Real = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+Integer = NDArray[np.int64]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Spectra:
+    """Transforms of a record whose delay is taken out.
+
+    Parameters
+    ----------
+    frequency : ndarray, shape (b,)
+        Hz, from 0 to below fs/2.
+    u, y : complex ndarray, shape (b,)
+        Input and output; 0 at DC.
+    """
+
+    frequency: Real
+    u: Complex
+    y: Complex
+
+    def mirrored(self, values: Complex, reach: int) -> Complex:
+        """Return `values` with `reach` negative frequencies before them."""
+        return np.concatenate((np.conj(values[reach:0:-1]), values))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Windows:
+    """Windows of one width, and which of them answers for which centre.
+
+    Parameters
+    ----------
+    start : integer ndarray, shape (w,)
+        First bin of each window, negative below DC.
+    x : ndarray, shape (s,)
+        Place of a window's bins, -1 to 1.
+    counted : integer ndarray, shape (w,)
+        Bins without the one at DC.
+    near : integer ndarray, shape (c,)
+        Window of each centre.
+    place : integer ndarray, shape (c,)
+        Place of each centre in its window.
+    """
+
+    start: Integer
+    x: Real
+    counted: Integer
+    near: Integer
+    place: Integer
+
+    @property
+    def size(self) -> int:
+        """Bins of a window."""
+        return self.x.size
+
+    def powers(self, order: int) -> Real:
+        """Return x^p, p = 0 … `order`, shape (s, order + 1)."""
+        return np.asarray(self.x[:, None] ** np.arange(order + 1))
+
+    def view(self, mirrored: Complex, reach: int) -> Complex:
+        """Return the windows of values that `Spectra.mirrored` made, shape (w, s)."""
+        return np.asarray(sliding_window_view(mirrored, self.size)[self.start + reach])
+
+    def without_dc(self) -> Real:
+        """Return 1 for bins that count and 0 at DC, shape (w, s)."""
+        return np.asarray((self.start[:, None] + np.arange(self.size)) != 0, dtype=np.float64)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class LocalFit:
+    """What one local method at one width says at every centre; all of shape (c,).
+
+    Parameters
+    ----------
+    response : complex ndarray
+        G.
+    spread : ndarray
+        Variance of G where the noise of a bin of Y is 1.
+    noise : ndarray
+        Variance of a bin of Y, from the residual over the window.
+    power : ndarray
+        Mean |U|² in the window.
+    prediction_error : ndarray
+        Square of what the fit without a bin misses there.
+    """
+
+    response: Complex
+    spread: Real
+    noise: Real
+    power: Real
+    prediction_error: Real
+
+
+def transform(u: Real, y: Real, fs: float, delay: float) -> Spectra:
+    """Transform a record, the delay taken out.
+
+    Its whole samples go by comparing y(n + k) with u(n), so that no response to the stimulus
+    lies beyond the end of the record; the rest goes by its phase.
+
+    Parameters
+    ----------
+    u, y : ndarray, shape (n,)
+        Input and output.
+    fs : float
+        Hz.
+    delay : float
+        Seconds.
+
+    Examples
+    --------
+    >>> u = np.sin(np.arange(64.0) ** 2 / 50)
+    >>> s = transform(u, np.concatenate((np.zeros(4), u[:-4])), 1.0, 4.0)
+    >>> bool(np.allclose(s.u, s.y))
+    True
+    """
+    # A delay beyond half the record leaves too little; the phase then takes the rest.
+    lag = min(int(np.floor(delay * fs + 1e-9)), u.size // 2)
+    length = u.size - lag
+    count = (length - 1) // 2 + 1  # without the bin at fs/2, which is real
+    frequency = np.asarray(np.arange(count) * (fs / length), dtype=np.float64)
+    spectrum_u = np.array(fft.rfft(u[:length])[:count])
+    spectrum_y = fft.rfft(y[lag:])[:count]
+    spectrum_y = spectrum_y * np.exp(2j * np.pi * frequency * (delay - lag / fs))
+    spectrum_u[0] = spectrum_y[0] = 0.0
+    return Spectra(frequency=frequency, u=spectrum_u, y=spectrum_y)
+
+
+def centres_in_band(low: int, high: int, points: int) -> Integer:
+    """Return the bins to answer at: all from `low` to `high`, or spaced by a constant ratio.
+
+    Examples
+    --------
+    >>> centres_in_band(1, 1000, 4).tolist()
+    [1, 10, 100, 1000]
+    """
+    if high - low + 1 <= points:
+        return np.arange(low, high + 1)
+    return np.unique(np.rint(np.geomspace(low, high, points)).astype(np.int64))
+
+
+def windows_around(centre: Integer, bins: int, width: int) -> Windows:
+    """Return windows of 2 `width` + 1 bins, one for every third of a width where centres are.
+
+    A polynomial or rational function is as good a little off the middle of its window, so one
+    fit answers for all centres within a sixth of the width. At the upper end of the spectrum
+    windows stay inside.
+
+    Parameters
+    ----------
+    centre : integer ndarray, shape (c,)
+        Bins to answer at, increasing, above 0.
+    bins : int
+        Bins of the spectra, DC included.
+    width : int
+        Neighbours on either side.
+
+    Examples
+    --------
+    >>> w = windows_around(np.arange(1, 9), 100, 6)
+    >>> w.start.tolist(), w.near.tolist()
+    ([-5, -3, -1, 1], [0, 0, 1, 1, 2, 2, 3, 3])
+    """
+    stride = max(width // 3, 1)
+    group, near = np.unique((centre - centre[0]) // stride, return_inverse=True)
+    middle = np.minimum(centre[0] + group * stride + (stride - 1) // 2, centre[-1])
+    size = min(2 * width + 1, 2 * bins - 1)
+    start = np.maximum(np.minimum(middle - width, bins - size), 1 - bins)
+    crosses = (start <= 0) & (start + size > 0)
+    return Windows(
+        start=start,
+        x=np.linspace(-1.0, 1.0, size),
+        counted=size - crosses.astype(np.int64),
+        near=near,
+        place=centre - start[near],
+    )

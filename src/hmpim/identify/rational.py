@@ -1,0 +1,208 @@
+"""Local rational functions: around each frequency Y = (B U + T) / A + noise.
+
+B, T and A are polynomials over neighbouring bins: T. McKelvey and G. Guerin, "Nonparametric
+frequency response estimation using a local rational model", SYSID 2012; R. Voorhoeve,
+A. van der Maas and T. Oomen, "Non-parametric identification of multivariable systems: a local
+rational modeling approach", Mech. Syst. Signal Process. 105, 2018. A resonance, which a
+polynomial follows over a few bins only, a rational function of order two follows exactly.
+
+McKelvey and Guerin multiply by A and solve the linear problem, which weighs the noise by A and
+sets it among the regressors; the answer is biased. Here the linear problem only gives the
+start, from an output already smoothed, and Gauss-Newton steps on Y itself lead to the least
+squares of the true residual. The covariance is that of those least squares, the columns of A
+included, so it knows what the denominator costs.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hmpim.identify.neighbours import LocalFit, Spectra, Windows, windows_around
+
+__all__ = ["rational_fits"]
+
+_NUMERATOR = 2
+_TRANSIENT = 3
+_DENOMINATOR = 2
+_NOTHING = 1e-24
+_RIDGE = 1e-13
+
+Complex = NDArray[np.complex128]
+Real = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _State:
+    """An iterate at every window: coefficients, A and the fitted Y on its bins, Σ|residual|²."""
+
+    theta: Complex
+    denominator: Complex
+    fitted: Complex
+    squares: Real
+
+
+def rational_fits(
+    spectra: Spectra,
+    centre: NDArray[np.int64],
+    widths: tuple[int, ...],
+    smooth: Complex,
+) -> list[LocalFit]:
+    """Fit rational functions of order 2/2, with T and without, over windows of each width.
+
+    Parameters
+    ----------
+    spectra : Spectra
+        With the delay taken out.
+    centre : integer ndarray, shape (c,)
+        Bins to answer at.
+    widths : tuple of int
+        Neighbours on either side, each at least 6.
+    smooth : complex ndarray, shape (b,)
+        Y as a first estimate predicts it, nearly free of noise; starts the iteration.
+
+    Returns
+    -------
+    list of LocalFit
+        Two for each width: with T, and without. `prediction_error` is infinite where the
+        iteration came to nothing.
+
+    Examples
+    --------
+    >>> from hmpim.identify.neighbours import transform
+    >>> n = np.arange(400)
+    >>> u, y = np.sin(n**2 / 1000), np.zeros(400)
+    >>> for k in n[2:]:  # poles at 0.9 exp(±0.44 i)
+    ...     y[k] = 1.628 * y[k - 1] - 0.81 * y[k - 2] + u[k]
+    >>> s = transform(u, y, 1.0, 0.0)
+    >>> fit = rational_fits(s, np.arange(20, 40), (16,), s.y)[0]
+    >>> z = np.exp(2j * np.pi * s.frequency[20])
+    >>> bool(abs(fit.response[0] * (1 - 1.628 / z + 0.81 / z**2) - 1) < 1e-3)
+    True
+    """
+    reach = max(widths)
+    mirrored = [spectra.mirrored(v, reach) for v in (spectra.u, spectra.y, smooth)]
+    floor = _NOTHING * float(np.max(np.abs(spectra.u)) ** 2)
+    fits = []
+    for width in widths:
+        windows = windows_around(centre, spectra.u.size, width)
+        u, y, start = (windows.view(v, reach) for v in mirrored)
+        power = np.maximum(np.sum(np.abs(u) ** 2, axis=1) / windows.counted, floor)
+        # Sharp features hide in wide windows, whose start is far off; they are also the fewest.
+        steps = 2 if width < 32 else 4
+        # An iterate may run off to infinity; it is then not taken.
+        with np.errstate(all="ignore"):
+            fits.extend(_fit(windows, u / np.sqrt(power)[:, None], y, start, power, steps))
+    return fits
+
+
+def _fit(
+    windows: Windows, u: Complex, y: Complex, smooth: Complex, power: Real, steps: int
+) -> list[LocalFit]:
+    terms = _NUMERATOR + 1
+    powers = windows.powers(max(_NUMERATOR, _TRANSIENT, _DENOMINATOR))
+    slopes = powers[:, 1 : _DENOMINATOR + 1]
+    b = u[:, :, None] * powers[:, :terms]
+    t = windows.without_dc()[:, :, None] * powers[:, : _TRANSIENT + 1]
+    # Columns of B, then of A, then of T: without T is with the last columns left away.
+    start: Complex = np.concatenate((b, -smooth[:, :, None] * slopes, t), axis=2)
+    left = np.conj(start.swapaxes(1, 2))
+    gram: Complex = left @ start
+    right: Complex = left @ smooth[:, :, None]
+    fits = []
+    for columns in (start.shape[2], terms + _DENOMINATOR):
+        _, theta = _solved(gram[:, :columns, :columns], right[:, :columns])
+        linear: Complex = b if columns == terms + _DENOMINATOR else np.concatenate((b, t), axis=2)
+        fits.append(_iterated(windows, linear, slopes, y, theta, power, steps))
+    return fits
+
+
+def _solved(gram: Complex, right: Complex) -> tuple[Complex, Complex]:
+    """Return inverse, (w, q, q), and solution, (w, q), of equations with scaled columns."""
+    index = np.arange(gram.shape[1])
+    scale = 1.0 / np.sqrt(np.maximum(gram[:, index, index].real, 1e-300))
+    scaled = gram * scale[:, :, None] * scale[:, None, :]
+    scaled[:, index, index] += _RIDGE * gram.shape[1]
+    inverse: Complex = np.asarray(
+        np.linalg.inv(scaled) * scale[:, :, None] * scale[:, None, :], dtype=np.complex128
+    )
+    return inverse, (inverse @ right)[:, :, 0]
+
+
+def _state(linear: Complex, slopes: Real, y: Complex, theta: Complex) -> _State:
+    terms = _NUMERATOR + 1
+    a = slice(terms, terms + _DENOMINATOR)
+    coefficients = np.concatenate((theta[:, :terms], theta[:, a.stop :]), axis=1)
+    denominator = 1.0 + theta[:, a] @ slopes.T
+    fitted = (linear @ coefficients[:, :, None])[:, :, 0] / denominator
+    squares = np.sum(np.abs(y - fitted) ** 2, axis=1)
+    return _State(
+        theta=theta,
+        denominator=denominator,
+        fitted=fitted,
+        squares=np.where(np.isfinite(squares), squares, np.inf),
+    )
+
+
+def _jacobian(linear: Complex, slopes: Real, state: _State) -> Complex:
+    terms = _NUMERATOR + 1
+    rows = np.empty((*linear.shape[:2], linear.shape[2] + _DENOMINATOR), dtype=np.complex128)
+    a = slice(terms, terms + _DENOMINATOR)
+    np.divide(linear[:, :, :terms], state.denominator[:, :, None], out=rows[:, :, :terms])
+    np.divide(linear[:, :, terms:], state.denominator[:, :, None], out=rows[:, :, a.stop :])
+    np.multiply(-(state.fitted / state.denominator)[:, :, None], slopes, out=rows[:, :, a])
+    return rows
+
+
+def _iterated(
+    windows: Windows,
+    linear: Complex,
+    slopes: Real,
+    y: Complex,
+    theta: Complex,
+    power: Real,
+    steps: int,
+) -> LocalFit:
+    """Gauss-Newton from `theta`, each window keeping its best; then read off each centre."""
+    state = _state(linear, slopes, y, theta)
+    for _ in range(steps):
+        rows = _jacobian(linear, slopes, state)
+        left = np.conj(rows.swapaxes(1, 2))
+        inverse, step = _solved(left @ rows, left @ (y - state.fitted)[:, :, None])
+        state = _better(state, _state(linear, slopes, y, state.theta + step))
+    terms, near, place = _NUMERATOR + 1, windows.near, windows.place
+    # The last step was small, so the derivatives before it serve.
+    inverse, row = inverse[near], rows[near, place]
+    x = windows.x[place]
+    a = state.denominator[near, place]
+    size = np.sqrt(power[near])
+    b = x[:, None] ** np.arange(terms)
+    response = np.sum(b * state.theta[near, :terms], axis=1) / a / size
+    slope = np.zeros_like(row)
+    slope[:, :terms] = b / (a * size)[:, None]
+    slope[:, terms : terms + _DENOMINATOR] = -(response / a)[:, None] * slopes[place]
+    spread = np.sum(slope * (inverse @ np.conj(slope)[:, :, None])[:, :, 0], axis=1).real
+    leverage = np.sum(row * (inverse @ np.conj(row)[:, :, None])[:, :, 0], axis=1).real
+    missed = (y - state.fitted)[near, place]
+    squares = np.maximum(state.squares, 1e-15 * np.sum(np.abs(y) ** 2, axis=1))
+    noise = (squares / np.maximum(windows.counted - row.shape[1], 1))[near]
+    error = np.abs(missed / np.maximum(1.0 - leverage, 1e-6)) ** 2
+    failed = ~(np.isfinite(response) & np.isfinite(spread) & np.isfinite(error))
+    return LocalFit(
+        response=np.where(failed, 0.0, response),
+        spread=np.where(failed, 1.0 / power[near], np.maximum(spread, 0.0)),
+        noise=noise,
+        power=power[near],
+        prediction_error=np.where(failed, np.inf, error),
+    )
+
+
+def _better(one: _State, other: _State) -> _State:
+    """Take each window from the iterate that leaves less."""
+    take = other.squares < one.squares
+    return _State(
+        theta=np.where(take[:, None], other.theta, one.theta),
+        denominator=np.where(take[:, None], other.denominator, one.denominator),
+        fitted=np.where(take[:, None], other.fitted, one.fitted),
+        squares=np.where(take, other.squares, one.squares),
+    )
