@@ -17,6 +17,7 @@ __all__ = ["BASE", "ORDER", "Plant", "Step", "build", "mujoco"]
 FloatArray = NDArray[np.float64]
 
 BASE = 3  # joints of the base, in front of the axes
+_NUDGE = 1e-6  # rad and rad/s
 ORDER = np.array([CHAIN.index(axis) for axis in AXES])
 """Where each of `AXES` stands among MuJoCo's five axis joints."""
 
@@ -157,12 +158,22 @@ class Plant:
         position : ndarray, shape (5,)
             Angles of the axes.
         """
-        mj = mujoco()
         data, _ = self.at_rest(position)
+        # A step turns a torque into so small an angle that it needs a nudge of its own size:
+        # what suits angles and rates would drown in the rounding of an axis off its middle.
+        a, _ = self._differences(data, _NUDGE)
+        by_torque, b = self._differences(
+            data, 0.1 * float(self.model.actuator_forcerange[:, 1].min())
+        )
+        torques = 2 * self.model.nv
+        a[:, torques:] = by_torque[:, torques:]
+        return Step(a=a, b=b)
+
+    def _differences(self, data: Any, nudge: float) -> tuple[FloatArray, FloatArray]:
         size = 2 * self.model.nv + self.model.na
         a, b = np.zeros((size, size)), np.zeros((size, self.model.nu))
-        mj.mjd_transitionFD(self.model, data, 1e-6, True, a, b, None, None)
-        return Step(a=a, b=b)
+        mujoco().mjd_transitionFD(self.model, data, nudge, True, a, b, None, None)
+        return a, b
 
 
 @lru_cache(maxsize=32)

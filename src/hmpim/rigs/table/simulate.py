@@ -90,7 +90,7 @@ def simulate(
     resolution: float,
     noise: FloatArray | None,
 ) -> History:
-    """Move the table from rest at the first command.
+    """Move the table from rest, where the first command has long been in force.
 
     Parameters
     ----------
@@ -100,8 +100,8 @@ def simulate(
         For their limits.
     gains : Gains
         Of the servos.
-    command : tuple of ndarray, each shape (n, 5)
-        Position, velocity, acceleration, rad; the first is taken as the place of rest.
+    command : tuple of ndarray, each shape (n + 1, 5)
+        Position, velocity, acceleration, rad; in front the place of rest before time 0.
     mode : {'P', 'PV', 'PVA'}
         Which commands count.
     timing : Timing
@@ -123,13 +123,13 @@ def simulate(
     mj = mujoco()
     model = plant.model
     data, trim = plant.at_rest(command[0][0])
+    count, hold, late = command[0].shape[0] - 1, timing.hold, timing.late
     joint = np.argsort(ORDER)  # from AXES to MuJoCo's order
     r, v, a = (np.ascontiguousarray(c[:, joint]) for c in command)
     stiffness, damping, inertia = gains.position[joint], gains.rate[joint], gains.inertia[joint]
     with_velocity, with_acceleration = feedforward(mode)
     wanted = stiffness * r + with_velocity * v
     push = with_acceleration * a
-    resting = stiffness * r[0]
     limits = [axis.limits.to("rad") for axis in axes]
     rate_limit = RESERVE * np.array([x.velocity for x in limits])[joint]
     acceleration_limit = RESERVE * np.array([x.acceleration for x in limits])[joint]
@@ -139,7 +139,6 @@ def simulate(
     q, qd = data.qpos[BASE:], data.qvel[BASE:]
     control, force = data.ctrl, data.actuator_force
     low_rate, low_acceleration, low_torque = -rate_limit, -acceleration_limit, -torque_limit
-    count, hold, late = r.shape[0], timing.hold, timing.late
     read, at, speed, torque = (np.empty((count, 5)) for _ in range(4))
     advance = mj.mj_step
     started = time.perf_counter()
@@ -154,13 +153,12 @@ def simulate(
             seen = np.rint(seen, out=seen) * resolution
             if i == 0:
                 read[j] = seen
-            m = (tick - late) // hold
-            rate = (wanted[m] if m >= 0 else resting) - stiffness * seen
+            row = max((tick - late) // hold, -1) + 1  # of the command in force
+            rate = wanted[row] - stiffness * seen
             rate = np.minimum(np.maximum(rate, low_rate, out=rate), rate_limit, out=rate)
             rate -= qd
             rate *= damping
-            if m >= 0:
-                rate += push[m]
+            rate += push[row]
             demand = np.maximum(rate, low_acceleration, out=rate)
             demand = np.minimum(demand, acceleration_limit, out=demand)
             demand *= inertia
@@ -175,7 +173,7 @@ def simulate(
     degrees = 180.0 / math.pi
     return History(
         time=np.asarray(np.arange(count) * (hold * timing.tick), dtype=np.float64),
-        command=command[0] * degrees,
+        command=command[0][1:] * degrees,
         encoder=read[:, ORDER] * degrees,
         position=at[:, ORDER] * degrees,
         velocity=speed[:, ORDER] * degrees,

@@ -91,7 +91,7 @@ class MotionTable:
     controller_rate: float = 2000.0
     delay: float = 1e-3
     encoder_resolution: float = 0.003
-    encoder_noise_std: float = 0.001
+    encoder_noise_std: float = 0.0005
     realtime: bool = False
     name: str = "table"
 
@@ -251,10 +251,11 @@ class MotionTable:
         hmpim.errors.LimitsError: peak acceleration 3197.75 deg/s² is beyond the limit ...
         """
         named = _by_axis(stimuli)
+        samples = max(stimulus.samples for stimulus in named.values())
         for axis, stimulus in named.items():
-            check_axis(stimulus, self.limits_of(axis), axis=axis)
+            check_axis(stimulus, self.limits_of(axis), axis=axis, samples=samples)
         time, command = self._command(named)
-        torque = self.plant.torques(*command)
+        torque = self.plant.torques(*command)[1:]
         check_torques(time, torque, self.axes)
         return torque
 
@@ -283,7 +284,7 @@ class MotionTable:
         _, command = self._command(named)
         noise = None
         if self.encoder_noise_std > 0.0:
-            ticks = command[0].shape[0] * timing.hold
+            ticks = (command[0].shape[0] - 1) * timing.hold
             noise = math.radians(self.encoder_noise_std) * rng.standard_normal((ticks, 5))
         return simulate(
             self.plant,
@@ -368,18 +369,21 @@ class MotionTable:
     def _command(
         self, named: Mapping[AxisName, Stimulus]
     ) -> tuple[FloatArray, tuple[FloatArray, FloatArray, FloatArray]]:
-        """Times, and position, velocity, acceleration of all axes in rad, shape (n, 5)."""
+        """Times of n commands, and position, velocity, acceleration of all axes, rad.
+
+        Those have shape (n + 1, 5): in front stands the place of rest before time 0.
+        """
         count = max(stimulus.samples for stimulus in named.values())
-        time = np.arange(count) / _rate(named)
-        position = np.tile(self.start_angles, (count, 1))
-        velocity, acceleration = np.zeros((count, 5)), np.zeros((count, 5))
+        time = np.arange(-1, count) / _rate(named)
+        position = np.tile(self.start_angles, (count + 1, 1))
+        velocity, acceleration = np.zeros((count + 1, 5)), np.zeros((count + 1, 5))
         for axis, stimulus in named.items():
             i, factor = _place(axis), conversion_factor(stimulus.unit, to="rad")
             motion = stimulus.motion(time)
             position[:, i] += factor * motion.position
             velocity[:, i] = factor * motion.velocity
             acceleration[:, i] = factor * motion.acceleration
-        return time, (position, velocity, acceleration)
+        return time[1:], (position, velocity, acceleration)
 
 
 def _place(axis: str) -> int:

@@ -1,0 +1,214 @@
+"""Limits are law: refused before anything moves, and kept by servo, torque and stops."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from hmpim.errors import ArgumentError, LimitsError, RigError, UnitError
+from hmpim.rigs.table import AXES, FIG_4, MotionTable, TablePosition
+from hmpim.rigs.table import table as room
+from hmpim.rigs.table.servo import RESERVE, Gains
+from hmpim.rigs.table.simulate import simulate
+from hmpim.stimulus import Limits, Ramp, Sine, Step, Stimulus, design
+
+pytest.importorskip("mujoco")
+
+RNG = np.random.default_rng(0)
+
+
+def sine(amplitude, frequency, duration=1.0, fs=500.0, unit="deg"):
+    waveform = Sine(amplitude=amplitude, frequency=frequency, duration=duration)
+    return Stimulus(waveform=waveform, fs=fs, unit=unit)
+
+
+@pytest.fixture
+def unmoved(monkeypatch):
+    """Whatever is simulated although it should not be fails the test."""
+
+    def move(*_args, **_kwargs):
+        pytest.fail("the table moved")
+
+    monkeypatch.setattr(room, "simulate", move)
+
+
+@pytest.mark.parametrize(
+    ("axis", "stimulus", "words"),
+    [
+        ("yaw", sine(56.0, 0.5), "peak position 56 deg is beyond the limit 55 deg of yaw"),
+        (
+            "pitch",
+            sine(-121.0, 0.2, duration=2.0),
+            "peak position 121 deg .* limit 120 deg of pitch",
+        ),
+        ("roll", sine(65.0, 2.0), "peak velocity 816.8.. deg/s .* limit 800 deg/s of roll"),
+        ("azimuth", sine(7.2, 2.0), "peak acceleration 1136.98 deg/s² .* 1000 .* azimuth"),
+        ("elevation", sine(1.0, 5.0), "peak acceleration 986.96 deg/s² .* 900 deg/s² of elevation"),
+        ("roll", sine(1.2, 2.0, unit="rad"), "peak velocity 864 deg/s .* 800 deg/s of roll"),
+        (
+            "pitch",
+            Stimulus(waveform=Step(amplitude=1.0, duration=1.0), fs=500.0, unit="deg"),
+            "peak (velocity|acceleration) .* is beyond the limit .* of pitch; ",
+        ),
+    ],
+)
+def test_each_limit_of_fig_4_is_checked_before_anything_moves(unmoved, axis, stimulus, words):
+    with pytest.raises(LimitsError, match=rf"{words}"):
+        MotionTable().play({axis: stimulus}, rng=RNG)
+
+
+def test_travel_counts_from_where_the_axis_starts(unmoved):
+    table = MotionTable(start=TablePosition(yaw=-30.0))
+    with pytest.raises(LimitsError, match="peak position 26 deg is beyond the limit 25 deg of yaw"):
+        table.play({"yaw": sine(26.0, 0.5)}, rng=RNG)
+    with pytest.raises(
+        LimitsError, match=r"leaves 25 deg of travel .* less than the 30 deg wanted"
+    ):
+        table.limits_of("yaw", travel=30.0)
+    with pytest.raises(LimitsError, match="start of yaw = 55 deg leaves 0 deg of travel"):
+        MotionTable(start=TablePosition(yaw=55.0))
+
+
+def test_a_sweep_that_stops_short_while_others_go_on_is_refused(unmoved):
+    short = Stimulus(waveform=Ramp(rate=100.0, duration=0.5), fs=500.0, unit="deg")
+    table = MotionTable()
+    table.check({"roll": short})
+    with pytest.raises(LimitsError, match=r"peak acceleration 50000 deg/s² .* of roll"):
+        table.play({"roll": short, "pitch": sine(1.0, 1.0, duration=2.0)}, rng=RNG)
+
+
+def test_axes_that_keep_their_limits_alone_may_not_together(unmoved):
+    """At yaw 40°, sin 40° of pitch's acceleration is roll's to carry, on top of its own."""
+    table = MotionTable(start=TablePosition(yaw=40.0))
+    roll = sine(0.99 * 33_000 / (40 * math.pi) ** 2, 20.0)
+    pitch = sine(0.99 * 14_000 / (40 * math.pi) ** 2, 20.0)
+    for axis, stimulus in (("roll", roll), ("pitch", pitch)):
+        alone = np.abs(table.check({axis: stimulus})).max(axis=0)
+        assert np.all(alone < [spec.torque_limit for spec in FIG_4])
+    with pytest.raises(LimitsError, match=r"at 0\.\d+ s the motion of all axes .* of roll, beyond"):
+        table.play({"roll": roll, "pitch": pitch}, rng=RNG)
+
+
+def test_predicted_torque_is_what_the_actuators_give():
+    """With all commands sent and a slow motion, the servo gives what inverse dynamics says."""
+    table = MotionTable(
+        mode="PVA", start=TablePosition(yaw=20.0), uut_load="bracket", encoder_noise_std=0.0
+    )
+    # Commanded at each tick: else the torque also follows the stairs of the held commands.
+    shake = {"duration": 2.0, "fs": 2000.0}
+    stimuli = {
+        axis.name: sine(0.3 * axis.limits.acceleration / (4 * math.pi) ** 2, 2.0, **shake)
+        for axis in FIG_4
+    }
+    stimuli["roll"] = sine(50.0, 2.0, **shake)
+    stimuli["pitch"] = sine(12.0, 2.0, **shake)
+    stimuli["yaw"] = sine(20.0, 2.0, **shake)
+    predicted = table.check(stimuli)
+    given = table.simulate(stimuli, rng=RNG).torque
+    late = 3  # ticks: transport, and the actuator
+    for i in range(5):
+        gap = given[2000 + late :, i] - predicted[2000:-late, i]
+        assert np.sqrt(np.mean(gap**2)) < 0.04 * np.sqrt(np.mean(predicted[2000:, i] ** 2))
+
+
+def thrown(axis, angle, seconds=1.0):
+    """The table after a position command that no check would let pass."""
+    table = MotionTable()
+    i = AXES.index(axis)
+    n = round(seconds * 500)
+    command = tuple(np.zeros((n + 1, 5)) for _ in range(3))
+    command[0][2:, i] = math.radians(angle)
+    history = simulate(
+        table.plant,
+        table.axes,
+        table.gains,
+        command=command,
+        mode="P",
+        timing=table.timing(500.0),
+        resolution=math.radians(table.encoder_resolution),
+        noise=None,
+    )
+    return history, FIG_4[i]
+
+
+@pytest.mark.parametrize("axis", AXES)
+def test_servo_keeps_rate_and_torque_on_a_jump(axis):
+    history, spec = thrown(axis, 0.8 * 45.0)
+    rate = np.abs(history.of(axis, "velocity")).max()
+    assert rate < 1.05 * RESERVE * spec.limits.velocity
+    torque = np.abs(history.of(axis, "torque")).max()
+    assert torque <= spec.torque_limit
+    assert torque > 0.9 * spec.torque_limit
+    assert abs(history.of(axis)[-1] - 36.0) < 0.5
+
+
+@pytest.mark.parametrize("axis", ["yaw", "elevation"])
+def test_stops_hold_an_axis_that_is_driven_into_them(axis):
+    history, spec = thrown(axis, 200.0, seconds=1.5)
+    stop = spec.limits.position + spec.stop_margin
+    assert history.of(axis).max() > stop - 0.2
+    assert history.of(axis).max() < stop + 0.5
+    assert abs(history.of(axis)[-1] - stop) < 0.2
+
+
+def test_interlock_opens_when_an_axis_runs_away(monkeypatch):
+    table = MotionTable()
+    wild = Gains(position=table.gains.position, rate=-table.gains.rate, inertia=table.gains.inertia)
+    monkeypatch.setattr(room, "tune", lambda *_args, **_kwargs: wild)
+    with pytest.raises(RigError, match=r"interlock opened at \d\.\d+ s: \w+ turned at"):
+        table.play({"roll": sine(1.0, 2.0)}, rng=RNG)
+
+
+@pytest.mark.parametrize("axis", AXES)
+def test_a_sweep_designed_in_an_axis_is_played(axis):
+    table = MotionTable()
+    limits = table.limits_of(axis, travel=2.0)
+    sweep = design(band=(0.5, 15.0), duration=3.0, fs=500.0, limits=limits, axis=axis)
+    record = table.play(sweep, rng=RNG)
+    assert np.ptp(record.outputs[0].values) > 1.0
+
+
+@pytest.mark.parametrize(
+    ("stimuli", "error", "words"),
+    [
+        ({}, ArgumentError, "no stimulus is given"),
+        ({"nod": sine(1.0, 1.0)}, ArgumentError, "axis 'nod' is not known"),
+        (sine(1.0, 1.0), ArgumentError, "axis '' is not known; use one of"),
+        ({"roll": sine(1.0, 1.0, unit="")}, UnitError, "the stimulus for roll has no unit"),
+        ({"roll": sine(1.0, 1.0, unit="m")}, UnitError, "cannot be turned into"),
+        ({"roll": sine(1.0, 1.0, fs=300.0)}, ArgumentError, "fs = 300 Hz does not divide"),
+        (
+            {"roll": sine(1.0, 1.0), "yaw": sine(1.0, 1.0, fs=1000.0)},
+            ArgumentError,
+            "stimuli have different rates",
+        ),
+    ],
+)
+def test_what_cannot_be_played_is_refused(unmoved, stimuli, error, words):
+    with pytest.raises(error, match=words):
+        MotionTable().play(stimuli, rng=RNG)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "words"),
+    [
+        ({"axes": FIG_4[:4]}, "give the five of"),
+        ({"mode": "VP"}, "mode = 'VP' is not known"),
+        ({"delay": -1.0}, "delay = -1.0 must be 0 or positive"),
+        ({"controller_rate": 0.0}, "controller_rate = 0.0 must be positive"),
+        ({"uut_load": "projector"}, "the uut gimbal carries no load 'projector'"),
+    ],
+)
+def test_what_is_no_table_is_refused(wrong, words):
+    with pytest.raises(ArgumentError, match=words):
+        MotionTable(**wrong)
+
+
+def test_an_axis_needs_all_its_limits():
+    with pytest.raises(ArgumentError, match=r"limits of roll are .* a table needs all three"):
+        replace(FIG_4[0], limits=Limits(position=1.0, unit="deg"))
+    with pytest.raises(ArgumentError, match="bandwidth = -1"):
+        replace(FIG_4[0], bandwidth=-1)
+    with pytest.raises(ArgumentError, match=r"share = 1\.5 must be"):
+        MotionTable().limits_of("roll", share=1.5)
