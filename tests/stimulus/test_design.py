@@ -363,7 +363,7 @@ def test_refusals(wrong, message):
 
 def test_stimulus_beyond_its_limits_is_refused_with_the_factor():
     sweep = Sweep(band=(0.1, 10.0), duration=10.0, gain=37.385 * 2)
-    with pytest.raises(LimitsError, match=r"peak position 20.* scale the waveform by 0.5 "):
+    with pytest.raises(LimitsError, match=r"peak position 20.* scale the waveform by 0.4999 "):
         Stimulus(waveform=sweep, fs=500.0, unit="deg", limits=Limits(position=10.0, unit="deg"))
 
 

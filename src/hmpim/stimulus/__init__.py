@@ -1,27 +1,57 @@
 """Section III: stimuli in closed form, inside limits, sampled for a rig."""
 
 from hmpim.stimulus.classical import Chirp, Ramp, Sine, Step, SumOfSines
+from hmpim.stimulus.command import Command, leave_room
+from hmpim.stimulus.exponential import ExponentialSweep
+from hmpim.stimulus.kinds import KINDS, Kind, design
 from hmpim.stimulus.lead import RestToRest, rest_to_rest
 from hmpim.stimulus.limits import Limits
 from hmpim.stimulus.motion import Motion, Peaks, Waveform
+from hmpim.stimulus.multisine import (
+    Multisine,
+    interleaved_multisines,
+    random_phase_multisine,
+    schroeder_multisine,
+)
 from hmpim.stimulus.peaks import true_peaks
-from hmpim.stimulus.stimulus import Stimulus, design
+from hmpim.stimulus.profile import Prbs, Steps, smooth_prbs, smooth_steps
+from hmpim.stimulus.quintic import Quintic
+from hmpim.stimulus.reverse import Reversed
+from hmpim.stimulus.scale import scale_to_limits
+from hmpim.stimulus.stimulus import Stimulus, blocks
 from hmpim.stimulus.sweep import Sweep
 
 __all__ = [
+    "KINDS",
     "Chirp",
+    "Command",
+    "ExponentialSweep",
+    "Kind",
     "Limits",
     "Motion",
+    "Multisine",
     "Peaks",
+    "Prbs",
+    "Quintic",
     "Ramp",
     "RestToRest",
+    "Reversed",
     "Sine",
     "Step",
+    "Steps",
     "Stimulus",
     "SumOfSines",
     "Sweep",
     "Waveform",
+    "blocks",
     "design",
+    "interleaved_multisines",
+    "leave_room",
+    "random_phase_multisine",
     "rest_to_rest",
+    "scale_to_limits",
+    "schroeder_multisine",
+    "smooth_prbs",
+    "smooth_steps",
     "true_peaks",
 ]

@@ -1,12 +1,12 @@
 """The classical test waveforms of Fig. 5: step, ramp, sine, sum of sines, plain chirp."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from hmpim.errors import ArgumentError
-from hmpim.stimulus.motion import FloatArray, Motion, at_rest_outside
+from hmpim.stimulus.motion import FloatArray, Motion, at_rest_outside, scaled_motion
 from hmpim.stimulus.sweep import Sweep, check_band, check_positive
 
 __all__ = ["Chirp", "Ramp", "Sine", "Step", "SumOfSines"]
@@ -56,12 +56,27 @@ class Step:
         """None: a step excites all frequencies, ever more weakly."""
         return None
 
+    @property
+    def breaks(self) -> tuple[float, ...]:
+        """Time in seconds of the jump."""
+        return (self.start,)
+
+    def scaled(self, factor: float) -> "Step":
+        """Return the same step, `factor` times as large."""
+        return replace(self, amplitude=self.amplitude * factor)
+
     def motion(self, time: FloatArray) -> Motion:
         """Position at `time` (s, shape (n,)); the derivatives are 0 except at the jump."""
         t = np.asarray(time, dtype=np.float64)
         still = np.zeros_like(t)
         position = np.where(t >= self.start, self.amplitude, 0.0)
-        return Motion(time=t, position=position, velocity=still, acceleration=still.copy())
+        return Motion(
+            time=t,
+            position=position,
+            velocity=still,
+            acceleration=still.copy(),
+            jerk=still.copy(),
+        )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -98,6 +113,15 @@ class Ramp:
         """None: a ramp excites all frequencies, ever more weakly."""
         return None
 
+    @property
+    def breaks(self) -> tuple[float, ...]:
+        """Time in seconds at which the velocity jumps."""
+        return (self.start,)
+
+    def scaled(self, factor: float) -> "Ramp":
+        """Return the same ramp, `factor` times as fast."""
+        return replace(self, rate=self.rate * factor)
+
     def motion(self, time: FloatArray) -> Motion:
         """Position, velocity and acceleration at `time` (s, shape (n,))."""
 
@@ -108,6 +132,7 @@ class Ramp:
                 position=self.rate * np.where(moving, t - self.start, 0.0),
                 velocity=np.where(moving, self.rate, 0.0),
                 acceleration=np.zeros_like(t),
+                jerk=np.zeros_like(t),
             )
 
         return at_rest_outside(time, self.duration, inside)
@@ -162,19 +187,30 @@ class SumOfSines:
         """Lowest and highest frequency, Hz."""
         return self.frequencies[0], self.frequencies[-1]
 
+    def scaled(self, factor: float) -> "SumOfSines":
+        """Return the same sum, `factor` times as large."""
+        return replace(self, amplitudes=tuple(factor * A for A in self.amplitudes))
+
     def motion(self, time: FloatArray) -> Motion:
         """Position, velocity and acceleration at `time` (s, shape (n,))."""
         phases = self.phases or (0.0,) * len(self.frequencies)
 
         def inside(t: FloatArray) -> Motion:
-            position, velocity, acceleration = np.zeros_like(t), np.zeros_like(t), np.zeros_like(t)
+            position, velocity, acceleration, jerk = np.zeros((4, *t.shape))
             for A, f, phi in zip(self.amplitudes, self.frequencies, phases, strict=True):
                 omega = 2.0 * math.pi * f
                 sine, cosine = np.sin(omega * t + phi), np.cos(omega * t + phi)
                 position += A * sine
                 velocity += A * omega * cosine
                 acceleration -= A * omega * omega * sine
-            return Motion(time=t, position=position, velocity=velocity, acceleration=acceleration)
+                jerk -= A * omega * omega * omega * cosine
+            return Motion(
+                time=t,
+                position=position,
+                velocity=velocity,
+                acceleration=acceleration,
+                jerk=jerk,
+            )
 
         return at_rest_outside(time, self.duration, inside)
 
@@ -212,6 +248,10 @@ class Sine:
     def band(self) -> tuple[float, float] | None:
         """The one frequency, twice, in Hz."""
         return self.frequency, self.frequency
+
+    def scaled(self, factor: float) -> "Sine":
+        """Return the same sine, `factor` times as large."""
+        return replace(self, amplitude=self.amplitude * factor)
 
     def motion(self, time: FloatArray) -> Motion:
         """Position, velocity and acceleration at `time` (s, shape (n,))."""
@@ -253,14 +293,12 @@ class Chirp:
         object.__setattr__(self, "band", check_band(self.band))
         check_positive("duration", self.duration, "s")
 
+    def scaled(self, factor: float) -> "Chirp":
+        """Return the same chirp, `factor` times as large."""
+        return replace(self, amplitude=self.amplitude * factor)
+
     def motion(self, time: FloatArray) -> Motion:
         """Position (1), velocity (2) and acceleration (3) at `time` (s, shape (n,)), scaled."""
         unit = Sweep(band=self.band, duration=self.duration, gain=1.0, extinction=0.0)
         scale = self.amplitude * (unit.start_omega + 0.5 * unit.sweep_rate)
-        at = unit.motion(time)
-        return Motion(
-            time=at.time,
-            position=scale * at.position,
-            velocity=scale * at.velocity,
-            acceleration=scale * at.acceleration,
-        )
+        return scaled_motion(unit.motion(time), scale)

@@ -9,27 +9,32 @@ extinction and phase.
 Where to join: with extinction the jerk, and for 0 < n < 1 the acceleration (7) too, is
 unbounded as t → 0. Such a sweep is joined a hundredth of a cycle after its start, or at the
 later instant from which its acceleration stays within that of its first full cycle.
-Without extinction it is joined at its start. How long: of all durations the one with the
+Without extinction it is joined at its start. Where the jerk is limited it, too, must stay
+within that of the first full cycle. How long: of all durations the one with the
 least sum of squares of peak position, velocity and acceleration, each relative to the cycle
 the lead adjoins, so a lead is as gentle as its neighbour and excites nothing above the
 band. Should that not fit the limits, the sweep is joined later (up to its first turning
 point) or left earlier (back to its last one), where it stands still for an instant.
+A reversed waveform is led as its original is, mirrored. One that is at rest at 0 at both
+ends, as a binary sequence, needs no lead; time at rest is put around it.
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 
 from hmpim.errors import ArgumentError, LimitsError
 from hmpim.stimulus.limits import Limits, three_digits
-from hmpim.stimulus.motion import FloatArray, Motion, Peaks, Waveform
+from hmpim.stimulus.motion import FloatArray, Motion, Peaks, Piecewise, Scalable, Waveform
 from hmpim.stimulus.peaks import true_peaks
 from hmpim.stimulus.quintic import Quintic, between
+from hmpim.stimulus.reverse import Reversed
 from hmpim.stimulus.sweep import Sweep
 
-__all__ = ["RestToRest", "join_time", "rest_to_rest"]
+__all__ = ["RestToRest", "join_time", "rest_to_rest", "starts_and_ends_at_rest"]
 
 _CHOICES = 64  # durations tried for one lead
 _STEPS = 16  # instants tried for joining or leaving
@@ -79,6 +84,13 @@ class RestToRest:
     @property
     def breaks(self) -> tuple[float, ...]:
         """Times in seconds at which one piece hands over to the next."""
+        within = self.core.breaks if isinstance(self.core, Piecewise) else ()
+        begin, joined, left, end = self._joints
+        inner = (self.sweep_start + t for t in within if self.join < t < self.leave)
+        return (begin, joined, *inner, left, end)
+
+    @property
+    def _joints(self) -> tuple[float, float, float, float]:
         return (
             self.lead_in.start,
             self.sweep_start + self.join,
@@ -86,8 +98,19 @@ class RestToRest:
             self.lead_out.end,
         )
 
+    def scaled(self, factor: float) -> "RestToRest":
+        """Return the same motion, leads included, `factor` times as large."""
+        if not isinstance(self.core, Scalable):
+            raise ArgumentError(f"a {type(self.core).__name__} has no scale to change")
+        return replace(
+            self,
+            core=self.core.scaled(factor),
+            lead_in=self.lead_in.scaled(factor),
+            lead_out=self.lead_out.scaled(factor),
+        )
+
     def motion(self, time: FloatArray) -> Motion:
-        """Position, velocity and acceleration at `time`.
+        """Position, velocity, acceleration and jerk at `time`.
 
         Parameters
         ----------
@@ -104,8 +127,9 @@ class RestToRest:
         True
         """
         t = np.asarray(time, dtype=np.float64)
-        motion = np.zeros((3, *t.shape))
-        begin, joined, left, end = self.breaks
+        motion = np.zeros((4, *t.shape))
+        known = True
+        begin, joined, left, end = self._joints
         for piece, offset, inside in (
             (self.lead_in, 0.0, (t >= begin) & (t < joined)),
             (self.core, self.sweep_start, (t >= joined) & (t <= left)),
@@ -115,10 +139,20 @@ class RestToRest:
             motion[0, inside] = part.position
             motion[1, inside] = part.velocity
             motion[2, inside] = part.acceleration
-        return Motion(time=t, position=motion[0], velocity=motion[1], acceleration=motion[2])
+            if part.jerk is None:
+                known = False
+            else:
+                motion[3, inside] = part.jerk
+        return Motion(
+            time=t,
+            position=motion[0],
+            velocity=motion[1],
+            acceleration=motion[2],
+            jerk=motion[3] if known else None,
+        )
 
 
-def join_time(sweep: Sweep) -> float:
+def join_time(sweep: Sweep, *, jerk: bool = False) -> float:
     """Where a lead may hand over to the sweep: past its singular start.
 
     The first instant from which the acceleration stays within that of the first full
@@ -128,6 +162,8 @@ def join_time(sweep: Sweep) -> float:
     ----------
     sweep : Sweep
         Of at least one cycle.
+    jerk : bool
+        Whether the jerk must stay within that of the first full cycle, too.
 
     Returns
     -------
@@ -144,10 +180,20 @@ def join_time(sweep: Sweep) -> float:
     total = 2.0 * math.pi * sweep.cycles
     quarter = sweep.time_of_phase(0.5 * math.pi)
     around = np.linspace(quarter, sweep.time_of_phase(min(2.5 * math.pi, total)), 512)
-    level = float(np.abs(sweep.motion(around).acceleration).max())
+    names = ("acceleration", "jerk") if jerk else ("acceleration",)
+    most = sweep.motion(around)
+    levels = {name: float(np.abs(getattr(most, name)).max()) for name in names}
+
+    def too_much(time: FloatArray) -> NDArray[np.bool_]:
+        at = sweep.motion(time)
+        over: NDArray[np.bool_] = np.zeros(time.shape, dtype=np.bool_)
+        for name, level in levels.items():
+            over |= np.abs(getattr(at, name)) > level
+        return over
+
     early = quarter * np.concatenate((np.geomspace(1e-12, 1.0, 512), np.linspace(0.01, 1.0, 100)))
     early = np.unique(np.concatenate(([0.0], early)))
-    beyond = np.abs(sweep.motion(early).acceleration) > level
+    beyond = too_much(early)
     earliest = 0.0 if sweep.extinction == 0.0 else sweep.time_of_phase(0.02 * math.pi)
     if not beyond.any():
         return earliest
@@ -155,7 +201,7 @@ def join_time(sweep: Sweep) -> float:
     low, high = float(early[last]), float(early[min(last + 1, early.size - 1)])
     while high - low > 1e-9 * quarter:
         middle = 0.5 * (low + high)
-        over = abs(float(sweep.motion(np.array([middle])).acceleration[0])) > level
+        over = bool(too_much(np.array([middle]))[0])
         low, high = (middle, high) if over else (low, middle)
     return max(high, earliest)
 
@@ -195,7 +241,12 @@ def rest_to_rest(
     >>> led.join, led.leave
     (0.0, 10.0)
     """
-    joins, leaves, first, last = _handovers(core)
+    if starts_and_ends_at_rest(core):
+        return _waiting(core, 0.0 if math.isinf(longest) else longest, fs)
+    if isinstance(core, Reversed):
+        forward = rest_to_rest(core.waveform, limits=limits, fs=fs, longest=longest)
+        return _mirrored(forward, fs)
+    joins, leaves, first, last = _handovers(core, jerk=math.isfinite(limits.jerk))
     start_peaks = true_peaks(core, start=joins[0], stop=first)
     end_peaks = true_peaks(core, start=last, stop=leaves[0])
     rest = np.zeros(3)
@@ -236,6 +287,54 @@ def rest_to_rest(
     )
 
 
+def starts_and_ends_at_rest(core: Waveform) -> bool:
+    """Whether a waveform needs no lead: at rest at position 0 at both ends.
+
+    Examples
+    --------
+    >>> from hmpim.stimulus.profile import Steps
+    >>> starts_and_ends_at_rest(Steps(levels=(1.0, 0.0), hold=1.0, rise=0.5))
+    True
+    """
+    return not any(_state(core, end).any() for end in (0.0, core.duration))
+
+
+def _waiting(core: Waveform, wait: float, fs: float) -> RestToRest:
+    """Time at rest around what starts and ends at rest."""
+    begin = math.ceil(wait * fs - 1e-9) / fs
+    rest = (0.0,) * 6
+    return RestToRest(
+        core=core,
+        sweep_start=begin,
+        join=0.0,
+        leave=core.duration,
+        lead_in=Quintic(start=0.0, duration=begin, coefficients=rest),
+        lead_out=Quintic(start=begin + core.duration, duration=wait, coefficients=rest),
+        duration=(math.ceil((begin + core.duration + wait) * fs - 1e-9) + 1) / fs,
+    )
+
+
+def _mirrored(forward: RestToRest, fs: float) -> RestToRest:
+    """The same leads around the reversed core, last first."""
+    core = Reversed(waveform=forward.core)
+    length = core.duration
+    after = forward.duration - 1.0 / fs - forward.sweep_start - length
+    begin = math.ceil(after * fs - 1e-9) / fs
+    join, leave = length - forward.leave, length - forward.join
+    rest = np.zeros(3)
+    into, out = forward.lead_out.duration, forward.lead_in.duration
+    end = begin + length + forward.sweep_start
+    return RestToRest(
+        core=core,
+        sweep_start=begin,
+        join=join,
+        leave=leave,
+        lead_in=between(rest, _state(core, join), start=begin + join - into, duration=into),
+        lead_out=between(_state(core, leave), rest, start=begin + leave, duration=out),
+        duration=(math.ceil(end * fs - 1e-9) + 1) / fs,
+    )
+
+
 def _no_lead(core: Waveform, which: str, limits: Limits, longest: float, fs: float) -> str:
     if math.isinf(longest):
         return (
@@ -260,12 +359,12 @@ def _state(waveform: Waveform, time: float) -> FloatArray:
     return np.array([at.position[0], at.velocity[0], at.acceleration[0]])
 
 
-def _handovers(core: Waveform) -> tuple[FloatArray, FloatArray, float, float]:
+def _handovers(core: Waveform, *, jerk: bool) -> tuple[FloatArray, FloatArray, float, float]:
     """Instants to join and to leave, best first, and the spans that a lead is compared with."""
     T = core.duration
     if isinstance(core, Sweep):
         total = 2.0 * math.pi * core.cycles
-        earliest = join_time(core)
+        earliest = join_time(core, jerk=jerk)
         first = core.time_of_phase(min(2.5 * math.pi, total))
         last = core.time_of_phase(max(total - 2.0 * math.pi, 0.0))
     elif core.band is None:

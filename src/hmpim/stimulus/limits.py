@@ -1,4 +1,4 @@
-"""What an axis may do (Fig. 3): bounds on position, velocity and acceleration."""
+"""What an axis may do (Fig. 3): bounds on position, velocity, acceleration and jerk."""
 
 import math
 from dataclasses import dataclass
@@ -7,7 +7,9 @@ from hmpim.errors import ArgumentError
 from hmpim.stimulus.motion import Peaks
 from hmpim.units import check_unit, conversion_factor, rate_unit
 
-__all__ = ["Limits", "three_digits"]
+__all__ = ["QUANTITIES", "Limits", "three_digits"]
+
+QUANTITIES = ("position", "velocity", "acceleration", "jerk")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -16,8 +18,8 @@ class Limits:
 
     Parameters
     ----------
-    position, velocity, acceleration : float
-        In `unit`, `unit`/s and `unit`/s². Infinite where nothing bounds.
+    position, velocity, acceleration, jerk : float
+        In `unit`, `unit`/s, `unit`/s² and `unit`/s³. Infinite where nothing bounds.
     unit : str
         Unit of the position; empty for none.
 
@@ -38,11 +40,12 @@ class Limits:
     position: float = math.inf
     velocity: float = math.inf
     acceleration: float = math.inf
+    jerk: float = math.inf
     unit: str = ""
 
     def __post_init__(self) -> None:
         check_unit(self.unit)
-        for order, name in enumerate(("position", "velocity", "acceleration")):
+        for order, name in enumerate(QUANTITIES):
             given = getattr(self, name)
             try:
                 value = float(given)
@@ -74,6 +77,7 @@ class Limits:
             position=self.position * factor,
             velocity=self.velocity * factor,
             acceleration=self.acceleration * factor,
+            jerk=self.jerk * factor,
             unit=unit,
         )
 
@@ -85,11 +89,12 @@ class Limits:
         >>> Limits(velocity=4.0).use(Peaks(position=9.0, velocity=1.0, acceleration=9.0))
         0.25
         """
-        return max(
-            peaks.position / self.position,
-            peaks.velocity / self.velocity,
-            peaks.acceleration / self.acceleration,
-        )
+        shares = [0.0]
+        for name in QUANTITIES:
+            limit: float = getattr(self, name)
+            if math.isfinite(limit):  # what has no limit may be infinite
+                shares.append(getattr(peaks, name) / limit)
+        return max(shares)
 
 
 def three_digits(value: float, *, up: bool) -> str:

@@ -1,20 +1,30 @@
-"""What every stimulus is made of: a closed form of position, velocity and acceleration."""
+"""What every stimulus is made of: position and its derivatives in closed form."""
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol, runtime_checkable
+from typing import Protocol, Self, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["FloatArray", "Motion", "Peaks", "Piecewise", "Waveform", "at_rest_outside"]
+__all__ = [
+    "FloatArray",
+    "Motion",
+    "Peaks",
+    "Piecewise",
+    "Scalable",
+    "Waveform",
+    "at_rest_outside",
+    "scaled_motion",
+]
 
 FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Motion:
-    """Position and its two derivatives at given times.
+    """Position and its derivatives at given times.
 
     Parameters
     ----------
@@ -22,21 +32,29 @@ class Motion:
         Seconds.
     position, velocity, acceleration : ndarray, shape (n,)
         In the stimulus's unit, that unit per second, and per second squared.
+    jerk : ndarray, shape (n,), or None
+        The third derivative, unit per second cubed; None where the waveform does not give it.
     """
 
     time: FloatArray
     position: FloatArray
     velocity: FloatArray
     acceleration: FloatArray
+    jerk: FloatArray | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Peaks:
-    """Largest magnitudes of position, velocity and acceleration, between samples too."""
+    """Largest magnitudes of position and its derivatives, between samples too.
+
+    Infinite after a jump: the velocity of a step, the jerk where the acceleration jumps. The
+    jerk is infinite also where a waveform does not give it.
+    """
 
     position: float
     velocity: float
     acceleration: float
+    jerk: float = math.inf
 
 
 class Waveform(Protocol):
@@ -71,6 +89,35 @@ class Piecewise(Protocol):
         ...
 
 
+@runtime_checkable
+class Scalable(Protocol):
+    """A waveform that can be made larger or smaller, all derivatives with it."""
+
+    def scaled(self, factor: float) -> Self:
+        """Return the same waveform, `factor` times as large."""
+        ...
+
+
+def scaled_motion(motion: Motion, factor: float) -> Motion:
+    """Return a motion `factor` times as large.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> one = np.ones(1)
+    >>> moved = Motion(time=one, position=one, velocity=one, acceleration=one)
+    >>> scaled_motion(moved, 3.0).velocity.tolist()
+    [3.0]
+    """
+    return Motion(
+        time=motion.time,
+        position=factor * motion.position,
+        velocity=factor * motion.velocity,
+        acceleration=factor * motion.acceleration,
+        jerk=None if motion.jerk is None else factor * motion.jerk,
+    )
+
+
 def at_rest_outside(
     time: FloatArray, duration: float, formula: Callable[[FloatArray], Motion]
 ) -> Motion:
@@ -101,4 +148,5 @@ def at_rest_outside(
         position=at.position,
         velocity=np.where(inside, at.velocity, 0.0),
         acceleration=np.where(inside, at.acceleration, 0.0),
+        jerk=None if at.jerk is None else np.where(inside, at.jerk, 0.0),
     )

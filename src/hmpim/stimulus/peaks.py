@@ -1,5 +1,6 @@
 """The true peaks of a waveform: every cycle is resolved, then each peak is closed in upon."""
 
+import math
 from itertools import pairwise
 
 import numpy as np
@@ -12,14 +13,18 @@ _POINTS_PER_CYCLE = 24
 _NEAR = 0.97  # a dense sample below this share of the largest cannot hide the true peak
 _BLOCK = 1 << 17
 _ROUNDS = 8  # each makes the bracket 4 times narrower
+_JUMP = 1e-6  # of the peak; less than this between two sides of an instant is rounding
 
 
-def true_peaks(waveform: Waveform, *, start: float = 0.0, stop: float | None = None) -> Peaks:
-    """Largest |position|, |velocity| and |acceleration| on [start, stop].
+def true_peaks(
+    waveform: Waveform, *, start: float = 0.0, stop: float | None = None, jerk: bool = True
+) -> Peaks:
+    """Largest |position|, |velocity|, |acceleration| and |jerk| on [start, stop].
 
     The waveform is evaluated densely (24 points for each cycle of its highest frequency,
     and geometrically towards the start, where a sweep with extinction turns sharply);
-    each grid maximum near the largest is then enclosed ever more tightly.
+    each grid maximum near the largest is then enclosed ever more tightly. Where one piece
+    hands over to the next both sides count, and what jumps makes its derivatives infinite.
 
     Parameters
     ----------
@@ -27,6 +32,8 @@ def true_peaks(waveform: Waveform, *, start: float = 0.0, stop: float | None = N
         Any motion in closed form.
     start, stop : float
         Span in seconds; the whole waveform by default.
+    jerk : bool
+        Whether the jerk is wanted; without it is infinite, that is, not known.
 
     Returns
     -------
@@ -42,12 +49,14 @@ def true_peaks(waveform: Waveform, *, start: float = 0.0, stop: float | None = N
     """
     end = waveform.duration if stop is None else stop
     grid = _grid(waveform, start, end)
-    brackets: list[list[FloatArray]] = [[], [], []]
-    coarse = np.zeros(3)
+    known = jerk and waveform.motion(grid[:1]).jerk is not None
+    orders = 4 if known else 3
+    brackets: list[list[FloatArray]] = [[] for _ in range(orders)]
+    coarse = np.zeros(orders)
     # blocks overlap by one point on each side, so that every interior point has neighbours
     for first in range(0, grid.size, _BLOCK):
         block = grid[max(first - 1, 0) : first + _BLOCK + 1]
-        for k, size in enumerate(_magnitudes(waveform.motion(block))):
+        for k, size in enumerate(_magnitudes(waveform.motion(block))[:orders]):
             coarse[k] = max(coarse[k], float(size.max()))
             near = size >= _NEAR * coarse[k]
             left = np.concatenate(([True], size[1:] >= size[:-1]))
@@ -56,9 +65,14 @@ def true_peaks(waveform: Waveform, *, start: float = 0.0, stop: float | None = N
             low, high = np.maximum(at - 1, 0), np.minimum(at + 1, block.size - 1)
             brackets[k].append(np.stack((size[at], block[low], block[high])))
     found = [
-        _closed_in(waveform, k, np.concatenate(brackets[k], axis=1), coarse[k]) for k in range(3)
+        _closed_in(waveform, k, np.concatenate(brackets[k], axis=1), coarse[k])
+        for k in range(orders)
     ]
-    return Peaks(position=found[0], velocity=found[1], acceleration=found[2])
+    jumping = _first_jump(waveform, found, start, end)
+    found += [math.inf] * (4 - orders)
+    found[jumping + 1 :] = [math.inf] * (3 - jumping)
+    x, v, a, j = found
+    return Peaks(position=x, velocity=v, acceleration=a, jerk=j)
 
 
 def _closed_in(waveform: Waveform, order: int, brackets: FloatArray, coarse: float) -> float:
@@ -78,8 +92,32 @@ def _closed_in(waveform: Waveform, order: int, brackets: FloatArray, coarse: flo
     return float(best)
 
 
-def _magnitudes(motion: Motion) -> tuple[FloatArray, FloatArray, FloatArray]:
-    return np.abs(motion.position), np.abs(motion.velocity), np.abs(motion.acceleration)
+def _magnitudes(motion: Motion) -> list[FloatArray]:
+    known = [motion.position, motion.velocity, motion.acceleration]
+    if motion.jerk is not None:
+        known.append(motion.jerk)
+    return [np.abs(values) for values in known]
+
+
+def _first_jump(waveform: Waveform, peaks: list[float], start: float, stop: float) -> int:
+    """Lowest derivative that jumps at a break, 3 if none below the jerk does.
+
+    At the ends only a jump of the position counts: that a printed waveform starts with its
+    velocity is known, and a stimulus with a lead does not.
+    """
+    if not isinstance(waveform, Piecewise):
+        return 3
+    at = np.array([t for t in waveform.breaks if start <= t <= stop])
+    if at.size == 0:
+        return 3
+    inside = (at > 0.0) & (at < waveform.duration)
+    before = waveform.motion(np.nextafter(at, -np.inf))
+    after = waveform.motion(np.nextafter(at, np.inf))
+    for order, name in enumerate(("position", "velocity", "acceleration")):
+        size = np.abs(getattr(after, name) - getattr(before, name))
+        if np.any(size[inside | (order == 0)] > _JUMP * peaks[order]):
+            return order
+    return 3
 
 
 def _grid(waveform: Waveform, start: float, stop: float) -> FloatArray:
@@ -89,6 +127,6 @@ def _grid(waveform: Waveform, start: float, stop: float) -> FloatArray:
     parts = [np.linspace(start, stop, count), start + span * np.geomspace(1e-9, 1.0, 256)]
     if isinstance(waveform, Piecewise):
         knots = np.array([t for t in waveform.breaks if start < t < stop])
-        parts.append(knots)
+        parts += [knots, np.nextafter(knots, -np.inf), np.nextafter(knots, np.inf)]
         parts += [np.linspace(a, b, 64) for a, b in pairwise(knots) if b - a < 0.2 * span]
     return np.unique(np.clip(np.concatenate(parts), start, stop))

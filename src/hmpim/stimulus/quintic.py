@@ -1,6 +1,6 @@
 """A polynomial of fifth degree from one state of motion to another."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -30,8 +30,12 @@ class Quintic:
         """Time in seconds at which it ends."""
         return self.start + self.duration
 
+    def scaled(self, factor: float) -> "Quintic":
+        """Return the same curve, `factor` times as large."""
+        return replace(self, coefficients=tuple(factor * c for c in self.coefficients))
+
     def motion(self, time: FloatArray) -> Motion:
-        """Position, velocity and acceleration at `time` (s, shape (n,)), the formula only.
+        """Position, velocity, acceleration, jerk at `time` (s, shape (n,)), the formula only.
 
         Examples
         --------
@@ -50,6 +54,7 @@ class Quintic:
             position=position,
             velocity=velocity / self.duration,
             acceleration=acceleration / self.duration**2,
+            jerk=(6 * c3 + s * (24 * c4 + s * 60 * c5)) / self.duration**3,
         )
 
     @property
@@ -57,7 +62,7 @@ class Quintic:
         """True peaks, from the roots of the derivatives."""
         c = np.array(self.coefficients)
         largest = []
-        for order in range(3):
+        for order in range(4):
             p = np.polynomial.polynomial.polyder(c, order) if order else c
             slope = np.trim_zeros(np.polynomial.polynomial.polyder(p), "b")
             roots = np.polynomial.polynomial.polyroots(slope) if slope.size > 1 else np.empty(0)
@@ -65,7 +70,8 @@ class Quintic:
             at = np.concatenate(([0.0, 1.0], np.clip(roots.real, 0.0, 1.0)))
             size = np.abs(np.polynomial.polynomial.polyval(at, p)).max()
             largest.append(float(size) / self.duration**order)
-        return Peaks(position=largest[0], velocity=largest[1], acceleration=largest[2])
+        x, v, a, j = largest
+        return Peaks(position=x, velocity=v, acceleration=a, jerk=j)
 
 
 def between(first: FloatArray, last: FloatArray, *, start: float, duration: float) -> Quintic:

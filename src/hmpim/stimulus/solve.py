@@ -1,36 +1,47 @@
 """Gain and extinction that keep the limits: amplitude first, then the smallest n (Fig. 3)."""
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import TypeVar
 
 import numpy as np
 from scipy.optimize import minimize_scalar
 
 from hmpim.errors import LimitsError
+from hmpim.stimulus.exponential import ExponentialSweep
 from hmpim.stimulus.lead import join_time
-from hmpim.stimulus.limits import Limits, three_digits
+from hmpim.stimulus.limits import QUANTITIES, Limits, three_digits
 from hmpim.stimulus.motion import Peaks
 from hmpim.stimulus.peaks import true_peaks
+from hmpim.stimulus.scale import KEEP
 from hmpim.stimulus.sweep import Sweep
 from hmpim.units import rate_unit
 
 __all__ = ["largest_gain", "smallest_extinction", "sweep_peaks"]
 
 STEP = 0.001  # extinction is solved to this
-LARGEST = 2.0  # from here on the acceleration falls along the sweep, so more n buys nothing
-_KEEP = 1.0 - 1e-9  # rounding must not carry a sample over a limit
+# from here on the acceleration (or the jerk) falls along the sweep, so more n buys nothing
+LARGEST = 2.0
+LARGEST_WITH_JERK = 3.0
+
+AnySweep = Sweep | ExponentialSweep
+S = TypeVar("S", Sweep, ExponentialSweep)
 
 
-def sweep_peaks(sweep: Sweep, *, start: float | None) -> Peaks:
+def sweep_peaks(sweep: AnySweep, *, start: float | None, jerk: bool = True) -> Peaks:
     """True peaks of a sweep, its singular instant left out.
 
     Parameters
     ----------
-    sweep : Sweep
+    sweep : Sweep or ExponentialSweep
         Any.
     start : float or None
         From where on, in seconds: the first sample after 0 for the printed waveform, which
         for 0 < n < 1 is unbounded before; None for where a lead joins.
+    jerk : bool
+        Whether the jerk is wanted. That of the printed waveform, which starts with a velocity
+        step, is infinite in any case.
 
     Examples
     --------
@@ -39,10 +50,11 @@ def sweep_peaks(sweep: Sweep, *, start: float | None) -> Peaks:
     10.0
     """
     if start is None:
-        return true_peaks(sweep, start=join_time(sweep))
-    if not 0.0 < sweep.extinction < 1.0:
-        return true_peaks(sweep)
-    peaks = true_peaks(sweep, start=start)
+        joined = join_time(sweep, jerk=jerk) if isinstance(sweep, Sweep) else 0.0
+        return true_peaks(sweep, start=joined, jerk=jerk)
+    if isinstance(sweep, ExponentialSweep) or not 0.0 < sweep.extinction < 1.0:
+        return replace(true_peaks(sweep, jerk=False), jerk=math.inf)
+    peaks = true_peaks(sweep, start=start, jerk=False)
     at = sweep.motion(np.zeros(1))
     return Peaks(
         position=peaks.position,
@@ -55,33 +67,28 @@ def sweep_peaks(sweep: Sweep, *, start: float | None) -> Peaks:
 class _Search:
     """The sweeps of one band and duration, over n, held against limits."""
 
-    band: tuple[float, float]
-    duration: float
+    make: Callable[[float], AnySweep]
     limits: Limits
     start: float | None
 
     def peaks(self, n: float) -> Peaks:
         """Peaks at gain 1."""
-        unit = Sweep(band=self.band, duration=self.duration, gain=1.0, extinction=n)
-        return sweep_peaks(unit, start=self.start)
+        return sweep_peaks(self.make(n), start=self.start, jerk=math.isfinite(self.limits.jerk))
 
     def excess(self, n: float) -> float:
-        """Log of rate's or acceleration's share of its limit with the amplitude at its limit."""
+        """Log of the largest share of a derivative's limit, the amplitude being at its limit."""
         peaks = self.peaks(n)
-        gain = _KEEP * self.limits.position / peaks.position
-        share = gain * max(
-            peaks.velocity / self.limits.velocity,
-            peaks.acceleration / self.limits.acceleration,
-        )
+        gain = KEEP * self.limits.position / peaks.position
+        share = gain * replace(self.limits, position=math.inf).use(peaks)
         return math.log(share) if share > 0.0 else -math.inf
 
 
-def largest_gain(sweep: Sweep, limits: Limits, *, start: float | None) -> Sweep:
+def largest_gain(sweep: S, limits: Limits, *, start: float | None) -> S:
     """The same sweep with the largest gain that keeps all limits.
 
     Parameters
     ----------
-    sweep : Sweep
+    sweep : Sweep or ExponentialSweep
         Its gain is ignored.
     limits : Limits
         At least one of them finite.
@@ -94,21 +101,20 @@ def largest_gain(sweep: Sweep, limits: Limits, *, start: float | None) -> Sweep:
     >>> round(largest_gain(unit, Limits(position=10.0), start=None).gain, 2)
     37.38
     """
-    use = limits.use(sweep_peaks(replace(sweep, gain=1.0), start=start))
-    return replace(sweep, gain=_KEEP / use)
+    unit = replace(sweep, gain=1.0)
+    use = limits.use(sweep_peaks(unit, start=start, jerk=math.isfinite(limits.jerk)))
+    return replace(sweep, gain=KEEP / use)
 
 
 def smallest_extinction(
-    band: tuple[float, float], duration: float, limits: Limits, *, start: float | None
+    make: Callable[[float], AnySweep], limits: Limits, *, start: float | None
 ) -> float:
-    """Smallest n, to 0.001, with which rate and acceleration fit at the full amplitude.
+    """Smallest n, to 0.001, with which all derivatives fit at the full amplitude.
 
     Parameters
     ----------
-    band : tuple of float
-        Hz.
-    duration : float
-        Seconds.
+    make : callable
+        The sweep of gain 1 with a given n.
     limits : Limits
         Position reached first, as the paper does; without a position limit n is 0.
     start : float or None
@@ -117,18 +123,20 @@ def smallest_extinction(
     Raises
     ------
     LimitsError
-        If no n up to 2 does; the message says which limits would.
+        If no n up to 2 (3 where the jerk is limited) does; the message says which limits would.
 
     Examples
     --------
     >>> limits = Limits(position=10, velocity=1000, acceleration=40000)
-    >>> smallest_extinction((0.1, 10.0), 10.0, limits, start=None)
+    >>> make = lambda n: Sweep(band=(0.1, 10.0), duration=10.0, extinction=n)
+    >>> smallest_extinction(make, limits, start=None)
     0.0
     """
     if math.isinf(limits.position):
         return 0.0
-    search = _Search(band=band, duration=duration, limits=limits, start=start)
-    grid = np.linspace(0.0, LARGEST, 41)
+    search = _Search(make=make, limits=limits, start=start)
+    largest = LARGEST if math.isinf(limits.jerk) else LARGEST_WITH_JERK
+    grid = np.linspace(0.0, largest, round(20 * largest) + 1)
     values: list[float] = []
     for k, n in enumerate(grid):
         values.append(search.excess(float(n)))
@@ -165,15 +173,15 @@ def _what_would_do(search: _Search, n: float) -> str:
     position = limits.position * math.exp(-search.excess(n))
     peaks = search.peaks(n)
     gain = limits.position / peaks.position
-    velocity, acceleration = gain * peaks.velocity, gain * peaks.acceleration
     needs = []
-    if velocity > limits.velocity:
-        needs.append(_need(velocity, limits.velocity, rate_unit(unit, 1)))
-    if acceleration > limits.acceleration:
-        needs.append(_need(acceleration, limits.acceleration, rate_unit(unit, 2)))
+    for order, name in enumerate(QUANTITIES[1:], start=1):
+        peak, limit = gain * getattr(peaks, name), getattr(limits, name)
+        if math.isfinite(limit) and peak > limit:
+            needs.append(_need(peak, limit, rate_unit(unit, order)))
+    sweep = search.make(n)
     return (
-        f"limits are too tight for {search.band[0]:g} to {search.band[1]:g} Hz in "
-        f"{search.duration:g} s: the amplitude {limits.position:g}{gap}{unit} needs at least "
+        f"limits are too tight for {sweep.band[0]:g} to {sweep.band[1]:g} Hz in "
+        f"{sweep.duration:g} s: the amplitude {limits.position:g}{gap}{unit} needs at least "
         f"{' and '.join(needs)}; allow that, or lower the position limit to "
         f"{three_digits(position, up=False)}{gap}{unit}"
     )

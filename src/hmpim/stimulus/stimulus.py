@@ -1,23 +1,24 @@
-"""A stimulus: a waveform sampled for a rig, inside its limits, and how one is designed."""
+"""A stimulus: a waveform sampled for a rig, inside its limits."""
 
 import math
-from dataclasses import dataclass, field
-from typing import Literal
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from hmpim.errors import ArgumentError, LimitsError
-from hmpim.stimulus.lead import RestToRest, rest_to_rest
-from hmpim.stimulus.limits import Limits, three_digits
+from hmpim.stimulus.command import Command, check_resolution, difference_peaks, rounded
+from hmpim.stimulus.exponential import ExponentialSweep
+from hmpim.stimulus.lead import RestToRest
+from hmpim.stimulus.limits import QUANTITIES, Limits
 from hmpim.stimulus.motion import FloatArray, Motion, Peaks, Waveform
 from hmpim.stimulus.peaks import true_peaks
-from hmpim.stimulus.solve import largest_gain, smallest_extinction, sweep_peaks
-from hmpim.stimulus.sweep import Sweep, check_band, check_positive
+from hmpim.stimulus.reverse import Reversed
+from hmpim.stimulus.solve import sweep_peaks
+from hmpim.stimulus.sweep import Sweep, check_positive
 from hmpim.units import check_unit, rate_unit
 
-__all__ = ["Stimulus", "design"]
-
-_SETTLING = 0.5  # seconds at rest that a led stimulus appends, so that a late response is caught
+__all__ = ["Stimulus", "blocks"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -38,6 +39,9 @@ class Stimulus:
         Which axis it is for, where there are several.
     tail : float
         Seconds at rest appended after the waveform.
+    resolution : float
+        Step that the rig rounds its position commands to; 0 for none. The limits must then
+        hold for the rounded commands, too.
 
     Attributes
     ----------
@@ -45,14 +49,17 @@ class Stimulus:
         Samples at k/fs, read only.
     peaks : Peaks
         True peaks, between the samples too. Where the printed sweep is singular
-        (0 < n < 1, no lead) the span between sample 0 and sample 1 is left out.
+        (0 < n < 1, no lead) the span between sample 0 and sample 1 is left out. Of a
+        jump it is the difference over one sampling interval, as commanded; any limit on a
+        derivative of what jumps refuses it. A waveform without leads begins and ends with a
+        velocity step: its jerk is infinite.
 
     Raises
     ------
     LimitsError
-        If the waveform goes beyond the limits.
+        If the waveform, or what is commanded of it, goes beyond the limits.
     ArgumentError
-        If `fs` or `tail` is out of range.
+        If `fs`, `tail` or `resolution` is out of range.
 
     Examples
     --------
@@ -68,6 +75,7 @@ class Stimulus:
     limits: Limits | None = None
     axis: str = ""
     tail: float = 0.0
+    resolution: float = 0.0
     time: FloatArray = field(init=False, repr=False)
     position: FloatArray = field(init=False, repr=False)
     velocity: FloatArray = field(init=False, repr=False)
@@ -79,21 +87,20 @@ class Stimulus:
         check_unit(self.unit)
         if not (math.isfinite(self.tail) and self.tail >= 0.0):
             raise ArgumentError(f"tail = {self.tail!r} s must be 0 or a positive, finite time")
-        count = math.ceil(self.duration * fs - 1e-6)
-        motion = self.waveform.motion(np.arange(count) / fs)
+        object.__setattr__(self, "resolution", check_resolution(self.resolution))
+        motion = self.waveform.motion(np.arange(_count(self.duration, fs)) / fs)
         for name in ("time", "position", "velocity", "acceleration"):
             samples: FloatArray = getattr(motion, name)
             samples.setflags(write=False)
             object.__setattr__(self, name, samples)
-        if isinstance(self.waveform, Sweep):
-            peaks = sweep_peaks(self.waveform, start=1.0 / fs)
-        else:
-            peaks = true_peaks(self.waveform)
-        object.__setattr__(self, "peaks", peaks)
+        peaks = _peaks(self.waveform, fs)
+        object.__setattr__(self, "peaks", _as_commanded(peaks, self.waveform, self.position, fs))
         if self.limits is not None:
             limits = self.limits.to(self.unit)
             object.__setattr__(self, "limits", limits)
             _keep(peaks, limits)
+            if self.resolution > 0.0:
+                self.commanded()
 
     @property
     def duration(self) -> float:
@@ -128,15 +135,17 @@ class Stimulus:
     @property
     def gain(self) -> float | None:
         """G of the sweep inside, None where there is none."""
-        return self.core.gain if isinstance(self.core, Sweep) else None
+        sweep = _unreversed(self.core)
+        return sweep.gain if isinstance(sweep, Sweep | ExponentialSweep) else None
 
     @property
     def extinction(self) -> float | None:
         """Extinction factor n of the sweep inside, None where there is none."""
-        return self.core.extinction if isinstance(self.core, Sweep) else None
+        sweep = _unreversed(self.core)
+        return sweep.extinction if isinstance(sweep, Sweep | ExponentialSweep) else None
 
     def motion(self, time: FloatArray) -> Motion:
-        """Position, velocity and acceleration at any times (s, shape (n,)).
+        """Position and its derivatives at any times (s, shape (n,)).
 
         Examples
         --------
@@ -147,121 +156,135 @@ class Stimulus:
         """
         return self.waveform.motion(time)
 
+    def commanded(self, *, resolution: float | None = None, fs: float | None = None) -> Command:
+        """Position commands as they are really sent, checked against the limits once more.
 
-def _keep(peaks: Peaks, limits: Limits) -> None:
-    for order, name in enumerate(("position", "velocity", "acceleration")):
-        peak, limit = getattr(peaks, name), getattr(limits, name)
-        if peak > limit * (1.0 + 1e-9):
-            unit = rate_unit(limits.unit, order)
-            bound = f"{limit:g} {unit}".rstrip()
-            raise LimitsError(
-                f"peak {name} {peak:.6g} is beyond the limit {bound}; "
-                f"scale the waveform by {limit / peak:.4g} or raise the limit"
-            )
+        Parameters
+        ----------
+        resolution : float, optional
+            Step that positions are rounded to; the stimulus's own by default.
+        fs : float, optional
+            Command rate in Hz; the stimulus's own by default.
+
+        Raises
+        ------
+        LimitsError
+            If the rounded commands, or their differences over the sampling interval, go beyond
+            a limit; the message says what would do.
+
+        Examples
+        --------
+        >>> from hmpim.stimulus.profile import Steps
+        >>> steps = Steps(levels=(1.0, 0.0), hold=1.0, rise=0.5)
+        >>> sent = Stimulus(waveform=steps, fs=8.0).commanded(resolution=0.25)
+        >>> sent.position[:5].tolist()
+        [0.0, 0.0, 0.5, 1.0, 1.0]
+        """
+        rate = self.fs if fs is None else check_positive("fs", fs, "Hz")
+        step = self.resolution if resolution is None else check_resolution(resolution)
+        time = np.arange(_count(self.duration, rate)) / rate
+        position = rounded(self.motion(time).position, step)
+        at = self.motion(np.zeros(1))
+        from_rest = at.velocity[0] == 0.0 and at.acceleration[0] == 0.0
+        before = rounded(self.motion(np.array([-1.0 / rate])).position, step)
+        sent = np.concatenate((before, position)) if from_rest else position
+        peaks = difference_peaks(sent, rate, first=0 if from_rest else 1)
+        if self.limits is not None:
+            what = f"rounded to {step:g} and sent at {rate:g} Hz, the stimulus's " if step else ""
+            _keep(peaks, self.limits, what=what)
+        return Command(fs=rate, resolution=step, time=time, position=position, peaks=peaks)
 
 
-def design(
-    *,
-    band: tuple[float, float],
-    duration: float,
-    fs: float,
-    limits: Limits,
-    extinction: float | Literal["auto"] = "auto",
-    lead: float | Literal["auto"] = "auto",
-    tail: float | Literal["auto"] = "auto",
-    axis: str = "",
-) -> Stimulus:
-    """Design an HMPIM sweep inside limits (section III).
+def blocks(stimulus: Stimulus, size: int, *, fs: float | None = None) -> Iterator[Motion]:
+    """Generate a stimulus block by block, as a real-time player wants it.
 
-    The amplitude is taken to the position limit first, then the extinction is raised
-    until rate and acceleration fit: the smallest n, to 0.001, and the largest gain.
+    Put together, the blocks are the whole, bit for bit.
 
     Parameters
     ----------
-    band : tuple of float
-        First and last frequency of the sweep, Hz.
-    duration : float
-        Length T of the sweep, seconds; leads and tail come on top.
-    fs : float
-        Sampling rate, Hz; more than twice the last frequency.
-    limits : Limits
-        What the axis may do; its unit is the stimulus's.
-    extinction : 'auto' or float
-        n; a number is taken as given, and only the gain is solved.
-    lead : 'auto' or float
-        Time for coming from rest and going back to rest, in seconds on each side; 'auto'
-        takes what is gentle; 0 is the waveform as printed, with its velocity step.
-    tail : 'auto' or float
-        Seconds at rest at the end; 'auto' is 0.5 s with a lead and 0 without.
-    axis : str
-        Name of the axis, where there are several.
+    stimulus : Stimulus
+        Any.
+    size : int
+        Samples of each block; the last may be shorter.
+    fs : float, optional
+        Rate in Hz; the stimulus's own by default.
 
-    Returns
-    -------
-    Stimulus
-        Never beyond the limits, between the samples too.
+    Yields
+    ------
+    Motion
+        Position (rounded to the stimulus's resolution) and its derivatives, times included.
 
     Raises
     ------
-    LimitsError
-        If limits and band cannot both be met; the message says what would do.
     ArgumentError
-        For anything else that is out of range.
+        If size or rate are out of range.
 
     Examples
     --------
-    >>> limits = Limits(position=10, velocity=1000, acceleration=40000, unit="deg")
-    >>> stimulus = design(band=(0.1, 10), duration=10, fs=500, limits=limits)
-    >>> stimulus.extinction, round(stimulus.peaks.velocity), stimulus.velocity[0]
-    (0.0, 628, np.float64(0.0))
+    >>> stimulus = Stimulus(waveform=Sweep(band=(0.1, 10.0), duration=5.0), fs=100.0)
+    >>> [block.time.size for block in blocks(stimulus, 200)]
+    [200, 200, 100]
     """
-    low, high = check_band(band)
-    length = check_positive("duration", duration, "s")
-    rate = check_positive("fs", fs, "Hz")
-    if high >= 0.5 * rate:
-        raise LimitsError(
-            f"band = ({low:g}, {high:g}) Hz reaches the Nyquist frequency {0.5 * rate:g} Hz of "
-            f"fs = {rate:g} Hz; sample faster than {2.0 * high:g} Hz, or end the band below "
-            f"{0.5 * rate:g} Hz"
-        )
-    cycles = 0.5 * (low + high) * length
-    if cycles < 1.0 - 1e-9:
-        raise LimitsError(
-            f"band = ({low:g}, {high:g}) Hz makes {cycles:.3g} cycles in {length:g} s, "
-            f"and one is needed; a duration of {three_digits(length / cycles, up=True)} s would do"
-        )
-    if not isinstance(limits, Limits):
-        raise ArgumentError(f"limits = {limits!r} is not a Limits; write Limits(position=10, ...)")
-    if math.isinf(min(limits.position, limits.velocity, limits.acceleration)):
-        raise LimitsError(
-            "no limit is finite, so nothing says how large the motion may be; give one"
-        )
-    ahead = _seconds("lead", lead)
-    start = 1.0 / rate if ahead == 0.0 else None
-    if extinction == "auto":
-        n = smallest_extinction((low, high), length, limits, start=start)
-    elif isinstance(extinction, str):
-        raise ArgumentError(f"extinction = {extinction!r} must be 'auto' or a number")
-    else:
-        n = extinction
-    sweep = Sweep(band=(low, high), duration=length, gain=1.0, extinction=n)
-    sweep = largest_gain(sweep, limits, start=start)
-    waveform: Waveform = sweep
-    if ahead != 0.0:
-        longest = math.inf if ahead is None else ahead
-        waveform = rest_to_rest(sweep, limits=limits, fs=rate, longest=longest)
-    settling = _seconds("tail", tail)
-    if settling is None:
-        settling = 0.0 if ahead == 0.0 else _SETTLING
-    return Stimulus(
-        waveform=waveform, fs=rate, unit=limits.unit, limits=limits, axis=axis, tail=settling
-    )
+    if isinstance(size, bool) or size != int(size) or size < 1:
+        raise ArgumentError(f"size = {size!r} must be a whole number of samples from 1 on")
+    rate = stimulus.fs if fs is None else check_positive("fs", fs, "Hz")
+    return _blocks(stimulus, int(size), rate)
 
 
-def _seconds(name: str, given: float | Literal["auto"]) -> float | None:
-    """Seconds, or None for 'auto'."""
-    if given == "auto":
-        return None
-    if isinstance(given, str) or not (math.isfinite(given) and given >= 0.0):
-        raise ArgumentError(f"{name} = {given!r} must be 'auto', 0 or a positive time in seconds")
-    return float(given)
+def _blocks(stimulus: Stimulus, size: int, rate: float) -> Iterator[Motion]:
+    count = _count(stimulus.duration, rate)
+    for first in range(0, count, size):
+        at = stimulus.motion(np.arange(first, min(first + size, count)) / rate)
+        yield replace(at, position=rounded(at.position, stimulus.resolution))
+
+
+def _count(duration: float, fs: float) -> int:
+    """Number of samples at k/fs in a duration."""
+    return math.ceil(duration * fs - 1e-6)
+
+
+def _unreversed(waveform: Waveform) -> Waveform:
+    return waveform.waveform if isinstance(waveform, Reversed) else waveform
+
+
+def _peaks(waveform: Waveform, fs: float) -> Peaks:
+    printed = _unreversed(waveform)
+    if isinstance(printed, Sweep):
+        return sweep_peaks(printed, start=1.0 / fs)
+    peaks = true_peaks(waveform)
+    ends = waveform.motion(np.array([0.0, waveform.duration]))
+    if ends.velocity.any() or ends.acceleration.any():
+        return replace(peaks, jerk=math.inf)
+    return peaks
+
+
+def _as_commanded(peaks: Peaks, waveform: Waveform, position: FloatArray, fs: float) -> Peaks:
+    """Peaks with the differences that the samples command where a jump makes them infinite."""
+    if math.isfinite(peaks.acceleration):
+        return peaks
+    before = waveform.motion(np.array([-1.0 / fs])).position
+    sent = difference_peaks(np.concatenate((before, position)), fs)
+    velocity = sent.velocity if math.isinf(peaks.velocity) else peaks.velocity
+    return replace(peaks, velocity=velocity, acceleration=sent.acceleration)
+
+
+def _keep(peaks: Peaks, limits: Limits, *, what: str = "") -> None:
+    for order, name in enumerate(QUANTITIES):
+        peak, limit = getattr(peaks, name), getattr(limits, name)
+        if math.isfinite(limit) and peak > limit * (1.0 + 1e-9):
+            bound = f"{limit:g} {rate_unit(limits.unit, order)}".rstrip()
+            if math.isinf(peak):
+                raise LimitsError(
+                    f"{what}peak {name} is infinite, for the waveform jumps, and the limit is "
+                    f"{bound}; take one with smooth transitions, or leave this limit out"
+                )
+            raise LimitsError(
+                f"{what}peak {name} {peak:.6g} is beyond the limit {bound}; "
+                f"scale the waveform by {_rounded_down(limit / peak)} or raise the limit"
+            )
+
+
+def _rounded_down(value: float) -> str:
+    """Four digits, cut and not rounded, so that the advice does."""
+    place = 10.0 ** (3 - math.floor(math.log10(value)))
+    return f"{math.floor(value * place) / place:.4g}"

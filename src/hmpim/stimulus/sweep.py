@@ -10,7 +10,7 @@ With n = 0 the equations are the plain chirp's, (1) to (3), times G.
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -103,7 +103,7 @@ class Sweep:
     -----
     At t = 0 the velocity is G, or Gb/(b + a/2) with n = 0. For 0 < n < 1 the acceleration
     grows without bound as t → 0, as t^(n-1); at t = 0 itself the finite part, Ga/b, is
-    returned.
+    returned, as of the jerk, which for 0 < n < 2 is unbounded there but for n = 1.
 
     Examples
     --------
@@ -159,8 +159,12 @@ class Sweep:
         a, b = self.sweep_rate, self.start_omega
         return 2.0 * phase / (b + math.sqrt(b * b + 2.0 * a * phase))
 
+    def scaled(self, factor: float) -> "Sweep":
+        """Return the same sweep, its gain times `factor`."""
+        return replace(self, gain=self.gain * factor)
+
     def motion(self, time: FloatArray) -> Motion:
-        """Position (5), velocity (6) and acceleration (7) at `time`.
+        """Position (5), velocity (6), acceleration (7) and its derivative at `time`.
 
         Parameters
         ----------
@@ -202,13 +206,32 @@ class Sweep:
             - curve * position
             + 2.0 * slope * slope * position / sigma
         ) / sigma
+        # 1/σ₂ and its derivatives against those of sin σ₁, by Leibniz
+        first = -slope / sigma
+        second = (2.0 * slope * slope / sigma - curve) / sigma
+        third = (
+            6.0 * slope * curve / sigma
+            - 6.0 * slope * slope * slope / sigma / sigma
+            - curve * (n - 2.0) / safe
+        ) / sigma
+        jerk = (
+            -omega * (3.0 * a * sine + omega * omega * cosine)
+            + 3.0 * (a * cosine - omega * omega * sine) * first
+            + 3.0 * omega * cosine * second
+            + sine * third
+        ) / sigma
         if not np.all(started):
             at_zero = b + (0.5 * a if n == 0.0 else 0.0)
             velocity = np.where(started, velocity, b / at_zero)
             acceleration = np.where(started, acceleration, 0.0 if n == 1.0 else a / at_zero)
+            first_0 = -0.5 * a / at_zero if n == 1.0 else 0.0
+            second_0 = 2.0 * first_0 * first_0 - (a / at_zero if n == 2.0 else 0.0)
+            jerk_0 = (-(b**3) + 3.0 * a * first_0 + 3.0 * b * second_0) / at_zero
+            jerk = np.where(started, jerk, jerk_0)
         return Motion(
             time=t,
             position=gain * position,
             velocity=gain * velocity,
             acceleration=gain * acceleration,
+            jerk=gain * jerk,
         )
