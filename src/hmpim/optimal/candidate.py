@@ -1,0 +1,151 @@
+"""A stimulus on trial: its gain solved so that it buys the accuracy, then what that costs."""
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hmpim.optimal.fisher import fisher_information, standard_deviations
+from hmpim.optimal.wish import PARAMETERS, Family, Gentle, Wish
+from hmpim.stimulus import Stimulus, Waveform
+from hmpim.stimulus.motion import Scalable
+
+__all__ = ["Candidate", "gentleness", "needed_gain", "try_out"]
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Candidate:
+    """A stimulus that buys exactly the accuracy wanted, limits or not.
+
+    Parameters
+    ----------
+    family : {'sweep', 'exponential', 'multisine'}
+        Its kind.
+    stimulus : Stimulus
+        Sampled, without limits.
+    use : float
+        Largest share of a limit that it takes; beyond 1 it must not be played.
+    value : float
+        What is to be small: °/s² for instance, or s; see `gentleness`.
+    shape : ndarray
+        Where the family's search may go on from.
+    """
+
+    family: Family
+    stimulus: Stimulus
+    use: float
+    value: float
+    shape: FloatArray
+
+
+def needed_gain(position: FloatArray, wish: Wish, *, finer: int = 1) -> float:
+    """Factor on a stimulus at which the least accurate parameter just is as accurate as wanted.
+
+    Standard deviations are inverse to the size of the stimulus, that of the bias aside, so
+    the factor is exact.
+
+    Parameters
+    ----------
+    position : ndarray, shape (n,)
+        Samples.
+    wish : Wish
+        Accuracy, noise and the models it is wanted of.
+    finer : int
+        How much finer the range of models is looked at.
+
+    Returns
+    -------
+    float
+        Infinite if the stimulus does not tell the parameters apart.
+    """
+    worst = 0.0
+    for model in wish.models(finer=finer):
+        information = fisher_information(
+            position, model=model, noise_std=wish.noise_std, fs=wish.fs
+        )
+        std = standard_deviations(information)[: len(PARAMETERS)]
+        worst = max(worst, float(np.max(std / wish.accuracy.std(model))))
+    return worst
+
+
+def gentleness(stimulus: Stimulus, gentle: Gentle) -> float:
+    """Return what is to be small.
+
+    Parameters
+    ----------
+    stimulus : Stimulus
+        Any.
+    gentle : {'peak_acceleration', 'rms_acceleration', 'travel', 'duration'}
+        Which: the true peak; the root mean square over the record; the distance moved in
+        all, to and fro; the length of the record with leads and tail.
+
+    Returns
+    -------
+    float
+        In the stimulus's unit per s², the same, the unit itself, and s.
+
+    Examples
+    --------
+    >>> from hmpim.stimulus import Sine
+    >>> once = Stimulus(waveform=Sine(frequency=1.0, duration=1.0), fs=400.0)
+    >>> round(gentleness(once, "travel"), 3), gentleness(once, "duration")
+    (4.0, 1.0)
+    """
+    if gentle == "peak_acceleration":
+        return stimulus.peaks.acceleration
+    if gentle == "rms_acceleration":
+        return float(np.sqrt(np.mean(stimulus.acceleration**2)))
+    if gentle == "travel":
+        return float(np.abs(stimulus.velocity).sum() / stimulus.fs)
+    return stimulus.samples / stimulus.fs
+
+
+def try_out(
+    waveform: Waveform,
+    wish: Wish,
+    *,
+    family: Family,
+    total: float,
+    shape: FloatArray,
+    finer: int = 1,
+) -> Candidate | None:
+    """Solve a waveform's gain for the accuracy and see what it costs.
+
+    Parameters
+    ----------
+    waveform : Waveform
+        At rest at both ends, of any size.
+    wish : Wish
+        What is wanted.
+    family : str
+        Its kind.
+    total : float
+        Length of the record in s, no shorter than the waveform.
+    shape : ndarray
+        Where the family's search may go on from.
+    finer : int
+        As in `needed_gain`.
+
+    Returns
+    -------
+    Candidate or None
+        None if no gain will do.
+    """
+    if not isinstance(waveform, Scalable):
+        return None
+    tail = max(total - waveform.duration, 0.0)
+    first = Stimulus(waveform=waveform, fs=wish.fs, unit=wish.limits.unit, tail=tail)
+    gain = needed_gain(first.position, wish, finer=finer)
+    if not math.isfinite(gain) or gain <= 0.0:
+        return None
+    stimulus = replace(first, waveform=waveform.scaled(gain))
+    return Candidate(
+        family=family,
+        stimulus=stimulus,
+        use=wish.limits.use(stimulus.peaks),
+        value=gentleness(stimulus, wish.gentle),
+        shape=shape,
+    )

@@ -1,0 +1,150 @@
+"""The gentlest sweep of a family: band, extinction and gain, from rest to rest.
+
+Band edges and extinction are searched with the simplex of J. A. Nelder and R. Mead (Computer
+Journal 7, 1965): three unknowns, each trial a whole stimulus with its leads, so that what
+leads cost is never left out. The gain of each trial is solved exactly.
+"""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import minimize
+
+from hmpim.errors import HmpimError
+from hmpim.optimal.candidate import Candidate, try_out
+from hmpim.optimal.wish import Family, Wish
+from hmpim.stimulus import ExponentialSweep, Limits, RestToRest, Sweep, rest_to_rest
+
+__all__ = ["best_sweep"]
+
+FloatArray = NDArray[np.float64]
+
+_DEAREST = 1e3  # log of the cost of what cannot be made
+_DEAR = 5.0  # power of the excess over a limit
+_EXTINCTIONS = (0.0, 4.0)
+_LOWEST_CYCLES = 1.0  # that a sweep makes at least, as a lead needs
+
+
+def best_sweep(
+    wish: Wish,
+    total: float,
+    *,
+    family: Family = "sweep",
+    start: FloatArray | None = None,
+    trials: int = 60,
+) -> Candidate | None:
+    """Find the sweep that buys the accuracy most gently in `total` seconds.
+
+    Parameters
+    ----------
+    wish : Wish
+        What is wanted; where it is a short duration, the least share of the limits is sought.
+    total : float
+        Length of the record in s, leads and tail included.
+    family : {'sweep', 'exponential'}
+        Linear as the paper's, or exponential.
+    start : ndarray, shape (3,), optional
+        Shape of an earlier candidate to begin at: logarithms of first frequency and width
+        of the band (Hz), extinction.
+    trials : int
+        At most so many from each start.
+
+    Returns
+    -------
+    Candidate or None
+        None if no sweep of that length can be made.
+    """
+    search = _Search(wish, total, family)
+    natural = wish.model.natural_frequency
+    begins = [start] if start is not None else list(_starts(natural, total, family))
+    found: list[tuple[float, FloatArray]] = []
+    for begin in begins:
+        simplex = begin + np.array(
+            [[0.0, 0.0, 0.0], [0.3, 0.0, 0.0], [0.0, 0.2, 0.0], [0.0, 0.0, 0.3]]
+        )
+        ended = minimize(
+            search.cost,
+            begin,
+            method="Nelder-Mead",
+            options={"maxfev": trials, "xatol": 2e-3, "fatol": 2e-4, "initial_simplex": simplex},
+        )
+        found.append((float(ended.fun), np.asarray(ended.x)))
+    cost, shape = min(found, key=lambda item: item[0])
+    return None if cost >= _DEAREST else search.candidate(shape, finer=3)
+
+
+def _starts(natural: float, total: float, family: Family) -> list[FloatArray]:
+    """A sweep from far below the natural frequency, and one around it."""
+    slowest = max(0.1 * natural, 2.0 / total)
+    extinction = 1.5 if family == "sweep" else 1.0
+    return [
+        np.array([math.log(low), math.log(high - low), extinction])
+        for low, high in (
+            (slowest, max(1.2 * natural, 2.0 * slowest)),
+            (0.4 * natural, 1.4 * natural),
+        )
+    ]
+
+
+class _Search:
+    """Trials of one family at one length; remembers how long the leads of the last one were."""
+
+    def __init__(self, wish: Wish, total: float, family: Family) -> None:
+        self._wish = wish
+        self._total = total
+        self._family: Family = family
+        self._leads = 0.5 / wish.model.natural_frequency
+
+    def candidate(self, shape: FloatArray, *, finer: int = 1) -> Candidate | None:
+        """Stimulus of this shape that fills the record to its last sample."""
+        waveform = None
+        for _ in range(6):
+            waveform = self._led(shape)
+            if waveform is None:
+                return None
+            over = waveform.duration + self._wish.tail - self._total
+            if -1.5 / self._wish.fs < over <= 1e-9:
+                break
+            self._leads += over + (0.5 / self._wish.fs if over > 0 else 0.0)
+        if waveform is None or waveform.duration > self._total:
+            return None
+        return try_out(
+            waveform, self._wish, family=self._family, total=self._total, shape=shape, finer=finer
+        )
+
+    def cost(self, shape: FloatArray) -> float:
+        """Logarithm of what is to be small, dearer beyond the limits."""
+        waveform = self._led(shape)
+        if waveform is None:
+            return _DEAREST
+        length = waveform.duration + self._wish.tail
+        self._leads += length - self._total
+        tried = try_out(waveform, self._wish, family=self._family, total=length, shape=shape)
+        if tried is None:
+            return _DEAREST
+        # the record is a little too long or short: its information goes with its length
+        even = 0.5 * math.log(length / self._total)
+        if self._wish.gentle == "duration":
+            return math.log(tried.use) + even
+        return math.log(tried.value) + even + _DEAR * max(math.log(tried.use), 0.0)
+
+    def _led(self, shape: FloatArray) -> RestToRest | None:
+        low = math.exp(min(float(shape[0]), 20.0))
+        high = low + math.exp(min(float(shape[1]), 20.0))
+        extinction = float(shape[2])
+        length = self._total - self._wish.tail - self._leads
+        inside = _EXTINCTIONS[0] <= extinction <= _EXTINCTIONS[1]
+        if not inside or high > 0.45 * self._wish.fs or length <= 0.0:
+            return None
+        core: Sweep | ExponentialSweep
+        try:
+            if self._family == "exponential":
+                core = ExponentialSweep(band=(low, high), duration=length, extinction=extinction)
+            else:
+                core = Sweep(band=(low, high), duration=length, extinction=extinction)
+            if core.cycles < _LOWEST_CYCLES:
+                return None
+            return rest_to_rest(core, limits=Limits(unit=self._wish.limits.unit), fs=self._wish.fs)
+        except HmpimError:  # this shape cannot be made; the search goes round it
+            return None
