@@ -150,16 +150,18 @@ def joint_fit(
     valid = _counted(fits, everything, forgotten, known)
     if valid is not everything:
         fits = [_refit(data.problem(natural, valid), f) for f in fits]
+    fitted = _under_each_assumption(data, natural, fits, valid, alone=intersample is not None)
+    mode, best_fit = min(fitted, key=lambda item: item[1].cost)
     others = tuple(name for name in structures if name not in PLAIN)
-    richer = _enriched(data, data.problem(natural, valid), fits, others, forced=not plain)
-    fits = [*fits, *richer] if plain else richer or fits
-    if richer and forgotten and not _forgotten(fits, everything):
-        forgotten = 0  # it was the structure that was wrong, not the beginning
-        valid = _counted(fits, everything, forgotten, known)
-        fits = [_refit(data.problem(natural, valid), f) for f in fits]
-    fitted: list[tuple[Intersample, Fit]] = [(natural, fit) for fit in fits]
-    if intersample is None:
-        fitted += _under_other_assumptions(data, natural, fits, valid)
+    if not plain or _worth_explaining(data.problem(mode, valid), best_fit, data):
+        richer = _enriched(data, data.problem(natural, valid), fits, others)
+        if richer and forgotten and not _forgotten(richer, everything):
+            forgotten = 0  # it was the structure that was wrong, not the beginning
+            valid = _counted(richer, everything, forgotten, known)
+            fits = [_refit(data.problem(natural, valid), f) for f in fits]
+            richer = [_refit(data.problem(natural, valid), f) for f in richer]
+        kept = [*fits, *richer] if plain else richer or fits
+        fitted = _under_each_assumption(data, natural, kept, valid, alone=intersample is not None)
     share = effective_share(min(fitted, key=lambda item: item[1].cost)[1].residual)
     count = data.problem(natural, valid).counted * share
     trials = [_trial(mode, fit, count) for mode, fit in fitted]
@@ -217,26 +219,34 @@ def _refit(problem: Problem, fit: Fit) -> Fit:
     return fit_structure(problem, fit.structure, fit.theta)
 
 
-def _under_other_assumptions(
-    data: _Data, natural: Intersample, fits: list[Fit], valid: NDArray[np.bool_] | None
+def _under_each_assumption(
+    data: _Data,
+    natural: Intersample,
+    fits: list[Fit],
+    valid: NDArray[np.bool_] | None,
+    *,
+    alone: bool,
 ) -> list[tuple[Intersample, Fit]]:
-    """Fit again as if the input did something else between its samples."""
+    """Add to fits under the natural assumption those under the others, unless it stands alone."""
+    fitted = [(natural, fit) for fit in fits]
+    if alone:
+        return fitted
     least = min(fit.cost for fit in fits)
     leading = [fit for fit in fits if fit.cost < _HOPELESS * least]
-    trailing = [fit for fit in fits if fit not in leading]
+    trailing = [fit for fit in fits if fit.cost >= _HOPELESS * least]
     others = [mode for mode in get_args(Intersample) if mode != natural]
-    fitted = [
-        (mode, _moved(data.problem(mode, valid), fit, natural, mode))
-        for mode in others
-        for fit in leading
-    ]
-    if min(fit.cost for _, fit in fitted) < least:
-        # What was hopeless under a wrong assumption may not be so now.
-        fitted += [
+
+    def moved(some: list[Fit]) -> list[tuple[Intersample, Fit]]:
+        return [
             (mode, _moved(data.problem(mode, valid), fit, natural, mode))
             for mode in others
-            for fit in trailing
+            for fit in some
         ]
+
+    fitted += moved(leading)
+    count = data.problem(natural, valid).counted
+    if min(fit.cost for _, fit in fitted) < least * (1.0 - 2 * CLEARLY / count):
+        fitted += moved(trailing)  # hopeless under a wrong assumption, perhaps not under this
     return fitted
 
 
@@ -283,17 +293,10 @@ def _fit_all(
 
 
 def _enriched(
-    data: _Data,
-    problem: Problem,
-    fits: list[Fit],
-    structures: tuple[StructureName, ...],
-    *,
-    forced: bool,
+    data: _Data, problem: Problem, fits: list[Fit], structures: tuple[StructureName, ...]
 ) -> list[Fit]:
-    """Fits of richer structures, if the best plain one leaves something worth explaining."""
+    """Fits of the richer structures."""
     best = min(fits, key=lambda fit: fit.cost)
-    if not (forced or _worth_explaining(problem, best, data)):
-        return []
     integrating = members(structures, INTEGRATING)
     found: list[Fit] = []
     if integrating:

@@ -4,7 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hmpim.identify.joint import CLEARLY, JointFit
+from hmpim.identify.enrich import PLAIN
+from hmpim.identify.joint import CLEARLY, JointFit, Trial
 from hmpim.identify.readings import Readings
 from hmpim.identify.result import Estimate, Verdict
 from hmpim.identify.whiteness import Misfit
@@ -24,9 +25,10 @@ _LOOSE = 0.3
 """Relative standard deviation beyond which a parameter is not known."""
 
 
-_AMBIGUOUS = 5.0
-"""Criterion by which another structure may be worse and still be worth naming: where first
-order is right, second order comes this near in one record of ten."""
+_AMBIGUOUS = 2.0
+"""Likelihood ratio (twice the logarithm) in favour of a richer structure above which it is
+named, though the criterion keeps the simpler one: where first order is right, one record in
+eight comes there by chance."""
 
 _DISAGREES = 4.0
 """Standard deviations by which its delay must differ to cast doubt."""
@@ -200,7 +202,8 @@ def _other_structure(joint: JointFit, readings: Readings) -> str | None:
         if (
             trial.intersample != best.intersample
             or trial.fit.structure.name == best.fit.structure.name
-            or trial.criterion - best.criterion > _AMBIGUOUS
+            or not {trial.fit.structure.name, best.fit.structure.name} <= set(PLAIN)
+            or not _rivals(trial, best, joint)
         ):
             continue
         apart = abs(trial.fit.delay - best.fit.delay)
@@ -211,6 +214,16 @@ def _other_structure(joint: JointFit, readings: Readings) -> str | None:
                 "deviations away. Lower the noise, or sweep higher, to tell them apart."
             )
     return None
+
+
+def _rivals(trial: Trial, best: Trial, joint: JointFit) -> bool:
+    """Whether another structure is within what the data can tell apart."""
+    worse = trial.criterion - best.criterion
+    extra = trial.fit.structure.parameters - best.fit.structure.parameters
+    if extra <= 0:
+        return worse < _AMBIGUOUS
+    count = joint.problem.counted * joint.effective_share
+    return bool(extra * np.log(count) - worse > _AMBIGUOUS)
 
 
 def _rival(joint: JointFit) -> str | None:

@@ -1,0 +1,125 @@
+"""Each structure found by name from its record alone, against scipy's time-domain simulation."""
+
+import numpy as np
+import pytest
+from scipy import signal
+
+import hmpim
+from hmpim.identify.joint import joint_fit
+from hmpim.model import STRUCTURES, coefficients_of, denominator_of, theta_of
+
+FS, DURATION, FINE = 500.0, 10.0, 8
+OMEGA = 2 * np.pi
+
+
+def chirp(time):
+    phase = OMEGA * (0.1 * time + 59.9 / (2 * DURATION) * time**2)
+    return np.where(time > 0, np.sin(phase), 0.0)
+
+
+def mode(frequency, damping):
+    return np.array([1 / (OMEGA * frequency) ** 2, 2 * damping / (OMEGA * frequency), 1.0])
+
+
+def pole(frequency):
+    return np.array([1 / (OMEGA * frequency), 1.0])
+
+
+# name, numerator, denominator, delay, natural frequency, damping, time constant
+CASES = {
+    "second_order_zero": ([0.02, 1.0], mode(8, 0.3), 0.0312, 8.0, 0.3, None),
+    "third_order": ([1.0], np.polymul(mode(10, 0.3), pole(6)), 0.0231, 10.0, 0.3, 1 / (OMEGA * 6)),
+    "fourth_order": ([1.0], np.polymul(mode(10, 0.3), mode(25, 0.2)), 0.0431, 10.0, 0.3, None),
+    "two_modes": (
+        mode(18, 0.05),
+        np.polymul(mode(12, 0.1), mode(30, 0.05)),
+        0.0131,
+        12.0,
+        0.1,
+        None,
+    ),
+    "integrator": ([2.0], [1.0, 0.0], 0.0531, None, None, None),
+    "integrator_first_order": (
+        [2.0],
+        np.polymul(pole(9), [1.0, 0.0]),
+        0.0531,
+        None,
+        None,
+        1 / (OMEGA * 9),
+    ),
+    "second_order": ([1.0], np.polymul(pole(3), pole(15)), 0.0131, None, None, 1 / (OMEGA * 3)),
+}
+
+
+@pytest.fixture(scope="module", params=sorted(CASES))
+def found(request):
+    numerator, denominator, delay, *_ = CASES[request.param]
+    fine = np.arange(int(FS * DURATION) * FINE) / (FS * FINE)
+    y = signal.lsim((numerator, denominator), chirp(fine - delay), fine)[1][::FINE]
+    noise = np.random.default_rng(0).standard_normal(y.size)
+    record = hmpim.Record.from_arrays(
+        {"u": chirp(fine[::FINE])}, {"y": y + 0.3 + 0.01 * np.std(y) * noise}, fs=FS
+    )
+    return request.param, record, hmpim.identify(record)["y", "u"]
+
+
+def test_it_is_named_and_all_its_figures_hold(found):
+    name, _, pair = found
+    _, _, delay, natural, damping, slow = CASES[name]
+    assert pair.structure == name
+    assert pair.verdict == "ok"
+    assert pair.fit_percent == pytest.approx(99.0, abs=0.15)
+    truth = {"delay": delay, "bias": 0.3, "natural_frequency": natural, "damping_ratio": damping}
+    truth["scale_factor"] = 2.0 if "integrator" in name else 1.0
+    if slow is not None and name != "third_order":
+        truth["time_constant"] = slow
+    for parameter, value in truth.items():
+        if value is not None:
+            estimate = getattr(pair, parameter)
+            assert abs(estimate.value - value) < 4.5 * estimate.std, parameter
+
+
+def test_why_it_was_chosen_is_said(found):
+    _, _, pair = found
+    chosen = [c for c in pair.candidates if c.chosen]
+    assert len(chosen) == 1
+    assert chosen[0].structure == pair.structure
+    same = [c for c in pair.candidates if c.intersample == pair.intersample]
+    assert {"static", "first_order", "second_order"} <= {c.structure for c in same}
+    assert all(chosen[0].criterion <= c.criterion for c in same)
+
+
+def test_the_model_simulates_what_was_identified(found):
+    _, record, pair = found
+    prediction = hmpim.predict(pair, record, start=0.0)
+    assert prediction.fit_percent == pytest.approx(pair.fit_percent, abs=0.01)
+
+
+@pytest.mark.parametrize("name", sorted(STRUCTURES))
+def test_parameters_of_a_fit_and_coefficients_undo_each_other(name):
+    structure = STRUCTURES[name]
+    rng = np.random.default_rng(3)
+    coefficients = np.exp(rng.normal(size=structure.order))
+    theta = theta_of(structure, coefficients)
+    np.testing.assert_allclose(coefficients_of(structure, theta), coefficients)
+    poles = np.roots(denominator_of(structure, coefficients)[::-1])
+    assert np.all(poles.real <= 0)
+
+
+def test_a_plain_system_is_not_made_richer_than_it_is(field_record):
+    """At high signal-to-noise ratio too, and where the record carries a small imperfection."""
+    _, u, y = field_record
+    rng = np.random.default_rng(8)
+    for sigma in (1e-4, 1e-2, 0.1):
+        joint = joint_fit(u, y + sigma * rng.standard_normal(y.size))
+        assert joint.best.fit.structure.name == "second_order"
+    imperfect = y + 0.005 * u**3 + 0.001 * rng.standard_normal(y.size)
+    assert joint_fit(u, imperfect).best.fit.structure.name == "second_order"
+
+
+def test_one_structure_can_be_asked_for(field_record):
+    _, u, y = field_record
+    noisy = y + 0.1 * np.random.default_rng(2).standard_normal(y.size)
+    record = hmpim.Record.from_arrays({"u": u}, {"y": noisy}, fs=200.0)
+    for name in ("first_order", "third_order"):
+        assert hmpim.identify(record, structures=[name])["y", "u"].structure == name
