@@ -23,6 +23,7 @@ __all__ = [
     "PaperEstimates",
     "Parameters",
     "RecordSummary",
+    "ResponseBandwidths",
     "Verdict",
 ]
 
@@ -55,6 +56,15 @@ class Estimate:
         return cls(value=data["value"], std=data["std"], ci95=(low, high), unit=data["unit"])
 
 
+def _estimates_to_dict(holder: "Parameters | ResponseBandwidths") -> dict[str, Any]:
+    named = {field.name: getattr(holder, field.name) for field in fields(holder)}
+    return {name: None if e is None else e.to_dict() for name, e in named.items()}
+
+
+def _estimates_from_dict(data: Mapping[str, Any]) -> dict[str, Estimate | None]:
+    return {name: None if d is None else Estimate.from_dict(d) for name, d in data.items()}
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Parameters:
     """Every parameter of one input-output pair; None where the record cannot tell.
@@ -83,18 +93,12 @@ class Parameters:
 
     def to_dict(self) -> dict[str, Any]:
         """Return name to estimate, null where there is none."""
-        out: dict[str, Any] = {}
-        for field in fields(self):
-            estimate = getattr(self, field.name)
-            out[field.name] = None if estimate is None else estimate.to_dict()
-        return out
+        return _estimates_to_dict(self)
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> "Parameters":
         """Read back what `to_dict` wrote."""
-        return cls(
-            **{name: None if d is None else Estimate.from_dict(d) for name, d in data.items()}
-        )
+        return cls(**_estimates_from_dict(data))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -160,6 +164,24 @@ class FrequencyResponse:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class ResponseBandwidths:
+    """Bandwidths read off the measured response, in Hz; None where it does not reach them."""
+
+    bandwidth_phase90: Estimate | None = None
+    bandwidth_phase90_without_delay: Estimate | None = None
+    bandwidth_3db: Estimate | None = None
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return name to estimate, null where there is none."""
+        return _estimates_to_dict(self)
+
+    @classmethod
+    def from_dict(cls, data: Mapping[str, Any]) -> "ResponseBandwidths":
+        """Read back what `to_dict` wrote."""
+        return cls(**_estimates_from_dict(data))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Candidate:
     """One structure that was tried: how well it fits and what its fit costs.
 
@@ -181,7 +203,8 @@ class PairIdentification:
     `dynamics` holds the rational dynamics that were fitted, without delay and with unit
     gain at DC: numerator and denominator coefficients in powers of s (rad/s), highest
     first. `prediction` and `residual` (shape (n,), the output's unit) are on the record's
-    own uniform clock `time`; they are not part of the JSON.
+    own uniform clock `time`; they are not part of the JSON. `from_response` holds bandwidths
+    read off the measured response, to be held against the model's.
     """
 
     input: str
@@ -197,6 +220,7 @@ class PairIdentification:
     candidates: tuple[Candidate, ...]
     verdict: Verdict
     warnings: tuple[Finding, ...]
+    from_response: ResponseBandwidths = ResponseBandwidths()
     time: NDArray[np.float64] | None = None
     prediction: NDArray[np.float64] | None = None
     residual: NDArray[np.float64] | None = None
@@ -219,6 +243,7 @@ class PairIdentification:
             "parameters": self.parameters.to_dict(),
             "paper": {f.name: getattr(self.paper, f.name) for f in fields(self.paper)},
             "frequency_response": self.frequency_response.to_dict(),
+            "bandwidths_from_response": self.from_response.to_dict(),
             "dynamics": {
                 "numerator": list(self.numerator),
                 "denominator": list(self.denominator),
@@ -242,6 +267,7 @@ class PairIdentification:
             parameters=Parameters.from_dict(data["parameters"]),
             paper=PaperEstimates(**data["paper"]),
             frequency_response=FrequencyResponse.from_dict(data["frequency_response"]),
+            from_response=ResponseBandwidths.from_dict(data.get("bandwidths_from_response", {})),
             numerator=tuple(data["dynamics"]["numerator"]),
             denominator=tuple(data["dynamics"]["denominator"]),
             candidates=tuple(Candidate(**c) for c in data["candidates"]),

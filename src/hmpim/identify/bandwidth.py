@@ -1,0 +1,184 @@
+"""Bandwidths, gain and phase read off the measured response, beside the model's.
+
+A noisy phase crosses -90° many times, and the first crossing lies too low (the paper's Fig. 24:
+22 Hz for 33). So the response is divided by the fitted model first: what remains is near 1 and
+flat, its phase does not wrap, and a straight line through the neighbours of a frequency tells how
+far measurement and model part there, and where the measurement crosses.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hmpim.identify.result import Estimate, FrequencyResponse, Parameters, ResponseBandwidths
+from hmpim.identify.uncertainty import estimate
+from hmpim.model import RationalDelay, bandwidth_3db, bandwidth_phase, phase, response
+from hmpim.record import Finding
+
+__all__ = ["GainPhase", "disagreement", "gain_and_phase", "response_bandwidths"]
+
+_REACH = 0.15
+"""Neighbours within this share of a frequency are looked at."""
+
+_FEWEST = 5
+
+_APART = 4.0
+"""Standard deviations by which response and model may part."""
+
+_MATTERS = 0.03
+"""Share of a bandwidth below which a disagreement is not worth a word."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class GainPhase:
+    """Gain in dB and phase in degrees (continuous from DC) at one frequency in Hz."""
+
+    frequency: float
+    gain_db: Estimate
+    phase: Estimate
+
+
+def _ratio_at(
+    measured: FrequencyResponse, system: RationalDelay, frequency: float
+) -> tuple[complex, float] | None:
+    """Measured over modelled response at a frequency, and the standard deviation of it.
+
+    Neighbouring frequencies share bins of the record, so averaging them is not counted as
+    lowering the error: the standard deviation is that of one of them.
+    """
+    apart = np.abs(measured.frequency - frequency)
+    inside = measured.frequency[0] <= frequency <= measured.frequency[-1]
+    if not inside or apart.size < _FEWEST:
+        return None
+    near = apart <= max(_REACH * frequency, float(np.partition(apart, _FEWEST - 1)[_FEWEST - 1]))
+    f = measured.frequency[near]
+    modelled = response(system, f)
+    ratio = measured.response[near] / modelled
+    std = measured.std[near] / np.abs(modelled)
+    weight = 1.0 / np.maximum(std, 1e-12)
+    line = np.polynomial.polynomial.polyfit(f - frequency, ratio, 1, w=weight)
+    return complex(line[0]), float(np.median(std))
+
+
+def response_bandwidths(
+    measured: FrequencyResponse, system: RationalDelay, *, freedom: float = 1e6
+) -> ResponseBandwidths:
+    """Where the measured response crosses -90° (with and without the delay) and -3 dB.
+
+    Parameters
+    ----------
+    measured : FrequencyResponse
+        With its error at each frequency.
+    system : RationalDelay
+        The fitted model, scale factor included.
+    freedom : float
+        Degrees of freedom behind the error bars.
+    """
+    highest = float(measured.frequency[-1])
+
+    def crossing(value: float | None, kind: str) -> Estimate | None:
+        if value is None:
+            return None
+        found = _ratio_at(measured, system, value)
+        if found is None:
+            return None
+        ratio, std = found
+        if kind == "gain":
+            steep = _gain_slope(system, value)
+            shift, spread = -(abs(ratio) - 1.0) / steep, (std / np.sqrt(2)) / abs(steep)
+        else:
+            steep = _phase_slope(system, value, delay=kind == "phase")
+            shift, spread = -float(np.angle(ratio)) / steep, (std / np.sqrt(2)) / abs(steep)
+        return estimate(value + shift, float(spread) ** 2, freedom=freedom, unit="Hz")
+
+    return ResponseBandwidths(
+        bandwidth_phase90=crossing(bandwidth_phase(system, highest=highest), "phase"),
+        bandwidth_phase90_without_delay=crossing(
+            bandwidth_phase(system, highest=highest, delay=False), "phase without delay"
+        ),
+        bandwidth_3db=crossing(bandwidth_3db(system, highest=highest), "gain"),
+    )
+
+
+def disagreement(measured: ResponseBandwidths, modelled: Parameters) -> Finding | None:
+    """Sentence on a bandwidth that response and model put apart beyond their error bars."""
+    for name, words in (
+        ("bandwidth_phase90", "-90° bandwidth"),
+        ("bandwidth_phase90_without_delay", "-90° bandwidth without delay"),
+        ("bandwidth_3db", "-3 dB bandwidth"),
+    ):
+        one, other = getattr(measured, name), getattr(modelled, name)
+        if one is None or other is None:
+            continue
+        apart = abs(one.value - other.value)
+        if apart > _APART * float(np.hypot(one.std, other.std)) and apart > _MATTERS * other.value:
+            return Finding(
+                code="bandwidth_disagrees",
+                message=f"The {words} is {one.value:.4g} Hz by the measured response and "
+                f"{other.value:.4g} Hz by the model, further apart than their errors allow. Look "
+                "at the Bode plot there before using either.",
+            )
+    return None
+
+
+def _gain_slope(system: RationalDelay, f: float) -> float:
+    """Derivative of ln|G| by frequency, 1/Hz."""
+    step = 1e-4 * f
+    low, high = np.abs(response(system, np.array([f - step, f + step])))
+    return float(np.log(high / low) / (2 * step))
+
+
+def _phase_slope(system: RationalDelay, f: float, *, delay: bool) -> float:
+    """Derivative of the phase by frequency, rad/Hz."""
+    step = 1e-4 * f
+    low, high = phase(system, np.array([f - step, f + step]), delay=delay)
+    return float((high - low) / (2 * step))
+
+
+def gain_and_phase(
+    measured: FrequencyResponse, system: RationalDelay, frequency: NDArray[np.float64]
+) -> tuple[GainPhase, ...]:
+    """Gain and phase of the measured response at chosen frequencies, each with its interval.
+
+    Parameters
+    ----------
+    measured : FrequencyResponse
+        With its error at each frequency.
+    system : RationalDelay
+        The fitted model: it says how often the phase has turned.
+    frequency : ndarray, shape (m,)
+        Hz; those outside the measured band are left out.
+
+    Returns
+    -------
+    tuple of GainPhase
+    """
+    readings = []
+    for f in np.atleast_1d(frequency):
+        found = _ratio_at(measured, system, float(f))
+        if found is None:
+            continue
+        ratio, std = found
+        there = np.array([float(f)])
+        gain = float(np.abs(response(system, there))[0]) * abs(ratio)
+        turned = float(phase(system, there)[0]) + float(np.angle(ratio))
+        relative = std / np.sqrt(2) / max(abs(ratio), 1e-12)
+        readings.append(
+            GainPhase(
+                frequency=float(f),
+                gain_db=estimate(
+                    20 * float(np.log10(gain)),
+                    float(20 / np.log(10) * relative) ** 2,
+                    freedom=1e6,
+                    unit="dB",
+                ),
+                phase=estimate(
+                    float(np.degrees(turned)),
+                    float(np.degrees(relative)) ** 2,
+                    freedom=1e6,
+                    unit="deg",
+                ),
+            )
+        )
+    return tuple(readings)
