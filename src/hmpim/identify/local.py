@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import PchipInterpolator
 
 from hmpim.errors import ArgumentError, RecordError
+from hmpim.identify.choice import choose
 from hmpim.identify.neighbours import LocalFit, Spectra, centres_in_band, transform
 from hmpim.identify.polynomial import polynomial_fits
 from hmpim.identify.rational import rational_fits
@@ -20,14 +21,6 @@ __all__ = ["local_polynomial_response", "local_response"]
 
 _FEWEST_SAMPLES = 16
 _ORDER = 2
-# The prediction error of a fit is averaged over this many neighbours on either side.
-_NEIGHBOURS = 30
-# Fits that predict within this of the best count as equally good.
-_TOLERANCE = 0.02
-# The next narrower window is taken unless the square of its error is this much greater.
-_DEAREST = 2.0
-# A fit is a reference for wider ones if it predicts within this of the best.
-_CREDIBLE = 1.25
 # Each window of polynomials is wider than the last by this.
 _RATIO = 1.6
 # Narrower windows are too short for eight coefficients beside noise.
@@ -263,7 +256,7 @@ def _single(
     widths = _rational_widths(centre, spectra.u.size)
     if not widths:
         return _answer(spectra, centre, delay, polynomials, ())
-    chosen, _ = _choice(polynomials, ())
+    chosen, _ = choose(polynomials, ())
     g = np.stack([fit.response for fit in polynomials])[chosen, np.arange(centre.size)]
     inside = np.arange(centre[0], centre[-1] + 1)
     smooth = spectra.y.copy()
@@ -308,7 +301,7 @@ def _answer(
     polynomials: list[LocalFit],
     rationals: list[LocalFit] | tuple[()],
 ) -> FrequencyResponse:
-    chosen, bent = _choice(polynomials, rationals)
+    chosen, bent = choose(polynomials, rationals)
     tried, rows = (*polynomials, *rationals), np.arange(centre.size)
     response = np.stack([fit.response for fit in tried])[chosen, rows]
     variance = np.stack([fit.spread * fit.noise for fit in tried])[chosen, rows]
@@ -319,71 +312,6 @@ def _answer(
         std=np.sqrt(variance + bent),
         coherence=None,
     )
-
-
-def _choice(
-    polynomials: list[LocalFit], rationals: list[LocalFit] | tuple[()]
-) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Return which fit to take at each frequency, and the square of the error it leaves in.
-
-    Prediction alone does not see that G and T cannot be told apart in a narrow window, nor
-    variance that a wide one is bent. So the error of G is weighed: its variance, plus what a
-    fit predicts worse than the best of them, referred to G through the power of U, or, if that
-    is more, plus what parts it from the same fit over the next narrower windows, or from that
-    with T, beyond the variance of these (A. Goldenshluger and O. Lepski, Ann. Statist. 39, 2011).
-    Then, of polynomials, the next narrower window is taken if it costs little, so that what
-    curvature leaves over is small beside the stated error (undersmoothing).
-    """
-    tried = (*polynomials, *rationals)
-    missed = np.stack([fit.prediction_error for fit in tried])
-    count = missed.shape[1]
-    # A window that came to nothing must not make nothing of those beyond its reach.
-    mean = _averaged(np.minimum(missed, 1e6 * missed.min(axis=0)))
-    least = mean.min(axis=0)
-    spread = np.stack([fit.spread for fit in tried])
-    power = np.stack([fit.power for fit in tried])
-    response = np.stack([fit.response for fit in tried])
-    bent = np.maximum(mean - (1 + _TOLERANCE) * least, 0.0) / power
-    credible = mean <= _CREDIBLE * least
-    variance = spread * least
-    # Fits come in pairs, with and without T: the same kind one width down stands two before.
-    kinds = [(0, len(polynomials)), (len(polynomials), len(tried))]
-    for begin, end in kinds:
-        without, fuller = slice(begin + 1, end, 2), slice(begin, end, 2)
-        wider, narrower = slice(begin + 2, end), slice(begin, max(end - 2, begin))
-        for fit, reference in ((without, fuller), (wider, narrower)):
-            parted = _beyond(
-                response[fit] - response[reference], variance[reference], credible[reference]
-            )
-            bent[fit] = np.maximum(bent[fit], parted)
-    cost = variance + bent
-    best = np.argmin(cost, axis=0)
-    position = np.arange(count)
-    polynomial = (best >= 2) & (best < len(polynomials))
-    below = np.where(polynomial, best - 2, best)
-    cheap = cost[below, position] <= _DEAREST * cost[best, position]
-    chosen = np.asarray(np.where(cheap, below, best), dtype=np.int64)
-    return chosen, bent[chosen, position]
-
-
-def _beyond(
-    apart: NDArray[np.complex128], variance: NDArray[np.float64], credible: NDArray[np.bool_]
-) -> NDArray[np.float64]:
-    """Return |difference|² beyond the variance of a credible reference, over neighbours."""
-    against = np.maximum(variance, np.finfo(float).tiny)
-    ratio = _averaged(np.where(credible, np.abs(apart) ** 2 / against, 0.0))
-    share = _averaged(credible.astype(np.float64))
-    return np.asarray(np.where(credible, np.maximum(ratio - share, 0.0) * variance, 0.0))
-
-
-def _averaged(values: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Average over neighbours on either side, fewer at the ends."""
-    count = values.shape[1]
-    reach = min(_NEIGHBOURS, count // 2)
-    position = np.arange(count)
-    begin, end = np.maximum(position - reach, 0), np.minimum(position + reach + 1, count)
-    total = np.pad(np.cumsum(values, axis=1), ((0, 0), (1, 0)))
-    return np.asarray((total[:, end] - total[:, begin]) / (end - begin))
 
 
 def _masked(

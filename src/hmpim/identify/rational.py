@@ -20,11 +20,23 @@ from numpy.typing import NDArray
 
 from hmpim.identify.neighbours import LocalFit, Spectra, Windows, windows_around
 
-__all__ = ["rational_fits"]
+__all__ = [
+    "DENOMINATOR_ORDER",
+    "TRANSIENT_ORDER",
+    "RationalSolution",
+    "RationalState",
+    "gauss_newton",
+    "rational_fits",
+    "solved",
+]
 
 _NUMERATOR = 2
-_TRANSIENT = 3
-_DENOMINATOR = 2
+TRANSIENT_ORDER = 3
+"""One more than of B: what a sampled transient rings with is a polynomial in z, not in jω."""
+
+DENOMINATOR_ORDER = 2
+"""One resonance within a window."""
+
 _NOTHING = 1e-24
 _RIDGE = 1e-13
 
@@ -33,13 +45,42 @@ Real = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class _State:
-    """An iterate at every window: coefficients, A and the fitted Y on its bins, Σ|residual|²."""
+class RationalState:
+    """An iterate at every window.
+
+    Parameters
+    ----------
+    theta : complex ndarray, shape (w, q)
+        Coefficients of the linear columns, then of A without its constant 1.
+    denominator, fitted : complex ndarray, shape (w, s)
+        A, and Y as fitted, on the window's bins.
+    squares : ndarray, shape (w,)
+        Σ |Y - fitted|²; infinite where the iterate ran off.
+    """
 
     theta: Complex
     denominator: Complex
     fitted: Complex
     squares: Real
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class RationalSolution:
+    """Where the iteration ended, with the derivatives there and the inverse of their products.
+
+    Parameters
+    ----------
+    state : RationalState
+        The best iterate of each window.
+    rows : complex ndarray, shape (w, s, q)
+        Derivatives of the fitted Y.
+    inverse : complex ndarray, shape (w, q, q)
+        Of rowsᴴ rows: the covariance of `theta` where the noise of a bin is 1.
+    """
+
+    state: RationalState
+    rows: Complex
+    inverse: Complex
 
 
 def rational_fits(
@@ -48,7 +89,7 @@ def rational_fits(
     widths: tuple[int, ...],
     smooth: Complex,
 ) -> list[LocalFit]:
-    """Fit rational functions of order 2/2, with T and without, over windows of each width.
+    """Fit rational functions of order 2 over 2, with T and without, over windows of each width.
 
     Parameters
     ----------
@@ -100,25 +141,27 @@ def _fit(
     windows: Windows, u: Complex, y: Complex, smooth: Complex, power: Real, steps: int
 ) -> list[LocalFit]:
     terms = _NUMERATOR + 1
-    powers = windows.powers(max(_NUMERATOR, _TRANSIENT, _DENOMINATOR))
-    slopes = powers[:, 1 : _DENOMINATOR + 1]
+    powers = windows.powers(max(_NUMERATOR, TRANSIENT_ORDER, DENOMINATOR_ORDER))
+    slopes = powers[:, 1 : DENOMINATOR_ORDER + 1]
     b = u[:, :, None] * powers[:, :terms]
-    t = windows.without_dc()[:, :, None] * powers[:, : _TRANSIENT + 1]
-    # Columns of B, then of A, then of T: without T is with the last columns left away.
-    start: Complex = np.concatenate((b, -smooth[:, :, None] * slopes, t), axis=2)
-    left = np.conj(start.swapaxes(1, 2))
-    gram: Complex = left @ start
-    right: Complex = left @ smooth[:, :, None]
+    t = windows.without_dc()[:, :, None] * powers[:, : TRANSIENT_ORDER + 1]
     fits = []
-    for columns in (start.shape[2], terms + _DENOMINATOR):
-        _, theta = _solved(gram[:, :columns, :columns], right[:, :columns])
-        linear: Complex = b if columns == terms + _DENOMINATOR else np.concatenate((b, t), axis=2)
-        fits.append(_iterated(windows, linear, slopes, y, theta, power, steps))
+    both: Complex = np.concatenate((b, t), axis=2)
+    for linear in (both, b):
+        found = gauss_newton(linear, slopes, y, smooth, steps=steps)
+        fits.append(_read_off(windows, found, y, power))
     return fits
 
 
-def _solved(gram: Complex, right: Complex) -> tuple[Complex, Complex]:
-    """Return inverse, (w, q, q), and solution, (w, q), of equations with scaled columns."""
+def solved(gram: Complex, right: Complex) -> tuple[Complex, Complex]:
+    """Return inverse, (w, q, q), and solution, (w, q), of normal equations, columns scaled.
+
+    Examples
+    --------
+    >>> inverse, x = solved(np.array([[[4.0 + 0j]]]), np.array([[[2.0 + 0j]]]))
+    >>> x.real.round(9).tolist()
+    [[0.5]]
+    """
     index = np.arange(gram.shape[1])
     scale = 1.0 / np.sqrt(np.maximum(gram[:, index, index].real, 1e-300))
     scaled = gram * scale[:, :, None] * scale[:, None, :]
@@ -129,14 +172,49 @@ def _solved(gram: Complex, right: Complex) -> tuple[Complex, Complex]:
     return inverse, (inverse @ right)[:, :, 0]
 
 
-def _state(linear: Complex, slopes: Real, y: Complex, theta: Complex) -> _State:
-    terms = _NUMERATOR + 1
-    a = slice(terms, terms + _DENOMINATOR)
-    coefficients = np.concatenate((theta[:, :terms], theta[:, a.stop :]), axis=1)
-    denominator = 1.0 + theta[:, a] @ slopes.T
-    fitted = (linear @ coefficients[:, :, None])[:, :, 0] / denominator
+def gauss_newton(
+    linear: Complex, slopes: Real, y: Complex, smooth: Complex, *, steps: int
+) -> RationalSolution:
+    """Fit Y = (linear columns · coefficients) / A, A = 1 + slopes · coefficients.
+
+    Parameters
+    ----------
+    linear : complex ndarray, shape (w, s, l)
+        Columns of B and T.
+    slopes : ndarray, shape (s, d)
+        Powers of x from the first.
+    y, smooth : complex ndarray, shape (w, s)
+        Y, and Y nearly free of noise, from which the linear problem gives the start.
+    steps : int
+        At least 1; each window keeps its best iterate.
+
+    Examples
+    --------
+    >>> x = np.linspace(-1, 1, 9)
+    >>> y = (2.0 / (1 + 0.5j * x))[None]
+    >>> found = gauss_newton(np.ones((1, 9, 1)) + 0j, x[:, None], y, y, steps=1)
+    >>> np.abs(found.state.theta).round(9).tolist()
+    [[2.0, 0.5]]
+    """
+    start = np.concatenate((linear, -smooth[:, :, None] * slopes), axis=2)
+    left = np.conj(start.swapaxes(1, 2))
+    _, theta = solved(left @ start, left @ smooth[:, :, None])
+    state = _state(linear, slopes, y, theta)
+    for _ in range(steps):
+        rows = _jacobian(linear, slopes, state)
+        left = np.conj(rows.swapaxes(1, 2))
+        inverse, step = solved(left @ rows, left @ (y - state.fitted)[:, :, None])
+        state = _better(state, _state(linear, slopes, y, state.theta + step))
+    # The last step was small, so the derivatives before it serve.
+    return RationalSolution(state=state, rows=rows, inverse=inverse)
+
+
+def _state(linear: Complex, slopes: Real, y: Complex, theta: Complex) -> RationalState:
+    count = linear.shape[2]
+    denominator = 1.0 + theta[:, count:] @ slopes.T
+    fitted = (linear @ theta[:, :count, None])[:, :, 0] / denominator
     squares = np.sum(np.abs(y - fitted) ** 2, axis=1)
-    return _State(
+    return RationalState(
         theta=theta,
         denominator=denominator,
         fitted=fitted,
@@ -144,43 +222,42 @@ def _state(linear: Complex, slopes: Real, y: Complex, theta: Complex) -> _State:
     )
 
 
-def _jacobian(linear: Complex, slopes: Real, state: _State) -> Complex:
-    terms = _NUMERATOR + 1
-    rows = np.empty((*linear.shape[:2], linear.shape[2] + _DENOMINATOR), dtype=np.complex128)
-    a = slice(terms, terms + _DENOMINATOR)
-    np.divide(linear[:, :, :terms], state.denominator[:, :, None], out=rows[:, :, :terms])
-    np.divide(linear[:, :, terms:], state.denominator[:, :, None], out=rows[:, :, a.stop :])
-    np.multiply(-(state.fitted / state.denominator)[:, :, None], slopes, out=rows[:, :, a])
+def _jacobian(linear: Complex, slopes: Real, state: RationalState) -> Complex:
+    count = linear.shape[2]
+    rows = np.empty((*linear.shape[:2], count + slopes.shape[1]), dtype=np.complex128)
+    inverse = 1.0 / state.denominator
+    np.multiply(linear, inverse[:, :, None], out=rows[:, :, :count])
+    np.multiply(-(state.fitted * inverse)[:, :, None], slopes, out=rows[:, :, count:])
     return rows
 
 
-def _iterated(
-    windows: Windows,
-    linear: Complex,
-    slopes: Real,
-    y: Complex,
-    theta: Complex,
-    power: Real,
-    steps: int,
-) -> LocalFit:
-    """Gauss-Newton from `theta`, each window keeping its best; then read off each centre."""
-    state = _state(linear, slopes, y, theta)
-    for _ in range(steps):
-        rows = _jacobian(linear, slopes, state)
-        left = np.conj(rows.swapaxes(1, 2))
-        inverse, step = _solved(left @ rows, left @ (y - state.fitted)[:, :, None])
-        state = _better(state, _state(linear, slopes, y, state.theta + step))
+def _better(one: RationalState, other: RationalState) -> RationalState:
+    """Take each window from the iterate that leaves less."""
+    take = other.squares < one.squares
+    if take.all():
+        return other
+    return RationalState(
+        theta=np.where(take[:, None], other.theta, one.theta),
+        denominator=np.where(take[:, None], other.denominator, one.denominator),
+        fitted=np.where(take[:, None], other.fitted, one.fitted),
+        squares=np.where(take, other.squares, one.squares),
+    )
+
+
+def _read_off(windows: Windows, found: RationalSolution, y: Complex, power: Real) -> LocalFit:
+    """Response, its spread and the prediction error at each centre."""
     terms, near, place = _NUMERATOR + 1, windows.near, windows.place
-    # The last step was small, so the derivatives before it serve.
-    inverse, row = inverse[near], rows[near, place]
-    x = windows.x[place]
+    state, inverse, row = found.state, found.inverse[near], found.rows[near, place]
+    x = windows.x[place][:, None]
     a = state.denominator[near, place]
     size = np.sqrt(power[near])
-    b = x[:, None] ** np.arange(terms)
+    b = x ** np.arange(terms)
     response = np.sum(b * state.theta[near, :terms], axis=1) / a / size
     slope = np.zeros_like(row)
     slope[:, :terms] = b / (a * size)[:, None]
-    slope[:, terms : terms + _DENOMINATOR] = -(response / a)[:, None] * slopes[place]
+    slope[:, -DENOMINATOR_ORDER:] = -(response / a)[:, None] * x ** np.arange(
+        1, DENOMINATOR_ORDER + 1
+    )
     spread = np.sum(slope * (inverse @ np.conj(slope)[:, :, None])[:, :, 0], axis=1).real
     leverage = np.sum(row * (inverse @ np.conj(row)[:, :, None])[:, :, 0], axis=1).real
     missed = (y - state.fitted)[near, place]
@@ -194,15 +271,4 @@ def _iterated(
         noise=noise,
         power=power[near],
         prediction_error=np.where(failed, np.inf, error),
-    )
-
-
-def _better(one: _State, other: _State) -> _State:
-    """Take each window from the iterate that leaves less."""
-    take = other.squares < one.squares
-    return _State(
-        theta=np.where(take[:, None], other.theta, one.theta),
-        denominator=np.where(take[:, None], other.denominator, one.denominator),
-        fitted=np.where(take[:, None], other.fitted, one.fitted),
-        squares=np.where(take, other.squares, one.squares),
     )
