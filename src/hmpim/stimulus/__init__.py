@@ -18,6 +18,14 @@ from hmpim.stimulus.profile import Prbs, Steps, smooth_prbs, smooth_steps
 from hmpim.stimulus.quintic import Quintic
 from hmpim.stimulus.reverse import Reversed
 from hmpim.stimulus.scale import scale_to_limits
+from hmpim.stimulus.spectrum import (
+    OverFrequency,
+    Redesign,
+    SignalToNoise,
+    check_spectrum,
+    measured_noise,
+    signal_to_noise,
+)
 from hmpim.stimulus.stimulus import Stimulus, blocks
 from hmpim.stimulus.sweep import Sweep
 
@@ -30,12 +38,15 @@ __all__ = [
     "Limits",
     "Motion",
     "Multisine",
+    "OverFrequency",
     "Peaks",
     "Prbs",
     "Quintic",
     "Ramp",
+    "Redesign",
     "RestToRest",
     "Reversed",
+    "SignalToNoise",
     "Sine",
     "Step",
     "Steps",
@@ -44,13 +55,16 @@ __all__ = [
     "Sweep",
     "Waveform",
     "blocks",
+    "check_spectrum",
     "design",
     "interleaved_multisines",
     "leave_room",
+    "measured_noise",
     "random_phase_multisine",
     "rest_to_rest",
     "scale_to_limits",
     "schroeder_multisine",
+    "signal_to_noise",
     "smooth_prbs",
     "smooth_steps",
     "true_peaks",

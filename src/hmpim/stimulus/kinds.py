@@ -1,5 +1,6 @@
 """Design a stimulus of any kind inside limits, rest to rest."""
 
+import copy
 import math
 from typing import Literal, get_args
 
@@ -16,6 +17,7 @@ from hmpim.stimulus.profile import smooth_prbs, smooth_steps
 from hmpim.stimulus.reverse import Reversed
 from hmpim.stimulus.scale import check_limits_given
 from hmpim.stimulus.solve import largest_gain, smallest_extinction
+from hmpim.stimulus.spectrum import OverFrequency, Redesign, check_spectrum
 from hmpim.stimulus.stimulus import Stimulus
 from hmpim.stimulus.sweep import Sweep, check_band, check_positive
 
@@ -41,6 +43,8 @@ def design(
     axis: str = "",
     resolution: float = 0.0,
     rng: np.random.Generator | int | None = None,
+    wanted_snr: float | OverFrequency | None = None,
+    noise: float | OverFrequency | None = None,
 ) -> Stimulus:
     """Design a stimulus inside limits, from rest to rest (section III).
 
@@ -77,6 +81,12 @@ def design(
         rounded commands at `fs`, too.
     rng : numpy.random.Generator, int or None
         Source of random phases, or its seed; needed for 'random_phase' only.
+    wanted_snr : float or OverFrequency, optional
+        Signal-to-noise ratio in dB wanted at each frequency of the band, in each line of the
+        waveform's DFT (`check_spectrum`); less is refused.
+    noise : float or OverFrequency, optional
+        Standard deviation of white noise, in the unit, or one-sided density of a measured
+        one, in unit²/Hz; needed with `wanted_snr`.
 
     Returns
     -------
@@ -86,7 +96,7 @@ def design(
     Raises
     ------
     LimitsError
-        If limits and band cannot both be met; the message says what would do.
+        If limits, band and ratio cannot all be met; the message says what would do.
     ArgumentError
         For anything else that is out of range.
 
@@ -103,6 +113,11 @@ def design(
     _check_frequencies(low, high, length, rate)
     check_limits_given(limits)
     ahead = _seconds("lead", lead)
+    if (wanted_snr is None) != (noise is None):
+        raise ArgumentError(
+            f"wanted_snr = {wanted_snr!r} and noise = {noise!r} belong together; give both"
+        )
+    again = copy.deepcopy(rng)  # a second design must draw the same phases
     if kind not in KINDS:
         raise ArgumentError(f"kind = {kind!r} must be one of {', '.join(map(repr, KINDS))}")
     room = leave_room(limits, resolution=resolution, fs=rate)
@@ -128,7 +143,7 @@ def design(
     settling = _seconds("tail", tail)
     if settling is None:
         settling = 0.0 if ahead == 0.0 else _SETTLING
-    return Stimulus(
+    stimulus = Stimulus(
         waveform=waveform,
         fs=rate,
         unit=limits.unit,
@@ -137,6 +152,31 @@ def design(
         tail=settling,
         resolution=resolution,
     )
+    if wanted_snr is not None and noise is not None:
+
+        def make(others: Limits, seconds: float) -> Stimulus:
+            return design(
+                band=band,
+                duration=seconds,
+                fs=fs,
+                limits=others,
+                kind=kind,
+                extinction=extinction,
+                lead=lead,
+                tail=tail,
+                resolution=resolution,
+                rng=copy.deepcopy(again),
+            )
+
+        check_spectrum(
+            stimulus,
+            noise=noise,
+            snr_db=wanted_snr,
+            band=(low, high),
+            resolution=1.0 / length,
+            redesign=Redesign(duration=length, make=make),
+        )
+    return stimulus
 
 
 def _sweep(
