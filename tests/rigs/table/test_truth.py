@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from hmpim.errors import ArgumentError
-from hmpim.rigs.table import AXES, FIG_4, MotionTable, TablePosition, exact_bandwidth
+from hmpim.rigs.table import AXES, FIG_4, MotionTable, Rigid, TablePosition, exact_bandwidth
 from hmpim.rigs.table import linear_response as exact
 from hmpim.stimulus import Limits, Sine, Stimulus
 
@@ -139,6 +139,16 @@ def test_a_bandwidth_that_cannot_be_had_is_refused():
     sluggish = (replace(FIG_4[0], actuator_lag=0.05), *FIG_4[1:])
     with pytest.raises(ArgumentError, match="roll"):
         _ = MotionTable(axes=sluggish).gains
+
+
+def test_servos_that_swing_have_no_response():
+    light = Rigid(mass=0.1, inertia=(1e-3, 1e-3, 1e-3))
+    feather = (replace(FIG_4[0], gimbal=light), *FIG_4[1:])
+    steel = MotionTable(axes=feather)
+    bare = replace(steel, uut_load=light)
+    assert abs(exact(steel, 43.0, axis_in="roll")[0].real) < 1e-6
+    with pytest.raises(ArgumentError, match="with these loads the servos are not stable"):
+        exact(bare, 43.0, axis_in="roll")
 
 
 def test_limits_of_the_tuned_axis_may_be_in_radians():

@@ -12,6 +12,7 @@ from hmpim.record import Channel, Record
 from hmpim.rigs.table.axes import AXES, FIG_4, AxisName, AxisSpec, CommandMode, TablePosition
 from hmpim.rigs.table.bodies import Base, LoadName, Rigid, load_named
 from hmpim.rigs.table.checks import check_axis, check_torques
+from hmpim.rigs.table.commands import by_axis, command_rate, commands, place
 from hmpim.rigs.table.plant import Plant, build
 from hmpim.rigs.table.servo import Gains
 from hmpim.rigs.table.simulate import History, Timing, simulate
@@ -148,7 +149,7 @@ class MotionTable:
         >>> MotionTable().limits_of("elevation", travel=3.0, share=0.5).acceleration
         450.0
         """
-        limits = self.axes[_place(axis)].limits.to("deg")
+        limits = self.axes[place(axis)].limits.to("deg")
         at = getattr(self.start, axis)
         left = limits.position - abs(at)
         if left <= 0.0 or (travel is not None and travel > left):
@@ -250,11 +251,11 @@ class MotionTable:
         Traceback (most recent call last):
         hmpim.errors.LimitsError: peak acceleration 3197.75 deg/s² is beyond the limit ...
         """
-        named = _by_axis(stimuli)
+        named = by_axis(stimuli)
         samples = max(stimulus.samples for stimulus in named.values())
         for axis, stimulus in named.items():
             check_axis(stimulus, self.limits_of(axis), axis=axis, samples=samples)
-        time, command = self._command(named)
+        time, command = commands(named, start=self.start_angles)
         torque = self.plant.torques(*command)[1:]
         check_torques(time, torque, self.axes)
         return torque
@@ -279,9 +280,9 @@ class MotionTable:
             If an axis runs away.
         """
         self.check(stimuli)
-        named = _by_axis(stimuli)
-        timing = self.timing(_rate(named))
-        _, command = self._command(named)
+        named = by_axis(stimuli)
+        timing = self.timing(command_rate(named))
+        _, command = commands(named, start=self.start_angles)
         noise = None
         if self.encoder_noise_std > 0.0:
             ticks = (command[0].shape[0] - 1) * timing.hold
@@ -340,10 +341,10 @@ class MotionTable:
         >>> table.play(sweep, rng=np.random.default_rng(0)).outputs[0].unit
         'deg'
         """
-        named = _by_axis(stimulus)
+        named = by_axis(stimulus)
         seen = tuple(named) if observe is None else observe
         for axis in seen:
-            _place(axis)
+            place(axis)
         history = self.simulate(named, rng=rng)
 
         def channel(axis: AxisName, quantity: str, name: str) -> Channel:
@@ -360,52 +361,8 @@ class MotionTable:
         return Record(
             inputs=tuple(channel(axis, "command", "command") for axis in named),
             outputs=tuple(channel(axis, "encoder", "position") for axis in seen),
-            fs=_rate(named),
+            fs=command_rate(named),
             band=(min(b[0] for b in bands), max(b[1] for b in bands)) if bands else None,
             intersample="zoh",
             source=f"simulated {self.name}, {self.mode}",
         )
-
-    def _command(
-        self, named: Mapping[AxisName, Stimulus]
-    ) -> tuple[FloatArray, tuple[FloatArray, FloatArray, FloatArray]]:
-        """Times of n commands, and position, velocity, acceleration of all axes, rad.
-
-        Those have shape (n + 1, 5): in front stands the place of rest before time 0.
-        """
-        count = max(stimulus.samples for stimulus in named.values())
-        time = np.arange(-1, count) / _rate(named)
-        position = np.tile(self.start_angles, (count + 1, 1))
-        velocity, acceleration = np.zeros((count + 1, 5)), np.zeros((count + 1, 5))
-        for axis, stimulus in named.items():
-            i, factor = _place(axis), conversion_factor(stimulus.unit, to="rad")
-            motion = stimulus.motion(time)
-            position[:, i] += factor * motion.position
-            velocity[:, i] = factor * motion.velocity
-            acceleration[:, i] = factor * motion.acceleration
-        return time[1:], (position, velocity, acceleration)
-
-
-def _place(axis: str) -> int:
-    if axis not in AXES:
-        raise ArgumentError(f"axis {axis!r} is not known; use one of {AXES}")
-    return AXES.index(axis)
-
-
-def _by_axis(stimuli: Stimulus | Mapping[AxisName, Stimulus]) -> dict[AxisName, Stimulus]:
-    """Stimulus by axis, in the order of `AXES`."""
-    if isinstance(stimuli, Stimulus):
-        stimuli = {AXES[_place(stimuli.axis)]: stimuli}
-    if not stimuli:
-        raise ArgumentError("no stimulus is given; give at least one axis something to do")
-    for axis in stimuli:
-        _place(axis)
-    named = {axis: stimuli[axis] for axis in AXES if axis in stimuli}
-    rates = {axis: stimulus.fs for axis, stimulus in named.items()}
-    if len(set(rates.values())) > 1:
-        raise ArgumentError(f"stimuli have different rates, {rates} Hz; design all at one rate")
-    return named
-
-
-def _rate(named: Mapping[AxisName, Stimulus]) -> float:
-    return next(iter(named.values())).fs

@@ -65,7 +65,8 @@ def linear_response(
     Raises
     ------
     ArgumentError
-        For an axis not known, or a frequency out of range.
+        For an axis not known, a frequency out of range, or a load so light that the servos,
+        which know nothing of it, are not stable.
 
     Examples
     --------
@@ -91,6 +92,11 @@ def linear_response(
     )
     timing = at.timing(fs)
     loop = close_loop(at.plant.step(at.start_angles), at.gains, mode=at.mode, tick=timing.tick)
+    if loop.slowest_decay >= 1.0:
+        raise ArgumentError(
+            f"with these loads the servos are not stable (an eigenvalue of "
+            f"{loop.slowest_decay:.4f}), and there is no response; carry more, or tune for less"
+        )
     response = loop.response(
         f,
         axis_in=AXES.index(axis_in),
