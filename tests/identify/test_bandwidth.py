@@ -5,13 +5,23 @@ import pytest
 
 import hmpim
 from hmpim.identify.bandwidth import gain_and_phase, response_bandwidths
-from hmpim.identify.result import FrequencyResponse
-from hmpim.model import RationalDelay, phase, response, second_order_coefficients
+from hmpim.identify.result import Estimate, FrequencyResponse, Parameters
+from hmpim.model import RationalDelay, bandwidth_phase, phase, response, second_order_coefficients
 
 ROLL = RationalDelay(
     delay=0.002,
     numerator=np.array([1.0]),
     denominator=np.concatenate([[1.0], second_order_coefficients(43.0, 0.6)]),
+)
+
+
+def near(value: float) -> Estimate:
+    return Estimate(value=value, std=0.1, ci95=(value - 0.2, value + 0.2), unit="Hz")
+
+
+MODELLED = Parameters(
+    bandwidth_phase90=near(bandwidth_phase(ROLL, highest=100.0)),
+    bandwidth_phase90_without_delay=near(43.0),
 )
 FREQUENCY = np.arange(0.5, 60.0, 0.1)
 
@@ -33,7 +43,7 @@ def first_crossing(measured: FrequencyResponse) -> float:
 
 
 def test_without_noise_it_is_the_models():
-    found = response_bandwidths(noisy(0, 1e-9), ROLL)
+    found = response_bandwidths(noisy(0, 1e-9), ROLL, MODELLED)
     there = found.bandwidth_phase90.value
     assert phase(ROLL, np.array([there]))[0] == pytest.approx(-np.pi / 2, abs=1e-6)
     assert found.bandwidth_phase90_without_delay.value == pytest.approx(43.0, abs=1e-4)
@@ -41,8 +51,11 @@ def test_without_noise_it_is_the_models():
 
 def test_a_noisy_phase_does_not_pull_it_down():
     """The first crossing of the raw phase comes far too low; this reading stays put."""
-    truth = response_bandwidths(noisy(0, 1e-9), ROLL).bandwidth_phase90.value
-    found = [response_bandwidths(noisy(seed, 0.4), ROLL).bandwidth_phase90 for seed in range(60)]
+    truth = response_bandwidths(noisy(0, 1e-9), ROLL, MODELLED).bandwidth_phase90.value
+    found = [
+        response_bandwidths(noisy(seed, 0.4), ROLL, MODELLED).bandwidth_phase90
+        for seed in range(60)
+    ]
     raw = [first_crossing(noisy(seed, 0.4)) for seed in range(60)]
     values = np.array([e.value for e in found])
     assert np.mean(raw) < 0.9 * truth
@@ -61,7 +74,7 @@ def test_a_response_that_differs_from_the_model_is_read_as_it_is():
         response=response(other, FREQUENCY),
         std=np.full(FREQUENCY.size, 1e-3),
     )
-    there = response_bandwidths(measured, ROLL).bandwidth_phase90.value
+    there = response_bandwidths(measured, ROLL, MODELLED).bandwidth_phase90.value
     assert phase(other, np.array([there]))[0] == pytest.approx(-np.pi / 2, abs=0.02)
 
 

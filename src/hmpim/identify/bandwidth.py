@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from hmpim.identify.result import Estimate, FrequencyResponse, Parameters, ResponseBandwidths
 from hmpim.identify.uncertainty import estimate
-from hmpim.model import RationalDelay, bandwidth_3db, bandwidth_phase, phase, response
+from hmpim.model import RationalDelay, phase, response
 from hmpim.record import Finding
 
 __all__ = ["GainPhase", "disagreement", "gain_and_phase", "response_bandwidths"]
@@ -22,6 +22,9 @@ _REACH = 0.15
 """Neighbours within this share of a frequency are looked at."""
 
 _FEWEST = 5
+
+_MANY = 1e6
+"""Degrees of freedom behind a response's error bars, in effect."""
 
 _APART = 4.0
 """Standard deviations by which response and model may part."""
@@ -62,7 +65,7 @@ def _ratio_at(
 
 
 def response_bandwidths(
-    measured: FrequencyResponse, system: RationalDelay, *, freedom: float = 1e6
+    measured: FrequencyResponse, system: RationalDelay, modelled: Parameters
 ) -> ResponseBandwidths:
     """Where the measured response crosses -90° (with and without the delay) and -3 dB.
 
@@ -72,14 +75,14 @@ def response_bandwidths(
         With its error at each frequency.
     system : RationalDelay
         The fitted model, scale factor included.
-    freedom : float
-        Degrees of freedom behind the error bars.
+    modelled : Parameters
+        Its bandwidths, near which the measurement is looked at.
     """
-    highest = float(measured.frequency[-1])
 
-    def crossing(value: float | None, kind: str) -> Estimate | None:
-        if value is None:
+    def crossing(near: Estimate | None, kind: str) -> Estimate | None:
+        if near is None:
             return None
+        value = near.value
         found = _ratio_at(measured, system, value)
         if found is None:
             return None
@@ -90,14 +93,14 @@ def response_bandwidths(
         else:
             steep = _phase_slope(system, value, delay=kind == "phase")
             shift, spread = -float(np.angle(ratio)) / steep, (std / np.sqrt(2)) / abs(steep)
-        return estimate(value + shift, float(spread) ** 2, freedom=freedom, unit="Hz")
+        return estimate(value + shift, float(spread) ** 2, freedom=_MANY, unit="Hz")
 
     return ResponseBandwidths(
-        bandwidth_phase90=crossing(bandwidth_phase(system, highest=highest), "phase"),
+        bandwidth_phase90=crossing(modelled.bandwidth_phase90, "phase"),
         bandwidth_phase90_without_delay=crossing(
-            bandwidth_phase(system, highest=highest, delay=False), "phase without delay"
+            modelled.bandwidth_phase90_without_delay, "phase without delay"
         ),
-        bandwidth_3db=crossing(bandwidth_3db(system, highest=highest), "gain"),
+        bandwidth_3db=crossing(modelled.bandwidth_3db, "gain"),
     )
 
 
@@ -170,13 +173,13 @@ def gain_and_phase(
                 gain_db=estimate(
                     20 * float(np.log10(gain)),
                     float(20 / np.log(10) * relative) ** 2,
-                    freedom=1e6,
+                    freedom=_MANY,
                     unit="dB",
                 ),
                 phase=estimate(
                     float(np.degrees(turned)),
                     float(np.degrees(relative)) ** 2,
-                    freedom=1e6,
+                    freedom=_MANY,
                     unit="deg",
                 ),
             )

@@ -24,7 +24,7 @@ from hmpim.identify.enrich import (
     members,
     rich_starts,
 )
-from hmpim.identify.fit import Fit, Problem, fit_structure
+from hmpim.identify.fit import Fit, Problem, fit_structure, jacobian
 from hmpim.identify.start import RoughResponse, rough_response, starting_values
 from hmpim.identify.whiteness import effective_share, is_white, misfit
 from hmpim.model.dynamics import STRUCTURES, Structure, StructureName
@@ -58,6 +58,9 @@ _FALLING = 10.0
 
 _DELAY_SHIFT: dict[Intersample, float] = {"zoh": -0.5, "foh": 0.0, "bandlimited": 0.0}
 """Samples by which the fitted delay moves when held, against the other two."""
+
+_FAR = 4.0
+"""Standard deviations of the delay beyond which another structure contradicts the chosen one."""
 
 _JUMP = 0.05
 """Share of its range by which a held input jumps at least once."""
@@ -167,6 +170,7 @@ def joint_fit(
     trials = [_trial(mode, fit, count) for mode, fit in fitted]
     chosen = _chosen(trials, natural)
     problem = data.problem(chosen.intersample, valid)
+    chosen = _wary(chosen, trials, problem, count)
     polished = fit_structure(
         problem, chosen.fit.structure, chosen.fit.theta, precision=_FINAL_PRECISION
     )
@@ -269,7 +273,8 @@ def _fit_all(
     for name in sorted(structures, key=lambda name: -STRUCTURES[name].order):
         structure = STRUCTURES[name]
         starts = starting_values(rough, structure, earliest=-2, thorough=not settled)
-        fit = fit_structure(problem, structure, starts[0], iterations=_TASTE)
+        steps = 2 if settled else _TASTE
+        fit = fit_structure(problem, structure, starts[0], iterations=steps)
         hopeful = min((f.cost for f in fits), default=np.inf) * _HOPELESS
         white = fit.cost < hopeful and is_white(fit.residual)
         if not white:
@@ -398,6 +403,31 @@ def _looks_held(u: NDArray[np.float64]) -> bool:
     jumps = np.abs(np.diff(u))
     moving = jumps[jumps > 0]
     return bool(moving.size < 0.5 * jumps.size and moving.max() > _JUMP * np.ptp(u))
+
+
+def _wary(chosen: Trial, trials: list[Trial], problem: Problem, count: float) -> Trial:
+    """Prefer a richer plain structure where it may well be right and would move the delay.
+
+    The criterion keeps a simpler structure until the evidence is strong, and the simpler one's
+    error bars take it for certain. Where the record half speaks for another pole and that
+    pole would take the delay far outside those bars, the wider bars are the honest ones.
+    """
+    if chosen.fit.structure.name not in PLAIN:
+        return chosen
+    rows = jacobian(problem, chosen.fit)
+    information = np.linalg.pinv(rows @ rows.T, hermitian=True)
+    std = np.sqrt(max(information[0, 0], 0.0) * chosen.fit.cost / problem.counted)
+    for trial in trials:
+        extra = trial.fit.structure.parameters - chosen.fit.structure.parameters
+        if (
+            trial.intersample == chosen.intersample
+            and trial.fit.structure.name in PLAIN
+            and extra > 0
+            and extra * np.log(count) - (trial.criterion - chosen.criterion) > 2.0 * extra
+            and abs(trial.fit.delay - chosen.fit.delay) > _FAR * std
+        ):
+            return trial
+    return chosen
 
 
 def _chosen(trials: list[Trial], natural: Intersample) -> Trial:

@@ -75,6 +75,7 @@ def read_parameters(
     fs: float,
     highest: float,
     delay_correlation: float | None,
+    known_covariance: _Vector | None = None,
     input_unit: str,
     output_unit: str,
 ) -> Readings:
@@ -90,6 +91,8 @@ def read_parameters(
         Frequency in Hz beyond which no bandwidth is read off: the end of the excited band.
     delay_correlation : float or None
         The paper's delay (eq. 8), in s.
+    known_covariance : ndarray, shape (p, p), optional
+        Of the fit's parameters, where other inputs were fitted with it.
     input_unit, output_unit : str
         Units of the channels.
     """
@@ -100,7 +103,9 @@ def read_parameters(
     freedom = max(counted - vector.size, 1)
     residual = fit.residual
     white = is_white(residual if joint.problem.valid is None else residual[joint.problem.valid])
-    cov = _covariance(joint, fit, freedom=freedom, white=white)
+    cov = known_covariance
+    if cov is None:
+        cov = _covariance(joint, fit, freedom=freedom, white=white)
     effective = freedom * joint.effective_share
     system = system_of(structure, vector, fs)
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hmpim.identify.enrich import PLAIN
-from hmpim.identify.joint import CLEARLY, JointFit, Trial
+from hmpim.identify.joint import CLEARLY, JointFit
 from hmpim.identify.readings import Readings
 from hmpim.identify.result import Estimate, Verdict
 from hmpim.identify.whiteness import Misfit
@@ -26,9 +26,7 @@ _LOOSE = 0.3
 
 
 _AMBIGUOUS = 2.0
-"""Likelihood ratio (twice the logarithm) in favour of a richer structure above which it is
-named, though the criterion keeps the simpler one: where first order is right, one record in
-eight comes there by chance."""
+"""Difference of the criterion within which another plain structure is worth naming."""
 
 _DISAGREES = 4.0
 """Standard deviations by which its delay must differ to cast doubt."""
@@ -203,7 +201,7 @@ def _other_structure(joint: JointFit, readings: Readings) -> str | None:
             trial.intersample != best.intersample
             or trial.fit.structure.name == best.fit.structure.name
             or not {trial.fit.structure.name, best.fit.structure.name} <= set(PLAIN)
-            or not _rivals(trial, best, joint)
+            or trial.criterion - best.criterion > _AMBIGUOUS
         ):
             continue
         apart = abs(trial.fit.delay - best.fit.delay)
@@ -214,16 +212,6 @@ def _other_structure(joint: JointFit, readings: Readings) -> str | None:
                 "deviations away. Lower the noise, or sweep higher, to tell them apart."
             )
     return None
-
-
-def _rivals(trial: Trial, best: Trial, joint: JointFit) -> bool:
-    """Whether another structure is within what the data can tell apart."""
-    worse = trial.criterion - best.criterion
-    extra = trial.fit.structure.parameters - best.fit.structure.parameters
-    if extra <= 0:
-        return worse < _AMBIGUOUS
-    count = joint.problem.counted * joint.effective_share
-    return bool(extra * np.log(count) - worse > _AMBIGUOUS)
 
 
 def _rival(joint: JointFit) -> str | None:
