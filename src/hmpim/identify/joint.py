@@ -97,6 +97,9 @@ class JointFit:
         Samples left out at the beginning because the record does not begin at rest.
     effective_share : float
         Independent samples per sample, from the best residual's correlation.
+    simpler : Trial or None
+        What the criterion alone would have chosen, where a richer structure was taken for its
+        wider error bars.
     """
 
     problem: Problem
@@ -104,6 +107,7 @@ class JointFit:
     trials: tuple[Trial, ...]
     forgotten: int
     effective_share: float
+    simpler: Trial | None = None
 
 
 def joint_fit(
@@ -170,6 +174,7 @@ def joint_fit(
     trials = [_trial(mode, fit, count) for mode, fit in fitted]
     chosen = _chosen(trials, natural)
     problem = data.problem(chosen.intersample, valid)
+    likeliest = chosen
     chosen = _wary(chosen, trials, problem, count)
     polished = fit_structure(
         problem, chosen.fit.structure, chosen.fit.theta, precision=_FINAL_PRECISION
@@ -181,6 +186,7 @@ def joint_fit(
         trials=tuple(best if trial is chosen else trial for trial in trials),
         forgotten=forgotten,
         effective_share=share,
+        simpler=None if chosen is likeliest else likeliest,
     )
 
 

@@ -151,6 +151,14 @@ def judge(
     other = _other_structure(joint, readings)
     if other is not None:
         note("structure", other, doubt=True)
+    if joint.simpler is not None:
+        note(
+            "structure",
+            f"The number of poles this record hardly tells: {fit.structure.name} is taken for "
+            f"its wider error bars; {joint.simpler.fit.structure.name} would put the delay at "
+            f"{joint.simpler.fit.delay / fs:.4g} s. Lower the noise, or sweep higher.",
+            doubt=True,
+        )
     rival = _rival(joint)
     if rival is not None:
         note("intersample", rival, doubt=False)

@@ -19,6 +19,7 @@ __all__ = [
 
 _LAGS = 25
 _LONGEST_AUTOREGRESSION = 30
+_FLICKER_BINS = 32
 
 
 def autocovariance(residual: NDArray[np.float64], lags: int) -> NDArray[np.float64]:
@@ -105,7 +106,30 @@ def autoregressive_spectrum(
     _, variance, coefficients = best
     steps = np.arange(1, coefficients.size + 1)
     transfer = 1.0 - np.exp(-1j * np.outer(omega, steps)) @ coefficients
-    return np.asarray(variance / np.abs(transfer) ** 2)
+    power = variance / np.abs(transfer) ** 2
+    return np.asarray(np.maximum(power, _flicker(residual, omega)))
+
+
+def _flicker(residual: NDArray[np.float64], omega: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Power that rises towards DC as f^-α, which a short autoregression levels off; 0 if none.
+
+    A straight line through the logarithm of the first bins of the periodogram, whose scatter
+    about it is known: standard deviation π/√6, mean -0.577 (Kay, Modern Spectral Estimation).
+    """
+    n = residual.size
+    bins = np.arange(1, min(_FLICKER_BINS, n // 8) + 1)
+    if bins.size < 8:
+        return np.zeros_like(omega)
+    wave = rfft(residual)[bins]
+    level = np.log(np.maximum(np.abs(wave) ** 2 / n, np.finfo(float).tiny)) + 0.5772
+    steps = np.log(bins) - np.mean(np.log(bins))
+    slope = float(steps @ level / (steps @ steps))
+    error = np.pi / np.sqrt(6.0 * float(steps @ steps))
+    if slope > -2.0 * error:
+        return np.zeros_like(omega)
+    at = np.maximum(omega * n / (2 * np.pi), 0.5)
+    power = np.exp(np.mean(level) + slope * (np.log(at) - np.mean(np.log(bins))))
+    return np.asarray(np.where(at <= bins[-1], power, 0.0))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
