@@ -5,7 +5,7 @@ BIN    := $(VENV)/bin
 RUN    := $(VENV)/.run-installed
 DEV    := $(VENV)/.dev-installed
 
-.PHONY: help install demo test check bench docs clean
+.PHONY: help install demo test check bench accuracy docs clean
 help:  ## show this list
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
 
@@ -37,6 +37,9 @@ check: $(DEV)  ## ruff, mypy strict, import-linter
 
 bench: $(DEV)  ## speed, against a hand-written fit in the same run
 	$(BIN)/python benchmarks/identification_speed.py
+
+accuracy: $(DEV)  ## every figure of docs/accuracy.md, from scratch
+	$(BIN)/python benchmarks/accuracy.py
 
 docs: $(DEV)  ## every figure and table of the paper, into docs/build
 	$(BIN)/hmpim paper --out docs/build
