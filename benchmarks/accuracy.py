@@ -227,8 +227,8 @@ def random_systems(count: int, mapped: Callable) -> list[str]:
         "",
         "First and second order; delay 0 to 0.3 s; natural frequency 10 to 80 % of the swept band; "
         "damping 0.1 to 1.5; scale 0.3 to 3, either sign; bias; noise 0.05 to 5 % of the "
-        "amplitude; 100 to 1000 Hz; 5 or 10 s; n from 0 to 1.1. Where the structure is not the true one, "
-        "delay, scale factor and bias are compared.",
+        "amplitude; 100 to 1000 Hz; 5 or 10 s; n from 0 to 1.1. Where the "
+        "structure is not the true one, delay, scale factor and bias are compared.",
     ]
 
 
@@ -251,8 +251,8 @@ def frequency_response(count: int, mapped: Callable) -> list[str]:
     errors = 100 * np.array(mapped(one_response, range(count), "frequency response"))
     return [
         "Median complex error over 0.5 to 20 Hz, relative, no delay given: "
-        f"{np.median(errors):.2f} % in the middle of {count} seeds, {np.percentile(errors, 95):.2f} % in the 95th "
-        f"percentile, {errors.max():.2f} % at worst; {100 * np.mean(errors <= 2):.1f} % of the "
+        f"{np.median(errors):.2f} % in the middle of {count} seeds, "
+        f"{np.percentile(errors, 95):.2f} % in the 95th percentile, {errors.max():.2f} % at worst; {100 * np.mean(errors <= 2):.1f} % of the "
         "seeds are at 2 % or below."
     ]
 
