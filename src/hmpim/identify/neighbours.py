@@ -13,7 +13,15 @@ from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 from scipy import fft
 
-__all__ = ["LocalFit", "Spectra", "Windows", "centres_in_band", "transform", "windows_around"]
+__all__ = [
+    "LocalFit",
+    "Spectra",
+    "Windows",
+    "centres_in_band",
+    "mirrored",
+    "transform",
+    "windows_around",
+]
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -35,10 +43,6 @@ class Spectra:
     frequency: Real
     u: Complex
     y: Complex
-
-    def mirrored(self, values: Complex, reach: int) -> Complex:
-        """Return `values` with `reach` negative frequencies before them."""
-        return np.concatenate((np.conj(values[reach:0:-1]), values))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -74,9 +78,9 @@ class Windows:
         """Return x^p, p = 0 … `order`, shape (s, order + 1)."""
         return np.asarray(self.x[:, None] ** np.arange(order + 1))
 
-    def view(self, mirrored: Complex, reach: int) -> Complex:
-        """Return the windows of values that `Spectra.mirrored` made, shape (w, s)."""
-        return np.asarray(sliding_window_view(mirrored, self.size)[self.start + reach])
+    def view(self, values: Complex, reach: int) -> Complex:
+        """Return the windows of values that `mirrored` made, shape (w, s)."""
+        return np.asarray(sliding_window_view(values, self.size)[self.start + reach])
 
     def without_dc(self) -> Real:
         """Return 1 for bins that count and 0 at DC, shape (w, s)."""
@@ -90,7 +94,7 @@ class LocalFit:
     Parameters
     ----------
     response : complex ndarray
-        G.
+        G; with m inputs at once (c, m), as are `spread` and `power`.
     spread : ndarray
         Variance of G where the noise of a bin of Y is 1.
     noise : ndarray
@@ -106,6 +110,17 @@ class LocalFit:
     noise: Real
     power: Real
     prediction_error: Real
+
+
+def mirrored(values: Complex, reach: int) -> Complex:
+    """Return a spectrum with `reach` negative frequencies before it.
+
+    Examples
+    --------
+    >>> mirrored(np.array([0, 1 + 2j, 3 + 4j]), 1).tolist()
+    [(1-2j), 0j, (1+2j), (3+4j)]
+    """
+    return np.concatenate((np.conj(values[reach:0:-1]), values))
 
 
 def transform(u: Real, y: Real, fs: float, delay: float) -> Spectra:

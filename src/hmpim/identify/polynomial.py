@@ -10,7 +10,7 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
-from hmpim.identify.neighbours import LocalFit, Spectra, Windows, windows_around
+from hmpim.identify.neighbours import LocalFit, Spectra, Windows, mirrored, windows_around
 
 __all__ = ["polynomial_fits"]
 
@@ -64,7 +64,7 @@ def polynomial_fits(
     [0.0, 0.0]
     """
     reach = min(max(widths), spectra.u.size - 1)
-    u, y = spectra.mirrored(spectra.u, reach), spectra.mirrored(spectra.y, reach)
+    u, y = mirrored(spectra.u, reach), mirrored(spectra.y, reach)
     products = np.stack((np.abs(u) ** 2 + 0j, np.conj(u), np.conj(u) * y, y, np.abs(y) ** 2 + 0j))
     fits: list[LocalFit] = []
     for width in widths:

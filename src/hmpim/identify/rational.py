@@ -18,7 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from hmpim.identify.neighbours import LocalFit, Spectra, Windows, windows_around
+from hmpim.identify.neighbours import LocalFit, Spectra, Windows, mirrored, windows_around
 
 __all__ = [
     "DENOMINATOR_ORDER",
@@ -122,12 +122,12 @@ def rational_fits(
     True
     """
     reach = max(widths)
-    mirrored = [spectra.mirrored(v, reach) for v in (spectra.u, spectra.y, smooth)]
+    folded = [mirrored(v, reach) for v in (spectra.u, spectra.y, smooth)]
     floor = _NOTHING * float(np.max(np.abs(spectra.u)) ** 2)
     fits = []
     for width in widths:
         windows = windows_around(centre, spectra.u.size, width)
-        u, y, start = (windows.view(v, reach) for v in mirrored)
+        u, y, start = (windows.view(v, reach) for v in folded)
         power = np.maximum(np.sum(np.abs(u) ** 2, axis=1) / windows.counted, floor)
         # Sharp features hide in wide windows, whose start is far off; they are also the fewest.
         steps = 2 if width < 32 else 4
