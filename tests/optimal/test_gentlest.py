@@ -88,13 +88,23 @@ def test_exactly_the_accuracy_is_bought_and_none_is_missed(which, request):
 @pytest.mark.parametrize("which", ["gentle_10s", "short"])
 def test_at_rest_at_both_ends(which, request):
     stimulus = request.getfixturevalue(which).stimulus
-    ends = stimulus.motion(np.array([0.0, stimulus.waveform.duration]))
-    assert np.abs(ends.position).max() <= 1e-9 * stimulus.peaks.position
-    assert np.abs(ends.velocity).max() <= 1e-9 * stimulus.peaks.velocity
-    assert np.abs(ends.acceleration).max() <= 1e-9 * stimulus.peaks.acceleration
-    still = stimulus.time > stimulus.waveform.duration
-    assert np.abs(stimulus.position[still]).max() <= 1e-9 * stimulus.peaks.position
+    moving = stimulus.sweep_start, stimulus.sweep_start + stimulus.sweep_duration
+    joints = stimulus.motion(np.array(moving))
+    for name in ("position", "velocity", "acceleration"):
+        peak = getattr(stimulus.peaks, name)
+        assert np.abs(getattr(joints, name)).max() <= 1e-9 * peak
+    still = (stimulus.time < moving[0]) | (stimulus.time > moving[1] + 1e-9)
+    for name in ("position", "velocity", "acceleration"):
+        assert not np.any(getattr(stimulus, name)[still])
     assert still.sum() >= FIG_17.delay * FS  # the delayed end is in the record
+
+
+def test_a_jerk_limit_is_kept_too():
+    free = search(duration=4.0)
+    limits = Limits(position=10, jerk=0.6 * free.stimulus.peaks.jerk, unit="deg")
+    found = search(limits, duration=4.0)
+    assert found.stimulus.peaks.jerk <= limits.jerk
+    assert found.value < 1.5 * free.value
 
 
 def test_limits_hold_between_the_samples(short):

@@ -26,6 +26,7 @@ _LONGEST = 60.0  # s, where the duration is to be short and no longest one is st
 _ROUNDS = 8  # of the search for the shortest record
 _CLOSE = 0.01  # of the duration, to which the shortest is found
 _FULL = 1.0 + 1e-9
+_ROOM = 1.05  # on what would do: another search may end in another, slightly worse minimum
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -251,9 +252,9 @@ def _best(family: Family, wish: Wish, *, near: Candidate | None = None) -> Candi
     if inside is None:
         return best
     inside = replace(inside, value=gentleness(inside.stimulus, wish.gentle))
-    if inside.use <= _FULL:
-        inside = _better(inside, _at(family, wish, wish.duration, inside))
-    return _better(best, inside)
+    if inside.use > _FULL:
+        return inside  # for limits in proportion, in proportion: what would do relies on it
+    return _better(inside, _at(family, wish, wish.duration, inside))
 
 
 def _at(family: Family, wish: Wish, total: float, near: Candidate | None) -> Candidate | None:
@@ -325,14 +326,15 @@ def _next_duration(
 
 def _what_would_do(wish: Wish, best: Candidate | None) -> str:
     """Say how far off the wish is, in errors, in limits, and in time."""
-    if best is None:
+    if best is None or not math.isfinite(best.use):
         needed = three_digits(wish.tail + 10.0 / wish.model.natural_frequency, up=True)
         return (
             f"duration = {wish.duration:g} s is too short for any motion: leads, and a tail of "
             f"{wish.tail:.3g} s for the delayed response, take it all; allow {needed} s or more"
         )
-    factor = three_digits(best.use, up=True)
-    longer = three_digits(wish.duration * best.use**2, up=True)
+    wide = _ROOM * best.use
+    factor = three_digits(wide, up=True)
+    longer = three_digits(wish.duration * wide**2, up=True)
     return (
         f"the accuracy cannot be met inside the limits in {wish.duration:g} s: the best "
         f"stimulus found needs {factor} times the limits; allow errors {factor} times as "

@@ -2,7 +2,8 @@ r"""The gentlest multisine: every amplitude and phase free, solved by linear pro
 
 The lines are harmonics, and three linear conditions, sums over the lines, put position,
 velocity and acceleration at 0 where a period begins; so the motion starts and ends at rest,
-and needs no lead. Over a long record a shorter period is repeated.
+and needs no lead but one sample at rest on either side. Over a long record a shorter period
+is repeated.
 
 With acceleration amplitudes z (cosine and sine parts of each line) the motion is linear in
 z and the information quadratic. Around a point, log(standard deviation / wanted) is
@@ -22,7 +23,8 @@ from scipy.optimize import linprog
 from hmpim.optimal.candidate import Candidate, try_out
 from hmpim.optimal.fisher import sensitivities
 from hmpim.optimal.wish import PARAMETERS, Wish
-from hmpim.stimulus import SumOfSines
+from hmpim.stimulus import RestToRest, SumOfSines
+from hmpim.stimulus.quintic import Quintic
 
 __all__ = ["best_multisine", "multisine_lines"]
 
@@ -91,13 +93,14 @@ class _Programme:
         values, slopes = self.log_ratios(z)
         near = values > -2.0 * trust - 0.1
         count = z.size
+        shares = np.abs(self.motion @ z).max(axis=1) / self.bounds
         rows, right = [np.column_stack([slopes[near], np.zeros(near.sum())])], []
         right.append(slopes[near] @ z - values[near])
         for order, matrix in enumerate(self.motion):
             bound = float(self.bounds[order])
             free = 0.0  # weight of the programme's extra variable, the largest peak
             if self.wish.gentle == "duration":
-                free = 1.0
+                bound, free = bound * float(shares.max()), 1.0
             elif self.wish.gentle == "peak_acceleration" and order == 2:
                 bound, free = float(np.abs(matrix @ z).max()), 1.0
             if math.isinf(bound):
@@ -175,8 +178,7 @@ def best_multisine(
     Candidate or None
         None if `total` leaves no room for the motion.
     """
-    samples = math.floor((total - wish.tail) * wish.fs + 1e-6)
-    moving = samples / wish.fs
+    moving = math.floor((total - wish.tail) * wish.fs - 2.0 + 1e-6) / wish.fs
     if moving <= 0.0:
         return None
     repeats, lines = multisine_lines(wish, moving)
@@ -193,7 +195,7 @@ def best_multisine(
             best = found
     if best is None:
         return None
-    waveform = _waveform(best, repeats, moving)
+    waveform = _waveform(best, repeats, moving, wish.fs)
     return try_out(waveform, wish, family="multisine", total=total, shape=best, finer=3)
 
 
@@ -243,9 +245,9 @@ def _programme(wish: Wish, moving: float, total: float, repeats: int, lines: int
     k = np.arange(1, lines + 1)
     omega = 2.0 * np.pi * repeats * k / moving
     count = round(total * wish.fs)
-    time = np.arange(count) / wish.fs
+    time = (np.arange(count) - 1) / wish.fs
     angle = np.outer(omega, time)
-    basis = np.vstack([np.cos(angle), np.sin(angle)]) * (time <= moving)
+    basis = np.vstack([np.cos(angle), np.sin(angle)]) * ((time >= 0.0) & (time <= moving))
     basis /= np.concatenate([omega, omega])[:, None] ** 2
     information, wanted = [], []
     for model in wish.models():
@@ -295,16 +297,26 @@ def _grams(rows: FloatArray) -> FloatArray:
     return np.asarray(0.5 * (gram + gram.transpose(0, 1, 3, 2)))
 
 
-def _waveform(z: FloatArray, repeats: int, moving: float) -> SumOfSines:
+def _waveform(z: FloatArray, repeats: int, moving: float, fs: float) -> RestToRest:
     lines = z.size // 2
     k = repeats * np.arange(1, lines + 1)
     omega = 2.0 * np.pi * k / moving
     cosine, sine = z[:lines] / omega**2, z[lines:] / omega**2
     size = np.hypot(cosine, sine)
     kept = size > 0.0
-    return SumOfSines(
+    core = SumOfSines(
         amplitudes=tuple(size[kept].tolist()),
         frequencies=tuple((k[kept] / moving).tolist()),
         phases=tuple(np.arctan2(cosine, sine)[kept].tolist()),
         duration=moving,
+    )
+    still, sample = (0.0,) * 6, 1.0 / fs
+    return RestToRest(
+        core=core,
+        sweep_start=sample,
+        join=0.0,
+        leave=moving,
+        lead_in=Quintic(start=0.0, duration=sample, coefficients=still),
+        lead_out=Quintic(start=sample + moving, duration=sample, coefficients=still),
+        duration=moving + 2.0 * sample,
     )
