@@ -9,6 +9,8 @@ from typer.testing import CliRunner
 
 from hmpim.cli.design import design
 from hmpim.errors import ArgumentError, LimitsError
+from hmpim.formats.stimulus_files import read_stimulus
+from hmpim.stimulus import KINDS
 
 FIG_12 = [
     *("--band", "0.1", "10", "--duration", "10", "--fs", "500", "--amplitude", "10"),
@@ -72,3 +74,42 @@ def test_refusals_write_nothing(tmp_path, more, error, message):
 def test_help_shows_an_example():
     out = run("--help")
     assert "hmpim design --band 0.1 10" in out.output
+
+
+@pytest.mark.parametrize("suffix", [".csv", ".h5", ".mat", ".h", ".toml"])
+def test_every_kind_of_file(tmp_path, suffix):
+    path = tmp_path / f"s{suffix}"
+    out = run(*FIG_12, "--kind", "exponential", "--resolution", "0.0001", "-o", str(path))
+    assert out.exit_code == 0, out.output
+    [back] = read_stimulus(path)
+    assert abs(back.position).max() == pytest.approx(10.0, rel=1e-3)
+    assert back.fs == 500.0
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_every_kind_of_waveform_with_a_jerk_limit(tmp_path, kind):
+    path = tmp_path / "s.json"
+    out = run(*FIG_12, "--kind", kind, "--jerk", "3e6", "--json", str(path))
+    assert out.exit_code == 0, out.output
+    data = json.loads(path.read_text())
+    assert data["limits"]["jerk"] == 3e6
+    assert data["peaks"]["jerk"] <= 3e6
+    assert "of 3e+06 deg/s³\n" in out.output
+    assert ("extinction n" in out.output) == (kind in ("hmpim", "exponential", "reversed"))
+
+
+@pytest.mark.parametrize(
+    ("more", "error", "message"),
+    [
+        (("--wanted-snr", "90", "--noise", "0.1"), LimitsError, "signal-to-noise .* would do"),
+        (("--wanted-snr", "90"), ArgumentError, "belong together"),
+        (("--kind", "square"), ArgumentError, "--kind 'square' must be one of hmpim"),
+        (("-o", "s.doc"), ArgumentError, r"--output s.doc must end in one of .csv"),
+        (("--resolution", "1"), LimitsError, "rounding to 1 deg at 500 Hz alone"),
+        (("--jerk", "-1"), ArgumentError, "jerk limit = -1.0"),
+    ],
+)
+def test_more_refusals(more, error, message):
+    out = run(*FIG_12, *more)
+    with pytest.raises(error, match=message):
+        raise out.exception

@@ -1,4 +1,4 @@
-"""`hmpim design`: a stimulus inside limits, as CSV for the rig and JSON for the record."""
+"""`hmpim design`: a stimulus inside limits, as a file for the rig and JSON for the record."""
 
 from pathlib import Path
 from typing import Annotated, Literal
@@ -7,6 +7,8 @@ import typer
 
 from hmpim.cli.terminal import check_target
 from hmpim.errors import ArgumentError
+from hmpim.stimulus.kinds import KINDS, Kind
+from hmpim.stimulus.limits import QUANTITIES
 
 __all__ = ["design"]
 
@@ -18,6 +20,13 @@ def _number_or_auto(option: str, text: str) -> float | Literal["auto"]:
         return float(text)
     except ValueError:
         raise ArgumentError(f"{option} {text!r} is neither 'auto' nor a number") from None
+
+
+def _known_kind(text: str) -> Kind:
+    for kind in KINDS:
+        if text == kind:
+            return kind
+    raise ArgumentError(f"--kind {text!r} must be one of {', '.join(KINDS)}")
 
 
 def design(
@@ -34,6 +43,10 @@ def design(
     max_acceleration: Annotated[
         float, typer.Option(help="Acceleration limit, unit per second squared.")
     ] = float("inf"),
+    jerk: Annotated[float, typer.Option(help="Jerk limit, unit per second cubed.")] = float("inf"),
+    kind: Annotated[
+        str, typer.Option(metavar="KIND", help=f"Waveform: {', '.join(KINDS)}.")
+    ] = "hmpim",
     extinction: Annotated[
         str, typer.Option(metavar="auto|N", help="Extinction factor n; auto: the smallest.")
     ] = "auto",
@@ -48,8 +61,23 @@ def design(
         str, typer.Option(metavar="auto|S", help="Seconds at rest appended at the end.")
     ] = "auto",
     unit: Annotated[str, typer.Option(help="Unit of the position, such as deg.")] = "",
+    resolution: Annotated[
+        float, typer.Option(help="Step to which the rig rounds positions; 0: none.")
+    ] = 0.0,
+    wanted_snr: Annotated[
+        float | None,
+        typer.Option(help="Signal-to-noise ratio wanted at each frequency, dB; less is refused."),
+    ] = None,
+    noise: Annotated[
+        float | None,
+        typer.Option(help="Standard deviation of the noise in each sample, in the unit."),
+    ] = None,
+    seed: Annotated[int, typer.Option(help="Of random phases.")] = 0,
     output: Annotated[
-        Path | None, typer.Option("-o", "--output", help="CSV of the samples.")
+        Path | None,
+        typer.Option(
+            "-o", "--output", help="Samples as .csv, .h5, .mat or .h; specification as .toml."
+        ),
     ] = None,
     json_file: Annotated[
         Path | None, typer.Option("--json", help="JSON of gain, extinction, peaks and the rest.")
@@ -59,35 +87,50 @@ def design(
     """Design a stimulus inside position, rate and acceleration limits.
 
     The amplitude is taken to its limit, then the extinction factor is raised until rate
-    and acceleration fit. The axis starts and ends at rest.
+    and acceleration fit. The axis starts and ends at rest. Multisines are shaped as the
+    limits are; binary sequences and steps move from level to level smoothly.
 
     Example:
 
     hmpim design --band 0.1 10 --duration 10 --fs 500 --amplitude 10 --max-rate 1000
     --max-acceleration 40000 --unit deg -o s.csv --json s.json
     """
-    from hmpim.formats.stimulus import save_stimulus_csv, save_stimulus_json
+    from hmpim.formats.stimulus import save_stimulus_json
+    from hmpim.formats.stimulus_files import STIMULUS_SUFFIXES, save_stimulus
     from hmpim.stimulus import Limits
     from hmpim.stimulus import design as design_stimulus
     from hmpim.units import rate_unit
 
     check_target(output, "--output")
+    if output is not None and output.suffix.lower() not in STIMULUS_SUFFIXES:
+        raise ArgumentError(f"--output {output} must end in one of {', '.join(STIMULUS_SUFFIXES)}")
     check_target(json_file, "--json")
     check_target(plot, "--plot")
     if plot is not None and plot.suffix.lower() != ".png":
         raise ArgumentError(f"--plot {plot} does not end in .png, the one picture made here")
-    limits = Limits(position=amplitude, velocity=max_rate, acceleration=max_acceleration, unit=unit)
+    limits = Limits(
+        position=amplitude,
+        velocity=max_rate,
+        acceleration=max_acceleration,
+        jerk=jerk,
+        unit=unit,
+    )
     stimulus = design_stimulus(
         band=band,
         duration=duration,
         fs=fs,
         limits=limits,
+        kind=_known_kind(kind),
         extinction=_number_or_auto("--extinction", extinction),
         lead=_number_or_auto("--lead", lead),
         tail=_number_or_auto("--tail", tail),
+        resolution=resolution,
+        rng=seed,
+        wanted_snr=wanted_snr,
+        noise=noise,
     )
     if output is not None:
-        save_stimulus_csv(stimulus, output)
+        save_stimulus(stimulus, output)
     if json_file is not None:
         save_stimulus_json(stimulus, json_file)
     if plot is not None:
@@ -96,9 +139,10 @@ def design(
         time_histories(stimulus).savefig(plot, dpi=150)
     typer.echo(
         f"{stimulus.samples} samples at {stimulus.fs:g} Hz, {stimulus.duration:g} s, "
-        f"of which the sweep {stimulus.sweep_duration:g} s from {stimulus.sweep_start:g} s"
+        f"of which the waveform {stimulus.sweep_duration:g} s from {stimulus.sweep_start:g} s"
     )
-    typer.echo(f"gain {stimulus.gain:.6g}, extinction n = {stimulus.extinction:g}")
-    for order, name in enumerate(("position", "velocity", "acceleration")):
+    if stimulus.gain is not None and stimulus.extinction is not None:
+        typer.echo(f"gain {stimulus.gain:.6g}, extinction n = {stimulus.extinction:g}")
+    for order, name in enumerate(QUANTITIES if jerk < float("inf") else QUANTITIES[:3]):
         peak, limit = getattr(stimulus.peaks, name), getattr(limits, name)
         typer.echo(f"peak {name:<12} {peak:>10.5g} of {limit:g} {rate_unit(unit, order)}".rstrip())

@@ -2,7 +2,9 @@
 
 import json
 import math
-from collections.abc import Sequence
+import os
+import tempfile
+from collections.abc import Callable, Sequence
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -11,17 +13,26 @@ import numpy as np
 
 from hmpim.errors import ArgumentError
 from hmpim.stimulus import Limits, Stimulus
+from hmpim.stimulus.command import rounded
+from hmpim.stimulus.limits import QUANTITIES
+from hmpim.stimulus.motion import FloatArray
 
-__all__ = ["save_stimulus_csv", "save_stimulus_json", "stimulus_to_dict"]
-
-_SIGNALS = ("position", "velocity", "acceleration")
+__all__ = [
+    "check_together",
+    "save_stimulus_csv",
+    "save_stimulus_json",
+    "stimulus_columns",
+    "stimulus_to_dict",
+    "write_whole",
+]
 
 
 def stimulus_to_dict(stimulus: Stimulus) -> dict[str, Any]:
     """Return what a stimulus is as plain JSON values; its samples are not among them.
 
     `duration`, `lead`, `lead_out` and `tail` are in seconds: `lead` before the sweep,
-    `lead_out` after it, `duration` of all together. A limit that is not set is null.
+    `lead_out` after it, `duration` of all together. A limit that is not set is null, and a peak
+    that is infinite.
 
     Parameters
     ----------
@@ -41,13 +52,14 @@ def stimulus_to_dict(stimulus: Stimulus) -> dict[str, Any]:
         "axis": stimulus.axis,
         "gain": stimulus.gain,
         "extinction": stimulus.extinction,
-        "peaks": {name: getattr(stimulus.peaks, name) for name in _SIGNALS},
+        "peaks": {name: _finite(getattr(stimulus.peaks, name)) for name in QUANTITIES},
         "band": None if stimulus.band is None else list(stimulus.band),
         "duration": stimulus.duration,
         "fs": stimulus.fs,
         "lead": before,
         "lead_out": round(stimulus.waveform.duration - before - stimulus.sweep_duration, 12),
         "tail": stimulus.tail,
+        "resolution": stimulus.resolution,
         "sweep_start": before,
         "sweep_duration": stimulus.sweep_duration,
         "limits": None if stimulus.limits is None else _limits(stimulus.limits),
@@ -57,9 +69,12 @@ def stimulus_to_dict(stimulus: Stimulus) -> dict[str, Any]:
 
 
 def _limits(limits: Limits) -> dict[str, float | str | None]:
-    bounds = {name: getattr(limits, name) for name in _SIGNALS}
-    finite = {name: value if math.isfinite(value) else None for name, value in bounds.items()}
-    return {**finite, "unit": limits.unit}
+    bounds = {name: _finite(getattr(limits, name)) for name in QUANTITIES}
+    return {**bounds, "unit": limits.unit}
+
+
+def _finite(value: float) -> float | None:
+    return value if math.isfinite(value) else None
 
 
 def save_stimulus_json(stimulus: Stimulus, path: str | PathLike[str]) -> None:
@@ -84,7 +99,7 @@ def save_stimulus_json(stimulus: Stimulus, path: str | PathLike[str]) -> None:
     20
     """
     text = json.dumps(stimulus_to_dict(stimulus), indent=1, allow_nan=False)
-    Path(path).write_text(text + "\n", encoding="utf-8")
+    write_whole(path, lambda target: target.write_bytes((text + "\n").encode()))
 
 
 def save_stimulus_csv(stimuli: Stimulus | Sequence[Stimulus], path: str | PathLike[str]) -> None:
@@ -117,23 +132,23 @@ def save_stimulus_csv(stimuli: Stimulus | Sequence[Stimulus], path: str | PathLi
     ...     file.read_text().splitlines()[1]
     'time,position,velocity,acceleration'
     """
-    several = (stimuli,) if isinstance(stimuli, Stimulus) else tuple(stimuli)
-    _check_together(several)
-    longest = max(several, key=lambda s: s.samples)
-    columns = [longest.time]
-    names = ["time"]
+    several = check_together(stimuli)
+    columns: list[FloatArray] = []
+    names: list[str] = []
     lines = []
     for stimulus in several:
-        motion = stimulus.motion(longest.time)
         prefix = f"{stimulus.axis}." if len(several) > 1 else ""
-        for name in _SIGNALS:
-            names.append(prefix + name)
-            columns.append(getattr(motion, name))
+        for name, values in stimulus_columns(stimulus, several).items():
+            if name == "time" and names:
+                continue
+            names.append(prefix + name if name != "time" else name)
+            columns.append(values)
         lines.append(_comment(stimulus))
     lines.append(",".join(names))
     rows = np.column_stack(columns).tolist()
     lines += [",".join(map(repr, row)) for row in rows]
-    Path(path).write_text("\n".join(lines) + "\n", encoding="utf-8")
+    data = ("\n".join(lines) + "\n").encode()
+    write_whole(path, lambda target: target.write_bytes(data))
 
 
 def _comment(stimulus: Stimulus) -> str:
@@ -147,7 +162,104 @@ def _comment(stimulus: Stimulus) -> str:
     return f"# hmpim stimulus; {axis}{', '.join(words)}"
 
 
-def _check_together(stimuli: tuple[Stimulus, ...]) -> None:
+def stimulus_columns(
+    stimulus: Stimulus, together: Sequence[Stimulus] = ()
+) -> dict[str, FloatArray]:
+    """Samples as a player gets them: time, position, velocity, acceleration.
+
+    Positions are rounded to the stimulus's resolution. Beside longer stimuli the axis stands
+    still to the end of the longest.
+
+    Parameters
+    ----------
+    stimulus : Stimulus
+        Whose samples.
+    together : sequence of Stimulus
+        Those that go into one file.
+
+    Examples
+    --------
+    >>> from hmpim.stimulus import Ramp, Stimulus
+    >>> ramp = Stimulus(waveform=Ramp(duration=0.5), fs=8.0, resolution=0.25)
+    >>> stimulus_columns(ramp)["position"].tolist()
+    [0.0, 0.0, 0.25, 0.5]
+    """
+    longest = max((stimulus, *together), key=lambda s: s.samples)
+    motion = stimulus.motion(longest.time)
+    return {
+        "time": longest.time,
+        "position": rounded(motion.position, stimulus.resolution),
+        "velocity": motion.velocity,
+        "acceleration": motion.acceleration,
+    }
+
+
+def write_whole(path: str | PathLike[str], write: Callable[[Path], object]) -> None:
+    """Write a file beside `path` and put it in its place when it is complete.
+
+    Parameters
+    ----------
+    path : path
+        File to write, replaced if there; as it was should anything fail.
+    write : callable
+        Writes the file at the path it is given.
+
+    Raises
+    ------
+    ArgumentError
+        If it cannot be written.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     write_whole(Path(folder) / "s.txt", lambda target: target.write_text("all"))
+    ...     [file.name for file in Path(folder).iterdir()]
+    ['s.txt']
+    """
+    wanted = Path(path).resolve()  # through a link, so that the link stays
+    if wanted.exists() and not wanted.is_file():
+        if wanted.is_dir():
+            raise ArgumentError(f"{str(path)!r} is a folder; name a file in it")
+        write(wanted)  # a pipe or a device
+        return
+    try:
+        handle, name = tempfile.mkstemp(dir=wanted.parent, prefix=".", suffix=wanted.suffix)
+    except OSError as error:
+        raise ArgumentError(f"{str(path)!r} cannot be written: {error}") from error
+    os.close(handle)
+    place = Path(name)
+    try:
+        write(place)
+        place.chmod(0o666 & ~_umask())
+        place.replace(wanted)
+    except OSError as error:
+        raise ArgumentError(f"{str(path)!r} cannot be written: {error}") from error
+    finally:
+        place.unlink(missing_ok=True)
+
+
+def _umask() -> int:
+    mask = os.umask(0o022)
+    os.umask(mask)
+    return mask
+
+
+def check_together(stimuli: Stimulus | Sequence[Stimulus]) -> tuple[Stimulus, ...]:
+    """Return the stimuli of one file, refusing those that do not go together.
+
+    Raises
+    ------
+    ArgumentError
+        If there is none, rates differ, or axes are not told apart.
+
+    Examples
+    --------
+    >>> check_together([])
+    Traceback (most recent call last):
+    hmpim.errors.ArgumentError: there is no stimulus to write; give at least one
+    """
+    stimuli = (stimuli,) if isinstance(stimuli, Stimulus) else tuple(stimuli)
     if not stimuli:
         raise ArgumentError("there is no stimulus to write; give at least one")
     rates = sorted({s.fs for s in stimuli})
@@ -164,3 +276,4 @@ def _check_together(stimuli: tuple[Stimulus, ...]) -> None:
             raise ArgumentError(
                 f'axis {axis!r} cannot head a column; leave out , " # and new lines'
             )
+    return stimuli
