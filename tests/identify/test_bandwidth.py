@@ -23,6 +23,7 @@ MODELLED = Parameters(
     bandwidth_phase90=near(bandwidth_phase(ROLL, highest=100.0)),
     bandwidth_phase90_without_delay=near(43.0),
 )
+SAMPLED = {"fs": 1e5, "intersample": "bandlimited"}
 FREQUENCY = np.arange(0.5, 60.0, 0.1)
 
 
@@ -43,7 +44,7 @@ def first_crossing(measured: FrequencyResponse) -> float:
 
 
 def test_without_noise_it_is_the_models():
-    found = response_bandwidths(noisy(0, 1e-9), ROLL, MODELLED)
+    found = response_bandwidths(noisy(0, 1e-9), ROLL, MODELLED, **SAMPLED)
     there = found.bandwidth_phase90.value
     assert phase(ROLL, np.array([there]))[0] == pytest.approx(-np.pi / 2, abs=1e-6)
     assert found.bandwidth_phase90_without_delay.value == pytest.approx(43.0, abs=1e-4)
@@ -51,9 +52,9 @@ def test_without_noise_it_is_the_models():
 
 def test_a_noisy_phase_does_not_pull_it_down():
     """The first crossing of the raw phase comes far too low; this reading stays put."""
-    truth = response_bandwidths(noisy(0, 1e-9), ROLL, MODELLED).bandwidth_phase90.value
+    truth = response_bandwidths(noisy(0, 1e-9), ROLL, MODELLED, **SAMPLED).bandwidth_phase90.value
     found = [
-        response_bandwidths(noisy(seed, 0.4), ROLL, MODELLED).bandwidth_phase90
+        response_bandwidths(noisy(seed, 0.4), ROLL, MODELLED, **SAMPLED).bandwidth_phase90
         for seed in range(60)
     ]
     raw = [first_crossing(noisy(seed, 0.4)) for seed in range(60)]
@@ -74,13 +75,13 @@ def test_a_response_that_differs_from_the_model_is_read_as_it_is():
         response=response(other, FREQUENCY),
         std=np.full(FREQUENCY.size, 1e-3),
     )
-    there = response_bandwidths(measured, ROLL, MODELLED).bandwidth_phase90.value
+    there = response_bandwidths(measured, ROLL, MODELLED, **SAMPLED).bandwidth_phase90.value
     assert phase(other, np.array([there]))[0] == pytest.approx(-np.pi / 2, abs=0.02)
 
 
 def test_gain_and_phase_at_chosen_frequencies():
     wanted = np.array([1.0, 10.0, 43.0, 500.0])
-    low, mid, high = gain_and_phase(noisy(1, 1e-3), ROLL, wanted)  # 500 Hz is left out
+    low, mid, high = gain_and_phase(noisy(1, 1e-3), ROLL, wanted, **SAMPLED)  # 500 Hz is left out
     for reading in (low, mid, high):
         there = np.array([reading.frequency])
         gain = 20 * np.log10(np.abs(response(ROLL, there))[0])
@@ -96,3 +97,15 @@ def test_response_and_model_agree_on_a_record(field_record):
     for name in ("bandwidth_phase90", "bandwidth_phase90_without_delay", "bandwidth_3db"):
         model, measured = getattr(pair, name), getattr(pair.from_response, name)
         assert abs(model.value - measured.value) < 3 * np.hypot(model.std, measured.std), name
+
+
+def test_a_held_input_is_taken_out():
+    """Samples over samples of a held input lag by half a sample more; the system does not."""
+    held = (
+        response(ROLL, FREQUENCY) * np.sinc(FREQUENCY / 500) * np.exp(-1j * np.pi * FREQUENCY / 500)
+    )
+    measured = FrequencyResponse(
+        frequency=FREQUENCY, response=held, std=np.full(FREQUENCY.size, 1e-3)
+    )
+    found = response_bandwidths(measured, ROLL, MODELLED, fs=500.0, intersample="zoh")
+    assert found.bandwidth_phase90.value == pytest.approx(MODELLED.bandwidth_phase90.value)

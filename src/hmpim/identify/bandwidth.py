@@ -14,9 +14,11 @@ from numpy.typing import NDArray
 from hmpim.identify.result import Estimate, FrequencyResponse, Parameters, ResponseBandwidths
 from hmpim.identify.uncertainty import estimate
 from hmpim.model import RationalDelay, phase, response
-from hmpim.record import Finding
+from hmpim.record import Finding, Intersample
 
 __all__ = ["GainPhase", "disagreement", "gain_and_phase", "response_bandwidths"]
+
+Complex = NDArray[np.complex128]
 
 _REACH = 0.15
 """Neighbours within this share of a frequency are looked at."""
@@ -42,8 +44,22 @@ class GainPhase:
     phase: Estimate
 
 
+def _between(frequency: NDArray[np.float64], fs: float, intersample: Intersample) -> Complex:
+    """What holding or joining the input's samples does to the response (aliases left out)."""
+    period = frequency / fs
+    if intersample == "zoh":
+        return np.asarray(np.sinc(period) * np.exp(-1j * np.pi * period))
+    if intersample == "foh":
+        return np.asarray(np.sinc(period) ** 2 + 0j)
+    return np.ones(frequency.size, dtype=np.complex128)
+
+
 def _ratio_at(
-    measured: FrequencyResponse, system: RationalDelay, frequency: float
+    measured: FrequencyResponse,
+    system: RationalDelay,
+    frequency: float,
+    fs: float,
+    intersample: Intersample,
 ) -> tuple[complex, float] | None:
     """Measured over modelled response at a frequency, and the standard deviation of it.
 
@@ -56,7 +72,7 @@ def _ratio_at(
         return None
     near = apart <= max(_REACH * frequency, float(np.partition(apart, _FEWEST - 1)[_FEWEST - 1]))
     f = measured.frequency[near]
-    modelled = response(system, f)
+    modelled = response(system, f) * _between(f, fs, intersample)
     ratio = measured.response[near] / modelled
     std = measured.std[near] / np.abs(modelled)
     weight = 1.0 / np.maximum(std, 1e-12)
@@ -65,7 +81,12 @@ def _ratio_at(
 
 
 def response_bandwidths(
-    measured: FrequencyResponse, system: RationalDelay, modelled: Parameters
+    measured: FrequencyResponse,
+    system: RationalDelay,
+    modelled: Parameters,
+    *,
+    fs: float,
+    intersample: Intersample,
 ) -> ResponseBandwidths:
     """Where the measured response crosses -90° (with and without the delay) and -3 dB.
 
@@ -77,13 +98,18 @@ def response_bandwidths(
         The fitted model, scale factor included.
     modelled : Parameters
         Its bandwidths, near which the measurement is looked at.
+    fs : float
+        Rate in Hz.
+    intersample : {'zoh', 'foh', 'bandlimited'}
+        What the input does between its samples: a ratio of sampled spectra contains it, the
+        bandwidths of the system behind it do not.
     """
 
     def crossing(near: Estimate | None, kind: str) -> Estimate | None:
         if near is None:
             return None
         value = near.value
-        found = _ratio_at(measured, system, value)
+        found = _ratio_at(measured, system, value, fs, intersample)
         if found is None:
             return None
         ratio, std = found
@@ -140,7 +166,12 @@ def _phase_slope(system: RationalDelay, f: float, *, delay: bool) -> float:
 
 
 def gain_and_phase(
-    measured: FrequencyResponse, system: RationalDelay, frequency: NDArray[np.float64]
+    measured: FrequencyResponse,
+    system: RationalDelay,
+    frequency: NDArray[np.float64],
+    *,
+    fs: float,
+    intersample: Intersample,
 ) -> tuple[GainPhase, ...]:
     """Gain and phase of the measured response at chosen frequencies, each with its interval.
 
@@ -152,6 +183,8 @@ def gain_and_phase(
         The fitted model: it says how often the phase has turned.
     frequency : ndarray, shape (m,)
         Hz; those outside the measured band are left out.
+    fs, intersample
+        As for `response_bandwidths`.
 
     Returns
     -------
@@ -159,7 +192,7 @@ def gain_and_phase(
     """
     readings = []
     for f in np.atleast_1d(frequency):
-        found = _ratio_at(measured, system, float(f))
+        found = _ratio_at(measured, system, float(f), fs, intersample)
         if found is None:
             continue
         ratio, std = found

@@ -7,22 +7,27 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hmpim.errors import ArgumentError, RecordError
-from hmpim.identify.joint import JointFit, joint_fit
-from hmpim.identify.local import local_polynomial_response
+from hmpim.identify.bandwidth import disagreement, response_bandwidths
+from hmpim.identify.joint import JointFit
+from hmpim.identify.local import local_response
+from hmpim.identify.multivariable import ResponseMatrix, response_matrix
 from hmpim.identify.paper import paper_estimates
 from hmpim.identify.readings import read_parameters
 from hmpim.identify.result import (
     Candidate,
+    FrequencyResponse,
     Identification,
     PairIdentification,
     PaperEstimates,
     Parameters,
     RecordSummary,
+    Verdict,
 )
+from hmpim.identify.several import Joined, fit_together
 from hmpim.identify.spectrum import excited_band
 from hmpim.identify.threads import one_thread
 from hmpim.identify.uncertainty import estimate, noise_estimate
-from hmpim.identify.verdict import is_unrelated, judge
+from hmpim.identify.verdict import Judgement, judge
 from hmpim.identify.whiteness import misfit
 from hmpim.model.dynamics import STRUCTURES, StructureName
 from hmpim.record import Aligned, Finding, Intersample, Record, Signal, uniform
@@ -30,6 +35,12 @@ from hmpim.record import Aligned, Finding, Intersample, Record, Signal, uniform
 __all__ = ["identify"]
 
 _FEWEST_SAMPLES = 50
+
+_NEVER_APART = 0.05
+"""Share of the frequencies below which inputs count as one and are refused."""
+
+_TOLD_APART = 0.5
+"""Share of the frequencies at which inputs must be told apart for an `ok`."""
 
 
 def identify(
@@ -102,9 +113,9 @@ def identify(
         )
     with one_thread():
         pairs = tuple(
-            _identify_pair(aligned, u, y, record=record, intersample=chosen, structures=names)
-            for y in aligned.outputs
-            for u in aligned.inputs
+            pair
+            for output in aligned.outputs
+            for pair in _identify_output(aligned, output, record, chosen, names)
         )
     return Identification(
         record=RecordSummary(
@@ -135,70 +146,163 @@ def _check_length(record: Record) -> None:
             )
 
 
-def _identify_pair(
+def _identify_output(
     aligned: Aligned,
-    source: Signal,
     output: Signal,
-    *,
     record: Record,
     intersample: Intersample | None,
     structures: tuple[StructureName, ...],
-) -> PairIdentification:
-    fs = aligned.fs
-    u, y = source.values, output.values
-    valid = None if bool(output.valid.all()) else np.asarray(output.valid)
-    band = record.band or excited_band(u, fs)
-    if np.ptp(y[output.valid]) == 0:
+) -> list[PairIdentification]:
+    """Identify one output against every input, together where there are several."""
+    if np.ptp(output.values[output.valid]) == 0:
         dead = Finding(
             code="dead_channel",
-            message=f"Output {output.name!r} is constant at {y[output.valid][0]:g}. "
+            message=f"Output {output.name!r} is constant at {output.values[output.valid][0]:g}. "
             "The sensor is dead, stuck or not connected.",
         )
-        return _untold(aligned, source, output, band, dead)
-    known = None if bool(source.valid.all()) else np.asarray(source.valid)
-    joint = joint_fit(
-        u, y, valid=valid, known=known, intersample=intersample, structures=structures
+        return [_untold(aligned, source, output, record, dead) for source in aligned.inputs]
+    valid = None if bool(output.valid.all()) else np.asarray(output.valid)
+    measured = np.logical_and.reduce([source.valid for source in aligned.inputs])
+    joined = fit_together(
+        [source.values for source in aligned.inputs],
+        output.values,
+        valid=valid,
+        known=None if bool(measured.all()) else np.asarray(measured),
+        intersample=intersample,
+        structures=structures,
     )
-    if is_unrelated(joint):
+    matrix = _matrix(aligned, output, record, joined) if len(aligned.inputs) > 1 else None
+    pairs = []
+    for i, source in enumerate(aligned.inputs):
+        if joined.related[i]:
+            pairs.append(_described(aligned, source, output, record, joined, i, matrix))
+            continue
         unrelated = Finding(
             code="unrelated",
             message=f"Output {output.name!r} does not follow input {source.name!r}: a constant "
             "explains it as well. Check the channels, or excite more.",
         )
-        return _untold(aligned, source, output, band, unrelated)
+        pairs.append(_untold(aligned, source, output, record, unrelated))
+    return pairs
+
+
+def _matrix(aligned: Aligned, output: Signal, record: Record, joined: Joined) -> ResponseMatrix:
+    """Response of one output to all inputs; inputs that cannot be told apart are refused."""
+    bands = [record.band or excited_band(s.values, aligned.fs) for s in aligned.inputs]
+    names = [s.name for s in aligned.inputs]
+    band = (max(low for low, _ in bands), min(high for _, high in bands))
+    # One delay for all inputs: moving them against each other would make them look different.
+    follows = [fit for fit, related in zip(joined.fits, joined.related, strict=True) if related]
+    strongest = min(follows or joined.fits, key=lambda fit: fit.best.fit.cost)
+    delay = min(max(strongest.best.fit.delay, 0.0), 0.4 * aligned.samples) / aligned.fs
+    matrix = response_matrix(
+        np.stack([s.values for s in aligned.inputs]),
+        output.values[None, :],
+        aligned.fs,
+        delays=[[delay]],
+        band=band,
+        names=[*names, output.name],
+    )
+    if np.mean(matrix.usable) < _NEVER_APART:
+        raise RecordError(
+            f"inputs {', '.join(names)} cannot be told apart: the condition number of their "
+            f"spectra is {np.median(matrix.condition):.3g} at the median frequency. Drive them one "
+            "at a time, or with sweeps that pass each frequency at different times"
+        )
+    return matrix
+
+
+def _described(
+    aligned: Aligned,
+    source: Signal,
+    output: Signal,
+    record: Record,
+    joined: Joined,
+    i: int,
+    matrix: ResponseMatrix | None,
+) -> PairIdentification:
+    """Say all that is known of an output that follows an input."""
+    fs, joint = aligned.fs, joined.fits[i]
+    fit = joint.best.fit
+    u, y = source.values, joint.problem.y  # what the other inputs leave over
+    band = record.band or excited_band(u, fs)
     paper = paper_estimates(u, y, fs, band=band)
     readings = read_parameters(
         joint,
         fs=fs,
         highest=min(band[1], fs / 2),
         delay_correlation=paper.delay,
+        known_covariance=joined.covariances[i] if matrix is not None else None,
         input_unit=source.unit,
         output_unit=output.unit,
     )
     fit_percent = _fit_percent(joint)
-    delay = joint.best.fit.delay
-    left = misfit(u, joint.best.fit.residual, delay=delay, band=(band[0] / fs, band[1] / fs))
+    left = misfit(u, fit.residual, delay=fit.delay, band=(band[0] / fs, band[1] / fs))
     judgement = judge(joint, readings, left, fs=fs, band=band, fit_percent=fit_percent)
+    if matrix is None:
+        response = local_response(u, y, fs, delay=max(fit.delay, 0.0) / fs, band=band)
+        findings, verdict = judgement.findings, judgement.verdict
+    else:
+        response = _column(matrix, i)
+        findings, verdict = _with_condition(judgement, matrix, aligned)
+    from_response = response_bandwidths(
+        response,
+        readings.system,
+        readings.parameters,
+        fs=fs,
+        intersample=joint.best.intersample,
+    )
+    parted = disagreement(from_response, readings.parameters)
+    if parted is not None:
+        findings, verdict = (*findings, parted), "doubtful"
     return PairIdentification(
         input=source.name,
         output=output.name,
-        structure=joint.best.fit.structure.name,
+        structure=fit.structure.name,
         intersample=joint.best.intersample,
         fit_percent=fit_percent,
         parameters=readings.parameters,
         paper=paper,
-        frequency_response=local_polynomial_response(
-            u, y, fs, delay=max(delay, 0.0) / fs, band=band
-        ),
+        frequency_response=response,
         numerator=_descending(readings.system.numerator / readings.system.numerator[0]),
         denominator=_descending(readings.system.denominator),
         candidates=_candidates(joint),
-        verdict=judgement.verdict,
-        warnings=(*aligned.findings, *judgement.findings),
+        verdict=verdict,
+        warnings=(*aligned.findings, *findings),
+        from_response=from_response,
         time=aligned.time,
-        prediction=joint.best.fit.prediction,
-        residual=joint.best.fit.residual,
+        prediction=fit.prediction,
+        residual=fit.residual,
     )
+
+
+def _column(matrix: ResponseMatrix, i: int) -> FrequencyResponse:
+    """One input's response at the frequencies where the inputs can be told apart."""
+    told = matrix.usable
+    return FrequencyResponse(
+        frequency=matrix.frequency[told],
+        response=matrix.response[told, 0, i],
+        std=matrix.std[told, 0, i],
+        coherence=matrix.partial_coherence[told, 0, i],
+    )
+
+
+def _with_condition(
+    judgement: Judgement, matrix: ResponseMatrix, aligned: Aligned
+) -> tuple[tuple[Finding, ...], Verdict]:
+    """Add a warning where the inputs cannot be told apart over a good part of the band."""
+    told = float(np.mean(matrix.usable))
+    if told > _TOLD_APART:
+        return judgement.findings, judgement.verdict
+    names = ", ".join(s.name for s in aligned.inputs)
+    coupled = Finding(
+        code="coupled_inputs",
+        message=f"Inputs {names} can be told apart at {100 * told:.0f} % of the frequencies only "
+        f"(median condition number {np.median(matrix.condition):.3g}). Drive them with sweeps that "
+        "pass each frequency at different times.",
+    )
+    verdict: Verdict = "doubtful" if judgement.verdict == "ok" else judgement.verdict
+    return (*judgement.findings, coupled), verdict
 
 
 def _descending(coefficients: NDArray[np.float64]) -> tuple[float, ...]:
@@ -234,10 +338,11 @@ def _untold(
     aligned: Aligned,
     source: Signal,
     output: Signal,
-    band: tuple[float, float],
+    record: Record,
     finding: Finding,
 ) -> PairIdentification:
     """Say what little can be said of an output that does not follow the input."""
+    band = record.band or excited_band(source.values, aligned.fs)
     counted = output.values[output.valid]
     mean, variance = float(counted.mean()), float(counted.var(ddof=1))
     return PairIdentification(
@@ -258,9 +363,7 @@ def _untold(
             ),
         ),
         paper=PaperEstimates(),
-        frequency_response=local_polynomial_response(
-            source.values, output.values, aligned.fs, band=band
-        ),
+        frequency_response=local_response(source.values, output.values, aligned.fs, band=band),
         numerator=(0.0,),
         denominator=(1.0,),
         candidates=(),

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from hmpim.identify.fit import Fit, jacobian
+from hmpim.identify.fit import jacobian
+from hmpim.identify.halves import Halves, compare_halves
 from hmpim.identify.joint import JointFit
 from hmpim.identify.result import Estimate, Parameters
 from hmpim.identify.uncertainty import covariance, estimate, gradient, noise_estimate
@@ -43,6 +44,8 @@ class Readings:
         Of `vector`.
     white : bool
         Whether the residual passed for white.
+    halves : Halves
+        Whether the halves of the record tell the same model.
     """
 
     parameters: Parameters
@@ -50,6 +53,7 @@ class Readings:
     vector: _Vector
     covariance: _Vector
     white: bool
+    halves: Halves
 
     def variance(self, function: Callable[[_Vector], float]) -> float:
         """Variance of a function of `vector`, to first order."""
@@ -103,9 +107,10 @@ def read_parameters(
     freedom = max(counted - vector.size, 1)
     residual = fit.residual
     white = is_white(residual if joint.problem.valid is None else residual[joint.problem.valid])
+    rows = jacobian(joint.problem, fit)
     cov = known_covariance
     if cov is None:
-        cov = _covariance(joint, fit, freedom=freedom, white=white)
+        cov = _covariance(joint, rows, freedom=freedom, white=white)
     effective = freedom * joint.effective_share
     system = system_of(structure, vector, fs)
 
@@ -213,7 +218,12 @@ def read_parameters(
         peak_gain_db=explicit(peak_at, "dB") if dynamic else None,
     )
     return Readings(
-        parameters=parameters, system=system, vector=vector, covariance=cov, white=white
+        parameters=parameters,
+        system=system,
+        vector=vector,
+        covariance=cov,
+        white=white,
+        halves=compare_halves(rows, residual, joint.problem.y, share=joint.effective_share),
     )
 
 
@@ -228,9 +238,9 @@ def _lowest_mode(structure: Structure, vector: _Vector) -> int | None:
     return min(found)[1] if found else None
 
 
-def _covariance(joint: JointFit, fit: Fit, *, freedom: int, white: bool) -> _Vector:
+def _covariance(joint: JointFit, rows: _Vector, *, freedom: int, white: bool) -> _Vector:
     """Covariance of theta and linear; a held, static system moves in whole samples only."""
-    rows = jacobian(joint.problem, fit)
+    fit = joint.best.fit
     if fit.structure.name == "static" and joint.best.intersample == "zoh":
         inner = covariance(rows[1:], fit.residual, freedom=freedom, white=white)
         full = np.zeros((rows.shape[0], rows.shape[0]))

@@ -151,6 +151,15 @@ def judge(
     other = _other_structure(joint, readings)
     if other is not None:
         note("structure", other, doubt=True)
+    if readings.halves.probability < 1e-6 and readings.halves.owed > _TOLERATED_MISFIT:
+        note(
+            "halves_disagree",
+            "The two halves of the record ask for different models, worth "
+            f"{100 * readings.halves.owed:.2g} % of the output (r.m.s.): the unit changed during "
+            "the test, or answers large and small motion differently. Repeat it, or lower the "
+            "amplitude.",
+            doubt=True,
+        )
     if joint.simpler is not None:
         note(
             "structure",

@@ -1,0 +1,106 @@
+"""Several inputs at once: every pair, direct and coupling, from one run."""
+
+import numpy as np
+import pytest
+
+import hmpim
+from hmpim.errors import RecordError
+
+FS = 200.0
+TIME = np.arange(2000) / FS
+OWN = ((10.0, 0.4, 0.02), (8.0, 0.5, 0.03), (6.0, 0.7, 0.025))
+
+
+def sweep(first, last):
+    return np.sin(2 * np.pi * (first * TIME + (last - first) / 20 * TIME**2))
+
+
+INPUTS = (sweep(0.1, 20), sweep(0.1, 20)[::-1].copy(), sweep(14, 0.2))
+
+
+def outputs(coupling, noise_std, seed):
+    rng = np.random.default_rng(seed)
+    made = []
+    for i, (natural, damping, delay) in enumerate(OWN):
+        w = 2 * np.pi * natural
+        y = 0.1 * i + noise_std * rng.standard_normal(2000)
+        for j, u in enumerate(INPUTS):
+            model = hmpim.Model(
+                delay=delay,
+                scale_factor=1.0 if i == j else coupling[i][j],
+                denominator=(1 / w**2, 2 * damping / w, 1.0),
+            )
+            y = y + hmpim.simulate(model, u, fs=FS, intersample="bandlimited")
+        made.append(y)
+    return made
+
+
+def record(signals):
+    return hmpim.Record.from_arrays(
+        {f"u{j}": u for j, u in enumerate(INPUTS)},
+        {f"y{i}": y for i, y in enumerate(signals)},
+        fs=FS,
+    )
+
+
+@pytest.fixture(scope="module")
+def result():
+    coupling = np.full((3, 3), 0.05) * np.array([1, -1, 1])
+    return coupling, hmpim.identify(record(outputs(coupling, 0.01, 0)))
+
+
+def test_each_pair_is_found_with_honest_bars(result):
+    coupling, found = result
+    off = []
+    for i in range(3):
+        for j in range(3):
+            pair = found[f"y{i}", f"u{j}"]
+            truth = {
+                "scale_factor": 1.0 if i == j else coupling[i, j],
+                "delay": OWN[i][2],
+                "bias": 0.1 * i,
+                "natural_frequency": OWN[i][0],
+            }
+            assert pair.structure == "second_order"
+            for name, value in truth.items():
+                estimate = getattr(pair, name)
+                off.append((estimate.value - value) / estimate.std)
+    assert np.max(np.abs(off)) < 4.5
+    assert np.sqrt(np.mean(np.square(off))) == pytest.approx(1.0, abs=0.45)
+
+
+def test_coupling_is_within_half_a_percent_where_usable(result):
+    coupling, found = result
+    for i in range(3):
+        natural, damping, delay = OWN[i]
+        for j in range(3):
+            response = found[f"y{i}", f"u{j}"].frequency_response
+            s = 2j * np.pi * response.frequency
+            w = 2 * np.pi * natural
+            own = np.exp(-delay * s) / ((s / w) ** 2 + 2 * damping * s / w + 1)
+            gain = 1.0 if i == j else coupling[i, j]
+            assert response.frequency.size > 50
+            error = np.abs(response.response - gain * own)
+            assert np.median(error) < 0.005
+            assert response.coherence is not None
+
+
+def test_an_axis_that_is_not_coupled_is_said_to_be_unrelated():
+    coupling = np.zeros((3, 3))
+    found = hmpim.identify(record(outputs(coupling, 0.01, 1)))
+    for i in range(3):
+        for j in range(3):
+            pair = found[f"y{i}", f"u{j}"]
+            if i == j:
+                assert pair.verdict == "ok"
+            else:
+                assert [w.code for w in pair.warnings] == ["unrelated"]
+
+
+def test_inputs_that_are_one_and_the_same_are_refused_by_name():
+    y = outputs(np.zeros((3, 3)), 0.01, 2)[0]
+    rng = np.random.default_rng(0)
+    for twin in (2 * INPUTS[0], 2 * INPUTS[0] + 0.01 * rng.standard_normal(2000)):
+        both = hmpim.Record.from_arrays({"left": INPUTS[0], "right": twin}, {"y": y}, fs=FS)
+        with pytest.raises(RecordError, match="left, right"):
+            hmpim.identify(both)
