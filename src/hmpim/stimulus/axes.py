@@ -27,7 +27,7 @@ from hmpim.stimulus.sweep import check_band, check_positive
 __all__ = ["AxisPlan", "InputCondition", "condition_table", "design_axes", "input_condition"]
 
 _SAME = 1e-6  # share of a stimulus's power that another one leaves unexplained
-_SINGULAR = 1e8  # condition beyond which nothing is told apart
+_SINGULAR = 1e8  # condition beyond which it is rounding, and infinite
 _ABSENT = 1e-4  # an input this far (80 dB) below its own r.m.s. level is leakage
 _KINDS: tuple[Literal["hmpim", "reversed", "exponential"], ...] = (
     "hmpim",
@@ -275,9 +275,10 @@ def input_condition(
     floor = _ABSENT * level[None, :, None] * math.sqrt(around.shape[2])
     scaled = np.divide(around, power, out=np.zeros_like(around), where=power > floor)
     values = np.linalg.svd(scaled, compute_uv=False)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        condition = np.where(values[:, -1] > 0.0, values[:, 0] / values[:, -1], np.inf)
-    if np.all(condition > _SINGULAR):
+    least = np.maximum(values[:, -1], np.finfo(float).tiny)
+    condition = values[:, 0] / least
+    condition = np.where(condition > _SINGULAR, np.inf, condition)
+    if np.all(np.isinf(condition)):
         raise ArgumentError(
             f"axes {', '.join(labels)} cannot be told apart anywhere from {low:g} to {high:g} Hz; "
             "excite each of them there, with sweeps that pass at different times"
