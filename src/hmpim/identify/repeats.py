@@ -1,0 +1,388 @@
+"""Several records of one stimulus: averages, repeatability, and whether the error bars hold.
+
+What differs from repeat to repeat is noise; what the model leaves over each time alike is not
+noise but dynamics or nonlinearity that it does not describe (Pintelon and Schoukens, System
+Identification, 2nd ed., Wiley 2012, section 4.3: averages over periods tell the two apart).
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import chi2
+from scipy.stats import f as fisher
+
+from hmpim.errors import RecordError
+from hmpim.identify.identify import identify
+from hmpim.identify.result import (
+    Estimate,
+    FrequencyResponse,
+    Identification,
+    PairIdentification,
+    Parameters,
+)
+from hmpim.identify.uncertainty import estimate, noise_estimate
+from hmpim.identify.whiteness import effective_share
+from hmpim.model.dynamics import StructureName
+from hmpim.record import Finding, Intersample, Record, uniform
+
+__all__ = ["RepeatedPair", "RepeatedParameter", "Repeats", "identify_repeats"]
+
+# Inputs of two repeats are the same if their difference is at most this share of their size.
+_SAME = 0.05
+# Chance of doubting right error bars, on either side.
+_DOUBT = 0.005
+# A whole number of samples, which may well be the same every time.
+_COUNTED = "delay_correlation"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RepeatedParameter:
+    """One parameter over the repeats that could tell it.
+
+    Parameters
+    ----------
+    name : str
+        As in `Parameters`.
+    mean : Estimate
+        Weighted by 1/std². Its std is that of the weights, or what the scatter says if that is
+        more (R. T. Birge, Phys. Rev. 40, 1932).
+    values : tuple of float
+        One for each repeat that has one.
+    repeatability : float
+        Standard deviation from repeat to repeat, same unit.
+    chi_squared : float
+        Σ (value - mean)²/std², which has `freedom` degrees if the stated errors are right.
+    freedom : int
+        Number of values less one.
+    probability : float
+        Chance of a larger `chi_squared` if the stated errors are right.
+    agree : bool
+        False if the scatter is larger, or smaller, than the stated errors would give once in
+        200 times. Of `delay_correlation`, a whole number of samples, only a larger one counts.
+    """
+
+    name: str
+    mean: Estimate
+    values: tuple[float, ...]
+    repeatability: float
+    chi_squared: float
+    freedom: int
+    probability: float
+    agree: bool
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class RepeatedPair:
+    """What the repeats say of one input and one output.
+
+    Parameters
+    ----------
+    input, output : str
+        Names.
+    structures : tuple of str
+        What each repeat was found to be.
+    parameters : tuple of RepeatedParameter
+        Those that at least two repeats tell.
+    frequency_response : FrequencyResponse
+        Weighted by 1/std² at each frequency; its std is that of the weights.
+    response_scatter : float
+        Scatter of the repeats' responses over their stated errors, root mean square over the
+        frequencies: near 1 if these are right.
+    noise_std : Estimate or None
+        What differs from repeat to repeat; None where no repeat could be identified.
+    unmodelled : float or None
+        Root mean square of what each repeat leaves over alike, in the output's unit, the noise
+        that remains in the average taken off.
+    unmodelled_probability : float or None
+        Chance of seeing so much if there were noise only.
+    findings : tuple of Finding
+        What the repeats disagree on.
+    """
+
+    input: str
+    output: str
+    structures: tuple[str, ...]
+    parameters: tuple[RepeatedParameter, ...]
+    frequency_response: FrequencyResponse
+    response_scatter: float
+    noise_std: Estimate | None
+    unmodelled: float | None
+    unmodelled_probability: float | None
+    findings: tuple[Finding, ...]
+
+    def __getitem__(self, name: str) -> RepeatedParameter:
+        for parameter in self.parameters:
+            if parameter.name == name:
+                return parameter
+        known = ", ".join(p.name for p in self.parameters)
+        raise RecordError(f"the repeats do not tell {name!r}; they tell {known}")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Repeats:
+    """Several records of one stimulus; index it output first: ``repeats["y", "u"]["delay"]``.
+
+    Parameters
+    ----------
+    results : tuple of Identification
+        Each record by itself.
+    pairs : tuple of RepeatedPair
+        All of them together.
+    """
+
+    results: tuple[Identification, ...]
+    pairs: tuple[RepeatedPair, ...]
+
+    def __getitem__(self, key: tuple[str, str]) -> RepeatedPair:
+        output, input_ = key
+        for pair in self.pairs:
+            if (pair.output, pair.input) == (output, input_):
+                return pair
+        known = ", ".join(f"({p.output!r}, {p.input!r})" for p in self.pairs)
+        raise RecordError(f"there is no pair ({output!r}, {input_!r}); the repeats have {known}")
+
+
+def identify_repeats(
+    records: Sequence[Record],
+    *,
+    intersample: Intersample | str = "auto",
+    structures: Sequence[StructureName] | None = None,
+) -> Repeats:
+    """Identify each record, average, and test the stated errors against the scatter seen.
+
+    Parameters
+    ----------
+    records : sequence of Record
+        At least two, of one stimulus, with the same channels.
+    intersample : {'auto', 'zoh', 'foh', 'bandlimited'}
+        As in `identify`.
+    structures : sequence of str, optional
+        As in `identify`.
+
+    Returns
+    -------
+    Repeats
+
+    Raises
+    ------
+    RecordError
+        For fewer than two records, channels or rates that differ, or inputs that are not the
+        same within 5 % (r.m.s.); and whatever `identify` refuses.
+
+    Examples
+    --------
+    >>> t = np.arange(1000) / 100
+    >>> u = np.sin(2 * np.pi * (0.1 * t + 1.0 * t**2))
+    >>> rng = np.random.default_rng(1)
+    >>> clean = 2.0 * np.interp(t - 0.05, t, u, left=0) + 0.5
+    >>> records = [
+    ...     Record.from_arrays({"u": u}, {"y": clean + 0.01 * rng.standard_normal(1000)}, fs=100.0)
+    ...     for _ in range(3)
+    ... ]
+    >>> found = identify_repeats(records, structures=["static"])["y", "u"]
+    >>> round(found["delay"].mean.value, 3)
+    0.05
+    """
+    given = tuple(records)
+    if len(given) < 2:
+        raise RecordError(
+            f"{len(given)} record is given; repeatability needs at least 2 of one stimulus"
+        )
+    _check_alike(given)
+    results = tuple(
+        identify(record, intersample=intersample, structures=structures) for record in given
+    )
+    return Repeats(
+        results=results,
+        pairs=tuple(
+            _pair(tuple(result[pair.output, pair.input] for result in results))
+            for pair in results[0].pairs
+        ),
+    )
+
+
+def _check_alike(records: tuple[Record, ...]) -> None:
+    first = records[0]
+    names = [[c.name for c in (*r.inputs, *r.outputs)] for r in records]
+    aligned = [uniform(record) for record in records]
+    for k, record in enumerate(records[1:], start=1):
+        if names[k] != names[0]:
+            raise RecordError(
+                f"record {k} has channels {', '.join(names[k])} and record 0 has "
+                f"{', '.join(names[0])}; give the same channels in the same order"
+            )
+        if abs(record.fs / first.fs - 1) > 1e-3:
+            raise RecordError(
+                f"record {k} is at {record.fs:g} Hz and record 0 at {first.fs:g} Hz; resample one"
+            )
+        for one, other in zip(aligned[0].inputs, aligned[k].inputs, strict=True):
+            length = min(one.values.size, other.values.size)
+            apart = float(np.std(one.values[:length] - other.values[:length]))
+            size = float(np.std(one.values[:length]))
+            if apart > _SAME * size:
+                raise RecordError(
+                    f"input {one.name!r} of record {k} differs from that of record 0 by "
+                    f"{100 * apart / size if size else np.inf:.3g} % (r.m.s.); repeats need one "
+                    "stimulus, from the same start"
+                )
+
+
+def _pair(found: tuple[PairIdentification, ...]) -> RepeatedPair:
+    parameters = tuple(
+        repeated
+        for field in fields(Parameters)
+        if (repeated := _parameter(field.name, found)) is not None
+    )
+    response, scatter = _averaged(found)
+    told = tuple(pair for pair in found if pair.verdict != "not_identifiable")
+    findings = []
+    structures = tuple(pair.structure for pair in found)
+    if len(told) < len(found):
+        findings.append(
+            Finding(
+                code="not_identifiable",
+                message=f"{len(found) - len(told)} of {len(found)} repeats could not be "
+                "identified. See their own warnings.",
+            )
+        )
+    if len({pair.structure for pair in told}) > 1:
+        findings.append(
+            Finding(
+                code="structure",
+                message=f"The repeats were found to be {', '.join(structures)}. Where they differ "
+                "the record hardly tells; state one with structures=.",
+            )
+        )
+    findings.extend(
+        _doubt(parameter, found[0].output) for parameter in parameters if not parameter.agree
+    )
+    noise, unmodelled, probability = _split(told)
+    if probability is not None and unmodelled and probability < _DOUBT:
+        findings.append(
+            Finding(
+                code="unmodelled",
+                message=f"{unmodelled:.3g} (r.m.s.) of what the model leaves over comes back in "
+                "every repeat: it is not noise. Look at the residual beside the stimulus.",
+            )
+        )
+    return RepeatedPair(
+        input=found[0].input,
+        output=found[0].output,
+        structures=structures,
+        parameters=parameters,
+        frequency_response=response,
+        response_scatter=scatter,
+        noise_std=noise,
+        unmodelled=unmodelled,
+        unmodelled_probability=probability,
+        findings=tuple(findings),
+    )
+
+
+def _parameter(name: str, found: tuple[PairIdentification, ...]) -> RepeatedParameter | None:
+    """Average one parameter; None where fewer than two repeats tell it with an error."""
+    estimates = [e for pair in found if (e := getattr(pair.parameters, name)) is not None]
+    estimates = [e for e in estimates if np.isfinite(e.std) and e.std > 0]
+    if len(estimates) < 2:
+        return None
+    values = np.array([e.value for e in estimates])
+    weights = 1.0 / np.array([e.std for e in estimates]) ** 2
+    mean = float(weights @ values / weights.sum())
+    statistic = float(weights @ (values - mean) ** 2)
+    freedom = values.size - 1
+    probability = float(chi2.sf(statistic, freedom))
+    widened = max(1.0, statistic / freedom) if probability < _DOUBT else 1.0
+    return RepeatedParameter(
+        name=name,
+        # Where the scatter is what counts, so are its few degrees of freedom.
+        mean=estimate(
+            mean,
+            widened / float(weights.sum()),
+            freedom=freedom if widened > 1 else 1e9,
+            unit=estimates[0].unit,
+        ),
+        values=tuple(float(v) for v in values),
+        repeatability=float(values.std(ddof=1)),
+        chi_squared=statistic,
+        freedom=freedom,
+        probability=probability,
+        agree=probability >= _DOUBT and (name == _COUNTED or probability <= 1 - _DOUBT),
+    )
+
+
+def _doubt(parameter: RepeatedParameter, output: str) -> Finding:
+    ratio = float(np.sqrt(parameter.chi_squared / parameter.freedom))
+    words = parameter.name.replace("_", " ")
+    if parameter.probability < _DOUBT:
+        return Finding(
+            code="scatter",
+            message=f"The {words} of {output!r} scatters from repeat to repeat {ratio:.3g} times "
+            "as much as its stated error. Something changes between the repeats, or the model "
+            "lacks something; use the repeatability as its error.",
+        )
+    return Finding(
+        code="scatter",
+        message=f"The {words} of {output!r} scatters from repeat to repeat only {ratio:.3g} times "
+        "as much as its stated error. The stated error is too large, or the repeats are not "
+        "independent records.",
+    )
+
+
+def _averaged(found: tuple[PairIdentification, ...]) -> tuple[FrequencyResponse, float]:
+    """Average the responses on the first one's frequencies; return the relative scatter too."""
+    frequency = found[0].frequency_response.frequency
+    delay = found[0].parameters.delay
+    turn = np.exp(2j * np.pi * frequency * (0.0 if delay is None else delay.value))
+    responses, stds = [], []
+    for pair in found:
+        own = pair.frequency_response
+        straight = own.response * np.exp(
+            2j * np.pi * own.frequency * (0.0 if delay is None else delay.value)
+        )
+        responses.append(np.interp(frequency, own.frequency, straight))
+        stds.append(np.interp(frequency, own.frequency, own.std))
+    values = np.stack(responses)
+    weights = 1.0 / np.maximum(np.stack(stds), np.finfo(float).tiny ** 0.25) ** 2
+    mean = np.sum(weights * values, axis=0) / np.sum(weights, axis=0)
+    scatter = np.sum(weights * np.abs(values - mean) ** 2, axis=0) / (len(found) - 1)
+    known = scatter[np.isfinite(scatter)]
+    return (
+        FrequencyResponse(
+            frequency=frequency,
+            response=mean / turn,
+            std=np.sqrt(1.0 / np.sum(weights, axis=0)),
+            coherence=None,
+        ),
+        float(np.sqrt(np.mean(known))) if known.size else float("nan"),
+    )
+
+
+def _split(
+    told: tuple[PairIdentification, ...],
+) -> tuple[Estimate | None, float | None, float | None]:
+    """Split what the models leave over into noise and what comes back every time."""
+    residuals = [pair.residual for pair in told if pair.residual is not None]
+    if len(residuals) < 2:
+        return None, None, None
+    length = min(residual.size for residual in residuals)
+    left: NDArray[np.float64] = np.stack([residual[:length] for residual in residuals])
+    count = left.shape[0]
+    mean = left.mean(axis=0)
+    apart = left - mean
+    freedom = length * (count - 1)
+    share = effective_share(apart[0])
+    bias = told[0].parameters.bias
+    noise = noise_estimate(
+        float(np.sum(apart**2)),
+        freedom=freedom,
+        share=share,
+        unit="" if bias is None else bias.unit,
+    )
+    remains = noise.value**2 / count
+    power = float(np.mean(mean**2))
+    probability = 1.0
+    if remains > 0:
+        probability = float(fisher.sf(power / remains, length * share, freedom * share))
+    return noise, float(np.sqrt(max(power - remains, 0.0))), probability

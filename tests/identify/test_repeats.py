@@ -1,0 +1,142 @@
+import numpy as np
+import pytest
+
+from hmpim.errors import RecordError
+from hmpim.identify.repeats import Repeats, identify_repeats
+from hmpim.record import Record
+
+FS = 100.0
+T = np.arange(1000) / FS
+U = np.sin(2 * np.pi * (0.1 * T + 0.9 * T**2))
+STRUCTURES = ("static", "first_order")
+
+
+def lagged(gain: float = 2.0, time_constant: float = 0.05, delay: int = 5) -> np.ndarray:
+    """First-order lag of the held input, exactly, and a delay of whole samples."""
+    a = np.exp(-1 / (FS * time_constant))
+    y = np.zeros(T.size)
+    for k in range(1, T.size):
+        y[k] = a * y[k - 1] + (1 - a) * gain * U[k - 1]
+    return np.concatenate((np.zeros(delay), y[: y.size - delay]))
+
+
+def record(y: np.ndarray, u: np.ndarray = U) -> Record:
+    return Record.from_arrays({"u": u}, {"y": y}, fs=FS, intersample="zoh", units={"y": "deg"})
+
+
+def repeats(
+    count: int, *, noise: float, seed: int = 0, drift: float = 0.0, left: float = 0.0
+) -> Repeats:
+    rng = np.random.default_rng(seed)
+    records = []
+    for _ in range(count):
+        clean = lagged(gain=2.0 * (1 + drift * rng.standard_normal()))
+        records.append(
+            record(clean + left * (U**2 - 0.5) + noise * rng.standard_normal(T.size) + 0.3)
+        )
+    return identify_repeats(records, structures=STRUCTURES)
+
+
+@pytest.fixture(scope="module")
+def eight() -> Repeats:
+    return repeats(8, noise=0.05)
+
+
+def test_averages_are_right_and_better_than_one_record(eight: Repeats) -> None:
+    pair = eight["y", "u"]
+    for name, true in (
+        ("scale_factor", 2.0),
+        ("time_constant", 0.05),
+        ("delay", 0.05),
+        ("bias", 0.3),
+    ):
+        parameter = pair[name]
+        single = getattr(eight.results[0]["y", "u"], name).std
+        assert abs(parameter.mean.value - true) < 4 * parameter.mean.std
+        assert parameter.mean.std == pytest.approx(single / np.sqrt(8), rel=0.2)
+        assert parameter.repeatability == pytest.approx(single, rel=0.8)
+        assert parameter.agree
+    assert pair["bias"].mean.unit == "deg"
+    assert pair.findings == ()
+
+
+def test_noise_is_what_differs_from_repeat_to_repeat(eight: Repeats) -> None:
+    pair = eight["y", "u"]
+    assert pair.noise_std is not None
+    assert pair.noise_std.value == pytest.approx(0.05, rel=0.03)
+    assert abs(pair.noise_std.value - 0.05) < 4 * pair.noise_std.std
+    assert pair.unmodelled_probability is not None
+    assert pair.unmodelled_probability > 0.005
+
+
+def test_the_averaged_response_is_right_within_its_error(eight: Repeats) -> None:
+    pair = eight["y", "u"]
+    found = pair.frequency_response
+    z = np.exp(2j * np.pi * found.frequency / FS)
+    a = np.exp(-1 / (FS * 0.05))
+    true = 2 * (1 - a) / (z - a) * z**-5
+    error = np.abs(found.response - true)
+    assert np.mean(error < 2 * found.std) > 0.85
+    assert np.median(error) < 0.01
+    assert pair.response_scatter == pytest.approx(1.0, abs=0.4)
+
+
+def test_right_error_bars_are_seldom_doubted(seeds: int) -> None:
+    agreed, probability = [], []
+    for seed in range(max(seeds // 20, 6)):
+        pair = repeats(4, noise=0.05, seed=100 + seed)["y", "u"]
+        for name in ("scale_factor", "time_constant", "delay", "bias"):
+            agreed.append(pair[name].agree)
+            probability.append(pair[name].probability)
+    assert np.mean(agreed) > 0.9
+    assert np.mean(probability) == pytest.approx(0.5, abs=0.2)
+
+
+def test_what_changes_between_repeats_is_seen() -> None:
+    pair = repeats(6, noise=0.01, drift=0.05)["y", "u"]
+    gain = pair["scale_factor"]
+    assert not gain.agree
+    assert gain.repeatability == pytest.approx(0.1, rel=0.7)
+    assert gain.mean.std == pytest.approx(gain.repeatability / np.sqrt(6), rel=0.1)
+    assert pair["time_constant"].agree
+    assert [f.code for f in pair.findings] == ["scatter"]
+    assert "scale factor" in pair.findings[0].message
+
+
+def test_copies_of_one_record_are_not_repeats() -> None:
+    one = record(lagged() + 0.05 * np.random.default_rng(0).standard_normal(T.size))
+    pair = identify_repeats([one, one, one], structures=STRUCTURES)["y", "u"]
+    assert not pair["delay"].agree
+    assert "not independent" in pair.findings[0].message
+
+
+def test_what_comes_back_every_time_is_told_from_noise() -> None:
+    pair = repeats(5, noise=0.05, left=0.1)["y", "u"]
+    assert pair.noise_std is not None
+    assert pair.noise_std.value == pytest.approx(0.05, rel=0.05)
+    # u² - ½ of a sweep has the r.m.s. 1/√8
+    assert pair.unmodelled == pytest.approx(0.1 / np.sqrt(8), rel=0.1)
+    assert pair.unmodelled_probability is not None
+    assert pair.unmodelled_probability < 1e-6
+    assert "unmodelled" in [f.code for f in pair.findings]
+
+
+def test_what_are_no_repeats_is_refused() -> None:
+    good = record(lagged())
+    with pytest.raises(RecordError, match="1 record is given"):
+        identify_repeats([good])
+    with pytest.raises(RecordError, match=r"input 'u' of record 1 .* by 2\d\d % \(r"):
+        identify_repeats([good, record(lagged(), -U)])
+    other = Record.from_arrays({"u": U}, {"z": lagged()}, fs=FS)
+    with pytest.raises(RecordError, match="record 1 has channels u, z and record 0 has u, y"):
+        identify_repeats([good, other])
+    fast = Record.from_arrays({"u": U}, {"y": lagged()}, fs=2 * FS)
+    with pytest.raises(RecordError, match="record 1 is at 200 Hz"):
+        identify_repeats([good, fast])
+
+
+def test_what_there_is_not_is_refused_by_name(eight: Repeats) -> None:
+    with pytest.raises(RecordError, match=r"there is no pair \('z', 'u'\)"):
+        eight["z", "u"]
+    with pytest.raises(RecordError, match="the repeats do not tell 'saturation_low'"):
+        eight["y", "u"]["saturation_low"]
