@@ -53,7 +53,7 @@ _LONG_TASTE = 12
 _TASTE = 4
 """Steps taken from each start before the best one is followed to its end."""
 
-_FALLING = 10.0
+_FALLING = 4.0
 """After so many steps a structure is given up if its sum of squares is this far from hopeful."""
 
 _DELAY_SHIFT: dict[Intersample, float] = {"zoh": -0.5, "foh": 0.0, "bandlimited": 0.0}
@@ -279,6 +279,8 @@ def _fit_all(
     for name in sorted(structures, key=lambda name: -STRUCTURES[name].order):
         structure = STRUCTURES[name]
         starts = starting_values(rough, structure, earliest=-2, thorough=not settled)
+        if settled and name == "first_order":
+            starts = [_without_second_pole(fits[0])]
         steps = 2 if settled else _TASTE
         fit = fit_structure(problem, structure, starts[0], iterations=steps)
         hopeful = min((f.cost for f in fits), default=np.inf) * _HOPELESS
@@ -347,6 +349,12 @@ def _nests(simple: Fit, rich: Fit) -> bool:
         and rich.structure.name == "second_order"
         and (simple.cost <= rich.cost or not is_white(rich.residual))
     )
+
+
+def _without_second_pole(second_order: Fit) -> NDArray[np.float64]:
+    """First order from second: a fast second pole counts as delay."""
+    delay, log_lag, shape = second_order.theta
+    return np.array([delay + min(shape, 0.25) * np.exp(log_lag), log_lag])
 
 
 def _nested(first_order: Fit) -> NDArray[np.float64]:
