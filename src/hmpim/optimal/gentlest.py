@@ -242,9 +242,9 @@ def _best(family: Family, wish: Wish, *, near: Candidate | None = None) -> Candi
     """
     if wish.gentle == "duration":
         return _shortest(family, wish)
-    best = _at(family, wish, wish.duration, None)
-    if near is not None:
-        best = _better(best, _at(family, wish, wish.duration, near))
+    best = None if near is None else _at(family, wish, wish.duration, near)
+    if best is None or best.use > _FULL:
+        best = _at(family, wish, wish.duration, None)
     if best is not None and best.use <= _FULL:
         return best
     # limits come first: the least share of them, and on from there if that is inside

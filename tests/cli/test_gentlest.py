@@ -1,0 +1,80 @@
+"""`hmpim gentlest`, the command by itself."""
+
+import csv
+import json
+
+import pytest
+import typer
+from typer.testing import CliRunner
+
+from hmpim.cli.gentlest import gentlest
+from hmpim.errors import ArgumentError
+
+ROUGH = [
+    *("--natural-frequency", "10", "--damping", "0.4", "--delay", "0.15", "--noise", "0.1"),
+    *("--fs", "200", "--amplitude", "10", "--unit", "deg", "--duration", "3"),
+    *("--family", "multisine"),
+]
+
+
+def run(*arguments):
+    app = typer.Typer()
+    app.command()(gentlest)
+    return CliRunner().invoke(app, [*arguments])
+
+
+def test_to_files(tmp_path):
+    files = ("-o", str(tmp_path / "s.csv"), "--json", str(tmp_path / "s.json"))
+    out = run(*ROUGH, "--range", "9", "11", *files)
+    assert out.exit_code == 0, out.output
+    data = json.loads((tmp_path / "s.json").read_text())
+    lines = (tmp_path / "s.csv").read_text().splitlines()
+    rows = list(csv.DictReader(line for line in lines if not line.startswith("#")))
+    assert len(rows) == data["stimulus"]["samples"] == 600
+    largest = max(abs(float(row["acceleration"])) for row in rows)
+    assert 0.8 * data["value"] <= largest <= data["value"] == data["peaks"]["acceleration"]
+    errors = data["errors"]["natural_frequency"]
+    assert errors["wanted_ci95"] == pytest.approx(0.17)
+    assert errors["ci95"] <= errors["worst_ci95"] <= 0.017 * 11 * 1.001
+    assert data["errors"]["delay"]["ci95"] <= 0.005
+    assert "Predicted errors at 95 %" in out.output
+    assert f"{data['value']:.4g}" in out.output
+
+
+def test_picture_of_the_trade(tmp_path):
+    out = run(*ROUGH, "--plot", str(tmp_path / "t.png"), "--json", str(tmp_path / "t.json"))
+    assert out.exit_code == 0, out.output
+    assert (tmp_path / "t.png").read_bytes().startswith(b"\x89PNG")
+    points = json.loads((tmp_path / "t.json").read_text())["trade"]
+    values = [p["value"] for p in points if p["value"] is not None]
+    assert values == sorted(values, reverse=True)
+
+
+def test_what_cannot_be_met_is_said_with_exit_code_1(tmp_path):
+    out = run(*ROUGH, "--max-acceleration", "50", "-o", str(tmp_path / "s.csv"))
+    assert out.exit_code == 1
+    assert "the accuracy cannot be met inside the limits in 3 s" in out.stderr
+    assert "allow errors" in out.stderr
+    assert not (tmp_path / "s.csv").exists()
+
+
+@pytest.mark.parametrize(
+    ("more", "message"),
+    [
+        (("--noise", "0"), "noise_std = 0.0 must be"),
+        (("--delay-error", "-1"), "accuracy of delay = -1.0"),
+        (("--range", "14", "7"), "does not rise"),
+        (("--family", "banjo"), "--family 'banjo' is not known"),
+        (("--amplitude", "nan"), "position limit = nan deg"),
+        (("--plot", "t.gif"), "does not end in .png"),
+        (("--fs", "20"), "is not seen at fs = 20 Hz"),
+    ],
+)
+def test_bad_input(more, message):
+    out = run(*ROUGH, *more)
+    assert isinstance(out.exception, ArgumentError)
+    assert message in str(out.exception)
+
+
+def test_help_shows_an_example():
+    assert "hmpim gentlest --natural-frequency 10" in run("--help").output
