@@ -152,7 +152,7 @@ def test_led_stimulus_is_at_rest_at_both_ends_and_inside_its_limits(wish):
         samples = getattr(stimulus, name)
         assert samples[0] == 0.0
         assert samples[-1] == 0.0
-    assert stimulus.tail == 0.5
+    assert stimulus.tail == max(0.5, 2 / stimulus.fs)
     settled = stimulus.time >= stimulus.duration - stimulus.tail
     assert not stimulus.position[settled].any()
 

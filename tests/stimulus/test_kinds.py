@@ -73,7 +73,7 @@ def check(wish):
         samples = getattr(stimulus, name)
         assert samples[0] == 0.0, name
         assert samples[-1] == 0.0, name
-    settled = stimulus.motion(np.array([-1.0, stimulus.duration - stimulus.tail, 1e6]))
+    settled = stimulus.motion(np.array([-1.0, stimulus.waveform.duration, 1e6]))
     for name in QUANTITIES:
         assert not getattr(settled, name).any(), name
     # never beyond a limit, 16 times oversampled, nor beyond the peaks that are stated

@@ -18,6 +18,7 @@ from hmpim.stimulus.profile import Prbs, Steps, smooth_prbs, smooth_steps
 from hmpim.stimulus.quintic import Quintic
 from hmpim.stimulus.reverse import Reversed
 from hmpim.stimulus.scale import scale_to_limits
+from hmpim.stimulus.section_v import FIG_4, section_v
 from hmpim.stimulus.spectrum import (
     OverFrequency,
     Redesign,
@@ -30,6 +31,7 @@ from hmpim.stimulus.stimulus import Stimulus, blocks
 from hmpim.stimulus.sweep import Sweep
 
 __all__ = [
+    "FIG_4",
     "KINDS",
     "Chirp",
     "Command",
@@ -64,6 +66,7 @@ __all__ = [
     "rest_to_rest",
     "scale_to_limits",
     "schroeder_multisine",
+    "section_v",
     "signal_to_noise",
     "smooth_prbs",
     "smooth_steps",

@@ -142,7 +142,7 @@ def design(
     waveform = _led(core, room, rate, ahead)
     settling = _seconds("tail", tail)
     if settling is None:
-        settling = 0.0 if ahead == 0.0 else _SETTLING
+        settling = 0.0 if ahead == 0.0 else max(_SETTLING, 2.0 / rate)  # a sample at rest at least
     stimulus = Stimulus(
         waveform=waveform,
         fs=rate,
