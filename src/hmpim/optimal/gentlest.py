@@ -285,7 +285,10 @@ def _shortest(family: Family, wish: Wish) -> Candidate | None:
     near: Candidate | None = None
     for _ in range(_ROUNDS):
         total = math.ceil(total * wish.fs - 1e-6) / wish.fs
-        near = _at(family, wish, total, near) or near
+        best = _at(family, wish, total, near)
+        if near is not None and family == "multisine" and (best is None or best.use > _FULL):
+            best = _better(best, _at(family, wish, total, None))  # a second look costs little
+        near = best or near
         tried = near if near is not None and _lasts(near, total, wish) else None
         if tried is not None and tried.use <= _FULL:
             enough, enough_at = tried, total
