@@ -13,6 +13,7 @@ from typer.core import TyperGroup
 
 from hmpim.cli.demo import demo
 from hmpim.cli.design import design
+from hmpim.cli.gentlest import gentlest
 from hmpim.cli.identify import identify
 from hmpim.cli.paper import paper
 from hmpim.errors import HmpimError
@@ -134,6 +135,7 @@ app.command(epilog="Example: hmpim identify test.csv --input u --output y --repo
     identify
 )
 app.command(epilog="Example: hmpim demo --out out/demo --seed 7")(demo)
+app.command()(gentlest)
 app.command(epilog="Example: hmpim paper --out docs/build --figures 12 13")(paper)
 
 

@@ -8,6 +8,13 @@ from numpy.typing import NDArray
 
 from hmpim.errors import ArgumentError, RecordError
 from hmpim.identify.bandwidth import disagreement, response_bandwidths
+from hmpim.identify.fit import Fit
+from hmpim.identify.imperfections import (
+    Imperfections,
+    find_imperfections,
+    refine,
+    with_imperfections,
+)
 from hmpim.identify.joint import JointFit
 from hmpim.identify.local import local_response
 from hmpim.identify.multivariable import ResponseMatrix, response_matrix
@@ -28,7 +35,7 @@ from hmpim.identify.spectrum import excited_band
 from hmpim.identify.threads import one_thread
 from hmpim.identify.uncertainty import estimate, noise_estimate
 from hmpim.identify.verdict import Judgement, judge
-from hmpim.identify.whiteness import misfit
+from hmpim.identify.whiteness import is_white, misfit
 from hmpim.model.dynamics import STRUCTURES, StructureName
 from hmpim.record import Aligned, Finding, Intersample, Record, Signal, uniform
 
@@ -161,21 +168,23 @@ def _identify_output(
             "The sensor is dead, stuck or not connected.",
         )
         return [_untold(aligned, source, output, record, dead) for source in aligned.inputs]
-    valid = None if bool(output.valid.all()) else np.asarray(output.valid)
-    measured = np.logical_and.reduce([source.valid for source in aligned.inputs])
-    joined = fit_together(
-        [source.values for source in aligned.inputs],
-        output.values,
-        valid=valid,
-        known=None if bool(measured.all()) else np.asarray(measured),
-        intersample=intersample,
-        structures=structures,
-    )
+    found = find_imperfections(output.values, aligned.fs)
+    joined = _joined(aligned, output, found, intersample, structures)
+    seen = found.saturation is not None or found.hold is not None
+    if seen or not is_white(joined.fits[0].best.fit.residual):
+        # Now that there is a model, a plateau can be told from a crest.
+        predicted = joined.fits[0].best.fit.prediction
+        again = find_imperfections(output.values, aligned.fs, prediction=predicted)
+        if (again.saturation is None) != (found.saturation is None) or (again.hold is None) != (
+            found.hold is None
+        ):
+            joined = _joined(aligned, output, again, intersample, structures)
+        found = again
     matrix = _matrix(aligned, output, record, joined) if len(aligned.inputs) > 1 else None
     pairs = []
     for i, source in enumerate(aligned.inputs):
         if joined.related[i]:
-            pairs.append(_described(aligned, source, output, record, joined, i, matrix))
+            pairs.append(_described(aligned, source, output, record, joined, i, matrix, found))
             continue
         unrelated = Finding(
             code="unrelated",
@@ -184,6 +193,29 @@ def _identify_output(
         )
         pairs.append(_untold(aligned, source, output, record, unrelated))
     return pairs
+
+
+def _joined(
+    aligned: Aligned,
+    output: Signal,
+    found: Imperfections,
+    intersample: Intersample | None,
+    structures: tuple[StructureName, ...],
+) -> Joined:
+    """Fit an output to all inputs on the samples that say what it was."""
+    valid = None if bool(output.valid.all()) else np.asarray(output.valid)
+    told = found.telling(output.values.size, aligned.fs)
+    if told is not None:
+        valid = told if valid is None else valid & told
+    measured = np.logical_and.reduce([source.valid for source in aligned.inputs])
+    return fit_together(
+        [source.values for source in aligned.inputs],
+        output.values,
+        valid=valid,
+        known=None if bool(measured.all()) else np.asarray(measured),
+        intersample=intersample,
+        structures=structures,
+    )
 
 
 def _matrix(aligned: Aligned, output: Signal, record: Record, joined: Joined) -> ResponseMatrix:
@@ -220,9 +252,16 @@ def _described(
     joined: Joined,
     i: int,
     matrix: ResponseMatrix | None,
+    found: Imperfections,
 ) -> PairIdentification:
     """Say all that is known of an output that follows an input."""
     fs, joint = aligned.fs, joined.fits[i]
+    covariance = joined.covariances[i] if matrix is not None else None
+    refined = refine(joint, found, fs) if matrix is None else None
+    censored = None
+    if refined is not None:
+        joint, censored = refined
+        covariance = censored.covariance
     fit = joint.best.fit
     u, y = source.values, joint.problem.y  # what the other inputs leave over
     band = record.band or excited_band(u, fs)
@@ -232,7 +271,7 @@ def _described(
         fs=fs,
         highest=min(band[1], fs / 2),
         delay_correlation=paper.delay,
-        known_covariance=joined.covariances[i] if matrix is not None else None,
+        known_covariance=covariance,
         input_unit=source.unit,
         output_unit=output.unit,
     )
@@ -240,7 +279,9 @@ def _described(
     left = misfit(u, fit.residual, delay=fit.delay, band=(band[0] / fs, band[1] / fs))
     judgement = judge(joint, readings, left, fs=fs, band=band, fit_percent=fit_percent)
     if matrix is None:
-        response = local_response(u, y, fs, delay=max(fit.delay, 0.0) / fs, band=band)
+        response = local_response(
+            u, _told(y, fit, found, fs), fs, delay=max(fit.delay, 0.0) / fs, band=band
+        )
         findings, verdict = judgement.findings, judgement.verdict
     else:
         response = _column(matrix, i)
@@ -252,8 +293,10 @@ def _described(
         fs=fs,
         intersample=joint.best.intersample,
     )
+    parameters, seen = with_imperfections(readings.parameters, found, censored, output.unit)
+    findings = (*findings, *seen)
     parted = disagreement(from_response, readings.parameters)
-    if parted is not None:
+    if parted is not None and found.hold is None:
         findings, verdict = (*findings, parted), "doubtful"
     return PairIdentification(
         input=source.name,
@@ -261,7 +304,7 @@ def _described(
         structure=fit.structure.name,
         intersample=joint.best.intersample,
         fit_percent=fit_percent,
-        parameters=readings.parameters,
+        parameters=parameters,
         paper=paper,
         frequency_response=response,
         numerator=_descending(readings.system.numerator / readings.system.numerator[0]),
@@ -274,6 +317,12 @@ def _described(
         prediction=fit.prediction,
         residual=fit.residual,
     )
+
+
+def _told(y: NDArray[np.float64], fit: Fit, found: Imperfections, fs: float) -> NDArray[np.float64]:
+    """Output with the model in place of clipped and held samples, for spectra."""
+    told = found.telling(y.size, fs)
+    return y if told is None else np.where(told, y, fit.prediction)
 
 
 def _column(matrix: ResponseMatrix, i: int) -> FrequencyResponse:

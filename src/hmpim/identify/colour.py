@@ -1,0 +1,287 @@
+"""What the noise is like: white, correlated, rumbling, or with a line; and whether the bias drifts.
+
+All of it is read off the residual of a fit, so it is as good as the fit is.
+"""
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.fft import rfft
+from scipy.optimize import minimize_scalar
+from scipy.stats import t as student
+
+from hmpim.errors import RecordError
+from hmpim.identify.signals import as_signal, check_rate
+from hmpim.identify.uncertainty import covariance
+from hmpim.identify.whiteness import autocovariance, effective_share, is_white
+
+__all__ = ["Colour", "Drift", "NoiseColour", "bias_drift", "noise_colour"]
+
+Colour = Literal["white", "autoregressive", "power_law"]
+"""White; correlated over a few samples (AR(1)); or as a power of the frequency (1/f, wander)."""
+
+_LINE = 25.0
+"""Power of a spectral line over its neighbours' mean; noise alone exceeds it once in 10^11."""
+
+_WANDERS = 0.98
+"""Correlation from sample to sample from which a noise counts as wander."""
+
+_NEIGHBOURS = 30
+"""Bins on either side that a line is compared with."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class NoiseColour:
+    """Colour of a noise.
+
+    Parameters
+    ----------
+    kind : {'white', 'autoregressive', 'power_law'}
+        The likelier description; a line is left out of it.
+    coefficient : float
+        Correlation between one sample and the next: the AR(1) coefficient.
+    coefficient_std : float
+        Its standard deviation were the noise AR(1).
+    exponent : float
+        α of a power spectrum that goes as f^-α; 0 is white, 1 flicker, 2 random walk.
+    line_frequency : float or None
+        Frequency of the strongest line that stands out of the noise, Hz.
+    line_amplitude : float or None
+        Its amplitude, in the residual's unit.
+    """
+
+    kind: Colour
+    coefficient: float
+    coefficient_std: float
+    exponent: float
+    line_frequency: float | None
+    line_amplitude: float | None
+
+    @property
+    def description(self) -> str:
+        """The colour in words."""
+        match self.kind:
+            case "white":
+                words = "white"
+            case "autoregressive":
+                words = f"correlated from sample to sample (coefficient {self.coefficient:.2f})"
+            case "power_law":
+                words = f"stronger at low frequency (power as 1/f^{self.exponent:.1f})"
+        if self.line_frequency is None:
+            return words
+        return f"{words}, with a line at {self.line_frequency:.4g} Hz"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Drift:
+    """Drift of the bias over the record.
+
+    Parameters
+    ----------
+    slope : float
+        The residual's unit per second.
+    std : float
+        Its standard deviation, the noise's own colour taken into account.
+    probability : float
+        Chance of a slope so great without any drift.
+    total : float
+        Slope times length of the record, in the residual's unit.
+    """
+
+    slope: float
+    std: float
+    probability: float
+    total: float
+
+
+def noise_colour(residual: ArrayLike, fs: float) -> NoiseColour:
+    """Describe the noise that a fit leaves over.
+
+    Parameters
+    ----------
+    residual : array_like, shape (n,)
+        Output less prediction, samples that do not count left out.
+    fs : float
+        Rate in Hz.
+
+    Returns
+    -------
+    NoiseColour
+        Of AR(1) and a power law, each fitted by Whittle's likelihood (P. Whittle, Arkiv för
+        Matematik 2, 1953), the likelier.
+
+    Raises
+    ------
+    RecordError
+        For the wrong shape, NaN or infinity.
+    ArgumentError
+        If `fs` is not positive.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> noise_colour(np.random.default_rng(0).standard_normal(2000), 200.0).kind
+    'white'
+    """
+    check_rate(fs)
+    e = as_signal("residual", residual)
+    e = e - e.mean()
+    n = e.size
+    line = _line(e, fs)
+    if line is not None:
+        e = e - _tone(e, line / fs)
+    r = autocovariance(e, 1)
+    rho = 0.0 if r[0] == 0 else float(r[1] / r[0])
+    rho = float(np.clip(rho + (1 + 3 * rho) / n, -0.9999, 0.9999))  # Kendall's bias
+    kind: Colour = "white"
+    exponent = 0.0
+    if r[0] > 0 and not is_white(e):
+        kind, exponent = _likelier(e)
+    return NoiseColour(
+        kind=kind,
+        coefficient=rho,
+        coefficient_std=float(np.sqrt((1 - rho * rho) / n)),
+        exponent=exponent,
+        line_frequency=line,
+        line_amplitude=None
+        if line is None
+        else _amplitude(as_signal("residual", residual), line / fs),
+    )
+
+
+def bias_drift(residual: ArrayLike, time: ArrayLike) -> Drift:
+    """Slope of the bias, with an error that holds for coloured noise.
+
+    Parameters
+    ----------
+    residual : array_like, shape (n,)
+        Output less the prediction of a model with constant bias.
+    time : array_like, shape (n,)
+        Seconds, rising.
+
+    Returns
+    -------
+    Drift
+
+    Raises
+    ------
+    RecordError
+        For the wrong shape, unequal lengths, NaN, infinity, or time that does not rise.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> time = np.arange(1000) / 100
+    >>> noise = 0.1 * np.random.default_rng(1).standard_normal(1000)
+    >>> found = bias_drift(0.05 * time + noise, time)
+    >>> bool(abs(found.slope - 0.05) < 3 * found.std), found.probability < 1e-4
+    (True, True)
+    """
+    e, t = as_signal("residual", residual), as_signal("time", time)
+    if e.size != t.size:
+        raise RecordError(f"the residual has {e.size} samples and time {t.size}; give one for each")
+    if not np.all(np.diff(t) > 0):
+        k = int(np.argmin(np.diff(t) > 0))
+        raise RecordError(f"time does not rise after sample {k} ({t[k]:.9g} s); sort the record")
+    rows = np.stack([np.ones(t.size), t - t.mean()])
+    slope = float(rows[1] @ e / (rows[1] @ rows[1]))
+    left = e - e.mean() - slope * rows[1]
+    length = float(t[-1] - t[0])
+    if not np.any(left):
+        return Drift(slope=slope, std=0.0, probability=float(slope == 0.0), total=slope * length)
+    variance = covariance(rows, left, freedom=t.size - 2, white=is_white(left))[1, 1]
+    if _wanders(left):
+        variance = max(variance, _wandering_variance(rows[1], left))
+    std = float(np.sqrt(variance))
+    freedom = max((t.size - 2) * effective_share(left), 1.0)
+    return Drift(
+        slope=slope,
+        std=std,
+        probability=float(2 * student.sf(abs(slope) / std, freedom)),
+        total=slope * length,
+    )
+
+
+def _wanders(e: NDArray[np.float64]) -> bool:
+    """Whether the noise is so slow that no autoregression reaches its lowest frequencies."""
+    if is_white(e):
+        return False
+    r = autocovariance(e, 1)
+    return bool(_likelier(e)[0] == "power_law" or r[1] > _WANDERS * r[0])
+
+
+def _wandering_variance(ramp: NDArray[np.float64], e: NDArray[np.float64]) -> float:
+    """Variance of the slope under noise whose power goes as f^-α down to the record's length."""
+    n = e.size
+    exponent = _likelier(e)[1]
+    omega = 2 * np.pi * np.arange(n + 1) / (2 * n)
+    omega[0] = omega[1]
+    inside = slice(2, n - 1, 2)
+    power = np.abs(rfft(e)[1 : (n - 1) // 2]) ** 2 / n
+    shape = omega**-exponent
+    level = float(np.mean(power / shape[inside][: power.size]))
+    weights = np.abs(rfft(ramp / (ramp @ ramp), 2 * n)) ** 2
+    return float(level * (weights[1:] @ shape[1:]) / n)
+
+
+def _line(e: NDArray[np.float64], fs: float) -> float | None:
+    """Frequency in Hz of the strongest narrow line, or None."""
+    n = e.size
+    if n < 8 * _NEIGHBOURS:
+        return None
+    power = np.abs(rfft(e * np.hanning(n))) ** 2
+    inner = np.arange(_NEIGHBOURS, power.size - _NEIGHBOURS)
+    summed = np.concatenate([[0.0], np.cumsum(power)])
+    wide = summed[inner + _NEIGHBOURS + 1] - summed[inner - _NEIGHBOURS]
+    narrow = summed[inner + 3] - summed[inner - 2]
+    around = (wide - narrow) / (2 * _NEIGHBOURS - 4)
+    ratio = power[inner] / np.maximum(around, np.finfo(float).tiny)
+    best = int(np.argmax(ratio))
+    if ratio[best] < _LINE:
+        return None
+    k = int(inner[best])
+    left, here, right = np.log(np.maximum(power[k - 1 : k + 2], np.finfo(float).tiny))
+    return float((k + 0.5 * (left - right) / (left - 2 * here + right)) * fs / n)
+
+
+def _pair(size: int, frequency: float) -> NDArray[np.float64]:
+    """Cosine and sine at `frequency` in cycles per sample, shape (2, n)."""
+    phase = 2 * np.pi * frequency * np.arange(size)
+    return np.stack([np.cos(phase), np.sin(phase)])
+
+
+def _weights(e: NDArray[np.float64], frequency: float) -> NDArray[np.float64]:
+    rows = _pair(e.size, frequency)
+    return np.asarray(np.linalg.solve(rows @ rows.T, rows @ (e - e.mean())))
+
+
+def _tone(e: NDArray[np.float64], frequency: float) -> NDArray[np.float64]:
+    return np.asarray(_weights(e, frequency) @ _pair(e.size, frequency))
+
+
+def _amplitude(e: NDArray[np.float64], frequency: float) -> float:
+    return float(np.hypot(*_weights(e, frequency)))
+
+
+def _likelier(e: NDArray[np.float64]) -> tuple[Colour, float]:
+    """AR(1) or a power law, by Whittle's likelihood, and the power law's exponent."""
+    n = e.size
+    power = np.abs(rfft(e)[1 : (n - 1) // 2]) ** 2 / n
+    power = np.maximum(power, 1e-12 * power.mean())
+    omega = 2 * np.pi * np.arange(1, power.size + 1) / n
+
+    def cost(shape: NDArray[np.float64]) -> float:
+        return float(np.log(np.mean(power / shape)) + np.mean(np.log(shape)))
+
+    def autoregressive(rho: float) -> float:
+        return cost(1.0 / (1.0 - 2.0 * rho * np.cos(omega) + rho * rho))
+
+    def law(exponent: float) -> float:
+        return cost(omega**-exponent)
+
+    first = minimize_scalar(autoregressive, bounds=(-0.999, 0.9999), method="bounded")
+    second = minimize_scalar(law, bounds=(-2.0, 4.0), method="bounded")
+    kind: Colour = "autoregressive" if first.fun <= second.fun else "power_law"
+    return kind, float(second.x)

@@ -1,0 +1,337 @@
+"""An output that is updated more slowly than it is recorded: the data hold of Fig. 1.
+
+Such an output repeats itself, then jumps. An update at time t shows in the first sample at
+or after t, so a change seen at sample c tells that c - 1 < t <= c. All changes together
+bound the period and the phase from both sides, without any noise in between: what the
+record leaves open is a small polygon, and its width is the error.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from hmpim.errors import RecordError
+from hmpim.identify.signals import as_signal, check_rate
+
+__all__ = ["Hold", "Updates", "detect_hold", "updates"]
+
+_FEWEST = 10
+"""Changes, repeats and distinct values that must be seen: a square wave has two values."""
+
+_RICHER = 1.5
+"""Some changes must exceed the smallest by so much: a rounded ramp changes by one step each."""
+
+_FASTEST = 1.05
+"""Samples between updates below which they cannot be told from one per sample."""
+
+_COMPLETE = 0.8
+"""Share of the updates that must show, if they come at less than every other sample: rounding
+and standing inputs leave the odd repeat too."""
+
+_CROWDED = 0.8
+"""Concentration of the changes on the circle, over that of all phases within one sample."""
+
+_VIOLATIONS = 0.02
+"""Share of changes that may be off the clock: gaps that were filled, a lost update."""
+
+_STILL = 6.0
+"""Change over the usual one that counts as an update where noise was added after the hold."""
+
+_MOVES = 0.2
+"""Motion of the prediction while the output stands, over that from update to update in the
+same time, below which it is the input that is held."""
+
+_ROUNDING = 1e-6
+"""Samples by which an update may miss the sample that shows it, by arithmetic alone."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Hold:
+    """Clock of a held output.
+
+    Parameters
+    ----------
+    period : float
+        Time between updates, s.
+    phase : float
+        Time of the first update in the record, s after its first sample.
+    std : float
+        Standard deviation of `period`, s.
+    phase_std : float
+        Standard deviation of `phase`, s. If the period is a whole number of samples the
+        record cannot tell when between two samples the update comes.
+    """
+
+    period: float
+    phase: float
+    std: float
+    phase_std: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Updates:
+    """Samples in which a new value arrives, and how old it is by then.
+
+    Parameters
+    ----------
+    index : ndarray of int, shape (m,)
+        Samples, rising.
+    age : ndarray, shape (m,)
+        Samples since the update, 0 <= age < 1.
+    age_std : float
+        Standard deviation, in samples, that all ages have in common: a delay found from them
+        is uncertain by as much.
+    """
+
+    index: NDArray[np.intp]
+    age: NDArray[np.float64]
+    age_std: float = 0.0
+
+
+def updates(hold: Hold, samples: int, fs: float) -> Updates:
+    """Say in which samples of a record a new value arrives.
+
+    Parameters
+    ----------
+    hold : Hold
+        From `detect_hold`.
+    samples : int
+        Length of the record.
+    fs : float
+        Its rate in Hz.
+
+    Examples
+    --------
+    >>> clock = Hold(period=0.25, phase=0.05, std=0.0, phase_std=0.0)
+    >>> found = updates(clock, 8, 10.0)
+    >>> found.index.tolist(), found.age.round(6).tolist()
+    ([1, 3, 6], [0.5, 0.0, 0.5])
+    """
+    period, phase = hold.period * fs, hold.phase * fs
+    count = max(int(np.floor((samples - 1 - phase) / period)) + 1, 0)
+    instant = phase + period * np.arange(count)
+    index = np.ceil(instant - _ROUNDING).astype(np.intp)
+    inside = (index >= 0) & (index < samples)
+    return Updates(
+        index=index[inside],
+        age=np.maximum(index - instant, 0.0)[inside],
+        age_std=hold.phase_std * fs,
+    )
+
+
+def detect_hold(y: ArrayLike, fs: float, prediction: ArrayLike | None = None) -> Hold | None:
+    """Find the clock by which `y` is updated, if it is slower than `fs`.
+
+    Parameters
+    ----------
+    y : array_like, shape (n,)
+        Output samples as recorded.
+    fs : float
+        Rate in Hz.
+    prediction : array_like, shape (n,), optional
+        What a model without a hold says the output would be. It tells an output that is held
+        from one whose input stands still.
+
+    Returns
+    -------
+    Hold or None
+        None where the output is updated at every sample, changes by no steady clock, or
+        takes fewer than ten different values.
+
+    Raises
+    ------
+    RecordError
+        For the wrong shape, unequal lengths, NaN or infinity.
+    ArgumentError
+        If `fs` is not positive.
+
+    Examples
+    --------
+    A sensor of 30 Hz recorded at 200 Hz:
+
+    >>> import numpy as np
+    >>> sample = np.arange(2000)
+    >>> last = np.floor(sample * 30 / 200 + 1e-9)
+    >>> found = detect_hold(np.sin(last / 5), 200.0)
+    >>> round(1 / found.period, 3)
+    30.0
+    """
+    check_rate(fs)
+    samples = as_signal("y", y)
+    change = np.abs(np.diff(samples))
+    changed = _changed(samples, change)
+    runs = np.diff(changed)
+    if np.count_nonzero(runs > 1) < _FEWEST or not _is_rich(samples, change, changed):
+        return None
+    shortest = int(np.quantile(runs, _VIOLATIONS, method="lower"))
+    if prediction is not None and not _moves_within(samples, changed, prediction):
+        return None
+    period = _coarse_period(changed, runs, shortest)
+    if period is None:
+        return None
+    if shortest == 1 and (
+        change.min() > 0 or changed.size * period < _COMPLETE * (changed[-1] - changed[0])
+    ):
+        return None
+    return _bounded(changed.astype(np.float64), period, fs)
+
+
+def _changed(samples: NDArray[np.float64], change: NDArray[np.float64]) -> NDArray[np.intp]:
+    """Samples that differ from the one before by more than arithmetic, or than usual."""
+    rounding = float(8 * np.finfo(float).eps * np.max(np.abs(samples)))
+    least = rounding
+    if np.count_nonzero(change <= rounding) < _FEWEST:  # no repeats: noise came after the hold
+        least = _STILL * float(np.median(change))
+    return np.flatnonzero(change > least) + 1
+
+
+def _is_rich(
+    samples: NDArray[np.float64], change: NDArray[np.float64], changed: NDArray[np.intp]
+) -> bool:
+    """Whether the output takes many values, by changes of many sizes."""
+    jump = change[changed - 1]
+    if np.mean(jump > _RICHER * np.quantile(jump, 0.01)) < 0.05:
+        return False
+    levels = np.sort(samples[changed])
+    apart = _STILL * float(np.median(change)) if change.min() > 0 else 0.0
+    return bool(
+        1 + np.count_nonzero(np.diff(levels) > apart) >= _FEWEST or _spread_out(levels, apart)
+    )
+
+
+def _spread_out(levels: NDArray[np.float64], apart: float) -> bool:
+    """Whether the values fill their range, rather than crowd at a few levels."""
+    cells = np.histogram(levels, bins=50)[0]
+    return bool(np.count_nonzero(cells) >= _FEWEST and np.ptp(levels) > 2 * _FEWEST * apart)
+
+
+def _moves_within(
+    samples: NDArray[np.float64], changed: NDArray[np.intp], prediction: ArrayLike
+) -> bool:
+    model = as_signal("prediction", prediction)
+    if model.size != samples.size:
+        raise RecordError(
+            f"y has {samples.size} samples and the prediction {model.size}; give one for each"
+        )
+    motion = np.diff(model)
+    standing = np.ones(motion.size, dtype=bool)
+    standing[changed - 1] = False
+    at_updates = float(np.mean(motion[~standing] ** 2))
+    return bool(np.mean(motion[standing] ** 2) > _MOVES**2 * at_updates)
+
+
+def _coarse_period(
+    changed: NDArray[np.intp], runs: NDArray[np.intp], shortest: int
+) -> float | None:
+    """Period in samples at which the changes crowd on the circle, refined over longer stretches."""
+    low, high = max(float(shortest), _FASTEST), float(shortest + 1)
+    count = min(200, changed.size)
+    stretch = _densest(changed, runs, count)
+    best = low
+    while True:
+        c = changed[stretch : stretch + count] - changed[stretch]
+        finest = 0.1 * low * low / max(float(c[-1]), 1.0)
+        trial = np.arange(low, high + finest, finest)
+        power = np.array([np.abs(np.exp(2j * np.pi * c / t).mean()) for t in trial])
+        best = float(trial[np.argmax(power)])
+        expected = best / np.pi * np.sin(np.pi / best)
+        if best < _FASTEST or power.max() < _CROWDED * expected:
+            return None
+        if count >= changed.size - stretch:
+            if stretch == 0:
+                return best
+            stretch = 0
+        low, high = max(best - 3 * finest, _FASTEST), best + 3 * finest
+        count = min(2 * count, changed.size - stretch)
+
+
+def _densest(changed: NDArray[np.intp], runs: NDArray[np.intp], count: int) -> int:
+    """Where `count` changes follow each other most closely."""
+    if changed.size <= count:
+        return 0
+    length = changed[count:] - changed[:-count]
+    return int(np.argmin(length))
+
+
+def _bounded(changed: NDArray[np.float64], period: float, fs: float) -> Hold | None:
+    """Bounds of period and phase from all changes, and the middle between them."""
+    k, changed, period = _numbered(changed, period)
+    allowed = int(_VIOLATIONS * changed.size)
+    for _ in range(allowed + 1):
+        interval = _feasible(k, changed, period)
+        if interval is not None:
+            low, high = interval
+            middle = 0.5 * (low + high)
+            bounds = [_phase(k, changed, t) for t in np.linspace(low, high, 21)]
+            first = 0.5 * sum(_phase(k, changed, middle))
+            lowest, highest = min(b[0] for b in bounds), max(b[1] for b in bounds)
+            back = np.floor(first / middle + _ROUNDING)  # to the first update in the record
+            return Hold(
+                period=middle / fs,
+                phase=float(first - back * middle) / fs,
+                std=float(high - low + 2e-9) / np.sqrt(12.0) / fs,
+                phase_std=float(highest - lowest) / np.sqrt(12.0) / fs,
+            )
+        off = changed - k * period
+        worst = int(np.argmax(np.abs(off - np.median(off))))
+        k, changed = np.delete(k, worst), np.delete(changed, worst)
+    return None
+
+
+def _numbered(
+    changed: NDArray[np.float64], period: float
+) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
+    """Which update each change is, and the period by least squares."""
+    phase = np.angle(np.mean(np.exp(2j * np.pi * changed / period))) * period / (2 * np.pi)
+    k = np.rint((changed - phase) / period)
+    for _ in range(5):
+        centred = k - k.mean()
+        period = float(centred @ changed / (centred @ centred))
+        moved = np.rint((changed - np.mean(changed - period * k)) / period)
+        if np.array_equal(moved, k):
+            break
+        k = moved
+    return k, changed, period
+
+
+def _phase(
+    k: NDArray[np.float64], changed: NDArray[np.float64], period: float
+) -> tuple[float, float]:
+    """Bounds of the phase at one period: change - 1 < phase + k period <= change."""
+    rest = changed - k * period
+    return float(rest.max()) - 1.0, float(rest.min())
+
+
+def _feasible(
+    k: NDArray[np.float64], changed: NDArray[np.float64], period: float
+) -> tuple[float, float] | None:
+    """Range of periods that leave a phase; the room for it is concave in the period."""
+
+    def room(t: float) -> float:
+        low, high = _phase(k, changed, t)
+        return high - low + _ROUNDING
+
+    reach = 2.0 / float(np.ptp(k))
+    left, right = period - reach, period + reach
+    for _ in range(80):  # golden section: where the room is greatest
+        a, b = left + 0.382 * (right - left), left + 0.618 * (right - left)
+        if room(a) < room(b):
+            left = a
+        else:
+            right = b
+    best = 0.5 * (left + right)
+    if room(best) < 0:
+        return None
+
+    def edge(outside: float) -> float:
+        inside = best
+        for _ in range(60):
+            middle = 0.5 * (inside + outside)
+            if room(middle) < 0:
+                outside = middle
+            else:
+                inside = middle
+        return inside
+
+    return edge(best - 2 * reach), edge(best + 2 * reach)

@@ -1,0 +1,185 @@
+"""The rest of Fig. 1: saturation, data hold and quantisation, found and fitted as what they are.
+
+Clipped samples and those between a hold's updates are left out of the first fit; then the
+likelihood of what was read is maximised, clipped samples counting as "beyond the level" and
+held ones at the instants of their updates (`hmpim.identify.censored`).
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hmpim.errors import RecordError
+from hmpim.identify.censored import CensoredFit, fit_censored
+from hmpim.identify.hold import Hold, Updates, detect_hold, updates
+from hmpim.identify.joint import JointFit, Trial
+from hmpim.identify.quantization import Quantization, detect_quantization
+from hmpim.identify.result import Parameters
+from hmpim.identify.saturation import Saturation, detect_saturation
+from hmpim.identify.uncertainty import estimate
+from hmpim.record import Finding
+
+__all__ = ["Imperfections", "find_imperfections", "refine", "with_imperfections"]
+
+_MANY = 1e6
+"""Degrees of freedom behind levels and periods, which are known all but exactly."""
+
+_COARSE = 1.0
+"""Steps of rounding, over the noise, from which quantisation is worth a warning."""
+
+_MOST_CLIPPED = 0.85
+"""Share of clipped samples beyond which too little is left."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Imperfections:
+    """What was seen in the output itself; None where nothing was."""
+
+    saturation: Saturation | None
+    hold: Hold | None
+    quantization: Quantization | None
+
+    def arrivals(self, samples: int, fs: float) -> Updates | None:
+        """Samples in which a held output is updated."""
+        return None if self.hold is None else updates(self.hold, samples, fs)
+
+    def telling(self, samples: int, fs: float) -> NDArray[np.bool_] | None:
+        """Samples that say what the output was; None when all do."""
+        if self.saturation is None and self.hold is None:
+            return None
+        told = np.ones(samples, dtype=bool)
+        arrivals = self.arrivals(samples, fs)
+        if arrivals is not None:
+            told[:] = False
+            told[arrivals.index] = True
+        if self.saturation is not None:
+            told &= ~self.saturation.clipped
+        return told
+
+
+def find_imperfections(
+    y: NDArray[np.float64], fs: float, *, prediction: NDArray[np.float64] | None = None
+) -> Imperfections:
+    """Look for saturation, hold and quantisation in an output.
+
+    Parameters
+    ----------
+    y : ndarray, shape (n,)
+        Output samples.
+    fs : float
+        Rate in Hz.
+    prediction : ndarray, shape (n,), optional
+        What a first model says; with it a plateau is told from a crest.
+    """
+    rounding = detect_quantization(y)
+    step = 0.0 if rounding is None else rounding.step
+    clipping: Saturation | None = detect_saturation(y, prediction, step=step)
+    if clipping is not None and (
+        (clipping.low is None and clipping.high is None) or clipping.share > _MOST_CLIPPED
+    ):
+        clipping = None
+    return Imperfections(
+        saturation=clipping, hold=detect_hold(y, fs, prediction), quantization=rounding
+    )
+
+
+def refine(joint: JointFit, found: Imperfections, fs: float) -> tuple[JointFit, CensoredFit] | None:
+    """Fit the chosen structure to what was read; None where there is nothing to refine."""
+    if found.saturation is None and found.hold is None:
+        return None
+    problem = joint.problem
+    whole = None if problem.valid is None else _gaps_only(problem.valid, found, fs)
+    arrivals = found.arrivals(problem.y.size, fs)
+    try:
+        censored = fit_censored(
+            replace(problem, valid=whole), joint.best.fit, found.saturation, arrivals=arrivals
+        )
+    except RecordError:  # fewer samples inside the range than parameters: the first fit stands
+        return None
+    counted = np.zeros(problem.y.size, dtype=bool)
+    counted[censored.index] = True
+    fit = replace(censored.fit, residual=censored.fit.residual * counted)
+    best = Trial(intersample=joint.best.intersample, fit=fit, criterion=joint.best.criterion)
+    refined = replace(
+        joint,
+        problem=replace(problem, valid=counted),
+        best=best,
+        trials=tuple(best if trial is joint.best else trial for trial in joint.trials),
+    )
+    return refined, censored
+
+
+def _gaps_only(valid: NDArray[np.bool_], found: Imperfections, fs: float) -> NDArray[np.bool_]:
+    """Samples that count, clipped and held ones among them again."""
+    told = found.telling(valid.size, fs)
+    return valid if told is None else np.asarray(valid | ~told)
+
+
+def with_imperfections(
+    parameters: Parameters, found: Imperfections, censored: CensoredFit | None, unit: str
+) -> tuple[Parameters, tuple[Finding, ...]]:
+    """Add levels, hold period and step to the parameters, and say what they are."""
+    findings: list[Finding] = []
+    clipping, hold, rounding = found.saturation, found.hold, found.quantization
+    if clipping is not None:
+        levels = [
+            f"{name} {level:.6g} {unit}".rstrip()
+            for name, level in (("low", clipping.low), ("high", clipping.high))
+            if level is not None
+        ]
+        findings.append(
+            Finding(
+                code="saturation",
+                message=f"{100 * clipping.share:.1f} % of the samples are clipped "
+                f"({', '.join(levels)}); they count as beyond the level. Lower the amplitude to "
+                "keep the whole range.",
+            )
+        )
+        parameters = replace(
+            parameters,
+            saturation_low=None
+            if clipping.low is None
+            else estimate(clipping.low, (clipping.low_std or 0.0) ** 2, freedom=_MANY, unit=unit),
+            saturation_high=None
+            if clipping.high is None
+            else estimate(clipping.high, (clipping.high_std or 0.0) ** 2, freedom=_MANY, unit=unit),
+        )
+    if hold is not None:
+        findings.append(
+            Finding(
+                code="hold",
+                message=f"The output is updated every {1e3 * hold.period:.4g} ms only, first at "
+                f"{1e3 * hold.phase:.4g} ms into the record; the delay is that of the values, "
+                "without the time for which they are held.",
+            )
+        )
+        parameters = replace(
+            parameters, hold_period=estimate(hold.period, hold.std**2, freedom=_MANY, unit="s")
+        )
+    if rounding is not None:
+        parameters = replace(
+            parameters,
+            quantization_step=estimate(rounding.step, rounding.std**2, freedom=_MANY, unit=unit),
+        )
+        noise = parameters.noise_std
+        if noise is not None and rounding.step > _COARSE * noise.value:
+            findings.append(
+                Finding(
+                    code="quantization",
+                    message=f"The output is rounded to steps of {rounding.step:.4g} {unit}".rstrip()
+                    + f", {rounding.step / max(noise.value, 1e-300):.2g} times the noise: errors "
+                    "of rounding are not independent; error bars are only as good as that.",
+                )
+            )
+    if censored is not None and parameters.noise_std is not None:
+        parameters = replace(
+            parameters,
+            noise_std=estimate(
+                censored.noise_std,
+                censored.noise_std_std**2,
+                freedom=float(censored.index.size),
+                unit=unit,
+            ),
+        )
+    return parameters, tuple(findings)

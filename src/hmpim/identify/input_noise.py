@@ -1,0 +1,124 @@
+"""Noise on the input itself: the stimulus was measured, not merely commanded.
+
+A fit takes the input as exact. If it carries noise of its own, the model is driven by that
+too, and every gain comes out smaller by the share of the noise in the input's power.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.fft import rfft
+from scipy.signal.windows import blackmanharris
+
+from hmpim.identify.signals import as_signal, check_band, check_rate
+
+__all__ = ["InputNoise", "input_noise"]
+
+_ABOVE = 1.3
+"""Where, over the end of the excited band, the spectrum is looked at for the floor."""
+
+_ROOM = 0.85
+"""The excited band must end below this share of the Nyquist frequency, over `_ABOVE`."""
+
+_FLAT = 4.0
+"""Ratio of the floor's two halves up to which it counts as white noise rather than a skirt."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class InputNoise:
+    """White noise on the input.
+
+    Parameters
+    ----------
+    std : float
+        Standard deviation, in the input's unit.
+    std_std : float
+        Standard deviation of `std`.
+    attenuation : float
+        Share by which a gain found at an average frequency of the band comes out too small:
+        the noise's power in the band over all power there.
+    """
+
+    std: float
+    std_std: float
+    attenuation: float
+
+
+def input_noise(u: ArrayLike, fs: float, *, band: tuple[float, float]) -> InputNoise | None:
+    """Estimate the noise on the input from its spectrum above the excited band.
+
+    Parameters
+    ----------
+    u : array_like, shape (n,)
+        Input samples.
+    fs : float
+        Rate in Hz.
+    band : tuple of float
+        Excited band, Hz.
+
+    Returns
+    -------
+    InputNoise or None
+        None where there is none to be seen: no flat floor above the arithmetic's own, or an
+        input (steps, PRBS, noise) that excites all frequencies, in which nothing can be told.
+
+    Raises
+    ------
+    RecordError
+        For the wrong shape, NaN or infinity.
+    ArgumentError
+        If `fs` or `band` cannot be.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> t = np.arange(4000) / 400
+    >>> u = np.sin(2 * np.pi * (0.1 * t + t**2))
+    >>> noisy = u + 0.02 * np.random.default_rng(0).standard_normal(t.size)
+    >>> round(input_noise(noisy, 400.0, band=(0.1, 20.0)).std, 3)
+    0.02
+    >>> input_noise(u, 400.0, band=(0.1, 20.0)) is None
+    True
+    """
+    check_rate(fs)
+    check_band(band, fs)
+    samples = as_signal("u", u)
+    if _ABOVE * band[1] > _ROOM * fs / 2 or np.ptp(samples) == 0:
+        return None
+    window = np.asarray(blackmanharris(samples.size, sym=False), dtype=np.float64)
+    power = np.abs(rfft(window * (samples - samples.mean()))) ** 2 / float(window @ window)
+    first = int(np.ceil(_ABOVE * band[1] * samples.size / fs))
+    floor = power[first:]
+    if floor.size < 32:
+        return None
+    half = floor.size // 2
+    halves = _level(floor[:half]), _level(floor[half:])
+    variance = _level(floor)
+    if variance <= 1e-20 * float(np.ptp(samples)) ** 2 or halves[1] <= 0:
+        return None
+    # Steps and kinks of the stimulus fall off with frequency; noise does not.
+    if not 1.0 / _FLAT < halves[0] / halves[1] < _FLAT or not _is_rough(samples, variance):
+        return None
+    inside = slice(
+        max(int(band[0] * samples.size / fs), 1), int(np.ceil(band[1] * samples.size / fs)) + 1
+    )
+    total = float(np.mean(power[inside]))
+    std = float(np.sqrt(variance))
+    return InputNoise(
+        std=std,
+        std_std=std / float(np.sqrt(floor.size)),
+        attenuation=min(variance / total, 1.0),
+    )
+
+
+def _level(power: NDArray[np.float64]) -> float:
+    """Mean of exponentially distributed power, from its median: a line does no harm."""
+    return float(np.median(power) / np.log(2.0))
+
+
+def _is_rough(samples: NDArray[np.float64], variance: float) -> bool:
+    """Whether noise shows between jumps as well; a clean square wave stands still there."""
+    third = np.diff(samples, 3)
+    usual = float(np.median(np.abs(third))) / 0.6745 / np.sqrt(20.0)
+    return bool(usual > 0.5 * np.sqrt(variance))
