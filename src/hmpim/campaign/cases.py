@@ -1,0 +1,138 @@
+"""A plan expanded into cases, each with its stimuli; refused before anything moves."""
+
+from dataclasses import dataclass, replace
+from itertools import product
+from typing import Any
+
+from hmpim.campaign.plan import Mode, Plan
+from hmpim.campaign.rig import CampaignRig
+from hmpim.errors import HmpimError
+from hmpim.stimulus import Limits, Stimulus, design
+
+__all__ = ["Case", "expand", "prepare", "scaled"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Case:
+    """One run: the axes that move, and how.
+
+    Examples
+    --------
+    >>> Case(test="rates", axes=("yaw",), mode="P", rate=500.0, level=0.5, load="none").id
+    'rates.none.P.500Hz.0.5.yaw'
+    """
+
+    test: str
+    axes: tuple[str, ...]
+    mode: Mode
+    rate: float
+    level: float
+    load: str
+    together: bool = False
+
+    @property
+    def id(self) -> str:
+        """Name of the case, and of its file."""
+        load = "".join(c if c.isalnum() or c in "+-_" else "_" for c in self.load)
+        what = "together" if self.together else self.axes[0]
+        return f"{self.test}.{load}.{self.mode}.{self.rate:g}Hz.{self.level:g}.{what}"
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the case as plain JSON values."""
+        return {
+            "test": self.test,
+            "axes": list(self.axes),
+            "mode": self.mode,
+            "rate": self.rate,
+            "level": self.level,
+            "load": self.load,
+            "together": self.together,
+        }
+
+
+def expand(plan: Plan) -> tuple[Case, ...]:
+    """Return every case of a plan, in the order in which they are run.
+
+    Examples
+    --------
+    >>> from hmpim.campaign.plan import read_plan
+    >>> from hmpim.campaign.shipped import shipped_plan
+    >>> [case.id for case in expand(read_plan(shipped_plan("example")))][0]
+    'rates.acceptance.P.250Hz.0.5.inner'
+    """
+    cases = []
+    for test in plan.tests:
+        moved = (test.axes,) if test.together else tuple((axis,) for axis in test.axes)
+        for load, mode, rate, level, axes in product(
+            test.loads, test.modes, test.rates, test.levels, moved
+        ):
+            cases.append(
+                Case(
+                    test=test.name,
+                    axes=axes,
+                    mode=mode,
+                    rate=rate,
+                    level=level,
+                    load=load,
+                    together=test.together,
+                )
+            )
+    return tuple(cases)
+
+
+def prepare(plan: Plan, case: Case, rig: CampaignRig) -> tuple[Stimulus, ...]:
+    """Design the stimuli of a case inside their limits, and have the rig check them.
+
+    Several axes at once get stimuli that one record can tell apart, in all as long as the
+    plan's duration; one axis alone gets the paper's sweep of that duration, leads on top.
+
+    Raises
+    ------
+    HmpimError
+        If limits, band and duration cannot all be met, or the rig refuses; names the case.
+    """
+    from hmpim.stimulus.axes import AxisPlan, design_axes
+
+    try:
+        wishes = [plan.axis(name) for name in case.axes]
+        limits = [scaled(rig.limits(case, wish), case.level) for wish in wishes]
+        if case.together:
+            stimuli = design_axes(
+                [
+                    AxisPlan(axis=wish.name, limits=bound, band=wish.band)
+                    for wish, bound in zip(wishes, limits, strict=True)
+                ],
+                duration=plan.duration,
+                fs=case.rate,
+            )
+        else:
+            stimuli = tuple(
+                design(
+                    band=wish.band,
+                    duration=plan.duration,
+                    fs=case.rate,
+                    limits=bound,
+                    axis=wish.name,
+                )
+                for wish, bound in zip(wishes, limits, strict=True)
+            )
+        rig.check(case, stimuli)
+    except HmpimError as error:
+        raise type(error)(f"case {case.id}: {error}") from error
+    return stimuli
+
+
+def scaled(limits: Limits, level: float) -> Limits:
+    """Limits with a share of the velocity, the acceleration and the jerk.
+
+    Examples
+    --------
+    >>> scaled(Limits(position=5.0, velocity=8.0), 0.5).velocity
+    4.0
+    """
+    return replace(
+        limits,
+        velocity=level * limits.velocity,
+        acceleration=level * limits.acceleration,
+        jerk=level * limits.jerk,
+    )

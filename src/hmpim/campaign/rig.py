@@ -1,0 +1,207 @@
+"""What a campaign asks of a rig, and the three rigs that a plan can name."""
+
+import importlib
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Protocol, cast, get_args
+
+import numpy as np
+
+from hmpim.campaign.plan import AxisWish, Plan
+from hmpim.errors import ArgumentError, RigError
+from hmpim.experiment import run
+from hmpim.experiment.run import check_limits
+from hmpim.record import Record
+from hmpim.rigs.table import AxisName, LoadName, MotionTable, exact_bandwidth
+from hmpim.stimulus import Limits, Stimulus
+
+if TYPE_CHECKING:
+    from hmpim.campaign.cases import Case
+
+__all__ = ["CampaignRig", "Player", "make_rig"]
+
+
+class Player(Protocol):
+    """A rig of one's own: plays the stimuli of a case, all at once.
+
+    The record's channels are named ``AXIS.command`` and ``AXIS.position``.
+    """
+
+    def __call__(
+        self, case: "Case", stimuli: Sequence[Stimulus], rng: np.random.Generator
+    ) -> Record:
+        """Move the axes (`Stimulus.axis`) and return what went in and came out."""
+        ...
+
+
+class CampaignRig(Protocol):
+    """What a campaign needs."""
+
+    def limits(self, case: "Case", wish: AxisWish) -> Limits:
+        """Limits of an axis, its travel as wished."""
+        ...
+
+    def check(self, case: "Case", stimuli: Sequence[Stimulus]) -> None:
+        """Refuse what the rig may not do; nothing moves."""
+        ...
+
+    def play(self, case: "Case", stimuli: Sequence[Stimulus], rng: np.random.Generator) -> Record:
+        """Move all axes of the stimuli at once."""
+        ...
+
+    def exact(self, case: "Case", axis: str) -> float | None:
+        """Exact bandwidth in Hz where the physics are known; None where not."""
+        ...
+
+
+def make_rig(plan: Plan, *, player: Player | None = None) -> CampaignRig:
+    """Return the rig that a plan names.
+
+    Parameters
+    ----------
+    plan : Plan
+        For its `rig` and its axes.
+    player : Player, optional
+        Takes the place of the plan's entry where the rig is of kind 'python'.
+
+    Raises
+    ------
+    RigError
+        If the plan's entry cannot be imported.
+
+    Examples
+    --------
+    >>> from hmpim.campaign.plan import read_plan
+    >>> from hmpim.campaign.shipped import shipped_plan
+    >>> plan = read_plan(shipped_plan("example"))
+    >>> from hmpim.campaign.cases import expand
+    >>> make_rig(plan).limits(expand(plan)[1], plan.axis("outer")).position
+    5.0
+    """
+    if player is not None or plan.rig.kind == "python":
+        return PlayedRig(player=player or _imported(plan.rig.entry))
+    if plan.rig.kind == "sensor":
+        return SensorRig(plan=plan)
+    return TableRig(
+        table=MotionTable(friction=plan.rig.friction, encoder_noise_std=plan.rig.encoder_noise_std)
+    )
+
+
+def _imported(entry: str) -> Player:
+    module, _, name = entry.partition(":")
+    try:
+        found = getattr(importlib.import_module(module), name)
+    except (ImportError, AttributeError) as error:
+        raise RigError(f"rig.entry = {entry!r} cannot be imported: {error}") from error
+    return cast(Player, found)
+
+
+def _wished(limits: Limits, wish: AxisWish) -> Limits:
+    travel = limits.position if wish.travel is None else wish.travel
+    return replace(limits, position=min(limits.position, travel))
+
+
+def _own(wish: AxisWish) -> Limits:
+    if wish.limits is None:
+        raise ArgumentError(f"axes.{wish.name}.limits is missing; give it")
+    return _wished(wish.limits, wish)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TableRig:
+    """The five-axis table."""
+
+    table: MotionTable
+
+    def loaded(self, case: "Case") -> MotionTable:
+        """Return the table as a case wants it; 'a+b' is a on the inner axes, b on the outer."""
+        inner, plus, outer = case.load.partition("+")
+        if not plus:
+            sides = {"bracket": (inner, "acceptance"), "projector": ("acceptance", inner)}
+            inner, outer = sides.get(inner, (inner, inner))
+        for load in (inner, outer):
+            if load not in get_args(LoadName):
+                raise ArgumentError(
+                    f"load {case.load!r} is not known; use {', '.join(get_args(LoadName))}, or "
+                    "two joined by +, such as bracket+projector"
+                )
+        return replace(
+            self.table,
+            uut_load=cast(LoadName, inner),
+            target_load=cast(LoadName, outer),
+            mode=case.mode,
+        )
+
+    def limits(self, case: "Case", wish: AxisWish) -> Limits:
+        """As Fig. 4."""
+        return _wished(self.loaded(case).limits_of(cast(AxisName, wish.name)), wish)
+
+    def check(self, case: "Case", stimuli: Sequence[Stimulus]) -> None:
+        """Limits of each axis, and the torque that all together take."""
+        self.loaded(case).check({cast(AxisName, s.axis): s for s in stimuli})
+
+    def play(self, case: "Case", stimuli: Sequence[Stimulus], rng: np.random.Generator) -> Record:
+        """Simulate."""
+        return self.loaded(case).play({cast(AxisName, s.axis): s for s in stimuli}, rng=rng)
+
+    def exact(self, case: "Case", axis: str) -> float | None:
+        """Of the linearised mechanics, behind the hold, friction off."""
+        return exact_bandwidth(self.loaded(case), axis=cast(AxisName, axis), fs=case.rate)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SensorRig:
+    """A simulated sensor for each axis."""
+
+    plan: Plan
+
+    def limits(self, case: "Case", wish: AxisWish) -> Limits:
+        """As the plan says."""
+        return _own(wish)
+
+    def check(self, case: "Case", stimuli: Sequence[Stimulus]) -> None:
+        """Limits of the plan."""
+        for stimulus in stimuli:
+            check_limits(stimulus, _own(self.plan.axis(stimulus.axis)), name=stimulus.axis)
+
+    def play(self, case: "Case", stimuli: Sequence[Stimulus], rng: np.random.Generator) -> Record:
+        """Simulate the sensor of the one axis."""
+        (stimulus,) = stimuli
+        sensor = self.plan.axis(stimulus.axis).sensor
+        if sensor is None:
+            raise ArgumentError(f"axes.{stimulus.axis}.sensor is missing; give it")
+        named = replace(
+            sensor,
+            input_name=f"{stimulus.axis}.command",
+            output_name=f"{stimulus.axis}.position",
+        )
+        return run(named, stimulus, rng=rng)
+
+    def exact(self, case: "Case", axis: str) -> float | None:
+        """Not worked out."""
+        return None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PlayedRig:
+    """Anyone's rig, behind one function."""
+
+    player: Player
+
+    def limits(self, case: "Case", wish: AxisWish) -> Limits:
+        """As the plan says."""
+        return _own(wish)
+
+    def check(self, case: "Case", stimuli: Sequence[Stimulus]) -> None:
+        """Nothing beyond the design's own limits."""
+
+    def play(self, case: "Case", stimuli: Sequence[Stimulus], rng: np.random.Generator) -> Record:
+        """Call the function."""
+        record = self.player(case, stimuli, rng)
+        if not isinstance(record, Record):
+            raise RigError(f"the rig returned {type(record).__name__}; it must be a Record")
+        return record
+
+    def exact(self, case: "Case", axis: str) -> float | None:
+        """Nobody knows."""
+        return None

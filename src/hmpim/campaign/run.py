@@ -1,0 +1,223 @@
+"""Run a campaign: every case once, each written as soon as it is done."""
+
+import json
+import math
+import zlib
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from hmpim.campaign.cases import Case, expand, prepare
+from hmpim.campaign.plan import Plan
+from hmpim.campaign.rig import CampaignRig, Player, make_rig
+from hmpim.errors import ArgumentError, FormatError
+from hmpim.identify import identify
+from hmpim.identify.multivariable import response_matrix
+from hmpim.identify.spectrum import decibel, spectrum
+from hmpim.record import Record
+from hmpim.report.files import replacing
+from hmpim.stimulus import Stimulus
+
+__all__ = ["CASE_SCHEMA", "run_campaign"]
+
+CASE_SCHEMA = "hmpim/campaign-case/1"
+Progress = Callable[[int, int, str], None]
+
+
+def run_campaign(
+    plan: Plan,
+    folder: Path,
+    *,
+    fresh: bool = False,
+    player: Player | None = None,
+    progress: Progress | None = None,
+) -> tuple[dict[str, Any], ...]:
+    """Run what is still missing of a campaign, and return all cases.
+
+    Stimuli of all missing cases are designed and checked first, so that what is refused is
+    refused before anything moves. Each case is written to ``folder/cases/ID.json`` the moment it
+    is done; stopped at any time, the campaign goes on from there and repeats nothing. The noise
+    of a simulated rig depends on the plan's seed and the case alone.
+
+    Parameters
+    ----------
+    plan : Plan
+        What to do.
+    folder : Path
+        Where it is kept; made if need be.
+    fresh : bool
+        True throws away what `folder` holds of an earlier campaign.
+    player : Player, optional
+        A rig of one's own in place of the plan's.
+    progress : callable, optional
+        Told cases done, cases in all, and what comes next.
+
+    Returns
+    -------
+    tuple of dict
+        As written, in the plan's order.
+
+    Raises
+    ------
+    ArgumentError
+        If `folder` holds a campaign of another plan.
+    LimitsError
+        If a stimulus cannot be designed inside its limits.
+    RigError
+        If the rig fails; what was done by then is kept.
+    """
+    rig = make_rig(plan, player=player)
+    cases = expand(plan)
+    _open(plan, folder, fresh=fresh)
+    known = {case.id: _read(folder, case) for case in cases}
+    missing = [case for case in cases if known[case.id] is None]
+    steps = 2 * len(missing)
+    ready = []
+    for i, case in enumerate(missing):
+        if progress is not None:
+            progress(i, steps, f"designing {case.id}")
+        ready.append((case, prepare(plan, case, rig)))
+    for i, (case, stimuli) in enumerate(ready):
+        if progress is not None:
+            progress(len(missing) + i, steps, case.id)
+        done = _measured(plan, case, stimuli, rig)
+        _write(folder / "cases" / f"{case.id}.json", done)
+        known[case.id] = done
+    if progress is not None:
+        progress(steps, steps, "study")
+    return tuple(found for found in known.values() if found is not None)
+
+
+def _open(plan: Plan, folder: Path, *, fresh: bool) -> None:
+    """Make the folder, or check that what it holds belongs to the plan."""
+    if folder.exists() and not folder.is_dir():
+        raise ArgumentError(f"{folder} is a file; name a folder")
+    (folder / "cases").mkdir(parents=True, exist_ok=True)
+    stamp = folder / "campaign.json"
+    if fresh:
+        for old in (folder / "cases").glob("*.json"):
+            old.unlink()
+    elif stamp.exists():
+        try:
+            digest = json.loads(stamp.read_text(encoding="utf-8"))["plan"]
+        except (ValueError, KeyError, TypeError) as error:
+            raise FormatError(f"{stamp} is damaged ({error}); start anew with --fresh") from error
+        if digest != plan.digest:
+            raise ArgumentError(
+                f"{folder} holds a campaign of another plan ({digest[:12]}, this one is "
+                f"{plan.digest[:12]}): the plan was changed since; start anew with --fresh, or "
+                "name another folder"
+            )
+    _write(stamp, {"schema": "hmpim/campaign/1", "name": plan.name, "plan": plan.digest})
+
+
+def _write(path: Path, data: dict[str, Any]) -> None:
+    with replacing(path) as place:
+        text = json.dumps(data, indent=1, ensure_ascii=False, allow_nan=False)
+        place.write_text(text + "\n", encoding="utf-8")
+
+
+def _read(folder: Path, case: Case) -> dict[str, Any] | None:
+    path = folder / "cases" / f"{case.id}.json"
+    if not path.exists():
+        return None
+    try:
+        data: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+    except ValueError as error:
+        raise FormatError(f"{path} is damaged ({error}); remove it to run it again") from error
+    if data.get("schema") != CASE_SCHEMA:
+        raise FormatError(f"{path} has schema {data.get('schema')!r}; {CASE_SCHEMA!r} is needed")
+    return data
+
+
+def _measured(
+    plan: Plan, case: Case, stimuli: Sequence[Stimulus], rig: CampaignRig
+) -> dict[str, Any]:
+    seed = (plan.seed, zlib.crc32(case.id.encode()))
+    record = rig.play(case, stimuli, np.random.default_rng(seed))
+    # Each position against its own command: what other axes couple in is small, and the same
+    # estimator then serves one axis alone and all at once.
+    pairs = []
+    for axis in case.axes:
+        alone = Record(
+            inputs=(record.channel(f"{axis}.command"),),
+            outputs=(record.channel(f"{axis}.position"),),
+            fs=record.fs,
+            band=plan.axis(axis).band,
+            intersample=record.intersample,
+            source=record.source,
+        )
+        result = identify(alone).to_dict()["pairs"][0]
+        pairs.append({"axis": axis, "exact": rig.exact(case, axis), **result})
+    done: dict[str, Any] = _finite(
+        {
+            "schema": CASE_SCHEMA,
+            "id": case.id,
+            "case": case.to_dict(),
+            "stimuli": [_described(stimulus) for stimulus in stimuli],
+            "pairs": pairs,
+            "couplings": _couplings(plan, case, record) if len(case.axes) > 1 else [],
+        }
+    )
+    return done
+
+
+def _couplings(plan: Plan, case: Case, record: Record) -> list[dict[str, Any]]:
+    """Gain from each command to each other position, where all axes are excited together."""
+    bands = [plan.axis(axis).band for axis in case.axes]
+    low, high = max(band[0] for band in bands), min(band[1] for band in bands)
+    inputs = [record.channel(f"{axis}.command").values for axis in case.axes]
+    outputs = [record.channel(f"{axis}.position").values for axis in case.axes]
+    matrix = response_matrix(
+        np.stack(inputs), np.stack(outputs), case.rate, band=(max(low, 0.02 * high), 0.75 * high)
+    )
+    seen = matrix.usable & (matrix.frequency >= 0.25 * high) & (matrix.frequency <= 0.5 * high)
+    if not seen.any():
+        return []
+    gain = np.median(np.abs(matrix.response[seen]), axis=0)
+    std = np.median(matrix.std[seen], axis=0)
+    return [
+        {
+            "from": source,
+            "to": target,
+            "band": [0.25 * high, 0.5 * high],
+            "gain": float(gain[j, i]),
+            "std": float(std[j, i]),
+            "usable_percent": 100.0 * float(np.mean(matrix.usable)),
+        }
+        for i, source in enumerate(case.axes)
+        for j, target in enumerate(case.axes)
+        if i != j
+    ]
+
+
+def _described(stimulus: Stimulus) -> dict[str, Any]:
+    bins = spectrum(stimulus.position, stimulus.fs, window="gaussian", alpha=1.5)
+    low, high = stimulus.band or (0.1, 0.4 * stimulus.fs)
+    grid = np.geomspace(low, min(1.2 * high, 0.5 * stimulus.fs), 120)
+    level = np.interp(grid, bins.frequency, decibel(bins.value))
+    peaks = stimulus.peaks
+    return {
+        "axis": stimulus.axis,
+        "unit": stimulus.unit,
+        "band": [low, high],
+        "samples": stimulus.samples,
+        "gain": stimulus.gain,
+        "extinction": stimulus.extinction,
+        "peaks": [peaks.position, peaks.velocity, peaks.acceleration],
+        "frequency": grid.tolist(),
+        "level_db": level.tolist(),
+    }
+
+
+def _finite(value: Any) -> Any:
+    """The same with null for what is no number, as JSON has none."""
+    if isinstance(value, dict):
+        return {key: _finite(inner) for key, inner in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_finite(inner) for inner in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value
