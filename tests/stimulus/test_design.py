@@ -304,7 +304,7 @@ def test_too_short_a_lead_is_refused_with_one_that_does():
     assert fits.limits.use(fits.peaks) <= 1.0
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=12, deadline=None)
 @given(wish=wishes(), tight=st.floats(-3.0, -1.5), lead=st.sampled_from(["auto", 0]))
 def test_too_tight_limits_are_refused_with_numbers_that_do(wish, tight, lead):
     wish["limits"] = replace(wish["limits"], velocity=wish["limits"].velocity * 10**tight)

@@ -124,7 +124,7 @@ def met(stimulus, t):
     return rough
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=25, deadline=None)
 @given(wish=wishes())
 def test_any_wish_of_any_kind(wish):
     check(wish)
@@ -187,7 +187,7 @@ def test_refusals(wrong, message):
 # what is really sent
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=14, deadline=None)
 @given(kind=st.sampled_from(KINDS), step=st.floats(1e-7, 3e-3), extra=st.sampled_from([1, 2]))
 @example(kind="hmpim", step=0.003, extra=1)
 def test_rounded_commands_keep_the_limits_at_the_command_rate(kind, step, extra):
