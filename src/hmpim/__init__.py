@@ -16,11 +16,13 @@ from hmpim.identify import (
     Estimate,
     Identification,
     identify,
+    identify_repeats,
     paper_analysis,
     predict,
     to_model,
 )
 from hmpim.model import Model, frequency_response, simulate
+from hmpim.optimal import gentlest
 from hmpim.record import Channel, Record
 from hmpim.report import report
 from hmpim.rigs import FunctionRig, Sensor
@@ -35,6 +37,7 @@ from hmpim.stimulus import (
     Sweep,
     design,
 )
+from hmpim.stimulus.axes import design_axes
 
 __version__ = "0.1.0"
 
@@ -56,8 +59,11 @@ __all__ = [
     "SumOfSines",
     "Sweep",
     "design",
+    "design_axes",
     "frequency_response",
+    "gentlest",
     "identify",
+    "identify_repeats",
     "paper_analysis",
     "predict",
     "read",

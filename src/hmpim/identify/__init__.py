@@ -1,9 +1,12 @@
 """Identification: from a record to every parameter, each with its error bar (paper, section IV)."""
 
+from hmpim.identify.bandwidth import gain_and_phase
 from hmpim.identify.identify import identify
-from hmpim.identify.local import local_polynomial_response
+from hmpim.identify.local import local_polynomial_response, local_response
+from hmpim.identify.multivariable import ResponseMatrix, response_matrix
 from hmpim.identify.paper import PaperAnalysis, paper_analysis
 from hmpim.identify.predict import Prediction, predict, to_model
+from hmpim.identify.repeats import Repeats, identify_repeats
 from hmpim.identify.result import (
     Candidate,
     Estimate,
@@ -13,6 +16,7 @@ from hmpim.identify.result import (
     PaperEstimates,
     Parameters,
     RecordSummary,
+    ResponseBandwidths,
     Verdict,
 )
 from hmpim.identify.spectrum import excited_band
@@ -28,11 +32,18 @@ __all__ = [
     "Parameters",
     "Prediction",
     "RecordSummary",
+    "Repeats",
+    "ResponseBandwidths",
+    "ResponseMatrix",
     "Verdict",
     "excited_band",
+    "gain_and_phase",
     "identify",
+    "identify_repeats",
     "local_polynomial_response",
+    "local_response",
     "paper_analysis",
     "predict",
+    "response_matrix",
     "to_model",
 ]
