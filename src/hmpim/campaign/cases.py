@@ -29,6 +29,7 @@ class Case:
     level: float
     load: str
     together: bool = False
+    levels_of: tuple[str, ...] = ("velocity", "acceleration")
 
     @property
     def id(self) -> str:
@@ -75,6 +76,7 @@ def expand(plan: Plan) -> tuple[Case, ...]:
                     level=level,
                     load=load,
                     together=test.together,
+                    levels_of=test.levels_of,
                 )
             )
     return tuple(cases)
@@ -95,7 +97,7 @@ def prepare(plan: Plan, case: Case, rig: CampaignRig) -> tuple[Stimulus, ...]:
 
     try:
         wishes = [plan.axis(name) for name in case.axes]
-        limits = [scaled(rig.limits(case, wish), case.level) for wish in wishes]
+        limits = [scaled(rig.limits(case, wish), case.level, case.levels_of) for wish in wishes]
         if case.together:
             stimuli = design_axes(
                 [
@@ -122,17 +124,20 @@ def prepare(plan: Plan, case: Case, rig: CampaignRig) -> tuple[Stimulus, ...]:
     return stimuli
 
 
-def scaled(limits: Limits, level: float) -> Limits:
-    """Limits with a share of the velocity, the acceleration and the jerk.
+def scaled(
+    limits: Limits, level: float, quantities: tuple[str, ...] = ("velocity", "acceleration")
+) -> Limits:
+    """Limits with a share of some of them.
 
     Examples
     --------
     >>> scaled(Limits(position=5.0, velocity=8.0), 0.5).velocity
     4.0
     """
+    velocity = level if "velocity" in quantities else 1.0
+    acceleration = level if "acceleration" in quantities else 1.0
     return replace(
         limits,
-        velocity=level * limits.velocity,
-        acceleration=level * limits.acceleration,
-        jerk=level * limits.jerk,
+        velocity=velocity * limits.velocity,
+        acceleration=acceleration * limits.acceleration,
     )

@@ -32,6 +32,7 @@ RigKind = Literal["table", "sensor", "python"]
 Mode = Literal["P", "PV", "PVA"]
 Compare = Literal["rates", "loads", "levels", "modes", "excitation", "stimulus", "fence"]
 QUANTITIES = tuple(field.name for field in fields(Parameters))
+_SCALED = ("velocity", "acceleration")
 _NOT_MEASURED = ("name", "description", "compare", "specification", "figure")
 
 
@@ -62,7 +63,10 @@ class RigPlan:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TestPlan:
-    """A product of axes, modes, rates (Hz), levels (shares of rate and acceleration), loads."""
+    """A product of axes, modes, rates (Hz), levels and loads.
+
+    Levels are shares of the limits on the quantities of `levels_of`.
+    """
 
     __test__ = False  # no test of pytest's
 
@@ -73,6 +77,7 @@ class TestPlan:
     levels: tuple[float, ...] = (0.5,)
     loads: tuple[str, ...] = ("acceptance",)
     together: bool = False
+    levels_of: tuple[str, ...] = _SCALED
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -268,6 +273,7 @@ def _test(table: Table, axes: tuple[str, ...], kind: RigKind) -> TestPlan:
         levels=table.numbers("levels", above=0.0, default=(0.5,)),
         loads=table.words("loads", None, default=("acceptance",)),
         together=table.flag("together", False),
+        levels_of=table.words("levels_of", _SCALED, default=_SCALED),
     )
     where = table.where
     if max(test.levels) > 1.0:

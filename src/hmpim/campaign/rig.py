@@ -12,7 +12,7 @@ from hmpim.errors import ArgumentError, RigError
 from hmpim.experiment import run
 from hmpim.experiment.run import check_limits
 from hmpim.record import Record
-from hmpim.rigs.table import AxisName, LoadName, MotionTable, exact_bandwidth
+from hmpim.rigs.table import AXES, AxisName, LoadName, MotionTable, exact_bandwidth
 from hmpim.stimulus import Limits, Stimulus
 
 if TYPE_CHECKING:
@@ -49,8 +49,8 @@ class CampaignRig(Protocol):
         """Move all axes of the stimuli at once."""
         ...
 
-    def exact(self, case: "Case", axis: str) -> float | None:
-        """Exact bandwidth in Hz where the physics are known; None where not."""
+    def known(self, case: "Case", axis: str) -> dict[str, float]:
+        """What the physics say: `exact_bandwidth` in Hz, `inertia` in kg·m²; empty if unknown."""
         ...
 
 
@@ -144,9 +144,12 @@ class TableRig:
         """Simulate."""
         return self.loaded(case).play({cast(AxisName, s.axis): s for s in stimuli}, rng=rng)
 
-    def exact(self, case: "Case", axis: str) -> float | None:
+    def known(self, case: "Case", axis: str) -> dict[str, float]:
         """Of the linearised mechanics, behind the hold, friction off."""
-        return exact_bandwidth(self.loaded(case), axis=cast(AxisName, axis), fs=case.rate)
+        table = self.loaded(case)
+        inertia = table.plant.inertia(table.start_angles)[AXES.index(axis), AXES.index(axis)]
+        bandwidth = exact_bandwidth(table, axis=cast(AxisName, axis), fs=case.rate)
+        return {"exact_bandwidth": bandwidth, "inertia": float(inertia)}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -177,9 +180,9 @@ class SensorRig:
         )
         return run(named, stimulus, rng=rng)
 
-    def exact(self, case: "Case", axis: str) -> float | None:
+    def known(self, case: "Case", axis: str) -> dict[str, float]:
         """Not worked out."""
-        return None
+        return {}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -202,6 +205,6 @@ class PlayedRig:
             raise RigError(f"the rig returned {type(record).__name__}; it must be a Record")
         return record
 
-    def exact(self, case: "Case", axis: str) -> float | None:
+    def known(self, case: "Case", axis: str) -> dict[str, float]:
         """Nobody knows."""
-        return None
+        return {}

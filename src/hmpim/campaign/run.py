@@ -99,7 +99,7 @@ def _open(plan: Plan, folder: Path, *, fresh: bool) -> None:
     if fresh:
         for old in (folder / "cases").glob("*.json"):
             old.unlink()
-    elif stamp.exists():
+    elif stamp.exists() and any((folder / "cases").glob("*.json")):
         try:
             digest = json.loads(stamp.read_text(encoding="utf-8"))["plan"]
         except (ValueError, KeyError, TypeError) as error:
@@ -150,7 +150,7 @@ def _measured(
             source=record.source,
         )
         result = identify(alone).to_dict()["pairs"][0]
-        pairs.append({"axis": axis, "exact": rig.exact(case, axis), **result})
+        pairs.append({"axis": axis, "known": rig.known(case, axis), **result})
     done: dict[str, Any] = _finite(
         {
             "schema": CASE_SCHEMA,

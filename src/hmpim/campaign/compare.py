@@ -1,0 +1,220 @@
+"""What a figure's cases say about each other, in sentences with numbers."""
+
+import math
+from collections.abc import Callable, Sequence
+from typing import Any
+
+from hmpim.campaign.plan import Compare
+from hmpim.campaign.study import Reading, Row
+
+__all__ = ["LINEAR", "bandwidth", "case_label", "findings", "linear_from"]
+
+LINEAR = 0.05
+"""Largest departure from the bandwidth at the largest level that still counts as linear."""
+
+
+def bandwidth(row: Row) -> Reading | None:
+    """The -90° bandwidth of the fitted model, or read off the response where there is no model."""
+    return row.parameters.get("bandwidth_phase90") or row.measured_bandwidth
+
+
+def case_label(row: Row, compare: Compare) -> str:
+    """What tells a row from its neighbours in a figure."""
+    what = {
+        "rates": f"{row.rate:g} Hz",
+        "stimulus": f"{row.rate:g} Hz",
+        "fence": f"{row.rate:g} Hz",
+        "loads": row.load,
+        "levels": f"{row.peaks[2]:.0f} {row.stimulus['unit']}/s²",
+        "modes": f"mode {row.mode}",
+        "excitation": "all at once" if row.together else "alone",
+    }[compare]
+    return f"{row.axis}, {what}"
+
+
+def findings(
+    rows: Sequence[Row], couplings: Sequence[dict[str, Any]], compare: Compare
+) -> tuple[str, ...]:
+    """Sentences for the rows of a figure, one axis after the other."""
+    says: dict[Compare, Callable[[str, list[Row]], str]] = {
+        "rates": _rates,
+        "loads": _loads,
+        "levels": _levels,
+        "modes": _modes,
+        "excitation": _excitation,
+        "stimulus": _stimulus,
+        "fence": _fence,
+    }
+    found = []
+    for axis in dict.fromkeys(row.axis for row in rows):
+        sentence = says[compare](axis, [row for row in rows if row.axis == axis])
+        if sentence:
+            found.append(sentence)
+    if compare == "excitation" and couplings:
+        found.append(_strongest(couplings))
+    return tuple(found)
+
+
+def _percent(value: float, base: float) -> float:
+    return 100.0 * (value / base - 1.0)
+
+
+def _rates(axis: str, rows: list[Row]) -> str:
+    read = [(row, b) for row in rows if (b := bandwidth(row)) is not None]
+    if len(read) < 2:
+        return ""
+    (first, a), (last, b) = read[0], read[-1]
+    return (
+        f"{axis}: {a.value:.2f} Hz at {first.rate:g} Hz, {b.value:.2f} Hz at {last.rate:g} Hz, "
+        f"{abs(_percent(b.value, a.value)):.2g} % apart." + _paper_rates(first, last)
+    )
+
+
+def _paper_rates(first: Row, last: Row) -> str:
+    if first.paper_bandwidth is None or last.paper_bandwidth is None:
+        return ""
+    return (
+        f" The paper's own steps, which see the hold too, give {first.paper_bandwidth:.2f} and "
+        f"{last.paper_bandwidth:.2f} Hz."
+    )
+
+
+def _loads(axis: str, rows: list[Row]) -> str:
+    read = [(row, b) for row in rows if (b := bandwidth(row)) is not None]
+    if len(read) < 2:
+        return ""
+    (first, a), (last, b) = read[0], read[-1]
+    text = (
+        f"{axis}: {a.value:.2f} Hz with {first.load}, {b.value:.2f} Hz with {last.load}, "
+        f"a ratio of {b.value / a.value:.3f}."
+    )
+    if first.inertia and last.inertia:
+        ratio = first.inertia / last.inertia
+        text += (
+            f" Torque over inertia falls to {ratio:.3f}; the bandwidth follows it to the power "
+            f"{math.log(b.value / a.value) / math.log(ratio):.2f}."
+        )
+    return text
+
+
+def linear_from(rows: Sequence[Row]) -> Row | None:
+    """Smallest level from which on the bandwidth stays within `LINEAR` of the largest level's."""
+    read = sorted(
+        ((row, b) for row in rows if (b := bandwidth(row)) is not None),
+        key=lambda item: item[0].peaks[2],
+    )
+    smallest = None
+    for row, b in reversed(read):
+        if abs(b.value / read[-1][1].value - 1.0) > LINEAR:
+            break
+        smallest = row
+    return smallest
+
+
+def _levels(axis: str, rows: list[Row]) -> str:
+    read = sorted(
+        ((row, b) for row in rows if (b := bandwidth(row)) is not None),
+        key=lambda item: item[0].peaks[2],
+    )
+    start = linear_from(rows)
+    if len(read) < 2 or start is None:
+        return ""
+    (low, a), (high, b) = read[0], read[-1]
+    unit = f"{low.stimulus['unit']}/s²"
+    text = (
+        f"{axis}: {a.value:.2f} Hz at {low.peaks[2]:.0f} {unit}, {b.value:.2f} Hz at "
+        f"{high.peaks[2]:.0f} {unit}. Linear to {100 * LINEAR:.0f} % from "
+        f"{start.peaks[2]:.0f} {unit} on."
+    )
+    if high.exact_bandwidth is not None:
+        text += f" Without friction it is {high.exact_bandwidth:.2f} Hz at every level."
+    return text
+
+
+def _modes(axis: str, rows: list[Row]) -> str:
+    by_mode = {row.mode: b.value for row in rows if (b := bandwidth(row)) is not None}
+    if len(by_mode) < 2:
+        return ""
+    return (
+        f"{axis}: " + ", ".join(f"{mode} {value:.2f} Hz" for mode, value in by_mode.items()) + "."
+    )
+
+
+def _excitation(axis: str, rows: list[Row]) -> str:
+    joint = [row for row in rows if row.together]
+    alone = [row for row in rows if not row.together and joint and row.rate == joint[0].rate]
+    if not joint or not alone:
+        return ""
+    a, b = bandwidth(alone[0]), bandwidth(joint[0])
+    if a is None or b is None:
+        return f"{axis}: no bandwidth from one of the two."
+    paper = joint[0].paper_bandwidth
+    stepwise = "" if paper is None else f" (the paper's own steps: {paper:.2f} Hz)"
+    return (
+        f"{axis}: {a.value:.2f} Hz alone, {b.value:.2f} Hz with all axes at once, "
+        f"{abs(_percent(b.value, a.value)):.2g} % apart{stepwise}."
+    )
+
+
+def _strongest(couplings: Sequence[dict[str, Any]]) -> str:
+    seen = [c for c in couplings if c["std"] is not None and c["gain"] > 3.0 * c["std"]]
+    low, high = couplings[0]["band"]
+    where = f"from {low:g} to {high:g} Hz"
+    if not seen:
+        return f"No coupling {where} stands out of the noise."
+    top = max(seen, key=lambda c: c["gain"])
+    return (
+        f"{len(seen)} of {len(couplings)} couplings {where} stand out of the noise by three "
+        f"standard deviations; the strongest is {top['from']} to {top['to']}, "
+        f"{100 * top['gain']:.2f} ± {100 * top['std']:.2f} % of the command."
+    )
+
+
+def _level_at(row: Row, frequency: float) -> float:
+    import numpy as np
+
+    return float(np.interp(frequency, row.stimulus["frequency"], row.stimulus["level_db"]))
+
+
+def _stimulus(axis: str, rows: list[Row]) -> str:
+    at = 0.5 * rows[0].stimulus["band"][1]
+    levels = [(row.rate, _level_at(row, at)) for row in rows]
+    text = ", ".join(f"{level:.1f} dB at {rate:g} Hz" for rate, level in levels)
+    n = rows[0].stimulus["extinction"]
+    more = f", {levels[-1][1] - levels[0][1]:.1f} dB more" if len(levels) > 1 else ""
+    shape = "" if n is None else f"extinction n = {n:.3f}; "
+    return f"{axis}: {shape}level at {at:g} Hz of {text}{more} (Gaussian window, α = 1.5)."
+
+
+def _fence(axis: str, rows: list[Row]) -> str:
+    parts = []
+    for row in rows:
+        high = row.stimulus["band"][1]
+        std = _scatter(row, 0.5 * high, 0.9 * high)
+        if std is not None:
+            parts.append(f"{std:.2g} % at {row.rate:g} Hz")
+    bin_width = 1.0 / (rows[0].stimulus["samples"] / rows[0].rate)
+    if not parts:
+        return ""
+    return (
+        f"{axis}: bins of the record are {bin_width:.3f} Hz apart at either rate. The response's "
+        f"error over the upper half of the band (median) is {' and '.join(parts)}: the faster "
+        "commands bring more samples of the same motion. The response is estimated between the "
+        "bins, locally, so that no peak falls through the fence."
+    )
+
+
+def _scatter(row: Row, low: float, high: float) -> float | None:
+    response = row.pair["frequency_response"]
+    shares = sorted(
+        std / math.hypot(re, im)
+        for f, re, im, std in zip(
+            response["frequency"],
+            response["real"],
+            response["imag"],
+            response["std"],
+            strict=True,
+        )
+        if low <= f <= high and std is not None
+    )
+    return 100.0 * shares[len(shares) // 2] if shares else None

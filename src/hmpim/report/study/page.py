@@ -1,0 +1,83 @@
+"""One page for a whole study: what passed, every case, and what was compared."""
+
+import re
+from dataclasses import dataclass
+
+from hmpim.plots.style import printable
+from hmpim.report.figures import Picture
+from hmpim.report.svg import inline_svg
+
+__all__ = ["Grid", "Section", "StudyPage", "render_study"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Grid:
+    """A table of text: its caption, its columns, its rows; the first column names the row."""
+
+    caption: str
+    columns: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Section:
+    """A heading, what was observed before, what was found, with tables and pictures."""
+
+    title: str
+    observed: str
+    found: tuple[str, ...]
+    grids: tuple[Grid, ...]
+    pictures: tuple[Picture, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class StudyPage:
+    """Everything that the page shows; `met` is None where nothing was specified."""
+
+    title: str
+    description: str
+    headline: str
+    met: bool | None
+    grids: tuple[Grid, ...]
+    sections: tuple[Section, ...]
+    facts: tuple[tuple[str, str], ...]
+
+
+def render_study(page: StudyPage) -> str:
+    """Return the page as HTML that needs no other file and no network.
+
+    Examples
+    --------
+    >>> page = StudyPage(title="T", description="", headline="All met.", met=True, grids=(),
+    ...                  sections=(), facts=())
+    >>> "All met." in render_study(page)
+    True
+    """
+    from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined
+    from markupsafe import Markup
+
+    def svg(picture: Picture, key: str) -> Markup:
+        # The only text that is not escaped: made by an XML writer, which has escaped it.
+        return Markup(
+            inline_svg(
+                picture.figure, key=key, title=picture.title, description=picture.description
+            )
+        )
+
+    environment = Environment(
+        loader=ChoiceLoader([PackageLoader("hmpim.report.study"), PackageLoader("hmpim.report")]),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    # One look for all pages: the style of the report of a single test.
+    source = environment.loader.get_source(environment, "report.html.j2")[0]  # type: ignore[union-attr]
+    style = re.search(r"<style>(.*?)</style>", source, re.DOTALL)
+    environment.globals["svg"] = svg
+    text = environment.get_template("study.html.j2").render(
+        page=page,
+        look=Markup(style.group(1)) if style else "",
+        verdict={True: "ok", False: "not_identifiable", None: ""}[page.met],
+    )
+    return "\n".join(printable(line) for line in text.splitlines()) + "\n"
