@@ -69,16 +69,23 @@ def test_noise_is_what_differs_from_repeat_to_repeat(eight: Repeats) -> None:
     assert pair.unmodelled_probability > 0.005
 
 
-def test_the_averaged_response_is_right_within_its_error(eight: Repeats) -> None:
-    pair = eight["y", "u"]
-    found = pair.frequency_response
-    z = np.exp(2j * np.pi * found.frequency / FS)
+def test_the_averaged_response_is_right_within_its_error(seeds: int) -> None:
     a = np.exp(-1 / (FS * 0.05))
-    true = 2 * (1 - a) / (z - a) * z**-5
-    error = np.abs(found.response - true)
-    assert np.mean(error < 2 * found.std) > 0.85
-    assert np.median(error) < 0.01
-    assert pair.response_scatter == pytest.approx(1.0, abs=0.4)
+    errors, stds, scatter = [], [], []
+    for seed in range(max(seeds // 20, 8)):
+        pair = repeats(4, noise=0.05, seed=seed)["y", "u"]
+        found = pair.frequency_response
+        z = np.exp(2j * np.pi * found.frequency / FS)
+        true = 2 * (1 - a) / (z - a) * z**-5
+        # Not the last hertz: what bends there is alike in every repeat and does not average out.
+        inside = found.frequency < 17
+        errors.append(np.abs(found.response - true)[inside])
+        stds.append(found.std[inside])
+        scatter.append(pair.response_scatter)
+    ratio = np.sqrt(np.mean(np.square(errors)) / np.mean(np.square(stds)))
+    assert ratio == pytest.approx(1.0, abs=0.3)
+    assert np.median(errors) < 0.012
+    assert np.mean(scatter) == pytest.approx(1.0, abs=0.2)
 
 
 def test_right_error_bars_are_seldom_doubted(seeds: int) -> None:

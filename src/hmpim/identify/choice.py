@@ -72,15 +72,14 @@ def choose(
     credible = (mean <= _CREDIBLE * least)[:, :, None]
     variance = spread * least[:, None]
     # Fits come in pairs, with and without T: the same kind one width down stands two before.
-    for begin, end in ((0, len(polynomials)), (len(polynomials), len(tried))):
-        without, fuller = slice(begin + 1, end, 2), slice(begin, end, 2)
-        wider, narrower = slice(begin + 2, end), slice(begin, max(end - 2, begin))
-        for fit, reference in ((without, fuller), (wider, narrower)):
-            parted = _beyond(
-                response[fit] - response[reference], variance[reference], credible[reference]
-            )
-            bent[fit] = np.maximum(bent[fit], parted)
-    cost = np.sum((variance + bent) * power[0], axis=2)
+    kinds = (range(len(polynomials)), range(len(polynomials), len(tried)))
+    fuller = [(k, k - 1) for kind in kinds for k in kind[1::2]]
+    narrower = [(k, k - 2) for kind in kinds for k in kind[2:]]
+    fit, reference = np.array(fuller + narrower).T
+    parted = _beyond(response[fit] - response[reference], variance[reference], credible[reference])
+    np.maximum.at(bent, fit, parted)
+    with np.errstate(over="ignore"):  # a hopeless fit costs infinitely much
+        cost = np.sum((variance + bent) * power[0], axis=2)
     best = np.argmin(cost, axis=0)
     polynomial = (best >= 2) & (best < len(polynomials))
     below = np.where(polynomial, best - 2, best)
@@ -92,8 +91,7 @@ def choose(
 def _beyond(apart: NDArray[np.float64], variance: Real, credible: NDArray[np.bool_]) -> Real:
     """Return |difference|² beyond the variance of a credible reference, over neighbours."""
     against = np.maximum(variance, np.finfo(float).tiny)
-    ratio = np.where(credible, np.abs(apart) ** 2 / against, 0.0)
-    excess = _averaged(ratio) - _averaged(credible.astype(np.float64))
+    excess = _averaged(np.where(credible, np.abs(apart) ** 2 / against - 1.0, 0.0))
     return np.asarray(np.where(credible, np.maximum(excess, 0.0) * variance, 0.0))
 
 

@@ -23,6 +23,8 @@ _FEWEST_SAMPLES = 16
 _ORDER = 2
 # Each window of polynomials is wider than the last by this.
 _RATIO = 1.6
+# Where rational functions are tried too, fewer will do.
+_RATIO_BESIDE_RATIONAL = 2.0
 # Narrower windows are too short for eight coefficients beside noise.
 _NARROWEST_RATIONAL = 20
 # Bins in all windows of one width of rational functions, beyond which they cost too much; a
@@ -252,7 +254,7 @@ def _single(
     """Polynomials first; what they predict starts the rational functions; then choose of all."""
     spectra = transform(u, y, fs, delay)
     centre = _centres(spectra, band, points)
-    polynomials = _polynomials(spectra, centre, _ORDER, None)
+    polynomials = _polynomials(spectra, centre, _ORDER, None, ratio=_RATIO_BESIDE_RATIONAL)
     widths = _rational_widths(centre, spectra.u.size)
     if not widths:
         return _answer(spectra, centre, delay, polynomials, ())
@@ -266,7 +268,11 @@ def _single(
 
 
 def _polynomials(
-    spectra: Spectra, centre: NDArray[np.int64], order: int, widths: tuple[int, ...] | None
+    spectra: Spectra,
+    centre: NDArray[np.int64],
+    order: int,
+    widths: tuple[int, ...] | None,
+    ratio: float = _RATIO,
 ) -> list[LocalFit]:
     bins = spectra.u.size - 1
     # Each polynomial has order + 1 coefficients, and residuals must be left over.
@@ -274,7 +280,7 @@ def _polynomials(
     least = 2 * (order + 1)
     if widths is None:
         top = min(max(int(centre[-1] - centre[0] + 1) // 3, least + 1), 1000)
-        count = max(int(np.ceil(np.log(top / least) / np.log(_RATIO))), 1)
+        count = max(int(np.ceil(np.log(top / least) / np.log(ratio))), 1)
         widths = tuple(int(w) for w in np.rint(np.geomspace(least, top, count + 1)))
     most = max((bins - 1) // 2, 1)
     return polynomial_fits(

@@ -24,7 +24,13 @@ from hmpim.identify.neighbours import (
     mirrored,
     windows_around,
 )
-from hmpim.identify.rational import DENOMINATOR_ORDER, TRANSIENT_ORDER, gauss_newton, solved
+from hmpim.identify.rational import (
+    DENOMINATOR_ORDER,
+    TRANSIENT_ORDER,
+    gauss_newton,
+    linear_start,
+    solved,
+)
 from hmpim.identify.signals import as_signal, check_band, check_rate
 
 __all__ = ["ResponseMatrix", "response_matrix"]
@@ -395,7 +401,8 @@ def _read_off(
     else:
         with np.errstate(all="ignore"):
             slopes = windows.powers(DENOMINATOR_ORDER)[:, 1:]
-            found = gauss_newton(linear, slopes, y, smooth, steps=_STEPS)
+            start = linear_start(linear, slopes, smooth)
+            found = gauss_newton(linear, slopes, y, start, steps=_STEPS)
         inverse, rows, theta = found.inverse, found.rows, found.state.theta
         fitted, denominator = found.state.fitted, found.state.denominator
     squares = np.sum(np.abs(y - fitted) ** 2, axis=1)

@@ -82,6 +82,18 @@ class Windows:
         """Return the windows of values that `mirrored` made, shape (w, s)."""
         return np.asarray(sliding_window_view(values, self.size)[self.start + reach])
 
+    def forms(self, vectors: Complex, inverse: Complex) -> Real:
+        """Return v V vᴴ for vectors of each centre, (c, k, q), V of its window, (w, q, q)."""
+        # Centres of one window stand together, so each window takes one product of matrices.
+        first = np.searchsorted(self.near, np.arange(self.start.size))
+        slot = np.arange(self.near.size) - first[self.near]
+        shape = (self.start.size, int(slot.max()) + 1, *vectors.shape[1:])
+        padded = np.zeros(shape, dtype=np.complex128)
+        padded[self.near, slot] = vectors
+        conjugate = np.conj(padded).reshape(shape[0], -1, shape[3])
+        product = (conjugate @ inverse.swapaxes(1, 2)).reshape(shape)
+        return np.asarray(np.sum(padded * product, axis=3).real[self.near, slot])
+
     def without_dc(self) -> Real:
         """Return 1 for bins that count and 0 at DC, shape (w, s)."""
         return np.asarray((self.start[:, None] + np.arange(self.size)) != 0, dtype=np.float64)
@@ -193,7 +205,9 @@ def windows_around(centre: Integer, bins: int, width: int) -> Windows:
     ([-5, -3, -1, 1], [0, 0, 1, 1, 2, 2, 3, 3])
     """
     stride = max(width // 3, 1)
-    group, near = np.unique((centre - centre[0]) // stride, return_inverse=True)
+    groups = (centre - centre[0]) // stride
+    first = np.concatenate(([True], groups[1:] != groups[:-1]))
+    group, near = groups[first], np.cumsum(first) - 1
     middle = np.minimum(centre[0] + group * stride + (stride - 1) // 2, centre[-1])
     size = min(2 * width + 1, 2 * bins - 1)
     start = np.maximum(np.minimum(middle - width, bins - size), 1 - bins)

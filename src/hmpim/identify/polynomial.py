@@ -121,15 +121,18 @@ def _solve(
     """Solve the normal equations of the first `columns` columns, and read off each centre."""
     near, terms = windows.near, here.shape[1]
     right = problem.right[:, :columns]
-    inverse = np.linalg.inv(problem.gram[:, :columns, :columns])
+    inverse = np.asarray(np.linalg.inv(problem.gram[:, :columns, :columns]), dtype=np.complex128)
     theta = (inverse @ right[:, :, None])[:, :, 0]
     left = problem.power - np.sum(np.conj(right) * theta, axis=1).real
     # The difference of two nearly equal sums is never less than its rounding.
     left = np.maximum(left, 1e-15 * problem.power)
     noise = left / np.maximum(windows.counted - columns, 1)
-    inverse, theta, size = inverse[near], theta[near], problem.size[near]
-    spread = np.sum((inverse[:, :terms, :terms] @ here[:, :, None])[:, :, 0].real * here, axis=1)
-    leverage = np.sum(row * (inverse @ np.conj(row)[:, :, None])[:, :, 0], axis=1).real
+    theta, size = theta[near], problem.size[near]
+    pair = np.zeros((near.size, 2, columns), dtype=np.complex128)
+    pair[:, 0, :terms] = here
+    pair[:, 1] = row
+    forms = windows.forms(pair, inverse)
+    spread, leverage = forms[:, 0], forms[:, 1]
     missed = y - np.sum(row * theta, axis=1)
     return LocalFit(
         response=np.sum(here * theta[:, :terms], axis=1) / size,

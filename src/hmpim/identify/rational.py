@@ -26,7 +26,9 @@ __all__ = [
     "RationalSolution",
     "RationalState",
     "gauss_newton",
+    "linear_start",
     "rational_fits",
+    "restricted",
     "solved",
 ]
 
@@ -145,12 +147,10 @@ def _fit(
     slopes = powers[:, 1 : DENOMINATOR_ORDER + 1]
     b = u[:, :, None] * powers[:, :terms]
     t = windows.without_dc()[:, :, None] * powers[:, : TRANSIENT_ORDER + 1]
-    fits = []
     both: Complex = np.concatenate((b, t), axis=2)
-    for linear in (both, b):
-        found = gauss_newton(linear, slopes, y, smooth, steps=steps)
-        fits.append(_read_off(windows, found, y, power))
-    return fits
+    full = gauss_newton(both, slopes, y, linear_start(both, slopes, smooth), steps=steps)
+    plain = gauss_newton(b, slopes, y, restricted(full, terms), steps=(steps + 1) // 2)
+    return [_read_off(windows, found, y, power) for found in (full, plain)]
 
 
 def solved(gram: Complex, right: Complex) -> tuple[Complex, Complex]:
@@ -172,8 +172,40 @@ def solved(gram: Complex, right: Complex) -> tuple[Complex, Complex]:
     return inverse, (inverse @ right)[:, :, 0]
 
 
+def linear_start(linear: Complex, slopes: Real, smooth: Complex) -> Complex:
+    """Solve A Y = linear columns · coefficients for a Y nearly free of noise, shape (w, q).
+
+    Examples
+    --------
+    >>> x = np.linspace(-1, 1, 9)
+    >>> y = (2.0 / (1 + 0.5j * x))[None]
+    >>> np.abs(linear_start(np.ones((1, 9, 1)) + 0j, x[:, None], y)).round(9).tolist()
+    [[2.0, 0.5]]
+    """
+    start = np.concatenate((linear, -smooth[:, :, None] * slopes), axis=2)
+    left = np.conj(start.swapaxes(1, 2))
+    return solved(left @ start, left @ smooth[:, :, None])[1]
+
+
+def restricted(found: RationalSolution, kept: int) -> Complex:
+    """Return what a solution becomes, to first order, if only `kept` linear columns may stay.
+
+    θ₁ - V₁₂ V₂₂⁻¹ θ₂, V the inverse of the products: least squares under θ₂ = 0.
+    """
+    q = found.state.theta.shape[1]
+    out = np.arange(kept, q - DENOMINATOR_ORDER)
+    stay = np.delete(np.arange(q), out)
+    part = found.inverse[:, :, out]
+    scale = 1.0 / np.sqrt(np.maximum(part[:, out, np.arange(out.size)].real, 1e-300))
+    block = part[:, out] * scale[:, :, None] * scale[:, None, :]
+    block[:, np.arange(out.size), np.arange(out.size)] += _RIDGE
+    gone = np.linalg.solve(block, (found.state.theta[:, out] * scale)[:, :, None])
+    change = (part[:, stay] * scale[:, None, :]) @ gone
+    return np.asarray(found.state.theta[:, stay] - change[:, :, 0])
+
+
 def gauss_newton(
-    linear: Complex, slopes: Real, y: Complex, smooth: Complex, *, steps: int
+    linear: Complex, slopes: Real, y: Complex, theta: Complex, *, steps: int
 ) -> RationalSolution:
     """Fit Y = (linear columns · coefficients) / A, A = 1 + slopes · coefficients.
 
@@ -183,8 +215,10 @@ def gauss_newton(
         Columns of B and T.
     slopes : ndarray, shape (s, d)
         Powers of x from the first.
-    y, smooth : complex ndarray, shape (w, s)
-        Y, and Y nearly free of noise, from which the linear problem gives the start.
+    y : complex ndarray, shape (w, s)
+        Y.
+    theta : complex ndarray, shape (w, l + d)
+        Start, such as that of `linear_start`.
     steps : int
         At least 1; each window keeps its best iterate.
 
@@ -192,13 +226,11 @@ def gauss_newton(
     --------
     >>> x = np.linspace(-1, 1, 9)
     >>> y = (2.0 / (1 + 0.5j * x))[None]
-    >>> found = gauss_newton(np.ones((1, 9, 1)) + 0j, x[:, None], y, y, steps=1)
+    >>> ones, start = np.ones((1, 9, 1)) + 0j, np.array([[1.9 + 0j, 0.4j]])
+    >>> found = gauss_newton(ones, x[:, None], y, start, steps=4)
     >>> np.abs(found.state.theta).round(9).tolist()
     [[2.0, 0.5]]
     """
-    start = np.concatenate((linear, -smooth[:, :, None] * slopes), axis=2)
-    left = np.conj(start.swapaxes(1, 2))
-    _, theta = solved(left @ start, left @ smooth[:, :, None])
     state = _state(linear, slopes, y, theta)
     for _ in range(steps):
         rows = _jacobian(linear, slopes, state)
@@ -247,7 +279,7 @@ def _better(one: RationalState, other: RationalState) -> RationalState:
 def _read_off(windows: Windows, found: RationalSolution, y: Complex, power: Real) -> LocalFit:
     """Response, its spread and the prediction error at each centre."""
     terms, near, place = _NUMERATOR + 1, windows.near, windows.place
-    state, inverse, row = found.state, found.inverse[near], found.rows[near, place]
+    state, row = found.state, found.rows[near, place]
     x = windows.x[place][:, None]
     a = state.denominator[near, place]
     size = np.sqrt(power[near])
@@ -258,8 +290,8 @@ def _read_off(windows: Windows, found: RationalSolution, y: Complex, power: Real
     slope[:, -DENOMINATOR_ORDER:] = -(response / a)[:, None] * x ** np.arange(
         1, DENOMINATOR_ORDER + 1
     )
-    spread = np.sum(slope * (inverse @ np.conj(slope)[:, :, None])[:, :, 0], axis=1).real
-    leverage = np.sum(row * (inverse @ np.conj(row)[:, :, None])[:, :, 0], axis=1).real
+    forms = windows.forms(np.stack((slope, row), axis=1), found.inverse)
+    spread, leverage = forms[:, 0], forms[:, 1]
     missed = (y - state.fitted)[near, place]
     squares = np.maximum(state.squares, 1e-15 * np.sum(np.abs(y) ** 2, axis=1))
     noise = (squares / np.maximum(windows.counted - row.shape[1], 1))[near]

@@ -86,7 +86,8 @@ class RepeatedPair:
     parameters : tuple of RepeatedParameter
         Those that at least two repeats tell.
     frequency_response : FrequencyResponse
-        Weighted by 1/std² at each frequency; its std is that of the weights.
+        Weighted by 1/std² at each frequency; its std is that of the weights, and knows nothing
+        of an error that all repeats have in common.
     response_scatter : float
         Scatter of the repeats' responses over their stated errors, root mean square over the
         frequencies: near 1 if these are right.
