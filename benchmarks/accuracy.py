@@ -252,8 +252,8 @@ def frequency_response(count: int, mapped: Callable) -> list[str]:
     return [
         "Median complex error over 0.5 to 20 Hz, relative, no delay given: "
         f"{np.median(errors):.2f} % in the middle of {count} seeds, "
-        f"{np.percentile(errors, 95):.2f} % in the 95th percentile, {errors.max():.2f} % at worst; {100 * np.mean(errors <= 2):.1f} % of the "
-        "seeds are at 2 % or below."
+        f"{np.percentile(errors, 95):.2f} % in the 95th percentile, {errors.max():.2f} % at "
+        f"worst; {100 * np.mean(errors <= 2):.1f} % of the seeds are at 2 % or below."
     ]
 
 
