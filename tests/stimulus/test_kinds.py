@@ -124,8 +124,20 @@ def met(stimulus, t):
     return rough
 
 
+# its velocity peaks just after the lead hands over to the sweep
+PEAK_BESIDE_A_BREAK = {
+    "band": (1.0, 4.216965034285822),
+    "duration": 14.567856886241147,
+    "fs": 42.16965034285822,
+    "limits": Limits(position=1.0, velocity=26.495972744314738, acceleration=70.20365716674695),
+    "rng": 0,
+    "kind": "exponential",
+}
+
+
 @settings(max_examples=25, deadline=None)
 @given(wish=wishes())
+@example(wish=PEAK_BESIDE_A_BREAK)
 def test_any_wish_of_any_kind(wish):
     check(wish)
 

@@ -13,6 +13,9 @@ _POINTS_PER_CYCLE = 24
 _NEAR = 0.97  # a dense sample below this share of the largest cannot hide the true peak
 _BLOCK = 1 << 17
 _ROUNDS = 8  # each makes the bracket 4 times narrower
+# points to each side of a grid maximum: at a break three stand so close together that rounding
+# alone decides which of them seems the highest
+_WIDE = 3
 _JUMP = 1e-6  # of the peak; less than this between two sides of an instant is rounding
 
 
@@ -53,17 +56,17 @@ def true_peaks(
     orders = 4 if known else 3
     brackets: list[list[FloatArray]] = [[] for _ in range(orders)]
     coarse = np.zeros(orders)
-    # blocks overlap by one point on each side, so that every interior point has neighbours
+    # blocks overlap on each side, so that every interior point has its neighbours
     for first in range(0, grid.size, _BLOCK):
-        block = grid[max(first - 1, 0) : first + _BLOCK + 1]
+        block = grid[max(first - _WIDE, 0) : first + _BLOCK + _WIDE]
         for k, size in enumerate(_magnitudes(waveform.motion(block))[:orders]):
             coarse[k] = max(coarse[k], float(size.max()))
             near = size >= _NEAR * coarse[k]
             left = np.concatenate(([True], size[1:] >= size[:-1]))
             right = np.concatenate((size[:-1] >= size[1:], [True]))
             at = np.flatnonzero(near & left & right)
-            low, high = np.maximum(at - 1, 0), np.minimum(at + 1, block.size - 1)
-            brackets[k].append(np.stack((size[at], block[low], block[high])))
+            low, high = np.maximum(at - _WIDE, 0), np.minimum(at + _WIDE, block.size - 1)
+            brackets[k].append(np.stack((size[at], block[low], block[at], block[high])))
     found = [
         _closed_in(waveform, k, np.concatenate(brackets[k], axis=1), coarse[k])
         for k in range(orders)
@@ -76,11 +79,14 @@ def true_peaks(
 
 
 def _closed_in(waveform: Waveform, order: int, brackets: FloatArray, coarse: float) -> float:
-    _, low, high = brackets[:, brackets[0] >= _NEAR * coarse]
+    _, low, middle, high = brackets[:, brackets[0] >= _NEAR * coarse]
     best = coarse
-    share = np.linspace(0.0, 1.0, 9)
+    share = np.linspace(0.0, 1.0, 5)
     for k in range(_ROUNDS if coarse > 0.0 else 0):
-        times = low[:, None] + (high - low)[:, None] * share
+        # the middle, the highest so far, is among them
+        left = low[:, None] + (middle - low)[:, None] * share[:-1]
+        right = middle[:, None] + (high - middle)[:, None] * share
+        times = np.concatenate((left, right), axis=1)
         values = _magnitudes(waveform.motion(times.ravel()))[order].reshape(times.shape)
         at = np.argmax(values, axis=1)
         rows = np.arange(at.size)
@@ -88,7 +94,8 @@ def _closed_in(waveform: Waveform, order: int, brackets: FloatArray, coarse: flo
         # what a bracket can still hide shrinks 16-fold a round; 4-fold is the cautious bound
         keep = values[rows, at] >= (1.0 - (1.0 - _NEAR) / 4.0**k) * best
         low = times[rows, np.maximum(at - 1, 0)][keep]
-        high = times[rows, np.minimum(at + 1, share.size - 1)][keep]
+        middle = times[rows, at][keep]
+        high = times[rows, np.minimum(at + 1, times.shape[1] - 1)][keep]
     return float(best)
 
 
@@ -127,6 +134,7 @@ def _grid(waveform: Waveform, start: float, stop: float) -> FloatArray:
     parts = [np.linspace(start, stop, count), start + span * np.geomspace(1e-9, 1.0, 256)]
     if isinstance(waveform, Piecewise):
         knots = np.array([t for t in waveform.breaks if start < t < stop])
+        knots = knots[np.diff(knots, prepend=-np.inf) > 1e-12 * span]
         parts += [knots, np.nextafter(knots, -np.inf), np.nextafter(knots, np.inf)]
         parts += [np.linspace(a, b, 64) for a, b in pairwise(knots) if b - a < 0.2 * span]
     return np.unique(np.clip(np.concatenate(parts), start, stop))
