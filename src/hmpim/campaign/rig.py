@@ -147,7 +147,7 @@ class TableRig:
     def known(self, case: "Case", axis: str) -> dict[str, float]:
         """Of the linearised mechanics, behind the hold, friction off."""
         table = self.loaded(case)
-        inertia = table.plant.inertia(table.start_angles)[AXES.index(axis), AXES.index(axis)]
+        inertia = table.plant.inertia(table.start_angles)[AXES.index(axis)]
         bandwidth = exact_bandwidth(table, axis=cast(AxisName, axis), fs=case.rate)
         return {"exact_bandwidth": bandwidth, "inertia": float(inertia)}
 

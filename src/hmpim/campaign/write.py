@@ -7,7 +7,7 @@ import math
 from collections.abc import Sequence
 from importlib.metadata import version
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -193,7 +193,7 @@ def _section(study: Study, figure: FigurePlan) -> Section:
         rows.sort(key=lambda row: axes.index(row.axis))
     elif figure.compare == "loads" and rows:
         rows = [row for row in rows if row.rate == max(r.rate for r in rows)]
-    couplings = [c for c in study.couplings if c["id"] in joint and figure.compare == "excitation"]
+    couplings = [c for c in study.couplings if c["case"] in joint and figure.compare == "excitation"]
     grids = [table(rows, "Cases of this section")]
     if couplings:
         grids.append(_couplings(couplings))
@@ -207,13 +207,14 @@ def _section(study: Study, figure: FigurePlan) -> Section:
     )
 
 
-def _couplings(couplings: Sequence[dict[str, object]]) -> Grid:
+def _couplings(couplings: Sequence[dict[str, Any]]) -> Grid:
+    low, high = couplings[0]["band"]
     rows = []
     for c in couplings:
         gain, std = c["gain"], c["std"]
-        known = isinstance(gain, float) and isinstance(std, float)
-        value = f"{100 * gain:.3f} ± {100 * std:.3f}" if known else "–"  # type: ignore[operator]
-        clear = "yes" if known and gain > 3 * std else "no"  # type: ignore[operator]
+        known = gain is not None and std is not None
+        value = f"{100 * gain:.3f} ± {100 * std:.3f}" if known else "–"
+        clear = "yes" if known and gain > 3 * std else "no"
         rows.append((f"{c['from']} → {c['to']}", value, clear))
     return Grid(
         caption=f"Couplings from {low:g} to {high:g} Hz, median gain",
