@@ -437,7 +437,7 @@ def _wary(chosen: Trial, trials: list[Trial], problem: Problem, count: float) ->
             trial.intersample == chosen.intersample
             and trial.fit.structure.name in PLAIN
             and extra > 0
-            and extra * np.log(count) - (trial.criterion - chosen.criterion) > 1.0 * extra
+            and extra * np.log(count) - (trial.criterion - chosen.criterion) > 0.5 * extra
             and abs(trial.fit.delay - chosen.fit.delay) > _FAR * std
         ):
             return trial

@@ -25,7 +25,7 @@ _LOOSE = 0.3
 """Relative standard deviation beyond which a parameter is not known."""
 
 
-_AMBIGUOUS = 2.0
+_AMBIGUOUS = 4.0
 """Difference of the criterion within which another plain structure is worth naming."""
 
 _DISAGREES = 4.0
