@@ -11,6 +11,7 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperGroup
 
+from hmpim.cli.campaign import campaign
 from hmpim.cli.demo import demo
 from hmpim.cli.design import design
 from hmpim.cli.gentlest import gentlest
@@ -135,6 +136,7 @@ app.command(epilog="Example: hmpim identify test.csv --input u --output y --repo
     identify
 )
 app.command(epilog="Example: hmpim demo --out out/demo --seed 7")(demo)
+app.command(epilog="Example: hmpim campaign section_v_reduced --out out/study")(campaign)
 app.command()(gentlest)
 app.command(epilog="Example: hmpim paper --out docs/build --figures 12 13")(paper)
 
