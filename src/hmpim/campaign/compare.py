@@ -18,6 +18,11 @@ def bandwidth(row: Row) -> Reading | None:
     return row.parameters.get("bandwidth_phase90") or row.measured_bandwidth
 
 
+def _response_first(row: Row) -> Reading | None:
+    """The -90° bandwidth off the response: friction and feedforward fit no linear structure."""
+    return row.measured_bandwidth or row.parameters.get("bandwidth_phase90")
+
+
 def case_label(row: Row, compare: Compare) -> str:
     """What tells a row from its neighbours in a figure."""
     what = {
@@ -100,7 +105,7 @@ def _loads(axis: str, rows: list[Row]) -> str:
 def linear_from(rows: Sequence[Row]) -> Row | None:
     """Smallest level from which on the bandwidth stays within `LINEAR` of the largest level's."""
     read = sorted(
-        ((row, b) for row in rows if (b := bandwidth(row)) is not None),
+        ((row, b) for row in rows if (b := _response_first(row)) is not None),
         key=lambda item: item[0].peaks[2],
     )
     smallest = None
@@ -113,7 +118,7 @@ def linear_from(rows: Sequence[Row]) -> Row | None:
 
 def _levels(axis: str, rows: list[Row]) -> str:
     read = sorted(
-        ((row, b) for row in rows if (b := bandwidth(row)) is not None),
+        ((row, b) for row in rows if (b := _response_first(row)) is not None),
         key=lambda item: item[0].peaks[2],
     )
     start = linear_from(rows)
@@ -124,15 +129,17 @@ def _levels(axis: str, rows: list[Row]) -> str:
     text = (
         f"{axis}: {a.value:.2f} Hz at {low.peaks[2]:.0f} {unit}, {b.value:.2f} Hz at "
         f"{high.peaks[2]:.0f} {unit}. Linear to {100 * LINEAR:.0f} % from "
-        f"{start.peaks[2]:.0f} {unit} on."
+        f"{start.peaks[2]:.0f} {unit} on (read off the responses)."
     )
+    if a.value < (1.0 - LINEAR) * b.value:
+        text += " The smaller the motion the lower the bandwidth, as dry friction makes it."
     if high.exact_bandwidth is not None:
         text += f" Without friction it is {high.exact_bandwidth:.2f} Hz at every level."
     return text
 
 
 def _modes(axis: str, rows: list[Row]) -> str:
-    by_mode = {row.mode: b.value for row in rows if (b := bandwidth(row)) is not None}
+    by_mode = {row.mode: b.value for row in rows if (b := _response_first(row)) is not None}
     if len(by_mode) < 2:
         return ""
     return (

@@ -37,6 +37,9 @@ COLUMNS = (
     ("bias", "Bias"),
 )
 
+_TOLD = ("delay", "natural_frequency", "damping_ratio", "bandwidth_phase90")
+_VAGUE = 10.0  # times its own size: an error that leaves nothing told
+
 
 def write_study(study: Study, folder: Path, *, document: Path | None = None) -> None:
     """Write ``study.html``, ``study.json``, ``study.csv``, ``study.md`` and its pictures.
@@ -143,6 +146,8 @@ def _exact(row: Row) -> str:
 
 def _cell(row: Row, name: str) -> str:
     reading = row.parameters.get(name)
+    if reading is not None and name in _TOLD and reading.std > _VAGUE * abs(reading.value):
+        return "–"
     if name == "delay" and reading is not None:
         reading = Reading(value=1e3 * reading.value, std=1e3 * reading.std)
     return _shown(reading)
@@ -193,7 +198,9 @@ def _section(study: Study, figure: FigurePlan) -> Section:
         rows.sort(key=lambda row: axes.index(row.axis))
     elif figure.compare == "loads" and rows:
         rows = [row for row in rows if row.rate == max(r.rate for r in rows)]
-    couplings = [c for c in study.couplings if c["case"] in joint and figure.compare == "excitation"]
+    couplings = [
+        c for c in study.couplings if c["case"] in joint and figure.compare == "excitation"
+    ]
     grids = [table(rows, "Cases of this section")]
     if couplings:
         grids.append(_couplings(couplings))

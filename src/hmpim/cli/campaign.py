@@ -95,7 +95,7 @@ def _print(study: object) -> None:
     console = output_console()
     shown = Table(title=page.title, box=None, header_style="bold", pad_edge=False)
     for column in ("Case", "Axis", "−90° (Hz)", "fn (Hz)", "ζ", "Delay (ms)", "Verdict"):
-        shown.add_column(column)
+        shown.add_column(column, overflow="fold")
     whole = page.grids[1] if study.checks else page.grids[0]
     at = [whole.columns.index(c) for c in ("−90° (Hz)", "fn (Hz)", "ζ", "Delay (ms)", "Verdict")]
     for row, cells in zip(study.rows, whole.rows, strict=True):

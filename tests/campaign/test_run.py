@@ -1,0 +1,175 @@
+"""Campaigns: cases run once, stopped and resumed, refused before anything moves."""
+
+import tomllib
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from hmpim.campaign import expand, parse_plan, run_campaign, shipped_plan
+from hmpim.campaign.study import make_study, study_dict
+from hmpim.campaign.write import write_study
+from hmpim.errors import ArgumentError, FormatError, LimitsError
+from hmpim.experiment import run
+from hmpim.rigs import Sensor
+
+
+def plan_of(**changes):
+    data = tomllib.loads(shipped_plan("example").read_text(encoding="utf-8"))
+    data["stimulus"]["duration"] = 3.0
+    data["test"][0]["rates"] = [500.0]
+    data.update(changes)
+    return parse_plan(data)
+
+
+class Stopping:
+    """A rig that counts its runs and is stopped from the keyboard at one of them."""
+
+    def __init__(self, stop_at=None):
+        self.played = []
+        self.stop_at = stop_at
+
+    def __call__(self, case, stimuli, rng):
+        if len(self.played) == self.stop_at:
+            raise KeyboardInterrupt
+        self.played.append(case.id)
+        (stimulus,) = stimuli
+        sensor = Sensor(
+            delay=0.003,
+            natural_frequency=20.0,
+            damping_ratio=0.7,
+            noise_std=0.01,
+            input_name=f"{stimulus.axis}.command",
+            output_name=f"{stimulus.axis}.position",
+        )
+        return run(sensor, stimulus, rng=rng)
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("finished")
+    plan = plan_of()
+    return plan, folder, run_campaign(plan, folder)
+
+
+def test_truth_is_found(finished):
+    plan, _, cases = finished
+    study = make_study(plan, cases)
+    for row in study.rows:
+        sensor = plan.axis(row.axis).sensor
+        for name in ("delay", "natural_frequency", "damping_ratio"):
+            reading = row.parameters[name]
+            assert abs(reading.value - getattr(sensor, name)) < 4.0 * reading.std
+    assert study.met is True
+
+
+def test_interrupted_goes_on_and_repeats_nothing(tmp_path):
+    plan = plan_of()
+    ids = [case.id for case in expand(plan)]
+    first = Stopping(stop_at=1)
+    with pytest.raises(KeyboardInterrupt):
+        run_campaign(plan, tmp_path, player=first)
+    second = Stopping()
+    run_campaign(plan, tmp_path, player=second)
+    assert first.played == ids[:1]
+    assert second.played == ids[1:]
+    third = Stopping()
+    whole = run_campaign(plan, tmp_path, player=third)
+    assert third.played == []
+    # Stopped or not, the same seed gives the same study.
+    assert whole == run_campaign(plan, tmp_path / "again", player=Stopping())
+
+
+def test_changed_plan_says_so_and_fresh_starts_anew(finished, tmp_path):
+    plan = plan_of()
+    rig = Stopping()
+    run_campaign(plan, tmp_path, player=rig)
+    changed = plan_of(seed=8)
+    with pytest.raises(ArgumentError, match="the plan was changed since"):
+        run_campaign(changed, tmp_path, player=rig)
+    assert len(rig.played) == 2
+    run_campaign(changed, tmp_path, fresh=True, player=rig)
+    assert len(rig.played) == 4
+
+
+def test_refused_before_anything_moves(tmp_path):
+    data = tomllib.loads(shipped_plan("example").read_text(encoding="utf-8"))
+    data["axes"]["outer"]["limits"]["velocity"] = 0.5  # the second axis cannot
+    rig = Stopping()
+    with pytest.raises(LimitsError, match=r"case rates\.acceptance\.P\.250Hz\.0\.5\.outer: "):
+        run_campaign(parse_plan(data), tmp_path, player=rig)
+    assert rig.played == []
+
+
+def test_damaged_case_is_named(finished, tmp_path):
+    plan = plan_of()
+    run_campaign(plan, tmp_path, player=Stopping())
+    path = next((tmp_path / "cases").glob("*.json"))
+    path.write_text("{", encoding="utf-8")
+    with pytest.raises(FormatError, match="is damaged"):
+        run_campaign(plan, tmp_path)
+
+
+def test_progress_never_goes_back(tmp_path):
+    told = []
+    run_campaign(plan_of(), tmp_path, player=Stopping(), progress=lambda *t: told.append(t))
+    done = [t[0] for t in told]
+    assert done == sorted(done)
+    assert told[-1][0] == told[-1][1] == 4
+
+
+def test_specification_not_met_and_without_figure(finished):
+    plan, _, cases = finished
+    (first, *_) = plan.specifications
+    tight = replace(first, low=1000.0)
+    absent = replace(first, quantity="hold_period")
+    study = make_study(replace(plan, specifications=(first, tight, absent)), cases)
+    assert [check.outcome for check in study.checks] == ["pass", "fail", "fail"]
+    assert study.met is False
+    nobody = replace(first, load="ton")
+    with pytest.raises(FormatError, match="fits no case"):
+        make_study(replace(plan, specifications=(nobody,)), cases)
+
+
+def test_comparison_finds_what_moved_and_only_that(finished, tmp_path):
+    plan, _, cases = finished
+    write_study(make_study(plan, cases), tmp_path)
+    earlier = tmp_path / "study.json"
+    same = make_study(plan, cases, earlier=earlier)
+    assert same.changes
+    assert not any(change.differs for change in same.changes)
+    moved = [dict(case) for case in cases]
+    pair = dict(moved[0]["pairs"][0])
+    delay = pair["parameters"]["delay"]
+    shifted = {**delay, "value": delay["value"] + 10.0 * delay["std"]}
+    pair["parameters"] = {**pair["parameters"], "delay": shifted}
+    moved[0]["pairs"] = [pair]
+    other = make_study(plan, moved, earlier=earlier)
+    assert [(c.axis, c.quantity) for c in other.changes if c.differs] == [("inner", "delay")]
+
+
+def test_page_needs_nothing_from_outside(finished, tmp_path):
+    plan, _, cases = finished
+    hostile = replace(plan, name="<script>alert(1)</script>")
+    study = make_study(hostile, cases)
+    write_study(study, tmp_path)
+    page = (tmp_path / "study.html").read_text(encoding="utf-8")
+    assert "<script" not in page
+    assert "http" not in page
+    rows = (tmp_path / "study.csv").read_text(encoding="utf-8").splitlines()
+    assert len(rows) == 1 + len(study.rows)
+    column = rows[0].split(",").index("bandwidth_phase90")
+    found = [float(row.split(",")[column]) for row in rows[1:]]
+    assert found == [row.parameters["bandwidth_phase90"].value for row in study.rows]
+    for line in (tmp_path / "study.md").read_text(encoding="utf-8").splitlines():
+        if line.startswith("!["):
+            assert (tmp_path / line.rpartition("(")[2].rstrip(")")).is_file()
+
+
+def test_study_survives_json(finished):
+    import json
+
+    plan, _, cases = finished
+    data = study_dict(make_study(plan, cases))
+    assert json.loads(json.dumps(data, allow_nan=False)) == data
+    assert np.isfinite(data["rows"][0]["parameters"]["delay"]["std"])

@@ -1,0 +1,58 @@
+"""Section V: what the paper saw, on the simulated table."""
+
+import os
+
+import pytest
+
+from hmpim.campaign import read_plan, run_campaign, shipped_plan
+from hmpim.campaign.compare import linear_from
+from hmpim.campaign.study import make_study
+
+pytest.importorskip("mujoco", reason="the table needs the extra 'table'")
+
+
+def check(study):
+    def row(test, axis, rate=1000.0, together=False):
+        (found,) = [
+            r
+            for r in study.rows
+            if (r.test, r.axis, r.rate, r.together) == (test, axis, rate, together)
+        ]
+        return found
+
+    def bandwidth(*which, **more):
+        return row(*which, **more).parameters["bandwidth_phase90"].value
+
+    assert study.met is True
+    # Figs 19 and 20: the rate of the commands hardly matters
+    slow, fast = bandwidth("loaded", "azimuth", 500.0), bandwidth("loaded", "azimuth", 1000.0)
+    assert slow == pytest.approx(fast, rel=0.01)
+    # heavier load, lower bandwidth: between the first and the half power of torque over inertia
+    free = row("acceptance", "azimuth")
+    ratio = free.inertia / row("loaded", "azimuth").inertia
+    assert ratio < fast / bandwidth("acceptance", "azimuth") < ratio**0.4
+    # Fig. 22: friction lowers the bandwidth of small motions
+    levels = sorted((r for r in study.rows if r.test == "levels"), key=lambda r: r.peaks[2])
+    read = [r.measured_bandwidth.value for r in levels]
+    assert read == sorted(read)
+    assert read[0] < 0.9 * read[-1]
+    assert levels[0].peaks[2] < linear_from(levels).peaks[2] < levels[-1].peaks[2]
+    # Figs 24 and 25: all at once says the same
+    joint = bandwidth("together", "roll", together=True)
+    assert joint == pytest.approx(bandwidth("loaded", "roll"), rel=0.03)
+    seen = {(c["from"], c["to"]): c["gain"] for c in study.couplings}
+    moved = [r.axis for r in study.rows if r.together]
+    assert len(seen) == len(moved) * (len(moved) - 1)
+    assert max(seen.values()) < 0.02
+
+
+def test_reduced(tmp_path):
+    plan = read_plan(shipped_plan("section_v_reduced"))
+    check(make_study(plan, run_campaign(plan, tmp_path)))
+
+
+@pytest.mark.slow
+@pytest.mark.skipif("HMPIM_FULL" not in os.environ, reason="set HMPIM_FULL for the full plan")
+def test_full(tmp_path):
+    plan = read_plan(shipped_plan("section_v"))
+    check(make_study(plan, run_campaign(plan, tmp_path)))
