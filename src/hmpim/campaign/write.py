@@ -40,6 +40,8 @@ COLUMNS = (
 _TOLD = ("delay", "natural_frequency", "damping_ratio", "bandwidth_phase90")
 _VAGUE = 10.0  # times its own size: an error that leaves nothing told
 
+_CLEAR = 0.3  # share of the response: what is less sure is left out of the pictures
+
 
 def write_study(study: Study, folder: Path, *, document: Path | None = None) -> None:
     """Write ``study.html``, ``study.json``, ``study.csv``, ``study.md`` and its pictures.
@@ -274,6 +276,13 @@ def _curve(row: Row) -> BodeCurve | None:
     response = dict(row.pair["frequency_response"])
     response["std"] = [math.inf if std is None else std for std in response["std"]]
     response["coherence"] = None
+    clear = [
+        k
+        for k, std in enumerate(response["std"])
+        if std < _CLEAR * math.hypot(response["real"][k], response["imag"][k])
+    ]
+    for name in ("frequency", "real", "imag", "std"):
+        response[name] = [response[name][k] for k in clear]
     pair = PairIdentification.from_dict(
         {
             **row.pair,

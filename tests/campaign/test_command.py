@@ -1,0 +1,66 @@
+"""The command: its exit codes, its files, its plan."""
+
+import typer
+from typer.testing import CliRunner
+
+from hmpim.campaign import parse_plan, shipped_plan
+from hmpim.cli.campaign import campaign
+from hmpim.cli.main import CommandGroup
+
+app = typer.Typer(cls=CommandGroup)
+app.command()(campaign)
+
+
+@app.command()
+def other() -> None:
+    """A second command, so that the first keeps its name."""
+
+
+def invoke(*arguments):
+    return CliRunner().invoke(app, ["campaign", *map(str, arguments)])
+
+
+def short_plan(folder, **replaced):
+    text = shipped_plan("example").read_text(encoding="utf-8")
+    text = text.replace("duration = 5.0", "duration = 2.0").replace("[250.0, 500.0]", "[500.0]")
+    for old, new in replaced.values():
+        assert old in text
+        text = text.replace(old, new)
+    path = folder / "plan.toml"
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def test_example_is_a_plan():
+    import tomllib
+
+    result = invoke("--example")
+    assert result.exit_code == 0
+    assert parse_plan(tomllib.loads(result.stdout)).name == "Two gimbals"
+
+
+def test_done_then_specification_not_met_without_a_second_run(tmp_path):
+    out = tmp_path / "out"
+    result = invoke(short_plan(tmp_path), "--out", out)
+    assert result.exit_code == 0, result.output
+    assert "All 3 checks of the specification are met." in result.stdout
+    cases = {p: p.stat().st_mtime_ns for p in (out / "cases").iterdir()}
+    tight = short_plan(tmp_path, limit=("min = 20.0", "min = 90.0"))
+    result = invoke(tight, "--out", out, "--quiet")
+    assert result.exit_code == 1
+    assert result.stdout == ""
+    assert {p: p.stat().st_mtime_ns for p in (out / "cases").iterdir()} == cases
+
+
+def test_bad_input_is_one_line_and_two(tmp_path):
+    bad = short_plan(tmp_path, kind=('kind = "sensor"', 'kind = "rocket"'))
+    for arguments, words in (
+        ((), "PLAN.toml is missing"),
+        ((tmp_path / "none.toml",), "No such file"),
+        ((bad, "--out", tmp_path / "out"), "rig.kind = 'rocket'"),
+    ):
+        result = invoke(*arguments)
+        assert result.exit_code == 2
+        assert words in result.stderr
+        assert result.stderr.count("\n") == 1
+    assert not (tmp_path / "out").exists()
