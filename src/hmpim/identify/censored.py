@@ -14,14 +14,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.fft import next_fast_len, rfft
 from scipy.stats import norm
 
 from hmpim.errors import RecordError
 from hmpim.identify.fit import Fit, Problem, fit_structure
 from hmpim.identify.held import held_prediction, rows_at_updates
 from hmpim.identify.hold import Updates
+from hmpim.identify.masked import masked_spectrum
 from hmpim.identify.saturation import Saturation
-from hmpim.identify.uncertainty import covariance
 from hmpim.identify.whiteness import is_white
 
 __all__ = ["CensoredFit", "censored_covariance", "fit_censored", "fit_held"]
@@ -31,6 +32,9 @@ _LARGEST_STEP = 0.5
 
 _NEGLIGIBLE = 1e-6
 """Rise of the log-likelihood, Newton's prediction, at which the fit is done."""
+
+_LEVELS_MOVE = 10
+"""Steps after which levels under noise stay as they are: their scatter is far below the noise."""
 
 _LEAST_NOISE = 1e-9
 """Least standard deviation of the noise, over that of the output."""
@@ -85,7 +89,8 @@ class _State:
     """Parameters, and value and derivatives of the log-likelihood there.
 
     `slope` and `bend` are the derivatives by the prediction, (m,), the second one's sign
-    changed; `rows` those of the prediction by the parameters.
+    changed; `rows` those of the prediction by the parameters; `inside` are the samples that
+    say what the output was.
     """
 
     fit: Fit
@@ -94,6 +99,8 @@ class _State:
     rows: NDArray[np.float64]
     value: float
     slope: NDArray[np.float64]
+    bend: NDArray[np.float64]
+    inside: NDArray[np.bool_]
     score: NDArray[np.float64]
     information: NDArray[np.float64]
 
@@ -148,7 +155,7 @@ def fit_censored(
     data = _data(problem, saturation, arrivals)
     state = _start(data, fit)
     damping, converged = 1e-4, False
-    for _ in range(iterations):
+    for count in range(iterations):
         step = _step(state, 0.0)
         if 0.0 <= float(step @ state.score) < _NEGLIGIBLE:
             converged = True
@@ -163,7 +170,7 @@ def fit_censored(
             converged = True
             break
         state = trial if trial is not None else state
-        if data.noise_after:
+        if data.noise_after and count < _LEVELS_MOVE:
             data = _levels_again(data, state)
             state = _evaluated(data, state.fit, state.log_sigma) or state
     return _finished(data, state, converged)
@@ -315,11 +322,12 @@ def _evaluated(data: _Data, fit: Fit, log_sigma: float) -> _State | None:
     sigma = float(np.exp(log_sigma))
     if data.noise_after:
         z = (data.y - np.clip(prediction, data.low_edge, data.high_edge)) / sigma
-        free = (prediction > data.low_edge) & (prediction < data.high_edge)
-        slope, bend, cross = free * z / sigma, free / sigma**2, free * 2 * z / sigma
+        inside = (prediction > data.low_edge) & (prediction < data.high_edge)
+        slope, bend, cross = inside * z / sigma, inside / sigma**2, inside * 2 * z / sigma
         value = -0.5 * z**2 - log_sigma
         by_sigma, bend_sigma = z**2 - 1.0, 2 * z**2
     else:
+        inside = ~(data.low | data.high)
         z = (data.y - prediction) / sigma
         slope, bend, cross = z / sigma, np.full(z.size, sigma**-2), 2 * z / sigma
         value = -0.5 * z**2 - log_sigma
@@ -345,6 +353,8 @@ def _evaluated(data: _Data, fit: Fit, log_sigma: float) -> _State | None:
         rows=rows,
         value=float(np.sum(value)),
         slope=slope,
+        bend=bend,
+        inside=inside,
         score=np.append(rows @ slope, np.sum(by_sigma)),
         information=np.block(
             [[inner, mixed[:, None]], [mixed[None, :], np.array([[np.sum(bend_sigma)]])]]
@@ -405,12 +415,25 @@ def _covariance(state: _State, *, white: bool) -> NDArray[np.float64]:
     if white:
         return np.asarray(inverse)
     size = state.rows.shape[0]
-    simple = covariance(state.rows, state.slope, freedom=state.slope.size - size, white=False)
-    gram = state.rows @ state.rows.T
     middle = np.zeros(inverse.shape)
-    middle[:size, :size] = gram @ simple @ gram
-    middle[-1, -1] = state.information[-1, -1]
+    middle[:size, :size], fewer = _coloured_scores(state)
+    middle[-1, -1] = state.information[-1, -1] * fewer
     return np.asarray(inverse @ middle @ inverse)
+
+
+def _coloured_scores(state: _State) -> tuple[NDArray[np.float64], float]:
+    """Covariance of the scores: their size as for white noise, their correlation as measured.
+
+    Also by how much fewer samples tell the noise: 1 + 2 Σ ρ² (M. S. Bartlett, 1946).
+    """
+    weighted = state.rows * np.sqrt(np.maximum(state.bend, 0.0))
+    length = next_fast_len(2 * state.slope.size, real=True)
+    spectra = rfft(weighted, length)
+    omega = 2 * np.pi * np.arange(spectra.shape[1]) / length
+    power = masked_spectrum(state.slope, state.inside, omega)
+    fewer = float(np.mean(np.concatenate([power, power[1:-1]]) ** 2))
+    power[1 : (length + 1) // 2] *= 2.0  # both signs of frequency
+    return np.asarray(((spectra * power) @ spectra.conj().T).real / length), fewer
 
 
 def _with_age(covariance: NDArray[np.float64], data: _Data) -> NDArray[np.float64]:

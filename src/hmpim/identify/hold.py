@@ -225,7 +225,13 @@ def _coarse_period(
     changed: NDArray[np.intp], runs: NDArray[np.intp], shortest: int
 ) -> float | None:
     """Period in samples at which the changes crowd on the circle, refined over longer stretches."""
-    low, high = max(float(shortest), _FASTEST), float(shortest + 1)
+    # Just below a whole number of samples the odd run is shorter, and rare.
+    low, high = max(0.9 * shortest, _FASTEST), float(shortest + 1)
+    if shortest == 1:  # 5/4 and 5/3 crowd alike; but nearly all updates show
+        mean = float(np.mean(runs))
+        low, high = max(_COMPLETE * mean, _FASTEST), 1.01 * mean
+        if high <= low:
+            return None
     count = min(200, changed.size)
     stretch = _densest(changed, runs, count)
     best = low
@@ -270,8 +276,8 @@ def _bounded(changed: NDArray[np.float64], period: float, fs: float) -> Hold | N
             return Hold(
                 period=middle / fs,
                 phase=float(first - back * middle) / fs,
-                std=float(high - low + 2e-9) / np.sqrt(12.0) / fs,
-                phase_std=float(highest - lowest) / np.sqrt(12.0) / fs,
+                std=float((high - low + 2e-9) / np.sqrt(12.0) / fs),
+                phase_std=float((highest - lowest) / np.sqrt(12.0) / fs),
             )
         off = changed - k * period
         worst = int(np.argmax(np.abs(off - np.median(off))))

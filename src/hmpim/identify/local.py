@@ -21,6 +21,8 @@ __all__ = ["local_polynomial_response", "local_response"]
 
 _FEWEST_SAMPLES = 16
 _ORDER = 2
+# Widest window of polynomials, on either side.
+_WIDEST = 1000
 # Each window of polynomials is wider than the last by this.
 _RATIO = 1.6
 # Where rational functions are tried too, fewer will do.
@@ -242,6 +244,12 @@ def _centres(spectra: Spectra, band: tuple[float, float], points: int) -> NDArra
     return centres_in_band(low, high, points)
 
 
+def _cut(spectra: Spectra, highest: int) -> Spectra:
+    """Leave out the bins that no window reaches: most of a long record's."""
+    end = highest + max(highest // 2, _WIDEST) + 1
+    return Spectra(frequency=spectra.frequency[:end], u=spectra.u[:end], y=spectra.y[:end])
+
+
 def _single(
     u: NDArray[np.float64],
     y: NDArray[np.float64],
@@ -254,6 +262,7 @@ def _single(
     """Polynomials first; what they predict starts the rational functions; then choose of all."""
     spectra = transform(u, y, fs, delay)
     centre = _centres(spectra, band, points)
+    spectra = _cut(spectra, int(centre[-1]))
     polynomials = _polynomials(spectra, centre, _ORDER, None, ratio=_RATIO_BESIDE_RATIONAL)
     widths = _rational_widths(centre, spectra.u.size)
     if not widths:
@@ -279,7 +288,7 @@ def _polynomials(
     order = min(order, max((bins - 2) // 4 - 1, 0))
     least = 2 * (order + 1)
     if widths is None:
-        top = min(max(int(centre[-1] - centre[0] + 1) // 3, least + 1), 1000)
+        top = min(max(int(centre[-1] - centre[0] + 1) // 3, least + 1), _WIDEST)
         count = max(int(np.ceil(np.log(top / least) / np.log(ratio))), 1)
         widths = tuple(int(w) for w in np.rint(np.geomspace(least, top, count + 1)))
     most = max((bins - 1) // 2, 1)

@@ -30,6 +30,9 @@ a flattened one, as of sin x + (1/9) sin 3x, 3.5."""
 _FEWEST = 8
 """Samples that must be at the level, and just below it, before anything is said."""
 
+_VISITS = 2
+"""Stays at the level that must look alike, where no prediction helps."""
+
 _SHELL = 0.3
 """Share of the signal's span below the level that is looked at."""
 
@@ -49,8 +52,9 @@ _LOPSIDED = 2.2
 _COARSEST = 0.03
 """Noise, over the signal's span, beyond which a plateau with scatter needs a prediction."""
 
-_NOISY = 3.0
-"""Noise over the resolution from which equal values at the extreme cannot be chance."""
+_NOISY = 1.0
+"""Noise over the resolution from which equal values at the extreme cannot be chance; rounding
+by itself makes 0.3."""
 
 _BEYOND = 1.5
 """How far the prediction must go beyond the level, in standard deviations of its own error."""
@@ -170,7 +174,7 @@ def detect_saturation(
 
 def _smeared(y: NDArray[np.float64], prediction: NDArray[np.float64], step: float) -> Saturation:
     """Clipping that only the prediction shows."""
-    found = smeared_plateaus(y, prediction)
+    found = smeared_plateaus(y, prediction, step=step)
     nothing = np.zeros(y.size, dtype=bool)
     if found is None:
         return Saturation(
@@ -315,7 +319,7 @@ def _visits(at: NDArray[np.bool_]) -> NDArray[np.intp]:
 def _is_flat(y: NDArray[np.float64], side: _Side, resolution: float, reach: float) -> bool:
     """Whether the level is met and left at speed, the same either way, and is flat between."""
     visits = _visits(side.at)
-    if visits.shape[0] == 0:
+    if visits.shape[0] < _VISITS:
         return False
     distance = side.level - y
     near = distance < reach
@@ -356,6 +360,9 @@ def _goes_beyond(
     slope = np.gradient(prediction)
     rows = np.stack([np.ones(y.size), prediction, slope, np.gradient(slope)])
     free = ~side.at
+    between = free & (y > y.min() + resolution)  # the other end may be clipped too
+    if np.count_nonzero(between) > 0.1 * y.size:
+        free = between
     if np.count_nonzero(free) < 4 * rows.shape[0]:
         return False
     weights = np.linalg.lstsq(rows[:, free].T, y[free], rcond=None)[0]

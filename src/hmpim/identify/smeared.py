@@ -1,0 +1,213 @@
+"""Clipping under noise that was added after it, judged by a prediction.
+
+No value repeats then, and the plateau is as wide as the noise. What can be compared is the
+output with the prediction, clipped and not: min(H, max(L, q)), q a correction of the
+prediction, against q itself and against a bent q, as a soft spring gives. Which samples are
+clipped and what q is are found in turn.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["Plateaus", "smeared_plateaus"]
+
+_FEWEST = 12
+"""Samples at a level."""
+
+_STARTS = (0.6, 0.75, 0.85, 0.92, 0.97)
+"""Where a level is first looked for: quantiles of the prediction."""
+
+_BENDS = 6.0
+"""Standard deviations by which the output must fall short at an extreme to be looked at."""
+
+_GAIN = 40.0
+"""Fall of the sum of squares in σ² that a level must bring; noise alone brings about 10."""
+
+_BEYOND = 0.3
+"""Standard deviations of the noise by which the prediction must go beyond on average."""
+
+_WORTH = 0.003
+"""And share of the output's span."""
+
+_FLAT = 0.3
+"""Slope of the output against the prediction on a plateau; 1 where nothing is clipped."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Plateaus:
+    """Levels, their standard deviations, and the samples whose prediction lies beyond.
+
+    `low` or `high` is None where that side is not clipped.
+    """
+
+    low: float | None
+    high: float | None
+    low_std: float
+    high_std: float
+    below: NDArray[np.bool_]
+    above: NDArray[np.bool_]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Split:
+    cost: float
+    low: float
+    high: float
+    below: NDArray[np.bool_]
+    above: NDArray[np.bool_]
+    unclipped: NDArray[np.float64]
+
+
+def smeared_plateaus(
+    y: NDArray[np.float64], prediction: NDArray[np.float64], *, step: float = 0.0
+) -> Plateaus | None:
+    """Find levels at which `y` was clipped before noise was added.
+
+    Parameters
+    ----------
+    y, prediction : ndarray, shape (n,)
+        Output, and what a linear model says it would be.
+    step : float
+        Step to which `y` is rounded, in its unit; 0 for none.
+
+    Returns
+    -------
+    Plateaus or None
+
+    Examples
+    --------
+    >>> p = np.sin(np.arange(2000) / 50)
+    >>> noise = 0.1 * np.random.default_rng(0).standard_normal(2000)
+    >>> found = smeared_plateaus(np.minimum(p, 0.7) + noise, p)
+    >>> round(found.high, 1), found.low
+    (0.7, None)
+    >>> smeared_plateaus(p + noise, p) is None
+    True
+    """
+    slope = np.gradient(prediction)
+    rows = np.stack([np.ones(y.size), prediction, slope, np.gradient(slope)])
+    sides = _falls_short(y, rows)
+    if not any(sides):
+        return None
+    best = _best_split(y, rows, sides)
+    if best is None:
+        return None
+    variance = best.cost / y.size
+    bent = np.vstack([rows, prediction**2, prediction**3])
+    if _cost(y, bent) - best.cost < 0.25 * _GAIN * variance:
+        return None
+    least = max(_BEYOND * float(np.sqrt(variance)), step, _WORTH * float(np.ptp(y)))
+    excess = np.abs(best.unclipped - np.clip(best.unclipped, best.low, best.high))
+    kept = tuple(
+        bool(np.any(clipped) and np.mean(excess[clipped]) > least)
+        and _holds(y, rows, best, clipped, others, variance)
+        for clipped, others in ((best.below, (False, sides[1])), (best.above, (sides[0], False)))
+    )
+    if not any(kept):
+        return None
+    if kept != (bool(best.below.any()), bool(best.above.any())):
+        best = _best_split(y, rows, (kept[0], kept[1]))
+        if best is None:
+            return None
+    sigma = float(np.sqrt(variance))
+    counts = int(np.count_nonzero(best.below)), int(np.count_nonzero(best.above))
+    return Plateaus(
+        low=best.low if kept[0] else None,
+        high=best.high if kept[1] else None,
+        low_std=sigma / float(np.sqrt(max(counts[0], 1))),
+        high_std=sigma / float(np.sqrt(max(counts[1], 1))),
+        below=best.below,
+        above=best.above,
+    )
+
+
+def _cost(y: NDArray[np.float64], rows: NDArray[np.float64]) -> float:
+    weights = np.linalg.lstsq(rows.T, y, rcond=None)[0]
+    return float(np.sum((y - weights @ rows) ** 2))
+
+
+def _falls_short(y: NDArray[np.float64], rows: NDArray[np.float64]) -> tuple[bool, bool]:
+    """Whether the output bends away from the prediction at its low and at its high end."""
+    p = rows[1]
+    ends = np.quantile(p, [0.1, 0.9])
+    hinges = np.stack([np.minimum(p - ends[0], 0.0), np.maximum(p - ends[1], 0.0)])
+    found = []
+    for i in range(2):
+        full = np.vstack([rows, hinges[i]])
+        q, r = np.linalg.qr(full.T)
+        if abs(r[-1, -1]) <= 1e-9 * float(np.linalg.norm(p)):
+            found.append(False)
+            continue
+        weight = float(q[:, -1] @ y) / r[-1, -1]
+        left = y - q @ (q.T @ y)
+        error = float(np.sqrt(left @ left / y.size)) / abs(r[-1, -1])
+        found.append(weight < -max(_BENDS * error, 0.1))
+    return found[0], found[1]
+
+
+def _best_split(
+    y: NDArray[np.float64], rows: NDArray[np.float64], sides: tuple[bool, bool]
+) -> _Split | None:
+    best = None
+    for quantile in _STARTS:
+        low, high = np.quantile(rows[1], [1.0 - quantile, quantile])
+        split = _settled(y, rows, low if sides[0] else -np.inf, high if sides[1] else np.inf)
+        if split is not None and (best is None or split.cost < best.cost):
+            best = split
+    return best
+
+
+def _settled(
+    y: NDArray[np.float64], rows: NDArray[np.float64], low: float, high: float
+) -> _Split | None:
+    """Levels and correction in turn, until the clipped samples stay the same."""
+    q = rows[1]
+    below, above = q < low, q > high
+    for _ in range(30):
+        free = ~(below | above)
+        if np.count_nonzero(free) < max(4 * rows.shape[0], 0.1 * y.size):
+            return None
+        weights = np.linalg.lstsq(rows[:, free].T, y[free], rcond=None)[0]
+        q = weights @ rows
+        if below.any():
+            low = float(np.mean(y[below]))
+        if above.any():
+            high = float(np.mean(y[above]))
+        moved = (q < low) & np.isfinite(low), (q > high) & np.isfinite(high)
+        done = np.array_equal(moved[0], below) and np.array_equal(moved[1], above)
+        below, above = moved
+        if done:
+            break
+    model = np.clip(q, low, high)
+    return _Split(
+        cost=float(np.sum((y - model) ** 2)),
+        low=low,
+        high=high,
+        below=below,
+        above=above,
+        unclipped=q,
+    )
+
+
+def _holds(
+    y: NDArray[np.float64],
+    rows: NDArray[np.float64],
+    best: _Split,
+    clipped: NDArray[np.bool_],
+    others: tuple[bool, bool],
+    variance: float,
+) -> bool:
+    """Whether one side's plateau is needed, and flat."""
+    if np.count_nonzero(clipped) < _FEWEST:
+        return False
+    q = best.unclipped[clipped]
+    centred = q - q.mean()
+    slope = float(centred @ y[clipped]) / float(centred @ centred)
+    error = float(np.sqrt(variance / (centred @ centred)))
+    if slope > _FLAT + 2 * error or error > 0.5:
+        return False
+    without = _best_split(y, rows, others) if any(others) else None
+    cost = _cost(y, rows) if without is None else without.cost
+    return cost - best.cost > _GAIN * variance
