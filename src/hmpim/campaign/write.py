@@ -276,11 +276,13 @@ def _curve(row: Row) -> BodeCurve | None:
     response = dict(row.pair["frequency_response"])
     response["std"] = [math.inf if std is None else std for std in response["std"]]
     response["coherence"] = None
-    clear = [
-        k
-        for k, std in enumerate(response["std"])
-        if std < _CLEAR * math.hypot(response["real"][k], response["imag"][k])
-    ]
+    runs: list[list[int]] = [[]]  # of neighbouring frequencies that are clear
+    for k, std in enumerate(response["std"]):
+        if std < _CLEAR * math.hypot(response["real"][k], response["imag"][k]):
+            runs[-1].append(k)
+        else:
+            runs.append([])
+    clear = max(runs, key=len)
     for name in ("frequency", "real", "imag", "std"):
         response[name] = [response[name][k] for k in clear]
     pair = PairIdentification.from_dict(
