@@ -14,7 +14,7 @@ $(BIN)/python:
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --upgrade "pip>=25.1"
 
 $(RUN): pyproject.toml constraints.txt | $(BIN)/python
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e .
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[table]'
 	@touch $@
 
 $(DEV): pyproject.toml constraints.txt | $(BIN)/python
@@ -23,8 +23,9 @@ $(DEV): pyproject.toml constraints.txt | $(BIN)/python
 
 install: $(DEV)  ## everything a developer needs, in .venv
 
-demo: $(RUN)  ## a stimulus, a sensor, its parameters found, a page to look at
+demo: $(RUN)  ## a sensor and then five axes at once: parameters found, pages to look at
 	$(BIN)/hmpim demo
+	$(BIN)/hmpim campaign demo --out out/demo-table
 
 test: $(DEV)  ## the whole test suite
 	$(BIN)/python -m pytest -n auto
@@ -37,6 +38,7 @@ check: $(DEV)  ## ruff, mypy strict, import-linter
 
 bench: $(DEV)  ## speed, against a hand-written fit in the same run
 	$(BIN)/python benchmarks/identification_speed.py
+	$(BIN)/python benchmarks/response_accuracy.py
 
 accuracy: $(DEV)  ## every figure of docs/accuracy.md, from scratch
 	$(BIN)/python benchmarks/accuracy.py

@@ -7,7 +7,7 @@ from hmpim.errors import ArgumentError
 
 __all__ = ["PLANS", "shipped_plan"]
 
-PLANS = ("example", "section_v", "section_v_reduced")
+PLANS = ("demo", "example", "section_v", "section_v_reduced")
 
 
 def shipped_plan(name: str) -> Path:

@@ -18,7 +18,7 @@ def campaign(
         str | None,
         typer.Argument(
             metavar="PLAN.toml",
-            help="The plan, or the name of one that ships: example, section_v, section_v_reduced.",
+            help="A plan, or one that ships: demo, example, section_v, section_v_reduced.",
             show_default=False,
         ),
     ] = None,
