@@ -278,9 +278,10 @@ def _fit_all(
     settled = False
     for name in sorted(structures, key=lambda name: -STRUCTURES[name].order):
         structure = STRUCTURES[name]
-        starts = starting_values(rough, structure, earliest=-2, thorough=not settled)
         if settled and name == "first_order":
             starts = [_without_second_pole(fits[0])]
+        else:
+            starts = starting_values(rough, structure, earliest=-2, thorough=not settled)
         steps = 2 if settled else _TASTE
         fit = fit_structure(problem, structure, starts[0], iterations=steps)
         hopeful = min((f.cost for f in fits), default=np.inf) * _HOPELESS
@@ -420,13 +421,13 @@ def _looks_held(u: NDArray[np.float64]) -> bool:
 
 
 def _wary(chosen: Trial, trials: list[Trial], problem: Problem, count: float) -> Trial:
-    """Prefer a richer plain structure where it may well be right and would move the delay.
+    """Prefer second order to first where it may well be right and would move the delay.
 
     The criterion keeps a simpler structure until the evidence is strong, and the simpler one's
     error bars take it for certain. Where the record half speaks for another pole and that
     pole would take the delay far outside those bars, the wider bars are the honest ones.
     """
-    if chosen.fit.structure.name not in PLAIN:
+    if chosen.fit.structure.name != "first_order":
         return chosen
     rows = jacobian(problem, chosen.fit)
     information = np.linalg.pinv(rows @ rows.T, hermitian=True)

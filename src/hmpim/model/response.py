@@ -92,7 +92,7 @@ def _first_crossing(frequency: NDArray[np.float64], values: NDArray[np.float64])
 
 
 def _grid(highest: float) -> NDArray[np.float64]:
-    return np.concatenate([[0.0], np.geomspace(highest * 1e-5, highest, 400)])
+    return np.concatenate([[0.0], np.geomspace(highest * 1e-4, highest, 150)])
 
 
 def bandwidth_phase(
