@@ -20,6 +20,7 @@ from hmpim.identify.local import local_response
 from hmpim.identify.multivariable import ResponseMatrix, response_matrix
 from hmpim.identify.paper import paper_estimates
 from hmpim.identify.readings import read_parameters
+from hmpim.identify.remarks import remarks
 from hmpim.identify.result import (
     Candidate,
     FrequencyResponse,
@@ -294,7 +295,17 @@ def _described(
         intersample=joint.best.intersample,
     )
     parameters, seen = with_imperfections(readings.parameters, found, censored, output.unit)
-    findings = (*findings, *seen)
+    counts = slice(None) if joint.problem.valid is None else joint.problem.valid
+    said = remarks(
+        fit.residual[counts],
+        aligned.time[counts],
+        u,
+        fs=fs,
+        band=band,
+        white=readings.white,
+        unit=output.unit,
+    )
+    findings = (*findings, *seen, *said)
     parted = disagreement(from_response, readings.parameters)
     if parted is not None and found.hold is None:
         findings, verdict = (*findings, parted), "doubtful"
