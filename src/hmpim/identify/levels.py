@@ -1,0 +1,244 @@
+"""The same test at several amplitudes: where the system is linear (Fig. 22).
+
+A linear system gives the same parameters whatever the amplitude. Each parameter is compared
+between the levels by the error bars it came with; those that move beyond them, and which way
+they move, tell where the linear range ends and what ends it.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+
+import numpy as np
+from scipy.stats import chi2
+
+from hmpim.errors import ArgumentError
+from hmpim.identify.result import Estimate, PairIdentification, Parameters
+from hmpim.record import Finding
+
+__all__ = ["Level", "LevelComparison", "Trend", "compare_levels"]
+
+_COMPARED = (
+    "natural_frequency",
+    "damping_ratio",
+    "time_constant",
+    "bandwidth_phase90",
+    "bandwidth_phase90_without_delay",
+    "bandwidth_3db",
+    "scale_factor",
+    "delay",
+)
+"""Parameters that a linear system keeps, the most telling first."""
+
+_CHANCE = 1e-3
+"""Chance of such scatter below which a parameter counts as changed, all looked at together."""
+
+_WORTH = 0.002
+"""Least relative change that is reported: below it error bars alone are in question."""
+
+_LINEAR = 0.02
+"""Relative change from the smallest level up to which a level counts as in the linear range."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Level:
+    """One amplitude and what was identified there.
+
+    Parameters
+    ----------
+    amplitude : float
+        Of the stimulus, by any measure that is the same for all: peak, r.m.s., peak acceleration.
+    parameters : Parameters
+        Estimates.
+    """
+
+    amplitude: float
+    parameters: Parameters
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Trend:
+    """How one parameter depends on the amplitude.
+
+    Parameters
+    ----------
+    name : str
+        Of the parameter.
+    amplitudes, values, stds : tuple of float
+        By rising amplitude; levels at which it is not known are left out.
+    probability : float
+        Chance of such differences were it the same at all levels.
+    change : float
+        From the smallest to the largest amplitude, relative to the value at the smallest.
+    """
+
+    name: str
+    amplitudes: tuple[float, ...]
+    values: tuple[float, ...]
+    stds: tuple[float, ...]
+    probability: float
+    change: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LevelComparison:
+    """All trends, the linear range, and sentences.
+
+    Parameters
+    ----------
+    trends : tuple of Trend
+        One per parameter known at two levels or more.
+    linear_up_to : float
+        Greatest amplitude up to which no parameter leaves its value at the smallest one by
+        more than 2 % and by more than its error.
+    findings : tuple of Finding
+        Codes 'nonlinear', 'hardening', 'softening', 'friction'; empty where nothing changes.
+    """
+
+    trends: tuple[Trend, ...]
+    linear_up_to: float
+    findings: tuple[Finding, ...]
+
+
+def compare_levels(
+    results: Sequence[PairIdentification | Parameters], amplitudes: Sequence[float]
+) -> LevelComparison:
+    """Compare what was identified at several amplitudes of one stimulus.
+
+    Parameters
+    ----------
+    results : sequence of PairIdentification or Parameters
+        One per level.
+    amplitudes : sequence of float
+        One per level, positive; in any order.
+
+    Returns
+    -------
+    LevelComparison
+
+    Raises
+    ------
+    ArgumentError
+        For fewer than two levels, unequal numbers, or an amplitude that is not positive.
+
+    Examples
+    --------
+    >>> def at(frequency):
+    ...     return Parameters(natural_frequency=Estimate(
+    ...         value=frequency, std=0.01, ci95=(frequency - 0.02, frequency + 0.02), unit="Hz"))
+    >>> found = compare_levels([at(10.0), at(10.4), at(10.9)], [1.0, 2.0, 3.0])
+    >>> [finding.code for finding in found.findings], found.linear_up_to
+    (['nonlinear', 'hardening'], 1.0)
+    """
+    levels = _levels(results, amplitudes)
+    trends = tuple(t for t in (_trend(levels, name) for name in _COMPARED) if t is not None)
+    changed = [
+        t for t in trends if t.probability * len(trends) < _CHANCE and abs(t.change) > _WORTH
+    ]
+    reach = _linear_up_to(levels, trends)
+    findings = []
+    if changed:
+        most = max(changed, key=lambda t: abs(t.change))
+        findings.append(
+            Finding(
+                code="nonlinear",
+                message=f"With the amplitude from {most.amplitudes[0]:.4g} to "
+                f"{most.amplitudes[-1]:.4g} the {most.name.replace('_', ' ')} changes by "
+                f"{100 * most.change:+.2g} %, beyond its error; up to "
+                f"{reach:.4g} it stays within 2 %. Use a linear model up to there only.",
+            )
+        )
+        kind = _kind({t.name: t for t in changed})
+        if kind is not None:
+            findings.append(kind)
+    return LevelComparison(trends=trends, linear_up_to=reach, findings=tuple(findings))
+
+
+def _levels(
+    results: Sequence[PairIdentification | Parameters], amplitudes: Sequence[float]
+) -> list[Level]:
+    if len(results) != len(amplitudes):
+        raise ArgumentError(
+            f"{len(results)} results and {len(amplitudes)} amplitudes do not go together; "
+            "give one amplitude for each"
+        )
+    if len(results) < 2:
+        raise ArgumentError(f"{len(results)} level has nothing to be compared with; give two")
+    for amplitude in amplitudes:
+        if not (np.isfinite(amplitude) and amplitude > 0):
+            raise ArgumentError(f"amplitude {amplitude!r} is not a positive number")
+    levels = [
+        Level(
+            amplitude=float(amplitude),
+            parameters=r.parameters if isinstance(r, PairIdentification) else r,
+        )
+        for r, amplitude in zip(results, amplitudes, strict=True)
+    ]
+    return sorted(levels, key=lambda level: level.amplitude)
+
+
+def _estimate(level: Level, name: str) -> Estimate | None:
+    known = {f.name for f in fields(level.parameters)}
+    found: Estimate | None = getattr(level.parameters, name) if name in known else None
+    return found
+
+
+def _trend(levels: list[Level], name: str) -> Trend | None:
+    """Values of one parameter, and a χ² test of their being equal."""
+    pairs = [(level.amplitude, _estimate(level, name)) for level in levels]
+    known = [(a, e) for a, e in pairs if e is not None and e.std > 0 and np.isfinite(e.std)]
+    if len(known) < 2:
+        return None
+    values = np.array([e.value for _, e in known])
+    stds = np.array([e.std for _, e in known])
+    weights = stds**-2
+    mean = float(weights @ values / weights.sum())
+    statistic = float(np.sum((values - mean) ** 2 * weights))
+    return Trend(
+        name=name,
+        amplitudes=tuple(a for a, _ in known),
+        values=tuple(float(v) for v in values),
+        stds=tuple(float(s) for s in stds),
+        probability=float(chi2.sf(statistic, len(known) - 1)),
+        change=float((values[-1] - values[0]) / abs(values[0])) if values[0] != 0 else 0.0,
+    )
+
+
+def _linear_up_to(levels: list[Level], trends: tuple[Trend, ...]) -> float:
+    """Last level before any parameter leaves its first value."""
+    reach = levels[-1].amplitude
+    for t in trends:
+        for a, value, std in zip(t.amplitudes[1:], t.values[1:], t.stds[1:], strict=True):
+            moved = abs(value - t.values[0])
+            if moved > _LINEAR * abs(t.values[0]) and moved > 3 * float(np.hypot(std, t.stds[0])):
+                before = [level.amplitude for level in levels if level.amplitude < a]
+                reach = min(reach, before[-1])
+                break
+    return reach
+
+
+def _kind(changed: dict[str, Trend]) -> Finding | None:
+    """A spring moves the natural frequency; friction damps small motions the most."""
+    frequency, damping = changed.get("natural_frequency"), changed.get("damping_ratio")
+    if damping is not None and damping.change < 0 and _faster_than(damping, frequency):
+        return Finding(
+            code="friction",
+            message=f"The damping ratio falls from {damping.values[0]:.3g} to "
+            f"{damping.values[-1]:.3g} as the amplitude grows, as Coulomb friction makes it. "
+            "Use large motions for the linear model, and put friction into it.",
+        )
+    if frequency is None:
+        return None
+    hardens = frequency.change > 0
+    return Finding(
+        code="hardening" if hardens else "softening",
+        message=f"The natural frequency {'rises' if hardens else 'falls'} from "
+        f"{frequency.values[0]:.5g} to {frequency.values[-1]:.5g} Hz as the amplitude grows, as "
+        f"with a {'hardening' if hardens else 'softening'} spring"
+        f"{'' if hardens else ', or a limit on rate or torque'}. "
+        "Take the value at the smallest amplitude for the linear model.",
+    )
+
+
+def _faster_than(damping: Trend, frequency: Trend | None) -> bool:
+    """Whether the damping changes far more than the frequency does."""
+    return frequency is None or abs(damping.change) > 4 * abs(frequency.change)

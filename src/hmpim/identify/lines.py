@@ -1,0 +1,221 @@
+"""Distortion at the lines that a periodic multisine leaves out.
+
+A linear system answers a sum of sines at its own lines only. What stands at the lines between
+them is noise, the same from period to period on average, or distortion, which repeats: at even
+lines from asymmetric nonlinearities, at odd ones from symmetric ones (J. Schoukens,
+R. Pintelon, Y. Rolain and T. Dobrowiecki, Automatica 41, 2005).
+"""
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.fft import irfft, next_fast_len, rfft
+from scipy.stats import f as fisher
+
+from hmpim.errors import ArgumentError
+from hmpim.identify.signals import as_pair, as_signal
+
+__all__ = ["LineLevel", "Lines", "detection_lines", "find_period"]
+
+Parity = Literal["even", "odd"]
+
+_EXCITED = 1e-2
+"""Amplitude over the greatest from which a line counts as excited."""
+
+_SILENT = 1e-4
+"""Amplitude over the greatest up to which it counts as left out."""
+
+_REPEATS = 1e-4
+"""Power of the difference from period to period over the input's: a clean repetition."""
+
+_FEWEST = 4
+"""Lines that a level is averaged over."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LineLevel:
+    """Distortion at lines of one parity.
+
+    Parameters
+    ----------
+    parity : {'even', 'odd'}
+        Even lines show asymmetric nonlinearities, odd ones symmetric.
+    lines : int
+        How many were looked at.
+    rms : float
+        R.m.s. amplitude of one line, noise taken off, in the output's unit.
+    share : float
+        That over the r.m.s. amplitude of the output's excited lines.
+    probability : float
+        Chance of so much, or more, from noise alone.
+    """
+
+    parity: Parity
+    lines: int
+    rms: float
+    share: float
+    probability: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Lines:
+    """Distortion and noise of a periodic test.
+
+    Parameters
+    ----------
+    period : int
+        Samples.
+    periods : int
+        How many were averaged.
+    levels : tuple of LineLevel
+        For each parity that has lines left out.
+    noise_rms : float
+        R.m.s. amplitude of the noise in one line, after averaging.
+    """
+
+    period: int
+    periods: int
+    levels: tuple[LineLevel, ...]
+    noise_rms: float
+
+
+def find_period(u: ArrayLike) -> int | None:
+    """Samples after which the input repeats exactly, at least twice in the record.
+
+    Parameters
+    ----------
+    u : array_like, shape (n,)
+        Input samples.
+
+    Returns
+    -------
+    int or None
+
+    Raises
+    ------
+    RecordError
+        For the wrong shape, NaN or infinity.
+
+    Examples
+    --------
+    >>> find_period(np.tile(np.random.default_rng(0).standard_normal(100), 3))
+    100
+    >>> find_period(np.random.default_rng(0).standard_normal(300)) is None
+    True
+    """
+    x = as_signal("u", u)
+    x = x - x.mean()
+    n = x.size
+    power = np.concatenate([[0.0], np.cumsum(x**2)])
+    if power[-1] == 0:
+        return None
+    length = next_fast_len(2 * n, real=True)
+    product = irfft(np.abs(rfft(x, length)) ** 2, length)[: n // 2 + 1]
+    lag = np.arange(n // 2 + 1)
+    both = power[n - lag] + (power[n] - power[lag])
+    different = (both - 2 * product) / np.maximum(both, np.finfo(float).tiny)
+    moved = np.flatnonzero(different > 0.1)
+    if moved.size == 0:
+        return None
+    good = np.flatnonzero(different < _REPEATS)
+    good = good[good > moved[0]]
+    if good.size == 0:
+        return None
+    run = good[: 1 + int(np.argmax(np.append(np.diff(good), 2) > 1))]
+    return int(run[np.argmin(different[run])])
+
+
+def detection_lines(u: ArrayLike, y: ArrayLike, *, period: int) -> Lines | None:
+    """Measure even and odd distortion at the lines that the input leaves out.
+
+    Parameters
+    ----------
+    u, y : array_like, shape (n,)
+        Input and output in the steady state, two periods or more; the last whole ones count.
+    period : int
+        Samples per period.
+
+    Returns
+    -------
+    Lines or None
+        None where no lines are left out within the excited band.
+
+    Raises
+    ------
+    RecordError
+        For the wrong shape, unequal lengths, NaN or infinity.
+    ArgumentError
+        If the record does not hold two periods.
+
+    Examples
+    --------
+    >>> k, t = np.array([1, 3, 7, 9, 13]), np.arange(3000) / 1000
+    >>> u = np.sum(np.cos(2 * np.pi * k[:, None] * t + k[:, None] ** 2), axis=0)
+    >>> y = u + 0.01 * u**2 + 0.01 * np.random.default_rng(0).standard_normal(3000)
+    >>> found = detection_lines(u, y, period=1000)
+    >>> [level.parity for level in found.levels if level.probability < 1e-3]
+    ['even']
+    """
+    source, output = as_pair(u, y)
+    if not isinstance(period, (int, np.integer)) or period < 8:
+        raise ArgumentError(f"period is {period!r}; give a whole number of samples, at least 8")
+    periods = source.size // int(period)
+    if periods < 2:
+        raise ArgumentError(
+            f"a period of {period} samples goes {source.size / period:.2f} times into "
+            f"{source.size}; noise is told from distortion by two periods at least"
+        )
+    start = source.size - periods * int(period)
+    U = rfft(source[start:].reshape(periods, -1), axis=1) * 2.0 / period
+    Y = rfft(output[start:].reshape(periods, -1), axis=1) * 2.0 / period
+    mean_u, mean_y = np.abs(U.mean(axis=0)), Y.mean(axis=0)
+    scatter = np.sum(np.abs(Y - mean_y) ** 2, axis=0) / (periods - 1) / periods
+    mean_u[0] = 0.0
+    excited = np.flatnonzero(mean_u > _EXCITED * mean_u.max())
+    line = np.arange(mean_u.size)
+    within = (line >= max(excited[0], 1)) & (line <= min(excited[-1], mean_u.size - 2))
+    silent = within & (mean_u < _SILENT * mean_u.max())
+    if np.count_nonzero(silent) < _FEWEST:
+        return None
+    signal = float(np.sqrt(np.mean(np.abs(mean_y[excited]) ** 2)))
+    levels = []
+    parities: tuple[tuple[Parity, int], ...] = (("even", 0), ("odd", 1))
+    for parity, rest in parities:
+        chosen = silent & (line % 2 == rest)
+        if np.count_nonzero(chosen) < _FEWEST:
+            continue
+        levels.append(_level(parity, mean_y[chosen], scatter[chosen], periods, signal))
+    if not levels:
+        return None
+    return Lines(
+        period=int(period),
+        periods=periods,
+        levels=tuple(levels),
+        noise_rms=float(np.sqrt(np.mean(scatter[silent]))),
+    )
+
+
+def _level(
+    parity: Parity,
+    line: NDArray[np.complex128],
+    scatter: NDArray[np.float64],
+    periods: int,
+    signal: float,
+) -> LineLevel:
+    """Compare what repeats with what does not."""
+    count = line.size
+    noise = float(np.mean(scatter))
+    power = float(np.mean(np.abs(line) ** 2))
+    chance = 1.0 if power == 0 else 0.0
+    if noise > 0:
+        chance = float(fisher.sf(power / noise, 2 * count, 2 * count * (periods - 1)))
+    rms = float(np.sqrt(max(power - noise, 0.0)))
+    return LineLevel(
+        parity=parity,
+        lines=count,
+        rms=rms,
+        share=rms / signal if signal > 0 else 0.0,
+        probability=chance,
+    )

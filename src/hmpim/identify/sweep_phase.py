@@ -1,0 +1,188 @@
+"""The phase of a swept sine, found from its samples: what its harmonics are measured against.
+
+Zero crossings give the phase at every half turn, whatever the amplitude does in between; a
+smooth curve through them gives the rest. They are looked for at four times the rate, so that
+a sweep may go up to four fifths of the Nyquist frequency.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.interpolate import CubicSpline
+from scipy.signal import resample_poly
+
+from hmpim.identify.signals import as_signal, check_rate
+
+__all__ = ["SweepPhase", "sweep_phase"]
+
+_FEWEST_CROSSINGS = 8
+"""Four turns at least."""
+
+_FLUKE = 0.15
+"""Peak between two crossings over its neighbours' below which noise made them."""
+
+_SINGLE = 0.99
+"""Share of the power that one sinusoid of slow amplitude must explain: a triangle has 0.986,
+a square wave 0.81."""
+
+_LOCAL = 0.05
+"""Share of the power that may be left around any one half turn: leads and noisy ends are cut."""
+
+_ENOUGH = 0.5
+"""Share of the samples that must belong to the sweep."""
+
+_FINER = 4
+"""Samples per sample in which crossings are looked for."""
+
+_DEEPEST = 1e-3
+"""Amplitude over the greatest below which nothing is looked at: leads, rests."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class SweepPhase:
+    """Instantaneous phase of a sweep.
+
+    Parameters
+    ----------
+    phase : ndarray, shape (n,)
+        Radians; u is about centre + amplitude · cos(phase).
+    frequency : ndarray, shape (n,)
+        Its rate, Hz.
+    amplitude : ndarray, shape (n,)
+        In the input's unit.
+    inside : ndarray of bool, shape (n,)
+        Samples during the sweep itself.
+    """
+
+    phase: NDArray[np.float64]
+    frequency: NDArray[np.float64]
+    amplitude: NDArray[np.float64]
+    inside: NDArray[np.bool_]
+
+
+def sweep_phase(u: ArrayLike, fs: float) -> SweepPhase | None:
+    """Find the phase of `u` if it is one sinusoid of varying frequency and amplitude.
+
+    Parameters
+    ----------
+    u : array_like, shape (n,)
+        Input samples.
+    fs : float
+        Rate in Hz.
+
+    Returns
+    -------
+    SweepPhase or None
+        None for anything else: several sines, noise, steps, a binary sequence.
+
+    Raises
+    ------
+    RecordError
+        For the wrong shape, NaN or infinity.
+    ArgumentError
+        If `fs` is not positive.
+
+    Examples
+    --------
+    >>> t = np.arange(2000) / 200
+    >>> found = sweep_phase(np.sin(2 * np.pi * (0.5 * t + t**2)), 200.0)
+    >>> found.frequency[[500, 1500]].round(2).tolist()
+    [5.5, 15.5]
+    >>> sweep_phase(np.random.default_rng(0).standard_normal(2000), 200.0) is None
+    True
+    """
+    check_rate(fs)
+    samples = as_signal("u", u)
+    if np.ptp(samples) == 0:
+        return None
+    x = samples - _centre(samples)
+    crossings, peaks, first = _crossings(x)
+    if crossings.size < _FEWEST_CROSSINGS:
+        return None
+    sample = np.arange(x.size, dtype=np.float64)
+    phase = _through(crossings, first, sample)
+    envelope = np.interp(sample, 0.5 * (crossings[1:] + crossings[:-1]), peaks)
+    inside = envelope > _DEEPEST * envelope.max()
+    inside &= (sample >= crossings[0]) & (sample <= crossings[-1])
+    level = x / np.maximum(envelope, _DEEPEST * envelope.max())
+    error = np.where(inside, (level - np.cos(phase)) ** 2, 0.0)
+    inside &= _locally(error, level, crossings) < _LOCAL
+    power = float(level[inside] @ level[inside])
+    if np.mean(inside) < _ENOUGH or float(np.sum(error[inside])) > (1.0 - _SINGLE) * power:
+        return None
+    return SweepPhase(
+        phase=phase,
+        frequency=np.gradient(phase) * fs / (2 * np.pi),
+        amplitude=envelope,
+        inside=inside,
+    )
+
+
+def _centre(x: NDArray[np.float64]) -> float:
+    """Middle between neighbouring extremes, the median of all."""
+    turns = np.flatnonzero(np.diff(np.sign(np.diff(x))) != 0) + 1
+    if turns.size < 4:
+        return float(np.mean(x))
+    return float(np.median(0.5 * (x[turns[1:]] + x[turns[:-1]])))
+
+
+def _locally(
+    error: NDArray[np.float64], level: NDArray[np.float64], crossings: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Share of the power left over three half turns around each sample."""
+    starts = np.unique(np.clip(np.ceil(crossings).astype(np.intp), 0, error.size - 1))
+    sums = np.add.reduceat(np.stack([error, level**2]), starts, axis=1)
+    wide = np.apply_along_axis(np.convolve, 1, sums, np.ones(3), mode="same")
+    share = wide[0] / np.maximum(wide[1], np.finfo(float).tiny)
+    which = np.searchsorted(starts, np.arange(error.size), side="right") - 1
+    return np.asarray(share[np.maximum(which, 0)])
+
+
+def _finer(x: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Samples at a multiple of the rate, shape ((n - 1) * finer + 1,); ends continued evenly."""
+    margin = min(32, x.size - 1)
+    before = 2 * x[0] - x[margin:0:-1]
+    after = 2 * x[-1] - x[-2 : -2 - margin : -1]
+    extended = resample_poly(np.concatenate([before, x, after]), _FINER, 1, window=("kaiser", 8.0))
+    start = margin * _FINER
+    return np.asarray(extended[start : start + (x.size - 1) * _FINER + 1], dtype=np.float64)
+
+
+def _crossings(
+    x: NDArray[np.float64],
+) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
+    """Times of the zero crossings in samples, peaks between them, phase at the first one."""
+    fine = _finer(x)
+    sign = np.where(fine >= 0, 1, -1)
+    at = np.flatnonzero(np.diff(sign))
+    while at.size > _FEWEST_CROSSINGS:
+        peaks = np.maximum.reduceat(np.abs(fine), at)[:-1]
+        around = np.minimum(
+            np.concatenate([[np.inf], peaks[:-1]]), np.concatenate([peaks[1:], [np.inf]])
+        )
+        ratio = peaks / np.maximum(around, np.finfo(float).tiny)
+        least = np.minimum(
+            np.concatenate([[np.inf], ratio[:-1]]), np.concatenate([ratio[1:], [np.inf]])
+        )
+        flukes = np.flatnonzero((ratio < _FLUKE) & (ratio < least))
+        if flukes.size == 0:
+            break
+        at = np.delete(at, np.concatenate([flukes, flukes + 1]))  # never two next to each other
+    if at.size < _FEWEST_CROSSINGS:
+        return np.zeros(0), np.zeros(0), 0.0
+    times = (at + fine[at] / (fine[at] - fine[at + 1])) / _FINER
+    peaks = np.maximum.reduceat(np.abs(fine), at)[:-1]
+    first = -0.5 * np.pi if fine[at[0]] < 0 else 0.5 * np.pi
+    return np.asarray(times), np.asarray(peaks), first
+
+
+def _through(
+    crossings: NDArray[np.float64], first: float, sample: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Phase by a smooth curve through the half turns, going on at the last rate beyond them."""
+    turns = first + np.pi * np.arange(crossings.size)
+    curve = CubicSpline(crossings, turns)
+    inside = np.clip(sample, crossings[0], crossings[-1])
+    beyond = sample - inside
+    return np.asarray(curve(inside) + beyond * curve(inside, 1))
