@@ -277,7 +277,7 @@ def _bounded(changed: NDArray[np.float64], period: float, fs: float) -> Hold | N
                 period=middle / fs,
                 phase=float(first - back * middle) / fs,
                 std=float((high - low + 2e-9) / np.sqrt(12.0) / fs),
-                phase_std=float((highest - lowest) / np.sqrt(12.0) / fs),
+                phase_std=float(max(highest - first, first - lowest) / np.sqrt(3.0) / fs),
             )
         off = changed - k * period
         worst = int(np.argmax(np.abs(off - np.median(off))))

@@ -16,6 +16,9 @@ __all__ = ["Plateaus", "smeared_plateaus"]
 _FEWEST = 12
 """Samples at a level."""
 
+_MOST = 20_000
+"""Samples looked at."""
+
 _STARTS = (0.6, 0.75, 0.85, 0.92, 0.97)
 """Where a level is first looked for: quantiles of the prediction."""
 
@@ -58,6 +61,7 @@ class _Split:
     below: NDArray[np.bool_]
     above: NDArray[np.bool_]
     unclipped: NDArray[np.float64]
+    weights: NDArray[np.float64]
 
 
 def smeared_plateaus(
@@ -87,7 +91,9 @@ def smeared_plateaus(
     True
     """
     slope = np.gradient(prediction)
-    rows = np.stack([np.ones(y.size), prediction, slope, np.gradient(slope)])
+    everything = np.stack([np.ones(y.size), prediction, slope, np.gradient(slope)])
+    every = 1 + y.size // _MOST  # a long record tells as well by some of its samples
+    rows, prediction, y = everything[:, ::every], prediction[::every], y[::every]
     sides = _falls_short(y, rows)
     if not any(sides):
         return None
@@ -113,13 +119,14 @@ def smeared_plateaus(
             return None
     sigma = float(np.sqrt(variance))
     counts = int(np.count_nonzero(best.below)), int(np.count_nonzero(best.above))
+    unclipped = best.weights @ everything
     return Plateaus(
         low=best.low if kept[0] else None,
         high=best.high if kept[1] else None,
         low_std=sigma / float(np.sqrt(max(counts[0], 1))),
         high_std=sigma / float(np.sqrt(max(counts[1], 1))),
-        below=best.below,
-        above=best.above,
+        below=unclipped < best.low if kept[0] else np.zeros(unclipped.size, dtype=bool),
+        above=unclipped > best.high if kept[1] else np.zeros(unclipped.size, dtype=bool),
     )
 
 
@@ -163,7 +170,7 @@ def _settled(
     y: NDArray[np.float64], rows: NDArray[np.float64], low: float, high: float
 ) -> _Split | None:
     """Levels and correction in turn, until the clipped samples stay the same."""
-    q = rows[1]
+    q, weights = rows[1], np.zeros(rows.shape[0])
     below, above = q < low, q > high
     for _ in range(30):
         free = ~(below | above)
@@ -188,6 +195,7 @@ def _settled(
         below=below,
         above=above,
         unclipped=q,
+        weights=weights,
     )
 
 

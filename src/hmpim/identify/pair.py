@@ -1,0 +1,185 @@
+"""All that is said of one output and one input, once the joint fit is made."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hmpim.identify.bandwidth import disagreement, response_bandwidths
+from hmpim.identify.coupled import column, with_condition
+from hmpim.identify.fit import Fit
+from hmpim.identify.imperfections import Imperfections, refine, with_imperfections
+from hmpim.identify.joint import JointFit
+from hmpim.identify.local import local_response
+from hmpim.identify.multivariable import ResponseMatrix
+from hmpim.identify.paper import paper_estimates
+from hmpim.identify.readings import read_parameters
+from hmpim.identify.remarks import remarks
+from hmpim.identify.result import Candidate, PairIdentification, PaperEstimates, Parameters
+from hmpim.identify.several import Joined
+from hmpim.identify.spectrum import excited_band
+from hmpim.identify.uncertainty import estimate, noise_estimate
+from hmpim.identify.verdict import judge
+from hmpim.identify.whiteness import misfit
+from hmpim.record import Aligned, Finding, Record, Signal
+
+__all__ = ["described", "untold"]
+
+
+def described(
+    aligned: Aligned,
+    source: Signal,
+    output: Signal,
+    record: Record,
+    joined: Joined,
+    i: int,
+    matrix: ResponseMatrix | None,
+    found: Imperfections,
+) -> PairIdentification:
+    """Say all that is known of an output that follows an input."""
+    fs, joint = aligned.fs, joined.fits[i]
+    covariance = joined.covariances[i] if matrix is not None else None
+    refined = refine(joint, found, fs) if matrix is None else None
+    censored = None
+    if refined is not None:
+        joint, censored = refined
+        covariance = censored.covariance
+    fit = joint.best.fit
+    u, y = source.values, joint.problem.y  # what the other inputs leave over
+    band = record.band or excited_band(u, fs)
+    paper = paper_estimates(u, y, fs, band=band)
+    readings = read_parameters(
+        joint,
+        fs=fs,
+        highest=min(band[1], fs / 2),
+        delay_correlation=paper.delay,
+        known_covariance=covariance,
+        input_unit=source.unit,
+        output_unit=output.unit,
+    )
+    fit_percent = _fit_percent(joint)
+    left = misfit(u, fit.residual, delay=fit.delay, band=(band[0] / fs, band[1] / fs))
+    judgement = judge(joint, readings, left, fs=fs, band=band, fit_percent=fit_percent)
+    if matrix is None:
+        response = local_response(
+            u, _told(y, fit, found, fs), fs, delay=max(fit.delay, 0.0) / fs, band=band
+        )
+        findings, verdict = judgement.findings, judgement.verdict
+    else:
+        response = column(matrix, i)
+        findings, verdict = with_condition(judgement, matrix, aligned)
+    from_response = response_bandwidths(
+        response,
+        readings.system,
+        readings.parameters,
+        fs=fs,
+        intersample=joint.best.intersample,
+    )
+    parameters, seen = with_imperfections(readings.parameters, found, censored, output.unit)
+    counts = slice(None) if joint.problem.valid is None else joint.problem.valid
+    said = remarks(
+        fit.residual[counts],
+        aligned.time[counts],
+        u,
+        fs=fs,
+        band=band,
+        white=readings.white,
+        unit=output.unit,
+    )
+    findings = (*findings, *seen, *said)
+    parted = disagreement(from_response, readings.parameters)
+    if parted is not None and found.hold is None:
+        findings, verdict = (*findings, parted), "doubtful"
+    return PairIdentification(
+        input=source.name,
+        output=output.name,
+        structure=fit.structure.name,
+        intersample=joint.best.intersample,
+        fit_percent=fit_percent,
+        parameters=parameters,
+        paper=paper,
+        frequency_response=response,
+        numerator=_descending(readings.system.numerator / readings.system.numerator[0]),
+        denominator=_descending(readings.system.denominator),
+        candidates=_candidates(joint),
+        verdict=verdict,
+        warnings=(*aligned.findings, *findings),
+        from_response=from_response,
+        time=aligned.time,
+        prediction=fit.prediction,
+        residual=fit.residual,
+    )
+
+
+def _told(y: NDArray[np.float64], fit: Fit, found: Imperfections, fs: float) -> NDArray[np.float64]:
+    """Output with the model in place of clipped and held samples, for spectra."""
+    told = found.telling(y.size, fs)
+    return y if told is None else np.where(told, y, fit.prediction)
+
+
+def _descending(coefficients: NDArray[np.float64]) -> tuple[float, ...]:
+    return tuple(float(c) for c in coefficients[::-1])
+
+
+def _spread(joint: JointFit) -> float:
+    problem = joint.problem
+    y = problem.y if problem.valid is None else problem.y[problem.valid]
+    return float(np.sum((y - y.mean()) ** 2))
+
+
+def _fit_percent(joint: JointFit, cost: float | None = None) -> float:
+    cost = joint.best.fit.cost if cost is None else cost
+    return float(100.0 * (1.0 - np.sqrt(cost / _spread(joint))))
+
+
+def _candidates(joint: JointFit) -> tuple[Candidate, ...]:
+    ordered = sorted(joint.trials, key=lambda trial: trial.criterion)
+    return tuple(
+        Candidate(
+            structure=trial.fit.structure.name,
+            intersample=trial.intersample,
+            criterion=trial.criterion,
+            fit_percent=_fit_percent(joint, trial.fit.cost),
+            chosen=trial is joint.best,
+        )
+        for trial in ordered
+    )
+
+
+def untold(
+    aligned: Aligned,
+    source: Signal,
+    output: Signal,
+    record: Record,
+    finding: Finding,
+) -> PairIdentification:
+    """Say what little can be said of an output that does not follow the input."""
+    band = record.band or excited_band(source.values, aligned.fs)
+    counted = output.values[output.valid]
+    mean, variance = float(counted.mean()), float(counted.var(ddof=1))
+    return PairIdentification(
+        input=source.name,
+        output=output.name,
+        structure="static",
+        intersample="bandlimited",
+        fit_percent=0.0,
+        parameters=Parameters(
+            bias=estimate(
+                mean, variance / counted.size, freedom=counted.size - 1, unit=output.unit
+            ),
+            noise_std=noise_estimate(
+                variance * (counted.size - 1),
+                freedom=counted.size - 1,
+                share=1.0,
+                unit=output.unit,
+            ),
+        ),
+        paper=PaperEstimates(),
+        frequency_response=local_response(source.values, output.values, aligned.fs, band=band),
+        numerator=(0.0,),
+        denominator=(1.0,),
+        candidates=(),
+        verdict="not_identifiable",
+        warnings=(*aligned.findings, finding),
+        time=aligned.time,
+        prediction=np.full(aligned.samples, mean),
+        residual=np.where(output.valid, output.values - mean, 0.0),
+    )
