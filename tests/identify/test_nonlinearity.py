@@ -8,8 +8,9 @@ from hmpim import Record, identify
 from hmpim.errors import RecordError
 from hmpim.identify.fit import Problem, fit_structure
 from hmpim.identify.joint import joint_fit
+from hmpim.identify.levels import compare_levels
 from hmpim.identify.mechanisms import compare_mechanisms, play, rate_limited
-from hmpim.identify.nonlinearity import compare_levels, inspect_nonlinearity
+from hmpim.identify.nonlinearity import inspect_nonlinearity
 from hmpim.identify.threads import one_thread
 from hmpim.model import STRUCTURES, prepare_input
 from hmpim.rigs import Sensor

@@ -9,20 +9,21 @@ friction, backlash, a hard or soft spring, limits. The terms of order 1 take up 
 linear misfit the residual holds, so a wrong linear structure makes no harmonic.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import solve_toeplitz
 from scipy.signal import lfilter
-from scipy.stats import f as fisher
+from scipy.special import chdtrc, fdtrc
 
 from hmpim.errors import RecordError
 from hmpim.identify.signals import as_pair, check_rate
 from hmpim.identify.sweep_phase import SweepPhase, sweep_phase
 from hmpim.identify.whiteness import autocovariance
 
-__all__ = ["Harmonic", "Harmonics", "sweep_harmonics", "whitener"]
+__all__ = ["Harmonic", "Harmonics", "any_harmonic", "sweep_harmonics", "whitener"]
 
 _ORDERS = (2, 3, 4, 5)
 """Orders looked for; 1 and the mean are taken up with them."""
@@ -54,11 +55,17 @@ class Harmonic:
         Its r.m.s. over the sweep in the residual's unit, what noise puts there taken off.
     probability : float
         Chance of so much, or more, from noise alone.
+    frequency, amplitude, std : tuple of float
+        Amplitude of the harmonic and its standard deviation, in the residual's unit, where the
+        sweep itself is at `frequency` in Hz; places that the order does not reach are left out.
     """
 
     order: int
     rms: float
     probability: float
+    frequency: tuple[float, ...] = ()
+    amplitude: tuple[float, ...] = ()
+    std: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -97,6 +104,7 @@ def sweep_harmonics(
     *,
     delay: float = 0.0,
     phase: SweepPhase | None = None,
+    others: Sequence[SweepPhase] = (),
 ) -> Harmonics | None:
     """Measure the harmonics of a sweep in the residual of a linear fit.
 
@@ -112,6 +120,8 @@ def sweep_harmonics(
         Delay of the system, s; the harmonics come as much later.
     phase : SweepPhase, optional
         From `hmpim.identify.sweep_phase.sweep_phase` if already known.
+    others : sequence of SweepPhase
+        Sweeps of other inputs: what follows those is no harmonic of this one.
 
     Returns
     -------
@@ -144,44 +154,129 @@ def sweep_harmonics(
             f"the sweep's phase has {sweep.phase.size} samples and the residual {e.size}; "
             "give both of one record"
         )
-    sample = np.arange(e.size, dtype=np.float64)
-    turned = np.interp(sample - delay * fs, sample, sweep.phase)
-    rate = np.interp(sample - delay * fs, sample, sweep.frequency) / fs
-    inside = np.interp(sample - delay * fs, sample, sweep.inside.astype(float)) > 0.99
-    inside &= e != 0.0 if np.any(e == 0.0) else True
-    orders = [k for k in _ORDERS if np.count_nonzero(inside & (k * rate < 0.5 * _HIGHEST)) > 50]
-    turns = float(np.ptp(turned[inside])) / (2 * np.pi) if inside.any() else 0.0
-    places = min(_PLACES, int(turns / _TURNS_PER_PLACE))
-    if np.count_nonzero(inside) < _FEWEST or places < 2 or not orders:
+    view = _view(e, sweep, fs, delay)
+    if view is None:
         return None
-    columns = _columns(turned, rate, inside, orders)
-    return _tested(e * inside, columns, turned, inside, orders, places)
+    more = [_turned(other, view.index, delay * fs) for other in others]
+    return _tested(e[view.index], view, more, fs)
 
 
-def _columns(
-    phase: NDArray[np.float64],
-    rate: NDArray[np.float64],
-    inside: NDArray[np.bool_],
-    orders: list[int],
-) -> NDArray[np.float64]:
-    """The mean, then cosine and sine of order 1 and each of `orders`; 0 where not looked at."""
-    out = np.empty((3 + 2 * len(orders), phase.size))
-    out[0] = inside
-    for i, k in enumerate([1, *orders]):
-        seen = inside & (k * rate < 0.5 * _HIGHEST)
-        out[1 + 2 * i] = np.cos(k * phase) * seen
-        out[2 + 2 * i] = np.sin(k * phase) * seen
+def any_harmonic(residual: ArrayLike, sweep: SweepPhase, fs: float, *, delay: float = 0.0) -> float:
+    """Chance that noise alone makes the harmonics seen in a white residual: a quick look.
+
+    A tenth of the work of `sweep_harmonics`, and only as good as the residual is white: it
+    tells where nothing need be looked for.
+
+    Parameters
+    ----------
+    residual : array_like, shape (n,)
+        Output less prediction; 0 where a sample does not count.
+    sweep : SweepPhase
+        From `hmpim.identify.sweep_phase.sweep_phase`.
+    fs : float
+        Rate in Hz.
+    delay : float
+        Delay of the system, s.
+
+    Examples
+    --------
+    >>> t = np.arange(2000) / 200
+    >>> u = np.sin(2 * np.pi * (0.1 * t + t**2))
+    >>> noise = 0.01 * np.random.default_rng(0).standard_normal(2000)
+    >>> sweep = sweep_phase(u, 200.0)
+    >>> any_harmonic(noise, sweep, 200.0) > 0.01
+    True
+    >>> any_harmonic(0.01 * u**2 + noise, sweep, 200.0) < 1e-20
+    True
+    """
+    e = np.asarray(residual, dtype=np.float64)
+    view = _view(e, sweep, fs, delay)
+    if view is None:
+        return 1.0
+    e = e[view.index]
+    e = e - e.mean()
+    power = float(e @ e) / e.size
+    if power == 0.0:
+        return 1.0
+    starts = np.searchsorted(view.along, np.arange(view.places))
+    turn = np.exp(1j * view.phase)
+    spun, chances = e * turn, []
+    for k in range(2, max(view.orders) + 1):
+        spun *= turn
+        seen = k * view.rate < 0.5 * _HIGHEST
+        if k not in view.orders:
+            continue
+        taken = np.add.reduceat(spun * seen, starts)
+        count = np.add.reduceat(seen.astype(np.float64), starts)
+        used = count > 0
+        statistic = float(np.sum(2.0 * np.abs(taken[used]) ** 2 / count[used])) / power
+        chances.append(float(chdtrc(2 * np.count_nonzero(used), statistic)))
+    return min(1.0, len(chances) * min(chances))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _View:
+    """Samples during the sweep that count, and where the sweep was when they began.
+
+    `rate` in turns per sample; `along` from 0 to `places`: half by turns, half by time.
+    """
+
+    index: NDArray[np.intp]
+    phase: NDArray[np.float64]
+    rate: NDArray[np.float64]
+    along: NDArray[np.float64]
+    places: int
+    orders: tuple[int, ...]
+
+
+def _turned(sweep: SweepPhase, index: NDArray[np.intp], late: float) -> NDArray[np.float64]:
+    return np.asarray(np.interp(index - late, np.arange(sweep.phase.size), sweep.phase))
+
+
+def _view(e: NDArray[np.float64], sweep: SweepPhase, fs: float, delay: float) -> _View | None:
+    """The stretch that is looked at; None if it is too short, or no order lies below Nyquist."""
+    late = delay * fs
+    came = np.arange(e.size) - int(np.rint(late))  # to the sample is enough for what is inside
+    inside = sweep.inside[np.clip(came, 0, e.size - 1)] & (came >= 0) & (came < e.size)
+    index = np.flatnonzero(inside & (e != 0.0))
+    if index.size < _FEWEST:
+        return None
+    phase = _turned(sweep, index, late)
+    rate = np.interp(index - late, np.arange(e.size), sweep.frequency) / fs
+    orders = [k for k in _ORDERS if np.count_nonzero(k * rate < 0.5 * _HIGHEST) > 50]
+    span = float(phase[-1] - phase[0])
+    places = min(_PLACES, int(abs(span) / (2 * np.pi) / _TURNS_PER_PLACE))
+    if places < 2 or not orders:
+        return None
+    time = (index - index[0]) / (index[-1] - index[0])
+    along = 0.5 * (np.clip((phase - phase[0]) / span, 0.0, 1.0) + time) * places
+    return _View(
+        index=index,
+        phase=phase,
+        rate=rate,
+        along=np.maximum.accumulate(np.minimum(along, places - 1e-9)),
+        places=places,
+        orders=tuple(orders),
+    )
+
+
+def _columns(view: _View, others: list[NDArray[np.float64]]) -> NDArray[np.float64]:
+    """Cosine and sine of order 1 and each of the others, the mean, then what other inputs do."""
+    out = np.empty((3 + 2 * len(view.orders) + 2 * len(others), view.phase.size))
+    turn = np.exp(1j * view.phase)
+    spun = np.ones_like(turn)
+    row = 0
+    for k in range(1, max(view.orders) + 1):
+        spun = spun * turn
+        if k == 1 or k in view.orders:
+            seen = k * view.rate < 0.5 * _HIGHEST
+            out[row], out[row + 1] = spun.real * seen, spun.imag * seen
+            row += 2
+    out[row] = 1.0
+    for phase in others:
+        out[row + 1], out[row + 2] = np.cos(phase), np.sin(phase)
+        row += 2
     return out
-
-
-def _hats(
-    phase: NDArray[np.float64], inside: NDArray[np.bool_], places: int
-) -> NDArray[np.float64]:
-    """Place along the sweep, 0 to `places`: half by turns, half by time."""
-    where = np.flatnonzero(inside)
-    along = np.clip((phase - phase[where[0]]) / (phase[where[-1]] - phase[where[0]]), 0.0, 1.0)
-    time = np.clip((np.arange(phase.size) - where[0]) / (where[-1] - where[0]), 0.0, 1.0)
-    return np.asarray(np.minimum(0.5 * (along + time) * places, places - 1e-9))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -257,45 +352,48 @@ def _expanded(
 
 
 def _tested(
-    e: NDArray[np.float64],
-    columns: NDArray[np.float64],
-    phase: NDArray[np.float64],
-    inside: NDArray[np.bool_],
-    orders: list[int],
-    places: int,
+    e: NDArray[np.float64], view: _View, others: list[NDArray[np.float64]], fs: float
 ) -> Harmonics:
-    along = _hats(phase, inside, places)
+    columns = _columns(view, others)
+    along, places = view.along, view.places
     weights, _, _ = _solved(_regression(e, columns, along, places))
-    left = e - np.sum(_expanded(columns, weights, along), axis=0) * inside
-    whitening = whitener(left[inside])
+    whitening = whitener(e - np.sum(_expanded(columns, weights, along), axis=0))
     white_e = lfilter(whitening, [1.0], e)
     white_columns = lfilter(whitening, [1.0], columns, axis=1)
     weights, covariance, used = _solved(_regression(white_e, white_columns, along, places))
     model = np.sum(_expanded(white_columns, weights, along), axis=0)
-    counted = int(np.count_nonzero(inside))
-    freedom = max(counted - int(np.count_nonzero(used)) - whitening.size + 1, 1)
-    variance = float(np.sum((white_e - model)[inside] ** 2)) / freedom
+    freedom = max(e.size - int(np.count_nonzero(used)) - whitening.size + 1, 1)
+    variance = float(np.sum((white_e - model) ** 2)) / freedom
+    covariance = covariance * max(variance, 1e-300)
     parts = _expanded(columns, weights, along)
+    frequency = np.interp(np.arange(places + 1), along, view.rate) * fs
     found = []
-    for i, k in enumerate([1, *orders]):
-        group = _group(1 + 2 * i, columns.shape[0], used)
+    for i, k in enumerate([1, *view.orders]):
+        group = _group(2 * i, columns.shape[0], used)
         block = covariance[np.ix_(group, group)]
         statistic = float(weights[group] @ np.linalg.pinv(block, hermitian=True) @ weights[group])
-        chance = fisher.sf(statistic / group.size / max(variance, 1e-300), group.size, freedom)
-        part = parts[1 + 2 * i] + parts[2 + 2 * i]
-        power = float(np.sum(part**2)) / counted
+        part = parts[2 * i] + parts[2 * i + 1]
         # Noise alone puts as much there as the weights' variance makes of the columns.
-        noise = variance * _noise_power(columns, covariance, along, 1 + 2 * i) / counted
+        noise = _noise_power(columns, covariance, along, 2 * i)
+        power = max(float(part @ part) - noise, 0.0) / e.size
+        at = np.arange(places + 1) * columns.shape[0] + 2 * i
+        told = used[at] & used[at + 1] & (k * frequency < 0.5 * _HIGHEST * fs)
+        spread = 0.5 * (covariance[at, at] + covariance[at + 1, at + 1])
         found.append(
             Harmonic(
-                order=k, rms=float(np.sqrt(max(power - noise, 0.0))), probability=float(chance)
+                order=k,
+                rms=float(np.sqrt(power)),
+                probability=float(fdtrc(group.size, freedom, statistic / group.size)),
+                frequency=tuple(frequency[told].tolist()),
+                amplitude=tuple(np.hypot(weights[at], weights[at + 1])[told].tolist()),
+                std=tuple(np.sqrt(spread[told]).tolist()),
             )
         )
-    rest = (e - np.sum(parts, axis=0))[inside]
+    rest = e - np.sum(parts, axis=0)
     return Harmonics(
         orders=tuple(found[1:]),
         fundamental_rms=found[0].rms,
-        noise_rms=float(np.sqrt(rest @ rest / max(counted - np.count_nonzero(used), 1))),
+        noise_rms=float(np.sqrt(rest @ rest / max(e.size - np.count_nonzero(used), 1))),
     )
 
 

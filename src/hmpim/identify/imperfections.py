@@ -40,6 +40,11 @@ class Imperfections:
     hold: Hold | None
     quantization: Quantization | None
 
+    @property
+    def rounding(self) -> float:
+        """R.m.s. of the error of rounding; 0 where none was seen."""
+        return 0.0 if self.quantization is None else self.quantization.step / 12**0.5
+
     def arrivals(self, samples: int, fs: float) -> Updates | None:
         """Samples in which a held output is updated."""
         return None if self.hold is None else updates(self.hold, samples, fs)

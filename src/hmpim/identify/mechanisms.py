@@ -57,7 +57,7 @@ _STICKS = 0.01
 
 _LONGEST_AUTOREGRESSION = 10
 
-_LONGEST = 65536
+_LONGEST = 32768
 """Samples looked at; of a longer record the stretch with the greatest residual."""
 
 _LAGS = 8
@@ -277,8 +277,9 @@ def _fitted(
     weight = max(float(alone @ e) / power, 0.0)
     left = e - (background @ e) @ background - weight * alone
     colour = whitener(left[counted], longest=_LONGEST_AUTOREGRESSION)
-    rows = lfilter(colour, [1.0], np.vstack([background, h]), axis=1)[:, counted]
-    white = lfilter(colour, [1.0], e)[counted]
+    # Samples that do not count are passed over: what is left keeps its linear relation.
+    rows = lfilter(colour, [1.0], np.vstack([background, h])[:, counted], axis=1)
+    white = lfilter(colour, [1.0], e[counted])
     q, r = np.linalg.qr(rows.T)  # the trace last
     if abs(r[-1, -1]) < 1e-9 * float(np.linalg.norm(rows[-1])):
         return None

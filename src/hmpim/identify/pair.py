@@ -10,6 +10,7 @@ from hmpim.identify.imperfections import Imperfections, refine, with_imperfectio
 from hmpim.identify.joint import JointFit
 from hmpim.identify.local import local_response
 from hmpim.identify.multivariable import ResponseMatrix
+from hmpim.identify.nonlinearity import inspect_nonlinearity
 from hmpim.identify.paper import paper_estimates
 from hmpim.identify.readings import read_parameters
 from hmpim.identify.remarks import remarks
@@ -84,7 +85,21 @@ def described(
         white=readings.white,
         unit=output.unit,
     )
-    findings = (*findings, *seen, *said)
+    inspection = inspect_nonlinearity(
+        u,
+        joint.problem,
+        fit,
+        fs=fs,
+        white=readings.white,
+        others=[other.values for other in aligned.inputs if other is not source],
+        floor=found.rounding,
+        unit=output.unit,
+    )
+    known = {finding.code for finding in seen}
+    bent = tuple(finding for finding in inspection.findings if finding.code not in known)
+    findings = (*findings, *seen, *bent, *said)
+    if inspection.doubtful:
+        verdict = "doubtful"
     parted = disagreement(from_response, readings.parameters)
     if parted is not None and found.hold is None:
         findings, verdict = (*findings, parted), "doubtful"
@@ -106,6 +121,7 @@ def described(
         time=aligned.time,
         prediction=fit.prediction,
         residual=fit.residual,
+        nonlinearity=inspection.summary,
     )
 
 

@@ -18,7 +18,9 @@ __all__ = [
     "Candidate",
     "Estimate",
     "FrequencyResponse",
+    "HarmonicCurve",
     "Identification",
+    "Nonlinearity",
     "PairIdentification",
     "PaperEstimates",
     "Parameters",
@@ -182,6 +184,100 @@ class ResponseBandwidths:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class HarmonicCurve:
+    """One harmonic along a sweep.
+
+    Parameters
+    ----------
+    order : int
+        Multiple of the sweep's frequency.
+    frequency : tuple of float
+        Frequency of the sweep itself, Hz.
+    amplitude, std : tuple of float
+        Amplitude of the harmonic while the sweep is there, and its standard deviation, in the
+        output's unit.
+    """
+
+    order: int
+    frequency: tuple[float, ...]
+    amplitude: tuple[float, ...]
+    std: tuple[float, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Nonlinearity:
+    """What no linear system makes of the input, and what it looks like.
+
+    Parameters
+    ----------
+    share : float
+        R.m.s. of the nonlinear part over that of the output about its mean; 0 if none is seen.
+    even, odd : float
+        The same for the part that is asymmetric and the part that is alike either way, noise
+        taken off.
+    noise, linear, nonlinear : float
+        What the power of the residual is made of; they add to 1. `linear` still follows the
+        input: dynamics left out, and what of a nonlinearity looks linear.
+    kinds : tuple of str
+        What the record leaves in question: one if it tells ('hardening', 'softening',
+        'friction', 'backlash', 'rate_limit', 'saturation', 'asymmetry', 'curvature'), several
+        if not, none if it is like none of them or too small to ask.
+    size : Estimate or None
+        Of the kind, if there is one: half width of the band of friction or backlash, speed,
+        level, or share by which the largest deflection departs from proportion.
+    harmonics : tuple of HarmonicCurve
+        Of a sweep in which there is something to see.
+    """
+
+    share: float
+    even: float
+    odd: float
+    noise: float
+    linear: float
+    nonlinear: float
+    kinds: tuple[str, ...] = ()
+    size: Estimate | None = None
+    harmonics: tuple[HarmonicCurve, ...] = ()
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the value as plain JSON values."""
+        plain = {f.name: getattr(self, f.name) for f in fields(self)}
+        return {
+            **plain,
+            "kinds": list(self.kinds),
+            "size": None if self.size is None else self.size.to_dict(),
+            "harmonics": [
+                {
+                    "order": h.order,
+                    "frequency": list(h.frequency),
+                    "amplitude": list(h.amplitude),
+                    "std": list(h.std),
+                }
+                for h in self.harmonics
+            ],
+        }
+
+    @classmethod
+    def from_dict(cls, data: Mapping[str, Any]) -> "Nonlinearity":
+        """Read back what `to_dict` wrote."""
+        return cls(
+            **{name: data[name] for name in ("share", "even", "odd")},
+            **{name: data[name] for name in ("noise", "linear", "nonlinear")},
+            kinds=tuple(data["kinds"]),
+            size=None if data["size"] is None else Estimate.from_dict(data["size"]),
+            harmonics=tuple(
+                HarmonicCurve(
+                    order=h["order"],
+                    frequency=tuple(h["frequency"]),
+                    amplitude=tuple(h["amplitude"]),
+                    std=tuple(h["std"]),
+                )
+                for h in data["harmonics"]
+            ),
+        )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Candidate:
     """One structure that was tried: how well it fits and what its fit costs.
 
@@ -204,7 +300,8 @@ class PairIdentification:
     gain at DC: numerator and denominator coefficients in powers of s (rad/s), highest
     first. `prediction` and `residual` (shape (n,), the output's unit) are on the record's
     own uniform clock `time`; they are not part of the JSON. `from_response` holds bandwidths
-    read off the measured response, to be held against the model's.
+    read off the measured response, to be held against the model's. `nonlinearity` is None
+    where the output does not follow the input at all.
     """
 
     input: str
@@ -224,6 +321,7 @@ class PairIdentification:
     time: NDArray[np.float64] | None = None
     prediction: NDArray[np.float64] | None = None
     residual: NDArray[np.float64] | None = None
+    nonlinearity: Nonlinearity | None = None
 
     def __getattr__(self, name: str) -> Estimate | None:
         """Return a parameter by its name: ``pair.delay`` is ``pair.parameters.delay``."""
@@ -251,6 +349,7 @@ class PairIdentification:
             "candidates": [
                 {f.name: getattr(c, f.name) for f in fields(c)} for c in self.candidates
             ],
+            "nonlinearity": None if self.nonlinearity is None else self.nonlinearity.to_dict(),
             "verdict": self.verdict,
             "warnings": [{"code": w.code, "message": w.message} for w in self.warnings],
         }
@@ -258,6 +357,7 @@ class PairIdentification:
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> "PairIdentification":
         """Read back what `to_dict` wrote."""
+        nonlinearity = data.get("nonlinearity")  # results written before it have none
         return cls(
             input=data["input"],
             output=data["output"],
@@ -273,6 +373,7 @@ class PairIdentification:
             candidates=tuple(Candidate(**c) for c in data["candidates"]),
             verdict=data["verdict"],
             warnings=tuple(Finding(**w) for w in data["warnings"]),
+            nonlinearity=None if nonlinearity is None else Nonlinearity.from_dict(nonlinearity),
         )
 
 
