@@ -26,13 +26,14 @@ from hmpim.identify.enrich import (
 )
 from hmpim.identify.fit import Fit, Problem, fit_structure, jacobian
 from hmpim.identify.start import RoughResponse, rough_response, starting_values
+from hmpim.identify.unexplained import unexplained_response
 from hmpim.identify.whiteness import effective_share, is_white, misfit
 from hmpim.model.dynamics import STRUCTURES, Structure, StructureName
 from hmpim.model.response import slowest_time_constant
 from hmpim.model.sampled import SampledInput, prepare_input
 from hmpim.record import Intersample
 
-__all__ = ["CLEARLY", "JointFit", "Trial", "joint_fit"]
+__all__ = ["CLEARLY", "JointFit", "Trial", "joint_fit", "nested"]
 
 CLEARLY = 6.0
 """Difference in log-likelihood that decides against the natural assumption (odds of 400)."""
@@ -43,6 +44,9 @@ under the other assumptions."""
 
 _MATERIAL = 0.02
 """Share of the output (r.m.s.) below which a misfit is reported but not modelled."""
+
+_PARTLY = 0.05
+"""Share of the response, evenly over the band, below which the same holds."""
 
 _POOR = 0.2
 """Share of the output's power left over, in colour, that asks for a richer structure anyway."""
@@ -295,7 +299,7 @@ def _fit_all(
     for i, fit in enumerate(fits):
         for other in fits:
             if _nests(other, fit):
-                rival = fit_structure(problem, fit.structure, _nested(other), iterations=_TASTE)
+                rival = fit_structure(problem, fit.structure, nested(other), iterations=_TASTE)
                 fits[i] = min(fits[i], rival, key=lambda f: f.cost)
     least = min(fit.cost for fit in fits)
     return [
@@ -332,15 +336,29 @@ def _best_of(problem: Problem, structure: Structure, starts: list[NDArray[np.flo
 
 
 def _worth_explaining(problem: Problem, fit: Fit, data: _Data) -> bool:
-    """Whether the residual follows the input by more than a small share of the output."""
+    """Whether the residual follows the input by more than a small share of output or response."""
     omega = data.rough.omega
     band = (omega[0] / (2 * np.pi), omega[-1] / (2 * np.pi))
     left = misfit(data.u, fit.residual, delay=fit.delay, band=band)
     spread = float(np.sum((problem.masked(problem.y - problem.y.mean())) ** 2))
     owed = float(np.sqrt(left.share * fit.cost / spread)) if spread else 0.0
-    return (left.probability < 1e-4 and owed > _MATERIAL) or (
-        fit.cost > _POOR * spread and not is_white(fit.residual)
+    if left.probability < 1e-4 and (owed > _MATERIAL or _misses_part(problem, fit, data, band)):
+        return True
+    return fit.cost > _POOR * spread and not is_white(fit.residual)
+
+
+def _misses_part(problem: Problem, fit: Fit, data: _Data, band: tuple[float, float]) -> bool:
+    """Whether the response is missed where the output hardly moves, as at the end of a sweep."""
+    span = slice(None)
+    if problem.valid is not None:
+        counted = np.flatnonzero(problem.valid)
+        span = slice(int(counted[0]), int(counted[-1]) + 1)
+        if counted.size < counted[-1] + 1 - counted[0]:
+            return False  # spectra do not bear gaps
+    missed = unexplained_response(
+        data.u[span], data.y[span], fit.residual[span], delay=fit.delay, band=band
     )
+    return missed > _PARTLY
 
 
 def _nests(simple: Fit, rich: Fit) -> bool:
@@ -358,7 +376,7 @@ def _without_second_pole(second_order: Fit) -> NDArray[np.float64]:
     return np.array([delay + min(shape, 0.25) * np.exp(log_lag), log_lag])
 
 
-def _nested(first_order: Fit) -> NDArray[np.float64]:
+def nested(first_order: Fit) -> NDArray[np.float64]:
     """First order as second: a quarter of its time constant moved into a second pole."""
     return np.concatenate([first_order.theta, [0.1875]])  # (1 + 3/4 Ts)(1 + 1/4 Ts)
 
