@@ -79,7 +79,7 @@ class MotionTable:
     >>> sweep = design(band=(0.5, 30), duration=1, fs=500, limits=limits)
     >>> record = table.play({"pitch": sweep}, rng=np.random.default_rng(0))
     >>> record.inputs[0].name, record.outputs[0].name, record.intersample
-    ('pitch.command', 'pitch.position', 'zoh')
+    ('pitch.command', 'pitch.position', 'bandlimited')
     """
 
     axes: tuple[AxisSpec, ...] = FIG_4
@@ -322,7 +322,9 @@ class MotionTable:
         -------
         Record
             Inputs ``roll.command`` and so on, outputs ``roll.position``, both from the start
-            position, in the stimulus's unit (outputs of axes held: deg), held between samples.
+            position, in the stimulus's unit (outputs of axes held: deg). Held between samples in
+            mode P; in PV and PVA the held position is not the whole input, and the record says
+            'bandlimited', so that the response found is that of samples over samples.
 
         Raises
         ------
@@ -363,6 +365,6 @@ class MotionTable:
             outputs=tuple(channel(axis, "encoder", "position") for axis in seen),
             fs=command_rate(named),
             band=(min(b[0] for b in bands), max(b[1] for b in bands)) if bands else None,
-            intersample="zoh",
+            intersample="zoh" if self.mode == "P" else "bandlimited",
             source=f"simulated {self.name}, {self.mode}",
         )
