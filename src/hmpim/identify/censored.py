@@ -79,8 +79,8 @@ class _Data:
     y: NDArray[np.float64]
     low: NDArray[np.bool_]
     high: NDArray[np.bool_]
-    low_edge: float
-    high_edge: float
+    low_edge: NDArray[np.float64]
+    high_edge: NDArray[np.float64]
     noise_after: bool
 
 
@@ -111,6 +111,7 @@ def fit_censored(
     saturation: Saturation | None,
     *,
     arrivals: Updates | None = None,
+    drift: NDArray[np.float64] | None = None,
     iterations: int = 50,
 ) -> CensoredFit:
     """Fit one structure to an output that was clipped.
@@ -125,6 +126,8 @@ def fit_censored(
         Levels and clipped samples; None for an output that was only held.
     arrivals : Updates, optional
         Samples in which a held output is updated; every sample by default.
+    drift : ndarray, shape (n,), optional
+        What was taken off the output, by which the levels move against it; none by default.
     iterations : int
         At most so many steps.
 
@@ -152,7 +155,7 @@ def fit_censored(
     >>> [round(float(fit.linear[0]), 1) for fit in (plain, better.fit)], round(better.noise_std, 1)
     ([2.3, 3.0], 0.1)
     """
-    data = _data(problem, saturation, arrivals)
+    data = _data(problem, saturation, arrivals, drift)
     state = _start(data, fit)
     damping, converged = 1e-4, False
     for count in range(iterations):
@@ -253,7 +256,12 @@ def censored_covariance(
     return _with_age(_covariance(state, white=white)[:size, :size], data)
 
 
-def _data(problem: Problem, saturation: Saturation | None, arrivals: Updates | None) -> _Data:
+def _data(
+    problem: Problem,
+    saturation: Saturation | None,
+    arrivals: Updates | None,
+    drift: NDArray[np.float64] | None = None,
+) -> _Data:
     n = problem.y.size
     counted = np.ones(n, dtype=bool) if problem.valid is None else problem.valid
     if arrivals is None:
@@ -264,15 +272,16 @@ def _data(problem: Problem, saturation: Saturation | None, arrivals: Updates | N
         arrivals = replace(arrivals, index=arrivals.index[keep], age=arrivals.age[keep])
     nothing = np.zeros(arrivals.index.size, dtype=bool)
     low = high = nothing
-    low_edge, high_edge, after = -np.inf, np.inf, False
+    moved = np.zeros(arrivals.index.size) if drift is None else drift[arrivals.index]
+    low_edge, high_edge, after = moved - np.inf, moved + np.inf, False
     if saturation is not None:
         after = saturation.noise == "after"
         if saturation.low is not None:
             low = saturation.clipped_low[arrivals.index]
-            low_edge = saturation.low + saturation.tolerance
+            low_edge = saturation.low + saturation.tolerance - moved
         if saturation.high is not None:
             high = saturation.clipped_high[arrivals.index]
-            high_edge = saturation.high - saturation.tolerance
+            high_edge = saturation.high - saturation.tolerance - moved
     return _Data(
         problem=problem,
         arrivals=arrivals,
@@ -335,7 +344,7 @@ def _evaluated(data: _Data, fit: Fit, log_sigma: float) -> _State | None:
         for where, edge, sign in ((data.low, data.low_edge, -1), (data.high, data.high_edge, 1)):
             if not where.any():
                 continue
-            a = sign * (edge - prediction[where]) / sigma
+            a = sign * (edge[where] - prediction[where]) / sigma
             tail = norm.logsf(a)
             hazard = np.exp(norm.logpdf(a) - tail)
             value[where] = tail + 0.5 * np.log(2 * np.pi)
@@ -394,9 +403,9 @@ def _levels_again(data: _Data, state: _State) -> _Data:
     low, high = data.low_edge, data.high_edge
     below, above = state.prediction < low, state.prediction > high
     if np.count_nonzero(below) > 3:
-        low = float(np.mean(data.y[below]))
+        low = low + float(np.mean((data.y - low)[below]))
     if np.count_nonzero(above) > 3:
-        high = float(np.mean(data.y[above]))
+        high = high + float(np.mean((data.y - high)[above]))
     return replace(data, low_edge=low, high_edge=high)
 
 

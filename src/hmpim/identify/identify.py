@@ -1,17 +1,22 @@
 """From a record to every parameter: the paper's steps and the joint fit, side by side."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import cast, get_args
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hmpim.errors import ArgumentError, RecordError
 from hmpim.identify.coupled import matrix_of
+from hmpim.identify.drift import Drifting, with_drift
 from hmpim.identify.imperfections import Imperfections, find_imperfections
+from hmpim.identify.joint import JointFit
 from hmpim.identify.pair import described, untold
 from hmpim.identify.result import Identification, PairIdentification, RecordSummary
 from hmpim.identify.several import Joined, fit_together
 from hmpim.identify.threads import one_thread
+from hmpim.identify.verdict import is_unrelated
 from hmpim.identify.whiteness import is_white
 from hmpim.model.dynamics import STRUCTURES, StructureName
 from hmpim.record import Aligned, Finding, Intersample, Record, Signal, uniform
@@ -140,22 +145,26 @@ def _identify_output(
         )
         return [untold(aligned, source, output, record, dead) for source in aligned.inputs]
     found = find_imperfections(output.values, aligned.fs)
-    joined = _joined(aligned, output, found, intersample, structures)
+    joined, drifting = _drifted(aligned, output, found, intersample, structures)
     seen = found.saturation is not None or found.hold is not None
     if seen or not is_white(joined.fits[0].best.fit.residual):
         # Now that there is a model, a plateau can be told from a crest.
         predicted = joined.fits[0].best.fit.prediction
+        if drifting is not None:
+            predicted = predicted + drifting.trend
         again = find_imperfections(output.values, aligned.fs, prediction=predicted)
         if (again.saturation is None) != (found.saturation is None) or (again.hold is None) != (
             found.hold is None
         ):
-            joined = _joined(aligned, output, again, intersample, structures)
+            joined, drifting = _drifted(aligned, output, again, intersample, structures)
         found = again
     matrix = matrix_of(aligned, output, record, joined) if len(aligned.inputs) > 1 else None
     pairs = []
     for i, source in enumerate(aligned.inputs):
         if joined.related[i]:
-            pairs.append(described(aligned, source, output, record, joined, i, matrix, found))
+            pairs.append(
+                described(aligned, source, output, record, joined, i, matrix, found, drifting)
+            )
             continue
         unrelated = Finding(
             code="unrelated",
@@ -164,6 +173,32 @@ def _identify_output(
         )
         pairs.append(untold(aligned, source, output, record, unrelated))
     return pairs
+
+
+def _drifted(
+    aligned: Aligned,
+    output: Signal,
+    found: Imperfections,
+    intersample: Intersample | None,
+    structures: tuple[StructureName, ...],
+) -> tuple[Joined, Drifting | None]:
+    """Fit an output, with a bias that drifts where the residual asks for it."""
+    joined = _joined(aligned, output, found, intersample, structures)
+    if len(aligned.inputs) > 1:
+        return joined, None
+
+    def fitted(y: NDArray[np.float64]) -> JointFit:
+        return _joined(aligned, replace(output, values=y), found, intersample, structures).fits[0]
+
+    drifting = with_drift(joined.fits[0], output.values, fitted)
+    if drifting is None:
+        return joined, None
+    return replace(
+        joined,
+        fits=(drifting.joint,),
+        related=(not is_unrelated(drifting.joint),),
+        covariances=(drifting.covariance,),
+    ), drifting
 
 
 def _joined(

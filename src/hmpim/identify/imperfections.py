@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from hmpim.errors import RecordError
 from hmpim.identify.censored import CensoredFit, fit_censored
+from hmpim.identify.drift import Drifting
 from hmpim.identify.hold import Hold, Updates, detect_hold, updates
 from hmpim.identify.joint import JointFit, Trial
 from hmpim.identify.quantization import Quantization, detect_quantization
@@ -89,7 +90,9 @@ def find_imperfections(
     )
 
 
-def refine(joint: JointFit, found: Imperfections, fs: float) -> tuple[JointFit, CensoredFit] | None:
+def refine(
+    joint: JointFit, found: Imperfections, fs: float, drifting: Drifting | None = None
+) -> tuple[JointFit, CensoredFit] | None:
     """Fit the chosen structure to what was read; None where there is nothing to refine."""
     if found.saturation is None and found.hold is None:
         return None
@@ -98,7 +101,11 @@ def refine(joint: JointFit, found: Imperfections, fs: float) -> tuple[JointFit, 
     arrivals = found.arrivals(problem.y.size, fs)
     try:
         censored = fit_censored(
-            replace(problem, valid=whole), joint.best.fit, found.saturation, arrivals=arrivals
+            replace(problem, valid=whole),
+            joint.best.fit,
+            found.saturation,
+            arrivals=arrivals,
+            drift=None if drifting is None else drifting.trend,
         )
     except RecordError:  # fewer samples inside the range than parameters: the first fit stands
         return None

@@ -5,6 +5,7 @@ from numpy.typing import NDArray
 
 from hmpim.identify.bandwidth import disagreement, response_bandwidths
 from hmpim.identify.coupled import column, with_condition
+from hmpim.identify.drift import Drifting, drift_finding
 from hmpim.identify.fit import Fit
 from hmpim.identify.imperfections import Imperfections, refine, with_imperfections
 from hmpim.identify.joint import JointFit
@@ -34,19 +35,20 @@ def described(
     i: int,
     matrix: ResponseMatrix | None,
     found: Imperfections,
+    drifting: Drifting | None = None,
 ) -> PairIdentification:
     """Say all that is known of an output that follows an input."""
     fs, joint = aligned.fs, joined.fits[i]
-    covariance = joined.covariances[i] if matrix is not None else None
-    refined = refine(joint, found, fs) if matrix is None else None
+    covariance = joined.covariances[i] if joined.covariances else None
+    refined = refine(joint, found, fs, drifting) if matrix is None else None
     censored = None
     if refined is not None:
         joint, censored = refined
         covariance = censored.covariance
     fit = joint.best.fit
-    u, y = source.values, joint.problem.y  # what the other inputs leave over
+    u, y = source.values, joint.problem.y  # without the drift, and what other inputs move
     band = record.band or excited_band(u, fs)
-    paper = paper_estimates(u, y, fs, band=band)
+    paper = paper_estimates(u, output.values if matrix is None else y, fs, band=band)
     readings = read_parameters(
         joint,
         fs=fs,
@@ -78,12 +80,10 @@ def described(
     counts = slice(None) if joint.problem.valid is None else joint.problem.valid
     said = remarks(
         fit.residual[counts],
-        aligned.time[counts],
         u,
         fs=fs,
         band=band,
         white=readings.white,
-        unit=output.unit,
     )
     inspection = inspect_nonlinearity(
         u,
@@ -98,6 +98,8 @@ def described(
     known = {finding.code for finding in seen}
     bent = tuple(finding for finding in inspection.findings if finding.code not in known)
     findings = (*findings, *seen, *bent, *said)
+    if drifting is not None:
+        findings = (*findings, drift_finding(drifting, fs, output.unit))
     if inspection.doubtful:
         verdict = "doubtful"
     parted = disagreement(from_response, readings.parameters)
@@ -119,7 +121,7 @@ def described(
         warnings=(*aligned.findings, *findings),
         from_response=from_response,
         time=aligned.time,
-        prediction=fit.prediction,
+        prediction=fit.prediction if drifting is None else fit.prediction + drifting.trend,
         residual=fit.residual,
         nonlinearity=inspection.summary,
     )

@@ -1,16 +1,13 @@
-"""What else is worth saying of a record: colour of the noise, drift, noise on the input."""
+"""What else is worth saying of a record: colour of the noise, noise on the input."""
 
 import numpy as np
 from numpy.typing import NDArray
 
-from hmpim.identify.colour import bias_drift, noise_colour
+from hmpim.identify.colour import noise_colour
 from hmpim.identify.input_noise import input_noise
 from hmpim.record import Finding
 
 __all__ = ["remarks"]
-
-_CERTAIN = 1e-5
-"""Chance below which a drift is not chance."""
 
 _ATTENUATES = 0.002
 """Share by which noise on the input must lower the gain to be worth a word."""
@@ -18,28 +15,24 @@ _ATTENUATES = 0.002
 
 def remarks(
     residual: NDArray[np.float64],
-    time: NDArray[np.float64],
     u: NDArray[np.float64],
     *,
     fs: float,
     band: tuple[float, float],
     white: bool,
-    unit: str,
 ) -> tuple[Finding, ...]:
-    """Say what colours the residual, whether the bias drifts, and whether the input is noisy.
+    """Say what colours the residual, and whether the input is noisy.
 
     Parameters
     ----------
-    residual, time, u : ndarray, shapes (m,), (m,) and (n,)
-        Residual and time of the samples that counted; the whole input.
+    residual, u : ndarray, shapes (m,) and (n,)
+        Residual of the samples that counted; the whole input.
     fs : float
         Rate in Hz.
     band : tuple of float
         Excited band in Hz.
     white : bool
         Whether the residual passed for white: then there is nothing to say of it.
-    unit : str
-        Of the output.
     """
     found: list[Finding] = []
     if not white:
@@ -51,16 +44,6 @@ def remarks(
                 "Look for hum, drift or motion that the model does not have.",
             )
         )
-        drift = bias_drift(residual, time)
-        if drift.probability < _CERTAIN:
-            found.append(
-                Finding(
-                    code="drift",
-                    message=f"The bias drifts by {drift.total:.3g} {unit} over the record "
-                    f"({drift.slope:.3g} ± {drift.std:.2g} per s). Let the unit warm up, or "
-                    "measure the bias before and after.",
-                )
-            )
     noise = input_noise(u, fs, band=band)
     if noise is not None and noise.attenuation > _ATTENUATES:
         found.append(
