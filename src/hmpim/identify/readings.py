@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from hmpim.identify.fit import jacobian
 from hmpim.identify.halves import Halves, compare_halves
 from hmpim.identify.joint import JointFit
+from hmpim.identify.nested import second_pole_limit, widened
 from hmpim.identify.result import Estimate, Parameters
 from hmpim.identify.uncertainty import covariance, estimate, gradient, noise_estimate
 from hmpim.identify.whiteness import is_white
@@ -46,6 +47,9 @@ class Readings:
         Whether the residual passed for white.
     halves : Halves
         Whether the halves of the record tell the same model.
+    second_pole : float or None
+        For a first-order fit, the longest second time constant that the record does not
+        exclude, over the first.
     """
 
     parameters: Parameters
@@ -54,6 +58,7 @@ class Readings:
     covariance: _Vector
     white: bool
     halves: Halves
+    second_pole: float | None
 
     def variance(self, function: Callable[[_Vector], float]) -> float:
         """Variance of a function of `vector`, to first order."""
@@ -110,7 +115,7 @@ def read_parameters(
     rows = jacobian(joint.problem, fit)
     cov = known_covariance
     if cov is None:
-        cov = _covariance(joint, rows, freedom=freedom, white=white)
+        cov = widened(joint, _covariance(joint, rows, freedom=freedom, white=white))
     effective = freedom * joint.effective_share
     system = system_of(structure, vector, fs)
 
@@ -224,6 +229,10 @@ def read_parameters(
         covariance=cov,
         white=white,
         halves=compare_halves(rows, residual, joint.problem.y, share=joint.effective_share),
+        second_pole=second_pole_limit(joint.problem, fit, rows, white=white)
+        / float(np.exp(vector[1]))
+        if structure.name == "first_order"
+        else None,
     )
 
 

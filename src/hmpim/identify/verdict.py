@@ -28,6 +28,9 @@ _LOOSE = 0.3
 _AMBIGUOUS = 4.0
 """Difference of the criterion within which another plain structure is worth naming."""
 
+_SECOND_POLE = 0.2
+"""Share of the time constant up to which a second pole may hide in a first-order result."""
+
 _DISAGREES = 4.0
 """Standard deviations by which its delay must differ to cast doubt."""
 
@@ -166,6 +169,15 @@ def judge(
             f"The number of poles this record hardly tells: {fit.structure.name} is taken for "
             f"its wider error bars; {joint.simpler.fit.structure.name} would put the delay at "
             f"{joint.simpler.fit.delay / fs:.4g} s. Lower the noise, or sweep higher.",
+            doubt=True,
+        )
+    if readings.second_pole is not None and readings.second_pole > _SECOND_POLE:
+        hidden = readings.second_pole * float(np.exp(fit.theta[1])) / fs
+        note(
+            "structure",
+            f"A second pole of up to {hidden:.3g} s beside the time constant would not show in "
+            "this record, and would shorten the delay by as much. Lower the noise, or sweep "
+            "higher.",
             doubt=True,
         )
     rival = _rival(joint)
