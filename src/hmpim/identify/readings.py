@@ -129,39 +129,35 @@ def read_parameters(
 
     axis = np.eye(vector.size)
 
-    def root(
-        value: float | None,
-        equation: Callable[[float, _Vector], float],
-    ) -> Estimate | None:
-        """Frequency in Hz that solves equation(frequency, vector) = 0."""
-        if value is None:
-            return None
-        slope = gradient(lambda v: equation(value, v), vector)
-        step = 1e-5 * value
-        rate = (equation(value + step, vector) - equation(value - step, vector)) / (2 * step)
-        return estimate(value, float(slope @ cov @ slope) / rate**2, freedom=effective, unit="Hz")
-
-    def phase_from(f: float, v: _Vector, delay: bool) -> float:
-        """Phase at f less that of the fitted system where the lag is 90°."""
-        here = system_of(structure, v, fs)
-        there = np.array([f])
-        turned = response(here, there)[0] / here.numerator[0]
-        if not delay:
-            turned *= np.exp(2j * np.pi * f * here.delay)
-        return float(np.angle(turned * 1j))
-
-    def gain_at(f: float, v: _Vector) -> float:
-        here = system_of(structure, v, fs)
-        return float(np.abs(response(here, np.array([f]))[0] / here.numerator[0]))
-
     order = structure.order
     steady = structure.integrators == 0  # an integrator has no gain at DC to compare with
     dynamic = order > 0 and steady
     peak = peak_gain(system, highest=highest) if dynamic else None
 
-    def peak_at(v: _Vector) -> float:
-        # At a maximum the frequency's own shift does not count.
-        return 20.0 * float(np.log10(gain_at(peak.frequency if peak else 0.0, v)))
+    marks = (
+        bandwidth_phase(system, highest=highest) if steady else None,
+        bandwidth_phase(system, highest=highest, delay=False) if dynamic else None,
+        bandwidth_3db(system, highest=highest) if dynamic else None,
+        peak.frequency if peak is not None else None,
+    )
+    sensitivity = _Sensitivity(structure, vector, fs, tuple(f for f in marks if f is not None))
+
+    def crossing(value: float | None, delay: bool | None) -> Estimate | None:
+        """Frequency at which the phase (with the delay or without) or, for None, the gain is met.
+
+        By the implicit function: the curve's own error over its slope.
+        """
+        if value is None:
+            return None
+        change, rate = sensitivity.at(value)
+        if delay is None:
+            slope, steep = change.real, rate.real
+        else:
+            slope, steep = change.imag.copy(), rate.imag
+            if not delay:
+                slope[0] += 2 * np.pi * value / fs
+                steep += 2 * np.pi * system.delay
+        return estimate(value, float(slope @ cov @ slope) / steep**2, freedom=effective, unit="Hz")
 
     mode = _lowest_mode(structure, vector)
     slow = dominant_time_constant(system)
@@ -202,25 +198,15 @@ def read_parameters(
         )
         if slow is not None
         else None,
-        bandwidth_phase90=root(
-            bandwidth_phase(system, highest=highest),
-            lambda f, v: phase_from(f, v, True),
+        bandwidth_phase90=crossing(marks[0], True),
+        bandwidth_phase90_without_delay=crossing(marks[1], False),
+        bandwidth_3db=crossing(marks[2], None),
+        # At a maximum the frequency's own shift does not count.
+        peak_gain_db=linear(
+            peak.gain_db, 20 / np.log(10) * sensitivity.at(peak.frequency)[0].real, "dB"
         )
-        if steady
+        if peak is not None
         else None,
-        bandwidth_phase90_without_delay=root(
-            bandwidth_phase(system, highest=highest, delay=False),
-            lambda f, v: phase_from(f, v, False),
-        )
-        if dynamic
-        else None,
-        bandwidth_3db=root(
-            bandwidth_3db(system, highest=highest),
-            lambda f, v: gain_at(f, v) - 1 / np.sqrt(2),
-        )
-        if dynamic
-        else None,
-        peak_gain_db=explicit(peak_at, "dB") if dynamic else None,
     )
     return Readings(
         parameters=parameters,
@@ -234,6 +220,34 @@ def read_parameters(
         if structure.name == "first_order"
         else None,
     )
+
+
+class _Sensitivity:
+    """Derivatives of ln(G / G(0)) with respect to the fit's vector, and to the frequency."""
+
+    def __init__(
+        self, structure: Structure, vector: _Vector, fs: float, frequencies: tuple[float, ...]
+    ) -> None:
+        self._places = np.array(frequencies)
+
+        def curve(v: _Vector, f: _Vector) -> NDArray[np.complex128]:
+            system = system_of(structure, v, fs)
+            return np.asarray(response(system, f) / system.numerator[0])
+
+        here = curve(vector, self._places)
+        self._slopes = np.empty((vector.size, self._places.size), dtype=np.complex128)
+        for i, value in enumerate(vector):
+            step = np.zeros(vector.size)
+            step[i] = 1e-6 * max(abs(value), 1e-3)
+            up, down = (curve(vector + sign * step, self._places) for sign in (1.0, -1.0))
+            self._slopes[i] = (up - down) / (2 * step[i] * here)
+        up, down = (curve(vector, self._places * (1 + sign * 1e-5)) for sign in (1.0, -1.0))
+        self._rates = (up - down) / (2e-5 * np.maximum(self._places, 1e-300) * here)
+
+    def at(self, frequency: float) -> tuple[NDArray[np.complex128], complex]:
+        """Derivatives with respect to the vector, shape (p,), and to the frequency in Hz."""
+        i = int(np.flatnonzero(self._places == frequency)[0])
+        return self._slopes[:, i], complex(self._rates[i])
 
 
 def _lowest_mode(structure: Structure, vector: _Vector) -> int | None:

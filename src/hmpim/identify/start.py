@@ -143,21 +143,23 @@ def starting_values(
     finer = int(np.clip(np.ceil(rough.omega[-1] / _PHASE_STEP), 1, 8))
     shifts = np.arange(min(earliest - rough.lag, 0) * finer, 2 * finer + 1)
     order = structure.order
-    if order == 0:
-        cost, _ = _levy(rough, shifts, finer, 0, rough.weight)
-        return [np.array([rough.lag + shifts[int(np.argmin(cost))] / finer])]
     scale = float(np.sqrt(rough.weight @ rough.omega**2 / rough.weight.sum()))
+    # Multiplied by A's coefficients and e^(jω shift), these should sum to a constant.
+    terms = np.vander(1j * rough.omega / scale, order + 1, increasing=True).T * rough.response
+    if order == 0:
+        cost, _ = _levy(rough, terms, shifts, finer, rough.weight)
+        return [np.array([rough.lag + shifts[int(np.argmin(cost))] / finer])]
     found: list[tuple[float, NDArray[np.float64]]] = []
     for corner in _CORNERS if thorough else _CORNERS[1:2]:
         roll_off = 1.0 + (rough.omega / (corner * rough.omega[-1])) ** 2
         first = rough.weight / roll_off ** min(order, 2)
-        cost, coefficients = _levy(rough, shifts, finer, order, first, scale)
+        cost, coefficients = _levy(rough, terms, shifts, finer, first)
         for i in _local_minima(cost, 2):
             shift, a = shifts[i], coefficients[i]
             for _ in range(2):  # Sanathanan-Koerner: reweight, look nearby for the delay again
                 weight = rough.weight / np.abs(_polynomial(a, rough.omega / scale)) ** 2
                 near = shifts[np.abs(shifts - shift) <= max(3, shifts.size // 8)]
-                local, solved = _levy(rough, near, finer, order, weight, scale)
+                local, solved = _levy(rough, terms, near, finer, weight)
                 best = int(np.argmin(local))
                 shift, a = near[best], solved[best]
             physical = _stable(a, order)
@@ -179,25 +181,26 @@ def starting_values(
 
 def _polynomial(a: NDArray[np.float64], x: NDArray[np.float64]) -> NDArray[np.complex128]:
     """1 + a1 s + a2 s² + … at s = jx."""
-    return np.asarray(np.polynomial.polynomial.polyval(1j * x, np.concatenate([[1.0], a])))
+    s, value = 1j * x, np.full(x.size, a[-1], dtype=complex)
+    for coefficient in (*a[-2::-1], 1.0):
+        value = coefficient + s * value
+    return value
 
 
 def _levy(
     rough: RoughResponse,
+    terms: NDArray[np.complex128],
     shifts: NDArray[np.intp],
     finer: int,
-    order: int,
     weight: NDArray[np.float64],
-    scale: float = 1.0,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Solve at each shift, in samples / finer; return costs, (k,), and coefficients, (k, order)."""
-    s = 1j * rough.omega / scale
-    powers = s[None, :] ** np.arange(order + 1)[:, None]
-    terms = powers * rough.response  # multiplied by e^(jω shift), these should sum to a constant
-    gram = ((terms * weight) @ terms.conj().T).real
+    order = terms.shape[0] - 1
+    weighted = terms * weight
+    gram = (weighted @ terms.conj().T).real
     length = rough.length * finer
     spectrum = np.zeros((order + 1, length // 2 + 1), dtype=complex)
-    spectrum[:, rough.bins] = terms * weight
+    spectrum[:, rough.bins] = weighted
     # irfft adds each bin's mirror and divides by the length.
     cross = irfft(spectrum, length, axis=1)[:, shifts % length] * length / 2
     total = weight.sum()

@@ -3,6 +3,7 @@
 Coefficients here are in seconds: numerator and denominator by rising powers of s.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -48,22 +49,38 @@ def response(system: RationalDelay, frequency: NDArray[np.float64]) -> NDArray[n
     >>> abs(response(lag, np.array([1 / (2 * np.pi)]))).round(6).tolist()
     [0.707107]
     """
-    s = 2j * np.pi * np.asarray(frequency, dtype=np.float64)
-    polyval = np.polynomial.polynomial.polyval
-    ratio = polyval(s, system.numerator) / polyval(s, system.denominator)
+    s = np.asarray(2j * np.pi * np.asarray(frequency, dtype=np.float64), dtype=np.complex128)
+    ratio = _polynomial(system.numerator, s) / _polynomial(system.denominator, s)
     return np.asarray(ratio * np.exp(-s * system.delay))
 
 
-def _turn(coefficients: NDArray[np.float64], omega: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Continuous phase of a polynomial in jω, zero at ω = 0, in radians."""
-    turned = np.zeros_like(omega)
+def _polynomial(
+    coefficients: NDArray[np.float64], s: NDArray[np.complex128]
+) -> NDArray[np.complex128]:
+    """By Horner's rule: `numpy.polynomial` checks its arguments longer than it computes."""
+    value = np.full(s.shape, coefficients[-1], dtype=np.complex128)
+    for coefficient in coefficients[-2::-1]:
+        value = coefficient + s * value
+    return value
+
+
+def _roots(coefficients: NDArray[np.float64]) -> NDArray[np.complex128]:
+    """Roots of a polynomial by rising powers."""
     trimmed = np.trim_zeros(coefficients, "b")
-    if trimmed.size < 2:
-        return turned
-    for root in np.roots(trimmed[::-1]):
-        away = -root.real if root.real != 0 else np.finfo(float).tiny
-        turned += np.arctan((omega - root.imag) / away) - np.arctan(-root.imag / away)
-    return turned
+    if trimmed.size == 3:  # in closed form, without loss where one root is much the greater
+        c, b, a = trimmed
+        away = np.sqrt(complex(b * b - 4 * a * c))
+        q = -0.5 * (b + (away if (b * away.conjugate()).real >= 0 else -away))
+        return np.array([q / a, c / q]) if q != 0 else np.zeros(2, dtype=complex)
+    return np.asarray(np.roots(trimmed[::-1]), dtype=np.complex128)
+
+
+def _turn(roots: NDArray[np.complex128], omega: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Continuous phase in jω of a polynomial with these roots, zero at ω = 0, in radians."""
+    away = np.where(roots.real != 0, -roots.real, np.finfo(float).tiny)[:, None]
+    aside = roots.imag[:, None]
+    turned = np.arctan((omega - aside) / away) - np.arctan(-aside / away)
+    return np.asarray(turned.sum(axis=0))
 
 
 def phase(
@@ -80,9 +97,21 @@ def phase(
     delay : bool
         Whether the pure delay's lag is included (paper, eq. 25, takes it out).
     """
-    omega = 2 * np.pi * np.asarray(frequency, dtype=np.float64)
-    lag = omega * system.delay if delay else 0.0
-    return _turn(system.numerator, omega) - _turn(system.denominator, omega) - lag
+    return _phase_of(system, delay=delay)(np.asarray(frequency, dtype=np.float64))
+
+
+def _phase_of(
+    system: RationalDelay, *, delay: bool
+) -> Callable[[NDArray[np.float64]], NDArray[np.float64]]:
+    """`phase` as a function of the frequency alone, the roots found once."""
+    zeros, poles = _roots(system.numerator), _roots(system.denominator)
+    late = system.delay if delay else 0.0
+
+    def at(frequency: NDArray[np.float64]) -> NDArray[np.float64]:
+        omega = 2 * np.pi * frequency
+        return _turn(zeros, omega) - _turn(poles, omega) - omega * late
+
+    return at
 
 
 def _first_crossing(frequency: NDArray[np.float64], values: NDArray[np.float64]) -> int | None:
@@ -101,8 +130,10 @@ def bandwidth_phase(
     """Lowest frequency in Hz at which the phase lags by `lag` rad; None beyond `highest` Hz."""
     grid = _grid(highest)
 
+    turned = _phase_of(system, delay=delay)
+
     def margin(f: NDArray[np.float64]) -> NDArray[np.float64]:
-        return phase(system, f, delay=delay) + lag
+        return turned(f) + lag
 
     i = _first_crossing(grid, margin(grid))
     if i is None:
@@ -155,8 +186,7 @@ def peak_gain(system: RationalDelay, *, highest: float) -> PeakGain:
 
 def _moving_poles(denominator: NDArray[np.float64]) -> NDArray[np.complex128]:
     """Poles other than those at zero, which belong to an integrator."""
-    poles = np.roots(np.trim_zeros(denominator, "f")[::-1])
-    return np.asarray(poles, dtype=np.complex128)
+    return _roots(np.trim_zeros(denominator, "f"))
 
 
 def slowest_time_constant(denominator: NDArray[np.float64]) -> float:

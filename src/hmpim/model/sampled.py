@@ -21,6 +21,7 @@ from math import comb, factorial, floor
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.fft import rfft
 from scipy.linalg import expm
 from scipy.ndimage import spline_filter1d
 from scipy.signal import firwin, lfilter, oaconvolve
@@ -107,7 +108,7 @@ def prepare_input(u: NDArray[np.float64], intersample: Intersample) -> SampledIn
 def _oversampling(deviation: NDArray[np.float64]) -> int:
     """Factor that brings the content of the input below the spline's good band."""
     taper = np.hanning(deviation.size + 2)[1:-1]  # the ends' jump is not content
-    power = np.abs(np.fft.rfft(deviation * taper)) ** 2
+    power = np.abs(rfft(deviation * taper)) ** 2
     total = power.sum()
     if total == 0:
         return 1
