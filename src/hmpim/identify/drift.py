@@ -68,7 +68,9 @@ class Drifting:
 
 
 def with_drift(
-    first: JointFit, y: NDArray[np.float64], fitted: Callable[[NDArray[np.float64]], JointFit]
+    first: JointFit,
+    y: NDArray[np.float64],
+    fitted: Callable[[NDArray[np.float64], bool], JointFit],
 ) -> Drifting | None:
     """Fit again with a drifting bias, where the first fit asks for it and gains by it.
 
@@ -79,7 +81,8 @@ def with_drift(
     y : ndarray, shape (n,)
         Output.
     fitted : callable
-        Makes the joint fit of another output.
+        Makes the joint fit of another output; of the plain structures only if the second
+        argument is true.
 
     Returns
     -------
@@ -92,19 +95,19 @@ def with_drift(
     valid = first.problem.valid
     best: Drifting | None = None
     for degree in (1, _DEGREES[-1]):
-        begun = fitted(y - _regressed(columns[:degree], y, valid))
+        begun = fitted(y - _regressed(columns[:degree], y, valid), True)
         settled, weights = _backfitted(begun, y, columns[:degree])
         chosen = _degree(settled, columns, weights)
         # The structure is chosen once more, now that the drift is known.
         joint, weights = _backfitted(
-            fitted(y - weights[:chosen] @ columns[:chosen]), y, columns[:chosen]
+            fitted(y - weights[:chosen] @ columns[:chosen], False), y, columns[:chosen]
         )
         found = _described(joint, columns[:chosen], weights)
-        if best is None or _criterion(joint, chosen) < _criterion(best.joint, best.degree):
+        if best is None or _gain(joint, chosen, best.joint, best.degree) > 0:
             best = found
         if not _asked_for(joint):
             break
-    if best is None or _criterion(best.joint, best.degree) > _criterion(first, 0):
+    if best is None or _gain(best.joint, best.degree, first, 0) < 0:
         return None
     return best
 
@@ -128,6 +131,8 @@ def _asked_for(joint: JointFit) -> bool:
     fit, problem = joint.best.fit, joint.problem
     if is_white(fit.residual):
         return False
+    if joint.forgotten:  # it may be the drift that parts the beginning from the rest
+        return True
     if slowest_time_constant(fit.denominator) > _SLOW * problem.y.size:
         return True
     counted = np.arange(problem.y.size) if problem.valid is None else np.flatnonzero(problem.valid)
@@ -222,12 +227,16 @@ def _degree(joint: JointFit, columns: NDArray[np.float64], weights: NDArray[np.f
     return best[1]
 
 
-def _criterion(joint: JointFit, degree: int) -> float:
-    """Schwarz's criterion with all samples counted, the polynomial's degree among the unknowns."""
-    count = joint.problem.counted
-    fit = joint.best.fit
-    cost = max(fit.cost, np.finfo(float).tiny) / count
-    return float(count * np.log(cost) + (fit.structure.parameters + degree) * np.log(count))
+def _gain(one: JointFit, degree: int, other: JointFit, other_degree: int) -> float:
+    """Schwarz's criterion of another fit less that of one, per sample that counts in either."""
+    count = max(one.problem.counted, other.problem.counted)
+
+    def criterion(joint: JointFit, order: int) -> float:
+        fit = joint.best.fit
+        cost = max(fit.cost, np.finfo(float).tiny) / joint.problem.counted
+        return float(count * np.log(cost) + (fit.structure.parameters + order) * np.log(count))
+
+    return criterion(other, other_degree) - criterion(one, degree)
 
 
 def _described(

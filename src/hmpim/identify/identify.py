@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from hmpim.errors import ArgumentError, RecordError
 from hmpim.identify.coupled import matrix_of
 from hmpim.identify.drift import Drifting, with_drift
+from hmpim.identify.enrich import PLAIN
 from hmpim.identify.imperfections import Imperfections, find_imperfections
 from hmpim.identify.joint import JointFit
 from hmpim.identify.pair import described, untold
@@ -187,8 +188,11 @@ def _drifted(
     if len(aligned.inputs) > 1:
         return joined, None
 
-    def fitted(y: NDArray[np.float64]) -> JointFit:
-        return _joined(aligned, replace(output, values=y), found, intersample, structures).fits[0]
+    plain = tuple(name for name in structures if name in PLAIN) or structures
+
+    def fitted(y: NDArray[np.float64], quickly: bool) -> JointFit:
+        names = plain if quickly else structures
+        return _joined(aligned, replace(output, values=y), found, intersample, names).fits[0]
 
     drifting = with_drift(joined.fits[0], output.values, fitted)
     if drifting is None:

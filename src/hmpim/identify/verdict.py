@@ -8,7 +8,7 @@ from hmpim.identify.enrich import PLAIN
 from hmpim.identify.joint import CLEARLY, JointFit
 from hmpim.identify.readings import Readings
 from hmpim.identify.result import Estimate, Verdict
-from hmpim.identify.whiteness import Misfit
+from hmpim.identify.whiteness import Misfit, innovation_gain
 from hmpim.model import slowest_time_constant
 from hmpim.record import Finding
 
@@ -17,6 +17,10 @@ __all__ = ["Judgement", "is_unrelated", "judge"]
 _RELATED = 40.0
 """Log-likelihood by which a model must beat "the output is constant": looking at thousands
 of delays and dynamics, pure noise reaches about 15."""
+
+_INNOVATES = 60.0
+"""And by which it must beat "the output is noise of some colour", where the residual is so
+coloured that few of its samples are independent; another sweep reaches about 40."""
 
 _TOLERATED_MISFIT = 0.03
 """Misfit, over the output's own r.m.s., beyond which a result is doubtful."""
@@ -51,7 +55,11 @@ def is_unrelated(joint: JointFit) -> bool:
     if joint.best.fit.cost <= 0:
         return spread == 0
     gain = 0.5 * y.size * joint.effective_share * np.log(spread / joint.best.fit.cost)
-    return bool(gain < _RELATED)
+    if gain >= _RELATED:
+        return False
+    residual = joint.best.fit.residual
+    residual = residual if problem.valid is None else residual[problem.valid]
+    return innovation_gain(y, residual) < _INNOVATES
 
 
 def judge(

@@ -13,6 +13,7 @@ __all__ = [
     "autocovariance",
     "autoregressive_spectrum",
     "effective_share",
+    "innovation_gain",
     "is_white",
     "misfit",
 ]
@@ -20,6 +21,8 @@ __all__ = [
 _LAGS = 25
 _LONGEST_AUTOREGRESSION = 30
 _FLICKER_BINS = 32
+_INNOVATION_ORDER = 12
+_MOST_INNOVATIONS = 100_000
 
 
 def autocovariance(residual: NDArray[np.float64], lags: int) -> NDArray[np.float64]:
@@ -71,6 +74,47 @@ def effective_share(residual: NDArray[np.float64]) -> float:
     rho = r[1:] / r[0]
     rho = rho[np.abs(rho) > 3.0 / np.sqrt(residual.size)]
     return float(1.0 / (1.0 + 2.0 * np.sum(rho**2)))
+
+
+def innovation_gain(y: NDArray[np.float64], residual: NDArray[np.float64]) -> float:
+    """Log-likelihood by which a residual is more likely than the output, both as coloured noise.
+
+    Each is taken as an autoregression of its own (order 12, least squares, so that wander and
+    lines are told exactly); what that cannot foresee of the output, the model must explain.
+
+    Parameters
+    ----------
+    y, residual : ndarray, shape (n,)
+        Output, and what a model leaves of it.
+
+    Examples
+    --------
+    A wandering output has nothing that its own past does not tell:
+
+    >>> rng = np.random.default_rng(0)
+    >>> wander, pulses = np.cumsum(rng.standard_normal(2000)), rng.standard_normal(2000)
+    >>> innovation_gain(wander, wander - wander.mean()) < 1
+    True
+    >>> innovation_gain(wander + 2 * pulses, wander) > 500
+    True
+    """
+    if y.size > _MOST_INNOVATIONS:
+        middle = slice((y.size - _MOST_INNOVATIONS) // 2, (y.size + _MOST_INNOVATIONS) // 2)
+        y, residual = y[middle], residual[middle]
+    unforeseen = _innovation(residual)
+    if unforeseen <= 0.0:
+        return float("inf") if _innovation(y) > 0.0 else 0.0
+    size = y.size - _INNOVATION_ORDER
+    return float(0.5 * size * np.log(max(_innovation(y) / unforeseen, np.finfo(float).tiny)))
+
+
+def _innovation(x: NDArray[np.float64]) -> float:
+    """Mean square of what an autoregression with a constant does not foresee."""
+    order = min(_INNOVATION_ORDER, x.size // 10)
+    past = [x[order - k : x.size - k] for k in range(1, order + 1)]
+    rows = np.stack([np.ones(x.size - order), *past])
+    weights = np.linalg.lstsq(rows.T, x[order:], rcond=None)[0]
+    return float(np.mean((x[order:] - weights @ rows) ** 2))
 
 
 def autoregressive_spectrum(
