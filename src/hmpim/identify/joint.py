@@ -45,7 +45,7 @@ under the other assumptions."""
 _MATERIAL = 0.02
 """Share of the output (r.m.s.) below which a misfit is reported but not modelled."""
 
-_PARTLY = 0.05
+_PARTLY = 0.08
 """Share of the response, evenly over the band, below which the same holds."""
 
 _POOR = 0.2
