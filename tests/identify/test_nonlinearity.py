@@ -11,6 +11,7 @@ from hmpim.identify.joint import joint_fit
 from hmpim.identify.levels import compare_levels
 from hmpim.identify.mechanisms import compare_mechanisms, play, rate_limited
 from hmpim.identify.nonlinearity import inspect_nonlinearity
+from hmpim.identify.plainer import plainer
 from hmpim.identify.threads import one_thread
 from hmpim.model import STRUCTURES, prepare_input
 from hmpim.rigs import Sensor
@@ -60,7 +61,9 @@ def inspected(drive, y):
     u = drive(T)
     with one_thread():
         joint = joint_fit(u, y, intersample="bandlimited")
-        found = inspect_nonlinearity(u, joint.problem, joint.best.fit, fs=FS, unit="deg")
+        found = inspect_nonlinearity(
+            u, joint.problem, joint.best.fit, fs=FS, plain=plainer(joint), unit="deg"
+        )
     return found, {f.code: f.message for f in found.findings}
 
 

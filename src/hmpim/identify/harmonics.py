@@ -13,34 +13,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
-from scipy.linalg import solve_toeplitz
-from scipy.signal import lfilter
+from numpy.typing import ArrayLike
 from scipy.special import chdtrc, fdtrc
 
 from hmpim.errors import RecordError
+from hmpim.identify.harmonic_regression import HIGHEST, HarmonicFit, fit_harmonics, view_of
 from hmpim.identify.signals import as_pair, check_rate
 from hmpim.identify.sweep_phase import SweepPhase, sweep_phase
-from hmpim.identify.whiteness import autocovariance
 
-__all__ = ["Harmonic", "Harmonics", "any_harmonic", "sweep_harmonics", "whitener"]
-
-_ORDERS = (2, 3, 4, 5)
-"""Orders looked for; 1 and the mean are taken up with them."""
-
-_PLACES = 10
-"""Times between which an amplitude changes linearly, at most."""
-
-_TURNS_PER_PLACE = 3.0
-"""Turns of the sweep between them, at least."""
-
-_HIGHEST = 0.9
-"""Share of the Nyquist frequency up to which an order is followed: beyond it folds back."""
-
-_LONGEST_AUTOREGRESSION = 20
-
-_FEWEST = 100
-"""Samples of the sweep."""
+__all__ = ["Harmonic", "Harmonics", "any_harmonic", "sweep_harmonics"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -81,11 +62,14 @@ class Harmonics:
         of a nonlinearity that looks linear.
     noise_rms : float
         R.m.s. of the rest.
+    regression : HarmonicFit
+        What they were read off.
     """
 
     orders: tuple[Harmonic, ...]
     fundamental_rms: float
     noise_rms: float
+    regression: HarmonicFit
 
     def rms(self, parity: int) -> float:
         """R.m.s. of all even (0) or odd (1) orders together."""
@@ -154,11 +138,10 @@ def sweep_harmonics(
             f"the sweep's phase has {sweep.phase.size} samples and the residual {e.size}; "
             "give both of one record"
         )
-    view = _view(e, sweep, fs, delay)
+    view = view_of(e, sweep, fs, delay)
     if view is None:
         return None
-    more = [_turned(other, view.index, delay * fs) for other in others]
-    return _tested(e[view.index], view, more, fs)
+    return _tested(fit_harmonics(e, view, others, delay * fs), fs)
 
 
 def any_harmonic(residual: ArrayLike, sweep: SweepPhase, fs: float, *, delay: float = 0.0) -> float:
@@ -190,7 +173,7 @@ def any_harmonic(residual: ArrayLike, sweep: SweepPhase, fs: float, *, delay: fl
     True
     """
     e = np.asarray(residual, dtype=np.float64)
-    view = _view(e, sweep, fs, delay)
+    view = view_of(e, sweep, fs, delay)
     if view is None:
         return 1.0
     e = e[view.index]
@@ -203,7 +186,7 @@ def any_harmonic(residual: ArrayLike, sweep: SweepPhase, fs: float, *, delay: fl
     spun, chances = e * turn, []
     for k in range(2, max(view.orders) + 1):
         spun *= turn
-        seen = k * view.rate < 0.5 * _HIGHEST
+        seen = k * view.rate < 0.5 * HIGHEST
         if k not in view.orders:
             continue
         taken = np.add.reduceat(spun * seen, starts)
@@ -214,207 +197,35 @@ def any_harmonic(residual: ArrayLike, sweep: SweepPhase, fs: float, *, delay: fl
     return min(1.0, len(chances) * min(chances))
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class _View:
-    """Samples during the sweep that count, and where the sweep was when they began.
-
-    `rate` in turns per sample; `along` from 0 to `places`: half by turns, half by time.
-    """
-
-    index: NDArray[np.intp]
-    phase: NDArray[np.float64]
-    rate: NDArray[np.float64]
-    along: NDArray[np.float64]
-    places: int
-    orders: tuple[int, ...]
-
-
-def _turned(sweep: SweepPhase, index: NDArray[np.intp], late: float) -> NDArray[np.float64]:
-    return np.asarray(np.interp(index - late, np.arange(sweep.phase.size), sweep.phase))
-
-
-def _view(e: NDArray[np.float64], sweep: SweepPhase, fs: float, delay: float) -> _View | None:
-    """The stretch that is looked at; None if it is too short, or no order lies below Nyquist."""
-    late = delay * fs
-    came = np.arange(e.size) - int(np.rint(late))  # to the sample is enough for what is inside
-    inside = sweep.inside[np.clip(came, 0, e.size - 1)] & (came >= 0) & (came < e.size)
-    index = np.flatnonzero(inside & (e != 0.0))
-    if index.size < _FEWEST:
-        return None
-    phase = _turned(sweep, index, late)
-    rate = np.interp(index - late, np.arange(e.size), sweep.frequency) / fs
-    orders = [k for k in _ORDERS if np.count_nonzero(k * rate < 0.5 * _HIGHEST) > 50]
-    span = float(phase[-1] - phase[0])
-    places = min(_PLACES, int(abs(span) / (2 * np.pi) / _TURNS_PER_PLACE))
-    if places < 2 or not orders:
-        return None
-    time = (index - index[0]) / (index[-1] - index[0])
-    along = 0.5 * (np.clip((phase - phase[0]) / span, 0.0, 1.0) + time) * places
-    return _View(
-        index=index,
-        phase=phase,
-        rate=rate,
-        along=np.maximum.accumulate(np.minimum(along, places - 1e-9)),
-        places=places,
-        orders=tuple(orders),
-    )
-
-
-def _columns(view: _View, others: list[NDArray[np.float64]]) -> NDArray[np.float64]:
-    """Cosine and sine of order 1 and each of the others, the mean, then what other inputs do."""
-    out = np.empty((3 + 2 * len(view.orders) + 2 * len(others), view.phase.size))
-    turn = np.exp(1j * view.phase)
-    spun = np.ones_like(turn)
-    row = 0
-    for k in range(1, max(view.orders) + 1):
-        spun = spun * turn
-        if k == 1 or k in view.orders:
-            seen = k * view.rate < 0.5 * _HIGHEST
-            out[row], out[row + 1] = spun.real * seen, spun.imag * seen
-            row += 2
-    out[row] = 1.0
-    for phase in others:
-        out[row + 1], out[row + 2] = np.cos(phase), np.sin(phase)
-        row += 2
-    return out
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class _Regression:
-    """Normal equations of all columns, each at every place."""
-
-    gram: NDArray[np.float64]
-    moment: NDArray[np.float64]
-
-
-def _regression(
-    e: NDArray[np.float64], columns: NDArray[np.float64], along: NDArray[np.float64], places: int
-) -> _Regression:
-    """Sum the normal equations place by place: at any time only two places have weight."""
-    count = columns.shape[0]
-    gram = np.zeros((places + 1, count, places + 1, count))
-    moment = np.zeros((places + 1, count))
-    cell = along.astype(np.intp)
-    for i in range(places):
-        here = cell == i
-        part, share = columns[:, here], along[here] - i
-        left, right = part * (1.0 - share), part * share
-        for a, first in ((i, left), (i + 1, right)):
-            moment[a] += first @ e[here]
-            for b, second in ((i, left), (i + 1, right)):
-                gram[a, :, b, :] += first @ second.T
-    size = (places + 1) * count
-    return _Regression(gram=gram.reshape(size, size), moment=moment.reshape(size))
-
-
-def _solved(
-    regression: _Regression,
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.bool_]]:
-    """Weights, their covariance for unit noise, and which columns have any content."""
-    scale = np.sqrt(np.maximum(np.diag(regression.gram), 0.0))
-    used = scale > 1e-6 * scale.max()
-    gram = regression.gram[np.ix_(used, used)] / np.outer(scale[used], scale[used])
-    values, vectors = np.linalg.eigh(gram)
-    inverse = (vectors / np.maximum(values, 1e-8)) @ vectors.T
-    weights, covariance = np.zeros(used.size), np.zeros(regression.gram.shape)
-    weights[used] = inverse @ (regression.moment[used] / scale[used]) / scale[used]
-    covariance[np.ix_(used, used)] = inverse / np.outer(scale[used], scale[used])
-    return weights, covariance, used
-
-
-def whitener(
-    e: NDArray[np.float64], *, longest: int = _LONGEST_AUTOREGRESSION
-) -> NDArray[np.float64]:
-    """Coefficients 1, -a1, … of the autoregression that Akaike's criterion chooses."""
-    longest = min(longest, e.size // 20)
-    r = autocovariance(e, longest)
-    if r[0] <= 0:
-        return np.ones(1)
-    best, chosen = e.size * np.log(r[0]), np.zeros(0)
-    for order in range(1, longest + 1):
-        coefficients = solve_toeplitz(r[:order], r[1 : order + 1])
-        variance = float(r[0] - coefficients @ r[1 : order + 1])
-        if variance <= 1e-12 * r[0]:
-            break
-        criterion = e.size * np.log(variance) + 2 * order
-        if criterion < best:
-            best, chosen = criterion, coefficients
-    return np.concatenate([[1.0], -chosen])
-
-
-def _expanded(
-    columns: NDArray[np.float64], weights: NDArray[np.float64], along: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    """What each column contributes over time, shape (columns, n)."""
-    shaped = weights.reshape(-1, columns.shape[0]).T
-    grid = np.arange(shaped.shape[1])
-    return np.stack([c * np.interp(along, grid, w) for c, w in zip(columns, shaped, strict=True)])
-
-
-def _tested(
-    e: NDArray[np.float64], view: _View, others: list[NDArray[np.float64]], fs: float
-) -> Harmonics:
-    columns = _columns(view, others)
-    along, places = view.along, view.places
-    weights, _, _ = _solved(_regression(e, columns, along, places))
-    whitening = whitener(e - np.sum(_expanded(columns, weights, along), axis=0))
-    white_e = lfilter(whitening, [1.0], e)
-    white_columns = lfilter(whitening, [1.0], columns, axis=1)
-    weights, covariance, used = _solved(_regression(white_e, white_columns, along, places))
-    model = np.sum(_expanded(white_columns, weights, along), axis=0)
-    freedom = max(e.size - int(np.count_nonzero(used)) - whitening.size + 1, 1)
-    variance = float(np.sum((white_e - model) ** 2)) / freedom
-    covariance = covariance * max(variance, 1e-300)
-    parts = _expanded(columns, weights, along)
-    frequency = np.interp(np.arange(places + 1), along, view.rate) * fs
+def _tested(fit: HarmonicFit, fs: float) -> Harmonics:
+    """Test each order, and read off its amplitude along the sweep."""
+    view, count = fit.view, fit.columns.shape[0]
+    frequency = np.interp(np.arange(view.places + 1), view.along, view.rate) * fs
     found = []
-    for i, k in enumerate([1, *view.orders]):
-        group = _group(2 * i, columns.shape[0], used)
-        block = covariance[np.ix_(group, group)]
-        statistic = float(weights[group] @ np.linalg.pinv(block, hermitian=True) @ weights[group])
-        part = parts[2 * i] + parts[2 * i + 1]
+    for i, k in enumerate(fit.orders):
+        group = fit.group(2 * i, 2 * i + 2)
+        block, weights = fit.covariance[np.ix_(group, group)], fit.weights[group]
+        statistic = float(weights @ np.linalg.pinv(block, hermitian=True) @ weights)
+        part = fit.part(i)
         # Noise alone puts as much there as the weights' variance makes of the columns.
-        noise = _noise_power(columns, covariance, along, 2 * i)
-        power = max(float(part @ part) - noise, 0.0) / e.size
-        at = np.arange(places + 1) * columns.shape[0] + 2 * i
-        told = used[at] & used[at + 1] & (k * frequency < 0.5 * _HIGHEST * fs)
-        spread = 0.5 * (covariance[at, at] + covariance[at + 1, at + 1])
+        power = max(float(part @ part) - fit.noise_power(i), 0.0) / part.size
+        at = np.arange(view.places + 1) * count + 2 * i
+        told = fit.used[at] & fit.used[at + 1] & (k * frequency < 0.5 * HIGHEST * fs)
+        spread = 0.5 * (fit.covariance[at, at] + fit.covariance[at + 1, at + 1])
         found.append(
             Harmonic(
                 order=k,
                 rms=float(np.sqrt(power)),
-                probability=float(fdtrc(group.size, freedom, statistic / group.size)),
+                probability=float(fdtrc(group.size, fit.freedom, statistic / group.size)),
                 frequency=tuple(frequency[told].tolist()),
-                amplitude=tuple(np.hypot(weights[at], weights[at + 1])[told].tolist()),
+                amplitude=tuple(np.hypot(fit.weights[at], fit.weights[at + 1])[told].tolist()),
                 std=tuple(np.sqrt(spread[told]).tolist()),
             )
         )
-    rest = e - np.sum(parts, axis=0)
+    degrees = max(fit.rest.size - int(np.count_nonzero(fit.used)), 1)
     return Harmonics(
         orders=tuple(found[1:]),
         fundamental_rms=found[0].rms,
-        noise_rms=float(np.sqrt(rest @ rest / max(e.size - np.count_nonzero(used), 1))),
+        noise_rms=float(np.sqrt(fit.rest @ fit.rest / degrees)),
+        regression=fit,
     )
-
-
-def _group(first: int, count: int, used: NDArray[np.bool_]) -> NDArray[np.intp]:
-    """Indices of one order's cosine and sine at all places."""
-    index = np.arange(used.size)
-    chosen = ((index % count == first) | (index % count == first + 1)) & used
-    return np.flatnonzero(chosen)
-
-
-def _noise_power(
-    columns: NDArray[np.float64],
-    covariance: NDArray[np.float64],
-    along: NDArray[np.float64],
-    first: int,
-) -> float:
-    """Sum of squares that unit noise puts into one order."""
-    count = columns.shape[0]
-    places = covariance.shape[0] // count - 1
-    pair = columns[first : first + 2]
-    own = _regression(np.zeros(columns.shape[1]), pair, along, places).gram
-    index = np.arange(covariance.shape[0])
-    group = np.flatnonzero((index % count == first) | (index % count == first + 1))
-    return float(np.sum(own * covariance[np.ix_(group, group)]))

@@ -27,10 +27,18 @@ from numpy.typing import NDArray
 from scipy.signal import lfilter
 
 from hmpim.identify.fit import Fit, Problem, jacobian
-from hmpim.identify.harmonics import whitener
+from hmpim.identify.harmonic_regression import whitener
 from hmpim.model.sampled import delayed_response, prepare_input
 
-__all__ = ["Kind", "Mechanism", "compare_mechanisms", "play", "rate_limited"]
+__all__ = [
+    "Hypothesis",
+    "Kind",
+    "Mechanism",
+    "compare_mechanisms",
+    "hypotheses",
+    "play",
+    "rate_limited",
+]
 
 Kind = Literal[
     "hardening",
@@ -43,7 +51,7 @@ Kind = Literal[
     "curvature",
 ]
 
-_GAPS = (0.01, 0.02, 0.04, 0.08, 0.15, 0.25, 0.4)
+_GAPS = (0.002, 0.005, 0.01, 0.02, 0.04, 0.08, 0.15, 0.25, 0.4)
 """Half gaps tried, over the output's largest deviation."""
 
 _RATES = (0.15, 0.3, 0.45, 0.6, 0.75, 0.88)
@@ -64,7 +72,7 @@ _LAGS = 8
 """Samples of the input on either side that a linear change of the model may use."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Mechanism:
     """One kind of nonlinearity, as well as it fits the residual.
 
@@ -85,7 +93,11 @@ class Mechanism:
     likelihood : float
         Log-likelihood, the same constant left out for all kinds.
     rms : float
-        R.m.s. of the effect in the output, in its unit.
+        R.m.s. of what of its effect in the output no linear change explains, in its unit.
+    effect : float
+        R.m.s. of its whole effect, in the output's unit.
+    trace : ndarray, shape (n,)
+        Its effect in the output, to a factor; empty where only part of the record was looked at.
     """
 
     kind: Kind
@@ -94,6 +106,8 @@ class Mechanism:
     gain: float
     likelihood: float
     rms: float
+    effect: float
+    trace: NDArray[np.float64]
 
 
 def play(x: NDArray[np.float64], half_gap: float) -> NDArray[np.float64]:
@@ -137,8 +151,20 @@ def rate_limited(x: NDArray[np.float64], step: float) -> NDArray[np.float64]:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class _Hypothesis:
-    """A trace. Its weight is the size, if `size` is None; `spacing` is that of values tried."""
+class Hypothesis:
+    """A kind with one value tried, and its trace.
+
+    Parameters
+    ----------
+    kind : str
+        Name as in the module's table.
+    trace : ndarray, shape (n,)
+        Effect in the output.
+    size : float or None
+        None where the weight of the trace is the size.
+    spacing : float
+        Half the spacing of the values tried.
+    """
 
     kind: Kind
     trace: NDArray[np.float64]
@@ -180,7 +206,7 @@ def compare_mechanisms(problem: Problem, fit: Fit, *, fs: float) -> tuple[Mechan
     background = _background(problem, fit, here)
     x = fit.prediction[here] - fit.linear[-1]
     best: dict[Kind, Mechanism] = {}
-    for hypothesis in _hypotheses(x, fit.denominator, fs):
+    for hypothesis in hypotheses(x, fit.denominator, fs):
         found = _fitted(hypothesis, fit.residual[here], background, counted[here])
         if found is None:
             continue
@@ -217,10 +243,20 @@ def _shifted(x: NDArray[np.float64], by: int) -> NDArray[np.float64]:
     return x[index]
 
 
-def _hypotheses(
+def hypotheses(
     x: NDArray[np.float64], denominator: NDArray[np.float64], fs: float
-) -> Iterator[_Hypothesis]:
-    """Every kind with every value tried, for the linear model's deflection `x`."""
+) -> Iterator[Hypothesis]:
+    """Every kind with every value tried.
+
+    Parameters
+    ----------
+    x : ndarray, shape (n,)
+        The linear model's output less its bias.
+    denominator : ndarray
+        Of the dynamics that a force goes through, by rising powers of s per sample.
+    fs : float
+        Rate in Hz.
+    """
     largest = float(np.max(np.abs(x)))
     step = np.gradient(x)
     fastest = float(np.max(np.abs(step)))
@@ -233,28 +269,28 @@ def _hypotheses(
 
     share = x / largest
     cube, square = largest * share**3, largest * share**2
-    yield _Hypothesis(kind="curvature", trace=cube)
-    yield _Hypothesis(kind="curvature", trace=-cube)
-    yield _Hypothesis(kind="asymmetry", trace=square)
-    yield _Hypothesis(kind="asymmetry", trace=-square)
+    yield Hypothesis(kind="curvature", trace=cube)
+    yield Hypothesis(kind="curvature", trace=-cube)
+    yield Hypothesis(kind="asymmetry", trace=square)
+    yield Hypothesis(kind="asymmetry", trace=-square)
     if denominator[0] > 0 and denominator.size > 1:  # an integrator gives way to any force
-        yield _Hypothesis(kind="hardening", trace=-through(cube))
-        yield _Hypothesis(kind="softening", trace=through(cube))
-        yield _Hypothesis(kind="asymmetry", trace=-through(square))
-        yield _Hypothesis(kind="asymmetry", trace=through(square))
-        yield _Hypothesis(kind="friction", trace=-through(np.tanh(step / (_STICKS * fastest))))
+        yield Hypothesis(kind="hardening", trace=-through(cube))
+        yield Hypothesis(kind="softening", trace=through(cube))
+        yield Hypothesis(kind="asymmetry", trace=-through(square))
+        yield Hypothesis(kind="asymmetry", trace=through(square))
+        yield Hypothesis(kind="friction", trace=-through(np.tanh(step / (_STICKS * fastest))))
     for gap in _GAPS:
         half = gap * largest
         trace = (play(x, half) - x) / half
-        yield _Hypothesis(kind="backlash", trace=trace, spacing=0.15 * half)
+        yield Hypothesis(kind="backlash", trace=trace, spacing=0.15 * half)
     for level in _LEVELS:
         size = level * largest
-        yield _Hypothesis(
+        yield Hypothesis(
             kind="saturation", trace=np.clip(x, -size, size) - x, size=size, spacing=0.08 * largest
         )
     for rate in _RATES:
         size = rate * fastest
-        yield _Hypothesis(
+        yield Hypothesis(
             kind="rate_limit",
             trace=rate_limited(x, size) - x,
             size=size * fs,
@@ -263,7 +299,7 @@ def _hypotheses(
 
 
 def _fitted(
-    hypothesis: _Hypothesis,
+    hypothesis: Hypothesis,
     e: NDArray[np.float64],
     background: NDArray[np.float64],
     counted: NDArray[np.bool_],
@@ -297,4 +333,6 @@ def _fitted(
         gain=0.5 * n * float(np.log1p(projected[-1] ** 2 / rest)),
         likelihood=-0.5 * n * float(np.log(rest / n)),
         rms=weight * float(np.sqrt(np.mean(alone**2))),
+        effect=weight * float(np.std(h[counted])),
+        trace=hypothesis.trace,
     )

@@ -25,6 +25,7 @@ def general(
     where: Sequence[str],
     made_of: tuple[float, float, float],
     kinds: Sequence[Mechanism],
+    effect: float,
     asked: bool,
 ) -> Finding:
     """Say that it is nonlinear, how much, even or odd, and what it may be.
@@ -39,6 +40,8 @@ def general(
         Shares of the residual's power: noise, linear, nonlinear.
     kinds : sequence of Mechanism
         Those left in question.
+    effect : float
+        R.m.s. of all that the first of them does, over that of the output.
     asked : bool
         Whether the kinds were compared at all.
 
@@ -46,7 +49,7 @@ def general(
     --------
     >>> general(
     ...     share=0.021, where=["odd harmonics of the sweep"], made_of=(0.3, 0.1, 0.6),
-    ...     kinds=[], asked=False).message[:58]
+    ...     kinds=[], effect=0.0, asked=False).message[:58]
     '2.1 % of the output (r.m.s.) is nonlinear: odd harmonics o'
     """
     noise, linear, nonlinear = (100 * part for part in made_of)
@@ -63,9 +66,11 @@ def general(
     left = f"Of the residual's power {noise:.0f} % is noise and {nonlinear:.0f} % nonlinear"
     if linear >= 0.5:
         left += f"; {linear:.0f} % still follows the input"
+    whole = f" All its effect, most of which passes for linear, is {100 * effect:.2g} %."
     return Finding(
         code="nonlinear",
-        message=f"{100 * share:.2g} % of the output (r.m.s.) is nonlinear{seen}. {guess} {left}. "
+        message=f"{100 * share:.2g} % of the output (r.m.s.) is nonlinear{seen}. {guess}"
+        f"{whole if effect > 1.5 * share else ''} {left}. "
         "Identify at several amplitudes to see where the linear model holds.",
     )
 
@@ -82,8 +87,10 @@ def particular(found: Mechanism, unit: str) -> Finding | None:
 
     Examples
     --------
+    >>> import numpy as np
     >>> found = Mechanism(
-    ...     kind="backlash", size=0.1, size_std=0.01, gain=99.0, likelihood=0.0, rms=0.02)
+    ...     kind="backlash", size=0.1, size_std=0.01, gain=99.0, likelihood=0.0, rms=0.02,
+    ...     effect=0.05, trace=np.zeros(0))
     >>> particular(found, "deg").message[:54]
     'There is play of about 0.2 deg in all (half: 0.1 ± 0.0'
     """

@@ -13,7 +13,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from hmpim.errors import RecordError
-from hmpim.identify.fit import Fit, Problem
+from hmpim.identify.fit import Fit, Problem, jacobian
+from hmpim.identify.harmonic_kinds import compare_harmonics
 from hmpim.identify.harmonics import Harmonics, any_harmonic, sweep_harmonics
 from hmpim.identify.lines import Lines, detection_lines, find_period
 from hmpim.identify.mechanisms import Mechanism, compare_mechanisms
@@ -21,6 +22,7 @@ from hmpim.identify.nonlinear_words import general, particular
 from hmpim.identify.result import Estimate, HarmonicCurve, Nonlinearity
 from hmpim.identify.signals import as_signal
 from hmpim.identify.sweep_phase import SweepPhase, sweep_phase
+from hmpim.identify.whiteness import is_white
 from hmpim.record import Finding
 
 __all__ = ["Inspection", "Shares", "inspect_nonlinearity"]
@@ -37,14 +39,29 @@ _GAIN = 12.0
 _SMALLEST = 0.003
 """R.m.s. of the nonlinear part over that of the output from which it is worth a warning."""
 
-_DOUBTFUL = 0.01
-"""The same, from which parameters depend on the amplitude beyond their error bars."""
+_DOUBTFUL = 0.005
+"""The same, from which parameters may depend on the amplitude by per cents."""
 
-_NAMED = 0.25
-"""Share of what is not noise in a sweep's residual that a kind must explain to be named."""
+_EFFECT = 0.01
+"""R.m.s. of all that a kind does, what passes for linear too, over that of the output, likewise."""
+
+_NAMED = 0.3
+"""Share of what the harmonics hold beyond noise that a kind must explain to be named."""
 
 _APART = 10.0
 """Log-likelihood by which the next kind must be behind to be ruled out."""
+
+_APART_SHARE = 0.03
+"""The same as a share of what the likeliest kind gains: no trace is exact."""
+
+_ALIKE_SHARE = 0.3
+"""The same between friction and backlash: slow motion against a spring with friction is play."""
+
+_MOSTLY = 0.6
+"""Share of what the harmonics tell, explained by one kind, that vouches for a plain structure."""
+
+_CLEARER = 0.05
+"""By how much that share must be above the one with a rich structure."""
 
 _LONGEST = 131072
 """Samples of a sweep looked at one by one; longer records are averaged in blocks first."""
@@ -91,6 +108,9 @@ class Inspection:
         'hardening', 'softening', 'friction', 'backlash', 'rate_limit', 'saturation'.
     doubtful : bool
         Whether it is so large that the linear parameters hold at this amplitude only.
+    fit : Fit
+        The linear fit that goes with it: the given one, or the plainer one where that and one
+        kind of nonlinearity explain the output better.
     summary : Nonlinearity
         The same, as the result keeps it.
     """
@@ -102,17 +122,46 @@ class Inspection:
     rms: float
     findings: tuple[Finding, ...]
     doubtful: bool
+    fit: Fit
     summary: Nonlinearity
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class _Seen:
-    """What the tests gave, before it is weighed."""
+class _Look:
+    """The record as it is looked at: in blocks of samples if it is long."""
 
+    u: NDArray[np.float64]
+    problem: Problem
+    fs: float
+    others: tuple[NDArray[np.float64], ...]
+    sweep: SweepPhase | None
+    block: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Seen:
+    """What the tests gave for one linear fit, before it is weighed."""
+
+    fit: Fit
     harmonics: Harmonics | None = None
     lines: Lines | None = None
     mechanisms: tuple[Mechanism, ...] = ()
+    named: tuple[Mechanism, ...] = ()
     rms: float = 0.0
+
+    @property
+    def explained(self) -> float:
+        """Share of what the harmonics tell that the likeliest kind explains."""
+        if self.harmonics is None or not self.named:
+            return 0.0
+        return self.named[0].gain / max(self.harmonics.regression.evidence, _GAIN)
+
+    @property
+    def effect(self) -> float:
+        """R.m.s. of all that the likeliest kind does, where harmonics vouch for its size."""
+        if self.harmonics is None or not self.named:
+            return self.rms
+        return max(self.rms, self.named[0].effect)
 
 
 def inspect_nonlinearity(
@@ -121,7 +170,7 @@ def inspect_nonlinearity(
     fit: Fit,
     *,
     fs: float,
-    white: bool = False,
+    plain: Fit | None = None,
     others: Sequence[NDArray[np.float64]] = (),
     floor: float = 0.0,
     unit: str = "",
@@ -136,8 +185,9 @@ def inspect_nonlinearity(
         The data and the linear fit.
     fs : float
         Rate in Hz.
-    white : bool
-        Whether the residual passed for white: then a quick look decides whether to go on.
+    plain : Fit, optional
+        Of a plainer structure, to be weighed against `fit` if there is a nonlinearity: a rich
+        structure may have been taken for the sake of what is not linear.
     others : sequence of ndarray, shape (n,)
         Other inputs that drove the output at the same time: then harmonics alone are asked.
     floor : float
@@ -176,19 +226,15 @@ def inspect_nonlinearity(
         )
     counted = problem.y if problem.valid is None else problem.y[problem.valid]
     output = float(np.std(counted))
-    power = fit.cost / max(problem.counted, 1)
-    smallest = max(_SMALLEST * output, floor)
     block = -(-source.size // _LONGEST)
     sweep = sweep_phase(_thinned(source, block), fs / block)
-    if sweep is not None:
-        seen = _by_harmonics(sweep, block, problem, fit, others, fs, white, smallest)
-    elif others:
-        seen = _Seen()
-    else:
-        seen = _by_traces(source, problem, fit, fs, white)
-    matters = seen.rms > smallest
-    named = _named(seen) if matters else ()
-    shares = _shares(seen, power)
+    look = _Look(u=source, problem=problem, fs=fs, others=tuple(others), sweep=sweep, block=block)
+    seen = _seen(look, fit)
+    if plain is not None and seen.rms > 0:
+        seen = _plainer(look, seen, _seen(look, plain))
+    matters = seen.effect > _SMALLEST * output and seen.rms > floor
+    named = seen.named if matters else ()
+    shares = _shares(seen, seen.fit.cost / max(problem.counted, 1))
     findings: list[Finding] = []
     if matters:
         findings.append(
@@ -197,6 +243,7 @@ def inspect_nonlinearity(
                 where=_where(seen),
                 made_of=(shares.noise, shares.linear, shares.nonlinear),
                 kinds=named,
+                effect=seen.effect / output,
                 asked=not others,
             )
         )
@@ -210,34 +257,41 @@ def inspect_nonlinearity(
         shares=shares,
         rms=seen.rms,
         findings=tuple(findings),
-        doubtful=matters and seen.rms > _DOUBTFUL * output,
+        doubtful=matters and (seen.rms > _DOUBTFUL * output or seen.effect > _EFFECT * output),
+        fit=seen.fit if matters else fit,
         summary=_summary(seen, named, shares, output, unit),
     )
 
 
 def _thinned(x: NDArray[np.float64], block: int) -> NDArray[np.float64]:
     """Means over blocks of samples; an incomplete one at the end is left out."""
-    return x if block == 1 else x[: x.size // block * block].reshape(-1, block).mean(axis=1)
+    if block == 1:
+        return x
+    return np.asarray(x[: x.size // block * block].reshape(-1, block).mean(axis=1))
 
 
-def _by_harmonics(
-    sweep: SweepPhase,
-    block: int,
-    problem: Problem,
-    fit: Fit,
-    others: Sequence[NDArray[np.float64]],
-    fs: float,
-    white: bool,
-    smallest: float,
-) -> _Seen:
-    """Ask a sweep for its harmonics, and if they matter, which kind makes them."""
-    residual = _thinned(fit.residual, block)
-    rate, delay = fs / block, fit.delay / fs
-    if white and any_harmonic(residual, sweep, rate, delay=delay) > _WORTH_A_LOOK:
-        return _Seen()
-    phases = [sweep_phase(_thinned(other, block), rate) for other in others]
+def _seen(look: _Look, fit: Fit) -> _Seen:
+    """All tests that the input allows; a quick look first if the residual is white."""
+    counted = slice(None) if look.problem.valid is None else look.problem.valid
+    white = is_white(fit.residual[counted])
+    if look.sweep is not None:
+        return _by_harmonics(look, look.sweep, fit, white)
+    return _Seen(fit=fit) if look.others else _by_traces(look, fit, white)
+
+
+def _by_harmonics(look: _Look, sweep: SweepPhase, fit: Fit, white: bool) -> _Seen:
+    """Ask a sweep for its harmonics, and which kind makes them."""
+    residual = _thinned(fit.residual, look.block)
+    rate, delay = look.fs / look.block, fit.delay / look.fs
+    if (
+        white
+        and any_harmonic(residual, sweep, rate, delay=delay) > _WORTH_A_LOOK
+        and not _curved(fit, look.problem)
+    ):
+        return _Seen(fit=fit)
+    phases = [sweep_phase(_thinned(other, look.block), rate) for other in look.others]
     harmonics = sweep_harmonics(
-        sweep.phase,  # not looked at beside the sweep itself
+        _thinned(look.u, look.block),
         residual,
         rate,
         delay=delay,
@@ -245,26 +299,78 @@ def _by_harmonics(
         others=[phase for phase in phases if phase is not None],
     )
     if harmonics is None:
-        return _Seen()
+        return _Seen(fit=fit)
     parts = [harmonics.rms(p) for p in (0, 1) if harmonics.probability(p) < _CHANCE]
-    rms = float(np.sqrt(np.sum(np.square(parts))))
-    asked = rms > smallest and not others
+    kinds: tuple[Mechanism, ...] = ()
+    if not look.others and np.ptp(fit.prediction) > 0:
+        powers = np.arange(fit.denominator.size)
+        kinds = compare_harmonics(
+            harmonics.regression,
+            _thinned(fit.prediction - fit.linear[-1], look.block),
+            fit.denominator / float(look.block) ** powers,
+            fs=rate,
+        )
+    named = _likely(kinds, harmonics.regression.evidence)
+    if not parts and not named:
+        return _Seen(fit=fit, harmonics=harmonics)
+    rms = float(np.sqrt(np.sum(np.square(parts)))) if parts else named[0].rms
+    return _Seen(fit=fit, harmonics=harmonics, mechanisms=kinds, named=named, rms=rms)
+
+
+def _by_traces(look: _Look, fit: Fit, white: bool) -> _Seen:
+    """Ask lines left out, if the input repeats, and whether any kind explains the residual."""
+    lines = _lines(look.u, look.problem)
+    levels = [] if lines is None else [v for v in lines.levels if v.probability < _CHANCE]
+    if white and not levels and not _curved(fit, look.problem):
+        return _Seen(fit=fit, lines=lines)
+    found = tuple(m for m in compare_mechanisms(look.problem, fit, fs=look.fs) if m.gain > _GAIN)
+    distortion = float(np.sqrt(sum(0.5 * v.lines * v.rms**2 for v in levels)))
     return _Seen(
-        harmonics=harmonics,
-        mechanisms=compare_mechanisms(problem, fit, fs=fs) if asked else (),
-        rms=rms,
+        fit=fit,
+        lines=lines,
+        mechanisms=found,
+        named=_likely(found, 0.0),
+        rms=max(distortion, found[0].rms if found else 0.0),
     )
 
 
-def _by_traces(u: NDArray[np.float64], problem: Problem, fit: Fit, fs: float, white: bool) -> _Seen:
-    """Ask lines left out, if the input repeats, and whether any kind explains the residual."""
-    lines = _lines(u, problem)
-    levels = [] if lines is None else [v for v in lines.levels if v.probability < _CHANCE]
-    if white and not levels and not _curved(fit, problem):
-        return _Seen(lines=lines)
-    found = tuple(m for m in compare_mechanisms(problem, fit, fs=fs) if m.gain > _GAIN)
-    distortion = float(np.sqrt(sum(0.5 * v.lines * v.rms**2 for v in levels)))
-    return _Seen(lines=lines, mechanisms=found, rms=max(distortion, found[0].rms if found else 0.0))
+def _likely(kinds: tuple[Mechanism, ...], evidence: float) -> tuple[Mechanism, ...]:
+    """The kinds that the record leaves in question; one of them, if it tells which.
+
+    `evidence` is the log-likelihood that all harmonics gain beyond what noise would.
+    """
+    if not kinds or kinds[0].gain < max(_GAIN, _NAMED * evidence):
+        return ()
+    first = kinds[0]
+
+    def behind(other: Mechanism) -> float:
+        alike = {first.kind, other.kind} == {"friction", "backlash"}
+        return max(_APART, (_ALIKE_SHARE if alike else _APART_SHARE) * first.gain)
+
+    return tuple(m for m in kinds if m.likelihood > first.likelihood - behind(m))
+
+
+def _plainer(look: _Look, rich: _Seen, plain: _Seen) -> _Seen:
+    """The plain fit if one kind beside it explains the harmonics clearly better, or all better."""
+    if plain.explained > max(_MOSTLY, rich.explained + _CLEARER):
+        return plain
+    return min(rich, plain, key=lambda one: _criterion(look, one))
+
+
+def _criterion(look: _Look, seen: _Seen) -> float:
+    """Bayesian criterion of a linear fit with the likeliest kind beside it, if there is one."""
+    e = _thinned(seen.fit.residual, look.block)
+    unknown, cost = seen.fit.structure.parameters, float(e @ e)
+    if seen.named and seen.named[0].trace.size == e.size:
+        valid = look.problem.valid
+        trace = seen.named[0].trace
+        if valid is not None:
+            trace = trace * _thinned(valid.astype(np.float64), look.block)
+        rows = [_thinned(row, look.block) for row in jacobian(look.problem, seen.fit)]
+        basis = np.linalg.qr(np.stack([*rows, trace]).T)[0]
+        cost -= float(np.sum((basis.T @ e) ** 2))
+        unknown += 1
+    return e.size * float(np.log(max(cost, np.finfo(float).tiny))) + unknown * float(np.log(e.size))
 
 
 def _curved(fit: Fit, problem: Problem) -> bool:
@@ -302,18 +408,6 @@ def _shares(seen: _Seen, power: float) -> Shares:
     parts = np.square([seen.harmonics.noise_rms, seen.harmonics.fundamental_rms, seen.rms])
     noise, linear, nonlinear = parts / parts.sum()
     return Shares(noise=float(noise), linear=float(linear), nonlinear=float(nonlinear))
-
-
-def _named(seen: _Seen) -> tuple[Mechanism, ...]:
-    """The kinds that the record leaves in question; one of them, if it tells which."""
-    likely = [m for m in seen.mechanisms if m.gain > _GAIN]
-    if seen.harmonics is not None:
-        found = seen.harmonics
-        explained = found.rms(0) ** 2 + found.rms(1) ** 2 + found.fundamental_rms**2
-        likely = [m for m in likely if m.rms**2 > _NAMED * explained]
-    if not likely:
-        return ()
-    return tuple(m for m in likely if m.likelihood > likely[0].likelihood - _APART)
 
 
 def _where(seen: _Seen) -> list[str]:

@@ -13,6 +13,7 @@ from hmpim.identify.local import local_response
 from hmpim.identify.multivariable import ResponseMatrix
 from hmpim.identify.nonlinearity import inspect_nonlinearity
 from hmpim.identify.paper import paper_estimates
+from hmpim.identify.plainer import plainer, taking
 from hmpim.identify.readings import read_parameters
 from hmpim.identify.remarks import remarks
 from hmpim.identify.result import Candidate, PairIdentification, PaperEstimates, Parameters
@@ -45,6 +46,18 @@ def described(
     if refined is not None:
         joint, censored = refined
         covariance = censored.covariance
+    alone = matrix is None and covariance is None
+    inspection = inspect_nonlinearity(
+        source.values,
+        joint.problem,
+        joint.best.fit,
+        fs=fs,
+        plain=plainer(joint) if alone else None,
+        others=[other.values for other in aligned.inputs if other is not source],
+        floor=found.rounding,
+        unit=output.unit,
+    )
+    joint = taking(joint, inspection.fit)
     fit = joint.best.fit
     u, y = source.values, joint.problem.y  # without the drift, and what other inputs move
     band = record.band or excited_band(u, fs)
@@ -84,16 +97,6 @@ def described(
         fs=fs,
         band=band,
         white=readings.white,
-    )
-    inspection = inspect_nonlinearity(
-        u,
-        joint.problem,
-        fit,
-        fs=fs,
-        white=readings.white,
-        others=[other.values for other in aligned.inputs if other is not source],
-        floor=found.rounding,
-        unit=output.unit,
     )
     known = {finding.code for finding in seen}
     bent = tuple(finding for finding in inspection.findings if finding.code not in known)
