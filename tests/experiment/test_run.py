@@ -56,6 +56,20 @@ def test_a_limit_is_checked_before_anything_moves(limits, words):
     assert spy.moved == []
 
 
+def test_a_jerk_limit_is_checked_where_there_is_one():
+    wide = Limits(position=1.0, velocity=20.0, acceleration=200.0, unit="deg")
+    gentle = design(band=(0.5, 5.0), duration=2.0, fs=200.0, limits=wide)
+    jerk = gentle.peaks.jerk
+    assert np.isfinite(jerk)
+    run(Spy(limits=Limits(jerk=1.001 * jerk, unit="deg")), gentle)
+    spy = Spy(limits=Limits(jerk=0.5 * jerk, unit="deg"))
+    with pytest.raises(LimitsError, match=r"peak jerk .* deg/s³ is beyond .* scale .* by 0\.5,"):
+        run(spy, gentle)
+    with pytest.raises(LimitsError, match=r"peak jerk inf deg/s³ .*; it jumps, so take one that"):
+        run(spy, SINE)
+    assert spy.moved == []
+
+
 @settings(max_examples=64, deadline=None)
 @given(
     share=st.floats(0.5, 2.0).filter(lambda s: abs(s - 1) > 1e-6),

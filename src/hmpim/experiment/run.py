@@ -8,6 +8,7 @@ from hmpim.errors import ArgumentError, HmpimError, LimitsError, RigError, UnitE
 from hmpim.record import Record
 from hmpim.rigs import Rig
 from hmpim.stimulus import Limits, Stimulus
+from hmpim.stimulus.limits import QUANTITIES
 from hmpim.units import conversion_factor, rate_unit
 
 __all__ = ["check_limits", "run"]
@@ -112,25 +113,32 @@ def check_limits(stimulus: Stimulus, limits: Limits, *, name: str = "rig") -> No
     factor = conversion_factor(stimulus.unit, to=limits.unit)
     shares = []
     commanded = _commanded_peaks(stimulus)
-    for order, quantity in enumerate(("position", "velocity", "acceleration")):
+    for order, quantity in enumerate(QUANTITIES):
+        limit: float = getattr(limits, quantity)
+        if math.isinf(limit):
+            continue
         peak = factor * max(getattr(stimulus.peaks, quantity), commanded[order])
-        limit = getattr(limits, quantity)
         shares.append((peak / limit, quantity, peak, limit, rate_unit(limits.unit, order)))
-    share, quantity, peak, limit, unit = max(shares)
+    share, quantity, peak, limit, unit = max(shares, default=(0.0, "", 0.0, 0.0, ""))
     if share > 1.0 + _ROUNDING:
+        advice = (
+            f"scale the stimulus by {_down(1 / share):.4g}, or design it within this limit"
+            if math.isfinite(share)
+            else "it jumps, so take one that starts and ends at rest, designed within this limit"
+        )
         raise LimitsError(
             f"peak {quantity} {peak:.6g} {unit} is beyond the limit {limit:.6g} {unit} of "
-            f"{name!r}; scale the stimulus by {_down(1 / share):.4g}, or design it within "
-            "this limit"
+            f"{name!r}; {advice}"
         )
 
 
-def _commanded_peaks(stimulus: Stimulus) -> tuple[float, float, float]:
+def _commanded_peaks(stimulus: Stimulus) -> tuple[float, float, float, float]:
     """Peaks that the samples alone command: largest value and differences.
 
     The mean velocity between samples is never above the true peak, unless the motion jumps,
     as a step does, whose derivative is 0 wherever it has one. The first interval is left out of
-    the second differences: the printed sweep (lead 0) starts there with a velocity step.
+    the second differences: the printed sweep (lead 0) starts there with a velocity step. Third
+    differences would be all rounding: the jerk is that of the motion in closed form.
     """
     x = stimulus.position
     fs = stimulus.fs
@@ -138,7 +146,7 @@ def _commanded_peaks(stimulus: Stimulus) -> tuple[float, float, float]:
     noise = 4 * float(np.spacing(np.abs(x).max()))  # of a difference of rounded samples
     velocity = np.abs(np.diff(np.concatenate((before, x)))).max() - noise
     bend = np.abs(np.diff(x[1:], 2)).max() - 2 * noise if x.size > 3 else 0.0
-    return float(np.abs(x).max()), float(velocity * fs), float(bend * fs * fs)
+    return float(np.abs(x).max()), float(velocity * fs), float(bend * fs * fs), 0.0
 
 
 def _down(value: float) -> float:

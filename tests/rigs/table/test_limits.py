@@ -90,6 +90,46 @@ def test_axes_that_keep_their_limits_alone_may_not_together(unmoved):
         table.play({"roll": roll, "pitch": pitch}, rng=RNG)
 
 
+def test_a_jerk_limit_of_an_axis_is_checked_too(unmoved):
+    table = MotionTable()
+    limits = table.limits_of("pitch", travel=2.0, share=0.5)
+    gentle = design(band=(0.5, 15.0), duration=2.0, fs=500.0, limits=limits, axis="pitch")
+    table.check(gentle)
+    stiff = replace(FIG_4[2], limits=replace(FIG_4[2].limits, jerk=0.5 * gentle.peaks.jerk))
+    careful = MotionTable(axes=(*FIG_4[:2], stiff, *FIG_4[3:]))
+    with pytest.raises(LimitsError, match=r"peak jerk .* deg/s³ of pitch; scale the stimulus by 0"):
+        careful.play(gentle, rng=RNG)
+    # and a stimulus designed in the axis's limits keeps it
+    within = careful.limits_of("pitch", travel=2.0, share=0.5)
+    assert within.jerk == 0.25 * gentle.peaks.jerk
+    calm = design(band=(0.5, 15.0), duration=2.0, fs=500.0, limits=within, axis="pitch")
+    careful.check(calm)
+
+
+def test_five_axes_near_their_limits_with_the_projector_are_refused_with_a_number(unmoved):
+    """Each keeps Fig. 4; what the outer axes carry is heavier than what Fig. 4 was found with."""
+    table = MotionTable(uut_load="bracket", target_load="projector")
+
+    def at(share):
+        made = {}
+        for spec in FIG_4:
+            limits = table.limits_of(spec.name, travel=1.0, share=share)
+            made[spec.name] = design(
+                band=(0.5, 15.0), duration=3.0, fs=500.0, limits=limits, axis=spec.name
+            )
+        return made
+
+    words = r"at \d\.\d+ s the motion of all axes together takes \S+ N·m of azimuth, beyond its"
+    with pytest.raises(LimitsError, match=words) as refused:
+        table.play(at(0.99), rng=RNG)
+    advised = float(str(refused.value).split("scale the stimuli by ")[1].split(" ")[0])
+    # Torque over inertia has fallen to 760/1040 of what it was, and a quarter was in hand.
+    assert advised == pytest.approx(1.25 * 760 / 1040 / 0.99, rel=0.04)
+    peak = np.abs(table.check(at(0.96 * 0.99 * advised))).max(axis=0)
+    assert np.all(peak < [spec.torque_limit for spec in FIG_4])
+    assert peak[3] > 0.9 * FIG_4[3].torque_limit
+
+
 def test_predicted_torque_is_what_the_actuators_give():
     """With all commands sent and a slow motion, the servo gives what inverse dynamics says."""
     table = MotionTable(

@@ -1,11 +1,14 @@
 """Limits are law: what is refused before anything moves."""
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
 from hmpim.errors import LimitsError, UnitError
 from hmpim.rigs.table.axes import AXES, AxisSpec
 from hmpim.stimulus import Limits, Stimulus
+from hmpim.stimulus.limits import QUANTITIES
 from hmpim.units import conversion_factor, rate_unit
 
 __all__ = ["check_axis", "check_torques"]
@@ -18,7 +21,7 @@ _ROUNDING = 1e-9  # a stimulus solved onto a limit may stand a rounding error be
 def check_axis(
     stimulus: Stimulus, limits: Limits, *, axis: str, samples: int | None = None
 ) -> None:
-    """Refuse a stimulus that goes beyond an axis's position, rate or acceleration.
+    """Refuse a stimulus that goes beyond an axis's position, rate, acceleration or jerk.
 
     Parameters
     ----------
@@ -53,11 +56,13 @@ def check_axis(
     factor = conversion_factor(stimulus.unit, to=limits.unit)
     sent = _peaks_sent(stimulus, stimulus.samples if samples is None else samples)
     shares = []
-    for order, quantity in enumerate(("position", "velocity", "acceleration")):
+    for order, quantity in enumerate(QUANTITIES):
+        limit: float = getattr(limits, quantity)
+        if math.isinf(limit):
+            continue
         peak = factor * max(getattr(stimulus.peaks, quantity), sent[order])
-        limit = getattr(limits, quantity)
         shares.append((peak / limit, quantity, peak, limit, rate_unit(limits.unit, order)))
-    share, quantity, peak, limit, unit = max(shares)
+    share, quantity, peak, limit, unit = max(shares, default=(0.0, "", 0.0, 0.0, ""))
     if share > 1.0 + _ROUNDING:
         advice = (
             f"scale the stimulus by {1.0 / share:.4g}, or design it within this limit"
@@ -70,19 +75,20 @@ def check_axis(
         )
 
 
-def _peaks_sent(stimulus: Stimulus, samples: int) -> tuple[float, float, float]:
+def _peaks_sent(stimulus: Stimulus, samples: int) -> tuple[float, float, float, float]:
     """Largest position, and first and second differences of the commands as they are sent.
 
     A jump has no derivative that would show it, and a sweep that stops short has none at its
     end. The first interval is left out of the second differences: the printed sweep (lead 0)
-    starts there with a velocity step.
+    starts there with a velocity step. Third differences would be all rounding: the jerk is that
+    of the motion in closed form alone.
     """
     fs = stimulus.fs
     x = stimulus.motion(np.arange(-1, samples) / fs).position
     rounding = 4.0 * float(np.spacing(np.abs(x).max()))
     rate = float(np.abs(np.diff(x)).max()) - rounding
     bend = float(np.abs(np.diff(x[2:], 2)).max()) - 2.0 * rounding if x.size > 4 else 0.0
-    return float(np.abs(x).max()), rate * fs, bend * fs * fs
+    return float(np.abs(x).max()), rate * fs, bend * fs * fs, 0.0
 
 
 def check_torques(time: FloatArray, torque: FloatArray, axes: tuple[AxisSpec, ...]) -> None:

@@ -133,7 +133,7 @@ class MotionTable:
             Largest position wanted, deg; None for all that is left. A sweep that has to fill
             the whole travel is seldom possible within the rate limit.
         share : float
-            Share of the rate and acceleration limits to use, at most 1.
+            Share of the limits on rate, acceleration and jerk to use, at most 1.
 
         Raises
         ------
@@ -164,6 +164,7 @@ class MotionTable:
             position=left if travel is None else travel,
             velocity=share * limits.velocity,
             acceleration=share * limits.acceleration,
+            jerk=share * limits.jerk,
             unit="deg",
         )
 
