@@ -241,10 +241,12 @@ def _exact(y: NDArray[np.float64], span: float, step: float) -> _Side | None:
 
 def _scattered(y: NDArray[np.float64], sigma: float) -> _Side | None:
     """A crowd of samples within a few `sigma` of the top."""
-    level = float(y.max()) - 3.0 * sigma
+    top = float(y.max())
+    upper = y[y > top - 20.0 * sigma]  # a level more than 6 below the top is none
+    level = top - 3.0 * sigma
     for _ in range(50):  # climbs to where the values are densest
-        weight = np.exp(-0.5 * ((y - level) / sigma) ** 2)
-        moved = float(weight @ y / weight.sum())
+        weight = np.exp(-0.5 * ((upper - level) / sigma) ** 2)
+        moved = float(weight @ upper / weight.sum())
         done = abs(moved - level) < 1e-3 * sigma
         level = moved
         if done:

@@ -12,6 +12,7 @@
 """
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,6 +32,13 @@ _CORNERS = (0.08, 0.25, 1.0)
 """Where, over the highest frequency, the first weight begins to roll off as 1/A would: above
 the system's own corner the response is noise, which an unweighted fit takes at face value."""
 
+_TURNS, _LATE = 64, 64
+"""Bins of a long record are taken together where a delay of `lag + _LATE` samples turns them
+against each other by less than a turn over `_TURNS`."""
+
+_ENOUGH = 16384
+"""Samples from which on they are: so many as a group has would be left."""
+
 _FLOOR = 1e-3
 """Bins whose input amplitude is below this share of the greatest are not looked at."""
 
@@ -44,7 +52,7 @@ class RoughResponse:
     lag : int
         Samples by which the output was moved back.
     length : int
-        Length of the transform.
+        Length of the transform whose bins these are.
     bins : ndarray of int, shape (m,)
         Bins with excitation.
     omega : ndarray, shape (m,)
@@ -95,10 +103,12 @@ def rough_response(
     """
     lag = coarse_lag(u, y, longest_delay)
     overlap = u.size - lag
-    length = next_fast_len(u.size, real=True)
-    spectrum_u = rfft(_tapered(u[:overlap]), length)
-    spectrum_y = rfft(_tapered(y[lag:]), length)
-    power = np.abs(spectrum_u) ** 2
+    group = max(min(u.size // (_TURNS * (lag + _LATE)), u.size // _ENOUGH), 1)
+    length = next_fast_len(-(-u.size // group), real=True)
+    spectrum_u = rfft(_tapered(u[:overlap]), group * length)
+    spectrum_y = rfft(_tapered(y[lag:]), group * length)
+    power = _grouped(spectrum_u.real**2 + spectrum_u.imag**2, group)
+    cross = _grouped(np.conj(spectrum_u) * spectrum_y, group)
     power[0] = 0.0
     bins = np.flatnonzero(power > _FLOOR**2 * power.max())
     weight = power[bins] / power.max()
@@ -107,9 +117,18 @@ def rough_response(
         length=length,
         bins=bins,
         omega=2 * np.pi * bins / length,
-        response=spectrum_y[bins] / spectrum_u[bins],
+        response=cross[bins] / power[bins],
         weight=weight,
     )
+
+
+def _grouped(values: NDArray[Any], group: int) -> NDArray[Any]:
+    """Sum over so many neighbouring bins around each multiple of `group`, shape (m,)."""
+    if group == 1:
+        return values
+    before = group // 2
+    after = -(before + values.size) % group
+    return np.asarray(np.pad(values, (before, after)).reshape(-1, group).sum(axis=1))
 
 
 def starting_values(
