@@ -10,11 +10,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.fft import irfft, rfft
 
 from hmpim.model.dynamics import Structure, coefficients_of, denominator_of
 from hmpim.model.sampled import SampledInput, delayed_response
 
-__all__ = ["Fit", "Problem", "fit_structure", "jacobian"]
+__all__ = ["Fit", "Problem", "basis_rows", "fit_structure", "jacobian", "moved_by"]
 
 _STEP = 1e-6
 """Step of the derivatives, relative to a parameter above 1: its square is below rounding."""
@@ -44,12 +45,16 @@ class Problem:
         Samples that count; None when all do.
     longest_delay : float
         Greatest delay to try, in samples.
+    whitening : ndarray, shape (n // 2 + 1,), or None
+        Gain at each bin of the transform after which the noise is white; residuals and
+        derivatives then are those of the whitened output. None for noise that is white.
     """
 
     source: SampledInput
     y: NDArray[np.float64]
     valid: NDArray[np.bool_] | None
     longest_delay: float
+    whitening: NDArray[np.float64] | None = None
 
     @property
     def counted(self) -> int:
@@ -57,8 +62,11 @@ class Problem:
         return self.y.size if self.valid is None else int(np.count_nonzero(self.valid))
 
     def masked(self, rows: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return `rows`, shape (k, n) or (n,), with the samples that do not count set to 0."""
-        return rows if self.valid is None else rows * self.valid
+        """Return `rows`, (k, n) or (n,), samples that do not count set to 0, noise whitened."""
+        counted = rows if self.valid is None else rows * self.valid
+        if self.whitening is None:
+            return counted
+        return np.asarray(irfft(rfft(counted) * self.whitening, rows.shape[-1]))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -103,7 +111,7 @@ class Fit:
         return denominator_of(self.structure, coefficients_of(self.structure, self.theta[1:]))
 
 
-def _basis(
+def basis_rows(
     problem: Problem, structure: Structure, theta: NDArray[np.float64]
 ) -> NDArray[np.float64]:
     """Responses that the linear parameters multiply, shape (zeros + 1, n)."""
@@ -134,7 +142,7 @@ def _responses(
 
 def _solve_linear(problem: Problem, structure: Structure, theta: NDArray[np.float64]) -> Fit:
     """Best numerator and bias at given delay and denominator."""
-    basis = _basis(problem, structure, theta)
+    basis = basis_rows(problem, structure, theta)
     rows = np.vstack([basis, np.ones(problem.y.size)])
     counted = problem.masked(rows)
     y = problem.masked(problem.y)
@@ -186,7 +194,7 @@ def jacobian(problem: Problem, fit: Fit) -> NDArray[np.float64]:
         moved = theta.copy()
         step = _STEP * max(1.0, abs(theta[i]))
         moved[i] += step
-        rows[i] = (weights @ _basis(problem, structure, moved) - here) / step
+        rows[i] = (weights @ basis_rows(problem, structure, moved) - here) / step
     rows[theta.size : -1] = basis
     rows[-1] = 1.0
     return problem.masked(rows)
@@ -209,6 +217,12 @@ def _bounded(
             bounded[start + 1] = np.clip(theta[start + 1], *_SHAPES)
         start += order
     return bounded
+
+
+def moved_by(problem: Problem, fit: Fit, step: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return theta after a step, no coefficient changed beyond recognition, within bounds."""
+    share = _limited(fit.structure, fit.theta, step)
+    return _bounded(problem, fit.structure, fit.theta + share * step, -4.0)
 
 
 def _limited(structure: Structure, theta: NDArray[np.float64], step: NDArray[np.float64]) -> float:

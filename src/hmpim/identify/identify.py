@@ -8,10 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hmpim.errors import ArgumentError, RecordError
-from hmpim.identify.coupled import matrix_of
+from hmpim.identify.coupled import inputs_of, responses_of, settled, unrelated
 from hmpim.identify.drift import Drifting, with_drift
 from hmpim.identify.enrich import PLAIN
 from hmpim.identify.imperfections import Imperfections, find_imperfections
+from hmpim.identify.inputs import InputSet, OutputCoherence
 from hmpim.identify.joint import JointFit
 from hmpim.identify.pair import described, untold
 from hmpim.identify.result import Identification, PairIdentification, RecordSummary
@@ -96,16 +97,20 @@ def identify(
             "stuck or not connected, or the wrong column is taken as output"
         )
     with one_thread():
-        pairs = tuple(
-            pair
+        inputs = inputs_of(aligned, record) if len(aligned.inputs) > 1 else None
+        found = [
+            _identify_output(aligned, output, record, chosen, names, inputs)
             for output in aligned.outputs
-            for pair in _identify_output(aligned, output, record, chosen, names)
-        )
+        ]
+    if inputs is not None:
+        coherence = tuple(seen for _, seen in found if seen is not None)
+        inputs = replace(inputs, coherence=coherence)
     return Identification(
         record=RecordSummary(
             fs=aligned.fs, samples=record.samples, sha256=record.sha256, source=record.source
         ),
-        pairs=pairs,
+        pairs=tuple(pair for pairs, _ in found for pair in pairs),
+        inputs=inputs,
         data=record,
     )
 
@@ -136,7 +141,8 @@ def _identify_output(
     record: Record,
     intersample: Intersample | None,
     structures: tuple[StructureName, ...],
-) -> list[PairIdentification]:
+    inputs: InputSet | None,
+) -> tuple[list[PairIdentification], OutputCoherence | None]:
     """Identify one output against every input, together where there are several."""
     if np.ptp(output.values[output.valid]) == 0:
         dead = Finding(
@@ -144,36 +150,57 @@ def _identify_output(
             message=f"Output {output.name!r} is constant at {output.values[output.valid][0]:g}. "
             "The sensor is dead, stuck or not connected.",
         )
-        return [untold(aligned, source, output, record, dead) for source in aligned.inputs]
+        return [untold(aligned, source, output, record, dead) for source in aligned.inputs], None
     found = find_imperfections(output.values, aligned.fs)
-    joined, drifting = _drifted(aligned, output, found, intersample, structures)
+    joined, drifting = _drifted(aligned, output, found, intersample, structures, inputs)
     seen = found.saturation is not None or found.hold is not None
     if seen or not is_white(joined.fits[0].best.fit.residual):
         # Now that there is a model, a plateau can be told from a crest.
-        predicted = joined.fits[0].best.fit.prediction
+        predicted = joined.prediction
         if drifting is not None:
             predicted = predicted + drifting.trend
         again = find_imperfections(output.values, aligned.fs, prediction=predicted)
         if (again.saturation is None) != (found.saturation is None) or (again.hold is None) != (
             found.hold is None
         ):
-            joined, drifting = _drifted(aligned, output, again, intersample, structures)
+            joined, drifting = _drifted(aligned, output, again, intersample, structures, inputs)
         found = again
-    matrix = matrix_of(aligned, output, record, joined) if len(aligned.inputs) > 1 else None
+    if inputs is not None:
+        return _each_input(aligned, output, record, joined, found, inputs)
+    (source,) = aligned.inputs
+    if joined.related[0]:
+        return [described(aligned, source, output, record, joined, 0, None, found, drifting)], None
+    unfollowed = Finding(
+        code="unrelated",
+        message=f"Output {output.name!r} does not follow input {source.name!r}: a constant "
+        "explains it as well. Check the channels, or excite more.",
+    )
+    return [untold(aligned, source, output, record, unfollowed)], None
+
+
+def _each_input(
+    aligned: Aligned,
+    output: Signal,
+    record: Record,
+    joined: Joined,
+    found: Imperfections,
+    inputs: InputSet,
+) -> tuple[list[PairIdentification], OutputCoherence]:
+    """Describe one output against each of several inputs, each one in its own band."""
+    responses = responses_of(aligned, output, joined, inputs)
     pairs = []
     for i, source in enumerate(aligned.inputs):
+        own = replace(record, band=inputs.bands[i])
         if joined.related[i]:
-            pairs.append(
-                described(aligned, source, output, record, joined, i, matrix, found, drifting)
-            )
+            pair = described(aligned, source, output, own, joined, i, responses, found)
+            pairs.append(settled(pair, joined, i, inputs, aligned.fs))
             continue
-        unrelated = Finding(
-            code="unrelated",
-            message=f"Output {output.name!r} does not follow input {source.name!r}: a constant "
-            "explains it as well. Check the channels, or excite more.",
-        )
-        pairs.append(untold(aligned, source, output, record, unrelated))
-    return pairs
+        seen = responses.columns[i]
+        finding = unrelated(output.name, source.name, seen)
+        pair = untold(aligned, source, output, own, finding, seen)
+        weak = finding.code == "weak_coupling"
+        pairs.append(replace(pair, verdict="doubtful") if weak else pair)
+    return pairs, responses.coherence
 
 
 def _drifted(
@@ -182,9 +209,10 @@ def _drifted(
     found: Imperfections,
     intersample: Intersample | None,
     structures: tuple[StructureName, ...],
+    inputs: InputSet | None,
 ) -> tuple[Joined, Drifting | None]:
     """Fit an output, with a bias that drifts where the residual asks for it."""
-    joined = _joined(aligned, output, found, intersample, structures)
+    joined = _joined(aligned, output, found, intersample, structures, inputs)
     if len(aligned.inputs) > 1:
         return joined, None
 
@@ -192,7 +220,8 @@ def _drifted(
 
     def fitted(y: NDArray[np.float64], quickly: bool) -> JointFit:
         names = plain if quickly else structures
-        return _joined(aligned, replace(output, values=y), found, intersample, names).fits[0]
+        moved = replace(output, values=y)
+        return _joined(aligned, moved, found, intersample, names, None).fits[0]
 
     drifting = with_drift(joined.fits[0], output.values, fitted)
     if drifting is None:
@@ -211,6 +240,7 @@ def _joined(
     found: Imperfections,
     intersample: Intersample | None,
     structures: tuple[StructureName, ...],
+    inputs: InputSet | None,
 ) -> Joined:
     """Fit an output to all inputs on the samples that say what it was."""
     valid = None if bool(output.valid.all()) else np.asarray(output.valid)
@@ -225,4 +255,5 @@ def _joined(
         known=None if bool(measured.all()) else np.asarray(measured),
         intersample=intersample,
         structures=structures,
+        alike=() if inputs is None else inputs.alike_bins(aligned.samples, aligned.fs),
     )

@@ -4,19 +4,24 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hmpim.identify.bandwidth import disagreement, response_bandwidths
-from hmpim.identify.coupled import column, with_condition
+from hmpim.identify.coupled import Responses
 from hmpim.identify.drift import Drifting, drift_finding
 from hmpim.identify.fit import Fit
 from hmpim.identify.imperfections import Imperfections, refine, with_imperfections
 from hmpim.identify.joint import JointFit
 from hmpim.identify.local import local_response
-from hmpim.identify.multivariable import ResponseMatrix
 from hmpim.identify.nonlinearity import inspect_nonlinearity
 from hmpim.identify.paper import paper_estimates
 from hmpim.identify.plainer import plainer, taking
 from hmpim.identify.readings import read_parameters
 from hmpim.identify.remarks import remarks
-from hmpim.identify.result import Candidate, PairIdentification, PaperEstimates, Parameters
+from hmpim.identify.result import (
+    Candidate,
+    FrequencyResponse,
+    PairIdentification,
+    PaperEstimates,
+    Parameters,
+)
 from hmpim.identify.several import Joined
 from hmpim.identify.spectrum import excited_band
 from hmpim.identify.uncertainty import estimate, noise_estimate
@@ -34,7 +39,7 @@ def described(
     record: Record,
     joined: Joined,
     i: int,
-    matrix: ResponseMatrix | None,
+    matrix: Responses | None,
     found: Imperfections,
     drifting: Drifting | None = None,
 ) -> PairIdentification:
@@ -78,10 +83,9 @@ def described(
         response = local_response(
             u, _told(y, fit, found, fs), fs, delay=max(fit.delay, 0.0) / fs, band=band
         )
-        findings, verdict = judgement.findings, judgement.verdict
     else:
-        response = column(matrix, i)
-        findings, verdict = with_condition(judgement, matrix, aligned)
+        response = matrix.columns[i]
+    findings, verdict = judgement.findings, judgement.verdict
     from_response = response_bandwidths(
         response,
         readings.system,
@@ -171,6 +175,7 @@ def untold(
     output: Signal,
     record: Record,
     finding: Finding,
+    response: FrequencyResponse | None = None,
 ) -> PairIdentification:
     """Say what little can be said of an output that does not follow the input."""
     band = record.band or excited_band(source.values, aligned.fs)
@@ -194,7 +199,9 @@ def untold(
             ),
         ),
         paper=PaperEstimates(),
-        frequency_response=local_response(source.values, output.values, aligned.fs, band=band),
+        frequency_response=local_response(source.values, output.values, aligned.fs, band=band)
+        if response is None
+        else response,
         numerator=(0.0,),
         denominator=(1.0,),
         candidates=(),

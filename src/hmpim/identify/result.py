@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hmpim.errors import FormatError, RecordError
+from hmpim.identify.inputs import InputSet
 from hmpim.record import Finding, Intersample, Record
 
 __all__ = [
@@ -392,11 +393,14 @@ class Identification:
     """The result of `hmpim.identify`: one `PairIdentification` for each input and output.
 
     Index it output first, as in a transfer matrix: ``result["y", "u"].delay``.
-    `data` is the record itself, kept for pictures; it is not part of the JSON.
+    `inputs` says how well several inputs are told apart, and how much of each output they
+    explain; None where there is one. `data` is the record itself, kept for pictures; it is not
+    part of the JSON.
     """
 
     record: RecordSummary
     pairs: tuple[PairIdentification, ...]
+    inputs: InputSet | None = None
     data: Record | None = None
 
     def __getitem__(self, key: tuple[str, str]) -> PairIdentification:
@@ -419,6 +423,7 @@ class Identification:
             "schema": SCHEMA,
             "record": {f.name: getattr(self.record, f.name) for f in fields(self.record)},
             "pairs": [pair.to_dict() for pair in self.pairs],
+            "inputs": None if self.inputs is None else self.inputs.to_dict(),
         }
 
     @classmethod
@@ -435,6 +440,7 @@ class Identification:
         return cls(
             record=RecordSummary(**data["record"]),
             pairs=tuple(PairIdentification.from_dict(pair) for pair in data["pairs"]),
+            inputs=None if data.get("inputs") is None else InputSet.from_dict(data["inputs"]),
         )
 
     def save(self, path: str | PathLike[str]) -> None:

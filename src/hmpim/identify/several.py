@@ -1,30 +1,52 @@
 """One output, several inputs at once: each pair's fit with the others taken out.
 
-Pairs are fitted in turn, each to what the others leave over, until nothing moves (backfitting:
-Hastie, Tibshirani and Friedman, The Elements of Statistical Learning, 2nd ed., section 9.1.1; for
-least squares it ends at the joint optimum). The error bars come from all pairs' derivatives
-together, so that inputs that resemble each other widen them.
+The inputs that move the output most are fitted as if alone, each to what the others leave over;
+what is weak beside them (`hmpim.identify.couplings`) follows, with the noise whitened. Then all
+pairs are fitted in turn until nothing moves (backfitting: Hastie, Tibshirani and Friedman, The
+Elements of Statistical Learning, 2nd ed., section 9.1.1; for least squares it ends at the joint
+optimum). The error bars come from all pairs' derivatives together, so that inputs that resemble
+each other widen them.
 """
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.fft import irfft, next_fast_len, rfft
 
+from hmpim.identify.couplings import FOLLOWS, coupling_fit, whitening_of
 from hmpim.identify.enrich import PLAIN
-from hmpim.identify.fit import Problem, fit_structure, jacobian
-from hmpim.identify.joint import JointFit, Trial, joint_fit
-from hmpim.identify.uncertainty import covariance
+from hmpim.identify.fit import Fit, Problem, fit_structure, jacobian
+from hmpim.identify.joint import JointFit, joint_fit
+from hmpim.identify.jointly import gained_by, joint_covariance, refined_together
+from hmpim.identify.lag import Lag, lag_of
 from hmpim.identify.verdict import is_unrelated
 from hmpim.identify.whiteness import effective_share, is_white
 from hmpim.model.dynamics import StructureName
+from hmpim.model.response import slowest_time_constant
+from hmpim.model.sampled import prepare_input
 from hmpim.record import Intersample
 
 __all__ = ["Joined", "fit_together"]
 
-_TURNS = 12
+_TURNS = 8
 _STILL = 1e-2
 """Stop when no pair's contribution moves by more than this share of the noise (r.m.s.)."""
+
+_LATEST = 0.1
+"""Delay of a coupling, as a share of the record, up to which it is looked for."""
+
+_PERIODS = 4.0
+"""Periods of a coupling's corner frequency that the record must hold."""
+
+_COLOURED = 1.6
+"""Factor on the evidence asked of a coupling where the stronger ones leave no white noise."""
+
+_STRONG = 0.15
+"""Share of the output's r.m.s. from which an input's contribution is fitted as if alone."""
+
+Real = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -39,21 +61,38 @@ class Joined:
         Whether the output follows that input at all.
     covariances : tuple of ndarray, shape (p_i, p_i)
         Of each fit's parameters, all fits considered together.
+    strong : tuple of bool
+        Whether the input's contribution is large beside the output, not a coupling.
+    lags : tuple of Lag or None
+        Delay and lag of couplings of no more than first order.
     """
 
     fits: tuple[JointFit, ...]
     related: tuple[bool, ...]
-    covariances: tuple[NDArray[np.float64], ...]
+    covariances: tuple[Real, ...]
+    strong: tuple[bool, ...]
+    lags: tuple[Lag | None, ...]
+
+    @property
+    def prediction(self) -> Real:
+        """What all inputs together predict of the output, bias included, shape (n,)."""
+        first = self.fits[0].best.fit
+        total: Real = np.full(first.prediction.size, first.linear[-1])
+        for fit, told in zip(self.fits, self.related, strict=True):
+            if told:
+                total = total + _part(fit)
+        return total
 
 
 def fit_together(
-    inputs: list[NDArray[np.float64]],
-    y: NDArray[np.float64],
+    inputs: list[Real],
+    y: Real,
     *,
     valid: NDArray[np.bool_] | None,
     known: NDArray[np.bool_] | None,
     intersample: Intersample | None,
     structures: tuple[StructureName, ...],
+    alike: Sequence[tuple[frozenset[int], NDArray[np.bool_]]] = (),
 ) -> Joined:
     """Fit one output to several inputs.
 
@@ -65,70 +104,221 @@ def fit_together(
         Uniform samples of the output.
     valid, known, intersample, structures
         As for `hmpim.identify.joint.joint_fit`; `known` is for all inputs together.
+    alike : sequence of (frozenset of int, ndarray of bool, shape (n // 2 + 1,))
+        Inputs that are not told apart, and the bins at which they are not. There a coupling is
+        not told from what the stronger one's model lacks.
     """
 
-    def fitted(
-        u: NDArray[np.float64],
-        rest: NDArray[np.float64],
-        names: tuple[StructureName, ...] = structures,
-    ) -> JointFit:
+    def fitted(u: Real, rest: Real, names: tuple[StructureName, ...]) -> JointFit:
         return joint_fit(
             u, rest, valid=valid, known=known, intersample=intersample, structures=names
         )
 
-    count = len(inputs)
-    if count == 1:
-        fit = fitted(inputs[0], y)
-        return Joined(fits=(fit,), related=(not is_unrelated(fit),), covariances=())
-    parts = [np.zeros(y.size) for _ in range(count)]
-    # With the other inputs still in it, the output does not tell rich structures from plain.
+    if len(inputs) == 1:
+        fit = fitted(inputs[0], y, structures)
+        return Joined(
+            fits=(fit,),
+            related=(not is_unrelated(fit),),
+            covariances=(),
+            strong=(True,),
+            lags=(None,),
+        )
     plain = tuple(name for name in structures if name in PLAIN) or structures
-    fits = [fitted(u, y, plain) for u in inputs]
-    order = sorted(range(count), key=lambda i: fits[i].best.fit.cost)
-    related = [True] * count
-    for names in (plain, structures):  # the strongest first; then again, the others known
-        for i in order:
-            fits[i] = fitted(inputs[i], y - _others(parts, i), names)
+    fits = _strongest(inputs, y, valid, lambda u, rest: fitted(u, rest, plain))
+    strong = tuple(fits)
+    related = dict.fromkeys(strong, True)
+    whitening: Real | None = None
+    found = None
+    for names in (plain, structures):  # then again, the couplings known
+        for i in strong:
+            fits[i] = fitted(inputs[i], y - _others(fits, related, i), names)
             related[i] = not is_unrelated(fits[i])
-            parts[i] = _part(fits[i]) if related[i] else np.zeros(y.size)
+        before, found = found, tuple(fits[i].best.fit.structure.name for i in strong)
+        if found != before:
+            whitening = _fit_couplings(inputs, y, fits, related, strong, plain, alike)
     for _ in range(_TURNS):
-        moved = 0.0
-        for i in order:
-            if not related[i]:
-                continue
-            fits[i] = _again(fits[i], y - _others(parts, i))
-            part = _part(fits[i])
-            noise = np.sqrt(fits[i].best.fit.cost / y.size)
-            moved = max(moved, float(np.sqrt(np.mean((part - parts[i]) ** 2)) / max(noise, 1e-300)))
-            parts[i] = part
-        if moved < _STILL:
+        before = _others(fits, related, None)
+        for i in strong:
+            if related[i]:
+                fits[i] = _again(fits[i], y - _others(fits, related, i))
+        _together(y, fits, related, strong, whitening, alike)
+        noise = max(float(np.sqrt(fits[strong[0]].best.fit.cost / y.size)), 1e-300)
+        moved = float(np.sqrt(np.mean((_others(fits, related, None) - before) ** 2)))
+        if moved < _STILL * noise:
             break
+    kept = [j for j in fits if related[j]]
+    pairs = [fits[j] for j in kept]
+    told = dict(zip(kept, _covariances(pairs, None), strict=True))
+    weak = [j for j in kept if j not in strong]
+    if whitening is not None and weak:
+        sharper = dict(zip(kept, _covariances(pairs, whitening), strict=True))
+        told |= {j: sharper[j] for j in weak}
+    everyone = range(len(inputs))
     return Joined(
-        fits=tuple(fits),
-        related=tuple(related),
-        covariances=_covariances(fits, related),
+        fits=tuple(fits[j] for j in everyone),
+        related=tuple(related[j] for j in everyone),
+        covariances=tuple(told.get(j, np.zeros((0, 0))) for j in everyone),
+        strong=tuple(j in strong for j in everyone),
+        lags=tuple(_lag(pairs, kept.index(j), whitening) if j in weak else None for j in everyone),
     )
 
 
-def _others(parts: list[NDArray[np.float64]], i: int) -> NDArray[np.float64]:
-    total = np.zeros_like(parts[0])
-    for j, part in enumerate(parts):
-        if j != i:
-            total = total + part
+def _strongest(
+    inputs: list[Real],
+    y: Real,
+    valid: NDArray[np.bool_] | None,
+    fitted: Callable[[Real, Real], JointFit],
+) -> dict[int, JointFit]:
+    """Fit the inputs that move the output most, one after the other; at least one."""
+    rest = y if valid is None else np.interp(np.arange(y.size), np.flatnonzero(valid), y[valid])
+    spread = max(float(np.std(rest)), 1e-300)
+    fits: dict[int, JointFit] = {}
+    waiting = list(range(len(inputs)))
+    while waiting:
+        share = [_follows_at_all(inputs[j], rest) / spread for j in waiting]
+        i = waiting[int(np.argmax(share))]
+        if fits and max(share) < _STRONG:
+            break
+        waiting.remove(i)
+        fit = fitted(inputs[i], y - sum((_part(f) for f in fits.values()), np.zeros(y.size)))
+        part = _part(fit)
+        if not fits or (float(np.std(part)) > _STRONG * spread and not is_unrelated(fit)):
+            fits[i] = fit
+            rest = rest - part
+    return fits
+
+
+def _follows_at_all(u: Real, y: Real) -> float:
+    """Amplitude (r.m.s.) of the output that correlates with the input at the best lag."""
+    first, second = u - u.mean(), y - y.mean()
+    length = next_fast_len(2 * u.size, real=True)
+    crossed = irfft(np.conj(rfft(first, length)) * rfft(second, length), length)[: u.size // 2]
+    size = float(np.linalg.norm(first))
+    return float(np.max(np.abs(crossed))) / max(size, 1e-300) / float(np.sqrt(u.size))
+
+
+def _fit_couplings(
+    inputs: list[Real],
+    y: Real,
+    fits: dict[int, JointFit],
+    related: dict[int, bool],
+    strong: tuple[int, ...],
+    structures: tuple[StructureName, ...],
+    alike: Sequence[tuple[frozenset[int], NDArray[np.bool_]]],
+) -> Real | None:
+    """Fit, in place, all that is weak, the strongest first; return how the noise was whitened."""
+    best = fits[strong[0]]
+    mode, counts = best.best.intersample, best.problem.valid
+    weak = [j for j in range(len(inputs)) if j not in strong]
+
+    def left() -> Real:
+        rest = y - _others(fits, related, None) - best.best.fit.linear[-1]
+        return rest if counts is None else np.asarray(rest * counts)
+
+    latest = max(_LATEST * y.size, 4.0 * best.best.fit.delay) + 2.0
+    whitening = whitening_of(left())
+    sources = {j: prepare_input(inputs[j], mode) for j in weak}
+    roughly = tuple(name for name in structures if name == "first_order") or structures
+    for names in (roughly, structures) if weak else ():  # what they leave over whitened anew
+        for j in sorted(weak, key=lambda j: -_follows_at_all(inputs[j], left())):
+            problem = Problem(
+                source=sources[j],
+                y=y - _others(fits, related, j),
+                valid=counts,
+                longest_delay=latest,
+                whitening=whitening,
+            )
+            fits[j] = coupling_fit(problem, inputs[j], intersample=mode, structures=names)
+            related[j] = True
+        while _together(y, fits, related, strong, whitening, alike):
+            pass
+        whitening = whitening_of(left())
+    return whitening
+
+
+def _together(
+    y: Real,
+    fits: dict[int, JointFit],
+    related: dict[int, bool],
+    strong: tuple[int, ...],
+    whitening: Real | None,
+    alike: Sequence[tuple[frozenset[int], NDArray[np.bool_]]],
+) -> bool:
+    """Move all couplings at once, in place; leave out the least if it adds nothing.
+
+    Returns
+    -------
+    bool
+        Whether one was left out.
+    """
+    weak = [j for j in fits if related[j] and j not in strong]
+    if not weak:
+        return False
+    rest = y - _others({j: fits[j] for j in strong}, related, None)
+    problems = [replace(fits[j].problem, y=rest, whitening=whitening) for j in weak]
+    found = refined_together(problems, [fits[j].best.fit for j in weak], rest)
+    parts = {j: fit.prediction - fit.linear[-1] for j, fit in zip(weak, found, strict=True)}
+    total = sum(parts.values(), np.zeros(y.size))
+    for j, fit in zip(weak, found, strict=True):
+        problem = replace(fits[j].problem, y=rest - (total - parts[j]))
+        trial = replace(fits[j].best, fit=fit)
+        fits[j] = replace(
+            fits[j],
+            problem=problem,
+            best=trial,
+            trials=tuple(trial if t is fits[j].best else t for t in fits[j].trials),
+            effective_share=effective_share(fit.residual),
+        )
+    gains = []
+    for k, j in enumerate(weak):
+        shared = [bins for group, bins in alike if j in group and group & set(strong)]
+        gains.append(
+            0.0 if _too_slow(found[k], y.size) else gained_by(_apart(problems, shared), found, k)
+        )
+    least = int(np.argmin(gains))
+    if gains[least] > (FOLLOWS if whitening is None else _COLOURED * FOLLOWS):
+        return False
+    related[weak[least]] = False
+    return True
+
+
+def _too_slow(fit: Fit, samples: int) -> bool:
+    """Whether a coupling is one of drifts only: its corner below a few periods of the record."""
+    slowest = slowest_time_constant(fit.denominator)
+    return bool(2 * np.pi * slowest * _PERIODS > samples)
+
+
+def _apart(problems: list[Problem], shared: list[NDArray[np.bool_]]) -> list[Problem]:
+    """The problems without the bins at which an input is not told from a stronger one."""
+    if not shared:
+        return problems
+    known = problems[0].whitening
+    gain = np.ones(problems[0].y.size // 2 + 1) if known is None else known
+    for bins in shared:
+        gain = gain * ~bins
+    return [replace(problem, whitening=gain) for problem in problems]
+
+
+def _others(fits: dict[int, JointFit], related: dict[int, bool], i: int | None) -> Real:
+    """What the inputs other than one move the output by."""
+    total: Real = np.zeros(next(iter(fits.values())).problem.y.size)
+    for j, fit in fits.items():
+        if j != i and related[j]:
+            total = total + _part(fit)
     return total
 
 
-def _part(fit: JointFit) -> NDArray[np.float64]:
+def _part(fit: JointFit) -> Real:
     """What the input contributes to the output, the bias aside."""
     best = fit.best.fit
     return np.asarray(best.prediction - best.linear[-1])
 
 
-def _again(fit: JointFit, rest: NDArray[np.float64]) -> JointFit:
+def _again(fit: JointFit, rest: Real) -> JointFit:
     """Fit the chosen structure again, to what the others leave over now."""
     problem = replace(fit.problem, y=rest)
     best = fit_structure(problem, fit.best.fit.structure, fit.best.fit.theta, precision=1e-4)
-    trial = Trial(intersample=fit.best.intersample, fit=best, criterion=fit.best.criterion)
+    trial = replace(fit.best, fit=best)
     trials = tuple(trial if t is fit.best else t for t in fit.trials)
     return replace(
         fit,
@@ -139,32 +329,44 @@ def _again(fit: JointFit, rest: NDArray[np.float64]) -> JointFit:
     )
 
 
-def _covariances(fits: list[JointFit], related: list[bool]) -> tuple[NDArray[np.float64], ...]:
+def _lag(pairs: list[JointFit], k: int, whitening: Real | None) -> Lag | None:
+    """Delay and lag of one of the pairs, if it is of no more than first order."""
+    fit = pairs[k].best.fit
+    if fit.structure.name not in ("static", "first_order"):
+        return None
+    problem, blocks = _derivatives([*pairs[:k], *pairs[k + 1 :]], whitening)
+    others = np.vstack([*blocks, problem.masked(np.ones(fit.residual.size))])
+    own = replace(pairs[k].problem, valid=problem.valid, whitening=whitening)
+    return lag_of(own, fit, others)
+
+
+def _derivatives(fits: list[JointFit], whitening: Real | None) -> tuple[Problem, list[Real]]:
+    """Derivatives of each pair but by the bias, on the samples that count for all."""
+    last = fits[-1].problem
+    counted = np.ones(last.y.size, dtype=bool)
+    for fit in fits:
+        counted &= True if fit.problem.valid is None else fit.problem.valid
+    problem = replace(last, valid=None if bool(counted.all()) else counted, whitening=whitening)
+    return problem, [
+        jacobian(replace(problem, source=fit.problem.source), fit.best.fit)[:-1] for fit in fits
+    ]
+
+
+def _covariances(fits: list[JointFit], whitening: Real | None) -> list[Real]:
     """Covariance of each pair's parameters and the bias, from all derivatives together."""
-    counted = _all_count([fit.problem for fit in fits])
-    blocks, spans, start = [], [], 0
-    for fit, follows in zip(fits, related, strict=True):
-        rows = jacobian(fit.problem, fit.best.fit)[:-1] * counted if follows else None
-        size = 0 if rows is None else rows.shape[0]
-        spans.append(range(start, start + size))
-        start += size
-        if rows is not None:
-            blocks.append(rows)
-    if not blocks:
-        return tuple(np.zeros((0, 0)) for _ in fits)
-    stacked = np.vstack([*blocks, counted.astype(float)])
-    last = next(fit for fit, follows in zip(fits, related, strict=True) if follows)
-    residual = last.best.fit.residual * counted
-    freedom = max(int(np.count_nonzero(counted)) - stacked.shape[0], 1)
-    full = covariance(stacked, residual, freedom=freedom, white=is_white(residual[counted]))
-    return tuple(
-        full[np.ix_([*span, start], [*span, start])] if span else np.zeros((0, 0)) for span in spans
-    )
-
-
-def _all_count(problems: list[Problem]) -> NDArray[np.bool_]:
-    counted = np.ones(problems[0].y.size, dtype=bool)
-    for problem in problems:
-        if problem.valid is not None:
-            counted &= problem.valid
-    return counted
+    if not fits:
+        return []
+    last = fits[-1]
+    problem, blocks = _derivatives(fits, whitening)
+    counted = np.ones(last.problem.y.size, dtype=bool) if problem.valid is None else problem.valid
+    rows = np.vstack([*blocks, problem.masked(np.ones(counted.size))])
+    residual = problem.masked(last.problem.y - last.best.fit.prediction)
+    freedom = max(int(np.count_nonzero(counted)) - rows.shape[0], 1)
+    white = whitening is not None or is_white(residual[counted])
+    full = joint_covariance(rows, residual, freedom=freedom, white=white)
+    end, start, out = rows.shape[0] - 1, 0, []
+    for block in blocks:
+        span = [*range(start, start + block.shape[0]), end]
+        out.append(full[np.ix_(span, span)])
+        start += block.shape[0]
+    return out
