@@ -36,6 +36,9 @@ _STEEP = 80.0
 _SLOW = 0.25
 """Time constant of the model, over the record's length, that may be a drift in disguise."""
 
+_POOR = 0.3
+"""Share of the output's power left over from which a drift is looked for in any case."""
+
 _TURNS = 12
 _STILL = 1e-3
 """Stop when the polynomial moves by less than this share of the noise (r.m.s.)."""
@@ -105,7 +108,7 @@ def with_drift(
         found = _described(joint, columns[:chosen], weights)
         if best is None or _gain(joint, chosen, best.joint, best.degree) > 0:
             best = found
-        if not _asked_for(joint):
+        if is_white(joint.best.fit.residual):
             break
     if best is None or _gain(best.joint, best.degree, first, 0) < 0:
         return None
@@ -134,6 +137,9 @@ def _asked_for(joint: JointFit) -> bool:
     if joint.forgotten:  # it may be the drift that parts the beginning from the rest
         return True
     if slowest_time_constant(fit.denominator) > _SLOW * problem.y.size:
+        return True
+    spread = problem.masked(problem.y - problem.y.mean())
+    if fit.cost > _POOR * float(spread @ spread):
         return True
     counted = np.arange(problem.y.size) if problem.valid is None else np.flatnonzero(problem.valid)
     residual = fit.residual[counted]
@@ -215,7 +221,7 @@ def _degree(joint: JointFit, columns: NDArray[np.float64], weights: NDArray[np.f
     problem = joint.problem
     counts = slice(None) if problem.valid is None else problem.valid
     left = (joint.best.fit.residual + problem.masked(weights @ columns[: weights.size]))[counts]
-    count = problem.counted * joint.effective_share
+    count = problem.counted  # of a wander, the more is taken out the better
     best = (np.inf, 1)
     for degree in _DEGREES:
         if degree > weights.size:
