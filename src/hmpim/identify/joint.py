@@ -285,13 +285,16 @@ def _fit_all(
         if settled and name == "first_order":
             starts = [_without_second_pole(fits[0])]
         else:
-            starts = starting_values(rough, structure, earliest=-2, thorough=not settled)
+            starts = starting_values(rough, structure, earliest=-2, thorough=False)
         steps = 2 if settled else _TASTE
         fit = fit_structure(problem, structure, starts[0], iterations=steps)
         hopeful = min((f.cost for f in fits), default=np.inf) * _HOPELESS
         white = fit.cost < hopeful and is_white(fit.residual)
-        if not white:
-            for theta in starts[1:] if fit.cost < _FALLING * hopeful else []:
+        if not white and fit.cost < _FALLING * hopeful:
+            rivals = starts[1:]
+            if not settled:
+                rivals += starting_values(rough, structure, earliest=-2)
+            for theta in rivals:
                 rival = fit_structure(problem, structure, theta, iterations=_TASTE)
                 fit = min(fit, rival, key=lambda f: f.cost)
         settled = settled or white
