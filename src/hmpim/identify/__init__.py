@@ -2,6 +2,14 @@
 
 from hmpim.identify.bandwidth import gain_and_phase
 from hmpim.identify.identify import identify
+from hmpim.identify.levels import (
+    Level,
+    LevelComparison,
+    Levels,
+    Trend,
+    compare_levels,
+    identify_levels,
+)
 from hmpim.identify.local import local_polynomial_response, local_response
 from hmpim.identify.multivariable import ResponseMatrix, response_matrix
 from hmpim.identify.paper import PaperAnalysis, paper_analysis
@@ -29,6 +37,9 @@ __all__ = [
     "FrequencyResponse",
     "HarmonicCurve",
     "Identification",
+    "Level",
+    "LevelComparison",
+    "Levels",
     "Nonlinearity",
     "PairIdentification",
     "PaperAnalysis",
@@ -39,10 +50,13 @@ __all__ = [
     "Repeats",
     "ResponseBandwidths",
     "ResponseMatrix",
+    "Trend",
     "Verdict",
+    "compare_levels",
     "excited_band",
     "gain_and_phase",
     "identify",
+    "identify_levels",
     "identify_repeats",
     "local_polynomial_response",
     "local_response",

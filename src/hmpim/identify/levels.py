@@ -7,15 +7,25 @@ they move, tell where the linear range ends and what ends it.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
+from typing import get_args
 
 import numpy as np
 from scipy.stats import chi2
 
-from hmpim.errors import ArgumentError
-from hmpim.identify.result import Estimate, PairIdentification, Parameters
-from hmpim.record import Finding
+from hmpim.errors import ArgumentError, RecordError
+from hmpim.identify.identify import identify
+from hmpim.identify.result import Estimate, Identification, PairIdentification, Parameters
+from hmpim.model.dynamics import StructureName
+from hmpim.record import Finding, Intersample, Record
 
-__all__ = ["Level", "LevelComparison", "Trend", "compare_levels"]
+__all__ = [
+    "Level",
+    "LevelComparison",
+    "Levels",
+    "Trend",
+    "compare_levels",
+    "identify_levels",
+]
 
 _COMPARED = (
     "natural_frequency",
@@ -97,6 +107,109 @@ class LevelComparison:
     trends: tuple[Trend, ...]
     linear_up_to: float
     findings: tuple[Finding, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Levels:
+    """One test at several amplitudes; index it output first: ``levels["y", "u"].trends``.
+
+    Parameters
+    ----------
+    results : tuple of Identification
+        Each record by itself, in the order given.
+    comparisons : tuple of LevelComparison
+        One for each pair of `results[0]`.
+    """
+
+    results: tuple[Identification, ...]
+    comparisons: tuple[LevelComparison, ...]
+
+    def __getitem__(self, key: tuple[str, str]) -> LevelComparison:
+        wanted = self.results[0][key]
+        return self.comparisons[self.results[0].pairs.index(wanted)]
+
+
+def identify_levels(
+    records: Sequence[Record],
+    *,
+    amplitudes: Sequence[float] | None = None,
+    intersample: Intersample | str = "auto",
+    structures: Sequence[StructureName] | None = None,
+) -> Levels:
+    """Identify one test at several amplitudes, and say where it stops being linear (Fig. 22).
+
+    Parameters
+    ----------
+    records : sequence of Record
+        Two or more, with the same channels.
+    amplitudes : sequence of float, optional
+        One per record, by any measure that is the same for all; if None, half the range that
+        each pair's own input covers.
+    intersample, structures
+        As in `identify`. Each pair takes the structure found at the smallest amplitude for
+        all, so that like is compared with like.
+
+    Returns
+    -------
+    Levels
+
+    Raises
+    ------
+    ArgumentError
+        For fewer than two records, or amplitudes that do not fit them.
+    RecordError
+        For channels that differ, and whatever `identify` refuses.
+
+    Examples
+    --------
+    >>> t = np.arange(1000) / 100
+    >>> sweep = np.sin(2 * np.pi * (0.1 * t + 1.0 * t**2))
+    >>> rng = np.random.default_rng(1)
+    >>> def test(gain):
+    ...     u = gain * sweep
+    ...     y = u - 0.02 * u**3 + 0.001 * rng.standard_normal(1000)
+    ...     return Record.from_arrays({"u": u}, {"y": y}, fs=100.0)
+    >>> levels = identify_levels([test(0.1), test(0.5), test(2.0)], structures=["static"])
+    >>> levels["y", "u"].findings[0].code, round(levels["y", "u"].linear_up_to, 1)
+    ('nonlinear', 0.5)
+    """
+    given = tuple(records)
+    if len(given) < 2:
+        raise ArgumentError(f"{len(given)} record has nothing to be compared with; give two")
+    if amplitudes is not None and len(amplitudes) != len(given):
+        raise ArgumentError(
+            f"{len(given)} records and {len(amplitudes)} amplitudes do not go together; "
+            "give one amplitude for each"
+        )
+    names = [[c.name for c in (*r.inputs, *r.outputs)] for r in given]
+    for k, own in enumerate(names):
+        if own != names[0]:
+            raise RecordError(
+                f"record {k} has channels {', '.join(own)} and record 0 has "
+                f"{', '.join(names[0])}; give the same channels in the same order"
+            )
+    results = [identify(r, intersample=intersample, structures=structures) for r in given]
+    comparisons = []
+    for pair in results[0].pairs:
+        key = (pair.output, pair.input)
+        heights = [float(np.ptp(r.channel(pair.input).values)) / 2 for r in given]
+        heights = heights if amplitudes is None else list(amplitudes)
+        first = results[int(np.argmin(heights))][key]
+        alike = [
+            found
+            if (found := result[key]).structure == first.structure
+            or found.verdict == "not_identifiable"
+            else identify(record, intersample=first.intersample, structures=_only(first.structure))[
+                key
+            ]
+            for record, result in zip(given, results, strict=True)
+        ]
+        comparisons.append(compare_levels(alike, heights))
+    return Levels(results=tuple(results), comparisons=tuple(comparisons))
+
+
+def _only(structure: str) -> list[StructureName]:
+    return [name for name in get_args(StructureName) if name == structure]
 
 
 def compare_levels(

@@ -27,6 +27,7 @@ def general(
     kinds: Sequence[Mechanism],
     effect: float,
     asked: bool,
+    swept: bool,
 ) -> Finding:
     """Say that it is nonlinear, how much, even or odd, and what it may be.
 
@@ -44,12 +45,14 @@ def general(
         R.m.s. of all that the first of them does, over that of the output.
     asked : bool
         Whether the kinds were compared at all.
+    swept : bool
+        Whether the input is a sweep, whose own frequency tells dynamics left out from noise.
 
     Examples
     --------
     >>> general(
     ...     share=0.021, where=["odd harmonics of the sweep"], made_of=(0.3, 0.1, 0.6),
-    ...     kinds=[], effect=0.0, asked=False).message[:58]
+    ...     kinds=[], effect=0.0, asked=False, swept=True).message[:58]
     '2.1 % of the output (r.m.s.) is nonlinear: odd harmonics o'
     """
     noise, linear, nonlinear = (100 * part for part in made_of)
@@ -63,8 +66,10 @@ def general(
     else:
         guess = "Drive one input at a time to see of which kind it is."
     seen = f": {' and '.join(where)}" if where else ""
-    left = f"Of the residual's power {noise:.0f} % is noise and {nonlinear:.0f} % nonlinear"
-    if linear >= 0.5:
+    left = f"Of the residual's power {nonlinear:.0f} % is nonlinear and {noise:.0f} % noise"
+    if not swept:
+        left += " or dynamics left out"
+    elif linear >= 0.5:
         left += f"; {linear:.0f} % still follows the input"
     whole = f" All its effect, most of which passes for linear, is {100 * effect:.2g} %."
     return Finding(

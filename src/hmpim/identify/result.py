@@ -227,7 +227,7 @@ class Nonlinearity:
         Of the kind, if there is one: half width of the band of friction or backlash, speed,
         level, or share by which the largest deflection departs from proportion.
     harmonics : tuple of HarmonicCurve
-        Of a sweep in which there is something to see.
+        Of a sweep in which there is something to see; order 1 is the output itself.
     """
 
     share: float

@@ -5,6 +5,7 @@ from hmpim.plots.candidates import candidates
 from hmpim.plots.correlation import cross_correlation, error_autocorrelation
 from hmpim.plots.curves import BodeCurve, deviation_curve, measured_curve, model_curve
 from hmpim.plots.envelope import envelope
+from hmpim.plots.harmonics import harmonics
 from hmpim.plots.histories import (
     input_output,
     model_over_measurement,
@@ -24,6 +25,7 @@ __all__ = [
     "draw_spectrum",
     "envelope",
     "error_autocorrelation",
+    "harmonics",
     "input_output",
     "measured_curve",
     "model_curve",

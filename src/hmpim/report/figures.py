@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hmpim import plots
-from hmpim.identify import Identification, PairIdentification
+from hmpim.identify import Identification, Nonlinearity, PairIdentification
 from hmpim.identify.paper import PaperAnalysis, paper_analysis
 from hmpim.record import Intersample, Record, Signal, uniform
 from hmpim.report.numbers import format_number
@@ -92,6 +92,8 @@ def pair_pictures(result: Identification, pair: PairIdentification) -> list[Pict
         pictures += _response_pictures(pair, units, result.record.fs)
     if record is not None and pair.time is not None:
         pictures += _model_pictures(pair, units[1])
+    if pair.nonlinearity is not None and pair.nonlinearity.harmonics:
+        pictures.append(_harmonics_picture(pair, pair.nonlinearity))
     if pair.candidates:
         pictures.append(_candidates_picture(pair))
     return pictures
@@ -262,6 +264,20 @@ def _model_pictures(pair: PairIdentification, unit: str) -> list[Picture]:
             figure=plots.residuals(pair.time, pair.residual, output_name=pair.output, unit=unit),
         ),
     ]
+
+
+def _harmonics_picture(pair: PairIdentification, found: Nonlinearity) -> Picture:
+    orders = [curve.order for curve in found.harmonics if curve.order > 1]
+    return Picture(
+        key="harmonics",
+        title="Harmonics",
+        caption="Harmonics of the sweep in what the linear model leaves over, against the "
+        "sweep's frequency, with the band of two standard deviations. Even ones come from what "
+        "is asymmetric, odd ones from what is alike either way.",
+        description=f"Amplitude of harmonics {', '.join(str(k) for k in orders)} of {pair.output}, "
+        "in per cent of its own amplitude at the frequency of the sweep.",
+        figure=plots.harmonics(found.harmonics),
+    )
 
 
 def _candidates_picture(pair: PairIdentification) -> Picture:

@@ -17,6 +17,7 @@ from hmpim.report.words import (
     GLOSSARY,
     VERDICTS,
     headline,
+    nonlinear_facts,
     pair_sentence,
     paper_value,
     remark,
@@ -195,5 +196,6 @@ def _pair_view(result: Identification, pair: PairIdentification) -> dict[str, An
             }
             for c in sorted(pair.candidates, key=lambda c: c.criterion)
         ],
+        "nonlinear": nonlinear_facts(pair),
         "pictures": pair_pictures(result, pair),
     }

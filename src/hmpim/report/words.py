@@ -4,13 +4,14 @@ from dataclasses import dataclass
 
 from hmpim.identify import Estimate, Identification, PairIdentification, Verdict
 from hmpim.plots.candidates import INTERSAMPLE_WORDS
-from hmpim.report.numbers import format_number
+from hmpim.report.numbers import format_number, plus_minus
 
 __all__ = [
     "GLOSSARY",
     "VERDICTS",
     "ParameterWords",
     "headline",
+    "nonlinear_facts",
     "paper_value",
     "remark",
     "structure_words",
@@ -188,6 +189,47 @@ def headline(result: Identification) -> str:
         return f"{VERDICTS[result.verdict]}: {pair_sentence(result.pairs[0])}"
     trusted = sum(pair.verdict == "ok" for pair in result.pairs)
     return f"{VERDICTS[result.verdict]}: {trusted} of {pairs} pairs can be trusted as they stand."
+
+
+def nonlinear_facts(pair: PairIdentification) -> list[tuple[str, str]]:
+    """Name and value of all that is said of a nonlinearity; none where there is none to report.
+
+    Parameters
+    ----------
+    pair : PairIdentification
+        What was found.
+
+    Examples
+    --------
+    >>> from types import SimpleNamespace
+    >>> from hmpim.identify import Nonlinearity
+    >>> from hmpim.record import Finding
+    >>> found = Nonlinearity(
+    ...     share=0.02, even=0.0, odd=0.02, noise=0.7, linear=0.1, nonlinear=0.2,
+    ...     kinds=("friction", "backlash"))
+    >>> warned = (Finding(code="nonlinear", message="…"),)
+    >>> nonlinear_facts(SimpleNamespace(nonlinearity=found, warnings=warned))[2]
+    ('Kind', 'friction or backlash; this record cannot tell which')
+    """
+    found = pair.nonlinearity
+    if found is None or not any(warning.code == "nonlinear" for warning in pair.warnings):
+        return []
+    kind = " or ".join(name.replace("_", " ") for name in found.kinds)
+    if len(found.kinds) > 1:
+        kind += "; this record cannot tell which"
+    elif found.size is not None:
+        kind += f", size {plus_minus(found.size.value, found.size.std)} {found.size.unit}".rstrip()
+    parts = [
+        ("noise", found.noise),
+        ("still following the input", found.linear),
+        ("nonlinear", found.nonlinear),
+    ]
+    return [
+        ("Nonlinear part", f"{100 * found.share:.2g} % of the output (r.m.s.)"),
+        ("Odd, even", f"{100 * found.odd:.2g} %, {100 * found.even:.2g} %"),
+        ("Kind", kind or "like none of those that are tried"),
+        ("The residual's power", ", ".join(f"{100 * part:.0f} % {name}" for name, part in parts)),
+    ]
 
 
 def pair_sentence(pair: PairIdentification) -> str:
