@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from hmpim.cli.several import identify_several
 from hmpim.cli.terminal import check_target, output_console, say, working
 from hmpim.errors import ArgumentError
 
@@ -28,8 +29,14 @@ class Between(StrEnum):
 
 
 def identify(
-    record: Annotated[
-        Path, typer.Argument(help="File with the record, such as a CSV file with a header.")
+    records: Annotated[
+        list[Path],
+        typer.Argument(
+            metavar="RECORD...",
+            help="File with the record, such as a CSV file with a header. Several of one stimulus "
+            "are averaged and their error bars held against their scatter; at several amplitudes "
+            "they tell where the unit is linear.",
+        ),
     ],
     input_: Annotated[
         list[str] | None,
@@ -69,7 +76,10 @@ def identify(
     ] = None,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print no table.")] = False,
 ) -> None:
-    """Find every parameter of a measured record, each with its error bar."""
+    """Find every parameter of a measured record, each with its error bar.
+
+    Of several records: averages, repeatability, and whether stated errors and scatter agree.
+    """
     check_target(json, "--json")
     check_target(report, "--report")
     if holdout is not None and not 0.0 < holdout < 1.0:
@@ -79,8 +89,22 @@ def identify(
     from hmpim.identify import identify as find
     from hmpim.report import print_result
 
-    with working(f"Reading {record}"):
-        data = read(record, inputs=input_ or None, outputs=output or None, fs=fs, time=time)
+    given = []
+    for record in records:
+        with working(f"Reading {record}"):
+            given.append(
+                read(record, inputs=input_ or None, outputs=output or None, fs=fs, time=time)
+            )
+    if len(given) > 1:
+        for option, wanted in (("--report", report), ("--holdout", holdout)):
+            if wanted is not None:
+                raise ArgumentError(
+                    f"{option} is about one record, and {len(given)} are given; leave it out, or "
+                    "give one"
+                )
+        identify_several(given, records, intersample=intersample.value, json=json, quiet=quiet)
+        return
+    (data,) = given
     part, split = (data, None) if holdout is None else _first_part(data, holdout)
     with working("Identifying"):
         result = find(part, intersample=intersample.value)

@@ -5,8 +5,12 @@ noise but dynamics or nonlinearity that it does not describe (Pintelon and Schou
 Identification, 2nd ed., Wiley 2012, section 4.3: averages over periods tell the two apart).
 """
 
+import json
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
+from os import PathLike
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,7 +31,9 @@ from hmpim.identify.whiteness import effective_share
 from hmpim.model.dynamics import StructureName
 from hmpim.record import Finding, Intersample, Record, uniform
 
-__all__ = ["RepeatedPair", "RepeatedParameter", "Repeats", "identify_repeats"]
+__all__ = ["RepeatedPair", "RepeatedParameter", "Repeats", "identify_repeats", "same_at_levels"]
+
+SCHEMA = "hmpim/repeats/1"
 
 # Inputs of two repeats are the same if their difference is at most this share of their size.
 _SAME = 0.05
@@ -71,6 +77,18 @@ class RepeatedParameter:
     freedom: int
     probability: float
     agree: bool
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return plain JSON values."""
+        return {
+            "mean": self.mean.to_dict(),
+            "values": list(self.values),
+            "repeatability": self.repeatability,
+            "chi_squared": self.chi_squared,
+            "freedom": self.freedom,
+            "probability": self.probability,
+            "agree": self.agree,
+        }
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -120,6 +138,22 @@ class RepeatedPair:
         known = ", ".join(p.name for p in self.parameters)
         raise RecordError(f"the repeats do not tell {name!r}; they tell {known}")
 
+    def to_dict(self) -> dict[str, Any]:
+        """Return plain JSON values; what is no number is null."""
+        scatter = self.response_scatter
+        return {
+            "input": self.input,
+            "output": self.output,
+            "structures": list(self.structures),
+            "parameters": {p.name: p.to_dict() for p in self.parameters},
+            "frequency_response": self.frequency_response.to_dict(),
+            "response_scatter": scatter if np.isfinite(scatter) else None,
+            "noise_std": None if self.noise_std is None else self.noise_std.to_dict(),
+            "unmodelled": self.unmodelled,
+            "unmodelled_probability": self.unmodelled_probability,
+            "warnings": [{"code": f.code, "message": f.message} for f in self.findings],
+        }
+
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Repeats:
@@ -143,6 +177,19 @@ class Repeats:
                 return pair
         known = ", ".join(f"({p.output!r}, {p.input!r})" for p in self.pairs)
         raise RecordError(f"there is no pair ({output!r}, {input_!r}); the repeats have {known}")
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return all of it as plain JSON values, `schema` first."""
+        return {
+            "schema": SCHEMA,
+            "results": [result.to_dict() for result in self.results],
+            "pairs": [pair.to_dict() for pair in self.pairs],
+        }
+
+    def save(self, path: str | PathLike[str]) -> None:
+        """Write all of it to `path` as JSON."""
+        text = json.dumps(self.to_dict(), indent=1, allow_nan=False)
+        Path(path).write_text(text + "\n", encoding="utf-8")
 
 
 def identify_repeats(
@@ -202,6 +249,43 @@ def identify_repeats(
             for pair in results[0].pairs
         ),
     )
+
+
+def same_at_levels(records: Sequence[Record]) -> bool:
+    """Whether records are of one stimulus at several amplitudes, rather than repeats of it.
+
+    Parameters
+    ----------
+    records : sequence of Record
+        With the same channels.
+
+    Returns
+    -------
+    bool
+        True if the inputs are the same but for a factor, and that factor is not 1 for all.
+
+    Examples
+    --------
+    >>> u = np.sin(np.arange(100.0) ** 2 / 300)
+    >>> small, large = (Record.from_arrays({"u": k * u}, {"y": u}, fs=9.0) for k in (1, 3))
+    >>> same_at_levels([small, large]), same_at_levels([small, small])
+    (True, False)
+    """
+    aligned = [uniform(record) for record in records]
+    changed = False
+    for other in aligned[1:]:
+        if len(other.inputs) != len(aligned[0].inputs):
+            return False
+        for one, two in zip(aligned[0].inputs, other.inputs, strict=True):
+            length = min(one.values.size, two.values.size)
+            first, second = (x.values[:length] - x.values[:length].mean() for x in (one, two))
+            power = float(first @ first)
+            factor = float(first @ second) / power if power else 0.0
+            rest = float(np.linalg.norm(second - factor * first))
+            if not factor > 0 or rest > _SAME * float(np.linalg.norm(second)):
+                return False
+            changed = changed or abs(factor - 1) > _SAME
+    return changed
 
 
 def _check_alike(records: tuple[Record, ...]) -> None:
@@ -337,7 +421,10 @@ def _averaged(found: tuple[PairIdentification, ...]) -> tuple[FrequencyResponse,
     delay = found[0].parameters.delay
     turn = np.exp(2j * np.pi * frequency * (0.0 if delay is None else delay.value))
     responses, stds = [], []
-    for pair in found:
+    known = [pair for pair in found if pair.frequency_response.frequency.size]
+    if not known or not frequency.size:
+        return found[0].frequency_response, float("nan")
+    for pair in known:
         own = pair.frequency_response
         straight = own.response * np.exp(
             2j * np.pi * own.frequency * (0.0 if delay is None else delay.value)
@@ -347,8 +434,8 @@ def _averaged(found: tuple[PairIdentification, ...]) -> tuple[FrequencyResponse,
     values = np.stack(responses)
     weights = 1.0 / np.maximum(np.stack(stds), np.finfo(float).tiny ** 0.25) ** 2
     mean = np.sum(weights * values, axis=0) / np.sum(weights, axis=0)
-    scatter = np.sum(weights * np.abs(values - mean) ** 2, axis=0) / (len(found) - 1)
-    known = scatter[np.isfinite(scatter)]
+    scatter = np.sum(weights * np.abs(values - mean) ** 2, axis=0) / max(len(known) - 1, 1)
+    finite = scatter[np.isfinite(scatter)]
     return (
         FrequencyResponse(
             frequency=frequency,
@@ -356,7 +443,7 @@ def _averaged(found: tuple[PairIdentification, ...]) -> tuple[FrequencyResponse,
             std=np.sqrt(1.0 / np.sum(weights, axis=0)),
             coherence=None,
         ),
-        float(np.sqrt(np.mean(known))) if known.size else float("nan"),
+        float(np.sqrt(np.mean(finite))) if finite.size else float("nan"),
     )
 
 

@@ -3,6 +3,7 @@
 from hmpim.report.files import replacing
 from hmpim.report.html import render, report
 from hmpim.report.numbers import format_estimate, format_interval, format_number, plus_minus
+from hmpim.report.repeats_text import print_levels, print_repeats, repeats_table
 from hmpim.report.text import parameter_table, print_result
 
 __all__ = [
@@ -11,8 +12,11 @@ __all__ = [
     "format_number",
     "parameter_table",
     "plus_minus",
+    "print_levels",
+    "print_repeats",
     "print_result",
     "render",
+    "repeats_table",
     "replacing",
     "report",
 ]

@@ -1,0 +1,77 @@
+"""``hmpim identify a.csv b.csv …``: repeats of one stimulus, or one stimulus at several levels."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from hmpim.cli.terminal import output_console, working
+
+if TYPE_CHECKING:
+    from hmpim.identify import Levels
+    from hmpim.record import Record
+
+__all__ = ["identify_several"]
+
+
+def identify_several(
+    records: "Sequence[Record]",
+    paths: Sequence[Path],
+    *,
+    intersample: str,
+    json: Path | None,
+    quiet: bool,
+) -> None:
+    """Average repeats, or compare levels, whichever the records are."""
+    from hmpim.identify import identify_levels, identify_repeats, same_at_levels
+    from hmpim.report import print_levels, print_repeats, replacing
+
+    with working(f"Identifying {len(records)} records"):
+        if same_at_levels(records):
+            levels = identify_levels(records, intersample=intersample)
+            if not quiet:
+                print_levels(levels, [path.name for path in paths], output_console())
+            if json is not None:
+                _write(_levels_dict(levels), json)
+            return
+        repeats = identify_repeats(records, intersample=intersample)
+    if not quiet:
+        print_repeats(repeats, output_console())
+    if json is not None:
+        with replacing(json) as place:
+            repeats.save(place)
+
+
+def _levels_dict(levels: "Levels") -> dict[str, Any]:
+    return {
+        "schema": "hmpim/levels/1",
+        "results": [result.to_dict() for result in levels.results],
+        "pairs": [
+            {
+                "input": pair.input,
+                "output": pair.output,
+                "linear_up_to": compared.linear_up_to,
+                "trends": [
+                    {
+                        "name": trend.name,
+                        "amplitudes": list(trend.amplitudes),
+                        "values": list(trend.values),
+                        "stds": list(trend.stds),
+                        "probability": trend.probability,
+                        "change": trend.change,
+                    }
+                    for trend in compared.trends
+                ],
+                "warnings": [{"code": f.code, "message": f.message} for f in compared.findings],
+            }
+            for pair, compared in zip(levels.results[0].pairs, levels.comparisons, strict=True)
+        ],
+    }
+
+
+def _write(data: dict[str, Any], path: Path) -> None:
+    from json import dumps
+
+    from hmpim.report import replacing
+
+    with replacing(path) as place:
+        place.write_text(dumps(data, indent=1, allow_nan=False) + "\n", encoding="utf-8")

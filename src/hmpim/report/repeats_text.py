@@ -1,0 +1,177 @@
+"""Several records of one test on a terminal: averages, repeatability, dependence on level."""
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from hmpim.identify.levels import Levels, Trend
+from hmpim.identify.repeats import RepeatedPair, Repeats
+from hmpim.plots.style import printable
+from hmpim.record import Finding
+from hmpim.report.numbers import format_number, plus_minus
+from hmpim.report.words import GLOSSARY
+
+if TYPE_CHECKING:
+    from rich.console import Console
+    from rich.table import Table
+
+__all__ = ["print_levels", "print_repeats", "repeats_table"]
+
+
+def repeats_table(pair: RepeatedPair) -> "Table":
+    """Return what the repeats say of one pair as a table for a terminal.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from hmpim.identify import Estimate, FrequencyResponse
+    >>> from hmpim.identify.repeats import RepeatedParameter
+    >>> none = np.empty(0)
+    >>> mean = Estimate(value=0.15, std=0.0001, ci95=(0.1498, 0.1502), unit="s")
+    >>> delay = RepeatedParameter(
+    ...     name="delay", mean=mean, values=(0.1499, 0.1501), repeatability=0.00014,
+    ...     chi_squared=1.0, freedom=1, probability=0.32, agree=True)
+    >>> pair = RepeatedPair(
+    ...     input="u", output="y", structures=("static", "static"), parameters=(delay,),
+    ...     frequency_response=FrequencyResponse(frequency=none, response=none, std=none),
+    ...     response_scatter=1.0, noise_std=None, unmodelled=None, unmodelled_probability=None,
+    ...     findings=())
+    >>> [str(next(column.cells)) for column in repeats_table(pair).columns]
+    ['Delay, pure', '0.15000 ± 0.00010', 's', '0.00014', '1.00', '32 %', 'yes']
+    """
+    from rich.box import SIMPLE_HEAD
+    from rich.table import Table
+    from rich.text import Text
+
+    table = Table(box=SIMPLE_HEAD, pad_edge=False)
+    table.add_column("Parameter")
+    for heading in ("Mean ± std", "Unit", "Repeatability", "Scatter / stated", "Chance"):
+        table.add_column(heading, justify="left" if heading == "Unit" else "right")
+    table.add_column("Error bars agree")
+    found = {parameter.name: parameter for parameter in pair.parameters}
+    for words in GLOSSARY:
+        parameter = found.get(words.name)
+        if parameter is None:
+            continue
+        ratio = (parameter.chi_squared / parameter.freedom) ** 0.5
+        cells = (
+            words.label,
+            plus_minus(parameter.mean.value, parameter.mean.std),
+            parameter.mean.unit,
+            format_number(parameter.repeatability),
+            f"{ratio:.2f}",
+            _percent(parameter.probability),
+            "yes" if parameter.agree else "no",
+        )
+        table.add_row(*(Text(cell) for cell in cells))
+    return table
+
+
+def print_repeats(repeats: Repeats, console: "Console") -> None:
+    """Print, for each pair, the averages and whether the stated errors agree with the scatter.
+
+    Parameters
+    ----------
+    repeats : Repeats
+        From `hmpim.identify_repeats`.
+    console : rich.console.Console
+        Where to.
+
+    Examples
+    --------
+    >>> from rich.console import Console
+    >>> print_repeats(Repeats(results=(), pairs=()), Console())
+    0 records of one stimulus
+    """
+    from rich.text import Text
+
+    count = len(repeats.results)
+    console.print(Text(f"{count} records of one stimulus", style="bold"))
+    for pair in repeats.pairs:
+        console.print(Text(printable(f"{pair.input} → {pair.output}"), style="bold"))
+        if not pair.parameters:
+            console.print(Text("No parameter is told by two records or more."))
+        else:
+            console.print(repeats_table(pair))
+        if pair.noise_std is not None:
+            console.print(
+                Text(
+                    f"Noise, from what differs between the records: "
+                    f"{plus_minus(pair.noise_std.value, pair.noise_std.std)} "
+                    f"{printable(pair.noise_std.unit)}".rstrip()
+                )
+            )
+        _print_findings(pair.findings, console)
+
+
+def print_levels(levels: Levels, names: Sequence[str], console: "Console") -> None:
+    """Print how each parameter depends on the amplitude, and the linear range.
+
+    Parameters
+    ----------
+    levels : Levels
+        From `hmpim.identify.identify_levels`.
+    names : sequence of str
+        Of the records, in the order given.
+    console : rich.console.Console
+        Where to.
+    """
+    from rich.text import Text
+
+    console.print(Text(f"{len(names)} records of one stimulus at several levels", style="bold"))
+    for pair, compared in zip(levels.results[0].pairs, levels.comparisons, strict=True):
+        console.print(Text(printable(f"{pair.input} → {pair.output}"), style="bold"))
+        if compared.trends:
+            console.print(_trend_table(compared.trends))
+            console.print(Text(f"Linear up to an amplitude of {compared.linear_up_to:.4g}."))
+        else:
+            console.print(Text("No parameter is told at two levels or more."))
+        _print_findings(compared.findings, console)
+
+
+def _trend_table(trends: Sequence[Trend]) -> "Table":
+    from rich.box import SIMPLE_HEAD
+    from rich.table import Table
+    from rich.text import Text
+
+    labels = {words.name: words.label for words in GLOSSARY}
+    amplitudes = sorted({a for trend in trends for a in trend.amplitudes})
+    table = Table(box=SIMPLE_HEAD, pad_edge=False)
+    table.add_column("Parameter, at amplitude")
+    for amplitude in amplitudes:
+        table.add_column(f"{amplitude:.4g}", justify="right")
+    table.add_column("Change", justify="right")
+    table.add_column("Chance", justify="right")
+    for trend in trends:
+        known = {
+            a: plus_minus(value, std)
+            for a, value, std in zip(trend.amplitudes, trend.values, trend.stds, strict=True)
+        }
+        cells = [
+            labels.get(trend.name, trend.name),
+            *(known.get(a, "–") for a in amplitudes),
+            f"{100 * trend.change:+.2g} %",
+            _percent(trend.probability),
+        ]
+        table.add_row(*(Text(cell) for cell in cells))
+    return table
+
+
+def _print_findings(findings: Sequence[Finding], console: "Console") -> None:
+    from rich.text import Text
+
+    for finding in findings:
+        console.print(Text.assemble(("Warning: ", "bold yellow"), printable(finding.message)))
+
+
+def _percent(probability: float) -> str:
+    """Chance in per cent.
+
+    Examples
+    --------
+    >>> _percent(1.0), _percent(0.0432), _percent(1e-9)
+    ('100 %', '4.3 %', '< 0.1 %')
+    """
+    if probability < 0.001:
+        return "< 0.1 %"
+    places = 1 if probability < 0.1 else 0
+    return f"{100 * probability:.{places}f} %"
