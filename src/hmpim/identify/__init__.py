@@ -1,7 +1,9 @@
 """Identification: from a record to every parameter, each with its error bar (paper, section IV)."""
 
+from hmpim.identify.averaged import Averaged, averaged_response, coherence_significance
 from hmpim.identify.bandwidth import gain_and_phase
 from hmpim.identify.identify import identify
+from hmpim.identify.inputs import Alike, InputSet, OutputCoherence
 from hmpim.identify.levels import (
     Level,
     LevelComparison,
@@ -14,7 +16,13 @@ from hmpim.identify.local import local_polynomial_response, local_response
 from hmpim.identify.multivariable import ResponseMatrix, response_matrix
 from hmpim.identify.paper import PaperAnalysis, paper_analysis
 from hmpim.identify.predict import Prediction, predict, to_model
-from hmpim.identify.repeats import Repeats, identify_repeats
+from hmpim.identify.repeats import (
+    RepeatedPair,
+    RepeatedParameter,
+    Repeats,
+    identify_repeats,
+    same_at_levels,
+)
 from hmpim.identify.result import (
     Candidate,
     Estimate,
@@ -32,26 +40,34 @@ from hmpim.identify.result import (
 from hmpim.identify.spectrum import excited_band
 
 __all__ = [
+    "Alike",
+    "Averaged",
     "Candidate",
     "Estimate",
     "FrequencyResponse",
     "HarmonicCurve",
     "Identification",
+    "InputSet",
     "Level",
     "LevelComparison",
     "Levels",
     "Nonlinearity",
+    "OutputCoherence",
     "PairIdentification",
     "PaperAnalysis",
     "PaperEstimates",
     "Parameters",
     "Prediction",
     "RecordSummary",
+    "RepeatedPair",
+    "RepeatedParameter",
     "Repeats",
     "ResponseBandwidths",
     "ResponseMatrix",
     "Trend",
     "Verdict",
+    "averaged_response",
+    "coherence_significance",
     "compare_levels",
     "excited_band",
     "gain_and_phase",
@@ -63,5 +79,6 @@ __all__ = [
     "paper_analysis",
     "predict",
     "response_matrix",
+    "same_at_levels",
     "to_model",
 ]
