@@ -418,9 +418,9 @@ def _covariance(state: _State, *, white: bool) -> NDArray[np.float64]:
     """Covariance of all parameters and ln σ."""
     scale = np.sqrt(np.maximum(np.diag(state.information), np.finfo(float).tiny))
     scaled = state.information / np.outer(scale, scale)
-    if np.linalg.cond(scaled) > 1e14:
-        return np.full(scaled.shape, np.inf)
-    inverse = np.linalg.inv(scaled) / np.outer(scale, scale)
+    values, vectors = np.linalg.eigh(scaled)
+    seen = np.maximum(np.abs(values), 1e-14 * np.abs(values).max())
+    inverse = (vectors / seen) @ vectors.T / np.outer(scale, scale)
     if white:
         return np.asarray(inverse)
     size = state.rows.shape[0]

@@ -11,9 +11,10 @@ from hmpim.errors import ArgumentError, RecordError
 from hmpim.identify.coupled import inputs_of, responses_of, settled, unrelated
 from hmpim.identify.drift import Drifting, with_drift
 from hmpim.identify.enrich import PLAIN
-from hmpim.identify.imperfections import Imperfections, find_imperfections
+from hmpim.identify.imperfections import Imperfections, count_levels, find_imperfections
 from hmpim.identify.inputs import InputSet, OutputCoherence
 from hmpim.identify.joint import JointFit
+from hmpim.identify.lost import stands_out
 from hmpim.identify.pair import described, untold
 from hmpim.identify.result import Identification, PairIdentification, RecordSummary
 from hmpim.identify.several import Joined, fit_together
@@ -151,17 +152,21 @@ def _identify_output(
             "The sensor is dead, stuck or not connected.",
         )
         return [untold(aligned, source, output, record, dead) for source in aligned.inputs], None
-    found = find_imperfections(output.values, aligned.fs)
+    richest = max(count_levels(source.values) for source in aligned.inputs)
+    found = find_imperfections(output.values, aligned.fs, richest=richest)
     joined, drifting = _drifted(aligned, output, found, intersample, structures, inputs)
     seen = found.saturation is not None or found.hold is not None
-    if seen or not is_white(joined.fits[0].best.fit.residual):
+    residual = joined.fits[0].best.fit.residual
+    if seen or not is_white(residual) or stands_out(residual):
         # Now that there is a model, a plateau can be told from a crest.
         predicted = joined.prediction
         if drifting is not None:
             predicted = predicted + drifting.trend
-        again = find_imperfections(output.values, aligned.fs, prediction=predicted)
-        if (again.saturation is None) != (found.saturation is None) or (again.hold is None) != (
-            found.hold is None
+        again = find_imperfections(output.values, aligned.fs, prediction=predicted, richest=richest)
+        if (
+            (again.saturation is None) != (found.saturation is None)
+            or (again.hold is None) != (found.hold is None)
+            or again.lost is not None
         ):
             joined, drifting = _drifted(aligned, output, again, intersample, structures, inputs)
         found = again

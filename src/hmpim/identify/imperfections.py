@@ -15,13 +15,14 @@ from hmpim.identify.censored import CensoredFit, fit_censored
 from hmpim.identify.drift import Drifting
 from hmpim.identify.hold import Hold, Updates, detect_hold, updates
 from hmpim.identify.joint import JointFit, Trial
+from hmpim.identify.lost import find_frozen, find_spikes
 from hmpim.identify.quantization import Quantization, detect_quantization
 from hmpim.identify.result import Parameters
 from hmpim.identify.saturation import Saturation, detect_saturation
 from hmpim.identify.uncertainty import estimate
 from hmpim.record import Finding
 
-__all__ = ["Imperfections", "find_imperfections", "refine", "with_imperfections"]
+__all__ = ["Imperfections", "count_levels", "find_imperfections", "refine", "with_imperfections"]
 
 _MANY = 1e6
 """Degrees of freedom behind levels and periods, which are known all but exactly."""
@@ -30,7 +31,13 @@ _COARSE = 1.0
 """Steps of rounding, over the noise, from which quantisation is worth a warning."""
 
 _MOST_CLIPPED = 0.85
-"""Share of clipped samples beyond which too little is left."""
+"""Share of clipped samples beyond which too little is left to find the levels' effect."""
+
+_MUCH_CLIPPED = 0.4
+"""Share beyond which the verdict is doubtful: a rectifier clips half."""
+
+_FEWEST_LEVELS = 8
+"""Levels that an output must take, unless its input takes as few."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -40,6 +47,26 @@ class Imperfections:
     saturation: Saturation | None
     hold: Hold | None
     quantization: Quantization | None
+    spikes: NDArray[np.bool_] | None
+    frozen: NDArray[np.bool_] | None
+    levels: int | None
+
+    @property
+    def lost(self) -> NDArray[np.bool_] | None:
+        """Samples that say nothing at all: spikes, and where the output stood still."""
+        if self.spikes is None or self.frozen is None:
+            return self.spikes if self.frozen is None else self.frozen
+        return self.spikes | self.frozen
+
+    @property
+    def doubtful(self) -> bool:
+        """Whether too little of the motion is left to trust what is found from it."""
+        return (
+            self.spikes is not None
+            or self.frozen is not None
+            or self.levels is not None
+            or (self.saturation is not None and self.saturation.share > _MUCH_CLIPPED)
+        )
 
     @property
     def rounding(self) -> float:
@@ -52,7 +79,8 @@ class Imperfections:
 
     def telling(self, samples: int, fs: float) -> NDArray[np.bool_] | None:
         """Samples that say what the output was; None when all do."""
-        if self.saturation is None and self.hold is None:
+        lost = self.lost
+        if self.saturation is None and self.hold is None and lost is None:
             return None
         told = np.ones(samples, dtype=bool)
         arrivals = self.arrivals(samples, fs)
@@ -61,13 +89,19 @@ class Imperfections:
             told[arrivals.index] = True
         if self.saturation is not None:
             told &= ~self.saturation.clipped
+        if lost is not None:
+            told &= ~lost
         return told
 
 
 def find_imperfections(
-    y: NDArray[np.float64], fs: float, *, prediction: NDArray[np.float64] | None = None
+    y: NDArray[np.float64],
+    fs: float,
+    *,
+    prediction: NDArray[np.float64] | None = None,
+    richest: int = 0,
 ) -> Imperfections:
-    """Look for saturation, hold and quantisation in an output.
+    """Look for saturation, hold, quantisation, spikes and standstill in an output.
 
     Parameters
     ----------
@@ -76,7 +110,10 @@ def find_imperfections(
     fs : float
         Rate in Hz.
     prediction : ndarray, shape (n,), optional
-        What a first model says; with it a plateau is told from a crest.
+        What a first model says; with it a plateau is told from a crest, and spikes and
+        standstill are looked for.
+    richest : int
+        Levels that the inputs take.
     """
     rounding = detect_quantization(y)
     step = 0.0 if rounding is None else rounding.step
@@ -85,9 +122,37 @@ def find_imperfections(
         (clipping.low is None and clipping.high is None) or clipping.share > _MOST_CLIPPED
     ):
         clipping = None
+    hold = detect_hold(y, fs, prediction)
+    spikes = frozen = None
+    if prediction is not None and hold is None:
+        frozen = find_frozen(y, prediction, step=step)
+        beyond = None if clipping is None else clipping.clipped
+        spikes = find_spikes(y, prediction, clipped=beyond)
     return Imperfections(
-        saturation=clipping, hold=detect_hold(y, fs, prediction), quantization=rounding
+        saturation=clipping,
+        hold=hold,
+        quantization=rounding,
+        spikes=spikes,
+        frozen=frozen,
+        levels=_few_levels(y, clipping, richest),
     )
+
+
+def count_levels(x: NDArray[np.float64]) -> int:
+    """Return how many different values `x` takes.
+
+    Examples
+    --------
+    >>> count_levels(np.array([0.0, 1.0, 1.0, 0.0]))
+    2
+    """
+    return int(np.unique(x).size)
+
+
+def _few_levels(y: NDArray[np.float64], clipping: Saturation | None, richest: int) -> int | None:
+    """How many values the output takes, if they are few beside those of the inputs."""
+    levels = count_levels(y)
+    return levels if levels < _FEWEST_LEVELS and richest > 2 * levels else None
 
 
 def refine(
@@ -124,8 +189,9 @@ def refine(
 
 def _gaps_only(valid: NDArray[np.bool_], found: Imperfections, fs: float) -> NDArray[np.bool_]:
     """Samples that count, clipped and held ones among them again."""
-    told = found.telling(valid.size, fs)
-    return valid if told is None else np.asarray(valid | ~told)
+    told, lost = found.telling(valid.size, fs), found.lost
+    whole = valid if told is None else np.asarray(valid | ~told)
+    return whole if lost is None else np.asarray(whole & ~lost)
 
 
 def with_imperfections(
@@ -144,8 +210,12 @@ def with_imperfections(
             Finding(
                 code="saturation",
                 message=f"{100 * clipping.share:.1f} % of the samples are clipped "
-                f"({', '.join(levels)}); they count as beyond the level. Lower the amplitude to "
-                "keep the whole range.",
+                f"({', '.join(levels)}); they count as beyond the level. "
+                + (
+                    "That is too much to rely on: lower the amplitude, or look for a rectifier."
+                    if clipping.share > _MUCH_CLIPPED
+                    else "Lower the amplitude to keep the whole range."
+                ),
             )
         )
         parameters = replace(
@@ -175,7 +245,8 @@ def with_imperfections(
             quantization_step=estimate(rounding.step, rounding.std**2, freedom=_MANY, unit=unit),
         )
         noise = parameters.noise_std
-        if noise is not None and rounding.step > _COARSE * noise.value:
+        coarse = noise is not None and rounding.step > _COARSE * noise.value
+        if noise is not None and coarse and found.levels is None:
             findings.append(
                 Finding(
                     code="quantization",
@@ -184,6 +255,15 @@ def with_imperfections(
                     "of rounding are not independent; error bars are only as good as that.",
                 )
             )
+    if found.levels is not None:
+        findings.append(
+            Finding(
+                code="quantization",
+                message=f"The output takes only {found.levels} different values, too few to follow "
+                "the motion between them. Measure with a finer resolution, or a larger motion.",
+            )
+        )
+    findings += _lost_findings(found)
     if censored is not None and parameters.noise_std is not None:
         parameters = replace(
             parameters,
@@ -195,3 +275,27 @@ def with_imperfections(
             ),
         )
     return parameters, tuple(findings)
+
+
+def _lost_findings(found: Imperfections) -> list[Finding]:
+    findings = []
+    if found.spikes is not None:
+        count = int(np.count_nonzero(found.spikes))
+        findings.append(
+            Finding(
+                code="spikes",
+                message=f"{count} samples ({100 * float(np.mean(found.spikes)):.2g} %) stand far "
+                "out of those around them and are left out. Look for loose contacts, lost bits "
+                "or impacts.",
+            )
+        )
+    if found.frozen is not None:
+        findings.append(
+            Finding(
+                code="frozen",
+                message="The output stands still where the model moves, over "
+                f"{100 * float(np.mean(found.frozen)):.2g} % of the record, which is left out. "
+                "Look for lost updates, a stuck sensor, or friction.",
+            )
+        )
+    return findings

@@ -109,6 +109,8 @@ def described(
         findings = (*findings, drift_finding(drifting, fs, output.unit))
     if inspection.doubtful:
         verdict = "doubtful"
+    if found.doubtful:
+        verdict = "doubtful"
     parted = disagreement(from_response, readings.parameters)
     if parted is not None and found.hold is None:
         findings, verdict = (*findings, parted), "doubtful"

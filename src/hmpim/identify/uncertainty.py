@@ -39,15 +39,17 @@ def covariance(
     Returns
     -------
     ndarray, shape (p, p)
-        Infinite on the diagonal of a direction that the record does not see.
+        Finite but very large along a direction that the record does not see.
     """
     scale = np.sqrt(np.maximum(np.sum(rows**2, axis=1), np.finfo(float).tiny))
     scaled = rows / scale[:, None]
     q, r = np.linalg.qr(scaled.T)
     diagonal = np.abs(np.diag(r))
     if diagonal.min() < 1e-10 * diagonal.max():
-        return np.full((scale.size, scale.size), np.inf)
-    inverse = np.linalg.inv(r)
+        left, values, right = np.linalg.svd(r)
+        inverse = (right.T / np.maximum(values, 1e-10 * values[0])) @ left.T
+    else:
+        inverse = np.linalg.inv(r)
     if white:
         inner = np.eye(scale.size) * float(residual @ residual) / freedom
     else:

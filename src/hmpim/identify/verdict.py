@@ -29,6 +29,12 @@ _LOOSE = 0.3
 """Relative standard deviation beyond which a parameter is not known."""
 
 
+_BLURRED = 2.0
+"""Standard deviation of the delay, in samples, up to which it is always known well enough."""
+
+_OUTSIDE = 2.0
+"""Mode of a richer structure, over the end of the excited band, that no record tells."""
+
 _AMBIGUOUS = 4.0
 """Difference of the criterion within which another plain structure is worth naming."""
 
@@ -104,7 +110,7 @@ def judge(
         note(
             "lack_of_fit",
             f"The residual still follows the input: about {100 * owed:.2g} % of the output "
-            f"(r.m.s.) is not described by the {fit.structure.name} model. "
+            f"(r.m.s.) is not described by the {_words(fit.structure.name)} model. "
             "Look at the Bode plot where model and measurement part.",
             doubt=owed > _TOLERATED_MISFIT,
         )
@@ -127,6 +133,23 @@ def judge(
             "weak_excitation",
             f"The record hardly tells the {name}: its standard deviation is {100 * spread:.0f} % "
             "of its value. Excite more around the natural frequency, or longer.",
+            doubt=True,
+        )
+    blurred = p.delay is not None and p.delay.std > max(_BLURRED / fs, _LOOSE * abs(p.delay.value))
+    if p.delay is not None and blurred:
+        note(
+            "weak_excitation",
+            f"The record hardly tells the delay: its standard deviation is {p.delay.std:.2g} s. "
+            "Excite more, or sweep higher.",
+            doubt=True,
+        )
+    fastest = _fastest_mode(readings)
+    if fit.structure.name not in PLAIN and fastest > _OUTSIDE * band[1]:
+        note(
+            "extrapolated",
+            f"A {_words(fit.structure.name)} model needs a mode at {fastest:.4g} Hz, beyond the "
+            f"excited band, which ends at {band[1]:.4g} Hz: the delay may not be constant, or the "
+            f"clocks may part. Check the time stamps, or sweep to {1.5 * fastest:.3g} Hz.",
             doubt=True,
         )
     natural = p.natural_frequency
@@ -174,8 +197,9 @@ def judge(
     if joint.simpler is not None:
         note(
             "structure",
-            f"The number of poles this record hardly tells: {fit.structure.name} is taken for "
-            f"its wider error bars; {joint.simpler.fit.structure.name} would put the delay at "
+            "The number of poles this record hardly tells: a "
+            f"{_words(fit.structure.name)} model is taken for its wider error bars; a "
+            f"{_words(joint.simpler.fit.structure.name)} one would put the delay at "
             f"{joint.simpler.fit.delay / fs:.4g} s. Lower the noise, or sweep higher.",
             doubt=True,
         )
@@ -244,9 +268,9 @@ def _other_structure(joint: JointFit, readings: Readings) -> str | None:
         apart = abs(trial.fit.delay - best.fit.delay)
         if apart > _DISAGREES * std:
             return (
-                f"A {trial.fit.structure.name} model fits about as well as the "
-                f"{best.fit.structure.name} one and puts the delay {apart / std:.0f} standard "
-                "deviations away. Lower the noise, or sweep higher, to tell them apart."
+                f"A {_words(trial.fit.structure.name)} model fits about as well as the "
+                f"{_words(best.fit.structure.name)} one and puts the delay {apart / std:.0f} "
+                "standard deviations away. Lower the noise, or sweep higher, to tell them apart."
             )
     return None
 
@@ -270,6 +294,26 @@ def _rival(joint: JointFit) -> str | None:
                 "State it with intersample=."
             )
     return None
+
+
+def _words(name: str) -> str:
+    """A structure's name in plain words."""
+    plain = {
+        "first_order": "first-order",
+        "second_order": "second-order",
+        "third_order": "third-order",
+        "fourth_order": "fourth-order",
+        "second_order_zero": "second-order (with a zero)",
+        "two_modes": "two-mode",
+        "integrator_first_order": "lagging integrator",
+    }
+    return plain.get(name, name.replace("_", " "))
+
+
+def _fastest_mode(readings: Readings) -> float:
+    """Frequency in Hz of the fastest pole, 0 if there is none."""
+    poles = np.roots(readings.system.denominator[::-1])
+    return float(np.max(np.abs(poles), initial=0.0) / (2 * np.pi))
 
 
 def _settling(readings: Readings) -> float:

@@ -1,0 +1,130 @@
+"""Samples that say nothing of the output: spikes, and stretches over which it stands still.
+
+A spike is a sample or two that stand out of what the model leaves over around them, farther
+than the model's own motion there could bring. An output that repeats one value exactly, while
+the model moves on, was not updated, was cut off, or read a fixed word in its place.
+"""
+
+import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
+from numpy.typing import NDArray
+
+__all__ = ["find_frozen", "find_spikes", "stands_out"]
+
+_FAR = 8.0
+"""Standard deviations, by the samples around it, from which a sample is a spike."""
+
+_STEPS = 1.5
+"""Motion of the model from sample to sample that a spike must exceed, at an edge above all."""
+
+_LONGEST_SPIKE = 3
+_MOST_SPIKES = 0.3
+_WINDOW = 51
+
+_FEWEST_EQUAL = 8
+"""Equal samples in a row from which an output may stand still."""
+
+_MOVES = 0.05
+"""Motion of the model over a stretch, as a share of all its motion, that it must have."""
+
+_REPEATS = 0.3
+"""Share of repeats among the other samples beyond which standing still is the output's habit."""
+
+
+def stands_out(residual: NDArray[np.float64]) -> bool:
+    """Whether any sample is far beyond the bulk of a residual; quick, without a model.
+
+    Examples
+    --------
+    >>> noise = np.random.default_rng(0).standard_normal(1000)
+    >>> stands_out(noise), stands_out(np.append(noise, 20.0))
+    (False, True)
+    """
+    away = np.abs(residual - np.median(residual))
+    return bool(away.max() > _FAR * 1.4826 * np.median(away) > 0.0)
+
+
+def find_spikes(
+    y: NDArray[np.float64],
+    prediction: NDArray[np.float64],
+    *,
+    clipped: NDArray[np.bool_] | None = None,
+) -> NDArray[np.bool_] | None:
+    """Return the samples that are spikes, or None.
+
+    Parameters
+    ----------
+    y, prediction : ndarray, shape (n,)
+        Output, and what a first model says.
+    clipped : ndarray of bool, shape (n,), optional
+        Samples that are not looked at.
+
+    Examples
+    --------
+    >>> y = 0.1 * np.random.default_rng(0).standard_normal(500)
+    >>> find_spikes(y, np.zeros(500)) is None
+    True
+    >>> y[[100, 301]] += [3.0, -2.0]
+    >>> np.flatnonzero(find_spikes(y, np.zeros(500))).tolist()
+    [100, 301]
+    """
+    residual = y - prediction
+    counted = residual if clipped is None else residual[~clipped]
+    if counted.size < 2 * _WINDOW or not stands_out(counted):
+        return None
+    bulk = 1.4826 * float(np.median(np.abs(counted - np.median(counted))))
+    if clipped is not None:
+        residual = np.where(clipped, np.median(counted), residual)
+    around = sliding_window_view(np.pad(residual, _WINDOW // 2, mode="reflect"), _WINDOW)
+    level = np.median(around, axis=1)
+    spread = 1.4826 * np.median(np.abs(around - level[:, None]), axis=1)
+    near = sliding_window_view(np.pad(prediction, 1, mode="edge"), 3)
+    least = np.maximum(_FAR * np.maximum(spread, 0.5 * bulk), _STEPS * np.ptp(near, axis=1))
+    away = np.abs(residual - level) > least
+    first, last = _runs(away)
+    for a, b in zip(first, last, strict=True):
+        if b - a >= _LONGEST_SPIKE:
+            away[a : b + 1] = False
+    return away if away.any() and np.mean(away) < _MOST_SPIKES else None
+
+
+def find_frozen(
+    y: NDArray[np.float64], prediction: NDArray[np.float64], *, step: float = 0.0
+) -> NDArray[np.bool_] | None:
+    """Return the samples at which the output stands still while the model moves, or None.
+
+    Parameters
+    ----------
+    y, prediction : ndarray, shape (n,)
+        Output, and what a first model says.
+    step : float
+        Step to which `y` is rounded, in its unit; 0 for none.
+
+    Examples
+    --------
+    >>> moving = np.sin(np.arange(1000) / 20) + 0.01 * np.random.default_rng(0).normal(size=1000)
+    >>> find_frozen(moving, np.sin(np.arange(1000) / 20)) is None
+    True
+    >>> moving[200:300] = moving[200]
+    >>> np.flatnonzero(find_frozen(moving, np.sin(np.arange(1000) / 20)))[[0, -1]].tolist()
+    [201, 299]
+    """
+    repeats = np.concatenate([[False], np.diff(y) == 0.0])
+    first, last = _runs(repeats)
+    frozen = np.zeros(y.size, dtype=bool)
+    least = max(5.0 * step, _MOVES * float(np.ptp(prediction)))
+    for a, b in zip(first, last, strict=True):
+        if b - a + 2 < _FEWEST_EQUAL or y[a] in (y.min(), y.max()):
+            continue
+        if float(np.ptp(prediction[a - 1 : b + 1])) > least:
+            frozen[a : b + 1] = True
+    others = repeats[~frozen]
+    if not frozen.any() or others.size == 0 or np.mean(others) > _REPEATS:
+        return None
+    return frozen
+
+
+def _runs(flags: NDArray[np.bool_]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """First and last sample of each run of true ones."""
+    edges = np.diff(np.concatenate([[0], flags.astype(np.int8), [0]]))
+    return np.flatnonzero(edges == 1), np.flatnonzero(edges == -1) - 1
