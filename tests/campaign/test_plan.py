@@ -21,8 +21,12 @@ def test_every_shipped_plan_has_cases_of_different_names(name):
 
 def test_section_v_is_every_combination():
     plan = read_plan(shipped_plan("section_v"))
-    # 5 acceptance, 2 x 5 loaded, 2 x 2 outer, 2 x 5 modes, 6 levels, 1 together
-    assert len(expand(plan)) == 5 + 10 + 4 + 10 + 6 + 1
+    # 5 acceptance, 2 x 5 loaded, 2 x 2 outer, 2 x 5 in each of two modes, 6 levels, 1 together
+    assert len(expand(plan)) == 5 + 10 + 4 + 20 + 6 + 1
+    driven = {(c.axes, c.mode, c.rate) for c in expand(plan) if not c.together}
+    for axis in ("roll", "yaw", "pitch", "azimuth", "elevation"):
+        for mode in ("P", "PV", "PVA"):
+            assert {((axis,), mode, 500.0), ((axis,), mode, 1000.0)} <= driven
     assert [case.axes for case in expand(plan) if case.together] == [
         ("roll", "yaw", "pitch", "azimuth", "elevation")
     ]
@@ -71,6 +75,9 @@ def broken(**changes):
         ({"test__0__rates": []}, r"test\[1\].rates = \[\] must be a list"),
         ({"test__0__rates": [500.0, 500.0]}, "stands twice"),
         ({"test__0__name": "../up"}, r"test\[1\].name = '../up' may hold"),
+        ({"test__0__travel": 0.0}, r"test\[1\].travel = 0.0 must be a finite number above 0"),
+        ({"test__0__bands": {"middle": [1.0, 2.0]}}, r"test\[1\].bands.middle is not known"),
+        ({"test__0__bands": {"inner": [2.0, 1.0]}}, r"test\[1\].bands.inner = .* two rising"),
         ({"test__0__together": True}, "together needs a rig with several axes"),
         ({"test__0__modes": ["PV"]}, "modes and loads belong to a table"),
         ({"specification__0__quantity": "speed"}, r"specification\[1\].quantity = 'speed'"),

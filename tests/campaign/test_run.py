@@ -1,12 +1,18 @@
 """Campaigns: cases run once, stopped and resumed, refused before anything moves."""
 
+import signal
+import subprocess
+import sys
+import time
 import tomllib
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from hmpim.campaign import expand, parse_plan, run_campaign, shipped_plan
+from hmpim.campaign import expand, parse_plan, read_plan, run_campaign, shipped_plan
+from hmpim.campaign.cases import prepare
+from hmpim.campaign.rig import make_rig
 from hmpim.campaign.study import make_study, study_dict
 from hmpim.campaign.write import write_study
 from hmpim.errors import ArgumentError, FormatError, LimitsError
@@ -173,3 +179,74 @@ def test_study_survives_json(finished):
     data = study_dict(make_study(plan, cases))
     assert json.loads(json.dumps(data, allow_nan=False)) == data
     assert np.isfinite(data["rows"][0]["parameters"]["delay"]["std"])
+
+
+def table_plan(*, level):
+    """All five axes of the table at once, what they carry heavier than at acceptance."""
+    axes = {
+        "roll": {"band": [0.5, 60.0], "travel": 1.0},
+        "yaw": {"band": [0.5, 40.0], "travel": 1.0},
+        "pitch": {"band": [0.5, 30.0], "travel": 1.0},
+        "azimuth": {"band": [0.5, 15.0], "travel": 1.0},
+        "elevation": {"band": [0.5, 15.0], "travel": 1.0},
+    }
+    test = {"name": "all", "together": True, "levels": [level], "loads": ["bracket+projector"]}
+    rig = {"kind": "table"}
+    stimulus = {"duration": 3.0}
+    return parse_plan(
+        {"name": "near", "rig": rig, "stimulus": stimulus, "axes": axes, "test": [test]}
+    )
+
+
+def test_load_of_all_axes_together_is_predicted_and_refused(tmp_path, monkeypatch):
+    """Each axis keeps Fig. 4's limits; the torque they take together does not."""
+    pytest.importorskip("mujoco")
+    from hmpim.rigs.table import MotionTable
+
+    def move(*_args, **_kwargs):
+        pytest.fail("the table moved")
+
+    monkeypatch.setattr(MotionTable, "play", move)
+    words = r"case all\..*together: at \d\.\d+ s the motion of all axes .* N·m of azimuth, beyond"
+    with pytest.raises(LimitsError, match=words):
+        run_campaign(table_plan(level=0.99), tmp_path)
+
+
+def test_a_test_may_have_bands_and_travel_of_its_own():
+    data = tomllib.loads(shipped_plan("example").read_text(encoding="utf-8"))
+    data["test"][0] |= {"bands": {"inner": [1.0, 20.0]}, "travel": 2.0}
+    plan = parse_plan(data)
+    assert plan.axis("inner", test="rates").band == (1.0, 20.0)
+    assert plan.axis("inner", test="rates").travel == 2.0
+    assert plan.axis("outer", test="rates").band == plan.axis("outer").band
+    assert plan.axis("inner").band == (0.1, 60.0)
+    case = expand(plan)[0]
+    (stimulus,) = prepare(plan, case, make_rig(plan))
+    assert stimulus.band == (1.0, 20.0)
+    assert 1.9 < stimulus.peaks.position <= 2.0
+
+
+def test_killed_outright_it_goes_on_and_repeats_nothing(tmp_path):
+    """kill -9 leaves no time to tidy up: what is written by then counts, and nothing else."""
+    plan = tmp_path / "plan.toml"
+    text = shipped_plan("example").read_text(encoding="utf-8")
+    plan.write_text(text.replace("duration = 5.0", "duration = 3.0"), encoding="utf-8")
+    out = tmp_path / "out"
+    command = [sys.executable, "-m", "hmpim.cli.main", "campaign", str(plan), "--out", str(out)]
+    with subprocess.Popen([*command, "--quiet"]) as running:
+        deadline = time.monotonic() + 60.0
+        while not list(out.glob("cases/*.json")) and time.monotonic() < deadline:
+            time.sleep(0.002)
+        running.kill()
+    assert running.returncode == -signal.SIGKILL
+    done = {path: path.stat().st_mtime_ns for path in out.glob("cases/*.json")}
+    assert 0 < len(done) < 4
+    assert not (out / "study.json").exists()
+    finished = subprocess.run(command, check=True, capture_output=True, text=True)
+    assert "All 6 checks of the specification are met." in finished.stdout
+    cases = {path: path.stat().st_mtime_ns for path in out.glob("cases/*.json")}
+    assert len(cases) == 4
+    assert {path: cases[path] for path in done} == done
+    # Killed or not, the same seed gives the same study.
+    whole = run_campaign(read_plan(plan), tmp_path / "whole")
+    assert whole == run_campaign(read_plan(plan), out)

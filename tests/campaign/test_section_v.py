@@ -4,9 +4,13 @@ import os
 
 import pytest
 
-from hmpim.campaign import read_plan, run_campaign, shipped_plan
+from hmpim.campaign import expand, read_plan, run_campaign, shipped_plan
+from hmpim.campaign.cases import prepare
 from hmpim.campaign.compare import linear_from
+from hmpim.campaign.crossing import samples_bandwidth
+from hmpim.campaign.rig import make_rig
 from hmpim.campaign.study import make_study
+from hmpim.identify.spectrum import decibel, spectrum
 
 pytest.importorskip("mujoco", reason="the table needs the extra 'table'")
 
@@ -44,6 +48,31 @@ def check(study):
     moved = [r.axis for r in study.rows if r.together]
     assert len(seen) == len(moved) * (len(moved) - 1)
     assert max(seen.values()) < 0.02
+
+    # Feedforward raises the bandwidth, each command by half as much again at least
+    fed = {
+        r.mode: samples_bandwidth(r.pair["frequency_response"], near=r.measured_bandwidth.value)
+        for r in study.rows
+        if r.axis == "pitch"
+        and r.rate == 1000.0
+        and r.test in ("loaded", "velocity", "acceleration")
+    }
+    assert 1.5 * fed["P"] < fed["PV"] < fed["PVA"] / 1.5
+
+
+@pytest.mark.parametrize("rate", [500.0, 1000.0])
+def test_stimuli_of_fig_18_are_above_30_db_up_to_10_hz(rate):
+    plan = read_plan(shipped_plan("section_v"))
+    rig = make_rig(plan)
+    cases = [c for c in expand(plan) if c.test == "outer" and c.rate == rate]
+    assert len(cases) == 2
+    for case in cases:
+        (stimulus,) = prepare(plan, case, rig)
+        bins = spectrum(stimulus.position, stimulus.fs, window="gaussian", alpha=1.5)
+        band = (bins.frequency >= 0.2) & (bins.frequency <= 10.0)
+        level = decibel(bins.value[band])
+        assert level.min() > (30.0 if rate == 500.0 else 36.0)
+        assert stimulus.extinction > 1.5  # the paper's "severe extinction"
 
 
 def test_reduced(tmp_path):

@@ -96,7 +96,7 @@ def prepare(plan: Plan, case: Case, rig: CampaignRig) -> tuple[Stimulus, ...]:
     from hmpim.stimulus.axes import AxisPlan, design_axes
 
     try:
-        wishes = [plan.axis(name) for name in case.axes]
+        wishes = [plan.axis(name, test=case.test) for name in case.axes]
         limits = [scaled(rig.limits(case, wish), case.level, case.levels_of) for wish in wishes]
         if case.together:
             stimuli = design_axes(

@@ -4,13 +4,17 @@ import math
 from collections.abc import Callable, Sequence
 from typing import Any
 
+from hmpim.campaign.crossing import samples_bandwidth
 from hmpim.campaign.plan import Compare
 from hmpim.campaign.study import Reading, Row
 
-__all__ = ["LINEAR", "bandwidth", "case_label", "findings", "linear_from"]
+__all__ = ["HEARD", "LINEAR", "bandwidth", "case_label", "findings", "linear_from"]
 
 LINEAR = 0.05
 """Largest departure from the bandwidth at the largest level that still counts as linear."""
+
+HEARD = 30.0
+"""Level in dB that the paper calls sufficient (Fig. 18)."""
 
 
 def bandwidth(row: Row) -> Reading | None:
@@ -31,9 +35,12 @@ def case_label(row: Row, compare: Compare) -> str:
         "fence": f"{row.rate:g} Hz",
         "loads": row.load,
         "levels": f"{row.peaks[2]:.0f} {row.stimulus['unit']}/s²",
-        "modes": f"mode {row.mode}",
+        "modes": f"{row.mode}, {row.rate:g} Hz",
         "excitation": "all at once" if row.together else "alone",
+        "axes": "",
     }[compare]
+    if not what:
+        return row.axis
     return f"{row.axis}, {what}"
 
 
@@ -49,13 +56,14 @@ def findings(
         "excitation": _excitation,
         "stimulus": _stimulus,
         "fence": _fence,
+        "axes": _axes,
     }
     found = []
     for axis in dict.fromkeys(row.axis for row in rows):
         sentence = says[compare](axis, [row for row in rows if row.axis == axis])
         if sentence:
             found.append(sentence)
-    if compare == "excitation" and couplings:
+    if compare in ("excitation", "axes") and couplings:
         found.append(_strongest(couplings))
     return tuple(found)
 
@@ -139,12 +147,45 @@ def _levels(axis: str, rows: list[Row]) -> str:
 
 
 def _modes(axis: str, rows: list[Row]) -> str:
-    by_mode = {row.mode: b.value for row in rows if (b := _response_first(row)) is not None}
-    if len(by_mode) < 2:
+    """Samples over samples for every mode: behind the hold there is no figure for all three."""
+    said, lifted = [], False
+    for rate in sorted({row.rate for row in rows}):
+        seen, exact = [], []
+        for row in (row for row in rows if row.rate == rate):
+            start = bandwidth(row) or row.measured_bandwidth
+            found = (
+                samples_bandwidth(row.pair["frequency_response"], near=start.value)
+                if start
+                else None
+            )
+            known = row.pair["known"].get("exact_samples_bandwidth")
+            seen.append(f"{row.mode} {'–' if found is None else f'{found:.1f}'}")
+            exact += [] if known is None else [f"{known:.1f}"]
+            lifted |= bool(known and found and found > 1.01 * known)
+        if len(seen) > 1:
+            free = f" (without friction {', '.join(exact)})" if len(exact) == len(seen) else ""
+            said.append(f"at {rate:g} Hz {', '.join(seen)} Hz{free}")
+    if not said:
         return ""
-    return (
-        f"{axis}: " + ", ".join(f"{mode} {value:.2f} Hz" for mode, value in by_mode.items()) + "."
-    )
+    text = f"{axis}, −90° of samples over samples: " + "; ".join(said) + "."
+    if lifted:
+        text += (
+            " Friction counts as damping: beyond the servo's own frequency that turns the phase "
+            "forward, and with feedforward it raises the figure."
+        )
+    return text
+
+
+def _axes(axis: str, rows: list[Row]) -> str:
+    row = rows[-1]
+    found = bandwidth(row)
+    if found is None:
+        return f"{axis}: no bandwidth."
+    text = f"{axis}: −90° at {found.value:.2f} ± {found.std:.2f} Hz"
+    if row.exact_bandwidth is not None:
+        off = _percent(found.value, row.exact_bandwidth)
+        text += f", {off:+.1f} % from {row.exact_bandwidth:.2f} Hz, exact without friction"
+    return text + "."
 
 
 def _excitation(axis: str, rows: list[Row]) -> str:
@@ -187,28 +228,60 @@ def _stimulus(axis: str, rows: list[Row]) -> str:
     at = 0.5 * rows[0].stimulus["band"][1]
     levels = [(row.rate, _level_at(row, at)) for row in rows]
     text = ", ".join(f"{level:.1f} dB at {rate:g} Hz" for rate, level in levels)
+    reach = [f"{_heard_to(row):.3g}" for row in rows]
     n = rows[0].stimulus["extinction"]
     more = f", {levels[-1][1] - levels[0][1]:.1f} dB more" if len(levels) > 1 else ""
     shape = "" if n is None else f"extinction n = {n:.3f}; "
-    return f"{axis}: {shape}level at {at:g} Hz of {text}{more} (Gaussian window, α = 1.5)."
+    return (
+        f"{axis}: {shape}level at {at:g} Hz of {text}{more} (Gaussian window, α = 1.5); above "
+        f"{HEARD:g} dB up to {' and '.join(reach)} Hz."
+    )
+
+
+def _heard_to(row: Row) -> float:
+    """Frequency up to which the level stays above `HEARD`, from where it first is."""
+    heard = 0.0
+    for f, level in zip(row.stimulus["frequency"], row.stimulus["level_db"], strict=True):
+        if level >= HEARD:
+            heard = f
+        elif heard:
+            break
+    return heard
 
 
 def _fence(axis: str, rows: list[Row]) -> str:
-    parts = []
+    parts, jumps = [], []
     for row in rows:
         high = row.stimulus["band"][1]
         std = _scatter(row, 0.5 * high, 0.9 * high)
         if std is not None:
             parts.append(f"{std:.2g} % at {row.rate:g} Hz")
+        jumps.append(f"{_bin_scatter(row, 0.5 * high, 0.9 * high):.2g} % at {row.rate:g} Hz")
     bin_width = 1.0 / (rows[0].stimulus["samples"] / rows[0].rate)
     if not parts:
         return ""
     return (
-        f"{axis}: bins of the record are {bin_width:.3f} Hz apart at either rate. The response's "
-        f"error over the upper half of the band (median) is {' and '.join(parts)}: the faster "
-        "commands bring more samples of the same motion. The response is estimated between the "
-        "bins, locally, so that no peak falls through the fence."
+        f"{axis}: bins of the record are {bin_width:.3f} Hz apart at either rate. Over the upper "
+        f"half of the band the ratio of the spectra jumps from bin to bin by {' and '.join(jumps)} "
+        f"of itself (r.m.s.); the response estimated between the bins, locally, is sure to "
+        f"{' and '.join(parts)} (median). The faster commands bring twice the samples of the same "
+        "motion; and no peak falls through the fence."
     )
+
+
+def _bin_scatter(row: Row, low: float, high: float) -> float:
+    """R.m.s. of half the second difference from bin to bin, in percent of the response."""
+    bins = row.pair["bins"]
+    z = [
+        complex(re, im)
+        for f, re, im in zip(bins["frequency"], bins["real"], bins["imag"], strict=True)
+        if low <= f <= high
+    ]
+    bends = [
+        abs(a - 2.0 * b + c) ** 2 / 6.0 / max(abs(b) ** 2, 1e-300)
+        for a, b, c in zip(z, z[1:], z[2:], strict=False)
+    ]
+    return 100.0 * math.sqrt(sum(bends) / len(bends)) if bends else math.nan
 
 
 def _scatter(row: Row, low: float, high: float) -> float | None:

@@ -5,7 +5,7 @@ import json
 import math
 import tomllib
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any, Literal, get_args
 
@@ -30,7 +30,7 @@ __all__ = [
 
 RigKind = Literal["table", "sensor", "python"]
 Mode = Literal["P", "PV", "PVA"]
-Compare = Literal["rates", "loads", "levels", "modes", "excitation", "stimulus", "fence"]
+Compare = Literal["rates", "loads", "levels", "modes", "excitation", "stimulus", "fence", "axes"]
 QUANTITIES = tuple(field.name for field in fields(Parameters))
 _SCALED = ("velocity", "acceleration")
 _NOT_MEASURED = ("name", "description", "compare", "specification", "figure")
@@ -65,7 +65,8 @@ class RigPlan:
 class TestPlan:
     """A product of axes, modes, rates (Hz), levels and loads.
 
-    Levels are shares of the limits on the quantities of `levels_of`.
+    Levels are shares of the limits on the quantities of `levels_of`. `travel` and `bands` take
+    the place of those of the axes.
     """
 
     __test__ = False  # no test of pytest's
@@ -78,6 +79,8 @@ class TestPlan:
     loads: tuple[str, ...] = ("acceptance",)
     together: bool = False
     levels_of: tuple[str, ...] = _SCALED
+    travel: float | None = None
+    bands: Mapping[str, tuple[float, float]] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -107,7 +110,10 @@ class FigurePlan:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Plan:
-    """A study to be made; `digest` stands for everything that decides what is measured."""
+    """A study to be made; `digest` stands for everything that decides what is measured.
+
+    `folder` is where the plan's file lies; a rig of one's own is looked for there too.
+    """
 
     name: str
     rig: RigPlan
@@ -120,9 +126,10 @@ class Plan:
     figures: tuple[FigurePlan, ...] = ()
     compare: str = ""
     digest: str = ""
+    folder: str = ""
 
-    def axis(self, name: str) -> AxisWish:
-        """Return what is wished of an axis.
+    def axis(self, name: str, *, test: str | None = None) -> AxisWish:
+        """Return what is wished of an axis, in a test that may wish something else of it.
 
         Raises
         ------
@@ -130,8 +137,13 @@ class Plan:
             If the plan has no such axis.
         """
         for wish in self.axes:
-            if wish.name == name:
-                return wish
+            if wish.name != name:
+                continue
+            for own in self.tests:
+                if own.name == test:
+                    travel = wish.travel if own.travel is None else own.travel
+                    return replace(wish, travel=travel, band=own.bands.get(name, wish.band))
+            return wish
         known = ", ".join(wish.name for wish in self.axes)
         raise ArgumentError(f"axis {name!r} is not in the plan, which has {known}")
 
@@ -160,7 +172,7 @@ def read_plan(path: Path) -> Plan:
     except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
         raise FormatError(f"{path} is no TOML plan: {error}") from error
     try:
-        return parse_plan(table)
+        return replace(parse_plan(table), folder=str(path.resolve().parent))
     except HmpimError as error:
         raise type(error)(f"{path.name}: {error}") from error
 
@@ -240,14 +252,19 @@ def _rig(table: Table) -> RigPlan:
     return rig
 
 
+def _band(table: Table, key: str) -> tuple[float, float]:
+    band = table.numbers(key, above=0.0)
+    if len(band) != 2 or band[0] >= band[1]:
+        raise ArgumentError(f"{table.where}{key} = {list(band)} must be two rising frequencies, Hz")
+    return band[0], band[1]
+
+
 def _axis(name: str, table: Table, kind: RigKind) -> AxisWish:
     from hmpim.rigs.table import AXES
 
     if kind == "table" and name not in AXES:
         raise ArgumentError(f"axes.{name} is no axis of the table; use {', '.join(AXES)}")
-    band = table.numbers("band", above=0.0)
-    if len(band) != 2 or band[0] >= band[1]:
-        raise ArgumentError(f"axes.{name}.band = {list(band)} must be two rising frequencies, Hz")
+    band = _band(table, "band")
     limits = sensor = None
     if kind != "table":
         limits = table.made("limits", Limits)
@@ -255,7 +272,7 @@ def _axis(name: str, table: Table, kind: RigKind) -> AxisWish:
         sensor = table.made("sensor", Sensor)
     wish = AxisWish(
         name=name,
-        band=(band[0], band[1]),
+        band=band,
         travel=table.number("travel", math.inf, above=0.0),
         limits=limits,
         sensor=sensor,
@@ -265,6 +282,8 @@ def _axis(name: str, table: Table, kind: RigKind) -> AxisWish:
 
 
 def _test(table: Table, axes: tuple[str, ...], kind: RigKind) -> TestPlan:
+    bands = table.table("bands", optional=True)
+    travel = table.number("travel", math.inf, above=0.0)
     test = TestPlan(
         name=table.text("name"),
         axes=table.words("axes", axes, default=axes),
@@ -274,7 +293,11 @@ def _test(table: Table, axes: tuple[str, ...], kind: RigKind) -> TestPlan:
         loads=table.words("loads", None, default=("acceptance",)),
         together=table.flag("together", False),
         levels_of=table.words("levels_of", _SCALED, default=_SCALED),
+        travel=None if math.isinf(travel) else travel,
+        bands={axis: _band(bands, axis) for axis in axes if axis in bands.values},
     )
+    bands.asked.update(axes)
+    bands.done()
     where = table.where
     if max(test.levels) > 1.0:
         raise ArgumentError(f"{where}levels = {list(test.levels)} go beyond 1, the limit itself")

@@ -1,6 +1,7 @@
 """What a campaign asks of a rig, and the three rigs that a plan can name."""
 
 import importlib
+import sys
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Protocol, cast, get_args
@@ -8,7 +9,7 @@ from typing import TYPE_CHECKING, Protocol, cast, get_args
 import numpy as np
 
 from hmpim.campaign.plan import AxisWish, Plan
-from hmpim.errors import ArgumentError, RigError
+from hmpim.errors import ArgumentError, HmpimError, RigError
 from hmpim.experiment import run
 from hmpim.experiment.run import check_limits
 from hmpim.record import Record
@@ -50,7 +51,11 @@ class CampaignRig(Protocol):
         ...
 
     def known(self, case: "Case", axis: str) -> dict[str, float]:
-        """What the physics say: `exact_bandwidth` in Hz, `inertia` in kg·m²; empty if unknown."""
+        """What the physics say; empty if unknown.
+
+        `exact_bandwidth` (Hz) is what is identified, `exact_samples_bandwidth` that of samples
+        over samples, `inertia` in kg·m².
+        """
         ...
 
 
@@ -79,7 +84,7 @@ def make_rig(plan: Plan, *, player: Player | None = None) -> CampaignRig:
     5.0
     """
     if player is not None or plan.rig.kind == "python":
-        return PlayedRig(player=player or _imported(plan.rig.entry))
+        return PlayedRig(player=player or _imported(plan.rig.entry, plan.folder))
     if plan.rig.kind == "sensor":
         return SensorRig(plan=plan)
     return TableRig(
@@ -87,12 +92,23 @@ def make_rig(plan: Plan, *, player: Player | None = None) -> CampaignRig:
     )
 
 
-def _imported(entry: str) -> Player:
+def _imported(entry: str, folder: str) -> Player:
+    """Import a function by its name, from the plan's own folder too."""
     module, _, name = entry.partition(":")
+    beside = [folder] if folder and folder not in sys.path else []
+    sys.path[:0] = beside
     try:
         found = getattr(importlib.import_module(module), name)
-    except (ImportError, AttributeError) as error:
-        raise RigError(f"rig.entry = {entry!r} cannot be imported: {error}") from error
+    except Exception as error:  # a module of one's own may raise anything
+        raise RigError(
+            f"rig.entry = {entry!r} cannot be imported: {type(error).__name__}: {error}; it must "
+            "name a function that Python finds from here or beside the plan"
+        ) from error
+    finally:
+        for path in beside:
+            sys.path.remove(path)
+    if not callable(found):
+        raise RigError(f"rig.entry = {entry!r} is {found!r}; it must name a function")
     return cast(Player, found)
 
 
@@ -145,11 +161,16 @@ class TableRig:
         return self.loaded(case).play({cast(AxisName, s.axis): s for s in stimuli}, rng=rng)
 
     def known(self, case: "Case", axis: str) -> dict[str, float]:
-        """Of the linearised mechanics, behind the hold, friction off."""
-        table = self.loaded(case)
-        inertia = table.plant.inertia(table.start_angles)[AXES.index(axis)]
-        bandwidth = exact_bandwidth(table, axis=cast(AxisName, axis), fs=case.rate)
-        return {"exact_bandwidth": bandwidth, "inertia": float(inertia)}
+        """Of the linearised mechanics, friction off."""
+        table, name = self.loaded(case), cast(AxisName, axis)
+        inertia = table.plant.inertia(table.start_angles)[AXES.index(name)]
+        return {
+            "exact_bandwidth": exact_bandwidth(table, axis=name, fs=case.rate),
+            "exact_samples_bandwidth": exact_bandwidth(
+                table, axis=name, fs=case.rate, hold="included"
+            ),
+            "inertia": float(inertia),
+        }
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -199,10 +220,25 @@ class PlayedRig:
         """Nothing beyond the design's own limits."""
 
     def play(self, case: "Case", stimuli: Sequence[Stimulus], rng: np.random.Generator) -> Record:
-        """Call the function."""
-        record = self.player(case, stimuli, rng)
+        """Call the function, and look at what it returns."""
+        try:
+            record = self.player(case, stimuli, rng)
+        except HmpimError:
+            raise
+        except Exception as error:  # a driver may raise anything
+            raise RigError(
+                f"the rig failed in case {case.id}: {type(error).__name__}: {error}"
+            ) from error
         if not isinstance(record, Record):
             raise RigError(f"the rig returned {type(record).__name__}; it must be a Record")
+        there = {channel.name for channel in (*record.inputs, *record.outputs)}
+        for axis in case.axes:
+            for name in (f"{axis}.command", f"{axis}.position"):
+                if name not in there:
+                    raise RigError(
+                        f"the rig's record of case {case.id} has no channel {name!r}, only "
+                        f"{', '.join(sorted(there))}"
+                    )
         return record
 
     def known(self, case: "Case", axis: str) -> dict[str, float]:

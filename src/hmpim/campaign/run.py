@@ -4,6 +4,7 @@ import json
 import math
 import zlib
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +24,7 @@ from hmpim.stimulus import Stimulus
 __all__ = ["CASE_SCHEMA", "run_campaign"]
 
 CASE_SCHEMA = "hmpim/campaign-case/1"
+_WAIT = 0.5  # s at rest before and after the motion of an axis that count
 Progress = Callable[[int, int, str], None]
 
 
@@ -137,20 +139,11 @@ def _measured(
 ) -> dict[str, Any]:
     seed = (plan.seed, zlib.crc32(case.id.encode()))
     record = rig.play(case, stimuli, np.random.default_rng(seed))
-    # Each position against its own command: what other axes couple in is small, and the same
-    # estimator then serves one axis alone and all at once.
     pairs = []
     for axis in case.axes:
-        alone = Record(
-            inputs=(record.channel(f"{axis}.command"),),
-            outputs=(record.channel(f"{axis}.position"),),
-            fs=record.fs,
-            band=plan.axis(axis).band,
-            intersample=record.intersample,
-            source=record.source,
-        )
-        result = identify(alone).to_dict()["pairs"][0]
-        pairs.append({"axis": axis, "known": rig.known(case, axis), **result})
+        alone = _alone(record, axis, band=plan.axis(axis, test=case.test).band)
+        known = {"known": rig.known(case, axis), "bins": _bins(alone)}
+        pairs.append({"axis": axis, **known, **identify(alone).to_dict()["pairs"][0]})
     done: dict[str, Any] = _finite(
         {
             "schema": CASE_SCHEMA,
@@ -164,9 +157,51 @@ def _measured(
     return done
 
 
+def _alone(record: Record, axis: str, *, band: tuple[float, float]) -> Record:
+    """One axis out of a record of several, from just before it moves to just after.
+
+    Each position is identified against its own command: what other axes couple in is small, and
+    the same estimator then serves one axis alone and all at once. While an axis waits for the
+    others it tells of the friction that it sticks by, and of nothing else.
+    """
+    command, position = (record.channel(f"{axis}.{name}") for name in ("command", "position"))
+    start, stop = 0, command.values.size
+    if len(record.inputs) > 1 and command.values.size == position.values.size:
+        moves = np.flatnonzero(np.diff(command.values)) + 1
+        if moves.size:
+            wait = _WAIT * (stop - 1) / float(command.time[-1] - command.time[0])
+            start = max(start, int(moves[0] - wait))
+            stop = min(stop, int(moves[-1] + wait) + 1)
+    clocks = {id(c.time): c.time[start:stop] for c in (command, position)}
+    command, position = (
+        replace(c, time=clocks[id(c.time)], values=c.values[start:stop])
+        for c in (command, position)
+    )
+    return Record(
+        inputs=(command,),
+        outputs=(position,),
+        fs=record.fs,
+        band=band,
+        intersample=record.intersample,
+        source=record.source,
+    )
+
+
+def _bins(record: Record) -> dict[str, list[float]]:
+    """Ratio of the spectra at the bins of the record, as the paper takes it, in the band."""
+    u, y = (channel.values for channel in (record.inputs[0], record.outputs[0]))
+    low, high = record.band or (0.0, np.inf)
+    above = spectrum(y - y.mean(), record.fs, window="gaussian", alpha=1.5, pad=0)
+    below = spectrum(u - u.mean(), record.fs, window="gaussian", alpha=1.5, pad=0)
+    seen = (above.frequency >= low) & (above.frequency <= high) & (np.abs(below.value) > 0.0)
+    ratio = above.value[seen] / below.value[seen]
+    columns = {"frequency": above.frequency[seen], "real": ratio.real, "imag": ratio.imag}
+    return {name: [float(f"{x:.6g}") for x in values.tolist()] for name, values in columns.items()}
+
+
 def _couplings(plan: Plan, case: Case, record: Record) -> list[dict[str, Any]]:
     """Gain from each command to each other position, where all axes are excited together."""
-    bands = [plan.axis(axis).band for axis in case.axes]
+    bands = [plan.axis(axis, test=case.test).band for axis in case.axes]
     low, high = max(band[0] for band in bands), min(band[1] for band in bands)
     inputs = [record.channel(f"{axis}.command").values for axis in case.axes]
     outputs = [record.channel(f"{axis}.position").values for axis in case.axes]

@@ -11,11 +11,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hmpim.campaign.compare import case_label, findings
+from hmpim.campaign.compare import HEARD, case_label, findings
 from hmpim.campaign.plan import FigurePlan
 from hmpim.campaign.study import Reading, Row, Study, study_dict
 from hmpim.identify import PairIdentification
 from hmpim.plots.curves import BodeCurve, measured_curve, model_curve
+from hmpim.plots.fence import picket_fence
 from hmpim.plots.overlay import overlaid_bode, overlaid_levels
 from hmpim.report.figures import Picture
 from hmpim.report.files import replacing
@@ -39,6 +40,8 @@ COLUMNS = (
 
 _TOLD = ("delay", "natural_frequency", "damping_ratio", "bandwidth_phase90")
 _VAGUE = 10.0  # times its own size: an error that leaves nothing told
+
+_CASES = "Cases of this section"  # left out of the Markdown, which has them all in one table
 
 _CLEAR = 0.3  # share of the response: what is less sure is left out of the pictures
 
@@ -200,10 +203,10 @@ def _section(study: Study, figure: FigurePlan) -> Section:
         rows.sort(key=lambda row: axes.index(row.axis))
     elif figure.compare == "loads" and rows:
         rows = [row for row in rows if row.rate == max(r.rate for r in rows)]
-    couplings = [
-        c for c in study.couplings if c["case"] in joint and figure.compare == "excitation"
-    ]
-    grids = [table(rows, "Cases of this section")]
+    coupled = figure.compare in ("excitation", "axes")
+    couplings = [c for c in study.couplings if c["case"] in joint and coupled]
+    whole = len(rows) == len(study.rows)  # the page has them all in one table already
+    grids = [] if whole else [table(rows, _CASES)]
     if couplings:
         grids.append(_couplings(couplings))
     found = findings(rows, couplings, figure.compare)
@@ -246,9 +249,18 @@ def _pictures(rows: Sequence[Row], figure: FigurePlan, found: Sequence[str]) -> 
         ]
         unit = rows[0].stimulus["unit"] if rows else ""
         return [
-            _picture("levels", figure.title, words, overlaid_levels(levels, unit=unit, level=30.0))
+            _picture("levels", figure.title, words, overlaid_levels(levels, unit=unit, level=HEARD))
         ]
+    if figure.compare == "axes":
+        every = [
+            (case_label(row, "axes"), curve) for row in rows if (curve := _curve(row)) is not None
+        ]
+        return [_picture("axes", figure.title, words, overlaid_bode(every))] if every else []
     for axis in dict.fromkeys(row.axis for row in rows):
+        if figure.compare == "fence":
+            drawn = _fence([row for row in rows if row.axis == axis])
+            pictures.append(_picture(axis, f"{figure.title}: {axis}", words, drawn))
+            continue
         curves = [
             (case_label(row, figure.compare), curve)
             for row in rows
@@ -257,6 +269,17 @@ def _pictures(rows: Sequence[Row], figure: FigurePlan, found: Sequence[str]) -> 
         if curves:
             pictures.append(_picture(axis, f"{figure.title}: {axis}", words, overlaid_bode(curves)))
     return pictures
+
+
+def _fence(rows: Sequence[Row]) -> "Figure":
+    """Close-up of the upper half of the band, bin by bin."""
+    low, high = rows[0].stimulus["band"]
+    records = []
+    for row in rows:
+        bins = row.pair["bins"]
+        ratio = np.array(bins["real"]) + 1j * np.array(bins["imag"])
+        records.append((case_label(row, "fence"), np.array(bins["frequency"]), ratio, _curve(row)))
+    return picket_fence(records, band=(max(low, 0.55 * high), 0.75 * high))
 
 
 def _picture(key: str, title: str, words: str, drawn: "Figure") -> Picture:
@@ -350,8 +373,9 @@ def markdown(page: StudyPage, pictures: str) -> str:
         lines += [""]
         for picture in section.pictures:
             lines += [f"![{picture.title}]({pictures}/{number}-{picture.key}.png)", ""]
-        for grid in section.grids[1:]:
-            lines += _grid(grid)
+        for grid in section.grids:
+            if grid.caption != _CASES:
+                lines += _grid(grid)
     for grid in page.grids:
         lines += _grid(grid)
     lines += ["## About this study", ""]
