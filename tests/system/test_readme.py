@@ -92,6 +92,7 @@ def test_the_public_names():
         "frequency_response",
         "gentlest",
         "identify",
+        "identify_levels",
         "identify_repeats",
         "paper_analysis",
         "predict",

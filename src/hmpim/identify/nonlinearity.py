@@ -178,7 +178,7 @@ def inspect_nonlinearity(
         findings.append(
             general(
                 share=seen.rms / output,
-                where=_where(seen),
+                where=_where(seen, output),
                 made_of=(shares.noise, shares.linear, shares.nonlinear),
                 kinds=named,
                 effect=seen.effect / output,
@@ -220,12 +220,12 @@ def _shares(seen: Seen, power: float) -> Shares:
     return Shares(noise=float(noise), linear=float(linear), nonlinear=float(nonlinear))
 
 
-def _where(seen: Seen) -> list[str]:
+def _where(seen: Seen, output: float) -> list[str]:
     """In words: which harmonics, which lines, or which symmetry."""
     where = []
     if seen.harmonics is not None:
         where = [
-            f"{name} harmonics of the sweep, {seen.harmonics.rms(parity):.2g}"
+            f"{100 * seen.harmonics.rms(parity) / output:.2g} % in {name} harmonics of the sweep"
             for name, parity in (("odd", 1), ("even", 0))
             if seen.harmonics.probability(parity) < CHANCE
         ]

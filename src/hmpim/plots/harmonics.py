@@ -20,11 +20,14 @@ LOOKS: dict[int, tuple[Colour, str]] = {
     4: ("other", ":"),
     5: ("limit", "-."),
 }
-LOWEST = 1e-3  # per cent; less is drawn at the edge
+SEEN = 3.0  # standard deviations from which an amplitude is no noise
 
 
 def harmonics(curves: "Sequence[HarmonicCurve]") -> "Figure":
     """Draw each harmonic's amplitude as a share of the output's own, in per cent.
+
+    What stands out of the noise by three standard deviations is drawn, and the level of three
+    standard deviations itself.
 
     Parameters
     ----------
@@ -43,34 +46,45 @@ def harmonics(curves: "Sequence[HarmonicCurve]") -> "Figure":
     """
     own = next(curve for curve in curves if curve.order == 1)
     figure, (axes,) = new_figure(1, height=2.6)
+    floor: dict[float, float] = {}
+    lowest = np.inf
     for curve in curves:
         if curve.order == 1 or not curve.frequency:
             continue
         colour, dashes = LOOKS[curve.order]
         frequency = np.array(curve.frequency)
+        level = np.interp(frequency, *_rising(own)) / 100.0
+        amplitude, noise = np.array(curve.amplitude), SEEN * np.array(curve.std)
         turn = np.argsort(frequency)
-        level = np.interp(frequency, *_rising(own))
-        share = 100.0 * np.array(curve.amplitude) / level
-        spread = 100.0 * np.array(curve.std) / level
+        for at, value in zip(frequency, noise / level, strict=True):
+            floor[float(at)] = max(floor.get(float(at), 0.0), float(value))
+        seen = amplitude > noise
+        if not seen.any():
+            continue
+        lowest = min(lowest, float(np.min((amplitude / level)[seen])))
         axes.plot(
             frequency[turn],
-            np.maximum(share, LOWEST)[turn],
+            np.where(seen, amplitude / level, np.nan)[turn],
             color=COLOURS[colour],
             linestyle=dashes,
             marker="o",
-            markersize=2.5,
+            markersize=3.0,
             linewidth=1.2,
-            label=f"{curve.order} × the sweep's frequency",
+            label=f"order {curve.order}",
         )
-        axes.fill_between(
-            frequency[turn],
-            np.maximum(share - 2.0 * spread, LOWEST)[turn],
-            np.maximum(share + 2.0 * spread, LOWEST)[turn],
-            color=COLOURS[colour],
-            alpha=0.12,
-            linewidth=0.0,
-        )
+    along = sorted(floor)
+    axes.fill_between(
+        along,
+        [floor[at] for at in along],
+        color=COLOURS["muted"],
+        alpha=0.15,
+        linewidth=0.0,
+        label="within noise",
+    )
     axes.set_yscale("log")
+    lowest = min([lowest, *(level for level in floor.values() if level > 0)])
+    if np.isfinite(lowest):
+        axes.set_ylim(bottom=0.5 * lowest)
     finish_axes(axes, x="Frequency of the sweep (Hz)", y="Share of the output (%)", log_x=True)
     draw_legend(axes)
     return figure

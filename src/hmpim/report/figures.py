@@ -85,7 +85,9 @@ def pair_pictures(result: Identification, pair: PairIdentification) -> list[Pict
     """
     pictures: list[Picture] = []
     record = result.data
-    if record is not None:
+    # Of a coupling that is not told, signals and the paper's steps show the other inputs only.
+    untold = result.inputs is not None and pair.parameters.scale_factor is None
+    if record is not None and not untold:
         pictures += _signal_pictures(record, pair)
     units = ("", "") if record is None else _units(record, pair)
     if np.any(pair.frequency_response.frequency > 0):
@@ -272,8 +274,8 @@ def _harmonics_picture(pair: PairIdentification, found: Nonlinearity) -> Picture
         key="harmonics",
         title="Harmonics",
         caption="Harmonics of the sweep in what the linear model leaves over, against the "
-        "sweep's frequency, with the band of two standard deviations. Even ones come from what "
-        "is asymmetric, odd ones from what is alike either way.",
+        "sweep's frequency, as far as they stand out of the noise. Even orders come from what is "
+        "asymmetric, odd ones from what is alike either way.",
         description=f"Amplitude of harmonics {', '.join(str(k) for k in orders)} of {pair.output}, "
         "in per cent of its own amplitude at the frequency of the sweep.",
         figure=plots.harmonics(found.harmonics),
