@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import hmpim
-from hmpim.identify.bandwidth import gain_and_phase, response_bandwidths
+from hmpim.identify.bandwidth import response_bandwidths
 from hmpim.identify.result import Estimate, FrequencyResponse, Parameters
 from hmpim.model import RationalDelay, bandwidth_phase, phase, response, second_order_coefficients
 
@@ -77,17 +77,6 @@ def test_a_response_that_differs_from_the_model_is_read_as_it_is():
     )
     there = response_bandwidths(measured, ROLL, MODELLED, **SAMPLED).bandwidth_phase90.value
     assert phase(other, np.array([there]))[0] == pytest.approx(-np.pi / 2, abs=0.02)
-
-
-def test_gain_and_phase_at_chosen_frequencies():
-    wanted = np.array([1.0, 10.0, 43.0, 500.0])
-    low, mid, high = gain_and_phase(noisy(1, 1e-3), ROLL, wanted, **SAMPLED)  # 500 Hz is left out
-    for reading in (low, mid, high):
-        there = np.array([reading.frequency])
-        gain = 20 * np.log10(np.abs(response(ROLL, there))[0])
-        assert abs(reading.gain_db.value - gain) < 4 * reading.gain_db.std
-        turned = np.degrees(phase(ROLL, there)[0])
-        assert abs(reading.phase.value - turned) < 4 * reading.phase.std
 
 
 def test_response_and_model_agree_on_a_record(field_record):

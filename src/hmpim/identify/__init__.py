@@ -1,7 +1,7 @@
 """Identification: from a record to every parameter, each with its error bar (paper, section IV)."""
 
 from hmpim.identify.averaged import Averaged, averaged_response, coherence_significance
-from hmpim.identify.bandwidth import gain_and_phase
+from hmpim.identify.gain_phase import GainPhase, gain_and_phase
 from hmpim.identify.identify import identify
 from hmpim.identify.inputs import Alike, InputSet, OutputCoherence
 from hmpim.identify.levels import (
@@ -45,6 +45,7 @@ __all__ = [
     "Candidate",
     "Estimate",
     "FrequencyResponse",
+    "GainPhase",
     "HarmonicCurve",
     "Identification",
     "InputSet",

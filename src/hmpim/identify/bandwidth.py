@@ -6,8 +6,6 @@ flat, its phase does not wrap, and a straight line through the neighbours of a f
 far measurement and model part there, and where the measurement crosses.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -16,7 +14,7 @@ from hmpim.identify.uncertainty import estimate
 from hmpim.model import RationalDelay, phase, response
 from hmpim.record import Finding, Intersample
 
-__all__ = ["GainPhase", "disagreement", "gain_and_phase", "response_bandwidths"]
+__all__ = ["disagreement", "ratio_at", "response_bandwidths"]
 
 Complex = NDArray[np.complex128]
 
@@ -35,15 +33,6 @@ _MATTERS = 0.03
 """Share of a bandwidth below which a disagreement is not worth a word."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class GainPhase:
-    """Gain in dB and phase in degrees (continuous from DC) at one frequency in Hz."""
-
-    frequency: float
-    gain_db: Estimate
-    phase: Estimate
-
-
 def _between(frequency: NDArray[np.float64], fs: float, intersample: Intersample) -> Complex:
     """What holding or joining the input's samples does to the response (aliases left out)."""
     period = frequency / fs
@@ -54,7 +43,7 @@ def _between(frequency: NDArray[np.float64], fs: float, intersample: Intersample
     return np.ones(frequency.size, dtype=np.complex128)
 
 
-def _ratio_at(
+def ratio_at(
     measured: FrequencyResponse,
     system: RationalDelay,
     frequency: float,
@@ -109,7 +98,7 @@ def response_bandwidths(
         if near is None:
             return None
         value = near.value
-        found = _ratio_at(measured, system, value, fs, intersample)
+        found = ratio_at(measured, system, value, fs, intersample)
         if found is None:
             return None
         ratio, std = found
@@ -163,58 +152,3 @@ def _phase_slope(system: RationalDelay, f: float, *, delay: bool) -> float:
     step = 1e-4 * f
     low, high = phase(system, np.array([f - step, f + step]), delay=delay)
     return float((high - low) / (2 * step))
-
-
-def gain_and_phase(
-    measured: FrequencyResponse,
-    system: RationalDelay,
-    frequency: NDArray[np.float64],
-    *,
-    fs: float,
-    intersample: Intersample,
-) -> tuple[GainPhase, ...]:
-    """Gain and phase of the measured response at chosen frequencies, each with its interval.
-
-    Parameters
-    ----------
-    measured : FrequencyResponse
-        With its error at each frequency.
-    system : RationalDelay
-        The fitted model: it says how often the phase has turned.
-    frequency : ndarray, shape (m,)
-        Hz; those outside the measured band are left out.
-    fs, intersample
-        As for `response_bandwidths`.
-
-    Returns
-    -------
-    tuple of GainPhase
-    """
-    readings = []
-    for f in np.atleast_1d(frequency):
-        found = _ratio_at(measured, system, float(f), fs, intersample)
-        if found is None:
-            continue
-        ratio, std = found
-        there = np.array([float(f)])
-        gain = float(np.abs(response(system, there))[0]) * abs(ratio)
-        turned = float(phase(system, there)[0]) + float(np.angle(ratio))
-        relative = std / np.sqrt(2) / max(abs(ratio), 1e-12)
-        readings.append(
-            GainPhase(
-                frequency=float(f),
-                gain_db=estimate(
-                    20 * float(np.log10(gain)),
-                    float(20 / np.log(10) * relative) ** 2,
-                    freedom=_MANY,
-                    unit="dB",
-                ),
-                phase=estimate(
-                    float(np.degrees(turned)),
-                    float(np.degrees(relative)) ** 2,
-                    freedom=_MANY,
-                    unit="deg",
-                ),
-            )
-        )
-    return tuple(readings)

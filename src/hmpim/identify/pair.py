@@ -132,6 +132,7 @@ def described(
         time=aligned.time,
         prediction=fit.prediction if drifting is None else fit.prediction + drifting.trend,
         residual=fit.residual,
+        covariance=_finite(readings.coefficient_covariance),
         nonlinearity=inspection.summary,
     )
 
@@ -140,6 +141,11 @@ def _told(y: NDArray[np.float64], fit: Fit, found: Imperfections, fs: float) -> 
     """Output with the model in place of clipped and held samples, for spectra."""
     told = found.telling(y.size, fs)
     return y if told is None else np.where(told, y, fit.prediction)
+
+
+def _finite(covariance: NDArray[np.float64]) -> NDArray[np.float64] | None:
+    """None where a direction is not seen by the record."""
+    return covariance if bool(np.isfinite(covariance).all()) else None
 
 
 def _descending(coefficients: NDArray[np.float64]) -> tuple[float, ...]:

@@ -50,6 +50,8 @@ class Readings:
     second_pole : float or None
         For a first-order fit, the longest second time constant that the record does not
         exclude, over the first.
+    coefficient_covariance : ndarray, shape (q, q)
+        Of the delay and the coefficients of `system` that may vary, by rising powers of s.
     """
 
     parameters: Parameters
@@ -59,6 +61,7 @@ class Readings:
     white: bool
     halves: Halves
     second_pole: float | None
+    coefficient_covariance: _Vector
 
     def variance(self, function: Callable[[_Vector], float]) -> float:
         """Variance of a function of `vector`, to first order."""
@@ -219,6 +222,7 @@ def read_parameters(
         / float(np.exp(vector[1]))
         if structure.name == "first_order"
         else None,
+        coefficient_covariance=sensitivity.coefficients.T @ cov @ sensitivity.coefficients,
     )
 
 
@@ -230,18 +234,27 @@ class _Sensitivity:
     ) -> None:
         self._places = np.array(frequencies)
 
-        def curve(v: _Vector, f: _Vector) -> NDArray[np.complex128]:
-            system = system_of(structure, v, fs)
+        def curve(system: RationalDelay, f: _Vector) -> NDArray[np.complex128]:
             return np.asarray(response(system, f) / system.numerator[0])
 
-        here = curve(vector, self._places)
+        def coefficients(system: RationalDelay) -> _Vector:
+            varied = system.denominator[structure.integrators + 1 :]
+            return np.concatenate([[system.delay], system.numerator, varied])
+
+        middle = system_of(structure, vector, fs)
+        here = curve(middle, self._places)
         self._slopes = np.empty((vector.size, self._places.size), dtype=np.complex128)
+        by_coefficient = []
         for i, value in enumerate(vector):
             step = np.zeros(vector.size)
             step[i] = 1e-6 * max(abs(value), 1e-3)
-            up, down = (curve(vector + sign * step, self._places) for sign in (1.0, -1.0))
+            above, below = (system_of(structure, vector + sign * step, fs) for sign in (1.0, -1.0))
+            up, down = curve(above, self._places), curve(below, self._places)
             self._slopes[i] = (up - down) / (2 * step[i] * here)
-        up, down = (curve(vector, self._places * (1 + sign * 1e-5)) for sign in (1.0, -1.0))
+            by_coefficient.append((coefficients(above) - coefficients(below)) / (2 * step[i]))
+        self.coefficients = np.stack(by_coefficient)
+        """Derivatives of the delay and the coefficients of B and A, in s, shape (p, q)."""
+        up, down = (curve(middle, self._places * (1 + sign * 1e-5)) for sign in (1.0, -1.0))
         self._rates = (up - down) / (2e-5 * np.maximum(self._places, 1e-300) * here)
 
     def at(self, frequency: float) -> tuple[NDArray[np.complex128], complex]:

@@ -299,9 +299,12 @@ class PairIdentification:
 
     `dynamics` holds the rational dynamics that were fitted, without delay and with unit
     gain at DC: numerator and denominator coefficients in powers of s (rad/s), highest
-    first. `prediction` and `residual` (shape (n,), the output's unit) are on the record's
-    own uniform clock `time`; they are not part of the JSON. `from_response` holds bandwidths
-    read off the measured response, to be held against the model's. `nonlinearity` is None
+    first. `covariance`, shape (q, q), is that of the delay in s, of the numerator times the scale
+    factor, and of the denominator without its constant 1, each by rising powers of s; None
+    where nothing was identified. `prediction` and `residual` (shape (n,), the output's unit)
+    are on the record's own uniform clock `time`; they are not part of the JSON. `from_response`
+    holds bandwidths read off the measured response, to be held against the model's.
+    `nonlinearity` is None
     where the output does not follow the input at all.
     """
 
@@ -323,6 +326,7 @@ class PairIdentification:
     prediction: NDArray[np.float64] | None = None
     residual: NDArray[np.float64] | None = None
     nonlinearity: Nonlinearity | None = None
+    covariance: NDArray[np.float64] | None = None
 
     def __getattr__(self, name: str) -> Estimate | None:
         """Return a parameter by its name: ``pair.delay`` is ``pair.parameters.delay``."""
@@ -346,6 +350,7 @@ class PairIdentification:
             "dynamics": {
                 "numerator": list(self.numerator),
                 "denominator": list(self.denominator),
+                "covariance": None if self.covariance is None else self.covariance.tolist(),
             },
             "candidates": [
                 {f.name: getattr(c, f.name) for f in fields(c)} for c in self.candidates
@@ -359,6 +364,7 @@ class PairIdentification:
     def from_dict(cls, data: Mapping[str, Any]) -> "PairIdentification":
         """Read back what `to_dict` wrote."""
         nonlinearity = data.get("nonlinearity")  # results written before it have none
+        covariance = data["dynamics"].get("covariance")
         return cls(
             input=data["input"],
             output=data["output"],
@@ -375,6 +381,7 @@ class PairIdentification:
             verdict=data["verdict"],
             warnings=tuple(Finding(**w) for w in data["warnings"]),
             nonlinearity=None if nonlinearity is None else Nonlinearity.from_dict(nonlinearity),
+            covariance=None if covariance is None else np.array(covariance, dtype=np.float64),
         )
 
 

@@ -1,0 +1,162 @@
+"""Gain and phase at chosen frequencies, from the measured response and from the model."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from hmpim.errors import ArgumentError
+from hmpim.identify.bandwidth import ratio_at
+from hmpim.identify.result import Estimate, PairIdentification
+from hmpim.identify.uncertainty import estimate
+from hmpim.model import RationalDelay, phase, response
+
+__all__ = ["GainPhase", "gain_and_phase"]
+
+_MANY = 1e6
+"""Degrees of freedom behind the error bars, in effect."""
+
+_STEP = 1e-6
+"""Relative step of the derivatives by the model's coefficients."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class GainPhase:
+    """Gain and phase at one frequency, measured and modelled.
+
+    Parameters
+    ----------
+    frequency : float
+        Hz.
+    gain_db, phase : Estimate or None
+        From the measured response, in dB (of output unit over input unit) and degrees,
+        continuous from DC; None outside the measured band.
+    model_gain_db, model_phase : Estimate
+        From the fitted model, which reaches beyond that band at the model's own risk.
+    """
+
+    frequency: float
+    gain_db: Estimate | None
+    phase: Estimate | None
+    model_gain_db: Estimate
+    model_phase: Estimate
+
+
+def gain_and_phase(
+    pair: PairIdentification, frequency: ArrayLike, *, fs: float
+) -> tuple[GainPhase, ...]:
+    """Gain and phase at chosen frequencies, each with its interval, by two routes.
+
+    Parameters
+    ----------
+    pair : PairIdentification
+        From `hmpim.identify`, or read back.
+    frequency : array_like, shape (m,)
+        Hz, positive.
+    fs : float
+        Rate of the record in Hz, ``result.record.fs``.
+
+    Returns
+    -------
+    tuple of GainPhase
+        One for each frequency.
+
+    Raises
+    ------
+    ArgumentError
+        For a frequency that is not positive, or a pair that was not identifiable.
+
+    Notes
+    -----
+    The measurement is divided by the model first, whose phase says how often it has turned
+    (`hmpim.identify.bandwidth`). The model's error is carried over to first order from the
+    covariance of its coefficients.
+
+    Examples
+    --------
+    >>> import hmpim
+    >>> rng = np.random.default_rng(1)
+    >>> t = np.arange(2000) / 200
+    >>> u = np.sin(2 * np.pi * (0.1 * t + t**2))
+    >>> y = 2.0 * np.interp(t - 0.05, t, u, left=0) + 0.01 * rng.standard_normal(2000)
+    >>> result = hmpim.identify(hmpim.Record.from_arrays({"u": u}, {"y": y}, fs=200.0))
+    >>> at = gain_and_phase(result["y", "u"], 5.0, fs=200.0)[0]
+    >>> round(at.phase.value), round(at.model_phase.value), round(at.model_gain_db.value, 1)
+    (-90, -90, 6.0)
+    """
+    places = np.atleast_1d(np.asarray(frequency, dtype=np.float64))
+    wrong = places[~(np.isfinite(places) & (places > 0))]
+    if wrong.size:
+        raise ArgumentError(f"frequency {wrong[0]:g} Hz is not positive; give frequencies above 0")
+    p = pair.parameters
+    if p.delay is None or p.scale_factor is None or pair.covariance is None:
+        raise ArgumentError(
+            f"{pair.output!r} from {pair.input!r} was not identifiable, so it has no gain and "
+            "phase to read off; see its warnings"
+        )
+    integrators = int(pair.denominator[-1] == 0.0)
+    numerator = p.scale_factor.value * np.array(pair.numerator[::-1])
+    vector = np.concatenate(
+        [[p.delay.value], numerator, np.array(pair.denominator[::-1])[integrators + 1 :]]
+    )
+
+    def system(v: NDArray[np.float64]) -> RationalDelay:
+        ones = [0.0] * integrators + [1.0]
+        return RationalDelay(
+            delay=float(v[0]),
+            numerator=v[1 : 1 + numerator.size],
+            denominator=np.concatenate([ones, v[1 + numerator.size :]]),
+        )
+
+    return tuple(_at(pair, float(f), system, vector, pair.covariance, fs) for f in places)
+
+
+def _at(
+    pair: PairIdentification,
+    f: float,
+    system: Callable[[NDArray[np.float64]], RationalDelay],
+    vector: NDArray[np.float64],
+    covariance: NDArray[np.float64],
+    fs: float,
+) -> GainPhase:
+    here, there = system(vector), np.array([f])
+    value = complex(response(here, there)[0])
+    slope = np.empty(vector.size, dtype=np.complex128)  # of ln G
+    for i in range(vector.size):
+        moved = vector.copy()
+        step = _STEP * (abs(vector[i]) or 1e-3)
+        moved[i] += step
+        slope[i] = (complex(response(system(moved), there)[0]) / value - 1.0) / step
+    turned = float(phase(here, there)[0])
+    if value.real * np.cos(turned) + value.imag * np.sin(turned) < 0:
+        turned += np.pi  # the phase counts from DC; a negative scale factor is half a turn
+    if here.denominator[0] == 0.0:
+        turned = float(np.angle(value))
+    decibel = 20 / np.log(10)
+    gain_db = decibel * float(np.log(abs(value)))
+    spread = [float(part @ covariance @ part) for part in (slope.real, slope.imag)]
+    measured = ratio_at(pair.frequency_response, here, f, fs, pair.intersample)
+    gain = lag = None
+    if measured is not None:
+        ratio, std = measured
+        relative = std / np.sqrt(2) / max(abs(ratio), 1e-12)
+        gain = _decibels(gain_db + decibel * float(np.log(abs(ratio))), relative**2)
+        lag = _degrees(turned + float(np.angle(ratio)), relative**2)
+    return GainPhase(
+        frequency=f,
+        gain_db=gain,
+        phase=lag,
+        model_gain_db=_decibels(gain_db, spread[0]),
+        model_phase=_degrees(turned, spread[1]),
+    )
+
+
+def _decibels(value: float, variance: float) -> Estimate:
+    scale = 20 / np.log(10)
+    return estimate(value, scale**2 * variance, freedom=_MANY, unit="dB")
+
+
+def _degrees(value: float, variance: float) -> Estimate:
+    scale = float(np.degrees(1.0))
+    return estimate(scale * value, scale**2 * variance, freedom=_MANY, unit="deg")
