@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from functools import cache, partial
 from pathlib import Path
 
+import nonlinearity
 import numpy as np
 from rich.progress import Progress
 from scipy.signal import lfilter
@@ -399,6 +400,7 @@ def study(share: float, progress: Progress) -> Iterable[tuple[str, list[str]]]:
         yield "Intervals under coloured noise", coloured(size(1000), mapped)
         yield "Random systems, no hints", random_systems(size(500), mapped)
         yield "Frequency response", frequency_response(size(300), mapped)
+        yield "Nonlinearity", nonlinearity.section(size(300), mapped)
     yield "Measured hardware", hardware()
     yield "Three inputs at once", several_inputs()
     yield "Cost", cost()

@@ -1,0 +1,243 @@
+"""What `identify` says of systems that are not linear, stepped in time, and of linear ones."""
+
+import importlib
+
+import numpy as np
+import pytest
+
+import hmpim
+from hmpim.identify.mechanisms import play, rate_limited
+
+FS, SUBSTEPS, DELAY = 200.0, 16, 0.03
+T = np.arange(2000) / FS
+
+
+def sweep(t: np.ndarray) -> np.ndarray:
+    """0.1 to 20 Hz in 10 s, its amplitude falling from 1 to a quarter."""
+    inside = np.maximum(t, 0.0)
+    return np.sin(2 * np.pi * (0.1 * inside + 19.9 / 20 * inside**2)) / (1 + 0.3 * inside)
+
+
+def motion(kind: str, size: float) -> np.ndarray:
+    """Second order, 10 Hz, ζ 0.4, delay 30 ms, by semi-implicit Euler."""
+    omega, step = 2 * np.pi * 10.0, 1 / FS / SUBSTEPS
+    u = sweep(np.arange(T.size * SUBSTEPS) * step - DELAY).tolist()
+    cubic = {"hardening": size, "softening": -size}.get(kind, 0.0)
+    square = size if kind == "asymmetry" else 0.0
+    grip = step * omega**2 * size if kind == "friction" else 0.0
+    y = v = 0.0
+    out = np.empty(len(u))
+    for k, target in enumerate(u):
+        out[k] = y
+        v += step * (omega**2 * (target - y - square * y**2 - cubic * y**3) - 0.8 * omega * v)
+        v = 0.0 if abs(v) <= grip else v - np.copysign(grip, v)
+        y += step * v
+    if kind == "backlash":
+        out = play(out, size)
+    if kind == "rate_limit":
+        out = rate_limited(out, size * step)
+    return out[::SUBSTEPS]
+
+
+def identified(y: np.ndarray, *, noise: float = 0.002, seed: int = 1) -> hmpim.Identification:
+    noisy = y + noise * np.random.default_rng(seed).standard_normal(y.size)
+    return hmpim.identify(hmpim.Record.from_arrays({"u": sweep(T)}, {"y": noisy}, fs=FS))
+
+
+def codes(pair) -> set[str]:
+    return {warning.code for warning in pair.warnings}
+
+
+@pytest.mark.parametrize(
+    ("kind", "size", "within"),
+    [
+        ("friction", 0.01, 0.2),
+        ("backlash", 0.01, 0.25),
+        ("rate_limit", 20.0, 0.15),
+        ("hardening", 0.1, 0.25),
+        ("softening", 0.1, 0.25),
+    ],
+)
+def test_kind_and_size_are_said_and_the_verdict_is_never_ok(kind, size, within):
+    pair = identified(motion(kind, size))["y", "u"]
+    assert {"nonlinear", kind} <= codes(pair)
+    assert pair.verdict == "doubtful"
+    found = pair.nonlinearity
+    assert found.kinds == (kind,)
+    # A spring's size is the share of force at the largest deflection, which is not exactly 1.
+    largest = float(np.max(np.abs(motion("none", 0.0))))
+    truth = size * largest**2 if kind in ("hardening", "softening") else size
+    assert found.size.value == pytest.approx(truth, rel=within)
+    assert found.odd > 5 * found.even
+    assert found.noise + found.linear + found.nonlinear == pytest.approx(1.0)
+
+
+def test_what_is_asymmetric_is_even():
+    found = identified(motion("asymmetry", 0.1))["y", "u"].nonlinearity
+    assert found.kinds == ("asymmetry",)
+    assert found.even > 3 * found.odd
+
+
+def test_a_tiny_one_is_said_and_leaves_the_verdict():
+    pair = identified(motion("hardening", 0.02), noise=0.0005)["y", "u"]
+    assert "nonlinear" in codes(pair)
+    assert pair.nonlinearity.share < 0.005
+    assert pair.verdict == "ok"
+    assert pair.natural_frequency.value == pytest.approx(10.0, rel=0.01)
+
+
+def test_a_rich_structure_gives_way_to_a_plain_one_with_friction():
+    pair = identified(motion("friction", 0.03))["y", "u"]
+    assert pair.structure == "second_order"
+    assert pair.nonlinearity.kinds[0] == "friction"
+    chosen = [c for c in pair.candidates if c.chosen]
+    assert [c.structure for c in chosen] == ["second_order"]
+
+
+def test_a_linear_system_has_nothing_to_report():
+    pair = identified(motion("none", 0.0), noise=0.02)["y", "u"]
+    assert pair.verdict == "ok"
+    assert "nonlinear" not in codes(pair)
+    found = pair.nonlinearity
+    assert (found.share, found.noise, found.kinds, found.harmonics) == (0.0, 1.0, (), ())
+
+
+def test_the_harmonics_follow_the_describing_function():
+    """Friction F makes a third harmonic of a third of 4 F / π, as the dynamics pass it on."""
+    curves = identified(motion("friction", 0.02), noise=0.0005)["y", "u"].nonlinearity.harmonics
+    own, third = (next(c for c in curves if c.order == k) for k in (1, 3))
+    for f, amplitude in list(zip(third.frequency, third.amplitude, strict=True))[1:4]:
+        s = 3 * f / 10.0  # the third harmonic's frequency over the natural one
+        passed = 1 / abs(1 - s**2 + 0.8j * s)
+        assert amplitude == pytest.approx(4 * 0.02 / np.pi / 3 * passed, rel=0.3)
+    assert own.amplitude[0] == pytest.approx(1.0, rel=0.35)
+
+
+def test_json_keeps_it_and_older_results_lack_it():
+    result = identified(motion("backlash", 0.02))
+    data = result.to_dict()
+    back = hmpim.Identification.from_dict(data)
+    assert back["y", "u"].nonlinearity == result["y", "u"].nonlinearity
+    assert data["pairs"][0]["nonlinearity"]["kinds"] == ["backlash"]
+    del data["pairs"][0]["nonlinearity"]
+    assert hmpim.Identification.from_dict(data)["y", "u"].nonlinearity is None
+
+
+def test_another_input_at_twice_the_frequency_is_no_harmonic():
+    rng = np.random.default_rng(0)
+    slow = np.sin(2 * np.pi * (0.1 * T + 0.5 * T**2))
+    fast = np.sin(2 * np.pi * (0.2 * T + 1.0 * T**2))  # exactly its second harmonic
+    lag = hmpim.Model(delay=0.02, scale_factor=1.0, denominator=(4e-4, 1.6e-2, 1.0))
+    y = hmpim.simulate(lag, slow, fs=FS, intersample="bandlimited")
+    y = y + 0.3 * hmpim.simulate(lag, fast, fs=FS, intersample="bandlimited")
+    record = hmpim.Record.from_arrays(
+        {"a": slow, "b": fast}, {"y": y + 0.005 * rng.standard_normal(T.size)}, fs=FS
+    )
+    for pair in hmpim.identify(record).pairs:
+        assert "nonlinear" not in codes(pair)
+
+
+def test_one_of_several_inputs_that_is_bent_is_told_by_its_harmonics():
+    rng = np.random.default_rng(0)
+    up = np.sin(2 * np.pi * (0.1 * T + 0.5 * T**2))
+    down = up[::-1].copy()
+    y = up - 0.2 * up**3 + 0.5 * down + 0.005 * rng.standard_normal(T.size)
+    record = hmpim.Record.from_arrays({"a": up, "b": down}, {"y": y}, fs=FS)
+    result = hmpim.identify(record)
+    assert "nonlinear" in codes(result["y", "a"])
+    assert "nonlinear" not in codes(result["y", "b"])
+    said = next(w.message for w in result["y", "a"].warnings if w.code == "nonlinear")
+    assert "Drive one input at a time" in said
+
+
+def test_a_long_record_is_looked_at_in_blocks(monkeypatch):
+    whole = identified(motion("friction", 0.02))["y", "u"].nonlinearity
+    monkeypatch.setattr(importlib.import_module("hmpim.identify.nonlinearity"), "_LONGEST", 1000)
+    halved = identified(motion("friction", 0.02))["y", "u"].nonlinearity
+    assert halved.kinds == whole.kinds
+    assert halved.size.value == pytest.approx(whole.size.value, rel=0.1)
+    assert halved.odd == pytest.approx(whole.odd, rel=0.3)
+
+
+def test_levels_of_a_hard_spring_name_it_and_end_the_linear_range():
+    rng = np.random.default_rng(0)
+    records = []
+    for gain in (1.0, 4.0, 8.0):
+        # A deflection `gain` times as large bends a spring as one gain² times as hard would.
+        y = gain * motion("hardening", 0.002 * gain**2)
+        noisy = y + 0.002 * rng.standard_normal(T.size)
+        records.append(hmpim.Record.from_arrays({"u": gain * sweep(T)}, {"y": noisy}, fs=FS))
+    levels = hmpim.identify_levels(records)
+    found = levels["y", "u"]
+    assert found.findings[0].code == "nonlinear"
+    reach = next(t for t in found.trends if t.name == "scale_factor")
+    assert reach.change < -0.01
+    first, last = reach.amplitudes[0], reach.amplitudes[-1]
+    assert first <= found.linear_up_to < last
+    assert levels.results[0]["y", "u"].verdict == "ok"
+    assert levels.results[2]["y", "u"].verdict == "doubtful"
+
+
+def test_levels_of_a_linear_system_are_all_alike():
+    rng = np.random.default_rng(0)
+    records = [
+        hmpim.Record.from_arrays(
+            {"u": gain * sweep(T)},
+            {"y": gain * motion("none", 0.0) + 0.01 * rng.standard_normal(T.size)},
+            fs=FS,
+        )
+        for gain in (2.0, 1.0, 4.0)
+    ]
+    found = hmpim.identify_levels(records)["y", "u"]
+    assert found.findings == ()
+    assert found.linear_up_to == pytest.approx(4.0 * np.ptp(sweep(T)) / 2)
+
+
+def test_levels_that_do_not_go_together_are_refused():
+    one = hmpim.Record.from_arrays({"u": sweep(T)}, {"y": sweep(T)}, fs=FS)
+    other = hmpim.Record.from_arrays({"u": sweep(T)}, {"z": sweep(T)}, fs=FS)
+    with pytest.raises(hmpim.HmpimError, match="1 record has nothing"):
+        hmpim.identify_levels([one])
+    with pytest.raises(hmpim.HmpimError, match="2 records and 1 amplitudes"):
+        hmpim.identify_levels([one, one], amplitudes=[1.0])
+    with pytest.raises(hmpim.HmpimError, match="record 1 has channels u, z"):
+        hmpim.identify_levels([one, other])
+
+
+@pytest.mark.real_data
+def test_the_silverbox_hardens_in_one_record_and_over_levels(measured):
+    data = np.load(measured / "silverbox" / "snls80mv.npz")
+    fs = 610.3515625
+
+    def part(start: int, stop: int) -> hmpim.Record:
+        return hmpim.Record.from_arrays(
+            {"u": data["input"][start:stop]}, {"y": data["output"][start:stop]}, fs=fs
+        )
+
+    arrow = hmpim.identify(part(0, 40_000))["y", "u"]
+    assert {"nonlinear", "hardening"} <= codes(arrow)
+    assert arrow.verdict == "doubtful"
+    assert arrow.nonlinearity.odd > 0.1
+    assert arrow.nonlinearity.even == 0.0
+    levels = hmpim.identify_levels([part(k, k + 6000) for k in range(2000, 36_000, 6000)])
+    found = levels["y", "u"]
+    assert [f.code for f in found.findings] == ["nonlinear", "hardening"]
+    frequency = next(t for t in found.trends if t.name == "natural_frequency")
+    assert frequency.values[0] == pytest.approx(68.35, rel=0.005)
+    assert np.all(np.diff(frequency.values) > 0)
+    assert frequency.values[-1] == pytest.approx(70.8, rel=0.01)
+
+
+@pytest.mark.real_data
+def test_hardware_that_is_linear_enough_is_not_doubted_for_it(measured):
+    """The circuit's converters bend by a per cent, seen and said; the loop by far less."""
+    circuit = hmpim.read(measured / "rcrc" / "prbs.csv").between(0.0, 8.0)
+    found = hmpim.identify(circuit)["output", "input"].nonlinearity
+    assert found.share < 0.02
+    assert found.odd == 0.0
+    loop = np.load(measured / "emps" / "emps.npz")
+    record = hmpim.Record.from_arrays({"u": loop["qg"]}, {"y": loop["qm"]}, time=loop["t"])
+    record = record.between(0.0, 10.0)
+    pair = hmpim.identify(record, structures=["second_order"])["y", "u"]
+    assert pair.nonlinearity.share < 1e-3
+    assert "nonlinear" not in codes(pair)
