@@ -64,3 +64,20 @@ def test_bad_input_is_one_line_and_two(tmp_path):
         assert words in result.stderr
         assert result.stderr.count("\n") == 1
     assert not (tmp_path / "out").exists()
+
+
+def test_an_earlier_study_is_read_before_anything_moves_and_told_of_after(tmp_path):
+    first, second = tmp_path / "first", tmp_path / "second"
+    assert invoke(short_plan(tmp_path), "--out", first, "--quiet").exit_code == 0
+    compared = ('# compare = "earlier/study.json"', 'compare = "first/study.json"')
+    slower = ("natural_frequency = 14.0", "natural_frequency = 12.0")
+    result = invoke(short_plan(tmp_path, c=compared, s=slower), "--out", second)
+    assert result.exit_code == 0, result.output
+    (told,) = [line for line in result.stdout.splitlines() if line.startswith("Against")]
+    differ, of = (int(word) for word in told.split() if word.isdigit())
+    assert 3 <= differ < of
+    (first / "study.json").write_text("{", encoding="utf-8")
+    result = invoke(short_plan(tmp_path, c=compared), "--out", tmp_path / "third")
+    assert result.exit_code == 2
+    assert "is no study to compare with" in result.stderr
+    assert not (tmp_path / "third").exists()

@@ -137,6 +137,17 @@ def test_specification_not_met_and_without_figure(finished):
         make_study(replace(plan, specifications=(nobody,)), cases)
 
 
+def test_a_specification_that_fits_no_case_is_refused_before_anything_moves(tmp_path):
+    plan = plan_of()
+    nobody = replace(plan.specifications[0], rate=123.0)
+    rig = Stopping()
+    with pytest.raises(ArgumentError, match=r"specification\[2\] fits no case"):
+        run_campaign(
+            replace(plan, specifications=(plan.specifications[0], nobody)), tmp_path, player=rig
+        )
+    assert rig.played == []
+
+
 def test_comparison_finds_what_moved_and_only_that(finished, tmp_path):
     plan, _, cases = finished
     write_study(make_study(plan, cases), tmp_path)

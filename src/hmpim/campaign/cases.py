@@ -6,10 +6,10 @@ from typing import Any
 
 from hmpim.campaign.plan import Mode, Plan
 from hmpim.campaign.rig import CampaignRig
-from hmpim.errors import HmpimError
+from hmpim.errors import ArgumentError, HmpimError
 from hmpim.stimulus import Limits, Stimulus, design
 
-__all__ = ["Case", "expand", "prepare", "scaled"]
+__all__ = ["Case", "check_wanted", "expand", "prepare", "scaled"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -80,6 +80,40 @@ def expand(plan: Plan) -> tuple[Case, ...]:
                 )
             )
     return tuple(cases)
+
+
+def check_wanted(plan: Plan, cases: tuple[Case, ...]) -> None:
+    """Refuse a specification that fits no case, before any of them is run.
+
+    Raises
+    ------
+    ArgumentError
+        If there is one; names it by its place in the plan.
+
+    Examples
+    --------
+    >>> from dataclasses import replace
+    >>> from hmpim.campaign.plan import read_plan
+    >>> from hmpim.campaign.shipped import shipped_plan
+    >>> plan = read_plan(shipped_plan("example"))
+    >>> wanted = replace(plan.specifications[0], mode="PVA")
+    >>> plan = replace(plan, specifications=(wanted,))
+    >>> check_wanted(plan, expand(plan))
+    Traceback (most recent call last):
+    hmpim.errors.ArgumentError: specification[1] fits no case of the plan; change or drop it
+    """
+    for number, wanted in enumerate(plan.specifications, start=1):
+        if not any(
+            wanted.test in (None, case.test)
+            and (wanted.axis is None or wanted.axis in case.axes)
+            and wanted.mode in (None, case.mode)
+            and wanted.load in (None, case.load)
+            and wanted.rate in (None, case.rate)
+            for case in cases
+        ):
+            raise ArgumentError(
+                f"specification[{number}] fits no case of the plan; change or drop it"
+            )
 
 
 def prepare(plan: Plan, case: Case, rig: CampaignRig) -> tuple[Stimulus, ...]:

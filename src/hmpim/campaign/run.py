@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from hmpim.campaign.cases import Case, expand, prepare
+from hmpim.campaign.cases import Case, check_wanted, expand, prepare
 from hmpim.campaign.plan import Plan
 from hmpim.campaign.rig import CampaignRig, Player, make_rig
 from hmpim.errors import ArgumentError, FormatError
@@ -64,7 +64,7 @@ def run_campaign(
     Raises
     ------
     ArgumentError
-        If `folder` holds a campaign of another plan.
+        If `folder` holds a campaign of another plan, or a specification fits no case.
     LimitsError
         If a stimulus cannot be designed inside its limits.
     RigError
@@ -72,6 +72,7 @@ def run_campaign(
     """
     rig = make_rig(plan, player=player)
     cases = expand(plan)
+    check_wanted(plan, cases)
     _open(plan, folder, fresh=fresh)
     known = {case.id: _read(folder, case) for case in cases}
     missing = [case for case in cases if known[case.id] is None]

@@ -10,7 +10,17 @@ from typing import Any, Literal
 from hmpim.campaign.plan import QUANTITIES, Plan, Specification
 from hmpim.errors import FormatError
 
-__all__ = ["SCHEMA", "Change", "Check", "Reading", "Row", "Study", "make_study", "study_dict"]
+__all__ = [
+    "SCHEMA",
+    "Change",
+    "Check",
+    "Reading",
+    "Row",
+    "Study",
+    "earlier_parameters",
+    "make_study",
+    "study_dict",
+]
 
 SCHEMA = "hmpim/study/1"
 _APART = 3.0  # standard deviations, beyond which two readings count as different
@@ -199,16 +209,27 @@ def _check(wanted: Specification, row: Row) -> Check:
     return Check(row=row, wanted=wanted, reading=reading, outcome="pass" if met else "fail")
 
 
-def _changes(rows: Sequence[Row], earlier: Path) -> tuple[Change, ...]:
+def earlier_parameters(path: Path) -> dict[tuple[str, str], dict[str, Any]]:
+    """Parameters of an earlier study by case and axis, from its ``study.json``.
+
+    Raises
+    ------
+    FormatError
+        If the file is no study.
+    """
     try:
-        data = json.loads(earlier.read_text(encoding="utf-8"))
+        data = json.loads(path.read_text(encoding="utf-8"))
         if data["schema"] != SCHEMA:
-            raise FormatError(f"{earlier} has schema {data['schema']!r}; {SCHEMA!r} is needed")
-        before = {(row["case"], row["axis"]): row["parameters"] for row in data["rows"]}
+            raise FormatError(f"{path} has schema {data['schema']!r}; {SCHEMA!r} is needed")
+        return {(row["case"], row["axis"]): row["parameters"] for row in data["rows"]}
     except (ValueError, KeyError, TypeError) as error:
         if isinstance(error, FormatError):
             raise
-        raise FormatError(f"{earlier} is no study to compare with: {error!r}") from error
+        raise FormatError(f"{path} is no study to compare with: {error!r}") from error
+
+
+def _changes(rows: Sequence[Row], earlier: Path) -> tuple[Change, ...]:
+    before = earlier_parameters(earlier)
     changes = []
     for row in rows:
         for quantity, now in row.parameters.items():

@@ -61,7 +61,7 @@ def campaign(
     wanted = read_plan(shipped_plan(plan) if plan in PLANS and not path.exists() else path)
 
     from hmpim.campaign.run import run_campaign
-    from hmpim.campaign.study import make_study
+    from hmpim.campaign.study import earlier_parameters, make_study
     from hmpim.campaign.write import write_study
     from hmpim.cli.terminal import check_target
 
@@ -70,6 +70,8 @@ def campaign(
     earlier = None if not wanted.compare else path.parent / wanted.compare
     if earlier is not None and not earlier.is_file():
         raise ArgumentError(f"compare = {wanted.compare!r}: there is no file {earlier}")
+    if earlier is not None:
+        earlier_parameters(earlier)  # what cannot be read is refused before anything moves
     with _counting(quiet) as tick:
         cases = run_campaign(wanted, out, fresh=not resume, progress=tick)
         study = make_study(wanted, cases, earlier=earlier)
@@ -108,6 +110,8 @@ def _print(study: object) -> None:
                 f"fail: {check.wanted.quantity} of {check.row.axis} in {check.row.case_id}: {found}"
             )
     console.print(page.headline)
+    if study.changes:
+        console.print(page.grids[-1].caption + ".")
 
 
 @contextmanager
