@@ -1,6 +1,7 @@
 """`hmpim identify`: what it prints and writes, and how it refuses."""
 
 import json
+import math
 import re
 import subprocess
 import sys
@@ -122,6 +123,19 @@ def test_holdout_fits_the_first_part_and_scores_the_rest(good, tmp_path):
     fit = float(re.search(r"fit of ([\d.]+) %", line)[1])
     # Noise of 0.01 on an output of about 1.4 r.m.s. leaves 99.3 %.
     assert 98.5 < fit < 99.6
+
+
+def test_gain_and_phase_at_chosen_frequencies(good):
+    done = run("identify", good, *NAMED, "--at", "0.5", "--at", "900")
+    assert done.exit_code == 0, done.stderr
+    near, far = (line for line in done.stdout.splitlines() if line.startswith("y from u at"))
+    found = re.search(r"measured ([-\d.]+) ± \S+ dB, ([-\d.]+) ± \S+°; the model ([-\d.]+)", near)
+    assert float(found[1]) == pytest.approx(20 * math.log10(2.0), abs=0.05)
+    assert float(found[2]) == pytest.approx(-0.5 * 360 * 0.1, abs=0.5)
+    assert float(found[3]) == pytest.approx(20 * math.log10(2.0), abs=0.05)
+    assert "not measured there; the model" in far
+    done = run("identify", good, *NAMED, "--at", "-3")
+    check_refusal(done.exit_code, done.stdout, done.stderr, "-3 Hz is not positive")
 
 
 def test_a_failure_while_writing_leaves_the_old_file(good, tmp_path, monkeypatch):

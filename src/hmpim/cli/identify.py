@@ -12,7 +12,7 @@ from hmpim.cli.terminal import check_target, output_console, say, working
 from hmpim.errors import ArgumentError
 
 if TYPE_CHECKING:
-    from hmpim.identify import Identification
+    from hmpim.identify import Estimate, Identification
     from hmpim.record import Record
     from hmpim.stimulus import Stimulus
 
@@ -68,6 +68,14 @@ def identify(
             help="Fit on the first part only, and predict this share at the end.",
         ),
     ] = None,
+    at: Annotated[
+        list[float] | None,
+        typer.Option(
+            "--at",
+            metavar="HZ",
+            help="Say gain and phase at this frequency, measured and modelled; may be repeated.",
+        ),
+    ] = None,
     json: Annotated[
         Path | None, typer.Option("--json", metavar="FILE", help="Write the result as JSON.")
     ] = None,
@@ -96,7 +104,7 @@ def identify(
                 read(record, inputs=input_ or None, outputs=output or None, fs=fs, time=time)
             )
     if len(given) > 1:
-        for option, wanted in (("--report", report), ("--holdout", holdout)):
+        for option, wanted in (("--report", report), ("--holdout", holdout), ("--at", at or None)):
             if wanted is not None:
                 raise ArgumentError(
                     f"{option} is about one record, and {len(given)} are given; leave it out, or "
@@ -109,6 +117,7 @@ def identify(
     with working("Identifying"):
         result = find(part, intersample=intersample.value)
     notes = [] if split is None else _predictions(result, data, split)
+    notes += _readings(result, at or [])
     if not quiet:
         print_result(result, output_console())
         for note in notes:
@@ -134,6 +143,30 @@ def write_result(
     if report is not None:
         with working("Drawing the page"):
             write_page(result, report, stimulus=stimulus, notes=notes)
+
+
+def _readings(result: "Identification", at: Sequence[float]) -> list[str]:
+    """Say gain and phase of each pair at each frequency."""
+    from hmpim.identify import gain_and_phase
+
+    notes = []
+    for pair in result.pairs:
+        if at and pair.verdict == "not_identifiable":
+            notes.append(f"{pair.output} from {pair.input} was not identifiable: no gain, no phase")
+            continue
+        for reading in gain_and_phase(pair, at, fs=result.record.fs) if at else ():
+            measured = "not measured there"
+            if reading.gain_db is not None and reading.phase is not None:
+                measured = f"measured {_both(reading.gain_db, reading.phase)}"
+            notes.append(
+                f"{pair.output} from {pair.input} at {reading.frequency:g} Hz: {measured}; "
+                f"the model {_both(reading.model_gain_db, reading.model_phase)}"
+            )
+    return notes
+
+
+def _both(gain: "Estimate", phase: "Estimate") -> str:
+    return f"{gain.value:.3f} ± {gain.std:.2g} dB, {phase.value:.2f} ± {phase.std:.2g}°"
 
 
 def _first_part(data: "Record", holdout: float) -> tuple["Record", float]:
