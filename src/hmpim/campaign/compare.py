@@ -72,6 +72,11 @@ def _percent(value: float, base: float) -> float:
     return 100.0 * (value / base - 1.0)
 
 
+def _apart(a: float, b: float) -> str:
+    percent = abs(_percent(b, a))
+    return "less than 0.01 %" if percent < 0.01 else f"{percent:.2g} %"
+
+
 def _rates(axis: str, rows: list[Row]) -> str:
     read = [(row, b) for row in rows if (b := bandwidth(row)) is not None]
     if len(read) < 2:
@@ -79,7 +84,7 @@ def _rates(axis: str, rows: list[Row]) -> str:
     (first, a), (last, b) = read[0], read[-1]
     return (
         f"{axis}: {a.value:.2f} Hz at {first.rate:g} Hz, {b.value:.2f} Hz at {last.rate:g} Hz, "
-        f"{abs(_percent(b.value, a.value)):.2g} % apart." + _paper_rates(first, last)
+        f"{_apart(a.value, b.value)} apart." + _paper_rates(first, last)
     )
 
 
@@ -200,7 +205,7 @@ def _excitation(axis: str, rows: list[Row]) -> str:
     stepwise = "" if paper is None else f" (the paper's own steps: {paper:.2f} Hz)"
     return (
         f"{axis}: {a.value:.2f} Hz alone, {b.value:.2f} Hz with all axes at once, "
-        f"{abs(_percent(b.value, a.value)):.2g} % apart{stepwise}."
+        f"{_apart(a.value, b.value)} apart{stepwise}."
     )
 
 
