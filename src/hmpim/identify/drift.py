@@ -18,6 +18,7 @@ from hmpim.identify.colour import bias_drift
 from hmpim.identify.fit import Problem, fit_structure, jacobian
 from hmpim.identify.joint import JointFit, Trial
 from hmpim.identify.uncertainty import covariance
+from hmpim.identify.verdict import is_unrelated
 from hmpim.identify.whiteness import effective_share, is_white
 from hmpim.model import slowest_time_constant
 from hmpim.record import Finding
@@ -40,6 +41,7 @@ _POOR = 0.3
 """Share of the output's power left over from which a drift is looked for in any case."""
 
 _TURNS = 12
+_STEPS = 3
 _STILL = 1e-3
 """Stop when the polynomial moves by less than this share of the noise (r.m.s.)."""
 
@@ -95,24 +97,16 @@ def with_drift(
     if not _asked_for(first):
         return None
     columns = _polynomials(y.size, _DEGREES[-1])
-    valid = first.problem.valid
-    best: Drifting | None = None
-    for degree in (1, _DEGREES[-1]):
-        begun = fitted(y - _regressed(columns[:degree], y, valid), True)
-        settled, weights = _backfitted(begun, y, columns[:degree])
-        chosen = _degree(settled, columns, weights)
-        # The structure is chosen once more, now that the drift is known.
-        joint, weights = _backfitted(
-            fitted(y - weights[:chosen] @ columns[:chosen], False), y, columns[:chosen]
-        )
-        found = _described(joint, columns[:chosen], weights)
-        if best is None or _gain(joint, chosen, best.joint, best.degree) > 0:
-            best = found
-        if is_white(joint.best.fit.residual):
-            break
-    if best is None or _gain(best.joint, best.degree, first, 0) < 0:
+    begun = fitted(y - _regressed(columns, y, first.problem.valid), True)
+    joint, weights = _backfitted(begun, y, columns)
+    degree = _degree(joint, columns, weights)
+    columns = columns[:degree]
+    if not is_unrelated(joint):  # the structure is chosen once more, now that the drift is known
+        joint = fitted(y - weights[:degree] @ columns, False)
+    joint, weights = _backfitted(joint, y, columns)
+    if _gain(joint, degree, first, 0) < 0:
         return None
-    return best
+    return _described(joint, columns, weights)
 
 
 def drift_finding(drifting: Drifting, fs: float, unit: str) -> Finding:
@@ -205,7 +199,9 @@ def _backfitted(
 def _again(joint: JointFit, y: NDArray[np.float64]) -> JointFit:
     """Fit the chosen structure to another output, from where it ended."""
     problem: Problem = replace(joint.problem, y=y)
-    fit = fit_structure(problem, joint.best.fit.structure, joint.best.fit.theta, precision=1e-5)
+    begun = joint.best.fit
+    fit = fit_structure(problem, begun.structure, begun.theta, iterations=_STEPS, precision=1e-3)
+    fit = replace(fit, converged=begun.converged or fit.converged)
     best = Trial(intersample=joint.best.intersample, fit=fit, criterion=joint.best.criterion)
     return replace(
         joint,
