@@ -6,10 +6,10 @@ import numpy as np
 
 from hmpim.identify.enrich import PLAIN
 from hmpim.identify.joint import CLEARLY, JointFit
-from hmpim.identify.readings import Readings
+from hmpim.identify.readings import Readings, system_of
 from hmpim.identify.result import Estimate, Verdict
 from hmpim.identify.whiteness import Misfit, innovation_gain
-from hmpim.model import slowest_time_constant
+from hmpim.model import bandwidth_phase, slowest_time_constant
 from hmpim.record import Finding
 
 __all__ = ["Judgement", "is_unrelated", "judge"]
@@ -37,6 +37,9 @@ _OUTSIDE = 2.0
 
 _AMBIGUOUS = 4.0
 """Difference of the criterion within which another plain structure is worth naming."""
+
+_MATTERS = 0.03
+"""Share of a bandwidth below which a disagreement casts no doubt."""
 
 _SECOND_POLE = 0.2
 """Share of the time constant up to which a second pole may hide in a first-order result."""
@@ -182,7 +185,7 @@ def judge(
             + ". Sweep higher to measure it.",
             doubt=False,
         )
-    other = _other_structure(joint, readings)
+    other = _other_structure(joint, readings, fs=fs, highest=min(band[1], fs / 2))
     if other is not None:
         note("structure", other, doubt=True)
     if readings.halves.probability < 1e-6 and readings.halves.owed > _TOLERATED_MISFIT:
@@ -253,8 +256,10 @@ def _loose(readings: Readings) -> list[tuple[str, float]]:
     return loose
 
 
-def _other_structure(joint: JointFit, readings: Readings) -> str | None:
-    """Sentence on another structure that fits hardly worse and says another delay."""
+def _other_structure(
+    joint: JointFit, readings: Readings, *, fs: float, highest: float
+) -> str | None:
+    """Sentence on another structure that fits hardly worse and says another delay or bandwidth."""
     best = joint.best
     std = float(np.sqrt(readings.covariance[0, 0]))
     for trial in joint.trials:
@@ -265,13 +270,22 @@ def _other_structure(joint: JointFit, readings: Readings) -> str | None:
             or trial.criterion - best.criterion > _AMBIGUOUS
         ):
             continue
+        names = (
+            f"A {_words(trial.fit.structure.name)} model fits about as well as the "
+            f"{_words(best.fit.structure.name)} one and puts the "
+        )
+        cure = "Lower the noise, or sweep higher, to tell them apart."
         apart = abs(trial.fit.delay - best.fit.delay)
         if apart > _DISAGREES * std:
-            return (
-                f"A {_words(trial.fit.structure.name)} model fits about as well as the "
-                f"{_words(best.fit.structure.name)} one and puts the delay {apart / std:.0f} "
-                "standard deviations away. Lower the noise, or sweep higher, to tell them apart."
-            )
+            return f"{names}delay {apart / std:.0f} standard deviations away. {cure}"
+        stated = readings.parameters.bandwidth_phase90
+        vector = np.concatenate([trial.fit.theta, trial.fit.linear])
+        other = bandwidth_phase(system_of(trial.fit.structure, vector, fs), highest=highest)
+        if stated is None or other is None:
+            continue
+        parted = abs(other - stated.value)
+        if parted > max(_DISAGREES * stated.std, _MATTERS * stated.value):
+            return f"{names}-90° bandwidth at {other:.4g} instead of {stated.value:.4g} Hz. {cure}"
     return None
 
 
