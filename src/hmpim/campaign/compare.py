@@ -63,8 +63,10 @@ def findings(
         sentence = says[compare](axis, [row for row in rows if row.axis == axis])
         if sentence:
             found.append(sentence)
-    if compare in ("excitation", "axes") and couplings:
-        found.append(_strongest(couplings))
+    if compare in ("excitation", "axes"):
+        if couplings:
+            found.append(_strongest(couplings))
+        found += _loaded([row for row in rows if row.together])
     return tuple(found)
 
 
@@ -207,6 +209,17 @@ def _excitation(axis: str, rows: list[Row]) -> str:
         f"{axis}: {a.value:.2f} Hz alone, {b.value:.2f} Hz with all axes at once, "
         f"{_apart(a.value, b.value)} apart{stepwise}."
     )
+
+
+def _loaded(rows: Sequence[Row]) -> list[str]:
+    """Torque of each axis that was predicted before anything moved."""
+    known = [f"{row.axis} {100.0 * row.torque:.0f} %" for row in rows if row.torque is not None]
+    if not known:
+        return []
+    return [
+        "Predicted load of all axes together, checked before anything moved: at most "
+        f"{', '.join(known)} of the torque limit."
+    ]
 
 
 def _strongest(couplings: Sequence[dict[str, Any]]) -> str:

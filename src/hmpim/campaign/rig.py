@@ -42,8 +42,11 @@ class CampaignRig(Protocol):
         """Limits of an axis, its travel as wished."""
         ...
 
-    def check(self, case: "Case", stimuli: Sequence[Stimulus]) -> None:
-        """Refuse what the rig may not do; nothing moves."""
+    def check(self, case: "Case", stimuli: Sequence[Stimulus]) -> dict[str, float]:
+        """Refuse what the rig may not do; nothing moves.
+
+        Returns the largest share of its torque that each axis will take, where it is known.
+        """
         ...
 
     def play(self, case: "Case", stimuli: Sequence[Stimulus], rng: np.random.Generator) -> Record:
@@ -152,9 +155,13 @@ class TableRig:
         """As Fig. 4."""
         return _wished(self.loaded(case).limits_of(cast(AxisName, wish.name)), wish)
 
-    def check(self, case: "Case", stimuli: Sequence[Stimulus]) -> None:
+    def check(self, case: "Case", stimuli: Sequence[Stimulus]) -> dict[str, float]:
         """Limits of each axis, and the torque that all together take."""
-        self.loaded(case).check({cast(AxisName, s.axis): s for s in stimuli})
+        table = self.loaded(case)
+        torque = table.check({cast(AxisName, s.axis): s for s in stimuli})
+        limit = np.array([axis.torque_limit for axis in table.axes])
+        share = np.abs(torque).max(axis=0) / limit
+        return dict(zip(AXES, share.tolist(), strict=True))
 
     def play(self, case: "Case", stimuli: Sequence[Stimulus], rng: np.random.Generator) -> Record:
         """Simulate."""
@@ -183,10 +190,11 @@ class SensorRig:
         """As the plan says."""
         return _own(wish)
 
-    def check(self, case: "Case", stimuli: Sequence[Stimulus]) -> None:
+    def check(self, case: "Case", stimuli: Sequence[Stimulus]) -> dict[str, float]:
         """Limits of the plan."""
         for stimulus in stimuli:
             check_limits(stimulus, _own(self.plan.axis(stimulus.axis)), name=stimulus.axis)
+        return {}
 
     def play(self, case: "Case", stimuli: Sequence[Stimulus], rng: np.random.Generator) -> Record:
         """Simulate the sensor of the one axis."""
@@ -216,8 +224,9 @@ class PlayedRig:
         """As the plan says."""
         return _own(wish)
 
-    def check(self, case: "Case", stimuli: Sequence[Stimulus]) -> None:
+    def check(self, case: "Case", stimuli: Sequence[Stimulus]) -> dict[str, float]:
         """Nothing beyond the design's own limits."""
+        return {}
 
     def play(self, case: "Case", stimuli: Sequence[Stimulus], rng: np.random.Generator) -> Record:
         """Call the function, and look at what it returns."""

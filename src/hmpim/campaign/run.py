@@ -139,6 +139,7 @@ def _measured(
     plan: Plan, case: Case, stimuli: Sequence[Stimulus], rig: CampaignRig
 ) -> dict[str, Any]:
     seed = (plan.seed, zlib.crc32(case.id.encode()))
+    torque = rig.check(case, stimuli)  # once more, right before anything moves
     record = rig.play(case, stimuli, np.random.default_rng(seed))
     pairs = []
     for axis in case.axes:
@@ -151,6 +152,7 @@ def _measured(
             "id": case.id,
             "case": case.to_dict(),
             "stimuli": [_described(stimulus) for stimulus in stimuli],
+            "torque": torque,
             "pairs": pairs,
             "couplings": _couplings(plan, case, record) if len(case.axes) > 1 else [],
         }

@@ -37,7 +37,11 @@ class Reading:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Row:
-    """One axis of one case. `pair` is what was identified, as in the result's JSON."""
+    """One axis of one case.
+
+    `pair` is what was identified, as in the result's JSON; `torque` the largest share of its
+    limit that the axis was predicted to take, all that move together.
+    """
 
     case_id: str
     test: str
@@ -54,6 +58,7 @@ class Row:
     paper_bandwidth: float | None
     exact_bandwidth: float | None
     inertia: float | None
+    torque: float | None
     stimulus: dict[str, Any]
     pair: dict[str, Any]
 
@@ -185,6 +190,7 @@ def _row(case: dict[str, Any], pair: dict[str, Any], stimulus: dict[str, Any]) -
         paper_bandwidth=pair["paper"]["bandwidth_phase90"],
         exact_bandwidth=pair["known"].get("exact_bandwidth"),
         inertia=pair["known"].get("inertia"),
+        torque=case["torque"].get(pair["axis"]),
         stimulus=stimulus,
         pair=pair,
     )
@@ -274,6 +280,7 @@ def study_dict(study: Study) -> dict[str, Any]:
                 "bandwidth_from_response": _json(row.measured_bandwidth),
                 "bandwidth_paper": row.paper_bandwidth,
                 "bandwidth_exact": row.exact_bandwidth,
+                "torque_share": row.torque,
             }
             for row in study.rows
         ],

@@ -96,12 +96,18 @@ def _print(study: object) -> None:
     page = study_page(study)
     console = output_console()
     shown = Table(title=page.title, box=None, header_style="bold", pad_edge=False)
-    for column in ("Case", "Axis", "−90° (Hz)", "fn (Hz)", "ζ", "Delay (ms)", "Verdict"):
+    names = ("−90° (Hz)", "fn (Hz)", "ζ", "Delay (ms)", "Verdict")
+    several = len({row.case_id for row in study.rows}) > 1
+    heads = (*(("Case",) if several else ()), "Axis", *names)
+    for column in (*heads, *(("Specification",) if study.checks else ())):
         shown.add_column(column, overflow="fold")
     whole = page.grids[1] if study.checks else page.grids[0]
-    at = [whole.columns.index(c) for c in ("−90° (Hz)", "fn (Hz)", "ζ", "Delay (ms)", "Verdict")]
+    at = [whole.columns.index(c) for c in names]
     for row, cells in zip(study.rows, whole.rows, strict=True):
-        shown.add_row(row.case_id, row.axis, *(cells[i] for i in at))
+        outcomes = [check.outcome for check in study.checks if check.row is row]
+        met = ["fail" if "fail" in outcomes else "pass" if outcomes else ""]
+        first = (row.case_id, row.axis) if several else (row.axis,)
+        shown.add_row(*first, *(cells[i] for i in at), *(met if study.checks else ()))
     console.print(shown)
     for check in study.checks:
         if check.outcome == "fail":
