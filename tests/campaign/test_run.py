@@ -226,6 +226,7 @@ def test_load_of_all_axes_together_is_predicted_and_refused(tmp_path, monkeypatc
 def test_a_test_may_have_bands_and_travel_of_its_own():
     data = tomllib.loads(shipped_plan("example").read_text(encoding="utf-8"))
     data["test"][0] |= {"bands": {"inner": [1.0, 20.0]}, "travel": 2.0}
+    data["axes"]["inner"]["travel"] = 1.0  # less than what the test has of its own
     plan = parse_plan(data)
     assert plan.axis("inner", test="rates").band == (1.0, 20.0)
     assert plan.axis("inner", test="rates").travel == 2.0
@@ -235,6 +236,21 @@ def test_a_test_may_have_bands_and_travel_of_its_own():
     (stimulus,) = prepare(plan, case, make_rig(plan))
     assert stimulus.band == (1.0, 20.0)
     assert 1.9 < stimulus.peaks.position <= 2.0
+
+
+@pytest.mark.parametrize("quantity", ["position", "velocity", "acceleration", "jerk"])
+def test_limits_of_a_rig_of_ones_own_are_checked_right_before_it_moves(quantity):
+    """Whatever made the stimulus: `check` looks at what is about to be played."""
+    plan = plan_of()
+    case = expand(plan)[0]
+    rig = make_rig(plan, player=Stopping())
+    (stimulus,) = prepare(plan, case, rig)
+    own = plan.axis("inner").limits
+    tight = replace(own, **{quantity: 0.9 * getattr(stimulus.peaks, quantity)})
+    axes = tuple(replace(axis, limits=tight) for axis in plan.axes)
+    stricter = make_rig(replace(plan, axes=axes), player=Stopping())
+    with pytest.raises(LimitsError, match=f"peak {quantity} .* of 'inner'; scale"):
+        stricter.check(case, (stimulus,))
 
 
 def test_killed_outright_it_goes_on_and_repeats_nothing(tmp_path):

@@ -87,7 +87,7 @@ def make_rig(plan: Plan, *, player: Player | None = None) -> CampaignRig:
     5.0
     """
     if player is not None or plan.rig.kind == "python":
-        return PlayedRig(player=player or _imported(plan.rig.entry, plan.folder))
+        return PlayedRig(plan=plan, player=player or _imported(plan.rig.entry, plan.folder))
     if plan.rig.kind == "sensor":
         return SensorRig(plan=plan)
     return TableRig(
@@ -193,7 +193,8 @@ class SensorRig:
     def check(self, case: "Case", stimuli: Sequence[Stimulus]) -> dict[str, float]:
         """Limits of the plan."""
         for stimulus in stimuli:
-            check_limits(stimulus, _own(self.plan.axis(stimulus.axis)), name=stimulus.axis)
+            wish = self.plan.axis(stimulus.axis, test=case.test)
+            check_limits(stimulus, _own(wish), name=stimulus.axis)
         return {}
 
     def play(self, case: "Case", stimuli: Sequence[Stimulus], rng: np.random.Generator) -> Record:
@@ -218,6 +219,7 @@ class SensorRig:
 class PlayedRig:
     """Anyone's rig, behind one function."""
 
+    plan: Plan
     player: Player
 
     def limits(self, case: "Case", wish: AxisWish) -> Limits:
@@ -225,7 +227,10 @@ class PlayedRig:
         return _own(wish)
 
     def check(self, case: "Case", stimuli: Sequence[Stimulus]) -> dict[str, float]:
-        """Nothing beyond the design's own limits."""
+        """Limits of the plan: what moves on a rig is looked at once more."""
+        for stimulus in stimuli:
+            wish = self.plan.axis(stimulus.axis, test=case.test)
+            check_limits(stimulus, _own(wish), name=stimulus.axis)
         return {}
 
     def play(self, case: "Case", stimuli: Sequence[Stimulus], rng: np.random.Generator) -> Record:
