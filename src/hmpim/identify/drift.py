@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from scipy.fft import rfft
 
 from hmpim.identify.colour import bias_drift
+from hmpim.identify.enrich import PLAIN
 from hmpim.identify.fit import Problem, fit_structure, jacobian
 from hmpim.identify.joint import JointFit, Trial
 from hmpim.identify.uncertainty import covariance
@@ -139,7 +140,8 @@ def _asked_for(joint: JointFit) -> bool:
     residual = fit.residual[counted]
     if counted.size < 100:
         return False
-    if _steepness(residual) > _STEEP:
+    steep = _STEEP if fit.structure.name in PLAIN else _STEEP / 5  # a rich model hides some
+    if _steepness(residual) > steep:
         return True
     return bias_drift(residual, counted.astype(np.float64)).probability < _CERTAIN
 

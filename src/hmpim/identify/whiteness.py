@@ -151,7 +151,8 @@ def autoregressive_spectrum(
     steps = np.arange(1, coefficients.size + 1)
     transfer = 1.0 - np.exp(-1j * np.outer(omega, steps)) @ coefficients
     power = variance / np.abs(transfer) ** 2
-    return np.asarray(np.maximum(power, _flicker(residual, omega)))
+    flicker = _flicker(residual, omega)
+    return np.asarray(np.where(flicker > 0, flicker, power))
 
 
 def _flicker(residual: NDArray[np.float64], omega: NDArray[np.float64]) -> NDArray[np.float64]:
