@@ -24,6 +24,7 @@ from hmpim.stimulus import Stimulus
 __all__ = ["CASE_SCHEMA", "run_campaign"]
 
 CASE_SCHEMA = "hmpim/campaign-case/1"
+_PLAYED = 5  # times as long as a design takes: what is left is told from it
 _WAIT = 0.5  # s at rest before and after the motion of an axis that count
 Progress = Callable[[int, int, str], None]
 
@@ -54,7 +55,8 @@ def run_campaign(
     player : Player, optional
         A rig of one's own in place of the plan's.
     progress : callable, optional
-        Told cases done, cases in all, and what comes next.
+        Told steps done, steps in all (a case played counts as several designed), and what
+        comes next.
 
     Returns
     -------
@@ -76,7 +78,7 @@ def run_campaign(
     _open(plan, folder, fresh=fresh)
     known = {case.id: _read(folder, case) for case in cases}
     missing = [case for case in cases if known[case.id] is None]
-    steps = 2 * len(missing)
+    steps = (1 + _PLAYED) * len(missing)
     ready = []
     for i, case in enumerate(missing):
         if progress is not None:
@@ -84,7 +86,7 @@ def run_campaign(
         ready.append((case, prepare(plan, case, rig)))
     for i, (case, stimuli) in enumerate(ready):
         if progress is not None:
-            progress(len(missing) + i, steps, case.id)
+            progress(len(missing) + _PLAYED * i, steps, case.id)
         done = _measured(plan, case, stimuli, rig)
         _write(folder / "cases" / f"{case.id}.json", done)
         known[case.id] = done

@@ -86,7 +86,11 @@ def study_page(study: Study) -> StudyPage:
     if study.met is None:
         headline = f"{len(study.rows)} identifications; nothing was specified."
     elif study.met:
-        headline = f"All {len(study.checks)} checks of the specification are met."
+        headline = (
+            f"All {len(study.checks)} checks of the specification are met."
+            if len(study.checks) > 1
+            else "The one check of the specification is met."
+        )
     else:
         headline = f"{len(study.checks) - passed} of {len(study.checks)} checks are not met."
     grids = [table(study.rows, "Every case: value ± standard deviation")]
