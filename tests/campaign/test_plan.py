@@ -2,6 +2,7 @@
 
 import copy
 import tomllib
+from pathlib import Path
 
 import pytest
 
@@ -96,3 +97,9 @@ def test_no_toml_is_refused(tmp_path):
     path.write_bytes(b"\xff\x00 = [")
     with pytest.raises(FormatError, match="is no TOML plan"):
         read_plan(path)
+
+
+@pytest.mark.parametrize("name", PLANS)
+def test_examples_are_the_plans_that_ship(name):
+    example = Path(__file__).parents[2] / "examples" / "plans" / f"{name}.toml"
+    assert example.read_bytes() == shipped_plan(name).read_bytes()
