@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hmpim.errors import RecordError
+from hmpim.identify.couplings import unsettled
 from hmpim.identify.inputs import Alike, InputSet, OutputCoherence, input_set
 from hmpim.identify.multivariable import ResponseMatrix, response_matrix
 from hmpim.identify.result import (
@@ -204,10 +205,18 @@ def settled(
     untold: list[str] = []
     if not joined.strong[i]:
         lag = joined.lags[i]
+        late, gain = unsettled(joined.fits[i])
+        parameters = replace(
+            parameters,
+            delay=_widened(parameters.delay, late / fs**2),
+            scale_factor=_widened(parameters.scale_factor, gain),
+        )
         if lag is not None:
             parameters = replace(
                 parameters,
-                delay=estimate(lag.delay / fs, (lag.delay_std / fs) ** 2, freedom=_MANY, unit="s"),
+                delay=estimate(
+                    lag.delay / fs, (lag.delay_std**2 + late) / fs**2, freedom=_MANY, unit="s"
+                ),
                 time_constant=estimate(
                     lag.time_constant / fs,
                     (lag.time_constant_std / fs) ** 2,
@@ -238,6 +247,12 @@ def settled(
             if group.share >= _DOUBTED and verdict == "ok":
                 verdict = "doubtful"
     return replace(pair, parameters=parameters, warnings=tuple(findings), verdict=verdict)
+
+
+def _widened(known: Estimate | None, variance: float) -> Estimate | None:
+    if known is None or variance == 0.0:
+        return known
+    return estimate(known.value, known.std**2 + variance, freedom=_MANY, unit=known.unit)
 
 
 def _coupled(group: Alike) -> Finding:

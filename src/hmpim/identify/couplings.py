@@ -21,7 +21,7 @@ from hmpim.identify.whiteness import effective_share, is_white
 from hmpim.model.dynamics import STRUCTURES, StructureName
 from hmpim.record import Intersample
 
-__all__ = ["FOLLOWS", "coupling_fit", "whitening_of"]
+__all__ = ["FOLLOWS", "coupling_fit", "unsettled", "whitening_of"]
 
 FOLLOWS = 25.0
 """Log-likelihood by which a coupling must beat none, the noise whitened: looking at thousands
@@ -163,6 +163,25 @@ def _resonances(rough: RoughResponse, lag: float) -> list[Real]:
         slope = 2 * 0.4 / (share * highest)
         starts.append(np.array([max(lag - slope, 0.0), np.log(slope), 1 / (4 * 0.4**2)]))
     return starts
+
+
+def unsettled(fit: JointFit) -> tuple[float, float]:
+    """Variance of delay (samples²) and scale factor that the choice of structure leaves open.
+
+    By Akaike's weights of the structures (K. P. Burnham and D. R. Anderson, Model Selection and
+    Multimodel Inference, 2nd ed., 2002, section 4.3), those of up to one pole taken as one.
+    """
+    richer = [t for t in fit.trials if t.fit.structure.order > 1]
+    plainer = [t for t in fit.trials if t.fit.structure.order < 2]
+    if not richer or not plainer:
+        return 0.0, 0.0
+    one = min(richer, key=lambda t: t.criterion)
+    other = min(plainer, key=lambda t: t.criterion)
+    weight = 1.0 / (1.0 + np.exp(0.5 * np.clip(one.criterion - _SECOND - other.criterion, -99, 99)))
+    share = float(weight * (1.0 - weight))
+    delay = one.fit.delay - other.fit.delay
+    gain = float(one.fit.linear[0] - other.fit.linear[0])
+    return share * delay**2, share * gain**2
 
 
 def _plainly(problem: Problem, fit: Fit) -> Fit:

@@ -43,6 +43,9 @@ _PERIODS = 4.0
 _COLOURED = 1.6
 """Factor on the evidence asked of a coupling where the stronger ones leave no white noise."""
 
+_RIVAL = 0.75
+"""Share of the best correlation from which an input is a rival for the strongest."""
+
 _STRONG = 0.15
 """Share of the output's r.m.s. from which an input's contribution is fitted as if alone."""
 
@@ -175,12 +178,16 @@ def _strongest(
     fits: dict[int, JointFit] = {}
     waiting = list(range(len(inputs)))
     while waiting:
-        share = [_follows_at_all(inputs[j], rest) / spread for j in waiting]
-        i = waiting[int(np.argmax(share))]
-        if fits and max(share) < _STRONG:
+        share = {j: _follows_at_all(inputs[j], rest) / spread for j in waiting}
+        most = max(share.values())
+        if fits and most < _STRONG:
             break
+        # A delayed copy of an input correlates as well; which one it is the fit tells.
+        left = y - sum((_part(f) for f in fits.values()), np.zeros(y.size))
+        tried = {j: fitted(inputs[j], left) for j in waiting if share[j] > _RIVAL * most}
+        i = min(tried, key=lambda j: tried[j].best.fit.cost)
+        fit = tried[i]
         waiting.remove(i)
-        fit = fitted(inputs[i], y - sum((_part(f) for f in fits.values()), np.zeros(y.size)))
         part = _part(fit)
         if not fits or (float(np.std(part)) > _STRONG * spread and not is_unrelated(fit)):
             fits[i] = fit

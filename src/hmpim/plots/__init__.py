@@ -12,6 +12,7 @@ from hmpim.plots.histories import (
     residuals,
     time_histories,
 )
+from hmpim.plots.inputs import inputs_plot
 from hmpim.plots.spectra import draw_spectrum, shade_band, spectra
 
 __all__ = [
@@ -27,6 +28,7 @@ __all__ = [
     "error_autocorrelation",
     "harmonics",
     "input_output",
+    "inputs_plot",
     "measured_curve",
     "model_curve",
     "model_over_measurement",

@@ -91,7 +91,8 @@ def pair_pictures(result: Identification, pair: PairIdentification) -> list[Pict
         pictures += _signal_pictures(record, pair)
     units = ("", "") if record is None else _units(record, pair)
     if np.any(pair.frequency_response.frequency > 0):
-        pictures += _response_pictures(pair, units, result.record.fs)
+        seen = _response_pictures(pair, units, result.record.fs)
+        pictures += seen[:1] if untold else seen
     if record is not None and pair.time is not None:
         pictures += _model_pictures(pair, units[1])
     if pair.nonlinearity is not None and pair.nonlinearity.harmonics:

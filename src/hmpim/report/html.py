@@ -11,6 +11,7 @@ from hmpim.plots.candidates import INTERSAMPLE_WORDS
 from hmpim.plots.style import printable
 from hmpim.report.figures import Picture, pair_pictures, stimulus_picture
 from hmpim.report.files import replacing
+from hmpim.report.inputs import inputs_view
 from hmpim.report.numbers import format_interval, format_number, plus_minus
 from hmpim.report.svg import inline_svg
 from hmpim.report.words import (
@@ -125,6 +126,7 @@ def render(
         notes=notes,
         facts=_facts(result),
         pairs=[_pair_view(result, pair) for pair in result.pairs],
+        inputs=inputs_view(result),
         stimulus=None if stimulus is None else stimulus_picture(stimulus),
         without_record=result.data is None,
         glossary=GLOSSARY,

@@ -1,0 +1,170 @@
+"""Five inputs and five outputs in one record: every coupling with its bars, or how small it is."""
+
+import numpy as np
+import pytest
+
+import hmpim
+from hmpim.stimulus.axes import AxisPlan
+
+FS = 250.0
+AXES = ("roll", "yaw", "pitch", "azimuth", "elevation")
+BANDS = (40.0, 36.0, 32.0, 20.0, 16.0)
+DIRECT = ((20.0, 0.7, 0.004), (18.0, 0.6, 0.006), (15.0, 0.7, 0.005), (10.0, 0.6, 0.008))
+DIRECT = (*DIRECT, (8.0, 0.7, 0.010))
+
+
+def second_order(natural, damping):
+    w = 2 * np.pi * natural
+    return (1 / w**2, 2 * damping / w, 1.0)
+
+
+# Output, input: scale factor, delay, denominator.
+COUPLED = {
+    (0, 1): (0.05, 0.010, second_order(12.0, 0.5)),
+    (1, 0): (-0.03, 0.006, (0.02, 1.0)),
+    (1, 2): (0.03, 0.0213, second_order(9.0, 0.4)),
+    (3, 4): (0.05, 0.030, second_order(6.0, 0.6)),
+    (4, 3): (-0.04, 0.015, second_order(7.0, 0.4)),
+    (2, 4): (0.03, 0.012, (0.03, 1.0)),
+    (4, 0): (0.03, 0.008, (1.0,)),
+    (0, 3): (0.0005, 0.01, (0.02, 1.0)),  # below the noise
+}
+TOO_WEAK = (0, 3)
+
+
+def second_order_truth(denominator):
+    w = 1 / np.sqrt(denominator[0])
+    return {"natural_frequency": w / (2 * np.pi), "damping_ratio": denominator[1] * w / 2}
+
+
+def truth(i, j):
+    if i == j:
+        natural, damping, delay = DIRECT[i]
+        return {"scale_factor": 1.0, "delay": delay} | second_order_truth(
+            second_order(natural, damping)
+        )
+    gain, delay, denominator = COUPLED[i, j]
+    known = {"scale_factor": gain, "delay": delay}
+    if len(denominator) == 3:
+        known |= second_order_truth(denominator)
+    if len(denominator) == 2:
+        known["time_constant"] = denominator[0]
+    return known
+
+
+@pytest.fixture(scope="module")
+def clean():
+    limits = hmpim.Limits(position=5.0, velocity=200.0, acceleration=8000.0, unit="deg")
+    plans = [
+        AxisPlan(axis=axis, limits=limits, band=(0.2, top))
+        for axis, top in zip(AXES, BANDS, strict=True)
+    ]
+    inputs = [s.position for s in hmpim.design_axes(plans, duration=10.0, fs=FS)]
+    outputs = []
+    for i in range(5):
+        y = np.full(inputs[0].size, 0.1 * i)
+        for j, u in enumerate(inputs):
+            if i == j:
+                natural, damping, delay = DIRECT[i]
+                model = (1.0, delay, second_order(natural, damping))
+            elif (i, j) in COUPLED:
+                model = COUPLED[i, j]
+            else:
+                continue
+            gain, delay, denominator = model
+            system = hmpim.Model(delay=delay, scale_factor=gain, denominator=denominator)
+            y = y + hmpim.simulate(system, u, fs=FS, intersample="bandlimited")
+        outputs.append(y)
+    return inputs, outputs
+
+
+def identified(clean, seed):
+    inputs, outputs = clean
+    rng = np.random.default_rng(seed)
+    return hmpim.identify(
+        hmpim.Record.from_arrays(
+            {f"{a}.command": u for a, u in zip(AXES, inputs, strict=True)},
+            {
+                f"{a}.position": y + 0.01 * rng.standard_normal(y.size)
+                for a, y in zip(AXES, outputs, strict=True)
+            },
+            fs=FS,
+        )
+    )
+
+
+def pair_of(result, i, j):
+    return result[f"{AXES[i]}.position", f"{AXES[j]}.command"]
+
+
+@pytest.fixture(scope="module")
+def result(clean):
+    return identified(clean, 0)
+
+
+def test_couplings_are_found_and_none_is_invented(result):
+    for i in range(5):
+        for j in range(5):
+            pair = pair_of(result, i, j)
+            real = i == j or ((i, j) in COUPLED and (i, j) != TOO_WEAK)
+            assert (pair.parameters.scale_factor is not None) == real, (AXES[j], AXES[i])
+            if not real:
+                assert [w.code for w in pair.warnings] == ["unrelated"]
+                assert "any coupling is below -" in pair.warnings[0].message
+
+
+def test_no_estimate_is_no_number(result):
+    for pair in result.pairs:
+        for name in type(pair.parameters).__dataclass_fields__:
+            estimate = getattr(pair.parameters, name)
+            if estimate is not None:
+                assert np.all(np.isfinite([estimate.value, estimate.std, *estimate.ci95])), name
+        assert np.all(np.isfinite(pair.frequency_response.std))
+
+
+def test_the_bound_of_what_is_too_weak_holds(result):
+    pair = pair_of(result, *TOO_WEAK)
+    words = pair.warnings[0].message.split("below ")[1]
+    assert 20 * np.log10(COUPLED[TOO_WEAK][0]) < float(words.split(" dB")[0]) < -40
+
+
+def test_coherence_tells_what_drives_what(result):
+    assert [c.output for c in result.inputs.coherence] == [f"{a}.position" for a in AXES]
+    for i, seen in enumerate(result.inputs.coherence):
+        # Where the output's own axis moves: beyond it there is nothing to be coherent with.
+        inside = (seen.frequency > 0.5) & (seen.frequency < 0.8 * DIRECT[i][0])
+        assert seen.multiple[inside].min() > 0.9
+        own = pair_of(result, i, i).frequency_response
+        assert np.median(own.coherence[own.frequency < DIRECT[i][0]]) > 0.98
+    none = pair_of(result, 3, 1).frequency_response
+    assert np.median(none.coherence) < 0.2
+
+
+def test_the_result_is_read_back_as_written(result):
+    written = result.to_dict()
+    assert written["inputs"]["names"] == [f"{a}.command" for a in AXES]
+    assert hmpim.Identification.from_dict(written).to_dict() == written
+
+
+@pytest.mark.slow
+def test_intervals_hold_the_truth(clean, seeds):
+    inside = {True: [], False: []}
+    missed = invented = 0
+    for seed in range(100, 100 + max(seeds // 25, 4)):
+        found = identified(clean, seed)
+        for i in range(5):
+            for j in range(5):
+                pair = pair_of(found, i, j)
+                real = i == j or ((i, j) in COUPLED and (i, j) != TOO_WEAK)
+                told = pair.parameters.scale_factor is not None
+                missed += real and not told
+                invented += told and not real
+                for name, value in truth(i, j).items() if real else ():
+                    estimate = getattr(pair.parameters, name)
+                    if estimate is not None:
+                        inside[i == j].append(estimate.ci95[0] <= value <= estimate.ci95[1])
+    assert invented == 0
+    assert missed == 0
+    for held in inside.values():
+        scatter = np.sqrt(0.95 * 0.05 / len(held))
+        assert np.mean(held) == pytest.approx(0.95, abs=3.5 * scatter)
