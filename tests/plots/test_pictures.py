@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from hmpim import plots
-from hmpim.identify import Candidate
+from hmpim.identify import Candidate, HarmonicCurve
 from hmpim.plots.envelope import MOST_POINTS
 from hmpim.plots.style import COLOURS, axis_label, plain
 from hmpim.stimulus import Limits, design
@@ -218,3 +218,13 @@ def test_nothing_global_is_touched():
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
+
+
+def test_harmonics_within_their_noise_are_not_drawn():
+    own = HarmonicCurve(order=1, frequency=(1.0, 5.0), amplitude=(2.0, 2.0), std=(0.0, 0.0))
+    third = HarmonicCurve(order=3, frequency=(1.0, 5.0), amplitude=(0.2, 0.02), std=(0.01, 0.01))
+    second = HarmonicCurve(order=2, frequency=(1.0,), amplitude=(0.01,), std=(0.01,))
+    axes = plots.harmonics([own, second, third]).axes[0]
+    assert [line.get_label() for line in axes.lines] == ["order 3"]
+    np.testing.assert_allclose(axes.lines[0].get_ydata(), [10.0, np.nan])
+    assert axes.get_ylabel() == "Share of the output (%)"

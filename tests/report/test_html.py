@@ -208,3 +208,16 @@ def test_the_page_is_written_where_it_is_wanted(found, tmp_path, page_text):
     written = (tmp_path / "r.html").read_text(encoding="utf-8")
     assert written.startswith("<!DOCTYPE html>")
     assert len(written) == pytest.approx(len(page_text), abs=20)
+
+
+def test_a_nonlinearity_has_its_section_and_a_linear_system_none(page_text):
+    assert "<h3>Nonlinearity</h3>" not in page_text
+    time = np.arange(2000) / 200.0
+    u = np.sin(2 * np.pi * (0.1 * time + time**2)) / (1 + 0.3 * time)
+    noise = 0.002 * np.random.default_rng(0).standard_normal(time.size)
+    bent = Record.from_arrays({"u": u}, {"y": u - 0.1 * u**3 + noise}, fs=200.0)
+    text = render(identify(bent))
+    section = text[text.index("<h3>Nonlinearity</h3>") :]
+    assert "<dt>Kind</dt><dd>curvature" in section
+    assert "order 3" in section
+    assert re.search(r"<dt>Nonlinear part</dt><dd>[\d.]+\u00a0% of the output", section)

@@ -54,10 +54,10 @@ Kind = Literal[
 _GAPS = (0.002, 0.005, 0.01, 0.02, 0.04, 0.08, 0.15, 0.25, 0.4)
 """Half gaps tried, over the output's largest deviation."""
 
-_RATES = (0.15, 0.3, 0.45, 0.6, 0.75, 0.88)
+_RATES = (0.15, 0.25, 0.35, 0.45, 0.55, 0.65, 0.75, 0.85, 0.93)
 """Speeds tried, over the largest of the linear model."""
 
-_LEVELS = (0.35, 0.5, 0.65, 0.8, 0.92)
+_LEVELS = (0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.88, 0.95)
 """Plateaus tried, over the largest deviation."""
 
 _STICKS = 0.01
@@ -286,7 +286,7 @@ def hypotheses(
     for level in _LEVELS:
         size = level * largest
         yield Hypothesis(
-            kind="saturation", trace=np.clip(x, -size, size) - x, size=size, spacing=0.08 * largest
+            kind="saturation", trace=np.clip(x, -size, size) - x, size=size, spacing=0.05 * largest
         )
     for rate in _RATES:
         size = rate * fastest
@@ -294,7 +294,7 @@ def hypotheses(
             kind="rate_limit",
             trace=rate_limited(x, size) - x,
             size=size * fs,
-            spacing=0.08 * fastest * fs,
+            spacing=0.05 * fastest * fs,
         )
 
 

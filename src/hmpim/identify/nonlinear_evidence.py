@@ -29,6 +29,9 @@ _WORTH_A_LOOK = 1e-3
 _GAIN = 12.0
 """Log-likelihood that a trace must bring; in linear systems the best of all reaches 7."""
 
+_HINT = 4.0
+"""Log-likelihood of all harmonics, beyond what noise would gain, from which kinds are compared."""
+
 _NAMED = 0.3
 """Share of what the harmonics hold beyond noise that a kind must explain to be named."""
 
@@ -126,7 +129,8 @@ def _by_harmonics(look: Look, sweep: SweepPhase, fit: Fit, white: bool) -> Seen:
         return Seen(fit=fit)
     parts = [harmonics.rms(p) for p in (0, 1) if harmonics.probability(p) < CHANCE]
     kinds: tuple[Mechanism, ...] = ()
-    if not look.others and np.ptp(fit.prediction) > 0:
+    told = bool(parts) or harmonics.regression.evidence > _HINT
+    if told and not look.others and np.ptp(fit.prediction) > 0:
         powers = np.arange(fit.denominator.size)
         kinds = compare_harmonics(
             harmonics.regression,
@@ -208,11 +212,17 @@ def _curved(fit: Fit, problem: Problem) -> bool:
         return False
     step = np.gradient(x)
     traces = np.stack([np.ones_like(x), x, step, x**2, x**3 / size, np.sign(step) * size])
-    q, r = np.linalg.qr(traces[:, counted].T)
-    e = fit.residual[counted]
-    taken = (q.T @ e)[3:] ** 2
-    told = np.abs(np.diag(r))[3:] > 1e-6 * np.abs(r).max()
-    return bool(np.any(taken[told] > 2 * np.log(1 / _WORTH_A_LOOK) * float(e @ e) / e.size))
+    rows, e = traces[:, counted], fit.residual[counted]
+    scale = np.sqrt(np.einsum("ij,ij->i", rows, rows))
+    gram = rows @ rows.T / np.outer(scale, scale)
+    moment = rows @ e / scale
+    # What each gains beside a constant, the output, and its rate.
+    mixed = np.linalg.solve(gram[:3, :3] + 1e-9 * np.eye(3), gram[:3, 3:])
+    left = 1.0 - np.einsum("ij,ij->j", mixed, gram[:3, 3:])
+    taken = (moment[3:] - mixed.T @ moment[:3]) ** 2
+    told = left > 1e-6
+    needed = 2 * np.log(1 / _WORTH_A_LOOK) * float(e @ e) / e.size
+    return bool(np.any(taken[told] > needed * left[told]))
 
 
 def _lines(u: NDArray[np.float64], problem: Problem) -> Lines | None:

@@ -39,7 +39,7 @@ _DOUBTFUL_UNSWEPT = 0.02
 _EFFECT = 0.01
 """R.m.s. of all that a kind does, what passes for linear too, over that of the output, likewise."""
 
-_LONGEST = 131072
+_LONGEST = 32768
 """Samples of a sweep looked at one by one; longer records are averaged in blocks first."""
 
 
