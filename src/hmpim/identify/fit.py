@@ -164,7 +164,8 @@ def _least_squares(
     gram: NDArray[np.float64], moment: NDArray[np.float64], damping: float = 0.0
 ) -> NDArray[np.float64]:
     """Solve normal equations, scaled to unit diagonal; directions without content stay 0."""
-    scale = np.sqrt(np.maximum(np.diag(gram), np.finfo(float).tiny))
+    diagonal = np.diag(gram)
+    scale = np.sqrt(np.where(diagonal > 1e-200 * diagonal.max(), diagonal, 1.0))
     scaled = gram / np.outer(scale, scale)
     values, vectors = np.linalg.eigh(scaled)
     keep = values > 1e-13 * values[-1]

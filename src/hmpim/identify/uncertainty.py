@@ -41,7 +41,8 @@ def covariance(
     ndarray, shape (p, p)
         Finite but very large along a direction that the record does not see.
     """
-    scale = np.sqrt(np.maximum(np.sum(rows**2, axis=1), np.finfo(float).tiny))
+    norm = np.linalg.norm(rows, axis=1)
+    scale = np.where(norm > 1e-100 * norm.max(), norm, 1.0)  # a row of zeros stays one
     scaled = rows / scale[:, None]
     q, r = np.linalg.qr(scaled.T)
     diagonal = np.abs(np.diag(r))

@@ -61,8 +61,8 @@ def is_unrelated(joint: JointFit) -> bool:
     problem = joint.problem
     y = problem.y if problem.valid is None else problem.y[problem.valid]
     spread = float(np.sum((y - y.mean()) ** 2))
-    if joint.best.fit.cost <= 0:
-        return spread == 0
+    if spread <= 0 or joint.best.fit.cost <= 0:
+        return spread <= 0
     gain = 0.5 * y.size * joint.effective_share * np.log(spread / joint.best.fit.cost)
     if gain >= _RELATED:
         return False
@@ -261,7 +261,7 @@ def _other_structure(
 ) -> str | None:
     """Sentence on another structure that fits hardly worse and says another delay or bandwidth."""
     best = joint.best
-    std = float(np.sqrt(readings.covariance[0, 0]))
+    std = float(np.sqrt(max(readings.covariance[0, 0], np.finfo(float).tiny)))
     for trial in joint.trials:
         if (
             trial.intersample != best.intersample
