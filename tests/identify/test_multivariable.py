@@ -229,3 +229,40 @@ def test_bad_records_are_refused() -> None:
         response_matrix(np.stack((U[0], np.full(N, 2.0))), U, FS, band=BAND)
     with pytest.raises(RecordError, match=r"outputs\[1\] holds nan at sample 0"):
         response_matrix(U, np.stack((U[0], np.full(N, np.nan))), FS, band=BAND)
+
+
+@pytest.mark.parametrize("modelled", [True, False])
+def test_gaps_cost_accuracy_and_the_error_says_so(
+    three_axes: tuple[np.ndarray, np.ndarray], modelled: bool
+) -> None:
+    u, clean = three_axes
+    errors, stds, whole = [], [], []
+    for seed in range(4):
+        rng = np.random.default_rng(seed)
+        valid = np.ones(clean.shape, dtype=bool)
+        # With a model a fifth of the record; without, single samples, which a curve bridges.
+        for start in rng.integers(0, N - 60, 8 if modelled else 40):
+            valid[:, start : start + (50 if modelled else 1)] = False
+        y = clean + 0.01 * rng.standard_normal(clean.shape)
+        fill = clean if modelled else None
+        broken = np.where(valid, y, 99.0)
+        options = {"delays": DELAYS, "band": BAND}
+        found = response_matrix(u, broken, FS, valid=valid, fill=fill, **options)
+        kept = found.usable & (found.frequency < 8.0)
+        errors.append(np.abs(found.response - true_matrix(found.frequency))[kept])
+        stds.append(found.std[kept])
+        whole.append(response_matrix(u, y, FS, **options).std[kept])
+    error, std = np.concatenate(errors), np.concatenate(stds)
+    assert np.mean(error < 2 * std) > 0.9
+    assert np.sqrt(np.mean(error**2)) < 1.5 * np.sqrt(np.mean(std**2))
+    assert np.median(std) > np.median(np.concatenate(whole))
+
+
+def test_bad_masks_are_refused(three_axes: tuple[np.ndarray, np.ndarray]) -> None:
+    u, clean = three_axes
+    with pytest.raises(ArgumentError, match=r"valid has shape \(3,\)"):
+        response_matrix(u, clean, FS, band=BAND, valid=[True, False, True])
+    with pytest.raises(RecordError, match="output 0 has 0 valid samples"):
+        response_matrix(u, clean, FS, band=BAND, valid=np.zeros(N, dtype=bool))
+    with pytest.raises(RecordError, match="fill has shape"):
+        response_matrix(u, clean, FS, band=BAND, valid=np.ones(N, dtype=bool), fill=clean[:2])

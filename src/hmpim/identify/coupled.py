@@ -102,10 +102,7 @@ def responses_of(aligned: Aligned, output: Signal, joined: Joined, inputs: Input
     strongest = min(kept or joined.fits, key=lambda fit: fit.best.fit.cost).best.fit
     delay = min(max(strongest.delay, 0.0), 0.4 * aligned.samples) / aligned.fs
     parts = [fit.best.fit.prediction - fit.best.fit.linear[-1] for fit in joined.fits]
-    y = output.values
-    if not bool(output.valid.all()):
-        whole = sum(p for p, told in zip(parts, joined.related, strict=True) if told)
-        y = np.where(output.valid, y, whole + strongest.linear[-1])
+    y, told = output.values, np.asarray(output.valid)
     edges = sorted({edge for band in inputs.bands for edge in band})
     pieces: list[tuple[list[int], ResponseMatrix]] = []
     for low, high in pairwise(edges):
@@ -114,9 +111,10 @@ def responses_of(aligned: Aligned, output: Signal, joined: Joined, inputs: Input
         if not active or bins < 8 * (len(active) + 1) + 2:
             continue
         rest = y
+        modelled = joined.prediction
         for j, part in enumerate(parts):
             if j not in active and joined.related[j]:
-                rest = rest - part
+                rest, modelled = rest - part, modelled - part
         pieces.append(
             (
                 active,
@@ -126,6 +124,8 @@ def responses_of(aligned: Aligned, output: Signal, joined: Joined, inputs: Input
                     aligned.fs,
                     delays=[[delay]],
                     band=(low, high),
+                    valid=None if told.all() else told,
+                    fill=modelled[None, :],
                     points=200,
                     names=[*(aligned.inputs[j].name for j in active), output.name],
                 ),

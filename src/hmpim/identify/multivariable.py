@@ -17,6 +17,7 @@ from scipy import fft
 
 from hmpim.errors import ArgumentError, RecordError
 from hmpim.identify.choice import choose
+from hmpim.identify.gaps import filled
 from hmpim.identify.neighbours import (
     LocalFit,
     Windows,
@@ -110,6 +111,8 @@ def response_matrix(
     *,
     delays: ArrayLike = 0.0,
     band: tuple[float, float],
+    valid: ArrayLike | None = None,
+    fill: ArrayLike | None = None,
     worst_condition: float = 10.0,
     points: int = 400,
     names: Sequence[str] | None = None,
@@ -128,6 +131,12 @@ def response_matrix(
         Pure delays in s, output over input, not negative; rough values will do.
     band : tuple of float
         Band in which every input has something, Hz.
+    valid : array_like of bool, shape (p, n) or (n,), optional
+        False where an output is missing; all of it valid by default.
+    fill : array_like, shape (p, n), optional
+        What a model predicts of the outputs, bias included, used where they are missing. A
+        smooth curve through the neighbours by default, which serves for gaps short beside a
+        period.
     worst_condition : float
         Greatest condition number at which inputs still count as told apart, above 1. At 10 the
         error of the worst combination of inputs is ten times that of the best.
@@ -174,6 +183,7 @@ def response_matrix(
         raise ArgumentError(f"worst_condition is {worst_condition}; give a number above 1")
     if points < 1:
         raise ArgumentError(f"points is {points}; give at least 1")
+    y, share = filled(y, valid, fill, labels_y)
     for row, label in zip(u, labels_u, strict=True):
         if np.ptp(row) == 0:
             raise RecordError(f"{label} is constant at {row[0]:g}; an input must move")
@@ -201,7 +211,8 @@ def response_matrix(
     usable = condition <= worst_condition
     response = np.stack([fit.local.response for fit in chosen], axis=1)
     response = response * np.exp(-2j * np.pi * frequency[:, None, None] * late)
-    std = np.sqrt(np.stack([fit.local.spread for fit in chosen], axis=1))
+    # What is filled in has no residual and says nothing new: both raise the error.
+    std = np.sqrt(np.stack([fit.local.spread for fit in chosen], axis=1)) / share[:, None]
     response[~usable] = complex(np.nan, np.nan)
     std[~usable] = np.nan
     coherence = np.stack([fit.coherence for fit in chosen], axis=1)
