@@ -237,7 +237,8 @@ def _fit_couplings(
             )
             fits[j] = coupling_fit(problem, inputs[j], intersample=mode, structures=names)
             related[j] = True
-        while _together(y, fits, related, strong, whitening, alike):
+        # Not before all are right is one of them tested: alike, they take each other's share.
+        while _together(y, fits, related, strong, whitening, alike, drop=names is structures):
             pass
         whitening = whitening_of(left())
     return whitening
@@ -250,8 +251,10 @@ def _together(
     strong: tuple[int, ...],
     whitening: Real | None,
     alike: Sequence[tuple[frozenset[int], NDArray[np.bool_]]],
+    *,
+    drop: bool = True,
 ) -> bool:
-    """Move all couplings at once, in place; leave out the least if it adds nothing.
+    """Move all couplings at once, in place; leave out the least if it adds nothing and may go.
 
     Returns
     -------
@@ -276,6 +279,8 @@ def _together(
             trials=tuple(trial if t is fits[j].best else t for t in fits[j].trials),
             effective_share=effective_share(fit.residual),
         )
+    if not drop:
+        return False
     gains = []
     for k, j in enumerate(weak):
         shared = [bins for group, bins in alike if j in group and group & set(strong)]
