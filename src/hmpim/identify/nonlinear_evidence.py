@@ -48,6 +48,9 @@ _ALIKE_SHARE = 0.2
 _MOSTLY = 0.6
 """Share of what the harmonics tell, explained by one kind, that vouches for a plain structure."""
 
+_TELLS_MORE = 1.3
+"""Times as much that a kind must gain beside the plain structure as beside the rich one."""
+
 _CLEARER = 0.05
 """By how much that share must be above the one with a rich structure."""
 
@@ -184,7 +187,14 @@ def plainer_of(look: Look, rich: Seen, plain: Seen) -> Seen:
     """The plain fit if one kind beside it explains the harmonics clearly better, or all better."""
     if plain.explained > max(_MOSTLY, rich.explained + _CLEARER):
         return plain
+    if plain.explained > 0.5 * rich.explained and _gain(plain) > _TELLS_MORE * _gain(rich):
+        return plain
     return min(rich, plain, key=lambda one: _criterion(look, one))
+
+
+def _gain(seen: Seen) -> float:
+    """Log-likelihood that the harmonics of the likeliest kind bring."""
+    return seen.named[0].gain if seen.harmonics is not None and seen.named else 0.0
 
 
 def _criterion(look: Look, seen: Seen) -> float:

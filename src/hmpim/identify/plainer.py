@@ -26,11 +26,9 @@ def plainer(joint: JointFit) -> Fit | None:
     best = joint.best
     if best.fit.structure.name in PLAIN:
         return None
-    rivals = [
-        trial
-        for trial in joint.trials
-        if trial.fit.structure.name in PLAIN and trial.intersample == best.intersample
-    ]
+    rivals = [trial for trial in joint.trials if trial.fit.structure.name in PLAIN]
+    # Under another assumption between the samples it is a start as good.
+    rivals = [r for r in rivals if r.intersample == best.intersample] or rivals
     if not rivals:
         return None
     plain = min(rivals, key=lambda trial: trial.criterion).fit
@@ -55,15 +53,9 @@ def taking(joint: JointFit, fit: Fit) -> JointFit:
     criterion = count * float(np.log(max(fit.cost, np.finfo(float).tiny) / count))
     criterion += fit.structure.parameters * float(np.log(count))
     best = Trial(intersample=mode, fit=fit, criterion=criterion)
-    return replace(
-        joint,
-        best=best,
-        trials=tuple(
-            best
-            if (trial.fit.structure.name, trial.intersample) == (fit.structure.name, mode)
-            else trial
-            for trial in joint.trials
-        ),
-        effective_share=share,
-        simpler=None,
-    )
+    others = [
+        trial
+        for trial in joint.trials
+        if (trial.fit.structure.name, trial.intersample) != (fit.structure.name, mode)
+    ]
+    return replace(joint, best=best, trials=(*others, best), effective_share=share, simpler=None)
