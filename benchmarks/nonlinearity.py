@@ -6,12 +6,14 @@ limit, hard and soft springs, each stepped in time.
 
 from __future__ import annotations
 
+import argparse
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
+from rich.progress import track
 from scipy.signal import lfilter
 
 import hmpim
@@ -202,3 +204,18 @@ def section(count: int, mapped: Callable) -> list[str]:
         "",
         *detections(max(count // 30, 2), mapped),
     ]
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--count", type=int, default=30, help="linear systems of each kind")
+    options = parser.parse_args()
+
+    def mapped(function: Callable, items: range, label: str) -> list:
+        return [function(item) for item in track(items, description=label, transient=True)]
+
+    print("\n".join(section(options.count, mapped)))
+
+
+if __name__ == "__main__":
+    main()
