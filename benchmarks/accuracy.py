@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from functools import cache, partial
 from pathlib import Path
 
+import five_axes
 import nonlinearity
 import numpy as np
 from rich.progress import Progress
@@ -401,6 +402,8 @@ def study(share: float, progress: Progress) -> Iterable[tuple[str, list[str]]]:
         yield "Random systems, no hints", random_systems(size(500), mapped)
         yield "Frequency response", frequency_response(size(300), mapped)
         yield "Nonlinearity", nonlinearity.section(size(300), mapped)
+        yield "Five inputs and outputs at once", five_axes.section(size(100), mapped)
+        yield "Repeats", five_axes.repeats(size(200), mapped)
     yield "Measured hardware", hardware()
     yield "Three inputs at once", several_inputs()
     yield "Cost", cost()
