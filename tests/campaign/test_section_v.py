@@ -6,8 +6,7 @@ import pytest
 
 from hmpim.campaign import expand, read_plan, run_campaign, shipped_plan
 from hmpim.campaign.cases import prepare
-from hmpim.campaign.compare import linear_from
-from hmpim.campaign.crossing import samples_bandwidth
+from hmpim.campaign.compare import linear_from, samples_reading
 from hmpim.campaign.rig import make_rig
 from hmpim.campaign.study import make_study
 from hmpim.identify.spectrum import decibel, spectrum
@@ -37,7 +36,7 @@ def check(study):
     assert ratio < fast / bandwidth("acceptance", "azimuth") < ratio**0.4
     # Fig. 22: friction lowers the bandwidth of small motions
     levels = sorted((r for r in study.rows if r.test == "levels"), key=lambda r: r.peaks[2])
-    read = [r.measured_bandwidth.value for r in levels]
+    read = [samples_reading(r).value for r in levels]
     assert read == sorted(read)
     assert read[0] < 0.9 * read[-1]
     assert levels[0].peaks[2] < linear_from(levels).peaks[2] < levels[-1].peaks[2]
@@ -51,7 +50,7 @@ def check(study):
 
     # Feedforward raises the bandwidth, each command by half as much again at least
     fed = {
-        r.mode: samples_bandwidth(r.pair["frequency_response"], near=r.measured_bandwidth.value)
+        r.mode: samples_reading(r).value
         for r in study.rows
         if r.axis == "pitch"
         and r.rate == 1000.0

@@ -8,7 +8,15 @@ from hmpim.campaign.crossing import samples_bandwidth
 from hmpim.campaign.plan import Compare
 from hmpim.campaign.study import Reading, Row
 
-__all__ = ["HEARD", "LINEAR", "bandwidth", "case_label", "findings", "linear_from"]
+__all__ = [
+    "HEARD",
+    "LINEAR",
+    "bandwidth",
+    "case_label",
+    "findings",
+    "linear_from",
+    "samples_reading",
+]
 
 LINEAR = 0.05
 """Largest departure from the bandwidth at the largest level that still counts as linear."""
@@ -22,9 +30,16 @@ def bandwidth(row: Row) -> Reading | None:
     return row.parameters.get("bandwidth_phase90") or row.measured_bandwidth
 
 
-def _response_first(row: Row) -> Reading | None:
-    """The -90° bandwidth off the response: friction and feedforward fit no linear structure."""
-    return row.measured_bandwidth or row.parameters.get("bandwidth_phase90")
+def samples_reading(row: Row) -> Reading | None:
+    """The -90° of samples over samples, off the response: friction fits no linear structure.
+
+    Where the response tells nothing, the bandwidth of the fitted model.
+    """
+    start = bandwidth(row) or row.measured_bandwidth
+    if start is None:
+        return None
+    found = samples_bandwidth(row.pair["frequency_response"], near=start.value)
+    return start if found is None else Reading(value=found, std=start.std, unit=start.unit)
 
 
 def case_label(row: Row, compare: Compare) -> str:
@@ -120,7 +135,7 @@ def _loads(axis: str, rows: list[Row]) -> str:
 def linear_from(rows: Sequence[Row]) -> Row | None:
     """Smallest level from which on the bandwidth stays within `LINEAR` of the largest level's."""
     read = sorted(
-        ((row, b) for row in rows if (b := _response_first(row)) is not None),
+        ((row, b) for row in rows if (b := samples_reading(row)) is not None),
         key=lambda item: item[0].peaks[2],
     )
     smallest = None
@@ -133,7 +148,7 @@ def linear_from(rows: Sequence[Row]) -> Row | None:
 
 def _levels(axis: str, rows: list[Row]) -> str:
     read = sorted(
-        ((row, b) for row in rows if (b := _response_first(row)) is not None),
+        ((row, b) for row in rows if (b := samples_reading(row)) is not None),
         key=lambda item: item[0].peaks[2],
     )
     start = linear_from(rows)
@@ -144,12 +159,13 @@ def _levels(axis: str, rows: list[Row]) -> str:
     text = (
         f"{axis}: {a.value:.2f} Hz at {low.peaks[2]:.0f} {unit}, {b.value:.2f} Hz at "
         f"{high.peaks[2]:.0f} {unit}. Linear to {100 * LINEAR:.0f} % from "
-        f"{start.peaks[2]:.0f} {unit} on (read off the responses)."
+        f"{start.peaks[2]:.0f} {unit} on (samples over samples, off the responses)."
     )
     if a.value < (1.0 - LINEAR) * b.value:
         text += " The smaller the motion the lower the bandwidth, as dry friction makes it."
-    if high.exact_bandwidth is not None:
-        text += f" Without friction it is {high.exact_bandwidth:.2f} Hz at every level."
+    exact = high.pair["known"].get("exact_samples_bandwidth")
+    if exact is not None:
+        text += f" Without friction it is {exact:.2f} Hz at every level."
     return text
 
 
@@ -159,12 +175,8 @@ def _modes(axis: str, rows: list[Row]) -> str:
     for rate in sorted({row.rate for row in rows}):
         seen, exact = [], []
         for row in (row for row in rows if row.rate == rate):
-            start = bandwidth(row) or row.measured_bandwidth
-            found = (
-                samples_bandwidth(row.pair["frequency_response"], near=start.value)
-                if start
-                else None
-            )
+            reading = samples_reading(row)
+            found = None if reading is None else reading.value
             known = row.pair["known"].get("exact_samples_bandwidth")
             seen.append(f"{row.mode} {'–' if found is None else f'{found:.1f}'}")
             exact += [] if known is None else [f"{known:.1f}"]
