@@ -1,9 +1,13 @@
 """Five inputs and five outputs in one record: every coupling with its bars, or how small it is."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 import hmpim
+from hmpim.report import render
+from hmpim.report.inputs import gain_rows
 
 FS = 250.0
 AXES = ("roll", "yaw", "pitch", "azimuth", "elevation")
@@ -179,3 +183,28 @@ def test_intervals_hold_the_truth(clean, seeds):
     for held in inside.values():
         scatter = np.sqrt(0.95 * 0.05 / len(held))
         assert np.mean(held) == pytest.approx(0.95, abs=3.5 * scatter)
+
+
+def test_an_axis_that_is_not_coupled_is_no_failure(result):
+    assert len(result.counted) == 5 + len(COUPLED) - 1
+    assert all(pair.parameters.scale_factor is not None for pair in result.counted)
+    assert result.verdict != "not_identifiable"
+
+
+def test_every_coupling_stands_in_one_table(result):
+    rows = gain_rows(result)
+    assert [row["name"] for row in rows] == [f"{axis}.command" for axis in AXES]
+    for j, row in enumerate(rows):
+        for i, cell in enumerate(row["cells"]):
+            real = i == j or ((i, j) in COUPLED and (i, j) != TOO_WEAK)
+            assert (cell == "–") != real
+            if real:
+                known = truth(i, j)["scale_factor"]
+                assert float(cell.split(" ± ")[0].strip("(")) == pytest.approx(known, abs=0.01)
+
+
+def test_the_page_shows_the_inputs(result):
+    text = render(replace(result, pairs=result.pairs[:0], data=None))
+    assert "Inputs driven at once" in text
+    assert "Multiple coherence" in text or "multiple coherence" in text
+    assert "roll.command" in text

@@ -34,6 +34,9 @@ _MENTIONED, _DOUBTED = 0.1, 0.5
 _KNOWN = 0.5
 """Relative standard deviation beyond which a weak coupling's parameter is not told."""
 
+_KNOWN_LAG = 0.33
+"""Likewise for a time constant, which is never below 0: told only when large, it would be so."""
+
 _LARGEST_DB = 6.0
 """Standard deviation of a peak, in dB, beyond which it is not told."""
 
@@ -292,7 +295,7 @@ def _told(p: Parameters, band: tuple[float, float]) -> tuple[Parameters, list[st
     gone: set[str] = set()
     for name, bad in (
         ("scale_factor", loose),
-        ("time_constant", loose),
+        ("time_constant", lambda e: not e.std <= _KNOWN_LAG * abs(e.value)),
         ("damping_ratio", loose),
         ("natural_frequency", beyond),
         ("bandwidth_phase90", beyond),

@@ -420,9 +420,27 @@ class Identification:
 
     @property
     def verdict(self) -> Verdict:
-        """The worst verdict of all pairs."""
+        """The worst verdict of all pairs that count."""
         order: tuple[Verdict, ...] = ("ok", "doubtful", "not_identifiable")
-        return max((pair.verdict for pair in self.pairs), key=order.index)
+        return max((pair.verdict for pair in self.counted), key=order.index)
+
+    @property
+    def counted(self) -> tuple[PairIdentification, ...]:
+        """Pairs but those of an output with an input that it is not coupled to.
+
+        That an axis does not follow another one's command is a finding, no failure, as long as
+        it follows some input.
+        """
+        if self.inputs is None:
+            return self.pairs
+        follows = {pair.output for pair in self.pairs if pair.verdict != "not_identifiable"}
+        return tuple(
+            pair
+            for pair in self.pairs
+            if pair.output not in follows
+            or pair.parameters.scale_factor is not None
+            or all(finding.code != "unrelated" for finding in pair.warnings)
+        )
 
     def to_dict(self) -> dict[str, Any]:
         """Return the result as plain JSON values, `schema` first."""

@@ -10,7 +10,7 @@ from hmpim.identify import Identification, InputSet, PairIdentification
 from hmpim.report.figures import Picture
 from hmpim.report.numbers import plus_minus
 
-__all__ = ["InputsView", "inputs_view"]
+__all__ = ["InputsView", "gain_rows", "inputs_view"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -60,10 +60,7 @@ def inputs_view(result: Identification) -> InputsView | None:
             for name, band in zip(inputs.names, inputs.bands, strict=True)
         ),
         outputs=outputs,
-        gains=tuple(
-            {"name": name, "cells": [_gain(result[output, name]) for output in outputs]}
-            for name in inputs.names
-        ),
+        gains=gain_rows(result),
         picture=Picture(
             key="inputs",
             title="Told apart, and explained",
@@ -73,6 +70,23 @@ def inputs_view(result: Identification) -> InputsView | None:
             description=f"The inputs are told apart at {told:.0f} % of the frequencies.",
             figure=plots.inputs_plot(inputs),
         ),
+    )
+
+
+def gain_rows(result: Identification) -> tuple[dict[str, Any], ...]:
+    """Return, for each input, its `name` and `cells`: the scale factor to each output.
+
+    Examples
+    --------
+    >>> from hmpim.identify import RecordSummary
+    >>> summary = RecordSummary(fs=200.0, samples=2000, sha256="")
+    >>> gain_rows(Identification(record=summary, pairs=()))
+    ()
+    """
+    outputs = dict.fromkeys(pair.output for pair in result.pairs)
+    return tuple(
+        {"name": name, "cells": [_gain(result[output, name]) for output in outputs]}
+        for name in dict.fromkeys(pair.input for pair in result.pairs)
     )
 
 

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING
 
 from hmpim.identify import Identification, PairIdentification
 from hmpim.plots.style import printable
+from hmpim.report.inputs import gain_rows
 from hmpim.report.numbers import format_interval, format_number, plus_minus
 from hmpim.report.words import (
     GLOSSARY,
@@ -114,15 +115,36 @@ def print_result(
 
     if len(result.pairs) != 1:
         console.print(Text(headline(result), style="bold"))
+    if result.inputs is not None:
+        console.print(_gain_table(result))
     for pair in result.pairs:
         title = Text(printable(f"{pair.input} → {pair.output}"), style="bold")
         colour = _COLOURS[pair.verdict]
         sentence = Text.assemble(
             (f"{VERDICTS[pair.verdict]}: ", f"bold {colour}"), pair_sentence(pair)
         )
-        console.print(title, sentence, parameter_table(pair, truth=truth), sep="\n")
-        for warning in pair.warnings:
+        console.print(title, sentence, sep="\n")
+        several = result.inputs is not None and pair.parameters.scale_factor is None
+        if not several:
+            console.print(parameter_table(pair, truth=truth))
+        said = pair.warnings[:1] if several else ()  # the sentence says it
+        for warning in pair.warnings[len(said) :]:
             console.print(Text.assemble(("Warning: ", "bold yellow"), printable(warning.message)))
         missing = untold(pair)
-        if missing:
+        if missing and not several:
             console.print(Text(f"No figure for: {missing}.", style="dim"))
+
+
+def _gain_table(result: Identification) -> "Table":
+    """Scale factor from every input to every output."""
+    from rich.box import SIMPLE_HEAD
+    from rich.table import Table
+    from rich.text import Text
+
+    table = Table(box=SIMPLE_HEAD, pad_edge=False)
+    table.add_column("Scale factor, from \\ to")
+    for output in dict.fromkeys(pair.output for pair in result.pairs):
+        table.add_column(printable(output))
+    for row in gain_rows(result):
+        table.add_row(*(Text(printable(cell)) for cell in (row["name"], *row["cells"])))
+    return table

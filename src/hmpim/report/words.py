@@ -187,8 +187,13 @@ def headline(result: Identification) -> str:
     pairs = len(result.pairs)
     if pairs == 1:
         return f"{VERDICTS[result.verdict]}: {pair_sentence(result.pairs[0])}"
-    trusted = sum(pair.verdict == "ok" for pair in result.pairs)
-    return f"{VERDICTS[result.verdict]}: {trusted} of {pairs} pairs can be trusted as they stand."
+    trusted = sum(pair.verdict == "ok" for pair in result.counted)
+    apart = pairs - len(result.counted)
+    rest = f" {apart} more are not coupled." if apart else ""
+    return (
+        f"{VERDICTS[result.verdict]}: {trusted} of {len(result.counted)} pairs can be trusted as "
+        f"they stand.{rest}"
+    )
 
 
 def nonlinear_facts(pair: PairIdentification) -> list[tuple[str, str]]:
@@ -238,6 +243,9 @@ def pair_sentence(pair: PairIdentification) -> str:
     if pair.verdict == "not_identifiable":
         reason = pair.warnings[0].message if warned else "no model describes the output."
         return reason[:1].lower() + reason[1:]
+    weak = [w.message for w in pair.warnings if w.code == "weak_coupling"]
+    if weak and pair.parameters.scale_factor is None:
+        return weak[0][:1].lower() + weak[0][1:]
     model = [_PARTS.get(pair.structure, f"{structure_words(pair.structure)} dynamics")]
     if pair.parameters.delay is not None:
         model.append("a delay")
