@@ -16,7 +16,7 @@ In this module time is counted in samples: coefficients are in powers of s/fs.
 """
 
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, lru_cache
 from math import comb, factorial, floor
 
 import numpy as np
@@ -138,14 +138,16 @@ def _spline_signs(degree: int) -> NDArray[np.float64]:
     return np.array([(-1.0) ** j * comb(degree + 1, j) for j in range(degree + 2)])
 
 
+@lru_cache(maxsize=16)  # a fit asks for the same system several times in a row
 def _spline_taps(
-    denominator: NDArray[np.float64], lag: float, degree: int
+    coefficients: tuple[float, ...], lag: float, degree: int
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Answer of s^i / A(s), i = 0..n-1, to one B-spline, as numerators in z^-1.
 
     The spline begins at time 0; the answer is sampled at i - lag, 0 <= lag < 1.
     Returns numerators, shape (n, n + degree + 2), and the denominator, shape (n + 1,).
     """
+    denominator = np.array(coefficients)
     n = denominator.size - 1
     taps = n + degree + 2
     # States: n of the companion form, then t^p/p!, ..., t, 1 driving it.
@@ -164,18 +166,19 @@ def _spline_taps(
         state = step @ state
     recursion = _characteristic(step[:n, :n])
     # Differences make the spline of the truncated powers, the recursion makes it finite.
-    weights = np.zeros(taps)
+    weights = np.zeros(taps + 1)
     both = np.convolve(_spline_signs(degree), recursion)
-    weights[: both.size] = both[:taps]
-    numerators = (weights[_lower(taps)] * np.tri(taps)) @ truncated
+    weights[: min(both.size, taps)] = both[:taps]
+    numerators = weights[_lower(taps)] @ truncated
     return np.ascontiguousarray(numerators.T), recursion
 
 
 @cache
 def _lower(taps: int) -> NDArray[np.intp]:
-    """Index i - j of a lower triangular Toeplitz matrix, 0 above the diagonal."""
+    """Index i - j of a lower triangular Toeplitz matrix; above the diagonal that of a zero."""
     i = np.arange(taps)
-    return np.asarray(np.maximum(i[:, None] - i[None, :], 0))
+    back = i[:, None] - i[None, :]
+    return np.asarray(np.where(back >= 0, back, taps))
 
 
 def _characteristic(step: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -261,7 +264,9 @@ def delayed_response(
     out = np.empty((powers, source.samples))
     if n:
         scale = float(factor) ** np.arange(n + 1)
-        numerators, recursion = _spline_taps(denominator * scale, lag, source.degree)
+        numerators, recursion = _spline_taps(
+            tuple((denominator * scale).tolist()), lag, source.degree
+        )
         for i in range(min(powers, n)):
             out[i] = filtered(numerators[i] * scale[i], recursion)
     if powers > n:
