@@ -416,7 +416,8 @@ def _shrink(counted: int, fit: Fit) -> float:
 
 def _covariance(state: _State, *, white: bool) -> NDArray[np.float64]:
     """Covariance of all parameters and ln σ."""
-    scale = np.sqrt(np.maximum(np.diag(state.information), np.finfo(float).tiny))
+    diagonal = np.abs(np.diag(state.information))
+    scale = np.sqrt(np.where(diagonal > 1e-200 * diagonal.max(), diagonal, 1.0))
     scaled = state.information / np.outer(scale, scale)
     values, vectors = np.linalg.eigh(scaled)
     seen = np.maximum(np.abs(values), 1e-14 * np.abs(values).max())

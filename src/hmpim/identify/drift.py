@@ -41,6 +41,9 @@ _SLOW = 0.25
 _POOR = 0.3
 """Share of the output's power left over from which a drift is looked for in any case."""
 
+_BEHIND_LEVELS = 0.3
+"""Gain per sample, in the criterion, that a drift of a clipped output must bring."""
+
 _TURNS = 12
 _STEPS = 3
 _STILL = 1e-3
@@ -77,6 +80,8 @@ def with_drift(
     first: JointFit,
     y: NDArray[np.float64],
     fitted: Callable[[NDArray[np.float64], bool], JointFit],
+    *,
+    clipped: bool = False,
 ) -> Drifting | None:
     """Fit again with a drifting bias, where the first fit asks for it and gains by it.
 
@@ -89,6 +94,9 @@ def with_drift(
     fitted : callable
         Makes the joint fit of another output; of the plain structures only if the second
         argument is true.
+    clipped : bool
+        Whether samples beyond a level were left out: that alone makes the residual slow, so a
+        drift must then explain more.
 
     Returns
     -------
@@ -100,12 +108,13 @@ def with_drift(
     columns = _polynomials(y.size, _DEGREES[-1])
     begun = fitted(y - _regressed(columns, y, first.problem.valid), True)
     joint, weights = _backfitted(begun, y, columns)
+    plainly = is_white(joint.best.fit.residual)
     degree = _degree(joint, columns, weights)
     columns = columns[:degree]
     if not is_unrelated(joint):  # the structure is chosen once more, now that the drift is known
-        joint = fitted(y - weights[:degree] @ columns, False)
+        joint = fitted(y - weights[:degree] @ columns, plainly)
     joint, weights = _backfitted(joint, y, columns)
-    if _gain(joint, degree, first, 0) < 0:
+    if _gain(joint, degree, first, 0) < (_BEHIND_LEVELS * joint.problem.counted if clipped else 0):
         return None
     return _described(joint, columns, weights)
 
@@ -127,11 +136,12 @@ def drift_finding(drifting: Drifting, fs: float, unit: str) -> Finding:
 def _asked_for(joint: JointFit) -> bool:
     """Whether what a fit leaves over is slow, or its model is as slow as a drift."""
     fit, problem = joint.best.fit, joint.problem
+    slow = slowest_time_constant(fit.denominator) > _SLOW * problem.y.size
+    if slow or fit.structure.integrators:  # the model may have taken the drift for its own
+        return True
     if is_white(fit.residual):
         return False
     if joint.forgotten:  # it may be the drift that parts the beginning from the rest
-        return True
-    if slowest_time_constant(fit.denominator) > _SLOW * problem.y.size:
         return True
     spread = problem.masked(problem.y - problem.y.mean())
     if fit.cost > _POOR * float(spread @ spread):

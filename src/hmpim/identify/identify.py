@@ -163,6 +163,9 @@ def _identify_output(
         if drifting is not None:
             predicted = predicted + drifting.trend
         again = find_imperfections(output.values, aligned.fs, prediction=predicted, richest=richest)
+        plateau = again.saturation
+        if drifting is not None and plateau is not None and plateau.noise == "after":
+            again = replace(again, saturation=None)  # a wander bends the output as a level does
         if (
             (again.saturation is None) != (found.saturation is None)
             or (again.hold is None) != (found.hold is None)
@@ -228,7 +231,9 @@ def _drifted(
         moved = replace(output, values=y)
         return _joined(aligned, moved, found, intersample, names, None).fits[0]
 
-    drifting = with_drift(joined.fits[0], output.values, fitted)
+    drifting = with_drift(
+        joined.fits[0], output.values, fitted, clipped=found.saturation is not None
+    )
     if drifting is None:
         return joined, None
     return replace(

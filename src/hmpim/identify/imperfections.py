@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from hmpim.errors import RecordError
 from hmpim.identify.censored import CensoredFit, fit_censored
 from hmpim.identify.drift import Drifting
+from hmpim.identify.enrich import PLAIN
 from hmpim.identify.hold import Hold, Updates, detect_hold, updates
 from hmpim.identify.joint import JointFit, Trial
 from hmpim.identify.lost import find_frozen, find_spikes
@@ -164,27 +165,51 @@ def refine(
     problem = joint.problem
     whole = None if problem.valid is None else _gaps_only(problem.valid, found, fs)
     arrivals = found.arrivals(problem.y.size, fs)
-    try:
-        censored = fit_censored(
-            replace(problem, valid=whole),
-            joint.best.fit,
-            found.saturation,
-            arrivals=arrivals,
-            drift=None if drifting is None else drifting.trend,
-        )
-    except RecordError:  # fewer samples inside the range than parameters: the first fit stands
+    tried: list[tuple[float, Trial, CensoredFit]] = []
+    for trial in _worth_refining(joint, found):
+        try:
+            censored = fit_censored(
+                replace(problem, valid=whole),
+                trial.fit,
+                found.saturation,
+                arrivals=arrivals,
+                drift=None if drifting is None else drifting.trend,
+            )
+        except RecordError:  # fewer samples inside the range than parameters
+            continue
+        price = trial.fit.structure.parameters * float(np.log(censored.index.size))
+        tried.append((price - 2.0 * censored.log_likelihood, trial, censored))
+    if not tried:  # the first fit stands
         return None
+    _, chosen, censored = min(tried, key=lambda item: item[0])
     counted = np.zeros(problem.y.size, dtype=bool)
     counted[censored.index] = True
     fit = replace(censored.fit, residual=censored.fit.residual * counted)
-    best = Trial(intersample=joint.best.intersample, fit=fit, criterion=joint.best.criterion)
+    best = Trial(intersample=chosen.intersample, fit=fit, criterion=joint.best.criterion)
     refined = replace(
         joint,
         problem=replace(problem, valid=counted),
         best=best,
-        trials=tuple(best if trial is joint.best else trial for trial in joint.trials),
+        trials=tuple(best if trial is chosen else trial for trial in joint.trials),
     )
     return refined, censored
+
+
+def _worth_refining(joint: JointFit, found: Imperfections) -> list[Trial]:
+    """The chosen trial, and simpler ones where clipping may have made it look too simple.
+
+    The samples inside the range are not a fair choice: noise that would have led out of it is
+    missing. To the first fit that is a misfit, which richer structures take up.
+    """
+    best = joint.best
+    if found.saturation is None or best.fit.structure.name in PLAIN:
+        return [best]
+    simpler = [
+        trial
+        for trial in joint.trials
+        if trial.intersample == best.intersample and trial.fit.structure.name in PLAIN
+    ]
+    return [best, *simpler]
 
 
 def _gaps_only(valid: NDArray[np.bool_], found: Imperfections, fs: float) -> NDArray[np.bool_]:

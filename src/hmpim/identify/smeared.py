@@ -11,6 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from hmpim.identify.whiteness import effective_share
+
 __all__ = ["Plateaus", "smeared_plateaus"]
 
 _FEWEST = 12
@@ -100,11 +102,13 @@ def smeared_plateaus(
     best = _best_split(y, rows, sides)
     if best is None:
         return None
-    variance = best.cost / y.size
+    # Slow noise bends the output as well: fewer of its samples are independent.
+    model = np.clip(best.unclipped, best.low, best.high)
+    variance = best.cost / y.size / effective_share(y - model)
     bent = np.vstack([rows, prediction**2, prediction**3])
     if _cost(y, bent) - best.cost < 0.25 * _GAIN * variance:
         return None
-    least = max(_BEYOND * float(np.sqrt(variance)), step, _WORTH * float(np.ptp(y)))
+    least = max(_BEYOND * float(np.sqrt(best.cost / y.size)), step, _WORTH * float(np.ptp(y)))
     excess = np.abs(best.unclipped - np.clip(best.unclipped, best.low, best.high))
     kept = tuple(
         bool(np.any(clipped) and np.mean(excess[clipped]) > least)

@@ -1,0 +1,103 @@
+"""A bias that drifts, up to several times the motion, and one that does not."""
+
+import numpy as np
+import pytest
+
+import hmpim
+
+FS = 200.0
+T = np.arange(2000) / FS
+TRUTH = {"delay": 0.05, "scale_factor": 1.0, "natural_frequency": 10.0, "damping_ratio": 0.4}
+STIMULUS = hmpim.Stimulus(waveform=hmpim.Chirp(band=(0.1, 20.0), duration=10.0), fs=FS)
+DRIFTS = {
+    "steady, small": lambda rng: 0.01 * T,
+    "steady, three times the amplitude": lambda rng: -0.3 * T,
+    "warming up": lambda rng: 3.0 * (1 - np.exp(-T / 3.0)),
+    "warming up for long": lambda rng: 5.0 * (1 - np.exp(-T / 20.0)),
+    "slow sine": lambda rng: 2.0 * np.sin(2 * np.pi * 0.07 * T + 1.0),
+    "random walk": lambda rng: 0.05 * np.cumsum(rng.standard_normal(T.size)),
+}
+
+
+def identified(drift, seed=1, **parts):
+    sensor = hmpim.Sensor(
+        delay=0.05, natural_frequency=10.0, damping_ratio=0.4, bias=0.1, noise_std=0.05, **parts
+    )
+    record = hmpim.run(sensor, STIMULUS, rng=seed)
+    y = record.outputs[0].values + drift
+    bare = hmpim.Record.from_arrays({"u": record.inputs[0].values}, {"y": y}, fs=FS)
+    return hmpim.identify(bare)["y", "u"]
+
+
+def said(pair):
+    return [w.message for w in pair.warnings if w.code == "drift"]
+
+
+@pytest.mark.parametrize("kind", DRIFTS)
+def test_everything_else_is_found_as_without_the_drift(kind):
+    drift = DRIFTS[kind](np.random.default_rng(7))
+    pair = identified(drift)
+    assert pair.structure == "second_order"
+    assert pair.verdict == "ok"
+    assert len(said(pair)) == 1
+    for name, value in (TRUTH | {"bias": 0.1 + drift.mean()}).items():
+        estimate = getattr(pair, name)
+        assert abs(estimate.value - value) < 4 * estimate.std, name
+    assert pair.scale_factor.std < 0.03
+    assert pair.delay.std < 0.0005
+
+
+def test_the_prediction_holds_the_drift():
+    drift = DRIFTS["warming up"](None)
+    pair = identified(drift)
+    assert np.std(pair.residual) == pytest.approx(0.05, rel=0.1)
+    assert np.corrcoef(pair.prediction, drift)[0, 1] > 0.5
+
+
+def test_a_steady_drift_is_said_with_its_rate_and_error():
+    message = said(identified(0.3 * T))[0]
+    rate, error = message.split("on average by ")[1].split(" per s")[0].split(" ± ")
+    assert abs(float(rate) - 0.3) < 4 * float(error)
+    # White noise: σ / sqrt(Σ t²) for a straight line.
+    assert float(error) == pytest.approx(0.05 / np.sqrt(np.sum((T - T.mean()) ** 2)), rel=0.1)
+
+
+def test_the_bias_costs_no_more_than_a_straight_line_takes():
+    assert identified(0.3 * T).bias.std == pytest.approx(identified(0.0 * T).bias.std, rel=0.1)
+
+
+def test_a_clipped_output_may_drift():
+    drift = 0.1 * T
+    sensor = hmpim.Sensor(delay=0.05, natural_frequency=10.0, damping_ratio=0.4, bias=0.1)
+    record = hmpim.run(sensor, STIMULUS, rng=1)
+    noise = 0.05 * np.random.default_rng(5).standard_normal(T.size)
+    y = np.minimum(record.outputs[0].values + drift + noise, 1.2)
+    pair = hmpim.identify(
+        hmpim.Record.from_arrays({"u": record.inputs[0].values}, {"y": y}, fs=FS)
+    )["y", "u"]
+    assert pair.saturation_high.value == pytest.approx(1.2)
+    assert said(pair)
+    for name, value in TRUTH.items():
+        estimate = getattr(pair, name)
+        assert abs(estimate.value - value) < 4 * estimate.std, name
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", ["steady, three times the amplitude", "warming up"])
+def test_stated_intervals_hold_with_a_drift(seeds, kind):
+    drift = DRIFTS[kind](None)
+    inside = total = 0
+    for seed in range(seeds // 4):
+        pair = identified(drift, seed)
+        for name, value in (TRUTH | {"bias": 0.1 + drift.mean()}).items():
+            low, high = getattr(pair, name).ci95
+            inside += low <= value <= high
+            total += 1
+    assert 0.92 - 2 / total**0.5 < inside / total <= 0.99
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("colour", [0.0, 0.9])
+def test_noise_is_not_taken_for_a_drift(seeds, colour):
+    alarms = sum(bool(said(identified(0.0 * T, s, noise_colour=colour))) for s in range(seeds // 2))
+    assert alarms <= max(1, 0.01 * seeds)
