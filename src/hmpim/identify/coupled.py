@@ -247,7 +247,10 @@ def settled(
     for group in inputs.alike:
         if pair.input in group.names and group.share >= _MENTIONED:
             findings.append(_coupled(group))
-            if group.share >= _DOUBTED and verdict == "ok":
+            others = [inputs.names.index(name) for name in group.names if name != pair.input]
+            # A coupling too weak to be seen may have been taken for this one.
+            hidden = not joined.strong[i] and not all(joined.related[j] for j in others)
+            if (group.share >= _DOUBTED or hidden) and verdict == "ok":
                 verdict = "doubtful"
     return replace(pair, parameters=parameters, warnings=tuple(findings), verdict=verdict)
 

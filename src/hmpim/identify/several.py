@@ -139,6 +139,10 @@ def fit_together(
         before, found = found, tuple(fits[i].best.fit.structure.name for i in strong)
         if found != before:
             whitening = _fit_couplings(inputs, y, fits, related, strong, plain, alike)
+    if whitening is not None:
+        # What is not white may be no noise but what one of them has not given back yet.
+        _refine(y, fits, [j for j in fits if related[j]], None)
+        whitening = _whitening(y, fits, related, strong)
     for _ in range(_TURNS):
         before = _others(fits, related, None)
         for i in strong:
@@ -265,20 +269,7 @@ def _together(
     if not weak:
         return False
     rest = y - _others({j: fits[j] for j in strong}, related, None)
-    problems = [replace(fits[j].problem, y=rest, whitening=whitening) for j in weak]
-    found = refined_together(problems, [fits[j].best.fit for j in weak], rest)
-    parts = {j: fit.prediction - fit.linear[-1] for j, fit in zip(weak, found, strict=True)}
-    total = sum(parts.values(), np.zeros(y.size))
-    for j, fit in zip(weak, found, strict=True):
-        problem = replace(fits[j].problem, y=rest - (total - parts[j]))
-        trial = replace(fits[j].best, fit=fit)
-        fits[j] = replace(
-            fits[j],
-            problem=problem,
-            best=trial,
-            trials=tuple(trial if t is fits[j].best else t for t in fits[j].trials),
-            effective_share=effective_share(fit.residual),
-        )
+    problems, found = _refine(rest, fits, weak, whitening)
     if not drop:
         return False
     gains = []
@@ -292,6 +283,40 @@ def _together(
         return False
     related[weak[least]] = False
     return True
+
+
+def _refine(
+    y: Real, fits: dict[int, JointFit], some: list[int], whitening: Real | None
+) -> tuple[list[Problem], list[Fit]]:
+    """Move some of the fits at once, in place, to what `y` is but for a bias."""
+    counted = np.logical_and.reduce(
+        [np.ones(y.size, bool) if (v := fits[j].problem.valid) is None else v for j in some]
+    )
+    valid = None if bool(counted.all()) else counted
+    problems = [replace(fits[j].problem, y=y, valid=valid, whitening=whitening) for j in some]
+    found = refined_together(problems, [fits[j].best.fit for j in some], y)
+    parts = {j: fit.prediction - fit.linear[-1] for j, fit in zip(some, found, strict=True)}
+    total = sum(parts.values(), np.zeros(y.size))
+    for j, fit in zip(some, found, strict=True):
+        trial = replace(fits[j].best, fit=fit)
+        fits[j] = replace(
+            fits[j],
+            problem=replace(fits[j].problem, y=y - (total - parts[j])),
+            best=trial,
+            trials=tuple(trial if t is fits[j].best else t for t in fits[j].trials),
+            effective_share=effective_share(fit.residual),
+        )
+    return problems, found
+
+
+def _whitening(
+    y: Real, fits: dict[int, JointFit], related: dict[int, bool], strong: tuple[int, ...]
+) -> Real | None:
+    """How to whiten what all of them leave over."""
+    best = fits[strong[0]]
+    rest = y - _others(fits, related, None) - best.best.fit.linear[-1]
+    counts = best.problem.valid
+    return whitening_of(rest if counts is None else np.asarray(rest * counts))
 
 
 def _too_slow(fit: Fit, samples: int) -> bool:
