@@ -147,3 +147,19 @@ def test_what_there_is_not_is_refused_by_name(eight: Repeats) -> None:
         eight["z", "u"]
     with pytest.raises(RecordError, match="the repeats do not tell 'saturation_low'"):
         eight["y", "u"]["saturation_low"]
+
+
+def test_a_delay_that_varies_between_runs_is_seen(seeds: int) -> None:
+    index = np.arange(T.size)
+    seen = []
+    for seed in range(max(seeds // 40, 4)):
+        rng = np.random.default_rng(seed)
+        records = []
+        for _ in range(4):
+            late = 5 + 0.1 * rng.standard_normal()  # 1 ms
+            y = np.interp(index - late, index, lagged(delay=0), left=0)
+            records.append(record(y + 0.05 * rng.standard_normal(T.size)))
+        found = identify_repeats(records, structures=STRUCTURES)["y", "u"]["delay"]
+        seen.append(found.probability < 0.05)
+        assert found.repeatability == pytest.approx(0.001, rel=0.9)
+    assert np.mean(seen) > 0.9

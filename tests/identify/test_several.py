@@ -104,3 +104,20 @@ def test_inputs_that_are_one_and_the_same_are_refused_by_name():
         both = hmpim.Record.from_arrays({"left": INPUTS[0], "right": twin}, {"y": y}, fs=FS)
         with pytest.raises(RecordError, match="left, right"):
             hmpim.identify(both)
+
+
+@pytest.mark.parametrize("noise_std", [1e-2, 1e-4, 0.0])
+def test_a_coupling_is_given_back_by_the_stronger_one_however_little_noise(noise_std):
+    rng = np.random.default_rng(0)
+    y = noise_std * rng.standard_normal(2000)
+    for (natural, delay, gain), u in zip(
+        ((8.0, 0.02, 1.0), (6.0, 0.05, 0.05)), INPUTS, strict=False
+    ):
+        w = 2 * np.pi * natural
+        model = hmpim.Model(delay=delay, scale_factor=gain, denominator=(1 / w**2, 1 / w, 1.0))
+        y = y + hmpim.simulate(model, u, fs=FS, intersample="bandlimited")
+    both = hmpim.Record.from_arrays({"u0": INPUTS[0], "u1": INPUTS[1]}, {"y": y}, fs=FS)
+    pair = hmpim.identify(both)["y", "u1"]
+    for name, value in {"scale_factor": 0.05, "natural_frequency": 6.0, "delay": 0.05}.items():
+        estimate = getattr(pair, name)
+        assert abs(estimate.value - value) < 4 * estimate.std + 1e-4 * value
