@@ -12,6 +12,7 @@ TRUTH = {
     "natural_frequency": 10.0,
     "damping_ratio": 0.4,
 }
+AT = np.arange(2000) / 200.0
 STIMULUS = hmpim.Stimulus(waveform=hmpim.Chirp(band=(0.1, 20.0), duration=10.0), fs=200.0)
 
 
@@ -80,6 +81,34 @@ def test_rounding_is_measured_and_said_where_it_matters():
     assert "quantization" in codes(coarse)
     assert "quantization" not in codes(fine)
     assert_true(fine)
+
+
+@pytest.mark.parametrize(("std", "verdict"), [(0.1, "ok"), (0.3, "doubtful")])
+def test_noise_on_the_measured_input_is_said_with_what_it_costs(std, verdict):
+    sensor = hmpim.Sensor(delay=0.05, natural_frequency=10.0, damping_ratio=0.4, noise_std=0.02)
+    record = hmpim.run(sensor, STIMULUS, rng=1)
+    u = record.inputs[0].values
+    measured = u + std * np.random.default_rng(3).standard_normal(u.size)
+    pair = hmpim.identify(
+        hmpim.Record.from_arrays({"u": measured}, {"y": record.outputs[0].values}, fs=200.0)
+    )["y", "u"]
+    message = next(w.message for w in pair.warnings if w.code == "input_noise")
+    assert float(message.split("noise of ")[1].split()[0]) == pytest.approx(std, rel=0.1)
+    # Of the input's power within the sweep, 0.5 is motion and a fifth of std² noise.
+    share = 100 * 0.2 * std**2 / (0.5 + 0.2 * std**2)
+    assert float(message.split("about ")[1].split()[0]) == pytest.approx(share, rel=0.3)
+    assert pair.verdict == verdict
+
+
+def test_a_noisy_clipped_static_sensor_stays_static():
+    y_true = 1.2 * np.roll(np.sin(2 * np.pi * (0.1 * AT + 0.995 * AT**2)), 10)
+    y_true[:10] = 0.0
+    y = np.clip(y_true + 0.05 * np.random.default_rng(1).standard_normal(AT.size), -0.8, 0.8)
+    u = np.sin(2 * np.pi * (0.1 * AT + 0.995 * AT**2))
+    pair = hmpim.identify(hmpim.Record.from_arrays({"u": u}, {"y": y}, fs=200.0))["y", "u"]
+    assert pair.structure == "static"
+    assert abs(pair.scale_factor.value - 1.2) < 4 * pair.scale_factor.std
+    assert abs(pair.delay.value - 0.05) < 4 * pair.delay.std
 
 
 @pytest.mark.slow

@@ -90,7 +90,7 @@ def choose(
 
 def _beyond(apart: NDArray[np.float64], variance: Real, credible: NDArray[np.bool_]) -> Real:
     """Return |difference|² beyond the variance of a credible reference, over neighbours."""
-    against = np.maximum(variance, np.finfo(float).tiny)
+    against = np.maximum(variance, 1e-150)  # a record without noise must not overflow
     excess = _averaged(np.where(credible, np.abs(apart) ** 2 / against - 1.0, 0.0))
     return np.asarray(np.where(credible, np.maximum(excess, 0.0) * variance, 0.0))
 

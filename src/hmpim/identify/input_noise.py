@@ -21,6 +21,9 @@ _ABOVE = 1.3
 _ROOM = 0.85
 """The excited band must end below this share of the Nyquist frequency, over `_ABOVE`."""
 
+_STANDS_OUT = 4.0
+"""Mean power over the floor's from which a stretch of the spectrum counts as excited."""
+
 _FLAT = 4.0
 """Ratio of the floor's two halves up to which it counts as white noise rather than a skirt."""
 
@@ -84,10 +87,13 @@ def input_noise(u: ArrayLike, fs: float, *, band: tuple[float, float]) -> InputN
     check_rate(fs)
     check_band(band, fs)
     samples = as_signal("u", u)
-    if _ABOVE * band[1] > _ROOM * fs / 2 or np.ptp(samples) == 0:
+    if np.ptp(samples) == 0:
         return None
     window = np.asarray(blackmanharris(samples.size, sym=False), dtype=np.float64)
     power = np.abs(rfft(window * (samples - samples.mean()))) ** 2 / float(window @ window)
+    band = (band[0], min(band[1], _end(power) * fs / samples.size))
+    if _ABOVE * band[1] > _ROOM * fs / 2 or band[1] <= band[0]:
+        return None
     first = int(np.ceil(_ABOVE * band[1] * samples.size / fs))
     floor = power[first:]
     if floor.size < 32:
@@ -110,6 +116,15 @@ def input_noise(u: ArrayLike, fs: float, *, band: tuple[float, float]) -> InputN
         std_std=std / float(np.sqrt(floor.size)),
         attenuation=min(variance / total, 1.0),
     )
+
+
+def _end(power: NDArray[np.float64]) -> int:
+    """Last bin that stands out of what fills the top of the spectrum, which noise may be."""
+    width = max(power.size // 50, 5)
+    summed = np.cumsum(np.concatenate([[0.0], power]))
+    mean = (summed[width:] - summed[:-width]) / width
+    above = np.flatnonzero(mean > _STANDS_OUT * _level(power[-(power.size // 4) :]))
+    return int(above[-1]) + width // 2 if above.size else power.size
 
 
 def _level(power: NDArray[np.float64]) -> float:

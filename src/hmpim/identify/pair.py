@@ -95,7 +95,7 @@ def described(
     )
     parameters, seen = with_imperfections(readings.parameters, found, censored, output.unit)
     counts = slice(None) if joint.problem.valid is None else joint.problem.valid
-    said = remarks(
+    said, noisy = remarks(
         fit.residual[counts],
         u,
         fs=fs,
@@ -109,7 +109,7 @@ def described(
         findings = (*findings, drift_finding(drifting, fs, output.unit))
     if inspection.doubtful:
         verdict = "doubtful"
-    if found.doubtful:
+    if found.doubtful or noisy:
         verdict = "doubtful"
     parted = disagreement(from_response, readings.parameters)
     if parted is not None and found.hold is None:

@@ -12,6 +12,9 @@ __all__ = ["remarks"]
 _ATTENUATES = 0.002
 """Share by which noise on the input must lower the gain to be worth a word."""
 
+_SPOILS = 0.01
+"""Share from which the scale factor is not to be relied on."""
+
 
 def remarks(
     residual: NDArray[np.float64],
@@ -20,7 +23,7 @@ def remarks(
     fs: float,
     band: tuple[float, float],
     white: bool,
-) -> tuple[Finding, ...]:
+) -> tuple[tuple[Finding, ...], bool]:
     """Say what colours the residual, and whether the input is noisy.
 
     Parameters
@@ -33,6 +36,12 @@ def remarks(
         Excited band in Hz.
     white : bool
         Whether the residual passed for white: then there is nothing to say of it.
+
+    Returns
+    -------
+    findings : tuple of Finding
+    doubtful : bool
+        Whether the input is so noisy that gains come out too small by a hundredth or more.
     """
     found: list[Finding] = []
     if not white:
@@ -54,4 +63,4 @@ def remarks(
                 "command instead of its measurement, if you have it.",
             )
         )
-    return tuple(found)
+    return tuple(found), noise is not None and noise.attenuation > _SPOILS
