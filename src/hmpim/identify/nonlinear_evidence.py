@@ -29,6 +29,12 @@ _WORTH_A_LOOK = 1e-3
 _GAIN = 12.0
 """Log-likelihood that a trace must bring; in linear systems the best of all reaches 7."""
 
+_UNSWEPT = 0.15
+"""Share of a coloured residual's power that a kind must explain, without a sweep, to count."""
+
+_PERIODIC = 0.5
+"""The same for an input that repeats."""
+
 _HINT = 4.0
 """Log-likelihood of all harmonics, beyond what noise would gain, from which kinds are compared."""
 
@@ -154,7 +160,15 @@ def _by_traces(look: Look, fit: Fit, white: bool) -> Seen:
     levels = [] if lines is None else [v for v in lines.levels if v.probability < CHANCE]
     if white and not levels and not _curved(fit, look.problem):
         return Seen(fit=fit, lines=lines)
-    found = tuple(m for m in compare_mechanisms(look.problem, fit, fs=look.fs) if m.gain > _GAIN)
+    power = fit.cost / max(look.problem.counted, 1)
+    least = 0.0
+    if not white:  # dynamics left out resemble every kind a little, more so at few lines
+        least = power * (_UNSWEPT if find_period(look.u) is None else _PERIODIC)
+    found = tuple(
+        m
+        for m in compare_mechanisms(look.problem, fit, fs=look.fs)
+        if m.gain > _GAIN and m.rms**2 > least
+    )
     distortion = float(np.sqrt(sum(0.5 * v.lines * v.rms**2 for v in levels)))
     return Seen(
         fit=fit,
