@@ -29,6 +29,9 @@ _WORTH_A_LOOK = 1e-3
 _GAIN = 12.0
 """Log-likelihood that a trace must bring; in linear systems the best of all reaches 7."""
 
+_BESIDE = 0.2
+"""R.m.s. of a kind's harmonics over that of linear misfit, from which it counts by itself."""
+
 _UNSWEPT = 0.15
 """Share of a coloured residual's power that a kind must explain, without a sweep, to count."""
 
@@ -148,7 +151,8 @@ def _by_harmonics(look: Look, sweep: SweepPhase, fit: Fit, white: bool) -> Seen:
             fs=rate,
         )
     named = _likely(kinds, harmonics.regression.evidence)
-    if not parts and not named:
+    # Without a harmonic of its own, a kind may be a sharp resonance that was left out.
+    if not parts and (not named or named[0].rms < _BESIDE * harmonics.fundamental_rms):
         return Seen(fit=fit, harmonics=harmonics)
     rms = float(np.sqrt(np.sum(np.square(parts)))) if parts else named[0].rms
     return Seen(fit=fit, harmonics=harmonics, mechanisms=kinds, named=named, rms=rms)
