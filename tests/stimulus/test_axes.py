@@ -64,6 +64,18 @@ def test_five_per_cent_coupling_within_half_a_per_cent(three):
     assert (declared & found.usable).mean() > 0.95
 
 
+def test_no_axis_is_a_delayed_copy_of_another_with_a_wider_band():
+    """Three quarters of the band in three quarters of the time would be the same sweep rate."""
+    bands = (20.0, 20.0, 20.0, 15.0, 15.0)
+    plan = [AxisPlan(axis=str(k), limits=LIMITS, band=(0.5, b)) for k, b in enumerate(bands)]
+    five = design_axes(plan, duration=10, fs=FS)
+    for later, earlier in ((3, 0), (4, 1)):
+        spectra = np.fft.rfft([five[later].position, five[earlier].position], 8192)
+        alike = np.fft.irfft(spectra[0] * np.conj(spectra[1]))
+        size = np.linalg.norm(five[later].position) * np.linalg.norm(five[earlier].position)
+        assert np.max(np.abs(alike)) < 0.9 * size  # 0.99 at one sweep rate
+
+
 def test_five_axes_at_once():
     five = design_axes(plans(("a", "b", "c", "d", "e")), duration=10, fs=FS)
     assert {s.samples for s in five} == {2000}

@@ -29,11 +29,9 @@ __all__ = ["AxisPlan", "InputCondition", "condition_table", "design_axes", "inpu
 _SAME = 1e-6  # share of a stimulus's power that another one leaves unexplained
 _SINGULAR = 1e8  # condition beyond which it is rounding, and infinite
 _ABSENT = 1e-4  # an input this far (80 dB) below its own r.m.s. level is leakage
-_KINDS: tuple[Literal["hmpim", "reversed", "exponential"], ...] = (
-    "hmpim",
-    "reversed",
-    "exponential",
-)
+_ALIKE = 0.15  # sweep rates nearer than this, relatively, make one sweep a delayed copy of another
+_Kind = Literal["hmpim", "reversed", "exponential"]
+_KINDS: tuple[_Kind, ...] = ("hmpim", "reversed", "exponential")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -185,20 +183,17 @@ def _made(
             for p, core in zip(plans, cores, strict=True)
         ]
     made = []
-    rounds = math.ceil(len(plans) / len(_KINDS))
-    for k, plan in enumerate(plans):
-        turn = k // len(_KINDS)
-        share = 1.0 - 0.5 * turn / rounds  # later and faster
+    for plan, (kind, share) in zip(plans, _turns(plans), strict=True):
         swept = design(
             band=plan.band,
             duration=share * length,
             fs=fs,
             limits=plan.limits,
-            kind=_KINDS[k % len(_KINDS)],
+            kind=kind,
             tail=0.0,
             axis=plan.axis,
         )
-        if turn:
+        if share < 1.0:
             begin = (1.0 - share) * length
             waiting = rest_to_rest(
                 swept.core, limits=plan.limits, fs=fs, longest=max(begin, swept.sweep_start)
@@ -206,6 +201,32 @@ def _made(
             swept = replace(swept, waveform=waiting)
         made.append(swept)
     return made
+
+
+def _turns(plans: Sequence[AxisPlan]) -> list[tuple[_Kind, float]]:
+    """Kind of each sweep, and the share of the time it takes: the later, the faster."""
+    turns: list[tuple[_Kind, float]] = []
+    rounds = math.ceil(len(plans) / len(_KINDS))
+    for k, plan in enumerate(plans):
+        kind = _KINDS[k % len(_KINDS)]
+        share = 1.0 - 0.5 * (k // len(_KINDS)) / rounds
+        before = [
+            _rate(other.band, taken, kind)
+            for other, (same, taken) in zip(plans, turns, strict=False)
+            if same == kind
+        ]
+        while share < 1.0 and any(
+            abs(_rate(plan.band, share, kind) / rate - 1) < _ALIKE for rate in before
+        ):
+            share *= 1.0 - 0.5 * _ALIKE
+        turns.append((kind, share))
+    return turns
+
+
+def _rate(band: tuple[float, float], share: float, kind: _Kind) -> float:
+    """Band passed in a unit of time, in Hz or, for an exponential sweep, in ln Hz."""
+    first, last = band
+    return (math.log(last / first) if kind == "exponential" else last - first) / share
 
 
 def input_condition(
