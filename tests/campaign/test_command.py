@@ -56,7 +56,7 @@ def test_bad_input_is_one_line_and_two(tmp_path):
     bad = short_plan(tmp_path, kind=('kind = "sensor"', 'kind = "rocket"'))
     for arguments, words in (
         ((), "PLAN.toml is missing"),
-        ((tmp_path / "none.toml",), "No such file"),
+        ((tmp_path / "none.toml",), "there is no plan"),
         ((bad, "--out", tmp_path / "out"), "rig.kind = 'rocket'"),
     ):
         result = invoke(*arguments)

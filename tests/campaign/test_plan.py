@@ -61,6 +61,7 @@ def broken(**changes):
     ("changes", "message"),
     [
         ({"name": None}, "name is missing"),
+        ({"name": None, "nmae": "n"}, "name is missing; give it in place of nmae"),
         ({"colour": 1}, "colour is not known"),
         ({"seed": -1}, "seed = -1 must be"),
         ({"rig__kind": "tabel"}, "rig.kind = 'tabel' must be one of table, sensor, python"),
@@ -83,6 +84,10 @@ def broken(**changes):
         ({"test__0__modes": ["PV"]}, "modes and loads belong to a table"),
         ({"specification__0__quantity": "speed"}, r"specification\[1\].quantity = 'speed'"),
         ({"specification__0__min": None}, r"specification\[1\].min .* limit nothing"),
+        (
+            {"specification__0__min": None, "specification__0__mim": 1.0},
+            r"specification\[1\].mim is not known; use .*min",
+        ),
         ({"figure__0__tests": ["none"]}, r"figure\[1\].tests holds 'none'"),
         ({"figure__0__compare": "colours"}, r"figure\[1\].compare = 'colours'"),
     ],

@@ -162,7 +162,19 @@ def test_comparison_finds_what_moved_and_only_that(finished, tmp_path):
     delay = pair["parameters"]["delay"]
     shifted = {**delay, "value": delay["value"] + 10.0 * delay["std"]}
     pair["parameters"] = {**pair["parameters"], "delay": shifted}
+    # A step of the encoder, known to rounding: its last digits are no change.
+    step = {"value": 0.003, "std": 1e-19, "ci95": [0.003, 0.003], "unit": "deg"}
+    pair["parameters"]["quantization_step"] = step
     moved[0]["pairs"] = [pair]
+    (tmp_path / "stepped").mkdir()
+    write_study(make_study(plan, moved), tmp_path / "stepped")
+    pair["parameters"] = {
+        **pair["parameters"],
+        "quantization_step": {**step, "value": 0.003 * (1.0 + 1e-15)},
+    }
+    stepped = make_study(plan, moved, earlier=tmp_path / "stepped" / "study.json")
+    assert "quantization_step" in [change.quantity for change in stepped.changes]
+    assert not any(change.differs for change in stepped.changes)
     other = make_study(plan, moved, earlier=earlier)
     assert [(c.axis, c.quantity) for c in other.changes if c.differs] == [("inner", "delay")]
 
@@ -223,6 +235,26 @@ def test_load_of_all_axes_together_is_predicted_and_refused(tmp_path, monkeypatc
     words = r"case all\..*together: at \d\.\d+ s the motion of all axes .* N·m of azimuth, beyond"
     with pytest.raises(LimitsError, match=words):
         run_campaign(table_plan(level=0.99), tmp_path)
+
+
+def test_a_rate_the_table_cannot_take_is_refused_before_the_first_case_moves(tmp_path, monkeypatch):
+    pytest.importorskip("mujoco")
+    from hmpim.rigs.table import MotionTable
+
+    monkeypatch.setattr(MotionTable, "play", lambda *_, **__: pytest.fail("the table moved"))
+    plan = table_plan(level=0.5)
+    tests = (replace(plan.tests[0], rates=(1000.0, 700.0)),)
+    with pytest.raises(ArgumentError, match=r"case all\..*700Hz.*: fs = 700 Hz does not divide"):
+        run_campaign(replace(plan, tests=tests), tmp_path)
+
+
+def test_more_travel_than_an_axis_has_is_refused_not_cut():
+    plan = plan_of()
+    case = expand(plan)[0]
+    wide = tuple(replace(axis, travel=1.01 * axis.limits.position) for axis in plan.axes)
+    plan = replace(plan, axes=wide)
+    with pytest.raises(LimitsError, match=r"case .*inner: travel = .* deg is more than the .* has"):
+        prepare(plan, case, make_rig(plan))
 
 
 def test_a_test_may_have_bands_and_travel_of_its_own():

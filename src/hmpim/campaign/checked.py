@@ -3,6 +3,7 @@
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from difflib import get_close_matches
 from typing import Any, TypeVar
 
 from hmpim.errors import ArgumentError
@@ -42,7 +43,10 @@ class Table:
         self.asked.add(key)
         value = self.values.get(key, default)
         if value is _MISSING:
-            raise ArgumentError(f"{self.where}{key} is missing; give it")
+            # The first key wanted may be there, but misspelt: then that is what to say.
+            alike = get_close_matches(key, set(self.values) - self.asked, n=1)
+            instead = f" in place of {alike[0]}" if alike else ""
+            raise ArgumentError(f"{self.where}{key} is missing; give it{instead}")
         return value
 
     def _bad(self, key: str, value: object, wanted: str) -> ArgumentError:

@@ -259,6 +259,11 @@ def _band(table: Table, key: str) -> tuple[float, float]:
     return band[0], band[1]
 
 
+def _travel(table: Table) -> float | None:
+    travel = table.number("travel", math.inf, above=0.0)
+    return None if math.isinf(travel) else travel
+
+
 def _axis(name: str, table: Table, kind: RigKind) -> AxisWish:
     from hmpim.rigs.table import AXES
 
@@ -273,7 +278,7 @@ def _axis(name: str, table: Table, kind: RigKind) -> AxisWish:
     wish = AxisWish(
         name=name,
         band=band,
-        travel=table.number("travel", math.inf, above=0.0),
+        travel=_travel(table),
         limits=limits,
         sensor=sensor,
     )
@@ -283,7 +288,6 @@ def _axis(name: str, table: Table, kind: RigKind) -> AxisWish:
 
 def _test(table: Table, axes: tuple[str, ...], kind: RigKind) -> TestPlan:
     bands = table.table("bands", optional=True)
-    travel = table.number("travel", math.inf, above=0.0)
     test = TestPlan(
         name=table.text("name"),
         axes=table.words("axes", axes, default=axes),
@@ -293,7 +297,7 @@ def _test(table: Table, axes: tuple[str, ...], kind: RigKind) -> TestPlan:
         loads=table.words("loads", None, default=("acceptance",)),
         together=table.flag("together", False),
         levels_of=table.words("levels_of", _SCALED, default=_SCALED),
-        travel=None if math.isinf(travel) else travel,
+        travel=_travel(table),
         bands={axis: _band(bands, axis) for axis in axes if axis in bands.values},
     )
     bands.asked.update(axes)
@@ -322,12 +326,12 @@ def _specification(table: Table, axes: tuple[str, ...], tests: tuple[str, ...]) 
         load=table.text("load", "") or None,
         rate=table.number("rate", 0.0) or None,
     )
+    table.done()
     if wanted.low > wanted.high or (wanted.low, wanted.high) == (-math.inf, math.inf):
         raise ArgumentError(
             f"{table.where}min = {wanted.low:g} and max = {wanted.high:g} limit nothing; "
             "give min, max or both, min first"
         )
-    table.done()
     return wanted
 
 

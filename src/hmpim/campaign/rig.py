@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Protocol, cast, get_args
 import numpy as np
 
 from hmpim.campaign.plan import AxisWish, Plan
-from hmpim.errors import ArgumentError, HmpimError, RigError
+from hmpim.errors import ArgumentError, HmpimError, LimitsError, RigError
 from hmpim.experiment import run
 from hmpim.experiment.run import check_limits
 from hmpim.record import Record
@@ -116,8 +116,14 @@ def _imported(entry: str, folder: str) -> Player:
 
 
 def _wished(limits: Limits, wish: AxisWish) -> Limits:
-    travel = limits.position if wish.travel is None else wish.travel
-    return replace(limits, position=min(limits.position, travel))
+    if wish.travel is None:
+        return limits
+    if wish.travel > limits.position:
+        raise LimitsError(
+            f"travel = {wish.travel:g} {limits.unit} is more than the {limits.position:g} "
+            f"{limits.unit} that {wish.name} has; ask for less"
+        )
+    return replace(limits, position=wish.travel)
 
 
 def _own(wish: AxisWish) -> Limits:

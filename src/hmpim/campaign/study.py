@@ -24,6 +24,7 @@ __all__ = [
 
 SCHEMA = "hmpim/study/1"
 _APART = 3.0  # standard deviations, beyond which two readings count as different
+_ROUNDING = 1e-9  # share of a reading: a step of the encoder is known to the last digit or two
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -242,8 +243,8 @@ def _changes(rows: Sequence[Row], earlier: Path) -> tuple[Change, ...]:
             then = reading_of(before.get((row.case_id, row.axis), {}).get(quantity))
             if then is None:
                 continue
-            spread = math.hypot(now.std, then.std)
-            differs = abs(now.value - then.value) > _APART * spread
+            spread = _APART * math.hypot(now.std, then.std)
+            differs = abs(now.value - then.value) > max(spread, _ROUNDING * abs(then.value))
             changes.append(
                 Change(
                     case_id=row.case_id,

@@ -58,6 +58,10 @@ def campaign(
     if plan is None:
         raise ArgumentError("PLAN.toml is missing; 'hmpim campaign --example' prints one")
     path = Path(plan)
+    if plan not in PLANS and not path.exists():
+        raise ArgumentError(
+            f"there is no plan {plan}; give a file, or one that ships: {', '.join(PLANS)}"
+        )
     wanted = read_plan(shipped_plan(plan) if plan in PLANS and not path.exists() else path)
 
     from hmpim.campaign.run import run_campaign

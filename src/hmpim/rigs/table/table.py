@@ -242,7 +242,8 @@ class MotionTable:
         UnitError
             If a stimulus is in no unit of angle.
         ArgumentError
-            If an axis is not known, or the stimuli differ in rate.
+            If an axis is not known, the stimuli differ in rate, or the controller's rate is no
+            multiple of theirs.
 
         Examples
         --------
@@ -253,6 +254,7 @@ class MotionTable:
         hmpim.errors.LimitsError: peak acceleration 3197.75 deg/s² is beyond the limit ...
         """
         named = by_axis(stimuli)
+        self.timing(command_rate(named))
         samples = max(stimulus.samples for stimulus in named.values())
         for axis, stimulus in named.items():
             check_axis(stimulus, self.limits_of(axis), axis=axis, samples=samples)
