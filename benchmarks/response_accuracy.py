@@ -25,8 +25,8 @@ from pathlib import Path
 import numpy as np
 from scipy import signal
 
-from hmpim.identify.local import local_polynomial_response, local_response
-from hmpim.identify.neighbours import transform
+from hmpim.identify.frf.local import local_polynomial_response, local_response
+from hmpim.identify.frf.neighbours import transform
 
 FS, BAND, DELAY, NATURAL, DAMPING, BIAS, NOISE = 200.0, (0.1, 20.0), 0.15, 10.0, 0.4, 0.6, 0.1
 FINE = 32

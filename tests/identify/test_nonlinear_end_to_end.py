@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import hmpim
-from hmpim.identify.mechanisms import play, rate_limited
+from hmpim.identify.nonlinear.mechanisms import play, rate_limited
 
 FS, SUBSTEPS, DELAY = 200.0, 16, 0.03
 T = np.arange(2000) / FS
@@ -152,7 +152,9 @@ def test_one_of_several_inputs_that_is_bent_is_told_by_its_harmonics():
 
 def test_a_long_record_is_looked_at_in_blocks(monkeypatch):
     whole = identified(motion("friction", 0.02))["y", "u"].nonlinearity
-    monkeypatch.setattr(importlib.import_module("hmpim.identify.nonlinearity"), "_LONGEST", 1000)
+    monkeypatch.setattr(
+        importlib.import_module("hmpim.identify.nonlinear.nonlinearity"), "_LONGEST", 1000
+    )
     halved = identified(motion("friction", 0.02))["y", "u"].nonlinearity
     assert halved.kinds == whole.kinds
     assert halved.size.value == pytest.approx(whole.size.value, rel=0.1)

@@ -5,7 +5,7 @@ import pytest
 from scipy import signal
 
 import hmpim
-from hmpim.identify.joint import joint_fit
+from hmpim.identify.fitting.joint import joint_fit
 from hmpim.model import STRUCTURES, coefficients_of, denominator_of, theta_of
 
 FS, DURATION, FINE = 500.0, 10.0, 8

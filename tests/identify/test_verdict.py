@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hmpim.identify.joint import Trial, joint_fit
+from hmpim.identify.fitting.joint import Trial, joint_fit
 from hmpim.identify.readings import read_parameters
 from hmpim.identify.verdict import judge
 from hmpim.identify.whiteness import misfit

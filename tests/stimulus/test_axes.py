@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from hmpim.errors import ArgumentError, LimitsError
-from hmpim.identify.multivariable import response_matrix
+from hmpim.identify.frf.multivariable import response_matrix
 from hmpim.rigs import Sensor
 from hmpim.stimulus import Limits, Sweep, design
 from hmpim.stimulus.axes import (

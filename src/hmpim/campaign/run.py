@@ -15,7 +15,7 @@ from hmpim.campaign.plan import Plan
 from hmpim.campaign.rig import CampaignRig, Player, make_rig
 from hmpim.errors import ArgumentError, FormatError
 from hmpim.identify import identify
-from hmpim.identify.multivariable import response_matrix
+from hmpim.identify.frf.multivariable import response_matrix
 from hmpim.identify.spectrum import decibel, spectrum
 from hmpim.record import Record
 from hmpim.report.files import replacing

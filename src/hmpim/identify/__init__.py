@@ -1,9 +1,11 @@
 """Identification: from a record to every parameter, each with its error bar (paper, section IV)."""
 
-from hmpim.identify.averaged import Averaged, averaged_response, coherence_significance
+from hmpim.identify.coupling.inputs import Alike, InputSet, OutputCoherence
+from hmpim.identify.frf.averaged import Averaged, averaged_response, coherence_significance
+from hmpim.identify.frf.local import local_polynomial_response, local_response
+from hmpim.identify.frf.multivariable import ResponseMatrix, response_matrix
 from hmpim.identify.gain_phase import GainPhase, gain_and_phase
 from hmpim.identify.identify import identify
-from hmpim.identify.inputs import Alike, InputSet, OutputCoherence
 from hmpim.identify.levels import (
     Level,
     LevelComparison,
@@ -12,8 +14,6 @@ from hmpim.identify.levels import (
     compare_levels,
     identify_levels,
 )
-from hmpim.identify.local import local_polynomial_response, local_response
-from hmpim.identify.multivariable import ResponseMatrix, response_matrix
 from hmpim.identify.paper import PaperAnalysis, paper_analysis
 from hmpim.identify.predict import Prediction, predict, to_model
 from hmpim.identify.repeats import (

@@ -8,16 +8,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hmpim.errors import ArgumentError, RecordError
-from hmpim.identify.coupled import inputs_of, responses_of, settled, unrelated
-from hmpim.identify.drift import Drifting, with_drift
-from hmpim.identify.enrich import PLAIN
-from hmpim.identify.imperfections import Imperfections, count_levels, find_imperfections
-from hmpim.identify.inputs import InputSet, OutputCoherence
-from hmpim.identify.joint import JointFit
-from hmpim.identify.lost import stands_out
+from hmpim.identify.coupling.coupled import inputs_of, responses_of, settled, unrelated
+from hmpim.identify.coupling.inputs import InputSet, OutputCoherence
+from hmpim.identify.coupling.several import Joined, fit_together
+from hmpim.identify.effects.drift import Drifting, with_drift
+from hmpim.identify.effects.imperfections import Imperfections, count_levels, find_imperfections
+from hmpim.identify.effects.lost import stands_out
+from hmpim.identify.fitting.enrich import PLAIN
+from hmpim.identify.fitting.joint import JointFit
 from hmpim.identify.pair import described, untold
 from hmpim.identify.result import Identification, PairIdentification, RecordSummary
-from hmpim.identify.several import Joined, fit_together
 from hmpim.identify.threads import one_thread
 from hmpim.identify.verdict import is_unrelated
 from hmpim.identify.whiteness import is_white

@@ -4,15 +4,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hmpim.identify.bandwidth import disagreement, response_bandwidths
-from hmpim.identify.coupled import Responses
-from hmpim.identify.drift import Drifting, drift_finding
-from hmpim.identify.fit import Fit
-from hmpim.identify.imperfections import Imperfections, refine, with_imperfections
-from hmpim.identify.joint import JointFit
-from hmpim.identify.local import local_response
-from hmpim.identify.nonlinearity import inspect_nonlinearity
+from hmpim.identify.coupling.coupled import Responses
+from hmpim.identify.coupling.several import Joined
+from hmpim.identify.effects.drift import Drifting, drift_finding
+from hmpim.identify.effects.imperfections import Imperfections, refine, with_imperfections
+from hmpim.identify.fitting.fit import Fit
+from hmpim.identify.fitting.joint import JointFit
+from hmpim.identify.fitting.plainer import plainer, taking
+from hmpim.identify.frf.local import local_response
+from hmpim.identify.nonlinear.nonlinearity import inspect_nonlinearity
 from hmpim.identify.paper import paper_estimates
-from hmpim.identify.plainer import plainer, taking
 from hmpim.identify.readings import read_parameters
 from hmpim.identify.remarks import remarks
 from hmpim.identify.result import (
@@ -22,7 +23,6 @@ from hmpim.identify.result import (
     PaperEstimates,
     Parameters,
 )
-from hmpim.identify.several import Joined
 from hmpim.identify.spectrum import excited_band
 from hmpim.identify.uncertainty import estimate, noise_estimate
 from hmpim.identify.verdict import judge

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from hmpim.identify.fit import jacobian
-from hmpim.identify.halves import Halves, compare_halves
-from hmpim.identify.joint import JointFit
-from hmpim.identify.nested import second_pole_limit, widened
+from hmpim.identify.fitting.fit import jacobian
+from hmpim.identify.fitting.halves import Halves, compare_halves
+from hmpim.identify.fitting.joint import JointFit
+from hmpim.identify.fitting.nested import second_pole_limit, widened
 from hmpim.identify.result import Estimate, Parameters
 from hmpim.identify.uncertainty import covariance, estimate, gradient, noise_estimate
 from hmpim.identify.whiteness import is_white
@@ -96,7 +96,7 @@ def read_parameters(
     Parameters
     ----------
     joint : JointFit
-        From `hmpim.identify.joint.joint_fit`.
+        From `hmpim.identify.fitting.joint.joint_fit`.
     fs : float
         Rate in Hz.
     highest : float

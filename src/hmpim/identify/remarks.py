@@ -3,8 +3,8 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from hmpim.identify.colour import noise_colour
-from hmpim.identify.input_noise import input_noise
+from hmpim.identify.effects.colour import noise_colour
+from hmpim.identify.effects.input_noise import input_noise
 from hmpim.record import Finding
 
 __all__ = ["remarks"]

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hmpim.errors import FormatError, RecordError
-from hmpim.identify.inputs import InputSet
+from hmpim.identify.coupling.inputs import InputSet
 from hmpim.record import Finding, Intersample, Record
 
 __all__ = [

@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hmpim.identify.enrich import PLAIN
-from hmpim.identify.joint import CLEARLY, JointFit
+from hmpim.identify.fitting.enrich import PLAIN
+from hmpim.identify.fitting.joint import CLEARLY, JointFit
 from hmpim.identify.readings import Readings, system_of
 from hmpim.identify.result import Estimate, Verdict
 from hmpim.identify.whiteness import Misfit, innovation_gain

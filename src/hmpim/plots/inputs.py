@@ -38,7 +38,7 @@ def inputs_plot(inputs: "InputSet") -> "Figure":
 
     Examples
     --------
-    >>> from hmpim.identify.inputs import input_set
+    >>> from hmpim.identify.coupling.inputs import input_set
     >>> t = np.arange(2000) / 200
     >>> up = np.sin(2 * np.pi * (0.1 * t + t**2))
     >>> figure = inputs_plot(input_set([up, up[::-1]], ["a", "b"], 200.0))

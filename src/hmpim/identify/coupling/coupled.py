@@ -1,0 +1,332 @@
+"""Several inputs at once: which can be told apart, the response to each, and what is weak."""
+
+from dataclasses import dataclass, fields, replace
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hmpim.errors import RecordError
+from hmpim.identify.coupling.couplings import unsettled
+from hmpim.identify.coupling.inputs import Alike, InputSet, OutputCoherence, input_set
+from hmpim.identify.coupling.several import Joined
+from hmpim.identify.frf.multivariable import ResponseMatrix, response_matrix
+from hmpim.identify.result import (
+    Estimate,
+    FrequencyResponse,
+    PairIdentification,
+    Parameters,
+)
+from hmpim.identify.uncertainty import estimate
+from hmpim.record import Aligned, Finding, Record, Signal
+
+__all__ = ["Responses", "inputs_of", "responses_of", "settled", "unrelated"]
+
+_ONE = 0.9
+"""Share of the frequencies they excite at which inputs that are alike count as one."""
+
+_NEVER_APART = 0.05
+"""Share of all frequencies below which inputs count as one, whichever they are."""
+
+_MENTIONED, _DOUBTED = 0.1, 0.5
+"""Shares of an input's band in which it is not told from others: for a word, for a doubt."""
+
+_KNOWN = 0.5
+"""Relative standard deviation beyond which a weak coupling's parameter is not told."""
+
+_KNOWN_LAG = 0.33
+"""Likewise for a time constant, which is never below 0: told only when large, it would be so."""
+
+_LARGEST_DB = 6.0
+"""Standard deviation of a peak, in dB, beyond which it is not told."""
+
+_UPPER = 1.2
+"""Standard deviations of |error| that a bound adds: 95 % where the gain is well seen, more else."""
+
+_SEEN, _SEEN_SHARE = 4.0, 0.2
+"""Standard deviations, and share of the frequencies, at which a response shows a coupling."""
+
+_MANY = 1e6
+
+Real = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Responses:
+    """Response of one output to each input, and how much of it all inputs explain.
+
+    Parameters
+    ----------
+    columns : tuple of FrequencyResponse
+        One for each input, at the frequencies that it excites and is told apart; `coherence`
+        is the partial one.
+    coherence : OutputCoherence
+        The multiple one.
+    """
+
+    columns: tuple[FrequencyResponse, ...]
+    coherence: OutputCoherence
+
+
+def inputs_of(aligned: Aligned, record: Record) -> InputSet:
+    """Look at all inputs; those that cannot be told apart are named and refused.
+
+    Raises
+    ------
+    RecordError
+        If inputs are the same, or pass every frequency alike.
+    """
+    found = input_set(
+        [s.values for s in aligned.inputs],
+        [s.name for s in aligned.inputs],
+        aligned.fs,
+        stated=record.band,
+    )
+    apart = float(np.mean(found.usable))
+    for group in found.alike:
+        if group.share >= _ONE or (apart < _NEVER_APART and group is found.alike[0]):
+            raise RecordError(
+                f"inputs {', '.join(group.names)} cannot be told apart: over "
+                f"{100 * group.share:.0f} % of the frequencies they excite, one of them is a copy "
+                "of the others, scaled or filtered, or their sum. Drive them one at a time, or "
+                "with sweeps that pass each frequency at different times"
+            )
+    return found
+
+
+def responses_of(aligned: Aligned, output: Signal, joined: Joined, inputs: InputSet) -> Responses:
+    """Response of one output to all inputs, each in its own band.
+
+    The band is cut where an input's own begins or ends; what an input beyond its band still
+    moves is taken out by its model.
+    """
+    # One delay for all inputs: moving them against each other would make them look different.
+    kept = [fit for fit, told in zip(joined.fits, joined.related, strict=True) if told]
+    strongest = min(kept or joined.fits, key=lambda fit: fit.best.fit.cost).best.fit
+    delay = min(max(strongest.delay, 0.0), 0.4 * aligned.samples) / aligned.fs
+    parts = [fit.best.fit.prediction - fit.best.fit.linear[-1] for fit in joined.fits]
+    y, told = output.values, np.asarray(output.valid)
+    edges = sorted({edge for band in inputs.bands for edge in band})
+    pieces: list[tuple[list[int], ResponseMatrix]] = []
+    for low, high in pairwise(edges):
+        active = [j for j, band in enumerate(inputs.bands) if band[0] <= low and band[1] >= high]
+        bins = (high - low) * aligned.samples / aligned.fs
+        if not active or bins < 8 * (len(active) + 1) + 2:
+            continue
+        rest = y
+        modelled = joined.prediction
+        for j, part in enumerate(parts):
+            if j not in active and joined.related[j]:
+                rest, modelled = rest - part, modelled - part
+        pieces.append(
+            (
+                active,
+                response_matrix(
+                    np.stack([aligned.inputs[j].values for j in active]),
+                    rest[None, :],
+                    aligned.fs,
+                    delays=[[delay]],
+                    band=(low, high),
+                    valid=None if told.all() else told,
+                    fill=modelled[None, :],
+                    points=200,
+                    names=[*(aligned.inputs[j].name for j in active), output.name],
+                ),
+            )
+        )
+    return Responses(
+        columns=tuple(_column(pieces, j) for j in range(len(aligned.inputs))),
+        coherence=OutputCoherence(
+            output=output.name,
+            frequency=_joined_up([m.frequency for _, m in pieces]),
+            multiple=_joined_up([m.multiple_coherence[:, 0] for _, m in pieces]),
+        ),
+    )
+
+
+def _joined_up(arrays: list[Real]) -> Real:
+    return np.concatenate(arrays) if arrays else np.zeros(0)
+
+
+def _column(pieces: list[tuple[list[int], ResponseMatrix]], j: int) -> FrequencyResponse:
+    """One input's response at the frequencies where the inputs can be told apart."""
+    own = [(m, active.index(j), m.usable) for active, m in pieces if j in active]
+    response = [m.response[told, 0, k] for m, k, told in own]
+    return FrequencyResponse(
+        frequency=_joined_up([m.frequency[told] for m, _, told in own]),
+        response=np.concatenate(response) if response else np.zeros(0, dtype=np.complex128),
+        std=_joined_up([m.std[told, 0, k] for m, k, told in own]),
+        coherence=_joined_up([m.partial_coherence[told, 0, k] for m, k, told in own]),
+    )
+
+
+def unrelated(output: str, source: str, response: FrequencyResponse) -> Finding:
+    """Sentence on an output that no structure follows from one of several inputs.
+
+    Either the response shows a coupling all the same, such as an inertia's, which is nothing at
+    DC; or there is none, and what it would be at most.
+    """
+    seen = np.abs(response.response) > _SEEN * response.std
+    if response.frequency.size and np.mean(seen) > _SEEN_SHARE:
+        k = int(np.argmax(np.where(seen, np.abs(response.response), 0.0)))
+        level = 20 * float(np.log10(np.abs(response.response[k])))
+        return Finding(
+            code="weak_coupling",
+            message=f"Output {output!r} follows input {source!r} weakly, by {level:.0f} dB at most "
+            f"(at {response.frequency[k]:.3g} Hz), in a shape that no simple structure describes. "
+            "Read it off the frequency response.",
+        )
+    bound = _bound(response)
+    what = "but nowhere is it told from the other inputs"
+    if bound is not None:
+        level, low, high = bound
+        what = (
+            f"and from {low:.3g} to {high:.3g} Hz any coupling is below {level:.0f} dB "
+            "(95 %, at nine in ten frequencies)"
+        )
+    return Finding(
+        code="unrelated",
+        message=f"Output {output!r} does not follow input {source!r}, {what}. "
+        "Check the channels if it should, or excite it more.",
+    )
+
+
+def _bound(response: FrequencyResponse) -> tuple[float, float, float] | None:
+    """Bound in dB and the band that it holds for, Hz."""
+    if response.frequency.size == 0:
+        return None
+    upper = np.abs(response.response) + _UPPER * response.std
+    level = 20 * float(np.log10(max(float(np.quantile(upper, 0.9)), 1e-300)))
+    return level, float(response.frequency[0]), float(response.frequency[-1])
+
+
+def settled(
+    pair: PairIdentification, joined: Joined, i: int, inputs: InputSet, fs: float
+) -> PairIdentification:
+    """Say only what the record tells: of weak couplings, and of inputs that are alike."""
+    parameters = pair.parameters
+    untold: list[str] = []
+    if not joined.strong[i]:
+        lag = joined.lags[i]
+        late, gain = unsettled(joined.fits[i])
+        parameters = replace(
+            parameters,
+            delay=_widened(parameters.delay, late / fs**2),
+            scale_factor=_widened(parameters.scale_factor, gain),
+        )
+        if lag is not None:
+            parameters = replace(
+                parameters,
+                delay=estimate(
+                    lag.delay / fs, (lag.delay_std**2 + late) / fs**2, freedom=_MANY, unit="s"
+                ),
+                time_constant=estimate(
+                    lag.time_constant / fs,
+                    (lag.time_constant_std / fs) ** 2,
+                    freedom=_MANY,
+                    unit="s",
+                )
+                if pair.structure == "first_order"
+                else None,
+            )
+        parameters, untold = _told(parameters, inputs.bands[i])
+    parameters = _finite(parameters)
+    findings, verdict = list(pair.warnings), pair.verdict
+    if untold:
+        bound = _bound(pair.frequency_response)
+        most = "" if bound is None else f" It is below {bound[0]:.0f} dB (95 %)."
+        findings.append(
+            Finding(
+                code="weak_coupling",
+                message=f"The coupling from {pair.input!r} to {pair.output!r} is too weak here, or "
+                f"outside what {pair.input!r} excites, to tell its {', '.join(untold)}.{most} "
+                "Excite it more, or alone.",
+            )
+        )
+        verdict = "doubtful" if verdict == "ok" else verdict
+    for group in inputs.alike:
+        if pair.input in group.names and group.share >= _MENTIONED:
+            findings.append(_coupled(group))
+            others = [inputs.names.index(name) for name in group.names if name != pair.input]
+            # A coupling too weak to be seen may have been taken for this one.
+            hidden = not joined.strong[i] and not all(joined.related[j] for j in others)
+            if (group.share >= _DOUBTED or hidden) and verdict == "ok":
+                verdict = "doubtful"
+    return replace(pair, parameters=parameters, warnings=tuple(findings), verdict=verdict)
+
+
+def _widened(known: Estimate | None, variance: float) -> Estimate | None:
+    if known is None or variance == 0.0:
+        return known
+    return estimate(known.value, known.std**2 + variance, freedom=_MANY, unit=known.unit)
+
+
+def _coupled(group: Alike) -> Finding:
+    return Finding(
+        code="coupled_inputs",
+        message=f"Inputs {', '.join(group.names)} cannot be told apart at {group.where} "
+        f"({100 * group.share:.0f} % of the frequencies they excite): there the error bars rest "
+        "on the models alone. Drive them with sweeps that pass each frequency at different times.",
+    )
+
+
+_WORDS = {
+    "scale_factor": "scale factor",
+    "delay": "delay",
+    "natural_frequency": "natural frequency",
+    "damping_ratio": "damping ratio",
+    "time_constant": "time constant",
+    "bandwidth_phase90": "-90° bandwidth",
+    "bandwidth_phase90_without_delay": "-90° bandwidth without delay",
+    "bandwidth_3db": "-3 dB bandwidth",
+    "peak_gain_db": "peak gain",
+}
+
+
+def _told(p: Parameters, band: tuple[float, float]) -> tuple[Parameters, list[str]]:
+    """Parameters that a weak coupling's record tells, and the words for the others."""
+
+    def loose(e: Estimate) -> bool:
+        return not e.std <= _KNOWN * abs(e.value)
+
+    def beyond(e: Estimate) -> bool:
+        return loose(e) or not band[0] <= e.value <= 1.2 * band[1]
+
+    def late(e: Estimate) -> bool:
+        return not e.std <= 0.5 / band[1]
+
+    gone: set[str] = set()
+    for name, bad in (
+        ("scale_factor", loose),
+        ("time_constant", lambda e: not e.std <= _KNOWN_LAG * abs(e.value)),
+        ("damping_ratio", loose),
+        ("natural_frequency", beyond),
+        ("bandwidth_phase90", beyond),
+        ("bandwidth_phase90_without_delay", beyond),
+        ("bandwidth_3db", beyond),
+        ("peak_gain_db", lambda e: not e.std <= _LARGEST_DB),
+        ("delay", late),
+        ("delay_low_frequency", late),
+    ):
+        value: Estimate | None = getattr(p, name)
+        if value is not None and bad(value):
+            gone.add(name)
+    if "natural_frequency" in gone:
+        gone |= {"damping_ratio", "peak_gain_db"}
+    if "scale_factor" in gone:
+        gone |= set(_WORDS) | {"delay_low_frequency", "delay_correlation"}
+    present = [n for n in gone if getattr(p, n) is not None]
+    return (
+        replace(p, **dict.fromkeys(gone, None)),
+        [words for name, words in _WORDS.items() if name in present],
+    )
+
+
+def _finite(p: Parameters) -> Parameters:
+    """The same without estimates whose error is no number."""
+    bad = [
+        f.name
+        for f in fields(p)
+        if (e := getattr(p, f.name)) is not None and not np.isfinite(e.std)
+    ]
+    return replace(p, **dict.fromkeys(bad, None))

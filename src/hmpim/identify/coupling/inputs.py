@@ -1,0 +1,321 @@
+"""The inputs of a simultaneous test by themselves: whether one record tells them apart.
+
+Around each frequency every input has a polynomial of neighbouring bins to itself, as in
+`hmpim.identify.frf.multivariable`. Where those of two inputs span the same, nothing tells which of
+them an output follows: one of them is a copy of the other, scaled, filtered, or passing that
+frequency at the same time and speed. The direction in which the least is known names them.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import groupby
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import fft
+
+from hmpim.identify.frf.neighbours import centres_in_band, mirrored, windows_around
+from hmpim.identify.spectrum import excited_band
+
+__all__ = ["Alike", "InputSet", "OutputCoherence", "input_set", "own_band"]
+
+BOUND = 10.0
+"""Condition number up to which inputs count as told apart."""
+
+_POINTS = 240
+_TERMS = 3
+_INVOLVED = 0.3
+"""Share, of the greatest, from which an input has part in a direction that is not told."""
+
+_SINGULAR = 1e6
+"""Condition beyond which it is rounding, and infinite."""
+
+_DEEP = 10 ** (-50 / 20)
+"""Level, relative to the highest, down to which an input still tells something."""
+
+Real = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Alike:
+    """Inputs that are not told apart, and where.
+
+    Parameters
+    ----------
+    names : tuple of str
+        Of the inputs.
+    bands : tuple of (float, float)
+        Hz.
+    share : float
+        Of the frequencies that all of them excite.
+    """
+
+    names: tuple[str, ...]
+    bands: tuple[tuple[float, float], ...]
+    share: float
+
+    @property
+    def where(self) -> str:
+        """The bands in words."""
+        spans = [f"{low:.3g} to {high:.3g}" for low, high in self.bands]
+        return ", ".join(spans[:4]) + (" and further" if len(spans) > 4 else "") + " Hz"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class OutputCoherence:
+    """Share of an output that all inputs together explain, over frequency.
+
+    Parameters
+    ----------
+    output : str
+        Name.
+    frequency, multiple : ndarray, shape (f,)
+        Hz, and the multiple coherence, 0 to 1, the number of coefficients taken off. That of
+        one input, what it explains of what the others leave over, stands with each pair's
+        frequency response.
+    """
+
+    output: str
+    frequency: Real
+    multiple: Real
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class InputSet:
+    """Several inputs driven at once, and how well one record tells them apart.
+
+    Parameters
+    ----------
+    names : tuple of str
+        Of the inputs.
+    bands : tuple of (float, float)
+        What each one excites, Hz.
+    frequency : ndarray, shape (f,)
+        Hz.
+    condition : ndarray, shape (f,)
+        Condition number of the errors of the responses, of those inputs that excite the
+        frequency; each counts with its own power. 1 for inputs that have nothing in common.
+    alike : tuple of Alike
+        Inputs that are not told apart, and where.
+    coherence : tuple of OutputCoherence
+        One for each output.
+    """
+
+    names: tuple[str, ...]
+    bands: tuple[tuple[float, float], ...]
+    frequency: Real
+    condition: Real
+    alike: tuple[Alike, ...] = ()
+    coherence: tuple[OutputCoherence, ...] = ()
+
+    @property
+    def usable(self) -> NDArray[np.bool_]:
+        """Where the inputs are told apart: condition at most 10, shape (f,)."""
+        return np.asarray(self.condition <= BOUND)
+
+    def alike_bins(
+        self, samples: int, fs: float
+    ) -> tuple[tuple[frozenset[int], NDArray[np.bool_]], ...]:
+        """Inputs that are not told apart, and which bins of a transform of `samples` that is."""
+        frequency = np.arange(samples // 2 + 1) * (fs / samples)
+        found = []
+        for group in self.alike:
+            inside = np.zeros(frequency.size, dtype=bool)
+            for low, high in group.bands:
+                inside |= (frequency >= low) & (frequency <= high)
+            found.append((frozenset(self.names.index(name) for name in group.names), inside))
+        return tuple(found)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return plain JSON values; an infinite condition is null."""
+        return {
+            "names": list(self.names),
+            "bands": [list(band) for band in self.bands],
+            "frequency": self.frequency.tolist(),
+            "condition": [c if np.isfinite(c) else None for c in self.condition.tolist()],
+            "alike": [
+                {"names": list(a.names), "bands": [list(b) for b in a.bands], "share": a.share}
+                for a in self.alike
+            ],
+            "coherence": [
+                {
+                    "output": c.output,
+                    "frequency": c.frequency.tolist(),
+                    "multiple": c.multiple.tolist(),
+                }
+                for c in self.coherence
+            ],
+        }
+
+    @classmethod
+    def from_dict(cls, data: Mapping[str, Any]) -> "InputSet":
+        """Read back what `to_dict` wrote."""
+        return cls(
+            names=tuple(data["names"]),
+            bands=tuple((low, high) for low, high in data["bands"]),
+            frequency=np.asarray(data["frequency"], dtype=float),
+            condition=np.array([np.inf if c is None else c for c in data["condition"]]),
+            alike=tuple(
+                Alike(
+                    names=tuple(a["names"]),
+                    bands=tuple((low, high) for low, high in a["bands"]),
+                    share=a["share"],
+                )
+                for a in data["alike"]
+            ),
+            coherence=tuple(
+                OutputCoherence(
+                    output=c["output"],
+                    frequency=np.asarray(c["frequency"], dtype=float),
+                    multiple=np.asarray(c["multiple"], dtype=float),
+                )
+                for c in data["coherence"]
+            ),
+        )
+
+
+def own_band(u: Real, fs: float, stated: tuple[float, float] | None) -> tuple[float, float]:
+    """Band that one of several inputs excites, in Hz.
+
+    A band that is stated for the record holds for all inputs together; of it counts what this
+    input reaches with a thousandth of its power or so (50 dB down).
+
+    Parameters
+    ----------
+    u : ndarray, shape (n,)
+        The input.
+    fs : float
+        Hz.
+    stated : tuple of float or None
+        Band stated for the record.
+
+    Examples
+    --------
+    >>> t = np.arange(2000) / 200
+    >>> slow = np.sin(2 * np.pi * (0.5 * t + 0.4 * t**2)) * np.hanning(2000)
+    >>> low, high = own_band(slow, 200.0, (0.1, 60.0))
+    >>> 8.0 < high < 12.0
+    True
+    """
+    low, high = excited_band(u, fs)
+    if stated is None:
+        return low, high
+    power = np.abs(fft.rfft(u - u.mean())) ** 2
+    level = np.sqrt(np.convolve(power, np.ones(5) / 5, mode="same"))
+    reached = np.flatnonzero(level >= _DEEP * level.max())
+    high = max(high, float(reached[-1]) * fs / u.size)
+    return max(low, stated[0]), max(min(high, stated[1]), 2 * max(low, stated[0]))
+
+
+def input_set(
+    inputs: Sequence[Real],
+    names: Sequence[str],
+    fs: float,
+    *,
+    stated: tuple[float, float] | None = None,
+) -> InputSet:
+    """Look at which inputs one record tells apart, and where.
+
+    Parameters
+    ----------
+    inputs : sequence of ndarray, shape (n,)
+        On one clock; each one moves.
+    names : sequence of str
+        One for each.
+    fs : float
+        Hz.
+    stated : tuple of float or None
+        Band stated for the record, Hz.
+
+    Examples
+    --------
+    >>> t = np.arange(2000) / 200
+    >>> up = np.sin(2 * np.pi * (0.1 * t + t**2))
+    >>> found = input_set([up, up[::-1], -2 * up], ["a", "b", "c"], 200.0)
+    >>> found.alike[0].names, round(found.alike[0].share, 1)
+    (('a', 'c'), 1.0)
+    """
+    bands = tuple(own_band(u, fs, stated) for u in inputs)
+    size = inputs[0].size
+    step = fs / size
+    spectra = [np.array(fft.rfft(u - u.mean()))[: (size - 1) // 2 + 1] for u in inputs]
+    low = max(round(min(b[0] for b in bands) / step), 1)
+    high = min(round(max(b[1] for b in bands) / step), spectra[0].size - 1)
+    centre = centres_in_band(low, max(high, low + 1), _POINTS)
+    frequency: Real = centre.astype(np.float64) * step
+    active = np.array([(frequency >= b[0]) & (frequency <= b[1]) for b in bands])
+    condition = np.ones(centre.size)
+    involved: list[tuple[str, ...]] = [()] * centre.size
+    for _, run in groupby(range(centre.size), key=lambda k: active[:, k].tobytes()):
+        some = np.array(list(run))
+        which = np.flatnonzero(active[:, some[0]])
+        if which.size < 2:
+            continue
+        condition[some], shares = _conditions([spectra[j] for j in which], centre[some])
+        for k, share in zip(some, shares, strict=True):
+            if condition[k] > BOUND:
+                involved[k] = tuple(names[j] for j in which[share > _INVOLVED * share.max()])
+    return InputSet(
+        names=tuple(names),
+        bands=bands,
+        frequency=frequency,
+        condition=condition,
+        alike=_alike(involved, frequency, active, tuple(names)),
+    )
+
+
+def _conditions(
+    spectra: Sequence[NDArray[np.complex128]], centre: NDArray[np.int64]
+) -> tuple[Real, Real]:
+    """Condition at each centre, (c,), and each input's share of the worst direction, (c, m)."""
+    m = len(spectra)
+    reach = max(int(centre[-1] - centre[0] + 1) // 8, 4 * (m + 1))
+    reach = min(reach, spectra[0].size - 1)
+    windows = windows_around(centre, spectra[0].size, reach)
+    block = np.stack([windows.view(mirrored(row, reach), reach) for row in spectra], axis=2)
+    powers = windows.powers(_TERMS - 1)
+    design = (block[:, :, :, None] * powers[:, None, :]).reshape(*block.shape[:2], -1)
+    size = np.sqrt(np.maximum(np.sum(np.abs(design) ** 2, axis=1, keepdims=True), 1e-300))
+    unit = (design / size)[windows.near]
+    place = windows.x[windows.place][:, None] ** np.arange(_TERMS)
+    slope = np.zeros((centre.size, m, m * _TERMS))
+    for j in range(m):
+        slope[:, j, j * _TERMS : (j + 1) * _TERMS] = place
+    slope = slope / size[windows.near]
+    # Errors of the responses at the centre, all together and each input by itself.
+    _, values, right = np.linalg.svd(unit, full_matrices=False)
+    least = np.maximum(values, 1e-12 * values[:, :1])
+    mapped = slope @ np.conj(right.swapaxes(1, 2)) / least[:, None, :]
+    alone = np.empty((centre.size, m))
+    for j in range(m):
+        own = slice(j * _TERMS, (j + 1) * _TERMS)
+        gram = np.conj(unit[:, :, own].swapaxes(1, 2)) @ unit[:, :, own]
+        gram = gram + 1e-12 * np.eye(_TERMS)
+        rows = slope[:, j, own]
+        solved = np.linalg.solve(gram, rows[:, :, None])[:, :, 0]
+        alone[:, j] = np.sqrt(np.maximum(np.sum(rows * solved, axis=1).real, 1e-300))
+    left, spread, _ = np.linalg.svd(mapped / alone[:, :, None], full_matrices=False)
+    condition = spread[:, 0] / np.maximum(spread[:, -1], 1e-300)
+    return np.where(condition > _SINGULAR, np.inf, condition), np.abs(left[:, :, 0])
+
+
+def _alike(
+    involved: Sequence[tuple[str, ...]],
+    frequency: Real,
+    active: NDArray[np.bool_],
+    names: tuple[str, ...],
+) -> tuple[Alike, ...]:
+    """Gather the frequencies at which the same inputs are not told apart."""
+    found = []
+    for group in sorted({g for g in involved if g}, key=lambda g: -list(involved).count(g)):
+        here = np.array([g == group for g in involved])
+        common = np.all(active[[names.index(n) for n in group]], axis=0)
+        spans: list[tuple[float, float]] = []
+        for held, run in groupby(range(here.size), key=lambda k: bool(here[k])):
+            if held:
+                some = list(run)
+                spans.append((float(frequency[some[0]]), float(frequency[some[-1]])))
+        share = float(np.sum(here) / max(int(np.sum(common)), 1))
+        found.append(Alike(names=group, bands=tuple(spans), share=share))
+    return tuple(found)

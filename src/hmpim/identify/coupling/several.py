@@ -1,0 +1,409 @@
+"""One output, several inputs at once: each pair's fit with the others taken out.
+
+The inputs that move the output most are fitted as if alone, each to what the others leave over;
+what is weak beside them (`hmpim.identify.coupling.couplings`) follows, with the noise whitened.
+Then all pairs are fitted in turn until nothing moves (backfitting: Hastie, Tibshirani and
+Friedman, The Elements of Statistical Learning, 2nd ed., section 9.1.1; for least squares it ends
+at the joint optimum). The error bars come from all pairs' derivatives together, so that inputs
+that resemble each other widen them.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.fft import irfft, next_fast_len, rfft
+
+from hmpim.identify.coupling.couplings import FOLLOWS, coupling_fit, whitening_of
+from hmpim.identify.coupling.jointly import gained_by, joint_covariance, refined_together
+from hmpim.identify.coupling.lag import Lag, lag_of
+from hmpim.identify.fitting.enrich import PLAIN
+from hmpim.identify.fitting.fit import Fit, Problem, fit_structure, jacobian
+from hmpim.identify.fitting.joint import JointFit, joint_fit
+from hmpim.identify.verdict import is_unrelated
+from hmpim.identify.whiteness import effective_share, is_white
+from hmpim.model.dynamics import StructureName
+from hmpim.model.response import slowest_time_constant
+from hmpim.model.sampled import prepare_input
+from hmpim.record import Intersample
+
+__all__ = ["Joined", "fit_together"]
+
+_TURNS = 8
+_STILL = 1e-2
+"""Stop when no pair's contribution moves by more than this share of the noise (r.m.s.)."""
+
+_LATEST = 0.1
+"""Delay of a coupling, as a share of the record, up to which it is looked for."""
+
+_PERIODS = 4.0
+"""Periods of a coupling's corner frequency that the record must hold."""
+
+_COLOURED = 1.6
+"""Factor on the evidence asked of a coupling where the stronger ones leave no white noise."""
+
+_RIVAL = 0.75
+"""Share of the best correlation from which an input is a rival for the strongest."""
+
+_STRONG = 0.15
+"""Share of the output's r.m.s. from which an input's contribution is fitted as if alone."""
+
+Real = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Joined:
+    """Fits of one output to each input.
+
+    Parameters
+    ----------
+    fits : tuple of JointFit
+        One for each input; its output is what the other inputs leave over.
+    related : tuple of bool
+        Whether the output follows that input at all.
+    covariances : tuple of ndarray, shape (p_i, p_i)
+        Of each fit's parameters, all fits considered together.
+    strong : tuple of bool
+        Whether the input's contribution is large beside the output, not a coupling.
+    lags : tuple of Lag or None
+        Delay and lag of couplings of no more than first order.
+    """
+
+    fits: tuple[JointFit, ...]
+    related: tuple[bool, ...]
+    covariances: tuple[Real, ...]
+    strong: tuple[bool, ...]
+    lags: tuple[Lag | None, ...]
+
+    @property
+    def prediction(self) -> Real:
+        """What all inputs together predict of the output, bias included, shape (n,)."""
+        first = self.fits[0].best.fit
+        total: Real = np.full(first.prediction.size, first.linear[-1])
+        for fit, told in zip(self.fits, self.related, strict=True):
+            if told:
+                total = total + _part(fit)
+        return total
+
+
+def fit_together(
+    inputs: list[Real],
+    y: Real,
+    *,
+    valid: NDArray[np.bool_] | None,
+    known: NDArray[np.bool_] | None,
+    intersample: Intersample | None,
+    structures: tuple[StructureName, ...],
+    alike: Sequence[tuple[frozenset[int], NDArray[np.bool_]]] = (),
+) -> Joined:
+    """Fit one output to several inputs.
+
+    Parameters
+    ----------
+    inputs : list of ndarray, shape (n,)
+        Uniform samples of each input.
+    y : ndarray, shape (n,)
+        Uniform samples of the output.
+    valid, known, intersample, structures
+        As for `hmpim.identify.fitting.joint.joint_fit`; `known` is for all inputs together.
+    alike : sequence of (frozenset of int, ndarray of bool, shape (n // 2 + 1,))
+        Inputs that are not told apart, and the bins at which they are not. There a coupling is
+        not told from what the stronger one's model lacks.
+    """
+
+    def fitted(u: Real, rest: Real, names: tuple[StructureName, ...]) -> JointFit:
+        return joint_fit(
+            u, rest, valid=valid, known=known, intersample=intersample, structures=names
+        )
+
+    if len(inputs) == 1:
+        fit = fitted(inputs[0], y, structures)
+        return Joined(
+            fits=(fit,),
+            related=(not is_unrelated(fit),),
+            covariances=(),
+            strong=(True,),
+            lags=(None,),
+        )
+    plain = tuple(name for name in structures if name in PLAIN) or structures
+    fits = _strongest(inputs, y, valid, lambda u, rest: fitted(u, rest, plain))
+    strong = tuple(fits)
+    related = dict.fromkeys(strong, True)
+    whitening: Real | None = None
+    found = None
+    for names in (plain, structures):  # then again, the couplings known
+        for i in strong:
+            fits[i] = fitted(inputs[i], y - _others(fits, related, i), names)
+            related[i] = not is_unrelated(fits[i])
+        before, found = found, tuple(fits[i].best.fit.structure.name for i in strong)
+        if found != before:
+            whitening = _fit_couplings(inputs, y, fits, related, strong, plain, alike)
+    if whitening is not None:
+        # What is not white may be no noise but what one of them has not given back yet.
+        _refine(y, fits, [j for j in fits if related[j]], None)
+        whitening = _whitening(y, fits, related, strong)
+    for _ in range(_TURNS):
+        before = _others(fits, related, None)
+        for i in strong:
+            if related[i]:
+                fits[i] = _again(fits[i], y - _others(fits, related, i))
+        _together(y, fits, related, strong, whitening, alike)
+        noise = max(float(np.sqrt(fits[strong[0]].best.fit.cost / y.size)), 1e-300)
+        moved = float(np.sqrt(np.mean((_others(fits, related, None) - before) ** 2)))
+        if moved < _STILL * noise:
+            break
+    kept = [j for j in fits if related[j]]
+    pairs = [fits[j] for j in kept]
+    told = dict(zip(kept, _covariances(pairs, None), strict=True))
+    weak = [j for j in kept if j not in strong]
+    if whitening is not None and weak:
+        sharper = dict(zip(kept, _covariances(pairs, whitening), strict=True))
+        told |= {j: sharper[j] for j in weak}
+    everyone = range(len(inputs))
+    return Joined(
+        fits=tuple(fits[j] for j in everyone),
+        related=tuple(related[j] for j in everyone),
+        covariances=tuple(told.get(j, np.zeros((0, 0))) for j in everyone),
+        strong=tuple(j in strong for j in everyone),
+        lags=tuple(_lag(pairs, kept.index(j), whitening) if j in weak else None for j in everyone),
+    )
+
+
+def _strongest(
+    inputs: list[Real],
+    y: Real,
+    valid: NDArray[np.bool_] | None,
+    fitted: Callable[[Real, Real], JointFit],
+) -> dict[int, JointFit]:
+    """Fit the inputs that move the output most, one after the other; at least one."""
+    rest = y if valid is None else np.interp(np.arange(y.size), np.flatnonzero(valid), y[valid])
+    spread = max(float(np.std(rest)), 1e-300)
+    fits: dict[int, JointFit] = {}
+    waiting = list(range(len(inputs)))
+    while waiting:
+        share = {j: _follows_at_all(inputs[j], rest) / spread for j in waiting}
+        most = max(share.values())
+        if fits and most < _STRONG:
+            break
+        # A delayed copy of an input correlates as well; which one it is the fit tells.
+        left = y - sum((_part(f) for f in fits.values()), np.zeros(y.size))
+        tried = {j: fitted(inputs[j], left) for j in waiting if share[j] > _RIVAL * most}
+        i = min(tried, key=lambda j: tried[j].best.fit.cost)
+        fit = tried[i]
+        waiting.remove(i)
+        part = _part(fit)
+        if not fits or (float(np.std(part)) > _STRONG * spread and not is_unrelated(fit)):
+            fits[i] = fit
+            rest = rest - part
+    return fits
+
+
+def _follows_at_all(u: Real, y: Real) -> float:
+    """Amplitude (r.m.s.) of the output that correlates with the input at the best lag."""
+    first, second = u - u.mean(), y - y.mean()
+    length = next_fast_len(2 * u.size, real=True)
+    crossed = irfft(np.conj(rfft(first, length)) * rfft(second, length), length)[: u.size // 2]
+    size = float(np.linalg.norm(first))
+    return float(np.max(np.abs(crossed))) / max(size, 1e-300) / float(np.sqrt(u.size))
+
+
+def _fit_couplings(
+    inputs: list[Real],
+    y: Real,
+    fits: dict[int, JointFit],
+    related: dict[int, bool],
+    strong: tuple[int, ...],
+    structures: tuple[StructureName, ...],
+    alike: Sequence[tuple[frozenset[int], NDArray[np.bool_]]],
+) -> Real | None:
+    """Fit, in place, all that is weak, the strongest first; return how the noise was whitened."""
+    best = fits[strong[0]]
+    mode, counts = best.best.intersample, best.problem.valid
+    weak = [j for j in range(len(inputs)) if j not in strong]
+
+    def left() -> Real:
+        rest = y - _others(fits, related, None) - best.best.fit.linear[-1]
+        return rest if counts is None else np.asarray(rest * counts)
+
+    latest = max(_LATEST * y.size, 4.0 * best.best.fit.delay) + 2.0
+    whitening = whitening_of(left())
+    sources = {j: prepare_input(inputs[j], mode) for j in weak}
+    roughly = tuple(name for name in structures if name == "first_order") or structures
+    for names in (roughly, structures) if weak else ():  # what they leave over whitened anew
+        for j in sorted(weak, key=lambda j: -_follows_at_all(inputs[j], left())):
+            problem = Problem(
+                source=sources[j],
+                y=y - _others(fits, related, j),
+                valid=counts,
+                longest_delay=latest,
+                whitening=whitening,
+            )
+            fits[j] = coupling_fit(problem, inputs[j], intersample=mode, structures=names)
+            related[j] = True
+        # Not before all are right is one of them tested: alike, they take each other's share.
+        while _together(y, fits, related, strong, whitening, alike, drop=names is structures):
+            pass
+        whitening = whitening_of(left())
+    return whitening
+
+
+def _together(
+    y: Real,
+    fits: dict[int, JointFit],
+    related: dict[int, bool],
+    strong: tuple[int, ...],
+    whitening: Real | None,
+    alike: Sequence[tuple[frozenset[int], NDArray[np.bool_]]],
+    *,
+    drop: bool = True,
+) -> bool:
+    """Move all couplings at once, in place; leave out the least if it adds nothing and may go.
+
+    Returns
+    -------
+    bool
+        Whether one was left out.
+    """
+    weak = [j for j in fits if related[j] and j not in strong]
+    if not weak:
+        return False
+    rest = y - _others({j: fits[j] for j in strong}, related, None)
+    problems, found = _refine(rest, fits, weak, whitening)
+    if not drop:
+        return False
+    gains = []
+    for k, j in enumerate(weak):
+        shared = [bins for group, bins in alike if j in group and group & set(strong)]
+        gains.append(
+            0.0 if _too_slow(found[k], y.size) else gained_by(_apart(problems, shared), found, k)
+        )
+    least = int(np.argmin(gains))
+    if gains[least] > (FOLLOWS if whitening is None else _COLOURED * FOLLOWS):
+        return False
+    related[weak[least]] = False
+    return True
+
+
+def _refine(
+    y: Real, fits: dict[int, JointFit], some: list[int], whitening: Real | None
+) -> tuple[list[Problem], list[Fit]]:
+    """Move some of the fits at once, in place, to what `y` is but for a bias."""
+    counted = np.logical_and.reduce(
+        [np.ones(y.size, bool) if (v := fits[j].problem.valid) is None else v for j in some]
+    )
+    valid = None if bool(counted.all()) else counted
+    problems = [replace(fits[j].problem, y=y, valid=valid, whitening=whitening) for j in some]
+    found = refined_together(problems, [fits[j].best.fit for j in some], y)
+    parts = {j: fit.prediction - fit.linear[-1] for j, fit in zip(some, found, strict=True)}
+    total = sum(parts.values(), np.zeros(y.size))
+    for j, fit in zip(some, found, strict=True):
+        trial = replace(fits[j].best, fit=fit)
+        fits[j] = replace(
+            fits[j],
+            problem=replace(fits[j].problem, y=y - (total - parts[j])),
+            best=trial,
+            trials=tuple(trial if t is fits[j].best else t for t in fits[j].trials),
+            effective_share=effective_share(fit.residual),
+        )
+    return problems, found
+
+
+def _whitening(
+    y: Real, fits: dict[int, JointFit], related: dict[int, bool], strong: tuple[int, ...]
+) -> Real | None:
+    """How to whiten what all of them leave over."""
+    best = fits[strong[0]]
+    rest = y - _others(fits, related, None) - best.best.fit.linear[-1]
+    counts = best.problem.valid
+    return whitening_of(rest if counts is None else np.asarray(rest * counts))
+
+
+def _too_slow(fit: Fit, samples: int) -> bool:
+    """Whether a coupling is one of drifts only: its corner below a few periods of the record."""
+    slowest = slowest_time_constant(fit.denominator)
+    return bool(2 * np.pi * slowest * _PERIODS > samples)
+
+
+def _apart(problems: list[Problem], shared: list[NDArray[np.bool_]]) -> list[Problem]:
+    """The problems without the bins at which an input is not told from a stronger one."""
+    if not shared:
+        return problems
+    known = problems[0].whitening
+    gain = np.ones(problems[0].y.size // 2 + 1) if known is None else known
+    for bins in shared:
+        gain = gain * ~bins
+    return [replace(problem, whitening=gain) for problem in problems]
+
+
+def _others(fits: dict[int, JointFit], related: dict[int, bool], i: int | None) -> Real:
+    """What the inputs other than one move the output by."""
+    total: Real = np.zeros(next(iter(fits.values())).problem.y.size)
+    for j, fit in fits.items():
+        if j != i and related[j]:
+            total = total + _part(fit)
+    return total
+
+
+def _part(fit: JointFit) -> Real:
+    """What the input contributes to the output, the bias aside."""
+    best = fit.best.fit
+    return np.asarray(best.prediction - best.linear[-1])
+
+
+def _again(fit: JointFit, rest: Real) -> JointFit:
+    """Fit the chosen structure again, to what the others leave over now."""
+    problem = replace(fit.problem, y=rest)
+    best = fit_structure(problem, fit.best.fit.structure, fit.best.fit.theta, precision=1e-4)
+    trial = replace(fit.best, fit=best)
+    trials = tuple(trial if t is fit.best else t for t in fit.trials)
+    return replace(
+        fit,
+        problem=problem,
+        best=trial,
+        trials=trials,
+        effective_share=effective_share(best.residual),
+    )
+
+
+def _lag(pairs: list[JointFit], k: int, whitening: Real | None) -> Lag | None:
+    """Delay and lag of one of the pairs, if it is of no more than first order."""
+    fit = pairs[k].best.fit
+    if fit.structure.name not in ("static", "first_order"):
+        return None
+    problem, blocks = _derivatives([*pairs[:k], *pairs[k + 1 :]], whitening)
+    others = np.vstack([*blocks, problem.masked(np.ones(fit.residual.size))])
+    own = replace(pairs[k].problem, valid=problem.valid, whitening=whitening)
+    return lag_of(own, fit, others)
+
+
+def _derivatives(fits: list[JointFit], whitening: Real | None) -> tuple[Problem, list[Real]]:
+    """Derivatives of each pair but by the bias, on the samples that count for all."""
+    last = fits[-1].problem
+    counted = np.ones(last.y.size, dtype=bool)
+    for fit in fits:
+        counted &= True if fit.problem.valid is None else fit.problem.valid
+    problem = replace(last, valid=None if bool(counted.all()) else counted, whitening=whitening)
+    return problem, [
+        jacobian(replace(problem, source=fit.problem.source), fit.best.fit)[:-1] for fit in fits
+    ]
+
+
+def _covariances(fits: list[JointFit], whitening: Real | None) -> list[Real]:
+    """Covariance of each pair's parameters and the bias, from all derivatives together."""
+    if not fits:
+        return []
+    last = fits[-1]
+    problem, blocks = _derivatives(fits, whitening)
+    counted = np.ones(last.problem.y.size, dtype=bool) if problem.valid is None else problem.valid
+    rows = np.vstack([*blocks, problem.masked(np.ones(counted.size))])
+    residual = problem.masked(last.problem.y - last.best.fit.prediction)
+    freedom = max(int(np.count_nonzero(counted)) - rows.shape[0], 1)
+    white = whitening is not None or is_white(residual[counted])
+    full = joint_covariance(rows, residual, freedom=freedom, white=white)
+    end, start, out = rows.shape[0] - 1, 0, []
+    for block in blocks:
+        span = [*range(start, start + block.shape[0]), end]
+        out.append(full[np.ix_(span, span)])
+        start += block.shape[0]
+    return out

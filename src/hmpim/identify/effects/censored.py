@@ -1,0 +1,477 @@
+"""Maximum likelihood where the output was clipped, or held.
+
+A clipped sample does not say what the output was, but it says that it was beyond the level.
+Its likelihood is the chance of that (J. Tobin, Econometrica 26, 1958), so neither scale
+factor nor dynamics are pulled towards the clipped values, nor is the noise. If the noise was
+added after the clipping, the model's output is clipped instead, and the squares of the
+difference count. A held output is compared with the model at the instants of its updates.
+
+Newton's method on all parameters and ln σ together; the derivatives of the logarithm of a
+normal tail are A. C. Cohen's, Technometrics 1, 1959.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.fft import next_fast_len, rfft
+from scipy.stats import norm
+
+from hmpim.errors import RecordError
+from hmpim.identify.effects.held import held_prediction, rows_at_updates
+from hmpim.identify.effects.hold import Updates
+from hmpim.identify.effects.masked import masked_spectrum
+from hmpim.identify.effects.saturation import Saturation
+from hmpim.identify.fitting.fit import Fit, Problem, fit_structure
+from hmpim.identify.whiteness import is_white
+
+__all__ = ["CensoredFit", "censored_covariance", "fit_censored", "fit_held"]
+
+_LARGEST_STEP = 0.5
+"""Most that a parameter of the dynamics may change in one step, relative to its size above 1."""
+
+_NEGLIGIBLE = 1e-6
+"""Rise of the log-likelihood, Newton's prediction, at which the fit is done."""
+
+_LEVELS_MOVE = 10
+"""Steps after which levels under noise stay as they are: their scatter is far below the noise."""
+
+_LEAST_NOISE = 1e-9
+"""Least standard deviation of the noise, over that of the output."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class CensoredFit:
+    """Where a fit to a clipped or held output ended.
+
+    Parameters
+    ----------
+    fit : Fit
+        `prediction` is the output without clipping, and with the hold; `residual` is the
+        difference expected given what was read: 0 on average, smaller where clipped.
+        `cost` over samples less parameters is `noise_std` squared.
+    noise_std : float
+        Standard deviation of the noise, in the output's unit.
+    noise_std_std : float
+        Standard deviation of that.
+    covariance : ndarray, shape (p, p)
+        Of `fit.theta` and `fit.linear`; widened if the residual is not white.
+    log_likelihood : float
+        For the choice among structures.
+    index : ndarray of int, shape (m,)
+        Samples that counted.
+    """
+
+    fit: Fit
+    noise_std: float
+    noise_std_std: float
+    covariance: NDArray[np.float64]
+    log_likelihood: float
+    index: NDArray[np.intp]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Data:
+    """What is compared: samples that count, and which of them are clipped."""
+
+    problem: Problem
+    arrivals: Updates
+    y: NDArray[np.float64]
+    low: NDArray[np.bool_]
+    high: NDArray[np.bool_]
+    low_edge: NDArray[np.float64]
+    high_edge: NDArray[np.float64]
+    noise_after: bool
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _State:
+    """Parameters, and value and derivatives of the log-likelihood there.
+
+    `slope` and `bend` are the derivatives by the prediction, (m,), the second one's sign
+    changed; `rows` those of the prediction by the parameters; `inside` are the samples that
+    say what the output was.
+    """
+
+    fit: Fit
+    log_sigma: float
+    prediction: NDArray[np.float64]
+    rows: NDArray[np.float64]
+    value: float
+    slope: NDArray[np.float64]
+    bend: NDArray[np.float64]
+    inside: NDArray[np.bool_]
+    score: NDArray[np.float64]
+    information: NDArray[np.float64]
+
+
+def fit_censored(
+    problem: Problem,
+    fit: Fit,
+    saturation: Saturation | None,
+    *,
+    arrivals: Updates | None = None,
+    drift: NDArray[np.float64] | None = None,
+    iterations: int = 50,
+) -> CensoredFit:
+    """Fit one structure to an output that was clipped.
+
+    Parameters
+    ----------
+    problem : Problem
+        The data; `valid` leaves out samples that say nothing at all, not the clipped ones.
+    fit : Fit
+        Where to start, and the structure: a fit to the samples that are not clipped does.
+    saturation : Saturation or None
+        Levels and clipped samples; None for an output that was only held.
+    arrivals : Updates, optional
+        Samples in which a held output is updated; every sample by default.
+    drift : ndarray, shape (n,), optional
+        What was taken off the output, by which the levels move against it; none by default.
+    iterations : int
+        At most so many steps.
+
+    Returns
+    -------
+    CensoredFit
+
+    Raises
+    ------
+    RecordError
+        If fewer samples are left inside the range than there are parameters.
+
+    Examples
+    --------
+    >>> from hmpim.identify.effects.saturation import detect_saturation
+    >>> from hmpim.model import STRUCTURES, prepare_input
+    >>> u = np.sin(np.arange(2000) / 20)
+    >>> noisy = 3.0 * u + 0.1 * np.random.default_rng(0).standard_normal(2000)
+    >>> clipped = np.clip(noisy, -2.0, 2.0)
+    >>> data = Problem(
+    ...     source=prepare_input(u, "bandlimited"), y=clipped, valid=None, longest_delay=5.0
+    ... )
+    >>> plain = fit_structure(data, STRUCTURES["static"], np.zeros(1))
+    >>> better = fit_censored(data, plain, detect_saturation(clipped))
+    >>> [round(float(fit.linear[0]), 1) for fit in (plain, better.fit)], round(better.noise_std, 1)
+    ([2.3, 3.0], 0.1)
+    """
+    data = _data(problem, saturation, arrivals, drift)
+    state = _start(data, fit)
+    damping, converged = 1e-4, False
+    for count in range(iterations):
+        step = _step(state, 0.0)
+        if 0.0 <= float(step @ state.score) < _NEGLIGIBLE:
+            converged = True
+            break
+        while damping < 1e8:
+            trial = _moved(data, state, _step(state, damping))
+            if trial is not None and trial.value > state.value:
+                damping = max(damping / 10, 1e-12)
+                break
+            damping *= 10
+        else:  # no way up: the arithmetic's own floor
+            converged = True
+            break
+        state = trial if trial is not None else state
+        if data.noise_after and count < _LEVELS_MOVE:
+            data = _levels_again(data, state)
+            state = _evaluated(data, state.fit, state.log_sigma) or state
+    return _finished(data, state, converged)
+
+
+def fit_held(problem: Problem, fit: Fit, arrivals: Updates) -> CensoredFit:
+    """Fit one structure to an output that is held between updates.
+
+    The delay found is that of the values, without the time for which they are held: a fit
+    that knows nothing of the hold finds about half the hold's period more.
+
+    Parameters
+    ----------
+    problem : Problem
+        The data.
+    fit : Fit
+        Where to start, and the structure: a fit that knows nothing of the hold does.
+    arrivals : Updates
+        From `hmpim.identify.effects.hold.updates`.
+
+    Raises
+    ------
+    RecordError
+        If there are fewer updates than parameters.
+
+    Examples
+    --------
+    >>> from hmpim.identify.effects.hold import detect_hold, updates
+    >>> from hmpim.model import STRUCTURES, prepare_input
+    >>> time = np.arange(2000) / 200
+    >>> taken = np.floor(time * 60 + 1e-9) / 60  # a sensor of 60 Hz recorded at 200 Hz
+    >>> u, y = np.sin(time * (1 + time)), np.sin((taken - 0.02) * (1 + taken - 0.02))
+    >>> data = Problem(source=prepare_input(u, "bandlimited"), y=y, valid=None, longest_delay=50)
+    >>> arrivals = updates(detect_hold(y, 200.0), 2000, 200.0)
+    >>> plain = fit_structure(data, STRUCTURES["static"], np.array([5.0]))
+    >>> held = fit_held(data, plain, arrivals)
+    >>> round(plain.delay / 200, 3), round(held.fit.delay / 200, 3)
+    (0.028, 0.019)
+
+    When between two samples the sensor reads, such a record cannot tell better:
+
+    >>> round(float(held.covariance[0, 0]) ** 0.5 / 200, 4)
+    0.0005
+    """
+    return fit_censored(problem, fit, None, arrivals=arrivals)
+
+
+def censored_covariance(
+    problem: Problem,
+    censored: CensoredFit,
+    saturation: Saturation | None,
+    *,
+    arrivals: Updates | None = None,
+    white: bool,
+) -> NDArray[np.float64]:
+    """Covariance of `theta` and `linear` of a fit to a clipped or held output.
+
+    The inverse of the observed information if the noise is white; else the sandwich, with
+    the colour of the generalised residual (C. Gourieroux, A. Monfort, E. Renault and
+    A. Trognon, Journal of Econometrics 34, 1987).
+
+    Parameters
+    ----------
+    problem, censored, saturation, arrivals
+        As given to and returned by `fit_censored`.
+    white : bool
+        Whether to take the noise as white.
+
+    Returns
+    -------
+    ndarray, shape (p, p)
+        Infinite where the record does not see a direction.
+    """
+    data = _data(problem, saturation, arrivals)
+    sigma = censored.noise_std * _shrink(censored.index.size, censored.fit)
+    state = _evaluated(data, censored.fit, float(np.log(sigma)))
+    size = censored.covariance.shape[0]
+    if state is None:
+        return np.full((size, size), np.inf)
+    return _with_age(_covariance(state, white=white)[:size, :size], data)
+
+
+def _data(
+    problem: Problem,
+    saturation: Saturation | None,
+    arrivals: Updates | None,
+    drift: NDArray[np.float64] | None = None,
+) -> _Data:
+    n = problem.y.size
+    counted = np.ones(n, dtype=bool) if problem.valid is None else problem.valid
+    if arrivals is None:
+        index = np.flatnonzero(counted)
+        arrivals = Updates(index=index, age=np.zeros(index.size))
+    else:
+        keep = counted[arrivals.index]
+        arrivals = replace(arrivals, index=arrivals.index[keep], age=arrivals.age[keep])
+    nothing = np.zeros(arrivals.index.size, dtype=bool)
+    low = high = nothing
+    moved = np.zeros(arrivals.index.size) if drift is None else drift[arrivals.index]
+    low_edge, high_edge, after = moved - np.inf, moved + np.inf, False
+    if saturation is not None:
+        after = saturation.noise == "after"
+        if saturation.low is not None:
+            low = saturation.clipped_low[arrivals.index]
+            low_edge = saturation.low + saturation.tolerance - moved
+        if saturation.high is not None:
+            high = saturation.clipped_high[arrivals.index]
+            high_edge = saturation.high - saturation.tolerance - moved
+    return _Data(
+        problem=problem,
+        arrivals=arrivals,
+        y=problem.y[arrivals.index],
+        low=low,
+        high=high,
+        low_edge=low_edge,
+        high_edge=high_edge,
+        noise_after=after,
+    )
+
+
+def _start(data: _Data, fit: Fit) -> _State:
+    """Fit the samples inside the range, from where the given fit ended."""
+    inside = ~(data.low | data.high)
+    unknown = fit.theta.size + fit.linear.size + 1
+    if np.count_nonzero(inside) <= 2 * unknown:
+        raise RecordError(
+            f"{np.count_nonzero(inside)} of {inside.size} samples are inside the range, too few "
+            f"for {unknown} parameters; drive the unit less hard, or record longer"
+        )
+    begun = fit
+    if data.low.any() or data.high.any():
+        valid = np.zeros(data.problem.y.size, dtype=bool)
+        valid[data.arrivals.index[inside]] = True
+        begun = fit_structure(replace(data.problem, valid=valid), fit.structure, fit.theta)
+    theta = begun.theta.copy()
+    if data.arrivals.index.size < 0.9 * data.problem.y.size:
+        gaps = np.diff(data.arrivals.index)
+        theta[0] -= 0.5 * float(np.median(gaps)) if begun is fit else 0.5
+    begun = replace(begun, theta=theta)
+    rows = rows_at_updates(data.problem, begun, data.arrivals)
+    left = (data.y - begun.linear @ rows[theta.size :])[inside]
+    sigma = max(float(np.std(left)), _LEAST_NOISE * float(np.std(data.y)))
+    state = _evaluated(data, begun, float(np.log(sigma)))
+    if state is None:
+        raise RecordError("the fit to the samples inside the range is not finite; check the data")
+    return state
+
+
+def _evaluated(data: _Data, fit: Fit, log_sigma: float) -> _State | None:
+    """Log-likelihood and its derivatives; None where it is not finite."""
+    rows = rows_at_updates(data.problem, fit, data.arrivals)
+    prediction = fit.linear @ rows[fit.theta.size :]
+    if not np.all(np.isfinite(prediction)):
+        return None
+    sigma = float(np.exp(log_sigma))
+    if data.noise_after:
+        z = (data.y - np.clip(prediction, data.low_edge, data.high_edge)) / sigma
+        inside = (prediction > data.low_edge) & (prediction < data.high_edge)
+        slope, bend, cross = inside * z / sigma, inside / sigma**2, inside * 2 * z / sigma
+        value = -0.5 * z**2 - log_sigma
+        by_sigma, bend_sigma = z**2 - 1.0, 2 * z**2
+    else:
+        inside = ~(data.low | data.high)
+        z = (data.y - prediction) / sigma
+        slope, bend, cross = z / sigma, np.full(z.size, sigma**-2), 2 * z / sigma
+        value = -0.5 * z**2 - log_sigma
+        by_sigma, bend_sigma = z**2 - 1.0, 2 * z**2
+        for where, edge, sign in ((data.low, data.low_edge, -1), (data.high, data.high_edge, 1)):
+            if not where.any():
+                continue
+            a = sign * (edge[where] - prediction[where]) / sigma
+            tail = norm.logsf(a)
+            hazard = np.exp(norm.logpdf(a) - tail)
+            value[where] = tail + 0.5 * np.log(2 * np.pi)
+            slope[where] = sign * hazard / sigma
+            bend[where] = hazard * (hazard - a) / sigma**2
+            cross[where] = sign * hazard * (1 + a * (hazard - a)) / sigma
+            by_sigma[where] = a * hazard
+            bend_sigma[where] = a * hazard * (1 + a * (hazard - a))
+    inner = (rows * bend) @ rows.T
+    mixed = rows @ cross
+    return _State(
+        fit=fit,
+        log_sigma=log_sigma,
+        prediction=prediction,
+        rows=rows,
+        value=float(np.sum(value)),
+        slope=slope,
+        bend=bend,
+        inside=inside,
+        score=np.append(rows @ slope, np.sum(by_sigma)),
+        information=np.block(
+            [[inner, mixed[:, None]], [mixed[None, :], np.array([[np.sum(bend_sigma)]])]]
+        ),
+    )
+
+
+def _step(state: _State, damping: float) -> NDArray[np.float64]:
+    """Newton's step, damped, on parameters scaled alike."""
+    scale = np.sqrt(np.maximum(np.diag(state.information), np.finfo(float).tiny))
+    scaled = state.information / np.outer(scale, scale)
+    values, vectors = np.linalg.eigh(scaled)
+    # Where the curvature is not that of a maximum, its magnitude still sets the step.
+    values = np.maximum(np.abs(values), 1e-12 * np.abs(values).max()) + damping
+    return np.asarray(vectors @ ((vectors.T @ (state.score / scale)) / values) / scale)
+
+
+def _moved(data: _Data, state: _State, step: NDArray[np.float64]) -> _State | None:
+    """The state after a step, shortened where it would change the dynamics beyond recognition."""
+    fit, unknown = state.fit, state.fit.theta.size
+    room = _LARGEST_STEP * np.maximum(1.0, np.abs(fit.theta))
+    room[0] = 10.0
+    excess = max(float(np.max(np.abs(step[:unknown]) / room)), abs(float(step[-1])) / 2.0, 1.0)
+    step = step / excess
+    moved = replace(fit, theta=fit.theta + step[:unknown], linear=fit.linear + step[unknown:-1])
+    denominator = moved.denominator
+    if not (np.all(np.isfinite(denominator)) and np.all(denominator >= 0)):
+        return None
+    if not -4.0 <= moved.delay <= data.problem.longest_delay:
+        return None
+    floor = np.log(_LEAST_NOISE * max(float(np.std(data.y)), np.finfo(float).tiny))
+    return _evaluated(data, moved, max(state.log_sigma + float(step[-1]), float(floor)))
+
+
+def _levels_again(data: _Data, state: _State) -> _Data:
+    """Levels as the mean of what was read where the model lies beyond them."""
+    low, high = data.low_edge, data.high_edge
+    below, above = state.prediction < low, state.prediction > high
+    if np.count_nonzero(below) > 3:
+        low = low + float(np.mean((data.y - low)[below]))
+    if np.count_nonzero(above) > 3:
+        high = high + float(np.mean((data.y - high)[above]))
+    return replace(data, low_edge=low, high_edge=high)
+
+
+def _shrink(counted: int, fit: Fit) -> float:
+    """Ratio of the likeliest standard deviation to the one without bias."""
+    return float(np.sqrt(max(counted - fit.theta.size - fit.linear.size, 1) / counted))
+
+
+def _covariance(state: _State, *, white: bool) -> NDArray[np.float64]:
+    """Covariance of all parameters and ln σ."""
+    diagonal = np.abs(np.diag(state.information))
+    scale = np.sqrt(np.where(diagonal > 1e-200 * diagonal.max(), diagonal, 1.0))
+    scaled = state.information / np.outer(scale, scale)
+    values, vectors = np.linalg.eigh(scaled)
+    seen = np.maximum(np.abs(values), 1e-14 * np.abs(values).max())
+    inverse = (vectors / seen) @ vectors.T / np.outer(scale, scale)
+    if white:
+        return np.asarray(inverse)
+    size = state.rows.shape[0]
+    middle = np.zeros(inverse.shape)
+    middle[:size, :size], fewer = _coloured_scores(state)
+    middle[-1, -1] = state.information[-1, -1] * fewer
+    return np.asarray(inverse @ middle @ inverse)
+
+
+def _coloured_scores(state: _State) -> tuple[NDArray[np.float64], float]:
+    """Covariance of the scores: their size as for white noise, their correlation as measured.
+
+    Also by how much fewer samples tell the noise: 1 + 2 Σ ρ² (M. S. Bartlett, 1946).
+    """
+    weighted = state.rows * np.sqrt(np.maximum(state.bend, 0.0))
+    length = next_fast_len(2 * state.slope.size, real=True)
+    spectra = rfft(weighted, length)
+    omega = 2 * np.pi * np.arange(spectra.shape[1]) / length
+    power = masked_spectrum(state.slope, state.inside, omega)
+    fewer = float(np.mean(np.concatenate([power, power[1:-1]]) ** 2))
+    power[1 : (length + 1) // 2] *= 2.0  # both signs of frequency
+    return np.asarray(((spectra * power) @ spectra.conj().T).real / length), fewer
+
+
+def _with_age(covariance: NDArray[np.float64], data: _Data) -> NDArray[np.float64]:
+    """Add what is not known of the values' age to the variance of the delay."""
+    widened = covariance.copy()
+    widened[0, 0] += data.arrivals.age_std**2
+    return widened
+
+
+def _finished(data: _Data, state: _State, converged: bool) -> CensoredFit:
+    fit, counted = state.fit, state.slope.size
+    noise_std = float(np.exp(state.log_sigma)) / _shrink(counted, fit)
+    expected = state.slope * float(np.exp(2 * state.log_sigma))
+    residual = np.zeros(data.problem.y.size)
+    residual[data.arrivals.index] = expected
+    cov = _covariance(state, white=is_white(expected))
+    freedom = max(counted - fit.theta.size - fit.linear.size, 1)
+    return CensoredFit(
+        fit=replace(
+            fit,
+            prediction=held_prediction(state.prediction, data.arrivals, data.problem.y.size),
+            residual=residual,
+            cost=noise_std**2 * freedom,
+            converged=converged,
+        ),
+        noise_std=noise_std,
+        noise_std_std=noise_std * float(np.sqrt(max(cov[-1, -1], 0.0))),
+        covariance=_with_age(cov[:-1, :-1], data),
+        log_likelihood=state.value - 0.5 * counted * float(np.log(2 * np.pi)),
+        index=data.arrivals.index,
+    )

@@ -1,0 +1,100 @@
+"""A model's output at the instants at which a held output was updated.
+
+A sample in which a new value arrives shows the output as it was some part of a sample
+earlier, when it was read. To the model that is one more delay, of another size for each
+sample. Responses are computed at a few such delays and interpolated between them; where the
+period is a simple fraction of samples, as 20/3, only so many delays occur and all are exact.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hmpim.identify.effects.hold import Updates
+from hmpim.identify.fitting.fit import Fit, Problem, jacobian
+
+__all__ = ["held_prediction", "rows_at_updates"]
+
+_EXACT = 6
+"""So many different ages are computed one by one."""
+
+_SMOOTH_NODES = 0.5 - 0.5 * np.cos(np.pi * np.arange(5) / 4)
+"""Ages of the interpolation for a smooth input, degree 4, Chebyshev's second kind."""
+
+_HELD_NODES = np.linspace(0.0, 1.0, 17)
+"""Ages for a held or linear input, whose response bends between the samples; linear."""
+
+
+def _weights(age: NDArray[np.float64], *, smooth: bool) -> tuple[NDArray[np.float64], ...]:
+    """Ages to compute at, shape (k,), and what each counts for each sample, shape (k, m)."""
+    distinct, which = np.unique(np.round(age, 6), return_inverse=True)
+    if distinct.size <= _EXACT:
+        return distinct, np.eye(distinct.size)[:, which]
+    if not smooth:
+        nodes = _HELD_NODES
+        return nodes, np.maximum(1.0 - np.abs(age - nodes[:, None]) * (nodes.size - 1), 0.0)
+    nodes = _SMOOTH_NODES
+    share = np.ones((nodes.size, age.size))
+    for i, node in enumerate(nodes):
+        for j, other in enumerate(nodes):
+            if i != j:
+                share[i] *= (age - other) / (node - other)
+    return nodes, share
+
+
+def rows_at_updates(problem: Problem, fit: Fit, arrivals: Updates) -> NDArray[np.float64]:
+    """Derivatives of the output at each update, with respect to `theta`, then `linear`.
+
+    The last rows, from `theta.size` on, times `linear` are the output itself.
+
+    Parameters
+    ----------
+    problem : Problem
+        The data; `valid` is not looked at.
+    fit : Fit
+        Its structure, `theta` and `linear`.
+    arrivals : Updates
+        Samples and the age of their values, shape (m,).
+
+    Returns
+    -------
+    ndarray, shape (1 + order + zeros + 2, m)
+
+    Examples
+    --------
+    A ramp through a gain of 2, read 0 and 0.25 samples before it shows:
+
+    >>> from hmpim.identify.fitting.fit import fit_structure
+    >>> from hmpim.model import STRUCTURES, prepare_input
+    >>> u = np.arange(8.0)
+    >>> ramp = Problem(source=prepare_input(u, "foh"), y=2 * u, valid=None, longest_delay=2.0)
+    >>> fit = fit_structure(ramp, STRUCTURES["static"], np.zeros(1))
+    >>> arrivals = Updates(index=np.array([3, 6]), age=np.array([0.0, 0.25]))
+    >>> rows = rows_at_updates(ramp, fit, arrivals)
+    >>> (fit.linear @ rows[1:]).round(9).tolist()
+    [6.0, 11.5]
+    """
+    whole = replace(problem, valid=None)
+    nodes, share = _weights(arrivals.age, smooth=problem.source.degree > 1)
+    rows = np.zeros((fit.theta.size + fit.linear.size, arrivals.index.size))
+    for node, weight in zip(nodes, share, strict=True):
+        theta = fit.theta.copy()
+        theta[0] += node
+        rows += weight * jacobian(whole, replace(fit, theta=theta))[:, arrivals.index]
+    return rows
+
+
+def held_prediction(
+    values: NDArray[np.float64], arrivals: Updates, samples: int
+) -> NDArray[np.float64]:
+    """Repeat each update's value until the next, shape (samples,).
+
+    Examples
+    --------
+    >>> arrivals = Updates(index=np.array([1, 3]), age=np.zeros(2))
+    >>> held_prediction(np.array([5.0, 7.0]), arrivals, 5).tolist()
+    [5.0, 5.0, 5.0, 7.0, 7.0]
+    """
+    last = np.searchsorted(arrivals.index, np.arange(samples), side="right") - 1
+    return np.asarray(values[np.maximum(last, 0)])

@@ -1,0 +1,326 @@
+"""The rest of Fig. 1: saturation, data hold and quantisation, found and fitted as what they are.
+
+Clipped samples and those between a hold's updates are left out of the first fit; then the
+likelihood of what was read is maximised, clipped samples counting as "beyond the level" and
+held ones at the instants of their updates (`hmpim.identify.effects.censored`).
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hmpim.errors import RecordError
+from hmpim.identify.effects.censored import CensoredFit, fit_censored
+from hmpim.identify.effects.drift import Drifting
+from hmpim.identify.effects.hold import Hold, Updates, detect_hold, updates
+from hmpim.identify.effects.lost import find_frozen, find_spikes
+from hmpim.identify.effects.quantization import Quantization, detect_quantization
+from hmpim.identify.effects.saturation import Saturation, detect_saturation
+from hmpim.identify.fitting.enrich import PLAIN
+from hmpim.identify.fitting.joint import JointFit, Trial
+from hmpim.identify.result import Parameters
+from hmpim.identify.uncertainty import estimate
+from hmpim.record import Finding
+
+__all__ = ["Imperfections", "count_levels", "find_imperfections", "refine", "with_imperfections"]
+
+_MANY = 1e6
+"""Degrees of freedom behind levels and periods, which are known all but exactly."""
+
+_COARSE = 1.0
+"""Steps of rounding, over the noise, from which quantisation is worth a warning."""
+
+_MOST_CLIPPED = 0.85
+"""Share of clipped samples beyond which too little is left to find the levels' effect."""
+
+_MUCH_CLIPPED = 0.4
+"""Share beyond which the verdict is doubtful: a rectifier clips half."""
+
+_FEWEST_LEVELS = 8
+"""Levels that an output must take, unless its input takes as few."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Imperfections:
+    """What was seen in the output itself; None where nothing was."""
+
+    saturation: Saturation | None
+    hold: Hold | None
+    quantization: Quantization | None
+    spikes: NDArray[np.bool_] | None
+    frozen: NDArray[np.bool_] | None
+    levels: int | None
+
+    @property
+    def lost(self) -> NDArray[np.bool_] | None:
+        """Samples that say nothing at all: spikes, and where the output stood still."""
+        if self.spikes is None or self.frozen is None:
+            return self.spikes if self.frozen is None else self.frozen
+        return self.spikes | self.frozen
+
+    @property
+    def doubtful(self) -> bool:
+        """Whether too little of the motion is left to trust what is found from it."""
+        return (
+            self.spikes is not None
+            or self.frozen is not None
+            or self.levels is not None
+            or (self.saturation is not None and self.saturation.share > _MUCH_CLIPPED)
+        )
+
+    @property
+    def rounding(self) -> float:
+        """R.m.s. of the error of rounding; 0 where none was seen."""
+        return 0.0 if self.quantization is None else self.quantization.step / 12**0.5
+
+    def arrivals(self, samples: int, fs: float) -> Updates | None:
+        """Samples in which a held output is updated."""
+        return None if self.hold is None else updates(self.hold, samples, fs)
+
+    def telling(self, samples: int, fs: float) -> NDArray[np.bool_] | None:
+        """Samples that say what the output was; None when all do."""
+        lost = self.lost
+        if self.saturation is None and self.hold is None and lost is None:
+            return None
+        told = np.ones(samples, dtype=bool)
+        arrivals = self.arrivals(samples, fs)
+        if arrivals is not None:
+            told[:] = False
+            told[arrivals.index] = True
+        if self.saturation is not None:
+            told &= ~self.saturation.clipped
+        if lost is not None:
+            told &= ~lost
+        return told
+
+
+def find_imperfections(
+    y: NDArray[np.float64],
+    fs: float,
+    *,
+    prediction: NDArray[np.float64] | None = None,
+    richest: int = 0,
+) -> Imperfections:
+    """Look for saturation, hold, quantisation, spikes and standstill in an output.
+
+    Parameters
+    ----------
+    y : ndarray, shape (n,)
+        Output samples.
+    fs : float
+        Rate in Hz.
+    prediction : ndarray, shape (n,), optional
+        What a first model says; with it a plateau is told from a crest, and spikes and
+        standstill are looked for.
+    richest : int
+        Levels that the inputs take.
+    """
+    rounding = detect_quantization(y)
+    step = 0.0 if rounding is None else rounding.step
+    clipping: Saturation | None = detect_saturation(y, prediction, step=step)
+    if clipping is not None and (
+        (clipping.low is None and clipping.high is None) or clipping.share > _MOST_CLIPPED
+    ):
+        clipping = None
+    hold = detect_hold(y, fs, prediction)
+    spikes = frozen = None
+    if prediction is not None and hold is None:
+        frozen = find_frozen(y, prediction, step=step)
+        beyond = None if clipping is None else clipping.clipped
+        spikes = find_spikes(y, prediction, clipped=beyond)
+    return Imperfections(
+        saturation=clipping,
+        hold=hold,
+        quantization=rounding,
+        spikes=spikes,
+        frozen=frozen,
+        levels=_few_levels(y, clipping, richest),
+    )
+
+
+def count_levels(x: NDArray[np.float64]) -> int:
+    """Return how many different values `x` takes.
+
+    Examples
+    --------
+    >>> count_levels(np.array([0.0, 1.0, 1.0, 0.0]))
+    2
+    """
+    return int(np.unique(x).size)
+
+
+def _few_levels(y: NDArray[np.float64], clipping: Saturation | None, richest: int) -> int | None:
+    """How many values the output takes, if they are few beside those of the inputs."""
+    levels = count_levels(y)
+    return levels if levels < _FEWEST_LEVELS and richest > 2 * levels else None
+
+
+def refine(
+    joint: JointFit, found: Imperfections, fs: float, drifting: Drifting | None = None
+) -> tuple[JointFit, CensoredFit] | None:
+    """Fit the chosen structure to what was read; None where there is nothing to refine."""
+    if found.saturation is None and found.hold is None:
+        return None
+    problem = joint.problem
+    whole = None if problem.valid is None else _gaps_only(problem.valid, found, fs)
+    arrivals = found.arrivals(problem.y.size, fs)
+    tried: list[tuple[float, Trial, CensoredFit]] = []
+    for trial in _worth_refining(joint, found):
+        try:
+            censored = fit_censored(
+                replace(problem, valid=whole),
+                trial.fit,
+                found.saturation,
+                arrivals=arrivals,
+                drift=None if drifting is None else drifting.trend,
+            )
+        except RecordError:  # fewer samples inside the range than parameters
+            continue
+        price = trial.fit.structure.parameters * float(np.log(censored.index.size))
+        tried.append((price - 2.0 * censored.log_likelihood, trial, censored))
+    if not tried:  # the first fit stands
+        return None
+    _, chosen, censored = min(tried, key=lambda item: item[0])
+    counted = np.zeros(problem.y.size, dtype=bool)
+    counted[censored.index] = True
+    fit = replace(censored.fit, residual=censored.fit.residual * counted)
+    best = Trial(intersample=chosen.intersample, fit=fit, criterion=joint.best.criterion)
+    refined = replace(
+        joint,
+        problem=replace(problem, valid=counted),
+        best=best,
+        trials=tuple(best if trial is chosen else trial for trial in joint.trials),
+    )
+    return refined, censored
+
+
+def _worth_refining(joint: JointFit, found: Imperfections) -> list[Trial]:
+    """The chosen trial, and simpler ones where clipping may have made it look too simple.
+
+    The samples inside the range are not a fair choice: noise that would have led out of it is
+    missing. To the first fit that is a misfit, which richer structures take up.
+    """
+    best = joint.best
+    if found.saturation is None or best.fit.structure.name in PLAIN:
+        return [best]
+    simpler = [
+        trial
+        for trial in joint.trials
+        if trial.intersample == best.intersample and trial.fit.structure.name in PLAIN
+    ]
+    return [best, *simpler]
+
+
+def _gaps_only(valid: NDArray[np.bool_], found: Imperfections, fs: float) -> NDArray[np.bool_]:
+    """Samples that count, clipped and held ones among them again."""
+    told, lost = found.telling(valid.size, fs), found.lost
+    whole = valid if told is None else np.asarray(valid | ~told)
+    return whole if lost is None else np.asarray(whole & ~lost)
+
+
+def with_imperfections(
+    parameters: Parameters, found: Imperfections, censored: CensoredFit | None, unit: str
+) -> tuple[Parameters, tuple[Finding, ...]]:
+    """Add levels, hold period and step to the parameters, and say what they are."""
+    findings: list[Finding] = []
+    clipping, hold, rounding = found.saturation, found.hold, found.quantization
+    if clipping is not None:
+        levels = [
+            f"{name} {level:.6g} {unit}".rstrip()
+            for name, level in (("low", clipping.low), ("high", clipping.high))
+            if level is not None
+        ]
+        findings.append(
+            Finding(
+                code="saturation",
+                message=f"{100 * clipping.share:.1f} % of the samples are clipped "
+                f"({', '.join(levels)}); they count as beyond the level. "
+                + (
+                    "That is too much to rely on: lower the amplitude, or look for a rectifier."
+                    if clipping.share > _MUCH_CLIPPED
+                    else "Lower the amplitude to keep the whole range."
+                ),
+            )
+        )
+        parameters = replace(
+            parameters,
+            saturation_low=None
+            if clipping.low is None
+            else estimate(clipping.low, (clipping.low_std or 0.0) ** 2, freedom=_MANY, unit=unit),
+            saturation_high=None
+            if clipping.high is None
+            else estimate(clipping.high, (clipping.high_std or 0.0) ** 2, freedom=_MANY, unit=unit),
+        )
+    if hold is not None:
+        findings.append(
+            Finding(
+                code="hold",
+                message=f"The output is updated every {1e3 * hold.period:.4g} ms only, first at "
+                f"{1e3 * hold.phase:.4g} ms into the record; the delay is that of the values, "
+                "without the time for which they are held.",
+            )
+        )
+        parameters = replace(
+            parameters, hold_period=estimate(hold.period, hold.std**2, freedom=_MANY, unit="s")
+        )
+    if rounding is not None:
+        parameters = replace(
+            parameters,
+            quantization_step=estimate(rounding.step, rounding.std**2, freedom=_MANY, unit=unit),
+        )
+        noise = parameters.noise_std
+        coarse = noise is not None and rounding.step > _COARSE * noise.value
+        if noise is not None and coarse and found.levels is None:
+            findings.append(
+                Finding(
+                    code="quantization",
+                    message=f"The output is rounded to steps of {rounding.step:.4g} {unit}".rstrip()
+                    + f", {rounding.step / max(noise.value, 1e-300):.2g} times the noise: errors "
+                    "of rounding are not independent; error bars are only as good as that.",
+                )
+            )
+    if found.levels is not None:
+        findings.append(
+            Finding(
+                code="quantization",
+                message=f"The output takes only {found.levels} different values, too few to follow "
+                "the motion between them. Measure with a finer resolution, or a larger motion.",
+            )
+        )
+    findings += _lost_findings(found)
+    if censored is not None and parameters.noise_std is not None:
+        parameters = replace(
+            parameters,
+            noise_std=estimate(
+                censored.noise_std,
+                censored.noise_std_std**2,
+                freedom=float(censored.index.size),
+                unit=unit,
+            ),
+        )
+    return parameters, tuple(findings)
+
+
+def _lost_findings(found: Imperfections) -> list[Finding]:
+    findings = []
+    if found.spikes is not None:
+        count = int(np.count_nonzero(found.spikes))
+        findings.append(
+            Finding(
+                code="spikes",
+                message=f"{count} samples ({100 * float(np.mean(found.spikes)):.2g} %) stand far "
+                "out of those around them and are left out. Look for loose contacts, lost bits "
+                "or impacts.",
+            )
+        )
+    if found.frozen is not None:
+        findings.append(
+            Finding(
+                code="frozen",
+                message="The output stands still where the model moves, over "
+                f"{100 * float(np.mean(found.frozen)):.2g} % of the record, which is left out. "
+                "Look for lost updates, a stuck sensor, or friction.",
+            )
+        )
+    return findings

@@ -1,0 +1,381 @@
+"""Levels at which a signal was clipped, and which samples were.
+
+A clipped signal spends far more time at its extreme than just below it, and reaches it at
+speed. A sinusoid's crest, a settled step or a square wave does not: at a crest the density
+of the values rises as one over the root of the distance, at a settling step as one over the
+distance, and a square wave has no values below its extreme at all. Where a prediction is at
+hand the question is simpler: does it go on beyond the level?
+"""
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.stats import poisson
+
+from hmpim.errors import RecordError
+from hmpim.identify.effects.smeared import smeared_plateaus
+from hmpim.identify.signals import as_signal
+
+__all__ = ["NoiseAt", "Saturation", "detect_saturation"]
+
+NoiseAt = Literal["before", "after"]
+"""Whether the noise is clipped with the signal, or added to what was clipped."""
+
+_CROWDED = 4.0
+"""Samples at the level over those expected from just below. A sinusoid's crest gives 2.4 to 3,
+a flattened one, as of sin x + (1/9) sin 3x, 3.5."""
+
+_FEWEST = 8
+"""Samples that must be at the level, and just below it, before anything is said."""
+
+_VISITS = 2
+"""Stays at the level that must look alike, where no prediction helps."""
+
+_SHELL = 0.3
+"""Share of the signal's span below the level that is looked at."""
+
+_STEEPEST = 0.42
+"""Exponent of the density against the distance: 0 if clipped, 1/2 at a crest, 1 if settling."""
+
+_DROP = 12.0
+"""Fall over as long again as a visit to the level lasted, in units of what is told apart
+there; a parabolic crest falls 8 to 9."""
+
+_BENT = 1.0
+"""Standard deviations of the noise by which a flat visit may bend or tilt; a crest bends 3 to 6."""
+
+_LOPSIDED = 2.2
+"""Time spent coming near the level over time spent leaving it; a settling step gives more."""
+
+_COARSEST = 0.03
+"""Noise, over the signal's span, beyond which a plateau with scatter needs a prediction."""
+
+_NOISY = 1.0
+"""Noise over the resolution from which equal values at the extreme cannot be chance; rounding
+by itself makes 0.3."""
+
+_BEYOND = 1.5
+"""How far the prediction must go beyond the level, in standard deviations of its own error."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Saturation:
+    """Clipping of a signal, with the standard deviation of each level.
+
+    Parameters
+    ----------
+    low, high : float or None
+        Levels in the signal's unit; None where the range was not reached.
+    low_std, high_std : float or None
+        Their standard deviations.
+    clipped_low, clipped_high : ndarray of bool, shape (n,)
+        Samples at the level. With noise added after the clipping these are the samples
+        within three of its standard deviations, or whose prediction lies beyond the level.
+    noise : {'before', 'after'}
+        Whether the clipped values are all alike (noise comes before) or scatter (after).
+    tolerance : float
+        Half the step of rounding: a value may lie so far inside the level and read as it.
+    """
+
+    low: float | None
+    high: float | None
+    low_std: float | None
+    high_std: float | None
+    clipped_low: NDArray[np.bool_]
+    clipped_high: NDArray[np.bool_]
+    noise: NoiseAt
+    tolerance: float
+
+    @property
+    def clipped(self) -> NDArray[np.bool_]:
+        """Samples at either level, shape (n,)."""
+        return self.clipped_low | self.clipped_high
+
+    @property
+    def share(self) -> float:
+        """Share of all samples that is clipped."""
+        return float(np.mean(self.clipped))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Side:
+    """One level, seen from below."""
+
+    level: float
+    std: float
+    at: NDArray[np.bool_]
+    exact: bool
+
+
+def detect_saturation(
+    y: ArrayLike, prediction: ArrayLike | None = None, *, step: float = 0.0
+) -> Saturation:
+    """Find the levels at which `y` was clipped.
+
+    Parameters
+    ----------
+    y : array_like, shape (n,)
+        Output samples.
+    prediction : array_like, shape (n,), optional
+        What a linear model says the output would be. It need not be good: its gain and timing
+        are corrected on the samples that are not at the level. With it a short plateau is
+        told from a crest, and a square wave from a clipped one.
+    step : float
+        Step to which `y` is rounded, in its unit; 0 for none (see `detect_quantization`).
+
+    Returns
+    -------
+    Saturation
+        Levels are None where there is no clipping.
+
+    Raises
+    ------
+    RecordError
+        For the wrong shape, unequal lengths, NaN or infinity.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> y = np.sin(np.arange(1000) / 50)
+    >>> found = detect_saturation(np.clip(y, -2.0, 0.8))
+    >>> found.high, found.low
+    (0.8, None)
+    >>> detect_saturation(y).high is None
+    True
+    """
+    samples = as_signal("y", y)
+    model = None
+    if prediction is not None:
+        model = as_signal("prediction", prediction)
+        if model.size != samples.size:
+            raise RecordError(
+                f"y has {samples.size} samples and the prediction {model.size}; "
+                "give one for each sample"
+            )
+    high = _upper(samples, model, step)
+    low = _upper(-samples, None if model is None else -model, step)
+    if high is None and low is None and model is not None:
+        return _smeared(samples, model, step)
+    nothing = np.zeros(samples.size, dtype=bool)
+    exact = all(side.exact for side in (low, high) if side is not None)
+    return Saturation(
+        low=None if low is None else -low.level,
+        high=None if high is None else high.level,
+        low_std=None if low is None else low.std,
+        high_std=None if high is None else high.std,
+        clipped_low=nothing if low is None else low.at,
+        clipped_high=nothing if high is None else high.at,
+        noise="before" if exact else "after",
+        tolerance=0.5 * step,
+    )
+
+
+def _smeared(y: NDArray[np.float64], prediction: NDArray[np.float64], step: float) -> Saturation:
+    """Clipping that only the prediction shows."""
+    found = smeared_plateaus(y, prediction, step=step)
+    nothing = np.zeros(y.size, dtype=bool)
+    if found is None:
+        return Saturation(
+            low=None,
+            high=None,
+            low_std=None,
+            high_std=None,
+            clipped_low=nothing,
+            clipped_high=nothing,
+            noise="before",
+            tolerance=0.5 * step,
+        )
+    return Saturation(
+        low=found.low,
+        high=found.high,
+        low_std=None if found.low is None else found.low_std,
+        high_std=None if found.high is None else found.high_std,
+        clipped_low=found.below,
+        clipped_high=found.above,
+        noise="after",
+        tolerance=0.5 * step,
+    )
+
+
+def _upper(
+    y: NDArray[np.float64], prediction: NDArray[np.float64] | None, step: float
+) -> _Side | None:
+    """The upper level, by exact ties; without a prediction, by a plateau with scatter too."""
+    span = float(np.ptp(y))
+    if span == 0.0:
+        return None
+    exact = _exact(y, span, step)
+    if exact is not None and _is_clipped(y, exact, prediction, step, span):
+        return exact
+    sigma = _scatter(y)
+    if prediction is None and max(step, 1e-6 * span) < sigma < _COARSEST * span:
+        side = _scattered(y, sigma)
+        if side is not None and _is_clipped(y, side, None, step, span):
+            return side
+    return None
+
+
+def _spread(x: NDArray[np.float64]) -> float:
+    """Standard deviation of the bulk, from the median of the magnitude."""
+    return float(np.median(np.abs(x - np.median(x))) / 0.6745)
+
+
+def _scatter(y: NDArray[np.float64]) -> float:
+    """Standard deviation of what is not smooth from sample to sample: third differences."""
+    return _spread(np.diff(y, 3)) / float(np.sqrt(20.0))
+
+
+def _exact(y: NDArray[np.float64], span: float, step: float) -> _Side | None:
+    """Samples that share the greatest value, if it is not just any value that recurs."""
+    rounding = max(1e-11 * span, 8 * np.finfo(float).eps * float(np.max(np.abs(y))))
+    tolerance = max(rounding, 0.5 * step)
+    top = float(y.max())
+    at = y >= top - tolerance
+    if np.count_nonzero(at) < _FEWEST:
+        return None
+    error = step / np.sqrt(12.0) if step else rounding
+    return _Side(level=top, std=float(error), at=at, exact=True)
+
+
+def _scattered(y: NDArray[np.float64], sigma: float) -> _Side | None:
+    """A crowd of samples within a few `sigma` of the top."""
+    top = float(y.max())
+    upper = y[y > top - 20.0 * sigma]  # a level more than 6 below the top is none
+    level = top - 3.0 * sigma
+    for _ in range(50):  # climbs to where the values are densest
+        weight = np.exp(-0.5 * ((upper - level) / sigma) ** 2)
+        moved = float(weight @ upper / weight.sum())
+        done = abs(moved - level) < 1e-3 * sigma
+        level = moved
+        if done:
+            break
+    near = np.abs(y - level) < 3.0 * sigma
+    count = int(np.count_nonzero(near))
+    if count < 3 * _FEWEST or np.any(y > level + 6.0 * sigma):
+        return None
+    width = float(np.std(y[near]))
+    return _Side(
+        level=float(np.mean(y[near])),
+        std=width / float(np.sqrt(count)),
+        at=y > level - 3.0 * sigma,
+        exact=False,
+    )
+
+
+def _is_clipped(
+    y: NDArray[np.float64],
+    side: _Side,
+    prediction: NDArray[np.float64] | None,
+    step: float,
+    span: float,
+) -> bool:
+    resolution = max(float(side.level - y[side.at].min()), 0.5 * step, 1e-9 * span)
+    if side.exact:
+        resolution *= 2.0  # the level stands for half a step on either side
+    distance = side.level - y[~side.at]
+    reach = resolution + _SHELL * span
+    below = distance[(distance >= 0) & (distance < reach)]
+    count = int(np.count_nonzero(side.at))
+    if not _is_crowded(count, below, resolution):
+        return False
+    if prediction is not None:
+        return _goes_beyond(y, side, prediction, resolution)
+    if below.size < _FEWEST or not _is_even(below, resolution, reach):
+        return False
+    return _is_flat(y, side, resolution, reach)
+
+
+def _is_crowded(count: int, below: NDArray[np.float64], resolution: float) -> bool:
+    """Whether the level holds more samples than a crest would, judged by what is just below."""
+    if below.size == 0:
+        return True
+    distances = np.sort(below)
+    nearest = min(max(40, count // 4), count, distances.size)
+    room = max(float(distances[nearest - 1]), 2.0 * resolution) - resolution
+    found = np.count_nonzero(distances < room + resolution) + 1
+    expected = found * resolution / room
+    return bool(count > _CROWDED * expected and poisson.sf(count - 1, 2.5 * expected) < 1e-6)
+
+
+def _is_even(below: NDArray[np.float64], resolution: float, reach: float) -> bool:
+    """Whether the values below the level do not crowd towards it."""
+    floor = max(resolution, reach / 100.0)
+    inside = np.maximum(below, floor) - floor + reach / 100.0
+    exponent = 1.0 - inside.size / float(np.sum(np.log((reach - floor) * 1.01 / inside)))
+    settled = np.count_nonzero(below < floor) > 0.1 * below.size + 3 * np.sqrt(below.size)
+    return bool(exponent < _STEEPEST and not settled)
+
+
+def _visits(at: NDArray[np.bool_]) -> NDArray[np.intp]:
+    """First and last sample of each stay at the level, shape (m, 2); short breaks do not count."""
+    where = np.flatnonzero(at)
+    breaks = np.flatnonzero(np.diff(where) > 3)
+    first = where[np.concatenate([[0], breaks + 1])]
+    last = where[np.concatenate([breaks, [where.size - 1]])]
+    inside = (first > 2) & (last < at.size - 3) & (last - first >= 2)
+    return np.stack([first[inside], last[inside]], axis=1)
+
+
+def _is_flat(y: NDArray[np.float64], side: _Side, resolution: float, reach: float) -> bool:
+    """Whether the level is met and left at speed, the same either way, and is flat between."""
+    visits = _visits(side.at)
+    if visits.shape[0] < _VISITS:
+        return False
+    distance = side.level - y
+    near = distance < reach
+    coming, leaving, falls = [], [], []
+    for first, last in visits:
+        length = last - first + 1
+        before = near[max(first - length, 0) : first][::-1]
+        after = near[last + 1 : last + 1 + length]
+        coming.append(before.size if before.all() else int(np.argmin(before)))
+        leaving.append(after.size if after.all() else int(np.argmin(after)))
+        falls.append(
+            max(distance[max(first - length, 0)], distance[min(last + length, y.size - 1)])
+        )
+    if min(np.median(coming), np.median(leaving)) < 2.0:  # by a jump: a square wave
+        return False
+    if not 1.0 / _LOPSIDED < sum(coming) / sum(leaving) < _LOPSIDED:
+        return False
+    if side.exact:
+        return bool(np.median(falls) > _DROP * resolution)
+    return _neither_bends_nor_tilts(y, visits, resolution / 3.0)
+
+
+def _neither_bends_nor_tilts(
+    y: NDArray[np.float64], visits: NDArray[np.intp], sigma: float
+) -> bool:
+    """Whether the values within the visits have no common slope or curvature."""
+    place = np.concatenate([np.linspace(-1, 1, last - first + 1) for first, last in visits])
+    value = np.concatenate([y[first : last + 1] for first, last in visits])
+    rows = np.stack([np.ones(place.size), place, place**2])
+    weights = np.linalg.lstsq(rows.T, value, rcond=None)[0]
+    return bool(abs(weights[1]) < _BENT * sigma and abs(weights[2]) < _BENT * sigma)
+
+
+def _goes_beyond(
+    y: NDArray[np.float64], side: _Side, prediction: NDArray[np.float64], resolution: float
+) -> bool:
+    """Whether the prediction, set right on the other samples, exceeds the level at the level."""
+    slope = np.gradient(prediction)
+    rows = np.stack([np.ones(y.size), prediction, slope, np.gradient(slope)])
+    free = ~side.at
+    between = free & (y > y.min() + resolution)  # the other end may be clipped too
+    if np.count_nonzero(between) > 0.1 * y.size:
+        free = between
+    if np.count_nonzero(free) < 4 * rows.shape[0]:
+        return False
+    weights = np.linalg.lstsq(rows[:, free].T, y[free], rcond=None)[0]
+    corrected = weights @ rows
+    error = _spread((y - corrected)[free])
+    beyond = (corrected - side.level)[side.at]
+    runs = int(np.count_nonzero(side.at[1:] & ~side.at[:-1])) + 1
+    least = max(_BEYOND * error / np.sqrt(runs), 0.5 * error, 0.5 * resolution)
+    if np.mean(beyond) > least and np.mean(beyond > 0) > 0.6:
+        return True
+    # Values that scatter elsewhere and are all alike here, while the prediction moves.
+    noise = min(error, _scatter(y))
+    moves = float(np.std(beyond))
+    return bool(noise > _NOISY * resolution and moves > max(0.3 * noise, 0.01 * float(np.ptp(y))))

@@ -1,0 +1,159 @@
+"""Richer structures, for a record that the plain ones do not explain.
+
+They are tried only where what the best plain structure leaves over still follows the input and
+is worth more than a small share of the output: every simulation pays for every pole, and with
+enough samples the smallest imperfection of real hardware is "significant".
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hmpim.identify.fitting.fit import Fit
+from hmpim.identify.fitting.start import RoughResponse, starting_values
+from hmpim.model.dynamics import STRUCTURES, Structure, StructureName, theta_of
+
+__all__ = ["INTEGRATING", "PLAIN", "RICH", "integrator_starts", "members", "rich_starts"]
+
+PLAIN: tuple[StructureName, ...] = ("static", "first_order", "second_order")
+RICH: tuple[StructureName, ...] = (
+    "second_order_zero",
+    "third_order",
+    "fourth_order",
+    "two_modes",
+)
+INTEGRATING: tuple[StructureName, ...] = ("integrator", "integrator_first_order")
+
+_DELAYS = 7
+"""How many delays to start from, about that of the best fit so far."""
+
+_REWEIGHTINGS = 6
+
+
+def integrator_starts(rough: RoughResponse, structure: Structure) -> list[NDArray[np.float64]]:
+    """Starts for an integrator: those of the rest of it, from the input's running sum.
+
+    Parameters
+    ----------
+    rough : RoughResponse
+        Of the output against the running sum of the input.
+    structure : Structure
+        An integrator, alone or with a lag.
+    """
+    rest = STRUCTURES["first_order" if structure.sections else "static"]
+    return starting_values(rough, rest, earliest=-2)
+
+
+def rich_starts(
+    rough: RoughResponse, structure: Structure, fit: Fit, *, count: int = 3
+) -> list[NDArray[np.float64]]:
+    """Starts for a structure with zeros or more than two poles, the most promising first.
+
+    Sanathanan and Koerner's iteration on the rough response, at several delays about that of
+    the best fit so far; poles in the right half plane are mirrored.
+
+    Parameters
+    ----------
+    rough : RoughResponse
+        From `hmpim.identify.fitting.start.rough_response`.
+    structure : Structure
+        What will be fitted.
+    fit : Fit
+        The best fit so far.
+    count : int
+        At most so many.
+
+    Returns
+    -------
+    list of ndarray, shape (1 + order,)
+        Delay in samples, parameters of the denominator's sections.
+    """
+    reach = np.pi / rough.omega[-1]
+    delays = np.maximum(fit.delay + reach * np.linspace(-1.5, 0.5, _DELAYS), -1.0)
+    scale = float(np.sqrt(rough.weight @ rough.omega**2 / rough.weight.sum()))
+    s = np.asarray(1j * rough.omega / scale, dtype=np.complex128)
+    found: list[tuple[float, NDArray[np.float64]]] = [_from_plain(rough, structure, fit)]
+    for delay in delays:
+        target = rough.response * np.exp(1j * rough.omega * (delay - rough.lag))
+        error, denominator = _reweighted(s, target, rough.weight, structure)
+        coefficients = _sections(denominator, structure)
+        if coefficients is None:
+            continue
+        powers = np.concatenate([np.arange(1, order + 1) for order in structure.sections])
+        theta = theta_of(structure, coefficients / scale**powers)
+        found.append((error, np.concatenate([[delay], theta])))
+    found.sort(key=lambda item: item[0])
+    return [theta for _, theta in found[:count]]
+
+
+def _from_plain(
+    rough: RoughResponse, structure: Structure, fit: Fit
+) -> tuple[float, NDArray[np.float64]]:
+    """The best plain fit with its missing sections added where they hardly matter; tried first."""
+    theta = list(fit.theta)
+    have = fit.structure.sections
+    if not have:
+        theta += [0.0]
+        have = (1,)
+    if have == (1,):
+        theta += [0.1875]  # (1 + 3/4 Ts)(1 + 1/4 Ts)
+    for order in structure.sections[1:]:
+        theta += [np.log(0.5 / rough.omega[-1])] + ([0.5] if order == 2 else [])
+    return 0.0, np.array(theta)
+
+
+def _reweighted(
+    s: NDArray[np.complex128],
+    target: NDArray[np.complex128],
+    weight: NDArray[np.float64],
+    structure: Structure,
+) -> tuple[float, NDArray[np.float64]]:
+    """Fit target A = B; return the output error and A by rising powers, A(0) = 1."""
+    order, zeros = structure.order, structure.zeros
+    below = s[:, None] ** np.arange(1, order + 1)
+    above = s[:, None] ** np.arange(zeros + 1)
+    columns = np.hstack([target[:, None] * below, -above])
+    root = np.sqrt(weight)
+    best = (np.inf, np.ones(order + 1))
+    for _ in range(_REWEIGHTINGS):
+        rows = np.vstack([(columns * root[:, None]).real, (columns * root[:, None]).imag])
+        right = -np.concatenate([(target * root).real, (target * root).imag])
+        solution = np.linalg.lstsq(rows, right, rcond=None)[0]
+        denominator = np.concatenate([[1.0], solution[:order]])
+        a = np.polynomial.polynomial.polyval(s, denominator)
+        b = above @ solution[order:]
+        error = float(weight @ np.abs(target - b / a) ** 2)
+        if error < best[0]:
+            best = (error, denominator)
+        root = np.sqrt(weight) / np.abs(a)
+    return best
+
+
+def _sections(denominator: NDArray[np.float64], structure: Structure) -> NDArray[np.float64] | None:
+    """Group the poles, mirrored into the left half plane, into the structure's sections."""
+    poles = np.roots(denominator[::-1])
+    if poles.size < structure.order or np.any(np.abs(poles) < 1e-9):
+        return None
+    poles = -np.abs(poles.real) + 1j * poles.imag
+    pairs = sorted(poles[poles.imag > 1e-9], key=abs)
+    real = sorted(poles[np.abs(poles.imag) <= 1e-9].real, key=abs)
+    out: list[float] = []
+    for order in structure.sections:
+        if order == 2 and pairs:
+            p = pairs.pop(0)
+            out += [-2 * p.real / abs(p) ** 2, 1 / abs(p) ** 2]
+        elif order == 2:
+            p, q = real.pop(0), real.pop(0)
+            out += [-1 / p - 1 / q, 1 / (p * q)]
+        elif real:
+            out += [-1 / real.pop(0)]
+        else:  # two pairs cannot be three poles
+            return None
+    values = np.array(out)
+    return np.maximum(values, 1e-4) if np.all(np.isfinite(values)) else None
+
+
+def members(
+    structures: tuple[StructureName, ...], group: tuple[StructureName, ...]
+) -> list[Structure]:
+    """Structures of a group that may be tried."""
+    return [STRUCTURES[name] for name in group if name in structures]

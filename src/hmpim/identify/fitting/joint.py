@@ -1,0 +1,475 @@
+"""The joint fit: structure, and what the input does between samples, chosen by the data.
+
+Each structure is fitted from starts that come from the data; the Bayesian information
+criterion (G. Schwarz, Annals of Statistics 6, 1978) chooses, with the number of samples
+counted down for a residual that is not white. The assumption between the samples is
+chosen by likelihood alone, since none costs a parameter. For an input that is smooth
+against the rate and a system that filters it, held, linear and band-limited differ
+by little more than half a sample of delay, which no likelihood sees; the input is then
+taken as band-limited, or as held if it mostly stands still and jumps, unless the record speaks
+clearly against it.
+"""
+
+from dataclasses import dataclass
+from typing import get_args
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hmpim.identify.fitting.enrich import (
+    INTEGRATING,
+    PLAIN,
+    RICH,
+    integrator_starts,
+    members,
+    rich_starts,
+)
+from hmpim.identify.fitting.fit import Fit, Problem, fit_structure, jacobian
+from hmpim.identify.fitting.start import RoughResponse, rough_response, starting_values
+from hmpim.identify.fitting.unexplained import unexplained_response
+from hmpim.identify.whiteness import effective_share, is_white, misfit
+from hmpim.model.dynamics import STRUCTURES, Structure, StructureName
+from hmpim.model.response import slowest_time_constant
+from hmpim.model.sampled import SampledInput, prepare_input
+from hmpim.record import Intersample
+
+__all__ = ["CLEARLY", "JointFit", "Trial", "joint_fit", "nested"]
+
+CLEARLY = 6.0
+"""Difference in log-likelihood that decides against the natural assumption (odds of 400)."""
+
+_HOPELESS = 2.0
+"""A structure whose sum of squares is this many times the least is not tried again at once
+under the other assumptions."""
+
+_MATERIAL = 0.02
+"""Share of the output (r.m.s.) below which a misfit is reported but not modelled."""
+
+_PARTLY = 0.08
+"""Share of the response, evenly over the band, below which the same holds."""
+
+_POOR = 0.2
+"""Share of the output's power left over, in colour, that asks for a richer structure anyway."""
+
+_LONG_TASTE = 12
+"""Steps from each start of a richer structure, whose valleys are longer."""
+
+_TASTE = 4
+"""Steps taken from each start before the best one is followed to its end."""
+
+_FALLING = 4.0
+"""After so many steps a structure is given up if its sum of squares is this far from hopeful."""
+
+_DELAY_SHIFT: dict[Intersample, float] = {"zoh": -0.5, "foh": 0.0, "bandlimited": 0.0}
+"""Samples by which the fitted delay moves when held, against the other two."""
+
+_FAR = 4.0
+"""Standard deviations of the delay beyond which another structure contradicts the chosen one."""
+
+_JUMP = 0.05
+"""Share of its range by which a held input jumps at least once."""
+
+_FINAL_PRECISION = 1e-6
+"""Precision of the chosen fit, see `fit_structure`."""
+
+_SETTLED = 5.0
+"""Time constants after which what came before the record is forgotten (0.7 % left)."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Trial:
+    """One structure under one assumption, fitted; `criterion` lower is better."""
+
+    intersample: Intersample
+    fit: Fit
+    criterion: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class JointFit:
+    """The chosen trial, all others, and the data they were fitted to.
+
+    Parameters
+    ----------
+    problem : Problem
+        The data under the chosen assumption, with the samples that counted.
+    best : Trial
+        The chosen one.
+    trials : tuple of Trial
+        All, the chosen one included.
+    forgotten : int
+        Samples left out at the beginning because the record does not begin at rest.
+    effective_share : float
+        Independent samples per sample, from the best residual's correlation.
+    simpler : Trial or None
+        What the criterion alone would have chosen, where a richer structure was taken for its
+        wider error bars.
+    """
+
+    problem: Problem
+    best: Trial
+    trials: tuple[Trial, ...]
+    forgotten: int
+    effective_share: float
+    simpler: Trial | None = None
+
+
+def joint_fit(
+    u: NDArray[np.float64],
+    y: NDArray[np.float64],
+    *,
+    valid: NDArray[np.bool_] | None = None,
+    known: NDArray[np.bool_] | None = None,
+    intersample: Intersample | None = None,
+    structures: tuple[StructureName, ...] = (*PLAIN, *RICH, *INTEGRATING),
+) -> JointFit:
+    """Fit every structure and keep the one that the record supports.
+
+    Parameters
+    ----------
+    u, y : ndarray, shape (n,)
+        Uniform samples of input and output.
+    valid : ndarray of bool, shape (n,), optional
+        Output samples that count; all if None.
+    known : ndarray of bool, shape (n,), optional
+        Input samples that were measured, not filled in; what the output does until it has
+        forgotten the others does not count. All if None.
+    intersample : {'zoh', 'foh', 'bandlimited'}, optional
+        What the input does between samples; chosen by likelihood if None.
+    structures : tuple of str
+        Which to try.
+
+    Returns
+    -------
+    JointFit
+    """
+    natural: Intersample = "zoh" if _looks_held(u) else "bandlimited"
+    if intersample is not None:
+        natural = intersample
+    data = _Data(
+        u=u,
+        y=y,
+        sources={natural: prepare_input(u, natural)},
+        rough=rough_response(
+            u, y if valid is None else _bridged(y, valid), longest_delay=u.size // 2
+        ),
+    )
+    plain = tuple(name for name in structures if name in PLAIN)
+    fits = _fit_all(data.problem(natural, valid), data.rough, plain or PLAIN)
+    everything = valid
+    forgotten = _forgotten(fits, everything)
+    valid = _counted(fits, everything, forgotten, known)
+    if valid is not everything:
+        fits = [_refit(data.problem(natural, valid), f) for f in fits]
+    fitted = _under_each_assumption(data, natural, fits, valid, alone=intersample is not None)
+    mode, best_fit = min(fitted, key=lambda item: item[1].cost)
+    others = tuple(name for name in structures if name not in PLAIN)
+    if not plain or _worth_explaining(data.problem(mode, valid), best_fit, data):
+        richer = _enriched(data, data.problem(natural, valid), fits, others)
+        if richer and forgotten and not _forgotten(richer, everything):
+            forgotten = 0  # it was the structure that was wrong, not the beginning
+            valid = _counted(richer, everything, forgotten, known)
+            fits = [_refit(data.problem(natural, valid), f) for f in fits]
+            richer = [_refit(data.problem(natural, valid), f) for f in richer]
+        kept = [*fits, *richer] if plain else richer or fits
+        fitted = _under_each_assumption(data, natural, kept, valid, alone=intersample is not None)
+    share = effective_share(min(fitted, key=lambda item: item[1].cost)[1].residual)
+    count = data.problem(natural, valid).counted * share
+    trials = [_trial(mode, fit, count) for mode, fit in fitted]
+    chosen = _chosen(trials, natural)
+    problem = data.problem(chosen.intersample, valid)
+    likeliest = chosen
+    chosen = _wary(chosen, trials, problem, count)
+    polished = fit_structure(
+        problem, chosen.fit.structure, chosen.fit.theta, precision=_FINAL_PRECISION
+    )
+    best = _trial(chosen.intersample, polished, count)
+    return JointFit(
+        problem=problem,
+        best=best,
+        trials=tuple(best if trial is chosen else trial for trial in trials),
+        forgotten=forgotten,
+        effective_share=share,
+        simpler=None if chosen is likeliest else likeliest,
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Data:
+    """What every trial shares; inputs are prepared for an assumption when first asked for."""
+
+    u: NDArray[np.float64]
+    y: NDArray[np.float64]
+    sources: dict[Intersample, SampledInput]
+    rough: RoughResponse
+
+    def problem(self, mode: Intersample, valid: NDArray[np.bool_] | None) -> Problem:
+        if mode not in self.sources:
+            self.sources[mode] = prepare_input(self.u, mode)
+        return Problem(
+            source=self.sources[mode], y=self.y, valid=valid, longest_delay=self.y.size // 2 + 2.0
+        )
+
+
+def _counted(
+    fits: list[Fit],
+    valid: NDArray[np.bool_] | None,
+    forgotten: int,
+    known: NDArray[np.bool_] | None,
+) -> NDArray[np.bool_] | None:
+    """Samples that count once it is known how long the system remembers."""
+    ahead = _ahead(fits)
+    if not (forgotten or ahead or known is not None):
+        return valid
+    counted = np.ones(fits[0].residual.size, dtype=bool) if valid is None else valid.copy()
+    counted[:forgotten] = False
+    counted[counted.size - ahead :] = False
+    if known is not None:
+        counted &= _unaffected(known, _memory(fits))
+    return counted
+
+
+def _refit(problem: Problem, fit: Fit) -> Fit:
+    return fit_structure(problem, fit.structure, fit.theta)
+
+
+def _under_each_assumption(
+    data: _Data,
+    natural: Intersample,
+    fits: list[Fit],
+    valid: NDArray[np.bool_] | None,
+    *,
+    alone: bool,
+) -> list[tuple[Intersample, Fit]]:
+    """Add to fits under the natural assumption those under the others, unless it stands alone."""
+    fitted = [(natural, fit) for fit in fits]
+    if alone:
+        return fitted
+    least = min(fit.cost for fit in fits)
+    leading = [fit for fit in fits if fit.cost < _HOPELESS * least]
+    trailing = [fit for fit in fits if fit.cost >= _HOPELESS * least]
+    others = [mode for mode in get_args(Intersample) if mode != natural]
+
+    def moved(some: list[Fit]) -> list[tuple[Intersample, Fit]]:
+        return [
+            (mode, _moved(data.problem(mode, valid), fit, natural, mode))
+            for mode in others
+            for fit in some
+        ]
+
+    fitted += moved(leading)
+    count = data.problem(natural, valid).counted
+    if min(fit.cost for _, fit in fitted) < least * (1.0 - 2 * CLEARLY / count):
+        fitted += moved(trailing)  # hopeless under a wrong assumption, perhaps not under this
+    return fitted
+
+
+def _bridged(y: NDArray[np.float64], valid: NDArray[np.bool_]) -> NDArray[np.float64]:
+    """Fill samples that do not count by straight lines, for spectra."""
+    index = np.arange(y.size)
+    return np.interp(index, index[valid], y[valid])
+
+
+def _fit_all(
+    problem: Problem, rough: RoughResponse, structures: tuple[StructureName, ...]
+) -> list[Fit]:
+    """Fit each structure, the richest first, from its own starts and then from the simpler ones.
+
+    A residual that is white needs no other start, and tells which simpler structures are
+    hopeless: those get one start and few steps.
+    """
+    fits: list[Fit] = []
+    settled = False
+    for name in sorted(structures, key=lambda name: -STRUCTURES[name].order):
+        structure = STRUCTURES[name]
+        if settled and name == "first_order":
+            starts = [_without_second_pole(fits[0])]
+        else:
+            starts = starting_values(rough, structure, earliest=-2, thorough=False)
+        steps = 2 if settled else _TASTE
+        fit = fit_structure(problem, structure, starts[0], iterations=steps)
+        hopeful = min((f.cost for f in fits), default=np.inf) * _HOPELESS
+        white = fit.cost < hopeful and is_white(fit.residual)
+        if not white and fit.cost < _FALLING * hopeful:
+            rivals = starts[1:]
+            if not settled:
+                rivals += starting_values(rough, structure, earliest=-2)
+            for theta in rivals:
+                rival = fit_structure(problem, structure, theta, iterations=_TASTE)
+                fit = min(fit, rival, key=lambda f: f.cost)
+        settled = settled or white
+        fits.append(fit)
+    for i, fit in enumerate(fits):
+        for other in fits:
+            if _nests(other, fit):
+                rival = fit_structure(problem, fit.structure, nested(other), iterations=_TASTE)
+                fits[i] = min(fits[i], rival, key=lambda f: f.cost)
+    least = min(fit.cost for fit in fits)
+    return [
+        fit
+        if fit.converged or fit.cost > _FALLING * least
+        else fit_structure(problem, fit.structure, fit.theta)
+        for fit in fits
+    ]
+
+
+def _enriched(
+    data: _Data, problem: Problem, fits: list[Fit], structures: tuple[StructureName, ...]
+) -> list[Fit]:
+    """Fits of the richer structures."""
+    best = min(fits, key=lambda fit: fit.cost)
+    integrating = members(structures, INTEGRATING)
+    found: list[Fit] = []
+    if integrating:
+        added = np.cumsum(data.u - data.u[0])
+        rough = rough_response(added, data.y, longest_delay=data.y.size // 2)
+        found = [_best_of(problem, s, integrator_starts(rough, s)) for s in integrating]
+        if is_white(min(found, key=lambda fit: fit.cost).residual):
+            return found
+    return found + [
+        _best_of(problem, structure, rich_starts(data.rough, structure, best))
+        for structure in members(structures, RICH)
+    ]
+
+
+def _best_of(problem: Problem, structure: Structure, starts: list[NDArray[np.float64]]) -> Fit:
+    tried = [fit_structure(problem, structure, theta, iterations=_LONG_TASTE) for theta in starts]
+    best = min(tried, key=lambda fit: fit.cost)
+    return best if best.converged else fit_structure(problem, structure, best.theta)
+
+
+def _worth_explaining(problem: Problem, fit: Fit, data: _Data) -> bool:
+    """Whether the residual follows the input by more than a small share of output or response."""
+    omega = data.rough.omega
+    band = (omega[0] / (2 * np.pi), omega[-1] / (2 * np.pi))
+    left = misfit(data.u, fit.residual, delay=fit.delay, band=band)
+    spread = float(np.sum((problem.masked(problem.y - problem.y.mean())) ** 2))
+    owed = float(np.sqrt(left.share * fit.cost / spread)) if spread else 0.0
+    if left.probability < 1e-4 and (owed > _MATERIAL or _misses_part(problem, fit, data, band)):
+        return True
+    return fit.cost > _POOR * spread and not is_white(fit.residual)
+
+
+def _misses_part(problem: Problem, fit: Fit, data: _Data, band: tuple[float, float]) -> bool:
+    """Whether the response is missed where the output hardly moves, as at the end of a sweep."""
+    span = slice(None)
+    if problem.valid is not None:
+        counted = np.flatnonzero(problem.valid)
+        span = slice(int(counted[0]), int(counted[-1]) + 1)
+        if counted.size < counted[-1] + 1 - counted[0]:
+            return False  # spectra do not bear gaps
+    missed = unexplained_response(
+        data.u[span], data.y[span], fit.residual[span], delay=fit.delay, band=band
+    )
+    return missed > _PARTLY
+
+
+def _nests(simple: Fit, rich: Fit) -> bool:
+    """Whether the simpler structure is a start for a richer one that may have missed its best."""
+    return (
+        simple.structure.name == "first_order"
+        and rich.structure.name == "second_order"
+        and (simple.cost <= rich.cost or not is_white(rich.residual))
+    )
+
+
+def _without_second_pole(second_order: Fit) -> NDArray[np.float64]:
+    """First order from second: a fast second pole counts as delay."""
+    delay, log_lag, shape = second_order.theta
+    return np.array([delay + min(shape, 0.25) * np.exp(log_lag), log_lag])
+
+
+def nested(first_order: Fit) -> NDArray[np.float64]:
+    """First order as second: a quarter of its time constant moved into a second pole."""
+    return np.concatenate([first_order.theta, [0.1875]])  # (1 + 3/4 Ts)(1 + 1/4 Ts)
+
+
+def _moved(problem: Problem, fit: Fit, origin: Intersample, mode: Intersample) -> Fit:
+    """Fit the same structure under another assumption, from where the first one ended."""
+    theta = fit.theta.copy()
+    theta[0] += _DELAY_SHIFT[mode] - _DELAY_SHIFT[origin]
+    return fit_structure(problem, fit.structure, theta)
+
+
+def _memory(fits: list[Fit]) -> int:
+    """Samples after which the output has forgotten its input, by the best fit so far."""
+    fit = min(fits, key=lambda f: f.cost)
+    slowest = slowest_time_constant(fit.denominator)
+    span = int(np.ceil(max(fit.delay, 0.0) + _SETTLED * slowest)) + 2
+    return min(span, fit.residual.size // 4)
+
+
+def _ahead(fits: list[Fit]) -> int:
+    """Samples at the end that depend on input after the record, if the delay is negative."""
+    delay = min(fits, key=lambda f: f.cost).delay
+    return int(np.ceil(-delay)) + 3 if delay < 0 else 0
+
+
+def _unaffected(known: NDArray[np.bool_], memory: int) -> NDArray[np.bool_]:
+    """Samples whose output depends on measured input alone."""
+    unknown = np.concatenate([[0], np.cumsum(~known)])
+    index = np.arange(known.size)
+    return np.asarray(unknown[index + 1] == unknown[np.maximum(index - memory, 0)])
+
+
+def _forgotten(fits: list[Fit], valid: NDArray[np.bool_] | None) -> int:
+    """Samples at the start that a system at rest cannot explain, to be left out."""
+    fit = min(fits, key=lambda f: f.cost)
+    n = fit.residual.size
+    span = _memory(fits)
+    counted = np.ones(n, dtype=bool) if valid is None else valid
+    early, late = fit.residual[:span][counted[:span]], fit.residual[span:][counted[span:]]
+    if early.size == 0 or late.size == 0:
+        return 0
+    level = float(np.median(late**2)) / 0.455  # median of a squared Gaussian of unit variance
+    excess = float(np.mean(early**2)) / max(level, np.finfo(float).tiny)
+    return span if excess > 1.0 + 10.0 * np.sqrt(2.0 / early.size) and excess > 4.0 else 0
+
+
+def _trial(mode: Intersample, fit: Fit, count: float) -> Trial:
+    tiny = np.finfo(float).tiny
+    criterion = count * np.log(max(fit.cost, tiny) / count) + fit.structure.parameters * np.log(
+        count
+    )
+    return Trial(intersample=mode, fit=fit, criterion=float(criterion))
+
+
+def _looks_held(u: NDArray[np.float64]) -> bool:
+    """Whether an input stands still most of the time and then jumps, as a held one does."""
+    jumps = np.abs(np.diff(u))
+    moving = jumps[jumps > 0]
+    return bool(moving.size < 0.5 * jumps.size and moving.max() > _JUMP * np.ptp(u))
+
+
+def _wary(chosen: Trial, trials: list[Trial], problem: Problem, count: float) -> Trial:
+    """Prefer second order to first where it may well be right and would move the delay.
+
+    The criterion keeps a simpler structure until the evidence is strong, and the simpler one's
+    error bars take it for certain. Where the record half speaks for another pole and that
+    pole would take the delay far outside those bars, the wider bars are the honest ones.
+    """
+    if chosen.fit.structure.name != "first_order":
+        return chosen
+    rows = jacobian(problem, chosen.fit)
+    information = np.linalg.pinv(rows @ rows.T, hermitian=True)
+    std = np.sqrt(max(information[0, 0], 0.0) * chosen.fit.cost / problem.counted)
+    for trial in trials:
+        extra = trial.fit.structure.parameters - chosen.fit.structure.parameters
+        if (
+            trial.intersample == chosen.intersample
+            and trial.fit.structure.name in PLAIN
+            and extra > 0
+            and extra * np.log(count) - (trial.criterion - chosen.criterion) > 0.5 * extra
+            and abs(trial.fit.delay - chosen.fit.delay) > _FAR * std
+        ):
+            return trial
+    return chosen
+
+
+def _chosen(trials: list[Trial], natural: Intersample) -> Trial:
+    best = min(trials, key=lambda trial: trial.criterion)
+    rivals = [trial for trial in trials if trial.intersample == natural]
+    if not rivals or best in rivals:
+        return best
+    rival = min(rivals, key=lambda trial: trial.criterion)
+    return best if rival.criterion - best.criterion > 2 * CLEARLY else rival

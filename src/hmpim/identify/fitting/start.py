@@ -1,0 +1,259 @@
+"""Starting values from the data alone: delay and denominator, for any structure.
+
+1. The lag of the greatest cross-correlation gives delay plus what the dynamics add.
+2. With the output moved back by that lag, both records are tapered and their spectra
+   divided: a response nearly free of leakage.
+3. For every delay at once, and a few guesses of the corner frequency, the denominator that
+   makes ``G e^(jωτ) A(jω)`` constant is a small linear least-squares problem (E. C. Levy, IRE
+   Trans. Autom. Control 4, 1959) whose only terms that depend on the delay are inverse Fourier
+   transforms. Reweighting by the last denominator (C. K. Sanathanan and J. Koerner, IEEE TAC 8,
+   1963) removes its bias.
+4. The few delays at which the output error is least locally are the starts.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.fft import irfft, next_fast_len, rfft
+
+from hmpim.model.dynamics import Structure, theta_of
+
+__all__ = ["RoughResponse", "rough_response", "starting_values"]
+
+_TAPER = 0.1
+"""Share of the record tapered at either end."""
+
+_PHASE_STEP = 0.3
+"""Steps of the delay looked at turn the highest frequency by no more than this, in rad."""
+
+_CORNERS = (0.08, 0.25, 1.0)
+"""Where, over the highest frequency, the first weight begins to roll off as 1/A would: above
+the system's own corner the response is noise, which an unweighted fit takes at face value."""
+
+_TURNS, _LATE = 64, 64
+"""Bins of a long record are taken together where a delay of `lag + _LATE` samples turns them
+against each other by less than a turn over `_TURNS`."""
+
+_ENOUGH = 16384
+"""Samples from which on they are: so many as a group has would be left."""
+
+_FLOOR = 1e-3
+"""Bins whose input amplitude is below this share of the greatest are not looked at."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class RoughResponse:
+    """Spectra with the coarse delay removed, on uniform bins.
+
+    Parameters
+    ----------
+    lag : int
+        Samples by which the output was moved back.
+    length : int
+        Length of the transform whose bins these are.
+    bins : ndarray of int, shape (m,)
+        Bins with excitation.
+    omega : ndarray, shape (m,)
+        Radians per sample at those bins.
+    response : complex ndarray, shape (m,)
+        Output over input.
+    weight : ndarray, shape (m,)
+        Power of the input, largest 1.
+    """
+
+    lag: int
+    length: int
+    bins: NDArray[np.intp]
+    omega: NDArray[np.float64]
+    response: NDArray[np.complex128]
+    weight: NDArray[np.float64]
+
+
+def _tapered(x: NDArray[np.float64]) -> NDArray[np.float64]:
+    n = x.size
+    edge = max(int(_TAPER * n), 1)
+    window = np.ones(n)
+    ramp = np.sin(0.5 * np.pi * (np.arange(edge) + 0.5) / edge) ** 2
+    window[:edge] = ramp
+    window[n - edge :] = ramp[::-1]
+    return np.asarray(window * (x - window @ x / window.sum()))
+
+
+def coarse_lag(u: NDArray[np.float64], y: NDArray[np.float64], longest: int) -> int:
+    """Lag in samples, 0..longest, of the greatest magnitude of the cross-correlation."""
+    length = next_fast_len(u.size + longest + 1, real=True)
+    spectrum = np.conj(rfft(u - u.mean(), length)) * rfft(y - y.mean(), length)
+    correlation = irfft(spectrum, length)[: longest + 1]
+    return int(np.argmax(np.abs(correlation)))
+
+
+def rough_response(
+    u: NDArray[np.float64], y: NDArray[np.float64], *, longest_delay: int
+) -> RoughResponse:
+    """Divide tapered spectra, the output first moved back by the coarse delay.
+
+    Parameters
+    ----------
+    u, y : ndarray, shape (n,)
+        Uniform samples.
+    longest_delay : int
+        Greatest lag to look at, in samples.
+    """
+    lag = coarse_lag(u, y, longest_delay)
+    overlap = u.size - lag
+    group = max(min(u.size // (_TURNS * (lag + _LATE)), u.size // _ENOUGH), 1)
+    length = next_fast_len(-(-u.size // group), real=True)
+    spectrum_u = rfft(_tapered(u[:overlap]), group * length)
+    spectrum_y = rfft(_tapered(y[lag:]), group * length)
+    power = _grouped(spectrum_u.real**2 + spectrum_u.imag**2, group)
+    cross = _grouped(np.conj(spectrum_u) * spectrum_y, group)
+    power[0] = 0.0
+    bins = np.flatnonzero(power > _FLOOR**2 * power.max())
+    weight = power[bins] / power.max()
+    return RoughResponse(
+        lag=lag,
+        length=length,
+        bins=bins,
+        omega=2 * np.pi * bins / length,
+        response=cross[bins] / power[bins],
+        weight=weight,
+    )
+
+
+def _grouped(values: NDArray[Any], group: int) -> NDArray[Any]:
+    """Sum over so many neighbouring bins around each multiple of `group`, shape (m,)."""
+    if group == 1:
+        return values
+    before = group // 2
+    after = -(before + values.size) % group
+    return np.asarray(np.pad(values, (before, after)).reshape(-1, group).sum(axis=1))
+
+
+def starting_values(
+    rough: RoughResponse,
+    structure: Structure,
+    *,
+    earliest: int,
+    count: int = 3,
+    thorough: bool = True,
+) -> list[NDArray[np.float64]]:
+    """Starts for `hmpim.identify.fitting.fit.fit_structure`, the most promising first.
+
+    Parameters
+    ----------
+    rough : RoughResponse
+        From `rough_response`.
+    structure : Structure
+        What will be fitted.
+    earliest : int
+        Least pure delay to look at, in samples.
+    count : int
+        At most so many.
+    thorough : bool
+        Try several guesses of the corner frequency; one if False.
+
+    Returns
+    -------
+    list of ndarray, shape (1 + order,)
+        Delay in samples, parameters of the denominator's sections.
+    """
+    finer = int(np.clip(np.ceil(rough.omega[-1] / _PHASE_STEP), 1, 8))
+    shifts = np.arange(min(earliest - rough.lag, 0) * finer, 2 * finer + 1)
+    order = structure.order
+    scale = float(np.sqrt(rough.weight @ rough.omega**2 / rough.weight.sum()))
+    # Multiplied by A's coefficients and e^(jω shift), these should sum to a constant.
+    terms = np.vander(1j * rough.omega / scale, order + 1, increasing=True).T * rough.response
+    if order == 0:
+        cost, _ = _levy(rough, terms, shifts, finer, rough.weight)
+        return [np.array([rough.lag + shifts[int(np.argmin(cost))] / finer])]
+    found: list[tuple[float, NDArray[np.float64]]] = []
+    for corner in _CORNERS if thorough else _CORNERS[1:2]:
+        roll_off = 1.0 + (rough.omega / (corner * rough.omega[-1])) ** 2
+        first = rough.weight / roll_off ** min(order, 2)
+        cost, coefficients = _levy(rough, terms, shifts, finer, first)
+        for i in _local_minima(cost, 2):
+            shift, a = shifts[i], coefficients[i]
+            for _ in range(2):  # Sanathanan-Koerner: reweight, look nearby for the delay again
+                weight = rough.weight / np.abs(_polynomial(a, rough.omega / scale)) ** 2
+                near = shifts[np.abs(shifts - shift) <= max(3, shifts.size // 8)]
+                local, solved = _levy(rough, terms, near, finer, weight)
+                best = int(np.argmin(local))
+                shift, a = near[best], solved[best]
+            physical = _stable(a, order)
+            error = _output_error(rough, shift / finer, physical, scale)
+            theta = np.concatenate(
+                [
+                    [rough.lag + shift / finer],
+                    theta_of(structure, physical / scale ** np.arange(1, order + 1)),
+                ]
+            )
+            found.append((error, theta))
+    found.sort(key=lambda item: item[0])
+    starts: list[NDArray[np.float64]] = []
+    for _, theta in found:
+        if all(np.max(np.abs(theta - other)) > 0.3 for other in starts):
+            starts.append(theta)
+    return starts[:count]
+
+
+def _polynomial(a: NDArray[np.float64], x: NDArray[np.float64]) -> NDArray[np.complex128]:
+    """1 + a1 s + a2 s² + … at s = jx."""
+    s, value = 1j * x, np.full(x.size, a[-1], dtype=complex)
+    for coefficient in (*a[-2::-1], 1.0):
+        value = coefficient + s * value
+    return value
+
+
+def _levy(
+    rough: RoughResponse,
+    terms: NDArray[np.complex128],
+    shifts: NDArray[np.intp],
+    finer: int,
+    weight: NDArray[np.float64],
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Solve at each shift, in samples / finer; return costs, (k,), and coefficients, (k, order)."""
+    order = terms.shape[0] - 1
+    weighted = terms * weight
+    gram = (weighted @ terms.conj().T).real
+    length = rough.length * finer
+    spectrum = np.zeros((order + 1, length // 2 + 1), dtype=complex)
+    spectrum[:, rough.bins] = weighted
+    # irfft adds each bin's mirror and divides by the length.
+    cross = irfft(spectrum, length, axis=1)[:, shifts % length] * length / 2
+    total = weight.sum()
+    # Eliminate the constant K = sum_j a_j cross_j / total, a_0 = 1.
+    reduced = gram[None, :, :] - cross.T[:, :, None] * cross.T[:, None, :] / total
+    if order == 0:
+        return reduced[:, 0, 0], np.zeros((shifts.size, 0))
+    inner = reduced[:, 1:, 1:] + 1e-9 * np.trace(gram) * np.eye(order)
+    a = np.linalg.solve(inner, -reduced[:, 1:, :1])[:, :, 0]
+    full = np.concatenate([np.ones((shifts.size, 1)), a], axis=1)
+    cost = np.einsum("ki,kij,kj->k", full, reduced, full)
+    # An unstable denominator fits by running time backwards.
+    return np.where(np.all(a > 0, axis=1), cost, cost + gram[0, 0]), a
+
+
+def _local_minima(cost: NDArray[np.float64], count: int) -> list[int]:
+    inside = np.concatenate([[np.inf], cost, [np.inf]])
+    low = np.flatnonzero((inside[1:-1] <= inside[:-2]) & (inside[1:-1] <= inside[2:]))
+    return [int(i) for i in low[np.argsort(cost[low])][:count]]
+
+
+def _stable(a: NDArray[np.float64], order: int) -> NDArray[np.float64]:
+    """Nearest positive coefficients."""
+    floor = 1e-2 ** np.arange(1, order + 1)
+    return np.asarray(np.maximum(a, floor))
+
+
+def _output_error(
+    rough: RoughResponse, shift: float, a: NDArray[np.float64], scale: float
+) -> float:
+    """Weighted squared error of the response itself, gain solved."""
+    target = rough.response * np.exp(1j * rough.omega * shift)
+    model = 1.0 / _polynomial(a, rough.omega / scale)
+    gain = (rough.weight * model.conj() * target).sum().real / (
+        rough.weight * np.abs(model) ** 2
+    ).sum()
+    return float((rough.weight * np.abs(target - gain * model) ** 2).sum())

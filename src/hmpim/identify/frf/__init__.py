@@ -1,0 +1,8 @@
+"""The frequency response, with its error at each frequency.
+
+local           one record: local polynomials and rational functions, chosen by the data
+neighbours, polynomial, rational, choice   the parts of it
+averaged        H1, H2, Hv over segments or repeats, with coherence
+multivariable   several inputs at once
+gaps            outputs with gaps
+"""

@@ -1,0 +1,107 @@
+"""Which local fit to take at each frequency, and how much of its error is bend, not noise."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hmpim.identify.frf.neighbours import LocalFit
+
+__all__ = ["choose"]
+
+# What is judged is averaged over this many frequencies on either side.
+_NEIGHBOURS = 30
+# Fits that predict within this of the best count as equally good.
+_TOLERANCE = 0.02
+# A fit is a reference for others if it predicts within this of the best.
+_CREDIBLE = 1.25
+# The next narrower window is taken unless the square of its error is this much greater.
+_DEAREST = 2.0
+
+Real = NDArray[np.float64]
+
+
+def choose(
+    polynomials: Sequence[LocalFit], rationals: Sequence[LocalFit]
+) -> tuple[NDArray[np.int64], Real]:
+    """Return which fit to take at each frequency, and the square of the error it leaves in.
+
+    Prediction alone does not see that G and T cannot be told apart in a narrow window, nor
+    variance that a wide one is bent. So the error of G is weighed: its variance, plus what a
+    fit predicts worse than the best of them, referred to G through the power of U, or, if that
+    is more, plus what parts it from the same fit over the next narrower windows, or from that
+    with T, beyond the variance of these (A. Goldenshluger and O. Lepski, Ann. Statist. 39,
+    2011). Then, of polynomials, the next narrower window is taken if it costs little, so that
+    what curvature leaves over is small beside the stated error (undersmoothing).
+
+    Parameters
+    ----------
+    polynomials, rationals : sequence of LocalFit
+        In pairs, with T and without, widths increasing; the rational ones may be none.
+
+    Returns
+    -------
+    chosen : integer ndarray, shape (c,)
+        Place in polynomials and rationals, one after the other.
+    bent : ndarray, shape (c,) or (c, m)
+        Variance to be added, in the unit of G squared.
+
+    Examples
+    --------
+    >>> one = LocalFit(
+    ...     response=np.ones(3) + 0j, spread=np.ones(3), noise=np.ones(3), power=np.ones(3),
+    ...     prediction_error=np.ones(3),
+    ... )
+    >>> chosen, bent = choose([one, one], [])
+    >>> chosen.tolist(), bent.tolist()
+    ([0, 0, 0], [0.0, 0.0, 0.0])
+    """
+    tried = (*polynomials, *rationals)
+    shape = tried[0].response.shape
+    position = np.arange(shape[0])
+
+    def stacked(name: str) -> NDArray[np.float64]:
+        return np.stack([getattr(fit, name) for fit in tried]).reshape(len(tried), shape[0], -1)
+
+    response, spread, power = stacked("response"), stacked("spread"), stacked("power")
+    missed = np.stack([fit.prediction_error for fit in tried])
+    # A window that came to nothing must not make nothing of those beyond its reach.
+    mean = _averaged(np.minimum(missed, 1e6 * missed.min(axis=0)))
+    least = mean.min(axis=0)
+    bent = np.maximum(mean - (1 + _TOLERANCE) * least, 0.0)[:, :, None] / power
+    credible = (mean <= _CREDIBLE * least)[:, :, None]
+    variance = spread * least[:, None]
+    # Fits come in pairs, with and without T: the same kind one width down stands two before.
+    kinds = (range(len(polynomials)), range(len(polynomials), len(tried)))
+    fuller = [(k, k - 1) for kind in kinds for k in kind[1::2]]
+    narrower = [(k, k - 2) for kind in kinds for k in kind[2:]]
+    fit, reference = np.array(fuller + narrower).T
+    parted = _beyond(response[fit] - response[reference], variance[reference], credible[reference])
+    np.maximum.at(bent, fit, parted)
+    with np.errstate(over="ignore"):  # a hopeless fit costs infinitely much
+        cost = np.sum((variance + bent) * power[0], axis=2)
+    best = np.argmin(cost, axis=0)
+    polynomial = (best >= 2) & (best < len(polynomials))
+    below = np.where(polynomial, best - 2, best)
+    cheap = cost[below, position] <= _DEAREST * cost[best, position]
+    chosen = np.asarray(np.where(cheap, below, best), dtype=np.int64)
+    return chosen, bent[chosen, position].reshape(shape)
+
+
+def _beyond(apart: NDArray[np.float64], variance: Real, credible: NDArray[np.bool_]) -> Real:
+    """Return |difference|² beyond the variance of a credible reference, over neighbours."""
+    against = np.maximum(variance, 1e-150)  # a record without noise must not overflow
+    excess = _averaged(np.where(credible, np.abs(apart) ** 2 / against - 1.0, 0.0))
+    return np.asarray(np.where(credible, np.maximum(excess, 0.0) * variance, 0.0))
+
+
+def _averaged(values: Real) -> Real:
+    """Average along the second axis over neighbours on either side, fewer at the ends."""
+    count = values.shape[1]
+    reach = min(_NEIGHBOURS, count // 2)
+    position = np.arange(count)
+    begin, end = np.maximum(position - reach, 0), np.minimum(position + reach + 1, count)
+    total = np.zeros((values.shape[0], count + 1, *values.shape[2:]))
+    np.cumsum(values, axis=1, out=total[:, 1:])
+    number = (end - begin).reshape(-1, *[1] * (values.ndim - 2))
+    return np.asarray((total[:, end] - total[:, begin]) / number)

@@ -1,0 +1,477 @@
+"""Several inputs at once: every response of a simultaneous test, direct and coupling.
+
+Around each frequency Y_i = Σ_j G_ij U_j + T_i over neighbouring bins, all inputs together, by
+local polynomials and by local rational functions with one denominator for each output:
+Pintelon and Schoukens, System Identification, 2nd ed., Wiley 2012, section 7.3; R. Voorhoeve,
+A. van der Maas and T. Oomen, Mech. Syst. Signal Process. 105, 2018. Sweeps that pass a
+frequency at different times turn their phases differently from bin to bin there, and that is
+what tells them apart. Where they do not, the answer is refused.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy import fft
+
+from hmpim.errors import ArgumentError, RecordError
+from hmpim.identify.frf.choice import choose
+from hmpim.identify.frf.gaps import filled
+from hmpim.identify.frf.neighbours import (
+    LocalFit,
+    Windows,
+    centres_in_band,
+    mirrored,
+    windows_around,
+)
+from hmpim.identify.frf.rational import (
+    DENOMINATOR_ORDER,
+    TRANSIENT_ORDER,
+    gauss_newton,
+    linear_start,
+    solved,
+)
+from hmpim.identify.signals import as_signal, check_band, check_rate
+
+__all__ = ["ResponseMatrix", "response_matrix"]
+
+_ORDER = 2
+_TERMS = _ORDER + 1
+# Power of U, relative to its greatest, that counts as none.
+_NOTHING = 1e-24
+# Inputs whose normalised spectra depend on one another to this, over the whole band.
+_IDENTICAL = 1e-6
+_RATIO = 1.6
+_STEPS = 3
+# Bins in all windows of one width, beyond which they cost too much.
+_AFFORDABLE = 60_000
+
+Complex = NDArray[np.complex128]
+Real = NDArray[np.float64]
+Integer = NDArray[np.int64]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ResponseMatrix:
+    """Frequency responses from every input to every output, measured at once.
+
+    Parameters
+    ----------
+    frequency : ndarray, shape (f,)
+        Hz.
+    response : complex ndarray, shape (f, p, m)
+        Output i over input j, delay included; NaN where not `usable`.
+    std : ndarray, shape (f, p, m)
+        √E|error|²; NaN where not `usable`.
+    condition : ndarray, shape (f,)
+        Condition number of the inputs' spectra over a quarter of the band around, or, if that
+        is more, of the error of the responses there: 1 for inputs that have nothing in common,
+        infinite for one and the same. Each input counts with its own power, so units and
+        levels do not matter.
+    usable : bool ndarray, shape (f,)
+        Whether the inputs can be told apart.
+    multiple_coherence : ndarray, shape (f, p)
+        Share of the output's power in the window that all inputs together explain, less what
+        as many coefficients explain of noise.
+    partial_coherence : ndarray, shape (f, p, m)
+        Share that one input explains of what the others leave over, likewise.
+    inputs, outputs : tuple of str
+        Names.
+    """
+
+    frequency: Real
+    response: Complex
+    std: Real
+    condition: Real
+    usable: NDArray[np.bool_]
+    multiple_coherence: Real
+    partial_coherence: Real
+    inputs: tuple[str, ...]
+    outputs: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Joint:
+    """All inputs to one output by one method at one width.
+
+    `local` holds arrays of shape (c, m); `condition` is (c,); `coherence` is (c, m + 1), of
+    each input and, last, of all.
+    """
+
+    local: LocalFit
+    condition: Real
+    coherence: Real
+
+
+def response_matrix(
+    inputs: ArrayLike,
+    outputs: ArrayLike,
+    fs: float,
+    *,
+    delays: ArrayLike = 0.0,
+    band: tuple[float, float],
+    valid: ArrayLike | None = None,
+    fill: ArrayLike | None = None,
+    worst_condition: float = 10.0,
+    points: int = 400,
+    names: Sequence[str] | None = None,
+) -> ResponseMatrix:
+    """Return the responses of all outputs to all inputs of one simultaneous test.
+
+    Parameters
+    ----------
+    inputs : array_like, shape (m, n)
+        Stimuli on one clock, at rest before the record.
+    outputs : array_like, shape (p, n)
+        Responses.
+    fs : float
+        Sampling rate, Hz.
+    delays : array_like, shape (p, m), (p, 1) or ()
+        Pure delays in s, output over input, not negative; rough values will do.
+    band : tuple of float
+        Band in which every input has something, Hz.
+    valid : array_like of bool, shape (p, n) or (n,), optional
+        False where an output is missing; all of it valid by default.
+    fill : array_like, shape (p, n), optional
+        What a model predicts of the outputs, bias included, used where they are missing. A
+        smooth curve through the neighbours by default, which serves for gaps short beside a
+        period.
+    worst_condition : float
+        Greatest condition number at which inputs still count as told apart, above 1. At 10 the
+        error of the worst combination of inputs is ten times that of the best.
+    points : int
+        Greatest number of frequencies; beyond it they are spaced by a constant ratio.
+    names : sequence of str, optional
+        Of the inputs, then of the outputs; "input 0" and so on by default.
+
+    Returns
+    -------
+    ResponseMatrix
+
+    Raises
+    ------
+    RecordError
+        For shapes that do not fit, NaN, a constant input, or inputs that are the same over the
+        whole band but for a factor, or sums of others: they are named.
+    ArgumentError
+        For a rate, band, delay, bound or names that cannot be.
+
+    Examples
+    --------
+    >>> t = np.arange(2000) / 200
+    >>> up = np.sin(2 * np.pi * (0.1 * t + t**2))
+    >>> u = np.stack((up, up[::-1]))
+    >>> y = np.array([[1.0, 0.05], [-0.05, 2.0]]) @ u
+    >>> found = response_matrix(u, y, 200.0, band=(0.5, 20.0))
+    >>> bool(np.nanmax(np.abs(found.response[:, 0, 1] - 0.05)) < 1e-4)
+    True
+    >>> bool(found.usable.all())
+    True
+    """
+    u, y = _checked_signals("inputs", inputs), _checked_signals("outputs", outputs)
+    m, p = u.shape[0], y.shape[0]
+    if u.shape[1] != y.shape[1]:
+        raise RecordError(
+            f"inputs have {u.shape[1]} samples and outputs {y.shape[1]}; cut them to the same span"
+        )
+    check_rate(fs)
+    check_band(band, fs)
+    labels_u, labels_y = _checked_names(names, m, p)
+    late = _checked_delays(delays, p, m, u.shape[1] / fs)
+    if not worst_condition > 1:
+        raise ArgumentError(f"worst_condition is {worst_condition}; give a number above 1")
+    if points < 1:
+        raise ArgumentError(f"points is {points}; give at least 1")
+    y, share = filled(y, valid, fill, labels_y)
+    for row, label in zip(u, labels_u, strict=True):
+        if np.ptp(row) == 0:
+            raise RecordError(f"{label} is constant at {row[0]:g}; an input must move")
+    base = int(np.floor(late.min() * fs + 1e-9))
+    step = fs / (u.shape[1] - base)
+    bins = (u.shape[1] - base - 1) // 2 + 1
+    low = max(int(np.ceil(band[0] / step - 1e-9)), 1)
+    high = min(int(np.floor(band[1] / step + 1e-9)), bins - 1)
+    if high - low < 8 * (m + 1):
+        raise ArgumentError(
+            f"band is ({band[0]:g}, {band[1]:g}) Hz and holds {max(high - low + 1, 0)} bins of "
+            f"{step:g} Hz, too few for {m} inputs; give a wider band or a longer record"
+        )
+    _refuse_identical(u, low, high, labels_u)
+    centre = centres_in_band(low, high, points)
+    chosen = [_chosen(_moved(u, row, fs, base), y[i], base, centre) for i, row in enumerate(late)]
+    frequency = centre * step
+    condition = np.max(
+        np.stack(
+            [_input_condition(_moved(u, late[0], fs, base), centre)]
+            + [fit.condition for fit in chosen]
+        ),
+        axis=0,
+    )
+    usable = condition <= worst_condition
+    response = np.stack([fit.local.response for fit in chosen], axis=1)
+    response = response * np.exp(-2j * np.pi * frequency[:, None, None] * late)
+    # What is filled in has no residual and says nothing new: both raise the error.
+    std = np.sqrt(np.stack([fit.local.spread for fit in chosen], axis=1)) / share[:, None]
+    response[~usable] = complex(np.nan, np.nan)
+    std[~usable] = np.nan
+    coherence = np.stack([fit.coherence for fit in chosen], axis=1)
+    return ResponseMatrix(
+        frequency=frequency,
+        response=response,
+        std=std,
+        condition=condition,
+        usable=usable,
+        multiple_coherence=coherence[:, :, -1],
+        partial_coherence=coherence[:, :, :-1],
+        inputs=labels_u,
+        outputs=labels_y,
+    )
+
+
+def _checked_signals(name: str, values: ArrayLike) -> Real:
+    array = np.asarray(values, dtype=np.float64)
+    if array.ndim != 2 or array.shape[0] < 1:
+        raise RecordError(f"{name} has shape {array.shape}; give one row for each channel, (m, n)")
+    for k, row in enumerate(array):
+        as_signal(f"{name}[{k}]", row)
+    return array
+
+
+def _checked_names(
+    names: Sequence[str] | None, m: int, p: int
+) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    if names is None:
+        return tuple(f"input {k}" for k in range(m)), tuple(f"output {k}" for k in range(p))
+    given = tuple(names)
+    if len(given) != m + p:
+        raise ArgumentError(f"names holds {len(given)}; give {m} of inputs and {p} of outputs")
+    return given[:m], given[m:]
+
+
+def _checked_delays(delays: ArrayLike, p: int, m: int, length: float) -> Real:
+    late = np.asarray(delays, dtype=np.float64)
+    try:
+        late = np.broadcast_to(late, (p, m))
+    except ValueError:
+        raise ArgumentError(
+            f"delays has shape {late.shape}; give ({p}, {m}), output over input"
+        ) from None
+    if not np.all((late >= 0) & (late < length / 2)):
+        raise ArgumentError(
+            f"delays holds {late[~((late >= 0) & (late < length / 2))][0]} s; give 0 or more, "
+            "and less than half the record"
+        )
+    return np.asarray(late)
+
+
+def _refuse_identical(u: Real, low: int, high: int, labels: tuple[str, ...]) -> None:
+    """Name the inputs that are one and the same over the band, or sums of others."""
+    spectra = fft.rfft(u, axis=1)[:, low : high + 1]
+    size = np.sqrt(np.mean(np.abs(spectra) ** 2, axis=1))
+    if np.any(size == 0):
+        raise RecordError(
+            f"{labels[int(np.argmin(size))]} has nothing in the band; give a band that it excites"
+        )
+    spectra = spectra / size[:, None]
+    left, values, _ = np.linalg.svd(spectra, full_matrices=False)
+    if values[-1] > _IDENTICAL * values[0]:
+        return
+    share = np.abs(left[:, -1])
+    same = [label for label, s in zip(labels, share, strict=True) if s > 0.1 * share.max()]
+    raise RecordError(
+        f"{', '.join(same)} move alike over the whole band, but for a factor, so their responses "
+        "cannot be told apart; drive them one at a time, or with sweeps that pass each frequency "
+        "at different times"
+    )
+
+
+def _input_condition(u: Complex, centre: Integer) -> Real:
+    """Condition number of the inputs' spectra around each centre, each of unit power.
+
+    A wide window may tell inputs apart by what it sees far off; that much near by is asked for.
+    """
+    reach = max(int(centre[-1] - centre[0] + 1) // 8, 4 * (u.shape[0] + 1))
+    reach = min(reach, u.shape[1] - 1)
+    windows = windows_around(centre, u.shape[1], reach)
+    block = np.stack([windows.view(mirrored(row, reach), reach) for row in u], axis=1)
+    size = np.sqrt(np.maximum(np.sum(np.abs(block) ** 2, axis=2), 1e-300))
+    singular = np.linalg.svd(block / size[:, :, None], compute_uv=False)
+    ratio = singular[:, 0] / np.maximum(singular[:, -1], 1e-300)
+    return np.asarray(ratio)[windows.near]
+
+
+def _moved(u: Real, late: Real, fs: float, base: int) -> Complex:
+    """Transforms of the inputs, each delayed as its response is, less `base` samples.
+
+    At rest before the record nothing is lost: what moves in is the first value, held.
+    """
+    length = u.shape[1] - base
+    moved = np.empty((u.shape[0], length))
+    rest = np.empty(late.size)
+    for j, row in enumerate(u):
+        lag = int(np.floor(late[j] * fs + 1e-9)) - base
+        moved[j, lag:] = row[: length - lag]
+        moved[j, :lag] = row[0]
+        rest[j] = late[j] * fs - (lag + base)
+    count = (length - 1) // 2 + 1
+    turn = np.exp(-2j * np.pi * np.outer(rest, np.arange(count)) / length)
+    spectra: Complex = np.asarray(fft.rfft(moved, axis=1))[:, :count] * turn
+    spectra[:, 0] = 0.0
+    return spectra
+
+
+def _chosen(u: Complex, y: Real, base: int, centre: Integer) -> _Joint:
+    """Fit one output at every width, and choose at each centre."""
+    spectrum = np.array(fft.rfft(y[base:]))[: u.shape[1]]
+    spectrum[0] = 0.0
+    polynomials = [
+        fit
+        for width in _widths(centre, u, narrowest=(u.shape[0] + 1) * _TERMS, ratio=_RATIO)
+        for fit in _fits(u, spectrum, centre, width, None)
+    ]
+    best, _ = choose([fit.local for fit in polynomials], [])
+    rows = np.arange(centre.size)
+    inside = np.arange(centre[0], centre[-1] + 1)
+    g = np.stack([fit.local.response for fit in polynomials])[best, rows]
+    smooth = spectrum.copy()
+    smooth[inside] = sum(
+        u[j, inside] * np.interp(inside, centre, g[:, j]) for j in range(u.shape[0])
+    )
+    rationals = [
+        fit
+        for width in _widths(centre, u, narrowest=20 + 8 * u.shape[0], ratio=2.0)
+        for fit in _fits(u, spectrum, centre, width, smooth)
+    ]
+    tried = (*polynomials, *rationals)
+    best, bent = choose([fit.local for fit in polynomials], [fit.local for fit in rationals])
+
+    def picked(values: list[NDArray[np.float64]]) -> NDArray[np.float64]:
+        return np.asarray(np.stack(values)[best, rows])
+
+    response: Complex = np.stack([fit.local.response for fit in tried])[best, rows]
+    variance = picked([fit.local.spread * fit.local.noise[:, None] for fit in tried]) + bent
+    return _Joint(
+        local=LocalFit(
+            response=response,
+            spread=variance,
+            noise=np.ones(centre.size),
+            power=picked([fit.local.power for fit in tried]),
+            prediction_error=picked([fit.local.prediction_error for fit in tried]),
+        ),
+        condition=picked([fit.condition for fit in tried]),
+        coherence=picked([fit.coherence for fit in tried]),
+    )
+
+
+def _widths(centre: Integer, u: Complex, *, narrowest: int, ratio: float) -> tuple[int, ...]:
+    """Return half the band, and less by a constant ratio, as far as each can be paid for."""
+    span = int(centre[-1] - centre[0] + 1)
+    top = min(span // 2, (u.shape[1] - 2) // 2)
+    widths = {top}
+    width = float(top)
+    while (width := width / ratio) >= narrowest:
+        if 2 * width * min(centre.size, 3 * span / width) <= _AFFORDABLE:
+            widths.add(round(width))
+    return tuple(sorted(widths))
+
+
+def _fits(
+    u: Complex, y: Complex, centre: Integer, width: int, smooth: Complex | None
+) -> tuple[_Joint, _Joint]:
+    """Fit with T and without: rational functions where `smooth` is given to start from."""
+    windows = windows_around(centre, y.size, width)
+    reach = width
+    block = np.stack([windows.view(mirrored(row, reach), reach) for row in u], axis=2)
+    seen = windows.view(mirrored(y, reach), reach)
+    floor = _NOTHING * float(np.max(np.abs(u)) ** 2)
+    power = np.maximum(np.sum(np.abs(block) ** 2, axis=1) / windows.counted[:, None], floor)
+    block = block / np.sqrt(power)[:, None, :]
+    order = TRANSIENT_ORDER if smooth is not None else _ORDER
+    powers = windows.powers(max(order, _ORDER))
+    b = (block[:, :, :, None] * powers[:, None, :_TERMS]).reshape(*seen.shape, -1)
+    t = windows.without_dc()[:, :, None] * powers[:, : order + 1]
+    both = np.concatenate((b, t), axis=2)
+    start = None if smooth is None else windows.view(mirrored(smooth, reach), reach)
+    return (
+        _read_off(windows, both, seen, power, start),
+        _read_off(windows, b, seen, power, start),
+    )
+
+
+def _read_off(
+    windows: Windows, linear: Complex, y: Complex, power: Real, smooth: Complex | None
+) -> _Joint:
+    """Solve over each window, and read off each centre."""
+    m, near, place = power.shape[1], windows.near, windows.place
+    if smooth is None:
+        left = np.conj(linear.swapaxes(1, 2))
+        inverse, theta = solved(left @ linear, left @ y[:, :, None])
+        rows, fitted = linear, (linear @ theta[:, :, None])[:, :, 0]
+        denominator = np.ones_like(y)
+    else:
+        with np.errstate(all="ignore"):
+            slopes = windows.powers(DENOMINATOR_ORDER)[:, 1:]
+            start = linear_start(linear, slopes, smooth)
+            found = gauss_newton(linear, slopes, y, start, steps=_STEPS)
+        inverse, rows, theta = found.inverse, found.rows, found.state.theta
+        fitted, denominator = found.state.fitted, found.state.denominator
+    squares = np.sum(np.abs(y - fitted) ** 2, axis=1)
+    squares = np.maximum(squares, 1e-15 * np.sum(np.abs(y) ** 2, axis=1))
+    freedom = np.maximum(windows.counted - rows.shape[2], 1)
+    noise = squares / freedom
+    x = windows.x[place][:, None]
+    a, size = denominator[near, place], np.sqrt(power[near])
+    b = x ** np.arange(_TERMS)
+    numerator = theta[near, : m * _TERMS].reshape(near.size, m, _TERMS)
+    response = np.sum(numerator * b[:, None], axis=2) / a[:, None]
+    slope = np.zeros((near.size, m, rows.shape[2]), dtype=np.complex128)
+    for j in range(m):
+        slope[:, j, j * _TERMS : (j + 1) * _TERMS] = b / a[:, None]
+        if smooth is not None:
+            slope[:, j, -DENOMINATOR_ORDER:] = -(response[:, j] / a)[:, None] * x ** np.arange(
+                1, DENOMINATOR_ORDER + 1
+            )
+    inverse_near, row = inverse[near], rows[near, place]
+    joint = slope @ inverse_near @ np.conj(slope.swapaxes(1, 2))
+    leverage = np.sum(row * (inverse_near @ np.conj(row)[:, :, None])[:, :, 0], axis=1).real
+    missed = (y - fitted)[near, place] / np.maximum(1.0 - leverage, 1e-6)
+    error = np.abs(missed) ** 2
+    failed = ~(np.isfinite(error) & np.isfinite(joint).all(axis=(1, 2)))
+    joint = np.where(failed[:, None, None], np.eye(m), joint)
+    spread = np.maximum(np.diagonal(joint, axis1=1, axis2=2).real, 0.0)
+    condition = np.sqrt(np.maximum(np.linalg.cond(joint), 1.0))
+    coherence = _coherence(inverse, theta, squares, freedom, m)[near]
+    return _Joint(
+        local=LocalFit(
+            response=np.asarray(
+                np.where(failed[:, None], 0j, response) / size, dtype=np.complex128
+            ),
+            spread=spread / size**2,
+            noise=noise[near],
+            power=power[near],
+            prediction_error=np.where(failed, np.inf, error),
+        ),
+        condition=condition,
+        coherence=np.where(failed[:, None], 0.0, coherence),
+    )
+
+
+def _coherence(
+    inverse: Complex, theta: Complex, squares: Real, freedom: NDArray[np.int64], m: int
+) -> Real:
+    """Share of what is left without an input's columns that they explain, adjusted for number.
+
+    What Σ|residual|² grows by without them is θᴴ V⁻¹ θ over their own block. Shape (w, m + 1).
+    """
+    blocks = [slice(j * _TERMS, (j + 1) * _TERMS) for j in range(m)]
+    out = np.zeros((squares.size, m + 1))
+    for k, block in enumerate((*blocks, slice(0, m * _TERMS))):
+        part = theta[:, block]
+        with np.errstate(all="ignore"):
+            against = np.linalg.pinv(inverse[:, block, block], hermitian=True)
+            grown = np.sum(np.conj(part) * (against @ part[:, :, None])[:, :, 0], axis=1).real
+        count = part.shape[1]
+        without = (squares + np.maximum(grown, 0.0)) / (freedom + count)
+        out[:, k] = np.clip(1.0 - squares / freedom / without, 0.0, 1.0)
+    return out

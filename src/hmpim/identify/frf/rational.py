@@ -1,0 +1,306 @@
+"""Local rational functions: around each frequency Y = (B U + T) / A + noise.
+
+B, T and A are polynomials over neighbouring bins: T. McKelvey and G. Guerin, "Nonparametric
+frequency response estimation using a local rational model", SYSID 2012; R. Voorhoeve,
+A. van der Maas and T. Oomen, "Non-parametric identification of multivariable systems: a local
+rational modeling approach", Mech. Syst. Signal Process. 105, 2018. A resonance, which a
+polynomial follows over a few bins only, a rational function of order two follows exactly.
+
+McKelvey and Guerin multiply by A and solve the linear problem, which weighs the noise by A and
+sets it among the regressors; the answer is biased. Here the linear problem only gives the
+start, from an output already smoothed, and Gauss-Newton steps on Y itself lead to the least
+squares of the true residual. The covariance is that of those least squares, the columns of A
+included, so it knows what the denominator costs.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hmpim.identify.frf.neighbours import LocalFit, Spectra, Windows, mirrored, windows_around
+
+__all__ = [
+    "DENOMINATOR_ORDER",
+    "TRANSIENT_ORDER",
+    "RationalSolution",
+    "RationalState",
+    "gauss_newton",
+    "linear_start",
+    "rational_fits",
+    "restricted",
+    "solved",
+]
+
+_NUMERATOR = 2
+TRANSIENT_ORDER = 3
+"""One more than of B: what a sampled transient rings with is a polynomial in z, not in jω."""
+
+DENOMINATOR_ORDER = 2
+"""One resonance within a window."""
+
+_NOTHING = 1e-24
+_RIDGE = 1e-13
+
+Complex = NDArray[np.complex128]
+Real = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class RationalState:
+    """An iterate at every window.
+
+    Parameters
+    ----------
+    theta : complex ndarray, shape (w, q)
+        Coefficients of the linear columns, then of A without its constant 1.
+    denominator, fitted : complex ndarray, shape (w, s)
+        A, and Y as fitted, on the window's bins.
+    squares : ndarray, shape (w,)
+        Σ |Y - fitted|²; infinite where the iterate ran off.
+    """
+
+    theta: Complex
+    denominator: Complex
+    fitted: Complex
+    squares: Real
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class RationalSolution:
+    """Where the iteration ended, with the derivatives there and the inverse of their products.
+
+    Parameters
+    ----------
+    state : RationalState
+        The best iterate of each window.
+    rows : complex ndarray, shape (w, s, q)
+        Derivatives of the fitted Y.
+    inverse : complex ndarray, shape (w, q, q)
+        Of rowsᴴ rows: the covariance of `theta` where the noise of a bin is 1.
+    """
+
+    state: RationalState
+    rows: Complex
+    inverse: Complex
+
+
+def rational_fits(
+    spectra: Spectra,
+    centre: NDArray[np.int64],
+    widths: tuple[int, ...],
+    smooth: Complex,
+) -> list[LocalFit]:
+    """Fit rational functions of order 2 over 2, with T and without, over windows of each width.
+
+    Parameters
+    ----------
+    spectra : Spectra
+        With the delay taken out.
+    centre : integer ndarray, shape (c,)
+        Bins to answer at.
+    widths : tuple of int
+        Neighbours on either side, each at least 6.
+    smooth : complex ndarray, shape (b,)
+        Y as a first estimate predicts it, nearly free of noise; starts the iteration.
+
+    Returns
+    -------
+    list of LocalFit
+        Two for each width: with T, and without. `prediction_error` is infinite where the
+        iteration came to nothing.
+
+    Examples
+    --------
+    >>> from hmpim.identify.frf.neighbours import transform
+    >>> n = np.arange(400)
+    >>> u, y = np.sin(n**2 / 1000), np.zeros(400)
+    >>> for k in n[2:]:  # poles at 0.9 exp(±0.44 i)
+    ...     y[k] = 1.628 * y[k - 1] - 0.81 * y[k - 2] + u[k]
+    >>> s = transform(u, y, 1.0, 0.0)
+    >>> fit = rational_fits(s, np.arange(20, 40), (16,), s.y)[0]
+    >>> z = np.exp(2j * np.pi * s.frequency[20])
+    >>> bool(abs(fit.response[0] * (1 - 1.628 / z + 0.81 / z**2) - 1) < 1e-3)
+    True
+    """
+    reach = max(widths)
+    folded = [mirrored(v, reach) for v in (spectra.u, spectra.y, smooth)]
+    floor = _NOTHING * float(np.max(np.abs(spectra.u)) ** 2)
+    fits = []
+    for width in widths:
+        windows = windows_around(centre, spectra.u.size, width)
+        u, y, start = (windows.view(v, reach) for v in folded)
+        power = np.maximum(np.sum(np.abs(u) ** 2, axis=1) / windows.counted, floor)
+        # Sharp features hide in wide windows, whose start is far off; they are also the fewest.
+        steps = 2 if width < 32 else 4
+        # An iterate may run off to infinity; it is then not taken.
+        with np.errstate(all="ignore"):
+            fits.extend(_fit(windows, u / np.sqrt(power)[:, None], y, start, power, steps))
+    return fits
+
+
+def _fit(
+    windows: Windows, u: Complex, y: Complex, smooth: Complex, power: Real, steps: int
+) -> list[LocalFit]:
+    terms = _NUMERATOR + 1
+    powers = windows.powers(max(_NUMERATOR, TRANSIENT_ORDER, DENOMINATOR_ORDER))
+    slopes = powers[:, 1 : DENOMINATOR_ORDER + 1]
+    b = u[:, :, None] * powers[:, :terms]
+    t = windows.without_dc()[:, :, None] * powers[:, : TRANSIENT_ORDER + 1]
+    both: Complex = np.concatenate((b, t), axis=2)
+    full = gauss_newton(both, slopes, y, linear_start(both, slopes, smooth), steps=steps)
+    plain = gauss_newton(b, slopes, y, restricted(full, terms), steps=(steps + 1) // 2)
+    return [_read_off(windows, found, y, power) for found in (full, plain)]
+
+
+def solved(gram: Complex, right: Complex) -> tuple[Complex, Complex]:
+    """Return inverse, (w, q, q), and solution, (w, q), of normal equations, columns scaled.
+
+    Examples
+    --------
+    >>> inverse, x = solved(np.array([[[4.0 + 0j]]]), np.array([[[2.0 + 0j]]]))
+    >>> x.real.round(9).tolist()
+    [[0.5]]
+    """
+    index = np.arange(gram.shape[1])
+    scale = 1.0 / np.sqrt(np.maximum(gram[:, index, index].real, 1e-300))
+    scaled = gram * scale[:, :, None] * scale[:, None, :]
+    scaled[:, index, index] += _RIDGE * gram.shape[1]
+    inverse: Complex = np.asarray(
+        np.linalg.inv(scaled) * scale[:, :, None] * scale[:, None, :], dtype=np.complex128
+    )
+    return inverse, (inverse @ right)[:, :, 0]
+
+
+def linear_start(linear: Complex, slopes: Real, smooth: Complex) -> Complex:
+    """Solve A Y = linear columns · coefficients for a Y nearly free of noise, shape (w, q).
+
+    Examples
+    --------
+    >>> x = np.linspace(-1, 1, 9)
+    >>> y = (2.0 / (1 + 0.5j * x))[None]
+    >>> np.abs(linear_start(np.ones((1, 9, 1)) + 0j, x[:, None], y)).round(9).tolist()
+    [[2.0, 0.5]]
+    """
+    start = np.concatenate((linear, -smooth[:, :, None] * slopes), axis=2)
+    left = np.conj(start.swapaxes(1, 2))
+    return solved(left @ start, left @ smooth[:, :, None])[1]
+
+
+def restricted(found: RationalSolution, kept: int) -> Complex:
+    """Return what a solution becomes, to first order, if only `kept` linear columns may stay.
+
+    θ₁ - V₁₂ V₂₂⁻¹ θ₂, V the inverse of the products: least squares under θ₂ = 0.
+    """
+    q = found.state.theta.shape[1]
+    out = np.arange(kept, q - DENOMINATOR_ORDER)
+    stay = np.delete(np.arange(q), out)
+    part = found.inverse[:, :, out]
+    scale = 1.0 / np.sqrt(np.maximum(part[:, out, np.arange(out.size)].real, 1e-300))
+    block = part[:, out] * scale[:, :, None] * scale[:, None, :]
+    block[:, np.arange(out.size), np.arange(out.size)] += _RIDGE
+    gone = np.linalg.solve(block, (found.state.theta[:, out] * scale)[:, :, None])
+    change = (part[:, stay] * scale[:, None, :]) @ gone
+    return np.asarray(found.state.theta[:, stay] - change[:, :, 0])
+
+
+def gauss_newton(
+    linear: Complex, slopes: Real, y: Complex, theta: Complex, *, steps: int
+) -> RationalSolution:
+    """Fit Y = (linear columns · coefficients) / A, A = 1 + slopes · coefficients.
+
+    Parameters
+    ----------
+    linear : complex ndarray, shape (w, s, l)
+        Columns of B and T.
+    slopes : ndarray, shape (s, d)
+        Powers of x from the first.
+    y : complex ndarray, shape (w, s)
+        Y.
+    theta : complex ndarray, shape (w, l + d)
+        Start, such as that of `linear_start`.
+    steps : int
+        At least 1; each window keeps its best iterate.
+
+    Examples
+    --------
+    >>> x = np.linspace(-1, 1, 9)
+    >>> y = (2.0 / (1 + 0.5j * x))[None]
+    >>> ones, start = np.ones((1, 9, 1)) + 0j, np.array([[1.9 + 0j, 0.4j]])
+    >>> found = gauss_newton(ones, x[:, None], y, start, steps=4)
+    >>> np.abs(found.state.theta).round(9).tolist()
+    [[2.0, 0.5]]
+    """
+    state = _state(linear, slopes, y, theta)
+    for _ in range(steps):
+        rows = _jacobian(linear, slopes, state)
+        left = np.conj(rows.swapaxes(1, 2))
+        inverse, step = solved(left @ rows, left @ (y - state.fitted)[:, :, None])
+        state = _better(state, _state(linear, slopes, y, state.theta + step))
+    # The last step was small, so the derivatives before it serve.
+    return RationalSolution(state=state, rows=rows, inverse=inverse)
+
+
+def _state(linear: Complex, slopes: Real, y: Complex, theta: Complex) -> RationalState:
+    count = linear.shape[2]
+    denominator = 1.0 + theta[:, count:] @ slopes.T
+    fitted = (linear @ theta[:, :count, None])[:, :, 0] / denominator
+    squares = np.sum(np.abs(y - fitted) ** 2, axis=1)
+    return RationalState(
+        theta=theta,
+        denominator=denominator,
+        fitted=fitted,
+        squares=np.where(np.isfinite(squares), squares, np.inf),
+    )
+
+
+def _jacobian(linear: Complex, slopes: Real, state: RationalState) -> Complex:
+    count = linear.shape[2]
+    rows = np.empty((*linear.shape[:2], count + slopes.shape[1]), dtype=np.complex128)
+    inverse = 1.0 / state.denominator
+    np.multiply(linear, inverse[:, :, None], out=rows[:, :, :count])
+    np.multiply(-(state.fitted * inverse)[:, :, None], slopes, out=rows[:, :, count:])
+    return rows
+
+
+def _better(one: RationalState, other: RationalState) -> RationalState:
+    """Take each window from the iterate that leaves less."""
+    take = other.squares < one.squares
+    if take.all():
+        return other
+    return RationalState(
+        theta=np.where(take[:, None], other.theta, one.theta),
+        denominator=np.where(take[:, None], other.denominator, one.denominator),
+        fitted=np.where(take[:, None], other.fitted, one.fitted),
+        squares=np.where(take, other.squares, one.squares),
+    )
+
+
+def _read_off(windows: Windows, found: RationalSolution, y: Complex, power: Real) -> LocalFit:
+    """Response, its spread and the prediction error at each centre."""
+    terms, near, place = _NUMERATOR + 1, windows.near, windows.place
+    state, row = found.state, found.rows[near, place]
+    x = windows.x[place][:, None]
+    a = state.denominator[near, place]
+    size = np.sqrt(power[near])
+    b = x ** np.arange(terms)
+    response = np.sum(b * state.theta[near, :terms], axis=1) / a / size
+    slope = np.zeros_like(row)
+    slope[:, :terms] = b / (a * size)[:, None]
+    slope[:, -DENOMINATOR_ORDER:] = -(response / a)[:, None] * x ** np.arange(
+        1, DENOMINATOR_ORDER + 1
+    )
+    forms = windows.forms(np.stack((slope, row), axis=1), found.inverse)
+    spread, leverage = forms[:, 0], forms[:, 1]
+    missed = (y - state.fitted)[near, place]
+    squares = np.maximum(state.squares, 1e-15 * np.sum(np.abs(y) ** 2, axis=1))
+    noise = (squares / np.maximum(windows.counted - row.shape[1], 1))[near]
+    error = np.abs(missed / np.maximum(1.0 - leverage, 1e-6)) ** 2
+    failed = ~(np.isfinite(response) & np.isfinite(spread) & np.isfinite(error))
+    return LocalFit(
+        response=np.where(failed, 0.0, response),
+        spread=np.where(failed, 1.0 / power[near], np.maximum(spread, 0.0)),
+        noise=noise,
+        power=power[near],
+        prediction_error=np.where(failed, np.inf, error),
+    )

@@ -1,0 +1,12 @@
+"""Nonlinearity: what follows the input but no linear model.
+
+nonlinearity          the inspection of one fit, and its summary
+harmonics             harmonics that follow a sweep, odd and even
+sweep_phase           the phase of a sweep, from its samples
+harmonic_regression   the regression behind them
+lines                 lines of a periodic input left out
+mechanisms            friction, backlash, rate limit, hard and soft springs
+harmonic_kinds        what each of them leaves at the harmonics
+evidence              which of them the record speaks for
+words                 sentences
+"""

@@ -1,0 +1,263 @@
+"""What a sweep's harmonics, lines left out, or traces say of one linear fit.
+
+Evidence first: harmonics that no noise makes, lines that no linear system answers, traces that
+bring likelihood. Then which kinds are left in question, and whether a plainer linear structure
+with one kind beside it says more than a rich one alone.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hmpim.identify.fitting.fit import Fit, Problem, jacobian
+from hmpim.identify.nonlinear.harmonic_kinds import compare_harmonics
+from hmpim.identify.nonlinear.harmonics import Harmonics, any_harmonic, sweep_harmonics
+from hmpim.identify.nonlinear.lines import Lines, detection_lines, find_period
+from hmpim.identify.nonlinear.mechanisms import Mechanism, compare_mechanisms
+from hmpim.identify.nonlinear.sweep_phase import SweepPhase, sweep_phase
+from hmpim.identify.whiteness import is_white
+
+__all__ = ["CHANCE", "Look", "Seen", "look_at", "plainer_of", "thinned"]
+
+CHANCE = 1e-5
+"""Chance of a harmonic or a line from noise alone below which it counts."""
+
+_WORTH_A_LOOK = 1e-3
+"""Chance in the quick look at a white residual below which it is looked at in full."""
+
+_GAIN = 12.0
+"""Log-likelihood that a trace must bring; in linear systems the best of all reaches 7."""
+
+_BESIDE = 0.2
+"""R.m.s. of a kind's harmonics over that of linear misfit, from which it counts by itself."""
+
+_UNSWEPT = 0.15
+"""Share of a coloured residual's power that a kind must explain, without a sweep, to count."""
+
+_PERIODIC = 0.5
+"""The same for an input that repeats."""
+
+_HINT = 4.0
+"""Log-likelihood of all harmonics, beyond what noise would gain, from which kinds are compared."""
+
+_NAMED = 0.3
+"""Share of what the harmonics hold beyond noise that a kind must explain to be named."""
+
+_APART = 10.0
+"""Log-likelihood by which the next kind must be behind to be ruled out."""
+
+_APART_SHARE = 0.03
+"""The same as a share of what the likeliest kind gains, more where that explains less: no trace
+is exact."""
+
+_ALIKE_SHARE = 0.2
+"""The same between friction and backlash: slow motion against a spring with friction is play."""
+
+_MOSTLY = 0.6
+"""Share of what the harmonics tell, explained by one kind, that vouches for a plain structure."""
+
+_TELLS_MORE = 1.3
+"""Times as much that a kind must gain beside the plain structure as beside the rich one."""
+
+_CLEARER = 0.05
+"""By how much that share must be above the one with a rich structure."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Look:
+    """The record as it is looked at: in blocks of samples if it is long."""
+
+    u: NDArray[np.float64]
+    problem: Problem
+    fs: float
+    others: tuple[NDArray[np.float64], ...]
+    sweep: SweepPhase | None
+    block: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Seen:
+    """What the tests gave for one linear fit, before it is weighed."""
+
+    fit: Fit
+    harmonics: Harmonics | None = None
+    lines: Lines | None = None
+    mechanisms: tuple[Mechanism, ...] = ()
+    named: tuple[Mechanism, ...] = ()
+    rms: float = 0.0
+
+    @property
+    def explained(self) -> float:
+        """Share of what the harmonics tell that the likeliest kind explains."""
+        if self.harmonics is None or not self.named:
+            return 0.0
+        return self.named[0].gain / max(self.harmonics.regression.evidence, _GAIN)
+
+    @property
+    def effect(self) -> float:
+        """R.m.s. of all that the likeliest kind does, where harmonics vouch for its size."""
+        if self.harmonics is None or not self.named:
+            return self.rms
+        return max(self.rms, self.named[0].effect)
+
+
+def thinned(x: NDArray[np.float64], block: int) -> NDArray[np.float64]:
+    """Means over blocks of samples; an incomplete one at the end is left out."""
+    if block == 1:
+        return x
+    return np.asarray(x[: x.size // block * block].reshape(-1, block).mean(axis=1))
+
+
+def look_at(look: Look, fit: Fit) -> Seen:
+    """All tests that the input allows; a quick look first if the residual is white."""
+    counted = slice(None) if look.problem.valid is None else look.problem.valid
+    white = is_white(fit.residual[counted])
+    if look.sweep is not None:
+        return _by_harmonics(look, look.sweep, fit, white)
+    return Seen(fit=fit) if look.others else _by_traces(look, fit, white)
+
+
+def _by_harmonics(look: Look, sweep: SweepPhase, fit: Fit, white: bool) -> Seen:
+    """Ask a sweep for its harmonics, and which kind makes them."""
+    residual = thinned(fit.residual, look.block)
+    rate, delay = look.fs / look.block, fit.delay / look.fs
+    if (
+        white
+        and any_harmonic(residual, sweep, rate, delay=delay) > _WORTH_A_LOOK
+        and not _curved(fit, look.problem)
+    ):
+        return Seen(fit=fit)
+    phases = [sweep_phase(thinned(other, look.block), rate) for other in look.others]
+    harmonics = sweep_harmonics(
+        thinned(look.u, look.block),
+        residual,
+        rate,
+        delay=delay,
+        phase=sweep,
+        others=[phase for phase in phases if phase is not None],
+    )
+    if harmonics is None:
+        return Seen(fit=fit)
+    parts = [harmonics.rms(p) for p in (0, 1) if harmonics.probability(p) < CHANCE]
+    kinds: tuple[Mechanism, ...] = ()
+    told = bool(parts) or harmonics.regression.evidence > _HINT
+    if told and not look.others and np.ptp(fit.prediction) > 0:
+        powers = np.arange(fit.denominator.size)
+        kinds = compare_harmonics(
+            harmonics.regression,
+            thinned(fit.prediction - fit.linear[-1], look.block),
+            fit.denominator / float(look.block) ** powers,
+            fs=rate,
+        )
+    named = _likely(kinds, harmonics.regression.evidence)
+    # Without a harmonic of its own, a kind may be a sharp resonance that was left out.
+    if not parts and (not named or named[0].rms < _BESIDE * harmonics.fundamental_rms):
+        return Seen(fit=fit, harmonics=harmonics)
+    rms = float(np.sqrt(np.sum(np.square(parts)))) if parts else named[0].rms
+    return Seen(fit=fit, harmonics=harmonics, mechanisms=kinds, named=named, rms=rms)
+
+
+def _by_traces(look: Look, fit: Fit, white: bool) -> Seen:
+    """Ask lines left out, if the input repeats, and whether any kind explains the residual."""
+    lines = _lines(look.u, look.problem)
+    levels = [] if lines is None else [v for v in lines.levels if v.probability < CHANCE]
+    if white and not levels and not _curved(fit, look.problem):
+        return Seen(fit=fit, lines=lines)
+    power = fit.cost / max(look.problem.counted, 1)
+    least = 0.0
+    if not white:  # dynamics left out resemble every kind a little, more so at few lines
+        least = power * (_UNSWEPT if find_period(look.u) is None else _PERIODIC)
+    found = tuple(
+        m
+        for m in compare_mechanisms(look.problem, fit, fs=look.fs)
+        if m.gain > _GAIN and m.rms**2 > least
+    )
+    distortion = float(np.sqrt(sum(0.5 * v.lines * v.rms**2 for v in levels)))
+    return Seen(
+        fit=fit,
+        lines=lines,
+        mechanisms=found,
+        named=_likely(found, 0.0),
+        rms=max(distortion, found[0].rms if found else 0.0),
+    )
+
+
+def _likely(kinds: tuple[Mechanism, ...], evidence: float) -> tuple[Mechanism, ...]:
+    """The kinds that the record leaves in question; one of them, if it tells which.
+
+    `evidence` is the log-likelihood that all harmonics gain beyond what noise would.
+    """
+    if not kinds or kinds[0].gain < max(_GAIN, _NAMED * evidence):
+        return ()
+    first = kinds[0]
+    unexplained = 1.0 - min(first.gain / max(evidence, first.gain), 1.0)
+
+    def behind(other: Mechanism) -> float:
+        alike = {first.kind, other.kind} == {"friction", "backlash"}
+        share = (_ALIKE_SHARE if alike else _APART_SHARE) + 0.5 * unexplained
+        return max(_APART, share * first.gain)
+
+    return tuple(m for m in kinds if m.likelihood > first.likelihood - behind(m))
+
+
+def plainer_of(look: Look, rich: Seen, plain: Seen) -> Seen:
+    """The plain fit if one kind beside it explains the harmonics clearly better, or all better."""
+    if plain.explained > max(_MOSTLY, rich.explained + _CLEARER):
+        return plain
+    if plain.explained > 0.5 * rich.explained and _gain(plain) > _TELLS_MORE * _gain(rich):
+        return plain
+    return min(rich, plain, key=lambda one: _criterion(look, one))
+
+
+def _gain(seen: Seen) -> float:
+    """Log-likelihood that the harmonics of the likeliest kind bring."""
+    return seen.named[0].gain if seen.harmonics is not None and seen.named else 0.0
+
+
+def _criterion(look: Look, seen: Seen) -> float:
+    """Bayesian criterion of a linear fit with the likeliest kind beside it, if there is one."""
+    e = thinned(seen.fit.residual, look.block)
+    unknown, cost = seen.fit.structure.parameters, float(e @ e)
+    if seen.named and seen.named[0].trace.size == e.size:
+        valid = look.problem.valid
+        trace = seen.named[0].trace
+        if valid is not None:
+            trace = trace * thinned(valid.astype(np.float64), look.block)
+        rows = [thinned(row, look.block) for row in jacobian(look.problem, seen.fit)]
+        basis = np.linalg.qr(np.stack([*rows, trace]).T)[0]
+        cost -= float(np.sum((basis.T @ e) ** 2))
+        unknown += 1
+    return e.size * float(np.log(max(cost, np.finfo(float).tiny))) + unknown * float(np.log(e.size))
+
+
+def _curved(fit: Fit, problem: Problem) -> bool:
+    """Whether a white residual follows square, cube or direction of the linear model's output."""
+    counted = slice(None) if problem.valid is None else problem.valid
+    x = fit.prediction - fit.linear[-1]
+    size = float(np.std(x))
+    if size == 0:
+        return False
+    step = np.gradient(x)
+    traces = np.stack([np.ones_like(x), x, step, x**2, x**3 / size, np.sign(step) * size])
+    rows, e = traces[:, counted], fit.residual[counted]
+    scale = np.sqrt(np.einsum("ij,ij->i", rows, rows))
+    gram = rows @ rows.T / np.outer(scale, scale)
+    moment = rows @ e / scale
+    # What each gains beside a constant, the output, and its rate.
+    mixed = np.linalg.solve(gram[:3, :3] + 1e-9 * np.eye(3), gram[:3, 3:])
+    left = 1.0 - np.einsum("ij,ij->j", mixed, gram[:3, 3:])
+    taken = (moment[3:] - mixed.T @ moment[:3]) ** 2
+    told = left > 1e-6
+    needed = 2 * np.log(1 / _WORTH_A_LOOK) * float(e @ e) / e.size
+    return bool(np.any(taken[told] > needed * left[told]))
+
+
+def _lines(u: NDArray[np.float64], problem: Problem) -> Lines | None:
+    """Distortion at lines left out, if the input repeats; the first period may be transient."""
+    if problem.valid is not None:
+        return None
+    period = find_period(u)
+    if period is None or u.size < 3 * period:
+        return None
+    return detection_lines(u[period:], problem.y[period:], period=period)

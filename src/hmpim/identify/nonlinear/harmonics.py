@@ -1,0 +1,236 @@
+"""Harmonics that follow a sweep: what no linear system can make.
+
+A nonlinear system answers a sinusoid of phase φ(t) at 2φ, 3φ, …: a curve in time and
+frequency of its own for each order (A. Farina, AES 108th Convention, 2000). The residual of a
+linear fit is regressed on cos kφ and sin kφ, each with an amplitude that changes slowly with
+time, after it and they were made white by an autoregression; an F test per order says whether
+there is anything. Even orders come from asymmetry, odd ones from what is alike either way:
+friction, backlash, a hard or soft spring, limits. The terms of order 1 take up whatever
+linear misfit the residual holds, so a wrong linear structure makes no harmonic.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.special import chdtrc, fdtrc
+
+from hmpim.errors import RecordError
+from hmpim.identify.nonlinear.harmonic_regression import (
+    HIGHEST,
+    HarmonicFit,
+    fit_harmonics,
+    view_of,
+)
+from hmpim.identify.nonlinear.sweep_phase import SweepPhase, sweep_phase
+from hmpim.identify.signals import as_pair, check_rate
+
+__all__ = ["Harmonic", "Harmonics", "any_harmonic", "sweep_harmonics"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Harmonic:
+    """One order.
+
+    Parameters
+    ----------
+    order : int
+        Multiple of the sweep's frequency.
+    rms : float
+        Its r.m.s. over the sweep in the residual's unit, what noise puts there taken off.
+    probability : float
+        Chance of so much, or more, from noise alone.
+    frequency, amplitude, std : tuple of float
+        Amplitude of the harmonic and its standard deviation, in the residual's unit, where the
+        sweep itself is at `frequency` in Hz; places that the order does not reach are left out.
+    """
+
+    order: int
+    rms: float
+    probability: float
+    frequency: tuple[float, ...] = ()
+    amplitude: tuple[float, ...] = ()
+    std: tuple[float, ...] = ()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Harmonics:
+    """What the residual of a linear fit is made of, over the sweep.
+
+    Parameters
+    ----------
+    orders : tuple of Harmonic
+        Orders 2 to 5, those that lie below the Nyquist frequency for part of the sweep.
+    fundamental_rms : float
+        R.m.s. of what still follows the sweep at its own frequency: linear misfit, and the part
+        of a nonlinearity that looks linear.
+    noise_rms : float
+        R.m.s. of the rest.
+    regression : HarmonicFit
+        What they were read off.
+    """
+
+    orders: tuple[Harmonic, ...]
+    fundamental_rms: float
+    noise_rms: float
+    regression: HarmonicFit
+
+    def rms(self, parity: int) -> float:
+        """R.m.s. of all even (0) or odd (1) orders together."""
+        return float(np.sqrt(sum(h.rms**2 for h in self.orders if h.order % 2 == parity)))
+
+    def probability(self, parity: int) -> float:
+        """Chance of so much in the even (0) or odd (1) orders, the number looked at counted."""
+        chances = [h.probability for h in self.orders if h.order % 2 == parity]
+        return min(1.0, len(chances) * min(chances, default=1.0))
+
+
+def sweep_harmonics(
+    u: ArrayLike,
+    residual: ArrayLike,
+    fs: float,
+    *,
+    delay: float = 0.0,
+    phase: SweepPhase | None = None,
+    others: Sequence[SweepPhase] = (),
+) -> Harmonics | None:
+    """Measure the harmonics of a sweep in the residual of a linear fit.
+
+    Parameters
+    ----------
+    u : array_like, shape (n,)
+        Input samples.
+    residual : array_like, shape (n,)
+        Output less prediction; 0 where a sample does not count.
+    fs : float
+        Rate in Hz.
+    delay : float
+        Delay of the system, s; the harmonics come as much later.
+    phase : SweepPhase, optional
+        From `hmpim.identify.nonlinear.sweep_phase.sweep_phase` if already known.
+    others : sequence of SweepPhase
+        Sweeps of other inputs: what follows those is no harmonic of this one.
+
+    Returns
+    -------
+    Harmonics or None
+        None if the input is not a sweep, or has too few turns.
+
+    Raises
+    ------
+    RecordError
+        For the wrong shape, unequal lengths, NaN or infinity.
+    ArgumentError
+        If `fs` is not positive.
+
+    Examples
+    --------
+    >>> t = np.arange(2000) / 200
+    >>> u = np.sin(2 * np.pi * (0.1 * t + t**2))
+    >>> noise = 0.01 * np.random.default_rng(0).standard_normal(2000)
+    >>> found = sweep_harmonics(u, 0.1 * (u**3 - 0.75 * u) + noise, 200.0)
+    >>> [h.order for h in found.orders if h.probability < 1e-4], round(found.rms(1), 3)
+    ([3], 0.017)
+    """
+    check_rate(fs)
+    source, e = as_pair(u, residual)
+    sweep = phase if phase is not None else sweep_phase(source, fs)
+    if sweep is None:
+        return None
+    if sweep.phase.size != e.size:
+        raise RecordError(
+            f"the sweep's phase has {sweep.phase.size} samples and the residual {e.size}; "
+            "give both of one record"
+        )
+    view = view_of(e, sweep, fs, delay)
+    if view is None:
+        return None
+    return _tested(fit_harmonics(e, view, others, delay * fs), fs)
+
+
+def any_harmonic(residual: ArrayLike, sweep: SweepPhase, fs: float, *, delay: float = 0.0) -> float:
+    """Chance that noise alone makes the harmonics seen in a white residual: a quick look.
+
+    A tenth of the work of `sweep_harmonics`, and only as good as the residual is white: it
+    tells where nothing need be looked for.
+
+    Parameters
+    ----------
+    residual : array_like, shape (n,)
+        Output less prediction; 0 where a sample does not count.
+    sweep : SweepPhase
+        From `hmpim.identify.nonlinear.sweep_phase.sweep_phase`.
+    fs : float
+        Rate in Hz.
+    delay : float
+        Delay of the system, s.
+
+    Examples
+    --------
+    >>> t = np.arange(2000) / 200
+    >>> u = np.sin(2 * np.pi * (0.1 * t + t**2))
+    >>> noise = 0.01 * np.random.default_rng(0).standard_normal(2000)
+    >>> sweep = sweep_phase(u, 200.0)
+    >>> any_harmonic(noise, sweep, 200.0) > 0.01
+    True
+    >>> any_harmonic(0.01 * u**2 + noise, sweep, 200.0) < 1e-20
+    True
+    """
+    e = np.asarray(residual, dtype=np.float64)
+    view = view_of(e, sweep, fs, delay)
+    if view is None:
+        return 1.0
+    e = e[view.index]
+    e = e - e.mean()
+    power = float(e @ e) / e.size
+    if power == 0.0:
+        return 1.0
+    starts = np.searchsorted(view.along, np.arange(view.places))
+    turn = np.exp(1j * view.phase)
+    spun, chances = e * turn, []
+    for k in range(2, max(view.orders) + 1):
+        spun *= turn
+        seen = k * view.rate < 0.5 * HIGHEST
+        if k not in view.orders:
+            continue
+        taken = np.add.reduceat(spun * seen, starts)
+        count = np.add.reduceat(seen.astype(np.float64), starts)
+        used = count > 0
+        statistic = float(np.sum(2.0 * np.abs(taken[used]) ** 2 / count[used])) / power
+        chances.append(float(chdtrc(2 * np.count_nonzero(used), statistic)))
+    return min(1.0, len(chances) * min(chances))
+
+
+def _tested(fit: HarmonicFit, fs: float) -> Harmonics:
+    """Test each order, and read off its amplitude along the sweep."""
+    view, count = fit.view, fit.columns.shape[0]
+    frequency = np.interp(np.arange(view.places + 1), view.along, view.rate) * fs
+    found = []
+    for i, k in enumerate(fit.orders):
+        group = fit.group(2 * i, 2 * i + 2)
+        block, weights = fit.covariance[np.ix_(group, group)], fit.weights[group]
+        statistic = float(weights @ np.linalg.pinv(block, hermitian=True) @ weights)
+        part = fit.part(i)
+        # Noise alone puts as much there as the weights' variance makes of the columns.
+        power = max(float(part @ part) - fit.noise_power(i), 0.0) / part.size
+        at = np.arange(view.places + 1) * count + 2 * i
+        told = fit.used[at] & fit.used[at + 1] & (k * frequency < 0.5 * HIGHEST * fs)
+        spread = 0.5 * (fit.covariance[at, at] + fit.covariance[at + 1, at + 1])
+        found.append(
+            Harmonic(
+                order=k,
+                rms=float(np.sqrt(power)),
+                probability=float(fdtrc(group.size, fit.freedom, statistic / group.size)),
+                frequency=tuple(frequency[told].tolist()),
+                amplitude=tuple(np.hypot(fit.weights[at], fit.weights[at + 1])[told].tolist()),
+                std=tuple(np.sqrt(spread[told]).tolist()),
+            )
+        )
+    degrees = max(fit.rest.size - int(np.count_nonzero(fit.used)), 1)
+    return Harmonics(
+        orders=tuple(found[1:]),
+        fundamental_rms=found[0].rms,
+        noise_rms=float(np.sqrt(fit.rest @ fit.rest / degrees)),
+        regression=fit,
+    )

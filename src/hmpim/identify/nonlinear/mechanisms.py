@@ -1,0 +1,338 @@
+"""Which nonlinearity the residual of a linear fit looks like.
+
+Each kind leaves its own trace in the residual. With x the output of the linear model, v its
+velocity and 1/A its dynamics:
+
+=================  ========================================================================
+hardening          -(1/A) x³: a spring force beyond proportion (softening: the other sign)
+friction           -(1/A) sign v: a force of constant size against the motion
+backlash           the play operator less x: the output waits at each reversal
+rate_limit         the output, or the command, followed at no more than a fixed speed, less it
+saturation         x clipped, less x: a plateau
+asymmetry          -(1/A) x², or x² itself: more one way than the other
+curvature          x³ itself: a scale that changes with the deflection, behind the dynamics
+=================  ========================================================================
+
+The residual is regressed on each in turn, beside all that a linear change of the model could
+explain, with noise that is an autoregression. The likelihoods say which fits best, and
+whether the next best is far enough behind to be ruled out.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import lfilter
+
+from hmpim.identify.fitting.fit import Fit, Problem, jacobian
+from hmpim.identify.nonlinear.harmonic_regression import whitener
+from hmpim.model.sampled import delayed_response, prepare_input
+
+__all__ = [
+    "Hypothesis",
+    "Kind",
+    "Mechanism",
+    "compare_mechanisms",
+    "hypotheses",
+    "play",
+    "rate_limited",
+]
+
+Kind = Literal[
+    "hardening",
+    "softening",
+    "friction",
+    "backlash",
+    "rate_limit",
+    "saturation",
+    "asymmetry",
+    "curvature",
+]
+
+_GAPS = (0.002, 0.005, 0.01, 0.02, 0.04, 0.08, 0.15, 0.25, 0.4)
+"""Half gaps tried, over the output's largest deviation."""
+
+_RATES = (0.15, 0.25, 0.35, 0.45, 0.55, 0.65, 0.75, 0.85, 0.93)
+"""Speeds tried, over the largest of the linear model."""
+
+_LEVELS = (0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.88, 0.95)
+"""Plateaus tried, over the largest deviation."""
+
+_STICKS = 0.01
+"""Speed, over the largest, at which friction is fully turned around: below the sampling's reach."""
+
+_LONGEST_AUTOREGRESSION = 10
+
+_LONGEST = 32768
+"""Samples looked at; of a longer record the stretch with the greatest residual."""
+
+_LAGS = 8
+"""Samples of the input on either side that a linear change of the model may use."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Mechanism:
+    """One kind of nonlinearity, as well as it fits the residual.
+
+    Parameters
+    ----------
+    kind : str
+        Name as in the module's table.
+    size : float
+        Hardening and softening: share by which the force at the largest deviation departs from
+        proportion. Friction and backlash: half width of the band, in the output's unit.
+        Rate limit: speed in the unit per second. Saturation: distance of the plateau from
+        the bias, in the unit. Asymmetry, curvature: share by which the output at the largest
+        deviation departs from proportion.
+    size_std : float
+        Standard deviation; the spacing of the values tried where it is one of a list.
+    gain : float
+        Log-likelihood above that of no nonlinearity in noise of the same colour.
+    likelihood : float
+        Log-likelihood, the same constant left out for all kinds.
+    rms : float
+        R.m.s. of what of its effect in the output no linear change explains, in its unit.
+    effect : float
+        R.m.s. of its whole effect, in the output's unit.
+    trace : ndarray, shape (n,)
+        Its effect in the output, to a factor; empty where only part of the record was looked at.
+    """
+
+    kind: Kind
+    size: float
+    size_std: float
+    gain: float
+    likelihood: float
+    rms: float
+    effect: float
+    trace: NDArray[np.float64]
+
+
+def play(x: NDArray[np.float64], half_gap: float) -> NDArray[np.float64]:
+    """Output of backlash: follows `x` half a gap behind, and waits at each reversal.
+
+    Parameters
+    ----------
+    x : ndarray, shape (n,)
+        What drives.
+    half_gap : float
+        Half of the gap, in the unit of `x`.
+
+    Examples
+    --------
+    >>> play(np.array([0.0, 1.0, 2.0, 1.5, 0.0]), 0.5).tolist()
+    [0.0, 0.5, 1.5, 1.5, 0.5]
+    """
+    out = x.tolist()
+    low, high = (x - half_gap).tolist(), (x + half_gap).tolist()
+    now = out[0]
+    for k in range(len(out)):
+        now = min(max(now, low[k]), high[k])
+        out[k] = now
+    return np.array(out)
+
+
+def rate_limited(x: NDArray[np.float64], step: float) -> NDArray[np.float64]:
+    """Follow `x` by no more than `step` from sample to sample.
+
+    Examples
+    --------
+    >>> rate_limited(np.array([0.0, 3.0, 3.0, 3.0]), 1.0).tolist()
+    [0.0, 1.0, 2.0, 3.0]
+    """
+    target = x.tolist()
+    now = target[0]
+    for k in range(1, len(target)):
+        now += min(max(target[k] - now, -step), step)
+        target[k] = now
+    return np.array(target)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Hypothesis:
+    """A kind with one value tried, and its trace.
+
+    Parameters
+    ----------
+    kind : str
+        Name as in the module's table.
+    trace : ndarray, shape (n,)
+        Effect in the output.
+    size : float or None
+        None where the weight of the trace is the size.
+    spacing : float
+        Half the spacing of the values tried.
+    """
+
+    kind: Kind
+    trace: NDArray[np.float64]
+    size: float | None = None
+    spacing: float = 0.0
+
+
+def compare_mechanisms(problem: Problem, fit: Fit, *, fs: float) -> tuple[Mechanism, ...]:
+    """Fit each kind of nonlinearity to the residual of a linear fit, the likeliest first.
+
+    Parameters
+    ----------
+    problem, fit
+        The data and the linear fit.
+    fs : float
+        Rate in Hz.
+
+    Returns
+    -------
+    tuple of Mechanism
+        One of each kind whose weight has the right sign; empty for a fit without residual.
+
+    Examples
+    --------
+    >>> from hmpim.identify.fitting.fit import fit_structure
+    >>> from hmpim.model import STRUCTURES
+    >>> u = np.sin(np.arange(3000) / 30 * (1 + np.arange(3000) / 3000))
+    >>> y = play(u, 0.1) + 0.01 * np.random.default_rng(0).standard_normal(3000)
+    >>> data = Problem(source=prepare_input(u, "foh"), y=y, valid=None, longest_delay=9.0)
+    >>> fit = fit_structure(data, STRUCTURES["static"], np.zeros(1))
+    >>> best = compare_mechanisms(data, fit, fs=100.0)[0]
+    >>> best.kind, round(best.size, 1)
+    ('backlash', 0.1)
+    """
+    if not np.any(fit.residual) or np.ptp(fit.prediction) == 0:
+        return ()
+    here = _where(fit.residual)
+    counted = np.ones(problem.y.size, dtype=bool) if problem.valid is None else problem.valid
+    background = _background(problem, fit, here)
+    x = fit.prediction[here] - fit.linear[-1]
+    best: dict[Kind, Mechanism] = {}
+    for hypothesis in hypotheses(x, fit.denominator, fs):
+        found = _fitted(hypothesis, fit.residual[here], background, counted[here])
+        if found is None:
+            continue
+        if found.kind not in best or found.likelihood > best[found.kind].likelihood:
+            best[found.kind] = found
+    return tuple(sorted(best.values(), key=lambda m: -m.likelihood))
+
+
+def _where(residual: NDArray[np.float64]) -> slice:
+    """The stretch that is looked at: all, or the part of a long record with most to explain."""
+    n = residual.size
+    if n <= _LONGEST:
+        return slice(0, n)
+    power = np.concatenate([[0.0], np.cumsum(residual**2)])
+    starts = np.arange(0, n - _LONGEST + 1, _LONGEST // 8)
+    start = int(starts[np.argmax(power[starts + _LONGEST] - power[starts])])
+    return slice(start, start + _LONGEST)
+
+
+def _background(problem: Problem, fit: Fit, here: slice) -> NDArray[np.float64]:
+    """All that a linear change of the model could explain, orthonormal, shape (k, m)."""
+    x = fit.prediction - fit.linear[-1]
+    shifted = [problem.masked(_shifted(x, k))[here] for k in range(-_LAGS, _LAGS + 1, 2)]
+    stacked = np.vstack([jacobian(problem, fit)[:, here], np.stack(shifted)])
+    norms = np.linalg.norm(stacked, axis=1)
+    stacked = stacked[norms > 0] / norms[norms > 0, None]
+    values, vectors = np.linalg.eigh(stacked @ stacked.T)
+    keep = values > 1e-9 * values[-1]
+    return np.asarray((vectors[:, keep] / np.sqrt(values[keep])).T @ stacked)
+
+
+def _shifted(x: NDArray[np.float64], by: int) -> NDArray[np.float64]:
+    index = np.clip(np.arange(x.size) - by, 0, x.size - 1)
+    return x[index]
+
+
+def hypotheses(
+    x: NDArray[np.float64], denominator: NDArray[np.float64], fs: float
+) -> Iterator[Hypothesis]:
+    """Every kind with every value tried.
+
+    Parameters
+    ----------
+    x : ndarray, shape (n,)
+        The linear model's output less its bias.
+    denominator : ndarray
+        Of the dynamics that a force goes through, by rising powers of s per sample.
+    fs : float
+        Rate in Hz.
+    """
+    largest = float(np.max(np.abs(x)))
+    step = np.gradient(x)
+    fastest = float(np.max(np.abs(step)))
+
+    def through(force: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Answer of the dynamics, without delay, to a force given in the output's unit."""
+        source = prepare_input(force, "foh")
+        answer = delayed_response(source, delay=0.0, denominator=denominator)[0]
+        return np.asarray(answer + source.first)
+
+    share = x / largest
+    cube, square = largest * share**3, largest * share**2
+    yield Hypothesis(kind="curvature", trace=cube)
+    yield Hypothesis(kind="curvature", trace=-cube)
+    yield Hypothesis(kind="asymmetry", trace=square)
+    yield Hypothesis(kind="asymmetry", trace=-square)
+    if denominator[0] > 0 and denominator.size > 1:  # an integrator gives way to any force
+        yield Hypothesis(kind="hardening", trace=-through(cube))
+        yield Hypothesis(kind="softening", trace=through(cube))
+        yield Hypothesis(kind="asymmetry", trace=-through(square))
+        yield Hypothesis(kind="asymmetry", trace=through(square))
+        yield Hypothesis(kind="friction", trace=-through(np.tanh(step / (_STICKS * fastest))))
+    for gap in _GAPS:
+        half = gap * largest
+        trace = (play(x, half) - x) / half
+        yield Hypothesis(kind="backlash", trace=trace, spacing=0.15 * half)
+    for level in _LEVELS:
+        size = level * largest
+        yield Hypothesis(
+            kind="saturation", trace=np.clip(x, -size, size) - x, size=size, spacing=0.05 * largest
+        )
+    for rate in _RATES:
+        size = rate * fastest
+        yield Hypothesis(
+            kind="rate_limit",
+            trace=rate_limited(x, size) - x,
+            size=size * fs,
+            spacing=0.05 * fastest * fs,
+        )
+
+
+def _fitted(
+    hypothesis: Hypothesis,
+    e: NDArray[np.float64],
+    background: NDArray[np.float64],
+    counted: NDArray[np.bool_],
+) -> Mechanism | None:
+    """Weight by generalised least squares, the noise's colour from what is then left."""
+    h = hypothesis.trace * counted
+    alone = h - (background @ h) @ background
+    power = float(alone @ alone)
+    if power <= 1e-10 * float(h @ h) or power == 0.0:
+        return None
+    weight = max(float(alone @ e) / power, 0.0)
+    left = e - (background @ e) @ background - weight * alone
+    colour = whitener(left[counted], longest=_LONGEST_AUTOREGRESSION)
+    # Samples that do not count are passed over: what is left keeps its linear relation.
+    rows = lfilter(colour, [1.0], np.vstack([background, h])[:, counted], axis=1)
+    white = lfilter(colour, [1.0], e[counted])
+    q, r = np.linalg.qr(rows.T)  # the trace last
+    if abs(r[-1, -1]) < 1e-9 * float(np.linalg.norm(rows[-1])):
+        return None
+    projected = q.T @ white
+    weight = float(projected[-1] / r[-1, -1])
+    if weight <= 0:
+        return None
+    n = white.size
+    rest = max(float(white @ white - projected @ projected), 1e-30 * float(white @ white))
+    error = float(np.sqrt(rest / max(n - rows.shape[0], 1))) / abs(float(r[-1, -1]))
+    return Mechanism(
+        kind=hypothesis.kind,
+        size=weight if hypothesis.size is None else hypothesis.size,
+        size_std=float(np.hypot(error if hypothesis.size is None else 0.0, hypothesis.spacing)),
+        gain=0.5 * n * float(np.log1p(projected[-1] ** 2 / rest)),
+        likelihood=-0.5 * n * float(np.log(rest / n)),
+        rms=weight * float(np.sqrt(np.mean(alone**2))),
+        effect=weight * float(np.std(h[counted])),
+        trace=hypothesis.trace,
+    )

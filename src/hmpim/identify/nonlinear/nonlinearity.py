@@ -1,0 +1,313 @@
+"""Whether the system is linear, and if not, in which way and by how much.
+
+A sweep answers the first question by its harmonics, a multisine by the lines it leaves out,
+any other input by how much better a nonlinear trace explains the residual. Which way is for
+`hmpim.identify.nonlinear.mechanisms`, asked only where there is something to explain. Dependence on
+the amplitude takes several records: `hmpim.identify.levels`.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from hmpim.errors import RecordError
+from hmpim.identify.fitting.fit import Fit, Problem
+from hmpim.identify.nonlinear.evidence import CHANCE, Look, Seen, look_at, plainer_of, thinned
+from hmpim.identify.nonlinear.harmonic_regression import SweepView
+from hmpim.identify.nonlinear.harmonics import Harmonics
+from hmpim.identify.nonlinear.lines import Lines
+from hmpim.identify.nonlinear.mechanisms import Mechanism
+from hmpim.identify.nonlinear.sweep_phase import sweep_phase
+from hmpim.identify.nonlinear.words import general, particular
+from hmpim.identify.result import Estimate, HarmonicCurve, Nonlinearity
+from hmpim.identify.signals import as_signal
+from hmpim.record import Finding
+
+__all__ = ["Inspection", "Shares", "inspect_nonlinearity"]
+
+_SMALLEST = 0.003
+"""R.m.s. of the nonlinear part over that of the output from which it is worth a warning."""
+
+_DOUBTFUL = 0.005
+"""The same, from which parameters may depend on the amplitude by per cents."""
+
+_DOUBTFUL_UNSWEPT = 0.02
+"""The same without a sweep, where the traces see next to all of it."""
+
+_EFFECT = 0.01
+"""R.m.s. of all that a kind does, what passes for linear too, over that of the output, likewise."""
+
+_LONGEST = 32768
+"""Samples of a sweep looked at one by one; longer records are averaged in blocks first."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Shares:
+    """What the power of the residual is made of; the three add to 1.
+
+    Parameters
+    ----------
+    noise : float
+        Noise.
+    linear : float
+        What follows the input at its own frequency: dynamics left out, and the part of a
+        nonlinearity that looks linear. 0 where it is not told from noise.
+    nonlinear : float
+        What no linear system makes.
+    """
+
+    noise: float
+    linear: float
+    nonlinear: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Inspection:
+    """What was found; None where the input does not allow it or there was nothing to ask.
+
+    Parameters
+    ----------
+    harmonics : Harmonics or None
+        For a sweep whose residual gave reason to look.
+    lines : Lines or None
+        For a periodic input with lines left out.
+    mechanisms : tuple of Mechanism
+        The likeliest first; empty where nothing nonlinear was seen.
+    shares : Shares
+        Of the residual's power.
+    rms : float
+        R.m.s. of the nonlinear part, in the output's unit.
+    findings : tuple of Finding
+        Code 'nonlinear' if it matters; then the code of the kind where it can be named:
+        'hardening', 'softening', 'friction', 'backlash', 'rate_limit', 'saturation'.
+    doubtful : bool
+        Whether it is so large that the linear parameters hold at this amplitude only.
+    fit : Fit
+        The linear fit that goes with it: the given one, or the plainer one where that and one
+        kind of nonlinearity explain the output better.
+    summary : Nonlinearity
+        The same, as the result keeps it.
+    """
+
+    harmonics: Harmonics | None
+    lines: Lines | None
+    mechanisms: tuple[Mechanism, ...]
+    shares: Shares
+    rms: float
+    findings: tuple[Finding, ...]
+    doubtful: bool
+    fit: Fit
+    summary: Nonlinearity
+
+
+def inspect_nonlinearity(
+    u: ArrayLike,
+    problem: Problem,
+    fit: Fit,
+    *,
+    fs: float,
+    plain: Fit | None = None,
+    others: Sequence[NDArray[np.float64]] = (),
+    floor: float = 0.0,
+    unit: str = "",
+) -> Inspection:
+    """Look for nonlinearity in what a linear fit leaves over.
+
+    Parameters
+    ----------
+    u : array_like, shape (n,)
+        Input samples.
+    problem, fit
+        The data and the linear fit.
+    fs : float
+        Rate in Hz.
+    plain : Fit, optional
+        Of a plainer structure, to be weighed against `fit` if there is a nonlinearity: a rich
+        structure may have been taken for the sake of what is not linear.
+    others : sequence of ndarray, shape (n,)
+        Other inputs that drove the output at the same time: then harmonics alone are asked.
+    floor : float
+        R.m.s. up to which nothing is said, in the output's unit: the error of rounding.
+    unit : str
+        The output's unit, for the sentences.
+
+    Returns
+    -------
+    Inspection
+
+    Raises
+    ------
+    RecordError
+        For the wrong shape, unequal lengths, NaN or infinity.
+    ArgumentError
+        If `fs` is not positive.
+
+    Examples
+    --------
+    >>> from hmpim.identify.fitting.fit import fit_structure
+    >>> from hmpim.model import STRUCTURES, prepare_input
+    >>> t = np.arange(2000) / 200
+    >>> u = np.sin(2 * np.pi * (0.1 * t + t**2))
+    >>> y = u - 0.1 * u**3 + 0.01 * np.random.default_rng(0).standard_normal(2000)
+    >>> data = Problem(source=prepare_input(u, "bandlimited"), y=y, valid=None, longest_delay=9.0)
+    >>> fit = fit_structure(data, STRUCTURES["static"], np.zeros(1))
+    >>> found = inspect_nonlinearity(u, data, fit, fs=200.0)
+    >>> found.mechanisms[0].kind, [finding.code for finding in found.findings]
+    ('curvature', ['nonlinear'])
+    """
+    source = as_signal("u", u)
+    if source.size != problem.y.size:
+        raise RecordError(
+            f"u has {source.size} samples and the output {problem.y.size}; give one for each"
+        )
+    counted = problem.y if problem.valid is None else problem.y[problem.valid]
+    output = float(np.std(counted))
+    block = -(-source.size // _LONGEST)
+    sweep = sweep_phase(thinned(source, block), fs / block)
+    look = Look(u=source, problem=problem, fs=fs, others=tuple(others), sweep=sweep, block=block)
+    seen = look_at(look, fit)
+    if plain is not None and seen.rms > 0:
+        seen = plainer_of(look, seen, look_at(look, plain))
+    matters = seen.effect > _SMALLEST * output and seen.rms > floor
+    named = seen.named if matters else ()
+    shares = _shares(seen, seen.fit.cost / max(problem.counted, 1))
+    findings: list[Finding] = []
+    if matters:
+        findings.append(
+            general(
+                share=seen.rms / output,
+                where=_where(seen, output),
+                made_of=(shares.noise, shares.linear, shares.nonlinear),
+                kinds=named,
+                effect=seen.effect / output,
+                asked=not others,
+                swept=seen.harmonics is not None,
+            )
+        )
+        of_kind = particular(named[0], unit) if len(named) == 1 else None
+        if of_kind is not None:
+            findings.append(of_kind)
+    return Inspection(
+        harmonics=seen.harmonics,
+        lines=seen.lines,
+        mechanisms=seen.mechanisms,
+        shares=shares,
+        rms=seen.rms,
+        findings=tuple(findings),
+        doubtful=matters and _is_large(seen, output),
+        fit=seen.fit if matters else fit,
+        summary=_summary(look, seen, shares, output, unit=unit, named=named),
+    )
+
+
+def _is_large(seen: Seen, output: float) -> bool:
+    """Whether the linear parameters hold at this amplitude only."""
+    if seen.harmonics is None:
+        return seen.rms > _DOUBTFUL_UNSWEPT * output
+    return seen.rms > _DOUBTFUL * output or seen.effect > _EFFECT * output
+
+
+def _shares(seen: Seen, power: float) -> Shares:
+    if power <= 0:
+        return Shares(noise=0.0, linear=0.0, nonlinear=0.0)
+    if seen.harmonics is None:
+        nonlinear = min(seen.rms**2 / power, 1.0)
+        return Shares(noise=1.0 - nonlinear, linear=0.0, nonlinear=nonlinear)
+    parts = np.square([seen.harmonics.noise_rms, seen.harmonics.fundamental_rms, seen.rms])
+    noise, linear, nonlinear = parts / parts.sum()
+    return Shares(noise=float(noise), linear=float(linear), nonlinear=float(nonlinear))
+
+
+def _where(seen: Seen, output: float) -> list[str]:
+    """In words: which harmonics, which lines, or which symmetry."""
+    where = []
+    if seen.harmonics is not None:
+        where = [
+            f"{100 * seen.harmonics.rms(parity) / output:.2g} % in {name} harmonics of the sweep"
+            for name, parity in (("odd", 1), ("even", 0))
+            if seen.harmonics.probability(parity) < CHANCE
+        ]
+    elif seen.mechanisms:
+        even = seen.mechanisms[0].kind == "asymmetry"
+        where = [f"{'even' if even else 'odd'} in the deflection"]
+    if seen.lines is not None:
+        where += [
+            f"{100 * level.share:.2g} % at {level.parity} lines left out"
+            for level in seen.lines.levels
+            if level.probability < CHANCE
+        ]
+    return where
+
+
+def _summary(
+    look: Look,
+    seen: Seen,
+    shares: Shares,
+    output: float,
+    *,
+    unit: str,
+    named: tuple[Mechanism, ...],
+) -> Nonlinearity:
+    """What the result keeps."""
+    even: float | None
+    odd: float | None
+    even = odd = 0.0
+    curves: tuple[HarmonicCurve, ...] = ()
+    if seen.harmonics is not None:
+        even, odd = (seen.harmonics.rms(p) / output for p in (0, 1))
+        curves = (
+            _own_amplitude(
+                seen.harmonics.regression.view,
+                thinned(seen.fit.prediction, look.block),
+                look.fs / look.block,
+            ),
+            *(
+                HarmonicCurve(
+                    order=h.order, frequency=h.frequency, amplitude=h.amplitude, std=h.std
+                )
+                for h in seen.harmonics.orders
+            ),
+        )
+    elif seen.mechanisms:
+        share = seen.mechanisms[0].rms / output
+        even, odd = (share, 0.0) if seen.mechanisms[0].kind == "asymmetry" else (0.0, share)
+    size = None
+    if len(named) == 1:
+        value, std = named[0].size, named[0].size_std
+        measures = {"friction": unit, "backlash": unit, "saturation": unit}
+        measures["rate_limit"] = f"{unit}/s" if unit else "1/s"
+        size = Estimate(
+            value=value,
+            std=std,
+            ci95=(value - 1.96 * std, value + 1.96 * std),
+            unit=measures.get(named[0].kind, ""),
+        )
+    return Nonlinearity(
+        share=seen.rms / output if output else 0.0,
+        even=even,
+        odd=odd,
+        noise=shares.noise,
+        linear=shares.linear,
+        nonlinear=shares.nonlinear,
+        kinds=tuple(m.kind for m in named),
+        size=size,
+        harmonics=curves,
+    )
+
+
+def _own_amplitude(view: SweepView, x: NDArray[np.float64], fs: float) -> HarmonicCurve:
+    """Amplitude of the linear model's output along the sweep, where the harmonics are told."""
+    frequency, amplitude = [], []
+    for place in range(view.places + 1):
+        near = view.index[np.abs(view.along - place) < 0.5]
+        if near.size:
+            frequency.append(fs * float(np.interp(place, view.along, view.rate)))
+            amplitude.append(float(np.std(x[near]) * np.sqrt(2.0)))
+    return HarmonicCurve(
+        order=1,
+        frequency=tuple(frequency),
+        amplitude=tuple(amplitude),
+        std=(0.0,) * len(frequency),
+    )

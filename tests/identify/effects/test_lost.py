@@ -1,0 +1,85 @@
+"""Spikes and standstill: found where they are, left out, and nowhere else."""
+
+import numpy as np
+import pytest
+
+import hmpim
+from hmpim.identify.effects.lost import find_frozen, find_spikes
+
+FS = 200.0
+T = np.arange(2000) / FS
+STIMULUS = hmpim.Stimulus(waveform=hmpim.Chirp(band=(0.1, 20.0), duration=10.0), fs=FS)
+CHIRP = np.sin(2 * np.pi * (0.1 * T + 19.9 / 20 * T * T))
+
+
+def noisy(seed=0, std=0.05):
+    return CHIRP + std * np.random.default_rng(seed).standard_normal(T.size)
+
+
+def test_every_spike_and_no_other_sample_is_found():
+    y, where = noisy(), np.array([5, 300, 301, 1500, 1990])
+    y[where] += [2.0, -3.0, -2.5, 2.0, 4.0]
+    # The stimulus moves fast at the end, where a spike must be larger.
+    assert np.flatnonzero(find_spikes(y, CHIRP)).tolist() == where.tolist()
+
+
+def test_what_lasts_longer_is_no_spike():
+    y = noisy()
+    y[300:310] += 5.0
+    assert find_spikes(y, CHIRP) is None
+
+
+def test_a_misfit_that_grows_with_frequency_is_no_spike():
+    assert find_spikes(noisy(std=0.005), CHIRP * (1 - 0.03 * T)) is None
+
+
+def test_an_edge_that_comes_a_sample_late_is_no_spike():
+    square = np.sign(np.sin(2 * np.pi * 0.7 * T + 0.1))
+    late = np.concatenate([square[:1], square[:-1]])
+    assert find_spikes(0.9 * square, late) is None
+
+
+def test_clipped_samples_are_not_looked_at():
+    y = np.minimum(noisy(std=0.01), 0.3)
+    assert find_spikes(y, CHIRP, clipped=y == 0.3) is None
+
+
+def test_standstill_is_found_from_its_second_sample_on():
+    y = noisy()
+    y[400:900] = y[400]
+    frozen = find_frozen(y, CHIRP)
+    assert np.flatnonzero(frozen).tolist() == list(range(401, 900))
+
+
+def test_a_plateau_at_the_extreme_is_clipping_and_no_standstill():
+    y = np.minimum(noisy(), 0.5)
+    assert find_frozen(y, CHIRP) is None
+
+
+def test_an_output_whose_input_rests_does_not_stand_still():
+    y = noisy()
+    y[:600] = 0.0
+    assert find_frozen(y, np.where(np.arange(T.size) < 600, 0.0, CHIRP)) is None
+
+
+@pytest.mark.parametrize("step", [0.02, 0.1])
+def test_a_rounded_output_does_not_stand_still(step):
+    y = step * np.rint(noisy() / step)
+    assert find_frozen(y, CHIRP, step=step) is None
+
+
+def test_spikes_cost_next_to_nothing():
+    sensor = hmpim.Sensor(delay=0.05, natural_frequency=10.0, damping_ratio=0.4, noise_std=0.02)
+    record = hmpim.run(sensor, STIMULUS, rng=1)
+    y, rng = record.outputs[0].values.copy(), np.random.default_rng(2)
+    plain = hmpim.identify(record)["y", "u"]
+    y[rng.choice(2000, 40, replace=False)] += rng.choice([-5.0, 5.0], 40)
+    pair = hmpim.identify(
+        hmpim.Record.from_arrays({"u": record.inputs[0].values}, {"y": y}, fs=FS)
+    )["y", "u"]
+    assert pair.verdict == "doubtful"
+    assert "spikes" in {w.code for w in pair.warnings}
+    assert pair.noise_std.value == pytest.approx(0.02, rel=0.08)
+    for name in ("delay", "scale_factor", "natural_frequency", "damping_ratio"):
+        estimate = getattr(pair, name)
+        assert estimate.std == pytest.approx(getattr(plain, name).std, rel=0.15), name

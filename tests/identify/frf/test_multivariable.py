@@ -1,0 +1,268 @@
+import numpy as np
+import pytest
+from scipy import signal
+
+from hmpim.errors import ArgumentError, RecordError
+from hmpim.identify.frf.local import local_response
+from hmpim.identify.frf.multivariable import ResponseMatrix, response_matrix
+
+FS, N, FINE = 200.0, 2000, 32
+BAND = (0.5, 19.5)
+FINE_TIME = np.arange(N * FINE) / (FS * FINE)
+
+
+def sweep(first: float, last: float, *, seconds: float = 10.0) -> np.ndarray:
+    """Linear sweep on the fine grid, 0 outside its time."""
+    t = FINE_TIME
+    phase = 2 * np.pi * (first * t + (last - first) / (2 * seconds) * t**2)
+    return np.where(t <= seconds, np.sin(phase), 0.0)
+
+
+UP = sweep(0.1, 20.0)
+DOWN = np.concatenate(([0.0], UP[:0:-1]))
+FAST = sweep(0.1, 40.0)
+
+
+def through(drive: np.ndarray, natural: float, damping: float, delay: float) -> np.ndarray:
+    """Output on the coarse grid of a second-order system; the input is linear over 1/6400 s."""
+    w = 2 * np.pi * natural
+    matrices = ([[0, 1], [-(w**2), -2 * damping * w]], [[0], [w**2]], [[1.0, 0]], [[0.0]])
+    step = signal.cont2discrete(tuple(map(np.array, matrices)), 1 / (FS * FINE), "foh")
+    numerator, denominator = signal.ss2tf(*step[:4])
+    late = round(delay * FS * FINE)
+    moved = np.concatenate((np.zeros(late), drive[: drive.size - late]))
+    return signal.lfilter(numerator[0], denominator, moved)[::FINE]
+
+
+def second_order(f: np.ndarray, natural: float, damping: float, delay: float) -> np.ndarray:
+    s, w = 2j * np.pi * f, 2 * np.pi * natural
+    return w**2 / (s**2 + 2 * damping * w * s + w**2) * np.exp(-s * delay)
+
+
+# Natural frequency, damping ratio and delay of three axes, and of what couples into each.
+DIRECT = ((10.0, 0.4, 0.150), (12.0, 0.6, 0.120), (8.0, 0.5, 0.155))
+COUPLED = ((14.0, 0.7, 0.150), (9.0, 0.5, 0.120), (11.0, 0.6, 0.155))
+COUPLING = 0.05
+
+
+@pytest.fixture(scope="module")
+def three_axes() -> tuple[np.ndarray, np.ndarray]:
+    """Inputs and noise-free outputs of three axes driven at once, 5 % into each from the others."""
+    drives = (UP, DOWN, FAST)
+    outputs = [
+        sum(
+            through(drive, *DIRECT[i]) if i == j else COUPLING * through(drive, *COUPLED[i])
+            for j, drive in enumerate(drives)
+        )
+        + 0.5 * (i - 1)
+        for i in range(3)
+    ]
+    return np.stack([drive[::FINE] for drive in drives]), np.stack(outputs)
+
+
+def true_matrix(f: np.ndarray) -> np.ndarray:
+    out = np.empty((f.size, 3, 3), dtype=complex)
+    for i in range(3):
+        for j in range(3):
+            out[:, i, j] = (
+                second_order(f, *DIRECT[i]) if i == j else COUPLING * second_order(f, *COUPLED[i])
+            )
+    return out
+
+
+DELAYS = np.array([[axis[2]] for axis in DIRECT])
+OFF = ~np.eye(3, dtype=bool)
+
+
+def measured(
+    three_axes: tuple[np.ndarray, np.ndarray], noise: float, seed: int
+) -> tuple[ResponseMatrix, np.ndarray]:
+    u, clean = three_axes
+    y = clean + noise * np.random.default_rng(seed).standard_normal(clean.shape)
+    found = response_matrix(u, y, FS, delays=DELAYS, band=BAND)
+    return found, np.abs(found.response - true_matrix(found.frequency))
+
+
+def test_couplings_of_three_axes_are_within_half_a_percent_of_the_direct_gain(
+    three_axes: tuple[np.ndarray, np.ndarray],
+) -> None:
+    for seed in range(5):
+        found, error = measured(three_axes, 0.01, seed)
+        assert found.usable.mean() > 0.9
+        assert error[found.usable][:, OFF].max() < 0.005
+
+
+def test_without_noise_couplings_are_nearly_exact(
+    three_axes: tuple[np.ndarray, np.ndarray],
+) -> None:
+    found, error = measured(three_axes, 0.0, 0)
+    assert np.median(error[found.usable][:, OFF]) < 3e-4
+    assert error[found.usable].max() < 0.003
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("noise", [0.1, 0.01])
+def test_stated_errors_agree_with_the_scatter(
+    three_axes: tuple[np.ndarray, np.ndarray], noise: float, seeds: int
+) -> None:
+    errors, stds = [], []
+    for seed in range(max(seeds // 10, 5)):
+        found, error = measured(three_axes, noise, seed)
+        errors.append(error[found.usable])
+        stds.append(found.std[found.usable])
+    error, std = np.concatenate(errors), np.concatenate(stds)
+    for part in (OFF, ~OFF):
+        ratio = np.sqrt(np.mean(error[:, part] ** 2) / np.mean(std[:, part] ** 2))
+        assert ratio == pytest.approx(1, abs=0.15)
+    assert np.mean(error < 2 * std) > 0.94
+
+
+def test_coherences_say_what_drives_what(three_axes: tuple[np.ndarray, np.ndarray]) -> None:
+    u, clean = three_axes
+    y = clean + 0.01 * np.random.default_rng(0).standard_normal(clean.shape)
+    y[2] = np.random.default_rng(1).standard_normal(N)  # an output that follows nothing
+    y[1] = through(DOWN, *DIRECT[1]) + 0.01 * np.random.default_rng(2).standard_normal(N)
+    found = response_matrix(u, y, FS, delays=DELAYS, band=BAND)
+    inside = found.frequency < 15
+    assert found.multiple_coherence[inside, :2].min() > 0.98
+    assert np.median(found.multiple_coherence[:, 2]) < 0.1
+    assert found.partial_coherence[inside, 0, 0].min() > 0.98
+    assert np.median(found.partial_coherence[:, 1, 0]) < 0.1
+    assert np.median(found.partial_coherence[:, 1, 1]) > 0.98
+
+
+def test_one_input_gives_what_the_single_estimate_gives(
+    three_axes: tuple[np.ndarray, np.ndarray],
+) -> None:
+    u = three_axes[0][0]
+    y = through(UP, *DIRECT[0]) + 0.01 * np.random.default_rng(0).standard_normal(N)
+    many = response_matrix(u[None], y[None], FS, delays=0.15, band=BAND)
+    one = local_response(u, y, FS, band=BAND, delay=0.15)
+    np.testing.assert_allclose(many.frequency, one.frequency)
+    apart = np.abs(many.response[:, 0, 0] - one.response)
+    assert np.all(apart < 4 * np.hypot(many.std[:, 0, 0], one.std))
+    assert np.median(apart) < np.median(one.std)
+    np.testing.assert_allclose(many.condition, 1.0)
+
+
+def test_units_and_order_of_the_channels_do_not_matter(
+    three_axes: tuple[np.ndarray, np.ndarray],
+) -> None:
+    u, clean = three_axes
+    y = clean + 0.01 * np.random.default_rng(0).standard_normal(clean.shape)
+    scale_u, scale_y = np.array([1.0, 50.0, 0.02]), np.array([1e3, 1.0, 1e-3])
+    one = response_matrix(u, y, FS, delays=DELAYS, band=BAND)
+    other = response_matrix(
+        (u * scale_u[:, None])[::-1],
+        (y * scale_y[:, None])[::-1],
+        FS,
+        delays=DELAYS[::-1],
+        band=BAND,
+    )
+    back = other.response[:, ::-1, ::-1] * scale_u / scale_y[:, None]
+    np.testing.assert_allclose(back, one.response, rtol=1e-4, atol=1e-6)
+    np.testing.assert_allclose(other.condition, one.condition, rtol=1e-3)
+
+
+def test_inputs_alike_in_part_of_the_band_are_refused_there() -> None:
+    # Both sweep alike until 5 s, at 10 Hz; then one goes on and the other turns back.
+    t = np.arange(N) / FS
+    phase = 2 * np.pi * (0.1 * t + 0.995 * t**2)
+    one = np.sin(phase)
+    rng = np.random.default_rng(0)
+    other = np.where(t < 5, one, 0.0)
+    late = signal.sosfilt(
+        signal.butter(6, (11, 19), "bandpass", fs=FS, output="sos"), rng.standard_normal(N)
+    )
+    other = other + np.where(t >= 5, late, 0.0)
+    u = np.stack((one, other))
+    y = np.array([[1.0, 0.3]]) @ u + 0.01 * rng.standard_normal((1, N))
+    found = response_matrix(u, y, FS, band=(0.5, 19.0))
+    low, high = found.frequency < 8, found.frequency > 12
+    assert not found.usable[low].any()
+    assert found.usable[high].mean() > 0.9
+    assert np.all(np.isnan(found.response[~found.usable]))
+    assert np.all(np.isnan(found.std[~found.usable]))
+    error = np.abs(found.response[found.usable][:, 0] - [1.0, 0.3])
+    assert np.mean(error < 3 * found.std[found.usable][:, 0]) > 0.95
+
+
+@pytest.mark.parametrize("factor", [1.0, -3.0])
+def test_inputs_that_are_the_same_are_named(factor: float) -> None:
+    u = np.stack((UP[::FINE], DOWN[::FINE], factor * UP[::FINE]))
+    names = ("roll", "pitch", "yaw", "y")
+    with pytest.raises(RecordError, match=r"^roll, yaw move alike over the whole band"):
+        response_matrix(u, u[:1], FS, band=BAND, names=names)
+    total = np.stack((u[0], u[1], u[0] + u[1]))
+    with pytest.raises(RecordError, match=r"^roll, pitch, yaw move alike"):
+        response_matrix(total, u[:1], FS, band=BAND, names=names)
+
+
+U = np.stack((UP[::FINE], DOWN[::FINE]))
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"delays": -0.1}, r"delays holds -0.1 s"),
+        ({"delays": 6.0}, r"delays holds 6.0 s"),
+        ({"delays": [[1, 2, 3]]}, r"delays has shape \(1, 3\); give \(2, 2\)"),
+        ({"worst_condition": 1.0}, "worst_condition is 1.0"),
+        ({"points": 0}, "points is 0"),
+        ({"names": ("a",)}, "names holds 1; give 2 of inputs and 2 of outputs"),
+        ({"band": (1.0, 2.0)}, "holds 11 bins of 0.1 Hz, too few for 2 inputs"),
+        ({"band": (1.0, 101.0)}, "band is"),
+    ],
+)
+def test_bad_options_are_refused(change: dict[str, object], message: str) -> None:
+    options: dict[str, object] = {"band": BAND} | change
+    with pytest.raises(ArgumentError, match=message):
+        response_matrix(U, U, FS, **options)  # type: ignore[arg-type]
+
+
+def test_bad_records_are_refused() -> None:
+    with pytest.raises(RecordError, match=r"inputs has shape \(2000,\)"):
+        response_matrix(U[0], U, FS, band=BAND)
+    with pytest.raises(RecordError, match="inputs have 2000 samples and outputs 1999"):
+        response_matrix(U, U[:, 1:], FS, band=BAND)
+    with pytest.raises(RecordError, match="input 1 is constant at 2"):
+        response_matrix(np.stack((U[0], np.full(N, 2.0))), U, FS, band=BAND)
+    with pytest.raises(RecordError, match=r"outputs\[1\] holds nan at sample 0"):
+        response_matrix(U, np.stack((U[0], np.full(N, np.nan))), FS, band=BAND)
+
+
+@pytest.mark.parametrize("modelled", [True, False])
+def test_gaps_cost_accuracy_and_the_error_says_so(
+    three_axes: tuple[np.ndarray, np.ndarray], modelled: bool
+) -> None:
+    u, clean = three_axes
+    errors, stds, whole = [], [], []
+    for seed in range(4):
+        rng = np.random.default_rng(seed)
+        valid = np.ones(clean.shape, dtype=bool)
+        # With a model a fifth of the record; without, single samples, which a curve bridges.
+        for start in rng.integers(0, N - 60, 8 if modelled else 40):
+            valid[:, start : start + (50 if modelled else 1)] = False
+        y = clean + 0.01 * rng.standard_normal(clean.shape)
+        fill = clean if modelled else None
+        broken = np.where(valid, y, 99.0)
+        options = {"delays": DELAYS, "band": BAND}
+        found = response_matrix(u, broken, FS, valid=valid, fill=fill, **options)
+        kept = found.usable & (found.frequency < 8.0)
+        errors.append(np.abs(found.response - true_matrix(found.frequency))[kept])
+        stds.append(found.std[kept])
+        whole.append(response_matrix(u, y, FS, **options).std[kept])
+    error, std = np.concatenate(errors), np.concatenate(stds)
+    assert np.mean(error < 2 * std) > 0.9
+    assert np.sqrt(np.mean(error**2)) < 1.5 * np.sqrt(np.mean(std**2))
+    assert np.median(std) > np.median(np.concatenate(whole))
+
+
+def test_bad_masks_are_refused(three_axes: tuple[np.ndarray, np.ndarray]) -> None:
+    u, clean = three_axes
+    with pytest.raises(ArgumentError, match=r"valid has shape \(3,\)"):
+        response_matrix(u, clean, FS, band=BAND, valid=[True, False, True])
+    with pytest.raises(RecordError, match="output 0 has 0 valid samples"):
+        response_matrix(u, clean, FS, band=BAND, valid=np.zeros(N, dtype=bool))
+    with pytest.raises(RecordError, match="fill has shape"):
+        response_matrix(u, clean, FS, band=BAND, valid=np.ones(N, dtype=bool), fill=clean[:2])

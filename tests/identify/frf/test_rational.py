@@ -1,0 +1,204 @@
+import numpy as np
+import pytest
+from scipy import signal
+
+from hmpim.errors import ArgumentError, RecordError
+from hmpim.identify.frf.local import local_polynomial_response, local_response
+
+FS, BAND, DELAY = 200.0, (0.1, 20.0), 0.15
+FINE = 32
+Record = tuple[np.ndarray, np.ndarray]
+
+
+def chirp(t: np.ndarray) -> np.ndarray:
+    t = np.maximum(t, 0.0)
+    return np.sin(2 * np.pi * (0.1 * t + 0.995 * t**2))
+
+
+def second_order(f: np.ndarray, damping: float = 0.4) -> np.ndarray:
+    s, w = 2j * np.pi * f, 2 * np.pi * 10
+    # The input of `clean_record` is joined linearly over 1/6400 s, a low-pass of its own.
+    joined = np.sinc(f / (FS * FINE)) ** 2
+    return joined * w**2 / (s**2 + 2 * damping * w * s + w**2) * np.exp(-s * DELAY)
+
+
+def clean_record(damping: float) -> Record:
+    """FIELD.md's system without noise; the input is linear over 1/6400 s."""
+    fine, w = FINE, 2 * np.pi * 10
+    t = np.arange(2000 * fine) / (FS * fine)
+    matrices = ([[0, 1], [-(w**2), -2 * damping * w]], [[0], [w**2]], [[1.0, 0]], [[0.0]])
+    step = signal.cont2discrete(tuple(map(np.array, matrices)), 1 / (FS * fine), "foh")
+    numerator, denominator = signal.ss2tf(*step[:4])
+    return chirp(np.arange(2000) / FS), signal.lfilter(numerator[0], denominator, chirp(t - DELAY))[
+        ::fine
+    ] + 0.6
+
+
+@pytest.fixture(scope="module")
+def records() -> dict[float, Record]:
+    """Input and noise-free output by damping ratio."""
+    return {damping: clean_record(damping) for damping in (0.4, 0.05)}
+
+
+def study(
+    record: Record, damping: float, noise: float, seeds: int
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    u, clean = record
+    errors, stds = [], []
+    for seed in range(seeds):
+        y = clean + noise * np.random.default_rng(seed).standard_normal(clean.size)
+        found = local_response(u, y, FS, band=BAND, delay=DELAY)
+        errors.append(np.abs(found.response - second_order(found.frequency, damping)))
+        stds.append(found.std)
+    return found.frequency, np.array(errors), np.array(stds)
+
+
+@pytest.mark.slow
+def test_median_error_on_the_field_record_is_at_most_2_percent_for_every_seed(
+    records: dict[float, Record], seeds: int
+) -> None:
+    f, error, _ = study(records[0.4], 0.4, 0.1, seeds + seeds // 2)
+    relative = (error / np.abs(second_order(f)))[:, f >= 0.5]
+    per_seed = np.median(relative, axis=1)
+    assert per_seed.max() <= 0.02
+    assert np.median(per_seed) < 0.01
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("noise", "damping"), [(0.1, 0.4), (0.1, 0.05), (0.01, 0.4), (0.01, 0.05), (1e-4, 0.4)]
+)
+def test_stated_errors_agree_with_the_scatter(
+    records: dict[float, Record], noise: float, damping: float, seeds: int
+) -> None:
+    _, error, std = study(records[damping], damping, noise, max(seeds // 4, 50))
+    # |error|/std is Rayleigh distributed: half lie within 0.83 of one, 98 % within two.
+    assert np.median(error) / np.median(std) / np.sqrt(np.log(2)) == pytest.approx(1, abs=0.15)
+    assert np.mean(error < 2 * std) > 0.94
+
+
+@pytest.mark.parametrize("noise", [0.1, 0.01, 1e-4])
+def test_the_stated_error_holds_at_a_sharp_resonance(
+    records: dict[float, Record], noise: float, seeds: int
+) -> None:
+    f, error, std = study(records[0.05], 0.05, noise, max(seeds // 5, 40))
+    near = np.abs(f - 10) < 2
+    ratio = np.sqrt(np.mean(error[:, near] ** 2) / np.mean(std[:, near] ** 2))
+    assert ratio == pytest.approx(1, abs=0.15)
+
+
+@pytest.mark.parametrize("noise", [0.01, 1e-4])
+def test_the_stated_error_holds_in_the_lowest_bins(
+    records: dict[float, Record], noise: float, seeds: int
+) -> None:
+    f, error, std = study(records[0.4], 0.4, noise, max(seeds // 4, 50))
+    low = f < 1
+    ratio = np.sqrt(np.mean(error[:, low] ** 2) / np.mean(std[:, low] ** 2))
+    assert ratio == pytest.approx(1, abs=0.2)
+
+
+def test_near_a_sharp_resonance_rational_functions_beat_polynomials(
+    records: dict[float, Record],
+) -> None:
+    u, clean = records[0.05]
+    y = clean + 0.01 * np.random.default_rng(0).standard_normal(clean.size)
+    errors = []
+    for method in (local_response, local_polynomial_response):
+        found = method(u, y, FS, band=BAND, delay=DELAY)
+        near = np.abs(found.frequency - 10) < 1
+        miss = (found.response - second_order(found.frequency, 0.05))[near]
+        errors.append(np.sqrt(np.mean(np.abs(miss) ** 2)))
+    assert errors[0] < 0.1 * errors[1]
+
+
+def test_without_noise_a_second_order_system_is_found_nearly_exactly(
+    records: dict[float, Record],
+) -> None:
+    f, error, _ = study(records[0.4], 0.4, 0.0, 1)
+    relative = error[0] / np.abs(second_order(f))
+    assert np.median(relative) < 1e-6
+
+
+def test_an_integrator_is_followed_to_the_lowest_bin() -> None:
+    rng = np.random.default_rng(4)
+    u = rng.standard_normal(2000)
+    y = np.cumsum(u) / FS  # z / (z - 1), over the rate
+    found = local_response(u, y, FS, band=(0.2, 10.0))
+    z = np.exp(2j * np.pi * found.frequency / FS)
+    true = z / (z - 1) / FS
+    error = np.abs(found.response / true - 1)
+    assert error[:5].max() < 2e-3
+    assert np.median(error) < 3e-4
+    assert error.max() < 0.05
+
+
+@pytest.mark.parametrize("factor", [1e-6, 1e6])
+def test_units_do_not_matter(factor: float, records: dict[float, Record]) -> None:
+    u, clean = records[0.4]
+    y = clean + 0.1 * np.random.default_rng(2).standard_normal(clean.size)
+    one = local_response(u, y, FS, band=BAND, delay=DELAY)
+    other = local_response(u / factor, factor * y, FS, band=BAND, delay=DELAY)
+    np.testing.assert_allclose(other.response, factor**2 * one.response, rtol=1e-6)
+    np.testing.assert_allclose(other.std, factor**2 * one.std, rtol=1e-5)
+
+
+def test_a_gap_filled_by_a_model_keeps_the_stated_error_true(
+    records: dict[float, Record],
+) -> None:
+    u, clean = records[0.4]
+    valid = np.ones(2000, dtype=bool)
+    valid[1000:1100] = False  # the sweep is between 9.7 and 10.7 Hz, answered 0.15 s later
+    fill = clean + 1e-4 * FS * np.gradient(clean)  # a model whose delay is 0.1 ms off
+    errors, stds, kept = [], [], []
+    for seed in range(40):
+        y = clean + 0.1 * np.random.default_rng(seed).standard_normal(clean.size)
+        found = local_response(
+            u, np.where(valid, y, 77.0), FS, band=BAND, delay=DELAY, valid=valid, fill=fill
+        )
+        errors.append(np.abs(found.response - second_order(found.frequency)))
+        stds.append(found.std)
+        whole = local_response(u, y, FS, band=BAND, delay=DELAY)
+        far = np.abs(found.frequency - 4.0) < 2
+        kept.append(np.median(found.std[far]) / np.median(whole.std[far]))
+    error, std = np.array(errors), np.array(stds)
+    assert np.mean(error < 2 * std) > 0.9
+    assert np.sqrt(np.mean(error**2) / np.mean(std**2)) < 1.3
+    assert np.median(error) < 0.015
+    assert 0.5 < np.median(kept) < 2
+
+
+def test_short_gaps_are_bridged(records: dict[float, Record]) -> None:
+    u, clean = records[0.4]
+    valid = np.ones(2000, dtype=bool)
+    valid[5::40] = False
+    found = local_response(u, np.where(valid, clean, 77.0), FS, band=BAND, delay=DELAY, valid=valid)
+    error = np.abs(found.response / second_order(found.frequency) - 1)
+    assert np.median(error) < 0.02
+
+
+def test_what_stands_in_a_gap_is_of_no_consequence(
+    records: dict[float, Record],
+) -> None:
+    u, clean = records[0.4]
+    valid = np.random.default_rng(3).random(2000) > 0.2
+    found = [
+        local_response(
+            u, np.where(valid, clean, junk), FS, band=BAND, delay=DELAY, valid=valid, fill=clean
+        )
+        for junk in (0.0, 1e3)
+    ]
+    np.testing.assert_allclose(found[0].response, found[1].response, rtol=1e-9)
+    error = np.abs(found[0].response - second_order(found[0].frequency))
+    assert np.median(error) < 1e-5
+
+
+def test_a_mask_that_cannot_be_is_refused() -> None:
+    u = np.sin(np.arange(200.0) ** 2 / 500)
+    with pytest.raises(ArgumentError, match=r"valid has shape \(3,\)"):
+        local_response(u, u, FS, band=(1.0, 60.0), valid=[True, False, True])
+    with pytest.raises(RecordError, match="10 samples are valid"):
+        local_response(u, u, FS, band=(1.0, 60.0), valid=np.arange(200) < 10)
+    with pytest.raises(RecordError, match="fill has 3 samples"):
+        local_response(
+            u, u, FS, band=(1.0, 60.0), valid=np.arange(200) < 99, fill=[0, 1, 2.0, 3][:3]
+        )

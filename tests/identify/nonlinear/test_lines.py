@@ -1,0 +1,87 @@
+"""Lines that a multisine leaves out: distortion told from noise, even from odd."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from hmpim.errors import ArgumentError
+from hmpim.identify.nonlinear.lines import detection_lines, find_period
+
+N = 1024
+EXCITED = np.array([k for k in range(1, 120, 2) if k % 8 != 5])
+"""Odd lines, one in four of them left out."""
+
+
+def multisine(periods: int, seed: int = 0) -> np.ndarray:
+    phase = np.random.default_rng(seed).uniform(0, 2 * np.pi, EXCITED.size)
+    t = np.arange(N) / N
+    one = np.cos(2 * np.pi * EXCITED[:, None] * t + phase[:, None]).sum(axis=0)
+    return np.tile(one / np.std(one), periods)
+
+
+@settings(max_examples=40, deadline=None)
+@given(period=st.integers(20, 400), times=st.floats(2.1, 6.0), seed=st.integers(0, 50))
+def test_the_period_of_whatever_repeats(period, times, seed):
+    one = np.random.default_rng(seed).standard_normal(period)
+    u = np.resize(one, int(period * times))
+    assert find_period(u) == period
+    assert find_period(u + 1e-3 * np.random.default_rng(1).standard_normal(u.size)) == period
+
+
+def test_no_period_where_there_is_none():
+    t = np.arange(2000) / 200
+    assert find_period(np.sin(2 * np.pi * (0.1 * t + t**2))) is None
+    assert find_period(np.random.default_rng(0).standard_normal(500)) is None
+    assert find_period(np.ones(500)) is None
+
+
+@pytest.mark.parametrize(
+    ("shape", "expected"),
+    [
+        (lambda x: x + 0.01 * x**2, ["even"]),
+        (lambda x: x + 0.01 * x**3, ["odd"]),
+        (lambda x: x + 0.01 * x**2 + 0.01 * x**3, ["even", "odd"]),
+        (lambda x: x, []),
+    ],
+)
+def test_even_and_odd(shape, expected):
+    u = multisine(6)
+    y = shape(u) + 0.02 * np.random.default_rng(1).standard_normal(u.size)
+    found = detection_lines(u, y, period=N)
+    assert [level.parity for level in found.levels] == ["even", "odd"]
+    assert [lv.parity for lv in found.levels if lv.probability < 1e-4] == expected
+    # Of white noise, the amplitude of one line: |Y| 2/N, r.m.s. 2 σ / √N, over √6 periods.
+    assert found.noise_rms == pytest.approx(2 * 0.02 / np.sqrt(N * 6), rel=0.1)
+
+
+def test_the_share_is_that_of_the_clean_distortion():
+    u = multisine(4)
+    y = u + 0.05 * u**2
+    clean = detection_lines(u, y, period=N)
+    noisy = detection_lines(
+        u, y + 0.05 * np.random.default_rng(0).standard_normal(u.size), period=N
+    )
+    assert noisy.levels[0].rms == pytest.approx(clean.levels[0].rms, rel=0.1)
+    spectrum = np.abs(np.fft.rfft(u[:N] ** 2)) * 0.05 * 2 / N
+    even = spectrum[2:119:2]
+    assert clean.levels[0].rms == pytest.approx(np.sqrt(np.mean(even**2)), rel=0.05)
+
+
+def test_the_chance_is_uniform_without_distortion():
+    u = multisine(4)
+    chances = []
+    for seed in range(150):
+        y = u + 0.1 * np.random.default_rng(seed).standard_normal(u.size)
+        chances += [lv.probability for lv in detection_lines(u, y, period=N).levels]
+    assert 0.01 < np.mean(np.array(chances) < 0.05) < 0.1
+
+
+def test_one_period_is_refused_and_a_full_comb_says_nothing():
+    u = multisine(1)
+    with pytest.raises(ArgumentError, match="by two periods at least"):
+        detection_lines(u, u, period=N)
+    with pytest.raises(ArgumentError, match=r"period is 2\.5"):
+        detection_lines(u, u, period=2.5)
+    full = np.tile(np.random.default_rng(0).standard_normal(N), 3)
+    assert detection_lines(full, full, period=N) is None
