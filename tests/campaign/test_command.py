@@ -52,6 +52,35 @@ def test_done_then_specification_not_met_without_a_second_run(tmp_path):
     assert {p: p.stat().st_mtime_ns for p in (out / "cases").iterdir()} == cases
 
 
+def test_stopped_from_the_keyboard_it_says_what_is_kept(tmp_path, monkeypatch):
+    from hmpim.campaign import run
+
+    written = []
+
+    def stop_after_one(path, data):
+        write(path, data)
+        written.append(path)
+        if path.parent.name == "cases":
+            raise KeyboardInterrupt
+
+    write = run._write
+    monkeypatch.setattr(run, "_write", stop_after_one)
+    out = tmp_path / "out"
+    result = invoke(short_plan(tmp_path), "--out", out)
+    assert result.exit_code == 130
+    assert "keeps what is done (cases: 1), and the same command goes on" in result.stderr
+    assert not (out / "study.html").exists()
+
+
+def test_table_of_several_cases_keeps_each_row_on_one_line(tmp_path):
+    plan = short_plan(tmp_path, level=("levels = [0.5]", "levels = [0.5, 0.7]"))
+    result = invoke(plan, "--out", tmp_path / "out")
+    assert result.exit_code in (0, 1)
+    head, *lines = result.stdout.splitlines()[1:6]
+    assert head.split()[:3] == ["Axis", "Peak", "acc."]
+    assert [line.split()[0] for line in lines] == ["inner", "outer", "inner", "outer"]
+
+
 def test_bad_input_is_one_line_and_two(tmp_path):
     bad = short_plan(tmp_path, kind=('kind = "sensor"', 'kind = "rocket"'))
     for arguments, words in (

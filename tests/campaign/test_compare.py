@@ -81,6 +81,36 @@ def test_demo_finds_all_five_axes_and_shows_them(demo):
     assert "<svg" in page
 
 
+def test_couplings_stand_beside_the_exact_ones(demo):
+    """A true coupling is seen, or bounded: noise makes a gain larger, hardly ever smaller."""
+    study, _ = demo
+    assert len(study.couplings) == 20
+    for c in study.couplings:
+        assert 0.0 <= c["exact"] < 0.02
+        assert c["gain"] > c["exact"] - 3.0 * c["std"]
+        assert c["gain"] < c["exact"] + 4.0 * c["std"]
+
+
+def test_page_says_how_to_read_it_and_why_a_verdict_is_not_ok(demo):
+    study, folder = demo
+    page = study_page(study)
+    (cases,) = [grid for grid in page.grids if grid.caption.startswith("Every case")]
+    assert "behind the hold" in cases.note
+    assert "without friction" in cases.note
+    assert "Noise (deg)" in cases.columns
+    assert "Load" not in cases.columns  # the usual one in every row
+    verdicts = [row[cases.columns.index("Verdict")] for row in cases.rows]
+    (remarks,) = [grid for grid in page.grids if grid.caption.startswith("What the identif")]
+    assert f"{sum(v != 'ok' for v in verdicts)} of 5 verdicts" in remarks.caption
+    told = {row[0]: int(row[1]) for row in remarks.rows}
+    codes = [{w["code"] for w in row.pair["warnings"]} for row in study.rows]
+    for code, count in told.items():
+        assert count == sum(code.replace(" ", "_") in found for found in codes)
+    text = (folder / "study.md").read_text(encoding="utf-8")
+    assert remarks.rows[0][-1] in text
+    assert remarks.note in text
+
+
 def test_bins_of_the_record_lie_about_the_estimate(demo):
     """The paper's ratio of spectra, bin by bin, and the local estimate are of one thing."""
     _, folder = demo

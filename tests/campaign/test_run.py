@@ -245,7 +245,7 @@ def test_a_rate_the_table_cannot_take_is_refused_before_the_first_case_moves(tmp
     plan = table_plan(level=0.5)
     tests = (replace(plan.tests[0], rates=(1000.0, 700.0)),)
     with pytest.raises(ArgumentError, match=r"case all\..*700Hz.*: fs = 700 Hz does not divide"):
-        run_campaign(replace(plan, tests=tests), tmp_path)
+        run_campaign(replace(plan, tests=tests, duration=8.0), tmp_path)
 
 
 def test_more_travel_than_an_axis_has_is_refused_not_cut():

@@ -42,8 +42,8 @@ def samples_reading(row: Row) -> Reading | None:
     return start if found is None else Reading(value=found, std=start.std, unit=start.unit)
 
 
-def case_label(row: Row, compare: Compare) -> str:
-    """What tells a row from its neighbours in a figure."""
+def case_label(row: Row, compare: Compare, among: Sequence[Row]) -> str:
+    """What tells a row from the others of a figure."""
     what = {
         "rates": f"{row.rate:g} Hz",
         "stimulus": f"{row.rate:g} Hz",
@@ -52,11 +52,25 @@ def case_label(row: Row, compare: Compare) -> str:
         "levels": f"{row.peaks[2]:.0f} {row.stimulus['unit']}/s²",
         "modes": f"{row.mode}, {row.rate:g} Hz",
         "excitation": "all at once" if row.together else "alone",
-        "axes": "",
+        "axes": _varied(row, [other for other in among if other.axis == row.axis]),
     }[compare]
     if not what:
         return row.axis
     return f"{row.axis}, {what}"
+
+
+def _varied(row: Row, among: Sequence[Row]) -> str:
+    """What is not the same in all rows."""
+    said = {
+        "test": row.test,
+        "load": row.load,
+        "mode": row.mode,
+        "rate": f"{row.rate:g} Hz",
+        "level": f"{row.peaks[2]:.0f} {row.stimulus['unit']}/s²",
+    }
+    return ", ".join(
+        words for name, words in said.items() if len({getattr(other, name) for other in among}) > 1
+    )
 
 
 def findings(
@@ -78,6 +92,11 @@ def findings(
         sentence = says[compare](axis, [row for row in rows if row.axis == axis])
         if sentence:
             found.append(sentence)
+    if compare == "modes" and any(_lifted(row) for row in rows):
+        found.append(
+            "Friction counts as damping: beyond the servo's own frequency that turns the phase "
+            "forward, and with feedforward it raises the figure."
+        )
     if compare in ("excitation", "axes"):
         if couplings:
             found.append(_strongest(couplings))
@@ -171,7 +190,7 @@ def _levels(axis: str, rows: list[Row]) -> str:
 
 def _modes(axis: str, rows: list[Row]) -> str:
     """Samples over samples for every mode: behind the hold there is no figure for all three."""
-    said, lifted = [], False
+    said = []
     for rate in sorted({row.rate for row in rows}):
         seen, exact = [], []
         for row in (row for row in rows if row.rate == rate):
@@ -180,31 +199,34 @@ def _modes(axis: str, rows: list[Row]) -> str:
             known = row.pair["known"].get("exact_samples_bandwidth")
             seen.append(f"{row.mode} {'–' if found is None else f'{found:.1f}'}")
             exact += [] if known is None else [f"{known:.1f}"]
-            lifted |= bool(known and found and found > 1.01 * known)
         if len(seen) > 1:
             free = f" (without friction {', '.join(exact)})" if len(exact) == len(seen) else ""
             said.append(f"at {rate:g} Hz {', '.join(seen)} Hz{free}")
     if not said:
         return ""
-    text = f"{axis}, −90° of samples over samples: " + "; ".join(said) + "."
-    if lifted:
-        text += (
-            " Friction counts as damping: beyond the servo's own frequency that turns the phase "
-            "forward, and with feedforward it raises the figure."
-        )
-    return text
+    return f"{axis}, −90° of samples over samples: " + "; ".join(said) + "."
+
+
+def _lifted(row: Row) -> bool:
+    """Whether the bandwidth lies above that without friction."""
+    reading, known = samples_reading(row), row.pair["known"].get("exact_samples_bandwidth")
+    return reading is not None and known is not None and reading.value > 1.01 * known
 
 
 def _axes(axis: str, rows: list[Row]) -> str:
-    row = rows[-1]
+    return f"{axis}: " + "; ".join(_at_90(row, _varied(row, rows)) for row in rows) + "."
+
+
+def _at_90(row: Row, varied: str) -> str:
     found = bandwidth(row)
+    where = f" ({varied})" if varied else ""
     if found is None:
-        return f"{axis}: no bandwidth."
-    text = f"{axis}: −90° at {found.value:.2f} ± {found.std:.2f} Hz"
+        return f"no bandwidth{where}"
+    text = f"−90° at {found.value:.2f} ± {found.std:.2f} Hz{where}"
     if row.exact_bandwidth is not None:
-        off = _percent(found.value, row.exact_bandwidth)
-        text += f", {off:+.1f} % from {row.exact_bandwidth:.2f} Hz, exact without friction"
-    return text + "."
+        off = f"{_percent(found.value, row.exact_bandwidth):+.1f}".replace("-", "−")
+        text += f", {off} % from {row.exact_bandwidth:.2f} Hz, exact without friction"
+    return text
 
 
 def _excitation(axis: str, rows: list[Row]) -> str:

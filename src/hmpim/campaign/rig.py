@@ -7,13 +7,14 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Protocol, cast, get_args
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hmpim.campaign.plan import AxisWish, Plan
 from hmpim.errors import ArgumentError, HmpimError, LimitsError, RigError
 from hmpim.experiment import run
 from hmpim.experiment.run import check_limits
 from hmpim.record import Record
-from hmpim.rigs.table import AXES, AxisName, LoadName, MotionTable, exact_bandwidth
+from hmpim.rigs.table import AXES, AxisName, LoadName, MotionTable, exact_bandwidth, linear_response
 from hmpim.stimulus import Limits, Stimulus
 
 if TYPE_CHECKING:
@@ -59,6 +60,12 @@ class CampaignRig(Protocol):
         `exact_bandwidth` (Hz) is what is identified, `exact_samples_bandwidth` that of samples
         over samples, `inertia` in kg·m².
         """
+        ...
+
+    def coupling(
+        self, case: "Case", source: str, target: str, frequency: NDArray[np.float64]
+    ) -> NDArray[np.float64] | None:
+        """Gain from the command of `source` to the position of `target`; None if unknown."""
         ...
 
 
@@ -185,6 +192,20 @@ class TableRig:
             "inertia": float(inertia),
         }
 
+    def coupling(
+        self, case: "Case", source: str, target: str, frequency: NDArray[np.float64]
+    ) -> NDArray[np.float64] | None:
+        """Of the linearised mechanics, samples over samples, friction off."""
+        response = linear_response(
+            self.loaded(case),
+            frequency,
+            axis_in=cast(AxisName, source),
+            axis_out=cast(AxisName, target),
+            fs=case.rate,
+            hold="included",
+        )
+        return np.abs(response)
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SensorRig:
@@ -219,6 +240,12 @@ class SensorRig:
     def known(self, case: "Case", axis: str) -> dict[str, float]:
         """Not worked out."""
         return {}
+
+    def coupling(
+        self, case: "Case", source: str, target: str, frequency: NDArray[np.float64]
+    ) -> NDArray[np.float64] | None:
+        """None: each sensor stands alone."""
+        return None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -264,3 +291,9 @@ class PlayedRig:
     def known(self, case: "Case", axis: str) -> dict[str, float]:
         """Nobody knows."""
         return {}
+
+    def coupling(
+        self, case: "Case", source: str, target: str, frequency: NDArray[np.float64]
+    ) -> NDArray[np.float64] | None:
+        """Nobody knows."""
+        return None

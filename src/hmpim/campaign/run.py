@@ -156,7 +156,7 @@ def _measured(
             "stimuli": [_described(stimulus) for stimulus in stimuli],
             "torque": torque,
             "pairs": pairs,
-            "couplings": _couplings(plan, case, record) if len(case.axes) > 1 else [],
+            "couplings": _couplings(plan, case, record, rig) if len(case.axes) > 1 else [],
         }
     )
     return done
@@ -204,8 +204,11 @@ def _bins(record: Record) -> dict[str, list[float]]:
     return {name: [float(f"{x:.6g}") for x in values.tolist()] for name, values in columns.items()}
 
 
-def _couplings(plan: Plan, case: Case, record: Record) -> list[dict[str, Any]]:
-    """Gain from each command to each other position, where all axes are excited together."""
+def _couplings(plan: Plan, case: Case, record: Record, rig: CampaignRig) -> list[dict[str, Any]]:
+    """Gain from each command to each other position, where all axes are excited together.
+
+    Beside it stands the exact one where the rig knows it, the median over the same frequencies.
+    """
     bands = [plan.axis(axis, test=case.test).band for axis in case.axes]
     low, high = max(band[0] for band in bands), min(band[1] for band in bands)
     inputs = [record.channel(f"{axis}.command").values for axis in case.axes]
@@ -218,6 +221,11 @@ def _couplings(plan: Plan, case: Case, record: Record) -> list[dict[str, Any]]:
         return []
     gain = np.median(np.abs(matrix.response[seen]), axis=0)
     std = np.median(matrix.std[seen], axis=0)
+
+    def exact(source: str, target: str) -> float | None:
+        known = rig.coupling(case, source, target, matrix.frequency[seen])
+        return None if known is None else float(np.median(known))
+
     return [
         {
             "from": source,
@@ -225,6 +233,7 @@ def _couplings(plan: Plan, case: Case, record: Record) -> list[dict[str, Any]]:
             "band": [0.25 * high, 0.5 * high],
             "gain": float(gain[j, i]),
             "std": float(std[j, i]),
+            "exact": exact(source, target),
             "usable_percent": 100.0 * float(np.mean(matrix.usable)),
         }
         for i, source in enumerate(case.axes)

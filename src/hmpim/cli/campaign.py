@@ -1,14 +1,18 @@
 """``hmpim campaign``: a whole study from one plan."""
 
+import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from hmpim.cli.terminal import output_console, say
 from hmpim.errors import ArgumentError
+
+if TYPE_CHECKING:
+    from hmpim.campaign.study import Study
 
 __all__ = ["campaign"]
 
@@ -76,7 +80,7 @@ def campaign(
         raise ArgumentError(f"compare = {wanted.compare!r}: there is no file {earlier}")
     if earlier is not None:
         earlier_parameters(earlier)  # what cannot be read is refused before anything moves
-    with _counting(quiet) as tick:
+    with _stopping(out), _counting(quiet) as tick:
         cases = run_campaign(wanted, out, fresh=not resume, progress=tick)
         study = make_study(wanted, cases, earlier=earlier)
         write_study(study, out, document=document)
@@ -90,38 +94,73 @@ def campaign(
         raise typer.Exit(1)
 
 
-def _print(study: object) -> None:
+def _print(study: "Study") -> None:
     from rich.table import Table
 
-    from hmpim.campaign.study import Study
-    from hmpim.campaign.write import study_page
+    from hmpim.campaign.grids import bounds, case_grid, change_grid
+    from hmpim.campaign.write import headline
 
-    assert isinstance(study, Study)
-    page = study_page(study)
+    whole = case_grid(study.rows, "")
     console = output_console()
-    shown = Table(title=page.title, box=None, header_style="bold", pad_edge=False)
-    names = ("−90° (Hz)", "fn (Hz)", "ζ", "Delay (ms)", "Verdict")
+    shown = Table(title=study.plan.name, box=None, header_style="bold", pad_edge=False)
     several = len({row.case_id for row in study.rows}) > 1
-    heads = (*(("Case",) if several else ()), "Axis", *names)
-    for column in (*heads, *(("Specification",) if study.checks else ())):
-        shown.add_column(column, overflow="fold")
-    whole = page.grids[1] if study.checks else page.grids[0]
-    at = [whole.columns.index(c) for c in names]
+    # Of several cases the page has the rest: here each row is to stay on one line.
+    more = () if several else ("fn (Hz)", "ζ")
+    names = ("Axis", *_varied(study), "−90° (Hz)", *more, "Delay (ms)", "Verdict")
+    at = [i for name in names for i, column in enumerate(whole.columns) if column.startswith(name)]
+    for i in at:
+        shown.add_column(whole.columns[i], overflow="fold", no_wrap=True)
+    if study.checks:
+        shown.add_column("Specification")
     for row, cells in zip(study.rows, whole.rows, strict=True):
         outcomes = [check.outcome for check in study.checks if check.row is row]
         met = ["fail" if "fail" in outcomes else "pass" if outcomes else ""]
-        first = (row.case_id, row.axis) if several else (row.axis,)
-        shown.add_row(*first, *(cells[i] for i in at), *(met if study.checks else ()))
+        shown.add_row(*(cells[i] for i in at), *(met if study.checks else ()))
     console.print(shown)
+    unsure = sum(row.verdict != "ok" for row in study.rows)
+    if unsure:
+        console.print(f"{unsure} of {len(study.rows)} verdicts are not ok; the page says why.")
     for check in study.checks:
         if check.outcome == "fail":
-            found = "no figure" if check.reading is None else f"{check.reading.value:.5g}"
+            read = check.reading
+            found = "no figure" if read is None else f"{read.value:.5g} {read.unit}".rstrip()
+            wish = bounds(check.wanted.low, check.wanted.high)
             console.print(
-                f"fail: {check.wanted.quantity} of {check.row.axis} in {check.row.case_id}: {found}"
+                f"fail: {check.wanted.quantity} of {check.row.axis} in {check.row.case_id}: "
+                f"{found}, wanted {wish}"
             )
-    console.print(page.headline)
+    console.print(headline(study))
     if study.changes:
-        console.print(page.grids[-1].caption + ".")
+        console.print(change_grid(study).caption + ".")
+
+
+def _varied(study: "Study") -> tuple[str, ...]:
+    """Columns that tell the rows apart: the test, and what is not the same within one."""
+    if not study.rows:
+        return ()
+    tests = {row.test for row in study.rows}
+    fields = {"load": "Load", "mode": "Mode", "rate": "Rate (Hz)", "level": "Peak acc."}
+    within = tuple(
+        column
+        for field, column in fields.items()
+        if any(len({getattr(r, field) for r in study.rows if r.test == test}) > 1 for test in tests)
+    )
+    return (*(("Test",) if len(tests) > 1 else ()), *within)
+
+
+@contextmanager
+def _stopping(folder: Path) -> Iterator[None]:
+    """Say on Ctrl-C that nothing is lost."""
+    try:
+        yield
+    except KeyboardInterrupt:
+        done = len(list((folder / "cases").glob("*.json")))
+        print(
+            f"hmpim: stopped; {folder} keeps what is done (cases: {done}), and the same command "
+            "goes on from there",
+            file=sys.stderr,
+        )
+        raise
 
 
 @contextmanager

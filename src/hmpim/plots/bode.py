@@ -13,6 +13,7 @@ from hmpim.plots.curves import BodeCurve, deviation_curve, measured_curve, model
 from hmpim.plots.style import (
     COLOURS,
     Colour,
+    degree_ticks,
     draw_legend,
     draw_line,
     draw_mark,
@@ -70,16 +71,14 @@ def bode(
     >>> [axes.get_ylabel() for axes in figure.axes]
     ['Magnitude (dB)', 'Phase (deg)']
     """
-    from matplotlib.ticker import MaxNLocator
-
     figure, (magnitude, phase) = new_figure(2, height=2.5)
-    phase.yaxis.set_major_locator(MaxNLocator(nbins=7, steps=[1, 1.8, 3.6, 4.5, 9, 10]))
     for label, colour, curve in curves:
         draw_bode(magnitude, phase, curve, label=label, colour=colour)
     shown = band or _whole_band([curve for _, _, curve in curves])
     if shown is not None:
         magnitude.set_xlim(*shown)
         _fit_heights(magnitude, phase, [curve for _, _, curve in curves], shown)
+    degree_ticks(phase)
     reference = f"dB re 1 {plain(magnitude_unit)}" if magnitude_unit else "dB"
     finish_axes(magnitude, y=f"Magnitude ({reference})", log_x=True)
     finish_axes(phase, x="Frequency (Hz)", y="Phase (deg)", log_x=True)

@@ -10,6 +10,7 @@ from hmpim.plots.curves import BodeCurve
 from hmpim.plots.style import (
     COLOURS,
     Colour,
+    degree_ticks,
     draw_legend,
     draw_line,
     finish_axes,
@@ -26,7 +27,10 @@ _DASHES: tuple[Literal["-", "--", "-."], ...] = ("-", "--", "-.")
 
 
 def overlaid_bode(
-    curves: Sequence[tuple[str, BodeCurve]], *, phase_level: float | None = -90.0
+    curves: Sequence[tuple[str, BodeCurve]],
+    *,
+    phase_level: float | None = -90.0,
+    pairs: bool = True,
 ) -> "Figure":
     """Draw magnitude and phase of several curves over each other (Figs 19 to 22).
 
@@ -36,6 +40,8 @@ def overlaid_bode(
         Drawn in this order, told apart by colour and then by dashes; their bands are left out.
     phase_level : float, optional
         Phase in degrees at which a thin line is drawn.
+    pairs : bool
+        True draws every second curve thin over a wide one: of two that are the same both show.
 
     Examples
     --------
@@ -45,10 +51,7 @@ def overlaid_bode(
     >>> len(figure.axes[0].lines)
     2
     """
-    from matplotlib.ticker import MaxNLocator
-
     figure, (magnitude, phase) = new_figure(2, height=2.5)
-    phase.yaxis.set_major_locator(MaxNLocator(nbins=7, steps=[1, 1.8, 3.6, 4.5, 9, 10]))
     for i, (label, curve) in enumerate(curves):
         for axes, values in ((magnitude, curve.magnitude_db), (phase, curve.phase)):
             draw_line(
@@ -58,7 +61,7 @@ def overlaid_bode(
                 colour=_COLOURS[i % len(_COLOURS)],
                 label=label if axes is magnitude else "",
                 dashes=_DASHES[i // len(_COLOURS) % len(_DASHES)],
-                width=1.2,
+                width=_width(i) if pairs else 1.2,
                 spacing="log",
             )
     filled = [curve for _, curve in curves if curve.frequency.size > 1]
@@ -74,11 +77,16 @@ def overlaid_bode(
         magnitude.set_ylim(max(bottom, -50.0) - 2.0, min(top, 20.0) + 2.0)
     if phase_level is not None:
         phase.axhline(phase_level, color=COLOURS["muted"], linewidth=0.8, linestyle=(0, (1, 2)))
+    degree_ticks(phase)
     finish_axes(magnitude, y="Magnitude (dB)", log_x=True)
     finish_axes(phase, x="Frequency (Hz)", y="Phase (deg)", log_x=True)
     draw_legend(magnitude, columns=2)
     figure.align_ylabels([magnitude, phase])
     return figure
+
+
+def _width(place: int) -> float:
+    return 1.0 if place % 2 else 2.6
 
 
 def overlaid_levels(
@@ -112,7 +120,7 @@ def overlaid_levels(
             values,
             colour=_COLOURS[i % len(_COLOURS)],
             label=label,
-            width=1.2,
+            width=_width(i),
             spacing="log",
         )
     if level is not None:

@@ -22,6 +22,7 @@ __all__ = [
     "WIDTH",
     "Colour",
     "axis_label",
+    "degree_ticks",
     "draw_legend",
     "draw_level",
     "draw_line",
@@ -123,6 +124,34 @@ def new_figure(
         for upper in axes[:-1]:
             upper.tick_params(labelbottom=False)
     return figure, axes
+
+
+def degree_ticks(axes: "Axes", *, most: int = 7) -> None:
+    """Put the ticks of a phase at parts of a turn: 15, 30, 45, 90 degrees and so on.
+
+    Call it when the heights are set.
+
+    Parameters
+    ----------
+    axes : matplotlib.axes.Axes
+        With degrees upwards.
+    most : int
+        How many steps there may be.
+
+    Examples
+    --------
+    >>> figure, (axes,) = new_figure()
+    >>> _ = axes.set_ylim(-210.0, 20.0)
+    >>> degree_ticks(axes)
+    >>> axes.get_yticks().tolist()[-3:]
+    [-45.0, 0.0, 45.0]
+    """
+    from matplotlib.ticker import MultipleLocator
+
+    low, high = axes.get_ylim()
+    steps = (1.0, 2.0, 5.0, 15.0, 30.0, 45.0, 90.0, 180.0, 360.0, 720.0)
+    wanted = (step for step in steps if high - low <= most * step)
+    axes.yaxis.set_major_locator(MultipleLocator(next(wanted, 360.0 * np.ceil((high - low) / 2e3))))
 
 
 def finish_axes(

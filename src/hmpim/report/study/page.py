@@ -12,11 +12,15 @@ __all__ = ["Grid", "Section", "StudyPage", "render_study"]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Grid:
-    """A table of text: its caption, its columns, its rows; the first column names the row."""
+    """A table of text: its caption, its columns, its rows; the first column names the row.
+
+    `note` stands below it: how it is to be read.
+    """
 
     caption: str
     columns: tuple[str, ...]
     rows: tuple[tuple[str, ...], ...]
+    note: str = ""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -1,0 +1,240 @@
+"""The tables of a study as text: every case, what was specified, remarked, coupled, changed."""
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+from hmpim.campaign.study import Reading, Row, Study
+from hmpim.report.numbers import plus_minus
+from hmpim.report.study import Grid
+from hmpim.report.words import GLOSSARY
+
+__all__ = [
+    "PARAMETERS",
+    "bounds",
+    "case_grid",
+    "change_grid",
+    "check_grid",
+    "coupling_grid",
+    "remark_grid",
+]
+
+PARAMETERS = (
+    ("bandwidth_phase90", "−90° (Hz)"),
+    ("natural_frequency", "fn (Hz)"),
+    ("damping_ratio", "ζ"),
+    ("delay", "Delay (ms)"),
+    ("noise_std", "Noise"),
+    ("scale_factor", "Scale"),
+    ("bias", "Bias"),
+)
+"""Parameters of the table of cases, and their columns."""
+
+_TOLD = ("delay", "natural_frequency", "damping_ratio", "bandwidth_phase90")
+_VAGUE = 10.0  # times its own size: an error that leaves nothing told
+_LABELS = {words.name: words.label for words in GLOSSARY}
+
+_READING = (
+    "−90° is that of the fitted model: behind the hold where the record says that its input is "
+    "held (position commands alone, mode P), of samples over samples elsewhere; −90° of the "
+    "response is the same, read off the measured response"
+)
+_EXACT = "exact is the linearised mechanics of the simulated table, without friction"
+_NEGATIVE = (
+    "a negative delay belongs to the fit, not to the unit: where feedforward or friction shape "
+    "the response, dynamics and delay stand in for each other"
+)
+
+
+def case_grid(rows: Sequence[Row], caption: str, *, explained: bool = False) -> Grid:
+    """Table of rows: every parameter with its error.
+
+    Parameters
+    ----------
+    rows : sequence of Row
+        In the order wanted.
+    caption : str
+        What stands over the table.
+    explained : bool
+        True says under the table how its columns are to be read.
+    """
+    exact = any(row.exact_bandwidth is not None for row in rows)
+    units = {row.stimulus["unit"] for row in rows}
+    unit = units.pop() if len(units) == 1 else ""
+    of_unit = {"Noise": f"Noise ({unit})", "Bias": f"Bias ({unit})"} if unit else {}
+    peak = f"Peak acc. ({unit}/s²)" if unit else "Peak acc."
+    names = ("Axis", "Test", "Load", "Mode", "Rate (Hz)", peak, "At once", "Verdict")
+    found = tuple(of_unit.get(label, label) for _, label in PARAMETERS)
+    # A column that says the usual of every row says nothing, of a rig without loads above all.
+    usual = {"Load": "acceptance", "Mode": "P", "At once": ""}
+    said = [_READING, *([_EXACT] if exact else [])]
+    if any((delay := row.parameters.get("delay")) and delay.value < 0.0 for row in rows):
+        said.append(_NEGATIVE)
+    told = [
+        {
+            **dict(zip(names, _named(row), strict=True)),
+            **dict(zip(found, (_cell(row, name) for name, _ in PARAMETERS), strict=True)),
+            "−90° of the response (Hz)": _shown(row.measured_bandwidth),
+            **({"−90° exact (Hz)": _exact(row)} if exact else {}),
+        }
+        for row in rows
+    ]
+    columns = [
+        name
+        for name in (told[0] if told else names)
+        if name not in usual or any(cells[name] != usual[name] for cells in told)
+    ]
+    return Grid(
+        caption=caption,
+        columns=tuple(columns),
+        rows=tuple(tuple(cells[name] for name in columns) for cells in told),
+        note="; ".join(said) + "." if explained else "",
+    )
+
+
+def _named(row: Row) -> tuple[str, ...]:
+    """What a row is about, and what it is worth."""
+    return (
+        row.axis,
+        row.test,
+        row.load,
+        row.mode,
+        f"{row.rate:g}",
+        _plain(row.peaks[2]),
+        "yes" if row.together else "",
+        row.verdict.replace("_", " "),
+    )
+
+
+def _plain(value: float) -> str:
+    return f"{value:.0f}" if abs(value) >= 1000.0 else f"{value:.4g}"
+
+
+def _exact(row: Row) -> str:
+    return "–" if row.exact_bandwidth is None else f"{row.exact_bandwidth:.2f}"
+
+
+def _cell(row: Row, name: str) -> str:
+    reading = row.parameters.get(name)
+    if reading is not None and name in _TOLD and reading.std > _VAGUE * abs(reading.value):
+        return "–"
+    if name == "delay" and reading is not None:
+        reading = Reading(value=1e3 * reading.value, std=1e3 * reading.std)
+    return _shown(reading)
+
+
+def _shown(reading: Reading | None) -> str:
+    return "–" if reading is None else plus_minus(reading.value, reading.std)
+
+
+def check_grid(study: Study) -> Grid:
+    """Every limit of the specification, held against every case that it is for."""
+    rows = []
+    for check in study.checks:
+        unit = "" if check.reading is None else check.reading.unit
+        rows.append(
+            (
+                check.row.axis,
+                check.row.case_id,
+                _LABELS.get(check.wanted.quantity, check.wanted.quantity),
+                f"{bounds(check.wanted.low, check.wanted.high)} {unit}".rstrip(),
+                _shown(check.reading),
+                check.outcome,
+            )
+        )
+    columns = ("Axis", "Case", "Quantity", "Wanted", "Found", "Outcome")
+    return Grid(caption="Specification", columns=columns, rows=tuple(rows))
+
+
+def bounds(low: float, high: float) -> str:
+    """Limits in words.
+
+    Examples
+    --------
+    >>> bounds(20.0, math.inf)
+    'at least 20'
+    >>> bounds(0.99, 1.01)
+    'at least 0.99 and at most 1.01'
+    """
+    said = [f"at least {low:g}"] if math.isfinite(low) else []
+    said += [f"at most {high:g}"] if math.isfinite(high) else []
+    return " and ".join(said)
+
+
+def remark_grid(rows: Sequence[Row]) -> Grid | None:
+    """What the identifications remark: each kind once, with how many rows have it, and the first.
+
+    None where nothing is remarked.
+    """
+    first: dict[str, str] = {}
+    share: dict[str, list[str]] = {}
+    for row in rows:
+        for code, message in {w["code"]: w["message"] for w in row.pair["warnings"]}.items():
+            first.setdefault(code, f"{row.axis}, {row.test}: {message}")
+            share.setdefault(code, []).append(row.verdict)
+    if not first:
+        return None
+    unsure = sum(row.verdict != "ok" for row in rows)
+    order = sorted(share, key=lambda code: -len(share[code]))
+    return Grid(
+        caption=f"What the identifications remark; {unsure} of {len(rows)} verdicts are not ok",
+        columns=("Remark", "Rows", "Not ok", "For instance"),
+        rows=tuple(
+            (
+                code.replace("_", " "),
+                f"{len(share[code])}",
+                f"{sum(verdict != 'ok' for verdict in share[code])}",
+                first[code],
+            )
+            for code in order
+        ),
+        note="A verdict that is not ok says that one linear model of few poles is not all there "
+        "is, because of friction, for instance, or that the record does not tell one of its "
+        "parameters. The error bars say how well the best such model is known.",
+    )
+
+
+def change_grid(study: Study) -> Grid:
+    """What differs from the earlier study beyond the errors of both."""
+    moved = [change for change in study.changes if change.differs]
+    return Grid(
+        caption=f"Against the earlier study: {len(moved)} of {len(study.changes)} figures differ "
+        "by more than three standard deviations",
+        columns=("Axis", "Case", "Quantity", "Before", "Now"),
+        rows=tuple(
+            (
+                change.axis,
+                change.case_id,
+                _LABELS.get(change.quantity, change.quantity),
+                f"{_shown(change.before)} {change.before.unit}".rstrip(),
+                f"{_shown(change.now)} {change.now.unit}".rstrip(),
+            )
+            for change in moved
+        ),
+    )
+
+
+def coupling_grid(couplings: Sequence[dict[str, Any]]) -> Grid:
+    """Gain from each command to each other position, beside the exact one where it is known."""
+    low, high = couplings[0]["band"]
+    exact = any(c.get("exact") is not None for c in couplings)
+    rows = []
+    for c in couplings:
+        gain, std, true = c["gain"], c["std"], c.get("exact")
+        known = gain is not None and std is not None
+        value = f"{100 * gain:.3f} ± {100 * std:.3f}" if known else "–"
+        clear = "yes" if known and gain > 3 * std else "no"
+        truth = ("–" if true is None else f"{100 * true:.3f}",) if exact else ()
+        rows.append((f"{c['from']} → {c['to']}", value, *truth, clear))
+    return Grid(
+        caption=f"Couplings from {low:g} to {high:g} Hz, median gain",
+        columns=(
+            "From → to",
+            "Gain (% of the command)",
+            *(("Exact (%)",) if exact else ()),
+            "Beyond three std",
+        ),
+        rows=tuple(rows),
+        note="A gain that does not stand out by three standard deviations is mostly noise, and "
+        "too large: it bounds the coupling.",
+    )

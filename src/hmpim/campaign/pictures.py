@@ -1,0 +1,120 @@
+"""The pictures of a study: responses and levels of a figure's cases over each other."""
+
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from hmpim.campaign.compare import HEARD, case_label
+from hmpim.campaign.plan import FigurePlan
+from hmpim.campaign.study import Row
+from hmpim.identify import PairIdentification
+from hmpim.plots.curves import BodeCurve, measured_curve, model_curve
+from hmpim.plots.fence import picket_fence
+from hmpim.plots.overlay import overlaid_bode, overlaid_levels
+from hmpim.report.figures import Picture
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+__all__ = ["section_pictures"]
+
+_CLEAR = 0.3  # share of the response: what is less sure is left out
+
+
+def section_pictures(
+    rows: Sequence[Row], figure: FigurePlan, found: Sequence[str]
+) -> list[Picture]:
+    """Draw what a figure of the plan compares, `found` in words for who cannot see it."""
+    pictures = []
+    words = " ".join(found)
+    if figure.compare == "stimulus":
+        levels = [
+            (
+                case_label(row, "stimulus", rows),
+                np.array(row.stimulus["frequency"]),
+                np.array(row.stimulus["level_db"]),
+            )
+            for row in rows
+        ]
+        unit = rows[0].stimulus["unit"] if rows else ""
+        return [
+            _picture("levels", figure.title, words, overlaid_levels(levels, unit=unit, level=HEARD))
+        ]
+    if figure.compare == "axes":
+        every = [
+            (case_label(row, "axes", rows), curve)
+            for row in rows
+            if (curve := _curve(row)) is not None
+        ]
+        drawn = overlaid_bode(every, pairs=False)
+        return [_picture("axes", figure.title, words, drawn)] if every else []
+    for axis in dict.fromkeys(row.axis for row in rows):
+        if figure.compare == "fence":
+            drawn = _fence([row for row in rows if row.axis == axis])
+            pictures.append(_picture(axis, f"{figure.title}: {axis}", words, drawn))
+            continue
+        curves = [
+            (case_label(row, figure.compare, rows), curve)
+            for row in rows
+            if row.axis == axis and (curve := _curve(row)) is not None
+        ]
+        if curves:
+            pictures.append(_picture(axis, f"{figure.title}: {axis}", words, overlaid_bode(curves)))
+    return pictures
+
+
+def _fence(rows: Sequence[Row]) -> "Figure":
+    """Close-up of the upper half of the band, bin by bin."""
+    low, high = rows[0].stimulus["band"]
+    records = []
+    for row in rows:
+        bins = row.pair["bins"]
+        ratio = np.array(bins["real"]) + 1j * np.array(bins["imag"])
+        records.append(
+            (case_label(row, "fence", rows), np.array(bins["frequency"]), ratio, _curve(row))
+        )
+    return picket_fence(records, band=(max(low, 0.55 * high), 0.75 * high))
+
+
+def _picture(key: str, title: str, words: str, drawn: "Figure") -> Picture:
+    return Picture(key=key, title=title, caption=title + ".", description=words, figure=drawn)
+
+
+def _curve(row: Row) -> BodeCurve | None:
+    """Measured response of a row; its phase unwrapped beside the model's."""
+    parameters = {
+        name: estimate if estimate and estimate["std"] is not None else None
+        for name, estimate in row.pair["parameters"].items()
+    }
+    scale = row.pair["parameters"]["scale_factor"]
+    if scale is not None:  # a curve needs its value alone
+        sure = {"std": 0.0, "ci95": [scale["value"], scale["value"]], "unit": scale["unit"]}
+        parameters["scale_factor"] = {"value": scale["value"], **sure}
+    response = dict(row.pair["frequency_response"])
+    response["std"] = [math.inf if std is None else std for std in response["std"]]
+    response["coherence"] = None
+    runs: list[list[int]] = [[]]  # of neighbouring frequencies that are clear
+    for k, std in enumerate(response["std"]):
+        if std < _CLEAR * math.hypot(response["real"][k], response["imag"][k]):
+            runs[-1].append(k)
+        else:
+            runs.append([])
+    clear = max(runs, key=len)
+    for name in ("frequency", "real", "imag", "std"):
+        response[name] = [response[name][k] for k in clear]
+    pair = PairIdentification.from_dict(
+        {
+            **row.pair,
+            "parameters": parameters,
+            "frequency_response": response,
+            "bandwidths_from_response": {},
+            "candidates": [],
+        }
+    )
+    seen = pair.frequency_response.frequency
+    seen = seen[seen > 0]
+    if not seen.size:
+        return None
+    return measured_curve(pair.frequency_response, near=model_curve(pair, seen, fs=row.rate))
