@@ -1,11 +1,12 @@
 """What a figure says of its cases: readings that noise does not pull down, words with numbers."""
 
 import json
+import tomllib
 
 import numpy as np
 import pytest
 
-from hmpim.campaign import read_plan, run_campaign, shipped_plan
+from hmpim.campaign import parse_plan, read_plan, run_campaign, shipped_plan
 from hmpim.campaign.crossing import samples_bandwidth
 from hmpim.campaign.study import make_study
 from hmpim.campaign.write import study_page, write_study
@@ -128,3 +129,17 @@ def test_bins_of_the_record_lie_about_the_estimate(demo):
     off = ratio - smooth
     assert np.sqrt(np.mean(np.abs(off) ** 2)) < 0.05
     assert abs(off.mean()) < 0.01
+
+
+def test_without_figures_each_test_shows_all_its_cases_by_what_sets_them_apart(tmp_path):
+    data = tomllib.loads(shipped_plan("example").read_text(encoding="utf-8"))
+    del data["figure"]
+    data["stimulus"]["duration"] = 3.0
+    plan = parse_plan(data)
+    (section,) = study_page(make_study(plan, run_campaign(plan, tmp_path))).sections
+    (picture,) = section.pictures
+    labels = [line.get_label() for line in picture.figure.axes[0].lines]
+    assert labels == ["inner, 250 Hz", "outer, 250 Hz", "inner, 500 Hz", "outer, 500 Hz"]
+    inner, outer = section.found
+    assert inner.count("−90° at ") == outer.count("−90° at ") == 2
+    assert "(250 Hz); " in inner

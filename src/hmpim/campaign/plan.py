@@ -221,7 +221,10 @@ def parse_plan(data: Mapping[str, Any]) -> Plan:
         specifications=tuple(
             _specification(table, names, known) for table in top.list_of_tables("specification")
         ),
-        figures=tuple(_figure(table, names, known) for table in top.list_of_tables("figure")),
+        figures=tuple(_figure(table, names, known) for table in top.list_of_tables("figure"))
+        or tuple(
+            FigurePlan(title=t.name, tests=(t.name,), compare="axes", axes=t.axes) for t in tests
+        ),
         digest=_digest(data),
     )
     stimulus.done()
