@@ -263,10 +263,12 @@ def _strongest(couplings: Sequence[dict[str, Any]]) -> str:
     if not seen:
         return f"No coupling {where} stands out of the noise."
     top = max(seen, key=lambda c: c["gain"])
+    exact = top.get("exact")
+    beside = "" if exact is None else f" (exact without friction: {100 * exact:.2f} %)"
     return (
         f"{len(seen)} of {len(couplings)} couplings {where} stand out of the noise by three "
         f"standard deviations; the strongest is {top['from']} to {top['to']}, "
-        f"{100 * top['gain']:.2f} ± {100 * top['std']:.2f} % of the command."
+        f"{100 * top['gain']:.2f} ± {100 * top['std']:.2f} % of the command{beside}."
     )
 
 

@@ -235,6 +235,6 @@ def coupling_grid(couplings: Sequence[dict[str, Any]]) -> Grid:
             "Beyond three std",
         ),
         rows=tuple(rows),
-        note="A gain that does not stand out by three standard deviations is mostly noise, and "
-        "too large: it bounds the coupling.",
+        note="A gain that does not stand out by three standard deviations is mostly noise: it "
+        "tells how large the coupling may be, not how large it is.",
     )

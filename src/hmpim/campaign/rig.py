@@ -12,10 +12,9 @@ from numpy.typing import NDArray
 from hmpim.campaign.plan import AxisWish, Plan
 from hmpim.errors import ArgumentError, HmpimError, LimitsError, RigError
 from hmpim.experiment import run
-from hmpim.experiment.run import check_limits
 from hmpim.record import Record
 from hmpim.rigs.table import AXES, AxisName, LoadName, MotionTable, exact_bandwidth, linear_response
-from hmpim.stimulus import Limits, Stimulus
+from hmpim.stimulus import Limits, Stimulus, check_inside
 
 if TYPE_CHECKING:
     from hmpim.campaign.cases import Case
@@ -139,6 +138,13 @@ def _own(wish: AxisWish) -> Limits:
     return _wished(wish.limits, wish)
 
 
+def _check_own(plan: Plan, case: "Case", stimuli: Sequence[Stimulus]) -> None:
+    """Hold stimuli against the limits that the plan states."""
+    for stimulus in stimuli:
+        wish = plan.axis(stimulus.axis, test=case.test)
+        check_inside(stimulus, _own(wish), whose=repr(stimulus.axis))
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TableRig:
     """The five-axis table."""
@@ -219,9 +225,7 @@ class SensorRig:
 
     def check(self, case: "Case", stimuli: Sequence[Stimulus]) -> dict[str, float]:
         """Limits of the plan."""
-        for stimulus in stimuli:
-            wish = self.plan.axis(stimulus.axis, test=case.test)
-            check_limits(stimulus, _own(wish), name=stimulus.axis)
+        _check_own(self.plan, case, stimuli)
         return {}
 
     def play(self, case: "Case", stimuli: Sequence[Stimulus], rng: np.random.Generator) -> Record:
@@ -261,9 +265,7 @@ class PlayedRig:
 
     def check(self, case: "Case", stimuli: Sequence[Stimulus]) -> dict[str, float]:
         """Limits of the plan: what moves on a rig is looked at once more."""
-        for stimulus in stimuli:
-            wish = self.plan.axis(stimulus.axis, test=case.test)
-            check_limits(stimulus, _own(wish), name=stimulus.axis)
+        _check_own(self.plan, case, stimuli)
         return {}
 
     def play(self, case: "Case", stimuli: Sequence[Stimulus], rng: np.random.Generator) -> Record:

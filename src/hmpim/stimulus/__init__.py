@@ -3,6 +3,7 @@
 from hmpim.stimulus.classical import Chirp, Ramp, Sine, Step, SumOfSines
 from hmpim.stimulus.command import Command, leave_room
 from hmpim.stimulus.exponential import ExponentialSweep
+from hmpim.stimulus.inside import check_inside
 from hmpim.stimulus.kinds import KINDS, Kind, design
 from hmpim.stimulus.lead import RestToRest, rest_to_rest
 from hmpim.stimulus.limits import Limits
@@ -57,6 +58,7 @@ __all__ = [
     "Sweep",
     "Waveform",
     "blocks",
+    "check_inside",
     "check_spectrum",
     "design",
     "interleaved_multisines",

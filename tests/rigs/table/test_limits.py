@@ -215,7 +215,11 @@ def test_a_sweep_designed_in_an_axis_is_played(axis):
         ({}, ArgumentError, "no stimulus is given"),
         ({"nod": sine(1.0, 1.0)}, ArgumentError, "axis 'nod' is not known"),
         (sine(1.0, 1.0), ArgumentError, "axis '' is not known; use one of"),
-        ({"roll": sine(1.0, 1.0, unit="")}, UnitError, "the stimulus for roll has no unit"),
+        (
+            {"roll": sine(1.0, 1.0, unit="")},
+            UnitError,
+            "is in no unit and the limits of roll are in 'deg'",
+        ),
         ({"roll": sine(1.0, 1.0, unit="m")}, UnitError, "cannot be turned into"),
         ({"roll": sine(1.0, 1.0, fs=300.0)}, ArgumentError, "fs = 300 Hz does not divide"),
         (

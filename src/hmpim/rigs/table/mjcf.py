@@ -63,11 +63,11 @@ def mjcf(
     """
     of = {axis.name: axis for axis in axes}
 
-    def nested(names: tuple[AxisName, ...], load: Rigid | None, position: str) -> str:
+    def nested(names: tuple[AxisName, ...], load: Rigid | None, called: str) -> str:
         if not names:
-            return "" if load is None else f'<body name="{position}">{_inertial(load)}</body>'
+            return "" if load is None else f'<body name="{called}">{_inertial(load)}</body>'
         axis = of[names[0]]
-        inner = nested(names[1:], load, position)
+        inner = nested(names[1:], load, called)
         at = f' pos="0 0 {base.height!r}"' if names[0] in ("pitch", "elevation") else ""
         return (
             f'<body name="{axis.name}"{at}>{_inertial(axis.gimbal)}'

@@ -11,13 +11,13 @@ from hmpim.errors import ArgumentError, LimitsError
 from hmpim.record import Channel, Record
 from hmpim.rigs.table.axes import AXES, FIG_4, AxisName, AxisSpec, CommandMode, TablePosition
 from hmpim.rigs.table.bodies import Base, LoadName, Rigid, load_named
-from hmpim.rigs.table.checks import check_axis, check_torques
+from hmpim.rigs.table.checks import check_torques
 from hmpim.rigs.table.commands import by_axis, command_rate, commands, place
 from hmpim.rigs.table.plant import Plant, build
 from hmpim.rigs.table.servo import Gains
 from hmpim.rigs.table.simulate import History, Timing, simulate
 from hmpim.rigs.table.tuning import tune
-from hmpim.stimulus import Limits, Stimulus
+from hmpim.stimulus import Limits, Stimulus, check_inside
 from hmpim.units import conversion_factor
 
 __all__ = ["MotionTable"]
@@ -257,7 +257,7 @@ class MotionTable:
         self.timing(command_rate(named))
         samples = max(stimulus.samples for stimulus in named.values())
         for axis, stimulus in named.items():
-            check_axis(stimulus, self.limits_of(axis), axis=axis, samples=samples)
+            check_inside(stimulus, self.limits_of(axis), whose=axis, samples=samples)
         time, command = commands(named, start=self.start_angles)
         torque = self.plant.torques(*command)[1:]
         check_torques(time, torque, self.axes)
