@@ -144,8 +144,8 @@ def test_a_stimulus_designed_onto_the_limits_of_a_rig_is_played_by_it():
 @pytest.mark.parametrize(
     ("unit", "limits_unit", "words"),
     [
-        ("", "deg", "stimulus is in 'no unit' and the limits of 'pitch' are in 'deg'; state"),
-        ("deg", "", "stimulus is in 'deg' and the limits of 'pitch' are in 'no unit'; state"),
+        ("", "deg", "stimulus is in no unit and the limits of 'pitch' are in 'deg'; state"),
+        ("deg", "", "stimulus is in 'deg' and the limits of 'pitch' are in no unit; state"),
         ("m", "deg", "'m' cannot be turned into 'deg'"),
     ],
 )
