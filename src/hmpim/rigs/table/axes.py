@@ -6,6 +6,7 @@ from typing import Literal, get_args
 
 from hmpim.errors import ArgumentError
 from hmpim.rigs.table.bodies import Rigid
+from hmpim.stimulus import FIG_4 as LIMITS
 from hmpim.stimulus import Limits
 
 __all__ = ["AXES", "FIG_4", "AxisName", "AxisSpec", "CommandMode", "TablePosition"]
@@ -107,17 +108,13 @@ class TablePosition:
                 raise ArgumentError(f"{axis} = {getattr(self, axis)!r} deg is no position")
 
 
-def _limits(position: float, velocity: float, acceleration: float) -> Limits:
-    return Limits(position=position, velocity=velocity, acceleration=acceleration, unit="deg")
-
-
 # Limits and bandwidths: Fig. 4. Torque: what the acceleration limit takes with the acceptance
-# load, and a quarter more. Friction: 1 to 1.5 % of the torque for the seals, and about 3 % of
+# load, and a quarter more. Friction: 1 to 1.3 % of the torque for the seals, and about 3 % of
 # it at full rate. All others: sizes usual for such a table, see docs/table.md.
 FIG_4: tuple[AxisSpec, ...] = (
     AxisSpec(
         name="roll",
-        limits=_limits(120.0, 800.0, 33_000.0),
+        limits=LIMITS["roll"],
         bandwidth=43.0,
         torque_limit=390.0,
         actuator_lag=0.9e-3,
@@ -127,7 +124,7 @@ FIG_4: tuple[AxisSpec, ...] = (
     ),
     AxisSpec(
         name="yaw",
-        limits=_limits(55.0, 400.0, 16_000.0),
+        limits=LIMITS["yaw"],
         bandwidth=25.0,
         torque_limit=1550.0,
         actuator_lag=1.6e-3,
@@ -137,7 +134,7 @@ FIG_4: tuple[AxisSpec, ...] = (
     ),
     AxisSpec(
         name="pitch",
-        limits=_limits(120.0, 200.0, 14_000.0),
+        limits=LIMITS["pitch"],
         bandwidth=20.0,
         torque_limit=4600.0,
         actuator_lag=2.0e-3,
@@ -147,7 +144,7 @@ FIG_4: tuple[AxisSpec, ...] = (
     ),
     AxisSpec(
         name="azimuth",
-        limits=_limits(45.0, 180.0, 1_000.0),
+        limits=LIMITS["azimuth"],
         bandwidth=9.5,
         torque_limit=16_600.0,
         actuator_lag=4.2e-3,
@@ -157,7 +154,7 @@ FIG_4: tuple[AxisSpec, ...] = (
     ),
     AxisSpec(
         name="elevation",
-        limits=_limits(45.0, 180.0, 900.0),
+        limits=LIMITS["elevation"],
         bandwidth=7.0,
         torque_limit=21_600.0,
         actuator_lag=5.7e-3,
