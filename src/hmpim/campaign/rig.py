@@ -95,7 +95,7 @@ def make_rig(plan: Plan, *, player: Player | None = None) -> CampaignRig:
     if player is not None or plan.rig.kind == "python":
         return PlayedRig(plan=plan, player=player or _imported(plan.rig.entry, plan.folder))
     if plan.rig.kind == "sensor":
-        return SensorRig(plan=plan)
+        return PlayedRig(plan=plan, player=_sensors(plan))
     return TableRig(
         table=MotionTable(friction=plan.rig.friction, encoder_noise_std=plan.rig.encoder_noise_std)
     )
@@ -136,13 +136,6 @@ def _own(wish: AxisWish) -> Limits:
     if wish.limits is None:
         raise ArgumentError(f"axes.{wish.name}.limits is missing; give it")
     return _wished(wish.limits, wish)
-
-
-def _check_own(plan: Plan, case: "Case", stimuli: Sequence[Stimulus]) -> None:
-    """Hold stimuli against the limits that the plan states."""
-    for stimulus in stimuli:
-        wish = plan.axis(stimulus.axis, test=case.test)
-        check_inside(stimulus, _own(wish), whose=repr(stimulus.axis))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -213,25 +206,12 @@ class TableRig:
         return np.abs(response)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class SensorRig:
-    """A simulated sensor for each axis."""
+def _sensors(plan: Plan) -> Player:
+    """Play on the simulated sensor that the plan gives each axis."""
 
-    plan: Plan
-
-    def limits(self, case: "Case", wish: AxisWish) -> Limits:
-        """As the plan says."""
-        return _own(wish)
-
-    def check(self, case: "Case", stimuli: Sequence[Stimulus]) -> dict[str, float]:
-        """Limits of the plan."""
-        _check_own(self.plan, case, stimuli)
-        return {}
-
-    def play(self, case: "Case", stimuli: Sequence[Stimulus], rng: np.random.Generator) -> Record:
-        """Simulate the sensor of the one axis."""
+    def play(case: "Case", stimuli: Sequence[Stimulus], rng: np.random.Generator) -> Record:
         (stimulus,) = stimuli
-        sensor = self.plan.axis(stimulus.axis).sensor
+        sensor = plan.axis(stimulus.axis).sensor
         if sensor is None:
             raise ArgumentError(f"axes.{stimulus.axis}.sensor is missing; give it")
         named = replace(
@@ -241,20 +221,12 @@ class SensorRig:
         )
         return run(named, stimulus, rng=rng)
 
-    def known(self, case: "Case", axis: str) -> dict[str, float]:
-        """Not worked out."""
-        return {}
-
-    def coupling(
-        self, case: "Case", source: str, target: str, frequency: NDArray[np.float64]
-    ) -> NDArray[np.float64] | None:
-        """None: each sensor stands alone."""
-        return None
+    return play
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PlayedRig:
-    """Anyone's rig, behind one function."""
+    """Anyone's rig, behind one function; its limits are those that the plan states."""
 
     plan: Plan
     player: Player
@@ -265,7 +237,9 @@ class PlayedRig:
 
     def check(self, case: "Case", stimuli: Sequence[Stimulus]) -> dict[str, float]:
         """Limits of the plan: what moves on a rig is looked at once more."""
-        _check_own(self.plan, case, stimuli)
+        for stimulus in stimuli:
+            wish = self.plan.axis(stimulus.axis, test=case.test)
+            check_inside(stimulus, _own(wish), whose=repr(stimulus.axis))
         return {}
 
     def play(self, case: "Case", stimuli: Sequence[Stimulus], rng: np.random.Generator) -> Record:
