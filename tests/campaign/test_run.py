@@ -1,5 +1,6 @@
 """Campaigns: cases run once, stopped and resumed, refused before anything moves."""
 
+import re
 import signal
 import subprocess
 import sys
@@ -15,7 +16,7 @@ from hmpim.campaign.cases import prepare
 from hmpim.campaign.rig import make_rig
 from hmpim.campaign.study import make_study, study_dict
 from hmpim.campaign.write import write_study
-from hmpim.errors import ArgumentError, FormatError, LimitsError
+from hmpim.errors import ArgumentError, FormatError, HmpimError, LimitsError
 from hmpim.experiment import run
 from hmpim.rigs import Sensor
 
@@ -105,6 +106,23 @@ def test_refused_before_anything_moves(tmp_path):
     with pytest.raises(LimitsError, match=r"case rates\.acceptance\.P\.250Hz\.0\.5\.outer: "):
         run_campaign(parse_plan(data), tmp_path, player=rig)
     assert rig.played == []
+
+
+def test_what_cannot_be_identified_is_said_with_its_case_and_the_rest_is_kept(tmp_path):
+    plan = plan_of()
+    ids = [case.id for case in expand(plan)]
+    sound = Stopping()
+
+    def play(case, stimuli, rng):
+        record = sound(case, stimuli, rng)
+        if case.id == ids[0]:
+            return record
+        (output,) = record.outputs
+        return replace(record, outputs=(replace(output, values=0.0 * output.values),))
+
+    with pytest.raises(HmpimError, match=rf"case {re.escape(ids[1])}: output .* is constant"):
+        run_campaign(plan, tmp_path, player=play)
+    assert [path.stem for path in (tmp_path / "cases").iterdir()] == ids[:1]
 
 
 def test_damaged_case_is_named(finished, tmp_path):

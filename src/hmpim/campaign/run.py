@@ -13,7 +13,7 @@ import numpy as np
 from hmpim.campaign.cases import Case, check_wanted, expand, prepare
 from hmpim.campaign.plan import Plan
 from hmpim.campaign.rig import CampaignRig, Player, make_rig
-from hmpim.errors import ArgumentError, FormatError
+from hmpim.errors import ArgumentError, FormatError, HmpimError
 from hmpim.identify import identify
 from hmpim.identify.frf.multivariable import response_matrix
 from hmpim.identify.spectrum import decibel, spectrum
@@ -146,8 +146,12 @@ def _measured(
     pairs = []
     for axis in case.axes:
         alone = _alone(record, axis, band=plan.axis(axis, test=case.test).band)
+        try:
+            found = identify(alone).to_dict()["pairs"][0]
+        except HmpimError as error:  # a dead encoder, for instance: say where
+            raise type(error)(f"case {case.id}: {error}") from error
         known = {"known": rig.known(case, axis), "bins": _bins(alone)}
-        pairs.append({"axis": axis, **known, **identify(alone).to_dict()["pairs"][0]})
+        pairs.append({"axis": axis, **known, **found})
     done: dict[str, Any] = _finite(
         {
             "schema": CASE_SCHEMA,
