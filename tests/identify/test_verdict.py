@@ -58,3 +58,33 @@ def test_a_rival_as_likely_that_says_another_delay_or_bandwidth_casts_doubt(join
         assert re.search(words, finding.message)
     unlikely = with_rival(fitted, delay=2.0, lag=20.0, criterion=50.0)
     assert verdict(u, unlikely).verdict == "ok"
+
+
+def with_assumption(fitted, name, *, delay, criterion):
+    """Add a fit under a held input that came out so, its criterion so much worse."""
+    rival = replace(
+        fitted.best.fit,
+        structure=STRUCTURES[name],
+        theta=np.array([fitted.best.fit.delay + delay, *fitted.best.fit.theta[1:]]),
+    )
+    trial = Trial(intersample="zoh", fit=rival, criterion=fitted.best.criterion + criterion)
+    kept = tuple(t for t in fitted.trials if t.intersample == fitted.best.intersample)
+    return replace(fitted, trials=(*kept, trial))
+
+
+@pytest.mark.parametrize(
+    ("name", "criterion", "expected", "words"),
+    [
+        ("second_order", 1.0, "ok", "cannot tell. .* move the delay by -0.50 samples"),
+        ("second_order", -2.0, "ok", "cannot tell"),
+        ("second_order", -8.0, "doubtful", "speaks for the other, though not clearly"),
+        ("first_order", -2.0, "doubtful", "held, a first-order model fits as well"),
+    ],
+)
+def test_another_assumption_between_samples_casts_doubt(joint, name, criterion, expected, words):
+    """If it is rather the likelier one, or asks for another structure; else it is named."""
+    u, fitted = joint
+    judged = verdict(u, with_assumption(fitted, name, delay=-0.5, criterion=criterion))
+    (finding,) = [f for f in judged.findings if f.code == "intersample"]
+    assert re.search(words, finding.message)
+    assert judged.verdict == expected

@@ -7,16 +7,14 @@ far measurement and model part there, and where the measurement crosses.
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hmpim.identify.result import Estimate, FrequencyResponse, Parameters, ResponseBandwidths
+from hmpim.identify.sampled_response import sampled_response
 from hmpim.identify.uncertainty import estimate
 from hmpim.model import RationalDelay, phase, response
 from hmpim.record import Finding, Intersample
 
 __all__ = ["disagreement", "ratio_at", "response_bandwidths"]
-
-Complex = NDArray[np.complex128]
 
 _REACH = 0.15
 """Neighbours within this share of a frequency are looked at."""
@@ -31,16 +29,6 @@ _APART = 4.0
 
 _MATTERS = 0.03
 """Share of a bandwidth below which a disagreement is not worth a word."""
-
-
-def _between(frequency: NDArray[np.float64], fs: float, intersample: Intersample) -> Complex:
-    """What holding or joining the input's samples does to the response (aliases left out)."""
-    period = frequency / fs
-    if intersample == "zoh":
-        return np.asarray(np.sinc(period) * np.exp(-1j * np.pi * period))
-    if intersample == "foh":
-        return np.asarray(np.sinc(period) ** 2 + 0j)
-    return np.ones(frequency.size, dtype=np.complex128)
 
 
 def ratio_at(
@@ -61,7 +49,7 @@ def ratio_at(
         return None
     near = apart <= max(_REACH * frequency, float(np.partition(apart, _FEWEST - 1)[_FEWEST - 1]))
     f = measured.frequency[near]
-    modelled = response(system, f) * _between(f, fs, intersample)
+    modelled = sampled_response(system, f, fs=fs, intersample=intersample)
     ratio = measured.response[near] / modelled
     std = measured.std[near] / np.abs(modelled)
     weight = 1.0 / np.maximum(std, 1e-12)

@@ -44,6 +44,10 @@ _MATTERS = 0.03
 _SECOND_POLE = 0.2
 """Share of the time constant up to which a second pole may hide in a first-order result."""
 
+_LIKELIER = 6.0
+"""Criterion by which another assumption between the samples is likelier (odds of 20) that the
+natural one was preferred to: it then casts doubt."""
+
 _DISAGREES = 4.0
 """Standard deviations by which its delay must differ to cast doubt."""
 
@@ -217,7 +221,7 @@ def judge(
         )
     rival = _rival(joint)
     if rival is not None:
-        note("intersample", rival, doubt=False)
+        note("intersample", rival[0], doubt=rival[1])
     settle = _settling(readings)
     length = joint.problem.y.size / fs
     if settle > 0.5 * length:
@@ -293,10 +297,29 @@ def _other_structure(
     return None
 
 
-def _rival(joint: JointFit) -> str | None:
-    """Sentence on another assumption between the samples that fits as well, if there is one."""
+def _rival(joint: JointFit) -> tuple[str, bool] | None:
+    """Say which other assumption between the samples fits as well, and whether it casts doubt.
+
+    It does if it is rather the likelier one, or asks for another structure.
+    """
     best = joint.best
     words = {"zoh": "held", "foh": "linear", "bandlimited": "band-limited"}
+    here = words[best.intersample]
+    likeliest = min(joint.trials, key=lambda trial: trial.criterion)
+    if (
+        joint.simpler is None
+        and likeliest.intersample != best.intersample
+        and likeliest.fit.structure.name != best.fit.structure.name
+    ):
+        there = words[likeliest.intersample]
+        apart = likeliest.fit.delay - best.fit.delay
+        return (
+            f"Whether the input is {here} or {there} between its samples, this record cannot tell, "
+            f"and the structure depends on it: {there}, a {_words(likeliest.fit.structure.name)} "
+            f"model fits as well as the {_words(best.fit.structure.name)} one, with a delay that "
+            f"is {apart:+.2f} samples away. State it with intersample=.",
+            True,
+        )
     for trial in joint.trials:
         if trial.intersample == best.intersample or (
             trial.fit.structure.name != best.fit.structure.name
@@ -304,12 +327,15 @@ def _rival(joint: JointFit) -> str | None:
             continue
         apart = abs(trial.fit.delay - best.fit.delay)
         if trial.criterion - best.criterion < 2 * CLEARLY and apart > 0.25:
+            likelier = best.criterion - trial.criterion > _LIKELIER
+            tells = "speaks for the other, though not clearly" if likelier else "cannot tell"
             return (
-                f"Whether the input is {words[best.intersample]} or {words[trial.intersample]} "
-                "between its samples, this record cannot tell. "
-                f"{words[best.intersample].capitalize()} is assumed; the other would "
+                f"Whether the input is {here} or {words[trial.intersample]} "
+                f"between its samples, this record {tells}. "
+                f"{here.capitalize()} is assumed; the other would "
                 f"move the delay by {trial.fit.delay - best.fit.delay:+.2f} samples. "
-                "State it with intersample=."
+                "State it with intersample=.",
+                likelier,
             )
     return None
 
