@@ -105,6 +105,12 @@ def test_an_earlier_study_is_read_before_anything_moves_and_told_of_after(tmp_pa
     (told,) = [line for line in result.stdout.splitlines() if line.startswith("Against")]
     differ, of = (int(word) for word in told.split() if word.isdigit())
     assert 3 <= differ < of
+    renamed = ('name = "rates"', 'name = "speeds"')
+    figure = ('tests = ["rates"]', 'tests = ["speeds"]')
+    other = short_plan(tmp_path, c=compared, r=renamed, f=figure)
+    result = invoke(other, "--out", tmp_path / "third")
+    assert result.exit_code == 2
+    assert "has no case of this plan (its first is rates." in result.stderr
     (first / "study.json").write_text("{", encoding="utf-8")
     result = invoke(short_plan(tmp_path, c=compared), "--out", tmp_path / "third")
     assert result.exit_code == 2

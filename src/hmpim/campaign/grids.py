@@ -197,9 +197,11 @@ def remark_grid(rows: Sequence[Row]) -> Grid | None:
 def change_grid(study: Study) -> Grid:
     """What differs from the earlier study beyond the errors of both."""
     moved = [change for change in study.changes if change.differs]
+    shared = len({(change.case_id, change.axis) for change in study.changes})
+    whole = "" if shared == len(study.rows) else f"; {shared} of {len(study.rows)} rows are in both"
     return Grid(
         caption=f"Against the earlier study: {len(moved)} of {len(study.changes)} figures differ "
-        "by more than three standard deviations",
+        f"by more than three standard deviations{whole}",
         columns=("Axis", "Case", "Quantity", "Before", "Now"),
         rows=tuple(
             (

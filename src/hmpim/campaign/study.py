@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
+from hmpim.campaign.cases import expand
 from hmpim.campaign.plan import QUANTITIES, Plan, Specification
 from hmpim.errors import FormatError
 
@@ -17,6 +18,7 @@ __all__ = [
     "Reading",
     "Row",
     "Study",
+    "check_earlier",
     "earlier_parameters",
     "make_study",
     "study_dict",
@@ -233,6 +235,23 @@ def earlier_parameters(path: Path) -> dict[tuple[str, str], dict[str, Any]]:
         if isinstance(error, FormatError):
             raise
         raise FormatError(f"{path} is no study to compare with: {error!r}") from error
+
+
+def check_earlier(plan: Plan, path: Path) -> None:
+    """Refuse an earlier study with which there is nothing to compare, before anything moves.
+
+    Raises
+    ------
+    FormatError
+        If the file is no study, or has no case of the plan.
+    """
+    before = earlier_parameters(path)
+    if not any((case.id, axis) in before for case in expand(plan) for axis in case.axes):
+        known = next(iter(before), ("none",))[0]
+        raise FormatError(
+            f"{path} has no case of this plan (its first is {known}); compare with a study of "
+            "the same tests, or drop compare"
+        )
 
 
 def _changes(rows: Sequence[Row], earlier: Path) -> tuple[Change, ...]:

@@ -69,7 +69,7 @@ def campaign(
     wanted = read_plan(shipped_plan(plan) if plan in PLANS and not path.exists() else path)
 
     from hmpim.campaign.run import run_campaign
-    from hmpim.campaign.study import earlier_parameters, make_study
+    from hmpim.campaign.study import check_earlier, make_study
     from hmpim.campaign.write import write_study
     from hmpim.cli.terminal import check_target
 
@@ -79,7 +79,7 @@ def campaign(
     if earlier is not None and not earlier.is_file():
         raise ArgumentError(f"compare = {wanted.compare!r}: there is no file {earlier}")
     if earlier is not None:
-        earlier_parameters(earlier)  # what cannot be read is refused before anything moves
+        check_earlier(wanted, earlier)
     with _stopping(out), _counting(quiet) as tick:
         cases = run_campaign(wanted, out, fresh=not resume, progress=tick)
         study = make_study(wanted, cases, earlier=earlier)
