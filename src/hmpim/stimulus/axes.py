@@ -215,10 +215,17 @@ def _turns(plans: Sequence[AxisPlan]) -> list[tuple[_Kind, float]]:
             for other, (same, taken) in zip(plans, turns, strict=False)
             if same == kind
         ]
-        while share < 1.0 and any(
-            abs(_rate(plan.band, share, kind) / rate - 1) < _ALIKE for rate in before
-        ):
-            share *= 1.0 - 0.5 * _ALIKE
+        if share < 1.0:
+            longer = [share * (1.0 + 0.5 * _ALIKE * k) for k in range(1, 4)]  # gentler: first
+            shorter = [share * (1.0 - 0.5 * _ALIKE * k) for k in range(1, 7)]
+            share = next(
+                (
+                    tried
+                    for tried in (share, *longer, *shorter)
+                    if all(abs(_rate(plan.band, tried, kind) / r - 1) >= _ALIKE for r in before)
+                ),
+                share,
+            )
         turns.append((kind, share))
     return turns
 
