@@ -4,6 +4,7 @@ import json
 
 import numpy as np
 import pytest
+from scipy.integrate import cumulative_simpson
 
 import hmpim
 from hmpim.identify import gain_and_phase
@@ -64,3 +65,42 @@ def test_refusals(field_record):
     lost = hmpim.identify(hmpim.Record.from_arrays({"u": u}, {"y": noise}, fs=200.0))["y", "u"]
     with pytest.raises(hmpim.HmpimError, match="not identifiable"):
         gain_and_phase(lost, 2.0, fs=200.0)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_behind_clipped_samples_the_error_of_the_model_counts(field_record, seed):
+    """The model's answer stands in their place: leaving out its error, z reached 36."""
+    _, u, y = field_record
+    noisy = y + 0.02 * np.random.default_rng(seed).standard_normal(y.size)
+    clipped = np.clip(noisy, *np.quantile(y, [0.17, 0.83]))
+    pair = hmpim.identify(hmpim.Record.from_arrays({"u": u}, {"y": clipped}, fs=200.0))["y", "u"]
+    assert pair.saturation_low is not None
+    gain = 20 * np.log10(np.abs(response(TRUTH, np.array(WANTED))))
+    turned = np.degrees(phase(TRUTH, np.array(WANTED)))
+    for at, one, other in zip(gain_and_phase(pair, WANTED, fs=200.0), gain, turned, strict=True):
+        assert abs(at.gain_db.value - one) < 4 * at.gain_db.std
+        assert abs(at.phase.value - other) < 4 * at.phase.std
+        assert at.gain_db.std >= 0.99 * at.model_gain_db.std / np.sqrt(2)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_an_integrator_starts_from_a_quarter_turn_and_ends_elsewhere(seed):
+    """Where its output ends leaked into the measured response, ten standard deviations."""
+    fine = np.arange(0, 10, 1 / 6400)
+    moved = cumulative_simpson(np.sin(2 * np.pi * (0.1 * fine + fine**2)), x=fine, initial=0)
+    t = fine[::32]
+    u = np.sin(2 * np.pi * (0.1 * t + t**2))
+    y = np.concatenate([np.zeros(6), moved[::32]])[: t.size]  # 0.03 s later
+    y += 5e-3 * np.random.default_rng(seed).standard_normal(t.size)
+    result = hmpim.identify(hmpim.Record.from_arrays({"u": u}, {"y": y}, fs=200.0))
+    assert result["y", "u"].structure == "integrator"
+    for at in gain_and_phase(result["y", "u"], [0.5, 2.0, 12.0], fs=200.0):
+        turned = -90 - 360 * at.frequency * 0.03
+        gain = -20 * np.log10(2 * np.pi * at.frequency)
+        for value, truth in (
+            (at.model_phase, turned),
+            (at.phase, turned),
+            (at.model_gain_db, gain),
+            (at.gain_db, gain),
+        ):
+            assert abs(value.value - truth) < 4.5 * value.std

@@ -1,7 +1,7 @@
 """Gain and phase at chosen frequencies, from the measured response and from the model."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -31,7 +31,7 @@ class GainPhase:
         Hz.
     gain_db, phase : Estimate or None
         From the measured response, in dB (of output unit over input unit) and degrees,
-        continuous from DC; None outside the measured band.
+        continuous from DC (from -90° of an integrator); None outside the measured band.
     model_gain_db, model_phase : Estimate
         From the fitted model, which reaches beyond that band at the model's own risk.
     """
@@ -128,11 +128,11 @@ def _at(
         step = _STEP * (abs(vector[i]) or 1e-3)
         moved[i] += step
         slope[i] = (complex(response(system(moved), there)[0]) / value - 1.0) / step
-    turned = float(phase(here, there)[0])
+    poles = np.trim_zeros(here.denominator, "f")  # an integrator turns by -90° everywhere
+    integrators = here.denominator.size - poles.size
+    turned = float(phase(replace(here, denominator=poles), there)[0]) - integrators * np.pi / 2
     if value.real * np.cos(turned) + value.imag * np.sin(turned) < 0:
         turned += np.pi  # the phase counts from DC; a negative scale factor is half a turn
-    if here.denominator[0] == 0.0:
-        turned = float(np.angle(value))
     decibel = 20 / np.log(10)
     gain_db = decibel * float(np.log(abs(value)))
     spread = [float(part @ covariance @ part) for part in (slope.real, slope.imag)]

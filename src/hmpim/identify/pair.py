@@ -1,5 +1,7 @@
 """All that is said of one output and one input, once the joint fit is made."""
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -14,7 +16,7 @@ from hmpim.identify.fitting.plainer import plainer, taking
 from hmpim.identify.frf.local import local_response
 from hmpim.identify.nonlinear.nonlinearity import inspect_nonlinearity
 from hmpim.identify.paper import paper_estimates
-from hmpim.identify.readings import read_parameters
+from hmpim.identify.readings import Readings, read_parameters
 from hmpim.identify.remarks import remarks
 from hmpim.identify.result import (
     Candidate,
@@ -24,7 +26,7 @@ from hmpim.identify.result import (
     Parameters,
 )
 from hmpim.identify.spectrum import excited_band
-from hmpim.identify.uncertainty import estimate, noise_estimate
+from hmpim.identify.uncertainty import estimate, noise_estimate, response_std
 from hmpim.identify.verdict import judge
 from hmpim.identify.whiteness import misfit
 from hmpim.record import Aligned, Finding, Record, Signal
@@ -80,9 +82,11 @@ def described(
     left = misfit(u, fit.residual, delay=fit.delay, band=(band[0] / fs, band[1] / fs))
     judgement = judge(joint, readings, left, fs=fs, band=band, fit_percent=fit_percent)
     if matrix is None:
-        response = local_response(
-            u, _told(y, fit, found, fs), fs, delay=max(fit.delay, 0.0) / fs, band=band
-        )
+        told = found.telling(y.size, fs)
+        whole = y if told is None else np.where(told, y, _expected(fit, censored is not None))
+        response = _measured(u, whole, fit, fs, band)
+        if told is not None:
+            response = _with_error_of(response, readings)
     else:
         response = matrix.columns[i]
     findings, verdict = judgement.findings, judgement.verdict
@@ -137,10 +141,41 @@ def described(
     )
 
 
-def _told(y: NDArray[np.float64], fit: Fit, found: Imperfections, fs: float) -> NDArray[np.float64]:
-    """Output with the model in place of clipped and held samples, for spectra."""
-    told = found.telling(y.size, fs)
-    return y if told is None else np.where(told, y, fit.prediction)
+def _measured(
+    u: NDArray[np.float64],
+    y: NDArray[np.float64],
+    fit: Fit,
+    fs: float,
+    band: tuple[float, float],
+) -> FrequencyResponse:
+    """Local response; of an integrator through the output's differences, which do not wander.
+
+    Where an integrating output ends is not where it began, and that step leaks into every bin.
+    """
+    delay = max(fit.delay, 0.0) / fs
+    if not fit.structure.integrators:
+        return local_response(u, y, fs, delay=delay, band=band)
+    steps = local_response(u, np.diff(y, prepend=y[0]), fs, delay=delay, band=band)
+    difference = 1.0 - np.exp(-2j * np.pi * steps.frequency / fs)
+    return replace(steps, response=steps.response / difference, std=steps.std / np.abs(difference))
+
+
+def _expected(fit: Fit, refined: bool) -> NDArray[np.float64]:
+    """Say what the output was where it was clipped or held, for spectra.
+
+    Noise decides which samples near a level are clipped, so those that are left are not a fair
+    choice; the model alone in place of the others would pull the response towards the level.
+    """
+    return fit.prediction + fit.residual if refined else fit.prediction
+
+
+def _with_error_of(response: FrequencyResponse, readings: Readings) -> FrequencyResponse:
+    """Add the model's error, where samples were put in by it."""
+    covariance = _finite(readings.coefficient_covariance)
+    if covariance is None:
+        return response
+    own = response_std(readings.system, covariance, response.frequency)
+    return replace(response, std=np.hypot(response.std, own))
 
 
 def _finite(covariance: NDArray[np.float64]) -> NDArray[np.float64] | None:

@@ -16,8 +16,9 @@ from scipy.special import chdtri, stdtrit
 
 from hmpim.identify.result import Estimate
 from hmpim.identify.whiteness import autoregressive_spectrum
+from hmpim.model import RationalDelay, response
 
-__all__ = ["covariance", "estimate", "gradient", "noise_estimate"]
+__all__ = ["covariance", "estimate", "gradient", "noise_estimate", "response_std"]
 
 
 def covariance(
@@ -117,3 +118,46 @@ def noise_estimate(
         ci95=(sigma * (effective / low) ** 0.5, sigma * (effective / high) ** 0.5),
         unit=unit,
     )
+
+
+def response_std(
+    system: RationalDelay, covariance: NDArray[np.float64], frequency: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Standard deviation of a model's response, sqrt(E|error|²), to first order.
+
+    Parameters
+    ----------
+    system : RationalDelay
+        The model.
+    covariance : ndarray, shape (q, q)
+        Of its delay, its numerator, and its denominator behind the first coefficient that is not
+        zero, by rising powers of s.
+    frequency : ndarray, shape (m,)
+        Hz, above 0.
+
+    Returns
+    -------
+    ndarray, shape (m,)
+        In the response's unit.
+
+    Examples
+    --------
+    A delay that is known to 1 ms turns the response by 2π/1000 at 1 Hz:
+
+    >>> late = RationalDelay(delay=0.1, numerator=np.ones(1), denominator=np.ones(1))
+    >>> response_std(late, np.diag([1e-6, 0.0]), np.array([1.0])).round(6).tolist()
+    [0.006283]
+    """
+    s = 2j * np.pi * frequency
+    powers = s[None, :] ** np.arange(max(system.numerator.size, system.denominator.size))[:, None]
+    above, below = system.numerator, system.denominator
+    first = int(np.flatnonzero(below)[0]) + 1
+    slopes = np.concatenate(
+        [
+            -s[None, :],
+            powers[: above.size] / (above @ powers[: above.size]),
+            -powers[first : below.size] / (below @ powers[: below.size]),
+        ]
+    )
+    variance = np.sum(slopes.conj() * (covariance @ slopes), axis=0).real
+    return np.asarray(np.abs(response(system, frequency)) * np.sqrt(np.maximum(variance, 0.0)))

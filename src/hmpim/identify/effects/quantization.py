@@ -160,7 +160,8 @@ def _multiples(
     rounding = np.finfo(float).eps * float(np.max(np.abs(levels)))
     return Quantization(
         step=step,
-        std=float(max(error, rounding) / np.sqrt(spread)),
+        # No step is known better than a float holds it.
+        std=float(max(max(error, rounding) / np.sqrt(spread), np.finfo(float).eps * step)),
         offset=float(offset % step),
         exact=True,
     )
