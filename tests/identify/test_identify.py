@@ -243,3 +243,17 @@ def test_a_position_loop_from_reference_to_position(measured):
     assert pair.scale_factor.value == pytest.approx(1.0, abs=1e-4)
     relative = np.linalg.norm(pair.residual) / np.linalg.norm(data["qm"])
     assert relative < 6e-5
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_level_behind_the_noise_is_not_taken_for_a_drift(field_record, seed):
+    _, u, ideal = field_record
+    level = float(np.quantile(ideal, 2 / 3))
+    noise = 0.05 * np.random.default_rng([3, seed]).standard_normal(u.size)
+    y = np.minimum(ideal, level) + noise
+    pair = hmpim.identify(hmpim.Record.from_arrays({"u": u}, {"y": y}, fs=200.0))["y", "u"]
+    assert pair.saturation_high.value == pytest.approx(level, abs=4 * pair.saturation_high.std)
+    for name, truth in (("scale_factor", 1.0), ("bias", 0.6), ("natural_frequency", 10.0)):
+        found = getattr(pair, name)
+        assert found.value == pytest.approx(truth, abs=4 * found.std), name
+    assert "drift" not in {warning.code for warning in pair.warnings}

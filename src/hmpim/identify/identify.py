@@ -12,7 +12,12 @@ from hmpim.identify.coupling.coupled import inputs_of, responses_of, settled, un
 from hmpim.identify.coupling.inputs import InputSet, OutputCoherence
 from hmpim.identify.coupling.several import Joined, fit_together
 from hmpim.identify.effects.drift import Drifting, with_drift
-from hmpim.identify.effects.imperfections import Imperfections, count_levels, find_imperfections
+from hmpim.identify.effects.imperfections import (
+    Imperfections,
+    count_levels,
+    find_imperfections,
+    refine,
+)
 from hmpim.identify.effects.lost import stands_out
 from hmpim.identify.fitting.enrich import PLAIN
 from hmpim.identify.fitting.joint import JointFit
@@ -27,6 +32,9 @@ from hmpim.record import Aligned, Finding, Intersample, Record, Signal, uniform
 __all__ = ["identify"]
 
 _FEWEST_SAMPLES = 50
+
+_BETTER = 0.7
+"""Share of the noise's power under a drift below which a clipped level is taken instead."""
 
 
 def identify(
@@ -155,6 +163,10 @@ def _identify_output(
     richest = max(count_levels(source.values) for source in aligned.inputs)
     found = find_imperfections(output.values, aligned.fs, richest=richest)
     joined, drifting = _drifted(aligned, output, found, intersample, structures, inputs)
+    if drifting is not None and found.saturation is None:
+        clipped = _clipped(aligned, output, found, drifting, intersample, structures)
+        if clipped is not None:
+            found, joined, drifting = clipped[0], clipped[1], None
     seen = found.saturation is not None or found.hold is not None
     residual = joined.fits[0].best.fit.residual
     if seen or not is_white(residual) or stands_out(residual):
@@ -164,6 +176,8 @@ def _identify_output(
             predicted = predicted + drifting.trend
         again = find_imperfections(output.values, aligned.fs, prediction=predicted, richest=richest)
         plateau = again.saturation
+        if plateau is None and found.saturation is not None and found.saturation.noise == "after":
+            again = replace(again, saturation=found.saturation)
         if drifting is not None and plateau is not None and plateau.noise == "after":
             again = replace(again, saturation=None)  # a wander bends the output as a level does
         if (
@@ -242,6 +256,30 @@ def _drifted(
         related=(not is_unrelated(drifting.joint),),
         covariances=(drifting.covariance,),
     ), drifting
+
+
+def _clipped(
+    aligned: Aligned,
+    output: Signal,
+    found: Imperfections,
+    drifting: Drifting,
+    intersample: Intersample | None,
+    structures: tuple[StructureName, ...],
+) -> tuple[Imperfections, Joined] | None:
+    """Levels behind the noise, where they explain better what was taken for a drift."""
+    joined = _joined(aligned, output, found, intersample, structures, None)
+    predicted = joined.prediction
+    plateau = find_imperfections(output.values, aligned.fs, prediction=predicted).saturation
+    if plateau is None or plateau.noise != "after":
+        return None
+    found = replace(found, saturation=plateau)
+    joined = _joined(aligned, output, found, intersample, structures, None)
+    refined = refine(joined.fits[0], found, aligned.fs)
+    drifted = drifting.joint
+    left = drifted.best.fit.cost / drifted.problem.counted
+    if refined is None or refined[1].noise_std ** 2 > _BETTER * left:
+        return None
+    return found, joined
 
 
 def _joined(

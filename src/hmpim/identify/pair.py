@@ -80,7 +80,15 @@ def described(
     )
     fit_percent = _fit_percent(joint)
     left = misfit(u, fit.residual, delay=fit.delay, band=(band[0] / fs, band[1] / fs))
-    judgement = judge(joint, readings, left, fs=fs, band=band, fit_percent=fit_percent)
+    judgement = judge(
+        joint,
+        readings,
+        left,
+        fs=fs,
+        band=band,
+        fit_percent=fit_percent,
+        nonlinear=bool(inspection.findings),
+    )
     if matrix is None:
         told = found.telling(y.size, fs)
         whole = y if told is None else np.where(told, y, _expected(fit, censored is not None))

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from hmpim.identify.fitting.fit import jacobian
 from hmpim.identify.fitting.halves import Halves, compare_halves
 from hmpim.identify.fitting.joint import JointFit
-from hmpim.identify.fitting.nested import second_pole_limit, widened
+from hmpim.identify.fitting.nested import HiddenPole, hidden_pole, widened
 from hmpim.identify.result import Estimate, Parameters
 from hmpim.identify.uncertainty import covariance, estimate, gradient, noise_estimate
 from hmpim.identify.whiteness import is_white
@@ -47,9 +47,8 @@ class Readings:
         Whether the residual passed for white.
     halves : Halves
         Whether the halves of the record tell the same model.
-    second_pole : float or None
-        For a first-order fit, the longest second time constant that the record does not
-        exclude, over the first.
+    hidden : HiddenPole or None
+        For a first- or second-order fit, what the record says of one more pole.
     coefficient_covariance : ndarray, shape (q, q)
         Of the delay and the coefficients of `system` that may vary, by rising powers of s.
     """
@@ -60,7 +59,7 @@ class Readings:
     covariance: _Vector
     white: bool
     halves: Halves
-    second_pole: float | None
+    hidden: HiddenPole | None
     coefficient_covariance: _Vector
 
     def variance(self, function: Callable[[_Vector], float]) -> float:
@@ -218,9 +217,8 @@ def read_parameters(
         covariance=cov,
         white=white,
         halves=compare_halves(rows, residual, joint.problem.y, share=joint.effective_share),
-        second_pole=second_pole_limit(joint.problem, fit, rows, white=white)
-        / float(np.exp(vector[1]))
-        if structure.name == "first_order"
+        hidden=hidden_pole(joint.problem, fit, rows, white=white)
+        if structure.name in ("first_order", "second_order")
         else None,
         coefficient_covariance=sensitivity.coefficients.T @ cov @ sensitivity.coefficients,
     )

@@ -41,6 +41,9 @@ _AMBIGUOUS = 4.0
 _MATTERS = 0.03
 """Share of a bandwidth below which a disagreement casts no doubt."""
 
+_ASKED = 4.0
+"""Standard deviations of the score test from which one more pole is asked for."""
+
 _SECOND_POLE = 0.2
 """Share of the time constant up to which a second pole may hide in a first-order result."""
 
@@ -83,6 +86,7 @@ def judge(
     fs: float,
     band: tuple[float, float],
     fit_percent: float,
+    nonlinear: bool = False,
 ) -> Judgement:
     """Weigh the residual, the error bars and the band against each other.
 
@@ -96,6 +100,8 @@ def judge(
         Excited band in Hz.
     fit_percent : float
         100 (1 - ‖residual‖ / ‖deviation of the output‖).
+    nonlinear : bool
+        Whether the residual is known to be nonlinear, and so asks for no pole.
     """
     notes: list[tuple[Finding, bool]] = []  # a finding, and whether it casts doubt
 
@@ -210,15 +216,9 @@ def judge(
             f"{joint.simpler.fit.delay / fs:.4g} s. Lower the noise, or sweep higher.",
             doubt=True,
         )
-    if readings.second_pole is not None and readings.second_pole > _SECOND_POLE:
-        hidden = readings.second_pole * float(np.exp(fit.theta[1])) / fs
-        note(
-            "structure",
-            f"A second pole of up to {hidden:.3g} s beside the time constant would not show in "
-            "this record, and would shorten the delay by as much. Lower the noise, or sweep "
-            "higher.",
-            doubt=True,
-        )
+    missed = None if nonlinear else _missed_pole(readings, fs=fs, order=fit.structure.order)
+    if missed is not None:
+        note("structure", missed, doubt=True)
     rival = _rival(joint)
     if rival is not None:
         note("intersample", rival[0], doubt=rival[1])
@@ -258,6 +258,28 @@ def _loose(readings: Readings) -> list[tuple[str, float]]:
         if not spread <= _LOOSE:
             loose.append((name, min(spread, 99.0)))
     return loose
+
+
+def _missed_pole(readings: Readings, *, fs: float, order: int) -> str | None:
+    """Sentence on one more pole that the record asks for, or cannot exclude."""
+    hidden = readings.hidden
+    if hidden is None:
+        return None
+    moved = float(np.sqrt(abs(hidden.squared)))
+    if abs(hidden.squared) > _ASKED * hidden.std and moved > _MATTERS * hidden.scale:
+        return (
+            f"The record asks for more than {order} pole{'s' if order > 1 else ''} "
+            f"({abs(hidden.squared) / hidden.std:.0f} standard deviations), and the delay may be "
+            f"{moved / fs:.2g} s off. Lower the noise, or sweep higher, until a richer structure "
+            "can be told."
+        )
+    if order == 1 and hidden.limit > _SECOND_POLE * hidden.scale:
+        return (
+            f"A second pole of up to {hidden.limit / fs:.3g} s beside the time constant would not "
+            "show in this record, and would shorten the delay by as much. Lower the noise, or "
+            "sweep higher."
+        )
+    return None
 
 
 def _other_structure(

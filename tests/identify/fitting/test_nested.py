@@ -5,7 +5,7 @@ import pytest
 
 from hmpim.identify.fitting.fit import jacobian
 from hmpim.identify.fitting.joint import joint_fit
-from hmpim.identify.fitting.nested import second_pole_limit, widened
+from hmpim.identify.fitting.nested import hidden_pole, widened
 from hmpim.identify.uncertainty import covariance
 from hmpim.identify.whiteness import is_white
 from hmpim.model.sampled import delayed_response, prepare_input
@@ -65,7 +65,8 @@ def limits(u, second, noise, count):
         joint = joint_fit(u, y, intersample="bandlimited", structures=("first_order",))
         fit = joint.best.fit
         rows = jacobian(joint.problem, fit)
-        found.append(second_pole_limit(joint.problem, fit, rows, white=is_white(fit.residual)))
+        white = is_white(fit.residual)
+        found.append(hidden_pole(joint.problem, fit, rows, white=white).limit)
     return np.array(found)
 
 
@@ -74,3 +75,23 @@ def test_the_limit_holds_the_pole_and_narrows_with_the_noise(u):
     assert np.mean(hidden > 0.6) > 0.9
     quiet, loud = (np.median(limits(u, 0.0, noise, 12)) for noise in (0.005, 0.05))
     assert loud == pytest.approx(quiet * np.sqrt(10), rel=0.25)  # q, its square, is as the noise
+
+
+def test_a_pole_left_out_is_asked_for_and_none_where_there_is_none(u):
+    """A third pole that the misfit does not show: second order alone puts the delay far off."""
+    denominator = np.convolve([1.0, 2 * 0.4 * 6.0, 36.0], [1.0, 3.0])
+    source = prepare_input(u, "bandlimited")
+    third = delayed_response(source, delay=DELAY, denominator=denominator)[0] + u[0]
+    second = delayed_response(source, delay=DELAY, denominator=np.array([1.0, 4.8, 36.0]))[0]
+    scores = {}
+    for name, clean in (("third", third), ("second", second + u[0])):
+        scores[name] = []
+        for seed in range(40):
+            y = clean + 0.03 * np.random.default_rng(seed).standard_normal(N)
+            joint = joint_fit(u, y, intersample="bandlimited", structures=("second_order",))
+            rows = jacobian(joint.problem, joint.best.fit)
+            hidden = hidden_pole(joint.problem, joint.best.fit, rows, white=True)
+            scores[name].append(hidden.squared / hidden.std)
+    assert np.min(scores["third"]) > 4.0
+    assert np.std(scores["second"]) == pytest.approx(1.0, abs=0.3)
+    assert abs(np.mean(scores["second"])) < 0.5

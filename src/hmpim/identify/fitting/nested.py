@@ -8,6 +8,8 @@ so the record sees q = T₂², not T₂: its likelihood is quadratic in q, and a
 the curvature in T₂ is too short as soon as q is within a few of its own errors of 0.
 """
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -17,13 +19,13 @@ from hmpim.identify.uncertainty import covariance
 from hmpim.model.dynamics import STRUCTURES
 from hmpim.model.sampled import delayed_response
 
-__all__ = ["second_pole_limit", "widened"]
+__all__ = ["HiddenPole", "hidden_pole", "widened"]
 
 _FAR = 30.0
 """Deviance beyond which the simpler structure is out of the question."""
 
 _PROBE = 0.3
-"""Second time constant, over the first, by which the derivative with respect to q is taken."""
+"""Time constant, over the fit's own, by which the derivative with respect to q is taken."""
 
 
 def widened(joint: JointFit, cov: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -77,36 +79,63 @@ def _deviance(simple: Fit, joint: JointFit) -> float:
     return float(count * np.log(max(simple.cost / joint.best.fit.cost, 1.0)))
 
 
-def second_pole_limit(
-    problem: Problem, fit: Fit, rows: NDArray[np.float64], *, white: bool
-) -> float:
-    """Longest second time constant that a first-order record does not exclude, in samples.
+@dataclass(frozen=True, slots=True, kw_only=True)
+class HiddenPole:
+    """What a record says of one more pole beside a fit, T its time constant in samples.
 
-    A score test: the response to q = T₂² is fitted to the residual beside the other
-    parameters, and the limit is √(q + 2σ).
+    Parameters
+    ----------
+    squared, std : float
+        T² as a score test finds it, and its standard deviation. Below 0 it stands for what one
+        more pole cannot be: a zero, or a pair of poles.
+    scale : float
+        Time in samples that the fit itself has: the time constant, or 1/ω of the natural
+        frequency.
+    """
+
+    squared: float
+    std: float
+    scale: float
+
+    @property
+    def limit(self) -> float:
+        """Longest time constant, in samples, that the record does not exclude."""
+        return float(np.sqrt(max(self.squared, 0.0) + 2.0 * self.std))
+
+
+def hidden_pole(
+    problem: Problem, fit: Fit, rows: NDArray[np.float64], *, white: bool
+) -> HiddenPole:
+    """Test a first- or second-order fit for one more pole, the delay shortened by as much.
+
+    The response to q = T² is fitted to the residual beside the other parameters (a score
+    test: C. R. Rao, Proc. Camb. Phil. Soc. 44, 1948).
 
     Parameters
     ----------
     problem : Problem
         The data.
     fit : Fit
-        A first-order fit to them.
-    rows : ndarray, shape (4, n)
+        A fit of order 1 or 2 to them.
+    rows : ndarray, shape (p, n)
         Its derivatives, from `hmpim.identify.fitting.fit.jacobian`.
     white : bool
         Whether its residual is white.
     """
-    first = float(np.exp(fit.theta[1]))
-    second = _PROBE * first
-    here = delayed_response(problem.source, delay=fit.delay, denominator=np.array([1.0, first]))
-    there = delayed_response(
-        problem.source,
-        delay=max(fit.delay - second, -19.0),
-        denominator=np.array([1.0, first + second, first * second]),
+    denominator = fit.denominator
+    order = fit.structure.order
+    scale = float(denominator[order] ** (1.0 / order))
+    added = _PROBE * scale
+    here, there = (
+        delayed_response(problem.source, delay=delay, denominator=poles, powers=1)[0]
+        for delay, poles in (
+            (fit.delay, denominator),
+            (max(fit.delay - added, -19.0), np.convolve(denominator, [1.0, added])),
+        )
     )
-    added = problem.masked(fit.linear[0] * (there - here)[0]) / second**2
-    every = np.vstack([rows, added])
+    row = problem.masked(fit.linear[0] * (there - here)) / added**2
+    every = np.vstack([rows, row])
     freedom = max(problem.counted - every.shape[0], 1)
     variance = covariance(every, fit.residual, freedom=freedom, white=white)[-1, -1]
     squared = float(np.linalg.lstsq(every.T, fit.residual, rcond=None)[0][-1])
-    return float(np.sqrt(max(squared, 0.0) + 2.0 * np.sqrt(variance)))
+    return HiddenPole(squared=squared, std=float(np.sqrt(variance)), scale=scale)
