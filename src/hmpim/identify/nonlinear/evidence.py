@@ -5,7 +5,7 @@ bring likelihood. Then which kinds are left in question, and whether a plainer l
 with one kind beside it says more than a rich one alone.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -139,6 +139,7 @@ def _by_harmonics(look: Look, sweep: SweepPhase, fit: Fit, white: bool) -> Seen:
     )
     if harmonics is None:
         return Seen(fit=fit)
+    harmonics = _within(harmonics, float(np.sqrt(np.mean(residual**2))))
     parts = [harmonics.rms(p) for p in (0, 1) if harmonics.probability(p) < CHANCE]
     kinds: tuple[Mechanism, ...] = ()
     told = bool(parts) or harmonics.regression.evidence > _HINT
@@ -156,6 +157,16 @@ def _by_harmonics(look: Look, sweep: SweepPhase, fit: Fit, white: bool) -> Seen:
         return Seen(fit=fit, harmonics=harmonics)
     rms = float(np.sqrt(np.sum(np.square(parts)))) if parts else named[0].rms
     return Seen(fit=fit, harmonics=harmonics, mechanisms=kinds, named=named, rms=rms)
+
+
+def _within(harmonics: Harmonics, most: float) -> Harmonics:
+    """Limit each order to all there is: where few samples count, orders may cancel each other."""
+    if all(order.rms <= most for order in harmonics.orders):
+        return harmonics
+    return replace(
+        harmonics,
+        orders=tuple(replace(order, rms=min(order.rms, most)) for order in harmonics.orders),
+    )
 
 
 def _by_traces(look: Look, fit: Fit, white: bool) -> Seen:
