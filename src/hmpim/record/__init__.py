@@ -2,8 +2,10 @@
 
 from hmpim.record.align import Aligned, Signal, uniform
 from hmpim.record.clock import Clock, fit_clock
-from hmpim.record.quality import Finding, inspect_record, inspect_timing, inspect_values
+from hmpim.record.finding import Finding
+from hmpim.record.quality import inspect_record, inspect_timing, inspect_values
 from hmpim.record.record import Channel, Intersample, Record
+from hmpim.record.series import Series
 
 __all__ = [
     "Aligned",
@@ -12,6 +14,7 @@ __all__ = [
     "Finding",
     "Intersample",
     "Record",
+    "Series",
     "Signal",
     "fit_clock",
     "inspect_record",

@@ -9,7 +9,8 @@ from scipy.interpolate import CubicSpline
 
 from hmpim.errors import RecordError
 from hmpim.record.clock import Clock, fit_clock
-from hmpim.record.quality import Finding, clock_findings
+from hmpim.record.finding import Finding
+from hmpim.record.quality import clock_findings
 from hmpim.record.record import Channel, Intersample, Record
 
 __all__ = ["Aligned", "Signal", "uniform"]
@@ -52,7 +53,8 @@ class Aligned:
     inputs, outputs : tuple of Signal
         The channels, in the record's order.
     findings : tuple of Finding
-        What had to be repaired: 'gaps', 'jitter', 'rate', 'resampled'. Empty if nothing.
+        What was found when the record was read, then what had to be repaired here: 'gaps',
+        'jitter', 'rate', 'resampled'. Empty if nothing.
     """
 
     time: NDArray[np.float64]
@@ -133,7 +135,7 @@ def uniform(record: Record) -> Aligned:
     clocks = _clocks(channels, record.fs)
     first = channels[0]
     clock = clocks[id(first.time)]
-    findings = list(clock_findings(clock, first.time, stated=record.fs))
+    findings = [*record.findings, *clock_findings(clock, first.time, stated=record.fs)]
     shared = all(clocks[id(c.time)] is clock for c in channels)
     if shared and clock.uniform:
         everywhere = _frozen(np.ones(first.time.size, dtype=np.bool_))

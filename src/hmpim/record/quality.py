@@ -1,33 +1,16 @@
 """Quality of the data: what is odd about a record's clock and values, said plainly."""
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
 from hmpim.record.clock import Clock, fit_clock
+from hmpim.record.finding import Finding
 from hmpim.record.record import Channel, Record
 
-__all__ = ["Finding", "clock_findings", "inspect_record", "inspect_timing", "inspect_values"]
+__all__ = ["clock_findings", "inspect_record", "inspect_timing", "inspect_values"]
 
 STUCK_SHARE = 0.05
 """Share of a record over which an output may stand still while the input moves."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Finding:
-    """Something a person should know about data or a result.
-
-    Parameters
-    ----------
-    code : str
-        Stable word for programs, such as 'jitter' or 'saturation'.
-    message : str
-        One plain sentence with a number and a thing to do.
-    """
-
-    code: str
-    message: str
 
 
 def inspect_timing(time: NDArray[np.float64], fs: float) -> tuple[Finding, ...]:
@@ -177,7 +160,7 @@ def inspect_values(record: Record) -> tuple[Finding, ...]:
 
 
 def inspect_record(record: Record) -> tuple[Finding, ...]:
-    """Say what is odd about a record: its clocks first, then its values.
+    """Say what is odd about a record: as it was read, then its clocks, then its values.
 
     Examples
     --------
@@ -194,7 +177,7 @@ def inspect_record(record: Record) -> tuple[Finding, ...]:
         name = channel.name if seen else ""
         findings.extend(clock_findings(clock, channel.time, stated=stated, name=name))
         seen.append(channel.time)
-    return (*findings, *inspect_values(record))
+    return (*record.findings, *findings, *inspect_values(record))
 
 
 def _still(values: NDArray[np.float64]) -> bool:

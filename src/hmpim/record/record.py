@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from hmpim.errors import ArgumentError, RecordError
 from hmpim.record.clock import fit_clock
+from hmpim.record.finding import Finding
 from hmpim.units import check_unit
 
 __all__ = ["Channel", "Intersample", "Record"]
@@ -103,6 +104,8 @@ class Record:
         What the inputs do between samples, where known.
     source : str
         Where the record comes from, for people.
+    findings : tuple of Finding
+        What was noticed when the record was read: missing samples, mended stamps, and the like.
 
     Raises
     ------
@@ -116,6 +119,7 @@ class Record:
     band: tuple[float, float] | None = None
     intersample: Intersample | None = None
     source: str = ""
+    findings: tuple[Finding, ...] = ()
 
     def __post_init__(self) -> None:
         if not self.inputs or not self.outputs:
