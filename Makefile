@@ -5,7 +5,7 @@ BIN    := $(VENV)/bin
 RUN    := $(VENV)/.run-installed
 DEV    := $(VENV)/.dev-installed
 
-.PHONY: help install demo test check bench accuracy docs clean
+.PHONY: help install demo test check studies bench accuracy docs clean
 help:  ## show this list
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
 
@@ -27,8 +27,11 @@ demo: $(RUN)  ## a sensor and then five axes at once: parameters found, pages to
 	$(BIN)/hmpim demo
 	$(BIN)/hmpim campaign demo --out out/demo-table
 
-test: $(DEV)  ## the whole test suite
+test: $(DEV)  ## the test suite: a few minutes on two cores
 	$(BIN)/python -m pytest -n auto
+
+studies: $(DEV)  ## the tests' long form, over HMPIM_SEEDS seeds (200): hours
+	$(BIN)/python -m pytest -n auto -m study
 
 check: $(DEV)  ## ruff, mypy strict, import-linter
 	$(BIN)/ruff check .

@@ -21,10 +21,16 @@ def measured():
     return DATA
 
 
-@pytest.fixture
-def seeds() -> int:
-    """How many seeds a study takes; HMPIM_SEEDS makes it larger or smaller."""
-    return int(os.environ.get("HMPIM_SEEDS", "200"))
+@pytest.fixture(params=["few", pytest.param("many", marks=pytest.mark.study)])
+def seeds(request) -> int:
+    """How many seeds a study takes: few in `make test`, HMPIM_SEEDS (200) in `make studies`.
+
+    Few are 20 unless the test says otherwise: `@pytest.mark.few(50)`.
+    """
+    if request.param == "many":
+        return int(os.environ.get("HMPIM_SEEDS", "200"))
+    few = request.node.get_closest_marker("few")
+    return few.args[0] if few else 20
 
 
 @pytest.fixture(scope="session")

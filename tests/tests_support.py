@@ -1,7 +1,76 @@
-"""Physics that tests step themselves, apart from the package."""
+"""Physics that tests step themselves, apart from the package; bounds for counts and averages.
+
+A study counts how often something happens, or averages something over seeds. What it may
+claim follows from chance alone. `FALSE_ALARM` is the chance that a bound below is broken by a
+package that keeps its promise: one in ten thousand for each bound, one in a hundred for a
+suite that holds a hundred of them. Nothing else decides a bound.
+"""
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.stats import binom, chi2, norm
+
+FALSE_ALARM = 1e-4
+
+
+def fewest(trials: int, chance: float) -> int:
+    """Smallest count of `trials` that an event of this chance falls below with FALSE_ALARM."""
+    return int(binom.ppf(FALSE_ALARM, trials, chance))
+
+
+def most(trials: int, chance: float) -> int:
+    """Largest count of `trials` that an event of this chance exceeds with FALSE_ALARM."""
+    return int(binom.isf(FALSE_ALARM, trials, chance))
+
+
+def excluded(trials: int) -> float:
+    """Smallest chance that no event at all in `trials` excludes, at 95 % confidence."""
+    return float(1.0 - 0.05 ** (1.0 / trials))
+
+
+def assert_share(hits, *, at_least: float = 0.0, at_most: float = 1.0) -> None:
+    """Check that the share of hits is between two chances, as far as the count can tell.
+
+    Parameters
+    ----------
+    hits : array_like of bool, shape (trials,) or (trials, figures)
+        Rows are independent. Figures of one row are not: what they have in common is
+        estimated from the rows and makes the number of trials smaller.
+    at_least, at_most : float
+        The chance that is promised.
+    """
+    hits = np.asarray(hits, dtype=bool)
+    assert hits.size, "nothing was counted"
+    rows = hits.reshape(len(hits), -1)
+    trials = independent(rows)
+    count = rows.mean() * trials
+    low, high = fewest(trials, at_least), most(trials, at_most)
+    assert low <= count <= high, (
+        f"{rows.mean():.3f} of {rows.size} ({trials} independent) where {at_least} to {at_most} "
+        f"is promised, {low / trials:.3f} to {high / trials:.3f} with room for chance"
+    )
+
+
+def independent(rows: NDArray[np.bool_]) -> int:
+    """How many independent trials say as much as rows of figures that go together."""
+    figures = rows.shape[1]
+    within = rows.var() / figures  # what the mean of a row would scatter by
+    if within == 0.0:
+        return int(rows.size)
+    together = np.clip(rows.mean(axis=1).var() / within, 1.0, figures)
+    return max(int(rows.size / together), len(rows))
+
+
+def room(trials: int, std: float = 1.0) -> float:
+    """How far the mean of `trials` values of this standard deviation may be from theirs."""
+    return float(norm.isf(FALSE_ALARM / 2)) * std / np.sqrt(trials)
+
+
+def rms_between(trials: int) -> tuple[float, float]:
+    """Between what the r.m.s. of `trials` standard normal values lies."""
+    tails = [FALSE_ALARM / 2, 1.0 - FALSE_ALARM / 2]
+    low, high = np.sqrt(chi2.ppf(tails, trials) / trials)
+    return float(low), float(high)
 
 
 def second_order_lag(

@@ -79,7 +79,7 @@ def test_reduced(tmp_path):
     check(make_study(plan, run_campaign(plan, tmp_path)))
 
 
-@pytest.mark.slow
+@pytest.mark.study
 @pytest.mark.skipif("HMPIM_FULL" not in os.environ, reason="set HMPIM_FULL for the full plan")
 def test_full(tmp_path):
     plan = read_plan(shipped_plan("section_v"))

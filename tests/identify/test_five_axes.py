@@ -161,7 +161,6 @@ def test_the_result_is_read_back_as_written(result):
     assert hmpim.Identification.from_dict(written).to_dict() == written
 
 
-@pytest.mark.slow
 def test_intervals_hold_the_truth(clean, seeds):
     inside = {True: [], False: []}
     missed = invented = 0

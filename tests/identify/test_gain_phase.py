@@ -19,7 +19,6 @@ TRUTH = RationalDelay(
 )
 
 
-@pytest.mark.slow
 def test_intervals_hold_the_truth(field_record, seeds):
     _, u, y = field_record
     gain = 20 * np.log10(np.abs(response(TRUTH, np.array(WANTED))))

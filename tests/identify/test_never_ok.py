@@ -162,7 +162,7 @@ def test_a_spoilt_output_is_never_ok(name):
     assert pair.warnings
 
 
-@pytest.mark.slow
+@pytest.mark.study
 @pytest.mark.parametrize("name", [*UNRELATED, *SPOILT])
 def test_none_of_them_is_ok_for_any_seed(name):
     for seed in range(2, 2 + STUDY):

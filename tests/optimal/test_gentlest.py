@@ -223,7 +223,6 @@ def test_refusals(more, message):
         search(**more)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("which", ["gentle_10s", "short"])
 def test_predicted_and_achieved_errors_agree(which, request, seeds):
     """Simulated tests, each stepped in time and identified with no hint."""

@@ -65,7 +65,7 @@ def test_rows_of_given_stimuli(maker, printed):
     compare(maker.given_rows(), printed)
 
 
-@pytest.mark.slow
+@pytest.mark.study
 @pytest.mark.parametrize("family", ["multisine", "sweep", "exponential"])
 def test_rows_that_are_searched(maker, printed, family):
     compare(maker.found_rows(family), printed)

@@ -142,7 +142,7 @@ def test_any_wish_of_any_kind(wish):
     check(wish)
 
 
-@pytest.mark.slow
+@pytest.mark.study
 @settings(max_examples=MANY, deadline=None)
 @given(wish=wishes())
 def test_thousands_of_wishes(wish):

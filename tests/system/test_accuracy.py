@@ -17,7 +17,7 @@ def section(text, title):
     return rest.partition("\n## ")[0]
 
 
-@pytest.mark.slow
+@pytest.mark.study
 def test_a_reduced_study_keeps_its_promises(tmp_path):
     page = tmp_path / "accuracy.md"
     done = subprocess.run(

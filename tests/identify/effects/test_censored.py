@@ -85,7 +85,6 @@ def check_noise(noise):
     assert noise[:, 0].mean() == pytest.approx(0.1, abs=0.001 + chance)
 
 
-@pytest.mark.slow
 def test_a_third_clipped_with_the_noise(source, clean, truth, seeds):
     half = level(clean)
 
@@ -101,7 +100,6 @@ def test_a_third_clipped_with_the_noise(source, clean, truth, seeds):
     assert 0.8 < noise[:, 0].std() / noise[:, 1].mean() < 1.2
 
 
-@pytest.mark.slow
 def test_a_third_clipped_before_the_noise(source, clean, truth, seeds):
     half = level(clean)
 
@@ -114,7 +112,6 @@ def test_a_third_clipped_before_the_noise(source, clean, truth, seeds):
     check_noise(noise)
 
 
-@pytest.mark.slow
 def test_held_at_a_slower_clock(source, truth, seeds):
     def make(seed):
         sensor = Sensor(**SYSTEM, noise_std=0.1, hold_period=1 / 29.3, hold_phase=0.0013)
@@ -172,7 +169,6 @@ def test_with_nothing_clipped_it_is_least_squares(source, clean, truth):
     assert found.log_likelihood == pytest.approx(white, abs=1e-3)
 
 
-@pytest.mark.slow
 def test_coloured_noise_is_not_underrated(source, clean, truth, seeds):
     half = level(clean)
 

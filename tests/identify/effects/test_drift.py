@@ -82,7 +82,6 @@ def test_a_clipped_output_may_drift():
         assert abs(estimate.value - value) < 4 * estimate.std, name
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["steady, three times the amplitude", "warming up"])
 def test_stated_intervals_hold_with_a_drift(seeds, kind):
     drift = DRIFTS[kind](None)
@@ -96,7 +95,6 @@ def test_stated_intervals_hold_with_a_drift(seeds, kind):
     assert 0.92 - 2 / total**0.5 < inside / total <= 0.99
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("colour", [0.0, 0.9])
 def test_noise_is_not_taken_for_a_drift(seeds, colour):
     alarms = sum(bool(said(identified(0.0 * T, s, noise_colour=colour))) for s in range(seeds // 2))

@@ -111,7 +111,6 @@ def test_a_noisy_clipped_static_sensor_stays_static():
     assert abs(pair.delay.value - 0.05) < 4 * pair.delay.std
 
 
-@pytest.mark.slow
 def test_a_third_clipped_leaves_no_bias(seeds):
     errors, inside, total = {name: [] for name in TRUTH}, 0, 0
     for seed in range(seeds // 2):

@@ -78,7 +78,6 @@ def test_nothing_is_imagined(y):
     assert detect_quantization(y) is None
 
 
-@pytest.mark.slow
 def test_continuous_data_give_no_false_alarm(seeds):
     for seed in range(seeds):
         rng = np.random.default_rng(seed)

@@ -109,7 +109,6 @@ def test_the_prediction_tells_a_square_wave_from_a_clipped_one():
     assert detect_saturation(u, 1.5 * np.sin(2 * np.pi * 0.5 * T)).high == pytest.approx(0.8)
 
 
-@pytest.mark.slow
 def test_false_alarms_stay_below_one_percent(seeds):
     alarms = 0
     for seed in range(seeds):

@@ -121,7 +121,6 @@ def test_the_bound_is_the_published_one(field_record):
     assert bound["bias"] == pytest.approx(0.0022, rel=0.03)
 
 
-@pytest.mark.slow
 def test_at_the_bound_with_honest_intervals(field_record, seeds):
     _, u, y = field_record
     bound = cramer_rao(u, y)
@@ -216,7 +215,6 @@ def test_scaling_the_output_scales_gain_bias_and_noise_only(field_record):
 
 
 @pytest.mark.parametrize("colour", [0.9, -0.6])
-@pytest.mark.slow
 def test_intervals_hold_under_coloured_noise(field_record, seeds, colour):
     from scipy.signal import lfilter
 

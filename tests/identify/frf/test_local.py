@@ -74,7 +74,7 @@ def test_stated_errors_agree_with_the_scatter(field_record: tuple[np.ndarray, ..
     assert np.mean(np.abs(error) < 2 * std) == pytest.approx(1 - np.exp(-4), abs=0.02)
 
 
-@pytest.mark.slow
+@pytest.mark.study
 @pytest.mark.parametrize("delay", [0.145, 0.163, 0.17])
 def test_a_delay_known_only_roughly_is_enough(delay: float) -> None:
     frequency, error, _ = study(noise=0.1, delay=delay, seeds=max(SEEDS // 3, 10))

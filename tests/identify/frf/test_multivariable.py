@@ -100,7 +100,6 @@ def test_without_noise_couplings_are_nearly_exact(
     assert error[found.usable].max() < 0.003
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("noise", [0.1, 0.01])
 def test_stated_errors_agree_with_the_scatter(
     three_axes: tuple[np.ndarray, np.ndarray], noise: float, seeds: int

@@ -53,7 +53,6 @@ def study(
     return found.frequency, np.array(errors), np.array(stds)
 
 
-@pytest.mark.slow
 def test_median_error_on_the_field_record_is_at_most_2_percent_for_every_seed(
     records: dict[float, Record], seeds: int
 ) -> None:
@@ -64,7 +63,6 @@ def test_median_error_on_the_field_record_is_at_most_2_percent_for_every_seed(
     assert np.median(per_seed) < 0.01
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     ("noise", "damping"), [(0.1, 0.4), (0.1, 0.05), (0.01, 0.4), (0.01, 0.05), (1e-4, 0.4)]
 )

@@ -117,7 +117,6 @@ def test_the_three_parts_add_up():
     assert found.rms(0) == pytest.approx(0.05 / np.sqrt(2), rel=0.05)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("colour", [0.0, 0.9])
 def test_noise_alone_gives_the_chances_it_should(seeds, colour):
     source = prepare_input(CHIRP, "bandlimited")

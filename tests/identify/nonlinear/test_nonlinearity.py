@@ -132,7 +132,6 @@ def inputs(kind: str, rng: np.random.Generator):
             return np.cos(2 * np.pi * k * T + phase).sum(axis=0) / 6, "bandlimited"
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["sweep", "binary", "noise", "multisine"])
 @pytest.mark.parametrize("colour", [0.0, 0.9])
 def test_a_linear_system_raises_no_alarm(seeds, kind, colour):
