@@ -16,12 +16,11 @@ RUNNER = CliRunner()
 NAMED = ["--input", "u", "--output", "y"]
 
 REASONS = {
-    "nan": r"nan",
     "unequal_lengths": r"line 201|cells|columns|fields|values",
     "three_samples": r"\b3 samples",
     "constant_output": r"constant at 1",
     "missing_column": r"'y'",
-    "time_backwards": r"increase|backwards",
+    "time_starts_again": r"starts again",
     "empty": r"empty",
     "binary": r"text|binary|UTF-8",
     "absent": r"absent\.csv",

@@ -1,6 +1,6 @@
 """Files to records and back."""
 
-from hmpim.formats.csv import read_csv, write_csv
+from hmpim.formats.csv import write_csv
 from hmpim.formats.files import read
 
-__all__ = ["read", "read_csv", "write_csv"]
+__all__ = ["read", "write_csv"]

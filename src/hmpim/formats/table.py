@@ -66,7 +66,7 @@ class Table:
         Raises
         ------
         FormatError
-            If a cell is empty, not a number, or not finite; its line and column are named.
+            If a cell is empty or not a number; its line and column are named.
         """
         wanted = [c.position for c in columns]
         quoted = any('"' in row for row in self.rows)
@@ -82,14 +82,6 @@ class Table:
         except ValueError as error:
             self._blame(columns)
             raise FormatError(f"{self.name!r} cannot be read as numbers: {error}") from None
-        if not np.all(np.isfinite(values)):
-            row, k = (int(i) for i in np.argwhere(~np.isfinite(values))[0])
-            count = int(np.count_nonzero(~np.isfinite(values)))
-            raise FormatError(
-                f"{self.name!r}, line {self.lines[row]}, column {columns[k].heading!r} holds "
-                f"{values[row, k]} ({count} such in all); cut those rows out, or fill them, "
-                "before identifying"
-            )
         return values
 
     def _blame(self, columns: Sequence[Column]) -> None:

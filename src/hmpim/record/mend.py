@@ -1,0 +1,172 @@
+"""From series as files hold them to channels: what is missing, doubled or out of order is said."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hmpim.errors import RecordError
+from hmpim.record.finding import Finding
+from hmpim.record.record import Channel
+from hmpim.record.series import Series
+
+__all__ = ["Mended", "mend"]
+
+_LATE = 8
+"""Samples that may follow a stamp that ran ahead before the stamps count as starting again.
+
+A network or a bus delivers a few samples out of order; a clock that was set back, or a second
+recording in the same file, goes on from there.
+"""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Mended:
+    """Channels that can be used, and what had to be done for it.
+
+    Parameters
+    ----------
+    channels : tuple of Channel
+        In the order of the series.
+    findings : tuple of Finding
+        Codes 'missing_samples', 'doubled_stamps', 'backward_stamps', 'missing_stamps'.
+    """
+
+    channels: tuple[Channel, ...]
+    findings: tuple[Finding, ...]
+
+
+def mend(series: Sequence[Series], *, fs: float | None = None) -> Mended:
+    """Make channels of series: drop what is missing, put stamps in order, and count it.
+
+    * A sample that is NaN or infinite is dropped, which leaves a gap in its channel alone.
+    * Stamps that stand still: the first sample of each stamp is kept.
+    * Samples out of order, by up to eight places: sorted by stamp.
+    * Stamps that start again: refused.
+
+    Parameters
+    ----------
+    series : sequence of Series
+        As they were read.
+    fs : float, optional
+        Rate in Hz of series without stamps.
+
+    Raises
+    ------
+    RecordError
+        If stamps start again, a series has no stamps and there is no rate, or fewer than two
+        samples remain.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> time, values = np.array([0.0, 0.1, 0.1, 0.2]), np.array([1.0, 2.0, 2.0, np.nan])
+    >>> mended = mend([Series(name="y", values=values, time=time)])
+    >>> mended.channels[0].time.tolist(), [f.code for f in mended.findings]
+    ([0.0, 0.1], ['doubled_stamps', 'missing_samples'])
+    """
+    findings: list[Finding] = []
+    known: dict[int, tuple[NDArray[np.float64], NDArray[np.int64] | None]] = {}
+    made: list[Channel] = []
+    for s in series:
+        if s.time is None:
+            if fs is None:
+                raise RecordError(f"{s.name!r} has no time stamps; give its rate with fs=...")
+            stamps, order = np.arange(s.values.size) / fs, None
+            stamps = known.setdefault(-s.values.size, (stamps, None))[0]
+        else:
+            if id(s.time) not in known:
+                sharing = [o.name for o in series if o.time is s.time]
+                known[id(s.time)] = _ordered(s.time, sharing, findings)
+            stamps, order = known[id(s.time)]
+        values = s.values if order is None else s.values[order]
+        made.append(_without_missing(s, stamps, values, findings))
+    return Mended(channels=tuple(made), findings=tuple(findings))
+
+
+def _without_missing(
+    series: Series,
+    time: NDArray[np.float64],
+    values: NDArray[np.float64],
+    findings: list[Finding],
+) -> Channel:
+    there = np.isfinite(values)
+    missing = int(values.size - np.count_nonzero(there))
+    if missing:
+        if values.size - missing < 2:
+            raise RecordError(
+                f"channel {series.name!r} holds {values.size - missing} numbers in {values.size} "
+                "samples; at least 2 are needed"
+            )
+        runs = int(np.count_nonzero(np.diff(np.concatenate(([True], there)).astype(np.int8)) < 0))
+        infinite = int(np.count_nonzero(np.isinf(values)))
+        of_them = f" ({infinite} of them infinite)" if infinite else ""
+        findings.append(
+            Finding(
+                code="missing_samples",
+                message=(
+                    f"{missing} of {values.size} samples of {series.name!r} are missing{of_them}, "
+                    f"in {runs} {'place' if runs == 1 else 'places'}; they are gaps of this "
+                    "channel"
+                ),
+            )
+        )
+        time, values = time[there], values[there]
+    return Channel(name=series.name, time=time, values=values, unit=series.unit)
+
+
+def _ordered(
+    time: NDArray[np.float64], names: Sequence[str], findings: list[Finding]
+) -> tuple[NDArray[np.float64], NDArray[np.int64] | None]:
+    """Stamps that increase, and the samples they belong to (None: all, as they are)."""
+    if time.size and np.isfinite(time).all() and np.all(np.diff(time) > 0):
+        return time, None
+    order = np.flatnonzero(np.isfinite(time))
+    of = ", ".join(repr(name) for name in names)
+    if order.size < time.size:
+        findings.append(
+            Finding(
+                code="missing_stamps",
+                message=f"{time.size - order.size} of {time.size} samples of {of} have no time "
+                "stamp and are left out",
+            )
+        )
+    back = int(np.count_nonzero(np.diff(time[order]) < 0))
+    if back:
+        _check_not_restarted(time[order], of)
+        order = order[np.argsort(time[order], kind="stable")]
+        findings.append(
+            Finding(
+                code="backward_stamps",
+                message=f"time of {of} runs backward at {back} of {time.size} samples; the samples "
+                "are sorted by their stamps",
+            )
+        )
+    first = np.concatenate(([True], np.diff(time[order]) > 0)) if order.size else order > 0
+    doubled = int(order.size - np.count_nonzero(first))
+    if doubled:
+        order = order[first]
+        findings.append(
+            Finding(
+                code="doubled_stamps",
+                message=f"{doubled} of {time.size} stamps of {of} repeat the one before; the first "
+                "sample of each is kept",
+            )
+        )
+    return time[order], order
+
+
+def _check_not_restarted(time: NDArray[np.float64], of: str) -> None:
+    ahead = np.maximum.accumulate(time)
+    behind = time < ahead
+    # The run of samples behind the largest stamp so far.
+    edges = np.flatnonzero(np.diff(np.concatenate(([0], behind.astype(np.int8), [0]))))
+    starts, lengths = edges[::2], edges[1::2] - edges[::2]
+    long = np.flatnonzero(lengths > _LATE)
+    if long.size:
+        k = int(starts[long[0]])
+        raise RecordError(
+            f"time of {of} starts again at sample {k}: {ahead[k]:.9g} s is followed by "
+            f"{time[k]:.9g} s ({long.size} such in all); time must increase: cut the file there"
+        )
