@@ -21,7 +21,6 @@ def _listed(path, layout):
 def _read(path, names, layout):
     data = np.frombuffer(path.read_bytes()[8:], dtype="<f4").astype(float).reshape(2, -1)
     units = {"u": "V", "y": ""}
-    time = np.arange(data.shape[1]) / 10
     return tuple(
         Series(
             name=n, values=data["uy".index(n)], time=np.arange(data.shape[1]) / 10, unit=units[n]
