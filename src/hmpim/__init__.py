@@ -22,7 +22,7 @@ from hmpim.identify import (
     predict,
     to_model,
 )
-from hmpim.model import Model, frequency_response, simulate
+from hmpim.model import Model, draw_models, frequency_response, simulate
 from hmpim.optimal import gentlest
 from hmpim.record import Channel, Record
 from hmpim.report import report
@@ -61,6 +61,7 @@ __all__ = [
     "Sweep",
     "design",
     "design_axes",
+    "draw_models",
     "frequency_response",
     "gentlest",
     "identify",

@@ -89,6 +89,7 @@ def test_the_public_names():
         "Sweep",
         "design",
         "design_axes",
+        "draw_models",
         "frequency_response",
         "gentlest",
         "identify",

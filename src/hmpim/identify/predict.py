@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hmpim.errors import RecordError
-from hmpim.identify.result import PairIdentification
-from hmpim.model import Model, simulate, slowest_time_constant
+from hmpim.identify.result import Estimate, PairIdentification
+from hmpim.model import Model, Spread, simulate, slowest_time_constant
 from hmpim.record import Record, uniform
 
 __all__ = ["Prediction", "predict", "to_model"]
@@ -34,8 +34,15 @@ class Prediction:
     fit_percent: float
 
 
-def to_model(pair: PairIdentification) -> Model:
-    """Model that simulates what was identified.
+def to_model(pair: PairIdentification, *, fs: float | None = None) -> Model:
+    """Model that simulates what was identified, the whole sensor chain and its errors included.
+
+    Parameters
+    ----------
+    pair : PairIdentification
+        From `hmpim.identify`, or read back.
+    fs : float, optional
+        Rate of the record in Hz, ``result.record.fs``, for the model to remember.
 
     Raises
     ------
@@ -48,6 +55,7 @@ def to_model(pair: PairIdentification) -> Model:
             f"{pair.output!r} from {pair.input!r} was not identifiable, so there is no model: "
             + "; ".join(w.message for w in pair.warnings)
         )
+    frequency = pair.frequency_response.frequency
     return Model(
         delay=p.delay.value,
         scale_factor=p.scale_factor.value,
@@ -58,6 +66,38 @@ def to_model(pair: PairIdentification) -> Model:
         input=pair.input,
         output=pair.output,
         output_unit=p.bias.unit,
+        saturation_low=_value(p.saturation_low),
+        saturation_high=_value(p.saturation_high),
+        hold_period=_value(p.hold_period),
+        quantization_step=_value(p.quantization_step),
+        intersample=pair.intersample,
+        fs=fs,
+        band=float(frequency[-1]) if frequency.size else None,
+        spread=_spread(pair),
+    )
+
+
+def _value(estimate: Estimate | None) -> float | None:
+    return None if estimate is None else estimate.value
+
+
+def _spread(pair: PairIdentification) -> Spread | None:
+    """Errors of a model's figures; None where the record does not tell them."""
+    if pair.covariance is None:
+        return None
+    p = pair.parameters
+
+    def std(estimate: Estimate | None) -> float:
+        return 0.0 if estimate is None else estimate.std or 0.0
+
+    return Spread(
+        covariance=tuple(tuple(row) for row in pair.covariance.tolist()),
+        bias=std(p.bias),
+        noise_std=std(p.noise_std),
+        saturation_low=std(p.saturation_low),
+        saturation_high=std(p.saturation_high),
+        hold_period=std(p.hold_period),
+        quantization_step=std(p.quantization_step),
     )
 
 

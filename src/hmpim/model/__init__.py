@@ -1,5 +1,8 @@
 """The model of Fig. 1: delay, dynamics, scale factor, bias, and what lies between samples."""
 
+from hmpim.model.chain import Chain, Readout, chain_of, run_chain
+from hmpim.model.discrete import Discrete, RowPiece, discretise
+from hmpim.model.draws import coefficient_vector, draw_models
 from hmpim.model.dynamics import (
     STRUCTURES,
     Structure,
@@ -22,26 +25,37 @@ from hmpim.model.response import (
     slowest_time_constant,
 )
 from hmpim.model.sampled import SampledInput, delayed_response, prepare_input
+from hmpim.model.spread import Spread
 
 __all__ = [
     "STRUCTURES",
+    "Chain",
+    "Discrete",
     "Model",
     "PeakGain",
     "RationalDelay",
+    "Readout",
+    "RowPiece",
     "SampledInput",
+    "Spread",
     "Structure",
     "StructureName",
     "bandwidth_3db",
     "bandwidth_phase",
+    "chain_of",
+    "coefficient_vector",
     "coefficients_of",
     "delayed_response",
     "denominator_of",
+    "discretise",
     "dominant_time_constant",
+    "draw_models",
     "frequency_response",
     "peak_gain",
     "phase",
     "prepare_input",
     "response",
+    "run_chain",
     "second_order_coefficients",
     "simulate",
     "slowest_time_constant",

@@ -1,13 +1,17 @@
 """A model of one input-output pair: what a simulation needs, ready to run."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from math import ceil
+from typing import get_args
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from hmpim.errors import ArgumentError
+from hmpim.model.chain import Chain, Readout, chain_of, run_chain
 from hmpim.model.response import RationalDelay, response
 from hmpim.model.sampled import delayed_response, prepare_input
+from hmpim.model.spread import Spread
 from hmpim.record import Intersample
 
 __all__ = ["Model", "frequency_response", "simulate"]
@@ -32,11 +36,27 @@ class Model:
         Standard deviation of the measurement noise, in the output's unit.
     input, output, input_unit, output_unit : str
         Names and units of the channels.
+    saturation_low, saturation_high : float or None
+        Range of the output, in its unit; None where it is open.
+    hold_period, hold_phase : float or None, float
+        Interval in s at which the output is read and then held, and the instant of one reading;
+        None for a reading at every sample.
+    quantization_step : float or None
+        The output is rounded to whole steps of this size, in its unit.
+    intersample : {'zoh', 'foh', 'bandlimited'}
+        What the input does between its samples, as it was identified.
+    fs : float or None
+        Rate in Hz at which it was identified.
+    band : float or None
+        Frequency in Hz up to which it was excited.
+    spread : Spread or None
+        What is known of the errors of these figures.
 
     Raises
     ------
     ArgumentError
-        If the denominator is empty, ends in 0, or has a pole that is not in the left half plane.
+        If the denominator is empty, ends in 0 twice, or has a pole that is not in the left half
+        plane; if a level, period or step is not what it may be.
     """
 
     delay: float
@@ -49,8 +69,18 @@ class Model:
     output: str = "y"
     input_unit: str = ""
     output_unit: str = ""
+    saturation_low: float | None = None
+    saturation_high: float | None = None
+    hold_period: float | None = None
+    hold_phase: float = 0.0
+    quantization_step: float | None = None
+    intersample: Intersample = "bandlimited"
+    fs: float | None = None
+    band: float | None = None
+    spread: Spread | None = None
 
     def __post_init__(self) -> None:
+        _check_readout(self)
         if not any(self.denominator[-2:]):
             raise ArgumentError(
                 f"denominator {self.denominator} integrates more than once; one of its last two "
@@ -68,15 +98,143 @@ class Model:
                 "only stable dynamics can be simulated"
             )
 
+    @property
+    def system(self) -> RationalDelay:
+        """Rising powers of s, scale factor included, the first that is not 0 of A made 1."""
+        constant = self.denominator[-1] or self.denominator[-2]
+        return RationalDelay(
+            delay=self.delay,
+            numerator=self.scale_factor * np.asarray(self.numerator[::-1]) / constant,
+            denominator=np.asarray(self.denominator[::-1]) / constant,
+        )
 
-def _rational(model: Model) -> RationalDelay:
-    """Rising powers of s, scale factor included, the first that is not 0 of A made 1."""
-    constant = model.denominator[-1] or model.denominator[-2]
-    return RationalDelay(
-        delay=model.delay,
-        numerator=model.scale_factor * np.asarray(model.numerator[::-1]) / constant,
-        denominator=np.asarray(model.denominator[::-1]) / constant,
+    @property
+    def readout(self) -> Readout:
+        """What happens to the output once the dynamics are through."""
+        return Readout(
+            bias=self.bias,
+            noise_std=self.noise_std,
+            saturation_low=self.saturation_low,
+            saturation_high=self.saturation_high,
+            hold_period=self.hold_period,
+            hold_phase=self.hold_phase,
+            quantization_step=self.quantization_step,
+        )
+
+    def at_rate(self, fs: float, *, intersample: Intersample | None = None) -> Chain:
+        """Put the model on a rate in Hz: the arithmetic that `simulate` and the exports share.
+
+        Raises
+        ------
+        ArgumentError
+            If the delay is negative or the rate not positive.
+        """
+        return chain_of(
+            self.system,
+            self.readout,
+            fs=fs,
+            intersample=_known(intersample or self.intersample),
+            band=self.band,
+        )
+
+    def simulate(
+        self,
+        u: ArrayLike,
+        t: ArrayLike,
+        *,
+        intersample: Intersample | None = None,
+        rng: np.random.Generator | int | None = None,
+    ) -> NDArray[np.float64]:
+        """Output of the whole chain of Fig. 1, up to saturation, hold and rounding.
+
+        Parameters
+        ----------
+        u : array_like, shape (n,)
+            Input samples. Before the first the input stood there; in front of an integrator, at 0.
+        t : array_like, shape (n,)
+            Their times in s, evenly spaced. Readings of a held output count from time 0.
+        intersample : {'zoh', 'foh', 'bandlimited'}, optional
+            What the input does between its samples; as identified by default.
+        rng : numpy.random.Generator or int, optional
+            Adds noise drawn from it, one value a reading; none is added by default.
+
+        Returns
+        -------
+        ndarray, shape (n,)
+            In the output's unit.
+
+        Raises
+        ------
+        ArgumentError
+            If `u` and `t` are not two or more finite numbers each, or `t` not evenly spaced.
+
+        Notes
+        -----
+        The arithmetic is causal. A band-limited input's response is that of the model up to
+        `band`, to the error that ``at_rate(fs).error`` states.
+
+        Examples
+        --------
+        >>> model = Model(delay=0.02, scale_factor=2.0, quantization_step=0.5, intersample="zoh")
+        >>> model.simulate([0.0, 0.6, 0.6, 0.6], [0.0, 0.01, 0.02, 0.03]).tolist()
+        [0.0, 0.0, 0.0, 1.0]
+        """
+        values, fs, start = _evenly(u, t)
+        model = replace(self, hold_phase=self.hold_phase - start)
+        lead = max(ceil(-self.delay * fs - 1e-9), 0)
+        if lead:  # a model that is ahead of its input sees the input go on as it ended
+            values = np.concatenate([values, np.full(lead, values[-1])])
+            model = replace(
+                model, delay=self.delay + lead / fs, hold_phase=model.hold_phase + lead / fs
+            )
+        chain = model.at_rate(fs, intersample=intersample)
+        noise = None if rng is None else np.random.default_rng(rng)
+        return run_chain(chain, values, rng=noise)[lead:]
+
+
+def _known(intersample: str) -> Intersample:
+    for name in get_args(Intersample):
+        if intersample == name:
+            return name  # type: ignore[no-any-return]
+    raise ArgumentError(
+        f"intersample = {intersample!r} is not known; use 'zoh', 'foh' or 'bandlimited'"
     )
+
+
+def _evenly(u: ArrayLike, t: ArrayLike) -> tuple[NDArray[np.float64], float, float]:
+    """Check samples and their times; return samples, rate and first time."""
+    try:
+        values, time = np.asarray(u, dtype=np.float64), np.asarray(t, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise ArgumentError("u or t holds something that is not a number") from None
+    if values.ndim != 1 or values.shape != time.shape or values.size < 2:
+        raise ArgumentError(
+            f"u has shape {values.shape} and t {time.shape}; give two or more samples and as many "
+            "times, shape (n,)"
+        )
+    if not (np.all(np.isfinite(values)) and np.all(np.isfinite(time))):
+        raise ArgumentError("u or t holds a value that is not finite; give finite numbers")
+    step = (time[-1] - time[0]) / (time.size - 1)
+    off = np.abs(np.diff(time) - step)
+    if not step > 0 or np.max(off) > 1e-3 * step:
+        k = int(np.argmax(off))
+        raise ArgumentError(
+            f"t is not evenly spaced: {time[k + 1] - time[k]:.6g} s after sample {k}, "
+            f"{step:.6g} s on average; resample the input first"
+        )
+    return values, float(1.0 / step), float(time[0])
+
+
+def _check_readout(model: Model) -> None:
+    for name in ("hold_period", "quantization_step"):
+        value = getattr(model, name)
+        if value is not None and not (np.isfinite(value) and value > 0):
+            raise ArgumentError(f"{name} = {value!r} is out of range; it must be more than 0")
+    low, high = model.saturation_low, model.saturation_high
+    if low is not None and high is not None and low >= high:
+        raise ArgumentError(
+            f"saturation_low = {low!r} is not below saturation_high = {high!r}; swap them"
+        )
 
 
 def frequency_response(model: Model, frequency: NDArray[np.float64]) -> NDArray[np.complex128]:
@@ -88,7 +246,7 @@ def frequency_response(model: Model, frequency: NDArray[np.float64]) -> NDArray[
     >>> frequency_response(model, np.array([1.0])).tolist()
     [(2+0j)]
     """
-    return response(_rational(model), frequency)
+    return response(model.system, frequency)
 
 
 def simulate(
@@ -99,7 +257,10 @@ def simulate(
     intersample: Intersample,
     rng: np.random.Generator | None = None,
 ) -> NDArray[np.float64]:
-    """Output of the model for a sampled input; before the record the input stood at u[0].
+    """Output of the linear part for a sampled input, which stood at u[0] before.
+
+    It has the whole record at hand and so looks ahead between samples; `Model.simulate` steps
+    through the whole chain, causally.
 
     Parameters
     ----------
@@ -124,7 +285,7 @@ def simulate(
     >>> simulate(model, np.array([0.0, 1.0, 1.0, 1.0]), fs=100.0, intersample="zoh").tolist()
     [1.0, 1.0, 1.0, 3.0]
     """
-    system = _rational(model)
+    system = model.system
     source = prepare_input(np.asarray(u, dtype=np.float64), intersample)
     powers = system.numerator.size
     rows = delayed_response(

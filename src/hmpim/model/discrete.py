@@ -1,0 +1,349 @@
+"""A model stepped at a rate: state, delay line and taps that a program can run, exact and causal.
+
+A held or linear input is answered exactly: between two samples it is a polynomial, and the
+state's answer to a polynomial is one matrix exponential (C. Van Loan, Computing integrals
+involving the matrix exponential, IEEE TAC, 1978). A delay that is no whole number of samples
+splits the sample in two. A band-limited input goes through a short filter first, which makes
+the response that of the model over the excited band (`hmpim.model.causal`).
+
+Time is counted in samples here.
+"""
+
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import expm, matrix_balance
+from scipy.signal import tf2ss
+
+from hmpim.errors import ArgumentError
+from hmpim.model.causal import causal_filter
+from hmpim.model.response import RationalDelay, response
+from hmpim.record import Intersample
+
+__all__ = ["TAPS", "Discrete", "RowPiece", "discretise", "rows_between"]
+
+_Real = NDArray[np.float64]
+
+TAPS = 3
+"""Input samples that one step looks at: a fraction of a sample reaches over three of them."""
+
+LOOKAHEAD = 32
+"""Most samples of the delay that a band-limited input's filter may use to look both ways."""
+
+_WHOLE = 1e-9
+"""Part of a sample below which a delay counts as whole."""
+
+ROW_DEGREE = 12
+"""Degree of the polynomial that follows the state's answer within a part of a sample."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Discrete:
+    """A linear model at a rate, strictly causal in its arithmetic.
+
+    With ``c[k] = Σ prefilter[i] u[k-i]`` and ``v = [c[k-delay], c[k-delay-1], c[k-delay-2]]``::
+
+        x = transition x + drive v
+        y = output x + feed v
+
+    Parameters
+    ----------
+    fs : float
+        Rate in Hz.
+    intersample : {'zoh', 'foh', 'bandlimited'}
+        What the input does between its samples.
+    prefilter : ndarray, shape (p,)
+        Taps on the input; [1] unless the input is band-limited.
+    delay : int
+        Whole samples, those that the prefilter takes left out.
+    fraction : float
+        Rest of the delay in samples, 0 <= fraction < 1; it is in `drive` and `feed`.
+    transition : ndarray, shape (n, n)
+        Of the state over one sample.
+    drive : ndarray, shape (n, 3)
+        What three input samples add to it.
+    output : ndarray, shape (n,)
+        Output per state.
+    feed : ndarray, shape (3,)
+        Output per input sample.
+    generator, entry : ndarray, shapes (n, n) and (n,)
+        The continuous state's matrix and its input's column, per sample.
+    through : float
+        Output per input, at once.
+    error : float
+        Greatest error of the response up to `band`, over the response; 0 where it is exact.
+    gain : float
+        Greatest gain of the prefilter at any frequency.
+    band : float
+        Frequency in Hz up to which `error` holds.
+    """
+
+    fs: float
+    intersample: Intersample
+    prefilter: _Real
+    delay: int
+    fraction: float
+    transition: _Real
+    drive: _Real
+    output: _Real
+    feed: _Real
+    generator: _Real
+    entry: _Real
+    through: float
+    error: float
+    gain: float
+    band: float
+
+    @property
+    def order(self) -> int:
+        """States."""
+        return int(self.output.size)
+
+    def response(self, frequency: _Real) -> NDArray[np.complex128]:
+        """Response at `frequency` in Hz, shape (m,), from input samples to output samples."""
+        z = np.exp(2j * np.pi * np.asarray(frequency) / self.fs)
+        taps = z[:, None] ** -np.arange(self.prefilter.size)
+        before = (taps @ self.prefilter) * z**-self.delay
+        return np.asarray(before * _response(self, z))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class RowPiece:
+    """Output between two samples, for ages from `start` to `stop` (in samples, 0 newest).
+
+    The output ``age`` before sample k is ``rows(age) [x[k-1], v]``; each of the n + 3 numbers is
+    ``Σ coefficients[:, i] tⁱ`` with t from -1 at `start` to 1 at `stop`.
+    """
+
+    start: float
+    stop: float
+    coefficients: _Real
+
+
+def discretise(
+    system: RationalDelay, *, fs: float, intersample: Intersample, band: float | None = None
+) -> Discrete:
+    """Turn a continuous model into one that is stepped at a rate.
+
+    Parameters
+    ----------
+    system : RationalDelay
+        The model, in seconds; its delay at least 0.
+    fs : float
+        Rate in Hz.
+    intersample : {'zoh', 'foh', 'bandlimited'}
+        What the input does between its samples.
+    band : float, optional
+        Frequency in Hz up to which a band-limited input has content; a fifth of the rate by
+        default.
+
+    Raises
+    ------
+    ArgumentError
+        If the delay is negative, or the rate not positive.
+
+    Examples
+    --------
+    >>> lag = RationalDelay(delay=0.025, numerator=np.ones(1), denominator=np.array([1.0, 0.1]))
+    >>> step = discretise(lag, fs=100.0, intersample="zoh")
+    >>> step.delay, round(step.fraction, 9), round(float(step.transition[0, 0]), 6)
+    (2, 0.5, 0.904837)
+    """
+    if not (np.isfinite(fs) and fs > 0):
+        raise ArgumentError(f"fs = {fs!r} Hz is not a rate; give a positive number")
+    if not system.delay >= 0:
+        raise ArgumentError(
+            f"delay {system.delay:.6g} s is negative; no program can run ahead of its input, so "
+            "take the delay as 0, or add one"
+        )
+    reach = min(band, 0.45 * fs) if band else 0.2 * fs
+    total = system.delay * fs
+    ahead = 0
+    if intersample == "bandlimited":
+        ahead = min(int(total + _WHOLE), LOOKAHEAD)
+    rest = total - ahead
+    whole = int(rest + _WHOLE)
+    fraction = max(rest - whole, 0.0)
+    generator, entry, output, through = _realised(system, fs)
+    between: Intersample = "zoh" if intersample == "zoh" else "foh"
+    row = _row(generator, entry, output, through, fraction, 0.0, between)
+    n = output.size
+    transition, drive = _reached(generator, entry, fraction, 1.0, between)
+    plain = Discrete(
+        fs=fs,
+        intersample=intersample,
+        prefilter=np.ones(1),
+        delay=whole,
+        fraction=fraction,
+        transition=transition,
+        drive=drive,
+        output=output,
+        feed=row[n:] - output @ drive,
+        generator=generator,
+        entry=entry,
+        through=through,
+        error=0.0,
+        gain=1.0,
+        band=reach,
+    )
+    if intersample != "bandlimited":
+        return plain
+    if not n and fraction == 0.0:  # a gain and whole samples: nothing lies between
+        return replace(plain, delay=whole + ahead)
+    return _prefiltered(plain, system, ahead)
+
+
+def _prefiltered(plain: Discrete, system: RationalDelay, ahead: int) -> Discrete:
+    def wanted(f: _Real) -> NDArray[np.complex128]:
+        return response(system, f * plain.fs)
+
+    def bare(f: _Real) -> NDArray[np.complex128]:
+        return plain.response(f * plain.fs)
+
+    designed = causal_filter(wanted, bare, ahead=ahead, band=plain.band / plain.fs)
+    return replace(plain, prefilter=designed.taps, error=designed.error, gain=designed.gain)
+
+
+def _response(step: Discrete, z: NDArray[np.complex128]) -> NDArray[np.complex128]:
+    taps = z[:, None] ** -np.arange(TAPS)
+    direct = taps @ step.feed
+    if not step.order:
+        return np.asarray(direct)
+    pencil = np.eye(step.order) - step.transition / z[:, None, None]
+    driven = (taps @ step.drive.T).astype(np.complex128)
+    states = np.linalg.solve(pencil, driven[:, :, None])[:, :, 0]
+    return np.asarray(states @ step.output + direct)
+
+
+def _realised(system: RationalDelay, fs: float) -> tuple[_Real, _Real, _Real, float]:
+    """State matrices per sample, scaled so that their entries are alike in size."""
+    a = np.trim_zeros(system.denominator * fs ** np.arange(system.denominator.size), "b")
+    b = system.numerator * fs ** np.arange(system.numerator.size)
+    if a.size == 1:
+        return np.zeros((0, 0)), np.zeros(0), np.zeros(0), float(b[0] / a[0])
+    A, B, C, D = tf2ss(b[::-1], a[::-1])
+    balanced, (scale, _) = matrix_balance(A, permute=False, separate=True)
+    entry, output = B[:, 0] / scale, C[0] * scale
+    size = np.abs(entry).max()  # the state counts in units of what comes in
+    return np.asarray(balanced), np.asarray(entry / size), np.asarray(output * size), float(D[0, 0])
+
+
+def _advance(generator: _Real, entry: _Real, span: float) -> tuple[_Real, _Real, _Real]:
+    """Transition over `span`, and what an input that stands at 1, or grows as s, adds."""
+    n = entry.size
+    wide = np.zeros((n + 2, n + 2))
+    wide[:n, :n] = generator
+    wide[:n, n] = entry
+    wide[n, n + 1] = 1.0
+    moved = expm(wide * span)
+    return moved[:n, :n], moved[:n, n], moved[:n, n + 1]
+
+
+def _ramps(begin: float, between: Intersample) -> tuple[_Real, _Real]:
+    """Input over a piece that begins `begin` into its sample: value and slope per older, newer."""
+    if between == "zoh":
+        return np.array([1.0, 0.0]), np.zeros(2)
+    return np.array([1.0 - begin, begin]), np.array([-1.0, 1.0])
+
+
+def _reached(
+    generator: _Real, entry: _Real, fraction: float, until: float, between: Intersample
+) -> tuple[_Real, _Real]:
+    """Transition and taps (newest first) from sample k-1 to `until` into the sample after it.
+
+    The delayed input is in its older sample up to `fraction`, then in the newer one.
+    """
+    n = entry.size
+    drive = np.zeros((n, TAPS))
+    first = min(until, fraction)
+    transition, still, growing = _advance(generator, entry, first)
+    value, slope = _ramps(1.0 - fraction, between)
+    drive[:, 2] = still * value[0] + growing * slope[0]
+    drive[:, 1] = still * value[1] + growing * slope[1]
+    if until > fraction:
+        onward, still, growing = _advance(generator, entry, until - fraction)
+        transition, drive = onward @ transition, onward @ drive
+        value, slope = _ramps(0.0, between)
+        drive[:, 1] += still * value[0] + growing * slope[0]
+        drive[:, 0] += still * value[1] + growing * slope[1]
+    return transition, drive
+
+
+def _row(
+    generator: _Real,
+    entry: _Real,
+    output: _Real,
+    through: float,
+    fraction: float,
+    age: float,
+    between: Intersample,
+) -> _Real:
+    """Output `age` samples before sample k, per state at k-1 and input tap, shape (n + 3,)."""
+    until = 1.0 - age
+    transition, drive = _reached(generator, entry, fraction, until, between)
+    held = np.zeros(TAPS)  # the delayed input itself, then
+    late = until - fraction
+    if between == "zoh":
+        # At a sample the new value counts, if the delay is whole.
+        held[0 if late >= 1.0 - _WHOLE else (1 if late >= 0 else 2)] = 1.0
+    elif late >= 0:
+        held[:2] = late, 1.0 - late
+    else:
+        held[1:] = 1.0 + late, -late
+    return np.concatenate([output @ transition, output @ drive + through * held])
+
+
+def rows_between(step: Discrete) -> tuple[RowPiece, ...]:
+    """Output between samples, as polynomials of the age: for a sensor that reads by its own clock.
+
+    Parameters
+    ----------
+    step : Discrete
+        For a held or linear input.
+
+    Returns
+    -------
+    tuple of RowPiece
+        One or two pieces that cover ages from 0 to 1: the answer bends where the delayed input
+        comes to its next sample.
+
+    Examples
+    --------
+    A gain that is late by half a sample shows an older input from half a sample on:
+
+    >>> late = RationalDelay(delay=0.005, numerator=np.ones(1), denominator=np.ones(1))
+    >>> pieces = rows_between(discretise(late, fs=100.0, intersample="zoh"))
+    >>> [(p.start, p.stop, p.coefficients[:, 0].round(9).tolist()) for p in pieces]
+    [(0.0, 0.5, [0.0, 1.0, 0.0]), (0.5, 1.0, [0.0, 0.0, 1.0])]
+    """
+    between: Intersample = "zoh" if step.intersample == "zoh" else "foh"
+    bend = 1.0 - step.fraction
+    edges = [0.0, bend, 1.0] if _WHOLE < bend < 1.0 - _WHOLE else [0.0, 1.0]
+    pieces = []
+    nodes = np.cos(np.pi * (np.arange(ROW_DEGREE + 1) + 0.5) / (ROW_DEGREE + 1))
+    for start, stop in pairwise(edges):
+        ages = 0.5 * (start + stop) + 0.5 * (stop - start) * nodes
+        rows = np.array(
+            [
+                _row(
+                    step.generator,
+                    step.entry,
+                    step.output,
+                    step.through,
+                    step.fraction,
+                    float(age),
+                    between,
+                )
+                for age in ages
+            ]
+        )
+        series = np.polynomial.chebyshev.chebfit(nodes, rows, ROW_DEGREE)
+        powers = np.zeros_like(series.T)
+        for i, one in enumerate(series.T):
+            plain = np.polynomial.chebyshev.cheb2poly(one)
+            powers[i, : plain.size] = plain
+        powers[np.abs(powers) < 1e-15 * max(np.abs(powers).max(), 1e-300)] = 0.0
+        pieces.append(RowPiece(start=start, stop=stop, coefficients=powers))
+    return tuple(pieces)
