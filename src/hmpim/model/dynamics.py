@@ -45,15 +45,18 @@ class Structure:
     sections : tuple of int
         Orders, 1 or 2, of the sections of the denominator.
     zeros : int
-        Degree of the numerator, less than that of the denominator.
+        Degree of the numerator, at most that of the denominator.
     integrators : int
         Poles at zero, 0 or 1. With one, the scale factor is the output's rate per input.
+    dc_zeros : int
+        Zeros at zero: the least power of the numerator. With one, a constant input does nothing.
     """
 
     name: StructureName
     sections: tuple[int, ...]
     zeros: int = 0
     integrators: int = 0
+    dc_zeros: int = 0
 
     @property
     def order(self) -> int:
@@ -63,7 +66,7 @@ class Structure:
     @property
     def parameters(self) -> int:
         """How many parameters a fit has: delay, denominator, numerator, bias, and noise."""
-        return 1 + self.order + (self.zeros + 1) + 2
+        return 1 + self.order + (self.zeros + 1 - self.dc_zeros) + 2
 
 
 STRUCTURES: dict[StructureName, Structure] = {

@@ -28,9 +28,16 @@ from scipy.signal import firwin, lfilter, oaconvolve
 
 from hmpim.record import Intersample
 
-__all__ = ["SampledInput", "delayed_response", "prepare_input"]
+__all__ = [
+    "MARGIN",
+    "SampledInput",
+    "delayed_response",
+    "prepare_input",
+    "spline_at",
+    "spline_signs",
+]
 
-_MARGIN = 24
+MARGIN = 24
 """Samples by which the input is continued at either end: a spline's reach, with room."""
 
 _BAND_PER_RATE = 0.16
@@ -83,10 +90,10 @@ def prepare_input(u: NDArray[np.float64], intersample: Intersample) -> SampledIn
     1.0
     """
     deviation = u - u[0]
-    before = np.zeros(_MARGIN)
-    reach = min(_MARGIN, u.size - 1)
+    before = np.zeros(MARGIN)
+    reach = min(MARGIN, u.size - 1)
     after = 2.0 * deviation[-1] - deviation[-2 : -2 - reach : -1]  # odd about the last sample
-    after = np.concatenate([after, np.full(_MARGIN - reach, after[-1] if reach else 0.0)])
+    after = np.concatenate([after, np.full(MARGIN - reach, after[-1] if reach else 0.0)])
     if intersample == "zoh":
         after[:] = deviation[-1]
     extended = np.concatenate([before, deviation, after])
@@ -134,7 +141,7 @@ def _interpolated(extended: NDArray[np.float64], factor: int) -> NDArray[np.floa
 
 
 @cache
-def _spline_signs(degree: int) -> NDArray[np.float64]:
+def spline_signs(degree: int) -> NDArray[np.float64]:
     return np.array([(-1.0) ** j * comb(degree + 1, j) for j in range(degree + 2)])
 
 
@@ -167,7 +174,7 @@ def _spline_taps(
     recursion = _characteristic(step[:n, :n])
     # Differences make the spline of the truncated powers, the recursion makes it finite.
     weights = np.zeros(taps + 1)
-    both = np.convolve(_spline_signs(degree), recursion)
+    both = np.convolve(spline_signs(degree), recursion)
     weights[: min(both.size, taps)] = both[:taps]
     numerators = weights[_lower(taps)] @ truncated
     return np.ascontiguousarray(numerators.T), recursion
@@ -196,11 +203,11 @@ def _characteristic(step: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.asarray(np.poly(step).real)
 
 
-def _spline_at(lag: float, degree: int) -> NDArray[np.float64]:
+def spline_at(lag: float, degree: int) -> NDArray[np.float64]:
     """One B-spline itself, sampled at i - lag: the answer of a system without dynamics."""
     i = np.arange(degree + 2)
     answer = np.zeros(degree + 2)
-    for j, sign in enumerate(_spline_signs(degree)):
+    for j, sign in enumerate(spline_signs(degree)):
         t = i - lag - j
         power = np.where(t >= 0, 1.0, 0.0) if degree == 0 else np.maximum(t, 0.0) ** degree
         answer += sign * power / factorial(degree)
@@ -247,7 +254,7 @@ def delayed_response(
     whole = floor(offset)
     lag = offset - whole
     n = denominator.size - 1
-    begin = factor * _MARGIN - whole  # where in the filtered coefficients the record begins
+    begin = factor * MARGIN - whole  # where in the filtered coefficients the record begins
     stop = begin + factor * source.samples
     c = source.coefficients[: max(stop, 0)]
     if stop > source.coefficients.size:
@@ -270,6 +277,6 @@ def delayed_response(
         for i in range(min(powers, n)):
             out[i] = filtered(numerators[i] * scale[i], recursion)
     if powers > n:
-        fed = filtered(_spline_at(lag, source.degree), np.ones(1))
+        fed = filtered(spline_at(lag, source.degree), np.ones(1))
         out[n] = (fed - denominator[:-1] @ out[:n]) / denominator[-1] if n else fed
     return out

@@ -188,10 +188,7 @@ def _plainly(problem: Problem, fit: Fit) -> Fit:
     """Return the fit with its residual as it is, not whitened."""
     if problem.whitening is None:
         return fit
-    residual = problem.y - fit.prediction
-    if problem.valid is not None:
-        residual = residual * problem.valid
-    return replace(fit, residual=residual, cost=float(residual @ residual))
+    return replace(fit, cost=float(fit.residual @ fit.residual))
 
 
 def _akaike(problem: Problem, fit: Fit) -> float:

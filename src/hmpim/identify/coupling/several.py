@@ -16,10 +16,11 @@ from numpy.typing import NDArray
 from scipy.fft import irfft, next_fast_len, rfft
 
 from hmpim.identify.coupling.couplings import FOLLOWS, coupling_fit, whitening_of
-from hmpim.identify.coupling.jointly import gained_by, joint_covariance, refined_together
+from hmpim.identify.coupling.jointly import gained_by, joint_covariance
 from hmpim.identify.coupling.lag import Lag, lag_of
 from hmpim.identify.fitting.enrich import PLAIN
 from hmpim.identify.fitting.fit import Fit, Problem, fit_structure, jacobian
+from hmpim.identify.fitting.fit import fit_together as fit_all
 from hmpim.identify.fitting.joint import JointFit, joint_fit
 from hmpim.identify.verdict import is_unrelated
 from hmpim.identify.whiteness import effective_share, is_white
@@ -294,7 +295,14 @@ def _refine(
     )
     valid = None if bool(counted.all()) else counted
     problems = [replace(fits[j].problem, y=y, valid=valid, whitening=whitening) for j in some]
-    found = refined_together(problems, [fits[j].best.fit for j in some], y)
+    begun = [fits[j].best.fit for j in some]
+    found = fit_all(
+        problems,
+        [fit.structure for fit in begun],
+        [fit.theta for fit in begun],
+        iterations=8,
+        precision=1e-3,
+    )
     parts = {j: fit.prediction - fit.linear[-1] for j, fit in zip(some, found, strict=True)}
     total = sum(parts.values(), np.zeros(y.size))
     for j, fit in zip(some, found, strict=True):

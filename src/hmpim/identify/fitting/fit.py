@@ -1,24 +1,23 @@
-"""Maximum likelihood for one structure: delay, dynamics, scale factor and bias together.
+"""Maximum likelihood at given structures: delay, dynamics, scale factor and bias together.
 
 With white Gaussian noise the likelihood is greatest where the sum of squares of the
-residual is least. Delay and denominator enter nonlinearly, numerator and bias linearly;
-the linear ones are solved exactly at each step (variable projection: G. H. Golub and
-V. Pereyra, SIAM J. Numer. Anal. 10, 1973), the others by Levenberg-Marquardt.
+residual is least. Delay and denominator enter nonlinearly, all else linearly; the linear
+parameters are solved exactly at each step (variable projection: G. H. Golub and
+V. Pereyra, SIAM J. Numer. Anal. 10, 1973), the others by Levenberg-Marquardt, with derivatives in
+closed form. One input or several, with a drift or without, from rest or in mid-motion: there is
+one optimiser.
 """
 
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.fft import irfft, rfft
 
+from hmpim.identify.fitting.rows import Part, Problem
 from hmpim.model.dynamics import Structure, coefficients_of, denominator_of
-from hmpim.model.sampled import SampledInput, delayed_response
 
-__all__ = ["Fit", "Problem", "basis_rows", "fit_structure", "jacobian", "moved_by"]
-
-_STEP = 1e-6
-"""Step of the derivatives, relative to a parameter above 1: its square is below rounding."""
+__all__ = ["Fit", "Problem", "fit_structure", "fit_together", "jacobian", "solved"]
 
 _LONGEST_TIME_CONSTANT = 2.0
 """In record lengths; a slower pole cannot be told from an integrator."""
@@ -26,52 +25,18 @@ _LONGEST_TIME_CONSTANT = 2.0
 _SHORTEST_TIME_CONSTANT = 0.02
 """In samples; a faster pole cannot be told from none."""
 
-
 _SHAPES = (1e-4, 1e6)
 """Bounds of 1 / (4ζ²): from a second pole 10 000 times as fast as the first, to ζ = 0.0005."""
 
+_UNSEEN = 1e-13
+"""Share of the greatest eigenvalue below which the record does not see a direction."""
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Problem:
-    """One input, one output, and which samples of the output count.
-
-    Parameters
-    ----------
-    source : SampledInput
-        The prepared input.
-    y : ndarray, shape (n,)
-        Output samples.
-    valid : ndarray of bool, shape (n,), or None
-        Samples that count; None when all do.
-    longest_delay : float
-        Greatest delay to try, in samples.
-    whitening : ndarray, shape (n // 2 + 1,), or None
-        Gain at each bin of the transform after which the noise is white; residuals and
-        derivatives then are those of the whitened output. None for noise that is white.
-    """
-
-    source: SampledInput
-    y: NDArray[np.float64]
-    valid: NDArray[np.bool_] | None
-    longest_delay: float
-    whitening: NDArray[np.float64] | None = None
-
-    @property
-    def counted(self) -> int:
-        """How many samples count."""
-        return self.y.size if self.valid is None else int(np.count_nonzero(self.valid))
-
-    def masked(self, rows: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return `rows`, (k, n) or (n,), samples that do not count set to 0, noise whitened."""
-        counted = rows if self.valid is None else rows * self.valid
-        if self.whitening is None:
-            return counted
-        return np.asarray(irfft(rfft(counted) * self.whitening, rows.shape[-1]))
+Real = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Fit:
-    """Where a fit ended.
+    """Where a fit ended, for one input.
 
     Parameters
     ----------
@@ -80,25 +45,32 @@ class Fit:
     theta : ndarray, shape (1 + order,)
         Delay in samples, then the parameters of the denominator's sections (`coefficients_of`),
         time in samples.
-    linear : ndarray, shape (zeros + 2,)
+    linear : ndarray, shape (m + 1,)
         Numerator coefficients by rising power of s (the first is the scale factor), bias.
     prediction : ndarray, shape (n,)
-        Output of the fitted model.
+        Output of the fitted model, drift and free response included; where there are several
+        inputs, what this one and the bias make of it.
     residual : ndarray, shape (n,)
-        Output less prediction; 0 where a sample does not count.
+        Output less prediction of all, not whitened; 0 where a sample does not count.
     cost : float
-        Sum of squares of the residual.
+        Sum of squares of the residual, whitened where the problem says how.
     converged : bool
         Whether the last step was negligible.
+    nuisance : ndarray, shape (k,)
+        What multiplies the problem's nuisance rows.
+    initial : ndarray, shape (order,) or (0,)
+        What multiplies the free responses.
     """
 
     structure: Structure
-    theta: NDArray[np.float64]
-    linear: NDArray[np.float64]
-    prediction: NDArray[np.float64]
-    residual: NDArray[np.float64]
+    theta: Real
+    linear: Real
+    prediction: Real
+    residual: Real
     cost: float
     converged: bool
+    nuisance: Real
+    initial: Real
 
     @property
     def delay(self) -> float:
@@ -106,107 +78,118 @@ class Fit:
         return float(self.theta[0])
 
     @property
-    def denominator(self) -> NDArray[np.float64]:
+    def denominator(self) -> Real:
         """A(s) by rising powers of s per sample, shape (order + 1,)."""
         return denominator_of(self.structure, coefficients_of(self.structure, self.theta[1:]))
 
 
-def basis_rows(
-    problem: Problem, structure: Structure, theta: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    """Responses that the linear parameters multiply, shape (zeros + 1, n)."""
-    return _responses(problem, structure, theta, structure.zeros + 1)
+class _Evaluation:
+    """All inputs at given parameters: linear parameters solved, residual, derivatives on demand."""
+
+    def __init__(self, problems: Sequence[Problem], parts: Sequence[Part]) -> None:
+        self.problems, self.parts = problems, parts
+        first = problems[0]
+        self._blocks = [rows for part in parts for rows in (part.rows, part.free)]
+        self.rows = np.vstack([*self._blocks, first.fixed()])
+        self.counted = first.masked(self.rows)
+        target = first.masked(first.y)
+        gram = self.counted @ self.counted.T
+        self.linear = solved(gram, self.counted @ target)
+        self.residual = target - self.linear @ self.counted
+        self.cost = float(self.residual @ self.residual)
+
+    def weights(self) -> list[Real]:
+        """Linear parameters: numerator and initial state of each input, then the fixed rows'."""
+        edges = np.cumsum([block.shape[0] for block in self._blocks])
+        return np.split(self.linear, edges)
+
+    def slopes(self) -> Real:
+        """Derivatives of the prediction by all delays and denominators, as they count."""
+        weights = self.weights()
+        rows = [
+            part.slopes(weights[2 * i], weights[2 * i + 1]) for i, part in enumerate(self.parts)
+        ]
+        return self.problems[0].masked(np.vstack(rows))
+
+    def fits(self, *, converged: bool) -> list[Fit]:
+        """What each input makes of the output."""
+        weights = self.weights()
+        fixed, problem = weights[-1], self.problems[0]
+        residual = problem.y - self.linear @ self.rows
+        if problem.valid is not None:
+            residual = residual * problem.valid
+        out = []
+        for i, part in enumerate(self.parts):
+            own = weights[2 * i] @ part.rows + fixed[0]
+            if part.free.shape[0]:
+                own = own + weights[2 * i + 1] @ part.free
+            if len(self.parts) == 1 and problem.nuisance is not None:
+                own = own + fixed[1:] @ problem.nuisance
+            out.append(
+                Fit(
+                    structure=part.structure,
+                    theta=part.theta,
+                    linear=np.append(weights[2 * i], fixed[0]),
+                    prediction=own,
+                    residual=residual,
+                    cost=self.cost,
+                    converged=converged,
+                    nuisance=fixed[1:],
+                    initial=weights[2 * i + 1],
+                )
+            )
+        return out
 
 
-def _responses(
-    problem: Problem, structure: Structure, theta: NDArray[np.float64], powers: int
-) -> NDArray[np.float64]:
-    """Responses of s^i e^(-sτ) / A(s), the level before the record included."""
-    rows = delayed_response(
-        problem.source,
-        delay=float(theta[0]),
-        denominator=denominator_of(structure, coefficients_of(structure, theta[1:])),
-        powers=powers,
-    )
-    level = problem.source.first
-    if structure.integrators and level:
-        # What the level before the record adds up to from its first sample on.
-        since = np.maximum(np.arange(problem.y.size) - float(theta[0]), 0.0)
-        rows[0] += level * since
-        if powers > 1:
-            rows[1] += level * (since > 0)
-    else:
-        rows[0] += level
-    return rows
+def _evaluated(
+    problems: Sequence[Problem], structures: Sequence[Structure], thetas: Sequence[Real]
+) -> _Evaluation:
+    parts = [Part(p, s, t) for p, s, t in zip(problems, structures, thetas, strict=True)]
+    return _Evaluation(problems, parts)
 
 
-def _solve_linear(problem: Problem, structure: Structure, theta: NDArray[np.float64]) -> Fit:
-    """Best numerator and bias at given delay and denominator."""
-    basis = basis_rows(problem, structure, theta)
-    rows = np.vstack([basis, np.ones(problem.y.size)])
-    counted = problem.masked(rows)
-    y = problem.masked(problem.y)
-    linear = _least_squares(counted @ counted.T, counted @ y)
-    prediction = linear @ rows
-    residual = problem.masked(problem.y - prediction)
-    return Fit(
-        structure=structure,
-        theta=theta,
-        linear=linear,
-        prediction=prediction,
-        residual=residual,
-        cost=float(residual @ residual),
-        converged=False,
-    )
-
-
-def _least_squares(
-    gram: NDArray[np.float64], moment: NDArray[np.float64], damping: float = 0.0
-) -> NDArray[np.float64]:
+def solved(gram: Real, moment: Real, damping: float = 0.0) -> Real:
     """Solve normal equations, scaled to unit diagonal; directions without content stay 0."""
     diagonal = np.diag(gram)
     scale = np.sqrt(np.where(diagonal > 1e-200 * diagonal.max(), diagonal, 1.0))
     scaled = gram / np.outer(scale, scale)
     values, vectors = np.linalg.eigh(scaled)
-    keep = values > 1e-13 * values[-1]
+    keep = values > _UNSEEN * values[-1]
     projected = (vectors.T @ (moment / scale))[keep] / (values[keep] + damping)
     return np.asarray(vectors[:, keep] @ projected / scale)
 
 
-def jacobian(problem: Problem, fit: Fit) -> NDArray[np.float64]:
-    """Derivatives of the prediction with respect to theta, then to the linear parameters.
+def jacobian(problem: Problem, fit: Fit) -> Real:
+    """Derivatives of the prediction with respect to theta, then to `fit.linear`.
+
+    Drift and initial state, where they are fitted, are projected out: the inverse of the rows'
+    Gram matrix then is the covariance with them unknown.
 
     Returns
     -------
-    ndarray, shape (1 + order + zeros + 2, n)
+    ndarray, shape (1 + order + m + 1, n)
         Zero where a sample does not count.
     """
-    weights, theta, structure = fit.linear[:-1], fit.theta, fit.structure
-    rows = np.empty((theta.size + fit.linear.size, problem.y.size))
-    # d/dτ of e^(-sτ) is -s: one more power of s, whose responses come at little cost.
-    dynamic = structure.order + structure.integrators > 0
-    responses = _responses(problem, structure, theta, structure.zeros + (2 if dynamic else 1))
-    basis = responses[: weights.size]
-    here = weights @ basis
-    for i in range(theta.size):
-        if i == 0 and dynamic:
-            rows[0] = -(weights @ responses[1:])
-            continue
-        moved = theta.copy()
-        step = _STEP * max(1.0, abs(theta[i]))
-        moved[i] += step
-        rows[i] = (weights @ basis_rows(problem, structure, moved) - here) / step
-    rows[theta.size : -1] = basis
-    rows[-1] = 1.0
-    return problem.masked(rows)
+    part = Part(problem, fit.structure, fit.theta)
+    bias = np.ones((1, problem.y.size))
+    rows = np.vstack([part.slopes(fit.linear[:-1], fit.initial), part.rows, bias])
+    counted = problem.masked(rows)
+    others = [part.free] if problem.nuisance is None else [part.free, problem.nuisance]
+    return without(counted, problem.masked(np.vstack(others)))
 
 
-def _bounded(
-    problem: Problem,
-    structure: Structure,
-    theta: NDArray[np.float64],
-    shortest_delay: float,
-) -> NDArray[np.float64]:
+def without(rows: Real, others: Real) -> Real:
+    """Project `others`, (k, n), out of `rows`, (p, n)."""
+    if not others.shape[0]:
+        return rows
+    scale = np.sqrt(np.maximum(np.sum(others**2, axis=1), np.finfo(float).tiny))
+    q, r = np.linalg.qr((others / scale[:, None]).T)
+    told = np.abs(np.diag(r)) > np.sqrt(_UNSEEN)
+    q = q[:, told]
+    return np.asarray(rows - (rows @ q) @ q.T)
+
+
+def _bounded(problem: Problem, structure: Structure, theta: Real, shortest_delay: float) -> Real:
     """Keep delay and time constants where the record can tell them."""
     bounded = theta.copy()
     bounded[0] = np.clip(theta[0], shortest_delay, problem.longest_delay)
@@ -220,13 +203,7 @@ def _bounded(
     return bounded
 
 
-def moved_by(problem: Problem, fit: Fit, step: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return theta after a step, no coefficient changed beyond recognition, within bounds."""
-    share = _limited(fit.structure, fit.theta, step)
-    return _bounded(problem, fit.structure, fit.theta + share * step, -4.0)
-
-
-def _limited(structure: Structure, theta: NDArray[np.float64], step: NDArray[np.float64]) -> float:
+def _limited(structure: Structure, theta: Real, step: Real) -> float:
     """Share of a step to take so that no coefficient changes beyond recognition."""
     share, start = 1.0, 1
     for order in structure.sections:
@@ -241,7 +218,7 @@ def _limited(structure: Structure, theta: NDArray[np.float64], step: NDArray[np.
 def fit_structure(
     problem: Problem,
     structure: Structure,
-    theta: NDArray[np.float64],
+    theta: Real,
     *,
     iterations: int = 40,
     precision: float = 1e-2,
@@ -270,45 +247,80 @@ def fit_structure(
     Fit
         `converged` is False if the steps ran out.
     """
-    fit = _solve_linear(problem, structure, _bounded(problem, structure, theta, shortest_delay))
-    damping = 1e-4
-    unknown = fit.theta.size
-    freedom = max(problem.counted - unknown - fit.linear.size, 1)
-    for _ in range(iterations):
-        rows = jacobian(problem, fit)
-        gram, moment = rows @ rows.T, rows @ fit.residual
-        negligible = precision * fit.cost / freedom
-        undamped = _damped_step(gram, moment, unknown, 0.0)
-        if float(undamped @ moment[:unknown]) < negligible:  # Newton's decrement
-            return replace(fit, converged=True)
-        while True:
-            step = _damped_step(gram, moment, unknown, damping)
-            step = _limited(structure, fit.theta, step) * step
-            trial = _solve_linear(
-                problem,
-                structure,
-                _bounded(problem, structure, fit.theta + step, shortest_delay),
-            )
-            if trial.cost < fit.cost:
-                damping = max(damping / 10, 1e-9)
-                break
-            if damping > 1e6:  # no way down: a kink, a bound, or the arithmetic's own floor
-                return replace(fit, converged=True)
-            damping *= 10
-        fell, fit = fit.cost - trial.cost, trial
-        if fell < negligible and damping < 1e-3:
-            return replace(fit, converged=True)
+    (fit,) = fit_together(
+        [problem],
+        [structure],
+        [theta],
+        iterations=iterations,
+        precision=precision,
+        shortest_delay=shortest_delay,
+    )
     return fit
 
 
-def _damped_step(
-    gram: NDArray[np.float64], moment: NDArray[np.float64], unknown: int, damping: float
-) -> NDArray[np.float64]:
-    """Levenberg-Marquardt step of the nonlinear parameters, the linear ones projected out."""
-    nonlinear, mixed, linear = (
-        gram[:unknown, :unknown],
-        gram[:unknown, unknown:],
-        gram[unknown:, unknown:],
-    )
-    projected = nonlinear - mixed @ np.linalg.lstsq(linear, mixed.T, rcond=None)[0]
-    return _least_squares(projected, moment[:unknown], damping)
+def fit_together(
+    problems: Sequence[Problem],
+    structures: Sequence[Structure],
+    thetas: Sequence[Real],
+    *,
+    iterations: int = 40,
+    precision: float = 1e-2,
+    shortest_delay: float = -4.0,
+) -> list[Fit]:
+    """Fit one output to several inputs at once, each with a structure of its own.
+
+    Parameters
+    ----------
+    problems : sequence of Problem
+        One for each input; output, mask, whitening, nuisance and beginning are the first one's.
+    structures, thetas, iterations, precision, shortest_delay
+        As for `fit_structure`, one structure and start for each input.
+
+    Returns
+    -------
+    list of Fit
+        One for each input, residual and cost common to all.
+    """
+    sizes = [theta.size for theta in thetas]
+    edges = np.cumsum(sizes)[:-1]
+
+    def bounded(moved: Sequence[Real]) -> list[Real]:
+        return [
+            _bounded(p, s, t, shortest_delay)
+            for p, s, t in zip(problems, structures, moved, strict=True)
+        ]
+
+    best = _evaluated(problems, structures, bounded(thetas))
+    damping = 1e-4
+    freedom = max(problems[0].counted - sum(sizes) - best.linear.size, 1)
+    for _ in range(iterations):
+        rows = best.slopes()
+        moment = rows @ best.residual
+        normal = _projected(rows, best.counted)
+        negligible = precision * best.cost / freedom
+        # Newton's decrement: what a full step would still gain
+        if float(solved(normal, moment) @ moment) < negligible:
+            return best.fits(converged=True)
+        while True:
+            steps = np.split(solved(normal, moment, damping), edges)
+            here = [part.theta for part in best.parts]
+            share = min(_limited(s, t, d) for s, t, d in zip(structures, here, steps, strict=True))
+            moved = bounded([t + share * d for t, d in zip(here, steps, strict=True)])
+            trial = _evaluated(problems, structures, moved)
+            if trial.cost < best.cost:
+                damping = max(damping / 10, 1e-9)
+                break
+            if damping > 1e6:  # no way down: a kink, a bound, or the arithmetic's own floor
+                return best.fits(converged=True)
+            damping *= 10
+        fell, best = best.cost - trial.cost, trial
+        if fell < negligible and damping < 1e-3:
+            return best.fits(converged=True)
+    return best.fits(converged=False)
+
+
+def _projected(rows: Real, linear: Real) -> Real:
+    """Normal equations of the nonlinear parameters, the linear ones projected out."""
+    mixed = rows @ linear.T
+    inner = linear @ linear.T
+    return np.asarray(rows @ rows.T - mixed @ np.linalg.lstsq(inner, mixed.T, rcond=None)[0])

@@ -1,0 +1,171 @@
+"""The rows of one problem: what each linear parameter multiplies, and the derivatives.
+
+The output is a sum of rows: for each input, B(s)/A(s) behind a delay, one row for each
+coefficient of B; the bias; whatever else is linear, such as a drift; and, where a record does not
+begin at rest, the free response of the state it begins with.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.fft import irfft, rfft
+
+from hmpim.identify.fitting.sections import Expansion, Poles, poles_of
+from hmpim.model.dynamics import Structure
+from hmpim.model.poles import PoleResponses, input_responses
+from hmpim.model.sampled import SampledInput
+
+__all__ = ["Part", "Problem"]
+
+Real = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Problem:
+    """One input, one output, and which samples of the output count.
+
+    Parameters
+    ----------
+    source : SampledInput
+        The prepared input.
+    y : ndarray, shape (n,)
+        Output samples.
+    valid : ndarray of bool, shape (n,), or None
+        Samples that count; None when all do.
+    longest_delay : float
+        Greatest delay to try, in samples.
+    whitening : ndarray, shape (n // 2 + 1,), or None
+        Gain at each bin of the transform after which the noise is white; residuals and
+        derivatives then are those of the whitened output. None for noise that is white.
+    nuisance : ndarray, shape (k, n), or None
+        Rows beside the bias that enter linearly, such as a drift's.
+    begins : int or None
+        Sample from which on the free response of an unknown state is fitted; those before do not
+        count. None for a record that begins at rest.
+    """
+
+    source: SampledInput
+    y: Real
+    valid: NDArray[np.bool_] | None
+    longest_delay: float
+    whitening: Real | None = None
+    nuisance: Real | None = None
+    begins: int | None = None
+
+    @property
+    def counted(self) -> int:
+        """How many samples count."""
+        return self.y.size if self.valid is None else int(np.count_nonzero(self.valid))
+
+    def masked(self, rows: Real) -> Real:
+        """Return `rows`, (k, n) or (n,), samples that do not count set to 0, noise whitened."""
+        counted = rows if self.valid is None else rows * self.valid
+        if self.whitening is None:
+            return counted
+        return np.asarray(irfft(rfft(counted) * self.whitening, rows.shape[-1]))
+
+    def fixed(self) -> Real:
+        """Bias and nuisance, shape (1 + k, n)."""
+        bias = np.ones((1, self.y.size))
+        return bias if self.nuisance is None else np.vstack([bias, self.nuisance])
+
+
+class Part:
+    """What one input does to the output at given parameters.
+
+    Parameters
+    ----------
+    problem : Problem
+        Its source, and where it begins.
+    structure : Structure
+        The dynamics.
+    theta : ndarray, shape (1 + order,)
+        Delay in samples, then the parameters of the sections.
+    """
+
+    def __init__(self, problem: Problem, structure: Structure, theta: Real) -> None:
+        self.structure, self.theta = structure, theta
+        self._source = problem.source
+        self._delay = float(theta[0])
+        self._poles: Poles = poles_of(structure, theta[1:])
+        upper = self._poles.upper
+        self._answers = PoleResponses(self._source, self._delay, upper) if upper.size else None
+        self._fed: Real | None = None
+        self._numerators = _powers(structure)
+        expanded = self._poles.expand(self._numerators)
+        self.rows = self._added(expanded, 1)
+        """Responses that the numerator's coefficients multiply, shape (m, n)."""
+        level = self._source.first
+        if level and structure.dc_zeros == 0:
+            self.rows[0] += level * self._since() if structure.integrators else level
+        self._since_start: Complex | None = None
+        self.free = np.empty((0, problem.y.size))
+        """Free responses, shape (order, n)."""
+        if problem.begins is not None and structure.order:
+            late = np.arange(problem.y.size) - float(problem.begins)
+            after = late >= 0.0
+            self._late = np.where(after, late, 0.0)
+            self._since_start = np.exp(upper[:, None] * self._late) * after
+            count = structure.order + structure.integrators
+            impulses = np.eye(count)[structure.integrators :]
+            self.free = _real(self._poles.expand(impulses).simple, self._since_start)
+
+    def slopes(self, numerator: Real, initial: Real) -> Real:
+        """Derivatives of what the input does by theta, shape (1 + order, n).
+
+        Parameters
+        ----------
+        numerator : ndarray, shape (m,)
+            What multiplies `rows`.
+        initial : ndarray, shape (order,) or (0,)
+            What multiplies `free`.
+        """
+        structure = self.structure
+        full = numerator @ self._numerators
+        turned = self._answers.slopes() if self._answers is not None and structure.order else None
+        out = np.empty((self.theta.size, self._source.samples))
+        out[:1] = self._added(self._poles.by_delay(full), 2)
+        if structure.integrators and self._source.first:
+            out[0] -= full[0] * self._source.first * (self._since() > 0.0)
+        if structure.order:
+            by_sections = self._poles.by_sections(full)
+            out[1:] = self._added(by_sections, 1)
+            out[1:] += _real(by_sections.double, turned)
+            if initial.size and self._since_start is not None:
+                state = np.concatenate([np.zeros(structure.integrators), initial])
+                free = self._poles.by_sections(state)
+                out[1:] += _real(free.simple, self._since_start)
+                out[1:] += _real(free.double, self._late * self._since_start)
+        return out
+
+    def _added(self, expansion: Expansion, inputs: int) -> Real:
+        """Sum of single poles, the input itself and its rate."""
+        out = np.zeros((expansion.direct.size, self._source.samples))
+        if self._answers is not None:
+            out += _real(expansion.simple, self._answers.values)
+        if expansion.direct.any() or expansion.rate.any():
+            if self._fed is None or self._fed.shape[0] < inputs:
+                self._fed = input_responses(self._source, self._delay, slopes=inputs > 1)
+            out += np.outer(expansion.direct, self._fed[0])
+            if expansion.rate.any():
+                out += np.outer(expansion.rate, self._fed[1])
+        return out
+
+    def _since(self) -> Real:
+        return np.maximum(np.arange(self._source.samples) - self._delay, 0.0)
+
+
+def _powers(structure: Structure) -> Real:
+    """Numerators 1, s, s², … that a structure has, by rising powers, shape (m, zeros + 1)."""
+    return np.asarray(np.eye(structure.zeros + 1)[structure.dc_zeros :])
+
+
+def _real(weights: Complex, waves: Complex | None) -> Real:
+    """Real part of a sum over poles."""
+    if waves is None:
+        return np.zeros((weights.shape[0], 1))
+    if not waves.imag.any():
+        return np.asarray(weights.real @ waves.real)
+    return np.asarray(weights.real @ waves.real - weights.imag @ waves.imag)

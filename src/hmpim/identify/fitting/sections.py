@@ -1,0 +1,179 @@
+"""A structure's poles, and what the responses of single poles add up to.
+
+The denominator is a product of sections 1 + c₁s and 1 + c₁s + c₂s². Its poles differ, so that
+B(s)/A(s) is a sum of single poles; the derivative by a coefficient of one section, -s^m B/(A Aₖ),
+is a sum of single and double ones. The free response of an initial state is B/A again, B of one
+degree less than A and an impulse for an input: one expansion serves all.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hmpim.model.dynamics import Structure, coefficients_of
+from hmpim.model.poles import partial_fractions
+
+__all__ = ["Expansion", "Poles", "poles_of"]
+
+_APART = 2e-4
+"""Least distance of two poles, over their size: a double pole is taken as two that are as near,
+which changes no response by more than the square of this."""
+
+Real = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Expansion:
+    """Rows that add up single poles: weights of their responses, of the slopes, and of the input.
+
+    Parameters
+    ----------
+    simple, double : complex ndarray, shape (rows, k)
+        Of the responses of 1/(s - p) and 1/(s - p)², one of each conjugate pair: the rows are the
+        real parts.
+    direct, rate : ndarray, shape (rows,)
+        Of the input itself and of its rate.
+    """
+
+    simple: Complex
+    double: Complex
+    direct: Real
+    rate: Real
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Poles:
+    """Poles of a structure at given parameters, in samples.
+
+    Parameters
+    ----------
+    every : complex ndarray, shape (order + integrators,)
+        All poles.
+    kept : ndarray of bool
+        One of each conjugate pair.
+    section : ndarray of int
+        Which section each belongs to; -1 for an integrator.
+    coefficients : tuple of ndarray
+        c₁ (and c₂) of each section.
+    """
+
+    every: Complex
+    kept: NDArray[np.bool_]
+    section: NDArray[np.intp]
+    coefficients: tuple[Real, ...]
+
+    @property
+    def upper(self) -> Complex:
+        """One of each conjugate pair."""
+        return self.every[self.kept]
+
+    @property
+    def leading(self) -> float:
+        """Factor of the highest power of A(s)."""
+        return float(np.prod([c[-1] for c in self.coefficients]))
+
+    def expand(self, numerators: Real) -> Expansion:
+        """Rows of B(s)/A(s), one for each row of `numerators`, by rising powers of s."""
+        expanded = [partial_fractions(b, self.every, self.leading) for b in numerators]
+        simple = self._halved(np.array([e[0] for e in expanded]))
+        return Expansion(
+            simple=simple,
+            double=np.zeros_like(simple),
+            direct=np.array([e[2] for e in expanded]),
+            rate=np.zeros(len(expanded)),
+        )
+
+    def by_delay(self, numerator: Real) -> Expansion:
+        """The row of -s B(s)/A(s)."""
+        simple, _, constant = partial_fractions(numerator, self.every, self.leading)
+        return Expansion(
+            simple=self._halved(-(simple * self.every)[None, :]),
+            double=np.zeros((1, int(self.kept.sum())), dtype=np.complex128),
+            direct=np.array([-float(simple.sum().real)]),
+            rate=np.array([-constant]),
+        )
+
+    def by_sections(self, numerator: Real) -> Expansion:
+        """Rows of the derivatives of B(s)/A(s) by the parameters of each section in turn."""
+        simple, double, direct = [], [], []
+        for k, c in enumerate(self.coefficients):
+            doubled = self.section == k
+            by_c = []
+            for power in range(1, c.size + 1):
+                above = np.concatenate([np.zeros(power), -numerator])
+                by_c.append(partial_fractions(above, self.every, self.leading * c[-1], doubled))
+            weights = [[c[0], 2.0 * c[1]], [0.0, c[0] ** 2]] if c.size == 2 else [[c[0]]]
+            for row in weights:
+                simple.append(sum(w * e[0] for w, e in zip(row, by_c, strict=True)))
+                double.append(sum(w * e[1] for w, e in zip(row, by_c, strict=True)))
+                direct.append(sum(w * e[2] for w, e in zip(row, by_c, strict=True)))
+        return Expansion(
+            simple=self._halved(np.array(simple)),
+            double=self._halved(np.array(double)),
+            direct=np.array(direct),
+            rate=np.zeros(len(direct)),
+        )
+
+    def _halved(self, rows: Complex) -> Complex:
+        """Weights of one of each conjugate pair, which stands for both."""
+        return np.asarray(rows[:, self.kept] * np.where(self.upper.imag > 0, 2.0, 1.0))
+
+
+def poles_of(structure: Structure, theta: Real) -> Poles:
+    """Poles of a structure at the parameters of its sections.
+
+    Parameters
+    ----------
+    structure : Structure
+        Which sections.
+    theta : ndarray, shape (order,)
+        As for `hmpim.model.dynamics.coefficients_of`, time in samples.
+
+    Examples
+    --------
+    >>> from hmpim.model.dynamics import STRUCTURES
+    >>> found = poles_of(STRUCTURES["second_order"], np.array([0.0, 1.0]))  # 1 + s + s²
+    >>> found.every.round(3).tolist()
+    [(-0.5+0.866j), (-0.5-0.866j)]
+    """
+    flat = coefficients_of(structure, theta)
+    every = [0.0 + 0.0j] * structure.integrators
+    section = [-1] * structure.integrators
+    coefficients, start = [], 0
+    for k, order in enumerate(structure.sections):
+        c = flat[start : start + order]
+        every += [complex(-1.0 / c[0])] if order == 1 else _pair(c[0], c[1])
+        section += [k] * order
+        coefficients.append(c)
+        start += order
+    poles = _parted(np.array(every, dtype=np.complex128))
+    return Poles(
+        every=poles,
+        kept=poles.imag >= 0.0,
+        section=np.array(section, dtype=np.intp),
+        coefficients=tuple(coefficients),
+    )
+
+
+def _pair(c1: float, c2: float) -> list[complex]:
+    """Roots of 1 + c₁s + c₂s², never nearer than told apart."""
+    inside = 1.0 - 4.0 * c2 / c1**2
+    if abs(inside) < _APART**2:
+        inside = _APART**2
+    if inside < 0.0:
+        real, imag = -c1 / (2.0 * c2), c1 * float(np.sqrt(-inside)) / (2.0 * c2)
+        return [complex(real, imag), complex(real, -imag)]
+    slow = -2.0 / (c1 * (1.0 + float(np.sqrt(inside))))
+    return [complex(slow), complex(1.0 / (c2 * slow))]
+
+
+def _parted(poles: Complex) -> Complex:
+    """Poles of different sections that coincide, moved apart."""
+    for i in range(1, poles.size):
+        for j in range(i):
+            near = abs(poles[i] - poles[j]) < _APART * abs(poles[i])
+            if near and not np.isclose(poles[i], poles[j].conjugate(), rtol=1e-12, atol=0.0):
+                poles[i] *= 1.0 + 2.0 * _APART
+    return poles

@@ -1,0 +1,275 @@
+r"""Response of one pole, behind a delay, to a spline: closed form for tap and slope.
+
+A rational system is a sum of single poles, 1/A(s) = Σ rₖ/(s - pₖ). One pole answers one B-spline
+of degree d by d + 2 samples of its own and then by e^(pt) for ever, so that its response to a
+whole record is one recursion of first order. With
+
+    g(t) = ∫₀ᵗ e^(p(t-x)) xᵈ/d! dx = t^(d+1) φ_(d+1)(pt),
+
+φ the functions of exponential integrators (M. Hochbruck and A. Ostermann, Acta Numerica 19, 2010,
+section 2.1), the answer to a B-spline is the difference of order d + 1 of g. Its derivative by p
+is known as well: φₖ' = φₖ - k φₖ₊₁. φ is summed by quadrature, or by recursion where its
+argument is large. `hmpim.model.sampled` gives the same by a matrix exponential;
+each checks the other.
+
+In this module time is counted in samples.
+"""
+
+from functools import cache
+from math import factorial, floor
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import lfilter
+
+from hmpim.model.sampled import MARGIN, SampledInput, spline_at, spline_signs
+
+__all__ = ["PoleResponses", "input_responses", "partial_fractions", "placed", "pole_taps"]
+
+_NODES = 24
+_QUADRATURE = 12.0
+"""Modulus up to which quadrature gives φ to the last digit; beyond it the recursion from e^z."""
+
+Real = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+
+@cache
+def _nodes(order: int) -> tuple[Real, Real]:
+    """Gauss-Legendre nodes 1 - x on (0, 1) and weights x^(k-1)/(k-1)! of ∫ e^((1-x) z) dx."""
+    x, weight = np.polynomial.legendre.leggauss(_NODES)
+    x = (x + 1.0) / 2.0
+    return 1.0 - x, weight / 2.0 * x ** (order - 1) / factorial(order - 1)
+
+
+def _phi(z: Complex, order: int) -> tuple[Complex, Complex]:
+    """φ of an order from 1 on, and its derivative, elementwise."""
+    nodes, weights = _nodes(order)
+    small = np.abs(z) < _QUADRATURE
+    near = small.all()
+    waves = np.exp((z if near else np.where(small, z, 0.0))[..., None] * nodes)
+    low, slope = waves @ weights, waves @ (weights * nodes)
+    if not near:
+        outer = np.where(small, 1.0, z)
+        value = np.exp(outer)
+        for k in range(order):
+            value = (value - 1.0 / factorial(k)) / outer
+        following = (value - 1.0 / factorial(order)) / outer
+        low = np.where(small, low, value)
+        slope = np.where(small, slope, value - order * following)
+    return low, slope
+
+
+def pole_taps(poles: Complex, lag: float, degree: int) -> tuple[Complex, Complex]:
+    """Answer of 1/(s - p) to one B-spline, and its derivative by p, as numerators over 1 - e^p/z.
+
+    Parameters
+    ----------
+    poles : complex ndarray, shape (k,)
+        Per sample, real part at most 0.
+    lag : float
+        The answer is sampled at i - lag, 0 <= lag < 1.
+    degree : int
+        Of the spline, which begins at time 0.
+
+    Returns
+    -------
+    taps, slopes : complex ndarray, shape (k, degree + 3)
+        The answer's z-transform is Σ taps z^-i / (1 - e^p/z). That of its derivative is
+        Σ slopes z^-i / (1 - e^p/z) plus e^p/z / (1 - e^p/z) times the answer's own.
+
+    Examples
+    --------
+    >>> taps, _ = pole_taps(np.array([-1.0 + 0j]), 0.0, 0)  # a held input
+    >>> taps[0].real.round(6).tolist()
+    [0.0, 0.632121, 0.0]
+    """
+    t = np.maximum(np.arange(degree + 3) - lag, 0.0)
+    z = poles[:, None] * t
+    phi, rate = _phi(z, degree + 1)
+    powers = t ** (degree + 1)
+    value, slope = powers * phi, powers * t * rate
+    signs = spline_signs(degree)
+    answer, turned = np.zeros_like(value), np.zeros_like(slope)
+    for j, sign in enumerate(signs):
+        answer[:, j:] += sign * value[:, : value.shape[1] - j]
+        turned[:, j:] += sign * slope[:, : slope.shape[1] - j]
+    decay = np.exp(poles)[:, None]
+    taps, slopes = answer.copy(), turned.copy()
+    taps[:, 1:] -= decay * answer[:, :-1]
+    # From (1 - q/z) h = taps, differentiated: (1 - q/z) h' = taps' + q/z h.
+    slopes[:, 1:] -= decay * (turned[:, :-1] + answer[:, :-1])
+    return taps, slopes
+
+
+def placed(source: SampledInput, delay: float) -> tuple[int, float]:
+    """Where in a source's coefficients the record begins behind a delay, and the lag left.
+
+    Parameters
+    ----------
+    source : SampledInput
+        The prepared input.
+    delay : float
+        Samples of the record.
+
+    Returns
+    -------
+    begin : int
+        Fine sample of the filtered coefficients at which the record begins.
+    lag : float
+        Fine samples, 0 <= lag < 1.
+    """
+    half = 0.0 if source.degree == 0 else (source.degree + 1) / 2
+    offset = delay * source.oversampling - half
+    whole = floor(offset)
+    return source.oversampling * MARGIN - whole, offset - whole
+
+
+class PoleResponses:
+    """Responses of e^(-sτ)/(s - p) to an input's deviation from its first sample, from rest.
+
+    Parameters
+    ----------
+    source : SampledInput
+        The prepared input.
+    delay : float
+        Pure delay in samples, at least -20.
+    poles : complex ndarray, shape (k,)
+        Per sample of the record, real part at most 0.
+
+    Examples
+    --------
+    >>> from hmpim.model.sampled import prepare_input
+    >>> held = prepare_input(np.array([0.0, 1.0, 1.0, 1.0]), "zoh")
+    >>> PoleResponses(held, 0.0, np.array([-0.5 + 0j])).values.real.round(6).tolist()
+    [[0.0, 0.0, 0.786939, 1.264241]]
+    """
+
+    def __init__(self, source: SampledInput, delay: float, poles: Complex) -> None:
+        factor = source.oversampling
+        begin, lag = placed(source, delay)
+        self._source, self._poles = source, poles
+        self._c, self._first = _reaching(source, begin)
+        taps, self._turned = pole_taps(poles / factor, lag, source.degree)
+        self._decay = np.exp(poles / factor)
+        self._answers = [self._filtered(taps[k], k, self._c) for k in range(poles.size)]
+        self.values = self._stacked(self._answers) / factor
+        """Complex, shape (k, n)."""
+
+    def slopes(self) -> Complex:
+        """Derivatives by p: the responses of e^(-sτ)/(s - p)², shape (k, n)."""
+        found = []
+        for k, answer in enumerate(self._answers):
+            again = self._filtered(np.array([0.0, self._decay[k]]), k, answer)
+            found.append(self._filtered(self._turned[k], k, self._c) + again)
+        return self._stacked(found) / self._source.oversampling**2
+
+    def _filtered(self, taps: Complex, k: int, x: NDArray[Any]) -> NDArray[Any]:
+        q = self._decay[k]
+        if self._poles[k].imag == 0.0:
+            return np.asarray(lfilter(taps.real, np.array([1.0, -q.real]), x))
+        return np.asarray(lfilter(taps, np.array([1.0, -q]), x))
+
+    def _stacked(self, fine: list[NDArray[Any]]) -> Complex:
+        out = np.empty((len(fine), self._source.samples), dtype=np.complex128)
+        for k, answer in enumerate(fine):
+            out[k] = _kept(answer, self._source, self._first)
+        return out
+
+
+def input_responses(source: SampledInput, delay: float, *, slopes: bool) -> Real:
+    """The delayed input's deviation from its first sample, and its rate per sample.
+
+    A held input has no rate; 0 stands for it.
+
+    Parameters
+    ----------
+    source, delay, slopes
+        As for `PoleResponses`; whether to give the rate too.
+
+    Returns
+    -------
+    ndarray, shape (1, n) or (2, n)
+
+    Examples
+    --------
+    >>> from hmpim.model.sampled import prepare_input
+    >>> ramp = prepare_input(np.arange(5.0), "foh")
+    >>> input_responses(ramp, 0.5, slopes=True).tolist()
+    [[0.0, 0.5, 1.5, 2.5, 3.5], [0.0, 1.0, 1.0, 1.0, 1.0]]
+    """
+    begin, lag = placed(source, delay)
+    c, first = _reaching(source, begin)
+    rows = np.zeros((2 if slopes else 1, source.samples))
+    rows[0] = _kept(lfilter(spline_at(lag, source.degree), [1.0], c), source, first)
+    if slopes and source.degree > 0:
+        lower = spline_at(lag, source.degree - 1)
+        taps = np.append(lower, 0.0) - np.concatenate([[0.0], lower])
+        rows[1] = source.oversampling * _kept(lfilter(taps, [1.0], c), source, first)
+    return rows
+
+
+def _reaching(source: SampledInput, begin: int) -> tuple[Real, int]:
+    """Coefficients up to the record's last sample, and where the record begins in them."""
+    before = max(-begin, 0)
+    last = begin + source.oversampling * (source.samples - 1)
+    c = source.coefficients[: max(last + 1, 0)]
+    after = max(last + 1 - source.coefficients.size, 0)
+    if before or after:
+        c = np.concatenate([np.zeros(before), c, np.full(after, c[-1] if c.size else 0.0)])
+    return c, begin + before
+
+
+def _kept(fine: NDArray[Any], source: SampledInput, first: int) -> NDArray[Any]:
+    factor = source.oversampling
+    return fine[first : first + factor * (source.samples - 1) + 1 : factor]
+
+
+def partial_fractions(
+    numerator: Real, poles: Complex, leading: float, doubled: NDArray[np.bool_] | None = None
+) -> tuple[Complex, Complex, float]:
+    """Expand B(s) / (a Π(s - pₖ) Π_doubled(s - pₖ)) into poles, double poles and a constant.
+
+    Parameters
+    ----------
+    numerator : ndarray, shape (m + 1,)
+        B by rising powers of s, m at most the number of poles with their multiplicity.
+    poles : complex ndarray, shape (k,)
+        All different.
+    leading : float
+        a, the factor of the highest power below.
+    doubled : ndarray of bool, shape (k,), optional
+        Which poles count twice; none by default.
+
+    Returns
+    -------
+    simple, double : complex ndarray, shape (k,)
+        Factors of 1/(s - pₖ) and of 1/(s - pₖ)².
+    constant : float
+        What is fed through: 0 unless m equals the number of poles.
+
+    Examples
+    --------
+    >>> poles = np.array([-1.0, -2.0], dtype=complex)
+    >>> simple, _, constant = partial_fractions(np.array([0.0, 0.0, 1.0]), poles, 1.0)
+    >>> simple.real.tolist(), constant  # s²/((s + 1)(s + 2)) = 1 + 1/(s + 1) - 4/(s + 2)
+    ([1.0, -4.0], 1.0)
+    """
+    twice = np.zeros(poles.size, dtype=bool) if doubled is None else doubled
+    apart = poles[:, None] - poles[None, :]
+    np.fill_diagonal(apart, 1.0)
+    times = np.where(twice, 2, 1)
+    below = leading * np.prod(apart ** times[None, :], axis=1)
+    above = np.zeros(poles.size, dtype=np.complex128)
+    rate = np.zeros(poles.size, dtype=np.complex128)
+    for b in numerator[::-1]:
+        rate = above + poles * rate
+        above = b + poles * above
+    value = above / below
+    inverse = times[None, :] / apart
+    np.fill_diagonal(inverse, 0.0)
+    slope = (rate - above * inverse.sum(axis=1)) / below
+    order = int(times.sum())
+    constant = float(numerator[order] / leading) if numerator.size > order else 0.0
+    return np.where(twice, slope, value), np.where(twice, value, 0.0), constant
