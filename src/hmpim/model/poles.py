@@ -58,7 +58,7 @@ def _phi(z: Complex, order: int) -> tuple[Complex, Complex]:
         following = (value - 1.0 / factorial(order)) / outer
         low = np.where(small, low, value)
         slope = np.where(small, slope, value - order * following)
-    return low, slope
+    return np.asarray(low), np.asarray(slope)
 
 
 def pole_taps(poles: Complex, lag: float, degree: int) -> tuple[Complex, Complex]:

@@ -142,6 +142,7 @@ def _interpolated(extended: NDArray[np.float64], factor: int) -> NDArray[np.floa
 
 @cache
 def spline_signs(degree: int) -> NDArray[np.float64]:
+    """Binomial coefficients of alternating sign: a B-spline is that difference of powers."""
     return np.array([(-1.0) ** j * comb(degree + 1, j) for j in range(degree + 2)])
 
 

@@ -123,7 +123,7 @@ class Part:
             What multiplies `free`.
         """
         structure = self.structure
-        full = numerator @ self._numerators
+        full: Real = numerator @ self._numerators
         turned = self._answers.slopes() if self._answers is not None and structure.order else None
         out = np.empty((self.theta.size, self._source.samples))
         out[:1] = self._added(self._poles.by_delay(full), 2)
@@ -154,7 +154,7 @@ class Part:
         return out
 
     def _since(self) -> Real:
-        return np.maximum(np.arange(self._source.samples) - self._delay, 0.0)
+        return np.asarray(np.maximum(np.arange(self._source.samples) - self._delay, 0.0))
 
 
 def _powers(structure: Structure) -> Real:
