@@ -11,7 +11,7 @@
 
 from hmpim.errors import HmpimError
 from hmpim.experiment import run
-from hmpim.formats import read
+from hmpim.formats import load, read, save
 from hmpim.identify import (
     Estimate,
     Identification,
@@ -67,11 +67,13 @@ __all__ = [
     "identify",
     "identify_levels",
     "identify_repeats",
+    "load",
     "paper_analysis",
     "predict",
     "read",
     "report",
     "run",
+    "save",
     "simulate",
     "to_model",
 ]

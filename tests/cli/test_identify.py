@@ -2,6 +2,7 @@
 
 import json
 import math
+import os
 import re
 import subprocess
 import sys
@@ -141,11 +142,10 @@ def test_a_failure_while_writing_leaves_the_old_file(good, tmp_path, monkeypatch
     saved = tmp_path / "r.json"
     saved.write_text("old")
 
-    def full(self, path):
-        path.write_text("half")
-        raise OSError(28, "No space left on device", str(path))
+    def full(descriptor):
+        raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(Identification, "save", full)
+    monkeypatch.setattr(os, "fsync", full)
     done = run("identify", good, *NAMED, "--quiet", "--json", saved)
     check_refusal(done.exit_code, done.stdout, done.stderr, "No space left on device")
     assert saved.read_text() == "old"

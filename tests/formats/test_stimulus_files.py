@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from hmpim.errors import ArgumentError, FormatError, LimitsError
-from hmpim.formats.stimulus import save_stimulus_csv, save_stimulus_json, write_whole
+from hmpim.formats.stimulus import save_stimulus_csv, save_stimulus_json
 from hmpim.formats.stimulus_files import STIMULUS_SUFFIXES, read_stimulus, save_stimulus
 from hmpim.formats.stimulus_spec import read_stimulus_toml, save_stimulus_toml, stimulus_to_toml
 from hmpim.stimulus import (
@@ -179,9 +179,9 @@ def test_files_have_the_usual_rights_and_links_stay(tmp_path):
 
 def test_targets_that_cannot_be_written(tmp_path):
     with pytest.raises(ArgumentError, match="is a folder; name a file in it"):
-        write_whole(tmp_path, lambda target: None)
-    with pytest.raises(ArgumentError, match="cannot be written"):
-        write_whole(tmp_path / "no" / "s.csv", lambda target: None)
+        save_stimulus_csv(design(**WISH), tmp_path)
+    with pytest.raises(ArgumentError, match="does not exist; make it first"):
+        save_stimulus_csv(design(**WISH), tmp_path / "no" / "s.csv")
 
 
 BAD = {

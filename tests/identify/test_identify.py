@@ -60,7 +60,7 @@ def test_the_paper_stands_beside_it(result):
 
 
 def test_json_keeps_the_contract(result, tmp_path):
-    result.save(tmp_path / "r.json")
+    hmpim.save(result, tmp_path / "r.json")
     data = json.loads((tmp_path / "r.json").read_text())
     assert data["schema"] == "hmpim/identification/1"
     assert set(data["record"]) >= {"fs", "samples", "sha256"}

@@ -1,6 +1,7 @@
 """Section V: a whole study from one plan."""
 
-from hmpim.campaign.cases import Case, expand
+from hmpim.campaign.case import Case
+from hmpim.campaign.cases import expand
 from hmpim.campaign.plan import Plan, parse_plan, read_plan
 from hmpim.campaign.rig import Player
 from hmpim.campaign.run import run_campaign

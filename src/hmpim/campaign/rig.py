@@ -4,20 +4,18 @@ import importlib
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Protocol, cast, get_args
+from typing import Protocol, cast, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
+from hmpim.campaign.case import Case
 from hmpim.campaign.plan import AxisWish, Plan
 from hmpim.errors import ArgumentError, HmpimError, LimitsError, RigError
 from hmpim.experiment import run
 from hmpim.record import Record
 from hmpim.rigs.table import AXES, AxisName, LoadName, MotionTable, exact_bandwidth, linear_response
 from hmpim.stimulus import Limits, Stimulus, check_inside
-
-if TYPE_CHECKING:
-    from hmpim.campaign.cases import Case
 
 __all__ = ["CampaignRig", "Player", "make_rig"]
 
@@ -28,9 +26,7 @@ class Player(Protocol):
     The record's channels are named ``AXIS.command`` and ``AXIS.position``.
     """
 
-    def __call__(
-        self, case: "Case", stimuli: Sequence[Stimulus], rng: np.random.Generator
-    ) -> Record:
+    def __call__(self, case: Case, stimuli: Sequence[Stimulus], rng: np.random.Generator) -> Record:
         """Move the axes (`Stimulus.axis`) and return what went in and came out."""
         ...
 
@@ -38,22 +34,22 @@ class Player(Protocol):
 class CampaignRig(Protocol):
     """What a campaign needs."""
 
-    def limits(self, case: "Case", wish: AxisWish) -> Limits:
+    def limits(self, case: Case, wish: AxisWish) -> Limits:
         """Limits of an axis, its travel as wished."""
         ...
 
-    def check(self, case: "Case", stimuli: Sequence[Stimulus]) -> dict[str, float]:
+    def check(self, case: Case, stimuli: Sequence[Stimulus]) -> dict[str, float]:
         """Refuse what the rig may not do; nothing moves.
 
         Returns the largest share of its torque that each axis will take, where it is known.
         """
         ...
 
-    def play(self, case: "Case", stimuli: Sequence[Stimulus], rng: np.random.Generator) -> Record:
+    def play(self, case: Case, stimuli: Sequence[Stimulus], rng: np.random.Generator) -> Record:
         """Move all axes of the stimuli at once."""
         ...
 
-    def known(self, case: "Case", axis: str) -> dict[str, float]:
+    def known(self, case: Case, axis: str) -> dict[str, float]:
         """What the physics say; empty if unknown.
 
         `exact_bandwidth` (Hz) is what is identified, `exact_samples_bandwidth` that of samples
@@ -62,7 +58,7 @@ class CampaignRig(Protocol):
         ...
 
     def coupling(
-        self, case: "Case", source: str, target: str, frequency: NDArray[np.float64]
+        self, case: Case, source: str, target: str, frequency: NDArray[np.float64]
     ) -> NDArray[np.float64] | None:
         """Gain from the command of `source` to the position of `target`; None if unknown."""
         ...
@@ -144,7 +140,7 @@ class TableRig:
 
     table: MotionTable
 
-    def loaded(self, case: "Case") -> MotionTable:
+    def loaded(self, case: Case) -> MotionTable:
         """Return the table as a case wants it; 'a+b' is a on the inner axes, b on the outer."""
         inner, plus, outer = case.load.partition("+")
         if not plus:
@@ -163,11 +159,11 @@ class TableRig:
             mode=case.mode,
         )
 
-    def limits(self, case: "Case", wish: AxisWish) -> Limits:
+    def limits(self, case: Case, wish: AxisWish) -> Limits:
         """As Fig. 4."""
         return _wished(self.loaded(case).limits_of(cast(AxisName, wish.name)), wish)
 
-    def check(self, case: "Case", stimuli: Sequence[Stimulus]) -> dict[str, float]:
+    def check(self, case: Case, stimuli: Sequence[Stimulus]) -> dict[str, float]:
         """Limits of each axis, and the torque that all together take."""
         table = self.loaded(case)
         torque = table.check({cast(AxisName, s.axis): s for s in stimuli})
@@ -175,11 +171,11 @@ class TableRig:
         share = np.abs(torque).max(axis=0) / limit
         return dict(zip(AXES, share.tolist(), strict=True))
 
-    def play(self, case: "Case", stimuli: Sequence[Stimulus], rng: np.random.Generator) -> Record:
+    def play(self, case: Case, stimuli: Sequence[Stimulus], rng: np.random.Generator) -> Record:
         """Simulate."""
         return self.loaded(case).play({cast(AxisName, s.axis): s for s in stimuli}, rng=rng)
 
-    def known(self, case: "Case", axis: str) -> dict[str, float]:
+    def known(self, case: Case, axis: str) -> dict[str, float]:
         """Of the linearised mechanics, friction off."""
         table, name = self.loaded(case), cast(AxisName, axis)
         inertia = table.plant.inertia(table.start_angles)[AXES.index(name)]
@@ -192,7 +188,7 @@ class TableRig:
         }
 
     def coupling(
-        self, case: "Case", source: str, target: str, frequency: NDArray[np.float64]
+        self, case: Case, source: str, target: str, frequency: NDArray[np.float64]
     ) -> NDArray[np.float64] | None:
         """Of the linearised mechanics, samples over samples, friction off."""
         response = linear_response(
@@ -209,7 +205,7 @@ class TableRig:
 def _sensors(plan: Plan) -> Player:
     """Play on the simulated sensor that the plan gives each axis."""
 
-    def play(case: "Case", stimuli: Sequence[Stimulus], rng: np.random.Generator) -> Record:
+    def play(case: Case, stimuli: Sequence[Stimulus], rng: np.random.Generator) -> Record:
         (stimulus,) = stimuli
         sensor = plan.axis(stimulus.axis).sensor
         if sensor is None:
@@ -231,18 +227,18 @@ class PlayedRig:
     plan: Plan
     player: Player
 
-    def limits(self, case: "Case", wish: AxisWish) -> Limits:
+    def limits(self, case: Case, wish: AxisWish) -> Limits:
         """As the plan says."""
         return _own(wish)
 
-    def check(self, case: "Case", stimuli: Sequence[Stimulus]) -> dict[str, float]:
+    def check(self, case: Case, stimuli: Sequence[Stimulus]) -> dict[str, float]:
         """Limits of the plan: what moves on a rig is looked at once more."""
         for stimulus in stimuli:
             wish = self.plan.axis(stimulus.axis, test=case.test)
             check_inside(stimulus, _own(wish), whose=repr(stimulus.axis))
         return {}
 
-    def play(self, case: "Case", stimuli: Sequence[Stimulus], rng: np.random.Generator) -> Record:
+    def play(self, case: Case, stimuli: Sequence[Stimulus], rng: np.random.Generator) -> Record:
         """Call the function, and look at what it returns."""
         try:
             record = self.player(case, stimuli, rng)
@@ -264,12 +260,12 @@ class PlayedRig:
                     )
         return record
 
-    def known(self, case: "Case", axis: str) -> dict[str, float]:
+    def known(self, case: Case, axis: str) -> dict[str, float]:
         """Nobody knows."""
         return {}
 
     def coupling(
-        self, case: "Case", source: str, target: str, frequency: NDArray[np.float64]
+        self, case: Case, source: str, target: str, frequency: NDArray[np.float64]
     ) -> NDArray[np.float64] | None:
         """Nobody knows."""
         return None

@@ -10,15 +10,16 @@ from typing import Any
 
 import numpy as np
 
-from hmpim.campaign.cases import Case, check_wanted, expand, prepare
+from hmpim.campaign.case import Case
+from hmpim.campaign.cases import check_wanted, expand, prepare
 from hmpim.campaign.plan import Plan
 from hmpim.campaign.rig import CampaignRig, Player, make_rig
 from hmpim.errors import ArgumentError, FormatError, HmpimError
+from hmpim.formats.atomic import write_text
 from hmpim.identify import identify
 from hmpim.identify.frf.multivariable import response_matrix
 from hmpim.identify.spectrum import decibel, spectrum
 from hmpim.record import Record
-from hmpim.report.files import replacing
 from hmpim.stimulus import Stimulus
 
 __all__ = ["CASE_SCHEMA", "run_campaign"]
@@ -119,9 +120,8 @@ def _open(plan: Plan, folder: Path, *, fresh: bool) -> None:
 
 
 def _write(path: Path, data: dict[str, Any]) -> None:
-    with replacing(path) as place:
-        text = json.dumps(data, indent=1, ensure_ascii=False, allow_nan=False)
-        place.write_text(text + "\n", encoding="utf-8")
+    text = json.dumps(data, indent=1, ensure_ascii=False, allow_nan=False)
+    write_text(path, text + "\n")
 
 
 def _read(folder: Path, case: Case) -> dict[str, Any] | None:

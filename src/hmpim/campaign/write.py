@@ -20,7 +20,7 @@ from hmpim.campaign.grids import (
 from hmpim.campaign.pictures import section_pictures
 from hmpim.campaign.plan import FigurePlan
 from hmpim.campaign.study import Study, study_dict
-from hmpim.report.files import replacing
+from hmpim.formats.atomic import replacing, write_text
 from hmpim.report.study import Grid, Section, StudyPage, render_study
 
 __all__ = ["headline", "markdown", "study_csv", "study_page", "write_study"]
@@ -42,9 +42,9 @@ def write_study(study: Study, folder: Path, *, document: Path | None = None) -> 
     """
     page = study_page(study)
     text = json.dumps(study_dict(study), indent=1, ensure_ascii=False, allow_nan=False)
-    _write(folder / "study.json", text + "\n")
-    _write(folder / "study.csv", study_csv(study))
-    _write(folder / "study.html", render_study(page))
+    write_text(folder / "study.json", text + "\n")
+    write_text(folder / "study.csv", study_csv(study))
+    write_text(folder / "study.html", render_study(page))
     for place in (folder / "study.md", document):
         if place is None:
             continue
@@ -54,12 +54,7 @@ def write_study(study: Study, folder: Path, *, document: Path | None = None) -> 
             for picture in section.pictures:
                 with replacing(pictures / f"{number}-{picture.key}.png") as path:
                     picture.figure.savefig(path, format="png", dpi=110)
-        _write(place, markdown(page, pictures.name))
-
-
-def _write(path: Path, text: str) -> None:
-    with replacing(path) as place:
-        place.write_text(text, encoding="utf-8")
+        write_text(place, markdown(page, pictures.name))
 
 
 def headline(study: Study) -> str:

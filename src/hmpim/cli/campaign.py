@@ -72,6 +72,7 @@ def campaign(
     from hmpim.campaign.study import check_earlier, make_study
     from hmpim.campaign.write import write_study
     from hmpim.cli.terminal import check_target
+    from hmpim.formats.atomic import write_text
 
     check_target(json_file, "--json")
     check_target(document, "--document")
@@ -85,7 +86,7 @@ def campaign(
         study = make_study(wanted, cases, earlier=earlier)
         write_study(study, out, document=document)
     if json_file is not None:
-        json_file.write_text((out / "study.json").read_text(encoding="utf-8"), encoding="utf-8")
+        write_text(json_file, (out / "study.json").read_text(encoding="utf-8"))
     if not quiet:
         _print(study)
         say(f"Page:    {out / 'study.html'}")

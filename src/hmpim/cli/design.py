@@ -95,6 +95,7 @@ def design(
     hmpim design --band 0.1 10 --duration 10 --fs 500 --amplitude 10 --max-rate 1000
     --max-acceleration 40000 --unit deg -o s.csv --json s.json
     """
+    from hmpim.formats.atomic import replacing
     from hmpim.formats.stimulus import save_stimulus_json
     from hmpim.formats.stimulus_files import STIMULUS_SUFFIXES, save_stimulus
     from hmpim.stimulus import Limits
@@ -136,7 +137,8 @@ def design(
     if plot is not None:
         from hmpim.plots import time_histories
 
-        time_histories(stimulus).savefig(plot, dpi=150)
+        with replacing(plot) as place:
+            time_histories(stimulus).savefig(place, dpi=150)
     typer.echo(
         f"{stimulus.samples} samples at {stimulus.fs:g} Hz, {stimulus.duration:g} s, "
         f"of which the waveform {stimulus.sweep_duration:g} s from {stimulus.sweep_start:g} s"

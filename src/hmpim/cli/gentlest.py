@@ -93,6 +93,7 @@ def gentlest(
     hmpim gentlest --natural-frequency 10 --damping 0.4 --delay 0.15 --range 7 14 --noise 0.1
     --fs 200 --amplitude 10 --unit deg -o s.csv --json s.json --plot trade.png
     """
+    from hmpim.formats.atomic import replacing, write_text
     from hmpim.formats.stimulus import save_stimulus_csv
     from hmpim.optimal import FAMILIES, Accuracy, ModelRange, RoughModel
     from hmpim.optimal import gentlest as find_gentlest
@@ -152,12 +153,13 @@ def gentlest(
             points = trade_of(found, progress=progress)
         from hmpim.plots.trade import trade_plot
 
-        trade_plot(found, points).savefig(plot, dpi=150)
+        with replacing(plot) as place:
+            trade_plot(found, points).savefig(place, dpi=150)
     if output is not None:
         save_stimulus_csv(found.stimulus, output)
     if json_file is not None:
         text = json.dumps(_as_dict(found, points), indent=1, allow_nan=False)
-        json_file.write_text(text + "\n", encoding="utf-8")
+        write_text(json_file, text + "\n")
     _print(found)
     for target in (output, json_file, plot):
         if target is not None:

@@ -134,12 +134,11 @@ def write_result(
     notes: Sequence[str] = (),
 ) -> None:
     """Write a result to the files that are wanted, each as a whole or not at all."""
-    from hmpim.report import replacing
+    from hmpim.formats import save
     from hmpim.report import report as write_page
 
     if json is not None:
-        with replacing(json) as place:
-            result.save(place)
+        save(result, json)
     if report is not None:
         with working("Drawing the page"):
             write_page(result, report, stimulus=stimulus, notes=notes)

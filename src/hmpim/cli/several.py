@@ -22,8 +22,9 @@ def identify_several(
     quiet: bool,
 ) -> None:
     """Average repeats, or compare levels, whichever the records are."""
+    from hmpim.formats import save
     from hmpim.identify import identify_levels, identify_repeats, same_at_levels
-    from hmpim.report import print_levels, print_repeats, replacing
+    from hmpim.report import print_levels, print_repeats
 
     with working(f"Identifying {len(records)} records"):
         if same_at_levels(records):
@@ -37,8 +38,7 @@ def identify_several(
     if not quiet:
         print_repeats(repeats, output_console())
     if json is not None:
-        with replacing(json) as place:
-            repeats.save(place)
+        save(repeats, json)
 
 
 def _levels_dict(levels: "Levels") -> dict[str, Any]:
@@ -71,7 +71,6 @@ def _levels_dict(levels: "Levels") -> dict[str, Any]:
 def _write(data: dict[str, Any], path: Path) -> None:
     from json import dumps
 
-    from hmpim.report import replacing
+    from hmpim.formats.atomic import write_text
 
-    with replacing(path) as place:
-        place.write_text(dumps(data, indent=1, allow_nan=False) + "\n", encoding="utf-8")
+    write_text(path, dumps(data, indent=1, allow_nan=False) + "\n")

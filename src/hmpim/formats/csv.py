@@ -1,13 +1,12 @@
 """A record as CSV, which comes back bit for bit."""
 
 import json
-import os
 from os import PathLike
-from pathlib import Path
 
 import numpy as np
 
 from hmpim.errors import RecordError
+from hmpim.formats.atomic import write_text
 from hmpim.formats.readers.text import MARK, heading_of
 from hmpim.record import Record
 
@@ -69,10 +68,4 @@ def write_csv(record: Record, path: str | PathLike[str]) -> None:
     # float.__repr__ is the shortest text that reads back as the same number.
     columns = [map(repr, array.tolist()) for array in (time, *(c.values for c in channels))]
     lines.extend(map(",".join, zip(*columns, strict=True)))
-    file = Path(path)
-    draft = file.with_name(f".{file.name}.{os.getpid()}.part")
-    try:
-        draft.write_text("\n".join(lines) + "\n", encoding="utf-8", newline="\n")
-        draft.replace(file)
-    finally:
-        draft.unlink(missing_ok=True)
+    write_text(path, "\n".join(lines) + "\n")

@@ -2,16 +2,14 @@
 
 import json
 import math
-import os
-import tempfile
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from os import PathLike
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from hmpim.errors import ArgumentError
+from hmpim.formats.atomic import write_text
 from hmpim.stimulus import Limits, Stimulus
 from hmpim.stimulus.command import rounded
 from hmpim.stimulus.limits import QUANTITIES
@@ -23,7 +21,6 @@ __all__ = [
     "save_stimulus_json",
     "stimulus_columns",
     "stimulus_to_dict",
-    "write_whole",
 ]
 
 
@@ -99,7 +96,7 @@ def save_stimulus_json(stimulus: Stimulus, path: str | PathLike[str]) -> None:
     20
     """
     text = json.dumps(stimulus_to_dict(stimulus), indent=1, allow_nan=False)
-    write_whole(path, lambda target: target.write_bytes((text + "\n").encode()))
+    write_text(path, text + "\n")
 
 
 def save_stimulus_csv(stimuli: Stimulus | Sequence[Stimulus], path: str | PathLike[str]) -> None:
@@ -147,8 +144,7 @@ def save_stimulus_csv(stimuli: Stimulus | Sequence[Stimulus], path: str | PathLi
     lines.append(",".join(names))
     rows = np.column_stack(columns).tolist()
     lines += [",".join(map(repr, row)) for row in rows]
-    data = ("\n".join(lines) + "\n").encode()
-    write_whole(path, lambda target: target.write_bytes(data))
+    write_text(path, "\n".join(lines) + "\n")
 
 
 def _comment(stimulus: Stimulus) -> str:
@@ -192,57 +188,6 @@ def stimulus_columns(
         "velocity": motion.velocity,
         "acceleration": motion.acceleration,
     }
-
-
-def write_whole(path: str | PathLike[str], write: Callable[[Path], object]) -> None:
-    """Write a file beside `path` and put it in its place when it is complete.
-
-    Parameters
-    ----------
-    path : path
-        File to write, replaced if there; as it was should anything fail.
-    write : callable
-        Writes the file at the path it is given.
-
-    Raises
-    ------
-    ArgumentError
-        If it cannot be written.
-
-    Examples
-    --------
-    >>> import tempfile
-    >>> with tempfile.TemporaryDirectory() as folder:
-    ...     write_whole(Path(folder) / "s.txt", lambda target: target.write_text("all"))
-    ...     [file.name for file in Path(folder).iterdir()]
-    ['s.txt']
-    """
-    wanted = Path(path).resolve()  # through a link, so that the link stays
-    if wanted.exists() and not wanted.is_file():
-        if wanted.is_dir():
-            raise ArgumentError(f"{str(path)!r} is a folder; name a file in it")
-        write(wanted)  # a pipe or a device
-        return
-    try:
-        handle, name = tempfile.mkstemp(dir=wanted.parent, prefix=".", suffix=wanted.suffix)
-    except OSError as error:
-        raise ArgumentError(f"{str(path)!r} cannot be written: {error}") from error
-    os.close(handle)
-    place = Path(name)
-    try:
-        write(place)
-        place.chmod(0o666 & ~_umask())
-        place.replace(wanted)
-    except OSError as error:
-        raise ArgumentError(f"{str(path)!r} cannot be written: {error}") from error
-    finally:
-        place.unlink(missing_ok=True)
-
-
-def _umask() -> int:
-    mask = os.umask(0o022)
-    os.umask(mask)
-    return mask
 
 
 def check_together(stimuli: Stimulus | Sequence[Stimulus]) -> tuple[Stimulus, ...]:

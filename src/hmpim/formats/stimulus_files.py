@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 
 from hmpim.errors import ArgumentError, FormatError
+from hmpim.formats.atomic import replacing, write_text
 from hmpim.formats.stimulus import (
     check_together,
     save_stimulus_csv,
     stimulus_columns,
-    write_whole,
 )
 from hmpim.formats.stimulus_spec import read_stimulus_toml, save_stimulus_toml
 from hmpim.stimulus import Stimulus
@@ -121,18 +121,15 @@ def save_stimulus_hdf5(stimuli: _Several, path: str | PathLike[str]) -> None:
 
     several = check_together(stimuli)
 
-    def write(target: Path) -> None:
-        with h5py.File(target, "w") as file:
-            file.attrs["format"] = _FORMAT
-            for stimulus in several:
-                group = file.create_group(stimulus.axis.replace("/", "_") or "stimulus")
-                group.attrs["axis"] = stimulus.axis
-                group.attrs["unit"] = stimulus.unit
-                group.attrs["fs"] = stimulus.fs
-                for name, values in stimulus_columns(stimulus, several).items():
-                    group.create_dataset(name, data=values, track_times=False)
-
-    write_whole(path, write)
+    with replacing(path) as place, h5py.File(place, "w") as file:
+        file.attrs["format"] = _FORMAT
+        for stimulus in several:
+            group = file.create_group(stimulus.axis.replace("/", "_") or "stimulus")
+            group.attrs["axis"] = stimulus.axis
+            group.attrs["unit"] = stimulus.unit
+            group.attrs["fs"] = stimulus.fs
+            for name, values in stimulus_columns(stimulus, several).items():
+                group.create_dataset(name, data=values, track_times=False)
 
 
 def save_stimulus_mat(stimuli: _Several, path: str | PathLike[str]) -> None:
@@ -169,10 +166,8 @@ def save_stimulus_mat(stimuli: _Several, path: str | PathLike[str]) -> None:
             "axis": stimulus.axis,
         }
 
-    def write(target: Path) -> None:
-        savemat(str(target), structs, appendmat=False)
-
-    write_whole(path, write)
+    with replacing(path) as place:
+        savemat(str(place), structs, appendmat=False)
 
 
 def save_stimulus_c(stimuli: _Several, path: str | PathLike[str]) -> None:
@@ -214,7 +209,7 @@ def save_stimulus_c(stimuli: _Several, path: str | PathLike[str]) -> None:
         lines.append("")
     lines.append("#endif")
     text = "\n".join(lines) + "\n"
-    write_whole(path, lambda target: target.write_text(text, encoding="utf-8"))
+    write_text(path, text)
 
 
 def _identifier(axis: str, *, taken: dict[str, Any]) -> str:

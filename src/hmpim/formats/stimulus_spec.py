@@ -20,7 +20,8 @@ from pathlib import Path
 from typing import Any
 
 from hmpim.errors import ArgumentError, FormatError
-from hmpim.formats.stimulus import check_together, write_whole
+from hmpim.formats.atomic import write_text
+from hmpim.formats.stimulus import check_together
 from hmpim.stimulus import (
     Chirp,
     ExponentialSweep,
@@ -157,7 +158,7 @@ def save_stimulus_toml(stimuli: Stimulus | Sequence[Stimulus], path: str | PathL
     True
     """
     text = stimulus_to_toml(stimuli)
-    write_whole(path, lambda target: target.write_bytes(text.encode()))
+    write_text(path, text)
 
 
 def read_stimulus_toml(path: str | PathLike[str]) -> list[Stimulus]:

@@ -5,11 +5,8 @@ noise but dynamics or nonlinearity that it does not describe (Pintelon and Schou
 Identification, 2nd ed., Wiley 2012, section 4.3: averages over periods tell the two apart).
 """
 
-import json
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
-from os import PathLike
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -185,11 +182,6 @@ class Repeats:
             "results": [result.to_dict() for result in self.results],
             "pairs": [pair.to_dict() for pair in self.pairs],
         }
-
-    def save(self, path: str | PathLike[str]) -> None:
-        """Write all of it to `path` as JSON."""
-        text = json.dumps(self.to_dict(), indent=1, allow_nan=False)
-        Path(path).write_text(text + "\n", encoding="utf-8")
 
 
 def identify_repeats(

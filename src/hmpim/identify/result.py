@@ -1,10 +1,7 @@
 """What an identification says: estimates with error bars, side by side with the paper's."""
 
-import json
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
-from os import PathLike
-from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
@@ -467,8 +464,3 @@ class Identification:
             pairs=tuple(PairIdentification.from_dict(pair) for pair in data["pairs"]),
             inputs=None if data.get("inputs") is None else InputSet.from_dict(data["inputs"]),
         )
-
-    def save(self, path: str | PathLike[str]) -> None:
-        """Write the result to `path` as JSON."""
-        text = json.dumps(self.to_dict(), indent=1, allow_nan=False)
-        Path(path).write_text(text + "\n", encoding="utf-8")

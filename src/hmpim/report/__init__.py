@@ -1,6 +1,5 @@
 """Reports: one HTML page for a browser, one table for a terminal."""
 
-from hmpim.report.files import replacing
 from hmpim.report.html import render, report
 from hmpim.report.numbers import format_estimate, format_interval, format_number, plus_minus
 from hmpim.report.repeats_text import print_levels, print_repeats, repeats_table
@@ -17,6 +16,5 @@ __all__ = [
     "print_result",
     "render",
     "repeats_table",
-    "replacing",
     "report",
 ]

@@ -6,11 +6,11 @@ from importlib.metadata import version
 from os import PathLike
 from typing import TYPE_CHECKING, Any
 
+from hmpim.formats.atomic import write_text
 from hmpim.identify import Identification, PairIdentification
 from hmpim.plots.candidates import INTERSAMPLE_WORDS
 from hmpim.plots.style import printable
 from hmpim.report.figures import Picture, pair_pictures, stimulus_picture
-from hmpim.report.files import replacing
 from hmpim.report.inputs import inputs_view
 from hmpim.report.numbers import format_interval, format_number, plus_minus
 from hmpim.report.svg import inline_svg
@@ -56,7 +56,7 @@ def report(
 
     Raises
     ------
-    OSError
+    ArgumentError
         If `path` cannot be written.
 
     Examples
@@ -72,8 +72,7 @@ def report(
     '<!DOCTYPE html>'
     """
     text = render(result, stimulus=stimulus, notes=notes)
-    with replacing(path) as place:
-        place.write_text(text, encoding="utf-8")
+    write_text(path, text)
 
 
 def render(

@@ -7,7 +7,7 @@ from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from hmpim.report.files import replacing
+from hmpim.formats.atomic import replacing, write_text
 from hmpim.report.paper.rows import COLUMNS, cells, markdown_table, table_dict
 from hmpim.report.paper.study import Study
 from hmpim.report.svg import inline_svg
@@ -77,8 +77,7 @@ def write_study(
         ("table.json", json.dumps(data, indent=1, ensure_ascii=False, allow_nan=False) + "\n"),
         ("index.html", render_page(study)),
     ):
-        with replacing(place / name) as path:
-            path.write_text(text, encoding="utf-8")
+        write_text(place / name, text)
         if tick is not None:
             tick(name)
 
