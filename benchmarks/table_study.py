@@ -16,6 +16,7 @@ from rich.progress import Progress
 
 import hmpim
 from hmpim.campaign.crossing import samples_bandwidth
+from hmpim.experiment import SystemClock
 from hmpim.identify import PairIdentification
 from hmpim.plots.table import table_drawing
 from hmpim.rigs.table import (
@@ -146,7 +147,7 @@ def speed(tick: Callable[[], None]) -> str:
             took = []
             for _ in range(3):
                 begun = time.process_time()  # of this one core, whoever else is at work
-                table.play(stimuli, rng=np.random.default_rng(0))
+                hmpim.run(table, stimuli, rng=0)
                 took.append(time.process_time() - begun)
             cells.append(f"{seconds / min(took):.0f} times real time")
             tick()
@@ -154,34 +155,24 @@ def speed(tick: Callable[[], None]) -> str:
     late = paced(MotionTable(realtime=True))
     tick()
     return text + (
-        f"\nIn real time, 10 ms at a time: blocks end {1e3 * np.median(late):.2f} ms after the "
+        f"\nIn real time, 20 ms at a time: waits end {1e3 * np.median(late):.2f} ms after the "
         f"clock says (median), {1e3 * np.quantile(late, 0.99):.2f} ms at the 99th percentile, "
-        f"{1e3 * late.max():.2f} ms at worst, over {late.size} blocks on a shared machine.\n"
+        f"{1e3 * late.max():.2f} ms at worst, over {late.size} waits on a shared machine.\n"
     )
 
 
 def paced(table: MotionTable) -> np.ndarray:
-    """How late each block of a run in real time ends, s."""
-    from hmpim.rigs.table import simulate
-
+    """How late each wait of a run in real time ends, s."""
     ends: list[tuple[float, float]] = []
 
-    class Watch:
-        """The module's clock, whose sleeps are looked at as they end."""
+    class Watch(SystemClock):
+        """The computer's clock, whose waits are looked at as they end."""
 
-        perf_counter = staticmethod(time.perf_counter)
+        def sleep_until(self, instant: float) -> None:
+            super().sleep_until(instant)
+            ends.append((instant, self.now()))
 
-        @staticmethod
-        def sleep(seconds: float) -> None:
-            due = time.perf_counter() + seconds
-            time.sleep(seconds)
-            ends.append((due, time.perf_counter()))
-
-    clock, simulate.time = simulate.time, Watch  # type: ignore[attr-defined,assignment]
-    try:
-        table.play(all_axes(table, 500.0, 4.0), rng=np.random.default_rng(0))
-    finally:
-        simulate.time = clock  # type: ignore[attr-defined]
+    hmpim.run(table, all_axes(table, 500.0, 4.0), rng=0, clock=Watch())
     return np.array([end - due for due, end in ends])
 
 

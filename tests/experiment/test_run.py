@@ -1,5 +1,8 @@
 """Nothing moves beyond a limit; what a rig does wrong is told as its own error."""
 
+import os
+import signal
+import time
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -8,9 +11,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hmpim.errors import ArgumentError, LimitsError, RigError, UnitError
-from hmpim.experiment import run
+from hmpim.experiment import ManualClock, RunLog, run
 from hmpim.record import Record
-from hmpim.rigs import Sensor
+from hmpim.rigs import Samples, Sensor
 from hmpim.stimulus import Limits, Sine, Step, Stimulus, design
 
 SINE = Stimulus(waveform=Sine(amplitude=2.0, frequency=1.0, duration=2.0), fs=100.0, unit="deg")
@@ -19,21 +22,42 @@ RATE, ACCELERATION = 4 * np.pi, 8 * np.pi**2  # peaks of SINE
 
 @dataclass
 class Spy:
-    """A rig that remembers whether it moved."""
+    """A rig that remembers what it was told, and what moved."""
 
     limits: Limits | None = None
     name: str = "pitch"
-    fault: Exception | None = None
+    axes: tuple[str, ...] = ()
+    moves: bool = False
+    fault: BaseException | None = None
+    fails_in: str = "play"
     returns: object = None
+    told: list[str] = field(default_factory=list)
     moved: list[Stimulus] = field(default_factory=list)
 
-    def play(self, stimulus, *, rng):
-        self.moved.append(stimulus)
-        if self.fault is not None:
+    def _told(self, what):
+        self.told.append(what)
+        if self.fails_in == what and self.fault is not None:
             raise self.fault
-        if self.returns is not None:
-            return self.returns
-        return Sensor().play(stimulus, rng=rng)
+
+    def __enter__(self):
+        self._told("enter")
+        return self
+
+    def __exit__(self, *_):
+        self._told("exit")
+
+    def prepare(self, stimulus):
+        self._told("prepare")
+        self.stimulus = stimulus
+
+    def play(self, block):
+        if block.start == 0:
+            self.moved.append(self.stimulus)
+        self._told("play")
+        return block.position if self.returns is None else self.returns
+
+    def stop(self):
+        self._told("stop")
 
 
 @pytest.mark.parametrize(
@@ -170,23 +194,194 @@ def test_an_error_of_ours_passes_unchanged():
     assert caught.value is stop
 
 
-def test_an_interrupt_is_not_swallowed():
-    class Interrupted(Spy):
-        def play(self, stimulus, *, rng):
-            raise KeyboardInterrupt
+def test_a_rig_is_connected_prepared_played_stopped_and_disconnected_in_this_order():
+    spy = Spy()
+    record = run(spy, SINE)
+    assert spy.told[:3] == ["enter", "prepare", "play"]
+    assert spy.told[-2:] == ["stop", "exit"]
+    assert set(spy.told[2:-2]) == {"play"}
+    assert np.array_equal(record.outputs[0].values, SINE.position)
+    assert np.array_equal(record.inputs[0].time, SINE.time)
+    assert (record.inputs[0].unit, record.fs, record.source) == ("deg", 100.0, "rig pitch")
 
+
+@pytest.mark.parametrize(
+    "fault", [OSError("port closed"), RigError("stuck"), KeyboardInterrupt(), SystemExit(3)]
+)
+@pytest.mark.parametrize("place", ["prepare", "play"])
+def test_the_rig_is_stopped_and_disconnected_whatever_fails(fault, place):
+    spy = Spy(fault=fault, fails_in=place)
+    expected = RigError if isinstance(fault, Exception) else type(fault)
+    with pytest.raises(expected):
+        run(spy, SINE)
+    assert spy.told[-2:] == ["stop", "exit"]
+
+
+def test_a_rig_that_cannot_be_connected_is_not_told_to_stop():
+    spy = Spy(fault=OSError("no such port"), fails_in="enter")
+    with pytest.raises(RigError, match="OSError: no such port"):
+        run(spy, SINE)
+    assert spy.told == ["enter"]
+
+
+def test_a_failing_subscriber_ends_the_run_with_its_own_error_and_the_rig_stops():
+    spy = Spy()
+
+    def watch(played):
+        if played.block.time[-1] > 1.0:
+            raise ZeroDivisionError("mine")
+
+    with pytest.raises(ZeroDivisionError, match="mine"):
+        run(spy, SINE, subscribers=[watch])
+    assert spy.told[-2:] == ["stop", "exit"]
+    assert 50 <= spy.told.count("play") < 60
+
+
+def test_subscribers_see_every_block_once():
+    seen = []
+    record = run(Spy(), SINE, subscribers=[lambda played: seen.append(played.samples["y"])])
+    assert np.array_equal(np.concatenate([s.values for s in seen]), record.outputs[0].values)
+    assert np.array_equal(np.concatenate([s.time for s in seen]), record.outputs[0].time)
+
+
+def test_a_failing_stop_is_told():
+    with pytest.raises(RigError, match="rig 'pitch' failed: OSError: cable"):
+        run(Spy(fault=OSError("cable"), fails_in="stop"), SINE)
+
+
+def test_ctrl_c_during_a_stop_waits_until_the_rig_stands():
+    class Slow(Spy):
+        def stop(self):
+            os.kill(os.getpid(), signal.SIGINT)
+            time.sleep(0.01)  # where a handler would run
+            self.told.append("at rest")
+
+    spy = Slow()
     with pytest.raises(KeyboardInterrupt):
-        run(Interrupted(), SINE)
+        run(spy, SINE)
+    assert spy.told[-2:] == ["at rest", "exit"]
 
 
-def test_a_rig_must_return_a_record():
-    with pytest.raises(RigError, match="rig 'pitch' returned list; it must be a Record"):
-        run(Spy(returns=[1, 2]), SINE)
+def test_a_polite_kill_stops_the_rig():
+    class Killed(Spy):
+        def play(self, block):
+            os.kill(os.getpid(), signal.SIGTERM)
+            return super().play(block)
+
+    spy = Killed()
+    with pytest.raises(SystemExit) as ended:
+        run(spy, SINE)
+    assert ended.value.code == 128 + signal.SIGTERM
+    assert spy.told[-2:] == ["stop", "exit"]
+    assert signal.getsignal(signal.SIGTERM) == signal.SIG_DFL
 
 
-@pytest.mark.parametrize("rig", [None, abs, "sensor"])
+@pytest.mark.parametrize(
+    ("returns", "words"),
+    [
+        ("fast", "returned str from play; return samples by channel name"),
+        (np.zeros(3), r"an array of shape \(3, 1\) for a block of 2 commands with 1 outputs"),
+        ({"z": [0.0, 0.0]}, "returned channel 'z', which its layout does not have; it has u, y"),
+        ({"y": [0.0]}, r"channel 'y' of rig 'pitch' has shape \(1,\) for a block of 2 commands"),
+        ({"y": ["a", "b"]}, "channel 'y' of rig 'pitch' is not numeric"),
+        ({}, "delivered no usable record: channel 'y' has 0 samples"),
+        (np.full(2, np.nan), "delivered no usable record: channel 'y' holds nan at sample 0"),
+    ],
+)
+def test_what_a_rig_may_not_return(returns, words):
+    with pytest.raises(RigError, match=words):
+        run(Spy(returns=returns), SINE)
+
+
+def test_a_rig_that_moves_and_states_no_limits_is_refused():
+    spy = Spy(moves=True)
+    with pytest.raises(LimitsError, match="rig 'pitch' moves and states no limits; state"):
+        run(spy, SINE)
+    spy = Spy(moves=True, axes=("roll", "yaw"), limits={"roll": Limits(position=5, unit="deg")})
+    with pytest.raises(LimitsError, match="axis 'yaw' of rig 'pitch' moves and states no limits"):
+        run(spy, {"roll": SINE, "yaw": SINE})
+    assert spy.told == []
+    run(Spy(moves=True, limits=Limits()), SINE)  # stated: nothing bounds it
+
+
+def test_a_channel_on_its_own_clock_keeps_its_stamps():
+    class Late(Spy):
+        """The last half of each block comes with the next; the rest never."""
+
+        def prepare(self, stimulus):
+            super().prepare(stimulus)
+            self.waiting = []
+
+        def play(self, block):
+            self.waiting += list(zip(block.time + 0.003, block.position[:, 0], strict=True))
+            now, self.waiting = self.waiting[:-1], self.waiting[-1:]
+            time, values = np.array(now).reshape(-1, 2).T
+            return {"y": Samples(time=time, values=values)}
+
+    record = run(Late(), SINE)
+    y = record.outputs[0]
+    assert y.values.size == SINE.samples - 1
+    assert np.allclose(y.time, SINE.time[:-1] + 0.003)
+    assert np.array_equal(y.values, SINE.position[:-1])
+
+
+def test_several_axes_by_name_or_by_their_own():
+    axes = ("roll", "yaw")
+    slow = Stimulus(waveform=Sine(frequency=1.0, duration=1.0), fs=100.0, axis="yaw", unit="rad")
+    fast = Stimulus(waveform=Sine(frequency=2.0, duration=2.0), fs=100.0, axis="roll", unit="deg")
+    by_name = run(Spy(axes=axes), {"yaw": slow, "roll": fast})
+    by_own = run(Spy(axes=axes), [slow, fast])
+    assert by_name.sha256 == by_own.sha256
+    assert [c.name for c in by_name.inputs] == ["roll.command", "yaw.command"]
+    assert [c.unit for c in by_name.outputs] == ["deg", "rad"]
+    assert np.all(by_name.channel("yaw.position").values[100:] == slow.motion(np.ones(1)).position)
+    with pytest.raises(ArgumentError, match="axis 'nod' is not known; use one of"):
+        run(Spy(axes=axes), {"nod": slow})
+    with pytest.raises(ArgumentError, match=r"axes \['yaw', 'yaw'\] are not told apart"):
+        run(Spy(axes=axes), [slow, slow])
+    with pytest.raises(ArgumentError, match="'pitch' takes one stimulus, and 2 are given"):
+        run(Spy(), [slow, fast])
+
+
+def test_everything_that_happened_stands_in_the_log(tmp_path):
+    path = tmp_path / "run.log"
+    limits = Limits(position=3.0, velocity=20.0, unit="deg")
+    with RunLog(path) as log:
+        run(Spy(limits=limits), SINE, log=log)
+        with pytest.raises(RigError):
+            run(Spy(fault=OSError("cable"), limits=limits), SINE, log=log)
+        with pytest.raises(LimitsError):
+            run(Spy(limits=Limits(position=1.0, unit="deg")), SINE, log=log)
+    kinds = [event.kind for event in log.events]
+    whole = ["check", "arm", "start", "done", "stop"]
+    assert kinds == [*whole, "check", "arm", "start", "fault", "stop", "fault"]
+    assert log.events[0].message == "'pitch': position 2 of 3 deg, velocity 12.5664 of 20 deg/s"
+    seconds = [event.seconds for event in log.events]
+    assert seconds == sorted(seconds)
+    lines = path.read_text(encoding="utf-8").splitlines()
+    assert [line.split()[2] for line in lines[1:]] == kinds
+    with pytest.raises(ArgumentError, match="cannot be written"):
+        RunLog(tmp_path / "no" / "run.log")
+
+
+def test_commands_go_by_the_clock_of_the_run():
+    class Paced(Spy):
+        def play(self, block):
+            for _ in block.due():
+                self.sent.append(self.clock.now())
+            return block.position
+
+    spy = Paced()
+    spy.sent, spy.clock = [], ManualClock(late=np.array([0.0, 0.001]))
+    run(spy, SINE, clock=spy.clock)
+    late = np.array(spy.sent) - SINE.time
+    assert late[::2] == pytest.approx(0.0, abs=1e-12)
+    assert late[1::2] == pytest.approx(0.001)
+
+
+@pytest.mark.parametrize("rig", [None, abs, "sensor", Sensor])
 def test_what_is_no_rig(rig):
-    with pytest.raises(ArgumentError, match=r"is no rig; .* FunctionRig\(function=\.\.\.\)"):
+    with pytest.raises(ArgumentError, match=r"is no rig: .* FunctionRig\(function=\.\.\.\)"):
         run(rig, SINE)
 
 

@@ -23,7 +23,7 @@ def stimuli():
 
 def together(stimuli, *, friction):
     table = MotionTable(friction=friction)
-    record = table.play(stimuli, rng=np.random.default_rng(5))
+    record = hmpim.run(table, stimuli, rng=5)
     return table, record, hmpim.identify(record)
 
 

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from hmpim.errors import ArgumentError, RigError, UnitError
+from hmpim.experiment import run
 from hmpim.rigs import FunctionRig, Rig
 from hmpim.stimulus import Ramp, Sine, Stimulus
 
@@ -11,7 +12,7 @@ STIMULUS = Stimulus(waveform=Sine(frequency=1.0, duration=2.0), fs=50.0, unit="d
 
 
 def play(rig, stimulus=STIMULUS):
-    return rig.play(stimulus, rng=np.random.default_rng(0))
+    return run(rig, stimulus)
 
 
 class Smoother:

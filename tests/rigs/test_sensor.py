@@ -11,6 +11,7 @@ from scipy.integrate import solve_ivp
 from scipy.signal import cont2discrete, lfilter
 
 from hmpim.errors import ArgumentError, UnitError
+from hmpim.experiment import run
 from hmpim.rigs import Rig, Sensor
 from hmpim.stimulus import Limits, Ramp, Sine, Step, Stimulus, Sweep, design
 
@@ -20,7 +21,7 @@ NO_LIMITS = Limits(position=10, velocity=1000, acceleration=40000, unit="deg")
 
 def output(sensor, waveform, fs=200.0, seed=0, unit="deg"):
     stimulus = Stimulus(waveform=waveform, fs=fs, unit=unit)
-    record = sensor.play(stimulus, rng=np.random.default_rng(seed))
+    record = run(sensor, stimulus, rng=seed)
     return record.outputs[0].time, record.outputs[0].values
 
 
@@ -107,7 +108,7 @@ def test_the_sweep_agrees_with_a_general_purpose_integrator(lead, extinction):
         u = stimulus.motion(np.array([t])).position[0]
         return [x[1], w * w * (u - x[0]) - 2 * 0.4 * w * x[1]]
 
-    y = sensor.play(stimulus, rng=np.random.default_rng(0)).outputs[0].values
+    y = run(sensor, stimulus, rng=0).outputs[0].values
     truth = solve_ivp(
         motion,
         (0, stimulus.time[-1]),
@@ -162,15 +163,15 @@ def test_a_held_command_with_a_fractional_delay(delay, T):
 def test_the_commanded_samples_are_what_a_held_command_is_made_of():
     sensor = Sensor(time_constant=0.05, delay=0.0123, command="zoh")
     stimulus = design(band=(0.5, 20), duration=2, fs=200, limits=NO_LIMITS)
-    record = sensor.play(stimulus, rng=np.random.default_rng(0))
+    record = run(sensor, stimulus, rng=0)
     assert record.intersample == "zoh"
     again = sensor.respond(stimulus.position, fs=200.0, intersample="zoh")
     assert np.array_equal(record.outputs[0].values, again)
-    smooth = replace(sensor, command="continuous").play(stimulus, rng=np.random.default_rng(0))
+    smooth = run(replace(sensor, command="continuous"), stimulus, rng=0)
     assert smooth.intersample == "bandlimited"
     # Held samples are late by half an interval on the average.
     late = replace(sensor, command="continuous", delay=0.0123 + 0.0025)
-    late_values = late.play(stimulus, rng=np.random.default_rng(0)).outputs[0].values
+    late_values = run(late, stimulus, rng=0).outputs[0].values
     held = record.outputs[0].values
     assert np.abs(held - late_values).max() < 0.05 * np.abs(smooth.outputs[0].values - held).max()
 
@@ -194,7 +195,7 @@ def test_dynamics_far_beyond_the_sampling_rate_leave_their_lag_only():
 def test_a_rate_sensor_measures_the_velocity():
     sine = Sine(frequency=2.0, duration=3.0)
     stimulus = Stimulus(waveform=sine, fs=100.0, unit="deg")
-    record = Sensor(measures="velocity", delay=0.1).play(stimulus, rng=np.random.default_rng(0))
+    record = run(Sensor(measures="velocity", delay=0.1), stimulus, rng=0)
     assert record.inputs[0].unit == record.outputs[0].unit == "deg/s"
     assert np.array_equal(record.inputs[0].values, stimulus.velocity)
     t = stimulus.time - 0.1
@@ -289,7 +290,7 @@ def test_the_same_seed_makes_the_same_record_and_another_one_another():
     stimulus = design(band=(0.1, 20), duration=3, fs=200, limits=NO_LIMITS)
 
     def digest(seed):
-        return FIG17.play(stimulus, rng=np.random.default_rng(seed)).sha256
+        return run(FIG17, stimulus, rng=seed).sha256
 
     assert digest(1) == digest(1)
     assert digest(1) != digest(2)
@@ -317,7 +318,7 @@ def test_a_resting_position_other_than_zero_is_where_it_starts():
 def test_the_record_says_what_was_done():
     stimulus = design(band=(0.1, 20), duration=3, fs=200, limits=NO_LIMITS)
     sensor = Sensor(output_unit="V", name="seeker", input_name="angle", output_name="signal")
-    record = sensor.play(stimulus, rng=np.random.default_rng(0))
+    record = run(sensor, stimulus, rng=0)
     assert [(c.name, c.unit) for c in (*record.inputs, *record.outputs)] == [
         ("angle", "deg"),
         ("signal", "V"),

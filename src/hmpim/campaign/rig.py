@@ -167,13 +167,13 @@ class TableRig:
         """Limits of each axis, and the torque that all together take."""
         table = self.loaded(case)
         torque = table.check({cast(AxisName, s.axis): s for s in stimuli})
-        limit = np.array([axis.torque_limit for axis in table.axes])
+        limit = np.array([axis.torque_limit for axis in table.specs])
         share = np.abs(torque).max(axis=0) / limit
         return dict(zip(AXES, share.tolist(), strict=True))
 
     def play(self, case: Case, stimuli: Sequence[Stimulus], rng: np.random.Generator) -> Record:
         """Simulate."""
-        return self.loaded(case).play({cast(AxisName, s.axis): s for s in stimuli}, rng=rng)
+        return run(self.loaded(case), stimuli, rng=rng)
 
     def known(self, case: Case, axis: str) -> dict[str, float]:
         """Of the linearised mechanics, friction off."""

@@ -1,5 +1,17 @@
 """Run a stimulus on a rig, safely."""
 
-from hmpim.experiment.run import run
+from hmpim.experiment.clock import Clock, ManualClock, SystemClock
+from hmpim.experiment.collect import Played
+from hmpim.experiment.log import Event, RunLog
+from hmpim.experiment.run import Subscriber, run
 
-__all__ = ["run"]
+__all__ = [
+    "Clock",
+    "Event",
+    "ManualClock",
+    "Played",
+    "RunLog",
+    "Subscriber",
+    "SystemClock",
+    "run",
+]

@@ -1,28 +1,56 @@
-"""Run a stimulus on a rig: limits first, then motion."""
+"""Run a stimulus on a rig: limits first, then motion, and a stop whatever happens."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from hmpim.errors import ArgumentError, HmpimError, RigError
+from hmpim.experiment.checks import check_rig, check_stimuli, limits_by_axis
+from hmpim.experiment.clock import Clock, Pacer, SystemClock
+from hmpim.experiment.collect import Collected, Played, default_layout
+from hmpim.experiment.interrupt import ending_politely, undisturbed
+from hmpim.experiment.log import RunLog
 from hmpim.record import Record
-from hmpim.rigs import Rig
-from hmpim.stimulus import Stimulus, check_inside
+from hmpim.rigs import Commands, Rig, Seeded, commands_of, shared_band, stimuli_by_axis
+from hmpim.stimulus import Stimulus
 
-__all__ = ["run"]
+__all__ = ["Subscriber", "run"]
+
+Subscriber = Callable[[Played], object]
+"""Called with each block as it was played; what it returns is not looked at."""
+
+_BLOCK = 0.02  # s: commands handed to a rig at once, and how often anybody watching is told
 
 
-def run(rig: Rig, stimulus: Stimulus, *, rng: np.random.Generator | int | None = None) -> Record:
+def run(
+    rig: Rig,
+    stimulus: Stimulus | Mapping[str, Stimulus] | Sequence[Stimulus],
+    *,
+    rng: np.random.Generator | int | None = None,
+    subscribers: Sequence[Subscriber] = (),
+    log: RunLog | None = None,
+    clock: Clock | None = None,
+) -> Record:
     """Play a stimulus on a rig and return the record.
 
-    Nothing moves unless the stimulus keeps every limit of the rig.
+    Nothing moves unless the stimulus keeps every limit of the rig. Whatever happens after that,
+    an error, Ctrl-C or a polite kill, the rig is stopped before this returns.
 
     Parameters
     ----------
     rig : Rig
-        The unit under test.
-    stimulus : Stimulus
-        What to play.
+        The unit under test. It is entered here: give it as it is, not inside a `with`.
+    stimulus : Stimulus, or mapping of axis to Stimulus, or sequence of Stimulus
+        What to play: one, or one for each axis that moves (a sequence goes by `Stimulus.axis`).
     rng : numpy.random.Generator, int or None
         Source of what is random in a simulated unit, or its seed; None draws fresh.
+    subscribers : sequence of callable
+        Each is called with every block that was played. One that raises ends the run.
+    log : RunLog or None
+        Takes each limit check, arm, stop and fault with its time.
+    clock : Clock or None
+        None for the computer's own; `ManualClock` for tests.
 
     Returns
     -------
@@ -31,8 +59,8 @@ def run(rig: Rig, stimulus: Stimulus, *, rng: np.random.Generator | int | None =
     Raises
     ------
     LimitsError
-        If a true peak of the stimulus, between samples too, is beyond a limit of the rig; the
-        message says which, by how much, and what would do.
+        If a true peak of the stimulus, between samples too, is beyond a limit of the rig, or
+        the rig moves and states none; the message says what would do.
     UnitError
         If the units of stimulus and limits cannot be compared.
     RigError
@@ -48,23 +76,111 @@ def run(rig: Rig, stimulus: Stimulus, *, rng: np.random.Generator | int | None =
     >>> record.fs, record.inputs[0].unit
     (200.0, 'deg')
     """
-    if not isinstance(rig, Rig):
-        raise ArgumentError(
-            f"{rig!r} is no rig; a rig has name, limits and play(stimulus, rng=...), "
-            "and a plain function becomes one with FunctionRig(function=...)"
-        )
-    if not isinstance(stimulus, Stimulus):
+    unit = check_rig(rig)
+    log = RunLog() if log is None else log
+    named = stimuli_by_axis(_mapped(stimulus), unit.axes, name=repr(unit.name))
+    try:
+        check_stimuli(named, limits_by_axis(unit, named), rig=unit, log=log)
+    except HmpimError as error:
+        log.add("fault", str(error))
+        raise
+    commands = commands_of(named)
+    playing = _Playing(
+        rig=unit,
+        given=stimulus if isinstance(stimulus, Stimulus) else named,
+        commands=commands,
+        pacer=Pacer(SystemClock() if clock is None else clock, fs=commands.fs, count=len(commands)),
+        subscribers=tuple(subscribers),
+        log=log,
+    )
+    if isinstance(unit, Seeded):
+        unit.seed(np.random.default_rng(rng))
+    with ending_politely():
+        collected = playing.through()
+    return collected.record(fs=commands.fs, band=shared_band(named))
+
+
+def _mapped(
+    stimulus: Stimulus | Mapping[str, Stimulus] | Sequence[Stimulus],
+) -> Stimulus | Mapping[str, Stimulus]:
+    if isinstance(stimulus, Stimulus | Mapping):
+        return stimulus
+    if not isinstance(stimulus, Sequence) or not all(isinstance(s, Stimulus) for s in stimulus):
         raise ArgumentError(
             f"{stimulus!r} is no Stimulus; make one with design(...) or Stimulus(waveform=...)"
         )
-    if rig.limits is not None:
-        check_inside(stimulus, rig.limits, whose=repr(rig.name))
-    try:
-        record = rig.play(stimulus, rng=np.random.default_rng(rng))
-    except HmpimError:
-        raise
-    except Exception as error:  # a driver may raise anything
-        raise RigError(f"rig {rig.name!r} failed: {type(error).__name__}: {error}") from error
-    if not isinstance(record, Record):
-        raise RigError(f"rig {rig.name!r} returned {type(record).__name__}; it must be a Record")
-    return record
+    axes = [s.axis for s in stimulus]
+    if len(set(axes)) < len(axes) or (len(axes) > 1 and not all(axes)):
+        raise ArgumentError(f"axes {axes!r} are not told apart; give each stimulus its own axis")
+    return stimulus[0] if len(stimulus) == 1 else {s.axis: s for s in stimulus}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Playing:
+    """One run of one rig, from connecting to disconnecting."""
+
+    rig: Rig
+    given: Stimulus | Mapping[str, Stimulus]
+    commands: Commands
+    pacer: Pacer
+    subscribers: tuple[Subscriber, ...]
+    log: RunLog
+
+    def through(self) -> Collected:
+        """Connect, play, stop, disconnect; errors of a driver become the rig's own."""
+        try:
+            with self.rig:
+                try:
+                    return self._play()
+                except BaseException as error:
+                    self.log.add("fault", f"{type(error).__name__}: {error}")
+                    raise
+                finally:
+                    self._stop()
+        except HmpimError:
+            raise
+        except _Watching as failure:
+            raise failure.error from None
+        except Exception as error:  # a driver may raise anything
+            raise RigError(
+                f"rig {self.rig.name!r} failed: {type(error).__name__}: {error}"
+            ) from error
+
+    def _play(self) -> Collected:
+        commands = self.commands
+        layout = self.rig.prepare(self.given)
+        if layout is None:
+            layout = default_layout(commands, name=self.rig.name)
+        self.log.add("arm", f"{self.rig.name}: {', '.join(c.name for c in layout.channels)}")
+        collected = Collected(layout, name=self.rig.name)
+        size = max(1, round(_BLOCK * commands.fs))
+        seconds = len(commands) / commands.fs
+        self.log.add("start", f"{len(commands)} commands at {commands.fs:g} Hz, {seconds:g} s")
+        for block in commands.blocks(size, pace=self.pacer):
+            samples = collected.take(block, self.rig.play(block))
+            played = Played(block=block, layout=layout, samples=samples, seconds=seconds)
+            for subscriber in self.subscribers:
+                try:
+                    subscriber(played)
+                except Exception as error:
+                    raise _Watching(error) from error
+        self.log.add("done", f"{len(commands)} commands played")
+        return collected
+
+    def _stop(self) -> None:
+        """Stop the rig; nothing from outside breaks this off."""
+        with undisturbed():
+            try:
+                self.rig.stop()
+            except BaseException as error:
+                self.log.add("fault", f"stop failed: {type(error).__name__}: {error}")
+                raise
+            self.log.add("stop", f"{self.rig.name} was told to stop")
+
+
+class _Watching(Exception):  # noqa: N818
+    """A subscriber failed: its own error passes as it is, and is not the rig's."""
+
+    def __init__(self, error: Exception) -> None:
+        super().__init__(f"a subscriber failed: {type(error).__name__}: {error}")
+        self.error = error

@@ -1,22 +1,28 @@
 """Software under test: a Python function is fed the stimulus, all at once or by the sample."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Any, Literal
+from dataclasses import dataclass, field
+from typing import Any, Literal, get_args
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hmpim.errors import ArgumentError, RigError
-from hmpim.record import Channel, Intersample, Record
-from hmpim.rigs.sensor import Quantity
-from hmpim.stimulus import Limits, Stimulus
+from hmpim.record import Intersample
+from hmpim.rigs.block import Block, ChannelSpec, Layout, Quantity
+from hmpim.rigs.protocol import Stimuli
+from hmpim.rigs.simulated import Playing, Simulated
+from hmpim.rigs.stimuli import commands_of, stimuli_by_axis
+from hmpim.stimulus import Limits
 from hmpim.units import check_unit, rate_unit
 
 __all__ = ["FunctionRig"]
 
+FloatArray = NDArray[np.float64]
+
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class FunctionRig:
+class FunctionRig(Simulated):
     """An algorithm as the unit under test.
 
     Parameters
@@ -45,7 +51,8 @@ class FunctionRig:
     >>> from hmpim.stimulus import Ramp, Stimulus
     >>> doubling = FunctionRig(function=lambda u: 2 * u, mode="sample")
     >>> ramp = Stimulus(waveform=Ramp(duration=1.0), fs=4.0)
-    >>> doubling.play(ramp, rng=np.random.default_rng(0)).outputs[0].values.tolist()
+    >>> from hmpim.experiment import run
+    >>> run(doubling, ramp).outputs[0].values.tolist()
     [0.0, 0.5, 1.0, 1.5]
     """
 
@@ -59,6 +66,7 @@ class FunctionRig:
     input_name: str = "u"
     output_name: str = "y"
     limits: Limits | None = None
+    _playing: Playing = field(default_factory=Playing, init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         if not callable(self.function):
@@ -73,8 +81,38 @@ class FunctionRig:
         if self.output_unit is not None:
             check_unit(self.output_unit)
 
-    def play(self, stimulus: Stimulus, *, rng: np.random.Generator) -> Record:
-        """Feed the stimulus's samples to the function and record what it returns.
+    @property
+    def axes(self) -> tuple[str, ...]:
+        """Empty: any one stimulus is fed."""
+        return ()
+
+    def prepare(self, stimulus: Stimuli, /) -> Layout:
+        """Bring an algorithm with a memory back to its start, and say what will be recorded."""
+        named = stimuli_by_axis(stimulus, name=repr(self.name))
+        ((axis, only),) = named.items()
+        if self.reset is not None:
+            self.reset()
+        commands = commands_of(named)
+        fed: FloatArray = getattr(commands, self.measures)[:, 0]
+        self._playing.state = {"fed": fed, "returned": None}
+        in_unit = rate_unit(only.unit, get_args(Quantity).index(self.measures))
+        out_unit = in_unit if self.output_unit is None else self.output_unit
+        given = ChannelSpec(
+            name=self.input_name,
+            role="input",
+            unit=in_unit,
+            axis=axis,
+            quantity=self.measures,
+            commanded=True,
+        )
+        return Layout(
+            channels=(given, ChannelSpec(name=self.output_name, role="output", unit=out_unit)),
+            intersample=self.intersample,
+            source=f"function {self.name}",
+        )
+
+    def play(self, block: Block, /) -> dict[str, FloatArray]:
+        """Feed the block's samples to the function and return what it returns.
 
         Raises
         ------
@@ -84,38 +122,21 @@ class FunctionRig:
 
         Examples
         --------
+        >>> from hmpim.experiment import run
         >>> from hmpim.stimulus import Ramp, Stimulus
         >>> ramp = Stimulus(waveform=Ramp(duration=1.0), fs=4.0)
-        >>> record = FunctionRig(function=np.square).play(ramp, rng=np.random.default_rng(0))
-        >>> record.outputs[0].values.tolist()
+        >>> run(FunctionRig(function=np.square), ramp).outputs[0].values.tolist()
         [0.0, 0.0625, 0.25, 0.5625]
         """
-        del rng  # an algorithm brings its own randomness, if any
-        fed = np.array(getattr(stimulus, self.measures), dtype=np.float64)
-        if self.reset is not None:
-            self.reset()
-        values = self._whole(fed) if self.mode == "array" else self._one_by_one(fed)
-        bad = np.flatnonzero(~np.isfinite(values))
-        if bad.size:
-            raise RigError(
-                f"{self.name!r} returned {values[bad[0]]} at sample {bad[0]}, for the input "
-                f"{fed[bad[0]]:.6g} ({bad.size} such in all); make it return finite numbers"
-            )
-        order = ("position", "velocity", "acceleration").index(self.measures)
-        in_unit = rate_unit(stimulus.unit, order)
-        out_unit = in_unit if self.output_unit is None else self.output_unit
-        return Record(
-            inputs=(Channel(name=self.input_name, time=stimulus.time, values=fed, unit=in_unit),),
-            outputs=(
-                Channel(name=self.output_name, time=stimulus.time, values=values, unit=out_unit),
-            ),
-            fs=stimulus.fs,
-            band=stimulus.band,
-            intersample=self.intersample,
-            source=f"function {self.name}",
-        )
+        state = self._playing.current(self.name)
+        part = slice(block.start, block.stop)
+        if self.mode == "sample":
+            return {self.output_name: self._one_by_one(state["fed"][part], first=block.start)}
+        if state["returned"] is None:
+            state["returned"] = self._whole(state["fed"])
+        return {self.output_name: state["returned"][part]}
 
-    def _whole(self, fed: np.ndarray[Any, np.dtype[np.float64]]) -> Any:
+    def _whole(self, fed: FloatArray) -> FloatArray:
         try:
             values = np.asarray(self.function(fed.copy()), dtype=np.float64)
         except Exception as error:  # whatever the software under test raises
@@ -125,16 +146,25 @@ class FunctionRig:
                 f"{self.name!r} returned shape {values.shape} for an input of shape {fed.shape}; "
                 "make it return one number for each sample, or use mode='sample'"
             )
-        return values
+        return self._finite(values, fed, first=0)
 
-    def _one_by_one(self, fed: np.ndarray[Any, np.dtype[np.float64]]) -> Any:
+    def _one_by_one(self, fed: FloatArray, *, first: int) -> FloatArray:
         values = np.empty(fed.size)
         for k, sample in enumerate(fed.tolist()):
             try:
                 values[k] = self.function(sample)
             except Exception as error:  # whatever the software under test raises
                 raise RigError(
-                    f"{self.name!r} failed at sample {k}, for the input {sample:.6g}: "
+                    f"{self.name!r} failed at sample {first + k}, for the input {sample:.6g}: "
                     f"{type(error).__name__}: {error}"
                 ) from error
+        return self._finite(values, fed, first=first)
+
+    def _finite(self, values: FloatArray, fed: FloatArray, *, first: int) -> FloatArray:
+        bad = np.flatnonzero(~np.isfinite(values))
+        if bad.size:
+            raise RigError(
+                f"{self.name!r} returned {values[bad[0]]} at sample {first + bad[0]}, for the "
+                f"input {fed[bad[0]]:.6g} ({bad.size} such in all); make it return finite numbers"
+            )
         return values

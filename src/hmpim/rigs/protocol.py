@@ -1,20 +1,38 @@
-"""What every unit under test can do: play a stimulus and hand back a record."""
+"""What every unit under test can do: be prepared, play block after block, and stop.
 
-from typing import Protocol, runtime_checkable
+`hmpim.run` owns the clock and calls, in this order::
+
+    with rig:                        # connect
+        layout = rig.prepare(stimulus)   # check, arm; nothing moves yet
+        for block in blocks:
+            reply = rig.play(block)      # send what is due, return what has come in
+        rig.stop()                       # always, whatever has failed
+"""
+
+from collections.abc import Mapping
+from types import TracebackType
+from typing import Protocol, Self, runtime_checkable
 
 import numpy as np
 
-from hmpim.record import Record
+from hmpim.rigs.block import Block, Layout, Reply
 from hmpim.stimulus import Limits, Stimulus
 
-__all__ = ["Rig"]
+__all__ = ["LimitsOfAxes", "Rig", "Seeded", "Stimuli"]
+
+Stimuli = Stimulus | Mapping[str, Stimulus]
+"""One stimulus, or one for each axis that moves."""
+
+LimitsOfAxes = Limits | Mapping[str, Limits] | None
+"""Limits of every axis alike, or of each; None where none are stated."""
 
 
 @runtime_checkable
 class Rig(Protocol):
     """A unit under test, real or simulated.
 
-    Anything with these three is a rig; nothing is inherited.
+    Anything with these is a rig; nothing is inherited. A rig may say ``moves = False`` if it is
+    software or a simulation: only then it may leave its limits unstated.
 
     Examples
     --------
@@ -29,23 +47,74 @@ class Rig(Protocol):
         ...
 
     @property
-    def limits(self) -> Limits | None:
-        """What the unit bears; None where nothing bounds it. Checked before anything moves."""
+    def axes(self) -> tuple[str, ...]:
+        """Names of the axes; empty for a rig that takes any one stimulus."""
         ...
 
-    def play(self, stimulus: Stimulus, *, rng: np.random.Generator) -> Record:
-        """Apply the stimulus and record what went in and what came out.
+    @property
+    def limits(self) -> LimitsOfAxes:
+        """What the unit bears. Checked before anything moves; None is refused if it moves."""
+        ...
+
+    def __enter__(self) -> Self:
+        """Connect. `hmpim.run` enters the rig itself."""
+        ...
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+        /,
+    ) -> object:
+        """Disconnect."""
+        ...
+
+    def prepare(self, stimulus: Stimuli, /) -> Layout | None:
+        """Check the stimulus and get ready; nothing moves.
 
         Parameters
         ----------
-        stimulus : Stimulus
-            What to play; its limits were checked against the rig's.
-        rng : numpy.random.Generator
-            Source of whatever is random in a simulated unit; a real one ignores it.
+        stimulus : Stimulus or mapping of axis to Stimulus
+            As given to `hmpim.run`; its limits were checked.
+
+        Returns
+        -------
+        Layout or None
+            What will be recorded. None for the commands of each axis as inputs, and one output
+            for each, in the stimulus's unit.
 
         Raises
         ------
         RigError
-            If the unit refuses, fails or is stopped.
+            If the unit refuses.
         """
+        ...
+
+    def play(self, block: Block, /) -> Reply:
+        """Send the commands of a block, each when it is due, and return what has come in.
+
+        Parameters
+        ----------
+        block : Block
+            The next commands; ``for k in block.due():`` waits for each.
+
+        Raises
+        ------
+        RigError
+            If the unit fails or has stopped by itself.
+        """
+        ...
+
+    def stop(self) -> None:
+        """Bring everything to rest and disarm. Called always, even where nothing moved yet."""
+        ...
+
+
+@runtime_checkable
+class Seeded(Protocol):
+    """A rig with something random in it, drawn from the generator it is given."""
+
+    def seed(self, rng: np.random.Generator, /) -> None:
+        """Draw from `rng` in the next run."""
         ...

@@ -12,31 +12,33 @@ acts on the held value as it would on the reading.
 """
 
 import math
-from dataclasses import dataclass
-from typing import Literal
+from dataclasses import dataclass, field
+from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.signal import lfilter
 
 from hmpim.errors import ArgumentError
-from hmpim.record import Channel, Intersample, Record
+from hmpim.record import Intersample
 from hmpim.rigs.between import ContinuousInput, between_samples
+from hmpim.rigs.block import Block, ChannelSpec, Layout, Quantity
 from hmpim.rigs.dynamics import Poles, first_order, respond, second_order
+from hmpim.rigs.protocol import Stimuli
+from hmpim.rigs.simulated import Playing, Simulated
+from hmpim.rigs.stimuli import stimuli_by_axis
 from hmpim.stimulus import Limits, Stimulus
 from hmpim.units import check_unit, rate_unit
 
-__all__ = ["Quantity", "Sensor"]
+__all__ = ["Sensor"]
 
 FloatArray = NDArray[np.float64]
-Quantity = Literal["position", "velocity", "acceleration"]
-"""Which quantity of the motion a sensor measures."""
 
 _GRACE = 1e-9  # of an interval: an instant that falls on an update takes the new value
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Sensor:
+class Sensor(Simulated):
     """A simulated sensor, hardware and software (Fig. 1).
 
     Parameters
@@ -86,7 +88,8 @@ class Sensor:
     >>> from hmpim.stimulus import Chirp, Stimulus
     >>> sensor = Sensor(delay=0.15, natural_frequency=10, damping_ratio=0.4, bias=0.6)
     >>> stimulus = Stimulus(waveform=Chirp(band=(0.1, 20), duration=10), fs=200, unit="deg")
-    >>> record = sensor.play(stimulus, rng=np.random.default_rng(0))
+    >>> from hmpim.experiment import run
+    >>> record = run(sensor, stimulus, rng=0)
     >>> record.samples, record.outputs[0].unit, record.outputs[0].values[:30].tolist() == [0.6] * 30
     (2000, 'deg', True)
     """
@@ -111,14 +114,15 @@ class Sensor:
     input_name: str = "u"
     output_name: str = "y"
     limits: Limits | None = None
+    _playing: Playing = field(default_factory=Playing, init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
-        for field in ("hold_phase", "scale_factor", "bias"):
-            _check(field, getattr(self, field))
-        for field in ("delay", "noise_std"):
-            _check(field, getattr(self, field), above=0.0, or_equal=True)
-        for field in ("hold_period", "natural_frequency", "damping_ratio", "time_constant"):
-            _check(field, getattr(self, field), above=0.0)
+        for name in ("hold_phase", "scale_factor", "bias"):
+            _check(name, getattr(self, name))
+        for name in ("delay", "noise_std"):
+            _check(name, getattr(self, name), above=0.0, or_equal=True)
+        for name in ("hold_period", "natural_frequency", "damping_ratio", "time_constant"):
+            _check(name, getattr(self, name), above=0.0)
         _check("quantization_step", self.quantization_step, above=0.0)
         _check("saturation_low", self.saturation_low)
         _check("saturation_high", self.saturation_high)
@@ -145,68 +149,72 @@ class Sensor:
             )
         if self.output_unit is not None:
             check_unit(self.output_unit)
-        for field, known in (
+        for name, known in (
             ("measures", ("position", "velocity", "acceleration")),
             ("command", ("continuous", "zoh", "foh")),
         ):
-            if getattr(self, field) not in known:
+            if getattr(self, name) not in known:
                 raise ArgumentError(
-                    f"{field} = {getattr(self, field)!r} is not known; use one of {known}"
+                    f"{name} = {getattr(self, name)!r} is not known; use one of {known}"
                 )
 
-    def play(self, stimulus: Stimulus, *, rng: np.random.Generator) -> Record:
-        """Measure the stimulus's motion, and record it with what was read.
+    @property
+    def axes(self) -> tuple[str, ...]:
+        """Empty: any one stimulus is measured."""
+        return ()
 
-        Parameters
-        ----------
-        stimulus : Stimulus
-            The motion. Before its time 0 the sensor is at rest.
-        rng : numpy.random.Generator
-            Source of the noise; not touched without noise.
+    def prepare(self, stimulus: Stimuli, /) -> Layout:
+        """Measure the stimulus's motion; before its time 0 the sensor is at rest.
 
         Returns
         -------
-        Record
+        Layout
             Input and output at the stimulus's sample times; `intersample` says what went in
             between them: 'bandlimited' for the motion itself.
 
         Examples
         --------
+        >>> from hmpim.experiment import run
         >>> from hmpim.stimulus import Ramp, Stimulus
         >>> ramp = Stimulus(waveform=Ramp(duration=1.0), fs=4.0)
-        >>> record = Sensor(delay=0.1).play(ramp, rng=np.random.default_rng(0))
-        >>> record.outputs[0].values.round(9).tolist()
+        >>> run(Sensor(delay=0.1), ramp).outputs[0].values.round(9).tolist()
         [0.0, 0.15, 0.4, 0.65]
         """
-        order = ("position", "velocity", "acceleration").index(self.measures)
-        commanded: FloatArray = getattr(stimulus, self.measures)
-        intersample: Intersample
-        if self.command == "continuous":
-            intersample = "bandlimited"
-
-            def motion(t: FloatArray) -> FloatArray:
-                return np.asarray(getattr(stimulus.motion(t), self.measures))
-
-            rest = float(motion(np.array([-1.0]))[0])
-            u = ContinuousInput(at=motion, rest=rest, breaks=None)
-        else:
-            intersample = self.command
-            u = between_samples(commanded, stimulus.fs, self.command)
-        read = self._read(u, fs=stimulus.fs, count=stimulus.samples, rng=rng)
-        in_unit = rate_unit(stimulus.unit, order)
+        ((axis, only),) = stimuli_by_axis(stimulus, name=repr(self.name)).items()
+        commanded: FloatArray = getattr(only, self.measures)
+        intersample, went_in = self._input(only, commanded)
+        rng = self._playing.take_rng()
+        read = self._read(went_in, fs=only.fs, count=only.samples, rng=rng)
+        self._playing.state = (commanded, read)
+        in_unit = rate_unit(only.unit, get_args(Quantity).index(self.measures))
         out_unit = in_unit if self.output_unit is None else self.output_unit
-        return Record(
-            inputs=(
-                Channel(name=self.input_name, time=stimulus.time, values=commanded, unit=in_unit),
-            ),
-            outputs=(
-                Channel(name=self.output_name, time=stimulus.time, values=read, unit=out_unit),
-            ),
-            fs=stimulus.fs,
-            band=stimulus.band,
+        given = ChannelSpec(
+            name=self.input_name, role="input", unit=in_unit, axis=axis, quantity=self.measures
+        )
+        return Layout(
+            channels=(given, ChannelSpec(name=self.output_name, role="output", unit=out_unit)),
             intersample=intersample,
             source=f"simulated {self.name}",
         )
+
+    def play(self, block: Block, /) -> dict[str, FloatArray]:
+        """Return what went in and what was read at the block's times."""
+        commanded, read = self._playing.current(self.name)
+        part = slice(block.start, block.stop)
+        return {self.input_name: commanded[part], self.output_name: read[part]}
+
+    def _input(
+        self, stimulus: Stimulus, commanded: FloatArray
+    ) -> tuple[Intersample, ContinuousInput]:
+        """What goes in at any time, and what it does between the samples."""
+        if self.command != "continuous":
+            return self.command, between_samples(commanded, stimulus.fs, self.command)
+
+        def motion(t: FloatArray) -> FloatArray:
+            return np.asarray(getattr(stimulus.motion(t), self.measures))
+
+        rest = float(motion(np.array([-1.0]))[0])
+        return "bandlimited", ContinuousInput(at=motion, rest=rest, breaks=None)
 
     def respond(
         self,

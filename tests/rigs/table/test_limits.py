@@ -7,10 +7,11 @@ import numpy as np
 import pytest
 
 from hmpim.errors import ArgumentError, LimitsError, RigError, UnitError
+from hmpim.experiment import run
 from hmpim.rigs.table import AXES, FIG_4, MotionTable, TablePosition
 from hmpim.rigs.table import table as room
 from hmpim.rigs.table.servo import RESERVE, Gains
-from hmpim.rigs.table.simulate import simulate
+from hmpim.rigs.table.simulate import Motion
 from hmpim.stimulus import Limits, Ramp, Sine, Step, Stimulus, design
 
 pytest.importorskip("mujoco")
@@ -30,7 +31,7 @@ def unmoved(monkeypatch):
     def move(*_args, **_kwargs):
         pytest.fail("the table moved")
 
-    monkeypatch.setattr(room, "simulate", move)
+    monkeypatch.setattr(room, "Motion", move)
 
 
 @pytest.mark.parametrize(
@@ -55,13 +56,13 @@ def unmoved(monkeypatch):
 )
 def test_each_limit_of_fig_4_is_checked_before_anything_moves(unmoved, axis, stimulus, words):
     with pytest.raises(LimitsError, match=rf"{words}"):
-        MotionTable().play({axis: stimulus}, rng=RNG)
+        run(MotionTable(), {axis: stimulus}, rng=RNG)
 
 
 def test_travel_counts_from_where_the_axis_starts(unmoved):
     table = MotionTable(start=TablePosition(yaw=-30.0))
     with pytest.raises(LimitsError, match="peak position 26 deg is beyond the limit 25 deg of yaw"):
-        table.play({"yaw": sine(26.0, 0.5)}, rng=RNG)
+        run(table, {"yaw": sine(26.0, 0.5)}, rng=RNG)
     with pytest.raises(
         LimitsError, match=r"leaves 25 deg of travel .* less than the 30 deg wanted"
     ):
@@ -75,7 +76,7 @@ def test_a_sweep_that_stops_short_while_others_go_on_is_refused(unmoved):
     table = MotionTable()
     table.check({"roll": short})
     with pytest.raises(LimitsError, match=r"peak acceleration 50000 deg/s² .* of roll"):
-        table.play({"roll": short, "pitch": sine(1.0, 1.0, duration=2.0)}, rng=RNG)
+        run(table, {"roll": short, "pitch": sine(1.0, 1.0, duration=2.0)}, rng=RNG)
 
 
 def test_axes_that_keep_their_limits_alone_may_not_together(unmoved):
@@ -87,7 +88,7 @@ def test_axes_that_keep_their_limits_alone_may_not_together(unmoved):
         alone = np.abs(table.check({axis: stimulus})).max(axis=0)
         assert np.all(alone < [spec.torque_limit for spec in FIG_4])
     with pytest.raises(LimitsError, match=r"at 0\.\d+ s the motion of all axes .* of roll, beyond"):
-        table.play({"roll": roll, "pitch": pitch}, rng=RNG)
+        run(table, {"roll": roll, "pitch": pitch}, rng=RNG)
 
 
 def test_a_jerk_limit_of_an_axis_is_checked_too(unmoved):
@@ -96,9 +97,9 @@ def test_a_jerk_limit_of_an_axis_is_checked_too(unmoved):
     gentle = design(band=(0.5, 15.0), duration=2.0, fs=500.0, limits=limits, axis="pitch")
     table.check(gentle)
     stiff = replace(FIG_4[2], limits=replace(FIG_4[2].limits, jerk=0.5 * gentle.peaks.jerk))
-    careful = MotionTable(axes=(*FIG_4[:2], stiff, *FIG_4[3:]))
+    careful = MotionTable(specs=(*FIG_4[:2], stiff, *FIG_4[3:]))
     with pytest.raises(LimitsError, match=r"peak jerk .* deg/s³ of pitch; scale the stimulus by 0"):
-        careful.play(gentle, rng=RNG)
+        run(careful, gentle, rng=RNG)
     # and a stimulus designed in the axis's limits keeps it
     within = careful.limits_of("pitch", travel=2.0, share=0.5)
     assert within.jerk == 0.25 * gentle.peaks.jerk
@@ -121,7 +122,7 @@ def test_five_axes_near_their_limits_with_the_projector_are_refused_with_a_numbe
 
     words = r"at \d\.\d+ s the motion of all axes together takes \S+ N·m of azimuth, beyond its"
     with pytest.raises(LimitsError, match=words) as refused:
-        table.play(at(0.99), rng=RNG)
+        run(table, at(0.99), rng=RNG)
     advised = float(str(refused.value).split("scale the stimuli by ")[1].split(" ")[0])
     # Torque over inertia has fallen to 760/1040 of what it was, and a quarter was in hand.
     assert advised == pytest.approx(1.25 * 760 / 1040 / 0.99, rel=0.04)
@@ -157,18 +158,11 @@ def thrown(axis, angle, seconds=1.0):
     table = MotionTable()
     i = AXES.index(axis)
     n = round(seconds * 500)
-    command = tuple(np.zeros((n + 1, 5)) for _ in range(3))
-    command[0][2:, i] = math.radians(angle)
-    history = simulate(
-        table.plant,
-        table.axes,
-        table.gains,
-        command=command,
-        mode="P",
-        timing=table.timing(500.0),
-        resolution=math.radians(table.encoder_resolution),
-        noise=None,
-    )
+    position, still = np.zeros((n, 5)), np.zeros((n, 5))
+    position[1:, i] = math.radians(angle)
+    motion = replace(table, encoder_noise_std=0.0).motion(500.0, rng=RNG)
+    assert isinstance(motion, Motion)
+    history = motion.advance(position, still, still)
     return history, FIG_4[i]
 
 
@@ -197,7 +191,7 @@ def test_interlock_opens_when_an_axis_runs_away(monkeypatch):
     wild = Gains(position=table.gains.position, rate=-table.gains.rate, inertia=table.gains.inertia)
     monkeypatch.setattr(room, "tune", lambda *_args, **_kwargs: wild)
     with pytest.raises(RigError, match=r"interlock opened at \d\.\d+ s: \w+ turned at"):
-        table.play({"roll": sine(1.0, 2.0)}, rng=RNG)
+        run(table, {"roll": sine(1.0, 2.0)}, rng=RNG)
 
 
 @pytest.mark.parametrize("axis", AXES)
@@ -205,7 +199,7 @@ def test_a_sweep_designed_in_an_axis_is_played(axis):
     table = MotionTable()
     limits = table.limits_of(axis, travel=2.0)
     sweep = design(band=(0.5, 15.0), duration=3.0, fs=500.0, limits=limits, axis=axis)
-    record = table.play(sweep, rng=RNG)
+    record = run(table, sweep, rng=RNG)
     assert np.ptp(record.outputs[0].values) > 1.0
 
 
@@ -231,13 +225,13 @@ def test_a_sweep_designed_in_an_axis_is_played(axis):
 )
 def test_what_cannot_be_played_is_refused(unmoved, stimuli, error, words):
     with pytest.raises(error, match=words):
-        MotionTable().play(stimuli, rng=RNG)
+        run(MotionTable(), stimuli, rng=RNG)
 
 
 @pytest.mark.parametrize(
     ("wrong", "words"),
     [
-        ({"axes": FIG_4[:4]}, "give the five of"),
+        ({"specs": FIG_4[:4]}, "give the five of"),
         ({"mode": "VP"}, "mode = 'VP' is not known"),
         ({"delay": -1.0}, "delay = -1.0 must be 0 or positive"),
         ({"controller_rate": 0.0}, "controller_rate = 0.0 must be positive"),

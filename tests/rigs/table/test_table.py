@@ -3,12 +3,11 @@
 import numpy as np
 import pytest
 
-from hmpim.experiment import run
+from hmpim.experiment import ManualClock, run
 from hmpim.identify import identify
 from hmpim.record import Record
-from hmpim.rigs import MotionTable, Rig
+from hmpim.rigs import MotionTable, Rig, commands_of
 from hmpim.rigs.table import AXES, FIG_4, TablePosition, exact_bandwidth, linear_response
-from hmpim.rigs.table import simulate as clockwork
 from hmpim.rigs.table.linear import phase_crossing
 from hmpim.stimulus import Limits, Sine, Stimulus, design
 
@@ -61,11 +60,11 @@ def test_it_is_a_rig_and_run_plays_it():
 
 
 def test_record_of_several_axes():
-    table = MotionTable(start=TablePosition(roll=10.002, yaw=-5.001))
+    start = TablePosition(roll=10.002, yaw=-5.001)
+    table = MotionTable(start=start, observe=("yaw", "elevation"))
     yaw = Stimulus(waveform=Sine(amplitude=0.02, frequency=2.0, duration=2.0), fs=500.0, unit="rad")
     roll = sweep("roll", upto=30.0, duration=1.0, fs=500.0)
-    rng = np.random.default_rng(1)
-    record = table.play({"yaw": yaw, "roll": roll}, rng=rng, observe=("yaw", "elevation"))
+    record = run(table, {"yaw": yaw, "roll": roll}, rng=1)
     assert [c.name for c in record.inputs] == ["roll.command", "yaw.command"]
     assert [(c.name, c.unit) for c in record.outputs] == [
         ("yaw.position", "rad"),
@@ -136,7 +135,7 @@ def test_all_axes_at_once_give_the_bandwidths_of_each_alone():
         axis.name: sweep(axis.name, upto=1.8 * axis.bandwidth, share=0.3, fs=500.0, table=table)
         for axis in FIG_4
     }
-    together = table.play(stimuli, rng=np.random.default_rng(2))
+    together = run(table, stimuli, rng=2)
     for axis in AXES:
         alone = identified(run(table, stimuli[axis], rng=3), axis).bandwidth_phase90
         among = identified(pick(together, axis), axis).bandwidth_phase90
@@ -158,14 +157,13 @@ def test_friction_lowers_the_apparent_bandwidth_of_small_motions():
 
 def test_coupling_seen_in_the_encoders_is_the_exact_one():
     """Pitch at 12 Hz with yaw at 30°: what roll does, from a record of one axis moved."""
-    table = MotionTable(friction=False, start=TablePosition(yaw=30.0), encoder_noise_std=0.0)
+    turned = TablePosition(yaw=30.0)
+    table = MotionTable(
+        friction=False, start=turned, encoder_noise_std=0.0, observe=("roll", "pitch")
+    )
     frequency, seconds = 12.0, 4.0
     waveform = Sine(amplitude=1.5, frequency=frequency, duration=seconds)
-    record = table.play(
-        {"pitch": Stimulus(waveform=waveform, fs=1000.0, unit="deg")},
-        rng=np.random.default_rng(0),
-        observe=("roll", "pitch"),
-    )
+    record = run(table, {"pitch": Stimulus(waveform=waveform, fs=1000.0, unit="deg")}, rng=0)
     turn = np.exp(-2j * np.pi * frequency * record.inputs[0].time[1000:])
     command = turn @ record.inputs[0].values[1000:]
     for axis in ("roll", "pitch"):
@@ -176,18 +174,28 @@ def test_coupling_seen_in_the_encoders_is_the_exact_one():
         assert abs(seen - truth) < 5e-3 * max(abs(truth), 0.03)
 
 
-def test_real_time_is_kept_by_the_clock(monkeypatch):
-    now, slept = [100.0], []
-
-    def sleep(seconds):
-        slept.append(seconds)
-        now[0] += seconds
-
-    monkeypatch.setattr(clockwork.time, "perf_counter", lambda: now[0])
-    monkeypatch.setattr(clockwork.time, "sleep", sleep)
+def test_real_time_is_kept_by_the_clock_of_the_run():
     stimulus = sweep("pitch", upto=20.0, duration=1.0, fs=500.0)
-    paced = MotionTable(realtime=True).play(stimulus, rng=np.random.default_rng(0))
-    assert sum(slept) == pytest.approx(stimulus.samples / stimulus.fs, abs=0.02)
-    assert max(slept) < 0.02
-    free = MotionTable().play(stimulus, rng=np.random.default_rng(0))
-    assert paced.sha256 == free.sha256
+    paced, free = ManualClock(), ManualClock()
+    record = run(MotionTable(realtime=True), stimulus, rng=0, clock=paced)
+    assert paced.now() == pytest.approx((stimulus.samples - 1) / stimulus.fs)
+    assert run(MotionTable(), stimulus, rng=0, clock=free).sha256 == record.sha256
+    assert free.now() == 0.0
+
+
+def test_blocks_of_any_size_move_it_alike():
+    """What is in force late, and the encoders' noise, go on from block to block."""
+    table = MotionTable(delay=3.4e-3, mode="PVA")
+    stimulus = sweep("roll", upto=40.0, duration=0.5)
+    commands = commands_of({"roll": stimulus})
+    whole = table.simulate(stimulus, rng=np.random.default_rng(5))
+    for size in (1, 7, 1000):
+        motion = table.motion(1000.0, rng=np.random.default_rng(5))
+        parts = []
+        for block in commands.blocks(size):
+            five = np.zeros((3, len(block), 5))
+            for k, quantity in enumerate(("position", "velocity", "acceleration")):
+                five[k, :, 0] = np.radians(block.of("roll", quantity))
+            parts.append(motion.advance(*five))
+        assert np.array_equal(np.concatenate([p.encoder for p in parts]), whole.encoder)
+        assert np.allclose(np.concatenate([p.time for p in parts]), whole.time, atol=1e-12)

@@ -149,13 +149,13 @@ def test_refusals(wrong, words):
 def test_a_bandwidth_that_cannot_be_had_is_refused():
     sluggish = (replace(FIG_4[0], actuator_lag=0.05), *FIG_4[1:])
     with pytest.raises(ArgumentError, match="roll"):
-        _ = MotionTable(axes=sluggish).gains
+        _ = MotionTable(specs=sluggish).gains
 
 
 def test_servos_that_swing_have_no_response():
     light = Rigid(mass=0.1, inertia=(1e-3, 1e-3, 1e-3))
     feather = (replace(FIG_4[0], gimbal=light), *FIG_4[1:])
-    steel = MotionTable(axes=feather)
+    steel = MotionTable(specs=feather)
     bare = replace(steel, uut_load=light)
     assert abs(exact(steel, 43.0, axis_in="roll")[0].real) < 1e-6
     with pytest.raises(ArgumentError, match="with these loads the servos are not stable"):
@@ -164,5 +164,5 @@ def test_servos_that_swing_have_no_response():
 
 def test_limits_of_the_tuned_axis_may_be_in_radians():
     in_radians = tuple(replace(a, limits=a.limits.to("rad")) for a in FIG_4)
-    assert MotionTable(axes=in_radians).limits_of("roll").velocity == pytest.approx(800.0)
-    assert isinstance(MotionTable(axes=in_radians).limits_of("roll"), Limits)
+    assert MotionTable(specs=in_radians).limits_of("roll").velocity == pytest.approx(800.0)
+    assert isinstance(MotionTable(specs=in_radians).limits_of("roll"), Limits)

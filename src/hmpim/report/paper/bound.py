@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq
 
 from hmpim.errors import ArgumentError
+from hmpim.experiment import run
 from hmpim.rigs import Sensor
 from hmpim.stimulus import Stimulus
 
@@ -146,5 +147,5 @@ def _output(sensor: Sensor, stimulus: Stimulus, name: str, value: float) -> NDAr
         damping_ratio=value if name == "damping_ratio" else sensor.damping_ratio,
     )
     # without noise nothing is drawn
-    record = changed.play(stimulus, rng=np.random.default_rng(0))
+    record = run(changed, stimulus, rng=0)
     return np.asarray(record.outputs[0].values)

@@ -1,4 +1,4 @@
-"""Stimuli by axis, and the commands of all axes together."""
+"""Stimuli by axis, and the commands of all five axes together."""
 
 from collections.abc import Mapping
 
@@ -6,11 +6,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hmpim.errors import ArgumentError
+from hmpim.rigs.protocol import Stimuli
+from hmpim.rigs.stimuli import commands_of, stimuli_by_axis
 from hmpim.rigs.table.axes import AXES, AxisName
 from hmpim.stimulus import Stimulus
 from hmpim.units import conversion_factor
 
-__all__ = ["by_axis", "command_rate", "commands", "place"]
+__all__ = ["by_axis", "command_rate", "commands", "place", "spread"]
 
 FloatArray = NDArray[np.float64]
 
@@ -33,7 +35,7 @@ def place(axis: str) -> int:
     return AXES.index(axis)
 
 
-def by_axis(stimuli: Stimulus | Mapping[AxisName, Stimulus]) -> dict[AxisName, Stimulus]:
+def by_axis(stimuli: Stimuli) -> dict[AxisName, Stimulus]:
     """Stimulus by axis, in the order of `AXES`; a single one goes to the axis that it names.
 
     Raises
@@ -47,17 +49,8 @@ def by_axis(stimuli: Stimulus | Mapping[AxisName, Stimulus]) -> dict[AxisName, S
     >>> by_axis(Stimulus(waveform=Ramp(duration=1.0), fs=10.0, axis="yaw"))["yaw"].fs
     10.0
     """
-    if isinstance(stimuli, Stimulus):
-        stimuli = {AXES[place(stimuli.axis)]: stimuli}
-    if not stimuli:
-        raise ArgumentError("no stimulus is given; give at least one axis something to do")
-    for axis in stimuli:
-        place(axis)
-    named = {axis: stimuli[axis] for axis in AXES if axis in stimuli}
-    rates = {axis: stimulus.fs for axis, stimulus in named.items()}
-    if len(set(rates.values())) > 1:
-        raise ArgumentError(f"stimuli have different rates, {rates} Hz; design all at one rate")
-    return named
+    named = stimuli_by_axis(stimuli, AXES, name="the table")
+    return {axis: named[axis] for axis in AXES if axis in named}
 
 
 def command_rate(named: Mapping[AxisName, Stimulus]) -> float:
@@ -70,6 +63,35 @@ def command_rate(named: Mapping[AxisName, Stimulus]) -> float:
     500.0
     """
     return next(iter(named.values())).fs
+
+
+def spread(
+    values: FloatArray, axes: tuple[str, ...], units: tuple[str, ...], *, around: FloatArray
+) -> FloatArray:
+    """Commands of the axes that move as those of all five, rad; the others stay where they are.
+
+    Parameters
+    ----------
+    values : ndarray, shape (n, m)
+        Of the axes that move, in their units.
+    axes, units : tuple of str
+        Those axes, and the units of their positions.
+    around : ndarray, shape (5,)
+        What is added to every row, rad.
+
+    Returns
+    -------
+    ndarray, shape (n, 5)
+
+    Examples
+    --------
+    >>> spread(np.ones((1, 1)), ("yaw",), ("rad",), around=np.zeros(5)).tolist()
+    [[0.0, 1.0, 0.0, 0.0, 0.0]]
+    """
+    all_five = np.tile(around, (values.shape[0], 1))
+    for column, (axis, unit) in enumerate(zip(axes, units, strict=True)):
+        all_five[:, place(axis)] += conversion_factor(unit, to="rad") * values[:, column]
+    return all_five
 
 
 def commands(
@@ -88,8 +110,8 @@ def commands(
     -------
     time : ndarray, shape (n,)
         Of the commands, s.
-    command : tuple of ndarray, each shape (n + 1, 5)
-        Position, velocity, acceleration, rad; in front the place of rest before time 0.
+    command : tuple of ndarray, each shape (n, 5)
+        Position, velocity, acceleration, rad.
 
     Examples
     --------
@@ -97,16 +119,12 @@ def commands(
     >>> ramp = Stimulus(waveform=Ramp(rate=2.0, duration=1.0), fs=2.0, unit="rad")
     >>> time, command = commands({"yaw": ramp}, start=np.ones(5))
     >>> time.tolist(), command[0][:, 1].tolist()
-    ([0.0, 0.5], [1.0, 1.0, 2.0])
+    ([0.0, 0.5], [1.0, 2.0])
     """
-    count = max(stimulus.samples for stimulus in named.values())
-    time = np.arange(-1, count) / command_rate(named)
-    position = np.tile(start, (count + 1, 1))
-    velocity, acceleration = np.zeros((count + 1, 5)), np.zeros((count + 1, 5))
-    for axis, stimulus in named.items():
-        i, factor = place(axis), conversion_factor(stimulus.unit, to="rad")
-        motion = stimulus.motion(time)
-        position[:, i] += factor * motion.position
-        velocity[:, i] = factor * motion.velocity
-        acceleration[:, i] = factor * motion.acceleration
-    return time[1:], (position, velocity, acceleration)
+    sent = commands_of({str(axis): stimulus for axis, stimulus in named.items()})
+    still = np.zeros(5)
+    return sent.time, (
+        spread(sent.position, sent.axes, sent.units, around=start),
+        spread(sent.velocity, sent.axes, sent.units, around=still),
+        spread(sent.acceleration, sent.axes, sent.units, around=still),
+    )

@@ -1,7 +1,6 @@
 """The table in motion: the servos tick, MuJoCo steps, the encoders are read."""
 
 import math
-import time
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,12 +11,11 @@ from hmpim.rigs.table.axes import AXES, AxisName, AxisSpec, CommandMode
 from hmpim.rigs.table.plant import BASE, ORDER, Plant, mujoco
 from hmpim.rigs.table.servo import RESERVE, Gains, feedforward
 
-__all__ = ["History", "Timing", "simulate"]
+__all__ = ["History", "Motion", "Timing"]
 
 FloatArray = NDArray[np.float64]
 
 _OVERSPEED = 1.5  # times the rate limit: the interlock opens
-_BLOCK = 0.01  # s between looks at the clock, where the pace is real
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -30,14 +28,11 @@ class Timing:
         Period of the controller, and step of the integration, s.
     hold, late : int
         Ticks for which a command is held, and by which it comes late.
-    realtime : bool
-        Whether to keep pace with the clock on the wall.
     """
 
     tick: float
     hold: int
     late: int
-    realtime: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -79,18 +74,8 @@ class History:
         return array[:, AXES.index(axis)]
 
 
-def simulate(
-    plant: Plant,
-    axes: tuple[AxisSpec, ...],
-    gains: Gains,
-    *,
-    command: tuple[FloatArray, FloatArray, FloatArray],
-    mode: CommandMode,
-    timing: Timing,
-    resolution: float,
-    noise: FloatArray | None,
-) -> History:
-    """Move the table from rest, where the first command has long been in force.
+class Motion:
+    """The table from rest on, fed command by command.
 
     Parameters
     ----------
@@ -100,85 +85,126 @@ def simulate(
         For their limits.
     gains : Gains
         Of the servos.
-    command : tuple of ndarray, each shape (n + 1, 5)
-        Position, velocity, acceleration, rad; in front the place of rest before time 0.
+    start : ndarray, shape (5,)
+        Where the axes stand, rad; that command has long been in force.
     mode : {'P', 'PV', 'PVA'}
         Which commands count.
     timing : Timing
         Of commands and controller.
-    resolution : float
-        Of the encoders, rad.
-    noise : ndarray, shape (n * hold, 5), or None
-        What each reading of the encoders errs by, rad.
-
-    Returns
-    -------
-    History
-
-    Raises
-    ------
-    RigError
-        If an axis runs away and the interlock opens, or the simulation diverges.
+    resolution, noise_std : float
+        Step of the encoders, and standard deviation of what each reading errs by, rad.
+    rng : numpy.random.Generator
+        Source of that noise.
     """
-    mj = mujoco()
-    model = plant.model
-    data, trim = plant.at_rest(command[0][0])
-    count, hold, late = command[0].shape[0] - 1, timing.hold, timing.late
-    joint = np.argsort(ORDER)  # from AXES to MuJoCo's order
-    r, v, a = (np.ascontiguousarray(c[:, joint]) for c in command)
-    stiffness, damping, inertia = gains.position[joint], gains.rate[joint], gains.inertia[joint]
-    with_velocity, with_acceleration = feedforward(mode)
-    wanted = stiffness * r + with_velocity * v
-    push = with_acceleration * a
-    limits = [axis.limits.to("rad") for axis in axes]
-    rate_limit = RESERVE * np.array([x.velocity for x in limits])[joint]
-    acceleration_limit = RESERVE * np.array([x.acceleration for x in limits])[joint]
-    torque_limit = np.array([x.torque_limit for x in axes])[joint]
-    overspeed = _OVERSPEED * np.array([x.velocity for x in limits])[joint]
-    jitter = None if noise is None else np.ascontiguousarray(noise[:, joint])
-    q, qd = data.qpos[BASE:], data.qvel[BASE:]
-    control, force = data.ctrl, data.actuator_force
-    low_rate, low_acceleration, low_torque = -rate_limit, -acceleration_limit, -torque_limit
-    read, at, speed, torque = (np.empty((count, 5)) for _ in range(4))
-    advance = mj.mj_step
-    started = time.perf_counter()
-    block = max(1, round(_BLOCK / (hold * timing.tick)))
-    for j in range(count):
-        at[j], speed[j], torque[j] = q, qd, force
-        if not (np.abs(qd) < overspeed).all():
-            _open_interlock(qd[ORDER], overspeed[ORDER], j * hold * timing.tick)
-        for i in range(hold):
-            tick = j * hold + i
-            seen = (q if jitter is None else q + jitter[tick]) / resolution
-            seen = np.rint(seen, out=seen) * resolution
-            if i == 0:
-                read[j] = seen
-            row = max((tick - late) // hold, -1) + 1  # of the command in force
-            rate = wanted[row] - stiffness * seen
-            rate = np.minimum(np.maximum(rate, low_rate, out=rate), rate_limit, out=rate)
-            rate -= qd
-            rate *= damping
-            rate += push[row]
-            demand = np.maximum(rate, low_acceleration, out=rate)
-            demand = np.minimum(demand, acceleration_limit, out=demand)
-            demand *= inertia
-            demand += trim
-            np.maximum(demand, low_torque, out=demand)
-            np.minimum(demand, torque_limit, out=control)
-            advance(model, data)
-        if timing.realtime and j % block == 0:
-            ahead = (j + 1) * hold * timing.tick - (time.perf_counter() - started)
-            if ahead > 0.0:
-                time.sleep(ahead)
-    degrees = 180.0 / math.pi
-    return History(
-        time=np.asarray(np.arange(count) * (hold * timing.tick), dtype=np.float64),
-        command=command[0][1:] * degrees,
-        encoder=read[:, ORDER] * degrees,
-        position=at[:, ORDER] * degrees,
-        velocity=speed[:, ORDER] * degrees,
-        torque=torque[:, ORDER],
-    )
+
+    def __init__(
+        self,
+        plant: Plant,
+        axes: tuple[AxisSpec, ...],
+        gains: Gains,
+        *,
+        start: FloatArray,
+        mode: CommandMode,
+        timing: Timing,
+        resolution: float,
+        noise_std: float,
+        rng: np.random.Generator,
+    ) -> None:
+        self._step, self._model = mujoco().mj_step, plant.model
+        self._data, self._trim = plant.at_rest(start)
+        self._timing, self._resolution = timing, resolution
+        self._noise_std, self._rng = noise_std, rng
+        joint = self._joint = np.argsort(ORDER)  # from AXES to MuJoCo's order
+        self._stiffness, self._damping = gains.position[joint], gains.rate[joint]
+        self._inertia = gains.inertia[joint]
+        self._with_velocity, self._with_acceleration = feedforward(mode)
+        limits = [axis.limits.to("rad") for axis in axes]
+        self._rate_limit = RESERVE * np.array([x.velocity for x in limits])[joint]
+        self._acceleration_limit = RESERVE * np.array([x.acceleration for x in limits])[joint]
+        self._torque_limit = np.array([x.torque_limit for x in axes])[joint]
+        self._overspeed = _OVERSPEED * np.array([x.velocity for x in limits])[joint]
+        # Commands come late: those before the newest are needed, at rest the first of all.
+        before = -(-timing.late // timing.hold)
+        self._wanted = np.tile(self._stiffness * start[joint], (before, 1))
+        self._push = np.zeros((before, 5))
+        self._count = 0
+
+    def advance(
+        self, position: FloatArray, velocity: FloatArray, acceleration: FloatArray
+    ) -> History:
+        """Let the table follow the next commands.
+
+        Parameters
+        ----------
+        position, velocity, acceleration : ndarray, shape (n, 5)
+            Commands in the order of `AXES`, rad.
+
+        Returns
+        -------
+        History
+            At the times of these commands, counted from the first of all.
+
+        Raises
+        ------
+        RigError
+            If an axis runs away and the interlock opens, or the simulation diverges.
+        """
+        joint, hold, late = self._joint, self._timing.hold, self._timing.late
+        r, v, a = (c[:, joint] for c in (position, velocity, acceleration))
+        count, before = position.shape[0], self._wanted.shape[0]
+        wanted = np.concatenate(
+            (self._wanted, self._stiffness * r + self._with_velocity * v), dtype=np.float64
+        )
+        push = np.concatenate((self._push, self._with_acceleration * a), dtype=np.float64)
+        jitter = None
+        if self._noise_std > 0.0:
+            drawn = self._rng.standard_normal((count * hold, 5))
+            jitter = np.ascontiguousarray(self._noise_std * drawn[:, joint])
+        q, qd = self._data.qpos[BASE:], self._data.qvel[BASE:]
+        force = self._data.actuator_force
+        read, at, speed, torque = (np.empty((count, 5)) for _ in range(4))
+        for j in range(count):
+            at[j], speed[j], torque[j] = q, qd, force
+            if not (np.abs(qd) < self._overspeed).all():
+                seconds = (self._count + j) * hold * self._timing.tick
+                _open_interlock(qd[ORDER], self._overspeed[ORDER], seconds)
+            for i in range(hold):
+                tick = j * hold + i
+                seen = (q if jitter is None else q + jitter[tick]) / self._resolution
+                seen = np.rint(seen, out=seen) * self._resolution
+                if i == 0:
+                    read[j] = seen
+                row = before + (tick - late) // hold  # of the command in force
+                self._tick(wanted[row] - self._stiffness * seen, qd, push[row])
+        self._wanted, self._push = wanted[count:], push[count:]
+        time = (self._count + np.arange(count)) * (hold * self._timing.tick)
+        self._count += count
+        degrees = 180.0 / math.pi
+        return History(
+            time=np.asarray(time, dtype=np.float64),
+            command=position * degrees,
+            encoder=read[:, ORDER] * degrees,
+            position=at[:, ORDER] * degrees,
+            velocity=speed[:, ORDER] * degrees,
+            torque=torque[:, ORDER],
+        )
+
+    def _tick(self, rate: FloatArray, measured: FloatArray, push: FloatArray) -> None:
+        """One tick of the controller: rate wanted to torque, and one step of the mechanics."""
+        limit = self._rate_limit
+        rate = np.minimum(np.maximum(rate, -limit, out=rate), limit, out=rate)
+        rate -= measured
+        rate *= self._damping
+        rate += push
+        limit = self._acceleration_limit
+        demand = np.maximum(rate, -limit, out=rate)
+        demand = np.minimum(demand, limit, out=demand)
+        demand *= self._inertia
+        demand += self._trim
+        limit = self._torque_limit
+        np.maximum(demand, -limit, out=demand)
+        np.minimum(demand, limit, out=self._data.ctrl)
+        self._step(self._model, self._data)
 
 
 def _open_interlock(rate: FloatArray, overspeed: FloatArray, seconds: float) -> None:

@@ -1,23 +1,24 @@
 """A five-axis flight motion simulator (section II, Fig. 4) as a rig."""
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hmpim.errors import ArgumentError, LimitsError
-from hmpim.record import Channel, Record
+from hmpim.rigs.block import Block, ChannelSpec, Layout
+from hmpim.rigs.protocol import Stimuli
+from hmpim.rigs.simulated import Playing, Simulated
 from hmpim.rigs.table.axes import AXES, FIG_4, AxisName, AxisSpec, CommandMode, TablePosition
 from hmpim.rigs.table.bodies import Base, LoadName, Rigid, load_named
 from hmpim.rigs.table.checks import check_torques
-from hmpim.rigs.table.commands import by_axis, command_rate, commands, place
+from hmpim.rigs.table.commands import by_axis, command_rate, commands, place, spread
 from hmpim.rigs.table.plant import Plant, build
 from hmpim.rigs.table.servo import Gains
-from hmpim.rigs.table.simulate import History, Timing, simulate
+from hmpim.rigs.table.simulate import History, Motion, Timing
 from hmpim.rigs.table.tuning import tune
-from hmpim.stimulus import Limits, Stimulus, check_inside
+from hmpim.stimulus import Limits, check_inside
 from hmpim.units import conversion_factor
 
 __all__ = ["MotionTable"]
@@ -30,7 +31,7 @@ _TUNED_AT = 1000.0  # Hz, the command rate at which Fig. 4's bandwidths hold
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class MotionTable:
+class MotionTable(Simulated):
     """A simulated five-axis motion table: rigid bodies in MuJoCo, a digital servo on each axis.
 
     Commands come at the stimulus's rate and are held in between. Roll, yaw and pitch carry the
@@ -38,7 +39,7 @@ class MotionTable:
 
     Parameters
     ----------
-    axes : tuple of AxisSpec
+    specs : tuple of AxisSpec
         The five axes in the order of `AXES`; those of Fig. 4 by default.
     uut_load, target_load : str or Rigid
         What the inner and the outer axes carry: 'acceptance', 'none', 'bracket' (inner only),
@@ -61,6 +62,8 @@ class MotionTable:
         White noise of each encoder before it is rounded, deg.
     realtime : bool
         True keeps pace with the clock on the wall.
+    observe : tuple of str or None
+        Axes whose encoders are recorded; None for those that move.
     name : str
         Name of the rig.
 
@@ -77,12 +80,13 @@ class MotionTable:
     >>> table = MotionTable(mode="PV")
     >>> limits = table.limits_of("pitch", travel=2.0)
     >>> sweep = design(band=(0.5, 30), duration=1, fs=500, limits=limits)
-    >>> record = table.play({"pitch": sweep}, rng=np.random.default_rng(0))
+    >>> from hmpim.experiment import run
+    >>> record = run(table, {"pitch": sweep}, rng=0)
     >>> record.inputs[0].name, record.outputs[0].name, record.intersample
     ('pitch.command', 'pitch.position', 'bandlimited')
     """
 
-    axes: tuple[AxisSpec, ...] = FIG_4
+    specs: tuple[AxisSpec, ...] = FIG_4
     uut_load: LoadName | Rigid = "acceptance"
     target_load: LoadName | Rigid = "acceptance"
     mode: CommandMode = "P"
@@ -94,31 +98,40 @@ class MotionTable:
     encoder_resolution: float = 0.003
     encoder_noise_std: float = 0.0005
     realtime: bool = False
+    observe: tuple[AxisName, ...] | None = None
     name: str = "table"
+    _playing: Playing = field(default_factory=Playing, init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
-        names = tuple(axis.name for axis in self.axes)
+        names = tuple(axis.name for axis in self.specs)
         if names != AXES:
-            raise ArgumentError(f"axes are {names}; give the five of {AXES}, in this order")
+            raise ArgumentError(f"specs are of {names}; give the five of {AXES}, in this order")
         if self.mode not in ("P", "PV", "PVA"):
             raise ArgumentError(f"mode = {self.mode!r} is not known; use 'P', 'PV' or 'PVA'")
-        for field in ("controller_rate", "encoder_resolution"):
-            value = getattr(self, field)
+        for name in ("controller_rate", "encoder_resolution"):
+            value = getattr(self, name)
             if not (math.isfinite(value) and value > 0.0):
-                raise ArgumentError(f"{field} = {value!r} must be positive and finite")
-        for field in ("delay", "encoder_noise_std"):
-            value = getattr(self, field)
+                raise ArgumentError(f"{name} = {value!r} must be positive and finite")
+        for name in ("delay", "encoder_noise_std"):
+            value = getattr(self, name)
             if not (math.isfinite(value) and value >= 0.0):
-                raise ArgumentError(f"{field} = {value!r} must be 0 or positive, and finite")
+                raise ArgumentError(f"{name} = {value!r} must be 0 or positive, and finite")
         load_named("uut", self.uut_load)
         load_named("target", self.target_load)
+        for axis in self.observe or ():
+            place(axis)
         for axis in AXES:
             self.limits_of(axis)
 
     @property
-    def limits(self) -> Limits | None:
-        """None: each axis has its own, see `limits_of`; `play` checks them all itself."""
-        return None
+    def axes(self) -> tuple[str, ...]:
+        """Names of the five axes."""
+        return AXES
+
+    @property
+    def limits(self) -> dict[str, Limits]:
+        """Of each axis, from where it starts, see `limits_of`."""
+        return {axis: self.limits_of(axis) for axis in AXES}
 
     def limits_of(
         self, axis: AxisName, *, travel: float | None = None, share: float = 1.0
@@ -149,7 +162,7 @@ class MotionTable:
         >>> MotionTable().limits_of("elevation", travel=3.0, share=0.5).acceleration
         450.0
         """
-        limits = self.axes[place(axis)].limits.to("deg")
+        limits = self.specs[place(axis)].limits.to("deg")
         at = getattr(self.start, axis)
         left = limits.position - abs(at)
         if left <= 0.0 or (travel is not None and travel > left):
@@ -179,13 +192,15 @@ class MotionTable:
         """
         hold = max(1, round(self.controller_rate / _TUNED_AT))
         timing = self.timing(self.controller_rate / hold)
-        return tune(self.axes, base=self.base, tick=timing.tick, hold=timing.hold, late=timing.late)
+        return tune(
+            self.specs, base=self.base, tick=timing.tick, hold=timing.hold, late=timing.late
+        )
 
     @property
     def plant(self) -> Plant:
         """The mechanics with its loads, compiled once."""
         return build(
-            self.axes,
+            self.specs,
             uut=load_named("uut", self.uut_load),
             target=load_named("target", self.target_load),
             base=self.base,
@@ -221,10 +236,9 @@ class MotionTable:
             tick=1.0 / self.controller_rate,
             hold=hold,
             late=math.ceil(self.delay * self.controller_rate - 1e-9),
-            realtime=self.realtime,
         )
 
-    def check(self, stimuli: Stimulus | Mapping[AxisName, Stimulus]) -> FloatArray:
+    def check(self, stimuli: Stimuli) -> FloatArray:
         """Refuse what the table may not do; nothing moves.
 
         Position, rate and acceleration of each axis first, then the torque that the motion of
@@ -259,19 +273,49 @@ class MotionTable:
         for axis, stimulus in named.items():
             check_inside(stimulus, self.limits_of(axis), whose=axis, samples=samples)
         time, command = commands(named, start=self.start_angles)
-        torque = self.plant.torques(*command)[1:]
-        check_torques(time, torque, self.axes)
+        torque = self.plant.torques(*command)
+        check_torques(time, torque, self.specs)
         return torque
 
-    def simulate(
-        self, stimuli: Stimulus | Mapping[AxisName, Stimulus], *, rng: np.random.Generator
-    ) -> History:
+    def motion(self, fs: float, *, rng: np.random.Generator) -> Motion:
+        """Return the table at rest at its start, ready for commands at `fs` (Hz).
+
+        Nothing is checked: limits are the caller's to keep, see `check`.
+
+        Parameters
+        ----------
+        fs : float
+            Commands a second, Hz.
+        rng : numpy.random.Generator
+            Source of the encoders' noise.
+
+        Examples
+        --------
+        >>> table = MotionTable(encoder_noise_std=0.0)
+        >>> moved = table.motion(1000.0, rng=np.random.default_rng(0))
+        >>> still = np.zeros((3, 5))
+        >>> moved.advance(still, still, still).time.tolist()
+        [0.0, 0.001, 0.002]
+        """
+        return Motion(
+            self.plant,
+            self.specs,
+            self.gains,
+            start=self.start_angles,
+            mode=self.mode,
+            timing=self.timing(fs),
+            resolution=math.radians(self.encoder_resolution),
+            noise_std=math.radians(self.encoder_noise_std),
+            rng=rng,
+        )
+
+    def simulate(self, stimuli: Stimuli, *, rng: np.random.Generator) -> History:
         """Play stimuli and return what all five axes did; limits are checked first.
 
         Parameters
         ----------
         stimuli : Stimulus or mapping of axis to Stimulus
-            As for `play`.
+            One, for the axis it names in `Stimulus.axis`, or one for each axis that moves.
         rng : numpy.random.Generator
             Source of the encoders' noise.
 
@@ -284,31 +328,11 @@ class MotionTable:
         """
         self.check(stimuli)
         named = by_axis(stimuli)
-        timing = self.timing(command_rate(named))
         _, command = commands(named, start=self.start_angles)
-        noise = None
-        if self.encoder_noise_std > 0.0:
-            ticks = (command[0].shape[0] - 1) * timing.hold
-            noise = math.radians(self.encoder_noise_std) * rng.standard_normal((ticks, 5))
-        return simulate(
-            self.plant,
-            self.axes,
-            self.gains,
-            command=command,
-            mode=self.mode,
-            timing=timing,
-            resolution=math.radians(self.encoder_resolution),
-            noise=noise,
-        )
+        return self.motion(command_rate(named), rng=rng).advance(*command)
 
-    def play(
-        self,
-        stimulus: Stimulus | Mapping[AxisName, Stimulus],
-        *,
-        rng: np.random.Generator,
-        observe: tuple[AxisName, ...] | None = None,
-    ) -> Record:
-        """Move one axis, or several at once, and record commands and encoders.
+    def prepare(self, stimulus: Stimuli, /) -> Layout:
+        """Check one axis's stimulus, or those of several at once, and stand at the start.
 
         Parameters
         ----------
@@ -316,14 +340,10 @@ class MotionTable:
             One, for the axis it names in `Stimulus.axis`, or one for each axis that moves. All
             have one rate, that of the commands; a shorter one waits at rest for the others.
             Axes without a stimulus are held where they start.
-        rng : numpy.random.Generator
-            Source of the encoders' noise.
-        observe : tuple of str or None
-            Axes whose encoders are recorded; None for those that move.
 
         Returns
         -------
-        Record
+        Layout
             Inputs ``roll.command`` and so on, outputs ``roll.position``, both from the start
             position, in the stimulus's unit (outputs of axes held: deg). Held between samples in
             mode P; in PV and PVA the held position is not the whole input, and the record says
@@ -334,40 +354,67 @@ class MotionTable:
         LimitsError
             If an axis would leave its limits, or all together take too much torque of one;
             nothing has moved then.
-        RigError
-            If an axis runs away.
 
         Examples
         --------
+        >>> from hmpim.experiment import run
         >>> from hmpim.stimulus import design
         >>> table = MotionTable()
         >>> limits = table.limits_of("roll", travel=5.0)
         >>> sweep = design(band=(1, 50), duration=1, fs=1000, limits=limits, axis="roll")
-        >>> table.play(sweep, rng=np.random.default_rng(0)).outputs[0].unit
+        >>> run(table, sweep).outputs[0].unit
         'deg'
         """
         named = by_axis(stimulus)
-        seen = tuple(named) if observe is None else observe
-        for axis in seen:
-            place(axis)
-        history = self.simulate(named, rng=rng)
-
-        def channel(axis: AxisName, quantity: str, name: str) -> Channel:
-            unit = named[axis].unit if axis in named else "deg"
-            moved = history.of(axis, quantity) - getattr(self.start, axis)
-            return Channel(
-                name=f"{axis}.{name}",
-                time=history.time,
-                values=moved * conversion_factor("deg", to=unit),
-                unit=unit,
+        seen = tuple(named) if self.observe is None else self.observe
+        self.check(stimulus)
+        units = {axis: named[axis].unit if axis in named else "deg" for axis in seen}
+        self._playing.state = (
+            self.motion(command_rate(named), rng=self._playing.take_rng()),
+            {axis: conversion_factor("deg", to=unit) for axis, unit in units.items()},
+        )
+        inputs = [
+            ChannelSpec(
+                name=f"{axis}.command",
+                role="input",
+                unit=s.unit,
+                axis=axis,
+                quantity="position",
+                commanded=True,
             )
-
-        bands = [s.band for s in named.values() if s.band is not None]
-        return Record(
-            inputs=tuple(channel(axis, "command", "command") for axis in named),
-            outputs=tuple(channel(axis, "encoder", "position") for axis in seen),
-            fs=command_rate(named),
-            band=(min(b[0] for b in bands), max(b[1] for b in bands)) if bands else None,
+            for axis, s in named.items()
+        ]
+        outputs = [
+            ChannelSpec(
+                name=f"{axis}.position", role="output", unit=unit, axis=axis, quantity="position"
+            )
+            for axis, unit in units.items()
+        ]
+        return Layout(
+            channels=(*inputs, *outputs),
             intersample="zoh" if self.mode == "P" else "bandlimited",
             source=f"simulated {self.name}, {self.mode}",
         )
+
+    def play(self, block: Block, /) -> dict[str, FloatArray]:
+        """Move as commanded, and read the encoders.
+
+        Raises
+        ------
+        RigError
+            If an axis runs away.
+        """
+        motion, factors = self._playing.current(self.name)
+        if self.realtime:
+            for _ in block.due():
+                pass
+        still = np.zeros(5)
+        history = motion.advance(
+            spread(block.position, block.axes, block.units, around=self.start_angles),
+            spread(block.velocity, block.axes, block.units, around=still),
+            spread(block.acceleration, block.axes, block.units, around=still),
+        )
+        return {
+            f"{axis}.position": factor * (history.of(axis, "encoder") - getattr(self.start, axis))
+            for axis, factor in factors.items()
+        }

@@ -1,0 +1,114 @@
+"""What is looked at before a rig is armed: limits stated, and every stimulus inside them."""
+
+import math
+from collections.abc import Mapping
+
+from hmpim.errors import ArgumentError, LimitsError
+from hmpim.experiment.log import RunLog
+from hmpim.rigs import Rig
+from hmpim.stimulus import Limits, Stimulus, check_inside
+from hmpim.stimulus.limits import QUANTITIES
+from hmpim.units import rate_unit
+
+__all__ = ["check_rig", "check_stimuli", "limits_by_axis", "moves"]
+
+
+def check_rig(rig: object) -> Rig:
+    """Return `rig` if it is one.
+
+    Raises
+    ------
+    ArgumentError
+        If not; the message says what it lacks.
+
+    Examples
+    --------
+    >>> check_rig(abs)
+    Traceback (most recent call last):
+    hmpim.errors.ArgumentError: <built-in function abs> is no rig: it has no axes, limits, ...
+    """
+    if isinstance(rig, Rig) and not isinstance(rig, type):
+        return rig
+    wanted = ("name", "axes", "limits", "prepare", "play", "stop", "__enter__", "__exit__")
+    missing = [name for name in wanted if not hasattr(rig, name)]
+    raise ArgumentError(
+        f"{rig!r} is no rig: it has no {', '.join(missing) or 'instance'}; see hmpim.rigs.Rig, "
+        "and make a plain function one with FunctionRig(function=...)"
+    )
+
+
+def moves(rig: Rig) -> bool:
+    """Whether something real may move; True unless the rig says that it is software.
+
+    Examples
+    --------
+    >>> from hmpim.rigs import Sensor
+    >>> moves(Sensor())
+    False
+    """
+    return bool(getattr(rig, "moves", True))
+
+
+def limits_by_axis(rig: Rig, stimuli: Mapping[str, Stimulus]) -> dict[str, Limits | None]:
+    """Limits of each axis that is to move; None where nothing bounds it.
+
+    Raises
+    ------
+    LimitsError
+        If something moves and its limits are not stated.
+
+    Examples
+    --------
+    >>> from hmpim.rigs import Sensor
+    >>> from hmpim.stimulus import Ramp
+    >>> limits_by_axis(Sensor(), {"": Stimulus(waveform=Ramp(duration=1.0), fs=10.0)})
+    {'': None}
+    """
+    stated = rig.limits
+    if stated is None or isinstance(stated, Limits):
+        found: dict[str, Limits | None] = dict.fromkeys(stimuli, stated)
+    else:
+        found = {axis: stated.get(axis) for axis in stimuli}
+    for axis, limits in found.items():
+        if limits is None and moves(rig):
+            about = f"axis {axis!r} of " if axis else ""
+            raise LimitsError(
+                f"{about}rig {rig.name!r} moves and states no limits; state position, velocity "
+                "and acceleration, or, for software, moves = False (unlimited = true in a file)"
+            )
+        if limits is not None and all(math.isinf(getattr(limits, name)) for name in QUANTITIES):
+            found[axis] = None
+    return found
+
+
+def check_stimuli(
+    stimuli: Mapping[str, Stimulus], limits: Mapping[str, Limits | None], *, rig: Rig, log: RunLog
+) -> None:
+    """Refuse a stimulus beyond a limit, and say in the log what was looked at.
+
+    Raises
+    ------
+    LimitsError
+        If a true peak, between samples too, is beyond a limit.
+    UnitError
+        If the units of stimulus and limits cannot be compared.
+    """
+    samples = max(stimulus.samples for stimulus in stimuli.values())
+    for axis, stimulus in stimuli.items():
+        whose = axis if axis and len(rig.axes) > 1 else repr(rig.name)
+        bounds = limits[axis]
+        if bounds is None:
+            log.add("check", f"{whose}: no limits")
+            continue
+        check_inside(stimulus, bounds, whose=whose, samples=samples)
+        there = bounds.to(stimulus.unit)
+        log.add(
+            "check",
+            f"{whose}: "
+            + ", ".join(
+                f"{name} {getattr(stimulus.peaks, name):.6g} of {getattr(there, name):.6g} "
+                f"{rate_unit(stimulus.unit, order)}".rstrip()
+                for order, name in enumerate(QUANTITIES)
+                if math.isfinite(getattr(there, name))
+            ),
+        )

@@ -1,0 +1,176 @@
+"""Replies of a rig, block by block, put together as a record."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hmpim.errors import RecordError, RigError
+from hmpim.record import Channel, Record
+from hmpim.rigs import Block, ChannelSpec, Commands, Layout, Reply, Samples
+
+__all__ = ["Collected", "Played", "default_layout"]
+
+FloatArray = NDArray[np.float64]
+_EMPTY = Samples(time=np.empty(0), values=np.empty(0))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Played:
+    """A block as it was played, for whoever watches the run.
+
+    Parameters
+    ----------
+    block : Block
+        What was commanded.
+    layout : Layout
+        Channels of the run.
+    samples : mapping of str to Samples
+        What has come in since the block before, by channel; may be empty.
+    seconds : float
+        Length of the whole run, s.
+    """
+
+    block: Block
+    layout: Layout
+    samples: Mapping[str, Samples]
+    seconds: float
+
+
+def default_layout(commands: Commands, *, name: str) -> Layout:
+    """Layout of a rig that states none: each axis's command, and one output for each.
+
+    Examples
+    --------
+    >>> from hmpim.rigs import commands_of
+    >>> from hmpim.stimulus import Ramp, Stimulus
+    >>> ramp = Stimulus(waveform=Ramp(duration=1.0), fs=4.0, unit="deg")
+    >>> [c.name for c in default_layout(commands_of({"": ramp}), name="mine").channels]
+    ['u', 'y']
+    """
+    inputs, outputs = [], []
+    for axis, unit in zip(commands.axes, commands.units, strict=True):
+        u, y = (f"{axis}.command", f"{axis}.position") if axis else ("u", "y")
+        inputs.append(
+            ChannelSpec(
+                name=u, role="input", unit=unit, axis=axis, quantity="position", commanded=True
+            )
+        )
+        outputs.append(ChannelSpec(name=y, role="output", unit=unit, axis=axis))
+    return Layout(channels=(*inputs, *outputs), source=f"rig {name}")
+
+
+class Collected:
+    """Samples of all channels so far.
+
+    Parameters
+    ----------
+    layout : Layout
+        Channels to come.
+    name : str
+        Of the rig, for messages.
+    """
+
+    def __init__(self, layout: Layout, *, name: str) -> None:
+        self._layout = layout
+        self._name = name
+        self._specs = {spec.name: spec for spec in layout.channels}
+        self._parts: dict[str, list[Samples]] = {spec.name: [] for spec in layout.channels}
+
+    def take(self, block: Block, reply: Reply) -> Mapping[str, Samples]:
+        """Add what a rig returned for a block.
+
+        Raises
+        ------
+        RigError
+            If it returned a channel that its layout does not have, or another number of
+            samples than the block has commands.
+        """
+        new = self._named(block, reply)
+        for spec in self._specs.values():
+            if spec.commanded and spec.axis is not None and spec.quantity is not None:
+                values = block.of(spec.axis, spec.quantity)
+                new[spec.name] = Samples(time=block.time, values=values)
+        for name, samples in new.items():
+            self._parts[name].append(samples)
+        return MappingProxyType(new)
+
+    def record(
+        self, *, fs: float, band: tuple[float, float] | None, source: str | None = None
+    ) -> Record:
+        """Return all that was collected.
+
+        Raises
+        ------
+        RigError
+            If a channel got fewer than two samples, or samples that no record can hold.
+        """
+
+        def channel(spec: ChannelSpec) -> Channel:
+            parts = self._parts[spec.name] or [_EMPTY]
+            time = np.concatenate([p.time for p in parts])
+            values = np.concatenate([p.values for p in parts])
+            return Channel(name=spec.name, time=time, values=values, unit=spec.unit)
+
+        try:
+            return Record(
+                inputs=tuple(channel(spec) for spec in self._layout.of("input")),
+                outputs=tuple(channel(spec) for spec in self._layout.of("output")),
+                fs=fs,
+                band=band,
+                intersample=self._layout.intersample,
+                source=self._layout.source if source is None else source,
+            )
+        except RecordError as error:
+            raise RigError(f"rig {self._name!r} delivered no usable record: {error}") from error
+
+    def _named(self, block: Block, reply: Reply) -> dict[str, Samples]:
+        if reply is None:
+            return {}
+        if not isinstance(reply, Mapping):
+            reply = self._columns(block, reply)
+        new: dict[str, Samples] = {}
+        for name, given in reply.items():
+            if name not in self._specs:
+                raise RigError(
+                    f"rig {self._name!r} returned channel {name!r}, which its layout does not "
+                    f"have; it has {', '.join(self._specs)}"
+                )
+            new[name] = given if isinstance(given, Samples) else self._on_clock(block, name, given)
+        return new
+
+    def _columns(self, block: Block, reply: object) -> dict[str, FloatArray]:
+        """Columns of a bare array, by the names of the outputs."""
+        outputs = self._layout.of("output")
+        try:
+            values = np.asarray(reply, dtype=np.float64)
+        except (TypeError, ValueError) as error:
+            raise RigError(
+                f"rig {self._name!r} returned {type(reply).__name__} from play; return samples by "
+                "channel name, or an array with a column for each output"
+            ) from error
+        if values.ndim == 1:
+            values = values[:, None]
+        if values.shape != (len(block), len(outputs)):
+            raise RigError(
+                f"rig {self._name!r} returned an array of shape {values.shape} for a block of "
+                f"{len(block)} commands with {len(outputs)} outputs; return one row for each "
+                "command and one column for each output"
+            )
+        return {spec.name: values[:, k] for k, spec in enumerate(outputs)}
+
+    def _on_clock(self, block: Block, name: str, given: object) -> Samples:
+        try:
+            values = np.asarray(given, dtype=np.float64)
+        except (TypeError, ValueError) as error:
+            raise RigError(
+                f"channel {name!r} of rig {self._name!r} is not numeric: {error}"
+            ) from error
+        if values.shape != (len(block),):
+            raise RigError(
+                f"channel {name!r} of rig {self._name!r} has shape {values.shape} for a block of "
+                f"{len(block)} commands; return one sample for each, or Samples with their times"
+            )
+        return Samples(time=block.time, values=values)

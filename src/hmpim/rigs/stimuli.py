@@ -1,0 +1,167 @@
+"""Stimuli by axis, and the commands of all axes together on one clock."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hmpim.errors import ArgumentError
+from hmpim.rigs.block import Block, Pace
+from hmpim.stimulus import Stimulus
+from hmpim.stimulus.command import rounded
+
+__all__ = ["Commands", "commands_of", "shared_band", "stimuli_by_axis"]
+
+FloatArray = NDArray[np.float64]
+
+
+def stimuli_by_axis(
+    stimuli: Stimulus | Mapping[str, Stimulus], axes: Sequence[str] = (), *, name: str = "the rig"
+) -> dict[str, Stimulus]:
+    """Return the stimulus of each axis that moves, in the order of `axes`.
+
+    Parameters
+    ----------
+    stimuli : Stimulus or mapping of axis to Stimulus
+        A single one goes to the axis that it names, or to the only one there is.
+    axes : sequence of str
+        Axes there are; empty for a rig that takes any one stimulus.
+    name : str
+        Of the rig, for messages.
+
+    Raises
+    ------
+    ArgumentError
+        If there is none, an axis is not known, or the rates differ.
+
+    Examples
+    --------
+    >>> from hmpim.stimulus import Ramp
+    >>> ramp = Stimulus(waveform=Ramp(duration=1.0), fs=10.0, axis="yaw")
+    >>> list(stimuli_by_axis(ramp, ("roll", "yaw")))
+    ['yaw']
+    >>> stimuli_by_axis(ramp, ("roll",))
+    Traceback (most recent call last):
+    hmpim.errors.ArgumentError: axis 'yaw' is not known; use one of ('roll',)
+    """
+    if isinstance(stimuli, Stimulus):
+        only = axes[0] if len(axes) == 1 and not stimuli.axis else stimuli.axis
+        stimuli = {only: stimuli}
+    for axis, stimulus in stimuli.items():
+        if not isinstance(stimulus, Stimulus):
+            raise ArgumentError(
+                f"{stimulus!r} for axis {axis!r} is no Stimulus; make one with design(...) or "
+                "Stimulus(waveform=...)"
+            )
+    if not stimuli:
+        raise ArgumentError("no stimulus is given; give at least one axis something to do")
+    for axis in stimuli:
+        if axes and axis not in axes:
+            raise ArgumentError(f"axis {axis!r} is not known; use one of {tuple(axes)}")
+    if not axes and len(stimuli) > 1:
+        raise ArgumentError(
+            f"{name} takes one stimulus, and {len(stimuli)} are given, for {list(stimuli)}; "
+            "run them one after the other"
+        )
+    order = axes or tuple(stimuli)
+    named = {axis: stimuli[axis] for axis in order if axis in stimuli}
+    rates = {axis: stimulus.fs for axis, stimulus in named.items()}
+    if len(set(rates.values())) > 1:
+        raise ArgumentError(f"stimuli have different rates, {rates} Hz; design all at one rate")
+    return named
+
+
+def shared_band(stimuli: Mapping[str, Stimulus]) -> tuple[float, float] | None:
+    """Band in Hz from the lowest to the highest that is excited; None where none is known.
+
+    Examples
+    --------
+    >>> from hmpim.stimulus import Chirp
+    >>> slow = Stimulus(waveform=Chirp(band=(0.1, 5.0), duration=2.0), fs=100.0)
+    >>> fast = Stimulus(waveform=Chirp(band=(1.0, 20.0), duration=2.0), fs=100.0)
+    >>> shared_band({"yaw": slow, "roll": fast})
+    (0.1, 20.0)
+    """
+    bands = [s.band for s in stimuli.values() if s.band is not None]
+    return (min(b[0] for b in bands), max(b[1] for b in bands)) if bands else None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Commands:
+    """All commands of a run.
+
+    Parameters
+    ----------
+    axes, units : tuple of str
+        Axes that move, and the units of their positions.
+    fs : float
+        Commands a second.
+    time : ndarray, shape (n,)
+        When each is due, s.
+    position, velocity, acceleration : ndarray, shape (n, m)
+        Of each axis, in its unit.
+    """
+
+    axes: tuple[str, ...]
+    units: tuple[str, ...]
+    fs: float
+    time: FloatArray
+    position: FloatArray
+    velocity: FloatArray
+    acceleration: FloatArray
+
+    def __len__(self) -> int:
+        return self.time.size
+
+    def blocks(self, size: int, *, pace: Pace | None = None) -> Iterator[Block]:
+        """Cut into blocks of `size` commands; the last may be shorter."""
+        count = len(self)
+        for first in range(0, count, size):
+            part = slice(first, min(first + size, count))
+            yield Block(
+                axes=self.axes,
+                start=first,
+                time=self.time[part],
+                position=self.position[part],
+                velocity=self.velocity[part],
+                acceleration=self.acceleration[part],
+                units=self.units,
+                last=first + size >= count,
+                pace=pace,
+            )
+
+
+def commands_of(named: Mapping[str, Stimulus]) -> Commands:
+    """Sample all stimuli on one clock; a shorter one waits at rest for the longest.
+
+    Parameters
+    ----------
+    named : mapping of axis to Stimulus
+        All at one rate, see `stimuli_by_axis`.
+
+    Examples
+    --------
+    >>> from hmpim.stimulus import Ramp
+    >>> slow = Stimulus(waveform=Ramp(rate=2.0, duration=2.0), fs=2.0)
+    >>> fast = Stimulus(waveform=Ramp(rate=4.0, duration=1.0), fs=2.0)
+    >>> commands_of({"yaw": slow, "roll": fast}).position.tolist()
+    [[0.0, 0.0], [1.0, 2.0], [2.0, 4.0], [3.0, 4.0]]
+    """
+    longest = max(named.values(), key=lambda stimulus: stimulus.samples)
+    count = longest.samples
+    columns: dict[str, list[FloatArray]] = {"position": [], "velocity": [], "acceleration": []}
+    for stimulus in named.values():
+        source = stimulus if stimulus.samples == count else stimulus.motion(longest.time)
+        columns["position"].append(rounded(source.position, stimulus.resolution))
+        columns["velocity"].append(source.velocity)
+        columns["acceleration"].append(source.acceleration)
+    return Commands(
+        axes=tuple(named),
+        units=tuple(stimulus.unit for stimulus in named.values()),
+        fs=longest.fs,
+        time=longest.time,
+        position=np.column_stack(columns["position"]),
+        velocity=np.column_stack(columns["velocity"]),
+        acceleration=np.column_stack(columns["acceleration"]),
+    )
