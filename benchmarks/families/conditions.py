@@ -1,0 +1,162 @@
+"""What spoils a record on its way: each takes a `Take` and changes it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from families.take import Figure, Take
+
+Condition = Callable[[Take], None]
+
+
+def operating_point(*, both: bool) -> Condition:
+    """Output, or input and output, around 10⁷."""
+
+    def spoil(take: Take) -> None:
+        take.y += 1e7
+        take.clean += 1e7
+        take.system = take.system.moved(_with_bias(take, 1e7))
+        if both:
+            take.u = take.u + 1e7
+            take.u_offset = 1e7
+
+    return spoil
+
+
+def _with_bias(take: Take, shift: float) -> np.ndarray:
+    vector = take.system.vector()
+    vector[-1] += shift
+    return vector
+
+
+def mains(take: Take) -> None:
+    """50 or 60 Hz hum as strong as the noise or ten times as strong."""
+    rng, std = take.rng, np.sqrt(take.noise.variance)
+    line = float(rng.choice([50.0, 60.0]))
+    turn = 2 * np.pi * line * take.time
+    take.y += std * float(rng.uniform(1, 10)) * np.sin(turn + rng.uniform(0, 6.3))
+    take.nuisances += [np.sin(turn), np.cos(turn)]
+    take.absent.add("noise_std")
+
+
+def spikes(take: Take) -> None:
+    """A loose contact: one sample in two hundred far out."""
+    rng = take.rng
+    lost = rng.uniform(size=take.y.size) < 0.005
+    size = rng.uniform(1.0, 5.0, lost.sum()) * 3 * take.motion
+    take.y[lost] += size * rng.choice([-1, 1], lost.sum())
+    take.lose(lost)
+
+
+def missing(take: Take) -> None:
+    """One row in twenty was not written, here and there."""
+    kept = take.rng.uniform(size=take.y.size) > 0.05
+    kept[0] = True
+    take.rows = kept
+    take.lose(~kept)
+
+
+def jitter(take: Take) -> None:
+    """Both channels are sampled when the computer gets round to it; the stamps say when."""
+    step = 1 / take.drive.fs
+    off = np.clip(take.rng.standard_normal(take.y.size) * 0.05, -0.4, 0.4) * step
+    take.stamps = take.time + off
+    slope_y = np.gradient(take.clean) / step
+    take.y = take.y + slope_y * off
+    take.u = take.u + np.gradient(take.u) / step * off
+
+
+def drift(kind: str) -> Condition:
+    """The bias drifts: steadily, warming up, or as a slow wander."""
+
+    def spoil(take: Take) -> None:
+        rng, t = take.rng, np.arange(take.y.size) / take.y.size
+        size = take.motion * float(rng.uniform(0.3, 3)) * float(rng.choice([-1, 1]))
+        if kind == "steady":
+            curve, shapes = t, [t - t.mean()]
+        else:
+            rate = float(rng.uniform(2, 8))
+            curve = 1 - np.exp(-rate * t)
+            shapes = [curve - curve.mean(), t * np.exp(-rate * t)]
+            shapes[1] = shapes[1] - shapes[1].mean()
+        take.y += size * curve
+        take.clean += size * curve
+        take.nuisances += shapes
+        mean = size * float(curve.mean())
+        take.system = take.system.moved(_with_bias(take, mean))
+        take.clean -= size * curve - mean  # the bias is its mean over the record
+
+    return spoil
+
+
+def input_noise(take: Take) -> None:
+    """The input is measured, with noise of 0.3 to 3 % of its motion."""
+    std = float(np.std(take.u)) * float(np.exp(take.rng.uniform(np.log(0.003), np.log(0.03))))
+    take.u = take.u + std * take.rng.standard_normal(take.u.size)
+    f = np.linspace(0, take.drive.fs / 2, 400)[1:]
+    passed = std**2 * float(np.mean(np.abs(take.system.response(f)) ** 2))
+    take.noise = take.noise.plus(passed)
+    take.absent.add("noise_std")
+
+
+def repeated_frames(take: Take) -> None:
+    """One output sample in thirty is a copy of the one before: the frame was dropped."""
+    lost = take.rng.uniform(size=take.y.size) < 0.03
+    lost[0] = False
+    for k in np.flatnonzero(lost):
+        take.y[k] = take.y[k - 1]
+    take.lose(lost)
+
+
+def late_frames(take: Take) -> None:
+    """The delay jitters from frame to frame by a tenth of a sample; its mean is the truth."""
+    step = 1 / take.drive.fs
+    off = 0.1 * step * take.rng.standard_normal(take.y.size)
+    slope = np.gradient(take.clean) / step
+    take.y = take.y - slope * off
+    take.noise = take.noise.plus(float(np.mean((slope * 0.1 * step) ** 2)))
+    take.absent.add("noise_std")
+
+
+def quantised(take: Take) -> None:
+    """Rounded to 0.3 to 4 times the noise, or 1/30 to 1/300 of the motion."""
+    std = float(np.sqrt(take.noise.variance))
+    step = max(std * float(np.exp(take.rng.uniform(np.log(0.3), np.log(4)))), take.motion / 300)
+    step = min(step, take.motion / 10)
+    take.y = step * np.rint(take.y / step)
+    take.noise = take.noise.plus(step**2 / 12)
+    take.absent.add("noise_std")
+    take.extras["quantization_step"] = Figure(
+        value=step, bound=0.0, widest=np.inf, tolerance=0.02 * step, tellable=False
+    )
+
+
+def clipped(*, both: bool) -> Condition:
+    """The output's range ends where 5 to 30 % of the samples lie beyond it."""
+
+    def spoil(take: Take) -> None:
+        share = float(take.rng.uniform(0.05, 0.3))
+        high = float(np.quantile(take.clean, 1 - share))
+        low = float(np.quantile(take.clean, share)) if both else -np.inf
+        lost = (take.y > high) | (take.y < low)
+        take.y = np.clip(take.y, low, high)
+        take.lose(lost)
+        for name, level in (("saturation_low", low), ("saturation_high", high)):
+            if np.isfinite(level):
+                take.extras[name] = Figure(
+                    value=level,
+                    bound=0.0,
+                    widest=np.inf,
+                    tolerance=0.02 * take.motion,
+                    tellable=False,
+                )
+
+    return spoil
+
+
+def stated(take: Take) -> None:
+    """The record says what its input does between the samples."""
+    words = {"smooth": "bandlimited", "zoh": "zoh", "foh": "foh"}
+    take.intersample = words[take.drive.between]

@@ -1,0 +1,159 @@
+"""Draw, identify, score; many of them, by several processes."""
+
+from __future__ import annotations
+
+import inspect
+import signal
+import time
+import warnings
+import zlib
+from collections.abc import Callable, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from types import FrameType
+from typing import Any
+
+import numpy as np
+
+import hmpim
+from families.catalogue import FAMILIES, Family
+from families.scoring import Score, score
+from families.take import Draw
+
+__all__ = ["draw_of", "identified", "run"]
+
+PATIENCE = 120
+"""Seconds of processor time after which a draw counts as failed."""
+
+SEED = 1
+
+
+def draw_of(family: Family, seed: int, index: int) -> Draw:
+    """The draw that (family, seed, index) determine, and nothing else."""
+    rng = np.random.default_rng([zlib.crc32(family.name.encode()), seed, index])
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        return family.draw(rng)
+
+
+def record_of(draw: Draw) -> hmpim.Record:
+    """The package's record of a draw."""
+
+    def channels(named: dict) -> tuple[hmpim.Channel, ...]:
+        return tuple(
+            hmpim.Channel(
+                name=name,
+                time=np.arange(values.size) / draw.fs if stamps is None else stamps,
+                values=values,
+            )
+            for name, (stamps, values) in named.items()
+        )
+
+    extra = {}
+    if draw.references and "references" in hmpim.Record.__dataclass_fields__:
+        extra["references"] = channels(draw.references)
+    return hmpim.Record(
+        inputs=channels(draw.inputs),
+        outputs=channels(draw.outputs),
+        fs=draw.fs,
+        intersample=draw.intersample,
+        **extra,
+    )
+
+
+def identified(draw: Draw, *, options: bool = True) -> Any:
+    """What `hmpim.identify` says, told only what it can be told."""
+    taken = inspect.signature(hmpim.identify).parameters
+    given = {k: v for k, v in draw.options.items() if k in taken} if options else {}
+    if given.get("intersample") == "sampled" and not _knows_sampled():
+        del given["intersample"]
+    return hmpim.identify(record_of(draw), **given)
+
+
+def _knows_sampled() -> bool:
+    from typing import get_args
+
+    from hmpim.record import Intersample
+
+    return "sampled" in get_args(Intersample)
+
+
+def model_response(pair: Any, frequency: np.ndarray, fs: float) -> np.ndarray | None:
+    """Response of the model that a result stands for; None where it gives none."""
+    if pair.verdict == "not_identifiable" or pair.parameters.scale_factor is None:
+        return None
+    p = pair.parameters
+    s = 2j * np.pi * frequency
+    late = 0.0 if p.delay is None else p.delay.value
+    top, below = np.polyval(pair.numerator, s), np.polyval(pair.denominator, s)
+    return p.scale_factor.value * top / below * np.exp(-s * late)
+
+
+def one(name: str, seed: int, index: int, options: bool) -> Score:
+    """Draw one record, identify it and hold the result against the truth."""
+    draw = draw_of(FAMILIES[name], seed, index)
+
+    def late(_signal: int, _frame: FrameType | None) -> None:
+        raise TimeoutError(f"more than {PATIENCE} s")
+
+    before = signal.signal(signal.SIGVTALRM, late)
+    signal.setitimer(signal.ITIMER_VIRTUAL, PATIENCE)
+    begin = time.process_time()
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            result = identified(draw, options=options)
+            pair = result.pairs[0]
+        spent = time.process_time() - begin
+        response = None
+        if draw.response is not None:
+            response = model_response(pair, draw.response.frequency, draw.fs)
+        found = score(draw, pair, response)
+    except hmpim.HmpimError as error:
+        spent = time.process_time() - begin
+        found = Score(cell="no_answer", verdict="refused", failure=f"refused: {error}")
+    except Exception as error:
+        spent = time.process_time() - begin
+        found = Score(cell="no_answer", verdict="crash", failure=f"{type(error).__name__}: {error}")
+    finally:
+        signal.setitimer(signal.ITIMER_VIRTUAL, 0)
+        signal.signal(signal.SIGVTALRM, before)
+    if not found.figures:
+        found.figures = _unanswered(draw)
+    found.seconds = spent
+    return found
+
+
+def _unanswered(draw: Draw) -> dict:
+    from families.scoring import score_figure
+
+    return {name: score_figure(None, truth, "") for name, truth in draw.figures.items()}
+
+
+def run(
+    names: Sequence[str],
+    *,
+    draws: int,
+    seed: int = SEED,
+    jobs: int = 2,
+    options: bool = True,
+    tell: Callable[[str, list[Score]], None] | None = None,
+) -> dict[str, list[Score]]:
+    """All draws of the families named; `tell` is called as each family is done."""
+    found: dict[str, list[Score]] = {}
+    tasks = {n: min(draws, FAMILIES[n].most or draws) for n in names}
+    if jobs == 1:
+        for name, count in tasks.items():
+            found[name] = [one(name, seed, k, options) for k in range(count)]
+            if tell:
+                tell(name, found[name])
+        return found
+    with ProcessPoolExecutor(max_workers=jobs) as pool:
+        waiting = {
+            name: [pool.submit(one, name, seed, k, options) for k in range(count)]
+            for name, count in tasks.items()
+        }
+        for name, futures in waiting.items():
+            found[name] = [future.result() for future in futures]
+            if tell:
+                tell(name, found[name])
+    return found

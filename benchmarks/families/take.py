@@ -1,0 +1,339 @@
+"""A record in the making: what is simulated, what spoils it, and what it can still tell."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from typing import get_args
+
+import numpy as np
+
+from families.bound import derivatives, information, propagated, spread
+from families.drive import Between, Drive, Samples
+from families.noise import Noise, white
+from families.simulate import linear_output
+from families.system import System, figures
+
+__all__ = ["BIAS_SHARE", "Draw", "Figure", "Response", "Take", "finish", "shoot"]
+
+SHARE = 0.02
+"""Part of a figure within which it is never wrong."""
+DELAY_SHARE = 0.05
+"""The same for a delay, in samples."""
+BIAS_SHARE = SHARE
+"""The bias is held against the output's r.m.s. motion where that is larger than itself."""
+PEAK = 20 * np.log10(1 + SHARE)
+KNOWN = 0.01
+"""Relative deviation of the response, at the bound, where 5 % off is five deviations."""
+ALIKE = 12.0
+"""Twice the log-likelihood (6, odds of 400) by which another assumption must be worse."""
+FLOOR = 1e-4
+"""Of the tolerance: no interval need be narrower, where the noise is rounding alone."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Figure:
+    """A true value and what the record tells of it.
+
+    `bound` is the Cramér-Rao deviation, `widest` the widest 95 % interval that still counts,
+    `tolerance` the error that is never wrong.
+    """
+
+    value: float
+    bound: float
+    widest: float
+    tolerance: float
+    tellable: bool
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Response:
+    """True response at frequencies (Hz) where the record can tell it; of held samples, too."""
+
+    frequency: np.ndarray
+    value: np.ndarray
+    band: tuple[float, float]
+    at: Callable[[np.ndarray], np.ndarray]
+    sampled: Callable[[np.ndarray], np.ndarray] | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Draw:
+    """One record with its truth.
+
+    `channels` holds name to (time stamps or None, values), inputs first; `options` what
+    `identify` could be told, if it accepts it.
+    """
+
+    fs: float
+    inputs: dict[str, tuple[np.ndarray | None, np.ndarray]]
+    outputs: dict[str, tuple[np.ndarray | None, np.ndarray]]
+    figures: dict[str, Figure]
+    response: Response | None
+    intersample: str | None = None
+    options: dict[str, str] = field(default_factory=dict)
+    references: dict[str, tuple[np.ndarray | None, np.ndarray]] = field(default_factory=dict)
+    related: bool = True
+
+
+@dataclass(slots=True, kw_only=True, eq=False)
+class Take:
+    """What conditions work on; see `finish` for what becomes of it."""
+
+    rng: np.random.Generator
+    system: System
+    drive: Drive
+    noise: Noise
+    start: float
+    clean: np.ndarray
+    u: np.ndarray
+    y: np.ndarray
+    valid: np.ndarray | None = None
+    nuisances: list[np.ndarray] = field(default_factory=list)
+    extras: dict[str, Figure] = field(default_factory=dict)
+    absent: set[str] = field(default_factory=set)
+    telling: bool = True
+    stamps: np.ndarray | None = None
+    rows: np.ndarray | None = None
+    u_offset: float = 0.0
+    intersample: str | None = None
+    options: dict[str, str] = field(default_factory=dict)
+    references: dict[str, np.ndarray] = field(default_factory=dict)
+
+    @property
+    def time(self) -> np.ndarray:
+        return self.start + np.arange(self.y.size) / self.drive.fs
+
+    @property
+    def motion(self) -> float:
+        """R.m.s. of the output about its mean, without noise."""
+        return float(np.std(self.clean))
+
+    def lose(self, lost: np.ndarray) -> None:
+        """Samples whose value says nothing any more."""
+        self.valid = ~lost if self.valid is None else self.valid & ~lost
+
+
+def shoot(
+    rng: np.random.Generator,
+    system: System,
+    drive: Drive,
+    *,
+    snr_db: float,
+    colour: Noise | None = None,
+    start: float = 0.0,
+) -> Take:
+    """Simulate, and add noise; the ratio is of the output's motion to the noise, r.m.s."""
+    clean = linear_output(system, drive, start=start)
+    noise = (colour or white()).scaled(float(np.std(clean)) * 10 ** (-snr_db / 20))
+    y = clean + noise.draw(clean.size, rng)
+    u = drive.sampled(start)
+    return Take(
+        rng=rng, system=system, drive=drive, noise=noise, start=start, clean=clean, u=u, y=y
+    )
+
+
+def steps_of(system: System, drive: Drive) -> np.ndarray:
+    """Steps for numerical derivatives: a part of a sample for the delay, relative otherwise."""
+    vector = system.vector()
+    steps = 1e-5 * np.maximum(np.abs(vector), 1e-6)
+    steps[0] = 1e-3 / drive.fs
+    steps[-1] = 1.0
+    return steps
+
+
+def _figures(system: System, take: Take) -> dict[str, float]:
+    found = figures(system, top=take.drive.fs / 2)
+    if take.u_offset:
+        found["bias"] = system.bias - system.scale_factor * take.u_offset
+    return found
+
+
+def _tolerance(name: str, value: float, take: Take) -> float:
+    if name in ("delay", "delay_low_frequency"):
+        return DELAY_SHARE / take.drive.fs
+    if name == "bias":
+        return BIAS_SHARE * max(abs(value), take.motion)
+    return PEAK if name == "peak_gain_db" else SHARE * abs(value)
+
+
+def finish(take: Take) -> Draw:
+    """The record, its truth, and what it can tell."""
+    system, drive = take.system, take.drive
+    vector, steps = system.vector(), steps_of(system, drive)
+
+    def output(v: np.ndarray) -> np.ndarray:
+        return linear_output(system.moved(v), drive, start=take.start)
+
+    rows = derivatives(output, vector, steps)
+    nuisances = np.stack(take.nuisances, axis=1) if take.nuisances else None
+    covariance = information(rows, take.noise, valid=take.valid, nuisances=nuisances)
+
+    def named(v: np.ndarray) -> dict[str, float]:
+        return _figures(system.moved(v), take)
+
+    truth = named(vector)
+    deviations = propagated(named, vector, steps, covariance)
+    others = _alternatives(take, rows, nuisances)
+    found = {}
+    inside = _inside_band(truth, take)
+    for name, value in truth.items():
+        if name in take.absent:
+            continue
+        std, tolerance = deviations[name], _tolerance(name, value, take)
+        places = [value, *(o[name] for o in others if name in o)]
+        widest = 3 * (max(places) - min(places) + 2 * 1.96 * std)
+        found[name] = Figure(
+            value=value,
+            bound=std,
+            widest=max(widest, _floor(name, tolerance, std)),
+            tolerance=tolerance,
+            tellable=bool(take.telling and inside(name) and std < tolerance),
+        )
+    if take.noise.is_white and "noise_std" not in take.absent:
+        found["noise_std"] = _noise_figure(take, vector.size)
+    found |= take.extras
+    return _packed(take, found, _response(take, vector, steps, covariance))
+
+
+def _floor(name: str, tolerance: float, std: float) -> float:
+    if name == "peak_gain_db" and std == 0:  # no hump: 0 dB is exact
+        return tolerance
+    return FLOOR * tolerance
+
+
+def _noise_figure(take: Take, parameters: int) -> Figure:
+    std = float(np.sqrt(take.noise.variance))
+    count = take.y.size if take.valid is None else int(take.valid.sum())
+    bound = std / np.sqrt(2 * max(count - parameters - 1, 1))
+    return Figure(
+        value=std,
+        bound=bound,
+        widest=3 * 2 * 1.96 * bound,
+        tolerance=SHARE * std,
+        tellable=bool(take.telling and bound < SHARE * std),
+    )
+
+
+def _inside_band(truth: dict[str, float], take: Take) -> Callable[[str], bool]:
+    low, high = take.drive.band
+    peak = figures(take.system, top=high).get("peak_gain_db")
+
+    def inside(name: str) -> bool:
+        if name.startswith("bandwidth"):
+            return low <= truth[name] <= high
+        return name != "peak_gain_db" or truth[name] == peak
+
+    return inside
+
+
+def _alternatives(
+    take: Take, rows: np.ndarray, nuisances: np.ndarray | None
+) -> list[dict[str, float]]:
+    """Figures under each other assumption between the samples that fits as well."""
+    drive = take.drive
+    if take.intersample or drive.every > 1 or not take.telling or drive.samples > 20_000:
+        return []
+    vector, scale = take.system.vector(), np.linalg.norm(rows, axis=0)
+    if not scale.all():
+        scale[scale == 0] = 1.0
+    design = rows / scale
+    if nuisances is not None:
+        design = np.hstack([design, nuisances / np.linalg.norm(nuisances, axis=0)])
+    weighed = take.noise.solve(design, take.valid)
+    gain = np.linalg.pinv(design.T @ weighed, rcond=1e-12, hermitian=True) @ weighed.T
+    found = []
+    for between in get_args(Between):
+        if between == drive.between:
+            continue
+        here = vector.copy()
+        left = None
+        for _ in range(4):
+            here = _bounded(here, vector)
+            other = linear_output(take.system.moved(here), drive, start=take.start, between=between)
+            left = take.clean - other
+            move = gain @ left
+            if not np.isfinite(move).all():
+                break
+            here = here + move[: vector.size] / scale
+        assert left is not None
+        left = left - design @ (gain @ left)
+        if float(left @ take.noise.solve(left[:, None], take.valid)[:, 0]) < ALIKE:
+            found.append(_figures(take.system.moved(_bounded(here, vector)), take))
+    return found
+
+
+def _bounded(here: np.ndarray, around: np.ndarray) -> np.ndarray:
+    """No time constant, frequency or damping changes its sign or doubles on the way."""
+    reach = 0.5 * np.abs(around)
+    reach[0] = reach[-1] = np.inf
+    return np.clip(here, around - reach, around + reach)
+
+
+def _response(
+    take: Take, vector: np.ndarray, steps: np.ndarray, covariance: np.ndarray
+) -> Response:
+    """The true response where 5 % is five deviations at the bound."""
+    low, high = take.drive.band
+    low = max(low, 1.0 / take.drive.duration)
+    grid = np.geomspace(low, max(min(high, 0.45 * take.drive.fs), 1.01 * low), 60)
+    system = take.system
+
+    def at(frequency: np.ndarray) -> np.ndarray:
+        return system.response(frequency)
+
+    value = at(grid)
+    slopes = derivatives(lambda v: system.moved(v).response(grid) / value, vector, steps)
+    known = np.array(
+        [np.hypot(spread(s.real, covariance), spread(s.imag, covariance)) < KNOWN for s in slopes]
+    )
+    return Response(
+        frequency=grid[known],
+        value=value[known],
+        band=(low, high),
+        at=at,
+        sampled=_held_response(take) if take.drive.between == "zoh" else None,
+    )
+
+
+def _held_response(take: Take) -> Callable[[np.ndarray], np.ndarray]:
+    """Response from the samples of a held input to those of the output, delay included."""
+    system, fs = take.system, take.drive.fs
+    impulse = Drive(
+        source=Samples(np.array([0.0, 1.0, 0.0]), fs, -1 / fs),
+        between="zoh",
+        band=take.drive.band,
+        fs=fs,
+        samples=1 + int(np.clip(take.drive.samples, 2, 20_000)),
+    )
+    moved = replace(system, bias=0.0)
+    ahead = int(np.ceil(max(-system.delay, 0.0) * fs)) + 2
+
+    def at(frequency: np.ndarray) -> np.ndarray:
+        h = linear_output(moved, impulse, start=-ahead / fs)
+        time = (np.arange(h.size) - ahead) / fs
+        return np.array([h @ np.exp(-2j * np.pi * f * time) for f in frequency])
+
+    return at
+
+
+def _packed(take: Take, found: dict[str, Figure], response: Response) -> Draw:
+    stamps = take.stamps
+    rows = slice(None) if take.rows is None else take.rows
+    if take.rows is not None and stamps is None:
+        stamps = take.time
+
+    def channel(values: np.ndarray) -> tuple[np.ndarray | None, np.ndarray]:
+        return (None if stamps is None else stamps[rows]), values[rows]
+
+    inputs = {"u": channel(take.u)}
+    return Draw(
+        fs=take.drive.fs,
+        inputs=inputs,
+        outputs={"y": channel(take.y)},
+        figures=found,
+        response=response,
+        intersample=take.intersample,
+        options=take.options,
+        references={name: channel(values) for name, values in take.references.items()},
+    )
