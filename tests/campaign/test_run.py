@@ -1,5 +1,6 @@
 """Campaigns: cases run once, stopped and resumed, refused before anything moves."""
 
+import json
 import re
 import signal
 import subprocess
@@ -85,6 +86,21 @@ def test_interrupted_goes_on_and_repeats_nothing(tmp_path):
     assert third.played == []
     # Stopped or not, the same seed gives the same study.
     assert whole == run_campaign(plan, tmp_path / "again", player=Stopping())
+
+
+def test_a_campaign_of_an_earlier_schema_is_not_resumed(finished, tmp_path):
+    """It says to start afresh, before anything moves; afresh it runs."""
+    plan, _, _ = finished
+    rig = Stopping()
+    run_campaign(plan, tmp_path, player=rig)
+    stamp = tmp_path / "campaign.json"
+    old = json.loads(stamp.read_text(encoding="utf-8")) | {"schema": "hmpim/campaign/1"}
+    stamp.write_text(json.dumps(old), encoding="utf-8")
+    with pytest.raises(FormatError, match=r"hmpim/campaign/1.* start afresh with --fresh"):
+        run_campaign(plan, tmp_path, player=rig)
+    before = len(rig.played)
+    run_campaign(plan, tmp_path, fresh=True, player=rig)
+    assert len(rig.played) == 2 * before
 
 
 def test_changed_plan_says_so_and_fresh_starts_anew(finished, tmp_path):
@@ -181,7 +197,7 @@ def test_comparison_finds_what_moved_and_only_that(finished, tmp_path):
     shifted = {**delay, "value": delay["value"] + 10.0 * delay["std"]}
     pair["parameters"] = {**pair["parameters"], "delay": shifted}
     # A step of the encoder, known to rounding: its last digits are no change.
-    step = {"value": 0.003, "std": 1e-19, "ci95": [0.003, 0.003], "unit": "deg"}
+    step = {"value": 0.003, "std": 1e-19, "ci95": [0.003, 0.003], "unit": "deg", "verdict": "ok"}
     pair["parameters"]["quantization_step"] = step
     moved[0]["pairs"] = [pair]
     (tmp_path / "stepped").mkdir()

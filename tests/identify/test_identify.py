@@ -62,12 +62,12 @@ def test_the_paper_stands_beside_it(result):
 def test_json_keeps_the_contract(result, tmp_path):
     hmpim.save(result, tmp_path / "r.json")
     data = json.loads((tmp_path / "r.json").read_text())
-    assert data["schema"] == "hmpim/identification/1"
+    assert data["schema"] == "hmpim/identification/2"
     assert set(data["record"]) >= {"fs", "samples", "sha256"}
     pair = data["pairs"][0]
     assert set(pair) >= {
         "input", "output", "structure", "fit_percent", "parameters", "paper",
-        "frequency_response", "verdict", "warnings",
+        "frequency_response", "verdict", "warnings", "stopping",
     }  # fmt: skip
     assert set(pair["parameters"]) == {
         "delay", "delay_correlation", "delay_low_frequency", "scale_factor", "bias", "noise_std",
@@ -75,7 +75,7 @@ def test_json_keeps_the_contract(result, tmp_path):
         "bandwidth_phase90_without_delay", "bandwidth_3db", "peak_gain_db", "hold_period",
         "saturation_low", "saturation_high", "quantization_step",
     }  # fmt: skip
-    assert set(pair["parameters"]["delay"]) == {"value", "std", "ci95", "unit"}
+    assert set(pair["parameters"]["delay"]) == {"value", "std", "ci95", "unit", "verdict"}
     assert pair["parameters"]["hold_period"] is None
     assert set(pair["paper"]) >= {
         "delay", "bias", "noise_std", "natural_frequency", "bandwidth_phase90",

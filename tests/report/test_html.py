@@ -136,7 +136,15 @@ def test_every_warning_is_shown(found):
     from hmpim.record import Finding
 
     warned = replace(
-        found.pairs[0], warnings=(Finding(code="jitter", message="Stamps stray by 4 %."),)
+        found.pairs[0],
+        warnings=(
+            Finding(
+                code="jitter",
+                message="Stamps stray by 4 %.",
+                severity="info",
+                parameters=(),
+            ),
+        ),
     )
     text = render(replace(found, pairs=(warned,)))
     assert "Stamps stray by 4 %." in text

@@ -40,7 +40,9 @@ def test_no_row_is_cut_at_80_columns(found):
 
 
 def test_markup_and_escapes_in_a_warning_are_printed_as_text(found):
-    warning = Finding(code="x", message="[red]not markup[/red] \x1b[2J [link=a]")
+    warning = Finding(
+        code="x", message="[red]not markup[/red] \x1b[2J [link=a]", severity="info", parameters=()
+    )
     pair = replace(found.pairs[0], warnings=(warning,))
     text = printed(replace(found, pairs=(pair,)))
     assert "[red]not markup[/red]" in text

@@ -37,7 +37,12 @@ def test_the_headline_is_the_verdict_of_the_worst_pair(found):
     assert headline(found).startswith(
         "The record tells the model: second-order dynamics and a delay"
     )
-    reason = Finding(code="unrelated", message="Output 'y' does not follow input 'u'.")
+    reason = Finding(
+        code="unrelated",
+        message="Output 'y' does not follow input 'u'.",
+        severity="doubt",
+        parameters=("delay",),
+    )
     lost = replace(pair, verdict="not_identifiable", warnings=(reason,))
     assert headline(replace(found, pairs=(lost,))) == (
         "This record cannot tell: output 'y' does not follow input 'u'."

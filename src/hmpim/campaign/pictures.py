@@ -90,8 +90,7 @@ def _curve(row: Row) -> BodeCurve | None:
     }
     scale = row.pair["parameters"]["scale_factor"]
     if scale is not None:  # a curve needs its value alone
-        sure = {"std": 0.0, "ci95": [scale["value"], scale["value"]], "unit": scale["unit"]}
-        parameters["scale_factor"] = {"value": scale["value"], **sure}
+        parameters["scale_factor"] = {**scale, "std": 0.0, "ci95": [scale["value"]] * 2}
     response = dict(row.pair["frequency_response"])
     response["std"] = [math.inf if std is None else std for std in response["std"]]
     response["coherence"] = None

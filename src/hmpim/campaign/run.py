@@ -24,7 +24,8 @@ from hmpim.stimulus import Stimulus
 
 __all__ = ["CASE_SCHEMA", "run_campaign"]
 
-CASE_SCHEMA = "hmpim/campaign-case/1"
+CASE_SCHEMA = "hmpim/campaign-case/2"
+CAMPAIGN_SCHEMA = "hmpim/campaign/2"
 _PLAYED = 5  # times as long as a design takes: what is left is told from it
 _WAIT = 0.5  # s at rest before and after the motion of an axis that count
 Progress = Callable[[int, int, str], None]
@@ -107,16 +108,23 @@ def _open(plan: Plan, folder: Path, *, fresh: bool) -> None:
             old.unlink()
     elif stamp.exists() and any((folder / "cases").glob("*.json")):
         try:
-            digest = json.loads(stamp.read_text(encoding="utf-8"))["plan"]
+            stamped = json.loads(stamp.read_text(encoding="utf-8"))
+            schema, digest = stamped["schema"], stamped["plan"]
         except (ValueError, KeyError, TypeError) as error:
             raise FormatError(f"{stamp} is damaged ({error}); start anew with --fresh") from error
+        if schema != CAMPAIGN_SCHEMA:
+            raise FormatError(
+                f"{folder} holds a campaign of schema {schema!r} and this version writes "
+                f"{CAMPAIGN_SCHEMA!r}, so it cannot be resumed; start afresh with --fresh, or name "
+                "another folder"
+            )
         if digest != plan.digest:
             raise ArgumentError(
                 f"{folder} holds a campaign of another plan ({digest[:12]}, this one is "
                 f"{plan.digest[:12]}): the plan was changed since; start anew with --fresh, or "
                 "name another folder"
             )
-    _write(stamp, {"schema": "hmpim/campaign/1", "name": plan.name, "plan": plan.digest})
+    _write(stamp, {"schema": CAMPAIGN_SCHEMA, "name": plan.name, "plan": plan.digest})
 
 
 def _write(path: Path, data: dict[str, Any]) -> None:
@@ -133,7 +141,10 @@ def _read(folder: Path, case: Case) -> dict[str, Any] | None:
     except ValueError as error:
         raise FormatError(f"{path} is damaged ({error}); remove it to run it again") from error
     if data.get("schema") != CASE_SCHEMA:
-        raise FormatError(f"{path} has schema {data.get('schema')!r}; {CASE_SCHEMA!r} is needed")
+        raise FormatError(
+            f"{path} has schema {data.get('schema')!r} and {CASE_SCHEMA!r} is needed; start afresh "
+            "with --fresh, or name another folder"
+        )
     return data
 
 

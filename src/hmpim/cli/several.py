@@ -61,7 +61,7 @@ def _levels_dict(levels: "Levels") -> dict[str, Any]:
                     }
                     for trend in compared.trends
                 ],
-                "warnings": [{"code": f.code, "message": f.message} for f in compared.findings],
+                "warnings": [f.to_dict() for f in compared.findings],
             }
             for pair, compared in zip(levels.results[0].pairs, levels.comparisons, strict=True)
         ],

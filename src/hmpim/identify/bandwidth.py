@@ -12,9 +12,9 @@ from hmpim.identify.result import Estimate, FrequencyResponse, Parameters, Respo
 from hmpim.identify.sampled_response import sampled_response
 from hmpim.identify.uncertainty import estimate
 from hmpim.model import RationalDelay, phase, response
-from hmpim.record import Finding, Intersample
+from hmpim.record import Intersample
 
-__all__ = ["disagreement", "ratio_at", "response_bandwidths"]
+__all__ = ["ratio_at", "response_bandwidths"]
 
 _REACH = 0.15
 """Neighbours within this share of a frequency are looked at."""
@@ -23,12 +23,6 @@ _FEWEST = 5
 
 _MANY = 1e6
 """Degrees of freedom behind a response's error bars, in effect."""
-
-_APART = 4.0
-"""Standard deviations by which response and model may part."""
-
-_MATTERS = 0.03
-"""Share of a bandwidth below which a disagreement is not worth a word."""
 
 
 def ratio_at(
@@ -44,8 +38,9 @@ def ratio_at(
     lowering the error: the standard deviation is that of one of them.
     """
     apart = np.abs(measured.frequency - frequency)
-    inside = measured.frequency[0] <= frequency <= measured.frequency[-1]
-    if not inside or apart.size < _FEWEST:
+    if apart.size < _FEWEST:
+        return None
+    if not measured.frequency[0] <= frequency <= measured.frequency[-1]:
         return None
     near = apart <= max(_REACH * frequency, float(np.partition(apart, _FEWEST - 1)[_FEWEST - 1]))
     f = measured.frequency[near]
@@ -105,27 +100,6 @@ def response_bandwidths(
         ),
         bandwidth_3db=crossing(modelled.bandwidth_3db, "gain"),
     )
-
-
-def disagreement(measured: ResponseBandwidths, modelled: Parameters) -> Finding | None:
-    """Sentence on a bandwidth that response and model put apart beyond their error bars."""
-    for name, words in (
-        ("bandwidth_phase90", "-90° bandwidth"),
-        ("bandwidth_phase90_without_delay", "-90° bandwidth without delay"),
-        ("bandwidth_3db", "-3 dB bandwidth"),
-    ):
-        one, other = getattr(measured, name), getattr(modelled, name)
-        if one is None or other is None:
-            continue
-        apart = abs(one.value - other.value)
-        if apart > _APART * float(np.hypot(one.std, other.std)) and apart > _MATTERS * other.value:
-            return Finding(
-                code="bandwidth_disagrees",
-                message=f"The {words} is {one.value:.4g} Hz by the measured response and "
-                f"{other.value:.4g} Hz by the model, further apart than their errors allow. Look "
-                "at the Bode plot there before using either.",
-            )
-    return None
 
 
 def _gain_slope(system: RationalDelay, f: float) -> float:

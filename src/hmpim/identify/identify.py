@@ -21,10 +21,12 @@ from hmpim.identify.effects.imperfections import (
 from hmpim.identify.effects.lost import stands_out
 from hmpim.identify.fitting.enrich import PLAIN
 from hmpim.identify.fitting.joint import JointFit
+from hmpim.identify.fitting.unrelated import is_unrelated
+from hmpim.identify.groups import EVERY
+from hmpim.identify.judgement import judged
 from hmpim.identify.pair import described, untold
 from hmpim.identify.result import Identification, PairIdentification, RecordSummary
 from hmpim.identify.threads import one_thread
-from hmpim.identify.verdict import is_unrelated
 from hmpim.identify.whiteness import is_white
 from hmpim.model.dynamics import STRUCTURES, StructureName
 from hmpim.record import Aligned, Finding, Intersample, Record, Signal, uniform
@@ -118,7 +120,7 @@ def identify(
         record=RecordSummary(
             fs=aligned.fs, samples=record.samples, sha256=record.sha256, source=record.source
         ),
-        pairs=tuple(pair for pairs, _ in found for pair in pairs),
+        pairs=tuple(judged(pair) for pairs, _ in found for pair in pairs),
         inputs=inputs,
         data=record,
     )
@@ -158,6 +160,8 @@ def _identify_output(
             code="dead_channel",
             message=f"Output {output.name!r} is constant at {output.values[output.valid][0]:g}. "
             "The sensor is dead, stuck or not connected.",
+            severity="doubt",
+            parameters=EVERY,
         )
         return [untold(aligned, source, output, record, dead) for source in aligned.inputs], None
     richest = max(count_levels(source.values) for source in aligned.inputs)
@@ -196,6 +200,8 @@ def _identify_output(
         code="unrelated",
         message=f"Output {output.name!r} does not follow input {source.name!r}: a constant "
         "explains it as well. Check the channels, or excite more.",
+        severity="doubt",
+        parameters=EVERY,
     )
     return [untold(aligned, source, output, record, unfollowed)], None
 
@@ -220,8 +226,7 @@ def _each_input(
         seen = responses.columns[i]
         finding = unrelated(output.name, source.name, seen)
         pair = untold(aligned, source, output, own, finding, seen)
-        weak = finding.code == "weak_coupling"
-        pairs.append(replace(pair, verdict="doubtful") if weak else pair)
+        pairs.append(pair)
     return pairs, responses.coherence
 
 

@@ -258,6 +258,8 @@ def compare_levels(
                 f"{most.amplitudes[-1]:.4g} the {most.name.replace('_', ' ')} changes by "
                 f"{100 * most.change:+.2g} %, beyond its error; up to "
                 f"{reach:.4g} it stays within 2 %. Use a linear model up to there only.",
+                severity="doubt",
+                parameters=tuple(t.name for t in changed),
             )
         )
         kind = _kind({t.name: t for t in changed})
@@ -338,6 +340,8 @@ def _kind(changed: dict[str, Trend]) -> Finding | None:
             message=f"The damping ratio falls from {damping.values[0]:.3g} to "
             f"{damping.values[-1]:.3g} as the amplitude grows, as Coulomb friction makes it. "
             "Use large motions for the linear model, and put friction into it.",
+            severity="info",
+            parameters=("damping_ratio",),
         )
     if frequency is None:
         return None
@@ -349,6 +353,8 @@ def _kind(changed: dict[str, Trend]) -> Finding | None:
         f"with a {'hardening' if hardens else 'softening'} spring"
         f"{'' if hardens else ', or a limit on rate or torque'}. "
         "Take the value at the smallest amplitude for the linear model.",
+        severity="info",
+        parameters=("natural_frequency",),
     )
 
 

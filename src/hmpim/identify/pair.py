@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from hmpim.identify.bandwidth import disagreement, response_bandwidths
+from hmpim.identify.bandwidth import response_bandwidths
 from hmpim.identify.coupling.coupled import Responses
 from hmpim.identify.coupling.several import Joined
 from hmpim.identify.effects.drift import Drifting, drift_finding
@@ -14,21 +14,21 @@ from hmpim.identify.fitting.fit import Fit
 from hmpim.identify.fitting.joint import JointFit
 from hmpim.identify.fitting.plainer import plainer, taking
 from hmpim.identify.frf.local import local_response
+from hmpim.identify.judgement import Evidence, attempt, judge
 from hmpim.identify.nonlinear.nonlinearity import inspect_nonlinearity
 from hmpim.identify.paper import paper_estimates
 from hmpim.identify.readings import Readings, read_parameters
-from hmpim.identify.remarks import remarks
 from hmpim.identify.result import (
     Candidate,
     FrequencyResponse,
     PairIdentification,
     PaperEstimates,
     Parameters,
+    ResponseBandwidths,
 )
 from hmpim.identify.spectrum import excited_band
 from hmpim.identify.uncertainty import estimate, noise_estimate, response_std
-from hmpim.identify.verdict import judge
-from hmpim.identify.whiteness import misfit
+from hmpim.identify.whiteness import Misfit, misfit
 from hmpim.record import Aligned, Finding, Record, Signal
 
 __all__ = ["described", "untold"]
@@ -53,18 +53,21 @@ def described(
     if refined is not None:
         joint, censored = refined
         covariance = censored.covariance
-    alone = matrix is None and covariance is None
-    inspection = inspect_nonlinearity(
-        source.values,
-        joint.problem,
-        joint.best.fit,
-        fs=fs,
-        plain=plainer(joint) if alone else None,
-        others=[other.values for other in aligned.inputs if other is not source],
-        floor=found.rounding,
-        unit=output.unit,
+    inspection, unseen = attempt(
+        "nonlinearity",
+        lambda: inspect_nonlinearity(
+            source.values,
+            joint.problem,
+            joint.best.fit,
+            fs=fs,
+            plain=plainer(joint) if matrix is None and covariance is None else None,
+            others=[other.values for other in aligned.inputs if other is not source],
+            floor=found.rounding,
+            unit=output.unit,
+        ),
+        None,
     )
-    joint = taking(joint, inspection.fit)
+    joint = joint if inspection is None else taking(joint, inspection.fit)
     fit = joint.best.fit
     u, y = source.values, joint.problem.y  # without the drift, and what other inputs move
     band = record.band or excited_band(u, fs)
@@ -78,17 +81,6 @@ def described(
         input_unit=source.unit,
         output_unit=output.unit,
     )
-    fit_percent = _fit_percent(joint)
-    left = misfit(u, fit.residual, delay=fit.delay, band=(band[0] / fs, band[1] / fs))
-    judgement = judge(
-        joint,
-        readings,
-        left,
-        fs=fs,
-        band=band,
-        fit_percent=fit_percent,
-        nonlinear=bool(inspection.findings),
-    )
     if matrix is None:
         told = found.telling(y.size, fs)
         whole = y if told is None else np.where(told, y, _expected(fit, censored is not None))
@@ -97,55 +89,66 @@ def described(
             response = _with_error_of(response, readings)
     else:
         response = matrix.columns[i]
-    findings, verdict = judgement.findings, judgement.verdict
-    from_response = response_bandwidths(
-        response,
-        readings.system,
-        readings.parameters,
-        fs=fs,
-        intersample=joint.best.intersample,
+    from_response, unread = attempt(
+        "response_bandwidths",
+        lambda: response_bandwidths(
+            response,
+            readings.system,
+            readings.parameters,
+            fs=fs,
+            intersample=joint.best.intersample,
+        ),
+        ResponseBandwidths(),
     )
-    parameters, seen = with_imperfections(readings.parameters, found, censored, output.unit)
-    counts = slice(None) if joint.problem.valid is None else joint.problem.valid
-    said, noisy = remarks(
-        fit.residual[counts],
-        u,
+    left, untested = attempt(
+        "misfit",
+        lambda: misfit(u, fit.residual, delay=fit.delay, band=(band[0] / fs, band[1] / fs)),
+        Misfit(share=0.0, probability=1.0),
+    )
+    evidence = Evidence(
+        joint=joint,
+        readings=readings,
+        misfit=left,
+        u=u,
         fs=fs,
         band=band,
-        white=readings.white,
+        fit_percent=_fit_percent(joint),
+        nonlinear=inspection is not None and bool(inspection.findings),
+        held=found.hold is not None,
+        measured=from_response,
     )
+    parameters, seen = with_imperfections(readings.parameters, found, censored, output.unit)
     known = {finding.code for finding in seen}
-    bent = tuple(finding for finding in inspection.findings if finding.code not in known)
-    findings = (*findings, *seen, *bent, *said)
-    if drifting is not None:
-        findings = (*findings, drift_finding(drifting, fs, output.unit))
-    if inspection.doubtful:
-        verdict = "doubtful"
-    if found.doubtful or noisy:
-        verdict = "doubtful"
-    parted = disagreement(from_response, readings.parameters)
-    if parted is not None and found.hold is None:
-        findings, verdict = (*findings, parted), "doubtful"
+    bent = () if inspection is None else inspection.findings
+    drifts = () if drifting is None else (drift_finding(drifting, fs, output.unit),)
+    findings = (
+        *judge(evidence),
+        *seen,
+        *(finding for finding in bent if finding.code not in known),
+        *drifts,
+        *unseen,
+        *unread,
+        *untested,
+    )
     return PairIdentification(
         input=source.name,
         output=output.name,
         structure=fit.structure.name,
         intersample=joint.best.intersample,
-        fit_percent=fit_percent,
+        fit_percent=evidence.fit_percent,
         parameters=parameters,
         paper=paper,
         frequency_response=response,
         numerator=_descending(readings.system.numerator / readings.system.numerator[0]),
         denominator=_descending(readings.system.denominator),
         candidates=_candidates(joint),
-        verdict=verdict,
         warnings=(*aligned.findings, *findings),
         from_response=from_response,
         time=aligned.time,
         prediction=fit.prediction if drifting is None else fit.prediction + drifting.trend,
         residual=fit.residual,
         covariance=_finite(readings.coefficient_covariance),
-        nonlinearity=inspection.summary,
+        nonlinearity=None if inspection is None else inspection.summary,
     )
 
 
@@ -256,7 +259,6 @@ def untold(
         numerator=(0.0,),
         denominator=(1.0,),
         candidates=(),
-        verdict="not_identifiable",
         warnings=(*aligned.findings, finding),
         time=aligned.time,
         prediction=np.full(aligned.samples, mean),

@@ -7,9 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hmpim.identify.fitting.fit import jacobian
-from hmpim.identify.fitting.halves import Halves, compare_halves
 from hmpim.identify.fitting.joint import JointFit
-from hmpim.identify.fitting.nested import HiddenPole, hidden_pole, widened
+from hmpim.identify.fitting.nested import widened
 from hmpim.identify.result import Estimate, Parameters
 from hmpim.identify.uncertainty import covariance, estimate, gradient, noise_estimate
 from hmpim.identify.whiteness import is_white
@@ -45,10 +44,8 @@ class Readings:
         Of `vector`.
     white : bool
         Whether the residual passed for white.
-    halves : Halves
-        Whether the halves of the record tell the same model.
-    hidden : HiddenPole or None
-        For a first- or second-order fit, what the record says of one more pole.
+    rows : ndarray, shape (p, n)
+        Derivatives of the prediction, from `hmpim.identify.fitting.fit.jacobian`.
     coefficient_covariance : ndarray, shape (q, q)
         Of the delay and the coefficients of `system` that may vary, by rising powers of s.
     """
@@ -58,8 +55,7 @@ class Readings:
     vector: _Vector
     covariance: _Vector
     white: bool
-    halves: Halves
-    hidden: HiddenPole | None
+    rows: _Vector
     coefficient_covariance: _Vector
 
     def variance(self, function: Callable[[_Vector], float]) -> float:
@@ -216,10 +212,7 @@ def read_parameters(
         vector=vector,
         covariance=cov,
         white=white,
-        halves=compare_halves(rows, residual, joint.problem.y, share=joint.effective_share),
-        hidden=hidden_pole(joint.problem, fit, rows, white=white)
-        if structure.name in ("first_order", "second_order")
-        else None,
+        rows=rows,
         coefficient_covariance=sensitivity.coefficients.T @ cov @ sensitivity.coefficients,
     )
 

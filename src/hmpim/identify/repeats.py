@@ -15,6 +15,7 @@ from scipy.stats import chi2
 from scipy.stats import f as fisher
 
 from hmpim.errors import RecordError
+from hmpim.identify.groups import EVERY, MODELLED, PHASE_SPLIT
 from hmpim.identify.identify import identify
 from hmpim.identify.result import (
     Estimate,
@@ -148,7 +149,7 @@ class RepeatedPair:
             "noise_std": None if self.noise_std is None else self.noise_std.to_dict(),
             "unmodelled": self.unmodelled,
             "unmodelled_probability": self.unmodelled_probability,
-            "warnings": [{"code": f.code, "message": f.message} for f in self.findings],
+            "warnings": [f.to_dict() for f in self.findings],
         }
 
 
@@ -322,6 +323,8 @@ def _pair(found: tuple[PairIdentification, ...]) -> RepeatedPair:
                 code="not_identifiable",
                 message=f"{len(found) - len(told)} of {len(found)} repeats could not be "
                 "identified. See their own warnings.",
+                severity="doubt",
+                parameters=EVERY,
             )
         )
     if len({pair.structure for pair in told}) > 1:
@@ -330,6 +333,8 @@ def _pair(found: tuple[PairIdentification, ...]) -> RepeatedPair:
                 code="structure",
                 message=f"The repeats were found to be {', '.join(structures)}. Where they differ "
                 "the record hardly tells; state one with structures=.",
+                severity="doubt",
+                parameters=PHASE_SPLIT,
             )
         )
     findings.extend(
@@ -342,6 +347,8 @@ def _pair(found: tuple[PairIdentification, ...]) -> RepeatedPair:
                 code="unmodelled",
                 message=f"{unmodelled:.3g} (r.m.s.) of what the model leaves over comes back in "
                 "every repeat: it is not noise. Look at the residual beside the stimulus.",
+                severity="doubt",
+                parameters=MODELLED,
             )
         )
     return RepeatedPair(
@@ -398,12 +405,16 @@ def _doubt(parameter: RepeatedParameter, output: str) -> Finding:
             message=f"The {words} of {output!r} scatters from repeat to repeat {ratio:.3g} times "
             "as much as its stated error. Something changes between the repeats, or the model "
             "lacks something; use the repeatability as its error.",
+            severity="doubt",
+            parameters=(parameter.name,),
         )
     return Finding(
         code="scatter",
         message=f"The {words} of {output!r} scatters from repeat to repeat only {ratio:.3g} times "
         "as much as its stated error. The stated error is too large, or the repeats are not "
         "independent records.",
+        severity="doubt",
+        parameters=(parameter.name,),
     )
 
 

@@ -21,13 +21,16 @@ __all__ = [
     "Nonlinearity",
     "PairIdentification",
     "PaperEstimates",
+    "ParameterVerdict",
     "Parameters",
     "RecordSummary",
     "ResponseBandwidths",
     "Verdict",
 ]
 
-SCHEMA = "hmpim/identification/1"
+SCHEMA = "hmpim/identification/2"
+_FIRST = "hmpim/identification/1"
+ParameterVerdict = Literal["ok", "doubtful"]
 Verdict = Literal["ok", "doubtful", "not_identifiable"]
 
 
@@ -39,6 +42,7 @@ class Estimate:
     std: float
     ci95: tuple[float, float]
     unit: str = ""
+    verdict: ParameterVerdict = "ok"
 
     def to_dict(self) -> dict[str, Any]:
         """Return the estimate as plain JSON values."""
@@ -47,13 +51,20 @@ class Estimate:
             "std": self.std,
             "ci95": [self.ci95[0], self.ci95[1]],
             "unit": self.unit,
+            "verdict": self.verdict,
         }
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> "Estimate":
         """Read back what `to_dict` wrote."""
         low, high = data["ci95"]
-        return cls(value=data["value"], std=data["std"], ci95=(low, high), unit=data["unit"])
+        return cls(
+            value=data["value"],
+            std=data["std"],
+            ci95=(low, high),
+            unit=data["unit"],
+            verdict=data["verdict"],
+        )
 
 
 def _estimates_to_dict(holder: "Parameters | ResponseBandwidths") -> dict[str, Any]:
@@ -316,8 +327,8 @@ class PairIdentification:
     numerator: tuple[float, ...]
     denominator: tuple[float, ...]
     candidates: tuple[Candidate, ...]
-    verdict: Verdict
     warnings: tuple[Finding, ...]
+    verdict: Verdict = "doubtful"
     from_response: ResponseBandwidths = ResponseBandwidths()
     time: NDArray[np.float64] | None = None
     prediction: NDArray[np.float64] | None = None
@@ -354,7 +365,8 @@ class PairIdentification:
             ],
             "nonlinearity": None if self.nonlinearity is None else self.nonlinearity.to_dict(),
             "verdict": self.verdict,
-            "warnings": [{"code": w.code, "message": w.message} for w in self.warnings],
+            "warnings": [warning.to_dict() for warning in self.warnings],
+            "stopping": None,
         }
 
     @classmethod
@@ -376,7 +388,7 @@ class PairIdentification:
             denominator=tuple(data["dynamics"]["denominator"]),
             candidates=tuple(Candidate(**c) for c in data["candidates"]),
             verdict=data["verdict"],
-            warnings=tuple(Finding(**w) for w in data["warnings"]),
+            warnings=tuple(Finding.from_dict(w) for w in data["warnings"]),
             nonlinearity=None if nonlinearity is None else Nonlinearity.from_dict(nonlinearity),
             covariance=None if covariance is None else np.array(covariance, dtype=np.float64),
         )
@@ -455,12 +467,48 @@ class Identification:
         Raises
         ------
         FormatError
-            If `data` is not of schema hmpim/identification/1.
+            If `data` is of no schema that is known.
         """
-        if data.get("schema") != SCHEMA:
-            raise FormatError(f"schema is {data.get('schema')!r}; {SCHEMA!r} is needed")
+        schema = data.get("schema")
+        if schema not in (SCHEMA, _FIRST):
+            raise FormatError(f"schema is {schema!r}; {SCHEMA!r} or {_FIRST!r} is needed")
+        pairs = data["pairs"] if schema == SCHEMA else [_from_first(p) for p in data["pairs"]]
         return cls(
             record=RecordSummary(**data["record"]),
-            pairs=tuple(PairIdentification.from_dict(pair) for pair in data["pairs"]),
+            pairs=tuple(PairIdentification.from_dict(pair) for pair in pairs),
             inputs=None if data.get("inputs") is None else InputSet.from_dict(data["inputs"]),
         )
+
+
+def _from_first(pair: Mapping[str, Any]) -> dict[str, Any]:
+    """Return a pair of schema 1 as one of schema 2.
+
+    Schema 1 has one verdict for the pair. Where that is not ok, nothing says which of its
+    warnings casts the doubt, nor on what: all of them do, on everything.
+    """
+    trusted = pair["verdict"] == "ok"
+
+    def judged(estimates: Mapping[str, Any]) -> dict[str, Any]:
+        verdict = "ok" if trusted else "doubtful"
+        return {n: None if e is None else {**e, "verdict": verdict} for n, e in estimates.items()}
+
+    parameters = judged(pair["parameters"])
+    nonlinearity = pair.get("nonlinearity")
+    size = None if nonlinearity is None else nonlinearity["size"]
+    return {
+        **pair,
+        "parameters": parameters,
+        "bandwidths_from_response": judged(pair.get("bandwidths_from_response", {})),
+        "nonlinearity": None
+        if nonlinearity is None
+        else {**nonlinearity, "size": judged({"size": size})["size"]},
+        "warnings": [
+            {
+                "code": warning["code"],
+                "message": warning["message"],
+                "severity": "info" if trusted else "doubt",
+                "parameters": [] if trusted else list(parameters),
+            }
+            for warning in pair["warnings"]
+        ],
+    }

@@ -2,7 +2,7 @@
 
 from hmpim.record.align import Aligned, Signal, uniform
 from hmpim.record.clock import Clock, fit_clock
-from hmpim.record.finding import Finding
+from hmpim.record.finding import Finding, Severity
 from hmpim.record.quality import inspect_record, inspect_timing, inspect_values
 from hmpim.record.record import Channel, Intersample, Record
 from hmpim.record.series import Series
@@ -15,6 +15,7 @@ __all__ = [
     "Intersample",
     "Record",
     "Series",
+    "Severity",
     "Signal",
     "fit_clock",
     "inspect_record",

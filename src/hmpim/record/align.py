@@ -227,6 +227,8 @@ def _clock_differences(
                     f"{channels[0].name!r} at {clock.fs:.6g} Hz) and was interpolated; "
                     "what it holds above half the lower rate is lost or folded"
                 ),
+                severity="info",
+                parameters=(),
             )
         )
     return findings

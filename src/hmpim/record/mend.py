@@ -110,6 +110,8 @@ def _without_missing(
                     f"in {runs} {'place' if runs == 1 else 'places'}; they are gaps of this "
                     "channel"
                 ),
+                severity="info",
+                parameters=(),
             )
         )
         time, values = time[there], values[there]
@@ -130,6 +132,8 @@ def _ordered(
                 code="missing_stamps",
                 message=f"{time.size - order.size} of {time.size} samples of {of} have no time "
                 "stamp and are left out",
+                severity="info",
+                parameters=(),
             )
         )
     back = int(np.count_nonzero(np.diff(time[order]) < 0))
@@ -141,6 +145,8 @@ def _ordered(
                 code="backward_stamps",
                 message=f"time of {of} runs backward at {back} of {time.size} samples; the samples "
                 "are sorted by their stamps",
+                severity="info",
+                parameters=(),
             )
         )
     first = np.concatenate(([True], np.diff(time[order]) > 0)) if order.size else order > 0
@@ -152,6 +158,8 @@ def _ordered(
                 code="doubled_stamps",
                 message=f"{doubled} of {time.size} stamps of {of} repeat the one before; the first "
                 "sample of each is kept",
+                severity="info",
+                parameters=(),
             )
         )
     return time[order], order

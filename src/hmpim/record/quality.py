@@ -67,6 +67,8 @@ def clock_findings(
                     f"{stop - start:.4g} s from {start:.6g} s; the output is left out there, and "
                     "the input is filled in: repeat the test if the gap lies where the input moves"
                 ),
+                severity="info",
+                parameters=(),
             )
         )
     if clock.jittered:
@@ -82,6 +84,8 @@ def clock_findings(
                     "the samples are interpolated; record with a hardware clock if errors "
                     "at high frequency matter"
                 ),
+                severity="info",
+                parameters=(),
             )
         )
     if stated is not None and abs(clock.fs / stated - 1) > 0.01:
@@ -92,6 +96,8 @@ def clock_findings(
                     f"time stamps{of} run at {clock.fs:.6g} Hz where {stated:.6g} Hz is stated; "
                     "the stamps are believed: correct the rate, or the unit of the time column"
                 ),
+                severity="info",
+                parameters=(),
             )
         )
     return tuple(findings)
@@ -130,6 +136,8 @@ def inspect_values(record: Record) -> tuple[Finding, ...]:
                         f"channel {channel.name!r} reads {channel.values[0]:.6g} from end to end; "
                         "check its cable, its range and its column"
                     ),
+                    severity="info",
+                    parameters=(),
                 )
             )
     for output in record.outputs:
@@ -154,6 +162,8 @@ def inspect_values(record: Record) -> tuple[Finding, ...]:
                         f"before, a new value about every {every:.2g} samples: the unit updates "
                         "more slowly than it is recorded, or its quantisation is coarse"
                     ),
+                    severity="info",
+                    parameters=(),
                 )
             )
     return tuple(findings)
@@ -209,5 +219,7 @@ def _stuck(output: Channel, inputs: tuple[Channel, ...]) -> Finding | None:
                     f"{stop:.6g} s ({length} samples) while {u.name!r} moves; check the unit, or "
                     "cut that part out"
                 ),
+                severity="info",
+                parameters=(),
             )
     return None

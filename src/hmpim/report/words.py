@@ -212,7 +212,7 @@ def nonlinear_facts(pair: PairIdentification) -> list[tuple[str, str]]:
     >>> found = Nonlinearity(
     ...     share=0.02, even=0.0, odd=0.02, noise=0.7, linear=0.1, nonlinear=0.2,
     ...     kinds=("friction", "backlash"))
-    >>> warned = (Finding(code="nonlinear", message="…"),)
+    >>> warned = (Finding(code="nonlinear", message="…", severity="info", parameters=()),)
     >>> nonlinear_facts(SimpleNamespace(nonlinearity=found, warnings=warned))[2]
     ('Kind', 'friction or backlash; this record cannot tell which')
     """

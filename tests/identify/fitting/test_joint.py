@@ -6,8 +6,8 @@ import pytest
 from hmpim.identify.fitting.fit import Problem, fit_structure, jacobian
 from hmpim.identify.fitting.joint import joint_fit
 from hmpim.identify.fitting.start import rough_response, starting_values
+from hmpim.identify.fitting.unrelated import is_unrelated
 from hmpim.identify.readings import read_parameters
-from hmpim.identify.verdict import is_unrelated
 from hmpim.model import (
     STRUCTURES,
     Model,

@@ -11,6 +11,7 @@ from hmpim.identify.coupling.couplings import unsettled
 from hmpim.identify.coupling.inputs import Alike, InputSet, OutputCoherence, input_set
 from hmpim.identify.coupling.several import Joined
 from hmpim.identify.frf.multivariable import ResponseMatrix, response_matrix
+from hmpim.identify.groups import EVERY, MODELLED
 from hmpim.identify.result import (
     Estimate,
     FrequencyResponse,
@@ -175,6 +176,8 @@ def unrelated(output: str, source: str, response: FrequencyResponse) -> Finding:
             message=f"Output {output!r} follows input {source!r} weakly, by {level:.0f} dB at most "
             f"(at {response.frequency[k]:.3g} Hz), in a shape that no simple structure describes. "
             "Read it off the frequency response.",
+            severity="doubt",
+            parameters=EVERY,
         )
     bound = _bound(response)
     what = "but nowhere is it told from the other inputs"
@@ -188,6 +191,8 @@ def unrelated(output: str, source: str, response: FrequencyResponse) -> Finding:
         code="unrelated",
         message=f"Output {output!r} does not follow input {source!r}, {what}. "
         "Check the channels if it should, or excite it more.",
+        severity="doubt",
+        parameters=EVERY,
     )
 
 
@@ -231,28 +236,28 @@ def settled(
             )
         parameters, untold = _told(parameters, inputs.bands[i])
     parameters = _finite(parameters)
-    findings, verdict = list(pair.warnings), pair.verdict
+    findings = list(pair.warnings)
     if untold:
         bound = _bound(pair.frequency_response)
+        words = ", ".join(_WORDS[name] for name in untold)
         most = "" if bound is None else f" It is below {bound[0]:.0f} dB (95 %)."
         findings.append(
             Finding(
                 code="weak_coupling",
                 message=f"The coupling from {pair.input!r} to {pair.output!r} is too weak here, or "
-                f"outside what {pair.input!r} excites, to tell its {', '.join(untold)}.{most} "
+                f"outside what {pair.input!r} excites, to tell its {words}.{most} "
                 "Excite it more, or alone.",
+                severity="doubt",
+                parameters=EVERY if "scale_factor" in untold else tuple(untold),
             )
         )
-        verdict = "doubtful" if verdict == "ok" else verdict
     for group in inputs.alike:
         if pair.input in group.names and group.share >= _MENTIONED:
-            findings.append(_coupled(group))
             others = [inputs.names.index(name) for name in group.names if name != pair.input]
             # A coupling too weak to be seen may have been taken for this one.
             hidden = not joined.strong[i] and not all(joined.related[j] for j in others)
-            if (group.share >= _DOUBTED or hidden) and verdict == "ok":
-                verdict = "doubtful"
-    return replace(pair, parameters=parameters, warnings=tuple(findings), verdict=verdict)
+            findings.append(_coupled(group, doubt=group.share >= _DOUBTED or hidden))
+    return replace(pair, parameters=parameters, warnings=tuple(findings))
 
 
 def _widened(known: Estimate | None, variance: float) -> Estimate | None:
@@ -261,12 +266,14 @@ def _widened(known: Estimate | None, variance: float) -> Estimate | None:
     return estimate(known.value, known.std**2 + variance, freedom=_MANY, unit=known.unit)
 
 
-def _coupled(group: Alike) -> Finding:
+def _coupled(group: Alike, *, doubt: bool) -> Finding:
     return Finding(
         code="coupled_inputs",
         message=f"Inputs {', '.join(group.names)} cannot be told apart at {group.where} "
         f"({100 * group.share:.0f} % of the frequencies they excite): there the error bars rest "
         "on the models alone. Drive them with sweeps that pass each frequency at different times.",
+        severity="doubt" if doubt else "info",
+        parameters=MODELLED,
     )
 
 
@@ -284,7 +291,7 @@ _WORDS = {
 
 
 def _told(p: Parameters, band: tuple[float, float]) -> tuple[Parameters, list[str]]:
-    """Parameters that a weak coupling's record tells, and the words for the others."""
+    """Parameters that a weak coupling's record tells, and the names of the others."""
 
     def loose(e: Estimate) -> bool:
         return not e.std <= _KNOWN * abs(e.value)
@@ -318,7 +325,7 @@ def _told(p: Parameters, band: tuple[float, float]) -> tuple[Parameters, list[st
     present = [n for n in gone if getattr(p, n) is not None]
     return (
         replace(p, **dict.fromkeys(gone, None)),
-        [words for name, words in _WORDS.items() if name in present],
+        [name for name in _WORDS if name in present],
     )
 
 

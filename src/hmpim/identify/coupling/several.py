@@ -22,7 +22,7 @@ from hmpim.identify.fitting.enrich import PLAIN
 from hmpim.identify.fitting.fit import Fit, Problem, fit_structure, jacobian
 from hmpim.identify.fitting.fit import fit_together as fit_all
 from hmpim.identify.fitting.joint import JointFit, joint_fit
-from hmpim.identify.verdict import is_unrelated
+from hmpim.identify.fitting.unrelated import is_unrelated
 from hmpim.identify.whiteness import effective_share, is_white
 from hmpim.model.dynamics import StructureName
 from hmpim.model.response import slowest_time_constant

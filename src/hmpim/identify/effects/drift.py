@@ -18,8 +18,8 @@ from hmpim.identify.effects.colour import bias_drift
 from hmpim.identify.fitting.enrich import PLAIN
 from hmpim.identify.fitting.fit import Problem, fit_structure, jacobian
 from hmpim.identify.fitting.joint import JointFit, Trial
+from hmpim.identify.fitting.unrelated import is_unrelated
 from hmpim.identify.uncertainty import covariance
-from hmpim.identify.verdict import is_unrelated
 from hmpim.identify.whiteness import effective_share, is_white
 from hmpim.model import slowest_time_constant
 from hmpim.record import Finding
@@ -130,6 +130,8 @@ def drift_finding(drifting: Drifting, fs: float, unit: str) -> Finding:
         message=f"The bias drifts {shape}, by {span} over the record, on average by "
         f"{rate:.3g} ± {std:.2g}{per}; the drift is taken out, and the bias stated is the mean "
         "over the record. Let the unit warm up, or measure the bias before and after.",
+        severity="info",
+        parameters=("bias",),
     )
 
 

@@ -19,6 +19,7 @@ from hmpim.identify.effects.quantization import Quantization, detect_quantizatio
 from hmpim.identify.effects.saturation import Saturation, detect_saturation
 from hmpim.identify.fitting.enrich import PLAIN
 from hmpim.identify.fitting.joint import JointFit, Trial
+from hmpim.identify.groups import EVERY, MODELLED
 from hmpim.identify.result import Parameters
 from hmpim.identify.uncertainty import estimate
 from hmpim.record import Finding
@@ -35,7 +36,7 @@ _MOST_CLIPPED = 0.85
 """Share of clipped samples beyond which too little is left to find the levels' effect."""
 
 _MUCH_CLIPPED = 0.4
-"""Share beyond which the verdict is doubtful: a rectifier clips half."""
+"""Share beyond which what is found is doubtful: a rectifier clips half."""
 
 _FEWEST_LEVELS = 8
 """Levels that an output must take, unless its input takes as few."""
@@ -58,16 +59,6 @@ class Imperfections:
         if self.spikes is None or self.frozen is None:
             return self.spikes if self.frozen is None else self.frozen
         return self.spikes | self.frozen
-
-    @property
-    def doubtful(self) -> bool:
-        """Whether too little of the motion is left to trust what is found from it."""
-        return (
-            self.spikes is not None
-            or self.frozen is not None
-            or self.levels is not None
-            or (self.saturation is not None and self.saturation.share > _MUCH_CLIPPED)
-        )
 
     @property
     def rounding(self) -> float:
@@ -226,6 +217,7 @@ def with_imperfections(
     findings: list[Finding] = []
     clipping, hold, rounding = found.saturation, found.hold, found.quantization
     if clipping is not None:
+        much = clipping.share > _MUCH_CLIPPED
         levels = [
             f"{name} {level:.6g} {unit}".rstrip()
             for name, level in (("low", clipping.low), ("high", clipping.high))
@@ -238,9 +230,11 @@ def with_imperfections(
                 f"({', '.join(levels)}); they count as beyond the level. "
                 + (
                     "That is too much to rely on: lower the amplitude, or look for a rectifier."
-                    if clipping.share > _MUCH_CLIPPED
+                    if much
                     else "Lower the amplitude to keep the whole range."
                 ),
+                severity="doubt" if much else "info",
+                parameters=MODELLED if much else ("saturation_low", "saturation_high"),
             )
         )
         parameters = replace(
@@ -259,6 +253,8 @@ def with_imperfections(
                 message=f"The output is updated every {1e3 * hold.period:.4g} ms only, first at "
                 f"{1e3 * hold.phase:.4g} ms into the record; the delay is that of the values, "
                 "without the time for which they are held.",
+                severity="info",
+                parameters=("hold_period", "delay"),
             )
         )
         parameters = replace(
@@ -278,6 +274,8 @@ def with_imperfections(
                     message=f"The output is rounded to steps of {rounding.step:.4g} {unit}".rstrip()
                     + f", {rounding.step / max(noise.value, 1e-300):.2g} times the noise: errors "
                     "of rounding are not independent; error bars are only as good as that.",
+                    severity="info",
+                    parameters=MODELLED,
                 )
             )
     if found.levels is not None:
@@ -286,6 +284,8 @@ def with_imperfections(
                 code="quantization",
                 message=f"The output takes only {found.levels} different values, too few to follow "
                 "the motion between them. Measure with a finer resolution, or a larger motion.",
+                severity="doubt",
+                parameters=EVERY,
             )
         )
     findings += _lost_findings(found)
@@ -312,6 +312,8 @@ def _lost_findings(found: Imperfections) -> list[Finding]:
                 message=f"{count} samples ({100 * float(np.mean(found.spikes)):.2g} %) stand far "
                 "out of those around them and are left out. Look for loose contacts, lost bits "
                 "or impacts.",
+                severity="doubt",
+                parameters=MODELLED,
             )
         )
     if found.frozen is not None:
@@ -321,6 +323,8 @@ def _lost_findings(found: Imperfections) -> list[Finding]:
                 message="The output stands still where the model moves, over "
                 f"{100 * float(np.mean(found.frozen)):.2g} % of the record, which is left out. "
                 "Look for lost updates, a stuck sensor, or friction.",
+                severity="doubt",
+                parameters=MODELLED,
             )
         )
     return findings

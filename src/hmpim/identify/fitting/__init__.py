@@ -7,5 +7,6 @@ enrich        the richer structures
 unexplained   what of the response a fit leaves over
 plainer       a plain structure beside a rich one
 nested        one pole or two: what the record cannot tell
+unrelated     whether an output follows its input at all
 halves        whether the halves of a record agree
 """

@@ -82,8 +82,6 @@ class Inspection:
     findings : tuple of Finding
         Code 'nonlinear' if it matters; then the code of the kind where it can be named:
         'hardening', 'softening', 'friction', 'backlash', 'rate_limit', 'saturation'.
-    doubtful : bool
-        Whether it is so large that the linear parameters hold at this amplitude only.
     fit : Fit
         The linear fit that goes with it: the given one, or the plainer one where that and one
         kind of nonlinearity explain the output better.
@@ -97,7 +95,6 @@ class Inspection:
     shares: Shares
     rms: float
     findings: tuple[Finding, ...]
-    doubtful: bool
     fit: Fit
     summary: Nonlinearity
 
@@ -184,6 +181,7 @@ def inspect_nonlinearity(
                 effect=seen.effect / output,
                 asked=not others,
                 swept=seen.harmonics is not None,
+                doubt=_is_large(seen, output),
             )
         )
         of_kind = particular(named[0], unit) if len(named) == 1 else None
@@ -196,7 +194,6 @@ def inspect_nonlinearity(
         shares=shares,
         rms=seen.rms,
         findings=tuple(findings),
-        doubtful=matters and _is_large(seen, output),
         fit=seen.fit if matters else fit,
         summary=_summary(look, seen, shares, output, unit=unit, named=named),
     )

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 
+from hmpim.identify.groups import MODELLED
 from hmpim.identify.nonlinear.mechanisms import Kind, Mechanism
 from hmpim.record import Finding
 
@@ -28,6 +29,7 @@ def general(
     effect: float,
     asked: bool,
     swept: bool,
+    doubt: bool,
 ) -> Finding:
     """Say that it is nonlinear, how much, even or odd, and what it may be.
 
@@ -47,12 +49,14 @@ def general(
         Whether the kinds were compared at all.
     swept : bool
         Whether the input is a sweep, whose own frequency tells dynamics left out from noise.
+    doubt : bool
+        Whether it is so large that the linear parameters hold at this amplitude only.
 
     Examples
     --------
     >>> general(
     ...     share=0.021, where=["odd harmonics of the sweep"], made_of=(0.3, 0.1, 0.6),
-    ...     kinds=[], effect=0.0, asked=False, swept=True).message[:58]
+    ...     kinds=[], effect=0.0, asked=False, swept=True, doubt=True).message[:58]
     '2.1 % of the output (r.m.s.) is nonlinear: odd harmonics o'
     """
     noise, linear, nonlinear = (100 * part for part in made_of)
@@ -77,6 +81,8 @@ def general(
         message=f"{100 * share:.2g} % of the output (r.m.s.) is nonlinear{seen}. {guess}"
         f"{whole if effect > 1.5 * share else ''} {left}. "
         "Identify at several amplitudes to see where the linear model holds.",
+        severity="doubt" if doubt else "info",
+        parameters=MODELLED,
     )
 
 
@@ -134,4 +140,4 @@ def particular(found: Mechanism, unit: str) -> Finding | None:
             )
         case _:
             return None
-    return Finding(code=found.kind, message=message)
+    return Finding(code=found.kind, message=message, severity="info", parameters=MODELLED)

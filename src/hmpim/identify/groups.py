@@ -1,0 +1,48 @@
+"""Parameters that stand or fall together: what a finding names when it touches more than one."""
+
+from dataclasses import fields
+
+from hmpim.identify.result import Parameters
+
+__all__ = ["EVERY", "GAIN", "MODELLED", "PHASE_SPLIT", "TIMING"]
+
+EVERY = tuple(f.name for f in fields(Parameters))
+"""Every parameter."""
+
+_SEEN = (
+    "delay_correlation",
+    "hold_period",
+    "saturation_low",
+    "saturation_high",
+    "quantization_step",
+)
+"""Those that are seen in the record itself, whatever the model."""
+
+MODELLED = tuple(name for name in EVERY if name not in _SEEN)
+"""Those that are read off the fitted model, or off what it leaves over."""
+
+PHASE_SPLIT = (
+    "delay",
+    "natural_frequency",
+    "damping_ratio",
+    "time_constant",
+    "bandwidth_phase90_without_delay",
+)
+"""Those that depend on how the phase is divided between a delay and poles.
+
+The response within the band is the same either way: so are gain, bandwidths with the delay in
+them, and the slope of the phase at DC.
+"""
+
+TIMING = ("delay", "delay_correlation", "delay_low_frequency", "bandwidth_phase90")
+"""Those that move when one channel's clock moves against the other's."""
+
+GAIN = (
+    "scale_factor",
+    "natural_frequency",
+    "damping_ratio",
+    "time_constant",
+    "bandwidth_3db",
+    "peak_gain_db",
+)
+"""Those that depend on the size of the response."""

@@ -1,0 +1,81 @@
+"""The checks in their order, and `judge`, which makes them."""
+
+from collections.abc import Callable, Sequence
+from functools import partial
+
+from hmpim.identify.judgement.between_samples import other_intersample
+from hmpim.identify.judgement.errors import not_converged, weak_delay, weak_excitation
+from hmpim.identify.judgement.evidence import Evidence
+from hmpim.identify.judgement.failed import attempt
+from hmpim.identify.judgement.reach import (
+    beyond_band,
+    fast_mode,
+    initial_transient,
+    integrator,
+    natural_frequency_beyond,
+    negative_delay,
+    short_record,
+)
+from hmpim.identify.judgement.residual import (
+    coloured_noise,
+    halves_disagree,
+    lack_of_fit,
+    noise_colour_of,
+    noise_on_the_input,
+)
+from hmpim.identify.judgement.response import bandwidth_disagrees
+from hmpim.identify.judgement.structure import missed_pole, other_structure, undecided_order
+from hmpim.record import Finding
+
+__all__ = ["CHECKS", "Check", "judge"]
+
+Check = Callable[[Evidence], tuple[Finding, ...]]
+"""Looks at the evidence and says what it finds, if anything."""
+
+CHECKS: tuple[Check, ...] = (
+    initial_transient,
+    lack_of_fit,
+    coloured_noise,
+    not_converged,
+    weak_excitation,
+    weak_delay,
+    fast_mode,
+    natural_frequency_beyond,
+    integrator,
+    beyond_band,
+    other_structure,
+    halves_disagree,
+    undecided_order,
+    missed_pole,
+    other_intersample,
+    short_record,
+    negative_delay,
+    noise_colour_of,
+    noise_on_the_input,
+    bandwidth_disagrees,
+)
+"""All checks of one pair; each one's findings come in this order."""
+
+
+def judge(evidence: Evidence, *, checks: Sequence[Check] = CHECKS) -> tuple[Finding, ...]:
+    """Make every check; one that raises costs itself and is said.
+
+    Parameters
+    ----------
+    evidence : Evidence
+        What there is to look at.
+    checks : sequence of callable
+        What to look for.
+
+    Returns
+    -------
+    tuple of Finding
+        In the order of the checks; a check that raised stands as 'check_failed'.
+    """
+    found: list[Finding] = []
+    for check in checks:
+        name = getattr(check, "__name__", type(check).__name__)
+        nothing: tuple[Finding, ...] = ()
+        said, failure = attempt(name, partial(check, evidence), nothing)
+        found += [*said, *failure]
+    return tuple(found)

@@ -1,0 +1,83 @@
+"""Error bars that are too wide for the figure, and a fit that did not end."""
+
+from hmpim.identify.groups import MODELLED
+from hmpim.identify.judgement.evidence import Evidence
+from hmpim.identify.result import Estimate
+from hmpim.record import Finding
+
+__all__ = ["not_converged", "weak_delay", "weak_excitation"]
+
+_LOOSE = 0.3
+"""Relative standard deviation beyond which a parameter is not known."""
+
+_BLURRED = 2.0
+"""Standard deviation of the delay, in samples, up to which it is always known well enough."""
+
+
+def not_converged(evidence: Evidence) -> tuple[Finding, ...]:
+    """Doubt a fit that stopped on its way."""
+    if evidence.joint.best.fit.converged:
+        return ()
+    return (
+        Finding(
+            code="not_converged",
+            message="The fit stopped before its last step was negligible. "
+            "Try a longer record, or one with more excitation.",
+            severity="doubt",
+            parameters=MODELLED,
+        ),
+    )
+
+
+def weak_excitation(evidence: Evidence) -> tuple[Finding, ...]:
+    """Doubt each parameter whose standard deviation is above 30 % of its value."""
+    p = evidence.readings.parameters
+    named: tuple[tuple[str, Estimate | None], ...] = (
+        ("scale_factor", p.scale_factor),
+        ("natural_frequency", p.natural_frequency),
+        ("damping_ratio", p.damping_ratio),
+        ("time_constant", p.time_constant if p.natural_frequency is None else None),
+    )
+    findings = []
+    for name, estimate in named:
+        if estimate is None:
+            continue
+        spread = estimate.std / abs(estimate.value) if estimate.value else float("inf")
+        if spread <= _LOOSE:
+            continue
+        findings.append(
+            Finding(
+                code="weak_excitation",
+                message=f"The record hardly tells the {name.replace('_', ' ')}: its standard "
+                f"deviation is {100 * min(spread, 99.0):.0f} % of its value. Excite more around "
+                "the natural frequency, or longer.",
+                severity="doubt",
+                parameters=(name,),
+            )
+        )
+    return tuple(findings)
+
+
+def weak_delay(evidence: Evidence) -> tuple[Finding, ...]:
+    """Doubt a delay whose standard deviation is above two samples and 30 % of its value."""
+    p = evidence.readings.parameters
+    blurred = tuple(
+        name
+        for name, estimate in (
+            ("delay", p.delay),
+            ("delay_low_frequency", p.delay_low_frequency),
+        )
+        if estimate is not None
+        and estimate.std > max(_BLURRED / evidence.fs, _LOOSE * abs(estimate.value))
+    )
+    if p.delay is None or "delay" not in blurred:
+        return ()
+    return (
+        Finding(
+            code="weak_excitation",
+            message=f"The record hardly tells the delay: its standard deviation is "
+            f"{p.delay.std:.2g} s. Excite more, or sweep higher.",
+            severity="doubt",
+            parameters=blurred,
+        ),
+    )

@@ -1,0 +1,78 @@
+"""What a check looks at: the fit, what was read off it, and what the record says beside it."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hmpim.identify.fitting.joint import JointFit
+from hmpim.identify.readings import Readings
+from hmpim.identify.result import ResponseBandwidths
+from hmpim.identify.whiteness import Misfit
+
+__all__ = ["Evidence", "structure_in_words"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Evidence:
+    """One pair, fitted and read, before anything is said of it.
+
+    Parameters
+    ----------
+    joint : JointFit
+        The fit.
+    readings : Readings
+        What was read off it.
+    misfit : Misfit
+        What the residual still owes to the input.
+    u : ndarray, shape (n,)
+        The input, in its own unit.
+    fs : float
+        Rate in Hz.
+    band : (float, float)
+        Excited band in Hz.
+    fit_percent : float
+        100 (1 - ‖residual‖ / ‖deviation of the output‖).
+    measured : ResponseBandwidths
+        Bandwidths read off the measured response.
+    nonlinear : bool
+        Whether the residual is known to be nonlinear, and so asks for no pole.
+    held : bool
+        Whether the output is held, so that its measured response shows the hold too.
+    """
+
+    joint: JointFit
+    readings: Readings
+    misfit: Misfit
+    u: NDArray[np.float64]
+    fs: float
+    band: tuple[float, float]
+    fit_percent: float
+    measured: ResponseBandwidths
+    nonlinear: bool = False
+    held: bool = False
+
+    @property
+    def unexplained(self) -> float:
+        """R.m.s. of the residual over that of the output about its mean."""
+        return 1.0 - self.fit_percent / 100.0
+
+
+def structure_in_words(name: str) -> str:
+    """Return a structure's name in plain words.
+
+    Examples
+    --------
+    >>> structure_in_words("second_order_zero"), structure_in_words("static")
+    ('second-order (with a zero)', 'static')
+    """
+    plain = {
+        "first_order": "first-order",
+        "second_order": "second-order",
+        "third_order": "third-order",
+        "fourth_order": "fourth-order",
+        "second_order_zero": "second-order (with a zero)",
+        "two_modes": "two-mode",
+        "integrator_first_order": "lagging integrator",
+    }
+    return plain.get(name, name.replace("_", " "))

@@ -1,0 +1,52 @@
+"""A check that raises costs itself, and nothing else."""
+
+from collections.abc import Callable
+from typing import TypeVar
+
+from hmpim.record import Finding
+
+__all__ = ["attempt", "failed"]
+
+T = TypeVar("T")
+
+
+def attempt(name: str, look: Callable[[], T], otherwise: T) -> tuple[T, tuple[Finding, ...]]:
+    """Return what `look` returns; if it raises, `otherwise` and a finding that says so.
+
+    Parameters
+    ----------
+    name : str
+        Of the check, for the sentence.
+    look : callable
+        The check, without arguments.
+    otherwise : object
+        What stands in for its answer.
+
+    Returns
+    -------
+    answer : object
+    findings : tuple of Finding
+        Code 'check_failed', or none.
+
+    Examples
+    --------
+    >>> attempt("half", lambda: 1 / 2, 0.0)
+    (0.5, ())
+    >>> attempt("ratio", lambda: 1 / 0, 0.0)[1][0].message[:57]
+    "The check 'ratio' could not be made (ZeroDivisionError: d"
+    """
+    try:
+        return look(), ()
+    except Exception as error:  # whatever it is, the result stands without this check
+        return otherwise, (failed(name, error),)
+
+
+def failed(name: str, error: Exception) -> Finding:
+    """Say which check raised, and what."""
+    return Finding(
+        code="check_failed",
+        message=f"The check {name.replace('_', ' ')!r} could not be made ({type(error).__name__}: "
+        f"{error}). The rest of the result stands without it; please report the record.",
+        severity="info",
+        parameters=(),
+    )

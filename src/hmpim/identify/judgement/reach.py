@@ -1,0 +1,157 @@
+"""What lies outside the band, before the record's start or beyond its end."""
+
+import numpy as np
+
+from hmpim.identify.fitting.enrich import PLAIN
+from hmpim.identify.groups import MODELLED, PHASE_SPLIT, TIMING
+from hmpim.identify.judgement.evidence import Evidence, structure_in_words
+from hmpim.model import slowest_time_constant
+from hmpim.record import Finding
+
+__all__ = [
+    "beyond_band",
+    "fast_mode",
+    "initial_transient",
+    "integrator",
+    "natural_frequency_beyond",
+    "negative_delay",
+    "short_record",
+]
+
+_OUTSIDE = 2.0
+"""Mode of a richer structure, over the end of the excited band, that no record tells."""
+
+_PAST = 1.2
+"""Natural frequency, over the end of the excited band, up to which the band still tells it."""
+
+_LONG = 0.5
+"""Settling time over the record's length, beyond which it is too short."""
+
+_BANDWIDTHS = ("bandwidth_phase90", "bandwidth_phase90_without_delay", "bandwidth_3db")
+
+
+def initial_transient(evidence: Evidence) -> tuple[Finding, ...]:
+    """Say what was left out because the record does not begin at rest."""
+    joint = evidence.joint
+    if not joint.forgotten:
+        return ()
+    return (
+        Finding(
+            code="initial_transient",
+            message="The record does not begin at rest; its first "
+            f"{joint.forgotten / evidence.fs:.4g} s were "
+            "left out. Begin the record before the stimulus to keep them.",
+            severity="info",
+            parameters=(),
+        ),
+    )
+
+
+def fast_mode(evidence: Evidence) -> tuple[Finding, ...]:
+    """Doubt a richer structure with a mode far beyond what was excited."""
+    name = evidence.joint.best.fit.structure.name
+    poles = np.roots(evidence.readings.system.denominator[::-1])
+    fastest = float(np.max(np.abs(poles), initial=0.0) / (2 * np.pi))
+    if name in PLAIN or fastest <= _OUTSIDE * evidence.band[1]:
+        return ()
+    return (
+        Finding(
+            code="extrapolated",
+            message=f"A {structure_in_words(name)} model needs a mode at {fastest:.4g} Hz, beyond "
+            f"the excited band, which ends at {evidence.band[1]:.4g} Hz: the delay may not be "
+            "constant, or the clocks may part. Check the time stamps, or sweep to "
+            f"{1.5 * fastest:.3g} Hz.",
+            severity="doubt",
+            parameters=PHASE_SPLIT,
+        ),
+    )
+
+
+def natural_frequency_beyond(evidence: Evidence) -> tuple[Finding, ...]:
+    """Doubt a natural frequency that was not excited, and the delay that goes with it."""
+    natural = evidence.readings.parameters.natural_frequency
+    if natural is None or natural.value <= _PAST * evidence.band[1]:
+        return ()
+    return (
+        Finding(
+            code="extrapolated",
+            message=f"The natural frequency of {natural.value:.4g} Hz lies beyond the excited "
+            f"band, which ends at {evidence.band[1]:.4g} Hz. Sweep to at least "
+            f"{1.5 * natural.value:.3g} Hz.",
+            severity="doubt",
+            parameters=PHASE_SPLIT,
+        ),
+    )
+
+
+def integrator(evidence: Evidence) -> tuple[Finding, ...]:
+    """Say what an integrating output cannot have."""
+    if not evidence.joint.best.fit.structure.integrators:
+        return ()
+    return (
+        Finding(
+            code="integrator",
+            message="The output integrates the input: it has no gain at DC to measure bandwidths "
+            "from, and the scale factor is the output's rate per input.",
+            severity="info",
+            parameters=("scale_factor", *_BANDWIDTHS),
+        ),
+    )
+
+
+def beyond_band(evidence: Evidence) -> tuple[Finding, ...]:
+    """Name the bandwidths that the excited band does not reach."""
+    structure, p = evidence.joint.best.fit.structure, evidence.readings.parameters
+    asked = [("-90° frequency", "bandwidth_phase90")]
+    if structure.order > 1:  # a first-order lag alone never gets to -90°
+        asked.append(("-90° frequency without delay", "bandwidth_phase90_without_delay"))
+    if structure.order > 0:
+        asked.append(("-3 dB frequency", "bandwidth_3db"))
+    missing = [(words, name) for words, name in asked if getattr(p, name) is None]
+    if structure.integrators or not missing:
+        return ()
+    return (
+        Finding(
+            code="beyond_band",
+            message="Not reached within the excited band, which ends at "
+            f"{evidence.band[1]:.4g} Hz: "
+            + ", ".join(words for words, _ in missing)
+            + ". Sweep higher to measure it.",
+            severity="info",
+            parameters=tuple(name for _, name in missing),
+        ),
+    )
+
+
+def short_record(evidence: Evidence) -> tuple[Finding, ...]:
+    """Doubt what is read off a record that ends before the system has settled."""
+    system = evidence.readings.system
+    settle = max(system.delay, 0.0) + 5.0 * slowest_time_constant(system.denominator)
+    length = evidence.joint.problem.y.size / evidence.fs
+    if settle <= _LONG * length:
+        return ()
+    return (
+        Finding(
+            code="short_record",
+            message=f"The record of {length:.4g} s is short against the system's settling time of "
+            f"{settle:.4g} s. Record at least {2 * settle:.3g} s.",
+            severity="doubt",
+            parameters=MODELLED,
+        ),
+    )
+
+
+def negative_delay(evidence: Evidence) -> tuple[Finding, ...]:
+    """Doubt an output that moves before its input."""
+    delay = evidence.readings.parameters.delay
+    if delay is None or delay.ci95[1] >= 0:
+        return ()
+    return (
+        Finding(
+            code="negative_delay",
+            message=f"The delay is negative ({delay.value:.4g} s): the output moves before the "
+            "input. Check that the input column is not stamped late, and which column is which.",
+            severity="doubt",
+            parameters=TIMING,
+        ),
+    )

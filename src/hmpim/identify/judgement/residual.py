@@ -1,0 +1,134 @@
+"""What the model leaves over: lack of fit, colour, halves that disagree, noise on the input."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hmpim.identify.effects.colour import noise_colour
+from hmpim.identify.effects.input_noise import input_noise
+from hmpim.identify.fitting.halves import compare_halves
+from hmpim.identify.groups import GAIN, MODELLED
+from hmpim.identify.judgement.evidence import Evidence, structure_in_words
+from hmpim.record import Finding
+
+__all__ = [
+    "coloured_noise",
+    "halves_disagree",
+    "lack_of_fit",
+    "noise_colour_of",
+    "noise_on_the_input",
+]
+
+_CHANCE = 1e-4
+"""Chance of the residual following the input as it does, below which it is said to."""
+
+_TOLERATED_MISFIT = 0.03
+"""Misfit, over the output's own r.m.s., beyond which a result is doubtful."""
+
+_MOSTLY_NOISE = 0.5
+"""R.m.s. of the residual over that of the output beyond which its colour matters too."""
+
+_PARTED = 1e-6
+"""Chance of halves so far apart, below which they are said to disagree."""
+
+_ATTENUATES = 0.002
+"""Share by which noise on the input must lower the gain to be worth a word."""
+
+_SPOILS = 0.01
+"""Share from which the size of the response is not to be relied on."""
+
+
+def lack_of_fit(evidence: Evidence) -> tuple[Finding, ...]:
+    """Say that the residual still follows the input; a doubt from 3 % of the output on."""
+    if evidence.misfit.probability >= _CHANCE:
+        return ()
+    owed = float(np.sqrt(evidence.misfit.share)) * evidence.unexplained
+    name = structure_in_words(evidence.joint.best.fit.structure.name)
+    return (
+        Finding(
+            code="lack_of_fit",
+            message=f"The residual still follows the input: about {100 * owed:.2g} % of the output "
+            f"(r.m.s.) is not described by the {name} model. "
+            "Look at the Bode plot where model and measurement part.",
+            severity="doubt" if owed > _TOLERATED_MISFIT else "info",
+            parameters=MODELLED,
+        ),
+    )
+
+
+def coloured_noise(evidence: Evidence) -> tuple[Finding, ...]:
+    """Say that the residual is not white; a doubt where it is most of the output and follows u."""
+    if evidence.readings.white:
+        return ()
+    follows = evidence.misfit.probability < _CHANCE
+    return (
+        Finding(
+            code="coloured_noise",
+            message="The residual is not white (one independent sample in "
+            f"{1 / evidence.joint.effective_share:.3g}); the error bars are widened for it.",
+            severity="doubt" if evidence.unexplained > _MOSTLY_NOISE and follows else "info",
+            parameters=MODELLED,
+        ),
+    )
+
+
+def halves_disagree(evidence: Evidence) -> tuple[Finding, ...]:
+    """Doubt a model that the halves of the record do not share."""
+    joint = evidence.joint
+    halves = compare_halves(
+        evidence.readings.rows,
+        joint.best.fit.residual,
+        joint.problem.y,
+        share=joint.effective_share,
+    )
+    if halves.probability >= _PARTED or halves.owed <= _TOLERATED_MISFIT:
+        return ()
+    return (
+        Finding(
+            code="halves_disagree",
+            message="The two halves of the record ask for different models, worth "
+            f"{100 * halves.owed:.2g} % of the output (r.m.s.): the unit changed during "
+            "the test, or answers large and small motion differently. Repeat it, or lower the "
+            "amplitude.",
+            severity="doubt",
+            parameters=MODELLED,
+        ),
+    )
+
+
+def noise_colour_of(evidence: Evidence) -> tuple[Finding, ...]:
+    """Say what colours a residual that is not white."""
+    if evidence.readings.white:
+        return ()
+    colour = noise_colour(_counted(evidence), evidence.fs)
+    return (
+        Finding(
+            code="noise_colour",
+            message=f"What the model leaves over is {colour.description}. "
+            "Look for hum, drift or motion that the model does not have.",
+            severity="info",
+            parameters=("noise_std",),
+        ),
+    )
+
+
+def noise_on_the_input(evidence: Evidence) -> tuple[Finding, ...]:
+    """Say that the input is noisy; a doubt where gains come out too small by a hundredth."""
+    noise = input_noise(evidence.u, evidence.fs, band=evidence.band)
+    if noise is None or noise.attenuation <= _ATTENUATES:
+        return ()
+    return (
+        Finding(
+            code="input_noise",
+            message=f"The input carries noise of {noise.std:.3g} (standard deviation), which "
+            f"lowers the gain found by about {100 * noise.attenuation:.2g} %. Use the "
+            "command instead of its measurement, if you have it.",
+            severity="doubt" if noise.attenuation > _SPOILS else "info",
+            parameters=(*GAIN, "noise_std"),
+        ),
+    )
+
+
+def _counted(evidence: Evidence) -> NDArray[np.float64]:
+    """Residual of the samples that counted."""
+    residual, valid = evidence.joint.best.fit.residual, evidence.joint.problem.valid
+    return residual if valid is None else residual[valid]

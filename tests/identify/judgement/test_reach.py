@@ -1,0 +1,109 @@
+"""What lies outside the band, before the record's start or beyond its end."""
+
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from hmpim.identify.groups import MODELLED, PHASE_SPLIT, TIMING
+from hmpim.identify.judgement.reach import (
+    beyond_band,
+    fast_mode,
+    initial_transient,
+    integrator,
+    natural_frequency_beyond,
+    negative_delay,
+    short_record,
+)
+from hmpim.identify.result import Estimate
+from hmpim.model.dynamics import STRUCTURES
+from tests_support import field_chirp, second_order_lag
+
+TIME = np.arange(2000) / 200.0
+WHITE = 0.02 * np.random.default_rng(5).standard_normal(2000)
+
+
+@pytest.mark.parametrize(
+    "check",
+    [
+        beyond_band,
+        fast_mode,
+        initial_transient,
+        integrator,
+        natural_frequency_beyond,
+        negative_delay,
+        short_record,
+    ],
+)
+def test_a_clean_record_gives_no_finding(clean, check):
+    assert check(clean) == ()
+
+
+def test_what_was_left_out_at_the_beginning_is_information(clean):
+    (found,) = initial_transient(replace(clean, joint=replace(clean.joint, forgotten=50)))
+    assert (found.severity, found.parameters) == ("info", ())
+    assert "first 0.25 s" in found.message
+
+
+def test_a_resonance_beyond_the_band_casts_doubt_on_what_splits_the_phase(evidence_of):
+    y = second_order_lag(TIME, field_chirp, delay=0.05, natural_frequency=30.0, damping_ratio=0.1)
+    far = evidence_of(field_chirp(TIME), y + WHITE, structures=("second_order",))
+    (found,) = natural_frequency_beyond(far)
+    assert (found.code, found.severity, found.parameters) == ("extrapolated", "doubt", PHASE_SPLIT)
+    assert re.search(r"ends at 20 Hz\. Sweep to at least 4[45]\.?\d* Hz", found.message)
+    (missing,) = beyond_band(far)
+    assert missing.severity == "info"
+    assert missing.parameters == ("bandwidth_phase90_without_delay", "bandwidth_3db")
+    assert far.readings.parameters.bandwidth_phase90 is not None  # the delay alone: 5 Hz
+
+
+def test_a_mode_far_beyond_the_band_casts_doubt_only_in_a_richer_structure(clean):
+    """Poles at 100 Hz, five times the end of the band."""
+    w = 200 * np.pi
+    readings = replace(
+        clean.readings,
+        system=replace(
+            clean.readings.system, denominator=np.convolve([1, 1 / w], [1, 1.4 / w, 1 / w**2])
+        ),
+    )
+    best = clean.joint.best
+    third = replace(best, fit=replace(best.fit, structure=STRUCTURES["third_order"]))
+    evidence = replace(clean, readings=readings)
+    assert fast_mode(evidence) == ()
+    (found,) = fast_mode(replace(evidence, joint=replace(clean.joint, best=third)))
+    assert (found.code, found.severity, found.parameters) == ("extrapolated", "doubt", PHASE_SPLIT)
+    assert "third-order model needs a mode at 100 Hz" in found.message
+
+
+def test_an_integrating_output_has_no_bandwidth_to_miss(field_record, evidence_of):
+    u = field_chirp(TIME)
+    y = np.cumsum(u) / 200.0
+    wanders = evidence_of(u, y + 0.01 * WHITE, structures=("integrator",))
+    (found,) = integrator(wanders)
+    assert found.severity == "info"
+    assert "scale_factor" in found.parameters
+    assert beyond_band(wanders) == ()
+
+
+def test_a_record_that_ends_before_the_system_settles_casts_doubt(clean):
+    """Five time constants of 1.2 s and the delay are 6.15 s of 10."""
+    system = replace(clean.readings.system, denominator=np.array([1.0, 1.2]))
+    slow = replace(clean, readings=replace(clean.readings, system=system))
+    (found,) = short_record(slow)
+    assert (found.code, found.severity, found.parameters) == ("short_record", "doubt", MODELLED)
+    assert "settling time of 6.15 s" in found.message
+    quick = replace(system, denominator=np.array([1.0, 0.9]))
+    assert short_record(replace(clean, readings=replace(clean.readings, system=quick))) == ()
+
+
+def test_an_output_before_its_input_casts_doubt_on_what_a_clock_moves(clean):
+    p = clean.readings.parameters
+
+    def at(value):
+        late = Estimate(value=value, std=0.001, ci95=(value - 0.002, value + 0.002), unit="s")
+        return replace(clean, readings=replace(clean.readings, parameters=replace(p, delay=late)))
+
+    assert negative_delay(at(-0.001)) == ()  # zero is within its error
+    (found,) = negative_delay(at(-0.003))
+    assert (found.code, found.severity, found.parameters) == ("negative_delay", "doubt", TIMING)

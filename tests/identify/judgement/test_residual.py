@@ -1,0 +1,79 @@
+"""What the model leaves over: each check is silent on a clean record and speaks on its own."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from hmpim.identify.groups import GAIN, MODELLED
+from hmpim.identify.judgement.residual import (
+    coloured_noise,
+    halves_disagree,
+    lack_of_fit,
+    noise_colour_of,
+    noise_on_the_input,
+)
+from hmpim.identify.whiteness import Misfit
+
+WHITE = 0.1 * np.random.default_rng(3).standard_normal(2000)
+
+
+@pytest.mark.parametrize(
+    "check", [lack_of_fit, coloured_noise, halves_disagree, noise_colour_of, noise_on_the_input]
+)
+def test_a_clean_record_gives_no_finding(clean, check):
+    assert check(clean) == ()
+
+
+@pytest.mark.parametrize(("share", "severity"), [(0.008, "info"), (0.1, "doubt")])
+def test_a_residual_that_follows_the_input_casts_doubt_from_three_per_cent_on(
+    clean, share, severity
+):
+    """Of an output with 10 % left over, a share s of its power is 10 √s per cent."""
+    (found,) = lack_of_fit(
+        replace(clean, misfit=Misfit(share=share, probability=1e-9), fit_percent=90 - 10 * 1.2)
+    )
+    assert (found.code, found.severity, found.parameters) == ("lack_of_fit", severity, MODELLED)
+    assert f"about {100 * 0.22 * np.sqrt(share):.2g} % of the output" in found.message
+
+
+def test_a_missing_resonance_is_a_lack_of_fit(field_record, evidence_of):
+    """A static model of the field record, in which the resonance is all that matters."""
+    _, u, y = field_record
+    (found,) = lack_of_fit(evidence_of(u, y + WHITE, structures=("static",)))
+    assert found.severity == "doubt"
+    assert "static model" in found.message
+
+
+def test_coloured_noise_is_said_and_doubted_only_where_it_is_most_of_the_output(
+    field_record, evidence_of
+):
+    _, u, y = field_record
+    shaped = np.convolve(np.random.default_rng(1).standard_normal(2019), np.ones(20), "valid")
+    evidence = evidence_of(u, y + 0.02 * shaped)
+    (found,) = coloured_noise(evidence)
+    assert (found.severity, found.parameters) == ("info", MODELLED)
+    (colour,) = noise_colour_of(evidence)
+    assert (colour.code, colour.parameters) == ("noise_colour", ("noise_std",))
+    follows = replace(evidence, fit_percent=40.0, misfit=Misfit(share=0.1, probability=0.0))
+    assert coloured_noise(follows)[0].severity == "doubt"
+
+
+def test_halves_of_another_delay_cast_doubt(field_record, evidence_of):
+    """Two samples later from the middle on."""
+    _, u, y = field_record
+    changed = np.concatenate([y[:1000], y[998:-2]])
+    (found,) = halves_disagree(evidence_of(u, changed + 0.2 * WHITE))
+    assert (found.code, found.severity, found.parameters) == ("halves_disagree", "doubt", MODELLED)
+
+
+@pytest.mark.parametrize(("std", "severity"), [(0.1, "info"), (0.3, "doubt")])
+def test_noise_on_the_input_touches_the_size_of_the_response_alone(clean, std, severity):
+    noisy = clean.u + std * np.random.default_rng(4).standard_normal(clean.u.size)
+    (found,) = noise_on_the_input(replace(clean, u=noisy))
+    assert (found.code, found.severity) == ("input_noise", severity)
+    assert found.parameters == (*GAIN, "noise_std")
+    # A fifth of white noise of variance σ² lies in the band, beside a sweep of power 1/2.
+    lowered = 100 / (1 + 0.5 / (0.2 * std**2))
+    said = float(found.message.split("about ")[1].split(" %")[0])
+    assert said == pytest.approx(lowered, rel=0.25)

@@ -1,0 +1,135 @@
+"""From findings to verdicts: a doubt touches what it names, and nothing else."""
+
+import sys
+from dataclasses import fields, replace
+
+import numpy as np
+import pytest
+
+import hmpim
+from hmpim.errors import ArgumentError
+from hmpim.identify import Parameters
+from hmpim.identify.groups import EVERY, GAIN, MODELLED, PHASE_SPLIT, TIMING
+from hmpim.identify.judgement import CHECKS, attempt, judge, judged
+from hmpim.record import Finding
+
+
+@pytest.fixture(scope="module")
+def pair(field_record):
+    _, u, y = field_record
+    noisy = y + 0.1 * np.random.default_rng(0).standard_normal(y.size)
+    record = hmpim.Record.from_arrays({"u": u}, {"y": noisy}, fs=200.0)
+    return hmpim.identify(record, intersample="bandlimited")["y", "u"]
+
+
+def finding(*names, severity="doubt", code="x"):
+    return Finding(code=code, message="Said.", severity=severity, parameters=names)
+
+
+def verdicts(pair):
+    given = ((f.name, getattr(pair.parameters, f.name)) for f in fields(Parameters))
+    return {name: e.verdict for name, e in given if e is not None}
+
+
+def test_a_clean_record_is_ok_throughout(pair):
+    assert set(verdicts(pair).values()) == {"ok"}
+    assert pair.verdict == "ok"
+
+
+@pytest.mark.parametrize("group", [("delay",), PHASE_SPLIT, TIMING, GAIN, MODELLED, EVERY])
+def test_a_doubt_touches_what_it_names_and_nothing_else(pair, group):
+    found = judged(replace(pair, warnings=(finding(*group),)))
+    doubtful = {name for name, verdict in verdicts(found).items() if verdict == "doubtful"}
+    assert doubtful == set(group) & set(verdicts(pair))
+    assert found.verdict == "doubtful"
+
+
+def test_information_touches_nothing(pair):
+    found = judged(replace(pair, warnings=(finding(*EVERY, severity="info"),)))
+    assert found.verdict == "ok"
+    assert set(verdicts(found).values()) == {"ok"}
+
+
+def test_a_doubt_about_a_figure_that_is_not_given_leaves_the_pair_ok(pair):
+    assert pair.parameters.hold_period is None
+    assert judged(replace(pair, warnings=(finding("hold_period"),))).verdict == "ok"
+
+
+def test_judging_twice_is_judging_once_and_taking_a_doubt_back_works(pair):
+    once = judged(replace(pair, warnings=(finding("delay"),)))
+    assert verdicts(judged(once)) == verdicts(once)
+    assert judged(replace(once, warnings=())).verdict == "ok"
+
+
+@pytest.mark.parametrize("code", ["unrelated", "dead_channel"])
+def test_an_output_that_does_not_follow_is_not_identifiable(pair, code):
+    assert judged(replace(pair, warnings=(finding(*EVERY, code=code),))).verdict == (
+        "not_identifiable"
+    )
+
+
+def test_every_name_in_a_group_is_a_parameter():
+    known = {f.name for f in fields(Parameters)}
+    for group in (EVERY, GAIN, MODELLED, PHASE_SPLIT, TIMING):
+        assert set(group) <= known
+        assert len(set(group)) == len(group)
+
+
+def test_a_check_that_raises_is_said_and_costs_nothing_else(clean, breaking_checks):
+    def slips(evidence):
+        raise ZeroDivisionError("nothing there")
+
+    with breaking_checks():
+        found = judge(clean, checks=(slips, *CHECKS))
+    assert found[0].code == "check_failed"
+    assert "'slips' could not be made (ZeroDivisionError: nothing there)" in found[0].message
+    assert (found[0].severity, found[0].parameters) == ("info", ())
+    assert found[1:] == judge(clean)
+
+
+def test_every_check_may_raise_and_the_result_stands(field_record, monkeypatch, breaking_checks):
+    """Each analysis beside the fit itself is made to fail in turn, in a whole identification."""
+    _, u, y = field_record
+    noisy = y + 0.1 * np.random.default_rng(0).standard_normal(y.size)
+    record = hmpim.Record.from_arrays({"u": u}, {"y": noisy}, fs=200.0)
+
+    def broken(*args, **kwargs):
+        raise IndexError("index 0 is out of bounds")
+
+    room = "hmpim.identify.judgement"
+    for place, name in (
+        ("hmpim.identify.pair", "inspect_nonlinearity"),
+        ("hmpim.identify.pair", "response_bandwidths"),
+        ("hmpim.identify.pair", "misfit"),
+        (f"{room}.residual", "compare_halves"),
+        (f"{room}.residual", "input_noise"),
+        (f"{room}.structure", "hidden_pole"),
+        (f"{room}.reach", "slowest_time_constant"),
+    ):
+        monkeypatch.setattr(sys.modules[place], name, broken)
+    with breaking_checks():
+        found = hmpim.identify(record, intersample="bandlimited", structures=["second_order"])
+    pair = found["y", "u"]
+    failed = [w for w in pair.warnings if w.code == "check_failed"]
+    assert len(failed) == 7
+    assert all("IndexError: index 0 is out of bounds" in w.message for w in failed)
+    assert pair.delay.value == pytest.approx(0.15, abs=5 * pair.delay.std)
+    assert pair.verdict == "ok"
+
+
+def test_attempt_lets_an_interruption_through():
+    def stopped():
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        attempt("x", stopped, None)
+
+
+def test_a_severity_that_is_not_known_is_refused():
+    with pytest.raises(ArgumentError, match="severity 'fatal' is not known"):
+        finding("delay", severity="fatal")
+
+
+def test_a_finding_comes_back_from_its_plain_values():
+    said = finding("delay", "bias")
+    assert Finding.from_dict(said.to_dict()) == said
