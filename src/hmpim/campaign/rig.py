@@ -4,7 +4,7 @@ import importlib
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Protocol, cast, get_args
+from typing import Protocol, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +14,14 @@ from hmpim.campaign.plan import AxisWish, Plan
 from hmpim.errors import ArgumentError, HmpimError, LimitsError, RigError
 from hmpim.experiment import run
 from hmpim.record import Record
-from hmpim.rigs.table import AXES, AxisName, LoadName, MotionTable, exact_bandwidth, linear_response
+from hmpim.rigs.table import (
+    AXES,
+    AxisName,
+    MotionTable,
+    both_loads,
+    exact_bandwidth,
+    linear_response,
+)
 from hmpim.stimulus import Limits, Stimulus, check_inside
 
 __all__ = ["CampaignRig", "Player", "make_rig"]
@@ -142,22 +149,8 @@ class TableRig:
 
     def loaded(self, case: Case) -> MotionTable:
         """Return the table as a case wants it; 'a+b' is a on the inner axes, b on the outer."""
-        inner, plus, outer = case.load.partition("+")
-        if not plus:
-            sides = {"bracket": (inner, "acceptance"), "projector": ("acceptance", inner)}
-            inner, outer = sides.get(inner, (inner, inner))
-        for load in (inner, outer):
-            if load not in get_args(LoadName):
-                raise ArgumentError(
-                    f"load {case.load!r} is not known; use {', '.join(get_args(LoadName))}, or "
-                    "two joined by +, such as bracket+projector"
-                )
-        return replace(
-            self.table,
-            uut_load=cast(LoadName, inner),
-            target_load=cast(LoadName, outer),
-            mode=case.mode,
-        )
+        inner, outer = both_loads(case.load)
+        return replace(self.table, uut_load=inner, target_load=outer, mode=case.mode)
 
     def limits(self, case: Case, wish: AxisWish) -> Limits:
         """As Fig. 4."""

@@ -17,6 +17,8 @@ from hmpim.cli.design import design
 from hmpim.cli.gentlest import gentlest
 from hmpim.cli.identify import identify
 from hmpim.cli.paper import paper
+from hmpim.cli.rigs import rigs
+from hmpim.cli.run import run
 from hmpim.errors import HmpimError
 
 __all__ = ["app", "main"]
@@ -135,6 +137,8 @@ app.command()(design)
 app.command(epilog="Example: hmpim identify test.csv --input u --output y --report r.html")(
     identify
 )
+app.command(epilog="Example: hmpim run --rig bench s.csv -o run.csv --report r.html")(run)
+app.command(epilog="Example: hmpim rigs --json rigs.json")(rigs)
 app.command(epilog="Example: hmpim demo --out out/demo --seed 7")(demo)
 app.command(epilog="Example: hmpim campaign section_v_reduced --out out/study")(campaign)
 app.command()(gentlest)

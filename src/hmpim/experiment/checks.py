@@ -5,7 +5,7 @@ from collections.abc import Mapping
 
 from hmpim.errors import ArgumentError, LimitsError
 from hmpim.experiment.log import RunLog
-from hmpim.rigs import Rig
+from hmpim.rigs import LimitsOfAxes, Rig
 from hmpim.stimulus import Limits, Stimulus, check_inside
 from hmpim.stimulus.limits import QUANTITIES
 from hmpim.units import rate_unit
@@ -49,8 +49,19 @@ def moves(rig: Rig) -> bool:
     return bool(getattr(rig, "moves", True))
 
 
-def limits_by_axis(rig: Rig, stimuli: Mapping[str, Stimulus]) -> dict[str, Limits | None]:
+def limits_by_axis(
+    rig: Rig, stimuli: Mapping[str, Stimulus], *, stated: LimitsOfAxes = None
+) -> dict[str, Limits | None]:
     """Limits of each axis that is to move; None where nothing bounds it.
+
+    Parameters
+    ----------
+    rig : Rig
+        With limits of its own.
+    stimuli : mapping of axis to Stimulus
+        What is to move.
+    stated : Limits, or mapping of axis to Limits, or None
+        To be kept too.
 
     Raises
     ------
@@ -64,21 +75,38 @@ def limits_by_axis(rig: Rig, stimuli: Mapping[str, Stimulus]) -> dict[str, Limit
     >>> limits_by_axis(Sensor(), {"": Stimulus(waveform=Ramp(duration=1.0), fs=10.0)})
     {'': None}
     """
-    stated = rig.limits
-    if stated is None or isinstance(stated, Limits):
-        found: dict[str, Limits | None] = dict.fromkeys(stimuli, stated)
-    else:
-        found = {axis: stated.get(axis) for axis in stimuli}
-    for axis, limits in found.items():
+    found: dict[str, Limits | None] = {}
+    for axis in stimuli:
+        limits = _tighter(_of_axis(rig.limits, axis), _of_axis(stated, axis))
         if limits is None and moves(rig):
             about = f"axis {axis!r} of " if axis else ""
             raise LimitsError(
                 f"{about}rig {rig.name!r} moves and states no limits; state position, velocity "
                 "and acceleration, or, for software, moves = False (unlimited = true in a file)"
             )
-        if limits is not None and all(math.isinf(getattr(limits, name)) for name in QUANTITIES):
-            found[axis] = None
+        free = limits is None or all(math.isinf(getattr(limits, name)) for name in QUANTITIES)
+        found[axis] = None if free else limits
     return found
+
+
+def _of_axis(limits: LimitsOfAxes, axis: str) -> Limits | None:
+    return limits.get(axis) if isinstance(limits, Mapping) else limits
+
+
+def _tighter(own: Limits | None, stated: Limits | None) -> Limits | None:
+    """Return the smaller of two limits in each quantity, in the unit of the first."""
+    if own is None or stated is None:
+        return stated if own is None else own
+    if all(math.isinf(getattr(stated, name)) for name in QUANTITIES):
+        return own
+    there = stated.to(own.unit)
+    return Limits(
+        position=min(there.position, own.position),
+        velocity=min(there.velocity, own.velocity),
+        acceleration=min(there.acceleration, own.acceleration),
+        jerk=min(there.jerk, own.jerk),
+        unit=own.unit,
+    )
 
 
 def check_stimuli(

@@ -12,7 +12,15 @@ from hmpim.experiment.collect import Collected, Played, default_layout
 from hmpim.experiment.interrupt import ending_politely, undisturbed
 from hmpim.experiment.log import RunLog
 from hmpim.record import Record
-from hmpim.rigs import Commands, Rig, Seeded, commands_of, shared_band, stimuli_by_axis
+from hmpim.rigs import (
+    Commands,
+    LimitsOfAxes,
+    Rig,
+    Seeded,
+    commands_of,
+    shared_band,
+    stimuli_by_axis,
+)
 from hmpim.stimulus import Stimulus
 
 __all__ = ["Subscriber", "run"]
@@ -28,6 +36,7 @@ def run(
     stimulus: Stimulus | Mapping[str, Stimulus] | Sequence[Stimulus],
     *,
     rng: np.random.Generator | int | None = None,
+    limits: LimitsOfAxes = None,
     subscribers: Sequence[Subscriber] = (),
     log: RunLog | None = None,
     clock: Clock | None = None,
@@ -45,6 +54,8 @@ def run(
         What to play: one, or one for each axis that moves (a sequence goes by `Stimulus.axis`).
     rng : numpy.random.Generator, int or None
         Source of what is random in a simulated unit, or its seed; None draws fresh.
+    limits : Limits, or mapping of axis to Limits, or None
+        To be kept beside the rig's own, whichever is smaller; the only ones if it states none.
     subscribers : sequence of callable
         Each is called with every block that was played. One that raises ends the run.
     log : RunLog or None
@@ -80,7 +91,7 @@ def run(
     log = RunLog() if log is None else log
     named = stimuli_by_axis(_mapped(stimulus), unit.axes, name=repr(unit.name))
     try:
-        check_stimuli(named, limits_by_axis(unit, named), rig=unit, log=log)
+        check_stimuli(named, limits_by_axis(unit, named, stated=limits), rig=unit, log=log)
     except HmpimError as error:
         log.add("fault", str(error))
         raise

@@ -22,7 +22,7 @@ from hmpim.identify.repeats import Repeats
 from hmpim.record import Record
 from hmpim.stimulus import Stimulus
 
-__all__ = ["Saved", "load", "save"]
+__all__ = ["Saved", "load", "save", "suffixes_of"]
 
 Saved = Record | Stimulus | Identification | Repeats
 """What can be saved."""
@@ -67,6 +67,17 @@ def save(thing: Saved, path: str | PathLike[str]) -> None:
     raise ArgumentError(
         f"{type(thing).__name__} cannot be saved; give {', '.join(k.name for k in _KINDS)}"
     )
+
+
+def suffixes_of(kind: type) -> tuple[str, ...]:
+    """Suffixes with which a kind of value can be saved.
+
+    Examples
+    --------
+    >>> ".csv" in suffixes_of(Record)
+    True
+    """
+    return next((known.suffixes for known in _KINDS if known.type is kind), ())
 
 
 def load(path: str | PathLike[str]) -> Saved:

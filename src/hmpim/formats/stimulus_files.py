@@ -17,12 +17,13 @@ from hmpim.formats.stimulus import (
     stimulus_columns,
 )
 from hmpim.formats.stimulus_spec import read_stimulus_toml, save_stimulus_toml
-from hmpim.stimulus import Stimulus
+from hmpim.stimulus import SampledMotion, Stimulus
 from hmpim.stimulus.motion import FloatArray
 
 __all__ = [
     "STIMULUS_SUFFIXES",
     "PlayedStimulus",
+    "read_stimuli",
     "read_stimulus",
     "save_stimulus",
     "save_stimulus_c",
@@ -47,6 +48,8 @@ class PlayedStimulus:
         Hz.
     time, position, velocity, acceleration : ndarray, shape (n,)
         Bit for bit as they were saved.
+    band : tuple of float or None
+        Excited band in Hz, where the file says.
     """
 
     axis: str
@@ -56,6 +59,7 @@ class PlayedStimulus:
     position: FloatArray
     velocity: FloatArray
     acceleration: FloatArray
+    band: tuple[float, float] | None = None
 
 
 def save_stimulus(stimuli: _Several, path: str | PathLike[str]) -> None:
@@ -270,6 +274,55 @@ def read_stimulus(path: str | PathLike[str]) -> list[Stimulus] | list[PlayedStim
     return found
 
 
+def read_stimuli(path: str | PathLike[str]) -> list[Stimulus]:
+    """Read what a rig is to play: one stimulus for each axis.
+
+    Parameters
+    ----------
+    path : path
+        As for `read_stimulus`. Where the file holds samples alone, they are joined by a
+        `SampledMotion`.
+
+    Raises
+    ------
+    FormatError
+        If the file is not what its suffix claims.
+    ArgumentError
+        If the suffix is not known.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from hmpim.stimulus import Sine
+    >>> sine = Stimulus(waveform=Sine(frequency=1.0, duration=2.0), fs=10.0, unit="deg")
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     save_stimulus(sine, Path(folder) / "s.csv")
+    ...     [read] = read_stimuli(Path(folder) / "s.csv")
+    >>> bool(np.array_equal(read.position, sine.position)), read.unit
+    (True, 'deg')
+    """
+    if not Path(path).exists():
+        raise FormatError(f"there is no file {str(path)!r}; check the path")
+    return [s if isinstance(s, Stimulus) else _joined(s, path) for s in read_stimulus(path)]
+
+
+def _joined(played: PlayedStimulus, path: str | PathLike[str]) -> Stimulus:
+    clock = np.arange(played.time.size) / played.fs
+    if played.time.size < 2 or np.abs(played.time - clock).max() > 1e-6 / played.fs:
+        raise FormatError(
+            f"the times of {str(path)!r} are not those of {played.time.size} samples at "
+            f"{played.fs:g} Hz from 0 on; save the stimulus anew"
+        )
+    motion = SampledMotion(
+        fs=played.fs,
+        position=played.position,
+        velocity=played.velocity,
+        acceleration=played.acceleration,
+        band=played.band,
+    )
+    return Stimulus(waveform=motion, fs=played.fs, unit=played.unit, axis=played.axis)
+
+
 def _read_hdf5(path: Path) -> list[PlayedStimulus]:
     import h5py  # type: ignore[import-untyped, unused-ignore]
 
@@ -323,7 +376,9 @@ def _read_c(path: Path) -> list[PlayedStimulus]:
                 unit=defined[f"{name.upper()}_UNIT"].strip('"'),
                 fs=rate,
                 time=np.arange(arrays[f"{name}_position"].size) / rate,
-                **{signal: arrays[f"{name}_{signal}"] for signal in _SIGNALS},
+                position=arrays[f"{name}_position"],
+                velocity=arrays[f"{name}_velocity"],
+                acceleration=arrays[f"{name}_acceleration"],
             )
         )
     return found
@@ -350,11 +405,19 @@ def _read_csv(path: Path) -> list[PlayedStimulus]:
                 axis=axis or "",
                 unit="" if unit == "none" else unit,
                 fs=float(rate),
+                band=_band(comment),
                 time=columns["time"],
-                **{signal: columns[prefix + signal] for signal in _SIGNALS},
+                position=columns[f"{prefix}position"],
+                velocity=columns[f"{prefix}velocity"],
+                acceleration=columns[f"{prefix}acceleration"],
             )
         )
     return found
+
+
+def _band(comment: str) -> tuple[float, float] | None:
+    said = re.search(r", band = (\S+) (\S+) Hz", comment)
+    return None if said is None else (float(said[1]), float(said[2]))
 
 
 _WRITERS: dict[str, Callable[[_Several, str | PathLike[str]], None]] = {

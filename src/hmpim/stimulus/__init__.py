@@ -18,6 +18,7 @@ from hmpim.stimulus.peaks import true_peaks
 from hmpim.stimulus.profile import Prbs, Steps, smooth_prbs, smooth_steps
 from hmpim.stimulus.quintic import Quintic
 from hmpim.stimulus.reverse import Reversed
+from hmpim.stimulus.sampled import SampledMotion
 from hmpim.stimulus.scale import scale_to_limits
 from hmpim.stimulus.section_v import FIG_4, section_v
 from hmpim.stimulus.spectrum import (
@@ -49,6 +50,7 @@ __all__ = [
     "Redesign",
     "RestToRest",
     "Reversed",
+    "SampledMotion",
     "SignalToNoise",
     "Sine",
     "Step",

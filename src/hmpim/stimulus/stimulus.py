@@ -14,6 +14,7 @@ from hmpim.stimulus.limits import QUANTITIES, Limits
 from hmpim.stimulus.motion import FloatArray, Motion, Peaks, Waveform
 from hmpim.stimulus.peaks import true_peaks
 from hmpim.stimulus.reverse import Reversed
+from hmpim.stimulus.sampled import SampledMotion
 from hmpim.stimulus.solve import sweep_peaks
 from hmpim.stimulus.sweep import Sweep, check_positive
 from hmpim.units import check_unit, rate_unit
@@ -248,6 +249,8 @@ def _unreversed(waveform: Waveform) -> Waveform:
 
 
 def _peaks(waveform: Waveform, fs: float) -> Peaks:
+    if isinstance(waveform, SampledMotion):
+        return waveform.peaks
     printed = _unreversed(waveform)
     if isinstance(printed, Sweep):
         return sweep_peaks(printed, start=1.0 / fs)

@@ -2,13 +2,13 @@
 
 import math
 from dataclasses import dataclass
-from typing import Literal, get_args
+from typing import Literal, cast, get_args
 
 import numpy as np
 
 from hmpim.errors import ArgumentError
 
-__all__ = ["LOADS", "Base", "LoadName", "Rigid", "load_named"]
+__all__ = ["LOADS", "Base", "LoadName", "Rigid", "both_loads", "load_named"]
 
 LoadName = Literal["acceptance", "bracket", "projector", "none"]
 
@@ -164,3 +164,29 @@ def load_named(gimbal: Literal["uut", "target"], load: LoadName | Rigid) -> Rigi
         known = [name for where, name in LOADS if where == gimbal]
         raise ArgumentError(f"the {gimbal} gimbal carries no load {load!r}; choose of {known}")
     return LOADS[gimbal, load]
+
+
+def both_loads(name: str) -> tuple[LoadName, LoadName]:
+    """Loads of the inner and the outer axes from one name; 'a+b' is a inside, b outside.
+
+    Raises
+    ------
+    ArgumentError
+        If there is no such load.
+
+    Examples
+    --------
+    >>> both_loads("bracket"), both_loads("bracket+projector")
+    (('bracket', 'acceptance'), ('bracket', 'projector'))
+    """
+    inner, plus, outer = name.partition("+")
+    if not plus:
+        sides = {"bracket": (inner, "acceptance"), "projector": ("acceptance", inner)}
+        inner, outer = sides.get(inner, (inner, inner))
+    for load in (inner, outer):
+        if load not in get_args(LoadName):
+            raise ArgumentError(
+                f"load {name!r} is not known; use {', '.join(get_args(LoadName))}, or two joined "
+                "by +, such as bracket+projector"
+            )
+    return cast("LoadName", inner), cast("LoadName", outer)

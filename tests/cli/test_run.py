@@ -1,0 +1,105 @@
+"""``hmpim run`` and ``hmpim rigs``: as a user types them."""
+
+import json
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from hmpim.cli.main import app
+from hmpim.formats import load
+from hmpim.formats.stimulus_files import save_stimulus
+from hmpim.stimulus import Limits, design
+
+LIMITS = Limits(position=10, velocity=300, acceleration=5000, unit="deg")
+RIG = """
+rig = "sensor"
+unit = "deg"
+limits = {position = 10.0, velocity = 300.0, acceleration = 5000.0}
+[options]
+delay = 0.02
+natural_frequency = 15.0
+damping_ratio = 0.6
+noise_std = 0.01
+"""
+
+
+def run(*arguments):
+    return CliRunner().invoke(app, [str(a) for a in arguments])
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("platformdirs.user_config_path", lambda *_a, **_k: tmp_path / "nobody")
+    save_stimulus(design(band=(0.1, 20), duration=4, fs=200, limits=LIMITS), "s.csv")
+    (tmp_path / "rig.toml").write_text(RIG)
+    (tmp_path / "hmpim.toml").write_text("[rigs.eye]\n" + RIG.replace("[opt", "[rigs.eye.opt"))
+    return tmp_path
+
+
+def test_from_a_file_to_the_record_the_result_and_the_page(folder):
+    out = run(
+        *("run", "--rig", "eye", "s.csv", "-o", "r.csv", "--log", "run.log", "--seed", "3"),
+        *("--json", "r.json", "--report", "r.html"),
+    )
+    assert out.exit_code == 0, out.output
+    record = load("r.csv")
+    assert record.samples >= 800
+    assert np.abs(record.inputs[0].values).max() <= 10.0
+    (pair,) = json.loads((folder / "r.json").read_text())["pairs"]
+    delay = pair["parameters"]["delay"]
+    assert abs(delay["value"] - 0.02) < 4 * delay["std"]
+    assert "<html" in (folder / "r.html").read_text()[:200]
+    kinds = [line.split()[2] for line in (folder / "run.log").read_text().splitlines()[1:]]
+    assert kinds == ["check", "arm", "start", "done", "stop"]
+    same = run("run", "--rig-file", "rig.toml", "s.csv", "-o", "again.csv", "--seed", "3")
+    assert same.exit_code == 0, same.output
+    assert load("again.csv").sha256 == record.sha256
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["--rig", "eye", "s.csv"], "nothing would be kept of the run; name a file with -o"),
+        (["--rig", "eye", "s.csv", "-o", "s.csv"], "-o s.csv is the stimulus as well"),
+        (["--rig", "eye", "s.csv", "-o", "r.csv", "--log", "r.csv"], "--log r.csv is -o as well"),
+        (["--rig-file", "rig.toml", "s.csv", "--json", "rig.toml"], "is --rig-file as well"),
+        (["--rig", "eye", "s.csv", "-o", "r.doc"], "-o r.doc must end in one of .csv"),
+        (["--rig", "eye", "s.csv", "-o", "no/r.csv"], "folder no does not exist"),
+        (["--rig", "eye", "none.csv", "-o", "r.csv"], "there is no file 'none.csv'"),
+        (["--rig", "eel", "s.csv", "-o", "r.csv"], "there is no rig 'eel'; there are eye,"),
+        (["s.csv", "-o", "r.csv"], "no rig is named; give --rig"),
+        (["--rig-file", "no.toml", "s.csv", "-o", "r.csv"], "'no.toml' cannot be read"),
+    ],
+)
+def test_what_is_refused_in_one_line(folder, arguments, words):
+    out = run("run", *arguments)
+    assert out.exit_code == 2
+    assert words in out.stderr
+    assert out.stderr.count("\n") == 1
+    assert not (folder / "r.csv").exists()
+
+
+def test_a_stimulus_beyond_the_stated_limits_is_refused(folder):
+    (folder / "rig.toml").write_text(RIG.replace("position = 10.0", "position = 9.0"))
+    out = run("run", "--rig-file", "rig.toml", "s.csv", "-o", "r.csv", "--log", "run.log")
+    assert out.exit_code == 2
+    assert "peak position 9.99962 deg is beyond the limit 9 deg of 'sensor'" in out.stderr
+    assert "fault  peak position 9.99962 deg" in (folder / "run.log").read_text()
+
+
+def test_rigs_are_listed_and_the_broken_named(folder):
+    with (folder / "hmpim.toml").open("a") as file:
+        file.write('[rigs.bad]\nrig = "sensor"\nspeed = 3\n')
+    out = run("rigs", "--json", "rigs.json")
+    assert out.exit_code == 0, out.output
+    data = json.loads((folder / "rigs.json").read_text())
+    assert [(one["name"], one["rig"]) for one in data["named"]] == [
+        ("eye", "sensor"),
+        ("bad", None),
+    ]
+    assert "'speed' is not known" in data["named"][1]["fault"]
+    assert {"sensor", "table"} <= {kind["name"] for kind in data["kinds"]}
+    for words in ("eye", "simulated sensor of Fig. 1", "skipped:"):
+        assert words in out.output
