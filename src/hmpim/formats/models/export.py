@@ -1,0 +1,121 @@
+"""One door for all targets: which file each becomes, and who writes it."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from os import PathLike
+from pathlib import Path
+from typing import Literal, get_args
+
+from hmpim.errors import ArgumentError
+from hmpim.formats.models.c import write_c
+from hmpim.formats.models.python import write_python
+from hmpim.formats.models.source import Source, source_of
+from hmpim.identify import Identification
+from hmpim.record import Intersample
+
+__all__ = ["TARGETS", "Target", "export"]
+
+Target = Literal["c", "python"]
+"""What a result can be exported to."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Writer:
+    """How a target is written: the suffix of its file, "" for a folder of files."""
+
+    suffix: str
+    write: Callable[[Source, Path], tuple[Path, ...]]
+
+
+TARGETS: dict[str, _Writer] = {
+    "c": _Writer(suffix="", write=write_c),
+    "python": _Writer(suffix=".py", write=write_python),
+}
+
+
+def export(
+    result: Identification,
+    *,
+    to: Target | str,
+    path: str | PathLike[str],
+    pair: tuple[str, str] | None = None,
+    fs: float | None = None,
+    intersample: Intersample | None = None,
+) -> tuple[Path, ...]:
+    """Write what was identified as a model for another tool.
+
+    Every export carries the error bars, the units, and where it comes from: the digest of the
+    record, the version of hmpim, the verdict and the warnings. What is exact and what is not, and
+    by how much, is in docs/models.md and in each file.
+
+    Parameters
+    ----------
+    result : Identification
+        From `hmpim.identify`, or read back.
+    to : {'c', 'python'}
+        The target.
+    path : str or path-like
+        File to write; for C a folder, made if it is missing. A folder for a target of one file
+        gets it under the name of the pair. The name, without its suffix, is the model's.
+    pair : tuple of str, optional
+        Output and input; the only pair that has a model by default.
+    fs : float, optional
+        Rate in Hz of programs that are stepped; that of the record by default.
+    intersample : {'zoh', 'foh', 'bandlimited'}, optional
+        What their input does between its samples; as identified by default.
+
+    Returns
+    -------
+    tuple of pathlib.Path
+        The files written.
+
+    Raises
+    ------
+    ArgumentError
+        If the target is not known, a pair must be chosen, or the target cannot hold the model.
+    RecordError
+        If the pair was not identifiable: there is no model then.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> import numpy as np
+    >>> import hmpim
+    >>> u = np.sin(2 * np.pi * (0.1 * np.arange(1000) / 100 + (np.arange(1000) / 100) ** 2))
+    >>> y = np.interp(np.arange(1000) - 5.0, np.arange(1000), u, left=0)
+    >>> noise = 0.01 * np.random.default_rng(1).standard_normal(1000)
+    >>> record = hmpim.Record.from_arrays({"u": u}, {"y": y + noise}, fs=100.0)
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     written = export(hmpim.identify(record), to="c", path=Path(folder, "lag"))
+    ...     [file.name for file in written]
+    ['lag.h', 'lag.c']
+    """
+    writer = TARGETS.get(to)
+    if writer is None:
+        raise ArgumentError(f"target {to!r} is not known; choose of {', '.join(get_args(Target))}")
+    if not isinstance(result, Identification):
+        raise ArgumentError(
+            f"{type(result).__name__} is no result; give what hmpim.identify returned, or what "
+            "was read back from its JSON"
+        )
+    place = Path(path)
+    into_folder = str(path).endswith(("/", "\\")) or place.is_dir()
+    if writer.suffix and into_folder:
+        name = "_from_".join(pair) if pair else _named(result)
+        place.mkdir(parents=True, exist_ok=True)
+        place = place / f"{name}{writer.suffix}"
+    elif not writer.suffix and place.is_file():
+        raise ArgumentError(f"{place} is a file; {to} needs a folder, so name another place")
+    elif writer.suffix and not place.parent.is_dir():
+        raise FileNotFoundError(f"folder {place.parent} does not exist; make it first")
+    stem = place.name if not writer.suffix else place.stem
+    source = source_of(
+        result, name=stem or place.resolve().name, pair=pair, fs=fs, intersample=intersample
+    )
+    return writer.write(source, place)
+
+
+def _named(result: Identification) -> str:
+    known = [p for p in result.pairs if p.parameters.scale_factor is not None]
+    chosen = (known or list(result.pairs))[0]
+    return f"{chosen.output}_from_{chosen.input}"

@@ -1,0 +1,34 @@
+"""Python: one file that needs nothing else installed."""
+
+from pathlib import Path
+from pprint import pformat
+
+from hmpim.formats.models.c import accuracy
+from hmpim.formats.models.render import chain_context, rendered
+from hmpim.formats.models.source import Source
+
+__all__ = ["python_file", "write_python"]
+
+
+def python_file(source: Source) -> str:
+    """Return the text of the file."""
+    chain = source.chain()
+    spread = source.model.spread
+    covariance = None if spread is None else [list(row) for row in spread.covariance]
+    return rendered(
+        "model.py.jinja",
+        name=source.name,
+        title=f"{source.pair.output} from {source.pair.input}, one sample at a time.",
+        lines=[line.replace("\\", "/").replace('"""', "'''") for line in source.lines()],
+        said=accuracy(chain),
+        parameters=pformat({k: e.to_dict() for k, e in source.estimates()}, width=96),
+        covariance=pformat(covariance, width=96),
+        noise_std=source.model.noise_std,
+        **chain_context(chain),
+    )
+
+
+def write_python(source: Source, path: Path) -> tuple[Path, ...]:
+    """Write the file."""
+    path.write_text(python_file(source), encoding="utf-8")
+    return (path,)

@@ -1,0 +1,95 @@
+"""Templates filled in: numbers with all their digits, comments in the target's own form."""
+
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from hmpim.model import Chain
+
+__all__ = ["c_number", "chain_context", "rendered"]
+
+
+def c_number(value: float) -> str:
+    """Write a number with all its digits, recognisable as a floating one.
+
+    Examples
+    --------
+    >>> c_number(1.0), c_number(0.1), c_number(-2e-300)
+    ('1.0', '0.1', '-2e-300')
+    """
+    return repr(float(value))
+
+
+def _row(values: ArrayLike) -> str:
+    return ", ".join(c_number(v) for v in np.ravel(values))
+
+
+def _comment(lines: Iterable[str], sign: str) -> str:
+    return "\n".join(f"{sign} {line}".rstrip() for line in lines)
+
+
+def rendered(template: str, **context: Any) -> str:
+    """Fill in a template of this package.
+
+    Parameters
+    ----------
+    template : str
+        File name in the folder `templates`.
+    context : dict
+        What it asks for; a name that is missing is an error.
+    """
+    from jinja2 import Environment, PackageLoader, StrictUndefined
+
+    environment = Environment(
+        loader=PackageLoader("hmpim.formats.models"),
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+        autoescape=False,
+    )
+    environment.filters["number"] = c_number
+    environment.filters["row"] = _row
+    environment.filters["comment"] = _comment
+    return environment.get_template(template).render(**context)
+
+
+def chain_context(chain: Chain) -> dict[str, Any]:
+    """Lay out a chain's numbers for the templates of programs."""
+    step, readout = chain.step, chain.readout
+    pieces = [
+        {"start": p.start, "stop": p.stop, "coefficients": p.coefficients} for p in chain.pieces
+    ]
+    rows = chain.pieces[0].coefficients.shape[0] if chain.pieces else 0
+    terms = chain.pieces[0].coefficients.shape[1] if chain.pieces else 0
+    hold = readout.hold_period is not None
+    return {
+        "fs": step.fs,
+        "order": step.order,
+        "prefilter": step.prefilter,
+        "line": step.delay + 3,
+        "delay": step.delay,
+        "transition": step.transition,
+        "drive": step.drive,
+        "output": step.output,
+        "feed": step.feed,
+        "level": chain.level,
+        "integrates": chain.integrates,
+        "bias": readout.bias,
+        "low": readout.saturation_low,
+        "high": readout.saturation_high,
+        "quantum": readout.quantization_step,
+        "hold": hold,
+        "period": (readout.hold_period or 0.0) * step.fs,
+        "phase": readout.hold_phase * step.fs,
+        "over_outputs": chain.over_outputs,
+        "pieces": pieces,
+        "rows": rows,
+        "terms": terms,
+        "intersample": step.intersample,
+        "error": chain.error,
+        "band": step.band,
+        "gain": step.gain,
+    }

@@ -1,0 +1,182 @@
+"""What every export starts from: one pair of a result, with its errors and where it comes from."""
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass, fields, replace
+from importlib.metadata import version
+
+from hmpim.errors import ArgumentError
+from hmpim.identify import Estimate, Identification, PairIdentification, RecordSummary, to_model
+from hmpim.model import Chain, Model
+from hmpim.record import Intersample
+
+__all__ = ["Source", "source_of"]
+
+_NEGLIGIBLE = 3.0
+"""Standard deviations up to which a negative delay counts as none."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Source:
+    """A model to be exported, and what is to be said about it.
+
+    Parameters
+    ----------
+    name : str
+        Identifier in the target's language: letters, digits and underscores.
+    model : Model
+        What was identified, whole chain and errors included.
+    pair : PairIdentification
+        Where it comes from: estimates with error bars, measured response, verdict, warnings.
+    record : RecordSummary
+        Which record that was.
+    version : str
+        Of hmpim.
+    fs : float
+        Rate in Hz at which stepped targets run.
+    intersample : {'zoh', 'foh', 'bandlimited'}
+        What the input does between its samples.
+    """
+
+    name: str
+    model: Model
+    pair: PairIdentification
+    record: RecordSummary
+    version: str
+    fs: float
+    intersample: Intersample
+
+    def estimates(self) -> Iterator[tuple[str, Estimate]]:
+        """Yield every parameter that the record tells, with its name."""
+        parameters = self.pair.parameters
+        for field in fields(parameters):
+            estimate = getattr(parameters, field.name)
+            if estimate is not None:
+                yield field.name, estimate
+
+    def lines(self) -> list[str]:
+        """Say in plain lines what the model is, how sure it is, and where it comes from."""
+        record, pair = self.record, self.pair
+        where = f" ({record.source})" if record.source else ""
+        said = [
+            f"{pair.output} from {pair.input}: {pair.structure}, fit {pair.fit_percent:.2f} %, "
+            f"verdict {pair.verdict}.",
+            f"Identified by hmpim {self.version} from a record of {record.samples} samples at "
+            f"{record.fs:.9g} Hz{where},",
+            f"sha256 {record.sha256}.",
+            "Parameter: value +- standard deviation [95 % interval] unit.",
+        ]
+        said += [f"  {name}: {_words(estimate)}" for name, estimate in self.estimates()]
+        said += [f"Warning ({w.code}): {w.message}" for w in pair.warnings]
+        return [_ascii(line) for line in said]
+
+    def causal(self) -> Model:
+        """Return the model as something that can be stepped: its delay not negative.
+
+        Raises
+        ------
+        ArgumentError
+            If the delay is negative by more than its error.
+        """
+        delay = self.model.delay
+        if delay >= 0.0:
+            return self.model
+        estimate = self.pair.parameters.delay
+        std = (estimate.std or 0.0) if estimate is not None else 0.0
+        if -delay <= _NEGLIGIBLE * std:
+            return replace(self.model, delay=0.0)
+        raise ArgumentError(
+            f"the delay of {self.pair.output!r} from {self.pair.input!r} is {delay:.6g} s, so the "
+            "output is ahead of the input and no program can step it; export to json, csv or "
+            "uff58, or identify from a command that comes earlier"
+        )
+
+    def chain(self) -> Chain:
+        """Return the model at the export's rate."""
+        return self.causal().at_rate(self.fs, intersample=self.intersample)
+
+
+def source_of(
+    result: Identification,
+    *,
+    name: str,
+    pair: tuple[str, str] | None = None,
+    fs: float | None = None,
+    intersample: Intersample | None = None,
+) -> Source:
+    """Choose what is exported.
+
+    Parameters
+    ----------
+    result : Identification
+        From `hmpim.identify`, or read back.
+    name : str
+        What the model is to be called; characters that no identifier has become underscores.
+    pair : tuple of str, optional
+        Output and input; the only one that has a model by default.
+    fs : float, optional
+        Rate in Hz of stepped targets; that of the record by default.
+    intersample : {'zoh', 'foh', 'bandlimited'}, optional
+        What the input does between its samples; as identified by default.
+
+    Raises
+    ------
+    ArgumentError
+        If several pairs have a model and none is chosen, or the rate is not positive.
+    RecordError
+        If the pair chosen was not identifiable.
+    """
+    if pair is not None:
+        chosen = result[pair]
+    else:
+        known = [p for p in result.pairs if p.parameters.scale_factor is not None]
+        if len(known) > 1:
+            raise ArgumentError(
+                f"the result has {len(known)} models ("
+                + ", ".join(f"{p.output} from {p.input}" for p in known)
+                + "); choose one by its output and input"
+            )
+        chosen = known[0] if known else result.pairs[0]
+    rate = result.record.fs if fs is None else fs
+    if not rate > 0:
+        raise ArgumentError(f"fs = {rate!r} Hz is not a rate; give a positive number")
+    model = to_model(chosen, fs=result.record.fs)
+    return Source(
+        name=_identifier(name),
+        model=model,
+        pair=chosen,
+        record=result.record,
+        version=version("hmpim"),
+        fs=float(rate),
+        intersample=intersample or model.intersample,
+    )
+
+
+def _identifier(name: str) -> str:
+    """Turn a name into one that every target accepts.
+
+    Examples
+    --------
+    >>> _identifier("2nd axis.az")
+    'm2nd_axis_az'
+    """
+    plain = re.sub(r"\W+", "_", name, flags=re.ASCII).strip("_") or "model"
+    return f"m{plain}" if plain[0].isdigit() else plain
+
+
+def _words(estimate: Estimate) -> str:
+    said = f"{estimate.value:.9g}"
+    if estimate.std is not None:
+        said += f" +- {estimate.std:.2g}"
+    if estimate.ci95 is not None:
+        low, high = ("open" if end is None else f"{end:.9g}" for end in estimate.ci95)
+        said += f" [{low}, {high}]"
+    return f"{said} {estimate.unit}".rstrip()
+
+
+def _ascii(line: str) -> str:
+    """Keep what every compiler reads: comments of other characters differ between them."""
+    for sign, plain in (("→", "->"), ("±", "+-"), ("²", "^2"), ("³", "^3"), ("°", "deg")):
+        line = line.replace(sign, plain)
+    plain = line.encode("ascii", "replace").decode("ascii").replace("*/", "* /")
+    return " ".join(plain.split("\n")).rstrip("\\")
