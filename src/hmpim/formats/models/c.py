@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+from hmpim.formats.atomic import write_text
 from hmpim.formats.models.render import chain_context, rendered
 from hmpim.formats.models.source import Source
 from hmpim.model import Chain
@@ -51,6 +52,6 @@ def write_c(source: Source, folder: Path) -> tuple[Path, ...]:
     folder.mkdir(parents=True, exist_ok=True)
     written = []
     for name, text in c_files(source).items():
-        (folder / name).write_text(text, encoding="ascii")
+        write_text(folder / name, text)
         written.append(folder / name)
     return tuple(written)

@@ -8,14 +8,20 @@ from typing import Literal, get_args
 
 from hmpim.errors import ArgumentError
 from hmpim.formats.models.c import write_c
+from hmpim.formats.models.csv import write_csv
+from hmpim.formats.models.json import write_json
+from hmpim.formats.models.linear import write_control, write_scipy
+from hmpim.formats.models.mat import write_mat
+from hmpim.formats.models.matlab import write_matlab
 from hmpim.formats.models.python import write_python
 from hmpim.formats.models.source import Source, source_of
+from hmpim.formats.models.uff58 import write_uff58
 from hmpim.identify import Identification
 from hmpim.record import Intersample
 
 __all__ = ["TARGETS", "Target", "export"]
 
-Target = Literal["c", "python"]
+Target = Literal["control", "scipy", "matlab", "mat", "json", "c", "python", "uff58", "csv"]
 """What a result can be exported to."""
 
 
@@ -28,8 +34,15 @@ class _Writer:
 
 
 TARGETS: dict[str, _Writer] = {
+    "control": _Writer(suffix=".py", write=write_control),
+    "scipy": _Writer(suffix=".py", write=write_scipy),
+    "matlab": _Writer(suffix=".m", write=write_matlab),
+    "mat": _Writer(suffix=".mat", write=write_mat),
+    "json": _Writer(suffix=".json", write=write_json),
     "c": _Writer(suffix="", write=write_c),
     "python": _Writer(suffix=".py", write=write_python),
+    "uff58": _Writer(suffix=".uff", write=write_uff58),
+    "csv": _Writer(suffix=".csv", write=write_csv),
 }
 
 
@@ -41,6 +54,7 @@ def export(
     pair: tuple[str, str] | None = None,
     fs: float | None = None,
     intersample: Intersample | None = None,
+    pade: int | None = None,
 ) -> tuple[Path, ...]:
     """Write what was identified as a model for another tool.
 
@@ -52,8 +66,8 @@ def export(
     ----------
     result : Identification
         From `hmpim.identify`, or read back.
-    to : {'c', 'python'}
-        The target.
+    to : {'control', 'scipy', 'matlab', 'mat', 'json', 'c', 'python', 'uff58', 'csv'}
+        The target; docs/models.md tells what each is.
     path : str or path-like
         File to write; for C a folder, made if it is missing. A folder for a target of one file
         gets it under the name of the pair. The name, without its suffix, is the model's.
@@ -63,6 +77,9 @@ def export(
         Rate in Hz of programs that are stepped; that of the record by default.
     intersample : {'zoh', 'foh', 'bandlimited'}, optional
         What their input does between its samples; as identified by default.
+    pade : int, optional
+        Order of python-control's Padé approximation, 1 to 20; by default the least that is right
+        to 1 % over the excited band.
 
     Returns
     -------
@@ -112,6 +129,12 @@ def export(
     source = source_of(
         result, name=stem or place.resolve().name, pair=pair, fs=fs, intersample=intersample
     )
+    if pade is not None:
+        if to != "control" or not 1 <= pade <= 20:
+            raise ArgumentError(
+                f"pade = {pade!r} for target {to!r}: an order from 1 to 20 is for control alone"
+            )
+        return write_control(source, place, pade=pade)
     return writer.write(source, place)
 
 

@@ -3,6 +3,7 @@
 from pathlib import Path
 from pprint import pformat
 
+from hmpim.formats.atomic import write_text
 from hmpim.formats.models.c import accuracy
 from hmpim.formats.models.render import chain_context, rendered
 from hmpim.formats.models.source import Source
@@ -30,5 +31,5 @@ def python_file(source: Source) -> str:
 
 def write_python(source: Source, path: Path) -> tuple[Path, ...]:
     """Write the file."""
-    path.write_text(python_file(source), encoding="utf-8")
+    write_text(path, python_file(source))
     return (path,)

@@ -1,0 +1,78 @@
+"""How right a linear simulator is on a finer grid, and a Padé approximation on a band.
+
+Tools that simulate continuous systems know no delay, or only whole steps. Their exports shift
+the input by the exact delay, interpolate it on a grid `REFINE` times finer, and hand that over.
+"""
+
+from math import factorial
+
+import numpy as np
+
+from hmpim.formats.models.source import Source
+
+__all__ = ["REFINE", "pade_error", "pade_order", "refined_error", "refined_words"]
+
+REFINE = 20
+"""Steps of the finer grid for each sample."""
+
+_PADE_RIGHT = 0.01
+_PADE_ORDERS = range(1, 21)
+
+
+def refined_error(source: Source) -> float:
+    """Relative error of the response up to the band's end, for a band-limited input.
+
+    Notes
+    -----
+    A cubic spline's image is at most 2 (f / (fs - f))⁴ of the signal (Unser 1999, eq. 12); an
+    input joined over the fine steps loses 1 - sinc² of the gain.
+    """
+    fs = source.fs
+    f = min(source.model.band or 0.2 * fs, 0.45 * fs)
+    spline = 2.0 * (f / (fs - f)) ** 4
+    lost = float(np.sinc(f / (REFINE * fs)))
+    return spline + 1.0 - lost**2
+
+
+def refined_words(source: Source) -> str:
+    """Say how right the simulation of an export is."""
+    fs = source.fs
+    f = min(source.model.band or 0.2 * fs, 0.45 * fs)
+    if source.intersample == "bandlimited":
+        return (
+            f"simulate: for a band-limited input at {fs:.9g} Hz or more, response within "
+            f"{refined_error(source):.1e} of the model up to {f:.4g} Hz; response "
+            "itself is exact."
+        )
+    kind = {"zoh": "held", "foh": "linear"}[source.intersample]
+    return (
+        f"simulate: for a {kind} input, the delay is right to 1/{2 * REFINE} of a sample; "
+        "response itself is exact."
+    )
+
+
+def pade_error(order: int, turn: float) -> float:
+    """Greatest error of a Padé approximation of a delay, |P - e^(-jωτ)|, for ωτ up to `turn`.
+
+    Examples
+    --------
+    >>> pade_error(1, 0.1) < 1e-4 < pade_error(1, 1.0)
+    True
+    """
+    n = order
+    terms = [
+        factorial(2 * n - k) * factorial(n) / (factorial(2 * n) * factorial(k) * factorial(n - k))
+        for k in range(n + 1)
+    ]
+    x = 1j * np.linspace(0.0, turn, 400)
+    below = np.polynomial.polynomial.polyval(x, terms)
+    return float(np.max(np.abs(below.conj() / below - np.exp(-x))))
+
+
+def pade_order(source: Source) -> int:
+    """Least order within 1 % up to the band's end; 20 where none is."""
+    turn = 2 * np.pi * source.model.delay * (source.model.band or 0.2 * source.fs)
+    for order in _PADE_ORDERS:
+        if pade_error(order, turn) <= _PADE_RIGHT:
+            return order
+    return _PADE_ORDERS[-1]
