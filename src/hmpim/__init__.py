@@ -12,6 +12,7 @@
 from hmpim.errors import HmpimError
 from hmpim.experiment import run
 from hmpim.formats import load, read, save
+from hmpim.formats.models import export
 from hmpim.identify import (
     Estimate,
     Identification,
@@ -62,6 +63,7 @@ __all__ = [
     "design",
     "design_axes",
     "draw_models",
+    "export",
     "frequency_response",
     "gentlest",
     "identify",

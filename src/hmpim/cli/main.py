@@ -14,6 +14,7 @@ from typer.core import TyperGroup
 from hmpim.cli.campaign import campaign
 from hmpim.cli.demo import demo
 from hmpim.cli.design import design
+from hmpim.cli.export import export
 from hmpim.cli.gentlest import gentlest
 from hmpim.cli.identify import identify
 from hmpim.cli.paper import paper
@@ -142,6 +143,7 @@ app.command(epilog="Example: hmpim rigs --json rigs.json")(rigs)
 app.command(epilog="Example: hmpim demo --out out/demo --seed 7")(demo)
 app.command(epilog="Example: hmpim campaign section_v_reduced --out out/study")(campaign)
 app.command()(gentlest)
+app.command(epilog="Example: hmpim export r.json --to c -o model/")(export)
 app.command(epilog="Example: hmpim paper --out docs/build --figures 12 13")(paper)
 
 

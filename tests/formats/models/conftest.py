@@ -59,7 +59,14 @@ def result_of(model: Model, *, fs: float = FS) -> Identification:
         denominator=model.denominator,
         candidates=(),
         verdict="ok",
-        warnings=(Finding(code="odd", message="A message → with ± signs, \\ and */ in it."),),
+        warnings=(
+            Finding(
+                code="odd",
+                message="A message → with ± signs, \\ and */ in it.",
+                severity="info",
+                parameters=(),
+            ),
+        ),
         covariance=np.diag((1e-3 * np.abs(vector)) ** 2),
     )
     record = RecordSummary(fs=fs, samples=2000, sha256="0123abcd" * 8, source="bench 3")

@@ -47,7 +47,7 @@ def json_document(source: Source) -> dict[str, Any]:
         "structure": pair.structure,
         "fit_percent": pair.fit_percent,
         "verdict": pair.verdict,
-        "warnings": [{"code": w.code, "message": w.message} for w in pair.warnings],
+        "warnings": [warning.to_dict() for warning in pair.warnings],
         "record": {
             "sha256": record.sha256,
             "fs": record.fs,

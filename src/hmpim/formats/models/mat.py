@@ -4,7 +4,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.io import savemat
 
 from hmpim.formats.atomic import replacing
 from hmpim.formats.models.json import json_document
@@ -16,6 +15,8 @@ __all__ = ["write_mat"]
 
 def write_mat(source: Source, path: Path) -> tuple[Path, ...]:
     """Write a file of version 5 with one struct, named as the model; null becomes []."""
+    from scipy.io import savemat
+
     document = json_document(source)
     seen = response_of(source)
     document["response"] = {

@@ -171,7 +171,8 @@ def _words(estimate: Estimate) -> str:
     if estimate.ci95 is not None:
         low, high = ("open" if end is None else f"{end:.9g}" for end in estimate.ci95)
         said += f" [{low}, {high}]"
-    return f"{said} {estimate.unit}".rstrip()
+    said = f"{said} {estimate.unit}".rstrip()
+    return said if estimate.verdict == "ok" else f"{said} (doubtful)"
 
 
 def _ascii(line: str) -> str:

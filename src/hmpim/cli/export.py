@@ -1,0 +1,135 @@
+"""`hmpim export`: what was identified, as a model for another tool."""
+
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from hmpim.cli.terminal import say, working
+from hmpim.errors import ArgumentError, FormatError
+
+if TYPE_CHECKING:
+    from hmpim.identify import Identification
+
+__all__ = ["export", "read_result"]
+
+
+class To(StrEnum):
+    """Targets."""
+
+    CONTROL = "control"
+    SCIPY = "scipy"
+    MATLAB = "matlab"
+    MAT = "mat"
+    JSON = "json"
+    C = "c"
+    PYTHON = "python"
+    UFF58 = "uff58"
+    CSV = "csv"
+
+
+class Between(StrEnum):
+    """What the input of a program does between its samples."""
+
+    ZOH = "zoh"
+    FOH = "foh"
+    BANDLIMITED = "bandlimited"
+
+
+def export(
+    result: Annotated[
+        Path, typer.Argument(metavar="RESULT", help="JSON of `hmpim identify --json`.")
+    ],
+    to: Annotated[To, typer.Option("--to", help="The target.")],
+    out: Annotated[
+        Path,
+        typer.Option(
+            "--out",
+            "-o",
+            metavar="PATH",
+            help="File to write; a folder for c. Its name is the model's.",
+        ),
+    ],
+    output: Annotated[
+        str | None, typer.Option("--output", metavar="NAME", help="Output of the pair.")
+    ] = None,
+    input_: Annotated[
+        str | None, typer.Option("--input", metavar="NAME", help="Input of the pair.")
+    ] = None,
+    fs: Annotated[
+        float | None,
+        typer.Option("--fs", metavar="HZ", help="Rate of stepped programs; else the record's."),
+    ] = None,
+    intersample: Annotated[
+        Between | None,
+        typer.Option(
+            "--intersample", help="What their input does between samples; else as identified."
+        ),
+    ] = None,
+    pade: Annotated[
+        int | None,
+        typer.Option("--pade", metavar="N", help="Order of the delay's Padé form, for control."),
+    ] = None,
+) -> None:
+    """Write what was identified as a model for another tool, error bars and origin included.
+
+    docs/models.md says what each target holds exactly, and what it approximates by how much.
+    """
+    from hmpim.formats.models import export as write
+
+    found = read_result(result)
+    if out.exists() and out.resolve() == result.resolve():
+        raise ArgumentError(f"--out: {out} is the result itself; name another file")
+    with working(f"Writing {to.value}"):
+        written = write(
+            found,
+            to=to.value,
+            path=str(out),
+            pair=_pair(found, output, input_),
+            fs=fs,
+            intersample=None if intersample is None else intersample.value,
+            pade=pade,
+        )
+    for file in written:
+        say(str(file))
+
+
+def read_result(path: Path) -> "Identification":
+    """Read an identification; refuse what is none.
+
+    Raises
+    ------
+    FormatError
+        If the file holds something else.
+    """
+    from hmpim.formats import load
+    from hmpim.identify import Identification
+
+    found = load(path)
+    if not isinstance(found, Identification):
+        raise FormatError(
+            f"{str(path)!r} holds a {type(found).__name__.lower()}, not a result; give what "
+            "hmpim identify --json wrote"
+        )
+    return found
+
+
+def _pair(
+    found: "Identification", output: str | None, input_: str | None
+) -> tuple[str, str] | None:
+    """Complete a choice of which only one half is given."""
+    if output is None and input_ is None:
+        return None
+    fitting = [
+        (p.output, p.input)
+        for p in found.pairs
+        if output in (None, p.output) and input_ in (None, p.input)
+    ]
+    if len(fitting) == 1:
+        return fitting[0]
+    known = ", ".join(f"{p.output} from {p.input}" for p in found.pairs)
+    wanted = " ".join(
+        f"--{name} {value}" for name, value in (("output", output), ("input", input_)) if value
+    )
+    raise ArgumentError(f"{wanted} fits {len(fitting)} pairs of the result, which has {known}")

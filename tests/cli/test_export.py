@@ -1,0 +1,77 @@
+"""`hmpim export`, from the JSON that `hmpim identify` writes."""
+
+import json
+import runpy
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import hmpim
+from hmpim.cli.main import app
+from hmpim.formats.models import TARGETS
+
+
+def run(*words: object) -> int:
+    return app([str(w) for w in words], standalone_mode=False)
+
+
+@pytest.fixture(scope="module")
+def result(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("export")
+    sensor = hmpim.Sensor(delay=0.1, time_constant=0.05, scale_factor=2.0, noise_std=0.01)
+    limits = hmpim.Limits(position=10, velocity=1000, acceleration=40000, unit="deg")
+    stimulus = hmpim.design(band=(0.1, 10), duration=8, fs=100, limits=limits)
+    found = hmpim.identify(hmpim.run(sensor, stimulus, rng=3))
+    hmpim.save(found, folder / "r.json")
+    return folder / "r.json"
+
+
+@pytest.mark.parametrize("target", sorted(TARGETS))
+def test_every_target_is_written_from_a_result(target, result, tmp_path, capsys):
+    place = tmp_path / ("axis" + TARGETS[target].suffix)
+    assert run("export", result, "--to", target, "-o", place) == 0
+    shown = [line for line in capsys.readouterr().out.splitlines() if line]
+    assert shown
+    for name in shown:
+        text = Path(name).read_bytes()
+        assert json.loads(result.read_text())["record"]["sha256"][:60].encode() in text or (
+            target in ("mat", "fmu")
+        )
+
+
+def test_a_program_from_the_command_line_runs_as_the_model(result, tmp_path):
+    assert run("export", result, "--to", "python", "-o", tmp_path / "m.py", "--fs", "500") == 0
+    found = hmpim.load(result)
+    t = np.arange(400) / 500.0
+    u = np.sin(9 * t)
+    truth = hmpim.to_model(found["y", "u"]).simulate(u, t)
+    assert runpy.run_path(str(tmp_path / "m.py"))["simulate"](u) == pytest.approx(truth, abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["--to", "simulink", "-o", "x"], "simulink"),
+        (["--to", "c", "-o", "x", "--input", "w"], "--input w fits 0 pairs"),
+        (["--to", "json", "-o", "no/such/x.json"], "does not exist"),
+        (["--to", "c", "-o", "x", "--fs", "0"], "fs = 0"),
+        (["--to", "c", "-o", "x", "--pade", "3"], "for control alone"),
+    ],
+)
+def test_what_cannot_be_exported_is_one_clear_line(words, said, result, capsys, tmp_path):
+    words = [str(tmp_path / w) if w in ("x", "no/such/x.json") else w for w in words]
+    assert run("export", result, *words) == 2
+    error = capsys.readouterr().err
+    assert said in error
+    assert len(error.splitlines()) == 1
+
+
+def test_a_result_is_not_replaced_by_its_export(result, capsys, tmp_path):
+    before = result.read_bytes()
+    assert run("export", result, "--to", "json", "-o", result) == 2
+    assert "is the result itself" in capsys.readouterr().err
+    assert result.read_bytes() == before
+    (tmp_path / "r.csv").write_text("time,u,y\n0,0,0\n1,1,1\n2,0,1\n")
+    assert run("export", tmp_path / "r.csv", "--to", "c", "-o", tmp_path / "x") == 2
+    assert "not a result" in capsys.readouterr().err
