@@ -1,5 +1,6 @@
 """CSV to records and back: what is understood, what is refused, and in which words."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,9 +10,10 @@ from hypothesis import strategies as st
 
 from hmpim.errors import ArgumentError, FormatError, RecordError, UnitError
 from hmpim.formats import read, write_csv
-from hmpim.record import Channel, Record, uniform
+from hmpim.record import Channel, Finding, Record, uniform
 
 DATA = Path(__file__).resolve().parents[2].parent / "shared" / "data"
+GAPS = Finding(code="gaps", message="3 are missing", severity="info", parameters=("delay",))
 PLAIN = "time,u,y\n0,1,2\n0.1,3,4\n0.2,5,6\n"
 
 
@@ -276,6 +278,30 @@ def test_any_content_is_read_or_refused_in_our_own_words(tmp_path_factory, conte
     except (FormatError, RecordError, UnitError):
         return  # any other error fails the test
     assert record.samples >= 2
+
+
+def test_every_role_comes_back_and_a_person_may_choose_otherwise(tmp_path):
+    steps = np.arange(5.0)
+    record = Record.from_arrays(
+        {"u": steps},
+        {"y": 2 * steps},
+        fs=10.0,
+        references={"r": steps + 1 / 3},
+        auxiliary={"t": steps - 1, "time": steps**2},
+        units={"t": "degC"},
+    )
+    record = replace(record, findings=(GAPS,))
+    write_csv(record, tmp_path / "r.csv")
+    assert read(tmp_path / "r.csv") == record
+    other = read(tmp_path / "r.csv", inputs=["r"], outputs=["y"])
+    assert [c.name for c in other.inputs] == ["r"]
+    assert other.references == ()
+    assert [c.name for c in other.auxiliary] == ["t", "time"]
+    named = read(tmp_path / "r.csv", inputs=["u"], references=["t"], auxiliary=["r"])
+    assert [c.name for c in named.references] == ["t"]
+    assert [c.name for c in named.auxiliary] == ["r"]
+    with pytest.raises(ArgumentError, match="'u' is named as input and as reference"):
+        read(tmp_path / "r.csv", inputs=["u"], references=["u"])
 
 
 def test_channels_with_clocks_of_their_own_do_not_fit_a_table(tmp_path):

@@ -122,6 +122,8 @@ class Collected:
                 band=band,
                 intersample=self._layout.intersample,
                 source=self._layout.source if source is None else source,
+                references=tuple(channel(spec) for spec in self._layout.of("reference")),
+                auxiliary=tuple(channel(spec) for spec in self._layout.of("auxiliary")),
             )
         except RecordError as error:
             raise RigError(f"rig {self._name!r} delivered no usable record: {error}") from error

@@ -7,7 +7,7 @@ import numpy as np
 
 from hmpim.errors import RecordError
 from hmpim.formats.atomic import write_text
-from hmpim.formats.readers.text import MARK, heading_of
+from hmpim.formats.readers.text import KINDS, MARK, heading_of
 from hmpim.record import Record
 
 __all__ = ["write_csv"]
@@ -45,7 +45,7 @@ def write_csv(record: Record, path: str | PathLike[str]) -> None:
     ['time [s],u [deg],y', '0.0,0.0,0.0', '0.1,0.3333333333333333,2.0']
     >>> folder.cleanup()
     """
-    channels = (*record.inputs, *record.outputs)
+    channels = record.channels
     time = channels[0].time
     for c in channels[1:]:
         if not np.array_equal(c.time, time):
@@ -54,12 +54,15 @@ def write_csv(record: Record, path: str | PathLike[str]) -> None:
                 "bring the record on one clock first with hmpim.record.uniform"
             )
     notes = {
-        "inputs": [{"name": c.name, "unit": c.unit} for c in record.inputs],
-        "outputs": [{"name": c.name, "unit": c.unit} for c in record.outputs],
+        **{
+            kind: [{"name": c.name, "unit": c.unit} for c in record.of(role)]
+            for kind, role in KINDS.items()
+        },
         "fs": record.fs,
         "band": None if record.band is None else [float(f) for f in record.band],
         "intersample": record.intersample,
         "source": record.source,
+        "findings": [finding.to_dict() for finding in record.findings],
     }
     lines = [
         f"# {MARK}{json.dumps(notes)}",

@@ -25,6 +25,8 @@ def read(
     fs: float | None = None,
     time: str | None = None,
     units: Mapping[str, str] | None = None,
+    references: Sequence[str] | None = None,
+    auxiliary: Sequence[str] | None = None,
 ) -> Record:
     r"""Read a record from a file of any format that a reader knows.
 
@@ -46,6 +48,9 @@ def read(
         says otherwise, as ``time [ms]``.
     units : mapping of str to str, optional
         Unit by channel name; goes before that of the file.
+    references, auxiliary : sequence of str, optional
+        Names of the channels that say what a loop was asked, and of those that are kept beside
+        and never fitted. Without: those that the file states.
 
     Returns
     -------
@@ -80,7 +85,14 @@ def read(
     reader = reader_for(file)
     contents = reader.channels(file, layout)
     _check_units(units or {}, contents, file.name)
-    roles = choose_roles(contents, file.name, inputs=inputs, outputs=outputs)
+    roles = choose_roles(
+        contents,
+        file.name,
+        inputs=inputs,
+        outputs=outputs,
+        references=references,
+        auxiliary=auxiliary,
+    )
     series = reader.read(file, roles.names, layout)
     return assemble(series, roles, contents, file=file.name, fs=fs, units=units or {})
 
@@ -129,6 +141,8 @@ def assemble(
         intersample=contents.intersample,
         source=file if contents.source is None else contents.source,
         findings=(*contents.findings, *mended.findings),
+        references=of(roles.references),
+        auxiliary=of(roles.auxiliary),
     )
 
 

@@ -66,8 +66,12 @@ def choose_roles(
     """
     into = _choose("input", inputs, contents, INPUT_NAMES, OUTPUT_NAMES, file)
     out = _choose("output", outputs, contents, OUTPUT_NAMES, INPUT_NAMES, file)
-    asked = _named("reference", references, contents, file) or _stated(contents, "reference")
-    kept = _named("auxiliary", auxiliary, contents, file) or _stated(contents, "auxiliary")
+    asked = _named("reference", references, contents, file)
+    kept = _named("auxiliary", auxiliary, contents, file)
+    # What a person names has that role, whatever the file states.
+    named = {*into, *out, *asked, *kept}
+    asked = asked or tuple(n for n in _stated(contents, "reference") if n not in named)
+    kept = kept or tuple(n for n in _stated(contents, "auxiliary") if n not in named)
     kinds = (
         ("input", into),
         ("output", out),

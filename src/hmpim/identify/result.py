@@ -1,12 +1,13 @@
 """What an identification says: estimates with error bars, side by side with the paper's."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from hmpim.equality import ByValue
 from hmpim.errors import FormatError, RecordError
 from hmpim.identify.coupling.inputs import InputSet
 from hmpim.record import Finding, Intersample, Record
@@ -132,7 +133,7 @@ class PaperEstimates:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class FrequencyResponse:
+class FrequencyResponse(ByValue):
     """Measured frequency response, output over input, with its error at each frequency.
 
     Parameters
@@ -302,7 +303,7 @@ class Candidate:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class PairIdentification:
+class PairIdentification(ByValue):
     """Everything found between one input and one output.
 
     `dynamics` holds the rational dynamics that were fitted, without delay and with unit
@@ -310,10 +311,10 @@ class PairIdentification:
     first. `covariance`, shape (q, q), is that of the delay in s, of the numerator times the scale
     factor, and of the denominator without its constant 1, each by rising powers of s; None
     where nothing was identified. `prediction` and `residual` (shape (n,), the output's unit)
-    are on the record's own uniform clock `time`; they are not part of the JSON. `from_response`
-    holds bandwidths read off the measured response, to be held against the model's.
-    `nonlinearity` is None
-    where the output does not follow the input at all.
+    are on the record's own uniform clock `time`; they follow from the record, and are part neither
+    of the JSON nor of equality. `from_response` holds bandwidths read off the measured response, to
+    be held against the model's. `nonlinearity` is None where the output does not follow the input
+    at all.
     """
 
     input: str
@@ -330,9 +331,9 @@ class PairIdentification:
     warnings: tuple[Finding, ...]
     verdict: Verdict = "doubtful"
     from_response: ResponseBandwidths = ResponseBandwidths()
-    time: NDArray[np.float64] | None = None
-    prediction: NDArray[np.float64] | None = None
-    residual: NDArray[np.float64] | None = None
+    time: NDArray[np.float64] | None = field(default=None, compare=False)
+    prediction: NDArray[np.float64] | None = field(default=None, compare=False)
+    residual: NDArray[np.float64] | None = field(default=None, compare=False)
     nonlinearity: Nonlinearity | None = None
     covariance: NDArray[np.float64] | None = None
 
@@ -405,19 +406,19 @@ class RecordSummary:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Identification:
+class Identification(ByValue):
     """The result of `hmpim.identify`: one `PairIdentification` for each input and output.
 
     Index it output first, as in a transfer matrix: ``result["y", "u"].delay``.
     `inputs` says how well several inputs are told apart, and how much of each output they
-    explain; None where there is one. `data` is the record itself, kept for pictures; it is not
-    part of the JSON.
+    explain; None where there is one. `data` is the record itself, kept for pictures; its digest
+    in `record` stands for it in the JSON and where results are compared.
     """
 
     record: RecordSummary
     pairs: tuple[PairIdentification, ...]
     inputs: InputSet | None = None
-    data: Record | None = None
+    data: Record | None = field(default=None, compare=False)
 
     def __getitem__(self, key: tuple[str, str]) -> PairIdentification:
         output, input_ = key

@@ -1,25 +1,35 @@
 """A record: what went in, what came out, and when."""
 
 import hashlib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from hmpim.equality import ByValue
 from hmpim.errors import ArgumentError, RecordError
 from hmpim.record.clock import fit_clock
 from hmpim.record.finding import Finding
 from hmpim.units import check_unit
 
-__all__ = ["Channel", "Intersample", "Record"]
+__all__ = ["ROLES", "Channel", "Intersample", "Record", "Role"]
 
 Intersample = Literal["zoh", "foh", "bandlimited"]
 """What an input does between its samples: held, linear, or band-limited."""
 
+Role = Literal["input", "output", "reference", "auxiliary"]
+"""What a channel is in its record: what went in, what came out, what was asked, what is kept."""
+
+ROLES: tuple[Role, ...] = ("input", "output", "reference", "auxiliary")
+
 
 def _frozen(name: str, values: ArrayLike) -> NDArray[np.float64]:
+    if np.iscomplexobj(values):
+        raise RecordError(
+            f"channel {name!r} is complex; give real numbers: the real part, or two channels"
+        )
     try:
         array = np.array(values, dtype=np.float64)
     except (TypeError, ValueError) as error:
@@ -33,8 +43,10 @@ def _frozen(name: str, values: ArrayLike) -> NDArray[np.float64]:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Channel:
+class Channel(ByValue):
     """One measured signal on its own clock.
+
+    Samples that a masked array hides are left out: a gap in this channel alone.
 
     Parameters
     ----------
@@ -60,15 +72,19 @@ class Channel:
 
     def __post_init__(self) -> None:
         check_unit(self.unit)
+        hidden = _hidden(self.time), _hidden(self.values)
         time = _frozen(f"{self.name} (time)", self.time)
         values = _frozen(self.name, self.values)
-        object.__setattr__(self, "time", time)
-        object.__setattr__(self, "values", values)
         if time.size != values.size:
             raise RecordError(
                 f"channel {self.name!r} has {values.size} samples and {time.size} time stamps; "
                 "they must be as many"
             )
+        if any(mask is not None for mask in hidden):
+            seen = ~np.logical_or.reduce([mask for mask in hidden if mask is not None])
+            time, values = _frozen(self.name, time[seen]), _frozen(self.name, values[seen])
+        object.__setattr__(self, "time", time)
+        object.__setattr__(self, "values", values)
         if values.size < 2:
             raise RecordError(f"channel {self.name!r} has {values.size} samples; at least 2 needed")
         for label, array in ((self.name, values), (f"{self.name} (time)", time)):
@@ -89,7 +105,7 @@ class Channel:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Record:
+class Record(ByValue):
     """Inputs and outputs of one test, time-stamped.
 
     Parameters
@@ -106,6 +122,11 @@ class Record:
         Where the record comes from, for people.
     findings : tuple of Finding
         What was noticed when the record was read: missing samples, mended stamps, and the like.
+    references : tuple of Channel
+        What a loop was asked, where the test was made in a closed loop.
+    auxiliary : tuple of Channel
+        What is kept beside, such as feedforward commands or a temperature; never fitted unless
+        it is named.
 
     Raises
     ------
@@ -120,6 +141,8 @@ class Record:
     intersample: Intersample | None = None
     source: str = ""
     findings: tuple[Finding, ...] = ()
+    references: tuple[Channel, ...] = ()
+    auxiliary: tuple[Channel, ...] = ()
 
     def __post_init__(self) -> None:
         if not self.inputs or not self.outputs:
@@ -127,10 +150,8 @@ class Record:
                 f"a record needs at least one input and one output; "
                 f"this one has {len(self.inputs)} and {len(self.outputs)}"
             )
-        names = [c.name for c in (*self.inputs, *self.outputs)]
-        twice = sorted({name for name in names if names.count(name) > 1})
-        if twice:
-            raise RecordError(f"channel name {twice[0]!r} is used twice; names must be unique")
+        names = [c.name for c in self.channels]
+        _check_unique(names)
         _check_rate(self.fs)
 
     @classmethod
@@ -144,13 +165,15 @@ class Record:
         units: Mapping[str, str] | None = None,
         band: tuple[float, float] | None = None,
         intersample: Intersample | None = None,
+        references: Mapping[str, ArrayLike] | None = None,
+        auxiliary: Mapping[str, ArrayLike] | None = None,
     ) -> "Record":
         """Make a record of arrays that share one clock.
 
         Parameters
         ----------
         inputs, outputs : mapping of str to array_like, shape (n,)
-            Samples by channel name.
+            Samples by channel name. What a masked array hides is left out of that channel.
         fs : float, optional
             Sampling rate in Hz. Give this or `time`.
         time : array_like, shape (n,), optional
@@ -161,11 +184,13 @@ class Record:
             Excited band in Hz.
         intersample : {'zoh', 'foh', 'bandlimited'}, optional
             What the inputs do between samples, if known.
+        references, auxiliary : mapping of str to array_like, shape (n,), optional
+            What a loop was asked, and what is kept beside.
 
         Raises
         ------
         RecordError
-            For unequal lengths, NaN, or time that does not increase.
+            For unequal lengths, NaN, complex numbers, or time that does not increase.
         ArgumentError
             If neither `fs` nor `time` is given, or `fs` is not positive.
 
@@ -174,42 +199,56 @@ class Record:
         >>> record = Record.from_arrays({"u": [0, 1, 0]}, {"y": [0, 0, 1]}, fs=10.0)
         >>> record.duration
         0.3
+        >>> seen = np.ma.masked_greater([0.0, 99.0, 1.0, 2.0], 90.0)
+        >>> record = Record.from_arrays({"u": [0, 1, 0, 1]}, {"y": seen}, fs=10.0)
+        >>> record.outputs[0].values.tolist(), record.outputs[0].time.tolist()
+        ([0.0, 1.0, 2.0], [0.0, 0.2, 0.3])
         """
         if fs is None and time is None:
             raise ArgumentError("neither fs nor time is given; one of them is needed")
         if fs is not None:
             _check_rate(fs)
-        named = {**inputs, **outputs}
-        arrays = {name: _frozen(name, values) for name, values in named.items()}
-        lengths = {name: a.size for name, a in arrays.items()}
+        given = (inputs, outputs, references or {}, auxiliary or {})
+        _check_unique([name for part in given for name in part])
+        named = {name: values for part in given for name, values in part.items()}
+        lengths = {name: _frozen(name, values).size for name, values in named.items()}
         if len(set(lengths.values())) > 1:
             raise RecordError(
                 "channels have unequal lengths ("
                 + ", ".join(f"{name}: {n}" for name, n in lengths.items())
                 + "); give channels of one length, or each with its own time"
             )
-        if not arrays:
+        if not lengths:
             raise RecordError("a record needs at least one input and one output; this one has none")
         n = next(iter(lengths.values()))
         if time is None:
             assert fs is not None
-            stamps = np.arange(n) / fs
+            stamps: NDArray[Any] = np.arange(n) / fs
         else:
-            stamps = _frozen("time", time)
+            _frozen("time", time)
+            stamps = np.asanyarray(time)
         units = units or {}
         unknown = sorted(set(units) - set(named))
         if unknown:
             raise RecordError(f"a unit is given for {unknown[0]!r}, which is not a channel")
 
-        def channels(names: Mapping[str, ArrayLike]) -> tuple[Channel, ...]:
-            return tuple(
-                Channel(name=k, time=stamps, values=arrays[k], unit=units.get(k, "")) for k in names
+        made = [
+            tuple(
+                Channel(name=k, time=stamps, values=np.asanyarray(v), unit=units.get(k, ""))
+                for k, v in part.items()
             )
-
-        made_inputs, made_outputs = channels(inputs), channels(outputs)
-        rate = float(fs) if fs is not None else fit_clock(made_inputs[0].time).fs
+            for part in given
+        ]
+        if fs is None and made[0]:
+            fs = fit_clock(made[0][0].time).fs
         return cls(
-            inputs=made_inputs, outputs=made_outputs, fs=rate, band=band, intersample=intersample
+            inputs=made[0],
+            outputs=made[1],
+            fs=np.nan if fs is None else float(fs),
+            band=band,
+            intersample=intersample,
+            references=made[2],
+            auxiliary=made[3],
         )
 
     @property
@@ -226,12 +265,27 @@ class Record:
     def sha256(self) -> str:
         """Digest over names, units, time stamps and values of every channel."""
         digest = hashlib.sha256()
-        for kind, channels in (("input", self.inputs), ("output", self.outputs)):
-            for c in channels:
-                digest.update(f"{kind}\0{c.name}\0{c.unit}\0".encode())
+        for role in ROLES:
+            for c in self.of(role):
+                digest.update(f"{role}\0{c.name}\0{c.unit}\0".encode())
                 digest.update(np.ascontiguousarray(c.time, dtype="<f8").tobytes())
                 digest.update(np.ascontiguousarray(c.values, dtype="<f8").tobytes())
         return digest.hexdigest()
+
+    @property
+    def channels(self) -> tuple[Channel, ...]:
+        """Every channel: inputs, outputs, references, auxiliary."""
+        return (*self.inputs, *self.outputs, *self.references, *self.auxiliary)
+
+    def of(self, role: Role) -> tuple[Channel, ...]:
+        """Channels of one role, in order."""
+        by_role = {
+            "input": self.inputs,
+            "output": self.outputs,
+            "reference": self.references,
+            "auxiliary": self.auxiliary,
+        }
+        return by_role[role]
 
     def channel(self, name: str) -> Channel:
         """Return the channel called `name`.
@@ -241,23 +295,29 @@ class Record:
         RecordError
             If there is none; the message lists those there are.
         """
-        for c in (*self.inputs, *self.outputs):
+        for c in self.channels:
             if c.name == name:
                 return c
-        known = ", ".join(c.name for c in (*self.inputs, *self.outputs))
+        known = ", ".join(c.name for c in self.channels)
         raise RecordError(f"there is no channel {name!r}; the record has {known}")
 
     def between(self, start: float, stop: float) -> "Record":
         """Return the part with start <= time < stop, in seconds of the record's own clock.
 
+        An auxiliary channel that has fewer than two samples in that span, such as a slow
+        temperature, is left out.
+
         Raises
         ------
         RecordError
-            If fewer than two samples of a channel are in that span.
+            If fewer than two samples of another channel are in that span.
         """
 
+        def within(c: Channel) -> NDArray[np.bool_]:
+            return (c.time >= start) & (c.time < stop)
+
         def cut(c: Channel) -> Channel:
-            keep = (c.time >= start) & (c.time < stop)
+            keep = within(c)
             if np.count_nonzero(keep) < 2:
                 raise RecordError(
                     f"channel {c.name!r} has fewer than 2 samples between {start:g} s and "
@@ -269,7 +329,54 @@ class Record:
             self,
             inputs=tuple(cut(c) for c in self.inputs),
             outputs=tuple(cut(c) for c in self.outputs),
+            references=tuple(cut(c) for c in self.references),
+            auxiliary=tuple(cut(c) for c in self.auxiliary if np.count_nonzero(within(c)) >= 2),
         )
+
+    def with_roles(self, *, inputs: Sequence[str], outputs: Sequence[str]) -> "Record":
+        """Return the record with other inputs and outputs; what was one becomes auxiliary.
+
+        Parameters
+        ----------
+        inputs, outputs : sequence of str
+            Names of channels, of whatever role they are now.
+
+        Raises
+        ------
+        RecordError
+            If there is no such channel, one is named twice, or none is named.
+
+        Examples
+        --------
+        >>> record = Record.from_arrays(
+        ...     {"u": [0, 1]}, {"y": [0, 1]}, fs=1.0, auxiliary={"rate": [1, 0]}
+        ... )
+        >>> again = record.with_roles(inputs=["rate"], outputs=["y"])
+        >>> [c.name for c in again.inputs], [c.name for c in again.auxiliary]
+        (['rate'], ['u'])
+        """
+        named = [*inputs, *outputs]
+        free = [c for c in (*self.inputs, *self.outputs, *self.auxiliary) if c.name not in named]
+        return replace(
+            self,
+            inputs=tuple(self.channel(name) for name in inputs),
+            outputs=tuple(self.channel(name) for name in outputs),
+            references=tuple(c for c in self.references if c.name not in named),
+            auxiliary=tuple(free),
+        )
+
+
+def _hidden(values: ArrayLike) -> NDArray[np.bool_] | None:
+    """What a masked array hides, shape (n,); None if nothing."""
+    if not isinstance(values, np.ma.MaskedArray) or not np.ma.is_masked(values):
+        return None
+    return np.ma.getmaskarray(values)
+
+
+def _check_unique(names: Sequence[str]) -> None:
+    twice = sorted({name for name in names if names.count(name) > 1})
+    if twice:
+        raise RecordError(f"channel name {twice[0]!r} is used twice; names must be unique")
 
 
 def _check_rate(fs: float) -> None:

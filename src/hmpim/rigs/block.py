@@ -2,22 +2,20 @@
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import Literal, Protocol, get_args
+from typing import Literal, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from hmpim.errors import ArgumentError, RigError
-from hmpim.record import Intersample
+from hmpim.record import ROLES, Intersample, Role
 from hmpim.units import check_unit
 
-__all__ = ["Block", "ChannelSpec", "Layout", "Pace", "Quantity", "Reply", "Role", "Samples"]
+__all__ = ["Block", "ChannelSpec", "Layout", "Pace", "Quantity", "Reply", "Samples"]
 
 FloatArray = NDArray[np.float64]
 Quantity = Literal["position", "velocity", "acceleration"]
 """Which quantity of the motion a channel or a sensor is about."""
-Role = Literal["input", "output", "auxiliary"]
-"""What a channel is in the record: what went in, what came out, or what is kept beside."""
 
 
 class Pace(Protocol):
@@ -151,7 +149,7 @@ class ChannelSpec:
     ----------
     name : str
         Unique in the record.
-    role : {'input', 'output', 'auxiliary'}
+    role : {'input', 'output', 'reference', 'auxiliary'}
         What it is in the record.
     unit : str
         Of its values.
@@ -186,8 +184,8 @@ class ChannelSpec:
         check_unit(self.unit)
         if not self.name:
             raise ArgumentError("a channel has no name; give each one its own")
-        if self.role not in get_args(Role):
-            raise ArgumentError(f"role = {self.role!r} of {self.name!r}; use {get_args(Role)}")
+        if self.role not in ROLES:
+            raise ArgumentError(f"role = {self.role!r} of {self.name!r}; use {ROLES}")
         if self.commanded and (self.axis is None or self.quantity is None):
             raise ArgumentError(
                 f"{self.name!r} is commanded; state the axis and the quantity of the command"

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from hmpim.equality import ByValue
 from hmpim.errors import ArgumentError, LimitsError
 from hmpim.stimulus.command import Command, check_resolution, difference_peaks, rounded
 from hmpim.stimulus.exponential import ExponentialSweep
@@ -23,7 +24,7 @@ __all__ = ["Stimulus", "blocks"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Stimulus:
+class Stimulus(ByValue):
     """A waveform, sampled, checked against its limits when made.
 
     Parameters
@@ -77,11 +78,12 @@ class Stimulus:
     axis: str = ""
     tail: float = 0.0
     resolution: float = 0.0
-    time: FloatArray = field(init=False, repr=False)
-    position: FloatArray = field(init=False, repr=False)
-    velocity: FloatArray = field(init=False, repr=False)
-    acceleration: FloatArray = field(init=False, repr=False)
-    peaks: Peaks = field(init=False)
+    # These follow from the fields above, and do not count where stimuli are compared.
+    time: FloatArray = field(init=False, repr=False, compare=False)
+    position: FloatArray = field(init=False, repr=False, compare=False)
+    velocity: FloatArray = field(init=False, repr=False, compare=False)
+    acceleration: FloatArray = field(init=False, repr=False, compare=False)
+    peaks: Peaks = field(init=False, compare=False)
 
     def __post_init__(self) -> None:
         fs = check_positive("fs", self.fs, "Hz")

@@ -128,6 +128,20 @@ def test_records_say_what_their_input_is():
     assert said == {"P": "zoh", "PV": "bandlimited", "PVA": "bandlimited"}
 
 
+@pytest.mark.parametrize("mode", MODES)
+def test_feedforward_commands_are_kept_and_never_fitted(mode):
+    table = MotionTable(mode=mode)
+    stimulus = sweep("roll", upto=20.0, duration=1.0, table=table)
+    record = run(table, stimulus, rng=1)
+    names = ["roll.velocity_command", "roll.acceleration_command"][: len(mode) - 1]
+    assert [c.name for c in record.auxiliary] == names
+    assert [c.unit for c in record.auxiliary] == ["deg/s", "deg/s²"][: len(names)]
+    assert [c.name for c in record.inputs] == ["roll.command"]
+    for channel, name in zip(record.auxiliary, ("velocity", "acceleration"), strict=False):
+        np.testing.assert_array_equal(channel.values, getattr(stimulus, name))
+    assert len(identify(record).pairs) == 1
+
+
 def test_all_axes_at_once_give_the_bandwidths_of_each_alone():
     """Fig. 24: there the automatic roll bandwidth came out a third too low."""
     table = MotionTable()

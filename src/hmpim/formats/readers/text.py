@@ -14,15 +14,23 @@ from hmpim.errors import FormatError, UnitError
 from hmpim.formats.readers.headings import named
 from hmpim.formats.readers.protocol import ChannelInfo, Contents, Layout, Reader
 from hmpim.formats.table import Table, read_text, table_of
-from hmpim.record import Series
+from hmpim.record import Finding, Role, Series
 from hmpim.units import conversion_factor
 
-__all__ = ["MARK", "TEXT", "TIME_NAMES", "channels", "heading_of", "read", "sniff"]
+__all__ = ["KINDS", "MARK", "TEXT", "TIME_NAMES", "channels", "heading_of", "read", "sniff"]
 
 TIME_NAMES = ("time", "t")
 
 MARK = "hmpim/record/1 "
 """What the comment starts with in which `write_csv` notes what a table cannot hold."""
+
+KINDS: dict[str, Role] = {
+    "inputs": "input",
+    "outputs": "output",
+    "references": "reference",
+    "auxiliary": "auxiliary",
+}
+"""Names in that comment, and the role of the channels that they list."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -49,7 +57,7 @@ def sniff(head: bytes, path: Path) -> bool:
 def channels(path: Path, layout: Layout) -> Contents:
     """List the columns of a table, without time."""
     table, columns, notes = _opened(path)
-    clock = _clock(columns, layout, table.name)
+    clock = _clock(columns, layout, table.name, ours=notes is not None)
     data = tuple(
         ChannelInfo(name=c.name, unit=c.unit, samples=len(table.rows))
         for c in columns
@@ -64,17 +72,20 @@ def channels(path: Path, layout: Layout) -> Contents:
         time=time,
         inputs=tuple(c["name"] for c in notes["inputs"]),
         outputs=tuple(c["name"] for c in notes["outputs"]),
+        references=tuple(c["name"] for c in notes["references"]),
+        auxiliary=tuple(c["name"] for c in notes["auxiliary"]),
         fs=notes["fs"],
         band=notes["band"],
         intersample=notes["intersample"],
         source=notes["source"],
+        findings=notes["findings"],
     )
 
 
 def read(path: Path, names: Sequence[str], layout: Layout) -> tuple[Series, ...]:
     """Read columns of a table by name."""
-    table, columns, _ = _opened(path)
-    clock = _clock(columns, layout, table.name)
+    table, columns, notes = _opened(path)
+    clock = _clock(columns, layout, table.name, ours=notes is not None)
     data = {c.name: c for c in columns if c is not clock}
     chosen = [data[name] for name in names]
     wanted = [*([clock] if clock is not None else []), *chosen]
@@ -118,32 +129,34 @@ def _notes(table: Table) -> dict[str, Any] | None:
             continue
         try:
             notes: dict[str, Any] = json.loads(comment.removeprefix(MARK))
-            count = 1 + len(notes["inputs"]) + len(notes["outputs"])
-            headings = [
-                heading_of(str(c["name"]), str(c["unit"]))
-                for c in (*notes["inputs"], *notes["outputs"])
-            ]
+            notes = {"references": [], "auxiliary": [], "findings": [], **notes}
+            headings = [heading_of(str(c["name"]), str(c["unit"])) for c in _noted(notes)]
             if notes["intersample"] not in (None, "zoh", "foh", "bandlimited"):
                 raise ValueError(f"intersample {notes['intersample']!r}")
             if notes["band"] is not None:
                 low, high = notes["band"]
                 notes["band"] = (float(low), float(high))
             notes["fs"], notes["source"] = float(notes["fs"]), str(notes["source"])
-        except (ValueError, KeyError, TypeError) as error:
+            notes["findings"] = tuple(Finding.from_dict(f) for f in notes["findings"])
+        except (ValueError, KeyError, TypeError, AttributeError) as error:
             raise FormatError(
                 f"{table.name!r} starts with a spoilt comment {comment[:40]!r} ({error}); "
                 "delete that line"
             ) from None
         found = [c.heading for c in table.columns]
-        if len(found) == count and found[1:] == [h.strip('"') for h in headings]:
+        if len(found) == 1 + len(headings) and found[1:] == [h.strip('"') for h in headings]:
             return notes
     return None
 
 
+def _noted(notes: dict[str, Any]) -> list[dict[str, Any]]:
+    """Channels of every kind, in the order of the columns."""
+    return [channel for kind in KINDS for channel in notes[kind]]
+
+
 def _columns(table: Table, notes: dict[str, Any] | None) -> list[_Column]:
     if notes is not None:
-        both = (*notes["inputs"], *notes["outputs"])
-        pairs = [("time", "s"), *((c["name"], c["unit"]) for c in both)]
+        pairs = [("time", "s"), *((c["name"], c["unit"]) for c in _noted(notes))]
     else:
         pairs = [named(c.heading) for c in table.columns]
     columns = [
@@ -157,7 +170,10 @@ def _columns(table: Table, notes: dict[str, Any] | None) -> list[_Column]:
     return columns
 
 
-def _clock(columns: Sequence[_Column], layout: Layout, file: str) -> _Column | None:
+def _clock(columns: Sequence[_Column], layout: Layout, file: str, *, ours: bool) -> _Column | None:
+    """The column of time; the first one in a table that `write_csv` wrote."""
+    if ours and layout.time is None:
+        return columns[0]
     listed = ", ".join(c.name for c in columns)
     if layout.time is not None:
         wanted = layout.time

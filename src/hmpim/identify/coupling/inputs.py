@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
 
+from hmpim.equality import ByValue
 from hmpim.identify.frf.neighbours import centres_in_band, mirrored, windows_around
 from hmpim.identify.spectrum import excited_band
 
@@ -63,7 +64,7 @@ class Alike:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class OutputCoherence:
+class OutputCoherence(ByValue):
     """Share of an output that all inputs together explain, over frequency.
 
     Parameters
@@ -82,7 +83,7 @@ class OutputCoherence:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class InputSet:
+class InputSet(ByValue):
     """Several inputs driven at once, and how well one record tells them apart.
 
     Parameters

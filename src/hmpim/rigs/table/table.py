@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hmpim.errors import ArgumentError, LimitsError
-from hmpim.rigs.block import Block, ChannelSpec, Layout
+from hmpim.rigs.block import Block, ChannelSpec, Layout, Quantity
 from hmpim.rigs.protocol import Stimuli
 from hmpim.rigs.simulated import Playing, Simulated
 from hmpim.rigs.table.axes import AXES, FIG_4, AxisName, AxisSpec, CommandMode, TablePosition
@@ -19,7 +19,7 @@ from hmpim.rigs.table.servo import Gains
 from hmpim.rigs.table.simulate import History, Motion, Timing
 from hmpim.rigs.table.tuning import tune
 from hmpim.stimulus import Limits, check_inside
-from hmpim.units import conversion_factor
+from hmpim.units import conversion_factor, rate_unit
 
 __all__ = ["MotionTable"]
 
@@ -347,7 +347,9 @@ class MotionTable(Simulated):
             Inputs ``roll.command`` and so on, outputs ``roll.position``, both from the start
             position, in the stimulus's unit (outputs of axes held: deg). Held between samples in
             mode P; in PV and PVA the held position is not the whole input, and the record says
-            'bandlimited', so that the response found is that of samples over samples.
+            'bandlimited', so that the response found is that of samples over samples. The
+            velocity commands of PV, and the acceleration commands of PVA, are auxiliary:
+            ``roll.velocity_command`` and so on.
 
         Raises
         ------
@@ -390,8 +392,21 @@ class MotionTable(Simulated):
             )
             for axis, unit in units.items()
         ]
+        beside: tuple[Quantity, ...] = ("velocity", "acceleration")
+        feedforward = [
+            ChannelSpec(
+                name=f"{axis}.{quantity}_command",
+                role="auxiliary",
+                unit=rate_unit(s.unit, order),
+                axis=axis,
+                quantity=quantity,
+                commanded=True,
+            )
+            for axis, s in named.items()
+            for order, quantity in enumerate(beside[: len(self.mode) - 1], start=1)
+        ]
         return Layout(
-            channels=(*inputs, *outputs),
+            channels=(*inputs, *outputs, *feedforward),
             intersample="zoh" if self.mode == "P" else "bandlimited",
             source=f"simulated {self.name}, {self.mode}",
         )
