@@ -9,7 +9,7 @@ import pint
 
 from hmpim.errors import UnitError
 
-__all__ = ["check_unit", "conversion_factor", "rate_unit"]
+__all__ = ["check_unit", "conversion_factor", "rate_label", "rate_unit"]
 
 
 @cache
@@ -58,6 +58,17 @@ def rate_unit(unit: str, order: int) -> str:
         return unit
     power = {1: "", 2: "²", 3: "³"}[order]
     return f"{unit or '1'}/s{power}"
+
+
+def rate_label(unit: str, order: int) -> str:
+    """Unit of the `order`-th time derivative as people read it, where the position has none too.
+
+    Examples
+    --------
+    >>> rate_label("deg", 1), rate_label("", 1), rate_label("", 0)
+    ('deg/s', 'units/s', '')
+    """
+    return rate_unit(unit or "units", order) if unit or order else ""
 
 
 def conversion_factor(unit: str, *, to: str) -> float:

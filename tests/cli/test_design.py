@@ -113,3 +113,13 @@ def test_more_refusals(more, error, message):
     out = run(*FIG_12, *more)
     with pytest.raises(error, match=message):
         raise out.exception
+
+
+def test_jerk_has_one_spelling_and_the_old_one_still_works(tmp_path):
+    usual = ["--band", "0.5", "5", "--duration", "5", "--fs", "100", "--amplitude", "1"]
+    both = [run(*usual, option, "1e5").output for option in ("--max-jerk", "--jerk")]
+    assert both[0] == both[1]
+    assert "peak jerk" in both[0]
+    assert "units/s³" in both[0]
+    assert "--max-jerk" in run("--help").output
+    assert " --jerk" not in run("--help").output

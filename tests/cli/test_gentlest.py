@@ -58,6 +58,15 @@ def test_what_cannot_be_met_is_said_with_exit_code_1(tmp_path):
     assert not (tmp_path / "s.csv").exists()
 
 
+def test_without_any_limit():
+    rough = ("--natural-frequency", "10", "--damping", "0.4", "--noise", "0.1", "--fs", "200")
+    out = run(*rough, "--duration", "2", "--family", "sweep")
+    assert out.exit_code == 0, out.output
+    assert "peak velocity" in out.output
+    assert "units/s" in out.output
+    assert "times the limits" not in out.output
+
+
 @pytest.mark.parametrize(
     ("more", "message"),
     [

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.optimize import linprog
 
 from hmpim.errors import ArgumentError, LimitsError
 from hmpim.experiment import run
@@ -18,7 +19,7 @@ from hmpim.optimal import (
     trade,
 )
 from hmpim.optimal.candidate import needed_gain
-from hmpim.optimal.multisine import _programme, best_multisine
+from hmpim.optimal.multisine import _programme, _solved, best_multisine
 from hmpim.optimal.sweeps import best_sweep
 from hmpim.rigs import Sensor
 from hmpim.stimulus import Limits, Sine, Stimulus
@@ -194,6 +195,46 @@ def test_progress_is_told(gentle_10s):
     told = []
     trade(gentle_10s, factors=(1.0,), progress=lambda share, what: told.append((share, what)))
     assert told == [(0.0, "errors times 1"), (1.0, "done")]
+
+
+def test_progress_goes_on_within_a_family():
+    told = []
+    search(duration=2.0, progress=lambda share, _: told.append(share))
+    assert told[0] == 0.0
+    assert told[-1] == 1.0
+    assert told == sorted(told)
+    assert len(told) > 20
+
+
+def test_no_limit_at_all_is_as_good_as_wide_ones():
+    wide, none = Limits(position=1e6, unit="deg"), Limits(unit="deg")
+    free = fig_17_wish(limits=none, duration=4.0)
+    held = fig_17_wish(limits=wide, duration=4.0)
+    near = np.array([-0.44, 2.41, 1.9])
+    found = [best_sweep(wish, 4.0, start=near, trials=8) for wish in (free, held)]
+    assert found[0].value == found[1].value
+    assert found[0].use == 0.0
+
+
+def test_where_no_limit_binds_the_trade_is_the_same_shape_in_another_size(gentle_10s):
+    searched = search(gentle_10s.wish.limits, accuracy=Accuracy().times(2.0)).value
+    (scaled,) = trade(gentle_10s, factors=(2.0,))
+    assert scaled.value == 0.5 * gentle_10s.value
+    assert scaled.value == pytest.approx(searched, rel=0.02)
+
+
+@pytest.mark.parametrize("rows", [40, 3000])
+def test_a_linear_programme_solved_by_cuts_is_solved(rows):
+    rng = np.random.default_rng(rows)
+    size = 12
+    matrix, rest = rng.standard_normal((rows, size + 1)), np.zeros((3, size + 1))
+    matrix[:, -1] = -np.abs(matrix[:, -1]) - 0.1
+    rest[:, :3] = np.eye(3)
+    right, objective = rng.random(rows), np.append(rng.standard_normal(size) * 0.01, 1.0)
+    bounds = (np.append(-np.ones(size), 0.0), np.append(np.ones(size), np.inf))
+    found = _solved(objective, matrix, right, rest, bounds)
+    whole = linprog(objective, matrix, right, rest, np.zeros(3), np.stack(bounds, axis=1))
+    np.testing.assert_allclose(found, whole.x[:-1], atol=1e-7)
 
 
 def test_what_cannot_be_met_is_refused_with_what_would_do():

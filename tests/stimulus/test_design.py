@@ -319,9 +319,9 @@ def test_too_tight_limits_are_refused_with_numbers_that_do(wish, tight, lead):
     smaller = design(**{**wish, "limits": replace(wish["limits"], position=lower)}, lead=lead)
     assert of_sweep(smaller, lead).position == pytest.approx(lower, rel=1e-7)
     raised = wish["limits"]
-    if found := re.search(rf"{number} 1/s \(the limit", said):
+    if found := re.search(rf"{number} units/s \(the limit", said):
         raised = replace(raised, velocity=float(found[1]))
-    if found := re.search(rf"{number} 1/s² \(the limit", said):
+    if found := re.search(rf"{number} units/s² \(the limit", said):
         raised = replace(raised, acceleration=float(found[1]))
     allowed = design(**{**wish, "limits": raised}, lead=lead)
     assert of_sweep(allowed, lead).position == pytest.approx(raised.position, rel=1e-7)

@@ -43,7 +43,10 @@ def design(
     max_acceleration: Annotated[
         float, typer.Option(help="Acceleration limit, unit per second squared.")
     ] = float("inf"),
-    jerk: Annotated[float, typer.Option(help="Jerk limit, unit per second cubed.")] = float("inf"),
+    max_jerk: Annotated[
+        float, typer.Option("--max-jerk", help="Jerk limit, unit per second cubed.")
+    ] = float("inf"),
+    jerk: Annotated[float | None, typer.Option("--jerk", hidden=True)] = None,
     kind: Annotated[
         str, typer.Option(metavar="KIND", help=f"Waveform: {', '.join(KINDS)}.")
     ] = "hmpim",
@@ -100,7 +103,7 @@ def design(
     from hmpim.formats.stimulus_files import STIMULUS_SUFFIXES, save_stimulus
     from hmpim.stimulus import Limits
     from hmpim.stimulus import design as design_stimulus
-    from hmpim.units import rate_unit
+    from hmpim.units import rate_label
 
     check_target(output, "--output")
     if output is not None and output.suffix.lower() not in STIMULUS_SUFFIXES:
@@ -109,11 +112,13 @@ def design(
     check_target(plot, "--plot")
     if plot is not None and plot.suffix.lower() != ".png":
         raise ArgumentError(f"--plot {plot} does not end in .png, the one picture made here")
+    if jerk is not None and max_jerk < float("inf"):
+        raise ArgumentError("--jerk is the old name of --max-jerk; give --max-jerk alone")
     limits = Limits(
         position=amplitude,
         velocity=max_rate,
         acceleration=max_acceleration,
-        jerk=jerk,
+        jerk=max_jerk if jerk is None else jerk,
         unit=unit,
     )
     stimulus = design_stimulus(
@@ -145,6 +150,6 @@ def design(
     )
     if stimulus.gain is not None and stimulus.extinction is not None:
         typer.echo(f"gain {stimulus.gain:.6g}, extinction n = {stimulus.extinction:g}")
-    for order, name in enumerate(QUANTITIES if jerk < float("inf") else QUANTITIES[:3]):
+    for order, name in enumerate(QUANTITIES if limits.jerk < float("inf") else QUANTITIES[:3]):
         peak, limit = getattr(stimulus.peaks, name), getattr(limits, name)
-        typer.echo(f"peak {name:<12} {peak:>10.5g} of {limit:g} {rate_unit(unit, order)}".rstrip())
+        typer.echo(f"peak {name:<12} {peak:>10.5g} of {limit:g} {rate_label(unit, order)}".rstrip())

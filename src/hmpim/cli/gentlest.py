@@ -216,7 +216,7 @@ def _print(found: "Gentlest") -> None:
     from rich.table import Table
 
     from hmpim.plots.trade import gentle_label
-    from hmpim.units import rate_unit
+    from hmpim.units import rate_label
 
     stimulus, unit = found.stimulus, found.wish.limits.unit
     console = output_console()
@@ -236,7 +236,7 @@ def _print(found: "Gentlest") -> None:
     for order, name in enumerate(("position", "velocity", "acceleration")):
         peak, limit = getattr(stimulus.peaks, name), getattr(found.wish.limits, name)
         bound = f"of {limit:g} " if limit < _INFINITE else ""
-        console.print(f"peak {name:<12} {peak:>10.5g} {bound}{rate_unit(unit, order)}".rstrip())
+        console.print(f"peak {name:<12} {peak:>10.5g} {bound}{rate_label(unit, order)}".rstrip())
     for other in found.candidates[1:]:
         kept = "" if other.use <= 1.0 else f", {other.use:.3g} times the limits"
         console.print(f"instead, {other.family}: {other.value:.4g}{kept}")

@@ -11,7 +11,7 @@ from hmpim.optimal.wish import PARAMETERS, Family, Gentle, Wish
 from hmpim.stimulus import Stimulus, Waveform
 from hmpim.stimulus.motion import Scalable
 
-__all__ = ["Candidate", "gentleness", "needed_gain", "try_out"]
+__all__ = ["Candidate", "cost_of", "gentleness", "needed_gain", "try_out"]
 
 FloatArray = NDArray[np.float64]
 
@@ -134,13 +134,10 @@ def try_out(
     Candidate or None
         None if no gain will do.
     """
-    if not isinstance(waveform, Scalable):
+    sized = _sized(waveform, wish, total=total, finer=finer)
+    if sized is None or not isinstance(waveform, Scalable):
         return None
-    tail = max(total - waveform.duration, 0.0)
-    first = Stimulus(waveform=waveform, fs=wish.fs, unit=wish.limits.unit, tail=tail)
-    gain = needed_gain(first.position, wish, finer=finer)
-    if not math.isfinite(gain) or gain <= 0.0:
-        return None
+    first, gain = sized
     stimulus = replace(first, waveform=waveform.scaled(gain))
     return Candidate(
         family=family,
@@ -149,3 +146,39 @@ def try_out(
         value=gentleness(stimulus, wish.gentle),
         shape=shape,
     )
+
+
+def cost_of(waveform: Waveform, wish: Wish, *, total: float) -> tuple[float, float] | None:
+    """Share of the limits and value that `try_out` would find, without making the stimulus.
+
+    Both grow with the gain, the duration aside, so that the stimulus of gain 1 tells them.
+
+    Parameters
+    ----------
+    waveform, wish, total
+        As in `try_out`.
+
+    Returns
+    -------
+    tuple of float, or None
+        Largest share of a limit; what is to be small. None if no gain will do.
+    """
+    sized = _sized(waveform, wish, total=total, finer=1)
+    if sized is None:
+        return None
+    first, gain = sized
+    value = gentleness(first, wish.gentle)
+    use = gain * wish.limits.use(first.peaks)
+    return use, value if wish.gentle == "duration" else gain * value
+
+
+def _sized(
+    waveform: Waveform, wish: Wish, *, total: float, finer: int
+) -> tuple[Stimulus, float] | None:
+    """The stimulus as it stands, and the gain at which it is as accurate as wanted."""
+    if not isinstance(waveform, Scalable):
+        return None
+    tail = max(total - waveform.duration, 0.0)
+    first = Stimulus(waveform=waveform, fs=wish.fs, unit=wish.limits.unit, tail=tail)
+    gain = needed_gain(first.position, wish, finer=finer)
+    return (first, gain) if math.isfinite(gain) and gain > 0.0 else None

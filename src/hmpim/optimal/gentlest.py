@@ -1,5 +1,6 @@
 """The gentlest stimulus that buys a wanted accuracy (section III's trade, solved)."""
 
+import itertools
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -10,7 +11,7 @@ from hmpim.optimal.candidate import Candidate, gentleness
 from hmpim.optimal.fisher import Errors, predict_errors
 from hmpim.optimal.multisine import best_multisine
 from hmpim.optimal.sweeps import best_sweep
-from hmpim.optimal.wish import Accuracy, Family, Gentle, ModelRange, RoughModel, Wish
+from hmpim.optimal.wish import Accuracy, Family, Gentle, ModelRange, RoughModel, Step, Wish
 from hmpim.stimulus import Limits, Stimulus
 from hmpim.stimulus.limits import three_digits
 
@@ -23,9 +24,11 @@ FAMILIES: tuple[Family, ...] = get_args(Family)
 
 _LENGTH = 10.0  # s; the paper's longer one
 _LONGEST = 60.0  # s, where the duration is to be short and no longest one is stated
+_TRIALS = 100  # of one search, roughly: for the progress that is told
 _ROUNDS = 8  # of the search for the shortest record
 _CLOSE = 0.01  # of the duration, to which the shortest is found
 _FULL = 1.0 + 1e-9
+_FREE = 0.98  # of a limit: what is below it is not shaped by it
 _ROOM = 1.05  # on what would do: another search may end in another, slightly worse minimum
 
 
@@ -164,8 +167,7 @@ def gentlest(
         raise ArgumentError(f"no family is given; choose of {list(FAMILIES)}")
     found: list[Candidate] = []
     for k, family in enumerate(chosen):
-        _tell(progress, k / len(chosen), family)
-        best = _best(family, wish)
+        best = _best(family, wish, step=_steps(progress, family, k, len(chosen)))
         if best is not None:
             found.append(best)
     found.sort(key=lambda c: (c.use > _FULL, c.value if c.use <= _FULL else c.use))
@@ -217,13 +219,24 @@ def trade(
     points = []
     shape = found.candidates[0]
     for k, factor in enumerate(factors):
-        _tell(progress, k / len(factors), f"errors times {factor:g}")
+        step = _steps(progress, f"errors times {factor:g}", k, len(factors))
         wish = replace(found.wish, accuracy=found.wish.accuracy.times(factor))
-        best = shape if factor == 1.0 else _best(found.family, wish, near=shape)
+        best = _rescaled(shape, factor, wish) or _best(found.family, wish, near=shape, step=step)
         inside = best is not None and best.use <= _FULL
         points.append(TradePoint(factor=factor, value=best.value if best and inside else None))
     _tell(progress, 1.0, "done")
     return tuple(points)
+
+
+def _rescaled(best: Candidate, factor: float, wish: Wish) -> Candidate | None:
+    """The stimulus for `factor` times the errors, where it has the shape of the best one.
+
+    Errors are inverse to its size; so where no limit shapes either, only the size differs.
+    """
+    free = wish.gentle != "duration" and max(best.use, best.use / factor) < _FREE
+    if factor != 1.0 and not free:
+        return None
+    return replace(best, use=best.use / factor, value=best.value / factor)
 
 
 def _tell(progress: Progress | None, share: float, what: str) -> None:
@@ -231,37 +244,56 @@ def _tell(progress: Progress | None, share: float, what: str) -> None:
         progress(share, what)
 
 
+def _steps(progress: Progress | None, what: str, part: int, parts: int) -> Step:
+    """Give what is to be called at each trial; it tells the share done, and never all of it."""
+    trials = itertools.count(1)
+
+    def step() -> None:
+        trial = next(trials)
+        _tell(progress, (part + trial / (trial + _TRIALS)) / parts, f"{what}, trial {trial}")
+
+    _tell(progress, part / parts, what)
+    return step
+
+
 def _errors(stimulus: Stimulus, model: RoughModel, wish: Wish) -> Errors:
     return predict_errors(stimulus, model=model, noise_std=wish.noise_std)
 
 
-def _best(family: Family, wish: Wish, *, near: Candidate | None = None) -> Candidate | None:
+def _best(
+    family: Family, wish: Wish, *, step: Step, near: Candidate | None = None
+) -> Candidate | None:
     """Best of a family, in the wish's duration or, where that is to be small, in the shortest.
 
     One that is beyond the limits takes the least share of them that was found.
     """
     if wish.gentle == "duration":
-        return _shortest(family, wish)
-    best = None if near is None else _at(family, wish, wish.duration, near)
+        return _shortest(family, wish, step)
+    best = None if near is None else _at(family, wish, wish.duration, near, step)
     if best is None or best.use > _FULL:
-        best = _at(family, wish, wish.duration, None)
+        best = _at(family, wish, wish.duration, None, step)
     if best is not None and best.use <= _FULL:
         return best
+    if wish.unlimited:
+        return best
     # limits come first: the least share of them, and on from there if that is inside
-    inside = _at(family, replace(wish, gentle="duration"), wish.duration, None)
+    inside = _at(family, replace(wish, gentle="duration"), wish.duration, None, step)
     if inside is None:
         return best
     inside = replace(inside, value=gentleness(inside.stimulus, wish.gentle))
     if inside.use > _FULL:
         return inside  # for limits in proportion, in proportion: what would do relies on it
-    return _better(inside, _at(family, wish, wish.duration, inside))
+    return _better(inside, _at(family, wish, wish.duration, inside, step))
 
 
-def _at(family: Family, wish: Wish, total: float, near: Candidate | None) -> Candidate | None:
+def _at(
+    family: Family, wish: Wish, total: float, near: Candidate | None, step: Step
+) -> Candidate | None:
     start = None if near is None else near.shape
     if family == "multisine":
-        return best_multisine(wish, total, start=start)
-    return best_sweep(wish, total, family=family, start=start, trials=60 if near is None else 25)
+        return best_multisine(wish, total, start=start, step=step)
+    trials = 60 if near is None else 25
+    return best_sweep(wish, total, family=family, start=start, trials=trials, step=step)
 
 
 def _better(one: Candidate | None, other: Candidate | None) -> Candidate | None:
@@ -272,7 +304,7 @@ def _better(one: Candidate | None, other: Candidate | None) -> Candidate | None:
     return min(both, key=lambda c: (c.use > _FULL, c.value if c.use <= _FULL else c.use))
 
 
-def _shortest(family: Family, wish: Wish) -> Candidate | None:
+def _shortest(family: Family, wish: Wish, step: Step) -> Candidate | None:
     """Close in on the duration at which the accuracy takes the limits in full.
 
     Errors fall with the root of the time; from there it is a secant between a duration that
@@ -285,9 +317,9 @@ def _shortest(family: Family, wish: Wish) -> Candidate | None:
     near: Candidate | None = None
     for _ in range(_ROUNDS):
         total = math.ceil(total * wish.fs - 1e-6) / wish.fs
-        best = _at(family, wish, total, near)
+        best = _at(family, wish, total, near, step)
         if near is not None and family == "multisine" and (best is None or best.use > _FULL):
-            best = _better(best, _at(family, wish, total, None))  # a second look costs little
+            best = _better(best, _at(family, wish, total, None, step))  # a second look costs little
         near = best or near
         tried = near if near is not None and _lasts(near, total, wish) else None
         if tried is not None and tried.use <= _FULL:

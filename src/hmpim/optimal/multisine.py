@@ -22,7 +22,7 @@ from scipy.optimize import linprog
 
 from hmpim.optimal.candidate import Candidate, try_out
 from hmpim.optimal.fisher import sensitivities
-from hmpim.optimal.wish import PARAMETERS, Wish
+from hmpim.optimal.wish import PARAMETERS, Step, Wish
 from hmpim.stimulus import RestToRest, SumOfSines
 from hmpim.stimulus.quintic import Quintic
 
@@ -36,6 +36,8 @@ _POINTS = 24  # per cycle of the highest line, at which peaks are held
 _INSIDE = 0.995  # of the limits, for what those points cannot see
 _PATIENCE = 5  # good steps
 _LITTLE = 2e-3  # of the cost: less gained in so many steps ends a descent
+_FIRST_ROWS = 4  # per unknown, that a linear programme is begun with
+_BROKEN = 1e-9  # of a bound: what a solution may exceed it by
 _FEWEST = 4  # lines that leave freedom beside the three conditions of rest
 
 
@@ -61,7 +63,8 @@ class _Programme:
             variance = np.diag(inverse)[asked]
             values.append(0.5 * np.log(variance) - np.log(wanted[asked]))
             column = inverse[:, asked]
-            slope = np.einsum("ap,bp,abi->pi", column, column, applied, optimize=True)
+            slope = np.tensordot(column, applied, axes=(0, 0))  # (p, 4, 2m)
+            slope = np.einsum("pb,pbi->pi", column.T, slope)
             slopes.append(-slope / variance[:, None])
         return np.concatenate(values), np.concatenate(slopes)
 
@@ -119,16 +122,48 @@ class _Programme:
             objective[:-1] = slope / size
             objective[-1] = 0.0
         reach = trust * np.maximum(np.abs(z), 0.2 * np.abs(z).max())
+        return _solved(
+            objective,
+            np.vstack(rows),
+            np.concatenate(right),
+            np.hstack([self.rest, np.zeros((3, 1))]),
+            (np.append(z - reach, 0.0), np.append(z + reach, math.inf)),
+        )
+
+
+def _solved(
+    objective: FloatArray,
+    rows: FloatArray,
+    right: FloatArray,
+    rest: FloatArray,
+    bounds: tuple[FloatArray, FloatArray],
+) -> FloatArray | None:
+    """Solve a linear programme of few unknowns and many rows, the last unknown left out.
+
+    Only the rows that bind are handed to the solver: those nearest to their bound first, then
+    those that the answer breaks, until it breaks none (cutting planes, J. E. Kelley, Journal
+    of SIAM 8, 1960). The optimum is that of all rows.
+    """
+    middle = np.append(0.5 * (bounds[0] + bounds[1])[:-1], 1.0)
+    held = np.zeros(len(right), dtype=bool)
+    held[np.argsort(right - rows @ middle)[: _FIRST_ROWS * objective.size]] = True
+    while True:
         solved = linprog(
             objective,
-            A_ub=np.vstack(rows),
-            b_ub=np.concatenate(right),
-            A_eq=np.hstack([self.rest, np.zeros((3, 1))]),
+            A_ub=rows[held],
+            b_ub=right[held],
+            A_eq=rest,
             b_eq=np.zeros(3),
-            bounds=[*zip(z - reach, z + reach, strict=True), (0.0, None)],
-            method="highs",
+            bounds=[*zip(*(side.tolist() for side in bounds), strict=True)],
+            method="highs-ds",
+            options={"presolve": False},
         )
-        return None if solved.x is None else np.asarray(solved.x[:-1])
+        if solved.x is None:
+            return None
+        broken = (rows @ solved.x > right + _BROKEN * (1.0 + np.abs(right))) & ~held
+        if not broken.any():
+            return np.asarray(solved.x[:-1])
+        held |= broken
 
 
 def multisine_lines(wish: Wish, moving: float) -> tuple[int, int]:
@@ -157,6 +192,7 @@ def best_multisine(
     start: FloatArray | None = None,
     starts: int = 3,
     steps: int = 40,
+    step: Step | None = None,
 ) -> Candidate | None:
     """Find the multisine that buys the accuracy most gently in `total` seconds.
 
@@ -172,6 +208,8 @@ def best_multisine(
         How many starts; phases differ, as the problem has many minima.
     steps : int
         Linear programmes for each start, at most.
+    step : callable, optional
+        Called at each of them.
 
     Returns
     -------
@@ -190,7 +228,7 @@ def best_multisine(
     if start is not None:
         begins = [_resized(start, lines)]
     for begin in begins:
-        found = _descend(programme, begin, steps)
+        found = _descend(programme, begin, steps, step)
         if found is not None and (best is None or programme.cost(found) < programme.cost(best)):
             best = found
     if best is None:
@@ -199,12 +237,16 @@ def best_multisine(
     return try_out(waveform, wish, family="multisine", total=total, shape=best, finer=3)
 
 
-def _descend(programme: _Programme, begin: FloatArray, steps: int) -> FloatArray | None:
+def _descend(
+    programme: _Programme, begin: FloatArray, steps: int, step: Step | None
+) -> FloatArray | None:
     rest = programme.rest
     z = begin - rest.T @ np.linalg.solve(rest @ rest.T, rest @ begin)
     cost, trust = programme.cost(z), 0.3
     costs = [cost]
     for _ in range(steps):
+        if step is not None:
+            step()
         z = z * math.exp(float(programme.log_ratios(z)[0].max()))
         trial = programme.step(z, trust)
         reached = math.inf if trial is None else programme.cost(trial)

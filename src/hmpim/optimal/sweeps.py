@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize
 
 from hmpim.errors import HmpimError
-from hmpim.optimal.candidate import Candidate, try_out
-from hmpim.optimal.wish import Family, Wish
+from hmpim.optimal.candidate import Candidate, cost_of, try_out
+from hmpim.optimal.wish import Family, Step, Wish
 from hmpim.stimulus import ExponentialSweep, Limits, RestToRest, Sweep, rest_to_rest
 
 __all__ = ["best_sweep"]
@@ -23,6 +23,7 @@ FloatArray = NDArray[np.float64]
 _DEAREST = 1e3  # log of the cost of what cannot be made
 _DEAR = 5.0  # power of the excess over a limit
 _EXTINCTIONS = (0.0, 4.0)
+_LENGTHS = 6  # tried until one fills the record
 _LOWEST_CYCLES = 1.0  # that a sweep makes at least, as a lead needs
 
 
@@ -33,6 +34,7 @@ def best_sweep(
     family: Family = "sweep",
     start: FloatArray | None = None,
     trials: int = 60,
+    step: Step | None = None,
 ) -> Candidate | None:
     """Find the sweep that buys the accuracy most gently in `total` seconds.
 
@@ -49,13 +51,15 @@ def best_sweep(
         of the band (Hz), extinction.
     trials : int
         At most so many from each start.
+    step : callable, optional
+        Called at each trial.
 
     Returns
     -------
     Candidate or None
         None if no sweep of that length can be made.
     """
-    search = _Search(wish, total, family)
+    search = _Search(wish, total, family, step)
     natural = wish.model.natural_frequency
     begins = [start] if start is not None else list(_starts(natural, total, family))
     found: list[tuple[float, FloatArray]] = []
@@ -90,44 +94,54 @@ def _starts(natural: float, total: float, family: Family) -> list[FloatArray]:
 class _Search:
     """Trials of one family at one length; remembers how long the leads of the last one were."""
 
-    def __init__(self, wish: Wish, total: float, family: Family) -> None:
+    def __init__(self, wish: Wish, total: float, family: Family, step: Step | None) -> None:
+        self._step = step
         self._wish = wish
         self._total = total
         self._family: Family = family
         self._leads = 0.5 / wish.model.natural_frequency
 
     def candidate(self, shape: FloatArray, *, finer: int = 1) -> Candidate | None:
-        """Stimulus of this shape that fills the record to its last sample."""
-        waveform = None
-        for _ in range(6):
+        """Stimulus of this shape that fills the record, to its last sample where leads allow.
+
+        Where a lead hands over jumps with the length of the sweep, so that two lengths may call
+        for each other in turn: the longer of those that fit is taken then.
+        """
+        fits, longest = None, -math.inf
+        for _ in range(_LENGTHS):
             waveform = self._led(shape)
             if waveform is None:
-                return None
+                break
             over = waveform.duration + self._wish.tail - self._total
-            if -1.5 / self._wish.fs < over <= 1e-9:
+            if longest < over <= 1e-9:
+                fits, longest = waveform, over
+            if longest > -1.5 / self._wish.fs:
                 break
             self._leads += over + (0.5 / self._wish.fs if over > 0 else 0.0)
-        if waveform is None or waveform.duration > self._total:
+        if fits is None:
             return None
         return try_out(
-            waveform, self._wish, family=self._family, total=self._total, shape=shape, finer=finer
+            fits, self._wish, family=self._family, total=self._total, shape=shape, finer=finer
         )
 
     def cost(self, shape: FloatArray) -> float:
         """Logarithm of what is to be small, dearer beyond the limits."""
+        if self._step is not None:
+            self._step()
         waveform = self._led(shape)
         if waveform is None:
             return _DEAREST
         length = waveform.duration + self._wish.tail
         self._leads += length - self._total
-        tried = try_out(waveform, self._wish, family=self._family, total=length, shape=shape)
+        tried = cost_of(waveform, self._wish, total=length)
         if tried is None:
             return _DEAREST
+        use, value = tried
         # the record is a little too long or short: its information goes with its length
         even = 0.5 * math.log(length / self._total)
         if self._wish.gentle == "duration":
-            return math.log(tried.use) + even
-        return math.log(tried.value) + even + _DEAR * max(math.log(tried.use), 0.0)
+            return math.log(use) + even
+        return math.log(value) + even + _DEAR * math.log(max(use, 1.0))
 
     def _led(self, shape: FloatArray) -> RestToRest | None:
         low = math.exp(min(float(shape[0]), 20.0))

@@ -2,6 +2,7 @@
 
 import itertools
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal
 
@@ -11,13 +12,25 @@ from hmpim.errors import ArgumentError
 from hmpim.model import Model
 from hmpim.stimulus import Limits
 
-__all__ = ["PARAMETERS", "Accuracy", "Family", "Gentle", "ModelRange", "RoughModel", "Wish"]
+__all__ = [
+    "PARAMETERS",
+    "Accuracy",
+    "Family",
+    "Gentle",
+    "ModelRange",
+    "RoughModel",
+    "Step",
+    "Wish",
+]
 
 Gentle = Literal["peak_acceleration", "rms_acceleration", "travel", "duration"]
 """What is kept small: peak or r.m.s. acceleration, distance moved in all, or time."""
 
 Family = Literal["sweep", "exponential", "multisine"]
 """Kinds of stimulus that are tried."""
+
+Step = Callable[[], None]
+"""Called at each trial of a search, so that who waits can see it move."""
 
 PARAMETERS = ("delay", "natural_frequency", "damping_ratio", "scale_factor")
 """Parameters an accuracy may be asked of, in the order used throughout."""
@@ -298,8 +311,7 @@ class Wish:
                 f"gentle = {self.gentle!r} is not known; use 'peak_acceleration', "
                 "'rms_acceleration', 'travel' or 'duration'"
             )
-        bounds = self.limits.position, self.limits.velocity, self.limits.acceleration
-        if self.gentle == "duration" and math.isinf(min(bounds)):
+        if self.gentle == "duration" and self.unlimited:
             raise ArgumentError(
                 "no limit is finite, so any accuracy takes no time at all; "
                 "give a position, velocity or acceleration limit"
@@ -314,6 +326,12 @@ class Wish:
     def models(self, *, finer: int = 1) -> tuple[RoughModel, ...]:
         """Models over the range, the accuracy being wanted of each."""
         return self.model_range.models(self.model, finer=finer)
+
+    @property
+    def unlimited(self) -> bool:
+        """Whether nothing bounds position, velocity or acceleration."""
+        limits = self.limits
+        return math.isinf(min(limits.position, limits.velocity, limits.acceleration))
 
     @property
     def tail(self) -> float:

@@ -15,7 +15,7 @@ from hmpim.plots.style import (
     finish_axes,
     new_figure,
 )
-from hmpim.units import rate_unit
+from hmpim.units import rate_label
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -55,7 +55,7 @@ def time_histories(stimulus: "Stimulus") -> "Figure":
         if limit is not None and np.isfinite(limit):
             draw_level(panel, (-limit, limit), label="limit")
         last = "Time (s)" if order == 2 else ""
-        finish_axes(panel, x=last, y=axis_label(quantity, rate_unit(stimulus.unit, order)))
+        finish_axes(panel, x=last, y=axis_label(quantity, rate_label(stimulus.unit, order)))
     if axes[0].get_legend_handles_labels()[0]:
         draw_legend(axes[0])
     figure.align_ylabels(axes)

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hmpim.plots.style import COLOURS, FONT_SIZE, draw_legend, draw_line, finish_axes, new_figure
-from hmpim.units import rate_unit
+from hmpim.units import rate_label
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -32,7 +32,7 @@ def gentle_label(gentle: "Gentle", unit: str) -> str:
     ('Distance moved (deg)', 'Peak acceleration (deg/s²)')
     """
     orders = {"peak_acceleration": 2, "rms_acceleration": 2, "travel": 0}
-    of = "s" if gentle == "duration" else rate_unit(unit, orders[gentle])
+    of = "s" if gentle == "duration" else rate_label(unit, orders[gentle])
     return f"{_WORDS[gentle]} ({of or '–'})"
 
 

@@ -8,7 +8,7 @@ import numpy as np
 from hmpim.errors import ArgumentError, LimitsError
 from hmpim.stimulus.limits import QUANTITIES, Limits, three_digits
 from hmpim.stimulus.motion import FloatArray, Peaks
-from hmpim.units import rate_unit
+from hmpim.units import rate_label
 
 __all__ = ["Command", "check_resolution", "difference_peaks", "leave_room", "rounded"]
 
@@ -136,7 +136,7 @@ def leave_room(limits: Limits, *, resolution: float, fs: float) -> Limits:
         limit = getattr(limits, name)
         error = r * (0.5, 1.0, 2.0, 4.0)[order] * fs**order
         if error >= limit:
-            unit = rate_unit(limits.unit, order)
+            unit = rate_label(limits.unit, order)
             raise LimitsError(
                 f"rounding to {r:g} {limits.unit} at {fs:g} Hz alone can command {error:.4g} "
                 f"{unit} of {name}, and the limit is {limit:g} {unit}; a resolution of "

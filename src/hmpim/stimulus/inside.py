@@ -7,7 +7,7 @@ import numpy as np
 from hmpim.errors import LimitsError, UnitError
 from hmpim.stimulus.limits import QUANTITIES, Limits
 from hmpim.stimulus.stimulus import Stimulus
-from hmpim.units import conversion_factor, rate_unit
+from hmpim.units import conversion_factor, rate_label
 
 __all__ = ["check_inside"]
 
@@ -61,7 +61,7 @@ def check_inside(
         if math.isinf(limit):
             continue
         peak = factor * max(getattr(stimulus.peaks, quantity), sent[order])
-        shares.append((peak / limit, quantity, peak, limit, rate_unit(limits.unit, order)))
+        shares.append((peak / limit, quantity, peak, limit, rate_label(limits.unit, order)))
     share, quantity, peak, limit, unit = max(shares, default=(0.0, "", 0.0, 0.0, ""))
     if share > 1.0 + _ROUNDING:
         advice = (

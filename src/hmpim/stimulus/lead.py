@@ -27,10 +27,10 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 
 from hmpim.errors import ArgumentError, LimitsError
-from hmpim.stimulus.limits import Limits, three_digits
+from hmpim.stimulus.limits import QUANTITIES, Limits, three_digits
 from hmpim.stimulus.motion import FloatArray, Motion, Peaks, Piecewise, Scalable, Waveform
 from hmpim.stimulus.peaks import true_peaks
-from hmpim.stimulus.quintic import Quintic, between
+from hmpim.stimulus.quintic import Quintic, between, coefficients_between, largest
 from hmpim.stimulus.reverse import Reversed
 from hmpim.stimulus.sweep import Sweep
 
@@ -400,27 +400,30 @@ def _gentlest(
 ) -> Quintic | None:
     """The gentlest quintic beside its neighbour's peaks, of those that keep the limits."""
     scales = (beside.position / beside.velocity, beside.velocity / beside.acceleration)
+    neighbour = np.array([beside.position, beside.velocity, beside.acceleration])
+    bounds = np.array([getattr(limits, name) for name in QUANTITIES])
 
-    def harshness(log_duration: float) -> float:
-        candidate = between(first, last, start=0.0, duration=math.exp(log_duration))
-        peaks = candidate.peaks
-        use = limits.use(peaks)
-        if use > 1.0 + 1e-12:
-            return _BEYOND * use
-        return (
-            (peaks.position / beside.position) ** 2
-            + (peaks.velocity / beside.velocity) ** 2
-            + (peaks.acceleration / beside.acceleration) ** 2
-        )
+    def harshness(log_durations: FloatArray) -> FloatArray:
+        durations = np.exp(log_durations)
+        found = coefficients_between(first, last, duration=durations)
+        peaks = largest(np.stack(np.broadcast_arrays(*found), axis=1), durations)
+        use = (peaks / bounds[:, None]).max(axis=0)
+        shares = peaks[:3] / neighbour[:, None]
+        return np.asarray(np.where(use > 1.0 + 1e-12, _BEYOND * use, (shares**2).sum(axis=0)))
 
     low = math.log(0.3 * min(scales))
     high = min(math.log(20.0 * max(scales)), math.log(longest))
     grid = np.linspace(min(low, high - 1e-3), high, _CHOICES)
-    found = [harshness(float(g)) for g in grid]
+    found = harshness(grid)
     best = int(np.argmin(found))
     if found[best] >= _BEYOND:
         return None
     around = (float(grid[max(best - 1, 0)]), float(grid[min(best + 1, grid.size - 1)]))
-    finer = minimize_scalar(harshness, bounds=around, method="bounded", options={"xatol": 1e-9})
+    finer = minimize_scalar(
+        lambda at: float(harshness(np.array([at]))[0]),
+        bounds=around,
+        method="bounded",
+        options={"xatol": 1e-9},
+    )
     log_duration = float(finer.x) if finer.fun <= found[best] else float(grid[best])
     return between(first, last, start=0.0, duration=math.exp(log_duration))

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from hmpim.errors import ArgumentError
 from hmpim.stimulus.motion import Peaks
-from hmpim.units import check_unit, conversion_factor, rate_unit
+from hmpim.units import check_unit, conversion_factor, rate_label
 
 __all__ = ["QUANTITIES", "Limits", "three_digits"]
 
@@ -52,7 +52,7 @@ class Limits:
             except (TypeError, ValueError):
                 value = math.nan
             if isinstance(given, (str, bytes, bool)) or not value > 0:
-                shown = f"{given!r} {rate_unit(self.unit, order)}".rstrip()
+                shown = f"{given!r} {rate_label(self.unit, order)}".rstrip()
                 raise ArgumentError(
                     f"{name} limit = {shown} bounds nothing that could move; "
                     "give a positive number, or leave it out for no limit"

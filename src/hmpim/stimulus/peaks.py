@@ -67,10 +67,7 @@ def true_peaks(
             at = np.flatnonzero(near & left & right)
             low, high = np.maximum(at - _WIDE, 0), np.minimum(at + _WIDE, block.size - 1)
             brackets[k].append(np.stack((size[at], block[low], block[at], block[high])))
-    found = [
-        _closed_in(waveform, k, np.concatenate(brackets[k], axis=1), coarse[k])
-        for k in range(orders)
-    ]
+    found = _closed_in(waveform, [np.concatenate(b, axis=1) for b in brackets], coarse)
     jumping = _first_jump(waveform, found, start, end)
     found += [math.inf] * (4 - orders)
     found[jumping + 1 :] = [math.inf] * (3 - jumping)
@@ -78,25 +75,35 @@ def true_peaks(
     return Peaks(position=x, velocity=v, acceleration=a, jerk=j)
 
 
-def _closed_in(waveform: Waveform, order: int, brackets: FloatArray, coarse: float) -> float:
-    _, low, middle, high = brackets[:, brackets[0] >= _NEAR * coarse]
-    best = coarse
+def _closed_in(waveform: Waveform, brackets: list[FloatArray], coarse: FloatArray) -> list[float]:
+    """Largest value of each derivative within its brackets; one call of the waveform a round."""
+    around = [b[1:, b[0] >= _NEAR * top] for b, top in zip(brackets, coarse, strict=True)]
+    best = [float(top) for top in coarse]
+    orders = [k for k, top in enumerate(best) if top > 0.0]
     share = np.linspace(0.0, 1.0, 5)
-    for k in range(_ROUNDS if coarse > 0.0 else 0):
-        # the middle, the highest so far, is among them
-        left = low[:, None] + (middle - low)[:, None] * share[:-1]
-        right = middle[:, None] + (high - middle)[:, None] * share
-        times = np.concatenate((left, right), axis=1)
-        values = _magnitudes(waveform.motion(times.ravel()))[order].reshape(times.shape)
-        at = np.argmax(values, axis=1)
-        rows = np.arange(at.size)
-        best = max(best, float(values.max()))
-        # what a bracket can still hide shrinks 16-fold a round; 4-fold is the cautious bound
-        keep = values[rows, at] >= (1.0 - (1.0 - _NEAR) / 4.0**k) * best
-        low = times[rows, np.maximum(at - 1, 0)][keep]
-        middle = times[rows, at][keep]
-        high = times[rows, np.minimum(at + 1, times.shape[1] - 1)][keep]
-    return float(best)
+    for round_ in range(_ROUNDS if orders else 0):
+        times = []
+        for k in orders:
+            low, middle, high = around[k]
+            # the middle, the highest so far, is among them
+            left = low[:, None] + (middle - low)[:, None] * share[:-1]
+            right = middle[:, None] + (high - middle)[:, None] * share
+            times.append(np.concatenate((left, right), axis=1))
+        motion = waveform.motion(np.concatenate([at.ravel() for at in times]))
+        sizes = _magnitudes(motion)
+        first = 0
+        for k, at in zip(orders, times, strict=True):
+            values = sizes[k][first : first + at.size].reshape(at.shape)
+            first += at.size
+            top = np.argmax(values, axis=1)
+            rows = np.arange(top.size)
+            best[k] = max(best[k], float(values.max()))
+            # what a bracket can still hide shrinks 16-fold a round; 4-fold is the cautious bound
+            keep = values[rows, top] >= (1.0 - (1.0 - _NEAR) / 4.0**round_) * best[k]
+            last = at.shape[1] - 1
+            columns = (np.maximum(top - 1, 0), top, np.minimum(top + 1, last))
+            around[k] = np.stack([at[rows, column][keep] for column in columns])
+    return best
 
 
 def _magnitudes(motion: Motion) -> list[FloatArray]:

@@ -16,7 +16,7 @@ from hmpim.stimulus.motion import Peaks
 from hmpim.stimulus.peaks import true_peaks
 from hmpim.stimulus.scale import KEEP
 from hmpim.stimulus.sweep import Sweep
-from hmpim.units import rate_unit
+from hmpim.units import rate_label
 
 __all__ = ["largest_gain", "smallest_extinction", "sweep_peaks"]
 
@@ -177,7 +177,7 @@ def _what_would_do(search: _Search, n: float) -> str:
     for order, name in enumerate(QUANTITIES[1:], start=1):
         peak, limit = gain * getattr(peaks, name), getattr(limits, name)
         if math.isfinite(limit) and peak > limit:
-            needs.append(_need(peak, limit, rate_unit(unit, order)))
+            needs.append(_need(peak, limit, rate_label(unit, order)))
     sweep = search.make(n)
     return (
         f"limits are too tight for {sweep.band[0]:g} to {sweep.band[1]:g} Hz in "

@@ -22,7 +22,7 @@ from hmpim.stimulus.motion import FloatArray
 from hmpim.stimulus.multisine import Multisine
 from hmpim.stimulus.stimulus import Stimulus
 from hmpim.stimulus.sweep import check_band, check_positive
-from hmpim.units import rate_unit
+from hmpim.units import rate_label
 
 __all__ = [
     "OverFrequency",
@@ -387,7 +387,7 @@ def _other_designs(
 
     larger = _first_that_does(limit, 10.0 ** (lack / 20.0), _MOST, with_limit)
     if larger:
-        unit = rate_unit(limits.unit, QUANTITIES.index(binding))
+        unit = rate_label(limits.unit, QUANTITIES.index(binding))
         advice.append(f"{binding} limit {larger} {unit}".rstrip())
     longer = _first_that_does(redesign.duration, 10.0 ** (lack / 10.0), _LONGEST, with_duration)
     if longer:

@@ -18,7 +18,7 @@ from hmpim.stimulus.reverse import Reversed
 from hmpim.stimulus.sampled import SampledMotion
 from hmpim.stimulus.solve import sweep_peaks
 from hmpim.stimulus.sweep import Sweep, check_positive
-from hmpim.units import check_unit, rate_unit
+from hmpim.units import check_unit, rate_label
 
 __all__ = ["Stimulus", "blocks"]
 
@@ -277,7 +277,7 @@ def _keep(peaks: Peaks, limits: Limits, *, what: str = "") -> None:
     for order, name in enumerate(QUANTITIES):
         peak, limit = getattr(peaks, name), getattr(limits, name)
         if math.isfinite(limit) and peak > limit * (1.0 + 1e-9):
-            bound = f"{limit:g} {rate_unit(limits.unit, order)}".rstrip()
+            bound = f"{limit:g} {rate_label(limits.unit, order)}".rstrip()
             if math.isinf(peak):
                 raise LimitsError(
                     f"{what}peak {name} is infinite, for the waveform jumps, and the limit is "

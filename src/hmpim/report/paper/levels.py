@@ -23,7 +23,7 @@ from hmpim.report.paper.chapter import Chapter
 from hmpim.report.paper.panels import grid_figure, wide_figure
 from hmpim.report.paper.rows import Row, agreement, shown
 from hmpim.stimulus import Limits, Stimulus, design
-from hmpim.units import rate_unit
+from hmpim.units import rate_label
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -113,9 +113,9 @@ def _rows_12(sweeps: dict[float, Stimulus]) -> list[Row]:
             figure=12,
             where="Fig. 12",
             quantity=f"Peak {quantity}, T = {T:g} s",
-            paper=f"≤ {limit:g} {rate_unit('deg', order)}",
+            paper=f"≤ {limit:g} {rate_label('deg', order)}",
             value=getattr(stimulus.peaks, quantity),
-            unit=rate_unit("deg", order),
+            unit=rate_label("deg", order),
             why="The paper prints the limit; "
             f"{100 * getattr(stimulus.peaks, quantity) / limit:.0f} % of it is used.",
         )
@@ -270,7 +270,7 @@ def _level_figure(stimulus: Stimulus) -> "Figure":
         if limits is not None:
             bound = getattr(limits, quantity)
             draw_level(axes, (-bound, bound), label="limit")
-        label = axis_label(quantity.capitalize(), rate_unit(stimulus.unit, order))
+        label = axis_label(quantity.capitalize(), rate_label(stimulus.unit, order))
         finish_axes(axes, x="Time (s)" if order == 2 else "", y=label)
     draw_legend(upper[0])
     band = stimulus.band or (0.1, stimulus.fs / 2)
