@@ -1,6 +1,7 @@
 """Every figure of docs/accuracy.md, from scratch: `make accuracy`.
 
-`--share 0.05` makes a reduced study with the same code, as CI does.
+`--share 0.05` makes a reduced study with the same code, as CI does; `--only families` makes one
+section again and leaves the others.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from pathlib import Path
 import five_axes
 import nonlinearity
 import numpy as np
+from families.page import section as family_section
 from rich.progress import Progress
 from scipy.signal import lfilter
 
@@ -476,7 +478,50 @@ def field_row(seed: int = 0) -> list[str]:
 # --- the page ----------------------------------------------------------------------------------
 
 
-def study(share: float, progress: Progress) -> Iterable[tuple[str, list[str]]]:
+Section = Callable[[Callable[[int], int], Callable], list[str]]
+
+SECTIONS: dict[str, tuple[str, Section]] = {
+    "tools": ("The record every tool is compared on", lambda size, mapped: field_row()),
+    "bound": ("At the Cramér-Rao bound", lambda size, mapped: at_the_bound(size(2000), mapped)),
+    "colour": (
+        "Intervals under coloured noise",
+        lambda size, mapped: coloured(size(1000), mapped),
+    ),
+    "effects": ("Sensor effects", lambda size, mapped: sensor_effects(size(100), mapped)),
+    "random": (
+        "Random systems, no hints",
+        lambda size, mapped: random_systems(size(500), mapped),
+    ),
+    "response": (
+        "Frequency response",
+        lambda size, mapped: frequency_response(size(300), mapped),
+    ),
+    "nonlinearity": (
+        "Nonlinearity",
+        lambda size, mapped: nonlinearity.section(size(300), mapped),
+    ),
+    "axes": (
+        "Five inputs and outputs at once",
+        lambda size, mapped: five_axes.section(size(40), mapped),
+    ),
+    "repeats": ("Repeats", lambda size, mapped: five_axes.repeats(size(200), mapped)),
+    "hardware": ("Measured hardware", lambda size, mapped: hardware()),
+    "inputs": ("Three inputs at once", lambda size, mapped: several_inputs()),
+    "cost": ("Cost", lambda size, mapped: cost()),
+    "families": ("Families of records", lambda size, mapped: families(size)),
+}
+"""Word for --only: heading, and what makes the lines."""
+
+
+def families(size: Callable[[int], int]) -> list[str]:
+    """50 draws of each; a reduced study takes a few draws of a few families."""
+    full = size(1000) >= 1000
+    return family_section(50 if full else 2, jobs=os.cpu_count() or 1, every=1 if full else 12)
+
+
+def study(
+    words: Iterable[str], share: float, progress: Progress
+) -> Iterable[tuple[str, list[str]]]:
     def size(full: int) -> int:
         return max(int(full * share), 10)
 
@@ -490,18 +535,18 @@ def study(share: float, progress: Progress) -> Iterable[tuple[str, list[str]]]:
                 progress.advance(task)
             return found
 
-        yield "The record every tool is compared on", field_row()
-        yield "At the Cramér-Rao bound", at_the_bound(size(2000), mapped)
-        yield "Intervals under coloured noise", coloured(size(1000), mapped)
-        yield "Sensor effects", sensor_effects(size(100), mapped)
-        yield "Random systems, no hints", random_systems(size(500), mapped)
-        yield "Frequency response", frequency_response(size(300), mapped)
-        yield "Nonlinearity", nonlinearity.section(size(300), mapped)
-        yield "Five inputs and outputs at once", five_axes.section(size(40), mapped)
-        yield "Repeats", five_axes.repeats(size(200), mapped)
-    yield "Measured hardware", hardware()
-    yield "Three inputs at once", several_inputs()
-    yield "Cost", cost()
+        for word in words:
+            title, make = SECTIONS[word]
+            yield title, make(size, mapped)
+
+
+def put(page: str, title: str, body: str) -> str:
+    """A page with one section replaced, or added at the end."""
+    before, found, rest = page.partition(f"## {title}\n")
+    after = rest.partition("\n## ") if found else ("", "", "")
+    following = f"## {after[2]}" if after[1] else ""
+    parts = [before.rstrip("\n"), body.strip("\n"), following.rstrip("\n")]
+    return "\n\n".join(part for part in parts if part) + "\n"
 
 
 HEAD = """# Accuracy
@@ -516,13 +561,20 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--share", type=float, default=1.0, help="share of the full study")
     parser.add_argument("--out", type=Path, default=Path("docs/accuracy.md"))
+    parser.add_argument(
+        "--only", default="", help=f"make these sections again, with commas: {', '.join(SECTIONS)}"
+    )
     options = parser.parse_args()
+    words = [word.strip() for word in options.only.split(",") if word.strip()] or list(SECTIONS)
+    for word in words:
+        if word not in SECTIONS:
+            parser.error(f"no section is called {word!r}; choose of {', '.join(SECTIONS)}")
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    parts = [HEAD]
+    page = options.out.read_text(encoding="utf-8") if options.only else HEAD
     with Progress(transient=True) as progress:
-        for title, lines in study(options.share, progress):
-            parts.append(f"## {title}\n\n" + "\n".join(lines) + "\n")
-    options.out.write_text("\n".join(parts), encoding="utf-8")
+        for title, lines in study(words, options.share, progress):
+            page = put(page, title, f"## {title}\n\n" + "\n".join(lines))
+    options.out.write_text(page, encoding="utf-8")
     print(f"wrote {options.out}")
 
 

@@ -1,22 +1,19 @@
 """How right `hmpim.identify` is, family by family of records.
 
 python benchmarks/families [--families NAME,...] [--draws N] [--seed S] [--jobs 2]
-                           [--json OUT] [--against OLD] [--list]
+                           [--json OUT] [--against OLD] [--list] [--explain INDEX]
 """
 
 from __future__ import annotations
 
 import argparse
-import json
 import os
 import sys
 from pathlib import Path
 
 
-def main() -> int:
-    from families.catalogue import FAMILIES
-    from families.study import SEED, run
-    from families.table import markdown, moved, summary
+def arguments() -> argparse.Namespace:
+    from families.study import SEED
 
     parser = argparse.ArgumentParser(
         prog="python benchmarks/families", description=__doc__.split("\n")[0]
@@ -27,48 +24,54 @@ def main() -> int:
         "--seed", type=int, default=SEED, help=f"another seed, other draws ({SEED})"
     )
     parser.add_argument("--jobs", type=int, default=2, help="processes (2)")
-    parser.add_argument("--json", type=Path, help="write counts, and every draw, here")
+    parser.add_argument("--json", type=Path, help="write the counts here")
+    parser.add_argument("--detail", type=Path, help="write every draw here, figure by figure")
     parser.add_argument("--against", type=Path, help="an earlier --json: say what moved")
     parser.add_argument("--list", action="store_true", help="name the families")
+    parser.add_argument("--explain", type=int, help="one draw, figure by figure, beside its truth")
     parser.add_argument(
         "--no-options", action="store_true", help="do not tell identify what it could be told"
     )
-    given = parser.parse_args()
-    wanted = [part.strip() for part in given.families.split(",") if part.strip()]
-    names = [n for n in FAMILIES if not wanted or n in wanted]
-    for part in wanted:
-        if part not in FAMILIES:
-            found = [n for n in FAMILIES if part.lower() in n.lower()]
-            if not found:
-                parser.error(f"no family is called {part!r}; --list names them")
-            names += [n for n in found if n not in names]
+    return parser.parse_args()
+
+
+def main() -> int:
+    from families import study, table
+    from families.catalogue import FAMILIES, named
+
+    given = arguments()
+    try:
+        names = named(given.families)
+    except KeyError as error:
+        print(f"no family is called {error}; --list names them", file=sys.stderr)
+        return 2
     if given.list:
         for name in names:
             print(f"{name:32s}{FAMILIES[name].words}")
         return 0
+    told = not given.no_options
+    if given.explain is not None:
+        for name in names:
+            print("\n".join(study.explained(name, given.seed, given.explain, options=told)))
+        return 0
 
     def tell(name: str, scores: list) -> None:
-        row = summary(scores)
-        print(f"{name}: {row['cells']}, {row['seconds'][1]} s at most", file=sys.stderr, flush=True)
+        cells = table.summary(scores)["cells"]
+        print(f"{name}: " + ", ".join(f"{n} {cell}" for cell, n in cells.items() if n),
+              file=sys.stderr, flush=True)  # fmt: skip
 
-    scores = run(
-        names,
-        draws=given.draws,
-        seed=given.seed,
-        jobs=given.jobs,
-        options=not given.no_options,
-        tell=tell,
+    scores = study.run(
+        names, draws=given.draws, seed=given.seed, jobs=given.jobs, options=told, tell=tell
     )
-    rows = {name: summary(found) for name, found in scores.items()}
-    print("\n".join(markdown(rows)))
+    rows = {name: table.summary(found) for name, found in scores.items()}
+    print("\n".join(table.markdown(rows)))
     if given.json:
-        draws = {name: [s.plain() for s in found] for name, found in scores.items()}
-        kept = {"seed": given.seed, "families": rows, "draws": draws}
-        given.json.write_text(json.dumps(kept, allow_nan=True) + "\n", encoding="utf-8")
+        table.write(rows, given.json, seed=given.seed)
+    if given.detail:
+        table.write_detail(scores, given.detail)
     if given.against:
-        old = json.loads(given.against.read_text(encoding="utf-8"))["families"]
-        print("\nMoved since " + str(given.against) + ", in percent:\n")
-        print("\n".join(moved(rows, old)))
+        print(f"\nMoved since {given.against}, in percent:\n")
+        print("\n".join(table.moved(rows, table.read(given.against))))
     return 0
 
 

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from families.noise import Noise
 
-__all__ = ["derivatives", "information", "propagated", "spread"]
+__all__ = ["Information", "derivatives", "information", "propagated", "spread"]
 
 Output = Callable[[np.ndarray], np.ndarray]
 
@@ -24,33 +25,58 @@ def derivatives(output: Output, vector: np.ndarray, steps: np.ndarray) -> np.nda
     return np.stack(columns, axis=-1)
 
 
-def information(
-    rows: np.ndarray, noise: Noise, *, valid: np.ndarray | None, nuisances: np.ndarray | None = None
-) -> np.ndarray:
-    """Covariance of the parameters, shape (p, p), nuisances fitted with them.
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Information:
+    """What n samples say of p parameters, q nuisances fitted with them.
 
-    A direction that the record does not see gets an infinite variance.
+    Parameters
+    ----------
+    covariance : ndarray, shape (p, p)
+        The bound; infinite for a direction that the record does not see.
+    rows : ndarray, shape (n, p + q)
+        Derivatives of the output.
+    gain : ndarray, shape (p + q, n)
+        The best linear estimator: from what is left over to how far the parameters move.
     """
+
+    covariance: np.ndarray
+    rows: np.ndarray
+    gain: np.ndarray
+
+
+def information(
+    rows: np.ndarray,
+    noise: Noise,
+    *,
+    valid: np.ndarray | None = None,
+    nuisances: Sequence[np.ndarray] = (),
+) -> Information:
+    """The Cramér-Rao bound in Gaussian noise of a known covariance, of the valid samples."""
     count = rows.shape[1]
-    full = rows if nuisances is None else np.hstack([rows, nuisances])
+    full = np.column_stack([rows, *nuisances])
     size = np.linalg.norm(full, axis=0)
     size[size == 0] = 1.0
     scaled = full / size
     if noise.is_white:
-        kept = scaled if valid is None else scaled[valid]
-        _, s, v = np.linalg.svd(kept, full_matrices=False)
-        s = s / np.sqrt(noise.variance)
-        values, vectors = s**2, v.T
+        kept = scaled if valid is None else np.where(valid[:, None], scaled, 0.0)
+        left, s, v = np.linalg.svd(kept, full_matrices=False)
+        seen = s > 1e-11 * s.max()
+        gain = (v[seen].T / s[seen]) @ left[:, seen].T
+        inverse = noise.variance * (v[seen].T / s[seen] ** 2) @ v[seen]
+        hidden = v[~seen]
     else:
-        fisher = scaled.T @ noise.solve(scaled, valid)
+        weighed = noise.solve(scaled, valid)
+        fisher = scaled.T @ weighed
         values, vectors = np.linalg.eigh((fisher + fisher.T) / 2)
-    floor = 1e-22 if noise.is_white else 1e-13
-    seen = values > floor * values.max()
-    inverse = (vectors[:, seen] / values[seen]) @ vectors[:, seen].T
-    if not seen.all():
-        hidden = np.sum(vectors[:, ~seen] ** 2, axis=1) > 1e-9
-        inverse[hidden, hidden] = np.inf
-    return (inverse / size / size[:, None])[:count, :count]
+        seen = values > 1e-13 * values.max()
+        inverse = (vectors[:, seen] / values[seen]) @ vectors[:, seen].T
+        gain = inverse @ weighed.T
+        hidden = vectors[:, ~seen].T
+    if hidden.size:
+        unseen = np.sum(hidden**2, axis=0) > 1e-9
+        inverse[unseen, unseen] = np.inf
+    covariance = (inverse / size / size[:, None])[:count, :count]
+    return Information(covariance=covariance, rows=full, gain=gain / size[:, None])
 
 
 def propagated(

@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from families import conditions as c
 from families import kinds as k
-from families.noise import Noise, pink, wander
-from families.take import Draw, Take, finish, shoot
+from families import made as m
+from families.noise import Noise, pink, vibration, wander, white
+from families.take import Draw, finish, shoot
 
-__all__ = ["FAMILIES", "Family"]
+__all__ = ["FAMILIES", "Family", "named"]
+
+Change = Callable[[np.random.Generator, k.System, k.Drive], k.System]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -25,8 +28,6 @@ class Family:
         How it is called, and what it is.
     draw : callable
         Makes one draw from a random generator.
-    one_sided : bool
-        Whether its interval is a hull or one-sided by design: 93 % are needed, and no upper end.
     most : int
         Draws it takes at most; 0 for as many as are asked for.
     """
@@ -34,7 +35,6 @@ class Family:
     name: str
     words: str
     draw: Callable[[np.random.Generator], Draw]
-    one_sided: bool = False
     most: int = 0
 
 
@@ -47,9 +47,7 @@ def family(
     snr: tuple[float, float] = (25.0, 60.0),
     colour: Callable[[np.random.Generator, int], Noise] | None = None,
     start: float = 0.0,
-    adjust: Callable[[Take], None] | None = None,
-    change: Callable | None = None,
-    one_sided: bool = False,
+    change: Change | None = None,
     most: int = 0,
 ) -> Family:
     """A linear system under an input, and what spoils the record.
@@ -64,15 +62,18 @@ def family(
         if change is not None:
             unit = change(rng, unit, signal)
         made = None if colour is None else colour(rng, signal.samples)
-        begin = np.round(start * signal.samples) / signal.fs
-        take = shoot(
-            rng, unit, signal, snr_db=float(rng.uniform(*snr)), colour=made, start=float(begin)
-        )
+        skipped = round(start * signal.samples)
+        if skipped:
+            low, high = signal.band
+            band = (low + start * (high - low), high)
+            signal = replace(signal, samples=signal.samples - skipped, band=band)
+        begin = skipped / signal.fs
+        take = shoot(rng, unit, signal, snr_db=float(rng.uniform(*snr)), colour=made, start=begin)
         for condition in spoil:
             condition(take)
         return finish(take)
 
-    return Family(name=name, words=words, draw=draw, one_sided=one_sided, most=most)
+    return Family(name=name, words=words, draw=draw, most=most)
 
 
 def delayed(low: float, high: float):
@@ -92,48 +93,254 @@ def ahead(rng: np.random.Generator, unit: k.System, drive: k.Drive) -> k.System:
     return unit.moved(vector)
 
 
-SECOND = k.second_order()
+def short_sweep(rng: np.random.Generator) -> k.Drive:
+    return k.sweep(samples=int(rng.integers(50, 121)))(rng)
 
-ALL = (
-    family("static", "A gain and a delay under a sweep", k.static, k.sweep()),
-    family("first order", "One lag under a sweep", k.first_order, k.sweep()),
-    family("second order", "ζ 0.15 to 1.4 under a sweep", SECOND, k.sweep()),
-    family("light damping", "ζ 0.02 to 0.1", k.second_order(0.02, 0.1), k.sweep()),
-    family("heavy damping", "ζ 1.5 to 6", k.second_order(1.5, 6.0), k.sweep()),
-    family("Butterworth", "Order 2 to 6", k.low_pass("butterworth"), k.sweep()),
-    family("Bessel", "Order 2 to 6", k.low_pass("bessel"), k.sweep()),
-    family("lead", "A zero below its pole", k.lead, k.sweep()),
-    family("lead-lag", "Two zeros between two poles", k.lead_lag, k.sweep()),
-    family("non-minimum phase", "A zero on the right", k.non_minimum_phase, k.sweep()),
-    family("notch", "A narrow notch in a second-order lag", k.notch, k.sweep()),
-    family("anti-resonance", "A dip between two modes", k.anti_resonance, k.sweep()),
-    family("two modes", "In parallel", k.modes(2, 2), k.sweep()),
-    family("integrator", "With a gain and a delay", k.integrator, k.sweep()),
-    family("washout", "Zero at DC", k.washout, k.sweep()),
-    family("differentiator", "Behind a second-order lag", k.differentiator, k.sweep()),
-    family("lag behind a resonance", "A third pole", k.lag_behind_resonance, k.sweep()),
-    family("white held", "White, held at the rate", SECOND, k.sequence("white")),
-    family("PRBS held", "Clocked slower than the rate", SECOND, k.sequence("prbs")),
-    family("white", "Band-limited, moving before the record", SECOND, k.lines()),
-    family("step", "One step, held", SECOND, k.shaped("step")),
-    family("doublet", "Held", SECOND, k.shaped("doublet")),
-    family("3-2-1-1", "Held", SECOND, k.shaped("3211")),
-    family("one sine", "One line, already going", SECOND, k.sines(1)),
-    family("mid-sweep", "The record begins in the sweep", SECOND, k.sweep(), start=0.25),
+
+def shaking(rng: np.random.Generator, _samples: int) -> Noise:
+    """Inside the band of most sweeps; 80 % of the power."""
+    return vibration(k.log_uniform(rng, 0.01, 0.08), 0.002, 0.8)
+
+
+def slow_disturbance(rng: np.random.Generator) -> Noise:
+    return wander(float(rng.uniform(0.9, 0.99)))
+
+
+def other(name: str, words: str, draw: m.Make) -> Family:
+    return Family(name=name, words=words, draw=draw)
+
+
+SECOND, FIRST = k.second_order(), k.first_order
+SWEEP = k.sweep()
+MIDDLE = k.sweep(samples=2000)
+
+SYSTEMS = (
+    family("static", "A gain and a delay", k.static, SWEEP),
+    family("first order", "One lag", FIRST, SWEEP),
+    family("second order", "ζ 0.15 to 1.4", SECOND, SWEEP),
+    family("light damping", "ζ 0.02 to 0.1", k.second_order(0.02, 0.1), SWEEP),
+    family("heavy damping", "ζ 1.5 to 6", k.second_order(1.5, 6.0), SWEEP),
+    family("Butterworth", "Order 2 to 6", k.low_pass("butterworth"), SWEEP),
+    family("Bessel", "Order 2 to 6", k.low_pass("bessel"), SWEEP),
+    family("lead", "A zero below its pole", k.lead, SWEEP),
+    family("lead-lag", "Two zeros between two poles", k.lead_lag, SWEEP),
+    family("second order with a zero", "In the left half plane", k.with_zero, SWEEP),
+    family("non-minimum phase", "A zero in the right half plane", k.non_minimum_phase, SWEEP),
+    family("notch", "A narrow one in a second-order lag", k.notch, SWEEP),
+    family("anti-resonance", "A dip between two modes", k.anti_resonance, SWEEP),
+    family("two modes", "In parallel", k.modes(2, 2), SWEEP),
+    family("three or four modes", "In parallel", k.modes(3, 4), MIDDLE),
+    family("five to eight modes", "In parallel", k.modes(5, 8), k.sweep(samples=4000)),
+    family("integrator", "With a gain and a delay", k.integrator, SWEEP),
+    family("integrator with a lag", "One pole more", k.lagging_integrator, SWEEP),
+    family("washout", "First order, zero at DC", k.washout, SWEEP),
+    family("AC-coupled", "A second-order sensor behind a capacitor", k.ac_coupled, SWEEP),
+    family("differentiator", "Behind a second-order lag", k.differentiator, SWEEP),
+    family("lag behind a resonance", "A third pole", k.lag_behind_resonance, SWEEP),
+)
+
+INPUTS = (
+    family(
+        "hmpim design", "Second order; the paper's sweep, rest to rest", SECOND, k.designed("hmpim")
+    ),
+    family("exponential sweep", "Second order; rest to rest", SECOND, k.designed("exponential")),
+    family("reversed sweep", "Second order; high to low", SECOND, k.designed("reversed")),
+    family("Schroeder design", "Second order; rest to rest", SECOND, k.designed("schroeder")),
+    family("random-phase design", "Second order; rest to rest", SECOND, k.designed("random_phase")),
+    family("smooth PRBS", "Second order; smooth transitions", SECOND, k.designed("prbs")),
+    family("smooth steps", "Second order; smooth transitions", SECOND, k.designed("steps")),
+    family("held sweep", "Second order; a converter at the rate", SECOND, k.sweep("zoh")),
+    family(
+        "held sweep, stated", "The same, and the record says so", SECOND, k.sweep("zoh"), c.stated
+    ),
+    family(
+        "sweep, slow converter",
+        "Second order; held for 2 to 5 samples",
+        SECOND,
+        k.slower_clock(k.sweep("zoh")),
+    ),
+    family("linear sweep", "Second order; straight between the samples", SECOND, k.sweep("foh")),
+    family("first order, held sweep", "A converter at the rate", FIRST, k.sweep("zoh")),
+    family("PRBS held", "Second order; clocked slower than the rate", SECOND, k.sequence("prbs")),
+    family(
+        "PRBS at the rate",
+        "Second order; it may change at every sample",
+        SECOND,
+        k.sequence("fast_prbs"),
+    ),
+    family(
+        "two lags, PRBS",
+        "ζ 1 to 3, held; the second pole hides as delay",
+        k.second_order(1.05, 3.0),
+        k.sequence("prbs"),
+    ),
+    family(
+        "Butterworth, PRBS", "Order 2 to 6, held", k.low_pass("butterworth"), k.sequence("prbs")
+    ),
+    family("lag behind a resonance, PRBS", "Held", k.lag_behind_resonance, k.sequence("prbs")),
+    family("white held", "Second order; held at the rate", SECOND, k.sequence("white")),
+    family("white", "Second order; band-limited, moving before the record", SECOND, k.lines()),
+    family("two modes, white", "Band-limited, moving before the record", k.modes(2, 2), k.lines()),
+    family("washout, white", "Band-limited, moving before the record", k.washout, k.lines()),
+    family("static, PRBS", "Held", k.static, k.sequence("prbs")),
+    family("step", "Second order; held", SECOND, k.shaped("step")),
+    family("first order, step", "Held", FIRST, k.shaped("step")),
+    family("doublet", "Second order; held", SECOND, k.shaped("doublet")),
+    family("integrator, doublet", "With a lag; held", k.lagging_integrator, k.shaped("doublet")),
+    family("3-2-1-1", "Second order; held", SECOND, k.shaped("3211")),
+    family("ramp", "Second order; straight between the samples", SECOND, k.shaped("ramp", "foh")),
+    family("impact", "ζ 0.02 to 0.2; one blow of a hammer", k.second_order(0.02, 0.2), k.impact),
+    family("human", "Second order; what a hand does", SECOND, k.lines("human")),
+    family("one sine", "Second order; one line, already going", SECOND, k.sines(1)),
+    family("four sines", "Second order; already going", SECOND, k.sines(4)),
+)
+
+BEGINNINGS = (
+    family("mid-sweep", "The record begins in the sweep", SECOND, SWEEP, start=0.25),
+    family(
+        "mid-sweep, light damping",
+        "ζ 0.02 to 0.1; it begins in the sweep",
+        k.second_order(0.02, 0.1),
+        SWEEP,
+        start=0.25,
+    ),
+    family(
+        "ringing", "The output rings from a step before the record", SECOND, k.after_a_step(SWEEP)
+    ),
+    family(
+        "periodic steady state",
+        "One to three whole Schroeder periods",
+        SECOND,
+        k.lines("schroeder", periodic=True),
+    ),
+    family(
+        "output at 1e7", "Output around ten million", SECOND, SWEEP, c.operating_point(both=False)
+    ),
+    family(
+        "both at 1e7",
+        "Input and output around ten million",
+        SECOND,
+        SWEEP,
+        c.operating_point(both=True),
+    ),
+    other("any unit", "Both channels times 1e-100 to 1e100", m.in_units(SECOND, SWEEP)),
+    family("ahead", "Delay -0.5 s to -0.02 s", SECOND, SWEEP, change=ahead),
+    family("long delay", "A tenth to half of the record", SECOND, SWEEP, change=delayed(0.1, 0.5)),
+    family(
+        "delay beyond half", "0.5 to 0.8 of the record", SECOND, k.lines(), change=delayed(0.5, 0.8)
+    ),
+    family("50 to 120 samples", "Second order", SECOND, short_sweep),
+    family("100 000 samples", "Second order", SECOND, k.sweep(samples=100_000), most=20),
+    family("1 000 000 samples", "Second order", SECOND, k.sweep(samples=1_000_000), most=5),
+)
+
+NOISE = (
+    family("noisy", "-10 to 10 dB", SECOND, SWEEP, snr=(-10, 10)),
+    family("clean", "80 to 120 dB", SECOND, SWEEP, snr=(80, 120)),
+    family(
+        "clean and held",
+        "80 to 120 dB; a converter at the rate",
+        SECOND,
+        k.sweep("zoh"),
+        snr=(80, 120),
+    ),
     family(
         "AR(0.99)",
         "Strongly coloured noise",
         SECOND,
-        k.sweep(samples=3000),
+        MIDDLE,
         colour=lambda rng, n: wander(0.99),
+        snr=(10, 50),
     ),
-    family("1/f", "Pink noise", SECOND, k.sweep(samples=3000), colour=lambda rng, n: pink(n)),
-    family("noisy", "-10 to 10 dB", SECOND, k.sweep(), snr=(-10, 10)),
+    family("1/f", "Pink noise", SECOND, MIDDLE, colour=lambda rng, n: pink(n), snr=(10, 50)),
+    family("mains", "Hum of 50 or 60 Hz", SECOND, MIDDLE, c.mains),
     family(
-        "output at 1e7", "A bias of ten million", SECOND, k.sweep(), c.operating_point(both=False)
+        "vibration",
+        "A narrow band of noise inside the swept band",
+        SECOND,
+        MIDDLE,
+        colour=shaking,
+        snr=(15, 40),
     ),
-    family("both at 1e7", "Input and output", SECOND, k.sweep(), c.operating_point(both=True)),
-    family("ahead", "Delay -0.5 s to -0.02 s", SECOND, k.sweep(), change=ahead),
+    family("spikes", "One sample in two hundred far out", SECOND, SWEEP, c.spikes),
+    family("missing", "One row in twenty is not there", SECOND, SWEEP, c.missing),
+    family("jitter", "The clock's stamps jitter by 5 %", SECOND, SWEEP, c.jitter),
+    family("drift", "The bias moves steadily", SECOND, SWEEP, c.drift("steady")),
+    family("thermal", "The bias warms up", SECOND, SWEEP, c.drift("thermal")),
+    family("noise on the input", "0.3 to 3 %", SECOND, SWEEP, c.input_noise),
+    family(
+        "held, noise on the input", "0.3 to 3 %, PRBS", SECOND, k.sequence("prbs"), c.input_noise
+    ),
+    family(
+        "dropped frames",
+        "3 % of the samples repeat the one before",
+        SECOND,
+        SWEEP,
+        c.repeated_frames,
+    ),
+    family("late frames", "The delay jitters by a tenth of a sample", SECOND, SWEEP, c.late_frames),
+    family("quantised", "Rounded", SECOND, SWEEP, c.quantised),
+    family("clipped", "5 to 30 % beyond one end", SECOND, SWEEP, c.clipped(both=False)),
+    family("clipped twice", "5 to 30 % beyond each end", SECOND, SWEEP, c.clipped(both=True)),
+    other("unrelated", "Noise beside a sweep: not identifiable", m.unrelated),
 )
 
-FAMILIES = {f.name: f for f in ALL}
+BENT = (
+    other("slew", "The servo's speed is limited", m.bent(m.slew, SECOND, SWEEP)),
+    other("dead zone", "On the input", m.bent(m.dead, SECOND, SWEEP)),
+    other("backlash", "On the output", m.bent(m.loose, SECOND, SWEEP)),
+    other("friction", "Dry", m.bent(m.rubbing, SECOND, SWEEP)),
+    other("cubic spring", "Hardening or softening", m.bent(m.hardening, SECOND, SWEEP)),
+)
+
+LOOPS = (
+    other(
+        "loop, sensor noise",
+        "Plant read from its loop, no reference",
+        m.loop(lambda rng: white(), reference=False, biased=False),
+    ),
+    other(
+        "loop, disturbed",
+        "Slow disturbance, no reference: biased, so never ok",
+        m.loop(slow_disturbance, reference=False, biased=True),
+    ),
+    other(
+        "loop, with reference",
+        "Slow disturbance, reference given",
+        m.loop(slow_disturbance, reference=True, biased=True),
+    ),
+    other("servo", "Reference to output of a loop with a delay inside", m.servo),
+)
+
+SOFTWARE = (
+    other("z^-k", "A whole number of samples late", m.program(m.pure_delay, SWEEP)),
+    other(
+        "z^-k, white", "The same under white numbers", m.program(m.pure_delay, k.sequence("white"))
+    ),
+    other("one-pole filter", "y += a (u - y), and late", m.program(m.one_pole, SWEEP)),
+    other("IIR filter", "Butterworth of order 1 to 4", m.program(m.low_pass, SWEEP)),
+    other(
+        "IIR filter, noisy input",
+        "The same, 40 to 70 dB on the output",
+        m.program(m.low_pass, k.sequence("white"), snr=(40, 70)),
+    ),
+    other("alpha-beta tracker", "Position estimate", m.program(m.tracker, SWEEP)),
+    other("smoother", "A moving average", m.program(m.smoother, SWEEP)),
+    other("several rates", "A task at every 2 to 8 samples", m.several_rates),
+    other("held output", "Updated on a slower clock of its own", m.held_output),
+    other("two clocks", "Input and output logged at rates of their own", m.two_clocks),
+)
+
+FAMILIES = {f.name: f for f in (*SYSTEMS, *INPUTS, *BEGINNINGS, *NOISE, *BENT, *LOOPS, *SOFTWARE)}
+
+
+def named(wanted: str) -> list[str]:
+    """Families called so, or that have it in their names; all of them for nothing."""
+    parts = [part.strip() for part in wanted.split(",") if part.strip()]
+    chosen = set() if parts else set(FAMILIES)
+    for part in parts:
+        found = [part] if part in FAMILIES else [n for n in FAMILIES if part.lower() in n.lower()]
+        if not found:
+            raise KeyError(part)
+        chosen.update(found)
+    return [name for name in FAMILIES if name in chosen]

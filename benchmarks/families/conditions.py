@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
+from scipy.interpolate import CubicSpline
 
+from families.simulate import linear_output
 from families.take import Figure, Take
 
 Condition = Callable[[Take], None]
@@ -58,14 +61,24 @@ def missing(take: Take) -> None:
     take.lose(~kept)
 
 
+def at_instants(take: Take, time: np.ndarray) -> np.ndarray:
+    """What the system puts out at any times, by a cubic through 32 points a sample."""
+    drive = take.drive
+    fine = replace(drive, fs=32 * drive.fs, samples=32 * (drive.samples + 2))
+    first = take.start - 1 / drive.fs
+    y = linear_output(take.system, fine, start=first)
+    return CubicSpline(first + np.arange(y.size) / fine.fs, y)(time)
+
+
 def jitter(take: Take) -> None:
     """Both channels are sampled when the computer gets round to it; the stamps say when."""
     step = 1 / take.drive.fs
     off = np.clip(take.rng.standard_normal(take.y.size) * 0.05, -0.4, 0.4) * step
     take.stamps = take.time + off
-    slope_y = np.gradient(take.clean) / step
-    take.y = take.y + slope_y * off
-    take.u = take.u + np.gradient(take.u) / step * off
+    moved = at_instants(take, take.stamps)
+    take.y = take.y + moved - take.clean
+    take.clean = moved
+    take.u = take.drive.source(take.stamps)
 
 
 def drift(kind: str) -> Condition:
@@ -112,11 +125,10 @@ def repeated_frames(take: Take) -> None:
 
 def late_frames(take: Take) -> None:
     """The delay jitters from frame to frame by a tenth of a sample; its mean is the truth."""
-    step = 1 / take.drive.fs
-    off = 0.1 * step * take.rng.standard_normal(take.y.size)
-    slope = np.gradient(take.clean) / step
-    take.y = take.y - slope * off
-    take.noise = take.noise.plus(float(np.mean((slope * 0.1 * step) ** 2)))
+    off = 0.1 * take.rng.standard_normal(take.y.size).clip(-4, 4) / take.drive.fs
+    moved = at_instants(take, take.time - off) - take.clean
+    take.y = take.y + moved
+    take.noise = take.noise.plus(float(np.var(moved)))
     take.absent.add("noise_std")
 
 
@@ -140,7 +152,8 @@ def clipped(*, both: bool) -> Condition:
         share = float(take.rng.uniform(0.05, 0.3))
         high = float(np.quantile(take.clean, 1 - share))
         low = float(np.quantile(take.clean, share)) if both else -np.inf
-        lost = (take.y > high) | (take.y < low)
+        margin = 3 * float(np.sqrt(take.noise.variance))
+        lost = (take.clean > high - margin) | (take.clean < low + margin)
         take.y = np.clip(take.y, low, high)
         take.lose(lost)
         for name, level in (("saturation_low", low), ("saturation_high", high)):

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable
+from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
 from scipy.signal import besselap, buttap
+from scipy.special import expit
 
 import hmpim
 from families.drive import Drive, Lines, Samples
@@ -239,6 +241,14 @@ def sweep(
     return make
 
 
+def sweep_to(rng: Rng, fs: float, samples: int, top: float) -> Drive:
+    """A plain sweep to a stated frequency."""
+    low, amplitude = fs / samples, log_uniform(rng, 0.5, 20.0)
+    low = min(low, 0.2 * top)
+    source = _swept(low, top, samples / fs, 0.0, amplitude)
+    return Drive(source=source, between="smooth", band=(low, top), fs=fs, samples=samples)
+
+
 def _swept(low: float, high: float, seconds: float, n: float, amplitude: float):
     a, b = 2 * np.pi * (high - low) / seconds, 2 * np.pi * low
     grid = np.linspace(0, seconds, 4000)
@@ -268,7 +278,7 @@ def sequence(
         amplitude = log_uniform(rng, 0.5, 20.0)
         before = 0 if quiet else count // 2
         total = before + count + 200
-        slow = int(rng.integers(2, 7)) if kind == "prbs" else 1
+        slow = int(rng.integers(2, 7)) if kind == "prbs" else 1  # 'fast_prbs': at the rate
         if kind == "white":
             values = rng.standard_normal(total)
         else:
@@ -335,7 +345,7 @@ def shaped(
     *,
     rates: tuple[float, ...] = RATES,
 ) -> MakeDrive:
-    """Step, doublet, 3-2-1-1, ramp or impact; the system's speed goes with the pulse's length."""
+    """Step, doublet, 3-2-1-1 or ramp; the system's speed goes with the pulse's length."""
 
     def make(rng: Rng) -> Drive:
         fs = float(rng.choice(rates))
@@ -345,7 +355,7 @@ def shaped(
         amplitude = log_uniform(rng, 0.5, 20.0)
         values = np.zeros(count + 400)
         pieces = {
-            "step": ((count, 1.0),),
+            "step": ((values.size, 1.0),),
             "doublet": ((2 * unit, 1.0), (2 * unit, -1.0)),
             "3211": ((3 * unit, 1.0), (2 * unit, -1.0), (unit, 1.0), (unit, -1.0)),
         }
@@ -356,10 +366,7 @@ def shaped(
         if kind == "ramp":
             rise = 6 * unit
             values[begin:] = np.minimum(np.arange(values.size - begin) / rise, 1.0)
-        if kind == "impact":
-            width = max(int(0.004 * fs), 3)
-            values[begin : begin + width] = np.sin(np.pi * (np.arange(width) + 0.5) / width)
-        top = {"impact": 0.3 / max(int(0.004 * fs), 3)}.get(kind, 1.5 / unit)
+        top = 1.5 / unit
         return Drive(
             source=Samples(amplitude * values, fs),
             between=between,
@@ -389,3 +396,45 @@ def sines(count_of_lines: int) -> MakeDrive:
         return Drive(source=source, between="smooth", band=band, fs=fs, samples=count, quiet=False)
 
     return make
+
+
+def impact(rng: Rng) -> Drive:
+    """One blow of a hammer, a few samples wide."""
+    fs, count = float(rng.choice(RATES)), length(rng)
+    at, width = float(rng.uniform(0.03, 0.1)) * count / fs, float(rng.uniform(1.5, 4)) / fs
+    amplitude = log_uniform(rng, 5.0, 200.0)
+
+    def source(time: np.ndarray) -> np.ndarray:
+        return amplitude * np.exp(-0.5 * ((time - at) / width) ** 2)
+
+    band = (2 * fs / count, 0.32 / width)
+    return Drive(source=source, between="smooth", band=band, fs=fs, samples=count)
+
+
+def after_a_step(make: MakeDrive) -> MakeDrive:
+    """The same input, begun while the output still rings from a step to where it starts."""
+
+    def made(rng: Rng) -> Drive:
+        drive = make(rng)
+        size = float(rng.uniform(0.5, 2)) * float(np.max(np.abs(drive.sampled())))
+        edge = 2.0 / drive.fs
+        before = float(rng.uniform(0.1, 0.5)) / drive.band[1] * 2 + 6 * edge
+
+        def source(time: np.ndarray) -> np.ndarray:
+            return drive.source(time) + size * expit((time + before) / (0.5 * edge))
+
+        return replace(drive, source=source, quiet=False)
+
+    return made
+
+
+def slower_clock(make: MakeDrive, low: int = 2, high: int = 5) -> MakeDrive:
+    """Sent through a converter that is slower than the record's clock."""
+
+    def made(rng: Rng) -> Drive:
+        drive = make(rng)
+        every = int(rng.integers(low, high + 1))
+        top = min(drive.band[1], 0.4 * drive.fs / every)
+        return replace(drive, between="zoh", every=every, band=(drive.band[0], top))
+
+    return made

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from typing import Any, Literal
 
 import numpy as np
@@ -23,13 +23,18 @@ FEW = 0.05
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Scored:
-    """One figure: its cell, whether its interval holds the truth (None: there is none)."""
+    """One figure: its cell, and whether its interval holds the truth (None: there is none).
+
+    `error` is in tolerances, `width` that of the 95 % interval in what would still count.
+    """
 
     cell: Cell
     ok: bool
     tellable: bool
     holds: bool | None
     error: float | None = None
+    width: float | None = None
+    hull: bool = False
 
 
 @dataclass(slots=True, kw_only=True)
@@ -44,9 +49,6 @@ class Score:
     seconds: float = 0.0
     failure: str = ""
 
-    def plain(self) -> dict[str, Any]:
-        return asdict(self)
-
 
 def score_figure(estimate: Any, truth: Figure, verdict: str) -> Scored:
     """Right, wrong or no answer.
@@ -56,30 +58,37 @@ def score_figure(estimate: Any, truth: Figure, verdict: str) -> Scored:
     unless it is called ok: then the tolerance alone decides. An interval wider than `widest`
     is no answer either.
     """
-    told = truth.tellable
     if estimate is None:
-        return Scored(cell="no_answer", ok=False, tellable=told, holds=None)
+        return Scored(cell="no_answer", ok=False, tellable=truth.tellable, holds=None)
     ok = getattr(estimate, "verdict", verdict) == "ok"
     error = float(estimate.value) - truth.value
     low, high = _interval(estimate)
-    holds = None
+    holds = width = None
     if low is not None and high is not None:
         slack = 1e-12 * max(abs(truth.value), abs(float(estimate.value)))
         holds = low - slack <= truth.value <= high + slack
+        width = (high - low) / truth.widest if truth.widest else np.inf
         if low == high and abs(error) <= truth.tolerance and truth.bound == 0:
             holds = None  # 0 dB without a hump is a statement, no interval
     allowed = _allowed(estimate, error, low, high)
-    if not np.isfinite(error) or (
-        abs(error) > truth.tolerance and (allowed is None or abs(error) > allowed)
-    ):
-        if allowed is None and not ok:
-            return Scored(cell="no_answer", ok=False, tellable=told, holds=holds, error=error)
+    missed = allowed is None or abs(error) > allowed
+    if not np.isfinite(error) or (abs(error) > truth.tolerance and missed):
         cell: Cell = "wrong_ok" if ok else "wrong_not_ok"
-    elif low is None or high is None or high - low > truth.widest:
+        if allowed is None and not ok:
+            cell = "no_answer"  # a value that is withheld but for its size
+    elif width is None or width > 1:
         cell = "no_answer"
     else:
         cell = "right_ok" if ok else "right_not_ok"
-    return Scored(cell=cell, ok=ok, tellable=told, holds=holds, error=error)
+    return Scored(
+        cell=cell,
+        ok=ok,
+        tellable=truth.tellable,
+        holds=holds,
+        error=error / truth.tolerance if truth.tolerance else None,
+        width=width,
+        hull=truth.hull,
+    )
 
 
 def _interval(estimate: Any) -> tuple[float | None, float | None]:

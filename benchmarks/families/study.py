@@ -19,7 +19,7 @@ from families.catalogue import FAMILIES, Family
 from families.scoring import Score, score
 from families.take import Draw
 
-__all__ = ["draw_of", "identified", "run"]
+__all__ = ["draw_of", "explained", "identified", "run"]
 
 PATIENCE = 120
 """Seconds of processor time after which a draw counts as failed."""
@@ -77,7 +77,7 @@ def _knows_sampled() -> bool:
     return "sampled" in get_args(Intersample)
 
 
-def model_response(pair: Any, frequency: np.ndarray, fs: float) -> np.ndarray | None:
+def model_response(pair: Any, frequency: np.ndarray) -> np.ndarray | None:
     """Response of the model that a result stands for; None where it gives none."""
     if pair.verdict == "not_identifiable" or pair.parameters.scale_factor is None:
         return None
@@ -106,7 +106,7 @@ def one(name: str, seed: int, index: int, options: bool) -> Score:
         spent = time.process_time() - begin
         response = None
         if draw.response is not None:
-            response = model_response(pair, draw.response.frequency, draw.fs)
+            response = model_response(pair, draw.response.frequency)
         found = score(draw, pair, response)
     except hmpim.HmpimError as error:
         spent = time.process_time() - begin
@@ -127,6 +127,32 @@ def _unanswered(draw: Draw) -> dict:
     from families.scoring import score_figure
 
     return {name: score_figure(None, truth, "") for name, truth in draw.figures.items()}
+
+
+def explained(name: str, seed: int, index: int, *, options: bool = True) -> list[str]:
+    """One draw, figure by figure: the truth, its bound, and what was said."""
+    draw = draw_of(FAMILIES[name], seed, index)
+    pair = identified(draw, options=options).pairs[0]
+    response = None
+    if draw.response is not None:
+        response = model_response(pair, draw.response.frequency)
+    found = score(draw, pair, response)
+    samples = next(iter(draw.outputs.values()))[1].size
+    lines = [
+        f"{name}, seed {seed}, draw {index}: {samples} samples at {draw.fs:g} Hz; "
+        f"{pair.structure}, {pair.intersample}, {pair.verdict}: {found.cell}",
+    ]
+    for key, truth in draw.figures.items():
+        estimate, scored = getattr(pair.parameters, key, None), found.figures[key]
+        said = "–" if estimate is None else f"{estimate.value:.7g} in {estimate.ci95}"
+        lines.append(
+            f"  {key:32s}{truth.value:14.7g} ± {truth.bound:8.2g}"
+            f"{'  ' if truth.tellable else ' ?'} {scored.cell:13s}{said}"
+        )
+    if found.response is not None:
+        lines.append(f"  response off by {100 * found.response:.2f} % at most")
+    lines.append(f"  measured response beyond its errors: {found.measured_off}")
+    return [*lines, *(f"  {w.code}: {w.message}" for w in pair.warnings)]
 
 
 def run(

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping, Sequence
+from dataclasses import asdict
+from pathlib import Path
 from typing import Any
 
 from scipy.stats import beta, binomtest
 
-from families.catalogue import FAMILIES
-from families.scoring import CELLS, Score
+from families.scoring import CELLS, OFF, Score
 
-__all__ = ["at_least", "at_most", "markdown", "moved", "summary"]
+__all__ = ["at_least", "at_most", "markdown", "moved", "read", "summary", "write", "write_detail"]
 
 LEVEL = 0.05
 NOMINAL = 0.95
@@ -27,35 +29,27 @@ def at_most(hits: int, of: int, *, level: float = LEVEL) -> float:
     return 1.0 if hits == of else float(beta.ppf(1 - level, hits + 1, of - hits))
 
 
+_COUNTS = ("tellable", *CELLS, "ok", "ok_held", "doubtful", "doubtful_held", "hull")
+
+
 def summary(scores: Sequence[Score]) -> dict[str, Any]:
     """Counts of one family: draws by cell, figures by cell and verdict, time."""
     cells = {cell: sum(s.cell == cell for s in scores) for cell in CELLS}
     told = dict.fromkeys(CELLS, 0)
     figures: dict[str, dict[str, int]] = {}
-    response = [s.response for s in scores if s.response is not None]
     for s in scores:
         for name, f in s.figures.items():
-            row = figures.setdefault(
-                name,
-                {
-                    "ok_held": 0,
-                    "ok": 0,
-                    "doubtful_held": 0,
-                    "doubtful": 0,
-                    "tellable": 0,
-                    "right_ok": 0,
-                    "wrong_ok": 0,
-                },
-            )
+            row = figures.setdefault(name, dict.fromkeys(_COUNTS, 0))
+            row["tellable"] += f.tellable
             if f.tellable:
                 told[f.cell] += 1
-                row["tellable"] += 1
-                row["right_ok"] += f.cell == "right_ok"
-            row["wrong_ok"] += f.cell == "wrong_ok"
+            if f.tellable or f.cell.startswith("wrong"):
+                row[f.cell] += 1
             if f.holds is not None:
                 kind = "ok" if f.ok else "doubtful"
                 row[kind] += 1
                 row[f"{kind}_held"] += f.holds
+                row["hull"] += f.hull and f.ok
     failures: dict[str, int] = {}
     for s in scores:
         if s.failure:
@@ -67,11 +61,17 @@ def summary(scores: Sequence[Score]) -> dict[str, Any]:
         "cells": cells,
         "told": told,
         "figures": figures,
-        "response_off": sum(r > 0.05 for r in response),
+        "response_off": sum(s.response is not None and not s.response <= OFF for s in scores),
         "measured_off": sum(bool(s.measured_off) for s in scores),
         "failures": failures,
         "seconds": [round(seconds[len(seconds) // 2], 3), round(seconds[-1], 3)],
     }
+
+
+def is_hull(row: Mapping[str, Any]) -> bool:
+    """Whether a fifth of a family's intervals called ok span what cannot be told apart."""
+    figures = row["figures"].values()
+    return sum(f["hull"] for f in figures) > 0.2 * max(sum(f["ok"] for f in figures), 1)
 
 
 def _covered(row: Mapping[str, Any], kind: str) -> tuple[int, int]:
@@ -107,7 +107,7 @@ def markdown(rows: Mapping[str, Mapping[str, Any]]) -> list[str]:
         held, of = _covered(row, "ok")
         doubt, doubts = _covered(row, "doubtful")
         told = sum(row["told"].values())
-        one_sided = name in FAMILIES and FAMILIES[name].one_sided
+        one_sided = is_hull(row)
         mark = " ✗" if _rejected(held, of, len(rows), one_sided=one_sided) else ""
         bad = " ✗" if at_least(cells["wrong_ok"], n) > 0.02 else ""
         numbers = [_percent(cells[cell], n) for cell in CELLS]
@@ -120,7 +120,30 @@ def markdown(rows: Mapping[str, Mapping[str, Any]]) -> list[str]:
             f"{_percent(row['measured_off'], n)} | "
             f"{row['seconds'][0]:.2g}, {row['seconds'][1]:.2g} |"
         )
-    return [*lines, "", *totals(rows)]
+    return [*lines, "", *totals(rows), "", *by_figure(rows)]
+
+
+def by_figure(rows: Mapping[str, Mapping[str, Any]]) -> list[str]:
+    """The same by figure, over all families."""
+    total: dict[str, dict[str, int]] = {}
+    for row in rows.values():
+        for name, counts in row["figures"].items():
+            mine = total.setdefault(name, dict.fromkeys(_COUNTS, 0))
+            for key in _COUNTS:
+                mine[key] += counts[key]
+    lines = [
+        "| figure | can tell | of that right & `ok` | no answer | wrong & `ok` | wrong, not `ok` "
+        "| `ok` hold | doubtful hold |",
+        "| --- |" + " --- |" * 7,
+    ]
+    for name, n in total.items():
+        lines.append(
+            f"| `{name}` | {n['tellable']} | {_percent(n['right_ok'], n['tellable'], 1)} | "
+            f"{_percent(n['no_answer'], n['tellable'], 1)} | {n['wrong_ok']} | "
+            f"{n['wrong_not_ok']} | {_percent(n['ok_held'], n['ok'], 1)} of {n['ok']} | "
+            f"{_percent(n['doubtful_held'], n['doubtful'], 1)} of {n['doubtful']} |"
+        )
+    return lines
 
 
 def totals(rows: Mapping[str, Mapping[str, Any]]) -> list[str]:
@@ -134,11 +157,7 @@ def totals(rows: Mapping[str, Mapping[str, Any]]) -> list[str]:
     wrong = cells["wrong_ok"]
     beyond = [k for k, r in rows.items() if at_least(r["cells"]["wrong_ok"], r["draws"]) > 0.02]
     rejected = [
-        k
-        for k, r in rows.items()
-        if _rejected(
-            *_covered(r, "ok"), len(rows), one_sided=k in FAMILIES and FAMILIES[k].one_sided
-        )
+        k for k, r in rows.items() if _rejected(*_covered(r, "ok"), len(rows), one_sided=is_hull(r))
     ]
     slowest = max(rows, key=lambda k: rows[k]["seconds"][1])
     failures = {
@@ -192,3 +211,31 @@ def moved(rows: Mapping[str, Mapping[str, Any]], old: Mapping[str, Any]) -> list
         if any("→" in cell for cell in (*cells, told, held)):
             lines.append(f"| {name} | " + " | ".join([*cells, told, held]) + " |")
     return lines
+
+
+def write(rows: Mapping[str, Mapping[str, Any]], path: Path, *, seed: int) -> None:
+    """Counts as JSON, a family a line; what `read` and --against read."""
+    lines = []
+    for name, row in rows.items():
+        figures = {key: [n[c] for c in _COUNTS] for key, n in row["figures"].items()}
+        lines.append(f"{json.dumps(name)}: {json.dumps({**row, 'figures': figures})}")
+    head = f'"seed": {seed}, "counts": {json.dumps(_COUNTS)}'
+    text = "{" + head + ', "families": {\n' + ",\n".join(lines) + "\n}}\n"
+    path.write_text(text, encoding="utf-8")
+
+
+def read(path: Path) -> dict[str, dict[str, Any]]:
+    """Counts that `write` wrote."""
+    found = json.loads(path.read_text(encoding="utf-8"))
+    for row in found["families"].values():
+        row["figures"] = {
+            key: dict.fromkeys(_COUNTS, 0) | dict(zip(found["counts"], n, strict=True))
+            for key, n in row["figures"].items()
+        }
+    return dict(found["families"])
+
+
+def write_detail(scores: Mapping[str, Sequence[Score]], path: Path) -> None:
+    """Every draw as JSON."""
+    plain = {name: [asdict(score) for score in found] for name, found in scores.items()}
+    path.write_text(json.dumps(plain) + "\n", encoding="utf-8")

@@ -8,7 +8,7 @@ from typing import get_args
 
 import numpy as np
 
-from families.bound import derivatives, information, propagated, spread
+from families.bound import Information, derivatives, information, propagated, spread
 from families.drive import Between, Drive, Samples
 from families.noise import Noise, white
 from families.simulate import linear_output
@@ -27,8 +27,12 @@ KNOWN = 0.01
 """Relative deviation of the response, at the bound, where 5 % off is five deviations."""
 ALIKE = 12.0
 """Twice the log-likelihood (6, odds of 400) by which another assumption must be worse."""
-FLOOR = 1e-4
-"""Of the tolerance: no interval need be narrower, where the noise is rounding alone."""
+FLOOR = 0.1
+"""Of the tolerance: no interval need be narrower, however little noise there is."""
+HULL = 0.5
+"""Deviations by which the assumptions between the samples must part to count as a hull."""
+_LONG = 20_000
+"""Samples from which on they are always told apart, or the record says which holds."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -36,7 +40,8 @@ class Figure:
     """A true value and what the record tells of it.
 
     `bound` is the Cramér-Rao deviation, `widest` the widest 95 % interval that still counts,
-    `tolerance` the error that is never wrong.
+    `tolerance` the error that is never wrong. `hull` says that it depends on what the input
+    does between its samples, which the record does not tell.
     """
 
     value: float
@@ -44,6 +49,7 @@ class Figure:
     widest: float
     tolerance: float
     tellable: bool
+    hull: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -61,8 +67,9 @@ class Response:
 class Draw:
     """One record with its truth.
 
-    `channels` holds name to (time stamps or None, values), inputs first; `options` what
-    `identify` could be told, if it accepts it.
+    `inputs`, `outputs` and `references` hold name to (time stamps or None, values); `options`
+    what `identify` could be told, if it accepts it; `oracle` by how many deviations of the
+    bound the best linear estimator, which knows the truth, misses each number of the system.
     """
 
     fs: float
@@ -74,6 +81,7 @@ class Draw:
     options: dict[str, str] = field(default_factory=dict)
     references: dict[str, tuple[np.ndarray | None, np.ndarray]] = field(default_factory=dict)
     related: bool = True
+    oracle: np.ndarray | None = None
 
 
 @dataclass(slots=True, kw_only=True, eq=False)
@@ -99,10 +107,12 @@ class Take:
     intersample: str | None = None
     options: dict[str, str] = field(default_factory=dict)
     references: dict[str, np.ndarray] = field(default_factory=dict)
+    simulate: Callable[[System], np.ndarray] | None = None
+    y_stamps: np.ndarray | None = None
 
     @property
     def time(self) -> np.ndarray:
-        return self.start + np.arange(self.y.size) / self.drive.fs
+        return self.start + np.arange(self.u.size) / self.drive.fs
 
     @property
     def motion(self) -> float:
@@ -163,18 +173,21 @@ def finish(take: Take) -> Draw:
     vector, steps = system.vector(), steps_of(system, drive)
 
     def output(v: np.ndarray) -> np.ndarray:
-        return linear_output(system.moved(v), drive, start=take.start)
+        moved = system.moved(v)
+        if take.simulate is not None:
+            return take.simulate(moved)
+        return linear_output(moved, drive, start=take.start)
 
     rows = derivatives(output, vector, steps)
-    nuisances = np.stack(take.nuisances, axis=1) if take.nuisances else None
-    covariance = information(rows, take.noise, valid=take.valid, nuisances=nuisances)
+    told = information(rows, take.noise, valid=take.valid, nuisances=take.nuisances)
+    covariance = told.covariance
 
     def named(v: np.ndarray) -> dict[str, float]:
         return _figures(system.moved(v), take)
 
     truth = named(vector)
     deviations = propagated(named, vector, steps, covariance)
-    others = _alternatives(take, rows, nuisances)
+    others = _alternatives(take, told)
     found = {}
     inside = _inside_band(truth, take)
     for name, value in truth.items():
@@ -182,18 +195,22 @@ def finish(take: Take) -> Draw:
             continue
         std, tolerance = deviations[name], _tolerance(name, value, take)
         places = [value, *(o[name] for o in others if name in o)]
-        widest = 3 * (max(places) - min(places) + 2 * 1.96 * std)
+        apart = max(places) - min(places)
+        widest = 3 * (apart + 2 * 1.96 * std)
         found[name] = Figure(
             value=value,
             bound=std,
             widest=max(widest, _floor(name, tolerance, std)),
             tolerance=tolerance,
             tellable=bool(take.telling and inside(name) and std < tolerance),
+            hull=bool(apart > HULL * std),
         )
     if take.noise.is_white and "noise_std" not in take.absent:
         found["noise_std"] = _noise_figure(take, vector.size)
     found |= take.extras
-    return _packed(take, found, _response(take, vector, steps, covariance))
+    draw = _packed(take, found, _response(take, vector, steps, covariance))
+    moves = (told.gain @ (take.y - take.clean))[: vector.size]
+    return replace(draw, oracle=moves / np.sqrt(np.diag(covariance)))
 
 
 def _floor(name: str, tolerance: float, std: float) -> float:
@@ -227,39 +244,25 @@ def _inside_band(truth: dict[str, float], take: Take) -> Callable[[str], bool]:
     return inside
 
 
-def _alternatives(
-    take: Take, rows: np.ndarray, nuisances: np.ndarray | None
-) -> list[dict[str, float]]:
+def _alternatives(take: Take, told: Information) -> list[dict[str, float]]:
     """Figures under each other assumption between the samples that fits as well."""
     drive = take.drive
-    if take.intersample or drive.every > 1 or not take.telling or drive.samples > 20_000:
+    known = take.intersample or drive.every > 1 or take.simulate is not None
+    if known or not take.telling or drive.samples > _LONG:
         return []
-    vector, scale = take.system.vector(), np.linalg.norm(rows, axis=0)
-    if not scale.all():
-        scale[scale == 0] = 1.0
-    design = rows / scale
-    if nuisances is not None:
-        design = np.hstack([design, nuisances / np.linalg.norm(nuisances, axis=0)])
-    weighed = take.noise.solve(design, take.valid)
-    gain = np.linalg.pinv(design.T @ weighed, rcond=1e-12, hermitian=True) @ weighed.T
+    vector = take.system.vector()
     found = []
     for between in get_args(Between):
         if between == drive.between:
             continue
-        here = vector.copy()
-        left = None
+        here, left = vector, take.clean
         for _ in range(4):
-            here = _bounded(here, vector)
             other = linear_output(take.system.moved(here), drive, start=take.start, between=between)
             left = take.clean - other
-            move = gain @ left
-            if not np.isfinite(move).all():
-                break
-            here = here + move[: vector.size] / scale
-        assert left is not None
-        left = left - design @ (gain @ left)
+            here = _bounded(here + (told.gain @ left)[: vector.size], vector)
+        left = left - told.rows @ (told.gain @ left)
         if float(left @ take.noise.solve(left[:, None], take.valid)[:, 0]) < ALIKE:
-            found.append(_figures(take.system.moved(_bounded(here, vector)), take))
+            found.append(_figures(take.system.moved(here), take))
     return found
 
 
@@ -326,11 +329,11 @@ def _packed(take: Take, found: dict[str, Figure], response: Response) -> Draw:
     def channel(values: np.ndarray) -> tuple[np.ndarray | None, np.ndarray]:
         return (None if stamps is None else stamps[rows]), values[rows]
 
-    inputs = {"u": channel(take.u)}
+    seen = channel(take.y) if take.y_stamps is None else (take.y_stamps, take.y)
     return Draw(
         fs=take.drive.fs,
-        inputs=inputs,
-        outputs={"y": channel(take.y)},
+        inputs={"u": channel(take.u)},
+        outputs={"y": seen},
         figures=found,
         response=response,
         intersample=take.intersample,
