@@ -62,9 +62,12 @@ def test_from_a_file_to_the_record_the_result_and_the_page(folder):
     ("arguments", "words"),
     [
         (["--rig", "eye", "s.csv"], "nothing would be kept of the run; name a file with -o"),
-        (["--rig", "eye", "s.csv", "-o", "s.csv"], "-o s.csv is the stimulus as well"),
-        (["--rig", "eye", "s.csv", "-o", "r.csv", "--log", "r.csv"], "--log r.csv is -o as well"),
-        (["--rig-file", "rig.toml", "s.csv", "--json", "rig.toml"], "is --rig-file as well"),
+        (["--rig", "eye", "s.csv", "-o", "s.csv"], "-o s.csv is the stimulus itself"),
+        (
+            ["--rig", "eye", "s.csv", "-o", "r.csv", "--log", "r.csv"],
+            "-o r.csv and --log r.csv are one file",
+        ),
+        (["--rig-file", "rig.toml", "s.csv", "--json", "rig.toml"], "is the rig's file itself"),
         (["--rig", "eye", "s.csv", "-o", "r.doc"], "-o r.doc must end in one of .csv"),
         (["--rig", "eye", "s.csv", "-o", "no/r.csv"], "folder no does not exist"),
         (["--rig", "eye", "none.csv", "-o", "r.csv"], "there is no file 'none.csv'"),

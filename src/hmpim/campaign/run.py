@@ -22,7 +22,10 @@ from hmpim.identify.spectrum import decibel, spectrum
 from hmpim.record import Record
 from hmpim.stimulus import Stimulus
 
-__all__ = ["CASE_SCHEMA", "run_campaign"]
+__all__ = ["CASE_SCHEMA", "STAMP", "run_campaign"]
+
+STAMP = "campaign.json"
+"""Name of the file that says of which plan a folder's cases are."""
 
 CASE_SCHEMA = "hmpim/campaign-case/2"
 CAMPAIGN_SCHEMA = "hmpim/campaign/2"
@@ -102,7 +105,7 @@ def _open(plan: Plan, folder: Path, *, fresh: bool) -> None:
     if folder.exists() and not folder.is_dir():
         raise ArgumentError(f"{folder} is a file; name a folder")
     (folder / "cases").mkdir(parents=True, exist_ok=True)
-    stamp = folder / "campaign.json"
+    stamp = folder / STAMP
     if fresh:
         for old in (folder / "cases").glob("*.json"):
             old.unlink()

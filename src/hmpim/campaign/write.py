@@ -23,7 +23,19 @@ from hmpim.campaign.study import Study, study_dict
 from hmpim.formats.atomic import replacing, write_text
 from hmpim.report.study import Grid, Section, StudyPage, render_study
 
-__all__ = ["headline", "markdown", "study_csv", "study_page", "write_study"]
+__all__ = [
+    "STUDY_FILES",
+    "headline",
+    "markdown",
+    "pictures_folder",
+    "study_csv",
+    "study_page",
+    "write_study",
+]
+
+STUDY_FILES = ("study.json", "study.csv", "study.html", "study.md")
+"""What `write_study` writes, its pictures aside."""
+
 
 _CASES = "Cases of this section"  # left out of the Markdown, which has them all in one table
 
@@ -42,19 +54,31 @@ def write_study(study: Study, folder: Path, *, document: Path | None = None) -> 
     """
     page = study_page(study)
     text = json.dumps(study_dict(study), indent=1, ensure_ascii=False, allow_nan=False)
-    write_text(folder / "study.json", text + "\n")
-    write_text(folder / "study.csv", study_csv(study))
-    write_text(folder / "study.html", render_study(page))
-    for place in (folder / "study.md", document):
+    json_file, csv_file, html_file, markdown_file = (folder / name for name in STUDY_FILES)
+    write_text(json_file, text + "\n")
+    write_text(csv_file, study_csv(study))
+    write_text(html_file, render_study(page))
+    for place in (markdown_file, document):
         if place is None:
             continue
-        pictures = place.parent / place.stem
+        pictures = pictures_folder(place)
         pictures.mkdir(parents=True, exist_ok=True)
         for number, section in enumerate(page.sections, start=1):
             for picture in section.pictures:
                 with replacing(pictures / f"{number}-{picture.key}.png") as path:
                     picture.figure.savefig(path, format="png", dpi=110)
         write_text(place, markdown(page, pictures.name))
+
+
+def pictures_folder(document: Path) -> Path:
+    """Folder of the pictures of a Markdown document: beside it, and named as it is.
+
+    Examples
+    --------
+    >>> pictures_folder(Path("out/study.md")).name
+    'study'
+    """
+    return document.parent / document.stem
 
 
 def headline(study: Study) -> str:

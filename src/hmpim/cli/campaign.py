@@ -1,13 +1,14 @@
 """``hmpim campaign``: a whole study from one plan."""
 
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from hmpim.cli.files import check_files
 from hmpim.cli.terminal import output_console, say
 from hmpim.errors import ArgumentError
 
@@ -71,14 +72,12 @@ def campaign(
     from hmpim.campaign.run import run_campaign
     from hmpim.campaign.study import check_earlier, make_study
     from hmpim.campaign.write import write_study
-    from hmpim.cli.terminal import check_target
     from hmpim.formats.atomic import write_text
 
-    check_target(json_file, "--json")
-    check_target(document, "--document")
     earlier = None if not wanted.compare else path.parent / wanted.compare
     if earlier is not None and not earlier.is_file():
         raise ArgumentError(f"compare = {wanted.compare!r}: there is no file {earlier}")
+    _check_files(out, {"the plan": path, "the earlier study": earlier}, json_file, document)
     if earlier is not None:
         check_earlier(wanted, earlier)
     with _stopping(out), _counting(quiet) as tick:
@@ -93,6 +92,29 @@ def campaign(
         say(f"Study:   {out / 'study.json'}")
     if study.met is False:
         raise typer.Exit(1)
+
+
+def _check_files(
+    out: Path, reads: Mapping[str, Path | None], json_file: Path | None, document: Path | None
+) -> None:
+    from hmpim.campaign.run import STAMP
+    from hmpim.campaign.write import STUDY_FILES, pictures_folder
+
+    if document is not None and not document.suffix:
+        raise ArgumentError(f"--document {document} has no suffix; name it {document}.md")
+    check_files(
+        reads=reads,
+        writes={
+            "--json": json_file,
+            "--document": document,
+            "--out": [out / name for name in (STAMP, *STUDY_FILES)],
+        },
+        folders={"--out": out},
+        owned={
+            "--out": [out / "cases", pictures_folder(out / "study.md")],
+            "--document": None if document is None else pictures_folder(document),
+        },
+    )
 
 
 def _print(study: "Study") -> None:

@@ -5,6 +5,7 @@ from typing import Annotated
 
 import typer
 
+from hmpim.cli.files import check_files
 from hmpim.cli.identify import write_result
 from hmpim.cli.terminal import output_console, say, working
 
@@ -36,6 +37,7 @@ def demo(
 
     The sensor is that of the paper's Fig. 17, so the truth is known and shown beside.
     """
+    check_files(folders={"--out": out})
     from hmpim.experiment import run
     from hmpim.identify import identify
     from hmpim.report import print_result

@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 
 import typer
 
-from hmpim.cli.terminal import check_target
+from hmpim.cli.files import check_files
 from hmpim.errors import ArgumentError
 from hmpim.stimulus.kinds import KINDS, Kind
 from hmpim.stimulus.limits import QUANTITIES
@@ -105,11 +105,9 @@ def design(
     from hmpim.stimulus import design as design_stimulus
     from hmpim.units import rate_label
 
-    check_target(output, "--output")
+    check_files(writes={"--output": output, "--json": json_file, "--plot": plot})
     if output is not None and output.suffix.lower() not in STIMULUS_SUFFIXES:
         raise ArgumentError(f"--output {output} must end in one of {', '.join(STIMULUS_SUFFIXES)}")
-    check_target(json_file, "--json")
-    check_target(plot, "--plot")
     if plot is not None and plot.suffix.lower() != ".png":
         raise ArgumentError(f"--plot {plot} does not end in .png, the one picture made here")
     if jerk is not None and max_jerk < float("inf"):

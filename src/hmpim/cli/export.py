@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from hmpim.cli.files import check_files
 from hmpim.cli.terminal import say, working
 from hmpim.errors import ArgumentError, FormatError
 
@@ -78,9 +79,12 @@ def export(
     """
     from hmpim.formats.models import export as write
 
+    into = {"--out": out}
+    if to is To.C:
+        check_files(reads={"the result": result}, folders=into)
+    else:
+        check_files(reads={"the result": result}, writes=into)
     found = read_result(result)
-    if out.exists() and out.resolve() == result.resolve():
-        raise ArgumentError(f"--out: {out} is the result itself; name another file")
     with working(f"Writing {to.value}"):
         written = write(
             found,

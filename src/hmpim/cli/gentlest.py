@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from hmpim.cli.terminal import check_target, output_console, say
+from hmpim.cli.files import check_files
+from hmpim.cli.terminal import output_console, say
 from hmpim.errors import ArgumentError, LimitsError
 
 if TYPE_CHECKING:
@@ -100,8 +101,7 @@ def gentlest(
     from hmpim.optimal import trade as trade_of
     from hmpim.stimulus import Limits
 
-    for target, option in ((output, "--output"), (json_file, "--json"), (plot, "--plot")):
-        check_target(target, option)
+    check_files(writes={"--output": output, "--json": json_file, "--plot": plot})
     if plot is not None and plot.suffix.lower() != ".png":
         raise ArgumentError(f"--plot {plot} does not end in .png, the one picture made here")
     limits = Limits(

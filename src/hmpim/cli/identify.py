@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from hmpim.cli.files import check_files
 from hmpim.cli.several import identify_several
-from hmpim.cli.terminal import check_target, output_console, say, working
+from hmpim.cli.terminal import output_console, say, working
 from hmpim.errors import ArgumentError
 
 if TYPE_CHECKING:
@@ -88,8 +89,7 @@ def identify(
 
     Of several records: averages, repeatability, and whether stated errors and scatter agree.
     """
-    check_target(json, "--json")
-    check_target(report, "--report")
+    check_files(reads={"the record": records}, writes={"--json": json, "--report": report})
     if holdout is not None and not 0.0 < holdout < 1.0:
         raise ArgumentError(f"--holdout {holdout:g} is not a share between 0 and 1; give 0.5, say")
 

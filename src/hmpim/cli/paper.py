@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from hmpim.cli.files import check_files
 from hmpim.cli.terminal import say
 from hmpim.errors import ArgumentError
 
@@ -33,8 +34,7 @@ def paper(
     with all of it.
     """
     wanted = _numbers(figures or [], more or [])
-    if out.exists() and not out.is_dir():
-        raise ArgumentError(f"--out: {out} is a file; name a folder")
+    check_files(folders={"--out": out})
 
     from hmpim.report.paper import FIGURES, make_study, write_study
 

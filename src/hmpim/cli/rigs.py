@@ -5,7 +5,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from hmpim.cli.terminal import check_target, output_console
+from hmpim.cli.files import check_files
+from hmpim.cli.terminal import output_console
 
 if TYPE_CHECKING:
     from hmpim.rigs.catalogue import NamedRig, Offered
@@ -23,12 +24,12 @@ def rigs(
     A rig is described under [rigs.NAME] in hmpim.toml, here or in a folder above, or in the
     user's configuration folder. Other packages add kinds by the entry point hmpim.rigs.
     """
-    check_target(json, "--json")
     from rich.table import Table
 
     from hmpim.rigs.catalogue import KINDS, named_rigs, offered_kinds
 
     named, offered = list(named_rigs().values()), offered_kinds()
+    check_files(reads={"a list of rigs": [one.path for one in named]}, writes={"--json": json})
     table = Table("rig", "what it is", box=None, pad_edge=False)
     for one in named:
         table.add_row(one.name, _described(one))

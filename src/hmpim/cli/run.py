@@ -5,7 +5,8 @@ from typing import Annotated
 
 import typer
 
-from hmpim.cli.terminal import check_target, output_console, say, working
+from hmpim.cli.files import check_files
+from hmpim.cli.terminal import output_console, say, working
 from hmpim.errors import ArgumentError
 
 __all__ = ["run"]
@@ -63,9 +64,11 @@ def run(
 
     Limits are checked before anything moves, and the rig is stopped whatever happens.
     """
-    _check_files(
-        stimulus, rig_file, {"-o": output, "--log": log, "--json": json, "--report": report}
+    check_files(
+        reads={"the stimulus": stimulus, "the rig's file": _files_of(rig, rig_file)},
+        writes={"-o": output, "--log": log, "--json": json, "--report": report},
     )
+    _check_kept(output, kept=json is not None or report is not None)
     from hmpim.experiment import RunLog
     from hmpim.experiment import run as play
     from hmpim.formats import save
@@ -102,23 +105,21 @@ def run(
             say(f"{name}: {path}")
 
 
-def _check_files(stimulus: Path, rig_file: Path | None, targets: dict[str, Path | None]) -> None:
-    """Refuse, before anything moves, files that cannot be written or stand for two things."""
+def _files_of(rig: str, rig_file: Path | None) -> list[Path]:
+    """Files that say what the rig is: its own, those with named rigs, and code."""
+    from hmpim.rigs.catalogue.named import config_files
+
+    own = [] if rig_file is None else [rig_file]
+    code = [Path(part) for part in rig.split(":")[1:] if Path(part).is_file()]
+    return [*own, *config_files(), *code]
+
+
+def _check_kept(output: Path | None, *, kept: bool) -> None:
+    """Refuse, before anything moves, a run of which nothing is kept."""
     from hmpim.formats.saving import suffixes_of
     from hmpim.record import Record
 
-    taken = {path.resolve(): "the stimulus" for path in (stimulus,)}
-    if rig_file is not None:
-        taken[rig_file.resolve()] = "--rig-file"
-    for option, path in targets.items():
-        check_target(path, option)
-        if path is None:
-            continue
-        other = taken.setdefault(path.resolve(), option)
-        if other != option:
-            raise ArgumentError(f"{option} {path} is {other} as well; name another file")
-    output = targets["-o"]
-    if output is None and targets["--json"] is None and targets["--report"] is None:
+    if output is None and not kept:
         raise ArgumentError("nothing would be kept of the run; name a file with -o")
     if output is not None and output.suffix.lower() not in suffixes_of(Record):
         raise ArgumentError(f"-o {output} must end in one of {', '.join(suffixes_of(Record))}")

@@ -2,15 +2,12 @@
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from pathlib import Path
 from typing import TYPE_CHECKING
-
-from hmpim.errors import ArgumentError
 
 if TYPE_CHECKING:
     from rich.console import Console
 
-__all__ = ["check_target", "output_console", "say", "working"]
+__all__ = ["output_console", "say", "working"]
 
 _WIDTH_OF_FILES = 120  # columns where the output is no terminal, so that no row is cut
 
@@ -61,34 +58,3 @@ def working(what: str) -> Iterator[None]:
         return
     with console.status(f"{what} …"):
         yield
-
-
-def check_target(path: Path | None, option: str) -> None:
-    """Refuse a file that cannot be written, before the work rather than after it.
-
-    Parameters
-    ----------
-    path : Path or None
-        The file; None if none is wanted.
-    option : str
-        Name of the option, for the message.
-
-    Raises
-    ------
-    ArgumentError
-        If the folder is missing, or a folder stands where the file should.
-
-    Examples
-    --------
-    >>> check_target(Path("r.json"), "--json")
-    >>> check_target(Path("/no/such/folder/r.json"), "--json")
-    Traceback (most recent call last):
-    ...
-    hmpim.errors.ArgumentError: --json: folder /no/such/folder does not exist; make it first
-    """
-    if path is None:
-        return
-    if path.is_dir():
-        raise ArgumentError(f"{option}: {path} is a folder; name a file in it")
-    if not path.parent.is_dir():
-        raise ArgumentError(f"{option}: folder {path.parent} does not exist; make it first")
