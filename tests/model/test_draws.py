@@ -10,10 +10,10 @@ from hmpim.model import Model, Spread, coefficient_vector, draw_models, frequenc
 
 COVARIANCE = np.array(
     [
-        [1e-8, 0.0, 2e-9, 0.0],
+        [1e-8, 0.0, 0.0, 2e-9],
         [0.0, 4e-4, 0.0, 0.0],
-        [2e-9, 0.0, 9e-8, 1e-10],
-        [0.0, 0.0, 1e-10, 1e-12],
+        [0.0, 0.0, 1e-12, 1e-10],
+        [2e-9, 0.0, 1e-10, 9e-8],
     ]
 )
 MODEL = Model(
@@ -42,7 +42,7 @@ def test_draws_carry_the_spread_of_the_response():
     gains = [abs(frequency_response(m, f)[0]) for m in draw_models(MODEL, 2000, rng=2)]
     s = 2j * np.pi * f
     below = 1 + 0.0127 * s + 2.5e-4 * s**2
-    slope = np.array([0, 0.5, *(-np.concatenate([s, s**2]) / below)]) * (2 / abs(below))
+    slope = np.array([0, 0.5, *(-np.concatenate([s**2, s]) / below)]) * (2 / abs(below))
     turned = slope.copy()
     first_order = np.sqrt(np.real(turned).T @ COVARIANCE @ np.real(turned))
     assert np.std(gains) == pytest.approx(first_order, rel=0.1)

@@ -3,6 +3,7 @@ from dataclasses import replace
 
 from rich.console import Console
 
+from hmpim.identify.judgement import judged
 from hmpim.record import Finding
 from hmpim.report import plus_minus, print_result
 from hmpim.report.words import GLOSSARY, off_by
@@ -31,6 +32,19 @@ def test_a_known_truth_stands_beside_with_the_miss_in_standard_deviations(found)
     row = next(line for line in text.splitlines() if "Delay, pure" in line)
     assert row.split()[-2:] == [f"{off_by(found.pairs[0].delay, 0.15).split()[0]}", "std"]
     assert "0.15" in row.split()
+
+
+def test_each_row_has_its_own_verdict(found):
+    late = Finding(code="x", message="It slips.", severity="doubt", parameters=("delay",))
+    pair = judged(replace(found.pairs[0], warnings=(late,)))
+    lines = printed(replace(found, pairs=(pair,))).splitlines()
+
+    def row(label):
+        return next(line for line in lines if line.strip().startswith(label)).split()
+
+    assert "doubtful" in row("Delay, pure")
+    assert "ok" in row("Bias")
+    assert not any(line.startswith("Doubt: It slips.") for line in lines)  # the sentence says it
 
 
 def test_no_row_is_cut_at_80_columns(found):

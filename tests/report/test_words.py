@@ -3,6 +3,8 @@ from dataclasses import fields, replace
 import pytest
 
 from hmpim.identify import Estimate, PaperEstimates, Parameters
+from hmpim.identify.groups import EVERY
+from hmpim.identify.judgement import judged
 from hmpim.record import Finding
 from hmpim.report.words import GLOSSARY, headline, remark, untold
 
@@ -47,9 +49,36 @@ def test_the_headline_is_the_verdict_of_the_worst_pair(found):
     assert headline(replace(found, pairs=(lost,))) == (
         "This record cannot tell: output 'y' does not follow input 'u'."
     )
-    warned = replace(pair, verdict="doubtful", warnings=(reason, reason))
-    assert "but there are 2 warnings" in headline(replace(found, pairs=(warned,)))
     assert "1 of 2 pairs can be trusted" in headline(replace(found, pairs=(pair, lost)))
+
+
+def doubting(pair, *doubts):
+    said = tuple(
+        Finding(code="x", message=message, severity="doubt", parameters=names)
+        for names, message in doubts
+    )
+    return judged(replace(pair, warnings=said))
+
+
+def test_a_doubtful_pair_is_said_by_what_is_doubtful_and_why(found):
+    late = (("delay",), "The delay may be 2 ms off.")
+    vague = (("delay", "damping_ratio"), "A second pole may hide.")
+    pair = found.pairs[0]
+    assert headline(replace(found, pairs=(doubting(pair, late),))).endswith(
+        "of the output. Delay is doubtful, the other figures are good: the delay may be 2 ms off."
+    )
+    assert headline(replace(found, pairs=(doubting(pair, late, vague),))).endswith(
+        "of the output. Delay and damping ratio are doubtful, the other figures are good: a second "
+        "pole may hide."
+    )
+
+
+def test_where_most_is_doubtful_what_is_good_is_named(found):
+    names = tuple(n for n in EVERY if n not in ("bias", "scale_factor"))
+    text = headline(replace(found, pairs=(doubting(found.pairs[0], (names, "It slips.")),)))
+    assert text.endswith("Only scale factor and bias are good: it slips.")
+    text = headline(replace(found, pairs=(doubting(found.pairs[0], (EVERY, "It slips.")),)))
+    assert text.endswith("No figure of the model can be relied on: it slips.")
 
 
 def test_a_unit_without_dynamics_is_not_said_to_have_any(found):

@@ -165,7 +165,7 @@ def _readings(result: "Identification", at: Sequence[float]) -> list[str]:
 
 
 def _both(gain: "Estimate", phase: "Estimate") -> str:
-    return f"{gain.value:.3f} ± {gain.std:.2g} dB, {phase.value:.2f} ± {phase.std:.2g}°"
+    return f"{gain.value:.3f} ± {gain.spread:.2g} dB, {phase.value:.2f} ± {phase.spread:.2g}°"
 
 
 def _first_part(data: "Record", holdout: float) -> tuple["Record", float]:

@@ -1,6 +1,5 @@
 """Identification: from a record to every parameter, each with its error bar (paper, section IV)."""
 
-from hmpim.identify.coupling.inputs import Alike, InputSet, OutputCoherence
 from hmpim.identify.frf.averaged import Averaged, averaged_response, coherence_significance
 from hmpim.identify.frf.local import local_polynomial_response, local_response
 from hmpim.identify.frf.multivariable import ResponseMatrix, response_matrix
@@ -24,15 +23,19 @@ from hmpim.identify.repeats import (
     same_at_levels,
 )
 from hmpim.identify.result import (
+    Alike,
     Candidate,
     Estimate,
     FrequencyResponse,
     HarmonicCurve,
     Identification,
+    InputSet,
     Nonlinearity,
+    OutputCoherence,
     PairIdentification,
     PaperEstimates,
     Parameters,
+    ParameterVerdict,
     RecordSummary,
     ResponseBandwidths,
     Verdict,
@@ -57,6 +60,7 @@ __all__ = [
     "PairIdentification",
     "PaperAnalysis",
     "PaperEstimates",
+    "ParameterVerdict",
     "Parameters",
     "Prediction",
     "RecordSummary",

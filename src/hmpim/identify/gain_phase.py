@@ -96,17 +96,15 @@ def gain_and_phase(
             "phase to read off; see its warnings"
         )
     integrators = int(pair.denominator[-1] == 0.0)
-    numerator = p.scale_factor.value * np.array(pair.numerator[::-1])
-    vector = np.concatenate(
-        [[p.delay.value], numerator, np.array(pair.denominator[::-1])[integrators + 1 :]]
-    )
+    numerator = p.scale_factor.value * np.array(pair.numerator)
+    vector = np.concatenate([[p.delay.value], numerator, pair.denominator[: -1 - integrators]])
 
     def system(v: NDArray[np.float64]) -> RationalDelay:
-        ones = [0.0] * integrators + [1.0]
+        lowest = [0.0] * integrators + [1.0]
         return RationalDelay(
             delay=float(v[0]),
-            numerator=v[1 : 1 + numerator.size],
-            denominator=np.concatenate([ones, v[1 + numerator.size :]]),
+            numerator=v[1 : 1 + numerator.size][::-1],
+            denominator=np.concatenate([lowest, v[1 + numerator.size :][::-1]]),
         )
 
     return tuple(_at(pair, float(f), system, vector, pair.covariance, fs) for f in places)

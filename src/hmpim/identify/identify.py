@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 
 from hmpim.errors import ArgumentError, RecordError
 from hmpim.identify.coupling.coupled import inputs_of, responses_of, settled, unrelated
-from hmpim.identify.coupling.inputs import InputSet, OutputCoherence
 from hmpim.identify.coupling.several import Joined, fit_together
 from hmpim.identify.effects.drift import Drifting, with_drift
 from hmpim.identify.effects.imperfections import (
@@ -25,7 +24,13 @@ from hmpim.identify.fitting.unrelated import is_unrelated
 from hmpim.identify.groups import EVERY
 from hmpim.identify.judgement import judged
 from hmpim.identify.pair import described, untold
-from hmpim.identify.result import Identification, PairIdentification, RecordSummary
+from hmpim.identify.result import (
+    Identification,
+    InputSet,
+    OutputCoherence,
+    PairIdentification,
+    RecordSummary,
+)
 from hmpim.identify.threads import one_thread
 from hmpim.identify.whiteness import is_white
 from hmpim.model.dynamics import STRUCTURES, StructureName

@@ -5,7 +5,7 @@ between the levels by the error bars it came with; those that move beyond them, 
 they move, tell where the linear range ends and what ends it.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, fields
 from typing import get_args
 
@@ -124,9 +124,15 @@ class Levels:
     results: tuple[Identification, ...]
     comparisons: tuple[LevelComparison, ...]
 
-    def __getitem__(self, key: tuple[str, str]) -> LevelComparison:
+    def __getitem__(self, key: tuple[str, str] | str) -> LevelComparison:
         wanted = self.results[0][key]
         return self.comparisons[self.results[0].pairs.index(wanted)]
+
+    def __iter__(self) -> Iterator[LevelComparison]:
+        return iter(self.comparisons)
+
+    def __len__(self) -> int:
+        return len(self.comparisons)
 
 
 def identify_levels(
@@ -300,11 +306,11 @@ def _estimate(level: Level, name: str) -> Estimate | None:
 def _trend(levels: list[Level], name: str) -> Trend | None:
     """Values of one parameter, and a χ² test of their being equal."""
     pairs = [(level.amplitude, _estimate(level, name)) for level in levels]
-    known = [(a, e) for a, e in pairs if e is not None and e.std > 0 and np.isfinite(e.std)]
+    known = [(a, e) for a, e in pairs if e is not None and 0 < e.spread < np.inf]
     if len(known) < 2:
         return None
     values = np.array([e.value for _, e in known])
-    stds = np.array([e.std for _, e in known])
+    stds = np.array([e.spread for _, e in known])
     weights = stds**-2
     mean = float(weights @ values / weights.sum())
     statistic = float(np.sum((values - mean) ** 2 * weights))

@@ -147,7 +147,7 @@ def described(
         time=aligned.time,
         prediction=fit.prediction if drifting is None else fit.prediction + drifting.trend,
         residual=fit.residual,
-        covariance=_finite(readings.coefficient_covariance),
+        covariance=_highest_first(readings),
         nonlinearity=None if inspection is None else inspection.summary,
     )
 
@@ -192,6 +192,16 @@ def _with_error_of(response: FrequencyResponse, readings: Readings) -> Frequency
 def _finite(covariance: NDArray[np.float64]) -> NDArray[np.float64] | None:
     """None where a direction is not seen by the record."""
     return covariance if bool(np.isfinite(covariance).all()) else None
+
+
+def _highest_first(readings: Readings) -> NDArray[np.float64] | None:
+    """Covariance of delay, numerator and denominator, as results have it; None if not known."""
+    covariance = _finite(readings.coefficient_covariance)
+    if covariance is None:
+        return None
+    above = 1 + readings.system.numerator.size
+    order = [0, *range(1, above)[::-1], *range(above, covariance.shape[0])[::-1]]
+    return covariance[np.ix_(order, order)]
 
 
 def _descending(coefficients: NDArray[np.float64]) -> tuple[float, ...]:

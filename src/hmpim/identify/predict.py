@@ -1,5 +1,6 @@
 """From an identification to a model, and the model against data it has not seen."""
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -86,19 +87,18 @@ def _spread(pair: PairIdentification) -> Spread | None:
     if pair.covariance is None:
         return None
     p = pair.parameters
-
-    def std(estimate: Estimate | None) -> float:
-        return 0.0 if estimate is None else estimate.std or 0.0
-
-    return Spread(
-        covariance=tuple(tuple(row) for row in pair.covariance.tolist()),
-        bias=std(p.bias),
-        noise_std=std(p.noise_std),
-        saturation_low=std(p.saturation_low),
-        saturation_high=std(p.saturation_high),
-        hold_period=std(p.hold_period),
-        quantization_step=std(p.quantization_step),
-    )
+    given = {
+        "bias": p.bias,
+        "noise_std": p.noise_std,
+        "saturation_low": p.saturation_low,
+        "saturation_high": p.saturation_high,
+        "hold_period": p.hold_period,
+        "quantization_step": p.quantization_step,
+    }
+    stds = {name: 0.0 if e is None else e.spread for name, e in given.items()}
+    if not all(map(math.isfinite, stds.values())):
+        return None
+    return Spread(covariance=tuple(tuple(row) for row in pair.covariance.tolist()), **stds)
 
 
 def predict(pair: PairIdentification, record: Record, *, start: float | None = None) -> Prediction:

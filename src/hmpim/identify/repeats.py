@@ -5,7 +5,7 @@ noise but dynamics or nonlinearity that it does not describe (Pintelon and Schou
 Identification, 2nd ed., Wiley 2012, section 4.3: averages over periods tell the two apart).
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, fields
 from typing import Any
 
@@ -24,6 +24,7 @@ from hmpim.identify.result import (
     PairIdentification,
     Parameters,
 )
+from hmpim.identify.result.lookup import find_pair
 from hmpim.identify.uncertainty import estimate, noise_estimate
 from hmpim.identify.whiteness import effective_share
 from hmpim.model.dynamics import StructureName
@@ -168,13 +169,14 @@ class Repeats:
     results: tuple[Identification, ...]
     pairs: tuple[RepeatedPair, ...]
 
-    def __getitem__(self, key: tuple[str, str]) -> RepeatedPair:
-        output, input_ = key
-        for pair in self.pairs:
-            if (pair.output, pair.input) == (output, input_):
-                return pair
-        known = ", ".join(f"({p.output!r}, {p.input!r})" for p in self.pairs)
-        raise RecordError(f"there is no pair ({output!r}, {input_!r}); the repeats have {known}")
+    def __getitem__(self, key: tuple[str, str] | str) -> RepeatedPair:
+        return find_pair(self.pairs, key, holder="the repeats")
+
+    def __iter__(self) -> Iterator[RepeatedPair]:
+        return iter(self.pairs)
+
+    def __len__(self) -> int:
+        return len(self.pairs)
 
     def to_dict(self) -> dict[str, Any]:
         """Return all of it as plain JSON values, `schema` first."""
@@ -368,11 +370,11 @@ def _pair(found: tuple[PairIdentification, ...]) -> RepeatedPair:
 def _parameter(name: str, found: tuple[PairIdentification, ...]) -> RepeatedParameter | None:
     """Average one parameter; None where fewer than two repeats tell it with an error."""
     estimates = [e for pair in found if (e := getattr(pair.parameters, name)) is not None]
-    estimates = [e for e in estimates if np.isfinite(e.std) and e.std > 0]
+    estimates = [e for e in estimates if 0 < e.spread < np.inf]
     if len(estimates) < 2:
         return None
     values = np.array([e.value for e in estimates])
-    weights = 1.0 / np.array([e.std for e in estimates]) ** 2
+    weights = 1.0 / np.array([e.spread for e in estimates]) ** 2
     mean = float(weights @ values / weights.sum())
     statistic = float(weights @ (values - mean) ** 2)
     freedom = values.size - 1

@@ -15,24 +15,21 @@ _TRIES = 100
 
 
 def coefficient_vector(model: Model) -> NDArray[np.float64]:
-    """Delay, numerator times scale factor, denominator behind its first coefficient not 0.
+    """Delay, numerator times scale factor, denominator before its last coefficient not 0.
 
-    By rising powers of s, as `Spread.covariance` counts them.
+    By falling powers of s, as the model has them and `Spread.covariance` counts them.
 
     Examples
     --------
     >>> model = Model(delay=0.1, scale_factor=2.0, denominator=(0.25, 0.5, 1.0))
     >>> coefficient_vector(model).tolist()
-    [0.1, 2.0, 0.5, 0.25]
+    [0.1, 2.0, 0.25, 0.5]
     """
     rational = model.system
+    behind = 2 if model.denominator[-1] == 0.0 else 1
     return np.concatenate(
-        [[rational.delay], rational.numerator, rational.denominator[_behind(model) :]]
+        [[rational.delay], rational.numerator[::-1], rational.denominator[behind:][::-1]]
     )
-
-
-def _behind(model: Model) -> int:
-    return 2 if model.denominator[-1] == 0.0 else 1
 
 
 def draw_models(
@@ -111,9 +108,9 @@ def _one(model: Model, vector: NDArray[np.float64], source: np.random.Generator)
     assert spread is not None
     above = len(model.numerator)
     numerator = vector[1 : 1 + above]
-    lowest = [0.0, 1.0] if model.denominator[-1] == 0.0 else [1.0]
-    denominator = np.concatenate([lowest, vector[1 + above :]])
-    if numerator[0] == 0.0:
+    lowest = [1.0, 0.0] if model.denominator[-1] == 0.0 else [1.0]
+    denominator = np.concatenate([vector[1 + above :], lowest])
+    if numerator[-1] == 0.0:
         raise ArgumentError("a scale factor of 0 is no model")
 
     def moved(value: float | None, std: float) -> float | None:
@@ -124,9 +121,9 @@ def _one(model: Model, vector: NDArray[np.float64], source: np.random.Generator)
     return replace(
         model,
         delay=float(vector[0]),
-        scale_factor=float(numerator[0]),
-        numerator=tuple((numerator[::-1] / numerator[0]).tolist()),
-        denominator=tuple(denominator[::-1].tolist()),
+        scale_factor=float(numerator[-1]),
+        numerator=tuple((numerator / numerator[-1]).tolist()),
+        denominator=tuple(denominator.tolist()),
         bias=moved(model.bias, spread.bias) or 0.0,
         noise_std=abs(noise),
         saturation_low=moved(model.saturation_low, spread.saturation_low),

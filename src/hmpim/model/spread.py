@@ -13,7 +13,7 @@ class Spread:
     ----------
     covariance : tuple of tuple of float
         Of the delay in s, of the numerator times the scale factor, and of the denominator
-        behind its first coefficient that is not 0, each by rising powers of s; (q, q).
+        before its last coefficient that is not 0, each highest power of s first; (q, q).
     bias, noise_std, saturation_low, saturation_high, hold_period, quantization_step : float
         Standard deviations of the fields of these names.
     """

@@ -1,7 +1,13 @@
 """Reports: one HTML page for a browser, one table for a terminal."""
 
 from hmpim.report.html import render, report
-from hmpim.report.numbers import format_estimate, format_interval, format_number, plus_minus
+from hmpim.report.numbers import (
+    format_estimate,
+    format_interval,
+    format_number,
+    format_value,
+    plus_minus,
+)
 from hmpim.report.repeats_text import print_levels, print_repeats, repeats_table
 from hmpim.report.text import parameter_table, print_result
 
@@ -9,6 +15,7 @@ __all__ = [
     "format_estimate",
     "format_interval",
     "format_number",
+    "format_value",
     "parameter_table",
     "plus_minus",
     "print_levels",

@@ -12,11 +12,12 @@ from hmpim.plots.candidates import INTERSAMPLE_WORDS
 from hmpim.plots.style import printable
 from hmpim.report.figures import Picture, pair_pictures, stimulus_picture
 from hmpim.report.inputs import inputs_view
-from hmpim.report.numbers import format_interval, format_number, plus_minus
+from hmpim.report.numbers import format_interval, format_number, format_value
 from hmpim.report.svg import inline_svg
 from hmpim.report.words import (
     GLOSSARY,
     VERDICTS,
+    by_weight,
     headline,
     nonlinear_facts,
     pair_sentence,
@@ -171,9 +172,10 @@ def _pair_view(result: Identification, pair: PairIdentification) -> dict[str, An
             {
                 "name": words.name,
                 "label": words.label,
-                "value": "–" if estimate is None else plus_minus(estimate.value, estimate.std),
+                "value": "–" if estimate is None else format_value(estimate),
                 "unit": "" if estimate is None else estimate.unit,
                 "interval": "" if estimate is None else format_interval(estimate),
+                "verdict": "" if estimate is None else estimate.verdict,
                 "paper": format_number(paper) if words.differs else "",
                 "remark": remark(words, estimate, paper),
             }
@@ -184,7 +186,7 @@ def _pair_view(result: Identification, pair: PairIdentification) -> dict[str, An
         "verdict": pair.verdict,
         "verdict_words": VERDICTS[pair.verdict],
         "sentence": pair_sentence(pair),
-        "warnings": pair.warnings,
+        "warnings": by_weight(pair.warnings),
         "rows": rows,
         "untold": untold(pair),
         "candidates": [

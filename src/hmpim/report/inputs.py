@@ -8,7 +8,7 @@ import numpy as np
 from hmpim import plots
 from hmpim.identify import Identification, InputSet, PairIdentification
 from hmpim.report.figures import Picture
-from hmpim.report.numbers import plus_minus
+from hmpim.report.numbers import format_estimate
 
 __all__ = ["InputsView", "gain_rows", "inputs_view"]
 
@@ -104,7 +104,7 @@ def _gain(pair: PairIdentification) -> str:
     """Scale factor, or how large the coupling is at most."""
     gain = pair.parameters.scale_factor
     if gain is not None:
-        return f"{plus_minus(gain.value, gain.std)} {gain.unit}".rstrip()
+        return format_estimate(gain)
     response = pair.frequency_response
     if pair.verdict == "doubtful" and response.frequency.size:
         level = 20 * np.log10(max(float(np.max(np.abs(response.response))), 1e-300))

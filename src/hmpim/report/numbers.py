@@ -1,42 +1,25 @@
 """Numbers for people: the error to two digits, the value to match."""
 
-import math
-
 from hmpim.identify import Estimate
+from hmpim.identify.result.digits import aside, interval, plus_minus
 
-__all__ = ["format_estimate", "format_interval", "format_number", "plus_minus"]
-
-_MOST_PLACES = 7
-_LARGEST_PLAIN = 1e7
+__all__ = ["format_estimate", "format_interval", "format_number", "format_value", "plus_minus"]
 
 
-def plus_minus(value: float, std: float) -> str:
-    """Write ``value ± std`` with two digits of the error and the value to match.
-
-    Parameters
-    ----------
-    value, std : float
-        In one unit.
+def format_value(estimate: Estimate) -> str:
+    """Write an estimate without its unit: ``value ± std``, or how far it may lie to either side.
 
     Examples
     --------
-    >>> plus_minus(0.1500213, 0.0001062)
-    '0.15002 ± 0.00011'
-    >>> plus_minus(12345.6, 340.0)
-    '12350 ± 340'
-    >>> plus_minus(1.5e-9, 2e-11)
-    '(1.500 ± 0.020)e-09'
-    >>> plus_minus(3.0, math.inf)
-    '3 ± ?'
+    >>> format_value(Estimate(value=9.987, std=0.03, ci95=(9.928, 10.046), unit="Hz"))
+    '9.987 ± 0.030'
+    >>> format_value(Estimate(value=0.15, std=None, ci95=(0.1474, 0.1502), unit="s"))
+    '0.15000 −0.00260 +0.00020'
     """
-    places = _places(std)
-    if places is None:
-        return f"{_plain(value)} ± {'0' if std == 0 else '?'}"
-    exponent = _exponent(value, std, places)
-    if exponent:
-        value, std = value / 10.0**exponent, std / 10.0**exponent
-        return f"({_at(value, places + exponent)} ± {_at(std, places + exponent)})e{exponent:+03d}"
-    return f"{_at(value, places)} ± {_at(std, places)}"
+    if estimate.std is not None:
+        return plus_minus(estimate.value, estimate.std)
+    low, high = estimate.ci95 or (None, None)
+    return aside(estimate.value, low, high)
 
 
 def format_estimate(estimate: Estimate) -> str:
@@ -47,7 +30,7 @@ def format_estimate(estimate: Estimate) -> str:
     >>> format_estimate(Estimate(value=9.987, std=0.03, ci95=(9.928, 10.046), unit="Hz"))
     '9.987 ± 0.030 Hz'
     """
-    return f"{plus_minus(estimate.value, estimate.std)} {estimate.unit}".rstrip()
+    return f"{format_value(estimate)} {estimate.unit}".rstrip()
 
 
 def format_interval(estimate: Estimate) -> str:
@@ -57,12 +40,11 @@ def format_interval(estimate: Estimate) -> str:
     --------
     >>> format_interval(Estimate(value=9.987, std=0.03, ci95=(9.928, 10.046), unit="Hz"))
     '9.928 to 10.046'
+    >>> format_interval(Estimate(value=0.15, std=None, ci95=(0.1474, None), unit="s"))
+    '0.1474 or more'
     """
-    low, high = estimate.ci95
-    places = _places(estimate.std)
-    if places is None or _exponent(estimate.value, estimate.std, places):
-        return f"{_plain(low)} to {_plain(high)}"
-    return f"{_at(low, places)} to {_at(high, places)}"
+    low, high = estimate.ci95 or (None, None)
+    return interval(low, high, value=estimate.value, std=estimate.std)
 
 
 def format_number(value: float | None) -> str:
@@ -74,29 +56,3 @@ def format_number(value: float | None) -> str:
     ('0.17', '1235', '–')
     """
     return "–" if value is None else f"{value:.4g}"
-
-
-def _places(std: float) -> int | None:
-    """Decimal places that show two digits of `std`; None if it is no positive number."""
-    if not (math.isfinite(std) and std > 0.0):
-        return None
-    return 1 - int(f"{std:.1e}".partition("e")[2])
-
-
-def _exponent(value: float, std: float, places: int) -> int:
-    """Power of ten to take out, 0 where plain digits read well."""
-    largest = max(abs(value), std)
-    if places <= _MOST_PLACES and largest < _LARGEST_PLAIN:
-        return 0
-    return math.floor(math.log10(largest)) if math.isfinite(largest) else 0
-
-
-def _at(value: float, places: int) -> str:
-    if not math.isfinite(value):
-        return str(value)
-    text = f"{value:.{places}f}" if places >= 0 else f"{round(value, places):.0f}"
-    return text.removeprefix("-") if float(text) == 0.0 else text
-
-
-def _plain(value: float) -> str:
-    return f"{value:.6g}"

@@ -7,7 +7,7 @@ from hmpim.identify.levels import Levels, Trend
 from hmpim.identify.repeats import RepeatedPair, Repeats
 from hmpim.plots.style import printable
 from hmpim.record import Finding
-from hmpim.report.numbers import format_number, plus_minus
+from hmpim.report.numbers import format_estimate, format_number, format_value, plus_minus
 from hmpim.report.words import GLOSSARY
 
 if TYPE_CHECKING:
@@ -55,7 +55,7 @@ def repeats_table(pair: RepeatedPair) -> "Table":
         ratio = (parameter.chi_squared / parameter.freedom) ** 0.5
         cells = (
             words.label,
-            plus_minus(parameter.mean.value, parameter.mean.std),
+            format_value(parameter.mean),
             parameter.mean.unit,
             format_number(parameter.repeatability),
             f"{ratio:.2f}",
@@ -96,8 +96,7 @@ def print_repeats(repeats: Repeats, console: "Console") -> None:
             console.print(
                 Text(
                     f"Noise, from what differs between the records: "
-                    f"{plus_minus(pair.noise_std.value, pair.noise_std.std)} "
-                    f"{printable(pair.noise_std.unit)}".rstrip()
+                    f"{printable(format_estimate(pair.noise_std))}"
                 )
             )
         _print_findings(pair.findings, console)

@@ -6,11 +6,13 @@ from typing import TYPE_CHECKING
 from hmpim.identify import Identification, PairIdentification
 from hmpim.plots.style import printable
 from hmpim.report.inputs import gain_rows
-from hmpim.report.numbers import format_interval, format_number, plus_minus
+from hmpim.report.numbers import format_interval, format_number, format_value
 from hmpim.report.words import (
     GLOSSARY,
     VERDICTS,
+    by_weight,
     headline,
+    leading,
     off_by,
     pair_sentence,
     paper_value,
@@ -23,6 +25,7 @@ if TYPE_CHECKING:
 
 __all__ = ["parameter_table", "print_result"]
 
+_STYLES = {"ok": "green", "doubtful": "bold yellow"}  # of a row's verdict
 _COLOURS = {"ok": "green", "doubtful": "yellow", "not_identifiable": "red"}
 
 
@@ -58,11 +61,12 @@ def parameter_table(
     from rich.text import Text
 
     table = Table(box=SIMPLE_HEAD, pad_edge=False)
-    table.add_column("Parameter")
+    table.add_column("Parameter", min_width=11)
     table.add_column("Value ± std", justify="right")
     table.add_column("Unit")
     table.add_column("95 % interval", justify="right")
-    table.add_column("Paper's steps", justify="right")
+    table.add_column("Verdict")
+    table.add_column("Paper", justify="right")
     if truth is not None:
         table.add_column("Truth", justify="right")
         table.add_column("Off by", justify="right")
@@ -74,18 +78,19 @@ def parameter_table(
             continue
         cells = [words.label]
         if estimate is None:
-            cells += ["–", "", ""]
+            cells += ["–", "", "", ""]
         else:
             cells += [
-                plus_minus(estimate.value, estimate.std),
+                format_value(estimate),
                 estimate.unit,
                 format_interval(estimate),
+                estimate.verdict,
             ]
         cells.append(format_number(paper) if words.differs else "")
         if truth is not None:
             cells.append("" if known is None else f"{known:.5g}")
             cells.append("" if known is None or estimate is None else off_by(estimate, known))
-        table.add_row(*(Text(cell) for cell in cells))
+        table.add_row(*(Text(cell, style=_STYLES.get(cell, "")) for cell in cells))
     return table
 
 
@@ -127,9 +132,12 @@ def print_result(
         several = result.inputs is not None and pair.parameters.scale_factor is None
         if not several:
             console.print(parameter_table(pair, truth=truth))
-        said = pair.warnings[:1] if several else ()  # the sentence says it
-        for warning in pair.warnings[len(said) :]:
-            console.print(Text.assemble(("Warning: ", "bold yellow"), printable(warning.message)))
+        said = leading(pair)  # the sentence says it
+        for warning in by_weight(pair.warnings):
+            if warning is not said:
+                doubt = warning.severity == "doubt"
+                lead = ("Doubt: ", "bold yellow") if doubt else ("Note: ", "bold")
+                console.print(Text.assemble(lead, printable(warning.message)))
         missing = untold(pair)
         if missing and not several:
             console.print(Text(f"No figure for: {missing}.", style="dim"))

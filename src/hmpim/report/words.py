@@ -1,16 +1,21 @@
 """The words of a report: what each parameter is, what each verdict means, why figures differ."""
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from hmpim.identify import Estimate, Identification, PairIdentification, Verdict
 from hmpim.plots.candidates import INTERSAMPLE_WORDS
-from hmpim.report.numbers import format_number, plus_minus
+from hmpim.record import Finding
+from hmpim.report.numbers import format_estimate, format_number
 
 __all__ = [
     "GLOSSARY",
     "VERDICTS",
     "ParameterWords",
+    "by_weight",
     "headline",
+    "leading",
     "nonlinear_facts",
     "paper_value",
     "remark",
@@ -23,19 +28,27 @@ __all__ = [
 class ParameterWords:
     """A parameter's name in the result, for people, its meaning, and why the paper's differs.
 
-    `differs` is empty where the paper gives no figure.
+    `differs` is empty where the paper gives no figure; `short` is the name within a sentence,
+    where that is not the label.
     """
 
     name: str
     label: str
     meaning: str
     differs: str = ""
+    short: str = ""
+
+    @property
+    def inline(self) -> str:
+        """The name within a sentence."""
+        return self.short or self.label[:1].lower() + self.label[1:]
 
 
 GLOSSARY: tuple[ParameterWords, ...] = (
     ParameterWords(
         name="delay",
         label="Delay, pure",
+        short="delay",
         meaning="Time by which everything comes later, whatever its frequency: transport, "
         "processing, waiting for the next sample. The lag of the dynamics is not in it.",
         differs="the peak of the cross-correlation (8) is the delay plus what the dynamics add, "
@@ -44,12 +57,14 @@ GLOSSARY: tuple[ParameterWords, ...] = (
     ParameterWords(
         name="delay_correlation",
         label="Delay, by correlation",
+        short="delay by correlation",
         meaning="Where the cross-correlation of input and output has its peak, equation (8): the "
         "pure delay plus what the dynamics add for this input.",
     ),
     ParameterWords(
         name="delay_low_frequency",
         label="Delay, of slow motion",
+        short="delay of slow motion",
         meaning="Slope of the phase towards zero frequency: by how much a slow movement is late, "
         "dynamics included.",
     ),
@@ -96,6 +111,7 @@ GLOSSARY: tuple[ParameterWords, ...] = (
     ParameterWords(
         name="bandwidth_phase90",
         label="Bandwidth, −90°",
+        short="−90° bandwidth",
         meaning="Frequency at which the output is 90° late in all, delay included: the paper's "
         "measure of merit.",
         differs="it is read off one noisy, windowed ratio of spectra",
@@ -103,11 +119,13 @@ GLOSSARY: tuple[ParameterWords, ...] = (
     ParameterWords(
         name="bandwidth_phase90_without_delay",
         label="Bandwidth, −90° without delay",
+        short="−90° bandwidth without delay",
         meaning="Frequency at which the dynamics alone turn the phase by 90°.",
     ),
     ParameterWords(
         name="bandwidth_3db",
         label="Bandwidth, −3 dB",
+        short="−3 dB bandwidth",
         meaning="Frequency at which the magnitude has fallen 3 dB below that at standstill.",
         differs="it is read off one noisy, windowed ratio of spectra",
     ),
@@ -125,11 +143,13 @@ GLOSSARY: tuple[ParameterWords, ...] = (
     ParameterWords(
         name="saturation_low",
         label="Saturation, low",
+        short="low saturation",
         meaning="Value below which the output does not go.",
     ),
     ParameterWords(
         name="saturation_high",
         label="Saturation, high",
+        short="high saturation",
         meaning="Value above which the output does not go.",
     ),
     ParameterWords(
@@ -223,7 +243,7 @@ def nonlinear_facts(pair: PairIdentification) -> list[tuple[str, str]]:
     if len(found.kinds) > 1:
         kind += "; this record cannot tell which"
     elif found.size is not None:
-        kind += f", size {plus_minus(found.size.value, found.size.std)} {found.size.unit}".rstrip()
+        kind += f", size {format_estimate(found.size)}"
     parts = [
         ("noise", found.noise),
         ("still following the input", found.linear),
@@ -239,22 +259,57 @@ def nonlinear_facts(pair: PairIdentification) -> list[tuple[str, str]]:
 
 def pair_sentence(pair: PairIdentification) -> str:
     """Say in one sentence what model was found and what it explains."""
-    warned = len(pair.warnings)
+    cause = leading(pair)
     if pair.verdict == "not_identifiable":
-        reason = pair.warnings[0].message if warned else "no model describes the output."
-        return reason[:1].lower() + reason[1:]
-    weak = [w.message for w in pair.warnings if w.code == "weak_coupling"]
-    if weak and pair.parameters.scale_factor is None:
-        return weak[0][:1].lower() + weak[0][1:]
+        return "no model describes the output." if cause is None else _uncapped(cause.message)
+    if cause is not None and pair.parameters.scale_factor is None:
+        return _uncapped(cause.message)
     model = [_PARTS.get(pair.structure, f"{structure_words(pair.structure)} dynamics")]
     if pair.parameters.delay is not None:
         model.append("a delay")
     verb = "explain" if len(model) > 1 or pair.structure not in _PARTS else "explains"
     text = f"{' and '.join(model)} {verb} {pair.fit_percent:.1f} % of the output"
-    if pair.verdict == "doubtful" and warned:
-        return f"{text}, but there {'is a warning' if warned == 1 else f'are {warned} warnings'}."
+    if cause is not None:
+        return f"{text}. {_trust(pair)}: {_uncapped(cause.message)}"
     between = INTERSAMPLE_WORDS[pair.intersample]
     return f"{text}, the input taken as {between} between its samples."
+
+
+def leading(pair: PairIdentification) -> Finding | None:
+    """Return the doubt that touches the most of the figures given; None where there is none."""
+    given = [w.name for w in GLOSSARY if getattr(pair.parameters, w.name) is not None]
+    doubts = [w for w in pair.warnings if w.severity == "doubt"]
+    if pair.verdict == "ok" or not doubts:
+        return None
+    return max(doubts, key=lambda doubt: len(set(given) & set(doubt.parameters)))
+
+
+def by_weight(warnings: Sequence[Finding]) -> list[Finding]:
+    """Return doubts before remarks, each in their own order."""
+    return sorted(warnings, key=lambda warning: warning.severity != "doubt")
+
+
+def _trust(pair: PairIdentification) -> str:
+    """Say which figures are good and which are doubtful, the shorter list by name."""
+    given = [w for w in GLOSSARY if getattr(pair.parameters, w.name) is not None]
+    # The paper's delay is what it is, whatever the model.
+    given = [w for w in given if w.name != "delay_correlation"]
+    bad = [w.inline for w in given if getattr(pair.parameters, w.name).verdict == "doubtful"]
+    good = [w.inline for w in given if getattr(pair.parameters, w.name).verdict == "ok"]
+    if not good:
+        return "No figure of the model can be relied on"
+    if len(good) < len(bad):
+        return f"Only {_listed(good)} {'is' if len(good) == 1 else 'are'} good"
+    verb = "is" if len(bad) == 1 else "are"
+    return f"{_listed(bad).capitalize()} {verb} doubtful, the other figures are good"
+
+
+def _listed(names: Sequence[str]) -> str:
+    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
+
+
+def _uncapped(sentence: str) -> str:
+    return sentence[:1].lower() + sentence[1:]
 
 
 def paper_value(pair: PairIdentification, name: str) -> float | None:
@@ -291,7 +346,7 @@ def remark(words: ParameterWords, estimate: Estimate | None, paper: float | None
     if estimate is None:
         return "The chosen model has none."
     gap = paper - estimate.value
-    if abs(gap) <= max(2.0 * estimate.std, 0.002 * abs(estimate.value)):
+    if abs(gap) <= max(2.0 * estimate.spread, 0.002 * abs(estimate.value)):
         return "The two agree."
     return f"{abs(gap):.2g} {'above' if gap > 0 else 'below'}: {words.differs}."
 
@@ -310,6 +365,6 @@ def off_by(estimate: Estimate, truth: float) -> str:
     >>> off_by(Estimate(value=10.06, std=0.03, ci95=(10.0, 10.12)), 10.0)
     '+2.0 std'
     """
-    if estimate.std <= 0.0:
+    if not 0.0 < estimate.spread < math.inf:
         return format_number(estimate.value - truth)
-    return f"{(estimate.value - truth) / estimate.std:+.1f} std"
+    return f"{(estimate.value - truth) / estimate.spread:+.1f} std"

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from hmpim.identify.coupling.inputs import InputSet, OutputCoherence, input_set, own_band
+from hmpim.identify.coupling.inputs import input_set, own_band
+from hmpim.identify.result import InputSet, OutputCoherence
 
 FS, N = 200.0, 2000
 T = np.arange(N) / FS

@@ -8,13 +8,16 @@ from numpy.typing import NDArray
 
 from hmpim.errors import RecordError
 from hmpim.identify.coupling.couplings import unsettled
-from hmpim.identify.coupling.inputs import Alike, InputSet, OutputCoherence, input_set
+from hmpim.identify.coupling.inputs import input_set
 from hmpim.identify.coupling.several import Joined
 from hmpim.identify.frf.multivariable import ResponseMatrix, response_matrix
 from hmpim.identify.groups import EVERY, MODELLED
 from hmpim.identify.result import (
+    Alike,
     Estimate,
     FrequencyResponse,
+    InputSet,
+    OutputCoherence,
     PairIdentification,
     Parameters,
 )
@@ -263,7 +266,7 @@ def settled(
 def _widened(known: Estimate | None, variance: float) -> Estimate | None:
     if known is None or variance == 0.0:
         return known
-    return estimate(known.value, known.std**2 + variance, freedom=_MANY, unit=known.unit)
+    return estimate(known.value, known.spread**2 + variance, freedom=_MANY, unit=known.unit)
 
 
 def _coupled(group: Alike, *, doubt: bool) -> Finding:
@@ -294,24 +297,24 @@ def _told(p: Parameters, band: tuple[float, float]) -> tuple[Parameters, list[st
     """Parameters that a weak coupling's record tells, and the names of the others."""
 
     def loose(e: Estimate) -> bool:
-        return not e.std <= _KNOWN * abs(e.value)
+        return not e.spread <= _KNOWN * abs(e.value)
 
     def beyond(e: Estimate) -> bool:
         return loose(e) or not band[0] <= e.value <= 1.2 * band[1]
 
     def late(e: Estimate) -> bool:
-        return not e.std <= 0.5 / band[1]
+        return not e.spread <= 0.5 / band[1]
 
     gone: set[str] = set()
     for name, bad in (
         ("scale_factor", loose),
-        ("time_constant", lambda e: not e.std <= _KNOWN_LAG * abs(e.value)),
+        ("time_constant", lambda e: not e.spread <= _KNOWN_LAG * abs(e.value)),
         ("damping_ratio", loose),
         ("natural_frequency", beyond),
         ("bandwidth_phase90", beyond),
         ("bandwidth_phase90_without_delay", beyond),
         ("bandwidth_3db", beyond),
-        ("peak_gain_db", lambda e: not e.std <= _LARGEST_DB),
+        ("peak_gain_db", lambda e: not e.spread <= _LARGEST_DB),
         ("delay", late),
         ("delay_low_frequency", late),
     ):
@@ -334,6 +337,6 @@ def _finite(p: Parameters) -> Parameters:
     bad = [
         f.name
         for f in fields(p)
-        if (e := getattr(p, f.name)) is not None and not np.isfinite(e.std)
+        if (e := getattr(p, f.name)) is not None and not np.isfinite(e.spread)
     ]
     return replace(p, **dict.fromkeys(bad, None))

@@ -6,23 +6,18 @@ them an output follows: one of them is a copy of the other, scaled, filtered, or
 frequency at the same time and speed. The direction in which the least is known names them.
 """
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
 from itertools import groupby
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
 
-from hmpim.equality import ByValue
 from hmpim.identify.frf.neighbours import centres_in_band, mirrored, windows_around
+from hmpim.identify.result.inputs import BOUND, Alike, InputSet
 from hmpim.identify.spectrum import excited_band
 
-__all__ = ["Alike", "InputSet", "OutputCoherence", "input_set", "own_band"]
-
-BOUND = 10.0
-"""Condition number up to which inputs count as told apart."""
+__all__ = ["input_set", "own_band"]
 
 _POINTS = 240
 _TERMS = 3
@@ -36,144 +31,6 @@ _DEEP = 10 ** (-50 / 20)
 """Level, relative to the highest, down to which an input still tells something."""
 
 Real = NDArray[np.float64]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Alike:
-    """Inputs that are not told apart, and where.
-
-    Parameters
-    ----------
-    names : tuple of str
-        Of the inputs.
-    bands : tuple of (float, float)
-        Hz.
-    share : float
-        Of the frequencies that all of them excite.
-    """
-
-    names: tuple[str, ...]
-    bands: tuple[tuple[float, float], ...]
-    share: float
-
-    @property
-    def where(self) -> str:
-        """The bands in words."""
-        spans = [f"{low:.3g} to {high:.3g}" for low, high in self.bands]
-        return ", ".join(spans[:4]) + (" and further" if len(spans) > 4 else "") + " Hz"
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class OutputCoherence(ByValue):
-    """Share of an output that all inputs together explain, over frequency.
-
-    Parameters
-    ----------
-    output : str
-        Name.
-    frequency, multiple : ndarray, shape (f,)
-        Hz, and the multiple coherence, 0 to 1, the number of coefficients taken off. That of
-        one input, what it explains of what the others leave over, stands with each pair's
-        frequency response.
-    """
-
-    output: str
-    frequency: Real
-    multiple: Real
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class InputSet(ByValue):
-    """Several inputs driven at once, and how well one record tells them apart.
-
-    Parameters
-    ----------
-    names : tuple of str
-        Of the inputs.
-    bands : tuple of (float, float)
-        What each one excites, Hz.
-    frequency : ndarray, shape (f,)
-        Hz.
-    condition : ndarray, shape (f,)
-        Condition number of the errors of the responses, of those inputs that excite the
-        frequency; each counts with its own power. 1 for inputs that have nothing in common.
-    alike : tuple of Alike
-        Inputs that are not told apart, and where.
-    coherence : tuple of OutputCoherence
-        One for each output.
-    """
-
-    names: tuple[str, ...]
-    bands: tuple[tuple[float, float], ...]
-    frequency: Real
-    condition: Real
-    alike: tuple[Alike, ...] = ()
-    coherence: tuple[OutputCoherence, ...] = ()
-
-    @property
-    def usable(self) -> NDArray[np.bool_]:
-        """Where the inputs are told apart: condition at most 10, shape (f,)."""
-        return np.asarray(self.condition <= BOUND)
-
-    def alike_bins(
-        self, samples: int, fs: float
-    ) -> tuple[tuple[frozenset[int], NDArray[np.bool_]], ...]:
-        """Inputs that are not told apart, and which bins of a transform of `samples` that is."""
-        frequency = np.arange(samples // 2 + 1) * (fs / samples)
-        found = []
-        for group in self.alike:
-            inside = np.zeros(frequency.size, dtype=bool)
-            for low, high in group.bands:
-                inside |= (frequency >= low) & (frequency <= high)
-            found.append((frozenset(self.names.index(name) for name in group.names), inside))
-        return tuple(found)
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return plain JSON values; an infinite condition is null."""
-        return {
-            "names": list(self.names),
-            "bands": [list(band) for band in self.bands],
-            "frequency": self.frequency.tolist(),
-            "condition": [c if np.isfinite(c) else None for c in self.condition.tolist()],
-            "alike": [
-                {"names": list(a.names), "bands": [list(b) for b in a.bands], "share": a.share}
-                for a in self.alike
-            ],
-            "coherence": [
-                {
-                    "output": c.output,
-                    "frequency": c.frequency.tolist(),
-                    "multiple": c.multiple.tolist(),
-                }
-                for c in self.coherence
-            ],
-        }
-
-    @classmethod
-    def from_dict(cls, data: Mapping[str, Any]) -> "InputSet":
-        """Read back what `to_dict` wrote."""
-        return cls(
-            names=tuple(data["names"]),
-            bands=tuple((low, high) for low, high in data["bands"]),
-            frequency=np.asarray(data["frequency"], dtype=float),
-            condition=np.array([np.inf if c is None else c for c in data["condition"]]),
-            alike=tuple(
-                Alike(
-                    names=tuple(a["names"]),
-                    bands=tuple((low, high) for low, high in a["bands"]),
-                    share=a["share"],
-                )
-                for a in data["alike"]
-            ),
-            coherence=tuple(
-                OutputCoherence(
-                    output=c["output"],
-                    frequency=np.asarray(c["frequency"], dtype=float),
-                    multiple=np.asarray(c["multiple"], dtype=float),
-                )
-                for c in data["coherence"]
-            ),
-        )
 
 
 def own_band(u: Real, fs: float, stated: tuple[float, float] | None) -> tuple[float, float]:

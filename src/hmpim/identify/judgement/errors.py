@@ -42,7 +42,7 @@ def weak_excitation(evidence: Evidence) -> tuple[Finding, ...]:
     for name, estimate in named:
         if estimate is None:
             continue
-        spread = estimate.std / abs(estimate.value) if estimate.value else float("inf")
+        spread = estimate.spread / abs(estimate.value) if estimate.value else float("inf")
         if spread <= _LOOSE:
             continue
         findings.append(
@@ -68,7 +68,7 @@ def weak_delay(evidence: Evidence) -> tuple[Finding, ...]:
             ("delay_low_frequency", p.delay_low_frequency),
         )
         if estimate is not None
-        and estimate.std > max(_BLURRED / evidence.fs, _LOOSE * abs(estimate.value))
+        and estimate.spread > max(_BLURRED / evidence.fs, _LOOSE * abs(estimate.value))
     )
     if p.delay is None or "delay" not in blurred:
         return ()
@@ -76,7 +76,7 @@ def weak_delay(evidence: Evidence) -> tuple[Finding, ...]:
         Finding(
             code="weak_excitation",
             message=f"The record hardly tells the delay: its standard deviation is "
-            f"{p.delay.std:.2g} s. Excite more, or sweep higher.",
+            f"{p.delay.spread:.2g} s. Excite more, or sweep higher.",
             severity="doubt",
             parameters=blurred,
         ),

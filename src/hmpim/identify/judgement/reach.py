@@ -144,7 +144,8 @@ def short_record(evidence: Evidence) -> tuple[Finding, ...]:
 def negative_delay(evidence: Evidence) -> tuple[Finding, ...]:
     """Doubt an output that moves before its input."""
     delay = evidence.readings.parameters.delay
-    if delay is None or delay.ci95[1] >= 0:
+    latest = None if delay is None or delay.ci95 is None else delay.ci95[1]
+    if delay is None or latest is None or latest >= 0:
         return ()
     return (
         Finding(

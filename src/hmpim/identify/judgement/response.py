@@ -37,7 +37,7 @@ def bandwidth_disagrees(evidence: Evidence) -> tuple[Finding, ...]:
         if one is None or other is None:
             continue
         apart = abs(one.value - other.value)
-        if apart <= max(_APART * float(np.hypot(one.std, other.std)), _MATTERS * other.value):
+        if apart <= max(_APART * float(np.hypot(one.spread, other.spread)), _MATTERS * other.value):
             continue
         touched += [name, *shaped_by]
         message = message or (  # one sentence is enough

@@ -93,7 +93,7 @@ def _bandwidths_apart(evidence: Evidence, trial: Trial) -> list[tuple[str, str, 
     ):
         if stated is None or other is None:
             continue
-        if abs(other - stated.value) > max(_DISAGREES * stated.std, _MATTERS * stated.value):
+        if abs(other - stated.value) > max(_DISAGREES * stated.spread, _MATTERS * stated.value):
             moved.append((name, words, other, stated.value))
     return moved
 

@@ -50,7 +50,8 @@ def doubted(findings: Iterable[Finding]) -> frozenset[str]:
 
 
 def _weighed(estimate: Estimate, *, doubtful: bool) -> Estimate:
-    return replace(estimate, verdict="doubtful" if doubtful else "ok")
+    withheld = estimate.ci95 is None
+    return replace(estimate, verdict="doubtful" if doubtful or withheld else "ok")
 
 
 def _verdict(parameters: Parameters, findings: Iterable[Finding]) -> Verdict:

@@ -123,7 +123,7 @@ def _picture_17(sample: Sample) -> Picture:
         f"{format_number(found.noise_std)} deg, −90° at {format_number(found.bandwidth_phase90)} Hz"
     )
     joint = ", ".join(
-        f"{name} {factor * estimate.value:.5g} ± {factor * estimate.std:.2g} {unit}".rstrip()
+        f"{name} {factor * estimate.value:.5g} ± {factor * estimate.spread:.2g} {unit}".rstrip()
         for name, estimate, factor, unit in (
             ("delay", parameters.delay, 1e3, "ms"),
             ("bias", parameters.bias, 1.0, "deg"),

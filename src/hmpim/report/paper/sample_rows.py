@@ -84,7 +84,7 @@ def _pair_of_rows(quantity: _Quantity) -> list[Row]:
     joint = quantity.joint
     sure = ""
     if joint is not None:
-        away = abs(joint.value - quantity.truth) / joint.std
+        away = abs(joint.value - quantity.truth) / joint.spread
         sure = f"Jointly with all others; {away:.1f} standard deviations from the truth."
     return [
         Row(
@@ -105,7 +105,7 @@ def _pair_of_rows(quantity: _Quantity) -> list[Row]:
             paper=quantity.paper,
             value=None if joint is None else scaled(joint.value),
             text="none",
-            std=None if joint is None else scaled(joint.std),
+            std=None if joint is None else scaled(joint.spread),
             bound=scaled(quantity.bound),
             truth=scaled(quantity.truth),
             unit=quantity.unit,

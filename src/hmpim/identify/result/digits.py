@@ -1,0 +1,117 @@
+"""Numbers for people: the error to its digits, the value to match."""
+
+import math
+
+__all__ = ["aside", "interval", "plus_minus"]
+
+_MOST_PLACES = 7
+_LARGEST_PLAIN = 1e7
+
+_ONE_DIGIT = 355
+"""First three digits of an error from which one digit of it is enough (Particle Data Group)."""
+
+
+def plus_minus(value: float, std: float, *, short: bool = False) -> str:
+    """Write ``value ± std`` with two digits of the error and the value to match.
+
+    Parameters
+    ----------
+    value, std : float
+        In one unit.
+    short : bool
+        One digit of an error that begins with 355 or more, as the Particle Data Group rounds.
+
+    Examples
+    --------
+    >>> plus_minus(0.1500213, 0.0001062)
+    '0.15002 ± 0.00011'
+    >>> plus_minus(0.1500013, 0.0000945), plus_minus(0.1500013, 0.0000945, short=True)
+    ('0.150001 ± 0.000095', '0.15000 ± 0.00009')
+    >>> plus_minus(12345.6, 340.0)
+    '12350 ± 340'
+    >>> plus_minus(1.5e-9, 2e-11)
+    '(1.500 ± 0.020)e-09'
+    >>> plus_minus(3.0, math.inf)
+    '3 ± ?'
+    """
+    places = _places(std, short=short)
+    if places is None:
+        return f"{_plain(value)} ± {'0' if std == 0 else '?'}"
+    exponent = _exponent(value, std, places)
+    if exponent:
+        value, std = value / 10.0**exponent, std / 10.0**exponent
+        return f"({_at(value, places + exponent)} ± {_at(std, places + exponent)})e{exponent:+03d}"
+    return f"{_at(value, places)} ± {_at(std, places)}"
+
+
+def aside(value: float, low: float | None, high: float | None) -> str:
+    """Write a value with how far its interval reaches to either side; None for an open end.
+
+    Examples
+    --------
+    >>> aside(0.15, 0.1474, 0.1502)
+    '0.15000 −0.00260 +0.00020'
+    >>> aside(0.15, 0.1474, None)
+    '0.1500 −0.0026 +?'
+    >>> aside(0.15, None, None)
+    '0.15 ± ?'
+    """
+    reach = [None if end is None else abs(end - value) for end in (low, high)]
+    known = [length for length in reach if length]
+    places = _places(min(known)) if known else None
+    if places is None:
+        return f"{_plain(value)} ± ?"
+    down, up = ("?" if length is None else _at(length, places) for length in reach)
+    return f"{_at(value, places)} −{down} +{up}"
+
+
+def interval(low: float | None, high: float | None, *, value: float, std: float | None) -> str:
+    """Write an interval with as many places as the value has; an open end in words.
+
+    Examples
+    --------
+    >>> interval(9.928, 10.046, value=9.987, std=0.03)
+    '9.928 to 10.046'
+    >>> interval(0.1474, None, value=0.15, std=None), interval(None, None, value=0.15, std=None)
+    ('0.1474 or more', 'not known')
+    """
+    places = None if std is None else _places(std)
+    plainly = std is None or places is None or _exponent(value, std, places) != 0
+
+    def written(end: float) -> str:
+        return _plain(end) if plainly or places is None else _at(end, places)
+
+    if low is None or high is None:
+        if low is None and high is None:
+            return "not known"
+        return f"{written(low)} or more" if low is not None else f"{written(high or 0.0)} or less"
+    return f"{written(low)} to {written(high)}"
+
+
+def _places(std: float, *, short: bool = False) -> int | None:
+    """Decimal places that show two digits of `std`, or one; None if it is no positive number."""
+    if not (math.isfinite(std) and std > 0.0):
+        return None
+    digits, _, exponent = f"{std:.2e}".partition("e")
+    if short and _ONE_DIGIT <= int(digits.replace(".", "")) < 950:
+        return -int(exponent)
+    return 1 - int(f"{std:.1e}".partition("e")[2])
+
+
+def _exponent(value: float, std: float, places: int) -> int:
+    """Power of ten to take out, 0 where plain digits read well."""
+    largest = max(abs(value), std)
+    if places <= _MOST_PLACES and largest < _LARGEST_PLAIN:
+        return 0
+    return math.floor(math.log10(largest)) if math.isfinite(largest) else 0
+
+
+def _at(value: float, places: int) -> str:
+    if not math.isfinite(value):
+        return str(value)
+    text = f"{value:.{places}f}" if places >= 0 else f"{round(value, places):.0f}"
+    return text.removeprefix("-") if float(text) == 0.0 else text
+
+
+def _plain(value: float) -> str:
+    return f"{value:.6g}"

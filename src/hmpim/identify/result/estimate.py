@@ -1,0 +1,141 @@
+"""One figure: its value, its error, its interval, and whether to rely on it."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from typing import Any, Literal
+
+from hmpim.identify.result.digits import aside, plus_minus
+
+__all__ = [
+    "Estimate",
+    "ParameterVerdict",
+    "Verdict",
+    "estimates_from_dict",
+    "estimates_to_dict",
+]
+
+ParameterVerdict = Literal["ok", "doubtful"]
+Verdict = Literal["ok", "doubtful", "not_identifiable"]
+
+_HALF = 1.959963984540054
+"""Standard deviations of a normal error on either side of 95 %."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class Estimate:
+    """A value, its standard deviation, and its 95 % interval, all in `unit`.
+
+    Parameters
+    ----------
+    value : float
+        The figure; ``float(estimate)`` gives it.
+    std : float or None
+        Standard deviation; None where the interval does not come from a normal error. What is
+        no finite number counts as None.
+    ci95 : (float or None, float or None), or None
+        95 % interval. It may be asymmetric; an end that is open, or infinite, is None; None for
+        an interval that is withheld.
+    unit : str
+        Of all of them.
+    verdict : {'ok', 'doubtful'}
+        Whether to rely on it.
+
+    Examples
+    --------
+    >>> delay = Estimate(value=0.15, std=0.000094, ci95=(0.14981, 0.15019), unit="s")
+    >>> print(delay)
+    0.15000 ± 0.00009 s
+    >>> delay
+    Estimate(0.15000 ± 0.00009 s)
+    >>> f"{delay:.3f}", round(float(delay) * 1e3)
+    ('0.150', 150)
+    """
+
+    value: float
+    std: float | None
+    ci95: tuple[float | None, float | None] | None
+    unit: str = ""
+    verdict: ParameterVerdict = "ok"
+
+    def __post_init__(self) -> None:
+        set_field = object.__setattr__  # frozen from here on
+        set_field(self, "std", _finite(self.std))
+        if self.ci95 is not None:
+            low, high = (_finite(end) for end in self.ci95)
+            set_field(self, "ci95", None if low is None and high is None else (low, high))
+
+    @property
+    def spread(self) -> float:
+        """The standard deviation, or what stands for it: the interval's longer side over 1.96.
+
+        Infinite where the interval is open or withheld.
+        """
+        if self.std is not None:
+            return self.std
+        low, high = self.ci95 or (None, None)
+        if low is None or high is None:
+            return math.inf
+        return max(self.value - low, high - self.value) / _HALF
+
+    @property
+    def text(self) -> str:
+        """Value and error with their unit: '0.15000 ± 0.00009 s'."""
+        low, high = self.ci95 or (None, None)
+        if self.std is None:
+            number = aside(self.value, low, high)
+        else:
+            number = plus_minus(self.value, self.std, short=True)
+        return f"{number} {self.unit}".rstrip()
+
+    def __str__(self) -> str:
+        return self.text if self.verdict == "ok" else f"{self.text} ({self.verdict})"
+
+    def __repr__(self) -> str:
+        doubt = "" if self.verdict == "ok" else f", {self.verdict}"
+        return f"Estimate({self.text}{doubt})"
+
+    def __format__(self, spec: str) -> str:
+        return format(self.value, spec) if spec else str(self)
+
+    def __float__(self) -> float:
+        return float(self.value)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the estimate as plain JSON values."""
+        return {
+            "value": self.value,
+            "std": self.std,
+            "ci95": None if self.ci95 is None else list(self.ci95),
+            "unit": self.unit,
+            "verdict": self.verdict,
+        }
+
+    @classmethod
+    def from_dict(cls, data: Mapping[str, Any]) -> "Estimate":
+        """Read back what `to_dict` wrote."""
+        return cls(
+            value=data["value"],
+            std=data["std"],
+            ci95=None if data["ci95"] is None else (data["ci95"][0], data["ci95"][1]),
+            unit=data["unit"],
+            verdict=data["verdict"],
+        )
+
+
+def estimates_to_dict(holder: Any) -> dict[str, Any]:
+    """Name to estimate of a dataclass of estimates; null where there is no number."""
+    named = {field.name: getattr(holder, field.name) for field in fields(holder)}
+    return {
+        name: None if e is None or not math.isfinite(e.value) else e.to_dict()
+        for name, e in named.items()
+    }
+
+
+def estimates_from_dict(data: Mapping[str, Any]) -> dict[str, Estimate | None]:
+    """Read back what `estimates_to_dict` wrote."""
+    return {name: None if d is None else Estimate.from_dict(d) for name, d in data.items()}
+
+
+def _finite(number: float | None) -> float | None:
+    return number if number is not None and math.isfinite(number) else None

@@ -1,0 +1,107 @@
+"""The whole result of one record, and its JSON."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, fields
+from typing import Any
+
+from hmpim.equality import ByValue
+from hmpim.errors import FormatError
+from hmpim.identify.result.estimate import Verdict
+from hmpim.identify.result.first_schema import FIRST_SCHEMA, upgraded
+from hmpim.identify.result.inputs import InputSet
+from hmpim.identify.result.lookup import find_pair
+from hmpim.identify.result.pair import PairIdentification
+from hmpim.record import Record
+
+__all__ = ["SCHEMA", "Identification", "RecordSummary"]
+
+SCHEMA = "hmpim/identification/2"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RecordSummary:
+    """Which record was identified."""
+
+    fs: float
+    samples: int
+    sha256: str
+    source: str = ""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Identification(ByValue):
+    """The result of `hmpim.identify`: one `PairIdentification` for each input and output.
+
+    Index it output first, as in a transfer matrix: ``result["y", "u"].delay``; the output alone
+    is enough where there is one input. Iterating yields the pairs.
+    `inputs` says how well several inputs are told apart, and how much of each output they
+    explain; None where there is one. `data` is the record itself, kept for pictures; its digest
+    in `record` stands for it in the JSON and where results are compared.
+    """
+
+    record: RecordSummary
+    pairs: tuple[PairIdentification, ...]
+    inputs: InputSet | None = None
+    data: Record | None = field(default=None, compare=False)
+
+    def __getitem__(self, key: tuple[str, str] | str) -> PairIdentification:
+        return find_pair(self.pairs, key, holder="the result")
+
+    def __iter__(self) -> Iterator[PairIdentification]:
+        return iter(self.pairs)
+
+    def __len__(self) -> int:
+        return len(self.pairs)
+
+    @property
+    def verdict(self) -> Verdict:
+        """The worst verdict of all pairs that count."""
+        order: tuple[Verdict, ...] = ("ok", "doubtful", "not_identifiable")
+        verdicts = (pair.verdict for pair in self.counted)
+        return max(verdicts, key=order.index, default="not_identifiable")
+
+    @property
+    def counted(self) -> tuple[PairIdentification, ...]:
+        """Pairs but those of an output with an input that it is not coupled to.
+
+        That an axis does not follow another one's command is a finding, no failure, as long as
+        it follows some input.
+        """
+        if self.inputs is None:
+            return self.pairs
+        follows = {pair.output for pair in self.pairs if pair.verdict != "not_identifiable"}
+        return tuple(
+            pair
+            for pair in self.pairs
+            if pair.output not in follows
+            or pair.parameters.scale_factor is not None
+            or all(finding.code != "unrelated" for finding in pair.warnings)
+        )
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the result as plain JSON values, `schema` first."""
+        return {
+            "schema": SCHEMA,
+            "record": {f.name: getattr(self.record, f.name) for f in fields(self.record)},
+            "pairs": [pair.to_dict() for pair in self.pairs],
+            "inputs": None if self.inputs is None else self.inputs.to_dict(),
+        }
+
+    @classmethod
+    def from_dict(cls, data: Mapping[str, Any]) -> "Identification":
+        """Read back what `to_dict` wrote.
+
+        Raises
+        ------
+        FormatError
+            If `data` is of no schema that is known.
+        """
+        schema = data.get("schema")
+        if schema not in (SCHEMA, FIRST_SCHEMA):
+            raise FormatError(f"schema is {schema!r}; {SCHEMA!r} or {FIRST_SCHEMA!r} is needed")
+        pairs = data["pairs"] if schema == SCHEMA else [upgraded(p) for p in data["pairs"]]
+        return cls(
+            record=RecordSummary(**data["record"]),
+            pairs=tuple(PairIdentification.from_dict(pair) for pair in pairs),
+            inputs=None if data.get("inputs") is None else InputSet.from_dict(data["inputs"]),
+        )

@@ -1,0 +1,57 @@
+"""Pairs by the names of their channels, output first, as in a transfer matrix."""
+
+from collections.abc import Sequence
+from typing import Protocol, TypeVar
+
+from hmpim.errors import RecordError
+
+__all__ = ["Pair", "find_pair"]
+
+
+class Pair(Protocol):
+    """Anything that belongs to one input and one output."""
+
+    @property
+    def input(self) -> str: ...  # noqa: D102
+    @property
+    def output(self) -> str: ...  # noqa: D102
+
+
+P = TypeVar("P", bound=Pair)
+
+
+def find_pair(pairs: Sequence[P], key: object, *, holder: str) -> P:
+    """Return the pair of ``(output, input)``, or of an output alone that has one input.
+
+    Parameters
+    ----------
+    pairs : sequence
+        To look in.
+    key : (str, str) or str
+        Output and input, or the output.
+    holder : str
+        What has the pairs, for the message: 'the result'.
+
+    Raises
+    ------
+    RecordError
+        If there is no such pair, or an output alone leaves a choice of inputs.
+    """
+    known = ", ".join(f"({p.output!r}, {p.input!r})" for p in pairs)
+    if isinstance(key, tuple) and len(key) == 2:
+        for pair in pairs:
+            if (pair.output, pair.input) == key:
+                return pair
+        output, source = key
+        raise RecordError(f"there is no pair ({output!r}, {source!r}); {holder} has {known}")
+    if not isinstance(key, str):
+        raise RecordError(
+            f"{key!r} names no pair; give the output and the input, as one of {known}"
+        )
+    found = [pair for pair in pairs if pair.output == key]
+    if len(found) == 1:
+        return found[0]
+    if not found:
+        raise RecordError(f"there is no output {key!r}; {holder} has {known}")
+    choice = " or ".join(f"[{p.output!r}, {p.input!r}]" for p in found)
+    raise RecordError(f"output {key!r} has {len(found)} inputs; say which: {choice}")

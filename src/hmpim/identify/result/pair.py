@@ -1,0 +1,202 @@
+"""All that is known of one input and one output."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hmpim.equality import ByValue
+from hmpim.identify.result.estimate import Estimate, Verdict
+from hmpim.identify.result.measured import FrequencyResponse, Nonlinearity, ResponseBandwidths
+from hmpim.identify.result.parameters import PaperEstimates, Parameters
+from hmpim.record import Finding, Intersample
+
+__all__ = ["Candidate", "PairIdentification"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Candidate:
+    """One structure that was tried: how well it fits and what its fit costs.
+
+    `criterion` is the Bayesian information criterion, lower is better; `fit_percent` is
+    100 (1 - ||y - ŷ|| / ||y - mean y||).
+    """
+
+    structure: str
+    intersample: Intersample
+    criterion: float
+    fit_percent: float
+    chosen: bool = False
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class PairIdentification(ByValue):
+    """Everything found between one input and one output.
+
+    `dynamics` holds the rational dynamics that were fitted, without delay and with unit
+    gain at DC: numerator and denominator coefficients in powers of s (rad/s), highest
+    first. `covariance`, shape (q, q), is that of the delay in s, of the numerator times the scale
+    factor, and of the denominator before its last coefficient that is not 0, in the same order;
+    None where nothing was identified. `prediction` and `residual` (shape (n,), the output's unit)
+    are on the record's own uniform clock `time`; they follow from the record, and are part neither
+    of the JSON nor of equality. `from_response` holds bandwidths read off the measured response, to
+    be held against the model's. `nonlinearity` is None where the output does not follow the input
+    at all.
+    """
+
+    input: str
+    output: str
+    structure: str
+    intersample: Intersample
+    fit_percent: float
+    parameters: Parameters
+    paper: PaperEstimates
+    frequency_response: FrequencyResponse
+    numerator: tuple[float, ...]
+    denominator: tuple[float, ...]
+    candidates: tuple[Candidate, ...]
+    warnings: tuple[Finding, ...]
+    verdict: Verdict = "doubtful"
+    from_response: ResponseBandwidths = field(default_factory=ResponseBandwidths)
+    time: NDArray[np.float64] | None = field(default=None, compare=False)
+    prediction: NDArray[np.float64] | None = field(default=None, compare=False)
+    residual: NDArray[np.float64] | None = field(default=None, compare=False)
+    nonlinearity: Nonlinearity | None = None
+    covariance: NDArray[np.float64] | None = None
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the pair as plain JSON values (DESIGN.md, Result JSON)."""
+        return {
+            "input": self.input,
+            "output": self.output,
+            "structure": self.structure,
+            "intersample": self.intersample,
+            "fit_percent": self.fit_percent,
+            "parameters": self.parameters.to_dict(),
+            "paper": {f.name: getattr(self.paper, f.name) for f in fields(self.paper)},
+            "frequency_response": self.frequency_response.to_dict(),
+            "bandwidths_from_response": self.from_response.to_dict(),
+            "dynamics": {
+                "numerator": list(self.numerator),
+                "denominator": list(self.denominator),
+                "covariance": None if self.covariance is None else self.covariance.tolist(),
+            },
+            "candidates": [
+                {f.name: getattr(c, f.name) for f in fields(c)} for c in self.candidates
+            ],
+            "nonlinearity": None if self.nonlinearity is None else self.nonlinearity.to_dict(),
+            "verdict": self.verdict,
+            "warnings": [warning.to_dict() for warning in self.warnings],
+            "stopping": None,
+        }
+
+    @classmethod
+    def from_dict(cls, data: Mapping[str, Any]) -> "PairIdentification":
+        """Read back what `to_dict` wrote."""
+        nonlinearity = data.get("nonlinearity")  # results written before it have none
+        covariance = data["dynamics"].get("covariance")
+        return cls(
+            input=data["input"],
+            output=data["output"],
+            structure=data["structure"],
+            intersample=data["intersample"],
+            fit_percent=data["fit_percent"],
+            parameters=Parameters.from_dict(data["parameters"]),
+            paper=PaperEstimates(**data["paper"]),
+            frequency_response=FrequencyResponse.from_dict(data["frequency_response"]),
+            from_response=ResponseBandwidths.from_dict(data.get("bandwidths_from_response", {})),
+            numerator=tuple(data["dynamics"]["numerator"]),
+            denominator=tuple(data["dynamics"]["denominator"]),
+            candidates=tuple(Candidate(**c) for c in data["candidates"]),
+            verdict=data["verdict"],
+            warnings=tuple(Finding.from_dict(w) for w in data["warnings"]),
+            nonlinearity=None if nonlinearity is None else Nonlinearity.from_dict(nonlinearity),
+            covariance=None if covariance is None else np.array(covariance, dtype=np.float64),
+        )
+
+    @property
+    def delay(self) -> Estimate | None:
+        """Pure delay, s."""
+        return self.parameters.delay
+
+    @property
+    def delay_correlation(self) -> Estimate | None:
+        """The paper's delay (equation 8), s."""
+        return self.parameters.delay_correlation
+
+    @property
+    def delay_low_frequency(self) -> Estimate | None:
+        """Slope of the phase at DC, s."""
+        return self.parameters.delay_low_frequency
+
+    @property
+    def scale_factor(self) -> Estimate | None:
+        """Output per input at DC."""
+        return self.parameters.scale_factor
+
+    @property
+    def bias(self) -> Estimate | None:
+        """Output at an input of zero."""
+        return self.parameters.bias
+
+    @property
+    def noise_std(self) -> Estimate | None:
+        """Standard deviation of the noise."""
+        return self.parameters.noise_std
+
+    @property
+    def natural_frequency(self) -> Estimate | None:
+        """Undamped natural frequency, Hz."""
+        return self.parameters.natural_frequency
+
+    @property
+    def damping_ratio(self) -> Estimate | None:
+        """Damping over critical damping."""
+        return self.parameters.damping_ratio
+
+    @property
+    def time_constant(self) -> Estimate | None:
+        """Slowest time constant where the slowest pole is real, s."""
+        return self.parameters.time_constant
+
+    @property
+    def bandwidth_phase90(self) -> Estimate | None:
+        """Frequency at which the phase is -90°, delay included, Hz."""
+        return self.parameters.bandwidth_phase90
+
+    @property
+    def bandwidth_phase90_without_delay(self) -> Estimate | None:
+        """Frequency at which the dynamics alone turn the phase by -90°, Hz."""
+        return self.parameters.bandwidth_phase90_without_delay
+
+    @property
+    def bandwidth_3db(self) -> Estimate | None:
+        """Frequency at which the gain is 3 dB below that at DC, Hz."""
+        return self.parameters.bandwidth_3db
+
+    @property
+    def peak_gain_db(self) -> Estimate | None:
+        """Greatest gain over that at DC, dB."""
+        return self.parameters.peak_gain_db
+
+    @property
+    def hold_period(self) -> Estimate | None:
+        """Interval at which the output is renewed, s."""
+        return self.parameters.hold_period
+
+    @property
+    def saturation_low(self) -> Estimate | None:
+        """Value below which the output does not go."""
+        return self.parameters.saturation_low
+
+    @property
+    def saturation_high(self) -> Estimate | None:
+        """Value above which the output does not go."""
+        return self.parameters.saturation_high
+
+    @property
+    def quantization_step(self) -> Estimate | None:
+        """Smallest step of the output."""
+        return self.parameters.quantization_step

@@ -1,0 +1,64 @@
+"""All figures of one input and one output: the joint fit's, and the paper's."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from hmpim.identify.result.estimate import Estimate, estimates_from_dict, estimates_to_dict
+
+__all__ = ["PaperEstimates", "Parameters"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Parameters:
+    """Every parameter of one input-output pair; None where the record cannot tell.
+
+    Frequencies in Hz, times in s, the rest in the channels' own units (`scale_factor`
+    in output unit per input unit; `damping_ratio` without unit; `peak_gain_db` in dB).
+    """
+
+    delay: Estimate | None = None
+    delay_correlation: Estimate | None = None
+    delay_low_frequency: Estimate | None = None
+    scale_factor: Estimate | None = None
+    bias: Estimate | None = None
+    noise_std: Estimate | None = None
+    natural_frequency: Estimate | None = None
+    damping_ratio: Estimate | None = None
+    time_constant: Estimate | None = None
+    bandwidth_phase90: Estimate | None = None
+    bandwidth_phase90_without_delay: Estimate | None = None
+    bandwidth_3db: Estimate | None = None
+    peak_gain_db: Estimate | None = None
+    hold_period: Estimate | None = None
+    saturation_low: Estimate | None = None
+    saturation_high: Estimate | None = None
+    quantization_step: Estimate | None = None
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return name to estimate, null where there is none."""
+        return estimates_to_dict(self)
+
+    @classmethod
+    def from_dict(cls, data: Mapping[str, Any]) -> "Parameters":
+        """Read back what `to_dict` wrote."""
+        return cls(**estimates_from_dict(data))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PaperEstimates:
+    """The figures that section IV of the paper gives when done step by step, as printed.
+
+    Times in s, frequencies in Hz, bias and noise in the output's unit; None where the
+    step has no answer on this record.
+    """
+
+    delay: float | None = None
+    bias: float | None = None
+    scale_factor: float | None = None
+    noise_std: float | None = None
+    natural_frequency: float | None = None
+    damping_ratio: float | None = None
+    bandwidth_phase90: float | None = None
+    bandwidth_3db: float | None = None
+    peak_gain_db: float | None = None
