@@ -321,6 +321,11 @@ def test_limits_of_a_rig_of_ones_own_are_checked_right_before_it_moves(quantity)
         stricter.check(case, (stimulus,))
 
 
+def written(out):
+    """Cases that are whole; what is being written has a hidden name."""
+    return [path for path in out.glob("cases/*.json") if not path.name.startswith(".")]
+
+
 def test_killed_outright_it_goes_on_and_repeats_nothing(tmp_path):
     """kill -9 leaves no time to tidy up: what is written by then counts, and nothing else."""
     plan = tmp_path / "plan.toml"
@@ -330,18 +335,19 @@ def test_killed_outright_it_goes_on_and_repeats_nothing(tmp_path):
     command = [sys.executable, "-m", "hmpim.cli.main", "campaign", str(plan), "--out", str(out)]
     with subprocess.Popen([*command, "--quiet"]) as running:
         deadline = time.monotonic() + 60.0
-        while not list(out.glob("cases/*.json")) and time.monotonic() < deadline:
+        while not written(out) and time.monotonic() < deadline:
             time.sleep(0.002)
         running.kill()
     assert running.returncode == -signal.SIGKILL
-    done = {path: path.stat().st_mtime_ns for path in out.glob("cases/*.json")}
+    done = {path: path.stat().st_mtime_ns for path in written(out)}
     assert 0 < len(done) < 4
     assert not (out / "study.json").exists()
     finished = subprocess.run(command, check=True, capture_output=True, text=True)
     assert "All 6 checks of the specification are met." in finished.stdout
-    cases = {path: path.stat().st_mtime_ns for path in out.glob("cases/*.json")}
+    cases = {path: path.stat().st_mtime_ns for path in written(out)}
     assert len(cases) == 4
     assert {path: cases[path] for path in done} == done
+    assert sorted(out.glob("cases/*")) == sorted(cases)  # nothing half written is left
     # Killed or not, the same seed gives the same study.
     whole = run_campaign(read_plan(plan), tmp_path / "whole")
     assert whole == run_campaign(read_plan(plan), out)

@@ -105,6 +105,8 @@ def _open(plan: Plan, folder: Path, *, fresh: bool) -> None:
     if folder.exists() and not folder.is_dir():
         raise ArgumentError(f"{folder} is a file; name a folder")
     (folder / "cases").mkdir(parents=True, exist_ok=True)
+    for half in (folder / "cases").glob(".hmpim-*"):  # of a run that was killed as it wrote
+        half.unlink()
     stamp = folder / STAMP
     if fresh:
         for old in (folder / "cases").glob("*.json"):
