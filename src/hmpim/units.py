@@ -3,13 +3,14 @@
 The empty string means "no unit stated" and is taken as dimensionless.
 """
 
+import re
 from functools import cache
 
 import pint
 
 from hmpim.errors import UnitError
 
-__all__ = ["check_unit", "conversion_factor", "rate_label", "rate_unit"]
+__all__ = ["check_unit", "conversion_factor", "rate_label", "rate_unit", "read_unit"]
 
 
 @cache
@@ -90,3 +91,71 @@ def conversion_factor(unit: str, *, to: str) -> float:
         return float(_registry().Quantity(1.0, _parsed(unit)).to(_parsed(to)).magnitude)
     except pint.DimensionalityError as error:
         raise UnitError(f"unit {unit!r} cannot be turned into {to!r}: {error}") from error
+
+
+# By how they are written: what pint takes for something else, or for nothing.
+_SPELLINGS: dict[str, str | None] = {
+    "Nm": "N*m",  # pint: number times metre
+    "N m": "N*m",
+    "Nmm": "N*mm",
+    "mNm": "mN*m",
+    "Nm/rad": "N*m/rad",
+    "º": "deg",
+    "º/s": "deg/s",
+    "dps": "deg/s",
+    "Vpp": "V",
+    "amp": "A",
+    "amps": "A",  # pint: attometre per second
+    "volt": "V",
+    "volts": "V",
+    "ampere": "A",
+    "amperes": "A",
+    "second": "s",
+    "seconds": "s",
+    "degree": "deg",
+    "degrees": "deg",
+    "radian": "rad",
+    "radians": "rad",
+    "°": "deg",
+    "°/s": "deg/s",
+    "°/s²": "deg/s**2",
+    "LSB": "count",
+    "lsb": "count",
+    "Grad": None,  # German degree, or gon; pint: gigaradian
+    "grad": None,
+}
+
+
+def read_unit(text: str) -> str | None:
+    """Return a unit as instruments and spreadsheets write it in a spelling that pint knows.
+
+    Parameters
+    ----------
+    text : str
+        Such as 'Volt', 'm/s2', 'dps', 'Nm', '°/s'.
+
+    Returns
+    -------
+    str or None
+        None if it is not known, or means different things to different people ('Grad').
+
+    Examples
+    --------
+    >>> read_unit("Volt"), read_unit("m/s2"), read_unit("dps"), read_unit("Nm"), read_unit("deg")
+    ('V', 'm/s**2', 'deg/s', 'N*m', 'deg')
+    >>> read_unit("filtered") is None
+    True
+    """
+    text = text.strip()
+    for spelling in (text, text.casefold()):
+        if spelling in _SPELLINGS:
+            return _SPELLINGS[spelling]
+    powers = re.sub(r"(?<=[A-Za-z])([23])\b", r"**\1", text)
+    words = [text.casefold()] if len(text) > 3 and text.isalpha() else []
+    for candidate in (text, powers, *words):
+        if candidate and not re.fullmatch(r"[\d.+\- ]+", candidate):
+            try:
+                return check_unit(candidate)
+            except UnitError:
+                continue
+    return None

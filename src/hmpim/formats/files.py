@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from hmpim.errors import ArgumentError, FormatError, UnitError
-from hmpim.formats.readers import Contents, Layout, reader_for
+from hmpim.formats.readers import Contents, Layout, listed, reader_for
 from hmpim.formats.roles import Roles, choose_roles
 from hmpim.record import Channel, Record, Series, fit_clock
 from hmpim.record.mend import mend
@@ -116,9 +116,9 @@ def assemble(
         If the data cannot be used.
     """
     if fs is None and any(s.time is None for s in series):
-        listed = ", ".join(c.name for c in contents.channels)
+        names = listed([c.name for c in contents.channels])
         raise FormatError(
-            f"{file!r} has no column time or t among {listed}; give the rate with fs=... or "
+            f"{file!r} has no column time or t among {names}; give the rate with fs=... or "
             "--fs, or name the time column with time=... or --time"
         )
     if series and series[0].values.size < 2:
@@ -152,7 +152,7 @@ def _check_units(units: Mapping[str, str], contents: Contents, file: str) -> Non
         if name not in names:
             raise ArgumentError(
                 f"a unit is given for {name!r}, which is not a column of {file!r}; "
-                f"it has {', '.join(names)}"
+                f"it has {listed(names)}"
             )
         check_unit(unit)
 

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from hmpim.errors import ArgumentError, FormatError
-from hmpim.formats.readers import ChannelInfo, Contents
+from hmpim.formats.readers import ChannelInfo, Contents, listed
 
 __all__ = ["INPUT_NAMES", "OUTPUT_NAMES", "Roles", "choose_roles", "find_channel"]
 
@@ -107,7 +107,9 @@ def find_channel(wanted: str, contents: Contents) -> ChannelInfo | None:
     }
     found = [c for c in contents.channels if wanted in headings[c.name]]
     if not found:
-        found = [c for c in contents.channels if c.name.casefold() == wanted.casefold()]
+        # Columns without names are called by their number.
+        called = (wanted.casefold(), f"column {wanted}")
+        found = [c for c in contents.channels if c.name.casefold() in called]
     return found[0] if len(found) == 1 else None
 
 
@@ -122,7 +124,7 @@ def _stated(contents: Contents, kind: str) -> tuple[str, ...]:
 
 
 def _listed(contents: Contents) -> str:
-    return ", ".join(c.name for c in contents.channels) or "none beside time"
+    return listed([c.name for c in contents.channels])
 
 
 def _named(
@@ -134,6 +136,7 @@ def _named(
     for name in wanted or ():
         found = find_channel(name, contents)
         if found is None:
+            _refuse_twins(name, contents, file)
             raise FormatError(
                 f"{file!r} has no column {name!r}; its columns are {_listed(contents)}"
             )
@@ -141,6 +144,20 @@ def _named(
             raise ArgumentError(f"{kind} {name!r} is named twice; name it once")
         chosen.append(found.name)
     return tuple(chosen)
+
+
+def _refuse_twins(wanted: str, contents: Contents, file: str) -> None:
+    """Say so if several columns share a name, which readers then tell apart by their place."""
+    start = f"{wanted} (column ".casefold()
+    twins = [c.name for c in contents.channels if c.name.casefold().startswith(start)]
+    if twins:
+        raise FormatError(
+            f"{file!r} has {_COUNTS.get(len(twins), len(twins))} columns {wanted!r}; "
+            f"say which: {', '.join(repr(name) for name in twins)}"
+        )
+
+
+_COUNTS = {2: "two", 3: "three"}
 
 
 def _choose(
@@ -157,6 +174,9 @@ def _choose(
         return chosen
     names = [c.name for c in contents.channels]
     usual = [name for name in names if name.casefold() in known]
+    if not usual:
+        for name in known:
+            _refuse_twins(name, contents, file)
     if len(usual) == 1:
         return tuple(usual)
     if usual:

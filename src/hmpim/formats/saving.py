@@ -15,8 +15,8 @@ from hmpim.errors import ArgumentError, FormatError
 from hmpim.formats.atomic import write_text
 from hmpim.formats.csv import write_csv
 from hmpim.formats.files import read
+from hmpim.formats.readers.text import read_text
 from hmpim.formats.stimulus_files import STIMULUS_SUFFIXES, read_stimulus, save_stimulus
-from hmpim.formats.table import read_text
 from hmpim.identify import Identification
 from hmpim.identify.repeats import Repeats
 from hmpim.record import Record

@@ -30,7 +30,8 @@ class Mended:
     channels : tuple of Channel
         In the order of the series.
     findings : tuple of Finding
-        Codes 'missing_samples', 'doubled_stamps', 'backward_stamps', 'missing_stamps'.
+        What the reader noticed, then codes 'missing_samples', 'doubled_stamps',
+        'backward_stamps', 'missing_stamps'.
     """
 
     channels: tuple[Channel, ...]
@@ -66,7 +67,7 @@ def mend(series: Sequence[Series], *, fs: float | None = None) -> Mended:
     >>> mended.channels[0].time.tolist(), [f.code for f in mended.findings]
     ([0.0, 0.1], ['doubled_stamps', 'missing_samples'])
     """
-    findings: list[Finding] = []
+    findings: list[Finding] = list(dict.fromkeys(f for s in series for f in s.findings))
     known: dict[int, tuple[NDArray[np.float64], NDArray[np.int64] | None]] = {}
     made: list[Channel] = []
     for s in series:

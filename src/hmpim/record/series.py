@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hmpim.errors import RecordError
+from hmpim.record.finding import Finding
 
 __all__ = ["Series"]
 
@@ -25,6 +26,8 @@ class Series:
         clock should share one array.
     unit : str
         Unit as the file states it; empty where it states none.
+    findings : tuple of Finding
+        What its reader noticed, such as a file that is cut short.
 
     Raises
     ------
@@ -43,6 +46,7 @@ class Series:
     values: NDArray[np.float64]
     time: NDArray[np.float64] | None = None
     unit: str = ""
+    findings: tuple[Finding, ...] = ()
 
     def __post_init__(self) -> None:
         for label, array in (("values", self.values), ("time", self.time)):

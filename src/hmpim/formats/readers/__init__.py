@@ -3,7 +3,7 @@
 A reader of your own is a `Reader`; publish it as an entry point of the group ``hmpim.readers``.
 """
 
-from hmpim.formats.readers.protocol import ChannelInfo, Contents, Layout, Reader, need
+from hmpim.formats.readers.protocol import ChannelInfo, Contents, Layout, Reader, listed, need
 from hmpim.formats.readers.registry import BrokenReader, Found, reader_for, readers
 
 __all__ = [
@@ -13,6 +13,7 @@ __all__ = [
     "Found",
     "Layout",
     "Reader",
+    "listed",
     "need",
     "reader_for",
     "readers",

@@ -10,7 +10,7 @@ from typing import Literal
 from hmpim.errors import MissingExtraError
 from hmpim.record import Finding, Intersample, Series
 
-__all__ = ["ChannelInfo", "Contents", "Layout", "Reader", "Stamps", "need"]
+__all__ = ["ChannelInfo", "Contents", "Layout", "Reader", "Stamps", "listed", "need"]
 
 Stamps = Literal["auto", "header", "log"]
 """Which stamp counts where a file holds two: the sender's own, or the logger's."""
@@ -59,12 +59,15 @@ class ChannelInfo:
     clock : str
         Name of the channel, message or group whose stamps it has; channels of one clock have
         equal names. Empty where the file has one clock, or none.
+    text : bool
+        True if it holds words rather than numbers, and so cannot be read as a signal.
     """
 
     name: str
     unit: str = ""
     samples: int | None = None
     clock: str = ""
+    text: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -76,9 +79,11 @@ class Contents:
     format : str
         Name of the format, for people: 'text', 'MAT 5'.
     channels : tuple of ChannelInfo
-        All channels that hold numbers, without the time itself.
+        All channels but the time itself.
     time : str or None
         Name of the channel that time was taken from, where there is one for all.
+    origin : float or None
+        Unix time in s at which the file's time is 0; None where it does not tell.
     inputs, outputs, references, auxiliary : tuple of str
         Names of the channels whose role the file states.
     fs : float or None
@@ -96,6 +101,7 @@ class Contents:
     format: str
     channels: tuple[ChannelInfo, ...]
     time: str | None = None
+    origin: float | None = None
     inputs: tuple[str, ...] = ()
     outputs: tuple[str, ...] = ()
     references: tuple[str, ...] = ()
@@ -142,6 +148,23 @@ class Reader:
     read: Callable[[Path, Sequence[str], Layout], tuple[Series, ...]]
     extra: str = ""
     foreign: bool = False
+
+
+_LISTED = 20
+
+
+def listed(names: Sequence[str]) -> str:
+    """Return names for a message, the first twenty of them.
+
+    Examples
+    --------
+    >>> listed(["u", "y"]), listed([])
+    ('u, y', 'none beside time')
+    >>> listed([str(k) for k in range(100)])[-24:]
+    '17, 18, 19 and 80 others'
+    """
+    more = f" and {len(names) - _LISTED} others" if len(names) > _LISTED else ""
+    return ", ".join(names[:_LISTED]) + more or "none beside time"
 
 
 def need(module: str, *, extra: str, what: str) -> ModuleType:

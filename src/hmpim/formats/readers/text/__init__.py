@@ -1,0 +1,16 @@
+"""Tables of text: CSV, TSV, blank-separated, with or without headings, packed or not."""
+
+from hmpim.formats.readers.text.notes import KINDS, MARK, heading_of
+from hmpim.formats.readers.text.reader import TEXT, TIME_NAMES
+from hmpim.formats.readers.text.source import MAX_EXPANDED, MAX_LINE, read_text
+
+__all__ = [
+    "KINDS",
+    "MARK",
+    "MAX_EXPANDED",
+    "MAX_LINE",
+    "TEXT",
+    "TIME_NAMES",
+    "heading_of",
+    "read_text",
+]
