@@ -9,7 +9,7 @@ import pytest
 
 import hmpim
 from hmpim.cli.main import app
-from hmpim.formats.models import TARGETS
+from hmpim.formats.models import TARGETS, fmu
 
 
 def run(*words: object) -> int:
@@ -28,7 +28,8 @@ def result(tmp_path_factory):
 
 
 @pytest.mark.parametrize("target", sorted(TARGETS))
-def test_every_target_is_written_from_a_result(target, result, tmp_path, capsys):
+def test_every_target_is_written_from_a_result(target, result, tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr(fmu, "PLATFORMS", fmu.PLATFORMS[:1])
     place = tmp_path / ("axis" + TARGETS[target].suffix)
     assert run("export", result, "--to", target, "-o", place) == 0
     shown = [line for line in capsys.readouterr().out.splitlines() if line]
@@ -65,6 +66,14 @@ def test_what_cannot_be_exported_is_one_clear_line(words, said, result, capsys, 
     error = capsys.readouterr().err
     assert said in error
     assert len(error.splitlines()) == 1
+
+
+def test_an_fmu_of_sources_only_says_so(result, tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr(fmu, "can_compile", lambda: False)
+    assert run("export", result, "--to", "fmu", "-o", tmp_path / "x.fmu", "--fmi", "3") == 0
+    shown = capsys.readouterr().out.splitlines()
+    assert "x.fmu holds sources only" in shown[0]
+    assert shown[1] == str(tmp_path / "x.fmu")
 
 
 def test_a_result_is_not_replaced_by_its_export(result, capsys, tmp_path):

@@ -186,3 +186,13 @@ def test_readouts_that_cannot_be_are_refused():
         replace(STATIC, hold_period=1e-9).at_rate(FS)
     with pytest.raises(ArgumentError, match="is not known"):
         STATIC.at_rate(FS, intersample="cubic")
+
+
+@pytest.mark.parametrize("period", [None, 0.0123])
+@pytest.mark.parametrize("intersample", ["zoh", "foh", "bandlimited"])
+def test_what_is_late_by_a_sample_does_not_depend_on_the_newest_one(intersample, period):
+    for delay in (0.005, 0.0071, 0.3):
+        model = replace(SECOND, delay=delay, intersample=intersample, hold_period=period)
+        u = np.random.default_rng(0).standard_normal(40)
+        changed = np.concatenate([u[:-1], [u[-1] + 5.0]])
+        assert np.array_equal(model.simulate(u, T[:40]), model.simulate(changed, T[:40]))

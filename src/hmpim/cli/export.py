@@ -1,5 +1,6 @@
 """`hmpim export`: what was identified, as a model for another tool."""
 
+import warnings
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -26,6 +27,7 @@ class To(StrEnum):
     JSON = "json"
     C = "c"
     PYTHON = "python"
+    FMU = "fmu"
     UFF58 = "uff58"
     CSV = "csv"
 
@@ -68,6 +70,9 @@ def export(
             "--intersample", help="What their input does between samples; else as identified."
         ),
     ] = None,
+    fmi: Annotated[
+        int | None, typer.Option("--fmi", metavar="2|3", help="Version of FMI, for fmu; else 2.")
+    ] = None,
     pade: Annotated[
         int | None,
         typer.Option("--pade", metavar="N", help="Order of the delay's Padé form, for control."),
@@ -85,7 +90,8 @@ def export(
     else:
         check_files(reads={"the result": result}, writes=into)
     found = read_result(result)
-    with working(f"Writing {to.value}"):
+    with working(f"Writing {to.value}"), warnings.catch_warnings(record=True) as remarks:
+        warnings.simplefilter("always")
         written = write(
             found,
             to=to.value,
@@ -94,7 +100,10 @@ def export(
             fs=fs,
             intersample=None if intersample is None else intersample.value,
             pade=pade,
+            fmi=fmi,
         )
+    for remark in remarks:
+        say(str(remark.message))
     for file in written:
         say(str(file))
 

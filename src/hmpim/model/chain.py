@@ -134,7 +134,7 @@ def chain_of(
     over_outputs = False
     between_error = 0.0
     if period is not None and intersample == "bandlimited":
-        early = min(int(system.delay * fs + _GRACE), _EARLY)
+        early = min(max(int(system.delay * fs + _GRACE) - 1, 0), _EARLY)
         system = replace(system, delay=max(system.delay - early / fs, 0.0))
         step = discretise(system, fs=fs, intersample=intersample, band=band)
         piece, between_error = _outputs_between(early, step.band / fs)

@@ -30,7 +30,11 @@ TAPS = 3
 """Input samples that one step looks at: a fraction of a sample reaches over three of them."""
 
 LOOKAHEAD = 32
-"""Most samples of the delay that a band-limited input's filter may use to look both ways."""
+"""Most samples of the delay that a band-limited input's filter may use to look both ways.
+
+One sample is left alone: what is late by a sample or more never depends on the newest input, so
+that a loop can be closed over it.
+"""
 
 _WHOLE = 1e-9
 """Part of a sample below which a delay counts as whole."""
@@ -123,7 +127,11 @@ class RowPiece:
 
 
 def discretise(
-    system: RationalDelay, *, fs: float, intersample: Intersample, band: float | None = None
+    system: RationalDelay,
+    *,
+    fs: float,
+    intersample: Intersample,
+    band: float | None = None,
 ) -> Discrete:
     """Turn a continuous model into one that is stepped at a rate.
 
@@ -162,7 +170,7 @@ def discretise(
     total = system.delay * fs
     ahead = 0
     if intersample == "bandlimited":
-        ahead = min(int(total + _WHOLE), LOOKAHEAD)
+        ahead = min(max(int(total + _WHOLE) - 1, 0), LOOKAHEAD)
     rest = total - ahead
     whole = int(rest + _WHOLE)
     fraction = max(rest - whole, 0.0)

@@ -32,9 +32,8 @@ def accuracy(chain: Chain) -> str:
     )
 
 
-def c_files(source: Source) -> dict[str, str]:
+def c_files(source: Source, chain: Chain) -> dict[str, str]:
     """Return the text of each file by its name."""
-    chain = source.chain()
     context = {
         "name": source.name,
         "lines": source.lines(),
@@ -51,7 +50,7 @@ def write_c(source: Source, folder: Path) -> tuple[Path, ...]:
     """Write header and source into a folder, made if it is missing."""
     folder.mkdir(parents=True, exist_ok=True)
     written = []
-    for name, text in c_files(source).items():
+    for name, text in c_files(source, source.chain()).items():
         write_text(folder / name, text)
         written.append(folder / name)
     return tuple(written)

@@ -9,6 +9,7 @@ from typing import Literal, get_args
 from hmpim.errors import ArgumentError
 from hmpim.formats.models.c import write_c
 from hmpim.formats.models.csv import write_csv
+from hmpim.formats.models.fmu import write_fmu
 from hmpim.formats.models.json import write_json
 from hmpim.formats.models.linear import write_control, write_scipy
 from hmpim.formats.models.mat import write_mat
@@ -21,28 +22,53 @@ from hmpim.record import Intersample
 
 __all__ = ["TARGETS", "Target", "export"]
 
-Target = Literal["control", "scipy", "matlab", "mat", "json", "c", "python", "uff58", "csv"]
+Target = Literal["control", "scipy", "matlab", "mat", "json", "c", "python", "fmu", "uff58", "csv"]
 """What a result can be exported to."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class _Choices:
+    """What some targets alone can be told; None where it is left to them."""
+
+    pade: int | None = None
+    fmi: int | None = None
+    timestep: float | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class _Writer:
-    """How a target is written: the suffix of its file, "" for a folder of files."""
+    """How a target is written.
+
+    Parameters
+    ----------
+    suffix : str
+        Of its file; "" for a folder of files.
+    write : callable
+        Writes it.
+    choices : tuple of str
+        Which of the choices it takes.
+    """
 
     suffix: str
-    write: Callable[[Source, Path], tuple[Path, ...]]
+    write: Callable[[Source, Path, _Choices], tuple[Path, ...]]
+    choices: tuple[str, ...] = ()
 
 
 TARGETS: dict[str, _Writer] = {
-    "control": _Writer(suffix=".py", write=write_control),
-    "scipy": _Writer(suffix=".py", write=write_scipy),
-    "matlab": _Writer(suffix=".m", write=write_matlab),
-    "mat": _Writer(suffix=".mat", write=write_mat),
-    "json": _Writer(suffix=".json", write=write_json),
-    "c": _Writer(suffix="", write=write_c),
-    "python": _Writer(suffix=".py", write=write_python),
-    "uff58": _Writer(suffix=".uff", write=write_uff58),
-    "csv": _Writer(suffix=".csv", write=write_csv),
+    "control": _Writer(
+        suffix=".py", write=lambda s, p, c: write_control(s, p, pade=c.pade), choices=("pade",)
+    ),
+    "scipy": _Writer(suffix=".py", write=lambda s, p, c: write_scipy(s, p)),
+    "matlab": _Writer(suffix=".m", write=lambda s, p, c: write_matlab(s, p)),
+    "mat": _Writer(suffix=".mat", write=lambda s, p, c: write_mat(s, p)),
+    "json": _Writer(suffix=".json", write=lambda s, p, c: write_json(s, p)),
+    "c": _Writer(suffix="", write=lambda s, p, c: write_c(s, p)),
+    "python": _Writer(suffix=".py", write=lambda s, p, c: write_python(s, p)),
+    "fmu": _Writer(
+        suffix=".fmu", write=lambda s, p, c: write_fmu(s, p, fmi=c.fmi or 2), choices=("fmi",)
+    ),
+    "uff58": _Writer(suffix=".uff", write=lambda s, p, c: write_uff58(s, p)),
+    "csv": _Writer(suffix=".csv", write=lambda s, p, c: write_csv(s, p)),
 }
 
 
@@ -55,6 +81,8 @@ def export(
     fs: float | None = None,
     intersample: Intersample | None = None,
     pade: int | None = None,
+    fmi: int | None = None,
+    timestep: float | None = None,
 ) -> tuple[Path, ...]:
     """Write what was identified as a model for another tool.
 
@@ -66,7 +94,7 @@ def export(
     ----------
     result : Identification
         From `hmpim.identify`, or read back.
-    to : {'control', 'scipy', 'matlab', 'mat', 'json', 'c', 'python', 'uff58', 'csv'}
+    to : {'control', 'scipy', 'matlab', 'mat', 'json', 'c', 'python', 'fmu', 'uff58', 'csv'}
         The target; docs/models.md tells what each is.
     path : str or path-like
         File to write; for C a folder, made if it is missing. A folder for a target of one file
@@ -80,6 +108,10 @@ def export(
     pade : int, optional
         Order of python-control's Padé approximation, 1 to 20; by default the least that is right
         to 1 % over the excited band.
+    fmi : {2, 3}, optional
+        Version of FMI; 2 by default.
+    timestep : float, optional
+        Step in s of the simulator that the model is for, where the target needs it.
 
     Returns
     -------
@@ -110,6 +142,13 @@ def export(
     writer = TARGETS.get(to)
     if writer is None:
         raise ArgumentError(f"target {to!r} is not known; choose of {', '.join(get_args(Target))}")
+    choices = _Choices(pade=pade, fmi=fmi, timestep=timestep)
+    for name in ("pade", "fmi", "timestep"):
+        if getattr(choices, name) is not None and name not in writer.choices:
+            able = ", ".join(key for key, one in TARGETS.items() if name in one.choices)
+            raise ArgumentError(
+                f"{name} = {getattr(choices, name)!r} is for {able} alone, not {to}"
+            )
     if not isinstance(result, Identification):
         raise ArgumentError(
             f"{type(result).__name__} is no result; give what hmpim.identify returned, or what "
@@ -129,13 +168,7 @@ def export(
     source = source_of(
         result, name=stem or place.resolve().name, pair=pair, fs=fs, intersample=intersample
     )
-    if pade is not None:
-        if to != "control" or not 1 <= pade <= 20:
-            raise ArgumentError(
-                f"pade = {pade!r} for target {to!r}: an order from 1 to 20 is for control alone"
-            )
-        return write_control(source, place, pade=pade)
-    return writer.write(source, place)
+    return writer.write(source, place, choices)
 
 
 def _named(result: Identification) -> str:

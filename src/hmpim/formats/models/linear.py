@@ -5,6 +5,7 @@ from pprint import pformat
 
 import numpy as np
 
+from hmpim.errors import ArgumentError
 from hmpim.formats.atomic import write_text
 from hmpim.formats.models.refined import (
     REFINE,
@@ -19,7 +20,15 @@ __all__ = ["write_control", "write_scipy"]
 
 
 def write_control(source: Source, path: Path, *, pade: int | None = None) -> tuple[Path, ...]:
-    """Write the script for python-control; `pade` is the order of its approximation."""
+    """Write the script for python-control; `pade` is the order of its approximation.
+
+    Raises
+    ------
+    ArgumentError
+        If the order is not from 1 to 20: beyond, its coefficients lose all digits.
+    """
+    if pade is not None and not 1 <= pade <= 20:
+        raise ArgumentError(f"pade = {pade!r} is no order from 1 to 20; give one of these")
     return _write(source, path, control=True, pade=pade)
 
 
