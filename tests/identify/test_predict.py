@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 import hmpim
-from hmpim.identify.uncertainty import response_std
-from hmpim.model import draw_models, frequency_response
+from hmpim.model import draw_models, frequency_response, response_error
 
 
 @pytest.fixture(scope="module")
@@ -48,7 +47,7 @@ def test_draws_scatter_as_the_response_is_uncertain(found):
     f = np.array([0.5, 5.0, 12.0])
     drawn = np.array([frequency_response(m, f) for m in draw_models(model, 500, rng=3)])
     scatter = np.sqrt(np.mean(np.abs(drawn - frequency_response(model, f)) ** 2, axis=0))
-    stated = response_std(model.system, np.array(model.spread.covariance), f)
+    stated = response_error(model, f)
     assert scatter == pytest.approx(stated, rel=0.1)
 
 

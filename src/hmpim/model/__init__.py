@@ -2,7 +2,7 @@
 
 from hmpim.model.chain import Chain, Readout, chain_of, run_chain
 from hmpim.model.discrete import Discrete, RowPiece, discretise
-from hmpim.model.draws import coefficient_vector, draw_models
+from hmpim.model.draws import coefficient_vector, draw_models, response_error
 from hmpim.model.dynamics import (
     STRUCTURES,
     Structure,
@@ -55,6 +55,7 @@ __all__ = [
     "phase",
     "prepare_input",
     "response",
+    "response_error",
     "run_chain",
     "second_order_coefficients",
     "simulate",

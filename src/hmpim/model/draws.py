@@ -6,9 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hmpim.errors import ArgumentError
-from hmpim.model.model import Model
+from hmpim.model.model import Model, frequency_response
 
-__all__ = ["coefficient_vector", "draw_models"]
+__all__ = ["coefficient_vector", "draw_models", "response_error"]
 
 _TRIES = 100
 """Draws made for each one kept, before giving up."""
@@ -30,6 +30,51 @@ def coefficient_vector(model: Model) -> NDArray[np.float64]:
     return np.concatenate(
         [[rational.delay], rational.numerator[::-1], rational.denominator[behind:][::-1]]
     )
+
+
+def response_error(model: Model, frequency: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Standard deviation of a model's response, sqrt(E|error|²), to first order.
+
+    Parameters
+    ----------
+    model : Model
+        The model.
+    frequency : ndarray, shape (m,)
+        Hz, above 0.
+
+    Returns
+    -------
+    ndarray, shape (m,)
+        In the response's unit; NaN without a spread.
+
+    Examples
+    --------
+    A delay that is known to 1 ms turns the response by 2π/1000 at 1 Hz:
+
+    >>> from hmpim.model import Spread
+    >>> known = Spread(covariance=((1e-6, 0.0), (0.0, 0.0)))
+    >>> late = Model(delay=0.1, scale_factor=1.0, spread=known)
+    >>> response_error(late, np.array([1.0])).round(6).tolist()
+    [0.006283]
+    """
+    if model.spread is None:
+        return np.full(np.shape(frequency), np.nan)
+    s = 2j * np.pi * np.asarray(frequency, dtype=np.float64)
+    system = model.system
+    above, below = system.numerator, system.denominator
+    first = 2 if model.denominator[-1] == 0.0 else 1
+    powers = s[None, :] ** np.arange(max(above.size, below.size))[:, None]
+    slopes = np.concatenate(  # of ln G, in the order of `coefficient_vector`
+        [
+            -s[None, :],
+            (powers[: above.size] / (above @ powers[: above.size]))[::-1],
+            (-powers[first : below.size] / (below @ powers[: below.size]))[::-1],
+        ]
+    )
+    covariance = np.array(model.spread.covariance)
+    variance = np.sum(slopes.conj() * (covariance @ slopes), axis=0).real
+    size = np.abs(frequency_response(model, np.asarray(frequency, dtype=np.float64)))
+    return np.asarray(size * np.sqrt(np.maximum(variance, 0.0)))
 
 
 def draw_models(
@@ -62,7 +107,7 @@ def draw_models(
 
     Examples
     --------
-    >>> from hmpim.model.spread import Spread
+    >>> from hmpim.model import Spread
     >>> spread = Spread(covariance=((1e-8, 0.0), (0.0, 1e-4)), bias=0.02)
     >>> model = Model(delay=0.1, scale_factor=2.0, spread=spread)
     >>> drawn = draw_models(model, 500, rng=1)

@@ -9,8 +9,13 @@ import pytest
 from scipy.io import loadmat
 
 from hmpim.formats.models import export
-from hmpim.identify.uncertainty import response_std
-from hmpim.model import Model, coefficient_vector, frequency_response
+from hmpim.model import (
+    Model,
+    Spread,
+    coefficient_vector,
+    frequency_response,
+    response_error,
+)
 
 from .conftest import result_of
 
@@ -38,10 +43,10 @@ def test_json_holds_all_that_is_known(tmp_path):
     assert found["parameters"]["delay"]["ci95"] == pytest.approx([0.149706, 0.150294])
     assert found["covariance"]["of"] == [
         "delay",
-        "scale_factor * numerator s^0",
         "scale_factor * numerator s^1",
-        "denominator s^1",
+        "scale_factor * numerator s^0",
         "denominator s^2",
+        "denominator s^1",
     ]
     values = np.array(found["covariance"]["values"])
     assert np.sqrt(np.diag(values)) == pytest.approx(1e-3 * coefficient_vector(MODEL))
@@ -78,8 +83,8 @@ def test_csv_has_measurement_and_model_with_their_errors(tmp_path):
     response = np.array([complex(float(r["model_real"]), float(r["model_imag"])) for r in rows])
     assert response == pytest.approx(frequency_response(MODEL, f), rel=1e-12)
     assert [float(r["measured_std"]) for r in rows] == pytest.approx(0.01 * np.abs(response))
-    vector = coefficient_vector(MODEL)
-    stated = response_std(MODEL.system, np.diag((1e-3 * vector) ** 2), f)
+    spread = Spread(covariance=tuple(map(tuple, np.diag((1e-3 * coefficient_vector(MODEL)) ** 2))))
+    stated = response_error(replace(MODEL, spread=spread), f)
     assert [float(r["model_std"]) for r in rows] == pytest.approx(stated)
     phase = [float(r["model_phase_deg"]) for r in rows]
     assert phase == pytest.approx(np.degrees(np.angle(response)))

@@ -6,7 +6,6 @@ from typing import Any
 
 from hmpim.formats.atomic import write_text
 from hmpim.formats.models.source import Source
-from hmpim.model import coefficient_vector
 
 __all__ = ["SCHEMA", "json_document", "write_json"]
 
@@ -17,9 +16,9 @@ def json_document(source: Source) -> dict[str, Any]:
     """Return the document; coefficients highest power of s first, covariance as it says."""
     model, pair, record = source.model, source.pair, source.record
     spread = model.spread
-    above = [f"scale_factor * numerator s^{i}" for i in range(len(model.numerator))]
-    below = coefficient_vector(model).size - 1 - len(above)
-    first = len(model.denominator) - below
+    top = len(model.numerator) - 1
+    above = [f"scale_factor * numerator s^{top - i}" for i in range(top + 1)]
+    below = range(len(model.denominator) - 1, 1 if model.denominator[-1] == 0.0 else 0, -1)
     return {
         "schema": SCHEMA,
         "input": pair.input,
@@ -41,7 +40,7 @@ def json_document(source: Source) -> dict[str, Any]:
         "covariance": None
         if spread is None
         else {
-            "of": ["delay", *above, *(f"denominator s^{first + i}" for i in range(below))],
+            "of": ["delay", *above, *(f"denominator s^{power}" for power in below)],
             "values": [list(row) for row in spread.covariance],
         },
         "structure": pair.structure,

@@ -6,8 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hmpim.formats.models.source import Source
-from hmpim.identify.uncertainty import response_std
-from hmpim.model import frequency_response
+from hmpim.model import frequency_response, response_error
 
 __all__ = ["Response", "response_of"]
 
@@ -36,14 +35,10 @@ class Response:
 def response_of(source: Source) -> Response:
     """Return the response of a source at the frequencies at which it was measured."""
     seen, model = source.pair.frequency_response, source.model
-    spread = model.spread
-    std = np.full(seen.frequency.size, np.nan)
-    if spread is not None and seen.frequency.size:
-        std = response_std(model.system, np.array(spread.covariance), seen.frequency)
     return Response(
         frequency=seen.frequency,
         measured=seen.response,
         measured_std=seen.std,
         model=frequency_response(model, seen.frequency),
-        model_std=std,
+        model_std=response_error(model, seen.frequency),
     )
