@@ -190,7 +190,9 @@ INPUTS = (
     family("3-2-1-1", "Second order; held", SECOND, k.shaped("3211")),
     family("ramp", "Second order; straight between the samples", SECOND, k.shaped("ramp", "foh")),
     family("impact", "ζ 0.02 to 0.2; one blow of a hammer", k.second_order(0.02, 0.2), k.impact),
-    family("human", "Second order; what a hand does", SECOND, k.lines("human")),
+    family(
+        "human", "Second order; what a hand does", SECOND, k.lines("human", rates=(50.0, 100.0))
+    ),
     family("one sine", "Second order; one line, already going", SECOND, k.sines(1)),
     family("four sines", "Second order; already going", SECOND, k.sines(4)),
 )
@@ -331,7 +333,44 @@ SOFTWARE = (
     other("two clocks", "Input and output logged at rates of their own", m.two_clocks),
 )
 
-FAMILIES = {f.name: f for f in (*SYSTEMS, *INPUTS, *BEGINNINGS, *NOISE, *BENT, *LOOPS, *SOFTWARE)}
+ANY_SYSTEM = (
+    k.static, FIRST, SECOND, k.second_order(0.02, 0.1), k.second_order(1.5, 6.0),
+    k.low_pass("butterworth"), k.low_pass("bessel"), k.lead, k.lead_lag, k.with_zero,
+    k.non_minimum_phase, k.notch, k.anti_resonance, k.modes(2, 2), k.integrator,
+    k.lagging_integrator, k.washout, k.ac_coupled, k.differentiator, k.lag_behind_resonance,
+)  # fmt: skip
+ANY_INPUT = (
+    SWEEP, k.sweep("zoh"), k.sweep("foh"), k.slower_clock(k.sweep("zoh")), k.sequence("prbs"),
+    k.sequence("fast_prbs"), k.sequence("white"), k.lines(), k.lines("schroeder", periodic=True),
+    k.shaped("doublet"), k.shaped("3211"), k.designed("hmpim"), k.designed("exponential"),
+    k.designed("reversed"), k.after_a_step(SWEEP),
+)  # fmt: skip
+ANY_SPOIL = (  # in this order
+    c.operating_point(both=False), c.operating_point(both=True), c.stated, c.drift("steady"),
+    c.drift("thermal"), c.mains, c.input_noise, c.spikes, c.repeated_frames, c.quantised,
+    c.clipped(both=False), c.missing,
+)  # fmt: skip
+
+
+def by_chance(rng: np.random.Generator) -> Draw:
+    """Any system under any input, with none, one or two conditions: no draw is like another."""
+    drive = ANY_INPUT[int(rng.integers(len(ANY_INPUT)))](rng)
+    system = ANY_SYSTEM[int(rng.integers(len(ANY_SYSTEM)))](rng, drive)
+    take = shoot(rng, system, drive, snr_db=float(rng.uniform(20, 70)))
+    some = rng.choice(len(ANY_SPOIL), int(rng.integers(3)), replace=False)
+    for place in sorted(some):
+        ANY_SPOIL[place](take)
+    return finish(take)
+
+
+CHANCE = (
+    other("by chance", "Any system, any input, up to two conditions", by_chance),
+    other("by chance, more", "As many again", by_chance),
+)
+
+FAMILIES = {
+    f.name: f for f in (*SYSTEMS, *INPUTS, *BEGINNINGS, *NOISE, *BENT, *LOOPS, *SOFTWARE, *CHANCE)
+}
 
 
 def named(wanted: str) -> list[str]:

@@ -199,9 +199,8 @@ def designed(kind: str, between: str = "smooth") -> MakeDrive:
     def make(rng: Rng) -> Drive:
         stimulus = _designed(kind, int(rng.integers(3)))
         top = stimulus.band[1] if stimulus.band else 20.0
-        cycles = top * stimulus.time[-1]
         fs = float(rng.choice(RATES))
-        count = max(length(rng), int(3 * cycles))
+        count = int(stimulus.samples * rng.uniform(1.0, 1.4))  # as finely as designed, or finer
         pace = stimulus.time[-1] * fs / count
         top = top * pace
         amplitude = log_uniform(rng, 0.5, 20.0)
