@@ -24,7 +24,9 @@ def arguments() -> argparse.Namespace:
         "--seed", type=int, default=SEED, help=f"another seed, other draws ({SEED})"
     )
     parser.add_argument("--jobs", type=int, default=2, help="processes (2)")
-    parser.add_argument("--json", type=Path, help="write the counts here")
+    parser.add_argument(
+        "--json", type=Path, help="write the counts here; families not drawn now stay"
+    )
     parser.add_argument("--detail", type=Path, help="write every draw here, figure by figure")
     parser.add_argument("--against", type=Path, help="an earlier --json: say what moved")
     parser.add_argument("--list", action="store_true", help="name the families")

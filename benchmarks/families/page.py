@@ -18,13 +18,15 @@ since the first measurement.
 
 - A figure is **wrong** beyond 5 standard deviations (2.5 half-widths of an interval that is not
   symmetric) and 2 % (a delay: 0.05 sample; a bias: 2 % of the output's r.m.s. motion where that is
-  more), and a model's response is where it is off by 5 % anywhere the record could tell it to 1 %.
+  more, or less than a hundredth), and a model's response is where it is off by 5 % anywhere the
+  record could tell it to 1 %.
 - A record **can tell** a figure if the Cramér-Rao deviation of the true structure is below 2 %
   (0.05 sample), the true noise and what drifts or hums included; bandwidths and peaks only inside
   the excited band.
 - A figure is **right** only if its interval is at most 3 times the bound's. Where held, linear and
   band-limited inputs explain the record alike (log-likelihoods within 6), 3 times the hull of the
-  figures under each of them. No interval need be narrower than a tenth of what is never wrong.
+  figures under each of them, and each of their responses is accepted. No interval need be narrower
+  than a tenth of what is never wrong.
 - A draw is wrong if any figure or the response is, `ok` if that figure's verdict is (the pair's, of
   a response); else it is right if a figure that the record can tell is right. No answer: refused,
   not identifiable, crashed, or nothing right given. What a draw leaves out counts in the columns

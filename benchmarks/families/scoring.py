@@ -138,7 +138,8 @@ def score(draw: Draw, pair: Any, response: np.ndarray | None) -> Score:
     off = None
     truth_at = draw.response
     if truth_at is not None and response is not None and truth_at.frequency.size:
-        off = float(np.max(np.abs(response / truth_at.value - 1)))
+        accepted = (truth_at.value, *truth_at.others)
+        off = float(min(np.max(np.abs(response / value - 1)) for value in accepted))
     measured = None
     if truth_at is not None:
         measured = _measured_off(pair.frequency_response, truth_at)

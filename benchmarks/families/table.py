@@ -214,8 +214,13 @@ def moved(rows: Mapping[str, Mapping[str, Any]], old: Mapping[str, Any]) -> list
 
 
 def write(rows: Mapping[str, Mapping[str, Any]], path: Path, *, seed: int) -> None:
-    """Counts as JSON, a family a line; what `read` and --against read."""
+    """Counts as JSON, a family a line; what `read` and --against read.
+
+    Families that a file holds already and that were not drawn now stay as they are.
+    """
     lines = []
+    if path.is_file():
+        rows = read(path) | rows
     for name, row in rows.items():
         figures = {key: [n[c] for c in _COUNTS] for key, n in row["figures"].items()}
         lines.append(f"{json.dumps(name)}: {json.dumps({**row, 'figures': figures})}")

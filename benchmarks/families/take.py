@@ -14,14 +14,14 @@ from families.noise import Noise, white
 from families.simulate import linear_output
 from families.system import System, figures
 
-__all__ = ["BIAS_SHARE", "Draw", "Figure", "Response", "Take", "finish", "shoot"]
+__all__ = ["Draw", "Figure", "Response", "Take", "finish", "shoot"]
 
 SHARE = 0.02
 """Part of a figure within which it is never wrong."""
 DELAY_SHARE = 0.05
 """The same for a delay, in samples."""
-BIAS_SHARE = SHARE
-"""The bias is held against the output's r.m.s. motion where that is larger than itself."""
+OPERATING_POINT = 100.0
+"""A bias is held against the output's r.m.s. motion where that is larger, or this much smaller."""
 PEAK = 20 * np.log10(1 + SHARE)
 KNOWN = 0.01
 """Relative deviation of the response, at the bound, where 5 % off is five deviations."""
@@ -54,13 +54,18 @@ class Figure:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Response:
-    """True response at frequencies (Hz) where the record can tell it; of held samples, too."""
+    """True response at frequencies (Hz) where the record can tell it; of held samples, too.
+
+    `others` are the responses that explain the record as well under another assumption between
+    the samples.
+    """
 
     frequency: np.ndarray
     value: np.ndarray
     band: tuple[float, float]
     at: Callable[[np.ndarray], np.ndarray]
     sampled: Callable[[np.ndarray], np.ndarray] | None = None
+    others: tuple[np.ndarray, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -163,7 +168,8 @@ def _tolerance(name: str, value: float, take: Take) -> float:
     if name in ("delay", "delay_low_frequency"):
         return DELAY_SHARE / take.drive.fs
     if name == "bias":
-        return BIAS_SHARE * max(abs(value), take.motion)
+        usual = abs(value) < OPERATING_POINT * take.motion
+        return SHARE * max(abs(value) if usual else 0.0, take.motion)
     return PEAK if name == "peak_gain_db" else SHARE * abs(value)
 
 
@@ -187,7 +193,8 @@ def finish(take: Take) -> Draw:
 
     truth = named(vector)
     deviations = propagated(named, vector, steps, covariance)
-    others = _alternatives(take, told)
+    rivals = _alternatives(take, told)
+    others = [_figures(rival, take) for rival in rivals]
     found = {}
     inside = _inside_band(truth, take)
     for name, value in truth.items():
@@ -208,7 +215,7 @@ def finish(take: Take) -> Draw:
     if take.noise.is_white and "noise_std" not in take.absent:
         found["noise_std"] = _noise_figure(take, vector.size)
     found |= take.extras
-    draw = _packed(take, found, _response(take, vector, steps, covariance))
+    draw = _packed(take, found, _response(take, rivals, steps, covariance))
     moves = (told.gain @ (take.y - take.clean))[: vector.size]
     return replace(draw, oracle=moves / np.sqrt(np.diag(covariance)))
 
@@ -244,8 +251,8 @@ def _inside_band(truth: dict[str, float], take: Take) -> Callable[[str], bool]:
     return inside
 
 
-def _alternatives(take: Take, told: Information) -> list[dict[str, float]]:
-    """Figures under each other assumption between the samples that fits as well."""
+def _alternatives(take: Take, told: Information) -> list[System]:
+    """The system under each other assumption between the samples that fits as well."""
     drive = take.drive
     known = take.intersample or drive.every > 1 or take.simulate is not None
     if known or not take.telling or drive.samples > _LONG:
@@ -262,7 +269,7 @@ def _alternatives(take: Take, told: Information) -> list[dict[str, float]]:
             here = _bounded(here + (told.gain @ left)[: vector.size], vector)
         left = left - told.rows @ (told.gain @ left)
         if float(left @ take.noise.solve(left[:, None], take.valid)[:, 0]) < ALIKE:
-            found.append(_figures(take.system.moved(here), take))
+            found.append(take.system.moved(here))
     return found
 
 
@@ -274,7 +281,7 @@ def _bounded(here: np.ndarray, around: np.ndarray) -> np.ndarray:
 
 
 def _response(
-    take: Take, vector: np.ndarray, steps: np.ndarray, covariance: np.ndarray
+    take: Take, rivals: list[System], steps: np.ndarray, covariance: np.ndarray
 ) -> Response:
     """The true response where 5 % is five deviations at the bound."""
     low, high = take.drive.band
@@ -286,7 +293,7 @@ def _response(
         return system.response(frequency)
 
     value = at(grid)
-    slopes = derivatives(lambda v: system.moved(v).response(grid) / value, vector, steps)
+    slopes = derivatives(lambda v: system.moved(v).response(grid) / value, system.vector(), steps)
     known = np.array(
         [np.hypot(spread(s.real, covariance), spread(s.imag, covariance)) < KNOWN for s in slopes]
     )
@@ -296,6 +303,7 @@ def _response(
         band=(low, high),
         at=at,
         sampled=_held_response(take) if take.drive.between == "zoh" else None,
+        others=tuple(rival.response(grid[known]) for rival in rivals),
     )
 
 

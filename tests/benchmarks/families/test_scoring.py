@@ -128,3 +128,16 @@ def test_from_samples_to_samples_is_as_true_for_a_held_input():
     seen = SimpleNamespace(frequency=FREQUENCY, response=np.full(3, 1.1 + 0j), std=np.zeros(3))
     found = score(draw_with(response=truth), pair_with(GOOD, measured=seen), None)
     assert found.measured_off is False
+
+
+def test_the_response_of_an_assumption_that_cannot_be_told_apart_is_accepted():
+    truth = Response(
+        frequency=FREQUENCY,
+        value=np.ones(3) + 0j,
+        band=(1.0, 3.0),
+        at=lambda f: 0 * f + 1,
+        others=(np.full(3, 1.2 + 0j),),
+    )
+    draw = draw_with(response=truth)
+    assert score(draw, pair_with(GOOD), np.full(3, 1.19)).cell == "right_ok"
+    assert score(draw, pair_with(GOOD), np.full(3, 1.1)).cell == "wrong_ok"

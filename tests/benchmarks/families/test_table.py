@@ -64,8 +64,11 @@ def test_what_is_written_is_read_and_what_moved_is_said(tmp_path):
     old = {"x": summary(scores(10, 10)), "y": summary(scores(10, 10))}
     write(old, tmp_path / "old.json", seed=1)
     assert read(tmp_path / "old.json") == old
+    write({"z": old["y"]}, tmp_path / "old.json", seed=1)
+    assert read(tmp_path / "old.json") == old | {"z": old["y"]}
+    write(old, tmp_path / "two.json", seed=1)
     new = old | {"y": summary(scores(10, 10, cell="wrong_ok")), "z": summary(scores(1, 1))}
-    lines = moved(new, read(tmp_path / "old.json"))
+    lines = moved(new, read(tmp_path / "two.json"))
     assert not any(line.startswith("| x ") for line in lines)
     assert "100 → 0" in line_of(lines, "y")
     assert "new" in line_of(lines, "z")
