@@ -6,11 +6,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import settings
 
 from hmpim.identify.judgement import failed as attempts
 from tests_support import field_chirp, second_order_lag
 
 DATA = Path(__file__).parents[2] / "shared" / "data"
+
+settings.register_profile("untimed", deadline=None)  # a busy machine is no failure
+settings.load_profile("untimed")
 
 
 @pytest.fixture

@@ -8,6 +8,7 @@ import pytest
 
 from hmpim.campaign import parse_plan, read_plan, run_campaign, shipped_plan
 from hmpim.campaign.crossing import samples_bandwidth
+from hmpim.campaign.grids import PARAMETERS
 from hmpim.campaign.study import make_study
 from hmpim.campaign.write import study_page, write_study
 
@@ -105,11 +106,46 @@ def test_page_says_how_to_read_it_and_why_a_verdict_is_not_ok(demo):
     assert f"{sum(v != 'ok' for v in verdicts)} of 5 verdicts" in remarks.caption
     told = {row[0]: int(row[1]) for row in remarks.rows}
     codes = [{w["code"] for w in row.pair["warnings"]} for row in study.rows]
+    doubts = [
+        {w["code"] for w in row.pair["warnings"] if w["severity"] == "doubt"} for row in study.rows
+    ]
+    for row in remarks.rows:
+        assert int(row[2]) == sum(row[0].replace(" ", "_") in said for said in doubts)
     for code, count in told.items():
         assert count == sum(code.replace(" ", "_") in found for found in codes)
     text = (folder / "study.md").read_text(encoding="utf-8")
     assert remarks.rows[0][-1] in text
     assert remarks.note in text
+
+
+def test_a_doubtful_figure_is_marked_and_the_others_of_its_row_are_not(demo):
+    study, _ = demo
+    (cases,) = [g for g in study_page(study).grids if g.caption.startswith("Every case")]
+    marked = 0
+    for row, cells in zip(study.rows, cases.rows, strict=True):
+        shown = dict(zip(cases.columns, cells, strict=True))
+        for name, label in PARAMETERS:
+            cell = next(text for title, text in shown.items() if title.startswith(label))
+            assert cell.endswith(" ?") == (row.parameters[name].verdict == "doubtful")
+            marked += cell.endswith(" ?")
+    assert 0 < marked < len(study.rows) * len(PARAMETERS)
+
+
+def test_an_earlier_study_of_the_first_schema_is_compared_with(demo, tmp_path):
+    """It has no verdict for each figure; its values and errors are as they were."""
+    _, folder = demo
+    data = json.loads((folder / "study.json").read_text(encoding="utf-8"))
+    assert data["schema"] == "hmpim/study/2"
+    for row in data["rows"]:
+        for reading in row["parameters"].values():
+            del reading["verdict"]
+    before = tmp_path / "study.json"
+    before.write_text(json.dumps(data | {"schema": "hmpim/study/1"}), encoding="utf-8")
+    plan = read_plan(shipped_plan("demo"))
+    cases = [json.loads(p.read_text(encoding="utf-8")) for p in (folder / "cases").glob("*.json")]
+    changes = make_study(plan, cases, earlier=before).changes
+    assert len(changes) > 30
+    assert not any(change.differs for change in changes)
 
 
 def test_bins_of_the_record_lie_about_the_estimate(demo):

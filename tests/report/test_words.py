@@ -65,10 +65,10 @@ def test_a_doubtful_pair_is_said_by_what_is_doubtful_and_why(found):
     vague = (("delay", "damping_ratio"), "A second pole may hide.")
     pair = found.pairs[0]
     assert headline(replace(found, pairs=(doubting(pair, late),))).endswith(
-        "of the output. Delay is doubtful, the other figures are good: the delay may be 2 ms off."
+        "of the output. Delay is doubtful, the other figures are good. The delay may be 2 ms off."
     )
     assert headline(replace(found, pairs=(doubting(pair, late, vague),))).endswith(
-        "of the output. Delay and damping ratio are doubtful, the other figures are good: a second "
+        "of the output. Delay and damping ratio are doubtful, the other figures are good. A second "
         "pole may hide."
     )
 
@@ -76,9 +76,9 @@ def test_a_doubtful_pair_is_said_by_what_is_doubtful_and_why(found):
 def test_where_most_is_doubtful_what_is_good_is_named(found):
     names = tuple(n for n in EVERY if n not in ("bias", "scale_factor"))
     text = headline(replace(found, pairs=(doubting(found.pairs[0], (names, "It slips.")),)))
-    assert text.endswith("Only scale factor and bias are good: it slips.")
+    assert text.endswith("Only scale factor and bias are good. It slips.")
     text = headline(replace(found, pairs=(doubting(found.pairs[0], (EVERY, "It slips.")),)))
-    assert text.endswith("No figure of the model can be relied on: it slips.")
+    assert text.endswith("No figure of the model can be relied on. It slips.")
 
 
 def test_a_unit_without_dynamics_is_not_said_to_have_any(found):

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import Any
 
 from hmpim.campaign.crossing import samples_bandwidth
@@ -39,7 +40,7 @@ def samples_reading(row: Row) -> Reading | None:
     if start is None:
         return None
     found = samples_bandwidth(row.pair["frequency_response"], near=start.value)
-    return start if found is None else Reading(value=found, std=start.std, unit=start.unit)
+    return start if found is None else replace(start, value=found)
 
 
 def case_label(row: Row, compare: Compare, among: Sequence[Row]) -> str:

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 from hmpim.campaign.study import Reading, Row, Study
@@ -39,6 +40,7 @@ _READING = (
     "held (position commands alone, mode P), of samples over samples elsewhere; −90° of the "
     "response is the same, read off the measured response"
 )
+_DOUBTFUL = "a figure followed by ? is doubtful, and the others of its row are not"
 _EXACT = "exact is the linearised mechanics of the simulated table, without friction"
 _NEGATIVE = (
     "a negative delay belongs to the fit, not to the unit: where feedforward or friction shape "
@@ -68,6 +70,8 @@ def case_grid(rows: Sequence[Row], caption: str, *, explained: bool = False) -> 
     # A column that says the usual of every row says nothing, of a rig without loads above all.
     usual = {"Load": "acceptance", "Mode": "P", "At once": ""}
     said = [_READING, *([_EXACT] if exact else [])]
+    if any(reading.verdict != "ok" for row in rows for reading in row.parameters.values()):
+        said.append(_DOUBTFUL)
     if any((delay := row.parameters.get("delay")) and delay.value < 0.0 for row in rows):
         said.append(_NEGATIVE)
     told = [
@@ -119,12 +123,14 @@ def _cell(row: Row, name: str) -> str:
     if reading is not None and name in _TOLD and reading.std > _VAGUE * abs(reading.value):
         return "–"
     if name == "delay" and reading is not None:
-        reading = Reading(value=1e3 * reading.value, std=1e3 * reading.std)
+        reading = replace(reading, value=1e3 * reading.value, std=1e3 * reading.std)
     return _shown(reading)
 
 
 def _shown(reading: Reading | None) -> str:
-    return "–" if reading is None else plus_minus(reading.value, reading.std)
+    if reading is None:
+        return "–"
+    return plus_minus(reading.value, reading.std) + ("" if reading.verdict == "ok" else " ?")
 
 
 def check_grid(study: Study) -> Grid:
@@ -167,30 +173,33 @@ def remark_grid(rows: Sequence[Row]) -> Grid | None:
     None where nothing is remarked.
     """
     first: dict[str, str] = {}
-    share: dict[str, list[str]] = {}
+    share: dict[str, list[bool]] = {}  # of the rows with this remark, whether it casts doubt
     for row in rows:
-        for code, message in {w["code"]: w["message"] for w in row.pair["warnings"]}.items():
+        warnings = row.pair["warnings"]
+        doubts = {w["code"] for w in warnings if w["severity"] == "doubt"}
+        for code, message in {w["code"]: w["message"] for w in warnings}.items():
             first.setdefault(code, f"{row.axis}, {row.test}: {message}")
-            share.setdefault(code, []).append(row.verdict)
+            share.setdefault(code, []).append(code in doubts)
     if not first:
         return None
     unsure = sum(row.verdict != "ok" for row in rows)
     order = sorted(share, key=lambda code: -len(share[code]))
     return Grid(
         caption=f"What the identifications remark; {unsure} of {len(rows)} verdicts are not ok",
-        columns=("Remark", "Rows", "Not ok", "For instance"),
+        columns=("Remark", "Rows", "Casts doubt", "For instance"),
         rows=tuple(
             (
                 code.replace("_", " "),
                 f"{len(share[code])}",
-                f"{sum(verdict != 'ok' for verdict in share[code])}",
+                f"{sum(share[code])}",
                 first[code],
             )
             for code in order
         ),
-        note="A verdict that is not ok says that one linear model of few poles is not all there "
-        "is, because of friction, for instance, or that the record does not tell one of its "
-        "parameters. The error bars say how well the best such model is known.",
+        note="A verdict that is not ok says that at least one figure of the row is doubtful: one "
+        "linear model of few poles is not all there is, because of friction, for instance, or the "
+        "record does not tell that parameter. The error bars say how well the best such model is "
+        "known.",
     )
 
 

@@ -24,18 +24,20 @@ __all__ = [
     "study_dict",
 ]
 
-SCHEMA = "hmpim/study/1"
+SCHEMA = "hmpim/study/2"
+_COMPARED = (SCHEMA, "hmpim/study/1")  # the first has no verdict for each figure
 _APART = 3.0  # standard deviations, beyond which two readings count as different
 _ROUNDING = 1e-9  # share of a reading: a step of the encoder is known to the last digit or two
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Reading:
-    """A value and its standard deviation, infinite where the record cannot tell."""
+    """A value, its standard deviation, infinite where the record cannot tell, and its verdict."""
 
     value: float
     std: float
     unit: str = ""
+    verdict: str = "ok"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -164,13 +166,16 @@ def reading_of(data: dict[str, Any] | None) -> Reading | None:
     Examples
     --------
     >>> reading_of({"value": 2.0, "std": None, "unit": "Hz"})
-    Reading(value=2.0, std=inf, unit='Hz')
+    Reading(value=2.0, std=inf, unit='Hz', verdict='ok')
     """
     if data is None or data["value"] is None:
         return None
     std = data["std"]
     return Reading(
-        value=data["value"], std=math.inf if std is None else std, unit=data.get("unit", "")
+        value=data["value"],
+        std=math.inf if std is None else std,
+        unit=data.get("unit", ""),
+        verdict=data.get("verdict", "ok"),
     )
 
 
@@ -228,7 +233,7 @@ def earlier_parameters(path: Path) -> dict[tuple[str, str], dict[str, Any]]:
     """
     try:
         data = json.loads(path.read_text(encoding="utf-8"))
-        if data["schema"] != SCHEMA:
+        if data["schema"] not in _COMPARED:
             raise FormatError(f"{path} has schema {data['schema']!r}; {SCHEMA!r} is needed")
         return {(row["case"], row["axis"]): row["parameters"] for row in data["rows"]}
     except (ValueError, KeyError, TypeError) as error:
@@ -334,7 +339,12 @@ def study_dict(study: Study) -> dict[str, Any]:
 def _json(reading: Reading | None) -> dict[str, Any] | None:
     if reading is None:
         return None
-    return {"value": reading.value, "std": _number(reading.std), "unit": reading.unit}
+    return {
+        "value": reading.value,
+        "std": _number(reading.std),
+        "unit": reading.unit,
+        "verdict": reading.verdict,
+    }
 
 
 def _number(value: float) -> float | None:

@@ -270,7 +270,7 @@ def pair_sentence(pair: PairIdentification) -> str:
     verb = "explain" if len(model) > 1 or pair.structure not in _PARTS else "explains"
     text = f"{' and '.join(model)} {verb} {pair.fit_percent:.1f} % of the output"
     if cause is not None:
-        return f"{text}. {_trust(pair)}: {_uncapped(cause.message)}"
+        return f"{text}. {_trust(pair)}. {cause.message}"
     between = INTERSAMPLE_WORDS[pair.intersample]
     return f"{text}, the input taken as {between} between its samples."
 
