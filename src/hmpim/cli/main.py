@@ -20,6 +20,7 @@ from hmpim.cli.identify import identify
 from hmpim.cli.paper import paper
 from hmpim.cli.rigs import rigs
 from hmpim.cli.run import run
+from hmpim.cli.table import table
 from hmpim.errors import HmpimError
 
 __all__ = ["app", "main"]
@@ -140,6 +141,7 @@ app.command(epilog="Example: hmpim identify test.csv --input u --output y --repo
 )
 app.command(epilog="Example: hmpim run --rig bench s.csv -o run.csv --report r.html")(run)
 app.command(epilog="Example: hmpim rigs --json rigs.json")(rigs)
+app.command(epilog="Example: hmpim table --udp 127.0.0.1:5005 --rate 1000")(table)
 app.command(epilog="Example: hmpim demo --out out/demo --seed 7")(demo)
 app.command(epilog="Example: hmpim campaign section_v_reduced --out out/study")(campaign)
 app.command()(gentlest)

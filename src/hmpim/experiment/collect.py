@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from hmpim.errors import RecordError, RigError
 from hmpim.record import Channel, Record
-from hmpim.rigs import Block, ChannelSpec, Commands, Layout, Reply, Samples
+from hmpim.rigs import Block, ChannelSpec, Commands, Layout, Reply, RunReport, Samples
 
 __all__ = ["Collected", "Played", "default_layout"]
 
@@ -98,19 +98,22 @@ class Collected:
         return MappingProxyType(new)
 
     def record(
-        self, *, fs: float, band: tuple[float, float] | None, source: str | None = None
+        self, *, fs: float, band: tuple[float, float] | None, report: RunReport | None = None
     ) -> Record:
-        """Return all that was collected.
+        """Return all that was collected, its stamps put right as the rig's report says.
 
         Raises
         ------
         RigError
             If a channel got fewer than two samples, or samples that no record can hold.
         """
+        said = RunReport() if report is None else report
 
         def channel(spec: ChannelSpec) -> Channel:
             parts = self._parts[spec.name] or [_EMPTY]
             time = np.concatenate([p.time for p in parts])
+            if spec.clock in said.clocks:
+                time = said.clocks[spec.clock](time)
             values = np.concatenate([p.values for p in parts])
             return Channel(name=spec.name, time=time, values=values, unit=spec.unit)
 
@@ -121,9 +124,10 @@ class Collected:
                 fs=fs,
                 band=band,
                 intersample=self._layout.intersample,
-                source=self._layout.source if source is None else source,
+                source=self._layout.source,
                 references=tuple(channel(spec) for spec in self._layout.of("reference")),
                 auxiliary=tuple(channel(spec) for spec in self._layout.of("auxiliary")),
+                findings=said.findings,
             )
         except RecordError as error:
             raise RigError(f"rig {self._name!r} delivered no usable record: {error}") from error

@@ -1,22 +1,27 @@
 """Run a stimulus on a rig: limits first, then motion, and a stop whatever happens."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 
 import numpy as np
 
 from hmpim.errors import ArgumentError, HmpimError, RigError
 from hmpim.experiment.checks import check_rig, check_stimuli, limits_by_axis
-from hmpim.experiment.clock import Clock, Pacer, SystemClock
 from hmpim.experiment.collect import Collected, Played, default_layout
 from hmpim.experiment.interrupt import ending_politely, undisturbed
 from hmpim.experiment.log import RunLog
+from hmpim.experiment.pacer import Pacer
 from hmpim.record import Record
 from hmpim.rigs import (
+    Clock,
     Commands,
     LimitsOfAxes,
+    Reporting,
     Rig,
+    RunReport,
     Seeded,
+    SystemClock,
     commands_of,
     shared_band,
     stimuli_by_axis,
@@ -88,27 +93,19 @@ def run(
     (200.0, 'deg')
     """
     unit = check_rig(rig)
-    log = RunLog() if log is None else log
-    named = stimuli_by_axis(_mapped(stimulus), unit.axes, name=repr(unit.name))
-    try:
-        check_stimuli(named, limits_by_axis(unit, named, stated=limits), rig=unit, log=log)
-    except HmpimError as error:
-        log.add("fault", str(error))
-        raise
-    commands = commands_of(named)
-    playing = _Playing(
-        rig=unit,
-        given=stimulus if isinstance(stimulus, Stimulus) else named,
-        commands=commands,
-        pacer=Pacer(SystemClock() if clock is None else clock, fs=commands.fs, count=len(commands)),
-        subscribers=tuple(subscribers),
-        log=log,
-    )
+    given = _mapped(stimulus)
     if isinstance(unit, Seeded):
         unit.seed(np.random.default_rng(rng))
+    running = _Running(
+        rig=unit,
+        given=given,
+        limits=limits,
+        clock=SystemClock() if clock is None else clock,
+        subscribers=tuple(subscribers),
+        log=RunLog() if log is None else log,
+    )
     with ending_politely():
-        collected = playing.through()
-    return collected.record(fs=commands.fs, band=shared_band(named))
+        return running.through()
 
 
 def _mapped(
@@ -127,27 +124,23 @@ def _mapped(
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class _Playing:
+class _Running:
     """One run of one rig, from connecting to disconnecting."""
 
     rig: Rig
     given: Stimulus | Mapping[str, Stimulus]
-    commands: Commands
-    pacer: Pacer
+    limits: LimitsOfAxes
+    clock: Clock
     subscribers: tuple[Subscriber, ...]
     log: RunLog
 
-    def through(self) -> Collected:
-        """Connect, play, stop, disconnect; errors of a driver become the rig's own."""
+    def through(self) -> Record:
+        """Connect, check, play, stop, disconnect; errors of a driver become the rig's own."""
         try:
             with self.rig:
-                try:
-                    return self._play()
-                except BaseException as error:
-                    self.log.add("fault", f"{type(error).__name__}: {error}")
-                    raise
-                finally:
-                    self._stop()
+                with self._faults_logged():
+                    stimuli, commands = self._check()
+                return self._played(stimuli, commands)
         except HmpimError:
             raise
         except _Watching as failure:
@@ -157,9 +150,36 @@ class _Playing:
                 f"rig {self.rig.name!r} failed: {type(error).__name__}: {error}"
             ) from error
 
-    def _play(self) -> Collected:
-        commands = self.commands
-        layout = self.rig.prepare(self.given)
+    def _check(self) -> tuple[dict[str, Stimulus], Commands]:
+        """Look at everything that can be looked at while nothing moves."""
+        stimuli = stimuli_by_axis(self.given, self.rig.axes, name=repr(self.rig.name))
+        limits = limits_by_axis(self.rig, stimuli, stated=self.limits)
+        check_stimuli(stimuli, limits, rig=self.rig, log=self.log)
+        return stimuli, commands_of(stimuli)
+
+    def _played(self, stimuli: dict[str, Stimulus], commands: Commands) -> Record:
+        try:
+            with self._faults_logged():
+                collected = self._play(stimuli, commands)
+        finally:
+            self._stop()
+        with self._faults_logged():
+            report = self.rig.report() if isinstance(self.rig, Reporting) else RunReport()
+            for finding in report.findings:
+                self.log.add("note", finding.message)
+            return collected.record(fs=commands.fs, band=shared_band(stimuli), report=report)
+
+    @contextmanager
+    def _faults_logged(self) -> Iterator[None]:
+        try:
+            yield
+        except BaseException as error:
+            self.log.add("fault", f"{type(error).__name__}: {error}")
+            raise
+
+    def _play(self, stimuli: dict[str, Stimulus], commands: Commands) -> Collected:
+        pacer = Pacer(self.clock, fs=commands.fs, count=len(commands))
+        layout = self.rig.prepare(self.given if isinstance(self.given, Stimulus) else stimuli)
         if layout is None:
             layout = default_layout(commands, name=self.rig.name)
         self.log.add("arm", f"{self.rig.name}: {', '.join(c.name for c in layout.channels)}")
@@ -167,7 +187,7 @@ class _Playing:
         size = max(1, round(_BLOCK * commands.fs))
         seconds = len(commands) / commands.fs
         self.log.add("start", f"{len(commands)} commands at {commands.fs:g} Hz, {seconds:g} s")
-        for block in commands.blocks(size, pace=self.pacer):
+        for block in commands.blocks(size, pace=pacer):
             samples = collected.take(block, self.rig.play(block))
             played = Played(block=block, layout=layout, samples=samples, seconds=seconds)
             for subscriber in self.subscribers:

@@ -1,17 +1,26 @@
 """What goes to a rig and what comes back: blocks of commands, replies, and their layout."""
 
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
 from typing import Literal, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from hmpim.errors import ArgumentError, RigError
-from hmpim.record import ROLES, Intersample, Role
+from hmpim.record import ROLES, Finding, Intersample, Role
 from hmpim.units import check_unit
 
-__all__ = ["Block", "ChannelSpec", "Layout", "Pace", "Quantity", "Reply", "Samples"]
+__all__ = [
+    "Block",
+    "ChannelSpec",
+    "Layout",
+    "Pace",
+    "Quantity",
+    "Reply",
+    "RunReport",
+    "Samples",
+]
 
 FloatArray = NDArray[np.float64]
 Quantity = Literal["position", "velocity", "acceleration"]
@@ -20,6 +29,14 @@ Quantity = Literal["position", "velocity", "acceleration"]
 
 class Pace(Protocol):
     """The clock of a run, as a rig sees it."""
+
+    def now(self) -> float:
+        """Seconds from the instant at which the first command was due."""
+        ...
+
+    def left(self, number: int) -> float:
+        """Seconds until command `number` of the run is due; negative if that is past."""
+        ...
 
     def wait(self, number: int) -> None:
         """Return when command `number` of the run is due."""
@@ -132,6 +149,28 @@ class Samples:
             )
 
 
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class RunReport:
+    """What a rig says about a run that is over.
+
+    Parameters
+    ----------
+    findings : tuple of Finding
+        What a person should know; they go into the record.
+    clocks : mapping of str to callable
+        By the name of a clock (`ChannelSpec.clock`): stamps as delivered (s, shape (n,)) to
+        time in the run.
+
+    Examples
+    --------
+    >>> RunReport().findings
+    ()
+    """
+
+    findings: tuple[Finding, ...] = ()
+    clocks: Mapping[str, Callable[[FloatArray], FloatArray]] = field(default_factory=dict)
+
+
 Reply = Mapping[str, ArrayLike | Samples] | ArrayLike | None
 """What `play` returns: samples by channel.
 
@@ -161,6 +200,9 @@ class ChannelSpec:
     commanded : bool
         True for the command itself, of this axis and quantity: the run fills it in, and the rig
         need not return it.
+    clock : str
+        Name of the clock that stamps its samples, where that is not the run's own;
+        `RunReport.clocks` puts the stamps right when the run is over.
 
     Raises
     ------
@@ -179,6 +221,7 @@ class ChannelSpec:
     axis: str | None = None
     quantity: Quantity | None = None
     commanded: bool = False
+    clock: str = ""
 
     def __post_init__(self) -> None:
         check_unit(self.unit)

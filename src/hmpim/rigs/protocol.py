@@ -15,10 +15,10 @@ from typing import Protocol, Self, runtime_checkable
 
 import numpy as np
 
-from hmpim.rigs.block import Block, Layout, Reply
+from hmpim.rigs.block import Block, Layout, Reply, RunReport
 from hmpim.stimulus import Limits, Stimulus
 
-__all__ = ["LimitsOfAxes", "Rig", "Seeded", "Stimuli"]
+__all__ = ["LimitsOfAxes", "Reporting", "Rig", "Seeded", "Stimuli"]
 
 Stimuli = Stimulus | Mapping[str, Stimulus]
 """One stimulus, or one for each axis that moves."""
@@ -108,6 +108,15 @@ class Rig(Protocol):
 
     def stop(self) -> None:
         """Bring everything to rest and disarm. Called always, even where nothing moved yet."""
+        ...
+
+
+@runtime_checkable
+class Reporting(Protocol):
+    """A rig that has something to say about a run when it is over."""
+
+    def report(self) -> RunReport:
+        """Say it; called after `stop`, before the rig is left."""
         ...
 
 

@@ -63,6 +63,12 @@ KINDS: tuple[Kind, ...] = (
         words="simulated five-axis motion table (extra 'table'), as fast as it computes",
         builder="hmpim.rigs.catalogue.simulated:build_table",
     ),
+    Kind(
+        name="udp",
+        form="udp://HOST:PORT",
+        words="a rig that speaks the datagrams of docs/rigs.md, such as hmpim table --udp",
+        builder="hmpim.rigs.catalogue.wired:build_udp",
+    ),
 )
 """Add a kind here; its builder's module may import what it needs."""
 

@@ -1,4 +1,4 @@
-"""The clock of a run: real, or turned by hand in tests; and the pace it sets."""
+"""Clocks: the computer's own, one turned by hand in tests, and one that goes wrong on purpose."""
 
 import time
 from typing import Protocol
@@ -6,7 +6,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Clock", "ManualClock", "Pacer", "SystemClock"]
+__all__ = ["Clock", "ManualClock", "SkewedClock", "SystemClock"]
 
 
 class Clock(Protocol):
@@ -59,7 +59,7 @@ class ManualClock:
     5.0
     """
 
-    def __init__(self, late: "NDArray[np.float64] | None" = None) -> None:
+    def __init__(self, late: NDArray[np.float64] | None = None) -> None:
         self._now = 0.0
         self._late = late
         self._waits = 0
@@ -81,45 +81,39 @@ class ManualClock:
         self._now += seconds
 
 
-class Pacer:
-    """Lets each command go when it is due, and notes when it went.
+class SkewedClock:
+    """Another clock seen through an offset and a drift, as a second computer's would be.
 
     Parameters
     ----------
     clock : Clock
-        What tells the time.
-    fs : float
-        Commands a second.
-    count : int
-        Commands of the whole run.
+        The clock behind it.
+    offset : float
+        What it is ahead by, s.
+    drift : float
+        Seconds that it gains in a second.
 
     Examples
     --------
-    >>> pacer = Pacer(ManualClock(), fs=10.0, count=3)
-    >>> for number in range(3):
-    ...     pacer.wait(number)
-    >>> pacer.sent.round(9).tolist()
-    [0.0, 0.1, 0.2]
+    >>> behind = ManualClock()
+    >>> skewed = SkewedClock(behind, offset=100.0, drift=0.5)
+    >>> skewed.sleep_until(103.0)
+    >>> behind.now(), skewed.now()
+    (2.0, 103.0)
     """
 
-    def __init__(self, clock: Clock, *, fs: float, count: int) -> None:
+    def __init__(self, clock: Clock, *, offset: float = 0.0, drift: float = 0.0) -> None:
         self._clock = clock
-        self._period = 1.0 / fs
-        self._start: float | None = None
-        self._sent = np.full(count, np.nan)
-
-    @property
-    def sent(self) -> NDArray[np.float64]:
-        """When each command went, s from the first one's due time; NaN where none was awaited."""
-        return self._sent.copy()
+        self._offset = offset
+        self._rate = 1.0 + drift
+        self._origin = clock.now()
 
     def now(self) -> float:
-        """Seconds from the first command's due time; before the first, from now on."""
-        return 0.0 if self._start is None else self._clock.now() - self._start
+        """Seconds as this clock shows them."""
+        since = self._clock.now() - self._origin
+        return self._origin + self._offset + self._rate * since
 
-    def wait(self, number: int) -> None:
-        """Return when command `number` is due; the first is due at once."""
-        if self._start is None:
-            self._start = self._clock.now() - number * self._period
-        self._clock.sleep_until(self._start + number * self._period)
-        self._sent[number] = self._clock.now() - self._start
+    def sleep_until(self, instant: float) -> None:
+        """Sleep until this clock shows the instant."""
+        since = (instant - self._origin - self._offset) / self._rate
+        self._clock.sleep_until(self._origin + since)

@@ -1,0 +1,100 @@
+"""``hmpim table``: the simulated motion table served over UDP, in real time."""
+
+import signal
+from pathlib import Path
+from types import FrameType
+from typing import Annotated
+
+import typer
+
+from hmpim.cli.files import check_files
+from hmpim.cli.terminal import say
+from hmpim.errors import ArgumentError
+
+__all__ = ["table"]
+
+
+def table(
+    udp: Annotated[
+        str,
+        typer.Option(
+            "--udp",
+            metavar="HOST:PORT",
+            help="Address to serve at; 127.0.0.1 keeps it on this computer. Port 0: any free one.",
+        ),
+    ],
+    rate: Annotated[
+        float, typer.Option("--rate", metavar="HZ", help="Commands and samples a second.")
+    ] = 1000.0,
+    mode: Annotated[
+        str,
+        typer.Option("--mode", metavar="P|PV|PVA", help="Commands that the servos take."),
+    ] = "P",
+    load: Annotated[
+        str,
+        typer.Option("--load", metavar="NAME", help="What it carries: acceptance, bracket, ..."),
+    ] = "acceptance",
+    watchdog: Annotated[
+        float,
+        typer.Option(
+            "--watchdog", metavar="S", help="Silence after which it brakes, at most 0.1 s."
+        ),
+    ] = 0.08,
+    seed: Annotated[int | None, typer.Option("--seed", min=0, help="Of the encoders' noise.")] = (
+        None
+    ),
+    trace: Annotated[
+        Path | None,
+        typer.Option("--trace", metavar="FILE", help="Write every tick as CSV: what it truly did."),
+    ] = None,
+    clock_offset: Annotated[
+        float,
+        typer.Option("--clock-offset", metavar="S", help="Let its clock be ahead by this much."),
+    ] = 0.0,
+    clock_drift: Annotated[
+        float,
+        typer.Option("--clock-drift", metavar="PPM", help="Let its clock gain so many µs in 1 s."),
+    ] = 0.0,
+) -> None:
+    """Serve the simulated five-axis table until Ctrl-C; whoever runs hmpim run moves it.
+
+    It checks every command against Fig. 4's limits, brakes after the watchdog's silence, and
+    comes to rest inside its limits.
+    """
+    import numpy as np
+
+    from hmpim.rigs import MotionTable, SkewedClock, SystemClock
+    from hmpim.rigs.table import both_loads
+    from hmpim.rigs.table.served import TablePlant, table_hello
+    from hmpim.rigs.wire import FarEnd, Trace, UdpServer, parse_address, serve
+
+    if mode not in ("P", "PV", "PVA"):
+        raise ArgumentError(f"--mode {mode!r} is not known; use P, PV or PVA")
+    if not 0.0 < watchdog <= 0.1:
+        raise ArgumentError(f"--watchdog {watchdog:g} s must be more than 0 and at most 0.1")
+    check_files(writes={"--trace": trace})
+    uut, target = both_loads(load)
+    moved = MotionTable(mode=mode, uut_load=uut, target_load=target)  # type: ignore[arg-type]
+    hello = table_hello(moved, rate=rate, watchdog=watchdog)
+    plant = TablePlant(moved, rate=rate, rng=np.random.default_rng(seed))
+    farend = FarEnd(hello)
+    host, port = parse_address(udp)
+    ended: list[int] = []
+
+    def end(number: int, _frame: FrameType | None) -> None:
+        ended.append(number)
+
+    with UdpServer(host, port) as server:
+        for number in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(number, end)
+        at = server.address
+        say(f"Table at udp://{at[0]}:{at[1]}, {rate:g} Hz, {mode}, {load}; Ctrl-C ends it")
+        clock = SkewedClock(SystemClock(), offset=clock_offset, drift=1e-6 * clock_drift)
+        every = max(1, round(0.1 * rate))
+        writing = None if trace is None else Trace(trace, hello.axes, every=every)
+        try:
+            serve(server, farend, plant, clock=clock, until=lambda: bool(ended), trace=writing)
+        finally:
+            if writing is not None:
+                writing.__exit__(None, None, None)
+    say("Table at rest")
