@@ -89,7 +89,7 @@ def test_a_stimulus_beyond_the_stated_limits_is_refused(folder):
     out = run("run", "--rig-file", "rig.toml", "s.csv", "-o", "r.csv", "--log", "run.log")
     assert out.exit_code == 2
     assert "peak position 9.99962 deg is beyond the limit 9 deg of 'sensor'" in out.stderr
-    assert "fault  peak position 9.99962 deg" in (folder / "run.log").read_text()
+    assert "fault  LimitsError: peak position 9.99962 deg" in (folder / "run.log").read_text()
 
 
 def test_rigs_are_listed_and_the_broken_named(folder):
