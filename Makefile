@@ -18,7 +18,7 @@ $(RUN): pyproject.toml constraints.txt | $(BIN)/python
 	@touch $@
 
 $(DEV): pyproject.toml constraints.txt | $(BIN)/python
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[table,fmu,uff]' --group dev
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[table,fmu,uff,excel]' --group dev
 	@touch $(RUN) $@
 
 install: $(DEV)  ## everything a developer needs, in .venv

@@ -1,7 +1,7 @@
 """Tables of text: CSV, TSV, blank-separated, with or without headings, packed or not."""
 
 from hmpim.formats.readers.text.notes import KINDS, MARK, heading_of
-from hmpim.formats.readers.text.reader import TEXT, TIME_NAMES
+from hmpim.formats.readers.text.reader import TEXT, TIME_NAMES, list_table, read_table
 from hmpim.formats.readers.text.source import MAX_EXPANDED, MAX_LINE, read_text
 
 __all__ = [
@@ -12,5 +12,7 @@ __all__ = [
     "TEXT",
     "TIME_NAMES",
     "heading_of",
+    "list_table",
+    "read_table",
     "read_text",
 ]

@@ -11,13 +11,13 @@ from hmpim.formats.readers.protocol import ChannelInfo, Contents, Layout, Reader
 from hmpim.formats.readers.text.headings import Heading, named
 from hmpim.formats.readers.text.instruments import stated_time_unit
 from hmpim.formats.readers.text.notes import Notes, read_notes
-from hmpim.formats.readers.text.source import is_text
+from hmpim.formats.readers.text.source import is_text, open_source
 from hmpim.formats.readers.text.stamps import StampColumn, looks_like_stamp, stamp_column
-from hmpim.formats.readers.text.table import Table, open_table, read_columns
+from hmpim.formats.readers.text.table import Lines, Table, open_table, read_columns
 from hmpim.record import Finding, Series
 from hmpim.units import conversion_factor
 
-__all__ = ["TEXT", "TIME_NAMES", "channels", "read", "sniff"]
+__all__ = ["TEXT", "TIME_NAMES", "channels", "list_table", "read", "read_table", "sniff"]
 
 _TIME_UNITS = ("s", "ms", "us", "ns", "sec", "seconds")
 
@@ -40,8 +40,21 @@ def sniff(head: bytes, path: Path) -> bool:
 
 def channels(path: Path, layout: Layout) -> Contents:
     """List the columns of a table, without time."""
-    table = open_table(path)
-    notes = read_notes(table.comments, table.headings, file=path.name)
+    return list_table(open_source(path), layout, form="text")
+
+
+def read(path: Path, names: Sequence[str], layout: Layout) -> tuple[Series, ...]:
+    """Read columns of a table by name, on the clock of its column of time."""
+    return read_table(open_source(path), names, layout)
+
+
+TEXT = Reader(format="text", sniff=sniff, channels=channels, read=read)
+
+
+def list_table(lines: Lines, layout: Layout, *, form: str) -> Contents:
+    """List the columns of a table, wherever its text comes from; `form` names the format."""
+    table = open_table(lines)
+    notes = read_notes(table.comments, table.headings, file=lines.name)
     headings = notes.headings if notes is not None else table.headings
     clock, stamps, findings = _clock(table, headings, layout, own=notes is not None)
     data = tuple(
@@ -52,14 +65,14 @@ def channels(path: Path, layout: Layout) -> Contents:
     time = clock.name if clock is not None else "time" if table.steady is not None else None
     if notes is None:
         return Contents(
-            format="text",
+            format=form,
             channels=data,
             time=time,
             origin=None if stamps is None else stamps.origin,
             findings=findings,
         )
     return Contents(
-        format="text",
+        format=form,
         channels=data,
         time=time,
         inputs=notes.names["inputs"],
@@ -74,10 +87,10 @@ def channels(path: Path, layout: Layout) -> Contents:
     )
 
 
-def read(path: Path, names: Sequence[str], layout: Layout) -> tuple[Series, ...]:
-    """Read columns of a table by name, on the clock of its column of time."""
-    table = open_table(path)
-    notes: Notes | None = read_notes(table.comments, table.headings, file=path.name)
+def read_table(lines: Lines, names: Sequence[str], layout: Layout) -> tuple[Series, ...]:
+    """Read columns of a table by name, wherever its text comes from."""
+    table = open_table(lines)
+    notes: Notes | None = read_notes(table.comments, table.headings, file=lines.name)
     headings = notes.headings if notes is not None else table.headings
     clock, stamps, _ = _clock(table, headings, layout, own=notes is not None)
     by_name = {h.name: h for h in headings if h is not clock}
@@ -94,9 +107,6 @@ def read(path: Path, names: Sequence[str], layout: Layout) -> tuple[Series, ...]
         Series(name=h.name, values=values, time=time, unit=h.unit, findings=short)
         for h, values in zip(chosen, columns.values, strict=True)
     )
-
-
-TEXT = Reader(format="text", sniff=sniff, channels=channels, read=read)
 
 
 def _cut_short(line: int) -> tuple[Finding, ...]:
@@ -123,7 +133,7 @@ def _clock(
     table: Table, headings: Sequence[Heading], layout: Layout, *, own: bool
 ) -> tuple[Heading | None, StampColumn | None, tuple[Finding, ...]]:
     """The column of time, how it is read, and what is to be said of it."""
-    file = table.path.name
+    file = table.lines.name
     clock: Heading | None
     if own and layout.time is None:  # `write_csv` puts it first, whatever else is called so
         clock, unit = headings[0], "s"
@@ -158,7 +168,7 @@ def _clock(
 def _clock_column(
     table: Table, headings: Sequence[Heading], layout: Layout
 ) -> tuple[Heading | None, str]:
-    file = table.path.name
+    file = table.lines.name
     if layout.time is not None:
         wanted = layout.time
         for name, unit in ((wanted, ""), named(wanted)):

@@ -82,6 +82,11 @@ class Source:
     encoding: str
     mark: int
 
+    @property
+    def name(self) -> str:
+        """Name of the file, for messages."""
+        return self.path.name
+
     def blocks(self, *, size: int = _BLOCK) -> Iterator[str]:
         r"""Yield the text in blocks of whole lines, each line ended by ``\n``.
 

@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import chain
-from pathlib import Path
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,12 +29,24 @@ from hmpim.formats.readers.text.dialect import (
 )
 from hmpim.formats.readers.text.headings import Heading, find_headings
 from hmpim.formats.readers.text.instruments import Steady, known_headings, steady_time
-from hmpim.formats.readers.text.source import open_source
 from hmpim.formats.readers.text.stamps import StampColumn
 
-__all__ = ["Columns", "Table", "open_table", "read_columns"]
+__all__ = ["Columns", "Lines", "Table", "open_table", "read_columns"]
 
 _HEAD = 1500  # lines from which a table is understood
+
+
+class Lines(Protocol):
+    """Anything that gives lines of text: a text file, or the sheet of a workbook."""
+
+    @property
+    def name(self) -> str:
+        """Name of the file, for messages."""
+        ...
+
+    def blocks(self) -> Iterator[str]:
+        """Yield the text in blocks of whole lines, from its start."""
+        ...
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -43,8 +55,8 @@ class Table:
 
     Parameters
     ----------
-    path : Path
-        The file.
+    lines : Lines
+        Where the text comes from.
     start : tuple of str
         Its first lines.
     comments : tuple of str
@@ -59,7 +71,7 @@ class Table:
         Start and step of time, where the file prints those instead of stamps.
     """
 
-    path: Path
+    lines: Lines
     start: tuple[str, ...]
     comments: tuple[str, ...]
     dialect: Dialect
@@ -92,35 +104,35 @@ class Columns:
     cut_short: int
 
 
-def open_table(path: Path) -> Table:
-    """Read the first lines of a text file and tell how it is written.
+def open_table(text: Lines) -> Table:
+    """Read the first lines of a text and tell how it is written.
 
     Raises
     ------
     FormatError
         If it is no table of text.
     """
-    blocks = open_source(path).blocks()
+    blocks = text.blocks()
     lines: list[str] = []
     for block in blocks:
         lines.extend(block.removesuffix("\n").split("\n"))
         if len(lines) >= _HEAD:
             break
     del lines[_HEAD:]
-    dialect = find_dialect(lines, name=path.name)
+    dialect = find_dialect(lines, name=text.name)
     known = known_headings(lines, dialect)
     headings, printed = (
-        (known, True) if known is not None else find_headings(lines, dialect, name=path.name)
+        (known, True) if known is not None else find_headings(lines, dialect, name=text.name)
     )
     steady = steady_time(lines, dialect, headings)
     if steady is not None:
         headings = tuple(h for h in headings if not _is_steady(h, steady))
     if dialect.first >= len(lines):
         names = listed([h.name for h in headings])
-        raise FormatError(f"{path.name!r} has column names ({names}) and no samples; record again")
+        raise FormatError(f"{text.name!r} has column names ({names}) and no samples; record again")
     comments = tuple(uncommented(line) for line in lines[: dialect.first] if is_comment(line))
     return Table(
-        path=path,
+        lines=text,
         start=tuple(lines),
         comments=comments,
         dialect=dialect,
@@ -200,7 +212,7 @@ class _Block:
 
 
 def _row_blocks(table: Table) -> Iterator[_Block]:
-    blocks = open_source(table.path).blocks()
+    blocks = table.lines.blocks()
     line = 1
     ahead = next(blocks, None)
     skip = table.dialect.first
@@ -259,7 +271,7 @@ def _is_short(row: str, dialect: Dialect) -> bool:
 
 def _said_width(table: Table, row: str, line: int) -> str:
     count, width = len(split_row(row, table.dialect.delimiter)), table.dialect.width
-    message = f"{table.path.name!r}, line {line} has {count} cells where {width} are needed"
+    message = f"{table.lines.name!r}, line {line} has {count} cells where {width} are needed"
     if table.dialect.delimiter == "," and count in (2 * width - 1, 2 * width):
         return f"{message}: a decimal comma is no delimiter; export it with decimal points"
     return f"{message}; correct that line, or cut it out"
@@ -317,7 +329,7 @@ def _checked(
 
 
 def _said_cell(table: Table, column: Heading, cell: str, line: int) -> str:
-    where = f"{table.path.name!r}, line {line}, column {column.text!r}"
+    where = f"{table.lines.name!r}, line {line}, column {column.text!r}"
     cell = cell.strip()
     if table.dialect.decimal == "." and DECIMAL_COMMA.match(cell):
         return f"{where} holds {cell!r}, a decimal comma; export the file with decimal points"
