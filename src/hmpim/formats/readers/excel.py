@@ -3,6 +3,7 @@
 import warnings
 import zipfile
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import date, datetime, time, timedelta
 from itertools import islice
@@ -139,11 +140,29 @@ def _check_size(path: Path) -> None:
         )
 
 
-def _opened(path: Path) -> Any:
+@contextmanager
+def _opened(path: Path) -> Iterator[Any]:
+    """A workbook, open for reading; what goes wrong inside is said in our words."""
     openpyxl = need("openpyxl", extra="excel", what="an Excel file")
-    return _quietly(
-        lambda: openpyxl.load_workbook(path, read_only=True, data_only=True, keep_links=False)
-    )
+    try:
+        with path.open("rb") as file:  # by a path, openpyxl would ask for a suffix
+            book = _quietly(
+                lambda: openpyxl.load_workbook(
+                    file, read_only=True, data_only=True, keep_links=False
+                )
+            )
+            try:
+                yield book
+            finally:
+                book.close()
+    except HmpimError:
+        raise
+    except Exception as error:  # code of others
+        reason = " ".join(f"{type(error).__name__}: {error}".split())[:200]
+        raise FormatError(
+            f"{path.name!r} is a damaged workbook ({reason}); open it in a spreadsheet and save "
+            "it anew"
+        ) from None
 
 
 def _quietly(make: Callable[[], _T]) -> _T:
@@ -154,14 +173,8 @@ def _quietly(make: Callable[[], _T]) -> _T:
 
 
 def _titles(path: Path) -> list[str]:
-    try:
-        book = _opened(path)
-        try:
-            return [sheet.title for sheet in book.worksheets]
-        finally:
-            book.close()
-    except Exception as error:
-        raise _damaged(path, error) from None
+    with _opened(path) as book:
+        return [sheet.title for sheet in book.worksheets]
 
 
 def _width(path: Path, title: str) -> int:
@@ -176,30 +189,12 @@ def _width(path: Path, title: str) -> int:
 
 
 def _rows(path: Path, title: str) -> Iterator[tuple[Any, ...]]:
-    try:
-        book = _opened(path)
-        try:
-            sheet = book[title]
-            sheet.reset_dimensions()  # some programs write wrong ones
-            rows = sheet.iter_rows(values_only=True)
-            while part := _quietly(lambda: list(islice(rows, 1000))):
-                yield from part
-        finally:
-            book.close()
-    except GeneratorExit:
-        raise
-    except Exception as error:
-        raise _damaged(path, error) from None
-
-
-def _damaged(path: Path, error: Exception) -> Exception:
-    """The error that a person should see: our own as it is, one of openpyxl in our words."""
-    if isinstance(error, HmpimError):
-        return error
-    reason = " ".join(f"{type(error).__name__}: {error}".split())[:200]
-    return FormatError(
-        f"{path.name!r} is a damaged workbook ({reason}); open it in a spreadsheet and save it anew"
-    )
+    with _opened(path) as book:
+        sheet = book[title]
+        sheet.reset_dimensions()  # some programs write wrong ones
+        rows = sheet.iter_rows(values_only=True)
+        while part := _quietly(lambda: list(islice(rows, 1000))):
+            yield from part
 
 
 def _text(value: object) -> str:
