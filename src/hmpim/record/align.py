@@ -5,17 +5,21 @@ from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import CubicSpline
 
 from hmpim.errors import RecordError
 from hmpim.record.clock import Clock, fit_clock
 from hmpim.record.finding import Finding
+from hmpim.record.onto import is_reduced, on_grid
 from hmpim.record.quality import clock_findings
 from hmpim.record.record import Channel, Intersample, Record
+from hmpim.record.resample import share_above
 
 __all__ = ["Aligned", "Signal", "uniform"]
 
 _T = TypeVar("_T", bound=np.generic)
+
+_FOLDED = 0.001
+"""Share of an input's power above half the output's rate that is said: 3 % of its amplitude."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -100,7 +104,9 @@ def uniform(record: Record) -> Aligned:
       With stamps strewn by ±30 % of the interval it errs by 5e-4 of the amplitude (r.m.s.) at
       a tenth of the rate. A gap ends one spline and begins the next. An input stated as 'zoh'
       keeps its last value instead, and one stated as 'foh' is joined linearly.
-    * Channels with clocks of their own: interpolated likewise, over the span that all share.
+    * Channels with clocks of their own: interpolated likewise, over the span that all share. One
+      that is sampled faster loses what lies above half the lower rate first, by a symmetric
+      filter: no path moves the delay (see `hmpim.record.resample`).
 
     Inside a gap the filling is a cubic (Hermite) between the two edges, with slopes limited so
     that it never leaves the range between them.
@@ -150,16 +156,20 @@ def uniform(record: Record) -> Aligned:
         grid = clock.start + np.arange(clock.length) / clock.fs
     else:
         grid = _common_grid(channels, clocks, clock)
-        findings.extend(_clock_differences(channels, clocks, clock))
+        findings.extend(_clock_differences(record, clocks, clock))
 
-    def on_grid(channel: Channel, intersample: Intersample | None) -> Signal:
-        return _on_grid(channel, clocks[id(channel.time)], grid, 1 / clock.fs, intersample)
+    def signal(channel: Channel, intersample: Intersample | None) -> Signal:
+        own = clocks[id(channel.time)]
+        values, valid = on_grid(channel, own, grid, fs=clock.fs, intersample=intersample)
+        return Signal(
+            name=channel.name, values=_frozen(values), valid=_frozen(valid), unit=channel.unit
+        )
 
     return Aligned(
         time=_frozen(grid),
         fs=clock.fs,
-        inputs=tuple(on_grid(c, record.intersample) for c in record.inputs),
-        outputs=tuple(on_grid(c, None) for c in record.outputs),
+        inputs=tuple(signal(c, record.intersample) for c in record.inputs),
+        outputs=tuple(signal(c, None) for c in record.outputs),
         findings=tuple(findings),
     )
 
@@ -206,9 +216,9 @@ def _common_grid(
     return np.asarray(clock.start + np.arange(k0, k1 + 1) / clock.fs)
 
 
-def _clock_differences(
-    channels: tuple[Channel, ...], clocks: dict[int, Clock], clock: Clock
-) -> list[Finding]:
+def _clock_differences(record: Record, clocks: dict[int, Clock], clock: Clock) -> list[Finding]:
+    """What is to be said of the channels that have a clock of their own."""
+    channels = (*record.outputs, *record.inputs)
     findings: list[Finding] = []
     reported = {id(clock)}
     for c in channels:
@@ -217,118 +227,53 @@ def _clock_differences(
             continue
         reported.add(id(own))
         findings.extend(clock_findings(own, c.time, name=c.name))
-        offset = (own.start - clock.start) * clock.fs
-        findings.append(
-            Finding(
-                code="resampled",
-                message=(
-                    f"{c.name!r} has a clock of its own ({own.fs:.6g} Hz, "
-                    f"{offset - np.floor(offset):.2g} of an interval beside that of "
-                    f"{channels[0].name!r} at {clock.fs:.6g} Hz) and was interpolated; "
-                    "what it holds above half the lower rate is lost or folded"
-                ),
-                severity="info",
-                parameters=(),
-            )
-        )
+        place = (own.start - clock.start) * clock.fs
+        beside = abs(place - np.rint(place))
+        same = abs(own.fs / clock.fs - 1.0) * own.length < 0.01
+        if same and beside <= (own.rounding + clock.rounding) * clock.fs and not own.jittered:
+            continue  # one clock, of which this channel misses some samples
+        findings.append(_resampled(c, own, channels[0], clock, record.intersample))
+        if c in record.inputs:
+            findings.extend(_folded(c, own, channels[0], clock))
     return findings
 
 
-def _on_grid(
-    channel: Channel,
-    clock: Clock,
-    grid: NDArray[np.float64],
-    step: float,
-    intersample: Intersample | None,
-) -> Signal:
-    """Values of one channel at the instants of `grid`."""
-    place = (grid - clock.start) * clock.fs
-    nearest = np.rint(place).astype(np.int64)
-    on_clock = not clock.jittered and bool(
-        np.all(np.abs(place - nearest) <= clock.rounding * clock.fs)
-    )
-    if on_clock:
-        # Every instant is one of this channel's own: take its samples as they are.
-        position = np.minimum(np.searchsorted(clock.index, nearest), clock.index.size - 1)
-        valid = clock.index[position] == nearest
-        values = channel.values[position]
-    else:
-        valid = ~_inside_gaps(channel.time, clock, grid)
-        values = np.empty(grid.size)
-        values[valid] = _interpolated(channel, clock, grid[valid], intersample)
-    if not valid.all():
-        own = channel.time if not on_clock else clock.start + clock.index / clock.fs
-        values[~valid] = _filled(own, channel.values, clock, grid[~valid], intersample)
-    return Signal(
-        name=channel.name, values=_frozen(values), valid=_frozen(valid), unit=channel.unit
+def _resampled(
+    channel: Channel, own: Clock, first: Channel, clock: Clock, intersample: Intersample | None
+) -> Finding:
+    place = (own.start - clock.start) * clock.fs
+    how = "was interpolated"
+    if intersample not in ("zoh", "foh") and is_reduced(channel, own, clock.fs):
+        how = f"was reduced to it, with what it holds above {clock.fs / 2:.6g} Hz taken out"
+    return Finding(
+        code="resampled",
+        message=(
+            f"{channel.name!r} has a clock of its own ({own.fs:.6g} Hz, "
+            f"{place - np.floor(place):.2g} of an interval beside that of {first.name!r} at "
+            f"{clock.fs:.6g} Hz) and {how}; neither moves its delay"
+        ),
+        severity="info",
+        parameters=(),
     )
 
 
-def _inside_gaps(
-    time: NDArray[np.float64], clock: Clock, grid: NDArray[np.float64]
-) -> NDArray[np.bool_]:
-    """Instants more than half an interval from both edges of a gap, inside it."""
-    long = np.zeros(time.size + 1, dtype=np.bool_)
-    long[clock.gaps + 1] = True  # the interval that ends at each stamp; open at both ends
-    after = np.searchsorted(time, grid)
-    left = time[np.maximum(after - 1, 0)]
-    right = time[np.minimum(after, time.size - 1)]
-    half = 0.5 / clock.fs
-    return np.asarray(long[after] & (grid > left + half) & (grid < right - half))
-
-
-def _interpolated(
-    channel: Channel, clock: Clock, at: NDArray[np.float64], intersample: Intersample | None
-) -> NDArray[np.float64]:
-    time, values = channel.time, channel.values
-    if intersample == "zoh":
-        # Half a rounding step of grace, or a stamp printed low would give the value before.
-        before = np.searchsorted(time, at + clock.rounding, side="right") - 1
-        return np.asarray(values[np.clip(before, 0, time.size - 1)])
-    if intersample == "foh":
-        return np.interp(at, time, values)
-    out = np.empty(at.size)
-    edges = np.concatenate(([0], clock.gaps + 1, [time.size]))
-    # A segment answers for its own span and half a gap beyond, where instants lie within half
-    # an interval of its end; the spline is carried on that far.
-    middles = 0.5 * (time[edges[1:-1] - 1] + time[edges[1:-1]])
-    bounds = np.concatenate(([0], np.searchsorted(at, middles), [at.size]))
-    for k in np.flatnonzero(np.diff(bounds)):
-        part, mine = slice(edges[k], edges[k + 1]), slice(bounds[k], bounds[k + 1])
-        if edges[k + 1] - edges[k] == 1:
-            out[mine] = values[part]
-        else:
-            out[mine] = CubicSpline(time[part], values[part])(at[mine])
-    return out
-
-
-def _filled(
-    time: NDArray[np.float64],
-    values: NDArray[np.float64],
-    clock: Clock,
-    at: NDArray[np.float64],
-    intersample: Intersample | None,
-) -> NDArray[np.float64]:
-    """Values inside gaps: held, or a monotone cubic Hermite between the two edges."""
-    after = np.clip(np.searchsorted(time, at), 1, time.size - 1)
-    before = after - 1
-    t0, t1, v0, v1 = time[before], time[after], values[before], values[after]
-    if intersample == "zoh":
-        return np.asarray(v0)
-    chord = (v1 - v0) / (t1 - t0)
-    slope = np.diff(values) / np.diff(time)
-    # The slope at an edge is that of the interval outside the gap, if that is a sample long.
-    outside0 = np.where(before > 0, slope[np.maximum(before - 1, 0)], chord)
-    outside1 = np.where(after < time.size - 1, slope[np.minimum(after, slope.size - 1)], chord)
-    if intersample == "foh":
-        outside0 = outside1 = chord
-
-    def limited(s: NDArray[np.float64]) -> NDArray[np.float64]:
-        # Fritsch and Carlson (1980): same sign as the chord, at most three times as steep.
-        return np.where(s * chord > 0, np.sign(chord) * np.minimum(np.abs(s), 3 * np.abs(chord)), 0)
-
-    h = t1 - t0
-    x = (at - t0) / h
-    d0, d1 = limited(outside0) * h, limited(outside1) * h
-    cubic = v0 + x * (d0 + x * (3 * (v1 - v0) - 2 * d0 - d1 + x * (d0 + d1 - 2 * (v1 - v0))))
-    return np.asarray(cubic)
+def _folded(channel: Channel, own: Clock, first: Channel, clock: Clock) -> list[Finding]:
+    """An input that moves faster than the output is sampled comes back folded in the output."""
+    if own.fs < 1.02 * clock.fs:
+        return []
+    share = share_above(channel.values, fs=own.fs, limit=0.5 * clock.fs)
+    if share < _FOLDED:
+        return []
+    return [
+        Finding(
+            code="folded",
+            message=(
+                f"{100 * share:.2g} % of the power of {channel.name!r} lies above "
+                f"{clock.fs / 2:.6g} Hz, half the rate of {first.name!r}: the answer to it is "
+                "folded onto lower frequencies there, as noise; record the output faster, or "
+                "sweep lower"
+            ),
+            severity="info",
+            parameters=(),
+        )
+    ]

@@ -42,7 +42,9 @@ def mend(series: Sequence[Series], *, fs: float | None = None) -> Mended:
     """Make channels of series: drop what is missing, put stamps in order, and count it.
 
     * A sample that is NaN or infinite is dropped, which leaves a gap in its channel alone.
-    * Stamps that stand still: the first sample of each stamp is kept.
+    * Stamps that stand still because the clock is printed too coarsely (2 kHz in whole
+      milliseconds): the samples are spread on the uniform clock that the stamps are rounded from.
+      Else the first sample of each stamp is kept.
     * Samples out of order, by up to eight places: sorted by stamp.
     * Stamps that start again: refused.
 
@@ -78,7 +80,7 @@ def mend(series: Sequence[Series], *, fs: float | None = None) -> Mended:
             stamps = known.setdefault(-s.values.size, (stamps, None))[0]
         else:
             if id(s.time) not in known:
-                sharing = [o.name for o in series if o.time is s.time]
+                sharing = [o for o in series if o.time is s.time]
                 known[id(s.time)] = _ordered(s.time, sharing, findings)
             stamps, order = known[id(s.time)]
         values = s.values if order is None else s.values[order]
@@ -120,13 +122,13 @@ def _without_missing(
 
 
 def _ordered(
-    time: NDArray[np.float64], names: Sequence[str], findings: list[Finding]
+    time: NDArray[np.float64], sharing: Sequence[Series], findings: list[Finding]
 ) -> tuple[NDArray[np.float64], NDArray[np.int64] | None]:
     """Stamps that increase, and the samples they belong to (None: all, as they are)."""
     if time.size and np.isfinite(time).all() and np.all(np.diff(time) > 0):
         return time, None
     order = np.flatnonzero(np.isfinite(time))
-    of = ", ".join(repr(name) for name in names)
+    of = ", ".join(repr(s.name) for s in sharing[:4]) + (" and others" if sharing[4:] else "")
     if order.size < time.size:
         findings.append(
             Finding(
@@ -152,18 +154,48 @@ def _ordered(
         )
     first = np.concatenate(([True], np.diff(time[order]) > 0)) if order.size else order > 0
     doubled = int(order.size - np.count_nonzero(first))
-    if doubled:
-        order = order[first]
-        findings.append(
-            Finding(
-                code="doubled_stamps",
-                message=f"{doubled} of {time.size} stamps of {of} repeat the one before; the first "
-                "sample of each is kept",
-                severity="info",
-                parameters=(),
-            )
+    if not doubled:
+        return time[order], order
+    differ = any(_differs(s.values[order], first) for s in sharing)
+    spread = _spread(time[order]) if differ else None
+    if spread is not None:
+        step, rate = spread[1] - spread[0], 1.0 / (spread[1] - spread[0])
+        message = (
+            f"{doubled} of {time.size} stamps of {of} repeat the one before, because the clock is "
+            f"printed more coarsely than it runs; the samples are spread evenly, {step:.6g} s "
+            f"apart ({rate:.6g} Hz)"
         )
-    return time[order], order
+    else:
+        order = order[first]
+        message = (
+            f"{doubled} of {time.size} stamps of {of} repeat the one before; the first sample of "
+            "each is kept"
+        )
+    findings.append(Finding(code="doubled_stamps", message=message, severity="info", parameters=()))
+    return (time[order] if spread is None else spread), order
+
+
+def _differs(values: NDArray[np.float64], first: NDArray[np.bool_]) -> bool:
+    """Whether most samples with the stamp of the one before hold another value than it."""
+    again = np.flatnonzero(~first)
+    there = again[np.isfinite(values[again]) & np.isfinite(values[again - 1])]
+    return bool(there.size and np.mean(values[there] != values[there - 1]) > 0.5)
+
+
+def _spread(time: NDArray[np.float64]) -> NDArray[np.float64] | None:
+    """The uniform clock whose stamps, cut or rounded to their printed step, are these; or None."""
+    tick = float(np.min(np.diff(np.unique(time)), initial=np.inf))
+    if not np.isfinite(tick) or time.size < 4:
+        return None
+    # Of a clock cut to ticks the mean error is half a tick at both ends: the slope is free of it.
+    place = np.arange(time.size)
+    step, start = np.polyfit(place, time - time[0], 1)
+    even = start + step * place
+    if step <= 0 or float(np.abs(time - time[0] - even).max()) > 1.05 * tick:
+        return None
+    # The least start at which no sample is stamped before it happens: stamps are cut, not rounded,
+    # in most loggers; a constant offset of all channels of a clock moves no delay between them.
+    return np.asarray(time[0] + even)
 
 
 def _check_not_restarted(time: NDArray[np.float64], of: str) -> None:

@@ -1,0 +1,161 @@
+"""No path from stamps to the common clock moves a delay: every one with a delay that is known."""
+
+import re
+
+import numpy as np
+import pytest
+
+from hmpim.record import Channel, Record, Series, uniform
+from hmpim.record.mend import mend
+
+DELAY = 0.0123
+FS = 100.0
+DURATION = 20.0
+
+
+def sweep(t):
+    """Linear sweep, 0.2 to 20 Hz, started softly and ended softly; defined at any instant."""
+    inside = np.clip(t / DURATION, 0.0, 1.0)
+    edge = np.clip(np.minimum(inside, 1.0 - inside) * 10.0, 0.0, 1.0)
+    phase = 2 * np.pi * DURATION * (0.2 * inside + 9.9 * inside**2)
+    return np.sin(phase) * np.sin(np.pi / 2 * edge) ** 2
+
+
+def answered(t):
+    return sweep(t - DELAY)
+
+
+def delay_of(time, values, truth):
+    """Delay in s by which `values` are late on `truth`, by least squares; shape (n,)."""
+    step = 1e-5
+    slope = (truth(time + step) - truth(time - step)) / (2 * step)
+    return -float(slope @ (values - truth(time)) / (slope @ slope))
+
+
+def every(fs, *, late=0.0):
+    return np.arange(late, DURATION, 1.0 / fs)
+
+
+def strewn(fs, share):
+    time = every(fs)
+    return time + share / fs * np.random.default_rng(3).uniform(-1, 1, time.size)
+
+
+def without(time, *spans):
+    keep = np.ones(time.size, dtype=bool)
+    for start, stop in spans:
+        keep &= (time < start) | (time > stop)
+    return time[keep]
+
+
+PATHS = {
+    "one clock": (every(FS), every(FS)),
+    "beside": (every(FS, late=0.0037), every(FS)),
+    "input ten times as fast": (every(1000.0), every(FS)),
+    "input ten times as fast, beside": (every(1000.0, late=0.0004), every(FS)),
+    "input 3.73 times as fast": (every(373.0), every(FS)),
+    "output ten times as fast": (every(FS), every(1000.0)),
+    "output 1.7 times as fast": (every(FS), every(170.0, late=0.002)),
+    "both strewn": (strewn(FS, 0.3), strewn(FS, 0.3)),
+    "fast and strewn input": (strewn(1000.0, 0.3), every(FS)),
+    "gaps in both": (
+        without(every(FS, late=0.004), (5, 5.5), (12, 12.1)),
+        without(every(FS), (8, 8.3)),
+    ),
+    "fast input with gaps": (without(every(1000.0), (5, 5.5), (8.001, 8.003)), every(FS)),
+    "held up now and then": (every(FS), without(every(FS), (3, 3.01), (9, 9.02), (15, 15.01))),
+}
+
+
+@pytest.mark.parametrize("name", PATHS)
+def test_delay_stays_where_it_is(name):
+    t_u, t_y = PATHS[name]
+    # What lies above half the lower rate must not fold: a tone there, in the faster input.
+    tone = 0.3 * np.sin(2 * np.pi * 130.0 * t_u) if name.startswith("input ten") else 0.0
+    record = Record(
+        inputs=(Channel(name="u", time=t_u, values=sweep(t_u) + tone),),
+        outputs=(Channel(name="y", time=t_y, values=answered(t_y)),),
+        fs=FS,
+    )
+    aligned = uniform(record)
+    u, y = aligned.inputs[0], aligned.outputs[0]
+    both = u.valid & y.valid & (aligned.time > 0.5) & (aligned.time < DURATION - 0.5)
+    time = aligned.time[both]
+    moved = delay_of(time, y.values[both], answered) - delay_of(time, u.values[both], sweep)
+    assert abs(moved) < 0.01 / aligned.fs
+    # Nor does anything else happen to the signals.
+    for signal, truth in ((u, sweep), (y, answered)):
+        error = np.sqrt(np.mean((signal.values[both] - truth(time)) ** 2))
+        assert error < (0.004 if "strewn" in name else 3e-3), (signal.name, error)
+
+
+@pytest.mark.parametrize(
+    ("stamps", "code"),
+    [
+        (lambda t: np.floor(t * 1000 + 1e-9) / 1000, "doubled_stamps"),
+        (lambda t: np.round(t, 3), "doubled_stamps"),
+    ],
+    ids=["cut", "rounded"],
+)
+def test_stamps_printed_too_coarsely_are_spread(stamps, code):
+    t = every(2000.0)
+    time = stamps(t)
+    mended = mend(
+        [
+            Series(name="u", values=sweep(t), time=time),
+            Series(name="y", values=answered(t), time=time),
+        ]
+    )
+    (finding,) = mended.findings
+    assert finding.code == code
+    assert "spread evenly, 0.0005 s apart (2000 Hz)" in finding.message
+    u, y = mended.channels
+    assert u.time is y.time or np.array_equal(u.time, y.time)
+    assert np.abs(np.diff(u.time) - 5e-4).max() < 1e-8
+    moved = delay_of(y.time, y.values, answered) - delay_of(u.time, u.values, sweep)
+    assert abs(moved) < 0.01 / 2000.0
+
+
+def test_doubled_late_and_missing_samples_move_no_delay():
+    t = every(FS)
+    rng = np.random.default_rng(5)
+    u, y = sweep(t), answered(t)
+    y[rng.choice(t.size, 40, replace=False)] = np.nan
+    order = np.arange(t.size)
+    swapped = rng.choice(np.arange(10, t.size - 10, 3), 30, replace=False)
+    order[swapped], order[swapped + 1] = swapped + 1, swapped
+    again = np.sort(np.concatenate((np.arange(t.size), rng.choice(t.size, 25, replace=False))))
+    pick = order[again]
+    time = t[pick]
+    mended = mend(
+        [Series(name="u", values=u[pick], time=time), Series(name="y", values=y[pick], time=time)]
+    )
+    codes = {f.code: f.message for f in mended.findings}
+    assert set(codes) == {"backward_stamps", "doubled_stamps", "missing_samples"}
+    assert "25 of 2025 stamps" in codes["doubled_stamps"]
+    assert "40 of 2000 samples of 'y'" in codes["missing_samples"]
+    record = Record(inputs=mended.channels[:1], outputs=mended.channels[1:], fs=FS)
+    aligned = uniform(record)
+    assert [f.code for f in aligned.findings] == ["gaps"]
+    valid = aligned.outputs[0].valid
+    assert np.count_nonzero(~valid) == 40
+    moved = delay_of(aligned.time[valid], aligned.outputs[0].values[valid], answered)
+    assert abs(moved) < 1e-4 / FS
+    assert np.array_equal(aligned.inputs[0].values, sweep(t))
+
+
+def test_what_folds_is_said():
+    t_u, t_y = every(1000.0), every(FS)
+    values = sweep(t_u) + 0.3 * np.sin(2 * np.pi * 130.0 * t_u)
+    record = Record(
+        inputs=(Channel(name="u", time=t_u, values=values),),
+        outputs=(Channel(name="y", time=t_y, values=answered(t_y)),),
+        fs=FS,
+    )
+    codes = {f.code: f.message for f in uniform(record).findings}
+    assert "taken out" in codes["resampled"]
+    said = re.match(r"([\d.]+) % of the power of 'u' lies above 50 Hz", codes["folded"])
+    # Of the tone and the sweep, both seen through a Hann window.
+    seen = np.hanning(t_u.size) ** 2
+    tone, swept = 0.09 / 2 * seen.mean(), np.mean(seen * sweep(t_u) ** 2)
+    assert float(said[1]) == pytest.approx(100 * tone / (tone + swept), rel=0.02)
