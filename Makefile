@@ -5,6 +5,10 @@ BIN    := $(VENV)/bin
 RUN    := $(VENV)/.run-installed
 DEV    := $(VENV)/.dev-installed
 
+# One process for each core, each with one thread; a file's tests go to one process, so that what
+# they share is made once. Byte code is kept: the suite starts the command line many times.
+PYTEST := PYTHONDONTWRITEBYTECODE= OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n auto --dist loadscope
+
 .PHONY: help install demo test check studies bench accuracy docs clean
 help:  ## show this list
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
@@ -28,10 +32,10 @@ demo: $(RUN)  ## a sensor and then five axes at once: parameters found, pages to
 	$(BIN)/hmpim campaign demo --out out/demo-table
 
 test: $(DEV)  ## the test suite: a few minutes on two cores
-	$(BIN)/python -m pytest -n auto
+	$(PYTEST)
 
-studies: $(DEV)  ## the tests' long form, over HMPIM_SEEDS seeds (200): hours
-	$(BIN)/python -m pytest -n auto -m study
+studies: $(DEV)  ## the long form: HMPIM_SEEDS seeds (200), HMPIM_EXAMPLES times the examples (50)
+	HMPIM_EXAMPLES=$${HMPIM_EXAMPLES:-50} $(PYTEST) -m "study or hypothesis"
 
 check: $(DEV)  ## ruff, mypy strict, import-linter
 	$(BIN)/ruff check .

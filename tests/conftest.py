@@ -6,15 +6,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import settings
+from hypothesis import HealthCheck, settings
 
 from hmpim.identify.judgement import failed as attempts
 from tests_support import field_chirp, second_order_lag
 
-DATA = Path(__file__).parents[2] / "shared" / "data"
+# A busy machine is slow; that is no failure of what is tested.
+settings.register_profile("hmpim", deadline=None, suppress_health_check=[HealthCheck.too_slow])
+settings.load_profile("hmpim")
 
-settings.register_profile("untimed", deadline=None)  # a busy machine is no failure
-settings.load_profile("untimed")
+DATA = Path(__file__).parents[2] / "shared" / "data"
 
 
 @pytest.fixture

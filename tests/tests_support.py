@@ -1,4 +1,4 @@
-"""Physics that tests step themselves, apart from the package; bounds for counts and averages.
+"""What tests share: bounds for counts and averages, sizes of studies, physics stepped apart.
 
 A study counts how often something happens, or averages something over seeds. What it may
 claim follows from chance alone. `FALSE_ALARM` is the chance that a bound below is broken by a
@@ -6,11 +6,34 @@ package that keeps its promise: one in ten thousand for each bound, one in a hun
 suite that holds a hundred of them. Nothing else decides a bound.
 """
 
+import os
+from functools import cache
+
 import numpy as np
+import pytest
+from hypothesis import settings
 from numpy.typing import NDArray
 from scipy.stats import binom, chi2, norm
 
+import hmpim
+
 FALSE_ALARM = 1e-4
+
+
+def examples(few: int) -> settings:
+    """Settings of a property: few examples in `make test`, many times as many in `make studies`."""
+    return settings(max_examples=few * int(os.environ.get("HMPIM_EXAMPLES", "1")))
+
+
+def in_studies(*values) -> list:
+    """Values of a parameter that `make studies` takes and `make test` leaves out."""
+    return [pytest.param(value, marks=pytest.mark.study) for value in values]
+
+
+@cache
+def designed_once(**wish) -> hmpim.Stimulus:
+    """The stimulus of a wish, designed once per process: a stimulus is never changed."""
+    return hmpim.design(**wish)
 
 
 def fewest(trials: int, chance: float) -> int:

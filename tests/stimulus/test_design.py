@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from hmpim.errors import ArgumentError, LimitsError
@@ -22,6 +22,7 @@ from hmpim.stimulus import (
     true_peaks,
 )
 from hmpim.stimulus.solve import sweep_peaks
+from tests_support import designed_once, examples
 
 FIG_12 = Limits(position=10, velocity=1000, acceleration=40000, unit="deg")
 FIG_13 = Limits(position=10, velocity=500, acceleration=40000, unit="deg")
@@ -65,7 +66,7 @@ def test_figure_13_extinction_and_amplitude(duration, n, lead):
 
 
 def test_figure_13_level_at_40_hz_and_twice_the_rate():
-    slow = design(band=(0.1, 40), duration=10, fs=500, limits=FIG_13, lead=0)
+    slow = designed_once(band=(0.1, 40), duration=10, fs=500, limits=FIG_13, lead=0)
     fast = design(band=(0.1, 40), duration=10, fs=1000, limits=FIG_13, lead=0)
     assert windowed_level(slow, 40.0) == pytest.approx(23.0, abs=0.5)
     twice = windowed_level(fast, 40.0) - windowed_level(slow, 40.0)
@@ -73,7 +74,7 @@ def test_figure_13_level_at_40_hz_and_twice_the_rate():
 
 
 def test_sampled_at_fs_from_the_closed_form():
-    stimulus = design(band=(0.1, 20), duration=10, fs=200, limits=FIG_12, lead=0)
+    stimulus = designed_once(band=(0.1, 20), duration=10, fs=200, limits=FIG_12, lead=0)
     assert stimulus.samples == 2000
     assert stimulus.duration == 10.0
     assert stimulus.time == pytest.approx(np.arange(2000) / 200.0, abs=1e-15)
@@ -84,7 +85,7 @@ def test_sampled_at_fs_from_the_closed_form():
 
 
 def test_units_scale_the_motion_and_nothing_else():
-    deg = design(band=(0.1, 40), duration=10, fs=500, limits=FIG_13)
+    deg = designed_once(band=(0.1, 40), duration=10, fs=500, limits=FIG_13)
     rad = design(band=(0.1, 40), duration=10, fs=500, limits=FIG_13.to("rad"))
     assert rad.unit == "rad"
     assert rad.extinction == deg.extinction
@@ -143,7 +144,7 @@ def check_inside(stimulus, t):
         assert peak <= getattr(stimulus.peaks, name) * (1 + 1e-9)
 
 
-@settings(max_examples=25, deadline=None)
+@examples(6)
 @given(wish=wishes())
 def test_led_stimulus_is_at_rest_at_both_ends_and_inside_its_limits(wish):
     stimulus = designed(wish)
@@ -157,7 +158,7 @@ def test_led_stimulus_is_at_rest_at_both_ends_and_inside_its_limits(wish):
     assert not stimulus.position[settled].any()
 
 
-@settings(max_examples=25, deadline=None)
+@examples(6)
 @given(wish=wishes(), n=st.one_of(st.just(0.0), st.floats(0.0, 2.5)))
 def test_stated_extinction_is_taken_and_one_limit_is_reached(wish, n):
     stimulus = designed(wish, extinction=n)
@@ -167,7 +168,7 @@ def test_stated_extinction_is_taken_and_one_limit_is_reached(wish, n):
     assert stimulus.limits.use(of_sweep(stimulus, "auto")) == pytest.approx(1.0, abs=1e-7)
 
 
-@settings(max_examples=25, deadline=None)
+@examples(6)
 @given(wish=wishes(), lead=st.sampled_from(["auto", 0]))
 def test_extinction_is_the_smallest_and_gain_the_largest(wish, lead):
     stimulus = designed(wish, lead=lead)
@@ -180,7 +181,7 @@ def test_extinction_is_the_smallest_and_gain_the_largest(wish, lead):
         assert of_sweep(less, lead).position < stimulus.limits.position * (1 - 1e-8)
 
 
-@settings(max_examples=25, deadline=None)
+@examples(6)
 @given(wish=wishes())
 def test_printed_waveform_keeps_its_samples_inside(wish):
     stimulus = designed(wish, lead=0)
@@ -190,7 +191,7 @@ def test_printed_waveform_keeps_its_samples_inside(wish):
     check_inside(stimulus, t[(t == 0.0) | (t >= 1.0 / stimulus.fs)] if singular else t)
 
 
-@settings(max_examples=25, deadline=None)
+@examples(6)
 @given(wish=wishes(), n=st.one_of(st.just("auto"), st.floats(0.0, 2.0)))
 def test_led_derivatives_agree_and_pieces_meet(wish, n):
     stimulus = designed(wish, extinction=n)
@@ -223,7 +224,7 @@ def test_led_derivatives_agree_and_pieces_meet(wish, n):
         assert np.abs(numerical - getattr(here, slope)).max() < 1e-7 * size + rounding
 
 
-@settings(max_examples=25, deadline=None)
+@examples(6)
 @given(
     frequency=st.floats(0.2, 5.0),
     ratio=st.floats(1.2, 6.0),
@@ -272,8 +273,8 @@ def test_lead_removes_the_singular_start():
 
 
 def test_sweep_inside_the_leads_is_the_printed_one():
-    printed = design(band=(0.1, 40), duration=10, fs=500, limits=FIG_13, lead=0)
-    led = design(band=(0.1, 40), duration=10, fs=500, limits=FIG_13)
+    printed = designed_once(band=(0.1, 40), duration=10, fs=500, limits=FIG_13, lead=0)
+    led = designed_once(band=(0.1, 40), duration=10, fs=500, limits=FIG_13)
     assert led.extinction == printed.extinction
     assert led.gain == pytest.approx(printed.gain, rel=1e-9)
     first = round(led.sweep_start * led.fs)
@@ -286,7 +287,7 @@ def test_sweep_inside_the_leads_is_the_printed_one():
 
 
 def test_stated_lead_is_time_and_the_motion_in_it_is_as_gentle():
-    auto = design(band=(0.1, 40), duration=10, fs=500, limits=FIG_13)
+    auto = designed_once(band=(0.1, 40), duration=10, fs=500, limits=FIG_13)
     long = design(band=(0.1, 40), duration=10, fs=500, limits=FIG_13, lead=2.0, tail=1.0)
     assert long.sweep_start == 2.0
     assert long.duration == pytest.approx(2 + 10 + 2 + 1, abs=0.003)
@@ -304,7 +305,7 @@ def test_too_short_a_lead_is_refused_with_one_that_does():
     assert fits.limits.use(fits.peaks) <= 1.0
 
 
-@settings(max_examples=12, deadline=None)
+@examples(3)
 @given(wish=wishes(), tight=st.floats(-3.0, -1.5), lead=st.sampled_from(["auto", 0]))
 def test_too_tight_limits_are_refused_with_numbers_that_do(wish, tight, lead):
     wish["limits"] = replace(wish["limits"], velocity=wish["limits"].velocity * 10**tight)
@@ -367,7 +368,7 @@ def test_stimulus_beyond_its_limits_is_refused_with_the_factor():
         Stimulus(waveform=sweep, fs=500.0, unit="deg", limits=Limits(position=10.0, unit="deg"))
 
 
-@settings(max_examples=30, deadline=None)
+@examples(30)
 @given(wish=wishes(), n=st.floats(0.0, 2.5), start=st.floats(0.01, 0.5))
 def test_true_peaks_are_no_less_and_hardly_more_than_a_dense_scan(wish, n, start):
     sweep = Sweep(band=wish["band"], duration=wish["duration"], extinction=n)

@@ -1,14 +1,13 @@
 """Every kind through one interface: inside its limits, from rest to rest, always the same."""
 
 import math
-import os
 import re
 from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
 import pytest
-from hypothesis import assume, example, given, settings
+from hypothesis import assume, example, given
 from hypothesis import strategies as st
 
 from hmpim.errors import ArgumentError, LimitsError
@@ -27,10 +26,11 @@ from hmpim.stimulus import (
     signal_to_noise,
 )
 from hmpim.stimulus.limits import QUANTITIES
+from tests_support import designed_once, examples, in_studies
 
 LIMITS = Limits(position=10, velocity=500, acceleration=8000, unit="deg")
 WISH = {"band": (0.2, 15.0), "duration": 8.0, "fs": 200.0, "limits": LIMITS}
-MANY = int(os.environ.get("HMPIM_EXAMPLES", "300"))  # thousands for the full study
+SHORT = {"band": (0.5, 15.0), "duration": 2.0, "fs": 100.0, "limits": LIMITS}
 
 
 @st.composite
@@ -135,24 +135,17 @@ PEAK_BESIDE_A_BREAK = {
 }
 
 
-@settings(max_examples=25, deadline=None)
+@examples(8)
 @given(wish=wishes())
 @example(wish=PEAK_BESIDE_A_BREAK)
 def test_any_wish_of_any_kind(wish):
     check(wish)
 
 
-@pytest.mark.study
-@settings(max_examples=MANY, deadline=None)
-@given(wish=wishes())
-def test_thousands_of_wishes(wish):
-    check(wish)
-
-
 @pytest.mark.parametrize("kind", KINDS)
 def test_some_limit_is_reached_and_all_are_kept(kind):
     for limits in (LIMITS, replace(LIMITS, jerk=3e5)):
-        stimulus = design(**{**WISH, "limits": limits}, kind=kind, rng=1)
+        stimulus = designed_once(**{**WISH, "limits": limits}, kind=kind, rng=1)
         assert 0.97 < limits.use(stimulus.peaks) <= 1.0
         if math.isfinite(limits.jerk):
             assert stimulus.peaks.jerk <= limits.jerk
@@ -166,7 +159,7 @@ def test_stated_lead_is_time_at_each_end(kind):
 
 
 def test_jerk_limit_costs_extinction():
-    free = design(**WISH)
+    free = designed_once(**WISH)
     tight = design(**{**WISH, "limits": replace(LIMITS, jerk=1e5)})
     assert tight.peaks.jerk == pytest.approx(1e5, rel=5e-3)
     assert tight.extinction > free.extinction
@@ -199,7 +192,7 @@ def test_refusals(wrong, message):
 # what is really sent
 
 
-@settings(max_examples=14, deadline=None)
+@examples(5)
 @given(kind=st.sampled_from(KINDS), step=st.floats(1e-7, 3e-3), extra=st.sampled_from([1, 2]))
 @example(kind="hmpim", step=0.003, extra=1)
 def test_rounded_commands_keep_the_limits_at_the_command_rate(kind, step, extra):
@@ -216,7 +209,7 @@ def test_rounded_commands_keep_the_limits_at_the_command_rate(kind, step, extra)
 
 
 def test_commands_beyond_a_limit_after_rounding_are_refused():
-    plain = design(**WISH)
+    plain = designed_once(**WISH)
     plain.commanded(resolution=1e-6)
     with pytest.raises(LimitsError, match=r"rounded to 0.003 and sent at 1000 Hz, .* acceleration"):
         plain.commanded(resolution=0.003, fs=1000.0)
@@ -252,7 +245,7 @@ def test_room_left_for_rounding_is_enough(x, r):
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("size", [1, 7, 256, 100_000])
 def test_blocks_put_together_are_the_whole(kind, size):
-    stimulus = design(band=(0.5, 15.0), duration=2.0, fs=100.0, limits=LIMITS, kind=kind, rng=1)
+    stimulus = designed_once(**SHORT, kind=kind, rng=1)
     parts = list(blocks(stimulus, size))
     for name in ("time", "position", "velocity", "acceleration"):
         joined = np.concatenate([getattr(part, name) for part in parts])
@@ -311,16 +304,18 @@ def test_measured_noise_is_taken_at_its_frequencies():
     density = measured_noise(coloured, fs=200.0).at(at)
     assert density[0] == pytest.approx(2 * 0.1**2 / 200.0, rel=0.3)
     assert density[1] < 0.05 * density[0]
-    stimulus = design(**WISH)
+    stimulus = designed_once(**WISH)
     quiet = signal_to_noise(stimulus, noise=measured_noise(coloured, fs=200.0)).decibel
     plain = signal_to_noise(stimulus, noise=0.1).decibel
     assert quiet[-1] > plain[-1] + 2.0  # the average has fallen 4 dB at 15 Hz
 
 
-@pytest.mark.parametrize("kind", ["hmpim", "exponential", "schroeder", "prbs"])
+@pytest.mark.parametrize("kind", ["exponential", "prbs", *in_studies("hmpim", "schroeder")])
 def test_weaker_than_wanted_is_refused_with_numbers_that_do(kind):
-    wish = {**WISH, "kind": kind, "rng": 1, "noise": 0.1}
-    there = signal_to_noise(design(**{**WISH, "kind": kind, "rng": 1}), noise=0.1, band=(0.2, 15.0))
+    plain = {"band": (1.0, 15.0), "duration": 3.0, "fs": 100.0, "limits": LIMITS}
+    plain |= {"kind": kind, "rng": 1}
+    wish = {**plain, "noise": 0.1}
+    there = signal_to_noise(designed_once(**plain), noise=0.1, band=(1.0, 15.0))
     lowest = float(there.decibel.min())
     assert design(**wish, wanted_snr=lowest - 0.01).samples > 0
     with pytest.raises(LimitsError, match=r"below the .* wanted; there the") as refusal:
@@ -336,14 +331,14 @@ def test_weaker_than_wanted_is_refused_with_numbers_that_do(kind):
         design(**{**wish, "limits": eased}, wanted_snr=lowest + 2.0)
         tried += 1
     if longer := re.search(r"a duration of (\S+) s", said):
-        long = design(**{**WISH, "kind": kind, "rng": 1, "duration": float(longer[1])})
-        asked = {"noise": 0.1, "snr_db": lowest + 2.0, "band": (0.2, 15.0)}
-        check_spectrum(long, **asked, resolution=1 / 8.0)
+        long = design(**{**plain, "duration": float(longer[1])})
+        asked = {"noise": 0.1, "snr_db": lowest + 2.0, "band": plain["band"]}
+        check_spectrum(long, **asked, resolution=1 / 3.0)
         tried += 1
     if part := re.search(r"the band (\S+) to (\S+) Hz", said):
         narrower = (float(part[1]), float(part[2]))
-        stimulus = design(**{**WISH, "kind": kind, "rng": 1})
-        given_up = {"noise": 0.1, "snr_db": lowest + 2.0, "resolution": 1 / 8.0}
+        stimulus = designed_once(**plain)
+        given_up = {"noise": 0.1, "snr_db": lowest + 2.0, "resolution": 1 / 3.0}
         check_spectrum(stimulus, **given_up, band=narrower)
         tried += 1
     assert tried >= 2
@@ -364,7 +359,7 @@ def replace_limits(stimulus, limits):
 
 
 def test_ratio_wanted_may_depend_on_frequency():
-    stimulus = design(**WISH)
+    stimulus = designed_once(**WISH)
     there = signal_to_noise(stimulus, noise=0.1)
     just = OverFrequency(
         frequency=tuple(there.frequency.tolist()), value=tuple((there.decibel - 0.01).tolist())
@@ -396,4 +391,4 @@ def test_ratio_wanted_may_depend_on_frequency():
 )
 def test_refusals_of_ratios(call, message):
     with pytest.raises(ArgumentError, match=message):
-        call(design(**WISH))
+        call(designed_once(**WISH))
