@@ -22,10 +22,10 @@ $(RUN): pyproject.toml constraints.txt | $(BIN)/python
 	@touch $@
 
 $(DEV): pyproject.toml constraints.txt | $(BIN)/python
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[table,fmu,uff,excel]' --group dev
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[all]' --group dev
 	@touch $(RUN) $@
 
-install: $(DEV)  ## everything a developer needs, in .venv
+install: $(DEV)  ## everything, in .venv: all extras, and the tools for tests and checks
 
 demo: $(RUN)  ## a sensor and then five axes at once: parameters found, pages to look at
 	$(BIN)/hmpim demo

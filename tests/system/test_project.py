@@ -1,0 +1,46 @@
+"""The project's own files agree: extras, constraints, what make can do."""
+
+import re
+import subprocess
+import tomllib
+from itertools import chain
+from pathlib import Path
+
+ROOT = Path(__file__).parents[2]
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+EXTRAS = PROJECT["project"]["optional-dependencies"]
+TARGETS = ("demo", "test", "install", "check", "studies", "accuracy", "bench", "docs")
+
+
+def name_of(requirement):
+    """Name of a required package as package indexes write it."""
+    return re.match(r"[\w.-]+", requirement)[0].lower().replace("_", "-")
+
+
+def test_the_extra_all_holds_every_other_one():
+    (everything,) = EXTRAS["all"]
+    named = re.fullmatch(r"hmpim\[([\w,-]+)\]", everything)[1].split(",")
+    assert sorted(named) == sorted(set(EXTRAS) - {"all"})
+
+
+def test_every_package_that_is_asked_for_is_pinned():
+    lines = (ROOT / "constraints.txt").read_text(encoding="utf-8").splitlines()
+    pinned = {name_of(line) for line in lines if "==" in line}
+    groups = PROJECT["dependency-groups"].values()
+    wanted = [*PROJECT["project"]["dependencies"], *chain(*EXTRAS.values(), *groups)]
+    wanted = [line for line in wanted if isinstance(line, str)]  # groups include one another
+    assert {name_of(line) for line in wanted} - {"hmpim"} <= pinned
+
+
+def test_make_knows_what_is_promised():
+    for target in TARGETS:
+        done = subprocess.run(
+            ["make", "--dry-run", "--always-make", target],
+            cwd=ROOT,
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+        assert done.returncode == 0, done.stderr
+        extras = re.search(r"-e '\.\[([\w,]+)\]'", done.stdout)[1]
+        assert extras == ("table" if target == "demo" else "all"), target
