@@ -22,6 +22,7 @@ from hmpim.identify import (
     paper_analysis,
     predict,
     to_model,
+    validate,
 )
 from hmpim.model import Model, draw_models, frequency_response, simulate
 from hmpim.optimal import gentlest
@@ -78,4 +79,5 @@ __all__ = [
     "save",
     "simulate",
     "to_model",
+    "validate",
 ]

@@ -105,6 +105,7 @@ def test_the_public_names():
         "save",
         "simulate",
         "to_model",
+        "validate",
     ]
     assert all(hasattr(hmpim, name) for name in hmpim.__all__)
     assert callable(hmpim.identify)

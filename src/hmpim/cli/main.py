@@ -21,6 +21,7 @@ from hmpim.cli.paper import paper
 from hmpim.cli.rigs import rigs
 from hmpim.cli.run import run
 from hmpim.cli.table import table
+from hmpim.cli.validate import validate
 from hmpim.errors import HmpimError
 
 __all__ = ["app", "main"]
@@ -146,6 +147,7 @@ app.command(epilog="Example: hmpim demo --out out/demo --seed 7")(demo)
 app.command(epilog="Example: hmpim campaign section_v_reduced --out out/study")(campaign)
 app.command()(gentlest)
 app.command(epilog="Example: hmpim export r.json --to c -o model/")(export)
+app.command(epilog="Example: hmpim validate r.json second.csv --fit 90")(validate)
 app.command(epilog="Example: hmpim paper --out docs/build --figures 12 13")(paper)
 
 

@@ -1,5 +1,6 @@
 """Identification: from a record to every parameter, each with its error bar (paper, section IV)."""
 
+from hmpim.identify.compare import Change, compare
 from hmpim.identify.frf.averaged import Averaged, averaged_response, coherence_significance
 from hmpim.identify.frf.local import local_polynomial_response, local_response
 from hmpim.identify.frf.multivariable import ResponseMatrix, response_matrix
@@ -41,11 +42,15 @@ from hmpim.identify.result import (
     Verdict,
 )
 from hmpim.identify.spectrum import excited_band
+from hmpim.identify.validate import Bounds, Check, OutputValidation, Validation, validate
 
 __all__ = [
     "Alike",
     "Averaged",
+    "Bounds",
     "Candidate",
+    "Change",
+    "Check",
     "Estimate",
     "FrequencyResponse",
     "GainPhase",
@@ -57,6 +62,7 @@ __all__ = [
     "Levels",
     "Nonlinearity",
     "OutputCoherence",
+    "OutputValidation",
     "PairIdentification",
     "PaperAnalysis",
     "PaperEstimates",
@@ -70,9 +76,11 @@ __all__ = [
     "ResponseBandwidths",
     "ResponseMatrix",
     "Trend",
+    "Validation",
     "Verdict",
     "averaged_response",
     "coherence_significance",
+    "compare",
     "compare_levels",
     "excited_band",
     "gain_and_phase",
@@ -86,4 +94,5 @@ __all__ = [
     "response_matrix",
     "same_at_levels",
     "to_model",
+    "validate",
 ]

@@ -1,0 +1,114 @@
+"""Two results of one unit, held against each other within their bars: after a repair, say."""
+
+import math
+from dataclasses import dataclass, fields
+
+from scipy.special import ndtri
+
+from hmpim.errors import RecordError
+from hmpim.identify.result import Estimate, Identification, Parameters
+
+__all__ = ["Change", "compare"]
+
+_CHANCE = 0.01
+"""Chance of calling anything changed in a unit that has not, over all its parameters."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Change:
+    """One parameter in two results.
+
+    Parameters
+    ----------
+    output, input, name : str
+        Which it is.
+    old, new : Estimate
+        In the older and in the newer result.
+    deviations : float
+        Difference over the standard deviation of the difference; 0 where an interval is open.
+    limit : float
+        Deviations beyond which it has changed.
+    """
+
+    output: str
+    input: str
+    name: str
+    old: Estimate
+    new: Estimate
+    deviations: float
+    limit: float
+
+    @property
+    def changed(self) -> bool:
+        """Whether the difference is more than chance."""
+        return abs(self.deviations) > self.limit
+
+
+def compare(new: Identification, old: Identification) -> tuple[Change, ...]:
+    """Hold every parameter that both results tell against its older self.
+
+    Parameters
+    ----------
+    new, old : Identification
+        Of the same unit: pairs of the same names.
+
+    Returns
+    -------
+    tuple of Change
+        One for each parameter. The limit leaves a chance of 1 % that anything is called changed
+        in a unit that has not, however many parameters there are.
+
+    Raises
+    ------
+    RecordError
+        If the results have no parameter in common.
+
+    Examples
+    --------
+    >>> import hmpim
+    >>> from hmpim.identify import identify
+    >>> limits = hmpim.Limits(position=10, velocity=1000, acceleration=40000, unit="deg")
+    >>> stimulus = hmpim.design(band=(0.1, 10), duration=5, fs=100, limits=limits)
+    >>> def found(delay, rng):
+    ...     sensor = hmpim.Sensor(delay=delay, noise_std=0.1)
+    ...     return identify(hmpim.run(sensor, stimulus, rng=rng))
+    >>> [c.name for c in compare(found(0.101, 1), found(0.1, 2)) if c.changed][:1]
+    ['delay']
+    """
+    both: list[tuple[str, str, str, Estimate, Estimate]] = []
+    older = {(pair.output, pair.input): pair for pair in old.pairs}
+    for pair in new.pairs:
+        before = older.get((pair.output, pair.input))
+        if before is None:
+            continue
+        for field in fields(Parameters):
+            was: Estimate | None = getattr(before.parameters, field.name)
+            now: Estimate | None = getattr(pair.parameters, field.name)
+            if was is not None and now is not None:
+                both.append((pair.output, pair.input, field.name, was, now))
+    if not both:
+        raise RecordError(
+            "the two results have no parameter in common; are they of the same unit, with the "
+            "same channel names?"
+        )
+    limit = float(-ndtri(_CHANCE / (2 * len(both))))
+    return tuple(
+        Change(
+            output=output,
+            input=source,
+            name=name,
+            old=was,
+            new=now,
+            deviations=_deviations(now, was),
+            limit=limit,
+        )
+        for output, source, name, was, now in both
+    )
+
+
+def _deviations(now: Estimate, was: Estimate) -> float:
+    spread = math.hypot(now.spread, was.spread)
+    difference = now.value - was.value
+    if difference == 0.0 or math.isinf(spread):
+        return 0.0
+    return difference / spread if spread > 0.0 else math.copysign(math.inf, difference)

@@ -1,0 +1,450 @@
+"""A result held against a record it has not seen: fit, residual, and the band it promised."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.fft import rfft
+from scipy.special import chdtrc, chdtri, ndtr
+
+from hmpim.errors import ArgumentError, RecordError
+from hmpim.identify.effects.hold import Hold, detect_hold, updates
+from hmpim.identify.predict import to_model
+from hmpim.identify.result import Identification, PairIdentification
+from hmpim.identify.spectrum import excited_band
+from hmpim.identify.whiteness import autocovariance, effective_share, misfit
+from hmpim.model import Model, draw_models, simulate, slowest_time_constant
+from hmpim.record import Aligned, Record, uniform
+
+__all__ = ["Bounds", "Check", "OutputValidation", "Validation", "validate"]
+
+_DRAWS = 32
+"""Models drawn for the prediction band; its width is then known to an eighth."""
+
+_CHANCE = 1e-3
+"""Chance of failing a model that is right, for each test of the residual."""
+
+_LAGS = 25
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Bounds:
+    """What a validation must meet; None where a check is only reported.
+
+    Parameters
+    ----------
+    fit_percent : float or None
+        Least fit, 100 (1 - ‖measured - predicted‖ / ‖measured - mean‖).
+    noise_ratio : float or None
+        Greatest residual over the noise that was identified, both as standard deviations. The
+        prediction band must then hold between the shares that noise so much greater or smaller
+        would leave in it.
+    chance : float or None
+        Least probability of the residual, were the model right: that it does not follow the
+        input, and that it is white where the noise was.
+
+    Raises
+    ------
+    ArgumentError
+        If a bound can never or always be met.
+    """
+
+    fit_percent: float | None = None
+    noise_ratio: float | None = 1.2
+    chance: float | None = _CHANCE
+
+    def __post_init__(self) -> None:
+        if self.fit_percent is not None and not self.fit_percent < 100.0:
+            raise ArgumentError(f"fit_percent = {self.fit_percent!r} cannot be met; stay below 100")
+        if self.noise_ratio is not None and not self.noise_ratio > 1.0:
+            raise ArgumentError(
+                f"noise_ratio = {self.noise_ratio!r} fails right models; give more than 1"
+            )
+        if self.chance is not None and not 0.0 < self.chance < 0.5:
+            raise ArgumentError(f"chance = {self.chance!r} is no share from 0 to 0.5")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Check:
+    """One figure of a validation.
+
+    Parameters
+    ----------
+    name : str
+        Stable word: 'fit_percent', 'noise_ratio', 'coverage', 'follows_input', 'whiteness'.
+    value : float
+        The figure.
+    low, high : float or None
+        Its bounds; None where it has none.
+    message : str
+        What it says, in a sentence.
+    """
+
+    name: str
+    value: float
+    low: float | None
+    high: float | None
+    message: str
+
+    @property
+    def passed(self) -> bool:
+        """Whether it is inside its bounds."""
+        above = self.low is None or self.value >= self.low
+        return above and (self.high is None or self.value <= self.high)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class OutputValidation:
+    """One output: measured, predicted with its standard deviation, and the checks.
+
+    Parameters
+    ----------
+    output : str
+        Its name.
+    inputs : tuple of str
+        Inputs that the prediction is made of.
+    time, measured, predicted, std : ndarray, shape (n,)
+        Seconds; the output's unit. `std` counts noise and what is open about the model.
+    scored : bool ndarray, shape (n,)
+        Samples that count.
+    checks : tuple of Check
+        What was checked.
+    """
+
+    output: str
+    inputs: tuple[str, ...]
+    time: NDArray[np.float64]
+    measured: NDArray[np.float64]
+    predicted: NDArray[np.float64]
+    std: NDArray[np.float64]
+    scored: NDArray[np.bool_]
+    checks: tuple[Check, ...]
+
+    @property
+    def passed(self) -> bool:
+        """Whether all checks are inside their bounds."""
+        return all(check.passed for check in self.checks)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Validation:
+    """A result held against a record.
+
+    Parameters
+    ----------
+    outputs : tuple of OutputValidation
+        One for each output that the result has a model of.
+    """
+
+    outputs: tuple[OutputValidation, ...]
+
+    @property
+    def passed(self) -> bool:
+        """Whether every output is inside the bounds."""
+        return all(output.passed for output in self.outputs)
+
+    def to_dict(self) -> dict[str, object]:
+        """Return the figures as plain JSON values."""
+        return {
+            "schema": "hmpim/validation/1",
+            "passed": self.passed,
+            "outputs": [
+                {
+                    "output": output.output,
+                    "inputs": list(output.inputs),
+                    "passed": output.passed,
+                    "checks": [
+                        {
+                            "name": check.name,
+                            "value": check.value,
+                            "low": check.low,
+                            "high": check.high,
+                            "passed": check.passed,
+                            "message": check.message,
+                        }
+                        for check in output.checks
+                    ],
+                }
+                for output in self.outputs
+            ],
+        }
+
+
+def validate(result: Identification, record: Record, *, bounds: Bounds | None = None) -> Validation:
+    """Hold a result against a record: what it predicts, against what was measured.
+
+    Parameters
+    ----------
+    result : Identification
+        What was identified, on another record.
+    record : Record
+        Holds channels of the same names.
+    bounds : Bounds, optional
+        What must be met; the residual at most 1.2 times the noise by default, and no test of it
+        below a chance of one in a thousand.
+
+    Returns
+    -------
+    Validation
+        Its `passed` says whether all bounds are met.
+
+    Raises
+    ------
+    RecordError
+        If no pair has a model, a channel is missing, or nothing is left to score.
+
+    Notes
+    -----
+    The whole chain is predicted. What came before the record is unknown: scoring begins when the
+    model has forgotten it. Clipped samples do not count, of a held output only those in which it
+    is read. An integrator's prediction may start anywhere. That a residual follows the input
+    counts against the result only beyond what the error bars admit at the same chance.
+
+    Examples
+    --------
+    >>> import hmpim
+    >>> sensor = hmpim.Sensor(delay=0.1, time_constant=0.05, noise_std=0.05)
+    >>> limits = hmpim.Limits(position=10, velocity=1000, acceleration=40000, unit="deg")
+    >>> stimulus = hmpim.design(band=(0.1, 10), duration=5, fs=100, limits=limits)
+    >>> from hmpim.identify import identify
+    >>> result = identify(hmpim.run(sensor, stimulus, rng=1))
+    >>> validate(result, hmpim.run(sensor, stimulus, rng=2)).passed
+    True
+    """
+    limits = bounds or Bounds()
+    aligned = uniform(record)
+    known = [pair for pair in result.pairs if pair.parameters.scale_factor is not None]
+    if not known:
+        raise RecordError("the result has no model to validate: no pair was identifiable")
+    outputs = dict.fromkeys(pair.output for pair in known)
+    return Validation(
+        outputs=tuple(
+            _validated(aligned, [pair for pair in known if pair.output == name], limits)
+            for name in outputs
+        )
+    )
+
+
+def _validated(
+    aligned: Aligned, pairs: Sequence[PairIdentification], bounds: Bounds
+) -> OutputValidation:
+    """Validate one output, driven by all its inputs."""
+    y = aligned.signal(pairs[0].output)
+    models = [to_model(pair) for pair in pairs]
+    held = _held(models, y.values, aligned.fs)
+    scored = y.valid & _settled(models, aligned)
+    for pair in pairs:
+        scored &= aligned.signal(pair.input).valid
+    if held is not None:
+        arrivals = updates(held, y.values.size, aligned.fs)
+        read = np.zeros(y.values.size, dtype=bool)
+        read[arrivals.index] = True
+        scored &= read
+        models = [replace(m, hold_period=held.period, hold_phase=held.phase) for m in models]
+    predicted = _predicted(models, pairs, aligned)
+    noise = models[0].noise_std
+    model_std = _model_std(models, pairs, aligned)
+    for level, side in ((models[0].saturation_low, -1.0), (models[0].saturation_high, 1.0)):
+        if level is not None:  # near a level, noise decides what is clipped
+            scored &= side * (level - predicted) > 3.0 * noise
+            scored &= side * (level - y.values) > 0
+    if np.count_nonzero(scored) < 2 * _LAGS:
+        raise RecordError(
+            f"only {np.count_nonzero(scored)} samples of {y.name!r} are left to score, once the "
+            "model has settled and without gaps and clipping; give a longer record"
+        )
+    if any(model.denominator[-1] == 0.0 for model in models):
+        predicted = predicted + float(np.mean((y.values - predicted)[scored]))
+    residual = np.where(scored, y.values - predicted, 0.0)
+    std = np.hypot(noise, model_std)
+    return OutputValidation(
+        output=y.name,
+        inputs=tuple(pair.input for pair in pairs),
+        time=aligned.time,
+        measured=y.values,
+        predicted=predicted,
+        std=std,
+        scored=scored,
+        checks=(
+            _fit(y.values[scored], residual[scored], bounds),
+            *_size(residual[scored], noise, model_std[scored], std[scored], bounds),
+            *_tests(aligned, pairs, models, residual, scored, model_std, bounds),
+        ),
+    )
+
+
+def _held(models: Sequence[Model], y: NDArray[np.float64], fs: float) -> Hold | None:
+    """Find the clock of a held output in this record, whose phase is its own."""
+    if models[0].hold_period is None:
+        return None
+    return detect_hold(y, fs)
+
+
+def _settled(models: Sequence[Model], aligned: Aligned) -> NDArray[np.bool_]:
+    wait = max(
+        max(m.delay, 0.0) + 5.0 * slowest_time_constant(np.asarray(m.denominator[::-1]))
+        for m in models
+    )
+    return np.asarray(aligned.time >= aligned.start + wait)
+
+
+def _predicted(
+    models: Sequence[Model], pairs: Sequence[PairIdentification], aligned: Aligned
+) -> NDArray[np.float64]:
+    """Sum over the inputs, bias once; of a held output by its own clock."""
+    total = np.full(aligned.samples, models[0].bias)
+    clock = aligned.time - aligned.start
+    for model, pair in zip(models, pairs, strict=True):
+        u = aligned.signal(pair.input).values
+        free = replace(model, saturation_low=None, saturation_high=None, quantization_step=None)
+        if model.hold_period is None:
+            moved = simulate(free, u, fs=aligned.fs, intersample=model.intersample)
+        else:
+            moved = free.simulate(u, clock)
+        total += moved - model.bias
+    return total
+
+
+def _model_std(
+    models: Sequence[Model], pairs: Sequence[PairIdentification], aligned: Aligned
+) -> NDArray[np.float64]:
+    """Standard deviation of the prediction by what is open about the models."""
+    if any(model.spread is None for model in models):
+        return np.zeros(aligned.samples)
+    free = [replace(model, hold_period=None) for model in models]
+    drawn = [draw_models(model, _DRAWS, rng=0) for model in free]
+    predictions = [_predicted(some, pairs, aligned) for some in zip(*drawn, strict=True)]
+    return np.asarray(np.std(predictions, axis=0))
+
+
+def _fit(y: NDArray[np.float64], residual: NDArray[np.float64], bounds: Bounds) -> Check:
+    spread = float(np.linalg.norm(y - y.mean()))
+    fit = 100.0 * (1.0 - float(np.linalg.norm(residual)) / spread) if spread else 0.0
+    return Check(
+        name="fit_percent",
+        value=fit,
+        low=bounds.fit_percent,
+        high=None,
+        message=f"The model predicts the output with a fit of {fit:.2f} %.",
+    )
+
+
+def _size(
+    residual: NDArray[np.float64],
+    noise: float,
+    model_std: NDArray[np.float64],
+    std: NDArray[np.float64],
+    bounds: Bounds,
+) -> tuple[Check, Check]:
+    """Size of the residual, and how often it is inside the band."""
+    expected = float(np.sqrt(np.mean(std**2))) or np.finfo(float).tiny
+    ratio = float(np.sqrt(np.mean(residual**2))) / expected
+    share = float(np.mean(np.abs(residual) <= 1.96 * std))
+    low = high = None
+    if bounds.noise_ratio is not None:
+        # Few samples scatter: the standard deviation of a share, and of a level.
+        count = max(residual.size * effective_share(residual), 4.0)
+        low = 2.0 * float(ndtr(1.96 / bounds.noise_ratio)) - 1.0
+        high = 2.0 * float(ndtr(1.96 * bounds.noise_ratio)) - 1.0
+        scatter = 3.0 * float(np.sqrt(0.95 * 0.05 / count))
+        low, high = max(low - scatter, 0.0), min(high + scatter, 1.0)
+    of_model = float(np.sqrt(np.mean(model_std**2)))
+    return (
+        Check(
+            name="noise_ratio",
+            value=ratio,
+            low=None,
+            high=bounds.noise_ratio,
+            message=f"The residual is {ratio:.3g} times what the result said: noise {noise:.4g}, "
+            f"model {of_model:.2g}.",
+        ),
+        Check(
+            name="coverage",
+            value=share,
+            low=low,
+            high=high,
+            message=f"{100 * share:.1f} % of the samples are in the 95 % band of the prediction.",
+        ),
+    )
+
+
+def _tests(
+    aligned: Aligned,
+    pairs: Sequence[PairIdentification],
+    models: Sequence[Model],
+    residual: NDArray[np.float64],
+    scored: NDArray[np.bool_],
+    model_std: NDArray[np.float64],
+    bounds: Bounds,
+) -> tuple[Check, ...]:
+    """Whether the residual follows an input, and is white where the noise was."""
+    checks = []
+    worst = float(chdtri(1, bounds.chance or _CHANCE))
+    for pair, model in zip(pairs, models, strict=True):
+        u = aligned.signal(pair.input).values
+        band = excited_band(u, aligned.fs)
+        left = misfit(
+            u,
+            residual,
+            delay=model.delay * aligned.fs,
+            band=(band[0] / aligned.fs, band[1] / aligned.fs),
+        )
+        power = left.share * _power_in(residual, band, aligned.fs) / np.mean(scored)
+        # At worst one direction makes up the model's error: its square is chi-squared with 1.
+        admitted = power <= worst * float(np.mean(model_std[scored] ** 2))
+        name = f"follows_{pair.input}" if len(pairs) > 1 else "follows_input"
+        told = (
+            f"The residual follows {pair.input!r} no more than chance would have it"
+            if left.probability >= _CHANCE
+            else f"{100 * left.share:.2g} % of the residual follows {pair.input!r}"
+            + (", which the error bars admit" if admitted else "")
+        )
+        checks.append(
+            Check(
+                name=name,
+                value=left.probability,
+                low=None if admitted else bounds.chance,
+                high=None,
+                message=f"{told} (probability {left.probability:.2g}).",
+            )
+        )
+    white = _whiteness(residual[scored])
+    coloured = any(
+        warning.code in ("coloured_noise", "noise_colour", "quantization")
+        for pair in pairs
+        for warning in pair.warnings
+    )
+    quiet = float(np.mean(model_std[scored] ** 2)) < 0.01 * models[0].noise_std ** 2
+    checks.append(
+        Check(
+            name="whiteness",
+            value=white,
+            low=bounds.chance if quiet and not coloured else None,
+            high=None,
+            message="The residual is "
+            + ("white" if white >= _CHANCE else "coloured")
+            + (", as the noise was" if coloured and white < _CHANCE else "")
+            + f" (probability {white:.2g}).",
+        )
+    )
+    return tuple(checks)
+
+
+def _power_in(residual: NDArray[np.float64], band: tuple[float, float], fs: float) -> float:
+    """Mean square of what lies in a band, in Hz."""
+    n = residual.size
+    spectrum = np.abs(rfft(residual)) ** 2
+    f = np.arange(spectrum.size) * fs / n
+    return float(2.0 * spectrum[(f >= band[0]) & (f <= band[1])].sum() / n**2)
+
+
+def _whiteness(residual: NDArray[np.float64]) -> float:
+    """Probability of a Ljung-Box statistic as great, over 25 lags, were the residual white."""
+    n, lags = residual.size, min(_LAGS, residual.size // 4)
+    r = autocovariance(residual - residual.mean(), lags)
+    if r[0] <= 0:
+        return 1.0
+    rho = r[1:] / r[0]
+    statistic = n * (n + 2) * float(np.sum(rho**2 / (n - np.arange(1, lags + 1))))
+    return float(chdtrc(lags, statistic))

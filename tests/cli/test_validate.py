@@ -1,0 +1,80 @@
+"""`hmpim validate`: exit code 0, 1 and 2."""
+
+import json
+from dataclasses import replace
+
+import pytest
+
+import hmpim
+from hmpim.cli.main import app
+
+SENSOR = hmpim.Sensor(delay=0.1, time_constant=0.05, scale_factor=2.0, noise_std=0.02)
+LIMITS = hmpim.Limits(position=10, velocity=1000, acceleration=40000, unit="deg")
+SWEEP = hmpim.design(band=(0.1, 10), duration=8, fs=100, limits=LIMITS)
+
+
+def run(*words: object) -> int:
+    return app([str(w) for w in words], standalone_mode=False)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    place = tmp_path_factory.mktemp("validate")
+    slower = replace(SENSOR, delay=0.103)
+    hmpim.save(hmpim.identify(hmpim.run(SENSOR, SWEEP, rng=1)), place / "old.json")
+    hmpim.save(hmpim.identify(hmpim.run(slower, SWEEP, rng=2)), place / "new.json")
+    hmpim.save(hmpim.run(SENSOR, SWEEP, rng=3), place / "right.csv")
+    hmpim.save(hmpim.run(slower, SWEEP, rng=4), place / "late.csv")
+    return place
+
+
+def test_a_record_that_is_predicted_is_exit_0(folder, capsys):
+    assert run("validate", folder / "old.json", folder / "right.csv", "--fit", "90") == 0
+    shown = capsys.readouterr().out
+    assert "Passed." in shown
+    assert "coverage" in shown
+    assert "at least 90" in shown
+
+
+def test_a_record_that_is_not_is_exit_1_and_says_why(folder, capsys, tmp_path):
+    words = ("--json", tmp_path / "v.json")
+    assert run("validate", folder / "old.json", folder / "late.csv", *words) == 1
+    assert "Not passed." in capsys.readouterr().out
+    figures = json.loads((tmp_path / "v.json").read_text())
+    failed = {c["name"] for c in figures["outputs"][0]["checks"] if not c["passed"]}
+    assert "follows_input" in failed
+    assert figures["passed"] is False
+
+
+def test_an_older_result_is_compared_within_both_bars(folder, capsys):
+    assert run("validate", folder / "new.json", "--against", folder / "old.json") == 1
+    shown = capsys.readouterr().out
+    (line,) = [x for x in shown.splitlines() if " delay " in x]
+    assert "changed" in line
+    (line,) = [x for x in shown.splitlines() if " time_constant " in x]
+    assert "changed" not in line
+    assert run("validate", folder / "old.json", "--against", folder / "old.json") == 0
+
+
+def test_both_at_once(folder):
+    old, new = folder / "old.json", folder / "new.json"
+    assert run("validate", old, folder / "right.csv", "--against", old) == 0
+    assert run("validate", old, folder / "right.csv", "--against", new) == 1
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["old.json"], "nothing to hold the result against"),
+        (["old.json", "nowhere.csv"], "nowhere.csv"),
+        (["right.csv", "right.csv"], "not a result"),
+        (["old.json", "right.csv", "--noise-ratio", "0.5"], "noise_ratio = 0.5"),
+        (["old.json", "right.csv", "--json", "old.json"], "old.json"),
+    ],
+)
+def test_bad_input_is_exit_2_and_one_line(words, said, folder, capsys):
+    words = [folder / w if w.endswith((".json", ".csv")) else w for w in words]
+    assert run("validate", *words) == 2
+    error = capsys.readouterr().err
+    assert said in error
+    assert len(error.splitlines()) == 1

@@ -1,0 +1,180 @@
+"""A result held against records it has not seen: right ones pass, changed units do not."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import hmpim
+from hmpim.errors import ArgumentError, RecordError
+from hmpim.identify import Bounds, compare
+
+LIMITS = hmpim.Limits(position=10, velocity=1000, acceleration=40000, unit="deg")
+SWEEP = hmpim.design(band=(0.1, 15), duration=8, fs=100, limits=LIMITS)
+OTHER = hmpim.design(band=(0.3, 12), duration=12, fs=100, limits=LIMITS)
+SENSOR = hmpim.Sensor(
+    delay=0.083, natural_frequency=8, damping_ratio=0.5, bias=0.4, noise_std=0.05, scale_factor=1.5
+)
+
+
+@pytest.fixture(scope="module")
+def result():
+    return hmpim.identify(hmpim.run(SENSOR, SWEEP, rng=1))
+
+
+def checks(validation) -> dict[str, bool]:
+    (output,) = validation.outputs
+    return {check.name: check.passed for check in output.checks}
+
+
+def test_a_right_model_passes_on_other_records(result):
+    passed = [
+        hmpim.validate(result, hmpim.run(SENSOR, stimulus, rng=seed)).passed
+        for seed in range(20, 26)
+        for stimulus in (SWEEP, OTHER)
+    ]
+    assert all(passed)
+
+
+def test_the_band_holds_95_percent(result):
+    shares = []
+    for seed in range(40, 50):
+        (output,) = hmpim.validate(result, hmpim.run(SENSOR, OTHER, rng=seed)).outputs
+        shares.append(next(c.value for c in output.checks if c.name == "coverage"))
+    samples = 10 * OTHER.samples
+    assert np.mean(shares) == pytest.approx(0.95, abs=4 * np.sqrt(0.95 * 0.05 / samples) + 0.008)
+
+
+@pytest.mark.parametrize(
+    ("changed", "failed"),
+    [
+        ({"delay": 0.085}, "follows_input"),
+        ({"natural_frequency": 8.4}, "follows_input"),
+        ({"scale_factor": 1.55}, "follows_input"),
+        ({"noise_std": 0.08}, "noise_ratio"),
+        ({"noise_colour": 0.7}, "whiteness"),
+        ({"noise_std": 0.08}, "coverage"),
+        ({"bias": 0.5}, "noise_ratio"),
+    ],
+)
+def test_a_changed_unit_fails_where_it_has_changed(changed, failed, result):
+    record = hmpim.run(replace(SENSOR, **changed), OTHER, rng=5)
+    validation = hmpim.validate(result, record)
+    assert not validation.passed
+    assert not checks(validation)[failed]
+
+
+def test_a_model_that_is_off_within_its_bars_passes_a_long_record():
+    short = hmpim.design(band=(0.1, 15), duration=2, fs=100, limits=LIMITS)
+    long = hmpim.design(band=(0.1, 15), duration=60, fs=100, limits=LIMITS)
+    noisy = replace(SENSOR, noise_std=0.5)
+    record = hmpim.run(noisy, long, rng=3)
+    for seed in range(6):
+        found = hmpim.identify(hmpim.run(noisy, short, rng=seed), structures=["second_order"])
+        assert checks(hmpim.validate(found, record))["follows_input"]
+
+
+def test_what_is_bounded_is_what_is_asked(result):
+    record = hmpim.run(replace(SENSOR, noise_std=0.08), OTHER, rng=5)
+    loose = Bounds(noise_ratio=2.0, chance=1e-6)
+    assert hmpim.validate(result, record, bounds=loose).passed
+    assert hmpim.validate(result, record, bounds=Bounds(noise_ratio=None)).passed
+    assert not hmpim.validate(result, record, bounds=replace(loose, fit_percent=99.9)).passed
+    figures = hmpim.validate(result, record).to_dict()
+    assert figures["passed"] is False
+    assert {c["name"] for c in figures["outputs"][0]["checks"]} == {
+        "fit_percent",
+        "noise_ratio",
+        "coverage",
+        "follows_input",
+        "whiteness",
+    }
+
+
+def test_clipped_and_held_outputs_are_predicted_as_such():
+    # A record's hold has a phase of its own: it is found anew in each.
+    unit = replace(SENSOR, saturation_high=9.0, hold_period=0.0231, quantization_step=0.02)
+    fast = hmpim.design(band=(0.1, 10), duration=6, fs=200, limits=LIMITS)
+    found = hmpim.identify(hmpim.run(unit, fast, rng=1))
+    other = hmpim.design(band=(0.2, 9), duration=5, fs=200, limits=LIMITS)
+    right = hmpim.run(replace(unit, hold_phase=0.007), other, rng=2)
+    assert hmpim.validate(found, right).passed
+    wrong = hmpim.run(replace(unit, hold_phase=0.007, delay=0.09), other, rng=2)
+    assert not hmpim.validate(found, wrong).passed
+
+
+def test_an_output_of_two_inputs_is_predicted_from_both():
+    rng = np.random.default_rng(0)
+    t = np.arange(3000) / 100
+
+    def record(delay: float, seed: int) -> hmpim.Record:
+        noise = np.random.default_rng(seed)
+        a = np.sin(2 * np.pi * (0.2 * t + 0.15 * t**2))
+        b = np.sin(2 * np.pi * (9.0 * t - 0.14 * t**2) + rng.uniform(0, 6))
+        first = hmpim.Sensor(delay=0.05, time_constant=0.04).respond(a, fs=100.0)
+        second = hmpim.Sensor(delay=delay, scale_factor=0.7).respond(b, fs=100.0)
+        y = first + second + 0.3 + 0.05 * noise.standard_normal(t.size)
+        return hmpim.Record.from_arrays({"a": a, "b": b}, {"y": y}, fs=100.0)
+
+    found = hmpim.identify(record(0.03, 1))
+    right = hmpim.validate(found, record(0.03, 2))
+    assert right.passed, [c for o in right.outputs for c in o.checks if not c.passed]
+    assert right.outputs[0].inputs == ("a", "b")
+    wrong = hmpim.validate(found, record(0.04, 3))
+    failed = {c.name for o in wrong.outputs for c in o.checks if not c.passed}
+    assert "follows_b" in failed
+
+
+def test_an_integrator_may_start_anywhere():
+    rng = np.random.default_rng(4)
+    t = np.arange(2000) / 100
+    model = hmpim.Model(delay=0.04, scale_factor=2.0, denominator=(0.05, 1.0, 0.0))
+    u = np.sin(2 * np.pi * (0.2 * t + 0.1 * t**2))
+    clean = hmpim.simulate(model, u, fs=100.0, intersample="bandlimited")
+
+    def record(start: float) -> hmpim.Record:
+        y = clean + start + 0.01 * rng.standard_normal(t.size)
+        return hmpim.Record.from_arrays({"u": u}, {"y": y}, fs=100.0, intersample="bandlimited")
+
+    found = hmpim.identify(record(0.0))
+    assert found["y", "u"].structure.startswith("integrator")
+    assert hmpim.validate(found, record(7.0)).passed
+
+
+def test_what_cannot_be_validated_is_refused(result):
+    record = hmpim.run(SENSOR, OTHER, rng=5)
+    with pytest.raises(RecordError, match="samples of 'y' are left to score"):
+        hmpim.validate(result, record.between(0.0, 0.7))
+    renamed = hmpim.run(replace(SENSOR, output_name="z"), OTHER, rng=5)
+    with pytest.raises(RecordError, match="no channel 'y'"):
+        hmpim.validate(result, renamed)
+    with pytest.raises(ArgumentError, match=r"noise_ratio = 0\.5"):
+        Bounds(noise_ratio=0.5)
+    with pytest.raises(ArgumentError, match="fit_percent = 100"):
+        Bounds(fit_percent=100.0)
+    with pytest.raises(ArgumentError, match="chance = 2"):
+        Bounds(chance=2)
+
+
+def test_two_results_of_one_unit_differ_by_chance_only(result):
+    for seed in range(60, 66):
+        again = hmpim.identify(hmpim.run(SENSOR, SWEEP, rng=seed))
+        assert not any(change.changed for change in compare(again, result))
+
+
+def test_a_repair_shows_in_what_it_changed(result):
+    repaired = hmpim.identify(hmpim.run(replace(SENSOR, damping_ratio=0.7), SWEEP, rng=9))
+    changed = {change.name for change in compare(repaired, result) if change.changed}
+    assert "damping_ratio" in changed
+    assert "bandwidth_3db" in changed or "bandwidth_phase90" in changed
+    assert not {"bias", "scale_factor", "noise_std"} & changed
+    (delay,) = [c for c in compare(repaired, result) if c.name == "natural_frequency"]
+    assert delay.deviations == pytest.approx(
+        (delay.new.value - delay.old.value) / np.hypot(delay.new.std, delay.old.std)
+    )
+
+
+def test_results_of_different_units_are_not_compared(result):
+    other = hmpim.identify(hmpim.run(replace(SENSOR, output_name="z"), SWEEP, rng=2))
+    with pytest.raises(RecordError, match="no parameter in common"):
+        compare(other, result)
