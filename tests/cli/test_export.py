@@ -31,7 +31,8 @@ def result(tmp_path_factory):
 def test_every_target_is_written_from_a_result(target, result, tmp_path, capsys, monkeypatch):
     monkeypatch.setattr(fmu, "PLATFORMS", fmu.PLATFORMS[:1])
     place = tmp_path / ("axis" + TARGETS[target].suffix)
-    assert run("export", result, "--to", target, "-o", place) == 0
+    step = ["--timestep", "0.001"] if target in ("mujoco", "isaac") else []
+    assert run("export", result, "--to", target, "-o", place, *step) == 0
     shown = [line for line in capsys.readouterr().out.splitlines() if line]
     assert shown
     for name in shown:
@@ -58,6 +59,7 @@ def test_a_program_from_the_command_line_runs_as_the_model(result, tmp_path):
         (["--to", "json", "-o", "no/such/x.json"], "does not exist"),
         (["--to", "c", "-o", "x", "--fs", "0"], "fs = 0"),
         (["--to", "c", "-o", "x", "--pade", "3"], "for control alone"),
+        (["--to", "mujoco", "-o", "x"], "time step of the simulation is not known"),
     ],
 )
 def test_what_cannot_be_exported_is_one_clear_line(words, said, result, capsys, tmp_path):

@@ -27,7 +27,10 @@ class To(StrEnum):
     JSON = "json"
     C = "c"
     PYTHON = "python"
+    MUJOCO = "mujoco"
+    ISAAC = "isaac"
     FMU = "fmu"
+    MODELICA = "modelica"
     UFF58 = "uff58"
     CSV = "csv"
 
@@ -70,6 +73,12 @@ def export(
             "--intersample", help="What their input does between samples; else as identified."
         ),
     ] = None,
+    timestep: Annotated[
+        float | None,
+        typer.Option(
+            "--timestep", metavar="S", help="Step of the simulation, for mujoco and isaac."
+        ),
+    ] = None,
     fmi: Annotated[
         int | None, typer.Option("--fmi", metavar="2|3", help="Version of FMI, for fmu; else 2.")
     ] = None,
@@ -101,6 +110,7 @@ def export(
             intersample=None if intersample is None else intersample.value,
             pade=pade,
             fmi=fmi,
+            timestep=timestep,
         )
     for remark in remarks:
         say(str(remark.message))

@@ -10,10 +10,13 @@ from hmpim.errors import ArgumentError
 from hmpim.formats.models.c import write_c
 from hmpim.formats.models.csv import write_csv
 from hmpim.formats.models.fmu import write_fmu
+from hmpim.formats.models.isaac import write_isaac
 from hmpim.formats.models.json import write_json
 from hmpim.formats.models.linear import write_control, write_scipy
 from hmpim.formats.models.mat import write_mat
 from hmpim.formats.models.matlab import write_matlab
+from hmpim.formats.models.modelica import write_modelica
+from hmpim.formats.models.mujoco import write_mujoco
 from hmpim.formats.models.python import write_python
 from hmpim.formats.models.source import Source, source_of
 from hmpim.formats.models.uff58 import write_uff58
@@ -22,7 +25,21 @@ from hmpim.record import Intersample
 
 __all__ = ["TARGETS", "Target", "export"]
 
-Target = Literal["control", "scipy", "matlab", "mat", "json", "c", "python", "fmu", "uff58", "csv"]
+Target = Literal[
+    "control",
+    "scipy",
+    "matlab",
+    "mat",
+    "json",
+    "c",
+    "python",
+    "mujoco",
+    "isaac",
+    "fmu",
+    "modelica",
+    "uff58",
+    "csv",
+]
 """What a result can be exported to."""
 
 
@@ -67,6 +84,17 @@ TARGETS: dict[str, _Writer] = {
     "fmu": _Writer(
         suffix=".fmu", write=lambda s, p, c: write_fmu(s, p, fmi=c.fmi or 2), choices=("fmi",)
     ),
+    "mujoco": _Writer(
+        suffix=".xml",
+        write=lambda s, p, c: write_mujoco(s, p, timestep=c.timestep),
+        choices=("timestep",),
+    ),
+    "isaac": _Writer(
+        suffix=".py",
+        write=lambda s, p, c: write_isaac(s, p, timestep=c.timestep),
+        choices=("timestep",),
+    ),
+    "modelica": _Writer(suffix=".mo", write=lambda s, p, c: write_modelica(s, p)),
     "uff58": _Writer(suffix=".uff", write=lambda s, p, c: write_uff58(s, p)),
     "csv": _Writer(suffix=".csv", write=lambda s, p, c: write_csv(s, p)),
 }
@@ -94,8 +122,9 @@ def export(
     ----------
     result : Identification
         From `hmpim.identify`, or read back.
-    to : {'control', 'scipy', 'matlab', 'mat', 'json', 'c', 'python', 'fmu', 'uff58', 'csv'}
-        The target; docs/models.md tells what each is.
+    to : str
+        The target: 'control', 'scipy', 'matlab', 'mat', 'json', 'c', 'python', 'mujoco', 'isaac',
+        'fmu', 'modelica', 'uff58' or 'csv'; docs/models.md tells what each is.
     path : str or path-like
         File to write; for C a folder, made if it is missing. A folder for a target of one file
         gets it under the name of the pair. The name, without its suffix, is the model's.
