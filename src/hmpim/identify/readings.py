@@ -199,9 +199,11 @@ def read_parameters(
         bandwidth_phase90=crossing(marks[0], True),
         bandwidth_phase90_without_delay=crossing(marks[1], False),
         bandwidth_3db=crossing(marks[2], None),
-        # At a maximum the frequency's own shift does not count.
+        # At a maximum the frequency's own shift does not count; without a hump it is 0 dB exactly.
         peak_gain_db=linear(
-            peak.gain_db, 20 / np.log(10) * sensitivity.at(peak.frequency)[0].real, "dB"
+            peak.gain_db,
+            20 / np.log(10) * sensitivity.at(peak.frequency)[0].real * (peak.frequency > 0),
+            "dB",
         )
         if peak is not None
         else None,

@@ -6,7 +6,7 @@ Identification, 2nd ed., Wiley 2012, section 4.3: averages over periods tell the
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
@@ -17,6 +17,7 @@ from scipy.stats import f as fisher
 from hmpim.errors import RecordError
 from hmpim.identify.groups import EVERY, MODELLED, PHASE_SPLIT
 from hmpim.identify.identify import identify
+from hmpim.identify.judgement import judged_together
 from hmpim.identify.result import (
     Estimate,
     FrequencyResponse,
@@ -353,24 +354,35 @@ def _pair(found: tuple[PairIdentification, ...]) -> RepeatedPair:
                 parameters=MODELLED,
             )
         )
+    said = tuple(findings)
     return RepeatedPair(
         input=found[0].input,
         output=found[0].output,
         structures=structures,
-        parameters=parameters,
+        parameters=tuple(
+            replace(
+                p, mean=judged_together(p.mean, _told(p.name, found), name=p.name, findings=said)
+            )
+            for p in parameters
+        ),
         frequency_response=response,
         response_scatter=scatter,
         noise_std=noise,
         unmodelled=unmodelled,
         unmodelled_probability=probability,
-        findings=tuple(findings),
+        findings=said,
     )
+
+
+def _told(name: str, found: tuple[PairIdentification, ...]) -> list[Estimate]:
+    """Estimates of one parameter that have an error."""
+    estimates = [e for pair in found if (e := getattr(pair.parameters, name)) is not None]
+    return [e for e in estimates if 0 < e.spread < np.inf]
 
 
 def _parameter(name: str, found: tuple[PairIdentification, ...]) -> RepeatedParameter | None:
     """Average one parameter; None where fewer than two repeats tell it with an error."""
-    estimates = [e for pair in found if (e := getattr(pair.parameters, name)) is not None]
-    estimates = [e for e in estimates if 0 < e.spread < np.inf]
+    estimates = _told(name, found)
     if len(estimates) < 2:
         return None
     values = np.array([e.value for e in estimates])

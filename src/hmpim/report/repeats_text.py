@@ -8,7 +8,8 @@ from hmpim.identify.repeats import RepeatedPair, Repeats
 from hmpim.plots.style import printable
 from hmpim.record import Finding
 from hmpim.report.numbers import format_estimate, format_number, format_value, plus_minus
-from hmpim.report.words import GLOSSARY
+from hmpim.report.text import finding_line
+from hmpim.report.words import GLOSSARY, by_weight
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -36,7 +37,7 @@ def repeats_table(pair: RepeatedPair) -> "Table":
     ...     response_scatter=1.0, noise_std=None, unmodelled=None, unmodelled_probability=None,
     ...     findings=())
     >>> [str(next(column.cells)) for column in repeats_table(pair).columns]
-    ['Delay, pure', '0.15000 ± 0.00010', 's', '0.00014', '1.00', '32 %', 'yes']
+    ['Delay, pure', '0.15000 ± 0.00010', 's', '0.00014', '1.00', '32 %', 'yes', 'ok']
     """
     from rich.box import SIMPLE_HEAD
     from rich.table import Table
@@ -47,6 +48,7 @@ def repeats_table(pair: RepeatedPair) -> "Table":
     for heading in ("Mean ± std", "Unit", "Repeatability", "Scatter / stated", "Chance"):
         table.add_column(heading, justify="left" if heading == "Unit" else "right")
     table.add_column("Error bars agree")
+    table.add_column("Verdict")
     found = {parameter.name: parameter for parameter in pair.parameters}
     for words in GLOSSARY:
         parameter = found.get(words.name)
@@ -61,6 +63,7 @@ def repeats_table(pair: RepeatedPair) -> "Table":
             f"{ratio:.2f}",
             _percent(parameter.probability),
             "yes" if parameter.agree else "no",
+            parameter.mean.verdict,
         )
         table.add_row(*(Text(cell) for cell in cells))
     return table
@@ -156,10 +159,8 @@ def _trend_table(trends: Sequence[Trend]) -> "Table":
 
 
 def _print_findings(findings: Sequence[Finding], console: "Console") -> None:
-    from rich.text import Text
-
-    for finding in findings:
-        console.print(Text.assemble(("Warning: ", "bold yellow"), printable(finding.message)))
+    for finding in by_weight(findings):
+        console.print(finding_line(finding))
 
 
 def _percent(probability: float) -> str:

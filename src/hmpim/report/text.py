@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING
 
 from hmpim.identify import Identification, PairIdentification
 from hmpim.plots.style import printable
+from hmpim.record import Finding
 from hmpim.report.inputs import gain_rows
 from hmpim.report.numbers import format_interval, format_number, format_value
 from hmpim.report.words import (
@@ -22,8 +23,9 @@ from hmpim.report.words import (
 if TYPE_CHECKING:
     from rich.console import Console
     from rich.table import Table
+    from rich.text import Text
 
-__all__ = ["parameter_table", "print_result"]
+__all__ = ["finding_line", "parameter_table", "print_result"]
 
 _STYLES = {"ok": "green", "doubtful": "bold yellow"}  # of a row's verdict
 _COLOURS = {"ok": "green", "doubtful": "yellow", "not_identifiable": "red"}
@@ -135,12 +137,24 @@ def print_result(
         said = leading(pair)  # the sentence says it
         for warning in by_weight(pair.warnings):
             if warning is not said:
-                doubt = warning.severity == "doubt"
-                lead = ("Doubt: ", "bold yellow") if doubt else ("Note: ", "bold")
-                console.print(Text.assemble(lead, printable(warning.message)))
+                console.print(finding_line(warning))
         missing = untold(pair)
         if missing and not several:
             console.print(Text(f"No figure for: {missing}.", style="dim"))
+
+
+def finding_line(finding: Finding) -> "Text":
+    """Return a finding as a line for a terminal, with its weight before it.
+
+    Examples
+    --------
+    >>> str(finding_line(Finding(code="x", message="Late.", severity="doubt", parameters=())))
+    'Doubt: Late.'
+    """
+    from rich.text import Text
+
+    lead = ("Doubt: ", "bold yellow") if finding.severity == "doubt" else ("Note: ", "bold")
+    return Text.assemble(lead, printable(finding.message))
 
 
 def _gain_table(result: Identification) -> "Table":

@@ -1,7 +1,9 @@
 """From findings to verdicts: a doubt touches what it names, and nothing else."""
 
+import ast
 import sys
 from dataclasses import fields, replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,7 +12,7 @@ import hmpim
 from hmpim.errors import ArgumentError
 from hmpim.identify import Parameters
 from hmpim.identify.groups import EVERY, GAIN, MODELLED, PHASE_SPLIT, TIMING
-from hmpim.identify.judgement import CHECKS, attempt, judge, judged
+from hmpim.identify.judgement import CHECKS, attempt, judge, judged, judged_together
 from hmpim.record import Finding
 
 
@@ -133,3 +135,40 @@ def test_a_severity_that_is_not_known_is_refused():
 def test_a_finding_comes_back_from_its_plain_values():
     said = finding("delay", "bias")
     assert Finding.from_dict(said.to_dict()) == said
+
+
+def test_what_the_measured_response_shares_is_doubted_there_too(pair):
+    """A doubt about the model leaves what was measured without it; one about the record counts."""
+    assert pair.from_response.bandwidth_phase90.verdict == "ok"
+    about_model = finding("bandwidth_phase90", code="structure")
+    assert judged(replace(pair, warnings=(about_model,))).from_response == pair.from_response
+    about_record = finding("bandwidth_phase90", code="frozen")
+    found = judged(replace(pair, warnings=(about_record,))).from_response
+    assert found.bandwidth_phase90.verdict == "doubtful"
+    assert found.bandwidth_3db == pair.from_response.bandwidth_3db
+
+
+def test_a_mean_is_as_doubtful_as_its_parts_and_as_what_is_said_of_all(pair):
+    sure = pair.parameters.delay
+    unsure = replace(sure, verdict="doubtful")
+    assert judged_together(unsure, [sure, sure], name="delay").verdict == "ok"
+    assert judged_together(sure, [sure, unsure], name="delay").verdict == "doubtful"
+    scatters = [finding("delay", code="scatter")]
+    assert judged_together(sure, [sure], name="delay", findings=scatters).verdict == "doubtful"
+    assert judged_together(sure, [sure], name="bias", findings=scatters).verdict == "ok"
+
+
+def test_no_other_room_sets_a_verdict():
+    """Nowhere in the package, apart from here and from reading a file back."""
+    root = Path(hmpim.identify.__code__.co_filename).parents[1]
+    allowed = {"judgement", "result"}
+    setting = set()
+    for path in (root / "identify").rglob("*.py"):
+        room = path.relative_to(root / "identify").parts[0]
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.keyword) and node.arg == "verdict":
+                setting.add(room)
+            if isinstance(node, ast.Constant) and node.value == "doubtful":
+                setting.add(room)
+    assert setting <= allowed, setting
+    assert "judgement" in setting  # or nothing was looked at

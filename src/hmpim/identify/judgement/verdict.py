@@ -2,14 +2,29 @@
 
 from collections.abc import Iterable
 from dataclasses import fields, replace
+from typing import TypeVar
 
-from hmpim.identify.result import Estimate, PairIdentification, Parameters, Verdict
+from hmpim.identify.result import (
+    Estimate,
+    PairIdentification,
+    Parameters,
+    ResponseBandwidths,
+    Verdict,
+)
 from hmpim.record import Finding
 
-__all__ = ["doubted", "judged"]
+__all__ = ["doubted", "judged", "judged_together"]
+
+H = TypeVar("H", Parameters, ResponseBandwidths)
 
 _NOTHING = frozenset({"dead_channel", "unrelated"})
 """Codes of a pair whose output does not follow its input at all."""
+
+_OF_THE_RECORD = frozenset(
+    {"bandwidth_disagrees", "frozen", "halves_disagree", "nonlinear", "quantization", "spikes"}
+    | _NOTHING
+)
+"""Codes of doubts that the measured response shares; the others are about the model."""
 
 
 def judged(pair: PairIdentification) -> PairIdentification:
@@ -24,15 +39,34 @@ def judged(pair: PairIdentification) -> PairIdentification:
         With all its findings; the verdicts that it has do not count.
     """
     names = doubted(pair.warnings)
-    parameters = replace(
-        pair.parameters,
-        **{
-            field.name: _weighed(estimate, doubtful=field.name in names)
-            for field in fields(Parameters)
-            if (estimate := getattr(pair.parameters, field.name)) is not None
-        },
+    parameters = _all_weighed(pair.parameters, names)
+    shared = doubted(w for w in pair.warnings if w.code in _OF_THE_RECORD)
+    return replace(
+        pair,
+        parameters=parameters,
+        from_response=_all_weighed(pair.from_response, shared),
+        verdict=_verdict(parameters, pair.warnings),
     )
-    return replace(pair, parameters=parameters, verdict=_verdict(parameters, pair.warnings))
+
+
+def judged_together(
+    mean: Estimate, parts: Iterable[Estimate], *, name: str, findings: Iterable[Finding] = ()
+) -> Estimate:
+    """Return the mean of several estimates with its verdict: doubtful if any of them is.
+
+    Parameters
+    ----------
+    mean : Estimate
+        Of all of them.
+    parts : iterable of Estimate
+        What it is the mean of.
+    name : str
+        Of the parameter.
+    findings : iterable of Finding
+        What is said of all of them together.
+    """
+    doubtful = name in doubted(findings) or any(part.verdict == "doubtful" for part in parts)
+    return _weighed(mean, doubtful=doubtful)
 
 
 def doubted(findings: Iterable[Finding]) -> frozenset[str]:
@@ -46,6 +80,19 @@ def doubted(findings: Iterable[Finding]) -> frozenset[str]:
     """
     return frozenset(
         name for finding in findings if finding.severity == "doubt" for name in finding.parameters
+    )
+
+
+def _all_weighed(holder: H, names: frozenset[str]) -> H:
+    """Weigh every estimate that is there."""
+    given = {f.name: getattr(holder, f.name) for f in fields(holder)}
+    return replace(
+        holder,
+        **{
+            name: _weighed(estimate, doubtful=name in names)
+            for name, estimate in given.items()
+            if estimate is not None
+        },
     )
 
 
