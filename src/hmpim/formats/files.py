@@ -1,20 +1,21 @@
 """One door for all record files: the content says which reader."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from os import PathLike
 from pathlib import Path
 
 import numpy as np
 
-from hmpim.errors import ArgumentError, FormatError, UnitError
-from hmpim.formats.readers import Contents, Layout, listed, reader_for
-from hmpim.formats.roles import Roles, choose_roles
-from hmpim.record import Channel, Record, Series, fit_clock
-from hmpim.record.mend import mend
-from hmpim.units import check_unit
+from hmpim.errors import ArgumentError, RecordError
+from hmpim.formats.assemble import assemble, check_units, cut_runs
+from hmpim.formats.options import ReadOptions
+from hmpim.formats.readers import Layout
+from hmpim.formats.roles import choose_roles
+from hmpim.formats.together import open_logs
+from hmpim.record import Finding, Motion, Record, find_motions
 
-__all__ = ["read"]
+__all__ = ["read", "read_sweeps"]
 
 
 def read(
@@ -27,6 +28,7 @@ def read(
     units: Mapping[str, str] | None = None,
     references: Sequence[str] | None = None,
     auxiliary: Sequence[str] | None = None,
+    options: ReadOptions | None = None,
 ) -> Record:
     r"""Read a record from a file of any format that a reader knows.
 
@@ -51,6 +53,8 @@ def read(
     references, auxiliary : sequence of str, optional
         Names of the channels that say what a loop was asked, and of those that are kept beside
         and never fitted. Without: those that the file states.
+    options : ReadOptions, optional
+        The part that is wanted, clocks that are off, files beside, and the like.
 
     Returns
     -------
@@ -61,7 +65,7 @@ def read(
     FormatError
         If there is no such file, no reader for it, or the file is not what it claims to be.
     RecordError
-        If the data cannot be used: time that starts again, and the like.
+        If the data cannot be used: time that starts again with no sweep named, and the like.
     UnitError
         If a unit is not known.
     MissingExtraError
@@ -78,92 +82,170 @@ def read(
     (200.0, 'command', 'V', 'measured')
     >>> folder.cleanup()
     """
-    file = Path(path)
+    options = options or ReadOptions()
+    wish = _Wish(
+        path=Path(path),
+        roles=(inputs, outputs, references, auxiliary),
+        fs=fs,
+        time=time,
+        units=units or {},
+        options=options,
+    )
+    runs, ours = _runs(wish)
+    if options.sweep is not None:
+        motions = _motions(runs)
+        if not 1 <= options.sweep <= len(motions):
+            raise ArgumentError(
+                f"sweep {options.sweep} is asked for, and {Path(path).name!r} has "
+                f"{_told([m for _, m in motions])}"
+            )
+        run, motion = motions[options.sweep - 1]
+        return run.between(motion.start, motion.stop)
+    if len(runs) > 1:
+        motions = _motions(runs)
+        raise RecordError(
+            f"time starts again in {Path(path).name!r}: it holds {len(runs)} recordings with "
+            f"{_told([m for _, m in motions])}; choose one with --sweep N, or all with --sweep all"
+        )
+    return runs[0] if ours else _with_motions_said(runs[0])
+
+
+def read_sweeps(
+    path: str | PathLike[str],
+    *,
+    inputs: Sequence[str] | None = None,
+    outputs: Sequence[str] | None = None,
+    fs: float | None = None,
+    time: str | None = None,
+    units: Mapping[str, str] | None = None,
+    references: Sequence[str] | None = None,
+    auxiliary: Sequence[str] | None = None,
+    options: ReadOptions | None = None,
+) -> tuple[Record, ...]:
+    """Read every sweep of a file as a record of its own, in order.
+
+    The parameters are those of `read`; motions of the first input that are no sweeps are left
+    out.
+
+    Raises
+    ------
+    RecordError
+        If there is no sweep.
+    """
+    wish = _Wish(
+        path=Path(path),
+        roles=(inputs, outputs, references, auxiliary),
+        fs=fs,
+        time=time,
+        units=units or {},
+        options=options or ReadOptions(),
+    )
+    runs, _ = _runs(wish)
+    motions = _motions(runs)
+    sweeps = [run.between(m.start, m.stop) for run, m in motions if m.kind == "sweep"]
+    if not sweeps:
+        raise RecordError(
+            f"no sweep is found in {runs[0].inputs[0].name!r} of {Path(path).name!r}: it has "
+            f"{_told([m for _, m in motions])}; cut one out with --from and --to"
+        )
+    return tuple(sweeps)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Wish:
+    """What is asked of a file; `roles` are inputs, outputs, references and auxiliary channels."""
+
+    path: Path
+    roles: tuple[Sequence[str] | None, ...]
+    fs: float | None
+    time: str | None
+    units: Mapping[str, str]
+    options: ReadOptions
+
+
+def _runs(wish: _Wish) -> tuple[list[Record], bool]:
+    """Records of a file, one for each time that its clock starts again, cut to the span.
+
+    Also says whether the file states the roles itself, as our own do.
+    """
+    file, fs, options = wish.path, wish.fs, wish.options
     if fs is not None and not (np.isfinite(fs) and fs > 0):
         raise ArgumentError(f"fs = {fs} Hz is not a sampling rate; it must be positive and finite")
-    layout = Layout(time=time, fs=fs)
-    reader = reader_for(file)
-    contents = reader.channels(file, layout)
-    _check_units(units or {}, contents, file.name)
+    logs = open_logs(
+        file,
+        layout=Layout(time=wish.time, fs=fs, stamps=options.stamps, sheet=options.sheet),
+        beside=[Path(other) for other in options.beside],
+        common=options.common,
+    )
+    check_units(wish.units, logs.contents, file.name)
+    inputs, outputs, references, auxiliary = wish.roles
     roles = choose_roles(
-        contents,
+        logs.contents,
         file.name,
         inputs=inputs,
         outputs=outputs,
         references=references,
         auxiliary=auxiliary,
     )
-    series = reader.read(file, roles.names, layout)
-    return assemble(series, roles, contents, file=file.name, fs=fs, units=units or {})
+    series, said = logs.read(roles.names, options.offsets)
+    runs = [
+        assemble(part, roles, logs.contents, file=file.name, fs=fs, units=wish.units, findings=said)
+        for part in cut_runs(series)
+    ]
+    return _in_span(runs, options, file.name), bool(logs.contents.inputs)
 
 
-def assemble(
-    series: Sequence[Series],
-    roles: Roles,
-    contents: Contents,
-    *,
-    file: str,
-    fs: float | None,
-    units: Mapping[str, str],
-) -> Record:
-    """Make a record of the series of a file, in the order of `roles.names`.
-
-    Raises
-    ------
-    FormatError
-        If the series have no time and no rate is given.
-    RecordError
-        If the data cannot be used.
-    """
-    if fs is None and any(s.time is None for s in series):
-        names = listed([c.name for c in contents.channels])
-        raise FormatError(
-            f"{file!r} has no column time or t among {names}; give the rate with fs=... or "
-            "--fs, or name the time column with time=... or --time"
+def _in_span(runs: Sequence[Record], options: ReadOptions, file: str) -> list[Record]:
+    low = -np.inf if options.start is None else options.start
+    high = np.inf if options.stop is None else options.stop
+    if not low < high:
+        raise ArgumentError(
+            f"the part from {low:g} s to {high:g} s is empty; it must end after it starts"
         )
-    if series and series[0].values.size < 2:
-        count = "one sample" if series[0].values.size else "no samples"
-        raise FormatError(f"{file!r} holds {count}; at least 2 are needed")
-    mended = mend([replace(s, unit=_unit(s, units, file)) for s in series], fs=fs)
-    by_name = {c.name: c for c in mended.channels}
+    if low == -np.inf and high == np.inf:
+        return list(runs)
+    kept = [run.between(low, high) for run in runs if _holds(run, low, high)]
+    if kept:
+        return kept
+    spans = [(float(r.outputs[0].time[0]), float(r.outputs[0].time[-1])) for r in runs]
+    listed = ", ".join(f"{a:.6g} s to {b:.6g} s" for a, b in spans[:3])
+    raise ArgumentError(f"nothing of {file!r} lies in that part; it goes from {listed}")
 
-    def of(names: Sequence[str]) -> tuple[Channel, ...]:
-        return tuple(by_name[name] for name in names)
 
-    inputs, outputs = of(roles.inputs), of(roles.outputs)
-    stated = contents.fs if fs is None else fs
-    rate = float(stated) if stated is not None else fit_clock(inputs[0].time).fs
-    return Record(
-        inputs=inputs,
-        outputs=outputs,
-        fs=rate,
-        band=contents.band,
-        intersample=contents.intersample,
-        source=file if contents.source is None else contents.source,
-        findings=(*contents.findings, *mended.findings),
-        references=of(roles.references),
-        auxiliary=of(roles.auxiliary),
+def _holds(run: Record, low: float, high: float) -> bool:
+    return all(
+        np.count_nonzero((c.time >= low) & (c.time < high)) >= 2
+        for c in (*run.inputs, *run.outputs)
     )
 
 
-def _check_units(units: Mapping[str, str], contents: Contents, file: str) -> None:
-    names = [c.name for c in contents.channels]
-    for name, unit in units.items():
-        if name not in names:
-            raise ArgumentError(
-                f"a unit is given for {name!r}, which is not a column of {file!r}; "
-                f"it has {listed(names)}"
-            )
-        check_unit(unit)
+def _motions(runs: Sequence[Record]) -> list[tuple[Record, Motion]]:
+    return [(run, motion) for run in runs for motion in find_motions(run.inputs[0])]
 
 
-def _unit(series: Series, units: Mapping[str, str], file: str) -> str:
-    if series.name in units:
-        return units[series.name]
-    try:
-        return check_unit(series.unit)
-    except UnitError as error:
-        raise UnitError(
-            f"{file!r}, column '{series.name} [{series.unit}]': {error}; or say the unit yourself: "
-            f"units={{{series.name!r}: ...}}"
-        ) from None
+def _told(motions: Sequence[Motion]) -> str:
+    """The motions as a numbered list in words."""
+    if not motions:
+        return "no motion of the input"
+    words = [f"{k}: {m}" for k, m in enumerate(motions[:12], start=1)]
+    more = f"; and {len(motions) - 12} more" if len(motions) > 12 else ""
+    return (
+        f"{len(motions)} {'motion' if len(motions) == 1 else 'motions'} ({'; '.join(words)}{more})"
+    )
+
+
+def _with_motions_said(record: Record) -> Record:
+    """A record of several sweeps, with a word on it."""
+    motions = find_motions(record.inputs[0])
+    if sum(m.kind == "sweep" for m in motions) < 2:
+        return record
+    finding = Finding(
+        code="several_sweeps",
+        message=(
+            f"{record.inputs[0].name!r} makes {_told(motions)}, and all of it is used as one "
+            "record; take one with --sweep N, or each as a repeat with --sweep all"
+        ),
+        severity="info",
+        parameters=(),
+    )
+    return replace(record, findings=(*record.findings, finding))

@@ -3,22 +3,28 @@
 from hmpim.record.align import Aligned, Signal, uniform
 from hmpim.record.clock import Clock, fit_clock
 from hmpim.record.finding import Finding, Severity
+from hmpim.record.offset import ClockOffset, clock_offset
 from hmpim.record.quality import inspect_record, inspect_timing, inspect_values
 from hmpim.record.record import ROLES, Channel, Intersample, Record, Role
 from hmpim.record.series import Series
+from hmpim.record.sweeps import Motion, find_motions
 
 __all__ = [
     "ROLES",
     "Aligned",
     "Channel",
     "Clock",
+    "ClockOffset",
     "Finding",
     "Intersample",
+    "Motion",
     "Record",
     "Role",
     "Series",
     "Severity",
     "Signal",
+    "clock_offset",
+    "find_motions",
     "fit_clock",
     "inspect_record",
     "inspect_timing",

@@ -11,7 +11,7 @@ from hmpim.record.finding import Finding
 from hmpim.record.record import Channel
 from hmpim.record.series import Series
 
-__all__ = ["Mended", "mend"]
+__all__ = ["Mended", "mend", "restarts"]
 
 _LATE = 8
 """Samples that may follow a stamp that ran ahead before the stamps count as starting again.
@@ -19,6 +19,9 @@ _LATE = 8
 A network or a bus delivers a few samples out of order; a clock that was set back, or a second
 recording in the same file, goes on from there.
 """
+
+_ENOUGH = 20
+"""Samples from which stamps that stand still can be told from a coarse clock."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -185,7 +188,7 @@ def _differs(values: NDArray[np.float64], first: NDArray[np.bool_]) -> bool:
 def _spread(time: NDArray[np.float64]) -> NDArray[np.float64] | None:
     """The uniform clock whose stamps, cut or rounded to their printed step, are these; or None."""
     tick = float(np.min(np.diff(np.unique(time)), initial=np.inf))
-    if not np.isfinite(tick) or time.size < 4:
+    if not np.isfinite(tick) or time.size < _ENOUGH:
         return None
     # Of a clock cut to ticks the mean error is half a tick at both ends: the slope is free of it.
     place = np.arange(time.size)
@@ -199,15 +202,38 @@ def _spread(time: NDArray[np.float64]) -> NDArray[np.float64] | None:
 
 
 def _check_not_restarted(time: NDArray[np.float64], of: str) -> None:
-    ahead = np.maximum.accumulate(time)
-    behind = time < ahead
-    # The run of samples behind the largest stamp so far.
-    edges = np.flatnonzero(np.diff(np.concatenate(([0], behind.astype(np.int8), [0]))))
-    starts, lengths = edges[::2], edges[1::2] - edges[::2]
-    long = np.flatnonzero(lengths > _LATE)
-    if long.size:
-        k = int(starts[long[0]])
+    starts = restarts(time)
+    if starts.size:
+        k = int(starts[0])
         raise RecordError(
-            f"time of {of} starts again at sample {k}: {ahead[k]:.9g} s is followed by "
-            f"{time[k]:.9g} s ({long.size} such in all); time must increase: cut the file there"
+            f"time of {of} starts again at sample {k}: {time[k - 1]:.9g} s is followed by "
+            f"{time[k]:.9g} s ({starts.size} such in all); the file holds several recordings: "
+            "choose a sweep with --sweep, or cut the file there"
         )
+
+
+def restarts(time: NDArray[np.float64]) -> NDArray[np.int64]:
+    """Return the places at which time starts again; NaN are passed over.
+
+    A sample that is merely late is followed within eight samples by one that is not.
+
+    Parameters
+    ----------
+    time : ndarray, shape (n,)
+        Stamps in s.
+
+    Examples
+    --------
+    >>> restarts(np.concatenate((np.arange(20.0), np.arange(15.0)))).tolist()
+    [20]
+    >>> restarts(np.array([0.0, 1.0, 3.0, 2.0, 4.0])).tolist()
+    []
+    """
+    there = np.flatnonzero(np.isfinite(time))
+    stamps = time[there]
+    back = np.flatnonzero(np.diff(stamps) < 0) + 1
+    back = back[back + _LATE < stamps.size]
+    if not back.size:
+        return back
+    after = np.lib.stride_tricks.sliding_window_view(stamps, _LATE + 1)[back].max(axis=1)
+    return np.asarray(there[back[after < stamps[back - 1]]])

@@ -3,7 +3,15 @@
 A reader of your own is a `Reader`; publish it as an entry point of the group ``hmpim.readers``.
 """
 
-from hmpim.formats.readers.protocol import ChannelInfo, Contents, Layout, Reader, listed, need
+from hmpim.formats.readers.protocol import (
+    ChannelInfo,
+    Contents,
+    Layout,
+    Reader,
+    Stamps,
+    listed,
+    need,
+)
 from hmpim.formats.readers.registry import BrokenReader, Found, reader_for, readers
 
 __all__ = [
@@ -13,6 +21,7 @@ __all__ = [
     "Found",
     "Layout",
     "Reader",
+    "Stamps",
     "listed",
     "need",
     "reader_for",

@@ -1,0 +1,47 @@
+"""What may be said about reading a file beyond the names of its channels."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from os import PathLike
+
+from hmpim.formats.readers import Stamps
+
+__all__ = ["ReadOptions"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ReadOptions:
+    """How a file is read, and which part of it.
+
+    Parameters
+    ----------
+    start, stop : float or None
+        Only what lies between, in s of the file's own time.
+    sweep : int or None
+        Only this motion of the first input, counted from 1 as `hmpim channels` lists them.
+    offsets : mapping of str to float or None
+        By how much a clock is late, in s, by the name of a channel or of a file: so much is taken
+        off its stamps. None says that it is not known, which makes the delay doubtful.
+    beside : sequence of path-like
+        Other files that recorded the same test.
+    common : str or None
+        Name of a channel that every file holds, by which their clocks are held together.
+    stamps : {'auto', 'header', 'log'}
+        Which stamp counts where each message has two: the sender's or the logger's.
+    sheet : str or None
+        Sheet of a workbook, or table of a file with several.
+
+    Examples
+    --------
+    >>> ReadOptions(start=2.0, sweep=1).stop is None
+    True
+    """
+
+    start: float | None = None
+    stop: float | None = None
+    sweep: int | None = None
+    offsets: Mapping[str, float | None] = field(default_factory=dict)
+    beside: tuple[str | PathLike[str], ...] = ()
+    common: str | None = None
+    stamps: Stamps = "auto"
+    sheet: str | None = None
