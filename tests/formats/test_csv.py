@@ -169,9 +169,7 @@ def test_missing_cells_are_gaps_of_their_channel_alone(file):
 
 def test_a_recording_that_starts_again_is_refused(file):
     rows = "".join(f"{k % 30},{k},{k}\n" for k in range(60))
-    with pytest.raises(
-        RecordError, match=r"time starts again in .*: it holds 2 recordings"
-    ):
+    with pytest.raises(RecordError, match=r"time starts again in .*: it holds 2 recordings"):
         read(file("time,u,y\n" + rows))
 
 

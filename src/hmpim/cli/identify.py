@@ -8,6 +8,26 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from hmpim.cli.files import check_files
+from hmpim.cli.reading import (
+    Auxiliary,
+    Beside,
+    Common,
+    From,
+    Input,
+    Offset,
+    Output,
+    Rate,
+    Sheet,
+    StampChoice,
+    Stamps,
+    Sweep,
+    Time,
+    To,
+    Unit,
+    read_records,
+    reading,
+    units_of,
+)
 from hmpim.cli.several import identify_several
 from hmpim.cli.terminal import output_console, say, working
 from hmpim.errors import ArgumentError
@@ -39,21 +59,20 @@ def identify(
             "they tell where the unit is linear.",
         ),
     ],
-    input_: Annotated[
-        list[str] | None,
-        typer.Option("--input", metavar="NAME", help="Column of an input; may be repeated."),
-    ] = None,
-    output: Annotated[
-        list[str] | None,
-        typer.Option("--output", metavar="NAME", help="Column of an output; may be repeated."),
-    ] = None,
-    fs: Annotated[
-        float | None,
-        typer.Option("--fs", metavar="HZ", help="Sampling rate, if there is no time column."),
-    ] = None,
-    time: Annotated[
-        str | None, typer.Option("--time", metavar="NAME", help="Column of the time in seconds.")
-    ] = None,
+    input_: Input = None,
+    output: Output = None,
+    auxiliary: Auxiliary = None,
+    fs: Rate = None,
+    time: Time = None,
+    unit: Unit = None,
+    from_: From = None,
+    to: To = None,
+    sweep: Sweep = None,
+    offset: Offset = None,
+    beside: Beside = None,
+    common: Common = None,
+    stamps: StampChoice = Stamps.AUTO,
+    sheet: Sheet = None,
     intersample: Annotated[
         Between,
         typer.Option(
@@ -89,20 +108,34 @@ def identify(
 
     Of several records: averages, repeatability, and whether stated errors and scatter agree.
     """
-    check_files(reads={"the record": records}, writes={"--json": json, "--report": report})
+    check_files(
+        reads={"the record": [*records, *(beside or [])]},
+        writes={"--json": json, "--report": report},
+    )
     if holdout is not None and not 0.0 < holdout < 1.0:
         raise ArgumentError(f"--holdout {holdout:g} is not a share between 0 and 1; give 0.5, say")
 
-    from hmpim.formats import read
     from hmpim.identify import identify as find
     from hmpim.report import print_result
 
-    given = []
-    for record in records:
-        with working(f"Reading {record}"):
-            given.append(
-                read(record, inputs=input_ or None, outputs=output or None, fs=fs, time=time)
-            )
+    given = read_records(
+        records,
+        roles={"inputs": input_, "outputs": output, "auxiliary": auxiliary},
+        fs=fs,
+        time=time,
+        units=units_of(unit),
+        options=reading(
+            start=from_,
+            stop=to,
+            sweep=sweep,
+            offset=offset,
+            beside=beside,
+            common=common,
+            stamps=stamps,
+            sheet=sheet,
+        ),
+        every=sweep == "all",
+    )
     if len(given) > 1:
         for option, wanted in (("--report", report), ("--holdout", holdout), ("--at", at or None)):
             if wanted is not None:
@@ -110,7 +143,9 @@ def identify(
                     f"{option} is about one record, and {len(given)} are given; leave it out, or "
                     "give one"
                 )
-        identify_several(given, records, intersample=intersample.value, json=json, quiet=quiet)
+        identify_several(
+            given, _named(records, given), intersample=intersample.value, json=json, quiet=quiet
+        )
         return
     (data,) = given
     part, split = (data, None) if holdout is None else _first_part(data, holdout)
@@ -144,6 +179,13 @@ def write_result(
             write_page(result, report, stimulus=stimulus, notes=notes)
 
 
+def _named(records: Sequence[Path], given: "Sequence[Record]") -> list[Path]:
+    """A path for each record; the sweeps of one file are numbered."""
+    if len(given) == len(records):
+        return list(records)
+    return [Path(f"sweep {k} of {records[0].name}") for k in range(1, len(given) + 1)]
+
+
 def _readings(result: "Identification", at: Sequence[float]) -> list[str]:
     """Say gain and phase of each pair at each frequency."""
     from hmpim.identify import gain_and_phase
@@ -153,13 +195,13 @@ def _readings(result: "Identification", at: Sequence[float]) -> list[str]:
         if at and pair.verdict == "not_identifiable":
             notes.append(f"{pair.output} from {pair.input} was not identifiable: no gain, no phase")
             continue
-        for reading in gain_and_phase(pair, at, fs=result.record.fs) if at else ():
+        for found in gain_and_phase(pair, at, fs=result.record.fs) if at else ():
             measured = "not measured there"
-            if reading.gain_db is not None and reading.phase is not None:
-                measured = f"measured {_both(reading.gain_db, reading.phase)}"
+            if found.gain_db is not None and found.phase is not None:
+                measured = f"measured {_both(found.gain_db, found.phase)}"
             notes.append(
-                f"{pair.output} from {pair.input} at {reading.frequency:g} Hz: {measured}; "
-                f"the model {_both(reading.model_gain_db, reading.model_phase)}"
+                f"{pair.output} from {pair.input} at {found.frequency:g} Hz: {measured}; "
+                f"the model {_both(found.model_gain_db, found.model_phase)}"
             )
     return notes
 

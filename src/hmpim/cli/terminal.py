@@ -1,5 +1,6 @@
 """What the command line says: results to standard output, the rest to standard error."""
 
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
@@ -7,7 +8,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from rich.console import Console
 
-__all__ = ["output_console", "say", "working"]
+__all__ = ["output_console", "say", "warn", "working"]
 
 _WIDTH_OF_FILES = 120  # columns where the output is no terminal, so that no row is cut
 
@@ -39,6 +40,18 @@ def say(text: str) -> None:
     from hmpim.plots.style import printable
 
     print(printable(text))
+
+
+def warn(text: str) -> None:
+    """Print one line of plain text to standard error.
+
+    Examples
+    --------
+    >>> warn("a reader is skipped")
+    """
+    from hmpim.plots.style import printable
+
+    print(f"hmpim: {printable(text)}", file=sys.stderr)
 
 
 @contextmanager

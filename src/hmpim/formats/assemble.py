@@ -72,7 +72,7 @@ def assemble(
 
     inputs, outputs = of(roles.inputs), of(roles.outputs)
     stated = contents.fs if fs is None else fs
-    rate = float(stated) if stated is not None else fit_clock(inputs[0].time).fs
+    rate = float(stated) if stated is not None else fit_clock(outputs[0].time).fs
     return Record(
         inputs=inputs,
         outputs=outputs,

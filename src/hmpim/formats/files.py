@@ -14,6 +14,7 @@ from hmpim.formats.readers import Layout
 from hmpim.formats.roles import choose_roles
 from hmpim.formats.together import open_logs
 from hmpim.record import Finding, Motion, Record, find_motions
+from hmpim.record.sweeps import cut_alike
 
 __all__ = ["read", "read_sweeps"]
 
@@ -141,12 +142,14 @@ def read_sweeps(
         options=options or ReadOptions(),
     )
     runs, _ = _runs(wish)
-    motions = _motions(runs)
-    sweeps = [run.between(m.start, m.stop) for run, m in motions if m.kind == "sweep"]
+    sweeps = []
+    for run in runs:
+        found = [m for m in find_motions(run.inputs[0]) if m.kind == "sweep"]
+        sweeps += [run.between(*span) for span in cut_alike(run.inputs[0], found)]
     if not sweeps:
         raise RecordError(
-            f"no sweep is found in {runs[0].inputs[0].name!r} of {Path(path).name!r}: it has "
-            f"{_told([m for _, m in motions])}; cut one out with --from and --to"
+            f"no sweep is found in {runs[0].inputs[0].name!r} of {wish.path.name!r}: it has "
+            f"{_told([m for _, m in _motions(runs)])}; cut one out with --from and --to"
         )
     return tuple(sweeps)
 

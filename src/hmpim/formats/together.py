@@ -87,7 +87,7 @@ class Logs:
             for name, series in zip(mine, read, strict=True):
                 named = replace(series, name=name)
                 (found[name],) = _moved([named], offsets[name]) if name in offsets else (named,)
-        findings += [_stated(repr(n), offsets[n]) for n in names if n in offsets]
+        findings += [_stated(f"The clock of {n!r}", offsets[n]) for n in names if n in offsets]
         return tuple(found[n] for n in names), tuple(findings)
 
     def _check(self, offsets: Mapping[str, float | None], names: Sequence[str]) -> None:
@@ -108,7 +108,7 @@ class Logs:
         stated = next((key for key in (name, log.path.stem) if key in offsets), None)
         if stated is not None:
             late = offsets[stated]
-            return _moved(series, late), _stated(f"the clock of {name!r}", late)
+            return _moved(series, late), _stated(f"The clock of {name!r}", late)
         dates = (first.contents.origin, log.contents.origin)
         since = 0.0
         if dates[0] is not None and dates[1] is not None:
@@ -116,7 +116,7 @@ class Logs:
         moved = _moved(series, since)
         if self.common is None:
             how = "are held together by their dates" if all(d is not None for d in dates) else ""
-            return moved, _unknown(f"the clocks of {first.path.name!r} and {name!r}", how)
+            return moved, _unknown(f"The clocks of {first.path.name!r} and {name!r}", how)
         (one,), (other,) = first.series([self.common]), log.series([self.common])
         (other,) = _moved([other], since)
         found = clock_offset(_channel(one), _channel(other))
@@ -240,12 +240,13 @@ def _stated(what: str, late: float | None) -> Finding:
 
 
 def _unknown(what: str, how: str) -> Finding:
-    start = f"{what} {how}; their offset" if how else f"the offset of {what}"
+    start = f"{what} {how}, and" if how else f"{what} may be off by"
+    rest = "what these are off by" if how else "what nobody knows, and that"
     return Finding(
         code="clock_offset",
         message=(
-            f"{start} is not known, and what is not known of it cannot be told from delay: state "
-            "it with --offset, or record one signal on both clocks and name it with --common"
+            f"{start} {rest} cannot be told from delay: state it with --offset, or record one "
+            "signal on both clocks and name it with --common"
         ),
         severity="doubt",
         parameters=_DELAYS,
@@ -261,7 +262,7 @@ def _estimated(
     return Finding(
         code="clock_offset",
         message=(
-            f"the clock of {name!r} is {found.offset:.6f} ± {found.std:.2g} s beside that of "
+            f"The clock of {name!r} is {found.offset:.6f} ± {found.std:.2g} s beside that of "
             f"{first!r} and drifts by {1e6 * found.drift:.3g} ± {1e6 * found.drift_std:.2g} parts "
             f"in a million, by {common!r} in both (correlation {found.correlation:.4f}); the ± of "
             "the offset adds to that of the delay"

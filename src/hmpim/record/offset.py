@@ -16,7 +16,7 @@ __all__ = ["ClockOffset", "clock_offset"]
 _ALIKE = 0.5
 """Correlation below which two recordings are not of one signal: noise as large as the signal."""
 
-_TWICE = 0.98
+_TWICE = 0.95
 """Another peak this high means a signal that repeats itself, whose period cannot be told."""
 
 
@@ -105,17 +105,14 @@ def _lag(x1: NDArray[np.float64], x2: NDArray[np.float64], fs: float, name: str)
     lowest, highest = -b.size + 1, a.size - 1
     inside = (lags >= lowest) & (lags <= highest)
     lags, cross = lags[inside], cross[inside]
-    # Each lag by the energy of what then overlaps, so that a short overlap can be the best.
-    ea = np.concatenate(([0.0], np.cumsum(a**2)))
-    eb = np.concatenate(([0.0], np.cumsum(b**2)))
-    begin, end = np.maximum(lags, 0), np.minimum(lags + b.size, a.size)
-    energy = np.sqrt((ea[end] - ea[begin]) * (eb[end - lags] - eb[begin - lags]))
-    most = np.sqrt(ea[-1] * eb[-1])
-    score = np.where(energy > 0.2 * most, np.abs(cross) / np.maximum(energy, 0.2 * most), 0.0)
+    score = np.abs(cross) / float(np.sqrt((a @ a) * (b @ b)))
     best = int(np.argmax(score))
-    if score[best] < _ALIKE:
+    begin, end = max(int(lags[best]), 0), min(int(lags[best]) + b.size, a.size)
+    one, other = a[begin:end], b[begin - lags[best] : end - lags[best]]
+    alike = abs(float(cross[best])) / float(np.sqrt((one @ one) * (other @ other)))
+    if not alike >= _ALIKE:
         raise RecordError(
-            f"the two recordings of {name!r} are not alike (correlation {score[best]:.2f}); name a "
+            f"the two recordings of {name!r} are not alike (correlation {alike:.2f}); name a "
             "channel that both files hold, or give the offset"
         )
     _check_single(lags, score, best, name)

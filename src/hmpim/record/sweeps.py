@@ -1,16 +1,18 @@
 """The sweeps in a log: where the input moves, between rests, and what it does there."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.signal import fftconvolve
 from scipy.stats import spearmanr
 
 from hmpim.record.clock import fit_clock
 from hmpim.record.record import Channel
 
-__all__ = ["Motion", "find_motions"]
+__all__ = ["Motion", "cut_alike", "find_motions"]
 
 _BLOCKS = 2000
 """Blocks into which a channel is cut: a rest shows to 1/2000 of its length."""
@@ -107,7 +109,7 @@ def find_motions(channel: Channel) -> tuple[Motion, ...]:
         if float(np.ptp(part)) < max(0.02 * span, 5 * noise):
             continue
         # Half of the rest, and no more than half of the motion: an hour of waiting tells nothing.
-        lead = min((first - before + 1) // 2 if k else first, length // 2 + 1)
+        lead = min((first - before) // 2 if k else first, length // 2 + 1)
         tail = min(
             (after - stop + 1) // 2 if k + 1 < len(edges) else resting.size - stop, length // 2 + 1
         )
@@ -185,3 +187,87 @@ def _swept(
     if not abs(order) >= _STEADY or high < 1.5 * low:
         return None, None, None
     return order > 0, low, high
+
+
+_SAME = 0.98
+"""Correlation from which two motions are one stimulus played twice, whatever its size."""
+
+
+def cut_alike(channel: Channel, motions: Sequence[Motion]) -> tuple[tuple[float, float], ...]:
+    """Spans that cut motions out so that repeats of one stimulus lie over each other.
+
+    A motion that repeats the first one is cut where that begins to a sample, and as long; another
+    where it is found.
+
+    Parameters
+    ----------
+    channel : Channel
+        The input that makes them.
+    motions : sequence of Motion
+        As `find_motions` gives them.
+
+    Returns
+    -------
+    tuple of (float, float)
+        Start and stop in s, for `Record.between`.
+
+    Examples
+    --------
+    >>> t = np.arange(0, 12, 0.001)
+    >>> sweep = np.sin(2 * np.pi * (0.5 * t + 1.0 * t**2)) * (t < 4.0)
+    >>> u = Channel(name="u", time=t, values=sweep + np.roll(sweep, 6003))
+    >>> (a, b), (c, d) = cut_alike(u, find_motions(u))
+    >>> round(c - a, 6), round((d - c) - (b - a), 6)
+    (6.003, 0.0)
+    """
+    if not motions:
+        return ()
+    clock = fit_clock(channel.time)
+    time = clock.start + np.arange(clock.length) / clock.fs
+    values = np.interp(time, channel.time, channel.values)
+
+    def places(motion: Motion) -> tuple[int, int, int, int]:
+        ends = (motion.start, motion.begin, motion.end, motion.stop)
+        a, b, c, d = (round((t - clock.start) * clock.fs) for t in ends)
+        return a, b, c, d
+
+    _, begin, end, _ = places(motions[0])
+    shifts: list[int | None] = [0]
+    for motion in motions[1:]:
+        other = places(motion)
+        shift, alike = _shift(values[begin:end], values, other[1], end - begin)
+        same = alike > _SAME
+        shifts.append(shift - begin if same else None)
+    # As much rest as all the repeats have.
+    alike_ones = [(places(m), s) for m, s in zip(motions, shifts, strict=True) if s is not None]
+    lead = max(0, min(begin + s - p[0] for p, s in alike_ones))
+    tail = max(0, min(p[3] - end - s for p, s in alike_ones))
+    half = 0.5 / clock.fs
+    spans = []
+    for motion, shift_of in zip(motions, shifts, strict=True):
+        if shift_of is None:
+            spans.append((motion.start, motion.stop))
+            continue
+        first, last = begin - lead + shift_of, min(end + tail + shift_of, time.size)
+        spans.append((float(time[max(first, 0)] - half), float(time[last - 1] + half)))
+    return tuple(spans)
+
+
+def _shift(
+    pattern: NDArray[np.float64], values: NDArray[np.float64], near: int, reach: int
+) -> tuple[int, float]:
+    """Place near `near` where a pattern is found, and how well it fits there."""
+    low = max(0, near - reach)
+    part = values[low : near + pattern.size + reach]
+    if part.size < pattern.size:
+        return near, 0.0
+    centred = pattern - pattern.mean()
+    cross = fftconvolve(part, centred[::-1], mode="valid")
+    total = np.concatenate(([0.0], np.cumsum(part)))
+    square = np.concatenate(([0.0], np.cumsum(part**2)))
+    n = pattern.size
+    spread = (square[n:] - square[:-n]) - (total[n:] - total[:-n]) ** 2 / n
+    size = np.sqrt(np.maximum(spread, 1e-12 * max(float(square[-1]), 1e-300)))
+    fit = cross / (size * float(np.linalg.norm(centred)))
+    best = int(np.argmax(fit))
+    return low + best, float(fit[best])
