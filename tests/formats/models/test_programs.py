@@ -134,6 +134,14 @@ def test_programs_say_errors_units_and_where_they_come_from(tmp_path):
     assert loaded["NOISE_STD"] == pytest.approx(0.1)
 
 
+def test_numbers_of_any_kind_are_written_plainly(tmp_path):
+    result = result_of(replace(SECOND, bias=np.float64(0.25)))
+    for target in ("python", "scipy"):
+        (file,) = export(result, to=target, path=tmp_path / "m.py")
+        assert "np.float64" not in file.read_text(encoding="utf-8")
+        assert runpy.run_path(str(file))["PARAMETERS"]["bias"]["value"] == 0.25
+
+
 def test_another_rate_is_exact_too(tmp_path):
     model = replace(SECOND, intersample="foh", delay=0.0123)
     (file,) = export(result_of(model), to="python", path=tmp_path / "fast.py", fs=1000.0)

@@ -2,14 +2,13 @@
 
 from math import ceil, floor
 from pathlib import Path
-from pprint import pformat
 
 import numpy as np
 
 from hmpim.errors import ArgumentError
 from hmpim.formats.atomic import write_text
 from hmpim.formats.models.ranges import ranges_of
-from hmpim.formats.models.render import rendered
+from hmpim.formats.models.render import literal, rendered
 from hmpim.formats.models.source import Source
 from hmpim.model import Model, draw_models
 
@@ -56,7 +55,7 @@ def write_isaac(source: Source, path: Path, *, timestep: float | None) -> tuple[
         delay_error=max(model.delay - steps[0] * timestep, steps[1] * timestep - model.delay),
         steps=steps,
         scale_factor=model.scale_factor,
-        ranges=pformat(ranges, width=96),
+        ranges=literal(ranges),
         stiffness=stiffness,
         damping=damping,
         time_constant=1.0 / damping,

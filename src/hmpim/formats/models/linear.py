@@ -1,7 +1,6 @@
 """python-control and scipy.signal: a script each, the delay exact and apart from the dynamics."""
 
 from pathlib import Path
-from pprint import pformat
 
 import numpy as np
 
@@ -13,7 +12,7 @@ from hmpim.formats.models.refined import (
     pade_order,
     refined_words,
 )
-from hmpim.formats.models.render import rendered
+from hmpim.formats.models.render import literal, rendered
 from hmpim.formats.models.source import Source
 
 __all__ = ["write_control", "write_scipy"]
@@ -70,8 +69,8 @@ def _write(source: Source, path: Path, *, control: bool, pade: int | None) -> tu
         intersample=source.intersample,
         fs=source.fs,
         refine=REFINE,
-        parameters=pformat({k: e.to_dict() for k, e in source.estimates()}, width=96),
-        covariance=pformat(None if spread is None else [list(r) for r in spread.covariance]),
+        parameters=literal({k: e.to_dict() for k, e in source.estimates()}),
+        covariance=literal(None if spread is None else [list(r) for r in spread.covariance]),
         frequency=seen.frequency,
         real=seen.response.real,
         imag=seen.response.imag,

@@ -1,11 +1,10 @@
 """Python: one file that needs nothing else installed."""
 
 from pathlib import Path
-from pprint import pformat
 
 from hmpim.formats.atomic import write_text
 from hmpim.formats.models.c import accuracy
-from hmpim.formats.models.render import chain_context, rendered
+from hmpim.formats.models.render import chain_context, literal, rendered
 from hmpim.formats.models.source import Source
 
 __all__ = ["python_file", "write_python"]
@@ -22,8 +21,8 @@ def python_file(source: Source) -> str:
         title=f"{source.pair.output} from {source.pair.input}, one sample at a time.",
         lines=[line.replace("\\", "/").replace('"""', "'''") for line in source.lines()],
         said=accuracy(chain),
-        parameters=pformat({k: e.to_dict() for k, e in source.estimates()}, width=96),
-        covariance=pformat(covariance, width=96),
+        parameters=literal({k: e.to_dict() for k, e in source.estimates()}),
+        covariance=literal(covariance),
         noise_std=source.model.noise_std,
         **chain_context(chain),
     )

@@ -1,6 +1,8 @@
 """Templates filled in: numbers with all their digits, comments in the target's own form."""
 
+import json
 from collections.abc import Iterable
+from pprint import pformat
 from typing import Any
 
 import numpy as np
@@ -8,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from hmpim.model import Chain
 
-__all__ = ["c_number", "chain_context", "rendered"]
+__all__ = ["c_number", "chain_context", "literal", "rendered"]
 
 
 def c_number(value: float) -> str:
@@ -20,6 +22,17 @@ def c_number(value: float) -> str:
     ('1.0', '0.1', '-2e-300')
     """
     return repr(float(value))
+
+
+def literal(value: Any) -> str:
+    """Write plain values as Python would have them typed, whatever kind their numbers are.
+
+    Examples
+    --------
+    >>> literal({"delay": [np.float64(0.1), None]})
+    "{'delay': [0.1, None]}"
+    """
+    return pformat(json.loads(json.dumps(value)), width=96, sort_dicts=False)
 
 
 def _row(values: ArrayLike) -> str:
