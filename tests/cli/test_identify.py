@@ -2,7 +2,6 @@
 
 import json
 import math
-import os
 import re
 import subprocess
 import sys
@@ -142,10 +141,10 @@ def test_a_failure_while_writing_leaves_the_old_file(good, tmp_path, monkeypatch
     saved = tmp_path / "r.json"
     saved.write_text("old")
 
-    def full(descriptor):
+    def full(place, target):
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(os, "fsync", full)
+    monkeypatch.setattr("pathlib.Path.replace", full)
     done = run("identify", good, *NAMED, "--quiet", "--json", saved)
     check_refusal(done.exit_code, done.stdout, done.stderr, "No space left on device")
     assert saved.read_text() == "old"

@@ -35,12 +35,14 @@ def test_a_result(result, tmp_path):
 
 @pytest.mark.parametrize("kind", get_args(Kind))
 def test_a_stimulus_of_every_kind(kind, tmp_path):
-    stimulus = hmpim.design(kind=kind, band=(0.5, 20), duration=5, fs=200, limits=LIMITS, rng=3)
+    stimulus = hmpim.design(kind=kind, band=(0.5, 5), duration=4, fs=100, limits=LIMITS, rng=3)
     hmpim.save(stimulus, tmp_path / "s.toml")
     again = hmpim.load(tmp_path / "s.toml")
     assert again == stimulus
     assert again.acceleration.tobytes() == stimulus.acceleration.tobytes()
-    other = hmpim.design(kind=kind, band=(0.5, 20), duration=5, fs=250, limits=LIMITS, rng=3)
+    other = hmpim.design(
+        kind=kind, band=(0.5, 5), duration=4, fs=100, limits=LIMITS, rng=3, axis="roll"
+    )
     assert other != stimulus
 
 
@@ -59,12 +61,12 @@ def test_what_cannot_be_saved_or_loaded(result, tmp_path):
         hmpim.save(result, tmp_path / "no" / "r.json")
     for content, words in (
         ("{", "cannot be read as JSON"),
-        ("[]", "holds no result"),
+        ("[]", "holds nothing that hmpim.save writes"),
         ('{"schema": "x/1"}', "schema is 'x/1'"),
         ('{"schema": "hmpim/identification/2"}', "is not a whole result"),
     ):
         (tmp_path / "r.json").write_text(content)
         with pytest.raises(FormatError, match=words):
             hmpim.load(tmp_path / "r.json")
-    with pytest.raises(FormatError, match=r"suffix '\.docx'"):
+    with pytest.raises(FormatError, match="there is no file"):
         hmpim.load(tmp_path / "r.docx")

@@ -22,7 +22,6 @@ def identify_several(
     quiet: bool,
 ) -> None:
     """Average repeats, or compare levels, whichever the records are."""
-    from hmpim.formats import save
     from hmpim.identify import identify_levels, identify_repeats, same_at_levels
     from hmpim.report import print_levels, print_repeats
 
@@ -38,7 +37,7 @@ def identify_several(
     if not quiet:
         print_repeats(repeats, output_console())
     if json is not None:
-        save(repeats, json)
+        _write(repeats.to_dict(), json)
 
 
 def _levels_dict(levels: "Levels") -> dict[str, Any]:

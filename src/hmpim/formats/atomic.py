@@ -1,7 +1,8 @@
 """Files that are whole or not there: written beside their place, then moved into it.
 
 Every file that hmpim writes goes through `replacing`. The one exception is the record of a
-running test, which grows as it comes (`hmpim.formats.recorder`).
+running test, which grows as it comes (`hmpim.formats.recording`). A process that is killed, or a
+disk that is full, never leaves half a file; what a power cut leaves is up to the file system.
 """
 
 import os
@@ -53,7 +54,6 @@ def replacing(path: str | os.PathLike[str]) -> Iterator[Path]:
         if wanted.exists():
             place.chmod(wanted.stat().st_mode & 0o777)
         yield place
-        _to_disk(place)
         place.replace(wanted)
     except OSError as error:
         raise ArgumentError(f"{os.fspath(path)!r} cannot be written: {_reason(error)}") from error
@@ -152,14 +152,6 @@ def _resolved(path: str | os.PathLike[str]) -> Path:
             raise
         raise ArgumentError(f"{os.fspath(path)!r} cannot be written: {error}") from error
     return wanted
-
-
-def _to_disk(place: Path) -> None:
-    handle = os.open(place, os.O_RDWR)
-    try:
-        os.fsync(handle)
-    finally:
-        os.close(handle)
 
 
 def _free(folder: Path) -> int:

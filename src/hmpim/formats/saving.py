@@ -16,15 +16,16 @@ from hmpim.formats.atomic import write_text
 from hmpim.formats.csv import write_csv
 from hmpim.formats.files import read
 from hmpim.formats.readers.text import read_text
-from hmpim.formats.stimulus_files import STIMULUS_SUFFIXES, read_stimulus, save_stimulus
+from hmpim.formats.recording import read_recording, save_recording
+from hmpim.formats.stimulus_files import STIMULUS_SUFFIXES, save_stimulus
+from hmpim.formats.stimulus_spec import read_stimulus_toml
 from hmpim.identify import Identification
-from hmpim.identify.repeats import Repeats
 from hmpim.record import Record
 from hmpim.stimulus import Stimulus
 
 __all__ = ["Saved", "load", "save", "suffixes_of"]
 
-Saved = Record | Stimulus | Identification | Repeats
+Saved = Record | Stimulus | Identification
 """What can be saved."""
 
 
@@ -33,12 +34,12 @@ def save(thing: Saved, path: str | PathLike[str]) -> None:
 
     Parameters
     ----------
-    thing : Record, Stimulus, Identification or Repeats
+    thing : Record, Stimulus or Identification
         What to save.
     path : str or path-like
-        The file; replaced as a whole, or not at all. Its suffix says in which form: `.csv` for a
-        record, `.toml` for a stimulus (`.csv`, `.h5`, `.mat` and `.h` hold its samples alone),
-        `.json` for a result.
+        The file; replaced as a whole, or not at all. Its suffix says in which form: `.h5` for a
+        record (docs/files.md), or `.csv` if all its channels have one clock; `.toml` for a
+        stimulus; `.json` for a result.
 
     Raises
     ------
@@ -50,8 +51,8 @@ def save(thing: Saved, path: str | PathLike[str]) -> None:
     >>> import tempfile
     >>> record = Record.from_arrays({"u": [0, 1, 0]}, {"y": [0, 0, 1]}, fs=10.0)
     >>> with tempfile.TemporaryDirectory() as folder:
-    ...     save(record, Path(folder) / "r.csv")
-    ...     load(Path(folder) / "r.csv").sha256 == record.sha256
+    ...     save(record, Path(folder) / "r.h5")
+    ...     load(Path(folder) / "r.h5") == record
     True
     """
     for kind in _KINDS:
@@ -100,30 +101,67 @@ def load(path: str | PathLike[str]) -> Saved:
     hmpim.errors.FormatError: there is no file 'nowhere.json'; check the path
     """
     file = Path(path)
-    reader = _READERS.get(file.suffix.lower())
-    if reader is None:
-        raise FormatError(
-            f"{str(path)!r} has the suffix {file.suffix!r}, which save never gives; "
-            f"it gives {', '.join(_READERS)}"
-        )
-    return reader(file)
+    head = _head(file)
+    for kind in _KINDS:
+        if kind.knows(head):
+            return kind.read(file)
+    raise FormatError(
+        f"{str(path)!r} holds nothing that hmpim.save writes; a record that other programs wrote "
+        "is read with hmpim.read"
+    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Kind:
-    """A kind of value that can be saved."""
+    """A kind of value that can be saved: as what, and how its files are known and read."""
 
     name: str
     type: type
     suffixes: tuple[str, ...]
     write: Callable[[Any, str | PathLike[str]], None]
+    knows: Callable[[bytes], bool]
+    read: Callable[[Path], Saved]
 
 
-def _write_json(result: Identification | Repeats, path: str | PathLike[str]) -> None:
+def _head(path: Path) -> bytes:
+    """The first 64 kB of a file."""
+    if path.is_dir():
+        raise FormatError(f"{str(path)!r} is a folder; name the file in it")
+    try:
+        with path.open("rb") as file:
+            return file.read(65_536)
+    except FileNotFoundError:
+        raise FormatError(f"there is no file {str(path)!r}; check the path") from None
+    except (OSError, ValueError) as error:  # a NUL in the path is a ValueError
+        reason = getattr(error, "strerror", None) or error
+        raise FormatError(f"{str(path)!r} cannot be opened: {reason}") from None
+
+
+def _write_record(record: Record, path: str | PathLike[str]) -> None:
+    if Path(path).suffix.lower() == ".csv":
+        write_csv(record, path)
+    else:
+        save_recording(record, path)
+
+
+def _knows_record(head: bytes) -> bool:
+    return b"hmpim/record/" in head
+
+
+def _read_record(path: Path) -> Record:
+    ours = path.suffix.lower() in (".h5", ".hdf5")
+    return read_recording(path).record if ours else read(path)
+
+
+def _write_result(result: Identification, path: str | PathLike[str]) -> None:
     write_text(path, json.dumps(result.to_dict(), indent=1, allow_nan=False) + "\n")
 
 
-def _read_json(path: Path) -> Identification:
+def _knows_result(head: bytes) -> bool:
+    return head.lstrip().startswith(b"{")
+
+
+def _read_result(path: Path) -> Identification:
     try:
         data = json.loads(read_text(path))
     except ValueError as error:
@@ -140,26 +178,44 @@ def _read_json(path: Path) -> Identification:
         raise FormatError(f"{str(path)!r} is not a whole result: {error!r}") from error
 
 
-def _read_toml(path: Path) -> Stimulus:
-    found = read_stimulus(path)
+def _knows_stimulus(head: bytes) -> bool:
+    return b"hmpim/stimulus/" in head
+
+
+def _read_stimulus(path: Path) -> Stimulus:
+    found = read_stimulus_toml(path)
     if len(found) != 1:
         raise FormatError(
-            f"{str(path)!r} holds {len(found)} stimuli; read it with "
-            "hmpim.formats.stimulus_files.read_stimulus"
+            f"{str(path)!r} holds {len(found)} stimuli; read them with "
+            "hmpim.formats.stimulus_files.read_stimuli"
         )
-    (stimulus,) = found
-    assert isinstance(stimulus, Stimulus)
-    return stimulus
+    return found[0]
 
 
+# One row for each kind; the first that knows a file reads it.
 _KINDS = (
-    _Kind(name="a record", type=Record, suffixes=(".csv",), write=write_csv),
-    _Kind(name="a stimulus", type=Stimulus, suffixes=STIMULUS_SUFFIXES, write=save_stimulus),
-    _Kind(name="a result", type=Identification, suffixes=(".json",), write=_write_json),
-    _Kind(name="repeats", type=Repeats, suffixes=(".json",), write=_write_json),
+    _Kind(
+        name="a record",
+        type=Record,
+        suffixes=(".h5", ".hdf5", ".csv"),
+        write=_write_record,
+        knows=_knows_record,
+        read=_read_record,
+    ),
+    _Kind(
+        name="a stimulus",
+        type=Stimulus,
+        suffixes=STIMULUS_SUFFIXES,
+        write=save_stimulus,
+        knows=_knows_stimulus,
+        read=_read_stimulus,
+    ),
+    _Kind(
+        name="a result",
+        type=Identification,
+        suffixes=(".json",),
+        write=_write_result,
+        knows=_knows_result,
+        read=_read_result,
+    ),
 )
-_READERS: dict[str, Callable[[Path], Saved]] = {
-    ".csv": read,
-    ".json": _read_json,
-    ".toml": _read_toml,
-}

@@ -19,6 +19,8 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from hmpim.errors import ArgumentError, FormatError
 from hmpim.formats.atomic import write_text
 from hmpim.formats.stimulus import check_together
@@ -32,6 +34,7 @@ from hmpim.stimulus import (
     Ramp,
     RestToRest,
     Reversed,
+    SampledMotion,
     Sine,
     Step,
     Steps,
@@ -41,14 +44,14 @@ from hmpim.stimulus import (
     design,
 )
 
-__all__ = ["read_stimulus_toml", "save_stimulus_toml", "stimulus_to_toml"]
+__all__ = ["read_stimulus_toml", "save_stimulus_toml", "stimuli_from_toml", "stimulus_to_toml"]
 
 _FORMAT = "hmpim/stimulus/1"
 _TYPES: dict[str, Any] = {
     kind.__name__: kind
     for kind in (
         *(Chirp, ExponentialSweep, Multisine, Prbs, Quintic, Ramp, RestToRest, Reversed),
-        *(Sine, Step, Steps, SumOfSines, Sweep),
+        *(SampledMotion, Sine, Step, Steps, SumOfSines, Sweep),
     )
 }
 _STATED = ("axis", "unit", "fs", "tail", "resolution")
@@ -125,7 +128,7 @@ def _value(value: Any) -> str:
         return _quoted(value)
     if isinstance(value, int):
         return str(value)
-    if isinstance(value, Sequence):
+    if isinstance(value, Sequence | np.ndarray):
         return f"[{', '.join(_value(part) for part in value)}]"
     return repr(float(value))  # reads back to the very same float
 
@@ -193,29 +196,60 @@ def read_stimulus_toml(path: str | PathLike[str]) -> list[Stimulus]:
     0.0
     """
     try:
-        data = tomllib.loads(Path(path).read_bytes().decode())
-    except (OSError, tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        text = Path(path).read_bytes().decode()
+    except (OSError, UnicodeDecodeError) as error:
         raise FormatError(f"{str(path)!r} cannot be read as TOML: {error}") from error
+    return stimuli_from_toml(text, name=repr(str(path)))
+
+
+def stimuli_from_toml(text: str, *, name: str) -> list[Stimulus]:
+    """Make the stimuli that a text specifies.
+
+    Parameters
+    ----------
+    text : str
+        As `stimulus_to_toml` returns it, or with `[[design]]` tables.
+    name : str
+        What the text is called in messages.
+
+    Raises
+    ------
+    FormatError
+        If it is no TOML, or specifies no stimulus.
+    ArgumentError, LimitsError, UnitError
+        If what it specifies cannot be made.
+
+    Examples
+    --------
+    >>> from hmpim.stimulus import Sine
+    >>> sine = Stimulus(waveform=Sine(frequency=1.0, duration=2.0), fs=10.0)
+    >>> stimuli_from_toml(stimulus_to_toml(sine), name="sine") == [sine]
+    True
+    """
+    try:
+        data = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise FormatError(f"{name} cannot be read as TOML: {error}") from error
     said = data.get("format", _FORMAT)
     if said != _FORMAT:
-        raise FormatError(f"{str(path)!r} has format {said!r}; this version reads {_FORMAT!r}")
+        raise FormatError(f"{name} has format {said!r}; this version reads {_FORMAT!r}")
     stated, wished = data.get("stimulus", []), data.get("design", [])
     tables = [*([stated] if isinstance(stated, dict) else stated)]
     wishes = [*([wished] if isinstance(wished, dict) else wished)]
     if not tables and not wishes:
-        raise FormatError(f"{str(path)!r} holds neither [[stimulus]] nor [[design]]")
-    made = [_made(table, path) for table in tables]
-    return made + [_designed(table, path) for table in wishes]
+        raise FormatError(f"{name} holds neither [[stimulus]] nor [[design]]")
+    made = [_made(table, name) for table in tables]
+    return made + [_designed(table, name) for table in wishes]
 
 
-def _made(table: Any, path: str | PathLike[str]) -> Stimulus:
+def _made(table: Any, name: str) -> Stimulus:
     try:
-        stated = {name: table[name] for name in _STATED if name in table}
+        stated = {key: table[key] for key in _STATED if key in table}
         limits = Limits(**table["limits"]) if "limits" in table else None
         waveform = _waveform(table["waveform"])
         return Stimulus(waveform=waveform, limits=limits, **stated)
     except (KeyError, TypeError, AttributeError) as error:
-        raise FormatError(f"a [[stimulus]] of {str(path)!r} is not complete: {error}") from error
+        raise FormatError(f"a [[stimulus]] of {name} is not complete: {error}") from error
 
 
 def _waveform(table: dict[str, Any]) -> Any:
@@ -231,11 +265,11 @@ def _waveform(table: dict[str, Any]) -> Any:
     return _TYPES[kind](**arguments)
 
 
-def _designed(table: Any, path: str | PathLike[str]) -> Stimulus:
+def _designed(table: Any, name: str) -> Stimulus:
     if not isinstance(table, dict) or not set(table) <= _WISHES:
         unknown = sorted(set(table) - _WISHES) if isinstance(table, dict) else table
         raise FormatError(
-            f"a [[design]] of {str(path)!r} has {unknown!r}; known are {', '.join(sorted(_WISHES))}"
+            f"a [[design]] of {name} has {unknown!r}; known are {', '.join(sorted(_WISHES))}"
         )
     arguments = dict(table)
     try:
@@ -243,4 +277,4 @@ def _designed(table: Any, path: str | PathLike[str]) -> Stimulus:
         arguments["rng"] = arguments.pop("seed", None)
         return design(**arguments)
     except TypeError as error:
-        raise FormatError(f"a [[design]] of {str(path)!r} is not complete: {error}") from error
+        raise FormatError(f"a [[design]] of {name} is not complete: {error}") from error

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from hmpim.equality import ByValue
 from hmpim.errors import ArgumentError
 from hmpim.stimulus.motion import FloatArray, Motion, Peaks
 from hmpim.stimulus.quintic import coefficients_between, evaluated
@@ -13,7 +14,7 @@ __all__ = ["SampledMotion"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class SampledMotion:
+class SampledMotion(ByValue):
     """Samples of position, velocity and acceleration, joined by polynomials of fifth order.
 
     At the samples it is what they say; in between position, velocity and acceleration are

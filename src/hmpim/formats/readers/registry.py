@@ -7,7 +7,7 @@ from importlib.metadata import entry_points
 from pathlib import Path
 
 from hmpim.errors import FormatError
-from hmpim.formats.readers import excel, text
+from hmpim.formats.readers import excel, record_file, text
 from hmpim.formats.readers.protocol import Reader
 
 __all__ = ["BUILT_IN", "GROUP", "HEAD", "BrokenReader", "Found", "reader_for", "readers"]
@@ -19,7 +19,7 @@ HEAD = 65_536
 """Number of bytes at the start of a file by which a format is recognised."""
 
 # The most particular first; text, which anything printable may be, last.
-BUILT_IN: tuple[Reader, ...] = (excel.EXCEL, text.TEXT)
+BUILT_IN: tuple[Reader, ...] = (record_file.RECORD_FILE, excel.EXCEL, text.TEXT)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -1,0 +1,18 @@
+"""Our own record file: HDF5 that grows as samples come and outlives its writer; docs/files.md."""
+
+from hmpim.formats.recording.heading import FORMAT, Heading
+from hmpim.formats.recording.opened import Opened, Track, open_recording
+from hmpim.formats.recording.recording import Recording, read_recording, save_recording
+from hmpim.formats.recording.writer import RecordWriter
+
+__all__ = [
+    "FORMAT",
+    "Heading",
+    "Opened",
+    "RecordWriter",
+    "Recording",
+    "Track",
+    "open_recording",
+    "read_recording",
+    "save_recording",
+]
