@@ -85,4 +85,4 @@ def test_a_result_is_not_replaced_by_its_export(result, capsys, tmp_path):
     assert result.read_bytes() == before
     (tmp_path / "r.csv").write_text("time,u,y\n0,0,0\n1,1,1\n2,0,1\n")
     assert run("export", tmp_path / "r.csv", "--to", "c", "-o", tmp_path / "x") == 2
-    assert "not a result" in capsys.readouterr().err
+    assert "holds nothing that hmpim.save writes" in capsys.readouterr().err
