@@ -16,7 +16,7 @@ from rich.progress import Progress
 
 import hmpim
 from hmpim.campaign.crossing import samples_bandwidth
-from hmpim.experiment import SystemClock
+from hmpim.experiment import RunOptions, SystemClock
 from hmpim.identify import PairIdentification
 from hmpim.plots.table import table_drawing
 from hmpim.rigs.table import (
@@ -172,7 +172,7 @@ def paced(table: MotionTable) -> np.ndarray:
             super().sleep_until(instant)
             ends.append((instant, self.now()))
 
-    hmpim.run(table, all_axes(table, 500.0, 4.0), rng=0, clock=Watch())
+    hmpim.run(table, all_axes(table, 500.0, 4.0), rng=0, options=RunOptions(clock=Watch()))
     return np.array([end - due for due, end in ends])
 
 

@@ -3,7 +3,7 @@
 import os
 import signal
 import time
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import pytest
@@ -11,10 +11,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hmpim.errors import ArgumentError, LimitsError, RigError, UnitError
-from hmpim.experiment import ManualClock, RunLog, run
+from hmpim.experiment import ManualClock, RunLog, RunOptions, Watch, run
 from hmpim.record import Record
-from hmpim.rigs import Samples, Sensor
-from hmpim.stimulus import Limits, Sine, Step, Stimulus, design
+from hmpim.rigs import ChannelSpec, Layout, Samples, Sensor
+from hmpim.stimulus import Limits, SampledMotion, Sine, Step, Stimulus, design
 
 SINE = Stimulus(waveform=Sine(amplitude=2.0, frequency=1.0, duration=2.0), fs=100.0, unit="deg")
 RATE, ACCELERATION = 4 * np.pi, 8 * np.pi**2  # peaks of SINE
@@ -355,7 +355,8 @@ def test_everything_that_happened_stands_in_the_log(tmp_path):
     kinds = [event.kind for event in log.events]
     whole = ["check", "arm", "start", "done", "stop"]
     assert kinds == [*whole, "check", "arm", "start", "fault", "stop", "fault"]
-    assert log.events[0].message == "'pitch': position 2 of 3 deg, velocity 12.5664 of 20 deg/s"
+    words = "'pitch': position 2 of 3 deg, velocity 12.5664 of 20 deg/s; braking reaches 2"
+    assert log.events[0].message == words
     seconds = [event.seconds for event in log.events]
     assert seconds == sorted(seconds)
     lines = path.read_text(encoding="utf-8").splitlines()
@@ -373,7 +374,7 @@ def test_commands_go_by_the_clock_of_the_run():
 
     spy = Paced()
     spy.sent, spy.clock = [], ManualClock(late=np.array([0.0, 0.001]))
-    run(spy, SINE, clock=spy.clock)
+    run(spy, SINE, options=RunOptions(clock=spy.clock))
     late = np.array(spy.sent) - SINE.time
     assert late[::2] == pytest.approx(0.0, abs=1e-12)
     assert late[1::2] == pytest.approx(0.001)
@@ -396,3 +397,114 @@ def test_a_seed_makes_the_run_repeatable():
     assert run(rig, SINE, rng=np.random.default_rng(7)).sha256 == run(rig, SINE, rng=7).sha256
     assert run(rig, SINE).sha256 != run(rig, SINE).sha256
     assert isinstance(run(rig, SINE), Record)
+
+
+def test_a_motion_that_ends_where_it_could_not_stop_inside_its_limits_is_refused():
+    """At 14 deg/s it takes 14²/(2 · 54) = 1.8 deg to stand; smooth motions see to that."""
+    t = np.arange(80) / 100
+    fast = np.minimum(t, 0.25)
+    motion = SampledMotion(
+        fs=100.0,
+        position=0.5 * 54.0 * fast**2 + 13.5 * (t - fast),
+        velocity=54.0 * fast,
+        acceleration=np.where(t < 0.25, 54.0, 0.0),
+    )
+    stimulus = Stimulus(waveform=motion, fs=100.0)
+    reach = motion.position[-1] + 13.5**2 / (2 * 54.5)
+    spy = Spy(limits=Limits(position=1.01 * reach, velocity=14.0, acceleration=54.5))
+    run(spy, stimulus)
+    tight = Spy(limits=Limits(position=0.99 * reach, velocity=14.0, acceleration=54.5))
+    with pytest.raises(LimitsError, match=r"at 0\.790 s 'pitch' could not stop inside its limits"):
+        run(tight, stimulus)
+    assert tight.moved == []
+
+
+class Measured(Spy):
+    """A real axis whose encoder is read."""
+
+    def __init__(self, read, **kwargs):
+        limits = Limits(position=3.0, velocity=20.0, acceleration=100.0, unit="deg")
+        super().__init__(moves=True, limits=limits, **kwargs)
+        self.read = read
+
+    def prepare(self, stimulus):
+        super().prepare(stimulus)
+        command = ChannelSpec(
+            name="u", role="input", unit="deg", axis="", quantity="position", commanded=True
+        )
+        encoder = ChannelSpec(name="y", role="output", unit="rad", axis="", quantity="position")
+        return Layout(channels=(command, replace(encoder, unit=self.unit)))
+
+    unit = "deg"
+
+    def play(self, block):
+        super().play(block)
+        return {"y": self.read(block)}
+
+
+def nothing(block):
+    return Samples(time=np.empty(0), values=np.empty(0))
+
+
+@pytest.mark.parametrize(
+    ("read", "watch", "words"),
+    [
+        (
+            lambda b: 1.7 * b.position[:, 0],
+            Watch(),
+            r"measured position 3\.\d+ deg of y .* by more",
+        ),
+        (lambda b: b.position[:, 0] + np.nan, Watch(), "measured position nan deg of y"),
+        (
+            lambda b: 0.7 * b.position[:, 0],
+            Watch(following_error=0.5),
+            r"y is 0\.5\d+ deg from its command at .* more than the following error 0\.5 deg",
+        ),
+        (nothing, Watch(), r"no sample of y came for 0\.5\d* s; 'pitch' is stopped"),
+        (
+            lambda b: b.position[:, 0] if b.time[0] < 1.0 else nothing(b),
+            Watch(stale=0.3),
+            r"no sample of y came for 0\.3\d* s",
+        ),
+    ],
+)
+def test_what_is_watched_while_it_moves(read, watch, words):
+    rig = Measured(read)
+    log = RunLog()
+    with pytest.raises(RigError, match=words):
+        run(rig, SINE, options=RunOptions(watch=watch), log=log)
+    assert rig.told[-2:] == ["stop", "exit"]
+    assert [event.kind for event in log.events][-2:] == ["fault", "stop"]
+
+
+@pytest.mark.parametrize(
+    ("read", "watch"),
+    [
+        (lambda b: 1.6 * b.position[:, 0], Watch()),  # 3.2 of 3.3
+        (lambda b: 0.8 * b.position[:, 0], Watch(following_error=0.5)),
+        (nothing, Watch(stale=None)),
+    ],
+)
+def test_what_is_watched_and_still_allowed(read, watch):
+    rig = Measured(read)
+    try:
+        run(rig, SINE, options=RunOptions(watch=watch))
+    except RigError as error:
+        assert "has 0 samples" in str(error)  # noqa: PT017
+    assert rig.told.count("play") == 100
+
+
+def test_a_run_may_be_ended_early_for_a_reason():
+    spy = Spy()
+    record = run(spy, SINE, until=lambda p: "sure enough" if p.block.time[-1] > 0.985 else None)
+    assert record.samples == 100
+    assert spy.told[-2:] == ["stop", "exit"]
+    (finding,) = record.findings
+    assert finding.code == "ended_early"
+    assert finding.message == "The run was ended after 0.99 s: sure enough."
+
+
+@pytest.mark.parametrize("wrong", [{"margin": -0.1}, {"stale": True}, {"following_error": "x"}])
+def test_what_cannot_be_watched(wrong):
+    with pytest.raises(ArgumentError, match="must be 0 or positive"):
+        Watch(**wrong)

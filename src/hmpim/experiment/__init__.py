@@ -2,7 +2,11 @@
 
 from hmpim.experiment.collect import Played
 from hmpim.experiment.log import Event, RunLog
-from hmpim.experiment.run import Subscriber, run
+from hmpim.experiment.options import RunOptions
+from hmpim.experiment.run import run
+from hmpim.experiment.running import Subscriber, Until
+from hmpim.experiment.timing import Timing, measure_timing
+from hmpim.experiment.watch import Watch
 from hmpim.rigs import Clock, ManualClock, SystemClock
 
 __all__ = [
@@ -11,7 +15,12 @@ __all__ = [
     "ManualClock",
     "Played",
     "RunLog",
+    "RunOptions",
     "Subscriber",
     "SystemClock",
+    "Timing",
+    "Until",
+    "Watch",
+    "measure_timing",
     "run",
 ]

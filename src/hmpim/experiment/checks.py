@@ -3,9 +3,12 @@
 import math
 from collections.abc import Mapping
 
+import numpy as np
+
 from hmpim.errors import ArgumentError, LimitsError
 from hmpim.experiment.log import RunLog
 from hmpim.rigs import LimitsOfAxes, Rig
+from hmpim.rigs.brake import check_stoppable
 from hmpim.stimulus import Limits, Stimulus, check_inside
 from hmpim.stimulus.limits import QUANTITIES
 from hmpim.units import rate_unit
@@ -117,7 +120,8 @@ def check_stimuli(
     Raises
     ------
     LimitsError
-        If a true peak, between samples too, is beyond a limit.
+        If a true peak, between samples too, is beyond a limit, or some instant leaves no smooth
+        stop inside the limits.
     UnitError
         If the units of stimulus and limits cannot be compared.
     """
@@ -130,6 +134,8 @@ def check_stimuli(
             continue
         check_inside(stimulus, bounds, whose=whose, samples=samples)
         there = bounds.to(stimulus.unit)
+        motion = stimulus.motion(np.arange(samples) / stimulus.fs)
+        reach = check_stoppable(motion.time, motion.position, motion.velocity, there, whose=whose)
         log.add(
             "check",
             f"{whose}: "
@@ -138,5 +144,6 @@ def check_stimuli(
                 f"{rate_unit(stimulus.unit, order)}".rstrip()
                 for order, name in enumerate(QUANTITIES)
                 if math.isfinite(getattr(there, name))
-            ),
+            )
+            + (f"; braking reaches {reach:.6g}" if math.isfinite(there.position) else ""),
         )

@@ -79,8 +79,20 @@ class Collected:
         self._specs = {spec.name: spec for spec in layout.channels}
         self._parts: dict[str, list[Samples]] = {spec.name: [] for spec in layout.channels}
 
-    def take(self, block: Block, reply: Reply) -> Mapping[str, Samples]:
+    def take(
+        self, block: Block, reply: Reply, *, sent: FloatArray | None = None
+    ) -> Mapping[str, Samples]:
         """Add what a rig returned for a block.
+
+        Parameters
+        ----------
+        block : Block
+            What was played.
+        reply : Reply
+            What the rig returned for it.
+        sent : ndarray, shape (n,), or None
+            When each command really went, s; the stamps of commands and of bare arrays. None
+            for when they were due.
 
         Raises
         ------
@@ -88,11 +100,14 @@ class Collected:
             If it returned a channel that its layout does not have, or another number of
             samples than the block has commands.
         """
-        new = self._named(block, reply)
+        stamps = block.time if sent is None else sent
+        new = self._named(block, reply, stamps)
         for spec in self._specs.values():
-            if spec.commanded and spec.axis is not None and spec.quantity is not None:
+            if spec.name in new or not spec.commanded:
+                continue
+            if spec.axis is not None and spec.quantity is not None:
                 values = block.of(spec.axis, spec.quantity)
-                new[spec.name] = Samples(time=block.time, values=values)
+                new[spec.name] = Samples(time=stamps, values=values)
         for name, samples in new.items():
             self._parts[name].append(samples)
         return MappingProxyType(new)
@@ -132,7 +147,7 @@ class Collected:
         except RecordError as error:
             raise RigError(f"rig {self._name!r} delivered no usable record: {error}") from error
 
-    def _named(self, block: Block, reply: Reply) -> dict[str, Samples]:
+    def _named(self, block: Block, reply: Reply, stamps: FloatArray) -> dict[str, Samples]:
         if reply is None:
             return {}
         if not isinstance(reply, Mapping):
@@ -144,7 +159,7 @@ class Collected:
                     f"rig {self._name!r} returned channel {name!r}, which its layout does not "
                     f"have; it has {', '.join(self._specs)}"
                 )
-            new[name] = given if isinstance(given, Samples) else self._on_clock(block, name, given)
+            new[name] = given if isinstance(given, Samples) else self._on_clock(name, given, stamps)
         return new
 
     def _columns(self, block: Block, reply: object) -> dict[str, FloatArray]:
@@ -167,16 +182,16 @@ class Collected:
             )
         return {spec.name: values[:, k] for k, spec in enumerate(outputs)}
 
-    def _on_clock(self, block: Block, name: str, given: object) -> Samples:
+    def _on_clock(self, name: str, given: object, stamps: FloatArray) -> Samples:
         try:
             values = np.asarray(given, dtype=np.float64)
         except (TypeError, ValueError) as error:
             raise RigError(
                 f"channel {name!r} of rig {self._name!r} is not numeric: {error}"
             ) from error
-        if values.shape != (len(block),):
+        if values.shape != stamps.shape:
             raise RigError(
                 f"channel {name!r} of rig {self._name!r} has shape {values.shape} for a block of "
-                f"{len(block)} commands; return one sample for each, or Samples with their times"
+                f"{stamps.size} commands; return one sample for each, or Samples with their times"
             )
-        return Samples(time=block.time, values=values)
+        return Samples(time=stamps, values=values)

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from hmpim.rigs import Clock
+from hmpim.rigs import Block, Clock
 
 __all__ = ["Pacer"]
 
@@ -40,6 +40,11 @@ class Pacer:
     def sent(self) -> NDArray[np.float64]:
         """When each command went, s from the first one's due time; NaN where none was awaited."""
         return self._sent.copy()
+
+    def sent_of(self, block: Block) -> NDArray[np.float64] | None:
+        """When each command of a block went, s; None if the rig did not wait for them all."""
+        sent = self._sent[block.start : block.stop]
+        return sent.copy() if np.all(np.isfinite(sent)) else None
 
     def now(self) -> float:
         """Seconds from the first command's due time; before the first, from now on."""

@@ -198,8 +198,8 @@ class ChannelSpec:
         Quantity of that axis's motion, where it is one. A measured position is watched against
         the axis's limits.
     commanded : bool
-        True for the command itself, of this axis and quantity: the run fills it in, and the rig
-        need not return it.
+        True for the command itself, of this axis and quantity: the run fills it in where the rig
+        does not return it.
     clock : str
         Name of the clock that stamps its samples, where that is not the run's own;
         `RunReport.clocks` puts the stamps right when the run is over.

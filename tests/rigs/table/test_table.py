@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from hmpim.experiment import ManualClock, run
+from hmpim.experiment import ManualClock, RunOptions, run
 from hmpim.identify import identify
 from hmpim.record import Record
 from hmpim.rigs import MotionTable, Rig, commands_of
@@ -191,9 +191,11 @@ def test_coupling_seen_in_the_encoders_is_the_exact_one():
 def test_real_time_is_kept_by_the_clock_of_the_run():
     stimulus = sweep("pitch", upto=20.0, duration=1.0, fs=500.0)
     paced, free = ManualClock(), ManualClock()
-    record = run(MotionTable(realtime=True), stimulus, rng=0, clock=paced)
+    record = run(MotionTable(realtime=True), stimulus, rng=0, options=RunOptions(clock=paced))
     assert paced.now() == pytest.approx((stimulus.samples - 1) / stimulus.fs)
-    assert run(MotionTable(), stimulus, rng=0, clock=free).sha256 == record.sha256
+    assert (
+        run(MotionTable(), stimulus, rng=0, options=RunOptions(clock=free)).sha256 == record.sha256
+    )
     assert free.now() == 0.0
 
 

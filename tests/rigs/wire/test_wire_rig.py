@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from hmpim.errors import LimitsError, RigError, UnitError
-from hmpim.experiment import RunLog, run
+from hmpim.experiment import RunLog, RunOptions, run
 from hmpim.identify import identify
 from hmpim.rigs import ManualClock, Rig
 from hmpim.rigs.wire import FarEnd, Hello, State, WireRig, expected_hello
@@ -23,7 +23,7 @@ def play(stimulus=SWEEP, *, log=None, expected=None, **kwargs):
     plant = Lag(2, 500.0, late=LATE, time_constant=TIME_CONSTANT, noise_std=0.002)
     network = Network(clock, plant=plant, **kwargs)
     rig = WireRig(transport=network, clock=clock, expected=expected)
-    return run(rig, stimulus, clock=clock, log=log), network
+    return run(rig, stimulus, options=RunOptions(clock=clock), log=log), network
 
 
 def test_it_is_a_rig():
@@ -163,7 +163,7 @@ def test_a_stimulus_at_another_rate_is_refused_before_anything_moves():
     clock = ManualClock()
     network = Network(clock)
     with pytest.raises(RigError, match="runs at 500 Hz, and 250 Hz is expected; design the stim"):
-        run(WireRig(transport=network, clock=clock), slow, clock=clock)
+        run(WireRig(transport=network, clock=clock), slow, options=RunOptions(clock=clock))
     assert State.ARMED not in network.states
 
 
@@ -192,7 +192,9 @@ def test_a_pulled_cable_is_noticed_and_the_far_end_comes_to_rest(way):
         "back": "was told to stop and does not say that it stands, 2 s later; its watchdog brakes",
     }
     with pytest.raises(RigError, match=words[way]):
-        run(WireRig(transport=network, clock=clock), SWEEP, clock=clock, log=log)
+        run(
+            WireRig(transport=network, clock=clock), SWEEP, options=RunOptions(clock=clock), log=log
+        )
     faults = [event.message for event in log.events if event.kind == "fault"]
     assert "stopped by itself: no command came" in faults[0] or "nothing was heard" in faults[0]
     network.receive(1.0)
@@ -215,7 +217,7 @@ def test_a_far_end_that_trips_says_why():
 
     network.plant = Tripping(2, 500.0)
     with pytest.raises(RigError, match="'bench' stopped by itself: oil pressure low"):
-        run(WireRig(transport=network, clock=clock), SWEEP, clock=clock)
+        run(WireRig(transport=network, clock=clock), SWEEP, options=RunOptions(clock=clock))
     assert network.farend.state is State.FAULT
 
 
@@ -231,7 +233,7 @@ def test_ctrl_c_brakes_the_far_end_before_the_run_is_left():
         run(
             WireRig(transport=network, clock=clock),
             SWEEP,
-            clock=clock,
+            options=RunOptions(clock=clock),
             subscribers=[interrupted],
         )
     assert State.AT_REST in network.states

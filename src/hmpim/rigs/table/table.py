@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hmpim.errors import ArgumentError, LimitsError
-from hmpim.rigs.block import Block, ChannelSpec, Layout, Quantity
+from hmpim.rigs.block import Block, ChannelSpec, Layout, Quantity, Samples
 from hmpim.rigs.protocol import Stimuli
 from hmpim.rigs.simulated import Playing, Simulated
 from hmpim.rigs.table.axes import AXES, FIG_4, AxisName, AxisSpec, CommandMode, TablePosition
@@ -25,6 +25,7 @@ __all__ = ["MotionTable"]
 
 FloatArray = NDArray[np.float64]
 
+_BESIDE: tuple[Quantity, ...] = ("velocity", "acceleration")
 _MIDDLE = TablePosition()
 _BLOCK = Base()
 _TUNED_AT = 1000.0  # Hz, the command rate at which Fig. 4's bandwidths hold
@@ -382,7 +383,6 @@ class MotionTable(Simulated):
                 unit=s.unit,
                 axis=axis,
                 quantity="position",
-                commanded=True,
             )
             for axis, s in named.items()
         ]
@@ -392,7 +392,6 @@ class MotionTable(Simulated):
             )
             for axis, unit in units.items()
         ]
-        beside: tuple[Quantity, ...] = ("velocity", "acceleration")
         feedforward = [
             ChannelSpec(
                 name=f"{axis}.{quantity}_command",
@@ -403,7 +402,7 @@ class MotionTable(Simulated):
                 commanded=True,
             )
             for axis, s in named.items()
-            for order, quantity in enumerate(beside[: len(self.mode) - 1], start=1)
+            for order, quantity in enumerate(_BESIDE[: len(self.mode) - 1], start=1)
         ]
         return Layout(
             channels=(*inputs, *outputs, *feedforward),
@@ -411,7 +410,7 @@ class MotionTable(Simulated):
             source=f"simulated {self.name}, {self.mode}",
         )
 
-    def play(self, block: Block, /) -> dict[str, FloatArray]:
+    def play(self, block: Block, /) -> dict[str, Samples]:
         """Move as commanded, and read the encoders.
 
         Raises
@@ -429,7 +428,14 @@ class MotionTable(Simulated):
             spread(block.velocity, block.axes, block.units, around=still),
             spread(block.acceleration, block.axes, block.units, around=still),
         )
-        return {
-            f"{axis}.position": factor * (history.of(axis, "encoder") - getattr(self.start, axis))
-            for axis, factor in factors.items()
-        }
+        # Stamped with the time of the simulation, whatever the clock on the wall does.
+        samples: dict[str, Samples] = {}
+        for axis in block.axes:
+            samples[f"{axis}.command"] = Samples(time=block.time, values=block.of(axis))
+            for quantity in _BESIDE[: len(self.mode) - 1]:
+                sent = block.of(axis, quantity)
+                samples[f"{axis}.{quantity}_command"] = Samples(time=block.time, values=sent)
+        for axis, factor in factors.items():
+            read = history.of(axis, "encoder") - getattr(self.start, axis)
+            samples[f"{axis}.position"] = Samples(time=block.time, values=factor * read)
+        return samples

@@ -1,0 +1,32 @@
+"""How a run is to be made, beyond what is played on what."""
+
+from dataclasses import dataclass, field
+
+from hmpim.experiment.watch import Watch
+from hmpim.rigs import Clock
+
+__all__ = ["RunOptions"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RunOptions:
+    """How a run is to be made.
+
+    Parameters
+    ----------
+    clock : Clock or None
+        None for the computer's own; `ManualClock` for tests.
+    watch : Watch
+        What is watched while the rig moves.
+    realtime : bool
+        Whether to ask for real-time scheduling; the log says whether it was allowed.
+
+    Examples
+    --------
+    >>> RunOptions(watch=Watch(following_error=3.0)).realtime
+    True
+    """
+
+    clock: Clock | None = None
+    watch: Watch = field(default_factory=Watch)
+    realtime: bool = True

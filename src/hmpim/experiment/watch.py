@@ -1,0 +1,153 @@
+"""What is watched while a rig moves: measured limits, following error, and data that stop."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from hmpim.errors import ArgumentError, RigError
+from hmpim.experiment.collect import Played
+from hmpim.rigs import ChannelSpec, Samples
+from hmpim.stimulus import Limits
+from hmpim.units import conversion_factor
+
+__all__ = ["Watch", "Watcher"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Watch:
+    """What ends a run.
+
+    Parameters
+    ----------
+    margin : float
+        Share of a limit by which a measurement may be beyond it: overshoot, and noise.
+    following_error : float or None
+        Largest distance of a measured position from the command, in the axis's unit; None for
+        any, since a slow axis lags by nature.
+    stale : float or None
+        Seconds of the run without a new sample of a measured position; None for any.
+
+    Raises
+    ------
+    ArgumentError
+        If one of them is negative or no number.
+
+    Examples
+    --------
+    >>> Watch(following_error=3.0).stale
+    0.5
+    """
+
+    margin: float = 0.1
+    following_error: float | None = None
+    stale: float | None = 0.5
+
+    def __post_init__(self) -> None:
+        for name in ("margin", "following_error", "stale"):
+            value = getattr(self, name)
+            if value is None and name != "margin":
+                continue
+            if isinstance(value, bool) or not (isinstance(value, int | float) and value >= 0.0):
+                raise ArgumentError(f"{name} = {value!r} must be 0 or positive")
+
+
+class Watcher:
+    """Looks at every block as it comes in, and raises where something is wrong.
+
+    Parameters
+    ----------
+    watch : Watch
+        What ends a run.
+    limits : mapping of axis to Limits or None
+        Of each axis that moves.
+    name : str
+        Of the rig, for messages.
+    real : bool
+        Whether something real moves; only then data can be stale.
+    """
+
+    def __init__(
+        self, watch: Watch, limits: Mapping[str, Limits | None], *, name: str, real: bool
+    ) -> None:
+        self._watch, self._limits, self._name = watch, limits, name
+        self._stale = watch.stale if real else None
+        self._last: dict[str, float] = {}
+
+    def __call__(self, played: Played) -> None:
+        """Look at a block.
+
+        Raises
+        ------
+        RigError
+            If a measurement is beyond a limit or too far from its command, or none came.
+        """
+        for spec in played.layout.of("output"):
+            samples = played.samples.get(spec.name)
+            if spec.axis is None or spec.quantity is None:
+                continue
+            if samples is not None and samples.time.size:
+                self._last[spec.name] = float(played.block.time[-1])
+                self._inside(spec, samples)
+                if spec.quantity == "position":
+                    self._following(spec, samples, played)
+            self._fresh(spec, played)
+
+    def _inside(self, spec: ChannelSpec, samples: Samples) -> None:
+        limits = self._limits.get(spec.axis or "")
+        if limits is None or spec.quantity is None:
+            return
+        bound = getattr(limits, spec.quantity)
+        if math.isinf(bound):
+            return
+        order = ("position", "velocity", "acceleration").index(spec.quantity)
+        own = limits.unit if order == 0 else f"{limits.unit or '1'}/s{'²' if order == 2 else ''}"
+        factor = conversion_factor(spec.unit, to=own)
+        k = int(np.argmax(np.abs(samples.values)))
+        found = factor * float(samples.values[k])
+        if not abs(found) <= bound * (1.0 + self._watch.margin):
+            raise RigError(
+                f"measured {spec.quantity} {found:.6g} {own} of {spec.name} at "
+                f"{samples.time[k]:.3f} s is beyond the limit {bound:g} {own} by more than "
+                f"{100 * self._watch.margin:g} %; {self._name!r} is stopped"
+            )
+
+    def _following(self, spec: ChannelSpec, samples: Samples, played: Played) -> None:
+        allowed = self._watch.following_error
+        if allowed is None:
+            return
+        command = self._command(spec, played)
+        if command is None or not command.time.size:
+            return
+        wanted = np.interp(samples.time, command.time, command.values)
+        error = np.abs(samples.values - wanted)
+        k = int(np.argmax(error))
+        if not error[k] <= allowed:
+            raise RigError(
+                f"{spec.name} is {error[k]:.6g} {spec.unit} from its command at "
+                f"{samples.time[k]:.3f} s, more than the following error {allowed:g} {spec.unit} "
+                f"allowed; {self._name!r} is stopped"
+            )
+
+    @staticmethod
+    def _command(spec: ChannelSpec, played: Played) -> Samples | None:
+        for other in played.layout.of("input"):
+            same = (other.axis, other.quantity, other.unit) == (
+                spec.axis,
+                "position",
+                spec.unit,
+            )
+            if same:
+                return played.samples.get(other.name)
+        return None
+
+    def _fresh(self, spec: ChannelSpec, played: Played) -> None:
+        if self._stale is None:
+            return
+        now = float(played.block.time[-1])
+        silent = now - self._last.get(spec.name, 0.0)
+        if silent > self._stale:
+            raise RigError(
+                f"no sample of {spec.name} came for {silent:.3g} s; {self._name!r} is stopped"
+            )
