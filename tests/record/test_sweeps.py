@@ -69,6 +69,13 @@ def test_noise_and_constants_hold_no_sweep(seed):
     assert [m.kind for m in find_motions(log(np.sin(2 * np.pi * 3 * t + seed)))] == ["other"]
 
 
+def test_a_sweep_without_any_rest_is_one():
+    t = np.arange(2400) / FS
+    (motion,) = find_motions(log(3.0 + np.sin(2 * np.pi * (0.2 * t + 0.5 * t**2))))
+    assert (motion.kind, motion.rising) == ("sweep", True)
+    assert (motion.begin, motion.end) == (0.0, 2399 / FS)
+
+
 def test_a_slow_turning_point_is_no_rest():
     (motion,) = find_motions(log(rest(2), rising(duration=60, low=0.05, high=5), rest(2)))
     assert motion.begin == pytest.approx(2.0, abs=0.5)

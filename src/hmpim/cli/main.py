@@ -12,6 +12,7 @@ import typer
 from typer.core import TyperGroup
 
 from hmpim.cli.campaign import campaign
+from hmpim.cli.channels import channels
 from hmpim.cli.demo import demo
 from hmpim.cli.design import design
 from hmpim.cli.export import export
@@ -140,6 +141,7 @@ app.command()(design)
 app.command(epilog="Example: hmpim identify test.csv --input u --output y --report r.html")(
     identify
 )
+app.command(epilog="Example: hmpim channels test.csv --report channels.html")(channels)
 app.command(epilog="Example: hmpim run --rig bench s.csv -o run.csv --report r.html")(run)
 app.command(epilog="Example: hmpim rigs --json rigs.json")(rigs)
 app.command(epilog="Example: hmpim table --udp 127.0.0.1:5005 --rate 1000")(table)

@@ -2,8 +2,10 @@
 
 from hmpim.record.align import Aligned, Signal, uniform
 from hmpim.record.clock import Clock, fit_clock
+from hmpim.record.describe import Description, describe
 from hmpim.record.finding import Finding, Severity
 from hmpim.record.offset import ClockOffset, clock_offset
+from hmpim.record.propose import Proposal, propose
 from hmpim.record.quality import inspect_record, inspect_timing, inspect_values
 from hmpim.record.record import ROLES, Channel, Intersample, Record, Role
 from hmpim.record.series import Series
@@ -15,19 +17,23 @@ __all__ = [
     "Channel",
     "Clock",
     "ClockOffset",
+    "Description",
     "Finding",
     "Intersample",
     "Motion",
+    "Proposal",
     "Record",
     "Role",
     "Series",
     "Severity",
     "Signal",
     "clock_offset",
+    "describe",
     "find_motions",
     "fit_clock",
     "inspect_record",
     "inspect_timing",
     "inspect_values",
+    "propose",
     "uniform",
 ]

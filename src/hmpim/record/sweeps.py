@@ -148,9 +148,12 @@ def _rests(
     noise = float(np.quantile(ranges[near], 0.25))
     tolerance = max(3.0 * noise, 1e-9 * span)
     resting = near & (ranges <= tolerance) & (np.abs(means - level) <= max(tolerance, 1e-3 * span))
-    if noise > 0.1 * span:  # what never rests has no noise to be told
-        resting[:] = False
-        noise = 0.0
+    # A turning point may lie at the level too, if the channel never rests; it is short.
+    edges = np.flatnonzero(np.diff(np.concatenate(([0], resting.astype(np.int8), [0]))))
+    for first, stop in zip(edges[::2], edges[1::2], strict=True):
+        resting[first:stop] &= stop - first >= _SHORTEST_REST
+    if noise > 0.1 * span or not resting.any():  # what never rests shows no level and no noise
+        return np.zeros(count, dtype=np.bool_), float(np.median(values)), 0.0
     return resting, level, noise
 
 
