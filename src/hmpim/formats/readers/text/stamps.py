@@ -1,6 +1,7 @@
 """Columns of time: numbers with a unit, dates, clock times, Unix time."""
 
 import re
+import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
@@ -157,8 +158,10 @@ def _iso_at_once(cells: Sequence[str]) -> NDArray[np.int64] | None:
     if zone[:1] not in "+-" and ("+" in bare or "Z" in bare):
         return None
     try:
-        ticks = np.array(bare.split("\n"), dtype="datetime64[ns]").astype(np.int64)
-    except ValueError:
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")  # a zone of its own in one cell is only warned of
+            ticks = np.array(bare.split("\n"), dtype="datetime64[ns]").astype(np.int64)
+    except (ValueError, UserWarning):
         return None
     if shift is None or (ticks == np.iinfo(np.int64).min).any():  # an empty cell is "not a time"
         return None

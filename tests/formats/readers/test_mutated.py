@@ -1,0 +1,108 @@
+"""Damaged files: a record or a clear error, never a crash, never a hang."""
+
+import gzip
+import io
+import os
+import zipfile
+
+import numpy as np
+import openpyxl
+import pytest
+
+from mutations import mutated, read_or_refused
+
+N = 200
+
+
+def columns():
+    t = np.arange(N) / 100.0
+    u = np.sin(2 * np.pi * (0.5 * t + 1.5 * t**2))
+    return t, u, np.interp(t - 0.05, t, u)
+
+
+def text():
+    rows = "".join(f"{a:.2f},{b:.5f},{c:.5f}\n" for a, b, c in zip(*columns(), strict=True))
+    return ("# bench 2\ntime [s],u [deg],y [V]\n" + rows).encode()
+
+
+def german():
+    return text().replace(b",", b";").replace(b".", b",").decode().encode("utf-16")
+
+
+def dated():
+    form = "2026-11-21T12:00:{:06.3f}Z;{:.4f};{:.4f}\r\n"
+    rows = "".join(form.format(*row) for row in zip(*columns(), strict=True))
+    return ("Zeit;u;y\r\n" + rows).encode()
+
+
+def scope():
+    head = "Model,X\nSample Interval,1e-2\nVertical Units,V,V\n\nLabel,,\nTIME,CH1,CH2\n"
+    rows = "".join(f"{a:.4e},{b:.4e},{c:.4e}\n" for a, b, c in zip(*columns(), strict=True))
+    return (head + rows).encode()
+
+
+def excel():
+    book = openpyxl.Workbook()
+    sheet = book.active
+    sheet.append(["time", "u", "y"])
+    for row in zip(*columns(), strict=True):
+        sheet.append([float(value) for value in row])
+    out = io.BytesIO()
+    book.save(out)
+    return out.getvalue()
+
+
+def repacked(data, rng):
+    """A workbook whose parts are damaged inside, and packed again as if nothing were."""
+    out = io.BytesIO()
+    with zipfile.ZipFile(io.BytesIO(data)) as old, zipfile.ZipFile(out, "w") as new:
+        parts = old.namelist()
+        chosen = parts[int(rng.integers(len(parts)))] if rng.integers(2) else _SHEET
+        for part in parts:
+            inside = old.read(part)
+            new.writestr(part, mutated(inside, rng) if part == chosen else inside)
+    return out.getvalue()
+
+
+_SHEET = "xl/worksheets/sheet1.xml"
+
+FILES = {
+    "csv": (text, {}),
+    "utf-16": (german, {}),
+    "dates": (dated, {}),
+    "oscilloscope": (scope, {"inputs": ["CH1"], "outputs": ["CH2"]}),
+    "gzip": (lambda: gzip.compress(text(), mtime=0), {}),
+    "xlsx": (excel, {}),
+    "xlsx-inside": (excel, {}),
+}
+
+
+def outcomes(name, tmp_path, seeds):
+    make, wanted = FILES[name]
+    good = make()
+    path = tmp_path / f"good.{name}"
+    path.write_bytes(good)
+    assert read_or_refused(path, **wanted) == "read/read"
+    found = []
+    for seed in seeds:
+        path = tmp_path / f"bad.{name}"
+        damage = repacked if name == "xlsx-inside" else mutated
+        path.write_bytes(damage(good, np.random.default_rng(seed)))
+        found.append(read_or_refused(path, **wanted))
+    return found
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_thirty_damaged_files(name, tmp_path):
+    found = outcomes(name, tmp_path, range(30))
+    assert len(found) == 30
+    # Not all are refused out of hand, and damage does not go through as if nothing were.
+    assert "refused/refused" in found
+
+
+@pytest.mark.study
+@pytest.mark.parametrize("name", FILES)
+def test_a_thousand_damaged_files(name, tmp_path):
+    count = int(os.environ.get("HMPIM_MUTATIONS", "1000"))
+    found = outcomes(name, tmp_path, range(1000, 1000 + count))
+    assert len(found) == count
