@@ -38,7 +38,12 @@ def run(
     ] = None,
     output: Annotated[
         Path | None,
-        typer.Option("-o", "--output", metavar="FILE", help="Where the record goes."),
+        typer.Option(
+            "-o",
+            "--output",
+            metavar="FILE",
+            help="Where the record goes; one in .h5 is written as it comes, and survives a kill.",
+        ),
     ] = None,
     log: Annotated[
         Path | None,
@@ -71,7 +76,6 @@ def run(
     _check_kept(output, kept=json is not None or report is not None)
     from hmpim.experiment import RunLog
     from hmpim.experiment import run as play
-    from hmpim.formats import save
     from hmpim.formats.stimulus_files import read_stimuli
     from hmpim.rigs.catalogue import find_rig, read_description
 
@@ -79,13 +83,12 @@ def run(
     found = find_rig(rig, description=described)
     stimuli = read_stimuli(stimulus)
     with RunLog(log) as events, working(f"Running {found.rig.name}"):
-        record = play(found.rig, stimuli, rng=seed, limits=found.limits, log=events)
+        record = play(found.rig, stimuli, path=output, rng=seed, limits=found.limits, log=events)
     say(
         f"{record.samples} samples of {', '.join(c.name for c in record.outputs)} in "
         f"{record.duration:g} s from {record.source}"
     )
     if output is not None:
-        save(record, output)
         say(f"Record: {output}")
     if json is None and report is None:
         return

@@ -1,6 +1,7 @@
 """Run a stimulus on a rig, safely."""
 
 from hmpim.experiment.collect import Played
+from hmpim.experiment.feel import Feel
 from hmpim.experiment.log import Event, RunLog
 from hmpim.experiment.options import RunOptions
 from hmpim.experiment.run import run
@@ -12,6 +13,7 @@ from hmpim.rigs import Clock, ManualClock, SystemClock
 __all__ = [
     "Clock",
     "Event",
+    "Feel",
     "ManualClock",
     "Played",
     "RunLog",

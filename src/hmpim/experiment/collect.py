@@ -125,12 +125,10 @@ class Collected:
         said = RunReport() if report is None else report
 
         def channel(spec: ChannelSpec) -> Channel:
-            parts = self._parts[spec.name] or [_EMPTY]
-            time = np.concatenate([p.time for p in parts])
-            if spec.clock in said.clocks:
-                time = said.clocks[spec.clock](time)
-            values = np.concatenate([p.values for p in parts])
-            return Channel(name=spec.name, time=time, values=values, unit=spec.unit)
+            whole = Samples.joined(self._parts[spec.name] or [_EMPTY])
+            retime = said.clocks.get(spec.clock)
+            time = whole.time if retime is None else retime(whole.time)
+            return Channel(name=spec.name, time=time, values=whole.values, unit=spec.unit)
 
         try:
             return Record(

@@ -1,6 +1,7 @@
 """What happened in a run, line by line, each with its time."""
 
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
@@ -66,6 +67,7 @@ class RunLog:
         self._begun = time.perf_counter()
         self._file: TextIO | None = None
         self._events: list[Event] = []
+        self._follower: Callable[[Event], object] | None = None
         if path is not None:
             try:
                 self._file = Path(path).open("a", encoding="utf-8", buffering=1)  # noqa: SIM115
@@ -83,7 +85,13 @@ class RunLog:
         seconds = time.perf_counter() - self._begun
         event = Event(seconds=seconds, kind=kind, message=" ".join(message.split()))
         self._events.append(event)
+        if self._follower is not None:
+            self._follower(event)
         self._line(str(event))
+
+    def follow(self, follower: Callable[[Event], object] | None) -> None:
+        """Tell `follower` each further event as it happens; None tells nobody."""
+        self._follower = follower
 
     def text(self) -> str:
         """Return all events, one a line."""

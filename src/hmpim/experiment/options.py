@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, field
 
+from hmpim.experiment.feel import Feel
 from hmpim.experiment.watch import Watch
 from hmpim.rigs import Clock
 
@@ -20,6 +21,8 @@ class RunOptions:
         What is watched while the rig moves.
     realtime : bool
         Whether to ask for real-time scheduling; the log says whether it was allowed.
+    feel : Feel or None
+        How to move an unknown rig a little first; None plays at full amplitude at once.
 
     Examples
     --------
@@ -30,3 +33,4 @@ class RunOptions:
     clock: Clock | None = None
     watch: Watch = field(default_factory=Watch)
     realtime: bool = True
+    feel: Feel | None = None

@@ -46,6 +46,10 @@ class Pacer:
         sent = self._sent[block.start : block.stop]
         return sent.copy() if np.all(np.isfinite(sent)) else None
 
+    def note(self, start: int, sent: NDArray[np.float64]) -> None:
+        """Note when commands went that another process let go: those from number `start` on."""
+        self._sent[start : start + sent.size] = sent
+
     def now(self) -> float:
         """Seconds from the first command's due time; before the first, from now on."""
         return 0.0 if self._start is None else self._clock.now() - self._start

@@ -1,6 +1,7 @@
 """Run a stimulus on a rig: limits first, then motion, and a stop whatever happens."""
 
 from collections.abc import Mapping, Sequence
+from os import PathLike
 
 import numpy as np
 
@@ -21,6 +22,7 @@ def run(
     rig: Rig,
     stimulus: Stimulus | Mapping[str, Stimulus] | Sequence[Stimulus],
     *,
+    path: str | PathLike[str] | None = None,
     rng: np.random.Generator | int | None = None,
     limits: LimitsOfAxes = None,
     until: Until | None = None,
@@ -39,6 +41,10 @@ def run(
         The unit under test. It is entered here: give it as it is, not inside a `with`.
     stimulus : Stimulus, or mapping of axis to Stimulus, or sequence of Stimulus
         What to play: one, or one for each axis that moves (a sequence goes by `Stimulus.axis`).
+    path : path-like or None
+        File that keeps the record. One that ends in .h5 is written as samples come: killed at
+        any moment, all but the last half second can be read. Refused before anything moves if
+        it cannot be written.
     rng : numpy.random.Generator, int or None
         Source of what is random in a simulated unit, or its seed; None draws fresh.
     limits : Limits, or mapping of axis to Limits, or None
@@ -87,6 +93,7 @@ def run(
         limits=limits,
         subscribers=tuple(subscribers),
         until=until,
+        path=path,
         log=RunLog() if log is None else log,
         options=RunOptions() if options is None else options,
     )

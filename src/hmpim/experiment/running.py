@@ -2,16 +2,19 @@
 
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from os import PathLike
 
 from hmpim.errors import HmpimError, RigError
 from hmpim.experiment.checks import check_stimuli, limits_by_axis, moves
 from hmpim.experiment.collect import Collected, Played, default_layout
+from hmpim.experiment.feel import feel
 from hmpim.experiment.interrupt import undisturbed
 from hmpim.experiment.log import RunLog
 from hmpim.experiment.options import RunOptions
 from hmpim.experiment.pacer import Pacer
 from hmpim.experiment.priority import undelayed
+from hmpim.experiment.recorder import Recorder
 from hmpim.experiment.timing import judge_timing, measure_timing
 from hmpim.experiment.watch import Watcher
 from hmpim.record import Finding, Record
@@ -27,7 +30,7 @@ from hmpim.rigs import (
     shared_band,
     stimuli_by_axis,
 )
-from hmpim.stimulus import Limits, Stimulus
+from hmpim.stimulus import Limits, Stimulus, scaled_stimulus
 
 __all__ = ["Running", "Subscriber", "Until"]
 
@@ -59,6 +62,7 @@ class Running:
     limits: LimitsOfAxes
     subscribers: tuple[Subscriber, ...]
     until: Until | None
+    path: str | PathLike[str] | None
     log: RunLog
     options: RunOptions
 
@@ -67,8 +71,11 @@ class Running:
         try:
             with self.rig:
                 with self._faults_logged():
-                    ready = self._check()
-                return self._played(ready)
+                    ready = self._check(self._stimuli())
+                findings: list[Finding] = []
+                if self.options.feel is not None:
+                    ready = self._felt(ready, findings)
+                return self._kept(ready, findings)
         except HmpimError:
             raise
         except _Watching as failure:
@@ -78,9 +85,11 @@ class Running:
                 f"rig {self.rig.name!r} failed: {type(error).__name__}: {error}"
             ) from error
 
-    def _check(self) -> _Ready:
+    def _stimuli(self) -> dict[str, Stimulus]:
+        return stimuli_by_axis(self.given, self.rig.axes, name=repr(self.rig.name))
+
+    def _check(self, stimuli: dict[str, Stimulus]) -> _Ready:
         """Look at everything that can be looked at while nothing moves."""
-        stimuli = stimuli_by_axis(self.given, self.rig.axes, name=repr(self.rig.name))
         limits = limits_by_axis(self.rig, stimuli, stated=self.limits)
         check_stimuli(stimuli, limits, rig=self.rig, log=self.log)
         commands = commands_of(stimuli)
@@ -88,8 +97,52 @@ class Running:
         pacer = Pacer(clock, fs=commands.fs, count=len(commands))
         return _Ready(stimuli=stimuli, limits=limits, commands=commands, pacer=pacer)
 
-    def _played(self, ready: _Ready) -> Record:
-        findings: list[Finding] = []
+    def _felt(self, ready: _Ready, findings: list[Finding]) -> _Ready:
+        """Move a little first, and return what may be moved then."""
+        assert self.options.feel is not None
+        grows = self.path is not None and self._recorder(ready, path=self.path).grows
+        feeling = replace(self, until=None, subscribers=(), path=self.path if grows else None)
+
+        def play(stimuli: Mapping[str, Stimulus]) -> Record:
+            with self._faults_logged():
+                ready = self._check(dict(stimuli))
+            return feeling._kept(ready, [])
+
+        felt = feel(play, ready.stimuli, ready.limits, how=self.options.feel)
+        findings.extend(felt.findings)
+        if felt.share == 1.0:
+            return self._check(ready.stimuli)
+        return self._check(
+            {axis: scaled_stimulus(s, felt.share) for axis, s in ready.stimuli.items()}
+        )
+
+    def _recorder(self, ready: _Ready, *, path: str | PathLike[str] | None) -> Recorder:
+        bounds = {axis: bound for axis, bound in ready.limits.items() if bound is not None}
+        return Recorder(
+            path,
+            rig=self.rig.name,
+            limits=bounds,
+            stimuli=tuple(ready.stimuli.values()),
+            commands=ready.commands,
+            log=self.log,
+        )
+
+    def _kept(self, ready: _Ready, findings: list[Finding]) -> Record:
+        """Play, and keep what was recorded whatever happens."""
+        with self._faults_logged():
+            recorder = self._recorder(ready, path=self.path)
+        try:
+            record = self._played(ready, findings, recorder)
+        except BaseException as error:
+            with undisturbed():
+                kept = recorder.fail(f"{type(error).__name__}: {error}")
+            if kept:
+                self.log.add("note", f"what was recorded until then is in {self.path}")
+            raise
+        recorder.finish(record)
+        return record
+
+    def _played(self, ready: _Ready, findings: list[Finding], recorder: Recorder) -> Record:
         try:
             with (
                 self._faults_logged(),
@@ -97,7 +150,7 @@ class Running:
             ):
                 if moves(self.rig):
                     self.log.add("note", scheduling)
-                layout, collected = self._play(ready, findings)
+                layout, collected = self._play(ready, findings, recorder)
         finally:
             self._stop()
         with self._faults_logged():
@@ -109,12 +162,15 @@ class Running:
             band = shared_band(ready.stimuli)
             return collected.record(fs=ready.commands.fs, band=band, report=said)
 
-    def _play(self, ready: _Ready, findings: list[Finding]) -> tuple[Layout, Collected]:
+    def _play(
+        self, ready: _Ready, findings: list[Finding], recorder: Recorder
+    ) -> tuple[Layout, Collected]:
         commands = ready.commands
-        single = isinstance(self.given, Stimulus)
-        layout = self.rig.prepare(self.given if single else ready.stimuli)
+        only = next(iter(ready.stimuli.values()))
+        layout = self.rig.prepare(only if isinstance(self.given, Stimulus) else ready.stimuli)
         if layout is None:
             layout = default_layout(commands, name=self.rig.name)
+        recorder.open(layout, band=shared_band(ready.stimuli))
         self.log.add("arm", f"{self.rig.name}: {', '.join(c.name for c in layout.channels)}")
         collected = Collected(layout, name=self.rig.name)
         watcher = Watcher(
@@ -126,6 +182,7 @@ class Running:
         for block in commands.blocks(size, pace=ready.pacer):
             reply = self.rig.play(block)
             samples = collected.take(block, reply, sent=ready.pacer.sent_of(block))
+            recorder.take(samples, now=float(block.time[-1]))
             played = Played(block=block, layout=layout, samples=samples, seconds=seconds)
             watcher(played)
             reason = self._told(played)

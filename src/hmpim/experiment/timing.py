@@ -63,7 +63,7 @@ class Timing:
 
         Examples
         --------
-        >>> print(measure_timing(np.arange(5) / 10, fs=10.0).words())
+        >>> print(measure_timing(np.arange(5) / 8, fs=8.0).words())
         Commands went within 0 ms of their time (median; 99.9 %: 0 ms; worst: 0 ms), 100 % of ...
         """
         return (

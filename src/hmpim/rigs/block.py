@@ -1,6 +1,6 @@
 """What goes to a rig and what comes back: blocks of commands, replies, and their layout."""
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Literal, Protocol
 
@@ -36,6 +36,10 @@ class Pace(Protocol):
 
     def left(self, number: int) -> float:
         """Seconds until command `number` of the run is due; negative if that is past."""
+        ...
+
+    def note(self, start: int, sent: FloatArray) -> None:
+        """Note when commands went that somebody else let go: those from number `start` on, s."""
         ...
 
     def wait(self, number: int) -> None:
@@ -138,6 +142,21 @@ class Samples:
 
     time: FloatArray
     values: FloatArray
+
+    @classmethod
+    def joined(cls, parts: Sequence["Samples"]) -> "Samples":
+        """Put parts of a channel together, in order.
+
+        Examples
+        --------
+        >>> part = Samples(time=[0.0], values=[1.0])
+        >>> Samples.joined([part, Samples(time=[0.1], values=[2.0])]).time.tolist()
+        [0.0, 0.1]
+        """
+        return cls(
+            time=np.concatenate([part.time for part in parts]),
+            values=np.concatenate([part.values for part in parts]),
+        )
 
     def __post_init__(self) -> None:
         for name in ("time", "values"):

@@ -20,6 +20,7 @@ from hmpim.stimulus.quintic import Quintic
 from hmpim.stimulus.reverse import Reversed
 from hmpim.stimulus.sampled import SampledMotion
 from hmpim.stimulus.scale import scale_to_limits
+from hmpim.stimulus.scaled import scaled_stimulus
 from hmpim.stimulus.section_v import FIG_4, section_v
 from hmpim.stimulus.spectrum import (
     OverFrequency,
@@ -69,6 +70,7 @@ __all__ = [
     "random_phase_multisine",
     "rest_to_rest",
     "scale_to_limits",
+    "scaled_stimulus",
     "schroeder_multisine",
     "section_v",
     "signal_to_noise",

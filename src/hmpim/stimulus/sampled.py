@@ -1,6 +1,6 @@
 """A motion known by its samples only, as a file for a player holds it."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -80,6 +80,15 @@ class SampledMotion(ByValue):
             velocity=float(np.abs(self.velocity).max()),
             acceleration=float(np.abs(self.acceleration).max()),
             jerk=float(jerk) if still else np.inf,
+        )
+
+    def scaled(self, factor: float) -> "SampledMotion":
+        """Return the same motion, `factor` times as large."""
+        return replace(
+            self,
+            position=factor * self.position,
+            velocity=factor * self.velocity,
+            acceleration=factor * self.acceleration,
         )
 
     def motion(self, time: FloatArray) -> Motion:

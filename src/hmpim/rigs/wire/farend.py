@@ -119,6 +119,7 @@ class FarEnd:
             return []  # of an earlier run, or of somebody else
         if datagram.kind is Kind.ARM:
             if self.state in (State.IDLE, State.AT_REST):
+                self._forget(session=self._session)  # commands count from 0 each time
                 self.state, self._homing = State.HOMING, None
         elif datagram.kind is Kind.COMMAND and datagram.command is not None:
             self._take(datagram.number, datagram.command, now=now)

@@ -1,0 +1,145 @@
+"""What a run records, on the disk as it comes: killed at any moment, it can be read."""
+
+import contextlib
+from collections.abc import Mapping, Sequence
+from os import PathLike
+from pathlib import Path
+
+from hmpim.errors import HmpimError
+from hmpim.experiment.log import Event, RunLog
+from hmpim.formats.atomic import check_writable
+from hmpim.formats.recording import RecordWriter, save_recording
+from hmpim.formats.saving import save
+from hmpim.record import Record
+from hmpim.rigs import Commands, Layout, LimitsOfAxes, Samples
+from hmpim.stimulus import Stimulus
+
+__all__ = ["Recorder"]
+
+_EVERY = 0.25  # s of the run between two writings: half of what a kill may cost
+_BYTES = 64  # of a sample of one channel: stamp and value, twice over while it is closed
+_GROWING = (".h5", ".hdf5")
+
+
+class Recorder:
+    """Keeps a run.
+
+    Parameters
+    ----------
+    path : path-like or None
+        File to write; one that ends in .h5 grows as samples come, any other is written at the
+        end. None keeps nothing.
+    rig : str
+        On what it is played.
+    limits : Limits, or mapping of axis to Limits, or None
+        What the rig bears.
+    stimuli : sequence of Stimulus
+        What is played.
+    commands : Commands
+        As many samples are to be expected.
+    log : RunLog
+        What happens; kept with the samples.
+
+    Raises
+    ------
+    ArgumentError
+        If the file cannot be written there, or the disk is too full for it.
+    """
+
+    def __init__(
+        self,
+        path: str | PathLike[str] | None,
+        *,
+        rig: str,
+        limits: LimitsOfAxes,
+        stimuli: Sequence[Stimulus],
+        commands: Commands,
+        log: RunLog,
+    ) -> None:
+        self._path = None if path is None else Path(path)
+        self._rig, self._limits, self._stimuli = rig, limits, tuple(stimuli)
+        self._commands, self._log = commands, log
+        self._writer: RecordWriter | None = None
+        self._waiting: dict[str, list[Samples]] = {}
+        self._next = 0.0
+        if self._path is not None:
+            channels = 2 * len(commands.axes)
+            check_writable(self._path, size=_BYTES * channels * len(commands))
+
+    @property
+    def grows(self) -> bool:
+        """Whether samples go to the disk as they come."""
+        return self._path is not None and self._path.suffix.lower() in _GROWING
+
+    def open(self, layout: Layout, *, band: tuple[float, float] | None) -> None:
+        """Lay out the file, before anything moves."""
+        if self._path is None or not self.grows:
+            return
+        self._writer = RecordWriter(
+            self._path,
+            layout,
+            fs=self._commands.fs,
+            samples=len(self._commands),
+            band=band,
+            stimuli=self._stimuli,
+            rig=self._rig,
+            limits=self._limits,
+        )
+        for event in self._log.events:
+            self._write_event(event)
+        self._log.follow(self._write_event)
+
+    def take(self, samples: Mapping[str, Samples], *, now: float) -> None:
+        """Take what has come in; write it if it is time to, `now` being the run's time in s."""
+        if self._writer is None:
+            return
+        for name, part in samples.items():
+            self._waiting.setdefault(name, []).append(part)
+        if now >= self._next:
+            self._next = now + _EVERY
+            self._flush()
+
+    def finish(self, record: Record) -> None:
+        """Keep the whole record, its stamps put right and its findings with it."""
+        if self._path is None:
+            return
+        self._log.follow(None)
+        if self._writer is not None:
+            self._flush()
+            self._writer.close()
+            lines = [str(event) for event in self._log.events]
+            save_recording(
+                record,
+                self._path,
+                stimuli=self._stimuli,
+                rig=self._rig,
+                limits=self._limits,
+                log=lines,
+            )
+            return
+        save(record, self._path)
+
+    def fail(self, reason: str) -> bool:
+        """Keep what there is, marked incomplete; say whether there is anything."""
+        self._log.follow(None)
+        if self._writer is None:
+            return False
+        writer, self._writer = self._writer, None
+        with contextlib.suppress(HmpimError):  # a full disk: what was written before is kept
+            self._flush_to(writer)
+        kept = writer.samples > 1
+        with contextlib.suppress(HmpimError):  # the file stays as it grew, and can be read
+            writer.close(ended=reason or "the run failed")
+        return kept
+
+    def _flush(self) -> None:
+        if self._writer is not None:
+            self._flush_to(self._writer)
+
+    def _flush_to(self, writer: RecordWriter) -> None:
+        waiting, self._waiting = self._waiting, {}
+        writer.append({name: Samples.joined(parts) for name, parts in waiting.items()})
+
+    def _write_event(self, event: Event) -> None:
+        if self._writer is not None:
+            self._writer.log(str(event))

@@ -1,0 +1,164 @@
+"""What a run keeps on the disk: all of it, as it comes, whatever ends the run."""
+
+import errno
+import shutil
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from hmpim.errors import ArgumentError, RecordError
+from hmpim.experiment import RunLog, run
+from hmpim.formats import load
+from hmpim.formats.recording import read_recording, writer
+from hmpim.identify import identify
+from hmpim.rigs import Sensor
+from hmpim.stimulus import Limits, design
+
+LIMITS = Limits(position=10, velocity=300, acceleration=5000, unit="deg")
+SWEEP = design(band=(0.2, 20), duration=6, fs=200, limits=LIMITS)
+SENSOR = Sensor(delay=0.05, natural_frequency=8.0, damping_ratio=0.5, noise_std=0.01)
+
+
+class Failing:
+    """The sensor, until it fails."""
+
+    name, axes, limits, moves = "failing", (), LIMITS, True
+
+    def __init__(self, fault=None, after=3.0, unit=SENSOR):
+        self.fault, self.after, self.unit, self.told = fault, after, unit, []
+
+    def __enter__(self):
+        self.unit.__enter__()
+        return self
+
+    def __exit__(self, *_):
+        self.told.append("exit")
+
+    def seed(self, rng):
+        self.unit.seed(rng)
+
+    def prepare(self, stimulus):
+        self.told.append("prepare")
+        return self.unit.prepare(stimulus)
+
+    def play(self, block):
+        if self.fault is not None and block.time[0] >= self.after:
+            raise self.fault
+        return self.unit.play(block)
+
+    def stop(self):
+        self.told.append("stop")
+
+
+def test_the_file_is_the_record_and_says_what_it_was_made_with(tmp_path):
+    log = RunLog()
+    record = run(SENSOR, SWEEP, path=tmp_path / "r.h5", limits=LIMITS, rng=1, log=log)
+    kept = read_recording(tmp_path / "r.h5")
+    assert kept.record == record
+    assert kept.complete
+    assert kept.stimuli == (SWEEP,)
+    assert kept.rig == "sensor"
+    assert kept.limits == {"": LIMITS}
+    assert kept.log == tuple(" ".join(str(event).split()) for event in log.events)
+    assert [line.split()[2] for line in kept.log] == ["check", "arm", "start", "done", "stop"]
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["r.h5"]
+
+
+def test_a_file_of_another_kind_is_written_at_the_end(tmp_path):
+    record = run(SENSOR, SWEEP, path=tmp_path / "r.csv", rng=1)
+    assert load(tmp_path / "r.csv").sha256 == record.sha256
+
+
+@pytest.mark.parametrize(
+    "fault", [OSError("cable"), KeyboardInterrupt(), SystemExit(143), ZeroDivisionError()]
+)
+def test_whatever_ends_the_run_keeps_what_there_was_and_it_is_identified(tmp_path, fault):
+    rig, log = Failing(fault), RunLog()
+    with pytest.raises(BaseException) as caught:  # noqa: PT011 - each kind in turn
+        run(rig, SWEEP, path=tmp_path / "r.h5", rng=1, log=log)
+    assert caught.value is fault or caught.value.__cause__ is fault
+    assert rig.told == ["prepare", "stop", "exit"]
+    kept = read_recording(tmp_path / "r.h5")
+    assert not kept.complete
+    (said,) = [f for f in kept.record.findings if f.code == "incomplete"]
+    assert f"ended early ({type(fault).__name__}" in said.message
+    whole = run(SENSOR, SWEEP, rng=1)
+    assert kept.record.samples == 600
+    assert np.array_equal(kept.record.outputs[0].values, whole.outputs[0].values[:600])
+    assert any(" fault " in line for line in kept.log)
+    assert any(" stop " in line for line in kept.log)
+    pair = identify(kept.record)["y", "u"]
+    for name, truth in (("delay", 0.05), ("natural_frequency", 8.0), ("damping_ratio", 0.5)):
+        found = getattr(pair.parameters, name)
+        assert abs(found.value - truth) < 4 * found.std
+
+
+def test_another_process_reads_all_but_the_last_quarter_second_while_it_runs(tmp_path):
+    seen = []
+
+    def look(played):
+        now = played.block.time[-1]
+        if now > 1.0 and played.block.stop % 52 == 0:
+            kept = read_recording(tmp_path / "r.h5")
+            assert not kept.complete
+            seen.append(now - kept.record.outputs[0].time[-1])
+
+    run(SENSOR, SWEEP, path=tmp_path / "r.h5", rng=1, subscribers=[look])
+    assert len(seen) > 10
+    assert 0.1 < max(seen) < 0.27  # somewhere between two writings
+
+
+def test_an_unwritable_folder_is_refused_before_anything_moves(tmp_path):
+    rig = Failing()
+    for path, words in (
+        (tmp_path / "no" / "r.h5", "does not exist"),
+        (tmp_path, "is a folder"),
+        ("/dev/full/r.h5", "does not exist"),
+        ("/proc/r.h5", "cannot be written"),
+    ):
+        with pytest.raises(ArgumentError, match=words):
+            run(rig, SWEEP, path=path)
+    assert rig.told == ["exit"] * 4
+
+
+@pytest.mark.parametrize("name", ["r.h5", "r.csv"])
+def test_a_full_disk_is_refused_before_anything_moves(tmp_path, monkeypatch, name):
+    rig = Failing()
+    usage = SimpleNamespace(total=1 << 30, used=1 << 30, free=20_000)
+    monkeypatch.setattr(shutil, "disk_usage", lambda _path: usage)
+    with pytest.raises(ArgumentError, match=r"is going to take .* MB and its disk has 0\.02 MB"):
+        run(rig, SWEEP, path=tmp_path / name)
+    assert "prepare" not in rig.told
+    assert not any(tmp_path.iterdir())
+
+
+def test_a_disk_that_fails_later_stops_the_rig_and_leaves_what_was_written(tmp_path, monkeypatch):
+    rig, put = Failing(), writer._put
+
+    def failing(file, place, data):
+        if ready.is_set:
+            raise OSError(errno.EIO, "Input/output error")
+        put(file, place, data)
+
+    ready = SimpleNamespace(is_set=False)
+    monkeypatch.setattr(writer, "_put", failing)
+
+    def later(played):
+        ready.is_set = played.block.time[-1] > 2.9
+
+    with pytest.raises(RecordError, match=r"takes no more samples .Input/output error.; what was"):
+        run(rig, SWEEP, path=tmp_path / "r.h5", rng=1, subscribers=[later])
+    assert rig.told == ["prepare", "stop", "exit"]
+    kept = read_recording(tmp_path / "r.h5")
+    assert not kept.complete
+    assert kept.record.outputs[0].time[-1] > 2.6
+
+
+def test_a_run_that_fails_at_once_leaves_the_file_before_it_alone(tmp_path):
+    run(SENSOR, SWEEP, path=tmp_path / "r.h5", rng=1)
+    before = (tmp_path / "r.h5").read_bytes()
+    with pytest.raises(KeyboardInterrupt):
+        run(Failing(KeyboardInterrupt(), after=0.0), SWEEP, path=tmp_path / "r.h5")
+    assert (tmp_path / "r.h5").read_bytes() == before
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["r.h5"]
