@@ -7,7 +7,11 @@ suite that holds a hundred of them. Nothing else decides a bound.
 """
 
 import os
+import shutil
+import subprocess
 from functools import cache
+from pathlib import Path
+from typing import NoReturn
 
 import numpy as np
 import pytest
@@ -34,6 +38,35 @@ def in_studies(*values) -> list:
 def designed_once(**wish) -> hmpim.Stimulus:
     """The stimulus of a wish, designed once per process: a stimulus is never changed."""
     return hmpim.design(**wish)
+
+
+def missing(name: str, what: str) -> NoReturn:
+    """Skip the test, or fail it where HMPIM_TESTS_MUST_RUN says that what is missing is there.
+
+    The variable holds names parted by commas; `.ci/run` sets it to what it has installed.
+    """
+    if name in os.environ.get("HMPIM_TESTS_MUST_RUN", "").split(","):
+        pytest.fail(f"{what} is not installed, and HMPIM_TESTS_MUST_RUN names {name}")
+    pytest.skip(f"{what} is not installed")
+
+
+def c_compiler() -> str:
+    """Path of the C compiler; the test is skipped where there is none."""
+    return shutil.which("cc") or missing("cc", "a C compiler (cc)")
+
+
+def run_octave(folder: Path) -> str:
+    """What `run.m` of a folder prints in GNU Octave; the test is skipped where there is none."""
+    if shutil.which("octave-cli") is None:
+        missing("octave", "GNU Octave")
+    done = subprocess.run(
+        ["octave-cli", "--quiet", "--no-history", "run.m"],
+        cwd=folder, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    if "control' package" in done.stderr or "package control" in done.stderr:
+        missing("octave", "the control package of GNU Octave")
+    assert done.returncode == 0, done.stderr
+    return done.stdout
 
 
 def fewest(trials: int, chance: float) -> int:

@@ -1,8 +1,6 @@
 """python-control, scipy.signal and MATLAB's function, run in their own tools."""
 
 import runpy
-import shutil
-import subprocess
 from dataclasses import replace
 
 import numpy as np
@@ -12,6 +10,7 @@ from hmpim.errors import ArgumentError
 from hmpim.formats.models import export
 from hmpim.formats.models.refined import pade_error
 from hmpim.model import Model, frequency_response
+from tests_support import run_octave
 
 from .conftest import FS, result_of
 
@@ -103,7 +102,6 @@ def test_control_has_the_exact_delay_as_data_and_pade_within_what_it_says(tmp_pa
         export(result_of(model), to="json", path=tmp_path / "m.json", pade=3)
 
 
-@pytest.mark.skipif(shutil.which("octave-cli") is None, reason="GNU Octave is not installed")
 def test_octave_simulates_what_the_model_says(tmp_path):
     np.savetxt(tmp_path / "u.txt", np.stack([T, waves()], axis=1), fmt="%.17g")
     lines = ["data = load('u.txt');"]
@@ -120,14 +118,7 @@ def test_octave_simulates_what_the_model_says(tmp_path):
                 "m.parameters.delay.std, m.sha256);",
             ]
     (tmp_path / "run.m").write_text("\n".join(lines) + "\n")
-    done = subprocess.run(
-        ["octave-cli", "--quiet", "--no-history", "run.m"],
-        cwd=tmp_path, capture_output=True, text=True, check=False,
-    )  # fmt: skip
-    if "control' package" in done.stderr or "package control" in done.stderr:
-        pytest.skip("the control package of GNU Octave is not installed")
-    assert done.returncode == 0, done.stderr
-    said = {line.split()[0]: line.split()[1:] for line in done.stdout.splitlines()}
+    said = {line.split()[0]: line.split()[1:] for line in run_octave(tmp_path).splitlines()}
     for case, model in cases.items():
         found = np.loadtxt(tmp_path / f"{case}.txt")
         truth = model.simulate(waves(), T)

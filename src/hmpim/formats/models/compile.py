@@ -43,14 +43,19 @@ def compile_library(sources: list[Path], library: Path, platform: Platform) -> N
     FormatError
         If the compiler refuses; its first lines are in the message.
     """
-    math = [] if platform.suffix == ".dll" else ["-lm"]
+    own = {
+        ".so": ["-lm"],
+        ".dll": [],
+        # Without a name of its own the library would hold the folder in which it was compiled.
+        ".dylib": ["-lm", f"-Wl,-install_name,@rpath/{library.name}"],
+    }
     done = subprocess.run(
         [
             *(sys.executable, "-m", "ziglang", "cc", "-target", platform.target),
             *("-std=c99", "-Wall", "-Wextra", "-Werror", "-O2", "-s", "-fPIC", "-shared"),
             *("-fvisibility=hidden", "-o", str(library)),
             *(str(source) for source in sources),
-            *math,
+            *own[platform.suffix],
         ],
         capture_output=True,
         text=True,
