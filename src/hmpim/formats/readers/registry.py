@@ -9,6 +9,7 @@ from pathlib import Path
 from hmpim.errors import FormatError
 from hmpim.formats.readers import excel, record_file, text
 from hmpim.formats.readers.protocol import Reader
+from hmpim.formats.readers.worker import addressed, shielded
 
 __all__ = ["BUILT_IN", "GROUP", "HEAD", "BrokenReader", "Found", "reader_for", "readers"]
 
@@ -73,16 +74,29 @@ def readers() -> Found:
             reason = " ".join(f"{type(error).__name__}: {error}".split())
             broken.append(BrokenReader(name=name, reason=reason))
             continue
-        if isinstance(reader, Reader):
-            usable.append(reader)
-        else:
-            reason = f"it is a {type(reader).__name__}, not an hmpim.formats.readers.Reader"
+        reason = _unusable(reader)
+        if reason:
             broken.append(BrokenReader(name=name, reason=reason))
+        else:
+            usable.append(reader)
     return Found(usable=(*usable, *BUILT_IN), broken=tuple(broken))
 
 
+def _unusable(reader: object) -> str:
+    """Why what an entry point leads to is no reader; empty if it is one."""
+    if not isinstance(reader, Reader):
+        return f"it is a {type(reader).__name__}, not an hmpim.formats.readers.Reader"
+    if reader.foreign:
+        try:
+            addressed(reader.channels)
+            addressed(reader.read)
+        except FormatError as error:
+            return str(error)
+    return ""
+
+
 def reader_for(path: Path) -> Reader:
-    """Return the reader whose format a file is in.
+    """Return the reader whose format a file is in; a foreign one works in a process apart.
 
     Raises
     ------
@@ -104,7 +118,7 @@ def reader_for(path: Path) -> Reader:
     for reader in found.usable:
         try:
             if reader.sniff(head, path):
-                return reader
+                return shielded(reader)
         except Exception as error:  # code of others
             reason = f"{type(error).__name__} while looking at the file: {error}"
             failed.append(BrokenReader(name=reader.format, reason=reason))
