@@ -125,7 +125,7 @@ def test_holdout_fits_the_first_part_and_scores_the_rest(good, tmp_path):
 
 
 def test_gain_and_phase_at_chosen_frequencies(good):
-    done = run("identify", good, *NAMED, "--at", "0.5", "--at", "900")
+    done = run("identify", good, *NAMED, "--at", "0.5", "--at", "45")
     assert done.exit_code == 0, done.stderr
     near, far = (line for line in done.stdout.splitlines() if line.startswith("y from u at"))
     found = re.search(r"measured ([-\d.]+) ± \S+ dB, ([-\d.]+) ± \S+°; the model ([-\d.]+)", near)
@@ -135,6 +135,8 @@ def test_gain_and_phase_at_chosen_frequencies(good):
     assert "not measured there; the model" in far
     done = run("identify", good, *NAMED, "--at", "-3")
     check_refusal(done.exit_code, done.stdout, done.stderr, "-3 Hz is not positive")
+    done = run("identify", good, *NAMED, "--at", "900")
+    check_refusal(done.exit_code, done.stdout, done.stderr, "beyond the Nyquist frequency 50 Hz")
 
 
 def test_a_failure_while_writing_leaves_the_old_file(good, tmp_path, monkeypatch):

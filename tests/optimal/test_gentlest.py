@@ -282,7 +282,7 @@ def test_too_short_a_record_is_refused():
 @pytest.mark.parametrize(
     ("more", "message"),
     [
-        ({"families": ("banjo",)}, "family 'banjo' is not known"),
+        ({"families": ("banjo",)}, "is not a list of 'sweep', 'exponential', 'multisine'"),
         ({"families": ()}, "no family is given"),
         ({"duration": -1.0}, "duration = -1.0 s must be"),
     ],

@@ -101,9 +101,9 @@ def test_failures_are_told_with_their_place(rig, words):
 @pytest.mark.parametrize(
     ("wrong", "words"),
     [
-        ({"function": 3}, "function = 3 cannot be called"),
-        ({"function": abs, "mode": "block"}, "mode = 'block' is not known"),
-        ({"function": abs, "measures": "jerk"}, "measures = 'jerk' is not known"),
+        ({"function": 3}, "function = 3 is not a function"),
+        ({"function": abs, "mode": "block"}, "mode = 'block' is not one of 'array', 'sample'"),
+        ({"function": abs, "measures": "jerk"}, "measures = 'jerk' is not one of 'position'"),
     ],
 )
 def test_what_cannot_be_is_refused(wrong, words):

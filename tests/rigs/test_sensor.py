@@ -333,7 +333,7 @@ def test_the_record_says_what_was_done():
     [
         ({"delay": -0.1}, "delay = -0.1 is out of range; it must be at least 0"),
         ({"delay": math.nan}, "delay = nan is not a finite number"),
-        ({"delay": "fast"}, "delay = 'fast' is not a finite number"),
+        ({"delay": "fast"}, "delay = 'fast' is not a number"),
         ({"scale_factor": math.inf}, "scale_factor = inf"),
         ({"noise_std": -1}, "noise_std = -1 is out of range"),
         ({"noise_colour": 1.0}, "noise_colour = 1.0 makes noise that grows"),
@@ -346,8 +346,8 @@ def test_the_record_says_what_was_done():
             "two kinds of dynamics",
         ),
         ({"saturation_low": 1, "saturation_high": 1}, "saturation_low = 1 is not below"),
-        ({"measures": "jerk"}, "measures = 'jerk' is not known"),
-        ({"command": "spline"}, "command = 'spline' is not known"),
+        ({"measures": "jerk"}, "measures = 'jerk' is not one of 'position'"),
+        ({"command": "spline"}, "command = 'spline' is not one of 'continuous'"),
     ],
 )
 def test_what_cannot_be_is_refused(wrong, words):

@@ -59,8 +59,6 @@ def check_files(
                     "way; name another file"
                 )
     for option, path in written:
-        if not any(path.parent.resolve() == folder.resolve() for _, folder in made):
-            _check_file(option, path)
         for what, source in read:
             if _same(path, source):
                 raise ArgumentError(
@@ -72,6 +70,9 @@ def check_files(
                 f"{option} {path} and {other} {second} are one file, and one of the two would be "
                 "lost; name another"
             )
+    for option, path in written:
+        if not any(path.parent.resolve() == folder.resolve() for _, folder in made):
+            _check_file(option, path)
 
 
 def _each(named: Mapping[str, Paths] | None) -> Iterator[tuple[str, Path]]:
@@ -90,6 +91,10 @@ def _check_file(option: str, path: Path) -> None:
     if not path.parent.is_dir():
         raise ArgumentError(f"{option}: {path.parent} is a file, not a folder; name another folder")
     try:
+        if option == "--report":
+            from hmpim.report import check_page
+
+            check_page(path)
         check_writable(path)
     except ArgumentError as error:
         raise ArgumentError(f"{option}: {error}") from None

@@ -1,6 +1,6 @@
 """``hmpim identify``: a measured record in, a table, a JSON file and a page out."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -115,7 +115,11 @@ def identify(
     if holdout is not None and not 0.0 < holdout < 1.0:
         raise ArgumentError(f"--holdout {holdout:g} is not a share between 0 and 1; give 0.5, say")
 
+    single = {"--report": report, "--holdout": holdout, "--at": at or None}
+    _check_single(len(records), single)
+
     from hmpim.identify import identify as find
+    from hmpim.identify import measurable
     from hmpim.report import print_result
 
     given = read_records(
@@ -137,17 +141,13 @@ def identify(
         every=sweep == "all",
     )
     if len(given) > 1:
-        for option, wanted in (("--report", report), ("--holdout", holdout), ("--at", at or None)):
-            if wanted is not None:
-                raise ArgumentError(
-                    f"{option} is about one record, and {len(given)} are given; leave it out, or "
-                    "give one"
-                )
+        _check_single(len(given), single)
         identify_several(
             given, _named(records, given), intersample=intersample.value, json=json, quiet=quiet
         )
         return
     (data,) = given
+    measurable(at or [], data.fs)
     part, split = (data, None) if holdout is None else _first_part(data, holdout)
     with working("Identifying"):
         result = find(part, intersample=intersample.value)
@@ -158,6 +158,15 @@ def identify(
         for note in notes:
             say(note)
     write_result(result, json=json, report=report, notes=notes)
+
+
+def _check_single(count: int, options: Mapping[str, object]) -> None:
+    """Refuse options that are about one record where there are several."""
+    for option, wanted in options.items():
+        if count > 1 and wanted is not None:
+            raise ArgumentError(
+                f"{option} is about one record, and {count} are given; leave it out, or give one"
+            )
 
 
 def write_result(

@@ -5,6 +5,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from hmpim.arguments import shown
 from hmpim.errors import ArgumentError, LimitsError
 from hmpim.experiment.log import RunLog
 from hmpim.rigs import LimitsOfAxes, Rig
@@ -35,8 +36,8 @@ def check_rig(rig: object) -> Rig:
     wanted = ("name", "axes", "limits", "prepare", "play", "stop", "__enter__", "__exit__")
     missing = [name for name in wanted if not hasattr(rig, name)]
     raise ArgumentError(
-        f"{rig!r} is no rig: it has no {', '.join(missing) or 'instance'}; see hmpim.rigs.Rig, "
-        "and make a plain function one with FunctionRig(function=...)"
+        f"{shown(rig)} is no rig: it has no {', '.join(missing) or 'instance'}; see "
+        "hmpim.rigs.Rig, and make a plain function one with FunctionRig(function=...)"
     )
 
 

@@ -5,6 +5,7 @@ from os import PathLike
 
 import numpy as np
 
+from hmpim.arguments import check_argument, generator, shown
 from hmpim.errors import ArgumentError
 from hmpim.experiment.checks import check_rig
 from hmpim.experiment.interrupt import ending_politely
@@ -85,8 +86,17 @@ def run(
     """
     unit = check_rig(rig)
     given = _mapped(stimulus)
+    for name, value, hint in (
+        ("path", path, str | PathLike[str] | None),
+        ("limits", limits, LimitsOfAxes),
+        ("subscribers", subscribers, Sequence[Subscriber]),
+        ("until", until, Until | None),
+        ("log", log, RunLog | None),
+        ("options", options, RunOptions | None),
+    ):
+        check_argument(name, value, hint)
     if isinstance(unit, Seeded):
-        unit.seed(np.random.default_rng(rng))
+        unit.seed(generator(rng))
     running = Running(
         rig=unit,
         given=given,
@@ -108,7 +118,7 @@ def _mapped(
         return stimulus
     if not isinstance(stimulus, Sequence) or not all(isinstance(s, Stimulus) for s in stimulus):
         raise ArgumentError(
-            f"{stimulus!r} is no Stimulus; make one with design(...) or Stimulus(waveform=...)"
+            f"{shown(stimulus)} is no Stimulus; make one with design(...) or Stimulus(waveform=...)"
         )
     axes = [s.axis for s in stimulus]
     if len(set(axes)) < len(axes) or (len(axes) > 1 and not all(axes)):

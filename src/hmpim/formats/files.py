@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from hmpim.arguments import checked
 from hmpim.errors import ArgumentError, RecordError
 from hmpim.formats.assemble import assemble, check_units, cut_runs
 from hmpim.formats.options import ReadOptions
@@ -19,6 +20,7 @@ from hmpim.record.sweeps import cut_alike
 __all__ = ["read", "read_sweeps"]
 
 
+@checked
 def read(
     path: str | PathLike[str],
     *,

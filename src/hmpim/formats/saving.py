@@ -11,6 +11,7 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
+from hmpim.arguments import checked
 from hmpim.errors import ArgumentError, FormatError
 from hmpim.formats.atomic import write_text
 from hmpim.formats.csv import write_csv
@@ -29,6 +30,7 @@ Saved = Record | Stimulus | Identification
 """What can be saved."""
 
 
+@checked
 def save(thing: Saved, path: str | PathLike[str]) -> None:
     """Write a record, a stimulus or a result to a file, so that `load` gives it back.
 
@@ -81,6 +83,7 @@ def suffixes_of(kind: type) -> tuple[str, ...]:
     return next((known.suffixes for known in _KINDS if known.type is kind), ())
 
 
+@checked
 def load(path: str | PathLike[str]) -> Saved:
     """Read back what `save` wrote.
 

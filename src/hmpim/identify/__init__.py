@@ -4,7 +4,7 @@ from hmpim.identify.compare import Change, compare
 from hmpim.identify.frf.averaged import Averaged, averaged_response, coherence_significance
 from hmpim.identify.frf.local import local_polynomial_response, local_response
 from hmpim.identify.frf.multivariable import ResponseMatrix, response_matrix
-from hmpim.identify.gain_phase import GainPhase, gain_and_phase
+from hmpim.identify.gain_phase import GainPhase, gain_and_phase, measurable
 from hmpim.identify.identify import identify
 from hmpim.identify.levels import (
     Level,
@@ -89,6 +89,7 @@ __all__ = [
     "identify_repeats",
     "local_polynomial_response",
     "local_response",
+    "measurable",
     "paper_analysis",
     "predict",
     "response_matrix",

@@ -5,6 +5,7 @@ from dataclasses import dataclass, fields
 
 from scipy.special import ndtri
 
+from hmpim.arguments import checked
 from hmpim.errors import RecordError
 from hmpim.identify.result import Estimate, Identification, Parameters
 
@@ -44,6 +45,7 @@ class Change:
         return abs(self.deviations) > self.limit
 
 
+@checked
 def compare(new: Identification, old: Identification) -> tuple[Change, ...]:
     """Hold every parameter that both results tell against its older self.
 

@@ -6,13 +6,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from hmpim.arguments import numbers_of
 from hmpim.errors import ArgumentError
 from hmpim.identify.bandwidth import ratio_at
 from hmpim.identify.result import Estimate, PairIdentification
 from hmpim.identify.uncertainty import estimate
 from hmpim.model import RationalDelay, phase, response
 
-__all__ = ["GainPhase", "gain_and_phase"]
+__all__ = ["GainPhase", "gain_and_phase", "measurable"]
 
 _MANY = 1e6
 """Degrees of freedom behind the error bars, in effect."""
@@ -65,7 +66,8 @@ def gain_and_phase(
     Raises
     ------
     ArgumentError
-        For a frequency that is not positive, or a pair that was not identifiable.
+        For a frequency that is not positive or beyond half the rate, or a pair that was not
+        identifiable.
 
     Notes
     -----
@@ -85,10 +87,7 @@ def gain_and_phase(
     >>> round(at.phase.value), round(at.model_phase.value), round(at.model_gain_db.value, 1)
     (-90, -90, 6.0)
     """
-    places = np.atleast_1d(np.asarray(frequency, dtype=np.float64))
-    wrong = places[~(np.isfinite(places) & (places > 0))]
-    if wrong.size:
-        raise ArgumentError(f"frequency {wrong[0]:g} Hz is not positive; give frequencies above 0")
+    places = measurable(frequency, fs)
     p = pair.parameters
     if p.delay is None or p.scale_factor is None or pair.covariance is None:
         raise ArgumentError(
@@ -108,6 +107,32 @@ def gain_and_phase(
         )
 
     return tuple(_at(pair, float(f), system, vector, pair.covariance, fs) for f in places)
+
+
+def measurable(frequency: ArrayLike, fs: float) -> NDArray[np.float64]:
+    """Return frequencies in Hz, shape (m,), if a record of rate `fs` can tell of them.
+
+    Raises
+    ------
+    ArgumentError
+        If one is not positive, or beyond half the rate.
+
+    Examples
+    --------
+    >>> measurable(120.0, 200.0)
+    Traceback (most recent call last):
+    hmpim.errors.ArgumentError: frequency 120 Hz is beyond the Nyquist frequency 100 Hz of ...
+    """
+    places = np.atleast_1d(numbers_of("frequency", frequency))
+    low, high = places[places <= 0], places[places > 0.5 * fs]
+    if low.size:
+        raise ArgumentError(f"frequency {low[0]:g} Hz is not positive; give frequencies above 0")
+    if high.size:
+        raise ArgumentError(
+            f"frequency {high[0]:g} Hz is beyond the Nyquist frequency {0.5 * fs:g} Hz of the "
+            f"record, which says nothing there; ask at {0.5 * fs:g} Hz or below"
+        )
+    return places
 
 
 def _at(

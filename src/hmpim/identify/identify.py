@@ -7,6 +7,7 @@ from typing import cast, get_args
 import numpy as np
 from numpy.typing import NDArray
 
+from hmpim.arguments import checked
 from hmpim.errors import ArgumentError, RecordError
 from hmpim.identify.coupling.coupled import inputs_of, responses_of, settled, unrelated
 from hmpim.identify.coupling.several import Joined, fit_together
@@ -44,6 +45,7 @@ _BETTER = 0.7
 """Share of the noise's power under a drift below which a clipped level is taken instead."""
 
 
+@checked
 def identify(
     record: Record,
     *,

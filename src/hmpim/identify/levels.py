@@ -12,6 +12,7 @@ from typing import get_args
 import numpy as np
 from scipy.stats import chi2
 
+from hmpim.arguments import checked
 from hmpim.errors import ArgumentError, RecordError
 from hmpim.identify.identify import identify
 from hmpim.identify.result import Estimate, Identification, PairIdentification, Parameters
@@ -135,6 +136,7 @@ class Levels:
         return len(self.comparisons)
 
 
+@checked
 def identify_levels(
     records: Sequence[Record],
     *,

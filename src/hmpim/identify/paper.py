@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import fft
 
+from hmpim.arguments import checked
 from hmpim.errors import ArgumentError, RecordError
 from hmpim.identify import response as reading
 from hmpim.identify.correlation import (
@@ -114,6 +115,7 @@ class _FrequencySteps:
     phase_without_delay: NDArray[np.float64]
 
 
+@checked
 def paper_analysis(
     u: ArrayLike,
     y: ArrayLike,

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from hmpim.arguments import checked
 from hmpim.errors import RecordError
 from hmpim.identify.result import Estimate, PairIdentification
 from hmpim.model import Model, Spread, simulate, slowest_time_constant
@@ -35,6 +36,7 @@ class Prediction:
     fit_percent: float
 
 
+@checked
 def to_model(pair: PairIdentification, *, fs: float | None = None) -> Model:
     """Model that simulates what was identified, the whole sensor chain and its errors included.
 
@@ -101,6 +103,7 @@ def _spread(pair: PairIdentification) -> Spread | None:
     return Spread(covariance=tuple(tuple(row) for row in pair.covariance.tolist()), **stds)
 
 
+@checked
 def predict(pair: PairIdentification, record: Record, *, start: float | None = None) -> Prediction:
     """Simulate the identified model on a record and score it.
 

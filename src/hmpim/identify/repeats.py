@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from scipy.stats import chi2
 from scipy.stats import f as fisher
 
+from hmpim.arguments import checked
 from hmpim.errors import RecordError
 from hmpim.identify.groups import EVERY, MODELLED, PHASE_SPLIT
 from hmpim.identify.identify import identify
@@ -188,6 +189,7 @@ class Repeats:
         }
 
 
+@checked
 def identify_repeats(
     records: Sequence[Record],
     *,

@@ -25,6 +25,8 @@ def as_signal(name: str, values: ArrayLike) -> NDArray[np.float64]:
     >>> as_signal("u", [0, 1, 2, 3])
     array([0., 1., 2., 3.])
     """
+    if np.iscomplexobj(values):
+        raise RecordError(f"{name} is complex; give real numbers, the real part for instance")
     try:
         array = np.asarray(values, dtype=np.float64)
     except (TypeError, ValueError) as error:

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from scipy.fft import rfft
 from scipy.special import chdtrc, chdtri, ndtr
 
+from hmpim.arguments import checked
 from hmpim.errors import ArgumentError, RecordError
 from hmpim.identify.effects.hold import Hold, detect_hold, updates
 from hmpim.identify.predict import to_model
@@ -171,6 +172,7 @@ class Validation:
         }
 
 
+@checked
 def validate(result: Identification, record: Record, *, bounds: Bounds | None = None) -> Validation:
     """Hold a result against a record: what it predicts, against what was measured.
 

@@ -1,6 +1,5 @@
 """Windows that taper a record's ends before its transform (paper, equations 15-16, Fig. 14)."""
 
-import math
 from typing import Literal, get_args
 
 import numpy as np
@@ -27,6 +26,8 @@ WindowName = Literal[
     "tukey",
 ]
 """The Gaussian of equation (15), and the others of the kind that Fig. 14 compares."""
+
+_NARROWEST = 1e100  # of a window: its square is still a number
 
 
 def gaussian_window(samples: int, alpha: float = 1.5) -> NDArray[np.float64]:
@@ -58,7 +59,7 @@ def gaussian_window(samples: int, alpha: float = 1.5) -> NDArray[np.float64]:
     array([0.325, 0.755, 1.   , 0.755, 0.325])
     """
     _check_samples(samples)
-    if not (math.isfinite(alpha) and alpha > 0):
+    if not 0 < alpha <= _NARROWEST:
         raise ArgumentError(f"alpha is {alpha}; give a positive number, 1.5 in the paper")
     half = (samples - 1) / 2
     n = np.arange(samples) - half

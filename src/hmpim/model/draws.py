@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from hmpim.arguments import checked, generator
 from hmpim.errors import ArgumentError
 from hmpim.model.model import Model, frequency_response
 
@@ -77,6 +78,7 @@ def response_error(model: Model, frequency: NDArray[np.float64]) -> NDArray[np.f
     return np.asarray(size * np.sqrt(np.maximum(variance, 0.0)))
 
 
+@checked
 def draw_models(
     model: Model, count: int, *, rng: np.random.Generator | int | None = None
 ) -> tuple[Model, ...]:
@@ -122,7 +124,7 @@ def draw_models(
         )
     if count < 0:
         raise ArgumentError(f"count = {count!r} models cannot be drawn; give 0 or more")
-    source = np.random.default_rng(rng)
+    source = generator(rng)
     mean, covariance = coefficient_vector(model), np.array(spread.covariance)
     if covariance.shape != (mean.size, mean.size):
         raise ArgumentError(

@@ -7,6 +7,7 @@ from typing import get_args
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from hmpim.arguments import checked, generator, numbers_of
 from hmpim.errors import ArgumentError
 from hmpim.model.chain import Chain, Readout, chain_of, run_chain
 from hmpim.model.response import RationalDelay, response
@@ -17,6 +18,7 @@ from hmpim.record import Intersample
 __all__ = ["Model", "frequency_response", "simulate"]
 
 
+@checked
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Model:
     """Delay, dynamics, scale factor and bias between one input and one output (Fig. 1).
@@ -80,6 +82,13 @@ class Model:
     spread: Spread | None = None
 
     def __post_init__(self) -> None:
+        for name in ("numerator", "denominator"):
+            coefficients = tuple(numbers_of(name, getattr(self, name)).tolist())
+            if not coefficients:
+                raise ArgumentError(f"{name} is empty; give its coefficients, such as (1.0,)")
+            object.__setattr__(self, name, coefficients)
+        for name in ("delay", "scale_factor", "bias", "noise_std", "hold_phase"):
+            numbers_of(name, getattr(self, name))
         _check_readout(self)
         if not any(self.denominator[-2:]):
             raise ArgumentError(
@@ -188,7 +197,7 @@ class Model:
                 model, delay=self.delay + lead / fs, hold_phase=model.hold_phase + lead / fs
             )
         chain = model.at_rate(fs, intersample=intersample)
-        noise = None if rng is None else np.random.default_rng(rng)
+        noise = None if rng is None else generator(rng)
         return run_chain(chain, values, rng=noise)[lead:]
 
 
@@ -237,6 +246,7 @@ def _check_readout(model: Model) -> None:
         )
 
 
+@checked
 def frequency_response(model: Model, frequency: NDArray[np.float64]) -> NDArray[np.complex128]:
     """Complex response at `frequency` in Hz, shape (m,), delay and scale factor included.
 
@@ -246,16 +256,17 @@ def frequency_response(model: Model, frequency: NDArray[np.float64]) -> NDArray[
     >>> frequency_response(model, np.array([1.0])).tolist()
     [(2+0j)]
     """
-    return response(model.system, frequency)
+    return response(model.system, numbers_of("frequency", frequency))
 
 
+@checked
 def simulate(
     model: Model,
     u: NDArray[np.float64],
     *,
     fs: float,
     intersample: Intersample,
-    rng: np.random.Generator | None = None,
+    rng: np.random.Generator | int | None = None,
 ) -> NDArray[np.float64]:
     """Output of the linear part for a sampled input, which stood at u[0] before.
 
@@ -272,7 +283,7 @@ def simulate(
         Rate in Hz.
     intersample : {'zoh', 'foh', 'bandlimited'}
         What the input does between its samples.
-    rng : numpy.random.Generator, optional
+    rng : numpy.random.Generator or int, optional
         Adds measurement noise drawn from it; none is added by default.
 
     Returns
@@ -285,8 +296,13 @@ def simulate(
     >>> simulate(model, np.array([0.0, 1.0, 1.0, 1.0]), fs=100.0, intersample="zoh").tolist()
     [1.0, 1.0, 1.0, 3.0]
     """
+    if not (np.isfinite(fs) and fs > 0):
+        raise ArgumentError(f"fs = {fs:g} Hz is no sampling rate; give a positive number of Hz")
+    samples = np.atleast_1d(numbers_of("u", u))
+    if samples.size < 2:
+        raise ArgumentError(f"u has {samples.size} samples; give two or more")
     system = model.system
-    source = prepare_input(np.asarray(u, dtype=np.float64), intersample)
+    source = prepare_input(samples, intersample)
     powers = system.numerator.size
     rows = delayed_response(
         source,
@@ -300,5 +316,5 @@ def simulate(
         level = level * np.maximum(np.arange(source.samples) / fs - system.delay, 0.0)
     y = weights @ rows + level + model.bias
     if rng is not None:
-        y = y + model.noise_std * rng.standard_normal(y.size)
+        y = y + model.noise_std * generator(rng).standard_normal(y.size)
     return np.asarray(y)

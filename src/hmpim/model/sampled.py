@@ -257,7 +257,9 @@ def delayed_response(
     n = denominator.size - 1
     begin = factor * MARGIN - whole  # where in the filtered coefficients the record begins
     stop = begin + factor * source.samples
-    c = source.coefficients[: max(stop, 0)]
+    if stop <= 0:  # delayed beyond the record's end
+        return np.zeros((powers, source.samples))
+    c = source.coefficients[:stop]
     if stop > source.coefficients.size:
         c = np.concatenate([c, np.full(stop - source.coefficients.size, c[-1])])
 

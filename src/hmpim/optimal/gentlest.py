@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import get_args
 
+from hmpim.arguments import checked
 from hmpim.errors import ArgumentError, LimitsError
 from hmpim.optimal.candidate import Candidate, gentleness
 from hmpim.optimal.fisher import Errors, predict_errors
@@ -79,6 +80,7 @@ class TradePoint:
     value: float | None
 
 
+@checked
 def gentlest(
     *,
     accuracy: Accuracy,

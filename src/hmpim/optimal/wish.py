@@ -8,6 +8,7 @@ from typing import Literal
 
 import numpy as np
 
+from hmpim.arguments import checked, size_of
 from hmpim.errors import ArgumentError
 from hmpim.model import Model
 from hmpim.stimulus import Limits
@@ -46,6 +47,7 @@ def _positive(name: str, value: float, unit: str = "") -> None:
         raise ArgumentError(f"{name} = {shown} must be a positive, finite number")
 
 
+@checked
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RoughModel:
     """What is roughly known of the unit: delay, second-order dynamics, scale factor.
@@ -126,6 +128,7 @@ class RoughModel:
         )
 
 
+@checked
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Accuracy:
     """Errors that are wanted at 95 %: the half width of each interval; None for any.
@@ -202,6 +205,7 @@ class Accuracy:
         )
 
 
+@checked
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ModelRange:
     """Where the unit's parameters may lie; None where the rough model is good enough.
@@ -306,6 +310,7 @@ class Wish:
         _positive("noise_std", self.noise_std)
         _positive("fs", self.fs, "Hz")
         _positive("duration", self.duration, "s")
+        size_of(self.duration, self.fs)
         if self.gentle not in ("peak_acceleration", "rms_acceleration", "travel", "duration"):
             raise ArgumentError(
                 f"gentle = {self.gentle!r} is not known; use 'peak_acceleration', "

@@ -8,6 +8,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from hmpim.arguments import checked, shown
 from hmpim.equality import ByValue
 from hmpim.errors import ArgumentError, RecordError
 from hmpim.record.clock import fit_clock
@@ -42,6 +43,7 @@ def _frozen(name: str, values: ArrayLike) -> NDArray[np.float64]:
     return array
 
 
+@checked
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Channel(ByValue):
     """One measured signal on its own clock.
@@ -104,6 +106,7 @@ class Channel(ByValue):
             )
 
 
+@checked
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Record(ByValue):
     """Inputs and outputs of one test, time-stamped.
@@ -145,20 +148,25 @@ class Record(ByValue):
     auxiliary: tuple[Channel, ...] = ()
 
     def __post_init__(self) -> None:
-        if not self.inputs or not self.outputs:
+        if not len(self.inputs) or not len(self.outputs):
             raise RecordError(
                 f"a record needs at least one input and one output; "
                 f"this one has {len(self.inputs)} and {len(self.outputs)}"
             )
+        for role in ("inputs", "outputs", "references", "auxiliary", "findings"):
+            object.__setattr__(self, role, tuple(getattr(self, role)))
         names = [c.name for c in self.channels]
         _check_unique(names)
         _check_rate(self.fs)
+        if self.band is not None:
+            object.__setattr__(self, "band", _rising(self.band))
 
     @classmethod
+    @checked
     def from_arrays(
         cls,
-        inputs: Mapping[str, ArrayLike],
-        outputs: Mapping[str, ArrayLike],
+        inputs: Mapping[str, ArrayLike] | ArrayLike,
+        outputs: Mapping[str, ArrayLike] | ArrayLike,
         *,
         fs: float | None = None,
         time: ArrayLike | None = None,
@@ -173,7 +181,8 @@ class Record(ByValue):
         Parameters
         ----------
         inputs, outputs : mapping of str to array_like, shape (n,)
-            Samples by channel name. What a masked array hides is left out of that channel.
+            Samples by channel name; one array alone is called u, or y. What a masked array hides
+            is left out of that channel.
         fs : float, optional
             Sampling rate in Hz. Give this or `time`.
         time : array_like, shape (n,), optional
@@ -208,7 +217,7 @@ class Record(ByValue):
             raise ArgumentError("neither fs nor time is given; one of them is needed")
         if fs is not None:
             _check_rate(fs)
-        given = (inputs, outputs, references or {}, auxiliary or {})
+        given = (_by_name("u", inputs), _by_name("y", outputs), references or {}, auxiliary or {})
         _check_unique([name for part in given for name in part])
         named = {name: values for part in given for name, values in part.items()}
         lengths = {name: _frozen(name, values).size for name, values in named.items()}
@@ -287,6 +296,7 @@ class Record(ByValue):
         }
         return by_role[role]
 
+    @checked
     def channel(self, name: str) -> Channel:
         """Return the channel called `name`.
 
@@ -301,6 +311,7 @@ class Record(ByValue):
         known = ", ".join(c.name for c in self.channels)
         raise RecordError(f"there is no channel {name!r}; the record has {known}")
 
+    @checked
     def between(self, start: float, stop: float) -> "Record":
         """Return the part with start <= time < stop, in seconds of the record's own clock.
 
@@ -371,6 +382,30 @@ def _hidden(values: ArrayLike) -> NDArray[np.bool_] | None:
     if not isinstance(values, np.ma.MaskedArray) or not np.ma.is_masked(values):
         return None
     return np.ma.getmaskarray(values)
+
+
+def _by_name(name: str, given: Mapping[str, ArrayLike] | ArrayLike) -> Mapping[str, ArrayLike]:
+    """Samples by channel name; one channel alone is called `name`."""
+    if isinstance(given, Mapping):
+        for key in given:
+            if not isinstance(key, str):
+                raise ArgumentError(f"{shown(key)} names a channel and is not a text; write 'u'")
+        return given
+    if given is None or isinstance(given, (str, bytes)) or np.ndim(given) == 0:
+        raise ArgumentError(
+            f"{shown(given)} is no channel; give samples by name, such as {{{name!r}: [0.0, 1.0]}}"
+        )
+    return {name: given}
+
+
+def _rising(band: tuple[float, float]) -> tuple[float, float]:
+    low, high = map(float, band)
+    if not 0.0 <= low <= high < np.inf:  # one line alone is a band, too
+        raise ArgumentError(
+            f"band = ({low:g}, {high:g}) Hz is no band; give the lower frequency first, such as "
+            "(0.1, 20)"
+        )
+    return low, high
 
 
 def _check_unique(names: Sequence[str]) -> None:

@@ -1,6 +1,6 @@
 """Reports: one HTML page for a browser, one table for a terminal."""
 
-from hmpim.report.html import render, report
+from hmpim.report.html import check_page, render, report
 from hmpim.report.numbers import (
     format_estimate,
     format_interval,
@@ -12,6 +12,7 @@ from hmpim.report.repeats_text import print_levels, print_repeats, repeats_table
 from hmpim.report.text import parameter_table, print_result
 
 __all__ = [
+    "check_page",
     "format_estimate",
     "format_interval",
     "format_number",

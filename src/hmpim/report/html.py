@@ -4,9 +4,12 @@ from collections.abc import Sequence
 from datetime import UTC, datetime
 from importlib.metadata import version
 from os import PathLike
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
-from hmpim.formats.atomic import write_text
+from hmpim.arguments import checked
+from hmpim.errors import ArgumentError
+from hmpim.formats.atomic import check_writable, write_text
 from hmpim.identify import Identification, PairIdentification
 from hmpim.plots.candidates import INTERSAMPLE_WORDS
 from hmpim.plots.style import printable
@@ -26,18 +29,17 @@ from hmpim.report.words import (
     structure_words,
     untold,
 )
+from hmpim.stimulus import Stimulus
 
-if TYPE_CHECKING:
-    from hmpim.stimulus import Stimulus
-
-__all__ = ["render", "report"]
+__all__ = ["check_page", "render", "report"]
 
 
+@checked
 def report(
     result: Identification,
     path: str | PathLike[str],
     *,
-    stimulus: "Stimulus | None" = None,
+    stimulus: Stimulus | None = None,
     notes: Sequence[str] = (),
 ) -> None:
     """Write a result as one HTML page that needs no other file and no network.
@@ -58,7 +60,7 @@ def report(
     Raises
     ------
     ArgumentError
-        If `path` cannot be written.
+        If `path` cannot be written, or is named as something else than a page.
 
     Examples
     --------
@@ -72,14 +74,38 @@ def report(
     ...     page.read_text(encoding="utf-8")[:15]
     '<!DOCTYPE html>'
     """
+    check_page(path)
+    check_writable(path)
     text = render(result, stimulus=stimulus, notes=notes)
     write_text(path, text)
+
+
+def check_page(path: str | PathLike[str]) -> None:
+    """Refuse a page that is named as something else.
+
+    Raises
+    ------
+    ArgumentError
+        If the suffix is neither .html nor .htm; none is as good.
+
+    Examples
+    --------
+    >>> check_page("r.docx")
+    Traceback (most recent call last):
+    hmpim.errors.ArgumentError: 'r.docx' ends in .docx, and a report is an HTML page; name it r.html
+    """
+    place = Path(path)
+    if place.suffix.lower() not in ("", ".html", ".htm"):
+        raise ArgumentError(
+            f"{str(place)!r} ends in {place.suffix}, and a report is an HTML page; name it "
+            f"{place.with_suffix('.html').name}"
+        )
 
 
 def render(
     result: Identification,
     *,
-    stimulus: "Stimulus | None" = None,
+    stimulus: Stimulus | None = None,
     notes: Sequence[str] = (),
 ) -> str:
     """Return the page of `report` as text.

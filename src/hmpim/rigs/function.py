@@ -7,7 +7,8 @@ from typing import Any, Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from hmpim.errors import ArgumentError, RigError
+from hmpim.arguments import checked
+from hmpim.errors import RigError
 from hmpim.record import Intersample
 from hmpim.rigs.block import Block, ChannelSpec, Layout, Quantity
 from hmpim.rigs.protocol import Stimuli
@@ -21,6 +22,7 @@ __all__ = ["FunctionRig"]
 FloatArray = NDArray[np.float64]
 
 
+@checked
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class FunctionRig(Simulated):
     """An algorithm as the unit under test.
@@ -69,15 +71,6 @@ class FunctionRig(Simulated):
     _playing: Playing = field(default_factory=Playing, init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
-        if not callable(self.function):
-            raise ArgumentError(f"function = {self.function!r} cannot be called; give a function")
-        if self.mode not in ("array", "sample"):
-            raise ArgumentError(f"mode = {self.mode!r} is not known; use 'array' or 'sample'")
-        if self.measures not in ("position", "velocity", "acceleration"):
-            raise ArgumentError(
-                f"measures = {self.measures!r} is not known; "
-                "use 'position', 'velocity' or 'acceleration'"
-            )
         if self.output_unit is not None:
             check_unit(self.output_unit)
 

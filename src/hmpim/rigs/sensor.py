@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.signal import lfilter
 
+from hmpim.arguments import checked, generator
 from hmpim.errors import ArgumentError
 from hmpim.record import Intersample
 from hmpim.rigs.between import ContinuousInput, between_samples
@@ -37,6 +38,7 @@ FloatArray = NDArray[np.float64]
 _GRACE = 1e-9  # of an interval: an instant that falls on an update takes the new value
 
 
+@checked
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Sensor(Simulated):
     """A simulated sensor, hardware and software (Fig. 1).
@@ -267,7 +269,7 @@ class Sensor(Simulated):
                 f"intersample = {intersample!r} is not known; use 'zoh', 'foh' or 'bandlimited'"
             )
         u = between_samples(samples, fs, intersample)
-        return self._read(u, fs=fs, count=samples.size, rng=np.random.default_rng(rng))
+        return self._read(u, fs=fs, count=samples.size, rng=generator(rng))
 
     @property
     def poles(self) -> Poles | None:

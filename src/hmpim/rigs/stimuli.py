@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from hmpim.arguments import shown
 from hmpim.errors import ArgumentError
 from hmpim.rigs.block import Block, Pace
 from hmpim.stimulus import Stimulus
@@ -51,7 +52,7 @@ def stimuli_by_axis(
     for axis, stimulus in stimuli.items():
         if not isinstance(stimulus, Stimulus):
             raise ArgumentError(
-                f"{stimulus!r} for axis {axis!r} is no Stimulus; make one with design(...) or "
+                f"{shown(stimulus)} for axis {axis!r} is no Stimulus; make one with design(...) or "
                 "Stimulus(waveform=...)"
             )
     if not stimuli:

@@ -15,6 +15,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from hmpim.arguments import checked, size_of
 from hmpim.errors import ArgumentError
 from hmpim.stimulus.kinds import design
 from hmpim.stimulus.lead import rest_to_rest
@@ -34,6 +35,7 @@ _Kind = Literal["hmpim", "reversed", "exponential"]
 _KINDS: tuple[_Kind, ...] = ("hmpim", "reversed", "exponential")
 
 
+@checked
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AxisPlan:
     """What one axis may do and where it is to be excited.
@@ -96,6 +98,7 @@ class InputCondition:
         return float(np.mean(self.usable))
 
 
+@checked
 def design_axes(
     plans: Sequence[AxisPlan],
     *,
@@ -147,6 +150,9 @@ def design_axes(
     if not plans or len(set(names)) < len(names):
         raise ArgumentError(f"axes {names!r} are not told apart; give each plan its own axis")
     total = check_positive("duration", duration, "s")
+    size_of(total, check_positive("fs", fs, "Hz"))
+    if not 0.0 <= tail < math.inf:
+        raise ArgumentError(f"tail = {tail!r} s must be 0 or a positive, finite time")
     if method not in ("sweeps", "multisines"):
         raise ArgumentError(f"method = {method!r} must be 'sweeps' or 'multisines'")
     length = total - tail

@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from hmpim.arguments import checked
 from hmpim.errors import ArgumentError
 from hmpim.stimulus.motion import FloatArray, Motion, at_rest_outside, scaled_motion
 from hmpim.stimulus.sweep import Sweep, check_band, check_positive
@@ -22,6 +23,7 @@ def _check_start(start: float, duration: float) -> None:
         raise ArgumentError(f"start = {start!r} s must lie in the waveform's {duration:g} s")
 
 
+@checked
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Step:
     """A jump by `amplitude` at time `start`; velocity and acceleration have no finite value there.
@@ -79,6 +81,7 @@ class Step:
         )
 
 
+@checked
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Ramp:
     """A constant velocity from `start` to the end.
@@ -138,6 +141,7 @@ class Ramp:
         return at_rest_outside(time, self.duration, inside)
 
 
+@checked
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SumOfSines:
     """A sum of sinusoids, sum of A_k sin(2πf_k t + φ_k).
@@ -215,6 +219,7 @@ class SumOfSines:
         return at_rest_outside(time, self.duration, inside)
 
 
+@checked
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Sine:
     """One sinusoid, amplitude · sin(2πft).
@@ -261,6 +266,7 @@ class Sine:
         return one.motion(time)
 
 
+@checked
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Chirp:
     """The plain chirp, eqs (1) to (3), of a stated amplitude.

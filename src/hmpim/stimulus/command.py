@@ -103,6 +103,11 @@ def difference_peaks(position: FloatArray, fs: float, *, first: int = 0) -> Peak
     return Peaks(position=x, velocity=v, acceleration=a, jerk=j)
 
 
+def _with(value: float | str, unit: str) -> str:
+    shown = value if isinstance(value, str) else f"{value:.4g}"
+    return f"{shown} {unit}".rstrip()
+
+
 def leave_room(limits: Limits, *, resolution: float, fs: float) -> Limits:
     """Limits inside which a motion keeps `limits` after its commands have been rounded.
 
@@ -137,11 +142,11 @@ def leave_room(limits: Limits, *, resolution: float, fs: float) -> Limits:
         error = r * (0.5, 1.0, 2.0, 4.0)[order] * fs**order
         if error >= limit:
             unit = rate_label(limits.unit, order)
+            enough = three_digits(0.1 * r * limit / error, up=False)
             raise LimitsError(
-                f"rounding to {r:g} {limits.unit} at {fs:g} Hz alone can command {error:.4g} "
-                f"{unit} of {name}, and the limit is {limit:g} {unit}; a resolution of "
-                f"{three_digits(0.1 * r * limit / error, up=False)} {limits.unit} takes a tenth "
-                "of the limit"
+                f"rounding to {_with(r, limits.unit)} at {fs:g} Hz alone can command "
+                f"{_with(error, unit)} of {name}, and the limit is {_with(limit, unit)}; a "
+                f"resolution of {_with(enough, limits.unit)} takes a tenth of the limit"
             )
         left = replace(left, **{name: limit - error})
     return left

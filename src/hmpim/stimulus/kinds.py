@@ -6,6 +6,7 @@ from typing import Literal, get_args
 
 import numpy as np
 
+from hmpim.arguments import checked, generator, size_of
 from hmpim.errors import ArgumentError, LimitsError
 from hmpim.stimulus.command import leave_room
 from hmpim.stimulus.exponential import ExponentialSweep
@@ -30,6 +31,7 @@ _SETTLING = 0.5  # seconds at rest that a led stimulus appends, so that a late r
 _SMALLER = (0.98, 0.95, 0.9, 0.8, 0.7, 0.6, 0.5)  # scales that leave room for a lead
 
 
+@checked
 def design(
     *,
     band: tuple[float, float],
@@ -111,6 +113,9 @@ def design(
     length = check_positive("duration", duration, "s")
     rate = check_positive("fs", fs, "Hz")
     _check_frequencies(low, high, length, rate)
+    size_of(length, rate)
+    if rng is not None:
+        generator(rng)
     check_limits_given(limits)
     ahead = _seconds("lead", lead)
     if (wanted_snr is None) != (noise is None):

@@ -383,14 +383,15 @@ def _handovers(core: Waveform, *, jerk: bool) -> tuple[FloatArray, FloatArray, f
 
 def _turning(core: Waveform, times: FloatArray, which: int) -> float:
     velocity = core.motion(times).velocity
-    flips = np.flatnonzero(velocity[:-1] * velocity[1:] <= 0.0)
+    sign = np.sign(velocity)  # their product neither overflows nor underflows
+    flips = np.flatnonzero(sign[:-1] * sign[1:] <= 0.0)
     if flips.size == 0:
         return float(times[-1 if which == 0 else 0])
     low, high = float(times[flips[which]]), float(times[flips[which] + 1])
-    sign = float(velocity[flips[which]])
+    before = float(sign[flips[which]])
     for _ in range(50):
         middle = 0.5 * (low + high)
-        same = float(core.motion(np.array([middle])).velocity[0]) * sign > 0.0
+        same = float(core.motion(np.array([middle])).velocity[0]) * before > 0.0
         low, high = (middle, high) if same else (low, middle)
     return 0.5 * (low + high)
 

@@ -3,6 +3,7 @@
 import math
 from dataclasses import dataclass
 
+from hmpim.arguments import checked
 from hmpim.errors import ArgumentError
 from hmpim.stimulus.motion import Peaks
 from hmpim.units import check_unit, conversion_factor, rate_label
@@ -12,6 +13,7 @@ __all__ = ["QUANTITIES", "Limits", "three_digits"]
 QUANTITIES = ("position", "velocity", "acceleration", "jerk")
 
 
+@checked
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Limits:
     """Largest magnitudes allowed, measured from the position at rest.
@@ -59,6 +61,7 @@ class Limits:
                 )
             object.__setattr__(self, name, value)
 
+    @checked
     def to(self, unit: str) -> "Limits":
         """Return the same limits in another unit.
 

@@ -57,6 +57,7 @@ class Peaks:
     jerk: float = math.inf
 
 
+@runtime_checkable
 class Waveform(Protocol):
     """A motion in closed form, known at any time, so that a simulated rig may ask anywhere.
 

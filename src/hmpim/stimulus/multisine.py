@@ -12,6 +12,7 @@ from typing import Literal
 
 import numpy as np
 
+from hmpim.arguments import generator
 from hmpim.errors import ArgumentError, LimitsError
 from hmpim.stimulus.limits import QUANTITIES, Limits, three_digits
 from hmpim.stimulus.motion import FloatArray, Motion, at_rest_outside
@@ -235,7 +236,7 @@ def random_phase_multisine(
     True
     """
     frequency, shape = _lines(band, duration, limits, every, offset)
-    phases = np.random.default_rng(rng).uniform(-np.pi, np.pi, frequency.size)
+    phases = generator(rng).uniform(-np.pi, np.pi, frequency.size)
     return scale_to_limits(_multisine(frequency, shape, phases, duration), limits)
 
 
@@ -296,7 +297,7 @@ def interleaved_multisines(
         raise ArgumentError(f"phases = {phases!r} must be 'schroeder' or 'random'")
     if rng is None:
         raise ArgumentError("random phases need a source; give rng, a seed for instance")
-    source = np.random.default_rng(rng)
+    source = generator(rng)
     return tuple(
         random_phase_multisine(
             band=b, duration=duration, limits=m, rng=source, every=count, offset=k

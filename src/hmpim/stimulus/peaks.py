@@ -5,6 +5,8 @@ from itertools import pairwise
 
 import numpy as np
 
+from hmpim.arguments import MOST_SAMPLES
+from hmpim.errors import ArgumentError
 from hmpim.stimulus.motion import FloatArray, Motion, Peaks, Piecewise, Waveform
 
 __all__ = ["true_peaks"]
@@ -137,7 +139,14 @@ def _first_jump(waveform: Waveform, peaks: list[float], start: float, stop: floa
 def _grid(waveform: Waveform, start: float, stop: float) -> FloatArray:
     span = stop - start
     highest = waveform.band[1] if waveform.band is not None else 0.0
-    count = int(np.ceil(_POINTS_PER_CYCLE * highest * span)) + 256
+    points = _POINTS_PER_CYCLE * highest * span
+    if not points <= MOST_SAMPLES:
+        raise ArgumentError(
+            f"{span:g} s at up to {highest:g} Hz are {highest * span:.3g} cycles, and peaks are "
+            f"sought in {MOST_SAMPLES / _POINTS_PER_CYCLE:.1e} at most; take a shorter time, or "
+            "end the band lower"
+        )
+    count = math.ceil(points) + 256
     parts = [np.linspace(start, stop, count), start + span * np.geomspace(1e-9, 1.0, 256)]
     if isinstance(waveform, Piecewise):
         knots = np.array([t for t in waveform.breaks if start < t < stop])

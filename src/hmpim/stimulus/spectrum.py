@@ -35,6 +35,7 @@ __all__ = [
 
 _SHARE = 2.0 ** (1.0 / 12.0) - 1.0  # half of a sixth of an octave
 _PARTS = 8  # of measured noise, in Welch's estimate
+_MOST_DB = 313.0  # 20 lg of 2⁵²
 _MOST = 1e3  # factor on a limit beyond which it is no advice
 _LONGEST = 10.0  # factor on the duration likewise
 _MORE = (1.02, 1.1, 1.25, 1.5, 2.0, 3.0)  # times what the lack alone would ask for
@@ -294,8 +295,11 @@ def check_spectrum(
     found = signal_to_noise(stimulus, noise=noise, band=band, resolution=resolution)
     if isinstance(snr_db, OverFrequency):
         wanted = snr_db.at(found.frequency)
-    elif isinstance(snr_db, (str, bool)) or not math.isfinite(snr_db):
-        raise ArgumentError(f"snr_db = {snr_db!r} must be a finite number of dB")
+    elif isinstance(snr_db, (str, bool)) or not abs(snr_db) <= _MOST_DB:
+        raise ArgumentError(
+            f"wanted_snr = {snr_db!r} dB is out of range; give at most {_MOST_DB:g} dB, all that "
+            "double precision tells apart"
+        )
     else:
         wanted = np.full(found.frequency.size, float(snr_db))
     lack = wanted - found.decibel

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from hmpim.arguments import checked, size_of
 from hmpim.equality import ByValue
 from hmpim.errors import ArgumentError, LimitsError
 from hmpim.stimulus.command import Command, check_resolution, difference_peaks, rounded
@@ -23,6 +24,7 @@ from hmpim.units import check_unit, rate_label
 __all__ = ["Stimulus", "blocks"]
 
 
+@checked
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Stimulus(ByValue):
     """A waveform, sampled, checked against its limits when made.
@@ -91,7 +93,8 @@ class Stimulus(ByValue):
         if not (math.isfinite(self.tail) and self.tail >= 0.0):
             raise ArgumentError(f"tail = {self.tail!r} s must be 0 or a positive, finite time")
         object.__setattr__(self, "resolution", check_resolution(self.resolution))
-        motion = self.waveform.motion(np.arange(_count(self.duration, fs)) / fs)
+        count = size_of(self.duration, fs)
+        motion = self.waveform.motion(np.arange(count) / fs)
         for name in ("time", "position", "velocity", "acceleration"):
             samples: FloatArray = getattr(motion, name)
             samples.setflags(write=False)
@@ -185,7 +188,7 @@ class Stimulus(ByValue):
         """
         rate = self.fs if fs is None else check_positive("fs", fs, "Hz")
         step = self.resolution if resolution is None else check_resolution(resolution)
-        time = np.arange(_count(self.duration, rate)) / rate
+        time = np.arange(size_of(self.duration, rate)) / rate
         position = rounded(self.motion(time).position, step)
         at = self.motion(np.zeros(1))
         from_rest = at.velocity[0] == 0.0 and at.acceleration[0] == 0.0

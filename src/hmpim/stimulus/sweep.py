@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from hmpim.arguments import checked
 from hmpim.errors import ArgumentError
 from hmpim.stimulus.motion import FloatArray, Motion, at_rest_outside
 
@@ -79,6 +80,7 @@ def check_band(band: tuple[float, float]) -> tuple[float, float]:
     return low, high
 
 
+@checked
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Sweep:
     """HMPIM waveform, eqs (1) to (7) of the paper.

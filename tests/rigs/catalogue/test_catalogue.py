@@ -108,7 +108,7 @@ def test_a_rig_file_and_a_name_may_not_contradict(tmp_path):
     [
         ("sensor", {"options": {"dealy": 0.1}}, "option 'dealy' is not known for a sensor"),
         ("sensor", {"options": {"delay": -1}}, "delay = -1 is out of range"),
-        ("sensor", {"options": {"delay": "long"}}, "delay = 'long' is not a finite number"),
+        ("sensor", {"options": {"delay": "long"}}, "delay = 'long' is not a number"),
         ("sensor:7", {}, "sensor:7 says more than there is; write sensor"),
         ("table", {"load": "ton"}, "load 'ton' is not known"),
         ("table", {"options": {"mode": "PV"}}, "stands outside the options, as 'mode'"),

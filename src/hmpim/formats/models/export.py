@@ -6,6 +6,7 @@ from os import PathLike
 from pathlib import Path
 from typing import Literal, get_args
 
+from hmpim.arguments import checked
 from hmpim.errors import ArgumentError
 from hmpim.formats.models.c import write_c
 from hmpim.formats.models.csv import write_csv
@@ -100,6 +101,7 @@ TARGETS: dict[str, _Writer] = {
 }
 
 
+@checked
 def export(
     result: Identification,
     *,
@@ -192,7 +194,7 @@ def export(
     elif not writer.suffix and place.is_file():
         raise ArgumentError(f"{place} is a file; {to} needs a folder, so name another place")
     elif writer.suffix and not place.parent.is_dir():
-        raise FileNotFoundError(f"folder {place.parent} does not exist; make it first")
+        raise ArgumentError(f"folder {place.parent} does not exist; make it first")
     stem = place.name if not writer.suffix else place.stem
     source = source_of(
         result, name=stem or place.resolve().name, pair=pair, fs=fs, intersample=intersample

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from typing import Protocol, TypeVar
 
+from hmpim.arguments import shown
 from hmpim.errors import RecordError
 
 __all__ = ["Pair", "find_pair"]
@@ -46,7 +47,7 @@ def find_pair(pairs: Sequence[P], key: object, *, holder: str) -> P:
         raise RecordError(f"there is no pair ({output!r}, {source!r}); {holder} has {known}")
     if not isinstance(key, str):
         raise RecordError(
-            f"{key!r} names no pair; give the output and the input, as one of {known}"
+            f"{shown(key)} names no pair; give the output and the input, as one of {known}"
         )
     found = [pair for pair in pairs if pair.output == key]
     if len(found) == 1:
