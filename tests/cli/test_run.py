@@ -106,3 +106,34 @@ def test_rigs_are_listed_and_the_broken_named(folder):
     assert {"sensor", "table"} <= {kind["name"] for kind in data["kinds"]}
     for words in ("eye", "simulated sensor of Fig. 1", "skipped:"):
         assert words in out.output
+
+
+def test_a_rig_without_a_watchdog_is_refused_unless_that_is_said(folder, monkeypatch):
+    class Bare:
+        name, axes, limits = "bare", (), LIMITS
+        prepared = False
+
+        def __enter__(self):
+            return self
+
+        def __exit__(self, *_):
+            pass
+
+        def prepare(self, stimulus):
+            Bare.prepared = True
+
+        def play(self, block):
+            return 0.5 * block.position
+
+        def stop(self):
+            pass
+
+    monkeypatch.setattr("hmpim.rigs.catalogue.find.load_builder", lambda _kind: lambda *_: Bare())
+    out = run("run", "--rig", "bare", "s.csv", "-o", "r.h5")
+    assert out.exit_code == 2
+    assert "'bare' has no watchdog: if this process is killed, nothing stops it" in out.stderr
+    assert not Bare.prepared
+    (folder / "bare.toml").write_text('rig = "bare"\nwatchdog = 0.1\n')
+    out = run("run", "--rig-file", "bare.toml", "s.csv", "-o", "r.h5", "--feel")
+    assert out.exit_code == 0, out.output
+    assert {f.code for f in load("r.h5").findings} == {"felt"}

@@ -147,3 +147,12 @@ def test_a_scaled_stimulus_keeps_everything_but_its_size():
     assert (small.fs, small.samples, small.limits, small.band) == (
         *(SWEEP.fs, SWEEP.samples, SWEEP.limits, SWEEP.band),
     )
+
+
+def test_a_rig_is_unknown_if_the_person_alone_states_its_limits():
+    options = RunOptions(feel="unknown")
+    rig = Arm(lambda y: 0.5 * y)
+    assert not [f for f in run(rig, SWEEP, options=options).findings if f.code == "felt"]
+    rig.limits = None
+    record = run(rig, SWEEP, options=options, limits=LIMITS)
+    assert [f for f in record.findings if f.code == "felt"]

@@ -16,7 +16,7 @@ SWEEP = design(band=(0.2, 20), duration=6, fs=FS, limits=LIMITS)
 class Follower:
     """A rig with a lag of 20 ms that takes a command when it comes; its sensor has some noise."""
 
-    name, axes, limits, moves = "follower", (), LIMITS, True
+    name, axes, limits, moves, watchdog = "follower", (), LIMITS, True, 0.1
 
     def __enter__(self):
         return self

@@ -1,13 +1,19 @@
 """``hmpim run``: a stimulus played on a rig, its record in a file, and if wanted the page."""
 
+import sys
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from hmpim.cli.files import check_files
 from hmpim.cli.terminal import output_console, say, working
 from hmpim.errors import ArgumentError
+
+if TYPE_CHECKING:
+    from hmpim.cli.strip import Strip
+    from hmpim.rigs import Rig
+    from hmpim.rigs.catalogue import Description
 
 __all__ = ["run"]
 
@@ -51,6 +57,25 @@ def run(
             "--log", metavar="FILE", help="Each check, arm, stop and fault with its time."
         ),
     ] = None,
+    watchdog: Annotated[
+        bool,
+        typer.Option(
+            "--watchdog/--no-watchdog",
+            help="Refuse a rig that nothing stops if this process is killed; without, it is "
+            "driven by a process of its own that lives on to stop it.",
+        ),
+    ] = True,
+    feel: Annotated[
+        bool | None,
+        typer.Option(
+            "--feel/--no-feel",
+            help="Move it a little first, then more in steps. On for a rig that states no limits "
+            "of its own.",
+        ),
+    ] = None,
+    live: Annotated[
+        bool, typer.Option("--live/--no-live", help="Draw the run in the terminal.")
+    ] = True,
     seed: Annotated[
         int | None,
         typer.Option("--seed", min=0, help="Of what is random in a simulated rig."),
@@ -74,7 +99,7 @@ def run(
         writes={"-o": output, "--log": log, "--json": json, "--report": report},
     )
     _check_kept(output, kept=json is not None or report is not None)
-    from hmpim.experiment import RunLog
+    from hmpim.experiment import Feel, RunLog, RunOptions
     from hmpim.experiment import run as play
     from hmpim.formats.stimulus_files import read_stimuli
     from hmpim.rigs.catalogue import find_rig, read_description
@@ -82,8 +107,22 @@ def run(
     described = None if rig_file is None else read_description(rig_file)
     found = find_rig(rig, description=described)
     stimuli = read_stimuli(stimulus)
-    with RunLog(log) as events, working(f"Running {found.rig.name}"):
-        record = play(found.rig, stimuli, path=output, rng=seed, limits=found.limits, log=events)
+    options = RunOptions(
+        watchdog=watchdog and found.description.watchdog is None,
+        feel="unknown" if feel is None else Feel() if feel else None,
+    )
+    unit = found.rig if watchdog else _driven(found.rig, rig, described)
+    with RunLog(log) as events:
+        record = play(
+            unit,
+            stimuli,
+            path=output,
+            rng=seed,
+            limits=found.limits,
+            subscribers=_watching(live=live),
+            log=events,
+            options=options,
+        )
     say(
         f"{record.samples} samples of {', '.join(c.name for c in record.outputs)} in "
         f"{record.duration:g} s from {record.source}"
@@ -106,6 +145,31 @@ def run(
     for name, path in (("Result", json), ("Page", report)):
         if path is not None:
             say(f"{name}: {path}")
+
+
+def _driven(found: "Rig", text: str, description: "Description | None") -> "Rig":
+    """Return the rig in a process of its own, if it moves."""
+    from hmpim.experiment import OutlivingRig
+    from hmpim.experiment.checks import moves
+
+    return OutlivingRig(_again, text, description) if moves(found) else found
+
+
+def _again(text: str, description: "Description | None") -> "Rig":
+    """Make the rig once more, in the process that drives it."""
+    from hmpim.rigs.catalogue import find_rig
+
+    return find_rig(text, description=description).rig
+
+
+def _watching(*, live: bool) -> list["Strip"]:
+    """Subscribers: the strip, where there is a terminal that can draw it."""
+    from rich.console import Console
+
+    from hmpim.cli.strip import Strip
+
+    drawing = live and Console(stderr=True).is_terminal and "utf" in (sys.stderr.encoding or "")
+    return [Strip(sys.stderr)] if drawing else []
 
 
 def _files_of(rig: str, rig_file: Path | None) -> list[Path]:

@@ -4,6 +4,7 @@ from hmpim.experiment.collect import Played
 from hmpim.experiment.feel import Feel
 from hmpim.experiment.log import Event, RunLog
 from hmpim.experiment.options import RunOptions
+from hmpim.experiment.outliving import OutlivingRig
 from hmpim.experiment.run import run
 from hmpim.experiment.running import Subscriber, Until
 from hmpim.experiment.timing import Timing, measure_timing
@@ -15,6 +16,7 @@ __all__ = [
     "Event",
     "Feel",
     "ManualClock",
+    "OutlivingRig",
     "Played",
     "RunLog",
     "RunOptions",

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from hmpim.arguments import shown
-from hmpim.errors import ArgumentError, LimitsError
+from hmpim.errors import ArgumentError, LimitsError, RigError
 from hmpim.experiment.log import RunLog
 from hmpim.rigs import LimitsOfAxes, Rig
 from hmpim.rigs.brake import check_stoppable
@@ -14,7 +14,7 @@ from hmpim.stimulus import Limits, Stimulus, check_inside
 from hmpim.stimulus.limits import QUANTITIES
 from hmpim.units import rate_unit
 
-__all__ = ["check_rig", "check_stimuli", "limits_by_axis", "moves"]
+__all__ = ["check_rig", "check_stimuli", "check_watched", "limits_by_axis", "moves"]
 
 
 def check_rig(rig: object) -> Rig:
@@ -51,6 +51,25 @@ def moves(rig: Rig) -> bool:
     False
     """
     return bool(getattr(rig, "moves", True))
+
+
+def check_watched(rig: Rig, *, needed: bool, log: RunLog) -> None:
+    """Refuse, or note, a rig that nothing stops if this process is killed.
+
+    Raises
+    ------
+    RigError
+        If a watchdog is needed, and the rig moves and states none.
+    """
+    if not moves(rig) or getattr(rig, "watchdog", None) is not None:
+        return
+    what = f"{rig.name!r} has no watchdog: if this process is killed, nothing stops it"
+    if needed:
+        raise RigError(
+            f"{what}; give its far end one and state it (watchdog = 0.1), or say --no-watchdog, "
+            "and it is driven by a process of its own that lives on to stop it"
+        )
+    log.add("note", what)
 
 
 def limits_by_axis(

@@ -1,6 +1,7 @@
 """How a run is to be made, beyond what is played on what."""
 
 from dataclasses import dataclass, field
+from typing import Literal
 
 from hmpim.experiment.feel import Feel
 from hmpim.experiment.watch import Watch
@@ -21,8 +22,12 @@ class RunOptions:
         What is watched while the rig moves.
     realtime : bool
         Whether to ask for real-time scheduling; the log says whether it was allowed.
-    feel : Feel or None
-        How to move an unknown rig a little first; None plays at full amplitude at once.
+    watchdog : bool
+        Whether to refuse a rig that moves and has no watchdog: if this process is killed, nothing
+        stops it. Where False, the log says so; see `OutlivingRig`.
+    feel : Feel, 'unknown' or None
+        How to move a rig a little first; 'unknown' does so if it moves and states no limits of
+        its own; None plays at full amplitude at once.
 
     Examples
     --------
@@ -33,4 +38,5 @@ class RunOptions:
     clock: Clock | None = None
     watch: Watch = field(default_factory=Watch)
     realtime: bool = True
-    feel: Feel | None = None
+    watchdog: bool = False
+    feel: Feel | Literal["unknown"] | None = None

@@ -6,9 +6,9 @@ from dataclasses import dataclass, replace
 from os import PathLike
 
 from hmpim.errors import HmpimError, RigError
-from hmpim.experiment.checks import check_stimuli, limits_by_axis, moves
+from hmpim.experiment.checks import check_stimuli, check_watched, limits_by_axis, moves
 from hmpim.experiment.collect import Collected, Played, default_layout
-from hmpim.experiment.feel import feel
+from hmpim.experiment.feel import Feel, feel
 from hmpim.experiment.interrupt import undisturbed
 from hmpim.experiment.log import RunLog
 from hmpim.experiment.options import RunOptions
@@ -73,8 +73,11 @@ class Running:
                 with self._faults_logged():
                     ready = self._check(self._stimuli())
                 findings: list[Finding] = []
-                if self.options.feel is not None:
-                    ready = self._felt(ready, findings)
+                how = self.options.feel
+                if how == "unknown":
+                    how = Feel() if moves(self.rig) and self.rig.limits is None else None
+                if how is not None:
+                    ready = self._felt(ready, how, findings)
                 return self._kept(ready, findings)
         except HmpimError:
             raise
@@ -90,6 +93,7 @@ class Running:
 
     def _check(self, stimuli: dict[str, Stimulus]) -> _Ready:
         """Look at everything that can be looked at while nothing moves."""
+        check_watched(self.rig, needed=self.options.watchdog, log=self.log)
         limits = limits_by_axis(self.rig, stimuli, stated=self.limits)
         check_stimuli(stimuli, limits, rig=self.rig, log=self.log)
         commands = commands_of(stimuli)
@@ -97,9 +101,8 @@ class Running:
         pacer = Pacer(clock, fs=commands.fs, count=len(commands))
         return _Ready(stimuli=stimuli, limits=limits, commands=commands, pacer=pacer)
 
-    def _felt(self, ready: _Ready, findings: list[Finding]) -> _Ready:
+    def _felt(self, ready: _Ready, how: Feel, findings: list[Finding]) -> _Ready:
         """Move a little first, and return what may be moved then."""
-        assert self.options.feel is not None
         grows = self.path is not None and self._recorder(ready, path=self.path).grows
         feeling = replace(self, until=None, subscribers=(), path=self.path if grows else None)
 
@@ -108,7 +111,7 @@ class Running:
                 ready = self._check(dict(stimuli))
             return feeling._kept(ready, [])
 
-        felt = feel(play, ready.stimuli, ready.limits, how=self.options.feel)
+        felt = feel(play, ready.stimuli, ready.limits, how=how)
         findings.extend(felt.findings)
         if felt.share == 1.0:
             return self._check(ready.stimuli)

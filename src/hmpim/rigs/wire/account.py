@@ -1,6 +1,7 @@
 """The near end's account of a run: samples put in order, what was lost, and the two clocks."""
 
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +19,18 @@ FloatArray = NDArray[np.float64]
 _NANO = 1e-9
 _LAG = 0.02  # s: a far end that answers later than this after its tick is behind
 _PATIENCE = 16  # responses waited for one that is missing, before it is taken as lost
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _InRun:
+    """Stamps of the far end, shifted as `Account.take` gives them, turned into times in the run."""
+
+    fit: ClockFit
+    shift: float
+    start: float
+
+    def __call__(self, stamps: FloatArray) -> FloatArray:
+        return self.fit.near(stamps + self.shift) - self.start
 
 
 class Account:
@@ -124,12 +137,7 @@ class Account:
         fit = self._fit()
         if fit is not None:
             findings.append(_clocks(fit, name))
-            shift, start = self._shift or 0.0, self.start or 0.0
-
-            def in_run(stamps: FloatArray) -> FloatArray:
-                return fit.near(stamps + shift) - start
-
-            clocks[name] = in_run
+            clocks[name] = _InRun(fit=fit, shift=self._shift or 0.0, start=self.start or 0.0)
         return RunReport(findings=tuple(findings), clocks=clocks)
 
     def _fit(self) -> ClockFit | None:
