@@ -64,6 +64,25 @@ KINDS: tuple[Kind, ...] = (
         builder="hmpim.rigs.catalogue.simulated:build_table",
     ),
     Kind(
+        name="python",
+        form="python:FILE:FUNCTION",
+        words="a function of a Python file, given the whole array; with :sample behind it, or a "
+        "class, sample by sample",
+        builder="hmpim.rigs.catalogue.software:build_python",
+    ),
+    Kind(
+        name="process",
+        form="process:COMMAND",
+        words="a program of any language, over standard input and output; see docs/software.md",
+        builder="hmpim.rigs.catalogue.software:build_process",
+    ),
+    Kind(
+        name="fmu",
+        form="fmu:FILE",
+        words="an FMU of FMI 2 or 3, co-simulation or model exchange (extra 'fmu')",
+        builder="hmpim.rigs.catalogue.software:build_fmu",
+    ),
+    Kind(
         name="udp",
         form="udp://HOST:PORT",
         words="a rig that speaks the datagrams of docs/rigs.md, such as hmpim table --udp",
