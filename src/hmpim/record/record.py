@@ -350,7 +350,8 @@ class Record(ByValue):
         Parameters
         ----------
         inputs, outputs : sequence of str
-            Names of channels, of whatever role they are now.
+            Names of channels, of whatever role they are now. What inputs do between their
+            samples is no longer known if one was no input before.
 
         Raises
         ------
@@ -368,12 +369,14 @@ class Record(ByValue):
         """
         named = [*inputs, *outputs]
         free = [c for c in (*self.inputs, *self.outputs, *self.auxiliary) if c.name not in named]
+        same = set(inputs) <= {c.name for c in self.inputs}
         return replace(
             self,
             inputs=tuple(self.channel(name) for name in inputs),
             outputs=tuple(self.channel(name) for name in outputs),
             references=tuple(c for c in self.references if c.name not in named),
             auxiliary=tuple(free),
+            intersample=self.intersample if same else None,
         )
 
 

@@ -3,6 +3,7 @@
 from hmpim.rigs.block import Block, ChannelSpec, Layout, Quantity, Reply, RunReport, Samples
 from hmpim.rigs.clock import Clock, ManualClock, SkewedClock, SystemClock
 from hmpim.rigs.function import FunctionRig
+from hmpim.rigs.mounted import CarriedSensor, Mounted
 from hmpim.rigs.protocol import LimitsOfAxes, Reporting, Rig, Seeded, Stimuli
 from hmpim.rigs.sensor import Sensor
 from hmpim.rigs.stimuli import Commands, commands_of, shared_band, stimuli_by_axis
@@ -10,6 +11,7 @@ from hmpim.rigs.table import MotionTable
 
 __all__ = [
     "Block",
+    "CarriedSensor",
     "ChannelSpec",
     "Clock",
     "Commands",
@@ -18,6 +20,7 @@ __all__ = [
     "LimitsOfAxes",
     "ManualClock",
     "MotionTable",
+    "Mounted",
     "Quantity",
     "Reply",
     "Reporting",
