@@ -80,19 +80,28 @@ def compared(fs: float, share: float, tick: Callable[[], None]) -> tuple[str, fl
     worst = 0.0
     for mode in MODES:
         for axis in AXES:
-            table = MotionTable(friction=False, mode=mode)
-            truth = exact_bandwidth(table, axis=axis, fs=fs)
-            pair = pair_of(table, stimulus_for(table, axis, fs=fs, share=share))
-            cells = []
-            for found in (pair.bandwidth_phase90, pair.from_response.bandwidth_phase90):
-                if found is None:
-                    raise SystemExit(f"no bandwidth of {axis} in mode {mode}")
-                off = 100.0 * (found.value / truth - 1.0)
-                worst = max(worst, abs(off))
-                cells += [f"{found.value:.2f} ± {found.std:.2f}", f"{off:+.2f} %"]
-            text += line(mode, axis, f"{truth:.2f}", *cells)
+            row, off = compared_case(mode, axis, fs=fs, share=share)
+            text += row
+            worst = max(worst, off)
             tick()
     return text, worst
+
+
+def compared_case(
+    mode: CommandMode, axis: AxisName, *, fs: float, share: float
+) -> tuple[str, float]:
+    """Row of one case, and its largest difference in percent."""
+    table = MotionTable(friction=False, mode=mode)
+    truth = exact_bandwidth(table, axis=axis, fs=fs)
+    pair = pair_of(table, stimulus_for(table, axis, fs=fs, share=share))
+    cells, worst = [], 0.0
+    for found in (pair.bandwidth_phase90, pair.from_response.bandwidth_phase90):
+        if found is None:
+            raise SystemExit(f"no bandwidth of {axis} in mode {mode}")
+        off = 100.0 * (found.value / truth - 1.0)
+        worst = max(worst, abs(off))
+        cells += [f"{found.value:.2f} ± {found.std:.2f}", f"{off:+.2f} %"]
+    return line(mode, axis, f"{truth:.2f}", *cells), worst
 
 
 def levels(tick: Callable[[], None]) -> str:

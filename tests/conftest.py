@@ -9,10 +9,16 @@ import pytest
 from hypothesis import HealthCheck, settings
 
 from hmpim.identify.judgement import failed as attempts
-from tests_support import field_chirp, second_order_lag
+from tests_support import field_chirp, second_order_lag, study_size
 
-# A busy machine is slow; that is no failure of what is tested.
-settings.register_profile("hmpim", deadline=None, suppress_health_check=[HealthCheck.too_slow])
+# A busy machine is slow; that is no failure of what is tested. In `make test` the examples are
+# the same every time; new ones are for `make studies` to find.
+settings.register_profile(
+    "hmpim",
+    deadline=None,
+    suppress_health_check=[HealthCheck.too_slow],
+    derandomize="HMPIM_EXAMPLES" not in os.environ,
+)
 settings.load_profile("hmpim")
 
 DATA = Path(__file__).parents[2] / "shared" / "data"
@@ -35,7 +41,7 @@ def seeds(request) -> int:
     Few are 20 unless the test says otherwise: `@pytest.mark.few(50)`.
     """
     if request.param == "many":
-        return int(os.environ.get("HMPIM_SEEDS", "200"))
+        return study_size(200)
     few = request.node.get_closest_marker("few")
     return few.args[0] if few else 20
 

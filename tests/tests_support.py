@@ -20,8 +20,14 @@ from numpy.typing import NDArray
 from scipy.stats import binom, chi2, norm
 
 import hmpim
+from hmpim import Estimate
 
 FALSE_ALARM = 1e-4
+
+
+def study_size(usual: int) -> int:
+    """How many seeds a study takes that usually takes so many: HMPIM_SEEDS is 200 usually."""
+    return max(round(usual * int(os.environ.get("HMPIM_SEEDS", "200")) / 200), 1)
 
 
 def examples(few: int) -> settings:
@@ -30,8 +36,9 @@ def examples(few: int) -> settings:
 
 
 def in_studies(*values) -> list:
-    """Values of a parameter that `make studies` takes and `make test` leaves out."""
-    return [pytest.param(value, marks=pytest.mark.study) for value in values]
+    """Values of a parameter, or tuples of several, that only `make studies` takes."""
+    several = [value if isinstance(value, tuple) else (value,) for value in values]
+    return [pytest.param(*these, marks=pytest.mark.study) for these in several]
 
 
 @cache
@@ -82,6 +89,12 @@ def most(trials: int, chance: float) -> int:
 def excluded(trials: int) -> float:
     """Smallest chance that no event at all in `trials` excludes, at 95 % confidence."""
     return float(1.0 - 0.05 ** (1.0 / trials))
+
+
+def holds(estimate: Estimate, truth: float) -> bool:
+    """Whether the truth is in an estimate's interval."""
+    low, high = estimate.ci95
+    return low <= truth <= high
 
 
 def assert_share(hits, *, at_least: float = 0.0, at_most: float = 1.0) -> None:

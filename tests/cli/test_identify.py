@@ -11,6 +11,7 @@ from typer.testing import CliRunner
 
 from hmpim.cli.main import app
 from hmpim.identify import Identification
+from tests_support import in_studies
 
 RUNNER = CliRunner()
 NAMED = ["--input", "u", "--output", "y"]
@@ -50,6 +51,9 @@ def test_bad_input_is_refused_in_one_line(bad, tmp_path):
     assert not target.exists()
 
 
+@pytest.mark.parametrize(
+    "bad", ["binary", *in_studies(*(name for name in REASONS if name != "binary"))], indirect=True
+)
 def test_the_program_itself_refuses_in_one_line(bad):
     name, path = bad
     done = subprocess.run(

@@ -1,19 +1,17 @@
 """Records that do not tell what is asked: never 'ok', never a traceback; and the converse."""
 
-import os
-
 import numpy as np
 import pytest
 from scipy.signal import lfilter
 
 import hmpim
+from tests_support import in_studies, study_size
 
 FS = 200.0
 N = 2000
 T = np.arange(N) / FS
 STIMULUS = hmpim.Stimulus(waveform=hmpim.Chirp(band=(0.1, 20.0), duration=10.0), fs=FS)
 PARAMETERS = ("delay", "scale_factor", "bias", "natural_frequency", "damping_ratio", "noise_std")
-STUDY = max(int(os.environ.get("HMPIM_SEEDS", "200")) // 40, 2)
 
 
 def chirp(first, last, time=T):
@@ -130,6 +128,20 @@ SPOILT = {
 """Outputs that follow the input, but not as any linear unit would, or hardly at all."""
 
 
+LONG = {
+    *("resonant noise", "random walk", "sine", "the input reversed", "the input squared", "a ramp"),
+    *("a delay of four fifths", "stuck after half, noisy", "full-wave rectifier", "gain rises"),
+    *("clocks part by 0.1 %", "freezes", "two thirds clipped", "relay", "wraps around"),
+    "another input as well",
+}
+"""Three seconds and more to identify, each like another one that is not: in `make studies` only."""
+
+
+def shorter(cases):
+    """Names of cases, the long ones for studies only."""
+    return [*(n for n in cases if n not in LONG), *in_studies(*(n for n in cases if n in LONG))]
+
+
 def judged(y):
     return hmpim.identify(hmpim.Record.from_arrays({"u": U}, {"y": y}, fs=FS))["y", "u"]
 
@@ -145,7 +157,7 @@ def assert_sound(pair):
         assert "nan" not in warning.message.split(), warning
 
 
-@pytest.mark.parametrize("name", UNRELATED)
+@pytest.mark.parametrize("name", shorter(UNRELATED))
 def test_an_output_that_does_not_follow_is_refused(name):
     pair = judged(UNRELATED[name](np.random.default_rng(1)))
     assert_sound(pair)
@@ -154,7 +166,7 @@ def test_an_output_that_does_not_follow_is_refused(name):
     assert [w.code for w in pair.warnings if w.code == "unrelated"]
 
 
-@pytest.mark.parametrize("name", SPOILT)
+@pytest.mark.parametrize("name", shorter(SPOILT))
 def test_a_spoilt_output_is_never_ok(name):
     pair = judged(SPOILT[name](np.random.default_rng(1)))
     assert_sound(pair)
@@ -165,7 +177,8 @@ def test_a_spoilt_output_is_never_ok(name):
 @pytest.mark.study
 @pytest.mark.parametrize("name", [*UNRELATED, *SPOILT])
 def test_none_of_them_is_ok_for_any_seed(name):
-    for seed in range(2, 2 + STUDY):
+    """None of 60 excludes that one in twenty is ok, at 95 %; of all cases, one in nine hundred."""
+    for seed in range(2, 2 + study_size(60)):
         pair = judged({**UNRELATED, **SPOILT}[name](np.random.default_rng(seed)))
         assert_sound(pair)
         assert pair.verdict != "ok", (name, seed)

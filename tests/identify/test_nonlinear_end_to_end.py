@@ -106,7 +106,9 @@ def test_the_harmonics_follow_the_describing_function():
     """Friction F makes a third harmonic of a third of 4 F / π, as the dynamics pass it on."""
     curves = identified(motion("friction", 0.02), noise=0.0005)["y", "u"].nonlinearity.harmonics
     own, third = (next(c for c in curves if c.order == k) for k in (1, 3))
-    for f, amplitude in list(zip(third.frequency, third.amplitude, strict=True))[1:4]:
+    inner = list(zip(third.frequency, third.amplitude, strict=True))[1:4]
+    assert len(inner) == 3
+    for f, amplitude in inner:
         s = 3 * f / 10.0  # the third harmonic's frequency over the natural one
         passed = 1 / abs(1 - s**2 + 0.8j * s)
         assert amplitude == pytest.approx(4 * 0.02 / np.pi / 3 * passed, rel=0.3)
@@ -221,7 +223,7 @@ def test_the_silverbox_hardens_in_one_record_and_over_levels(measured):
     assert arrow.verdict == "doubtful"
     assert arrow.nonlinearity.odd > 0.1
     assert arrow.nonlinearity.even == 0.0
-    levels = hmpim.identify_levels([part(k, k + 6000) for k in range(2000, 36_000, 6000)])
+    levels = hmpim.identify_levels([part(k, k + 6000) for k in (2000, 20_000, 32_000)])
     found = levels["y", "u"]
     assert [f.code for f in found.findings] == ["nonlinear", "hardening"]
     frequency = next(t for t in found.trends if t.name == "natural_frequency")

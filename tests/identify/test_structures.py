@@ -7,6 +7,7 @@ from scipy import signal
 import hmpim
 from hmpim.identify.fitting.joint import joint_fit
 from hmpim.model import STRUCTURES, coefficients_of, denominator_of, theta_of
+from tests_support import in_studies
 
 FS, DURATION, FINE = 500.0, 10.0, 8
 OMEGA = 2 * np.pi
@@ -51,7 +52,10 @@ CASES = {
 }
 
 
-@pytest.fixture(scope="module", params=sorted(CASES))
+LONG = "integrator_first_order"  # to identify, as long as all the others
+
+
+@pytest.fixture(scope="module", params=[*sorted(set(CASES) - {LONG}), *in_studies(LONG)])
 def found(request):
     numerator, denominator, delay, *_ = CASES[request.param]
     fine = np.arange(int(FS * DURATION) * FINE) / (FS * FINE)

@@ -198,6 +198,7 @@ def test_led_derivatives_agree_and_pieces_meet(wish, n):
     led = stimulus.waveform
     assert isinstance(led, RestToRest)
     peaks = stimulus.peaks
+    assert len(led.breaks) >= 4  # a lead and a run-out, each with both its ends
     for at in led.breaks:
         # no jump: from one side to the other only what slope and instant allow
         step = 1e-7 * peaks.velocity / peaks.acceleration

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from hmpim.errors import ArgumentError, RecordError
@@ -31,6 +31,10 @@ def held(period: float, phase: float = 0.0031, **kind) -> np.ndarray:
     samples=st.one_of(st.floats(1.1, 30.0), st.sampled_from([2.0, 3.0, 20 / 3, 5.5, 5 / 3, 20.0])),
     phase=st.floats(0.0, 1.0),
     kind=st.sampled_from([{"noise_std": 0.01}, {"noise_std": 0.3, "saturation_high": 0.7}]),
+)
+@example(samples=2.25, phase=0.0, kind={"noise_std": 0.01}).xfail(
+    reason="updates that fall on every ninth sample: 1.8 samples are found",
+    raises=AssertionError,
 )
 def test_period_and_phase_lie_within_what_the_record_leaves_open(samples, phase, kind):
     if samples < 3 and "saturation_high" in kind:

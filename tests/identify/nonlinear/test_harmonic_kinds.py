@@ -8,6 +8,7 @@ from hmpim.identify.nonlinear.harmonics import any_harmonic, sweep_harmonics
 from hmpim.identify.nonlinear.mechanisms import hypotheses, play, rate_limited
 from hmpim.identify.nonlinear.sweep_phase import sweep_phase
 from hmpim.model.sampled import delayed_response, prepare_input
+from tests_support import assert_share
 
 FS = 200.0
 T = np.arange(2000) / FS
@@ -93,8 +94,7 @@ def test_the_quick_look_gives_honest_chances_in_white_noise():
         any_harmonic(np.random.default_rng(seed).standard_normal(T.size), sweep, FS)
         for seed in range(400)
     ]
-    room = 3 * np.sqrt(0.05 * 0.95 / 400)
-    assert np.mean(np.array(chances) < 0.05) < 0.05 + room
+    assert_share(np.array(chances) < 0.05, at_most=0.05)
     assert np.mean(np.array(chances) < 0.05) > 0.005
     assert min(chances) > 1e-5
     assert any_harmonic(np.zeros(T.size), sweep, FS) == 1.0

@@ -13,6 +13,7 @@ from hmpim.identify.nonlinear.sweep_phase import sweep_phase
 from hmpim.identify.threads import one_thread
 from hmpim.model import STRUCTURES, prepare_input
 from hmpim.rigs import Sensor
+from tests_support import assert_share
 
 FS = 200.0
 T = np.arange(2000) / FS
@@ -137,9 +138,8 @@ def test_noise_alone_gives_the_chances_it_should(seeds, colour):
             found = sweep_harmonics(CHIRP, fit.residual, FS, delay=fit.delay / FS)
             chances.append([h.probability for h in found.orders])
     chances = np.array(chances)
-    room = 3 * np.sqrt(0.05 * 0.95 / chances.size)
-    assert np.mean(chances < 0.05) < 0.07 + room
-    assert np.mean(chances < 1e-3) < 0.003 + 3 * np.sqrt(1e-3 / chances.size)
+    assert_share(chances < 0.05, at_most=0.07)
+    assert_share(chances < 1e-3, at_most=0.003)
     assert chances.min() > 1e-5
 
 

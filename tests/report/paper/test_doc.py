@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from hmpim.report.paper import make_study, markdown_table
+from hmpim.report.paper import markdown_table
 
 PAGE = Path(__file__).parents[3] / "docs" / "paper.md"
 NUMBER = re.compile(r"(?<![\w.])−?\d+(?:\.\d+)?")
@@ -22,10 +22,10 @@ def same_within_rounding(ours, theirs):
         assert abs(x - y) <= max(1.01 * 10 ** -max(places(a), places(b)), 1e-3 * abs(y)), theirs
 
 
-def test_table_of_the_page_is_the_table_made_now():
+def test_table_of_the_page_is_the_table_made_now(whole_study):
     lines = PAGE.read_text(encoding="utf-8").splitlines()
     shown = [line for line in lines if line.startswith("| ")]
-    made = markdown_table(make_study().rows).splitlines()
+    made = markdown_table(whole_study.rows).splitlines()
     assert len(shown) == len(made)
     for ours, theirs in zip(made, shown, strict=True):
         same_within_rounding(ours, theirs)

@@ -8,8 +8,8 @@ from hmpim.report.paper import FIGURES, make_study
 
 
 @pytest.fixture(scope="module")
-def study():
-    return make_study()
+def study(whole_study):
+    return whole_study
 
 
 @pytest.fixture(scope="module")
@@ -28,6 +28,7 @@ def test_every_figure_that_needs_no_motion_table_is_made(study):
 
 def test_no_panel_is_empty_or_without_its_unit(study):
     for number, picture in study.pictures.items():
+        assert picture.figure.axes, number
         for axes in picture.figure.axes:
             drawn = [line for line in axes.lines if np.ptp(line.get_xdata()) > 0]
             assert drawn, number

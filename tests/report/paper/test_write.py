@@ -67,7 +67,9 @@ def test_page_needs_no_other_file_and_no_network(folder):
     page = (folder / "index.html").read_text(encoding="utf-8")
     assert page.count("<svg") == 2
     assert "http" not in page
-    for outside in re.findall(r'(?:src|href|url)\s*[=(]\s*"?([^")\s]+)', page):
+    leads = re.findall(r'(?:src|href|url)\s*[=(]\s*"?([^")\s]+)', page)
+    assert leads
+    for outside in leads:
         assert outside.startswith("#"), outside
     assert "@import" not in page
     assert "<script" not in page

@@ -1,5 +1,7 @@
 """The table as a rig: records, determinism, friction, pace, and what identification finds."""
 
+from itertools import product
+
 import numpy as np
 import pytest
 
@@ -10,6 +12,7 @@ from hmpim.rigs import MotionTable, Rig, commands_of
 from hmpim.rigs.table import AXES, FIG_4, TablePosition, exact_bandwidth, linear_response
 from hmpim.rigs.table.linear import phase_crossing
 from hmpim.stimulus import Limits, Sine, Stimulus, design
+from tests_support import in_studies
 
 pytest.importorskip("mujoco")
 
@@ -90,8 +93,12 @@ def test_encoders_read_the_truth_to_their_resolution():
     assert gap[:, 1].std() == pytest.approx(0.003 / np.sqrt(12), rel=0.1)
 
 
-@pytest.mark.parametrize("mode", MODES)
-@pytest.mark.parametrize("axis", AXES)
+EACH = [("roll", "PVA"), ("yaw", "P"), ("pitch", "PV"), ("azimuth", "P"), ("elevation", "P")]
+"""Each axis once and each mode; the others take as long again each, in `make studies`."""
+OTHERS = [case for case in product(AXES, MODES) if case not in EACH]
+
+
+@pytest.mark.parametrize(("axis", "mode"), [*EACH, *in_studies(*OTHERS)])
 def test_identified_and_exact_bandwidths_agree(axis, mode):
     """Nothing is told to the fit; what is exact is what the record's own statement means."""
     table = MotionTable(friction=False, mode=mode)
@@ -110,7 +117,7 @@ def test_identified_and_exact_bandwidths_agree(axis, mode):
         assert abs(found.value / truth - 1.0) < 0.02
 
 
-@pytest.mark.parametrize("mode", ["PV", "PVA"])
+@pytest.mark.parametrize("mode", ["PV", *in_studies("PVA")])
 def test_slower_commands_lower_what_is_identified_as_much_as_what_is_exact(mode):
     table = MotionTable(friction=False, mode=mode)
     truth = exact_bandwidth(table, axis="pitch", fs=500.0)
