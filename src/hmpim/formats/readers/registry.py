@@ -8,6 +8,20 @@ from pathlib import Path
 
 from hmpim.errors import FormatError
 from hmpim.formats.readers import excel, record_file, text
+from hmpim.formats.readers.logs import (
+    ardupilot,
+    blackbox,
+    hdf5,
+    mat,
+    mdf,
+    parquet,
+    ros,
+    tdms,
+    uff58,
+    ulog,
+    wav,
+    wpilog,
+)
 from hmpim.formats.readers.protocol import Reader
 from hmpim.formats.readers.worker import addressed, shielded
 
@@ -20,7 +34,23 @@ HEAD = 65_536
 """Number of bytes at the start of a file by which a format is recognised."""
 
 # The most particular first; text, which anything printable may be, last.
-BUILT_IN: tuple[Reader, ...] = (record_file.RECORD_FILE, excel.EXCEL, text.TEXT)
+BUILT_IN: tuple[Reader, ...] = (
+    record_file.RECORD_FILE,
+    mat.MAT,
+    hdf5.HDF5,
+    parquet.PARQUET,
+    mdf.MDF,
+    tdms.TDMS,
+    ulog.ULOG,
+    ardupilot.ARDUPILOT,
+    blackbox.BLACKBOX,
+    ros.ROS,
+    wpilog.WPILOG,
+    wav.WAV,
+    uff58.UFF58,
+    excel.EXCEL,
+    text.TEXT,
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -127,7 +157,9 @@ def reader_for(path: Path) -> Reader:
 
 def _head(path: Path) -> bytes:
     if path.is_dir():
-        raise FormatError(f"{str(path)!r} is a folder; name the file in it")
+        path = path / "metadata.yaml"  # a ROS 2 bag is a folder
+        if not path.is_file():
+            raise FormatError(f"{str(path.parent)!r} is a folder; name the file in it")
     try:
         with path.open("rb") as file:
             return file.read(HEAD)

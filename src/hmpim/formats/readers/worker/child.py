@@ -192,7 +192,7 @@ def _temporary(arguments: tuple[Any, ...], folder: str) -> bool:
     if not isinstance(place, str | os.PathLike):
         return False
     real = os.path.realpath(place)
-    return real == os.devnull or real.startswith(folder + os.sep)
+    return real in (os.devnull, folder) or real.startswith(folder + os.sep)
 
 
 if __name__ == "__main__":
