@@ -1,16 +1,20 @@
 """What is saved comes back equal."""
 
 import json
+from dataclasses import replace
 from typing import get_args
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 import hmpim
 from hmpim.errors import ArgumentError, FormatError
-from hmpim.record import Record
+from hmpim.record import Finding, Record
 from hmpim.stimulus.kinds import Kind
 
+FS = 100.0
+TIME = np.arange(400) / FS
 LIMITS = hmpim.Limits(position=10, velocity=1000, acceleration=40000, unit="deg")
 
 
@@ -31,6 +35,76 @@ def test_a_result(result, tmp_path):
     changed["pairs"][0]["frequency_response"]["std"][3] *= 1.0 + 1e-15
     (tmp_path / "r.json").write_text(json.dumps(changed))
     assert hmpim.load(tmp_path / "r.json") != result
+
+
+def lag(u, pole=0.8):
+    return lfilter([1.0 - pole], [1.0, -pole], u)
+
+
+CHIRP = np.sin(2 * np.pi * (0.5 * TIME + 2.0 * TIME**2))
+OTHER = np.sign(np.random.default_rng(5).standard_normal(TIME.size // 10)).repeat(10)
+SENSOR = hmpim.Sensor(delay=0.02, noise_std=0.01, hold_period=0.05, saturation_high=0.7)
+RESULTS = {
+    "static": ({"u": CHIRP}, {"y": 2.0 * CHIRP + 0.1}),
+    "clipped and held": ({"u": CHIRP}, {"y": SENSOR.respond(CHIRP, fs=FS, rng=1)}),
+    "rounded": ({"u": CHIRP}, {"y": np.round(lag(CHIRP), 1)}),
+    "no relation": ({"u": CHIRP}, {"y": np.random.default_rng(2).standard_normal(TIME.size)}),
+    "rising": ({"u": CHIRP}, {"y": np.cumsum(CHIRP) / FS}),
+    "nonlinear": ({"u": CHIRP}, {"y": lag(CHIRP) + 0.2 * CHIRP**3}),
+    "two inputs": ({"u": CHIRP, "ö": OTHER}, {"y": 2.0 * CHIRP + 0.3 * OTHER}),
+}
+
+
+@pytest.mark.parametrize("kind", RESULTS)
+def test_a_result_of_every_kind(kind, tmp_path):
+    inputs, outputs = RESULTS[kind]
+    rng = np.random.default_rng(3)
+    noisy = {name: y + 1e-3 * rng.standard_normal(y.size) for name, y in outputs.items()}
+    if kind in ("rounded", "clipped and held"):
+        noisy = outputs
+    record = Record.from_arrays(inputs, noisy, fs=FS, band=(0.5, 8.0))
+    result = hmpim.identify(record)
+    hmpim.save(result, tmp_path / "r.json")
+    again = hmpim.load(tmp_path / "r.json")
+    assert again == result
+    assert [p.verdict for p in again] == [p.verdict for p in result]
+    hmpim.save(again, tmp_path / "again.json")
+    assert (tmp_path / "again.json").read_bytes() == (tmp_path / "r.json").read_bytes()
+
+
+@pytest.mark.parametrize(
+    "waveform",
+    [
+        hmpim.Chirp(band=(0.1, 3.0), duration=2.0),
+        hmpim.Ramp(rate=-0.1, duration=2.0, start=0.5),
+        hmpim.Sine(frequency=1 / 3, duration=2.0),
+        hmpim.Step(amplitude=1e-7, duration=2.0),
+        hmpim.SumOfSines(amplitudes=(0.1, 0.7), frequencies=(1.0, 2.0), duration=2.0),
+        hmpim.Sweep(band=(0.1, 3.0), duration=2.0, gain=0.3, extinction=0.5),
+    ],
+    ids=lambda waveform: type(waveform).__name__,
+)
+def test_a_stimulus_of_every_waveform(waveform, tmp_path):
+    stimulus = hmpim.Stimulus(waveform=waveform, fs=50.0, unit="deg", axis="yaw", tail=0.1)
+    hmpim.save(stimulus, tmp_path / "s.toml")
+    assert hmpim.load(tmp_path / "s.toml") == stimulus
+
+
+def test_a_record_of_every_role_in_either_form(tmp_path):
+    record = Record.from_arrays(
+        {"u": CHIRP},
+        {"y": lag(CHIRP)},
+        fs=FS,
+        references={"r": 2.0 * CHIRP},
+        auxiliary={"heat [°C]": TIME / 3.0, "u.velocity": np.gradient(CHIRP)},
+        units={"u": "deg", "heat [°C]": "degC"},
+        band=(0.5, 8.0),
+    )
+    findings = (Finding(code="gaps", message="2 missing", severity="info", parameters=()),)
+    record = replace(record, findings=findings, source="bench 2")
+    for name in ("r.h5", "r.csv"):
+        hmpim.save(record, tmp_path / name)
+        assert hmpim.load(tmp_path / name) == record, name
 
 
 @pytest.mark.parametrize("kind", get_args(Kind))
