@@ -1,0 +1,115 @@
+"""docs/method.md: its tables of warnings and of groups are what the code says."""
+
+import ast
+import re
+from pathlib import Path
+from typing import NamedTuple
+
+import pytest
+
+from hmpim.identify import groups
+from hmpim.identify.nonlinear.words import KIND_WORDS
+
+ROOT = Path(__file__).parents[2]
+TEXT = (ROOT / "docs" / "method.md").read_text(encoding="utf-8")
+WARNINGS = TEXT.partition("## Verdict and warnings")[2].partition("\n## ")[0]
+ROWS = [
+    [cell.strip() for cell in line.split("|")[1:-1]]
+    for line in WARNINGS.splitlines()
+    if line.startswith("| `")
+]
+TOUCHED = {code: row for row in reversed(ROWS) for code in re.findall(r"`(\w+)`", row[0])}
+WORDS = {
+    "EVERY": "everything",
+    "MODELLED": "all of the model",
+    "PHASE_SPLIT": "the split of the phase",
+    "TIMING": "timing",
+    "GAIN": "size",
+}
+
+
+class Said(NamedTuple):
+    """A finding as it stands in the code: its codes, and what is written beside them."""
+
+    codes: tuple[str, ...]
+    severity: str
+    parameters: str
+
+
+def strings(node):
+    return tuple(
+        each.value
+        for each in ast.walk(node)
+        if isinstance(each, ast.Constant) and isinstance(each.value, str)
+    )
+
+
+def findings(*rooms):
+    for room in rooms:
+        place = ROOT / "src" / "hmpim" / room
+        for file in [place] if place.is_file() else sorted(place.rglob("*.py")):
+            for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+                if isinstance(node, ast.Call) and getattr(node.func, "id", "") == "Finding":
+                    given = {k.arg: k.value for k in node.keywords}
+                    severity, touched = (ast.unparse(given[k]) for k in ("severity", "parameters"))
+                    yield Said(strings(given["code"]), severity, touched)
+
+
+IDENTIFY = [said for said in findings("identify") if said.codes]
+RECORD = [said for said in findings("record") if said.codes]
+DOUBTS = [said for said in IDENTIFY if said.severity != "'info'"]
+
+
+def test_the_code_was_read():
+    assert len(DOUBTS) > 20
+    assert len(RECORD) > 8
+
+
+@pytest.mark.parametrize("code", sorted({c for said in IDENTIFY + RECORD for c in said.codes}))
+def test_every_code_stands_in_a_table(code):
+    assert code in TOUCHED
+
+
+@pytest.mark.parametrize("said", DOUBTS, ids=lambda said: said.codes[0])
+def test_what_a_doubt_touches_is_what_its_row_says(said):
+    for code in said.codes:
+        for group in re.findall(r"\b[A-Z_]{4,}\b", said.parameters):
+            if group in WORDS:
+                assert WORDS[group] in TOUCHED[code][2], (code, group)
+
+
+def test_what_is_never_a_doubt_touches_nothing():
+    doubted = {code for said in DOUBTS for code in said.codes}
+    for row in ROWS:
+        if len(row) == 4 and not doubted & set(re.findall(r"`(\w+)`", row[0])):
+            assert row[2] == "–" or "few_lines" in row[0], row
+
+
+def test_what_the_record_file_says_of_itself():
+    code = (ROOT / "src/hmpim/formats/recording/opened.py").read_text(encoding="utf-8")
+    said = re.findall(r'_info\(\s*"(\w+)"', code)
+    assert len(said) >= 4
+    assert set(said) <= set(TOUCHED)
+
+
+def test_the_kinds_of_nonlinearity_have_their_own_page():
+    page = (ROOT / "docs" / "nonlinearity.md").read_text(encoding="utf-8")
+    for kind in KIND_WORDS:
+        assert f"`{kind}`" in page, kind
+
+
+def members(cell):
+    return set(re.findall(r"`(\w+)`", cell))
+
+
+def test_the_groups_are_those_of_the_code():
+    table = {
+        line.split("|")[1].strip(): line.split("|")[2]
+        for line in WARNINGS.partition("| group |")[2].partition("\n\n")[0].splitlines()[2:]
+    }
+    assert members(table["the split of the phase"]) == set(groups.PHASE_SPLIT)
+    assert members(table["timing"]) == set(groups.TIMING)
+    assert members(table["size"]) == {*groups.GAIN, "noise_std"}
+    seen = set(groups.EVERY) - set(groups.MODELLED)
+    assert members(table["all of the model"]) <= seen
+    assert {name for name in seen if "saturation" not in name} == members(table["all of the model"])
