@@ -137,3 +137,20 @@ def test_a_rig_without_a_watchdog_is_refused_unless_that_is_said(folder, monkeyp
     out = run("run", "--rig-file", "bare.toml", "s.csv", "-o", "r.h5", "--feel")
     assert out.exit_code == 0, out.output
     assert {f.code for f in load("r.h5").findings} == {"felt"}
+
+
+def test_the_axis_is_that_of_the_stimulus_or_asked_for_or_the_only_one_described(folder):
+    pytest.importorskip("mujoco")
+    slow = Limits(position=0.5, velocity=20, acceleration=300, unit="deg")
+    save_stimulus(design(band=(0.5, 10), duration=1, fs=500, limits=slow), "s.csv")
+    out = run("run", "--rig", "table", "s.csv", "-o", "r.csv")
+    assert out.exit_code == 2
+    assert "the stimulus names no axis, and 'table' has roll, yaw, pitch, azimuth" in out.stderr
+    assert run("run", "--rig", "table", "--axis", "pitch", "s.csv", "-o", "r.h5").exit_code == 0
+    assert load("r.h5").inputs[0].name == "pitch.command"
+    (folder / "t.toml").write_text('rig = "table"\naxes = ["yaw"]\n')
+    assert run("run", "--rig-file", "t.toml", "s.csv", "-o", "r.h5").exit_code == 0
+    assert load("r.h5").inputs[0].name == "yaw.command"
+    save_stimulus(design(band=(0.5, 10), duration=1, fs=500, limits=slow, axis="roll"), "s.csv")
+    out = run("run", "--rig", "table", "--axis", "pitch", "s.csv", "-o", "r.h5")
+    assert "--axis pitch: the stimulus is for roll already; leave it out" in out.stderr

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from hmpim.cli.strip import Strip
     from hmpim.rigs import Rig
     from hmpim.rigs.catalogue import Description
+    from hmpim.stimulus import Stimulus
 
 __all__ = ["run"]
 
@@ -42,6 +43,12 @@ def run(
             help="TOML that describes the rig: address, rate, axes, units, limits, load.",
         ),
     ] = None,
+    axis: Annotated[
+        str,
+        typer.Option(
+            "--axis", metavar="NAME", help="Axis that moves, where the stimulus names none."
+        ),
+    ] = "",
     output: Annotated[
         Path | None,
         typer.Option(
@@ -106,7 +113,7 @@ def run(
 
     described = None if rig_file is None else read_description(rig_file)
     found = find_rig(rig, description=described)
-    stimuli = read_stimuli(stimulus)
+    stimuli = _aimed(read_stimuli(stimulus), axis, found.description.axes)
     options = RunOptions(
         watchdog=watchdog and found.description.watchdog is None,
         feel="unknown" if feel is None else Feel() if feel else None,
@@ -145,6 +152,20 @@ def run(
     for name, path in (("Result", json), ("Page", report)):
         if path is not None:
             say(f"{name}: {path}")
+
+
+def _aimed(stimuli: "list[Stimulus]", axis: str, axes: tuple[str, ...]) -> "list[Stimulus]":
+    """Give a stimulus that names no axis the one that is asked for, or the only one described."""
+    from dataclasses import replace
+
+    if not axis and len(axes) == 1 and len(stimuli) == 1 and not stimuli[0].axis:
+        axis = axes[0]
+    if not axis:
+        return stimuli
+    if len(stimuli) > 1 or stimuli[0].axis not in ("", axis):
+        named = ", ".join(one.axis for one in stimuli)
+        raise ArgumentError(f"--axis {axis}: the stimulus is for {named} already; leave it out")
+    return [replace(stimuli[0], axis=axis)]
 
 
 def _driven(found: "Rig", text: str, description: "Description | None") -> "Rig":

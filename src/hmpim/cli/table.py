@@ -1,6 +1,7 @@
 """``hmpim table``: the simulated motion table served over UDP, in real time."""
 
 import signal
+from contextlib import nullcontext
 from pathlib import Path
 from types import FrameType
 from typing import Annotated
@@ -63,6 +64,7 @@ def table(
     """
     import numpy as np
 
+    from hmpim.experiment.priority import undelayed
     from hmpim.rigs import MotionTable, SkewedClock, SystemClock
     from hmpim.rigs.table import both_loads
     from hmpim.rigs.table.served import TablePlant, table_hello
@@ -92,9 +94,7 @@ def table(
         clock = SkewedClock(SystemClock(), offset=clock_offset, drift=1e-6 * clock_drift)
         every = max(1, round(0.1 * rate))
         writing = None if trace is None else Trace(trace, hello.axes, every=every)
-        try:
+        with undelayed(realtime=True) as scheduling, writing or nullcontext():
+            say(f"It has {scheduling}")
             serve(server, farend, plant, clock=clock, until=lambda: bool(ended), trace=writing)
-        finally:
-            if writing is not None:
-                writing.__exit__(None, None, None)
     say("Table at rest")

@@ -138,7 +138,7 @@ class Running:
             record = self._played(ready, findings, recorder)
         except BaseException as error:
             with undisturbed():
-                kept = recorder.fail(f"{type(error).__name__}: {error}")
+                kept = recorder.fail(f"{type(error).__name__}: {error}".rstrip(": "))
             if kept:
                 self.log.add("note", f"what was recorded until then is in {self.path}")
             raise

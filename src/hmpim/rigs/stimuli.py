@@ -58,6 +58,11 @@ def stimuli_by_axis(
     if not stimuli:
         raise ArgumentError("no stimulus is given; give at least one axis something to do")
     for axis in stimuli:
+        if axes and not axis:
+            raise ArgumentError(
+                f"the stimulus names no axis, and {name} has {', '.join(axes)}; name one "
+                "(Stimulus.axis, or --axis)"
+            )
         if axes and axis not in axes:
             raise ArgumentError(f"axis {axis!r} is not known; use one of {tuple(axes)}")
     if not axes and len(stimuli) > 1:

@@ -208,7 +208,7 @@ def test_a_sweep_designed_in_an_axis_is_played(axis):
     [
         ({}, ArgumentError, "no stimulus is given"),
         ({"nod": sine(1.0, 1.0)}, ArgumentError, "axis 'nod' is not known"),
-        (sine(1.0, 1.0), ArgumentError, "axis '' is not known; use one of"),
+        (sine(1.0, 1.0), ArgumentError, "axis '' is not known; use one of|names no axis"),
         (
             {"roll": sine(1.0, 1.0, unit="")},
             UnitError,

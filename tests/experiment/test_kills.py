@@ -1,0 +1,97 @@
+"""What ends a run, with real processes: the table comes to rest, and the record is kept."""
+
+import os
+import signal
+import time
+
+import numpy as np
+import pytest
+
+from farends import AXIS, SWEEP, Cable, Table, Ticks, begin, check_rest, moving_since
+from hmpim.formats.recording import read_recording
+from hmpim.identify import identify
+
+KINDS = ("kill", "interrupt", "cable")
+
+
+@pytest.fixture(scope="module")
+def table(tmp_path_factory):
+    table = Table(tmp_path_factory.mktemp("table"))
+    yield table
+    table.close()
+
+
+def ended(table, folder, kind, at):
+    """Begin a run, end it in some way `at` s into the motion, and return all that was done."""
+    cable = Cable(table.port) if kind == "cable" else None
+    process = begin(folder, table.port if cable is None else cable.port)
+    try:
+        parts = moving_since(table, at)
+        if cable is not None:
+            cable.plugged = False
+        else:
+            os.kill(process.pid, signal.SIGKILL if kind == "kill" else signal.SIGINT)
+        now = time.perf_counter()
+        _, said = process.communicate(timeout=60)
+    finally:
+        process.kill()
+        process.wait()
+        if cable is not None:
+            cable.close()
+    parts.append(table.until_rest())
+    return Ticks.joined(parts), now, process.returncode, said
+
+
+def check(table, folder, kind, at):
+    ticks, now, code, said = ended(table, folder, kind, at)
+    check_rest(ticks, ended=now)
+    moving = ticks.time[ticks.state == "MOVING"]
+    kept = read_recording(folder / "r.h5")
+    assert not kept.complete
+    assert [f.code for f in kept.record.findings if f.code == "incomplete"]
+    for channel in (*kept.record.inputs, *kept.record.outputs):
+        assert channel.time[-1] - channel.time[0] > moving[-1] - moving[0] - 0.5
+    assert kept.rig == "table"
+    assert kept.stimuli[0].axis == AXIS
+    if kind == "kill":
+        assert code == -signal.SIGKILL
+    elif kind == "interrupt":
+        assert code == 130
+        assert "ended early (KeyboardInterrupt)" in str(kept.record.findings)
+        assert "table was told to stop" in (folder / "run.log").read_text()
+    else:
+        assert code == 2
+        assert "its watchdog" in said
+    return kept.record
+
+
+def check_identified(record):
+    """What is found of the part that was kept is right: held at rest, the table follows exactly."""
+    pair = identify(record)[f"{AXIS}.position", f"{AXIS}.command"]
+    assert pair.parameters.scale_factor.value == pytest.approx(1.0, abs=0.03)
+    assert pair.fit_percent > 95
+
+
+@pytest.mark.parametrize(("kind", "at"), [("kill", 2.6), ("interrupt", 0.8), ("cable", 1.1)])
+def test_at_rest_inside_the_limits_and_the_record_kept_and_identified(table, tmp_path, kind, at):
+    record = check(table, tmp_path, kind, at)
+    if kind == "kill":  # the others in the study
+        check_identified(record)
+
+
+@pytest.mark.study
+def test_at_any_moment(table, tmp_path):
+    """200 moments drawn at random; identified wherever two seconds were kept."""
+    rng = np.random.default_rng(int(os.environ.get("HMPIM_KILLS_SEED", "0")))
+    for number in range(int(os.environ.get("HMPIM_KILLS", "200"))):
+        folder = tmp_path / str(number)
+        folder.mkdir()
+        at = rng.uniform(0.0, SWEEP.samples / SWEEP.fs - 0.6)
+        kind = KINDS[int(rng.choice(3, p=[0.7, 0.15, 0.15]))]
+        if kind == "kill" and at < 0.6:
+            ticks, now, *_ = ended(table, folder, kind, at)
+            check_rest(ticks, ended=now)
+            continue  # nothing needs to be on the disk yet
+        record = check(table, folder, kind, max(at, 0.6))
+        if at > 2.0:
+            check_identified(record)

@@ -1,0 +1,179 @@
+"""The served table and runs over it as processes of their own; what was done is read from files."""
+
+import os
+import signal
+import socket
+import subprocess
+import sys
+import threading
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from hmpim.formats.stimulus_files import save_stimulus
+from hmpim.rigs import MotionTable
+from hmpim.stimulus import design
+
+HMPIM = [sys.executable, "-m", "hmpim.cli.main"]
+RATE = 500.0
+AXIS = "azimuth"
+LIMITS = MotionTable().limits_of(AXIS)
+SWEEP = design(
+    band=(0.4, 10), duration=5, fs=RATE, axis=AXIS,
+    limits=MotionTable().limits_of(AXIS, travel=10.0, share=0.95),
+)  # fmt: skip
+
+
+def wait_for(condition, seconds=60.0):
+    deadline = time.monotonic() + seconds
+    while not (found := condition()):
+        assert time.monotonic() < deadline, "nothing happened"
+        time.sleep(0.03)
+    return found
+
+
+class Table:
+    """`hmpim table`, and its trace."""
+
+    def __init__(self, folder):
+        self.trace = folder / "trace.csv"
+        said = folder / "table.txt"
+        with said.open("w") as out:
+            self.process = subprocess.Popen(
+                [*HMPIM, "table", "--udp", "127.0.0.1:0", "--rate", f"{RATE:g}",
+                 "--trace", str(self.trace)],
+                stdout=out, env=os.environ | {"PYTHONUNBUFFERED": "1"},
+            )  # fmt: skip
+        wait_for(lambda: "udp://" in said.read_text())
+        self.port = int(said.read_text().split("udp://127.0.0.1:")[1].split(",")[0])
+        self.read_to = 0
+
+    def close(self):
+        self.process.send_signal(signal.SIGINT)
+        assert self.process.wait(60) == 0
+
+    def rows(self):
+        """What it has done since the last call, as far as whole lines are written."""
+        with self.trace.open() as file:
+            head = file.readline().strip().split(",")
+            if self.read_to:
+                file.seek(self.read_to)
+            text = file.read()
+            whole = text[: text.rfind("\n") + 1]
+            self.read_to = (self.read_to or file.tell() - len(text)) + len(whole)
+        rows = [line.split(",") for line in whole.splitlines()]
+        column = {name: k for k, name in enumerate(head)}
+        return Ticks(
+            time=np.array([float(r[column["time"]]) for r in rows]),
+            state=np.array([r[column["state"]] for r in rows]),
+            order=np.array([float(r[column[f"{AXIS}.order"]]) for r in rows]),
+            rate=np.array([float(r[column[f"{AXIS}.rate"]]) for r in rows]),
+            true=np.array([float(r[column[f"{AXIS}.true"]]) for r in rows]),
+        )
+
+    def until_rest(self, *, within=60.0):
+        """All that it does until it stands."""
+        parts = []
+
+        def there():
+            part = self.rows()
+            parts.append(part)
+            return part.state.size and part.state[-1] in ("AT_REST", "FAULT", "IDLE")
+
+        wait_for(there, within)
+        return Ticks.joined(parts)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Ticks:
+    time: np.ndarray
+    state: np.ndarray
+    order: np.ndarray
+    rate: np.ndarray
+    true: np.ndarray
+
+    @classmethod
+    def joined(cls, parts):
+        names = ("time", "state", "order", "rate", "true")
+        return cls(**{name: np.concatenate([getattr(p, name) for p in parts]) for name in names})
+
+
+class Cable:
+    """UDP passed on from one port to another, until it is pulled."""
+
+    def __init__(self, port):
+        self.near = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self.near.bind(("127.0.0.1", 0))
+        self.far = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self.far.connect(("127.0.0.1", port))
+        self.port = self.near.getsockname()[1]
+        self.plugged, self.peer = True, None
+        for ways in ((self.near, self._forth), (self.far, self._back)):
+            threading.Thread(target=self._pass, args=ways, daemon=True).start()
+
+    def _pass(self, source, on):
+        while True:
+            try:
+                data, sender = source.recvfrom(65_507)
+                if self.plugged:
+                    on(data, sender)
+            except OSError:
+                if source.fileno() < 0:
+                    return
+
+    def _forth(self, data, sender):
+        self.peer = sender
+        self.far.send(data)
+
+    def _back(self, data, _sender):
+        self.near.sendto(data, self.peer)
+
+    def close(self):
+        for one in (self.near, self.far):
+            one.shutdown(socket.SHUT_RDWR) if one is self.far else None
+            one.close()
+
+
+def begin(folder, port):
+    """Begin `hmpim run` of the sweep, its record in r.h5."""
+    save_stimulus(SWEEP, folder / "s.csv")
+    return subprocess.Popen(
+        [*HMPIM, "run", "--rig", f"udp://127.0.0.1:{port}", "--axis", AXIS, "s.csv",
+         "-o", "r.h5", "--log", "run.log"],
+        cwd=folder, stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True,
+    )  # fmt: skip
+
+
+def moving_since(table, at):
+    """Ticks so far once the table has moved for `at` s."""
+    parts = []
+
+    def enough():
+        parts.append(table.rows())
+        ticks = Ticks.joined(parts)
+        moving = ticks.time[ticks.state == "MOVING"]
+        return moving.size and time.perf_counter() >= moving[0] + at
+
+    wait_for(enough)
+    return parts
+
+
+def check_rest(ticks, *, ended):
+    """From `ended` (s of the clock) on: braked in time, smoothly, to rest, inside all limits."""
+    assert np.abs(ticks.order).max() <= LIMITS.position
+    assert np.abs(ticks.true).max() <= LIMITS.position
+    braking = np.flatnonzero(ticks.state == "BRAKING")
+    assert braking.size
+    assert ticks.time[braking[0]] - ended < 0.1
+    change = np.abs(np.diff(ticks.rate[braking[0] - 1 :])) * RATE
+    assert change.max() < 1.01 * LIMITS.acceleration
+    assert ticks.rate[-1] == 0.0
+    return ticks.time[braking[0]]
+
+
+def folder_of(path: Path, name: str) -> Path:
+    folder = path / name
+    folder.mkdir()
+    return folder
