@@ -35,6 +35,7 @@ from hmpim.errors import ArgumentError
 if TYPE_CHECKING:
     from hmpim.identify import Estimate, Identification
     from hmpim.record import Record
+    from hmpim.report.figures import Picture
     from hmpim.stimulus import Stimulus
 
 __all__ = ["Between", "identify", "write_result"]
@@ -176,6 +177,7 @@ def write_result(
     report: Path | None,
     stimulus: "Stimulus | None" = None,
     notes: Sequence[str] = (),
+    pictures: "Sequence[Picture]" = (),
 ) -> None:
     """Write a result to the files that are wanted, each as a whole or not at all."""
     from hmpim.formats import save
@@ -185,7 +187,7 @@ def write_result(
         save(result, json)
     if report is not None:
         with working("Drawing the page"):
-            write_page(result, report, stimulus=stimulus, notes=notes)
+            write_page(result, report, stimulus=stimulus, notes=notes, pictures=pictures)
 
 
 def _named(records: Sequence[Path], given: "Sequence[Record]") -> list[Path]:

@@ -12,6 +12,7 @@ from hmpim.errors import ArgumentError
 
 if TYPE_CHECKING:
     from hmpim.cli.strip import Strip
+    from hmpim.report.figures import Picture
     from hmpim.rigs import Rig
     from hmpim.rigs.catalogue import Description
     from hmpim.stimulus import Stimulus
@@ -147,7 +148,11 @@ def run(
     if not quiet:
         print_result(result, output_console())
     write_result(
-        result, json=json, report=report, stimulus=stimuli[0] if len(stimuli) == 1 else None
+        result,
+        json=json,
+        report=report,
+        stimulus=stimuli[0] if len(stimuli) == 1 else None,
+        pictures=() if report is None else _pictures(found.rig),
     )
     for name, path in (("Result", json), ("Page", report)):
         if path is not None:
@@ -200,6 +205,14 @@ def _files_of(rig: str, rig_file: Path | None) -> list[Path]:
     own = [] if rig_file is None else [rig_file]
     code = [Path(part) for part in rig.split(":")[1:] if Path(part).is_file()]
     return [*own, *config_files(), *code]
+
+
+def _pictures(rig: "Rig") -> "list[Picture]":
+    """What a camera saw, if the rig has one."""
+    from hmpim.report.frames import frames_picture
+
+    frames = getattr(rig, "frames", ())
+    return [frames_picture(frames)] if frames else []
 
 
 def _check_kept(output: Path | None, *, kept: bool) -> None:

@@ -5,6 +5,7 @@ from hmpim.plots.candidates import candidates
 from hmpim.plots.correlation import cross_correlation, error_autocorrelation
 from hmpim.plots.curves import BodeCurve, deviation_curve, measured_curve, model_curve
 from hmpim.plots.envelope import envelope
+from hmpim.plots.frames import tracked_frames
 from hmpim.plots.harmonics import harmonics
 from hmpim.plots.histories import (
     input_output,
@@ -38,4 +39,5 @@ __all__ = [
     "shade_band",
     "spectra",
     "time_histories",
+    "tracked_frames",
 ]

@@ -41,6 +41,7 @@ def report(
     *,
     stimulus: Stimulus | None = None,
     notes: Sequence[str] = (),
+    pictures: Sequence[Picture] = (),
 ) -> None:
     """Write a result as one HTML page that needs no other file and no network.
 
@@ -56,6 +57,8 @@ def report(
     notes : sequence of str
         Plain sentences to be shown under the verdict, such as how a held-out part was
         predicted.
+    pictures : sequence of Picture
+        What else was seen in the run, each with a key of its own.
 
     Raises
     ------
@@ -76,7 +79,7 @@ def report(
     """
     check_page(path)
     check_writable(path)
-    text = render(result, stimulus=stimulus, notes=notes)
+    text = render(result, stimulus=stimulus, notes=notes, pictures=pictures)
     write_text(path, text)
 
 
@@ -107,6 +110,7 @@ def render(
     *,
     stimulus: Stimulus | None = None,
     notes: Sequence[str] = (),
+    pictures: Sequence[Picture] = (),
 ) -> str:
     """Return the page of `report` as text.
 
@@ -118,6 +122,8 @@ def render(
         What was sent.
     notes : sequence of str
         Plain sentences under the verdict.
+    pictures : sequence of Picture
+        What else was seen in the run.
 
     Examples
     --------
@@ -154,6 +160,7 @@ def render(
         pairs=[_pair_view(result, pair) for pair in result.pairs],
         inputs=inputs_view(result),
         stimulus=None if stimulus is None else stimulus_picture(stimulus),
+        pictures=pictures,
         without_record=result.data is None,
         glossary=GLOSSARY,
     )

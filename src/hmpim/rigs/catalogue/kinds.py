@@ -83,6 +83,12 @@ KINDS: tuple[Kind, ...] = (
         builder="hmpim.rigs.catalogue.software:build_fmu",
     ),
     Kind(
+        name="tracker",
+        form="tracker",
+        words="a rendered scene, a camera and a tracker (extra 'tracker'): OpenCV's or your own",
+        builder="hmpim.rigs.catalogue.seen:build_tracker",
+    ),
+    Kind(
         name="udp",
         form="udp://HOST:PORT",
         words="a rig that speaks the datagrams of docs/rigs.md, such as hmpim table --udp",
