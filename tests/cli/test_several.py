@@ -54,6 +54,17 @@ def test_repeats_are_averaged_and_their_error_bars_tested(tmp_path):
     assert natural["agree"] is True
 
 
+def test_one_file_twice_is_not_two_repeats(tmp_path):
+    one = write(tmp_path / "one.csv", {"u": U, "y": output(U, natural=8.0, seed=1)})
+    copy = tmp_path / "copy.csv"
+    copy.write_bytes((tmp_path / "one.csv").read_bytes())
+    for other in (one, copy):
+        done = run(one, other)
+        assert done.exit_code == 2
+        assert "hold the same samples; one record given twice is not two repeats" in done.stderr
+        assert done.stdout == ""
+
+
 def test_levels_say_where_the_unit_is_linear(tmp_path):
     files = [
         write(

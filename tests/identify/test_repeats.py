@@ -112,7 +112,14 @@ def test_what_changes_between_repeats_is_seen() -> None:
 
 def test_copies_of_one_record_are_not_repeats() -> None:
     one = record(lagged() + 0.05 * np.random.default_rng(0).standard_normal(T.size))
-    pair = identify_repeats([one, one, one], structures=STRUCTURES)["y", "u"]
+    other = record(lagged() + 0.05 * np.random.default_rng(1).standard_normal(T.size))
+    with pytest.raises(RecordError, match="records 0 and 2 hold the same samples"):
+        identify_repeats([one, other, one], structures=STRUCTURES)
+    alike = [
+        record(one.outputs[0].values + 1e-4 * np.random.default_rng(k).standard_normal(T.size))
+        for k in range(3)
+    ]
+    pair = identify_repeats(alike, structures=STRUCTURES)["y", "u"]
     assert not pair["delay"].agree
     assert "not independent" in pair.findings[0].message
 

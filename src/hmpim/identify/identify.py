@@ -32,6 +32,7 @@ from hmpim.identify.result import (
     PairIdentification,
     RecordSummary,
 )
+from hmpim.identify.swapped import is_swapped, swapped_finding
 from hmpim.identify.threads import one_thread
 from hmpim.identify.whiteness import is_white
 from hmpim.model.dynamics import STRUCTURES, StructureName
@@ -40,6 +41,9 @@ from hmpim.record import Aligned, Finding, Intersample, Record, Signal, uniform
 __all__ = ["identify"]
 
 _FEWEST_SAMPLES = 50
+
+_LARGEST = 1e60
+"""Size of a sample, and one over the least: fourth powers stay in the range of doubles."""
 
 _BETTER = 0.7
 """Share of the noise's power under a drift below which a clipped level is taken instead."""
@@ -101,6 +105,7 @@ def identify(
         if name not in STRUCTURES:
             raise ArgumentError(f"structure {name!r} is not known; choose of {list(STRUCTURES)}")
     _check_length(record)
+    _check_size(record)
     aligned = uniform(record)
     for signal in aligned.inputs:
         if np.ptp(signal.values) == 0:
@@ -153,6 +158,23 @@ def _check_length(record: Record) -> None:
             )
 
 
+def _check_size(record: Record) -> None:
+    """Refuse numbers whose squares and products would leave the range of double precision."""
+    for channel in (*record.inputs, *record.outputs):
+        largest, span = float(np.abs(channel.values).max()), float(np.ptp(channel.values / 2))
+        if largest > _LARGEST or 0.0 < span < 1 / _LARGEST:
+            raise RecordError(
+                f"channel {channel.name!r} reaches {largest:.3g}, out of the range from "
+                f"{1 / _LARGEST:g} to {_LARGEST:g} that can be calculated with; give it in another "
+                "unit, or look for damaged samples"
+            )
+    if not 1 / _LARGEST < record.fs < _LARGEST:
+        raise RecordError(
+            f"the record runs at {record.fs:.3g} Hz; check the unit of its time stamps, which are "
+            "seconds"
+        )
+
+
 def _identify_output(
     aligned: Aligned,
     output: Signal,
@@ -171,9 +193,16 @@ def _identify_output(
             parameters=EVERY,
         )
         return [untold(aligned, source, output, record, dead) for source in aligned.inputs], None
+    backwards = _backwards(aligned, output)
+    if backwards:
+        structures = tuple(name for name in structures if name in PLAIN) or structures
     richest = max(count_levels(source.values) for source in aligned.inputs)
     found = find_imperfections(output.values, aligned.fs, richest=richest)
-    joined, drifting = _drifted(aligned, output, found, intersample, structures, inputs)
+    joined, drifting = (
+        (_joined(aligned, output, found, intersample, structures, inputs), None)
+        if backwards
+        else _drifted(aligned, output, found, intersample, structures, inputs)
+    )
     if drifting is not None and found.saturation is None:
         clipped = _clipped(aligned, output, found, drifting, intersample, structures)
         if clipped is not None:
@@ -202,7 +231,8 @@ def _identify_output(
         return _each_input(aligned, output, record, joined, found, inputs)
     (source,) = aligned.inputs
     if joined.related[0]:
-        return [described(aligned, source, output, record, joined, 0, None, found, drifting)], None
+        pair = described(aligned, source, output, record, joined, 0, None, found, drifting)
+        return [replace(pair, warnings=(*backwards, *pair.warnings))], None
     unfollowed = Finding(
         code="unrelated",
         message=f"Output {output.name!r} does not follow input {source.name!r}: a constant "
@@ -210,7 +240,18 @@ def _identify_output(
         severity="doubt",
         parameters=EVERY,
     )
-    return [untold(aligned, source, output, record, unfollowed)], None
+    (said,) = backwards or (unfollowed,)
+    return [untold(aligned, source, output, record, said)], None
+
+
+def _backwards(aligned: Aligned, output: Signal) -> tuple[Finding, ...]:
+    """What is said where the one input there is follows the output."""
+    if len(aligned.inputs) > 1:
+        return ()
+    (source,) = aligned.inputs
+    if not is_swapped(source.values, output.values, source.valid & output.valid):
+        return ()
+    return (swapped_finding(source.name, output.name),)
 
 
 def _each_input(

@@ -214,8 +214,8 @@ def identify_repeats(
     Raises
     ------
     RecordError
-        For fewer than two records, channels or rates that differ, or inputs that are not the
-        same within 5 % (r.m.s.); and whatever `identify` refuses.
+        For fewer than two records, one record given twice, channels or rates that differ, or
+        inputs that are not the same within 5 % (r.m.s.); and whatever `identify` refuses.
 
     Examples
     --------
@@ -237,6 +237,7 @@ def identify_repeats(
             f"{len(given)} record is given; repeatability needs at least 2 of one stimulus"
         )
     _check_alike(given)
+    _check_apart(given)
     results = tuple(
         identify(record, intersample=intersample, structures=structures) for record in given
     )
@@ -310,6 +311,19 @@ def _check_alike(records: tuple[Record, ...]) -> None:
                     f"{100 * apart / size if size else np.inf:.3g} % (r.m.s.); repeats need one "
                     "stimulus, from the same start"
                 )
+
+
+def _check_apart(records: tuple[Record, ...]) -> None:
+    """One record given twice tells nothing of repeatability; its noise would be the same noise."""
+    seen: dict[bytes, int] = {}
+    for k, record in enumerate(records):
+        measured = b"".join(channel.values.tobytes() for channel in record.outputs)
+        if measured in seen:
+            raise RecordError(
+                f"records {seen[measured]} and {k} hold the same samples; one record given twice "
+                "is not two repeats, so repeat the test"
+            )
+        seen[measured] = k
 
 
 def _pair(found: tuple[PairIdentification, ...]) -> RepeatedPair:
