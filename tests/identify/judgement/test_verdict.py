@@ -160,7 +160,7 @@ def test_a_mean_is_as_doubtful_as_its_parts_and_as_what_is_said_of_all(pair):
 
 def test_no_other_room_sets_a_verdict():
     """Nowhere in the package, apart from here and from reading a file back."""
-    root = Path(hmpim.identify.__code__.co_filename).parents[1]
+    root = Path(hmpim.__file__).parent
     allowed = {"judgement", "result"}
     setting = set()
     for path in (root / "identify").rglob("*.py"):
