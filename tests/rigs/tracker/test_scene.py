@@ -23,7 +23,7 @@ def test_a_pixel_is_the_mean_of_the_target_over_its_area():
         assert frame[60, column] == pytest.approx(60.0 + 190.0 * share.mean() * down, abs=0.51)
 
 
-@pytest.mark.parametrize(("name", "most"), [("centroid", 0.03), ("template", 0.05)])
+@pytest.mark.parametrize(("name", "most"), [("centroid", 0.015), ("template", 0.05)])
 def test_a_clean_target_is_found_in_fractions_of_a_pixel(name, most):
     pytest.importorskip("cv2")
     backdrop, rng = CLEAN.backdrop(np.random.default_rng(0)), np.random.default_rng(0)

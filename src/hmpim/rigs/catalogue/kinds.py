@@ -89,6 +89,13 @@ KINDS: tuple[Kind, ...] = (
         builder="hmpim.rigs.catalogue.seen:build_tracker",
     ),
     Kind(
+        name="seeker",
+        form="seeker",
+        words="a seeker on the five-axis table that follows what a tracker sees (extras 'table' "
+        "and 'tracker')",
+        builder="hmpim.rigs.catalogue.seen:build_seeker",
+    ),
+    Kind(
         name="udp",
         form="udp://HOST:PORT",
         words="a rig that speaks the datagrams of docs/rigs.md, such as hmpim table --udp",

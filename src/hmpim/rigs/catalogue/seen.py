@@ -5,11 +5,12 @@ from typing import Any
 
 from hmpim.errors import FormatError
 from hmpim.rigs.catalogue.description import Description
-from hmpim.rigs.catalogue.simulated import made_of, take_options
+from hmpim.rigs.catalogue.simulated import build_table, made_of, take_options
+from hmpim.rigs.seeker import SeekerRig
 from hmpim.rigs.software.code import Fresh, load_code
 from hmpim.rigs.tracker import TRACKERS, Camera, Scene, TrackerRig
 
-__all__ = ["build_tracker", "with_camera"]
+__all__ = ["build_seeker", "build_tracker", "with_camera"]
 
 
 def build_tracker(argument: str, description: Description) -> TrackerRig:
@@ -30,6 +31,31 @@ def build_tracker(argument: str, description: Description) -> TrackerRig:
     known = {f.name for f in dataclasses.fields(TrackerRig) if f.init} - {"reset"}
     options = take_options(description, known, kind="tracker", instead={"limits": "limits"})
     return made_of(TrackerRig, with_camera(options), kind_name="tracker")
+
+
+def build_seeker(argument: str, description: Description) -> SeekerRig:
+    """Make a rig of ``seeker``.
+
+    Options: those of `SeekerRig`, and the tables `scene`, `camera`, and `table` with options of
+    the motion table.
+
+    Examples
+    --------
+    >>> from hmpim.rigs.catalogue.description import describe
+    >>> options = {"track_gain": 4.0, "table": {"delay": 0.002}}
+    >>> build_seeker("", describe({"options": options})).table.delay
+    0.002
+    """
+    if argument:
+        raise FormatError(f"seeker:{argument} says more than there is; write seeker")
+    known = {f.name for f in dataclasses.fields(SeekerRig) if f.init} - {"reset"}
+    options = take_options(description, known, kind="seeker", instead={"limits": "limits"})
+    if "table" in options:
+        if not isinstance(options["table"], dict):
+            raise FormatError("option 'table' must be a table of the motion table's options")
+        given = Description(mode=description.mode or "PVA", options=options["table"])
+        options["table"] = build_table("", given)
+    return made_of(SeekerRig, with_camera(options), kind_name="seeker")
 
 
 def with_camera(options: dict[str, Any]) -> dict[str, Any]:

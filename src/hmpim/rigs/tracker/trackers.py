@@ -74,7 +74,7 @@ def _opencv() -> Any:
 
 
 class _Centroid:
-    """Centre of what is brighter than half of the brightest, in a gate around the last place."""
+    """Centre of what is clearly brighter than the background, in a gate around the last place."""
 
     def __init__(self, cv2: Any, at: Point, size: Point) -> None:
         self._cv2, self._at = cv2, at
@@ -91,7 +91,7 @@ class _Centroid:
         if peak < 5.0 * max(float(border.std()), 1.0):
             return None
         # Weights that rise from the threshold: a sharp cut would jump by whole pixels.
-        weights = np.clip(above - 0.5 * peak, 0.0, 0.4 * peak)
+        weights = np.clip(above - 0.35 * peak, 0.0, 0.6 * peak)
         found = self._cv2.moments(weights)
         if found["m00"] <= 0.0:
             return None

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from hmpim.report.paper.seeker import Seeker
+from hmpim.rigs.seeker import Seeker
 
 
 @pytest.mark.parametrize("frequency", [0.3, 1.0, 1.8, 4.0])
