@@ -46,6 +46,7 @@ check: $(DEV)  ## ruff, mypy strict, import-linter
 bench: $(DEV)  ## speed, against a hand-written fit in the same run
 	$(BIN)/python benchmarks/identification_speed.py
 	$(BIN)/python benchmarks/response_accuracy.py
+	$(BIN)/python benchmarks/live.py
 
 accuracy: $(DEV)  ## every figure of docs/accuracy.md, from scratch
 	$(BIN)/python benchmarks/accuracy.py

@@ -146,11 +146,12 @@ def begin(folder, port):
     )  # fmt: skip
 
 
-def moving_since(table, at):
+def moving_since(table, at, process):
     """Ticks so far once the table has moved for `at` s."""
     parts = []
 
     def enough():
+        assert process.poll() is None, process.stderr.read()
         parts.append(table.rows())
         ticks = Ticks.joined(parts)
         moving = ticks.time[ticks.state == "MOVING"]

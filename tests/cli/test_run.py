@@ -1,6 +1,7 @@
 """``hmpim run`` and ``hmpim rigs``: as a user types them."""
 
 import json
+import re
 
 import numpy as np
 import pytest
@@ -51,6 +52,8 @@ def test_from_a_file_to_the_record_the_result_and_the_page(folder):
     delay = pair["parameters"]["delay"]
     assert abs(delay["value"] - 0.02) < 4 * delay["std"]
     assert "<html" in (folder / "r.html").read_text()[:200]
+    stages = re.findall(r"(\w+) [\d.]+ s \([\d.]+ s of processor\)", out.output)
+    assert stages == ["run", "identification", "page"]
     kinds = [line.split()[2] for line in (folder / "run.log").read_text().splitlines()[1:]]
     assert kinds == ["check", "arm", "start", "done", "stop"]
     same = run("run", "--rig-file", "rig.toml", "s.csv", "-o", "again.csv", "--seed", "3")

@@ -26,7 +26,7 @@ def ended(table, folder, kind, at):
     cable = Cable(table.port) if kind == "cable" else None
     process = begin(folder, table.port if cable is None else cable.port)
     try:
-        parts = moving_since(table, at)
+        parts = moving_since(table, at, process)
         if cable is not None:
             cable.plugged = False
         else:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from hmpim.cli.files import check_files
+from hmpim.cli.stages import Stages
 from hmpim.cli.terminal import output_console, say, working
 from hmpim.errors import ArgumentError
 
@@ -120,7 +121,8 @@ def run(
         feel="unknown" if feel is None else Feel() if feel else None,
     )
     unit = found.rig if watchdog else _driven(found.rig, rig, described)
-    with RunLog(log) as events:
+    stages = Stages()
+    with RunLog(log) as events, stages.stage("run"):
         record = play(
             unit,
             stimuli,
@@ -143,20 +145,22 @@ def run(
     from hmpim.identify import identify
     from hmpim.report import print_result
 
-    with working("Identifying"):
+    with working("Identifying"), stages.stage("identification"):
         result = identify(record)
     if not quiet:
         print_result(result, output_console())
-    write_result(
-        result,
-        json=json,
-        report=report,
-        stimulus=stimuli[0] if len(stimuli) == 1 else None,
-        pictures=() if report is None else _pictures(found.rig),
-    )
+    with stages.stage("page" if report is not None else "result"):
+        write_result(
+            result,
+            json=json,
+            report=report,
+            stimulus=stimuli[0] if len(stimuli) == 1 else None,
+            pictures=() if report is None else _pictures(found.rig),
+        )
     for name, path in (("Result", json), ("Page", report)):
         if path is not None:
             say(f"{name}: {path}")
+    say(stages.words())
 
 
 def _aimed(stimuli: "list[Stimulus]", axis: str, axes: tuple[str, ...]) -> "list[Stimulus]":

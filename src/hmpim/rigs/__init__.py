@@ -2,6 +2,7 @@
 
 from hmpim.rigs.block import Block, ChannelSpec, Layout, Quantity, Reply, RunReport, Samples
 from hmpim.rigs.clock import Clock, ManualClock, SkewedClock, SystemClock
+from hmpim.rigs.fake import FakeRig
 from hmpim.rigs.function import FunctionRig
 from hmpim.rigs.mounted import CarriedSensor, Mounted
 from hmpim.rigs.protocol import LimitsOfAxes, Reporting, Rig, Seeded, Stimuli
@@ -15,6 +16,7 @@ __all__ = [
     "ChannelSpec",
     "Clock",
     "Commands",
+    "FakeRig",
     "FunctionRig",
     "Layout",
     "LimitsOfAxes",
