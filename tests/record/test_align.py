@@ -6,7 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hmpim.errors import RecordError
-from hmpim.record import Channel, Record, uniform
+from hmpim.record import Channel, Record, Series, uniform
+from hmpim.record.mend import mend, restarts
 
 
 def sine(time, f=1.0):
@@ -184,3 +185,20 @@ def test_an_unknown_signal_lists_those_there():
     aligned = uniform(record_at(np.arange(10.0)))
     with pytest.raises(RecordError, match="no channel 'z'; the record has u, y"):
         aligned.signal("z")
+
+
+def test_a_stamp_far_from_all_others_is_left_out_and_said():
+    """One damaged stamp is no second recording and no gap of a thousand years."""
+    time = np.arange(400) / 100.0
+    time[200] = 1e12
+    mended = mend([Series(name="y", values=np.sin(np.arange(400.0)), time=time)])
+    assert mended.channels[0].time.size == 399
+    assert [f.code for f in mended.findings] == ["stray_stamps"]
+    assert restarts(time).size == 0
+
+
+def test_a_clock_that_was_set_is_refused_with_its_place():
+    time = np.arange(400) / 100.0
+    time[300:] += 1e9
+    with pytest.raises(RecordError, match=r"time of 'y' jumps by 1e\+09 s after sample 299"):
+        mend([Series(name="y", values=np.sin(np.arange(400.0)), time=time)])

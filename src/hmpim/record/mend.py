@@ -20,6 +20,15 @@ A network or a bus delivers a few samples out of order; a clock that was set bac
 recording in the same file, goes on from there.
 """
 
+_FAR = 1000.0
+"""Lengths of a record beyond its ends at which a stamp is damaged and no time of a sample."""
+
+_STRAYS = 0.01
+"""Share of stamps that may lie so far off; more are a clock that was set."""
+
+_LONGEST_CLOCK = 10**7
+"""Intervals that a record may span beyond a thousand for each of its samples."""
+
 _ENOUGH = 20
 """Samples from which stamps that stand still can be told from a coarse clock."""
 
@@ -34,7 +43,7 @@ class Mended:
         In the order of the series.
     findings : tuple of Finding
         What the reader noticed, then codes 'missing_samples', 'doubled_stamps',
-        'backward_stamps', 'missing_stamps'.
+        'backward_stamps', 'missing_stamps', 'stray_stamps'.
     """
 
     channels: tuple[Channel, ...]
@@ -49,7 +58,8 @@ def mend(series: Sequence[Series], *, fs: float | None = None) -> Mended:
       milliseconds): the samples are spread on the uniform clock that the stamps are rounded from.
       Else the first sample of each stamp is kept.
     * Samples out of order, by up to eight places: sorted by stamp.
-    * Stamps that start again: refused.
+    * Single stamps a thousand lengths of the record away: left out, as they are damaged.
+    * Stamps that start again, or jump so far that nothing can be laid between: refused.
 
     Parameters
     ----------
@@ -88,6 +98,7 @@ def mend(series: Sequence[Series], *, fs: float | None = None) -> Mended:
             stamps, order = known[id(s.time)]
         values = s.values if order is None else s.values[order]
         made.append(_without_missing(s, stamps, values, findings))
+        _check_span(made[-1])
     return Mended(channels=tuple(made), findings=tuple(findings))
 
 
@@ -130,18 +141,18 @@ def _ordered(
     """Stamps that increase, and the samples they belong to (None: all, as they are)."""
     if time.size and np.isfinite(time).all() and np.all(np.diff(time) > 0):
         return time, None
-    order = np.flatnonzero(np.isfinite(time))
     of = ", ".join(repr(s.name) for s in sharing[:4]) + (" and others" if sharing[4:] else "")
-    if order.size < time.size:
-        findings.append(
-            Finding(
-                code="missing_stamps",
-                message=f"{time.size - order.size} of {time.size} samples of {of} have no time "
-                "stamp and are left out",
-                severity="info",
-                parameters=(),
-            )
-        )
+    absent = int(time.size - np.count_nonzero(np.isfinite(time)))
+    time = _without_strays(time)
+    order = np.flatnonzero(np.isfinite(time))
+    strays = time.size - order.size - absent
+    for code, count, words in (
+        ("missing_stamps", absent, "have no time stamp"),
+        ("stray_stamps", strays, "have a stamp far from all others"),
+    ):
+        if count:
+            message = f"{count} of {time.size} samples of {of} {words} and are left out"
+            findings.append(Finding(code=code, message=message, severity="info", parameters=()))
     back = int(np.count_nonzero(np.diff(time[order]) < 0))
     if back:
         _check_not_restarted(time[order], of)
@@ -176,6 +187,35 @@ def _ordered(
         )
     findings.append(Finding(code="doubled_stamps", message=message, severity="info", parameters=()))
     return (time[order] if spread is None else spread), order
+
+
+def _without_strays(time: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Stamps with NaN for the few that lie far from all others; the array itself if none do."""
+    there = time[np.isfinite(time)]
+    if there.size < _ENOUGH:
+        return time
+    low, high = (float(q) for q in np.quantile(there, [0.05, 0.95]))
+    reach = _FAR * (high - low)
+    with np.errstate(invalid="ignore", over="ignore"):
+        far = (time < low - reach) | (time > high + reach)
+    count = int(np.count_nonzero(far))
+    if not 0 < count <= max(1, _STRAYS * there.size):
+        return time
+    return np.where(far, np.nan, time)
+
+
+def _check_span(channel: Channel) -> None:
+    """Refuse stamps between which no clock can be laid for want of memory."""
+    steps = np.diff(channel.time)
+    most = _LONGEST_CLOCK + 1000 * channel.time.size
+    if float(channel.time[-1] - channel.time[0]) <= most * float(np.median(steps)):
+        return
+    k = int(np.argmax(steps))
+    raise RecordError(
+        f"time of {channel.name!r} jumps by {steps[k]:.6g} s after sample {k}, where its samples "
+        f"lie {np.median(steps):.3g} s apart; the stamps are damaged, or the clock was set: cut "
+        "the file there"
+    )
 
 
 def _differs(values: NDArray[np.float64], first: NDArray[np.bool_]) -> bool:
@@ -229,6 +269,7 @@ def restarts(time: NDArray[np.float64]) -> NDArray[np.int64]:
     >>> restarts(np.array([0.0, 1.0, 3.0, 2.0, 4.0])).tolist()
     []
     """
+    time = _without_strays(time)
     there = np.flatnonzero(np.isfinite(time))
     stamps = time[there]
     back = np.flatnonzero(np.diff(stamps) < 0) + 1

@@ -60,6 +60,10 @@ class _Follows:
     later: float
 
 
+_ABSURD = 1e100
+"""Range beyond which numbers are damage and no signal."""
+
+
 def propose(channels: Sequence[Channel]) -> Proposal:
     """Propose an input and outputs from what the channels are called and how they move.
 
@@ -149,7 +153,10 @@ def _idle(channel: Channel) -> str | None:
     values = channel.values
     if values.size < 20:
         return f"has {values.size} samples, too few to tell anything"
-    span = float(np.ptp(values))
+    with np.errstate(over="ignore"):
+        span = float(np.ptp(values))
+    if not span < _ABSURD:
+        return f"reaches {np.abs(values).max():.3g}, which no signal does; samples are damaged"
     if not np.isfinite(span) or span <= 1e-12 * float(np.abs(values).max()):
         return f"reads {values[0]:.6g} from end to end"
     steps = np.diff(values)
@@ -172,11 +179,13 @@ def _following(channels: Sequence[Channel]) -> list[list[_Follows]]:
     n = 1 << int(np.ceil(np.log2(2 * grid.size)))
     spectra = []
     for c, clock in zip(channels, clocks, strict=True):
-        values, _ = on_grid(c, clock, grid, fs=fs, intersample=None)
-        # Differences tell motion from drift, and have no mean.
-        moved = np.diff(values, prepend=values[0])
-        size = float(np.linalg.norm(moved))
-        spectra.append(np.fft.rfft(moved / size if size else moved, n))
+        with np.errstate(over="ignore", invalid="ignore"):  # between damaged stamps
+            values, _ = on_grid(c, clock, grid, fs=fs, intersample=None)
+            # Differences tell motion from drift, and have no mean.
+            moved = np.diff(values, prepend=values[0])
+            size = float(np.linalg.norm(moved))
+        usable = 0.0 < size < np.inf
+        spectra.append(np.fft.rfft(moved / size if usable else np.zeros_like(moved), n))
     return [[_follow(one, other, n, fs) for other in spectra] for one in spectra]
 
 

@@ -111,6 +111,8 @@ def share_above(values: NDArray[np.float64], *, fs: float, limit: float) -> floa
     0.01
     """
     window = np.hanning(values.size + 2)[1:-1]
+    largest = float(np.abs(values).max())
+    values = values / largest if largest > 0.0 else values  # squares of any number must be one
     power = np.abs(np.fft.rfft((values - values.mean()) * window)) ** 2
     total = float(power.sum())
     above = np.fft.rfftfreq(values.size, 1.0 / fs) > limit

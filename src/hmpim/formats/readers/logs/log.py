@@ -250,7 +250,8 @@ def numbers(values: NDArray[Any]) -> NDArray[np.float64]:
         return filled
     if values.dtype.kind not in "biuf":
         raise FormatError(f"a channel holds {values.dtype} and no real numbers")
-    return np.ascontiguousarray(values, dtype=np.float64)
+    with np.errstate(invalid="ignore"):  # a NaN of another kind stays one
+        return np.ascontiguousarray(values, dtype=np.float64)
 
 
 def unit_of(text: object) -> str:
