@@ -293,21 +293,17 @@ def _drifted(
 
     plain = tuple(name for name in structures if name in PLAIN) or structures
 
-    def fitted(y: NDArray[np.float64], quickly: bool) -> JointFit:
+    def fitted(rows: NDArray[np.float64], quickly: bool) -> JointFit:
         names = plain if quickly else structures
-        moved = replace(output, values=y)
-        return _joined(aligned, moved, found, intersample, names, None).fits[0]
+        return _joined(aligned, output, found, intersample, names, None, rows).fits[0]
 
-    drifting = with_drift(
-        joined.fits[0], output.values, fitted, clipped=found.saturation is not None
-    )
+    drifting = with_drift(joined.fits[0], fitted, clipped=found.saturation is not None)
     if drifting is None:
         return joined, None
     return replace(
         joined,
         fits=(drifting.joint,),
         related=(not is_unrelated(drifting.joint),),
-        covariances=(drifting.covariance,),
     ), drifting
 
 
@@ -342,6 +338,7 @@ def _joined(
     intersample: Intersample | None,
     structures: tuple[StructureName, ...],
     inputs: InputSet | None,
+    nuisance: NDArray[np.float64] | None = None,
 ) -> Joined:
     """Fit an output to all inputs on the samples that say what it was."""
     valid = None if bool(output.valid.all()) else np.asarray(output.valid)
@@ -357,4 +354,5 @@ def _joined(
         intersample=intersample,
         structures=structures,
         alike=() if inputs is None else inputs.alike_bins(aligned.samples, aligned.fs),
+        nuisance=nuisance,
     )

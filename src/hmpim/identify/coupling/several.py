@@ -2,10 +2,8 @@
 
 The inputs that move the output most are fitted as if alone, each to what the others leave over;
 what is weak beside them (`hmpim.identify.coupling.couplings`) follows, with the noise whitened.
-Then all pairs are fitted in turn until nothing moves (backfitting: Hastie, Tibshirani and
-Friedman, The Elements of Statistical Learning, 2nd ed., section 9.1.1; for least squares it ends
-at the joint optimum). The error bars come from all pairs' derivatives together, so that inputs
-that resemble each other widen them.
+Then all pairs are moved at once. The error bars come from all pairs' derivatives together, so that
+inputs that resemble each other widen them.
 """
 
 from collections.abc import Callable, Sequence
@@ -19,7 +17,7 @@ from hmpim.identify.coupling.couplings import FOLLOWS, coupling_fit, whitening_o
 from hmpim.identify.coupling.jointly import gained_by, joint_covariance
 from hmpim.identify.coupling.lag import Lag, lag_of
 from hmpim.identify.fitting.enrich import PLAIN
-from hmpim.identify.fitting.fit import Fit, Problem, fit_structure, jacobian
+from hmpim.identify.fitting.fit import Fit, Problem, jacobian
 from hmpim.identify.fitting.fit import fit_together as fit_all
 from hmpim.identify.fitting.joint import JointFit, joint_fit
 from hmpim.identify.fitting.unrelated import is_unrelated
@@ -30,10 +28,6 @@ from hmpim.model.sampled import prepare_input
 from hmpim.record import Intersample
 
 __all__ = ["Joined", "fit_together"]
-
-_TURNS = 8
-_STILL = 1e-2
-"""Stop when no pair's contribution moves by more than this share of the noise (r.m.s.)."""
 
 _LATEST = 0.1
 """Delay of a coupling, as a share of the record, up to which it is looked for."""
@@ -97,6 +91,7 @@ def fit_together(
     intersample: Intersample | None,
     structures: tuple[StructureName, ...],
     alike: Sequence[tuple[frozenset[int], NDArray[np.bool_]]] = (),
+    nuisance: Real | None = None,
 ) -> Joined:
     """Fit one output to several inputs.
 
@@ -111,11 +106,19 @@ def fit_together(
     alike : sequence of (frozenset of int, ndarray of bool, shape (n // 2 + 1,))
         Inputs that are not told apart, and the bins at which they are not. There a coupling is
         not told from what the stronger one's model lacks.
+    nuisance : ndarray, shape (k, n), optional
+        Rows beside the bias that enter linearly, such as a drift's.
     """
 
     def fitted(u: Real, rest: Real, names: tuple[StructureName, ...]) -> JointFit:
         return joint_fit(
-            u, rest, valid=valid, known=known, intersample=intersample, structures=names
+            u,
+            rest,
+            valid=valid,
+            known=known,
+            intersample=intersample,
+            structures=names,
+            nuisance=nuisance,
         )
 
     if len(inputs) == 1:
@@ -140,27 +143,16 @@ def fit_together(
         before, found = found, tuple(fits[i].best.fit.structure.name for i in strong)
         if found != before:
             whitening = _fit_couplings(inputs, y, fits, related, strong, plain, alike)
-    if whitening is not None:
-        # What is not white may be no noise but what one of them has not given back yet.
-        _refine(y, fits, [j for j in fits if related[j]], None)
-        whitening = _whitening(y, fits, related, strong)
-    for _ in range(_TURNS):
-        before = _others(fits, related, None)
-        for i in strong:
-            if related[i]:
-                fits[i] = _again(fits[i], y - _others(fits, related, i))
-        _together(y, fits, related, strong, whitening, alike)
-        noise = max(float(np.sqrt(fits[strong[0]].best.fit.cost / y.size)), 1e-300)
-        moved = float(np.sqrt(np.mean((_others(fits, related, None) - before) ** 2)))
-        if moved < _STILL * noise:
-            break
+    _refine(y, fits, [j for j in fits if related[j]], None)
+    # What was not white may have been no noise but what one of them had not given back yet.
+    whitening = _whitening(y, fits, related, strong)
+    _refine(y, fits, [j for j in fits if related[j]], whitening)
+    while _together(y, fits, related, strong, whitening, alike):
+        _refine(y, fits, [j for j in fits if related[j]], whitening)
     kept = [j for j in fits if related[j]]
     pairs = [fits[j] for j in kept]
-    told = dict(zip(kept, _covariances(pairs, None), strict=True))
+    told = dict(zip(kept, _covariances(pairs, whitening), strict=True))
     weak = [j for j in kept if j not in strong]
-    if whitening is not None and weak:
-        sharper = dict(zip(kept, _covariances(pairs, whitening), strict=True))
-        told |= {j: sharper[j] for j in weak}
     everyone = range(len(inputs))
     return Joined(
         fits=tuple(fits[j] for j in everyone),
@@ -296,13 +288,14 @@ def _refine(
     valid = None if bool(counted.all()) else counted
     problems = [replace(fits[j].problem, y=y, valid=valid, whitening=whitening) for j in some]
     begun = [fits[j].best.fit for j in some]
-    found = fit_all(
+    moved = fit_all(
         problems,
         [fit.structure for fit in begun],
         [fit.theta for fit in begun],
         iterations=8,
         precision=1e-3,
     )
+    found = [replace(fit, cost=float(fit.residual @ fit.residual)) for fit in moved]
     parts = {j: fit.prediction - fit.linear[-1] for j, fit in zip(some, found, strict=True)}
     total = sum(parts.values(), np.zeros(y.size))
     for j, fit in zip(some, found, strict=True):
@@ -357,21 +350,6 @@ def _part(fit: JointFit) -> Real:
     """What the input contributes to the output, the bias aside."""
     best = fit.best.fit
     return np.asarray(best.prediction - best.linear[-1])
-
-
-def _again(fit: JointFit, rest: Real) -> JointFit:
-    """Fit the chosen structure again, to what the others leave over now."""
-    problem = replace(fit.problem, y=rest)
-    best = fit_structure(problem, fit.best.fit.structure, fit.best.fit.theta, precision=1e-4)
-    trial = replace(fit.best, fit=best)
-    trials = tuple(trial if t is fit.best else t for t in fit.trials)
-    return replace(
-        fit,
-        problem=problem,
-        best=trial,
-        trials=trials,
-        effective_share=effective_share(best.residual),
-    )
 
 
 def _lag(pairs: list[JointFit], k: int, whitening: Real | None) -> Lag | None:

@@ -1,9 +1,8 @@
 """A bias that drifts: a slow polynomial of time, fitted together with everything else.
 
-Looked for only where a constant bias leaves a residual that is not white. The polynomial is
-found by backfitting: what the model leaves over is given to model and polynomial together, by
-one step of least squares, then the model is fitted to the rest, until neither moves. That ends
-at the joint optimum, and the error bars come from the derivatives of both.
+Looked for only where a constant bias leaves a residual that is not white. Its Legendre
+polynomials are rows of the same fit, solved with bias and numerator; the error bars come from the
+derivatives of all.
 """
 
 from collections.abc import Callable
@@ -16,11 +15,10 @@ from scipy.fft import rfft
 
 from hmpim.identify.effects.colour import bias_drift
 from hmpim.identify.fitting.enrich import PLAIN
-from hmpim.identify.fitting.fit import Problem, fit_structure, jacobian
+from hmpim.identify.fitting.fit import jacobian, solved, without
 from hmpim.identify.fitting.joint import JointFit, Trial
-from hmpim.identify.fitting.unrelated import is_unrelated
 from hmpim.identify.uncertainty import covariance
-from hmpim.identify.whiteness import effective_share, is_white
+from hmpim.identify.whiteness import is_white
 from hmpim.model import slowest_time_constant
 from hmpim.record import Finding
 
@@ -44,11 +42,6 @@ _POOR = 0.3
 _BEHIND_LEVELS = 0.3
 """Gain per sample, in the criterion, that a drift of a clipped output must bring."""
 
-_TURNS = 12
-_STEPS = 3
-_STILL = 1e-3
-"""Stop when the polynomial moves by less than this share of the noise (r.m.s.)."""
-
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Drifting:
@@ -57,11 +50,10 @@ class Drifting:
     Parameters
     ----------
     joint : JointFit
-        Fitted to the output without the drift; its bias is the mean over the record.
+        Fitted to the output, the drift taken off, its polynomials free to move; the bias is the
+        mean over the record.
     trend : ndarray, shape (n,)
         The drift, zero on average, in the output's unit.
-    covariance : ndarray, shape (p, p)
-        Of theta and the linear parameters, the drift being unknown too.
     degree : int
         Of the polynomial.
     rate, rate_std : float
@@ -70,7 +62,6 @@ class Drifting:
 
     joint: JointFit
     trend: NDArray[np.float64]
-    covariance: NDArray[np.float64]
     degree: int
     rate: float
     rate_std: float
@@ -78,7 +69,6 @@ class Drifting:
 
 def with_drift(
     first: JointFit,
-    y: NDArray[np.float64],
     fitted: Callable[[NDArray[np.float64], bool], JointFit],
     *,
     clipped: bool = False,
@@ -89,10 +79,8 @@ def with_drift(
     ----------
     first : JointFit
         With a constant bias.
-    y : ndarray, shape (n,)
-        Output.
     fitted : callable
-        Makes the joint fit of another output; of the plain structures only if the second
+        Makes the joint fit with rows for the drift; of the plain structures only if the second
         argument is true.
     clipped : bool
         Whether samples beyond a level were left out: that alone makes the residual slow, so a
@@ -105,18 +93,15 @@ def with_drift(
     """
     if not _asked_for(first):
         return None
-    columns = _polynomials(y.size, _DEGREES[-1])
-    begun = fitted(y - _regressed(columns, y, first.problem.valid), True)
-    joint, weights = _backfitted(begun, y, columns)
-    plainly = is_white(joint.best.fit.residual)
-    degree = _degree(joint, columns, weights)
+    columns = _polynomials(first.problem.y.size, _DEGREES[-1])
+    joint = fitted(columns, True)
+    degree = _degree(joint, columns)
     columns = columns[:degree]
-    if not is_unrelated(joint):  # the structure is chosen once more, now that the drift is known
-        joint = fitted(y - weights[:degree] @ columns, plainly)
-    joint, weights = _backfitted(joint, y, columns)
+    # The structure is chosen once more, now that the drift is known.
+    joint = fitted(columns, is_white(joint.best.fit.residual))
     if _gain(joint, degree, first, 0) < (_BEHIND_LEVELS * joint.problem.counted if clipped else 0):
         return None
-    return _described(joint, columns, weights)
+    return _described(joint, columns)
 
 
 def drift_finding(drifting: Drifting, fs: float, unit: str) -> Finding:
@@ -175,69 +160,16 @@ def _polynomials(size: int, degree: int) -> NDArray[np.float64]:
     return np.asarray(columns - columns.mean(axis=1, keepdims=True))
 
 
-def _regressed(
-    columns: NDArray[np.float64], y: NDArray[np.float64], valid: NDArray[np.bool_] | None
-) -> NDArray[np.float64]:
-    """Polynomial closest to `y`, zero on average."""
-    counts = slice(None) if valid is None else valid
-    rows = np.vstack([columns, np.ones(y.size)])[:, counts]
-    weights = _solved(rows, y[counts])[:-1]
-    return np.asarray(weights @ columns)
-
-
-def _solved(rows: NDArray[np.float64], target: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Least squares through normal equations scaled to unit diagonal."""
-    gram = rows @ rows.T
-    scale = np.sqrt(np.maximum(np.diag(gram), np.finfo(float).tiny))
-    solution = np.linalg.lstsq(gram / np.outer(scale, scale), (rows @ target) / scale, rcond=1e-12)
-    return np.asarray(solution[0] / scale)
-
-
-def _backfitted(
-    joint: JointFit, y: NDArray[np.float64], columns: NDArray[np.float64]
-) -> tuple[JointFit, NDArray[np.float64]]:
-    """Model and polynomial in turn, from a joint fit of `y` less some polynomial."""
-    weights = _solved(columns, y - joint.problem.y)
-    for _ in range(_TURNS):
-        problem, fit = joint.problem, joint.best.fit
-        rows = np.vstack([jacobian(problem, fit), problem.masked(columns)])
-        step = _solved(rows, fit.residual)[-columns.shape[0] :]
-        weights = weights + step
-        joint = _again(joint, y - weights @ columns)
-        noise = float(np.sqrt(fit.cost / problem.counted))
-        if float(np.sqrt(np.mean((step @ columns) ** 2))) <= _STILL * noise:
-            break
-    return joint, weights
-
-
-def _again(joint: JointFit, y: NDArray[np.float64]) -> JointFit:
-    """Fit the chosen structure to another output, from where it ended."""
-    problem: Problem = replace(joint.problem, y=y)
-    begun = joint.best.fit
-    fit = fit_structure(problem, begun.structure, begun.theta, iterations=_STEPS, precision=1e-3)
-    fit = replace(fit, converged=begun.converged or fit.converged)
-    best = Trial(intersample=joint.best.intersample, fit=fit, criterion=joint.best.criterion)
-    return replace(
-        joint,
-        problem=problem,
-        best=best,
-        trials=tuple(best if trial is joint.best else trial for trial in joint.trials),
-        effective_share=effective_share(fit.residual),
-    )
-
-
-def _degree(joint: JointFit, columns: NDArray[np.float64], weights: NDArray[np.float64]) -> int:
+def _degree(joint: JointFit, columns: NDArray[np.float64]) -> int:
     """Least degree that serves, by Schwarz's criterion on model's residual and polynomial."""
-    problem = joint.problem
+    problem, fit = joint.problem, joint.best.fit
     counts = slice(None) if problem.valid is None else problem.valid
-    left = (joint.best.fit.residual + problem.masked(weights @ columns[: weights.size]))[counts]
+    left = (fit.residual + problem.masked(fit.nuisance @ columns))[counts]
     count = problem.counted  # of a wander, the more is taken out the better
     best = (np.inf, 1)
     for degree in _DEGREES:
-        if degree > weights.size:
-            break
         rows = np.vstack([columns[:degree], np.ones(problem.y.size)])[:, counts]
-        rest = left - _solved(rows, left) @ rows
+        rest = left - solved(rows @ rows.T, rows @ left) @ rows
         cost = max(float(rest @ rest), np.finfo(float).tiny)
         best = min(best, (count * float(np.log(cost)) + degree * float(np.log(count)), degree))
     return best[1]
@@ -255,25 +187,37 @@ def _gain(one: JointFit, degree: int, other: JointFit, other_degree: int) -> flo
     return criterion(other, other_degree) - criterion(one, degree)
 
 
-def _described(
-    joint: JointFit, columns: NDArray[np.float64], weights: NDArray[np.float64]
-) -> Drifting:
+def _described(joint: JointFit, columns: NDArray[np.float64]) -> Drifting:
+    """The fit with the drift taken off the output, its polynomials still free to move."""
     problem, fit = joint.problem, joint.best.fit
-    rows = np.vstack([jacobian(problem, fit), problem.masked(columns)])
+    trend = fit.nuisance @ columns
+    others = jacobian(replace(problem, nuisance=None), fit)
+    slopes = without(problem.masked(columns), others)
     counts = slice(None) if problem.valid is None else problem.valid
-    full = covariance(
-        rows,
+    weights = covariance(
+        slopes,
         fit.residual,
-        freedom=max(problem.counted - rows.shape[0], 1),
+        freedom=max(problem.counted - slopes.shape[0] - others.shape[0], 1),
         white=is_white(fit.residual[counts]),
     )
-    unknown = rows.shape[0] - columns.shape[0]
     across = (columns[:, -1] - columns[:, 0]) / (problem.y.size - 1)
+    trials = {id(trial): _without_drift(trial, columns) for trial in joint.trials}
     return Drifting(
-        joint=joint,
-        trend=weights @ columns,
-        covariance=full[:unknown, :unknown],
+        joint=replace(
+            joint,
+            problem=replace(problem, y=problem.y - trend),
+            best=trials.get(id(joint.best)) or _without_drift(joint.best, columns),
+            trials=tuple(trials.values()),
+        ),
+        trend=trend,
         degree=columns.shape[0],
-        rate=float(across @ weights),
-        rate_std=float(np.sqrt(max(float(across @ full[unknown:, unknown:] @ across), 0.0))),
+        rate=float(across @ fit.nuisance),
+        rate_std=float(np.sqrt(max(float(across @ weights @ across), 0.0))),
     )
+
+
+def _without_drift(trial: Trial, columns: NDArray[np.float64]) -> Trial:
+    """The same fit, of an output without the drift."""
+    fit = trial.fit
+    plain = replace(fit, prediction=fit.prediction - fit.nuisance @ columns)
+    return replace(trial, fit=plain)

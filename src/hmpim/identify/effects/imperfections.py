@@ -22,6 +22,7 @@ from hmpim.identify.fitting.joint import JointFit, Trial
 from hmpim.identify.groups import EVERY, MODELLED
 from hmpim.identify.result import Parameters
 from hmpim.identify.uncertainty import estimate
+from hmpim.model import slowest_time_constant
 from hmpim.record import Finding
 
 __all__ = ["Imperfections", "count_levels", "find_imperfections", "refine", "with_imperfections"]
@@ -37,6 +38,9 @@ _MOST_CLIPPED = 0.85
 
 _MUCH_CLIPPED = 0.4
 """Share beyond which what is found is doubtful: a rectifier clips half."""
+
+_FORGETS = 5.0
+"""Time constants after which what came before the record is forgotten (0.7 % left)."""
 
 _FEWEST_LEVELS = 8
 """Levels that an output must take, unless its input takes as few."""
@@ -155,12 +159,14 @@ def refine(
         return None
     problem = joint.problem
     whole = None if problem.valid is None else _gaps_only(problem.valid, found, fs)
+    if problem.begins is not None and whole is not None:
+        whole[: problem.begins + _settled(joint)] = False
     arrivals = found.arrivals(problem.y.size, fs)
     tried: list[tuple[float, Trial, CensoredFit]] = []
     for trial in _worth_refining(joint, found):
         try:
             censored = fit_censored(
-                replace(problem, valid=whole),
+                replace(problem, valid=whole, nuisance=None, begins=None),
                 trial.fit,
                 found.saturation,
                 arrivals=arrivals,
@@ -184,6 +190,12 @@ def refine(
         trials=tuple(best if trial is chosen else trial for trial in joint.trials),
     )
     return refined, censored
+
+
+def _settled(joint: JointFit) -> int:
+    """Samples after which the state that a record begins with is forgotten."""
+    slowest = slowest_time_constant(joint.best.fit.denominator)
+    return min(int(np.ceil(_FORGETS * slowest)), joint.problem.y.size // 4)
 
 
 def _worth_refining(joint: JointFit, found: Imperfections) -> list[Trial]:

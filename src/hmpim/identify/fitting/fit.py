@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from hmpim.identify.fitting.rows import Part, Problem
 from hmpim.model.dynamics import Structure, coefficients_of, denominator_of
 
-__all__ = ["Fit", "Problem", "fit_structure", "fit_together", "jacobian", "solved"]
+__all__ = ["Fit", "Problem", "fit_structure", "fit_together", "jacobian", "solved", "without"]
 
 _LONGEST_TIME_CONSTANT = 2.0
 """In record lengths; a slower pole cannot be told from an integrator."""

@@ -10,11 +10,12 @@ taken as band-limited, or as held if it mostly stands still and jumps, unless th
 clearly against it.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import get_args
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import chdtri
 
 from hmpim.identify.fitting.enrich import (
     INTEGRATING,
@@ -24,7 +25,8 @@ from hmpim.identify.fitting.enrich import (
     members,
     rich_starts,
 )
-from hmpim.identify.fitting.fit import Fit, Problem, fit_structure, jacobian
+from hmpim.identify.fitting.fit import Fit, Problem, fit_structure, jacobian, solved
+from hmpim.identify.fitting.rows import Part
 from hmpim.identify.fitting.start import RoughResponse, rough_response, starting_values
 from hmpim.identify.fitting.unexplained import unexplained_response
 from hmpim.identify.whiteness import effective_share, is_white, misfit
@@ -72,6 +74,15 @@ _JUMP = 0.05
 _FINAL_PRECISION = 1e-6
 """Precision of the chosen fit, see `fit_structure`."""
 
+_REACH = 4
+"""Samples by which what lies between the samples reaches back: half of a spline's support."""
+
+_REST = 1e-4
+"""Chance of taking a record at rest for one in mid-motion."""
+
+_TWICE = 2.0
+"""Factor on what the beginning may hold, for noise that is not white or not Gaussian."""
+
 _SETTLED = 5.0
 """Time constants after which what came before the record is forgotten (0.7 % left)."""
 
@@ -98,7 +109,8 @@ class JointFit:
     trials : tuple of Trial
         All, the chosen one included.
     forgotten : int
-        Samples left out at the beginning because the record does not begin at rest.
+        Samples left out at the beginning because the record does not begin at rest: as long as
+        the output still depends on input before it.
     effective_share : float
         Independent samples per sample, from the best residual's correlation.
     simpler : Trial or None
@@ -122,6 +134,7 @@ def joint_fit(
     known: NDArray[np.bool_] | None = None,
     intersample: Intersample | None = None,
     structures: tuple[StructureName, ...] = (*PLAIN, *RICH, *INTEGRATING),
+    nuisance: NDArray[np.float64] | None = None,
 ) -> JointFit:
     """Fit every structure and keep the one that the record supports.
 
@@ -138,6 +151,8 @@ def joint_fit(
         What the input does between samples; chosen by likelihood if None.
     structures : tuple of str
         Which to try.
+    nuisance : ndarray, shape (k, n), optional
+        Rows beside the bias that enter linearly, such as a drift's.
 
     Returns
     -------
@@ -146,38 +161,40 @@ def joint_fit(
     natural: Intersample = "zoh" if _looks_held(u) else "bandlimited"
     if intersample is not None:
         natural = intersample
+    level = y if nuisance is None else y - _regressed(nuisance, y, valid)
     data = _Data(
         u=u,
         y=y,
         sources={natural: prepare_input(u, natural)},
         rough=rough_response(
-            u, y if valid is None else _bridged(y, valid), longest_delay=u.size // 2
+            u, level if valid is None else _bridged(level, valid), longest_delay=u.size // 2
         ),
+        nuisance=nuisance,
     )
     plain = tuple(name for name in structures if name in PLAIN)
-    fits = _fit_all(data.problem(natural, valid), data.rough, plain or PLAIN)
-    everything = valid
-    forgotten = _forgotten(fits, everything)
-    valid = _counted(fits, everything, forgotten, known)
-    if valid is not everything:
-        fits = [_refit(data.problem(natural, valid), f) for f in fits]
-    fitted = _under_each_assumption(data, natural, fits, valid, alone=intersample is not None)
+    seen = _Seen(valid=valid, begins=None)
+    fits = _fit_all(data.problem(natural, seen), data.rough, plain or PLAIN)
+    counted = _counted(data, natural, fits, seen, known)
+    if counted is not seen:
+        fits = [_refit(data.problem(natural, counted), f) for f in fits]
+    fitted = _under_each_assumption(data, natural, fits, counted, alone=intersample is not None)
     mode, best_fit = min(fitted, key=lambda item: item[1].cost)
     others = tuple(name for name in structures if name not in PLAIN)
-    if not plain or _worth_explaining(data.problem(mode, valid), best_fit, data):
-        richer = _enriched(data, data.problem(natural, valid), fits, others)
-        if richer and forgotten and not _forgotten(richer, everything):
-            forgotten = 0  # it was the structure that was wrong, not the beginning
-            valid = _counted(richer, everything, forgotten, known)
-            fits = [_refit(data.problem(natural, valid), f) for f in fits]
-            richer = [_refit(data.problem(natural, valid), f) for f in richer]
+    if not plain or _worth_explaining(data.problem(mode, counted), best_fit, data):
+        richer = _enriched(data, data.problem(natural, counted), fits, others)
+        if richer and counted.begins is not None:
+            resting = _counted(data, natural, richer, seen, known)
+            if resting.begins is None:  # it was the structure that was wrong, not the beginning
+                counted = resting
+                fits = [_refit(data.problem(natural, counted), f) for f in fits]
+                richer = [_refit(data.problem(natural, counted), f) for f in richer]
         kept = [*fits, *richer] if plain else richer or fits
-        fitted = _under_each_assumption(data, natural, kept, valid, alone=intersample is not None)
+        fitted = _under_each_assumption(data, natural, kept, counted, alone=intersample is not None)
     share = effective_share(min(fitted, key=lambda item: item[1].cost)[1].residual)
-    count = data.problem(natural, valid).counted * share
+    count = data.problem(natural, counted).counted * share
     trials = [_trial(mode, fit, count) for mode, fit in fitted]
     chosen = _chosen(trials, natural)
-    problem = data.problem(chosen.intersample, valid)
+    problem = data.problem(chosen.intersample, counted)
     likeliest = chosen
     chosen = _wary(chosen, trials, problem, count)
     polished = fit_structure(
@@ -188,10 +205,18 @@ def joint_fit(
         problem=problem,
         best=best,
         trials=tuple(best if trial is chosen else trial for trial in trials),
-        forgotten=forgotten,
+        forgotten=counted.begins or 0,
         effective_share=share,
         simpler=None if chosen is likeliest else likeliest,
     )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Seen:
+    """Which samples count, and from where on the state that a record begins with is fitted."""
+
+    valid: NDArray[np.bool_] | None
+    begins: int | None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -202,31 +227,81 @@ class _Data:
     y: NDArray[np.float64]
     sources: dict[Intersample, SampledInput]
     rough: RoughResponse
+    nuisance: NDArray[np.float64] | None
 
-    def problem(self, mode: Intersample, valid: NDArray[np.bool_] | None) -> Problem:
+    def problem(self, mode: Intersample, seen: _Seen) -> Problem:
         if mode not in self.sources:
             self.sources[mode] = prepare_input(self.u, mode)
         return Problem(
-            source=self.sources[mode], y=self.y, valid=valid, longest_delay=self.y.size // 2 + 2.0
+            source=self.sources[mode],
+            y=self.y,
+            valid=seen.valid,
+            longest_delay=self.y.size // 2 + 2.0,
+            nuisance=self.nuisance,
+            begins=seen.begins,
         )
 
 
+def _regressed(
+    rows: NDArray[np.float64], y: NDArray[np.float64], valid: NDArray[np.bool_] | None
+) -> NDArray[np.float64]:
+    """What of an output the rows explain beside a constant, by least squares."""
+    counts = slice(None) if valid is None else valid
+    every = np.vstack([rows, np.ones(y.size)])[:, counts]
+    weights = solved(every @ every.T, every @ y[counts])[:-1]
+    return np.asarray(weights @ rows)
+
+
 def _counted(
+    data: _Data,
+    mode: Intersample,
     fits: list[Fit],
-    valid: NDArray[np.bool_] | None,
-    forgotten: int,
+    seen: _Seen,
     known: NDArray[np.bool_] | None,
-) -> NDArray[np.bool_] | None:
-    """Samples that count once it is known how long the system remembers."""
+) -> _Seen:
+    """Samples that count once it is known how the system remembers, and where it begins."""
+    fit = min(fits, key=lambda f: f.cost)
     ahead = _ahead(fits)
-    if not (forgotten or ahead or known is not None):
-        return valid
-    counted = np.ones(fits[0].residual.size, dtype=bool) if valid is None else valid.copy()
-    counted[:forgotten] = False
-    counted[counted.size - ahead :] = False
+    begins = _begins(data.problem(mode, seen), fit)
+    if begins is None and not ahead and known is None:
+        return seen
+    n = fit.residual.size
+    counted = np.ones(n, dtype=bool) if seen.valid is None else seen.valid.copy()
+    counted[: begins or 0] = False
+    counted[n - ahead :] = False
     if known is not None:
         counted &= _unaffected(known, _memory(fits))
-    return counted
+    return _Seen(valid=counted, begins=begins)
+
+
+def _begins(problem: Problem, fit: Fit) -> int | None:
+    """Sample from which on an unknown state must be fitted; None for a record at rest.
+
+    A score test (C. R. Rao, Proc. Camb. Phil. Soc. 44, 1948) of the free responses beside all other
+    parameters, and a chi-squared test of what comes before them, when the output still answers
+    input before the record.
+    """
+    begins = int(np.ceil(max(fit.delay, 0.0))) + _REACH
+    if begins > problem.y.size // 2 or fit.cost <= 0.0:
+        return None
+    free = Part(replace(problem, begins=begins), fit.structure, fit.theta).free
+    late = np.arange(problem.y.size) >= begins
+    valid = late if problem.valid is None else problem.valid & late
+    residual = fit.residual * late
+    count = int(np.count_nonzero(valid))
+    power = float(residual @ residual)
+    share = effective_share(residual[valid])
+    early = fit.residual[:begins] @ fit.residual[:begins] if problem.valid is None else 0.0
+    level = float(np.median(residual[valid] ** 2)) / 0.455  # of a squared Gaussian
+    if early > _TWICE * level * chdtri(begins, _REST):
+        return begins
+    if not free.shape[0] or power <= 0.0:
+        return None
+    rows = np.vstack([jacobian(problem, fit), free]) * valid
+    gained = float((rows @ residual) @ solved(rows @ rows.T, rows @ residual))
+    left = max(power - gained, np.finfo(float).tiny)
+    statistic = share * count * float(np.log(power / left))
+    return begins if statistic > chdtri(free.shape[0], _REST) else None
 
 
 def _refit(problem: Problem, fit: Fit) -> Fit:
@@ -237,7 +312,7 @@ def _under_each_assumption(
     data: _Data,
     natural: Intersample,
     fits: list[Fit],
-    valid: NDArray[np.bool_] | None,
+    seen: _Seen,
     *,
     alone: bool,
 ) -> list[tuple[Intersample, Fit]]:
@@ -252,13 +327,13 @@ def _under_each_assumption(
 
     def moved(some: list[Fit]) -> list[tuple[Intersample, Fit]]:
         return [
-            (mode, _moved(data.problem(mode, valid), fit, natural, mode))
+            (mode, _moved(data.problem(mode, seen), fit, natural, mode))
             for mode in others
             for fit in some
         ]
 
     fitted += moved(leading)
-    count = data.problem(natural, valid).counted
+    count = data.problem(natural, seen).counted
     if min(fit.cost for _, fit in fitted) < least * (1.0 - 2 * CLEARLY / count):
         fitted += moved(trailing)  # hopeless under a wrong assumption, perhaps not under this
     return fitted
@@ -410,20 +485,6 @@ def _unaffected(known: NDArray[np.bool_], memory: int) -> NDArray[np.bool_]:
     unknown = np.concatenate([[0], np.cumsum(~known)])
     index = np.arange(known.size)
     return np.asarray(unknown[index + 1] == unknown[np.maximum(index - memory, 0)])
-
-
-def _forgotten(fits: list[Fit], valid: NDArray[np.bool_] | None) -> int:
-    """Samples at the start that a system at rest cannot explain, to be left out."""
-    fit = min(fits, key=lambda f: f.cost)
-    n = fit.residual.size
-    span = _memory(fits)
-    counted = np.ones(n, dtype=bool) if valid is None else valid
-    early, late = fit.residual[:span][counted[:span]], fit.residual[span:][counted[span:]]
-    if early.size == 0 or late.size == 0:
-        return 0
-    level = float(np.median(late**2)) / 0.455  # median of a squared Gaussian of unit variance
-    excess = float(np.mean(early**2)) / max(level, np.finfo(float).tiny)
-    return span if excess > 1.0 + 10.0 * np.sqrt(2.0 / early.size) and excess > 4.0 else 0
 
 
 def _trial(mode: Intersample, fit: Fit, count: float) -> Trial:

@@ -38,9 +38,9 @@ def initial_transient(evidence: Evidence) -> tuple[Finding, ...]:
     return (
         Finding(
             code="initial_transient",
-            message="The record does not begin at rest; its first "
-            f"{joint.forgotten / evidence.fs:.4g} s were "
-            "left out. Begin the record before the stimulus to keep them.",
+            message="The record does not begin at rest: the free response of its state is fitted "
+            f"with it, and its first {joint.forgotten / evidence.fs:.4g} s, which answer input "
+            "before the record, are left out.",
             severity="info",
             parameters=(),
         ),
