@@ -11,7 +11,7 @@ from hmpim.identify.fitting.joint import JointFit
 from hmpim.identify.fitting.nested import widened
 from hmpim.identify.result import Estimate, Parameters
 from hmpim.identify.uncertainty import covariance, estimate, gradient, noise_estimate
-from hmpim.identify.whiteness import is_white
+from hmpim.identify.whiteness import autoregressive_spectrum, is_white
 from hmpim.model.dynamics import Structure, coefficients_of, denominator_of
 from hmpim.model.response import (
     RationalDelay,
@@ -45,7 +45,11 @@ class Readings:
     white : bool
         Whether the residual passed for white.
     rows : ndarray, shape (p, n)
-        Derivatives of the prediction, from `hmpim.identify.fitting.fit.jacobian`.
+        Derivatives of the prediction, from `hmpim.identify.fitting.fit.jacobian`, whitened.
+    innovations : ndarray, shape (n,)
+        The residual, whitened.
+    whitened : bool
+        Whether that passed for white.
     coefficient_covariance : ndarray, shape (q, q)
         Of the delay and the coefficients of `system` that may vary, by rising powers of s.
     """
@@ -56,6 +60,8 @@ class Readings:
     covariance: _Vector
     white: bool
     rows: _Vector
+    innovations: _Vector
+    whitened: bool
     coefficient_covariance: _Vector
 
     def variance(self, function: Callable[[_Vector], float]) -> float:
@@ -106,15 +112,19 @@ def read_parameters(
     fit = joint.best.fit
     structure = fit.structure
     vector = np.concatenate([fit.theta, fit.linear])
-    counted = joint.problem.counted
-    freedom = max(counted - vector.size, 1)
-    residual = fit.residual
-    white = is_white(residual if joint.problem.valid is None else residual[joint.problem.valid])
-    rows = jacobian(joint.problem, fit)
+    weighed = joint.weighed
+    freedom = max(weighed.counted - vector.size, 1)
+    share = joint.effective_share if weighed.noise is None else 1.0
+    residual = weighed.innovations(fit.prediction, fit.residual)
+    counts = weighed.valid if weighed.told is None else weighed.told
+    white = is_white(residual if counts is None else residual[counts])
+    rows = jacobian(weighed, fit)
     cov = known_covariance
     if cov is None:
-        cov = widened(joint, _covariance(joint, rows, freedom=freedom, white=white))
-    effective = freedom * joint.effective_share
+        cov = widened(joint, _covariance(joint, rows, residual, freedom=freedom, white=white))
+    if weighed.noise is not None:
+        cov = _wandering(cov, fit.residual, joint.problem.counted)
+    effective = freedom * share
     system = system_of(structure, vector, fs)
 
     def explicit(function: Callable[[_Vector], float], unit: str) -> Estimate:
@@ -185,7 +195,10 @@ def read_parameters(
         scale_factor=linear(gain_rate * vector[1 + order], gain_rate * axis[1 + order], gain_unit),
         bias=linear(vector[-1], axis[-1], output_unit),
         noise_std=noise_estimate(
-            fit.cost, freedom=freedom, share=joint.effective_share, unit=output_unit
+            fit.cost,
+            freedom=max(joint.problem.counted - vector.size, 1),
+            share=joint.effective_share,
+            unit=output_unit,
         ),
         natural_frequency=linear(natural, -natural * (axis[mode] + stretch), "Hz")
         if mode is not None
@@ -213,8 +226,10 @@ def read_parameters(
         system=system,
         vector=vector,
         covariance=cov,
-        white=white,
+        white=white and weighed.noise is None,
         rows=rows,
+        innovations=residual,
+        whitened=white,
         coefficient_covariance=sensitivity.coefficients.T @ cov @ sensitivity.coefficients,
     )
 
@@ -267,16 +282,32 @@ def _lowest_mode(structure: Structure, vector: _Vector) -> int | None:
     return min(found)[1] if found else None
 
 
-def _covariance(joint: JointFit, rows: _Vector, *, freedom: int, white: bool) -> _Vector:
+def _covariance(
+    joint: JointFit, rows: _Vector, residual: _Vector, *, freedom: int, white: bool
+) -> _Vector:
     """Covariance of theta and linear; a held, static system moves in whole samples only."""
     fit = joint.best.fit
     if fit.structure.name == "static" and joint.best.intersample == "zoh":
-        inner = covariance(rows[1:], fit.residual, freedom=freedom, white=white)
+        inner = covariance(rows[1:], residual, freedom=freedom, white=white)
         full = np.zeros((rows.shape[0], rows.shape[0]))
         full[1:, 1:] = inner
         full[0, 0] = 1.0 / 12.0  # uniform over the sample in which the delay ends
         return full
-    return covariance(rows, fit.residual, freedom=freedom, white=white)
+    return covariance(rows, residual, freedom=freedom, white=white)
+
+
+def _wandering(cov: _Vector, residual: _Vector, counted: int) -> _Vector:
+    """Widen the bias to what noise does that rises towards DC below what an autoregression tells.
+
+    The variance of a mean is the noise's power at half a bin over the samples.
+    """
+    slowest = np.array([np.pi / residual.size])
+    known = float(autoregressive_spectrum(residual, slowest)[0]) / counted
+    if known <= cov[-1, -1]:
+        return cov
+    stretch = np.ones(cov.shape[0])
+    stretch[-1] = np.sqrt(known / cov[-1, -1])
+    return np.asarray(cov * np.outer(stretch, stretch))
 
 
 def _from_lag(delay: float | None, fs: float) -> Estimate | None:

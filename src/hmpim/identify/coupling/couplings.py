@@ -127,17 +127,17 @@ def coupling_fit(
             starts += [nested(fit) for fit in fits if fit.structure.name == "first_order"]
             starts += _resonances(rough, fits[0].delay)
         tried = [fit_structure(problem, structure, s, iterations=_TASTE) for s in starts]
-        best = min(tried, key=lambda fit: fit.cost)
+        best = min(tried, key=lambda fit: fit.objective)
         if not best.converged:
             best = fit_structure(problem, structure, best.theta, iterations=_STEPS)
         fits.append(best)
     trials = tuple(
-        Trial(intersample=intersample, fit=_plainly(problem, fit), criterion=_akaike(problem, fit))
-        for fit in fits
+        Trial(intersample=intersample, fit=fit, criterion=_akaike(problem, fit)) for fit in fits
     )
     best_trial = min(trials, key=lambda trial: trial.criterion)
     return JointFit(
         problem=replace(problem, whitening=None),
+        weighed=replace(problem, whitening=None),
         best=best_trial,
         trials=trials,
         forgotten=0,
@@ -148,7 +148,7 @@ def coupling_fit(
 def _hopeful(problem: Problem, fits: list[Fit]) -> bool:
     """Whether a simpler structure sees anything that a richer one might see better."""
     nothing = problem.masked(problem.y - fits[0].linear[-1])
-    gain = np.log(float(nothing @ nothing) / max(min(fit.cost for fit in fits), 1e-300))
+    gain = np.log(float(nothing @ nothing) / max(min(fit.objective for fit in fits), 1e-300))
     return bool(0.5 * problem.counted * gain > _HOPEFUL)
 
 
@@ -184,15 +184,8 @@ def unsettled(fit: JointFit) -> tuple[float, float]:
     return share * delay**2, share * gain**2
 
 
-def _plainly(problem: Problem, fit: Fit) -> Fit:
-    """Return the fit with its residual as it is, not whitened."""
-    if problem.whitening is None:
-        return fit
-    return replace(fit, cost=float(fit.residual @ fit.residual))
-
-
 def _akaike(problem: Problem, fit: Fit) -> float:
     tiny = np.finfo(float).tiny
     count = problem.counted
     owed = 2 * fit.structure.parameters + (_SECOND if fit.structure.order > 1 else 0.0)
-    return float(count * np.log(max(fit.cost, tiny) / count) + owed)
+    return float(count * np.log(max(fit.objective, tiny) / count) + owed)

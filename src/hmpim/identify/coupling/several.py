@@ -288,14 +288,13 @@ def _refine(
     valid = None if bool(counted.all()) else counted
     problems = [replace(fits[j].problem, y=y, valid=valid, whitening=whitening) for j in some]
     begun = [fits[j].best.fit for j in some]
-    moved = fit_all(
+    found = fit_all(
         problems,
         [fit.structure for fit in begun],
         [fit.theta for fit in begun],
         iterations=8,
         precision=1e-3,
     )
-    found = [replace(fit, cost=float(fit.residual @ fit.residual)) for fit in moved]
     parts = {j: fit.prediction - fit.linear[-1] for j, fit in zip(some, found, strict=True)}
     total = sum(parts.values(), np.zeros(y.size))
     for j, fit in zip(some, found, strict=True):
@@ -303,6 +302,7 @@ def _refine(
         fits[j] = replace(
             fits[j],
             problem=replace(fits[j].problem, y=y - (total - parts[j])),
+            weighed=replace(fits[j].problem, y=y - (total - parts[j])),
             best=trial,
             trials=tuple(trial if t is fits[j].best else t for t in fits[j].trials),
             effective_share=effective_share(fit.residual),

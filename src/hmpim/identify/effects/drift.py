@@ -177,28 +177,29 @@ def _degree(joint: JointFit, columns: NDArray[np.float64]) -> int:
 
 def _gain(one: JointFit, degree: int, other: JointFit, other_degree: int) -> float:
     """Schwarz's criterion of another fit less that of one, per sample that counts in either."""
-    count = max(one.problem.counted, other.problem.counted)
+    count = max(one.weighed.counted, other.weighed.counted)
 
     def criterion(joint: JointFit, order: int) -> float:
-        fit = joint.best.fit
-        cost = max(fit.cost, np.finfo(float).tiny) / joint.problem.counted
-        return float(count * np.log(cost) + (fit.structure.parameters + order) * np.log(count))
+        fit, noise = joint.best.fit, joint.weighed.noise
+        power = max(fit.objective, np.finfo(float).tiny) / joint.weighed.counted
+        unknown = fit.structure.parameters + order + (0 if noise is None else noise.size - 1)
+        return float(count * np.log(power) + unknown * np.log(count))
 
     return criterion(other, other_degree) - criterion(one, degree)
 
 
 def _described(joint: JointFit, columns: NDArray[np.float64]) -> Drifting:
     """The fit with the drift taken off the output, its polynomials still free to move."""
-    problem, fit = joint.problem, joint.best.fit
+    problem, weighed, fit = joint.problem, joint.weighed, joint.best.fit
     trend = fit.nuisance @ columns
-    others = jacobian(replace(problem, nuisance=None), fit)
-    slopes = without(problem.masked(columns), others)
-    counts = slice(None) if problem.valid is None else problem.valid
+    others = jacobian(replace(weighed, nuisance=None), fit)
+    slopes = without(weighed.masked(columns), others)
+    left = weighed.innovations(fit.prediction, fit.residual)
     weights = covariance(
         slopes,
-        fit.residual,
-        freedom=max(problem.counted - slopes.shape[0] - others.shape[0], 1),
-        white=is_white(fit.residual[counts]),
+        left,
+        freedom=max(weighed.counted - slopes.shape[0] - others.shape[0], 1),
+        white=is_white(left),
     )
     across = (columns[:, -1] - columns[:, 0]) / (problem.y.size - 1)
     trials = {id(trial): _without_drift(trial, columns) for trial in joint.trials}
@@ -206,6 +207,7 @@ def _described(joint: JointFit, columns: NDArray[np.float64]) -> Drifting:
         joint=replace(
             joint,
             problem=replace(problem, y=problem.y - trend),
+            weighed=replace(joint.weighed, y=problem.y - trend),
             best=trials.get(id(joint.best)) or _without_drift(joint.best, columns),
             trials=tuple(trials.values()),
         ),

@@ -186,6 +186,7 @@ def refine(
     refined = replace(
         joint,
         problem=replace(problem, valid=counted),
+        weighed=replace(problem, valid=counted),
         best=best,
         trials=tuple(best if trial is chosen else trial for trial in joint.trials),
     )

@@ -53,7 +53,9 @@ class Fit:
     residual : ndarray, shape (n,)
         Output less prediction of all, not whitened; 0 where a sample does not count.
     cost : float
-        Sum of squares of the residual, whitened where the problem says how.
+        Sum of squares of the residual.
+    objective : float
+        What was least: sum of squares of the residual, whitened where the problem says how.
     converged : bool
         Whether the last step was negligible.
     nuisance : ndarray, shape (k,)
@@ -68,6 +70,7 @@ class Fit:
     prediction: Real
     residual: Real
     cost: float
+    objective: float
     converged: bool
     nuisance: Real
     initial: Real
@@ -132,7 +135,8 @@ class _Evaluation:
                     linear=np.append(weights[2 * i], fixed[0]),
                     prediction=own,
                     residual=residual,
-                    cost=self.cost,
+                    cost=float(residual @ residual),
+                    objective=self.cost,
                     converged=converged,
                     nuisance=fixed[1:],
                     initial=weights[2 * i + 1],

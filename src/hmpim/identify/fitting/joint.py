@@ -15,8 +15,10 @@ from typing import get_args
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.signal import lfilter
 from scipy.special import chdtri
 
+from hmpim.identify.fitting.autoregression import autoregression
 from hmpim.identify.fitting.enrich import (
     INTEGRATING,
     PLAIN,
@@ -74,6 +76,12 @@ _JUMP = 0.05
 _FINAL_PRECISION = 1e-6
 """Precision of the chosen fit, see `fit_structure`."""
 
+_FOLLOWS = 1e-4
+"""Chance below which what is left over follows the input."""
+
+_HIDES = 0.1
+"""Share of a residual's power that is not foreseen, below which its colour may hide a response."""
+
 _REACH = 4
 """Samples by which what lies between the samples reaches back: half of a spline's support."""
 
@@ -104,6 +112,8 @@ class JointFit:
     ----------
     problem : Problem
         The data under the chosen assumption, with the samples that counted.
+    weighed : Problem
+        The same with the noise whitened, as all trials were weighed.
     best : Trial
         The chosen one.
     trials : tuple of Trial
@@ -119,6 +129,7 @@ class JointFit:
     """
 
     problem: Problem
+    weighed: Problem
     best: Trial
     trials: tuple[Trial, ...]
     forgotten: int
@@ -174,11 +185,15 @@ def joint_fit(
     plain = tuple(name for name in structures if name in PLAIN)
     seen = _Seen(valid=valid, begins=None)
     fits = _fit_all(data.problem(natural, seen), data.rough, plain or PLAIN)
+    prewhitened = _prewhitened(data, natural, fits, seen)
+    if prewhitened is not None:
+        data = prewhitened
+        fits = _fit_all(data.problem(natural, seen), data.rough, plain or PLAIN)
     counted = _counted(data, natural, fits, seen, known)
     if counted is not seen:
         fits = [_refit(data.problem(natural, counted), f) for f in fits]
     fitted = _under_each_assumption(data, natural, fits, counted, alone=intersample is not None)
-    mode, best_fit = min(fitted, key=lambda item: item[1].cost)
+    mode, best_fit = min(fitted, key=lambda item: item[1].objective)
     others = tuple(name for name in structures if name not in PLAIN)
     if not plain or _worth_explaining(data.problem(mode, counted), best_fit, data):
         richer = _enriched(data, data.problem(natural, counted), fits, others)
@@ -190,19 +205,25 @@ def joint_fit(
                 richer = [_refit(data.problem(natural, counted), f) for f in richer]
         kept = [*fits, *richer] if plain else richer or fits
         fitted = _under_each_assumption(data, natural, kept, counted, alone=intersample is not None)
-    share = effective_share(min(fitted, key=lambda item: item[1].cost)[1].residual)
-    count = data.problem(natural, counted).counted * share
+    mode, leading = min(fitted, key=lambda item: item[1].objective)
+    share = effective_share(leading.residual)
+    noise = _colour(data.problem(mode, counted), leading, data) if share < 1.0 else None
+    if noise is not None or data.noise is not None:
+        data = replace(data, noise=noise)
+        fitted = _whitened(data, fitted, counted)
+    count = data.problem(natural, counted).counted * (share if noise is None else 1.0)
     trials = [_trial(mode, fit, count) for mode, fit in fitted]
     chosen = _chosen(trials, natural)
-    problem = data.problem(chosen.intersample, counted)
+    weighed = data.problem(chosen.intersample, counted)
     likeliest = chosen
-    chosen = _wary(chosen, trials, problem, count)
+    chosen = _wary(chosen, trials, weighed, count)
     polished = fit_structure(
-        problem, chosen.fit.structure, chosen.fit.theta, precision=_FINAL_PRECISION
+        weighed, chosen.fit.structure, chosen.fit.theta, precision=_FINAL_PRECISION
     )
     best = _trial(chosen.intersample, polished, count)
     return JointFit(
-        problem=problem,
+        problem=replace(weighed, noise=None, told=None),
+        weighed=weighed,
         best=best,
         trials=tuple(best if trial is chosen else trial for trial in trials),
         forgotten=counted.begins or 0,
@@ -228,11 +249,12 @@ class _Data:
     sources: dict[Intersample, SampledInput]
     rough: RoughResponse
     nuisance: NDArray[np.float64] | None
+    noise: NDArray[np.float64] | None = None
 
     def problem(self, mode: Intersample, seen: _Seen) -> Problem:
         if mode not in self.sources:
             self.sources[mode] = prepare_input(self.u, mode)
-        return Problem(
+        problem = Problem(
             source=self.sources[mode],
             y=self.y,
             valid=seen.valid,
@@ -240,6 +262,55 @@ class _Data:
             nuisance=self.nuisance,
             begins=seen.begins,
         )
+        return problem if self.noise is None else problem.coloured(self.noise)
+
+
+def _colour(problem: Problem, fit: Fit, data: _Data) -> NDArray[np.float64] | None:
+    """Autoregression of what the best fit leaves over; None where that still follows the input.
+
+    What follows the input is no noise, and whitening it would hide what a model lacks.
+    """
+    omega = data.rough.omega
+    band = (omega[0] / (2 * np.pi), omega[-1] / (2 * np.pi))
+    if misfit(data.u, fit.residual, delay=fit.delay, band=band).probability < _FOLLOWS:
+        return None
+    noise = autoregression(fit.residual, problem.valid)
+    return noise if noise.size > 1 else None
+
+
+def _whitened(
+    data: _Data, fitted: list[tuple[Intersample, Fit]], seen: _Seen
+) -> list[tuple[Intersample, Fit]]:
+    """All fits once more under one noise model, the hopeless ones as they are."""
+    least = min(fit.objective for _, fit in fitted)
+    out = []
+    for mode, fit in fitted:
+        steps = 40 if fit.objective < _HOPELESS * least else 0
+        problem = data.problem(mode, seen)
+        out.append((mode, fit_structure(problem, fit.structure, fit.theta, iterations=steps)))
+    return out
+
+
+def _prewhitened(data: _Data, mode: Intersample, fits: list[Fit], seen: _Seen) -> _Data | None:
+    """Data with the noise whitened, where its colour hides the response; None elsewhere.
+
+    Input and output are filtered alike, so that the response stays: starts are sought in what a
+    wander or a line leaves free.
+    """
+    fit = min(fits, key=lambda f: f.objective)
+    noise = autoregression(fit.residual, seen.valid)
+    problem = data.problem(mode, seen)
+    spread = problem.masked(problem.y - problem.y.mean())
+    if noise.size == 1 or fit.cost < _POOR * float(spread @ spread):
+        return None
+    whitened = problem.coloured(noise)
+    left = whitened.innovations(fit.prediction, fit.residual)
+    if float(left @ left) > _HIDES * fit.cost:
+        return None
+    u, y = (lfilter(noise, np.ones(1), x - x.mean()) for x in (data.u, data.y))
+    y = y if seen.valid is None else y * whitened.told
+    rough = rough_response(u[noise.size :], y[noise.size :], longest_delay=data.u.size // 2)
+    return replace(data, noise=noise, rough=rough)
 
 
 def _regressed(
@@ -260,7 +331,7 @@ def _counted(
     known: NDArray[np.bool_] | None,
 ) -> _Seen:
     """Samples that count once it is known how the system remembers, and where it begins."""
-    fit = min(fits, key=lambda f: f.cost)
+    fit = min(fits, key=lambda f: f.objective)
     ahead = _ahead(fits)
     begins = _begins(data.problem(mode, seen), fit)
     if begins is None and not ahead and known is None:
@@ -282,22 +353,24 @@ def _begins(problem: Problem, fit: Fit) -> int | None:
     input before the record.
     """
     begins = int(np.ceil(max(fit.delay, 0.0))) + _REACH
-    if begins > problem.y.size // 2 or fit.cost <= 0.0:
+    if begins > problem.y.size // 2 or fit.objective <= 0.0:
         return None
     free = Part(replace(problem, begins=begins), fit.structure, fit.theta).free
     late = np.arange(problem.y.size) >= begins
-    valid = late if problem.valid is None else problem.valid & late
-    residual = fit.residual * late
+    counts = problem.valid if problem.told is None else problem.told
+    valid = late if counts is None else counts & late
+    innovations = problem.innovations(fit.prediction, fit.residual)
+    residual = innovations * late
     count = int(np.count_nonzero(valid))
     power = float(residual @ residual)
     share = effective_share(residual[valid])
-    early = fit.residual[:begins] @ fit.residual[:begins] if problem.valid is None else 0.0
+    early = float(innovations[:begins] @ innovations[:begins]) if problem.valid is None else 0.0
     level = float(np.median(residual[valid] ** 2)) / 0.455  # of a squared Gaussian
     if early > _TWICE * level * chdtri(begins, _REST):
         return begins
     if not free.shape[0] or power <= 0.0:
         return None
-    rows = np.vstack([jacobian(problem, fit), free]) * valid
+    rows = np.vstack([jacobian(problem, fit), problem.masked(free)]) * valid
     gained = float((rows @ residual) @ solved(rows @ rows.T, rows @ residual))
     left = max(power - gained, np.finfo(float).tiny)
     statistic = share * count * float(np.log(power / left))
@@ -320,9 +393,9 @@ def _under_each_assumption(
     fitted = [(natural, fit) for fit in fits]
     if alone:
         return fitted
-    least = min(fit.cost for fit in fits)
-    leading = [fit for fit in fits if fit.cost < _HOPELESS * least]
-    trailing = [fit for fit in fits if fit.cost >= _HOPELESS * least]
+    least = min(fit.objective for fit in fits)
+    leading = [fit for fit in fits if fit.objective < _HOPELESS * least]
+    trailing = [fit for fit in fits if fit.objective >= _HOPELESS * least]
     others = [mode for mode in get_args(Intersample) if mode != natural]
 
     def moved(some: list[Fit]) -> list[tuple[Intersample, Fit]]:
@@ -334,7 +407,7 @@ def _under_each_assumption(
 
     fitted += moved(leading)
     count = data.problem(natural, seen).counted
-    if min(fit.cost for _, fit in fitted) < least * (1.0 - 2 * CLEARLY / count):
+    if min(fit.objective for _, fit in fitted) < least * (1.0 - 2 * CLEARLY / count):
         fitted += moved(trailing)  # hopeless under a wrong assumption, perhaps not under this
     return fitted
 
@@ -363,26 +436,26 @@ def _fit_all(
             starts = starting_values(rough, structure, earliest=-2, thorough=False)
         steps = 2 if settled else _TASTE
         fit = fit_structure(problem, structure, starts[0], iterations=steps)
-        hopeful = min((f.cost for f in fits), default=np.inf) * _HOPELESS
-        white = fit.cost < hopeful and is_white(fit.residual)
-        if not white and fit.cost < _FALLING * hopeful:
+        hopeful = min((f.objective for f in fits), default=np.inf) * _HOPELESS
+        white = fit.objective < hopeful and is_white(fit.residual)
+        if not white and fit.objective < _FALLING * hopeful:
             rivals = starts[1:]
             if not settled:
                 rivals += starting_values(rough, structure, earliest=-2)
             for theta in rivals:
                 rival = fit_structure(problem, structure, theta, iterations=_TASTE)
-                fit = min(fit, rival, key=lambda f: f.cost)
+                fit = min(fit, rival, key=lambda f: f.objective)
         settled = settled or white
         fits.append(fit)
     for i, fit in enumerate(fits):
         for other in fits:
             if _nests(other, fit):
                 rival = fit_structure(problem, fit.structure, nested(other), iterations=_TASTE)
-                fits[i] = min(fits[i], rival, key=lambda f: f.cost)
-    least = min(fit.cost for fit in fits)
+                fits[i] = min(fits[i], rival, key=lambda f: f.objective)
+    least = min(fit.objective for fit in fits)
     return [
         fit
-        if fit.converged or fit.cost > _FALLING * least
+        if fit.converged or fit.objective > _FALLING * least
         else fit_structure(problem, fit.structure, fit.theta)
         for fit in fits
     ]
@@ -392,14 +465,14 @@ def _enriched(
     data: _Data, problem: Problem, fits: list[Fit], structures: tuple[StructureName, ...]
 ) -> list[Fit]:
     """Fits of the richer structures."""
-    best = min(fits, key=lambda fit: fit.cost)
+    best = min(fits, key=lambda fit: fit.objective)
     integrating = members(structures, INTEGRATING)
     found: list[Fit] = []
     if integrating:
         added = np.cumsum(data.u - data.u[0])
         rough = rough_response(added, data.y, longest_delay=data.y.size // 2)
         found = [_best_of(problem, s, integrator_starts(rough, s)) for s in integrating]
-        if is_white(min(found, key=lambda fit: fit.cost).residual):
+        if is_white(min(found, key=lambda fit: fit.objective).residual):
             return found
     return found + [
         _best_of(problem, structure, rich_starts(data.rough, structure, best))
@@ -409,7 +482,7 @@ def _enriched(
 
 def _best_of(problem: Problem, structure: Structure, starts: list[NDArray[np.float64]]) -> Fit:
     tried = [fit_structure(problem, structure, theta, iterations=_LONG_TASTE) for theta in starts]
-    best = min(tried, key=lambda fit: fit.cost)
+    best = min(tried, key=lambda fit: fit.objective)
     return best if best.converged else fit_structure(problem, structure, best.theta)
 
 
@@ -420,7 +493,7 @@ def _worth_explaining(problem: Problem, fit: Fit, data: _Data) -> bool:
     left = misfit(data.u, fit.residual, delay=fit.delay, band=band)
     spread = float(np.sum((problem.masked(problem.y - problem.y.mean())) ** 2))
     owed = float(np.sqrt(left.share * fit.cost / spread)) if spread else 0.0
-    if left.probability < 1e-4 and (owed > _MATERIAL or _misses_part(problem, fit, data, band)):
+    if left.probability < _FOLLOWS and (owed > _MATERIAL or _misses_part(problem, fit, data, band)):
         return True
     return fit.cost > _POOR * spread and not is_white(fit.residual)
 
@@ -444,7 +517,7 @@ def _nests(simple: Fit, rich: Fit) -> bool:
     return (
         simple.structure.name == "first_order"
         and rich.structure.name == "second_order"
-        and (simple.cost <= rich.cost or not is_white(rich.residual))
+        and (simple.objective <= rich.objective or not is_white(rich.residual))
     )
 
 
@@ -468,7 +541,7 @@ def _moved(problem: Problem, fit: Fit, origin: Intersample, mode: Intersample) -
 
 def _memory(fits: list[Fit]) -> int:
     """Samples after which the output has forgotten its input, by the best fit so far."""
-    fit = min(fits, key=lambda f: f.cost)
+    fit = min(fits, key=lambda f: f.objective)
     slowest = slowest_time_constant(fit.denominator)
     span = int(np.ceil(max(fit.delay, 0.0) + _SETTLED * slowest)) + 2
     return min(span, fit.residual.size // 4)
@@ -476,7 +549,7 @@ def _memory(fits: list[Fit]) -> int:
 
 def _ahead(fits: list[Fit]) -> int:
     """Samples at the end that depend on input after the record, if the delay is negative."""
-    delay = min(fits, key=lambda f: f.cost).delay
+    delay = min(fits, key=lambda f: f.objective).delay
     return int(np.ceil(-delay)) + 3 if delay < 0 else 0
 
 
@@ -489,9 +562,9 @@ def _unaffected(known: NDArray[np.bool_], memory: int) -> NDArray[np.bool_]:
 
 def _trial(mode: Intersample, fit: Fit, count: float) -> Trial:
     tiny = np.finfo(float).tiny
-    criterion = count * np.log(max(fit.cost, tiny) / count) + fit.structure.parameters * np.log(
-        count
-    )
+    criterion = count * np.log(
+        max(fit.objective, tiny) / count
+    ) + fit.structure.parameters * np.log(count)
     return Trial(intersample=mode, fit=fit, criterion=float(criterion))
 
 
@@ -513,7 +586,7 @@ def _wary(chosen: Trial, trials: list[Trial], problem: Problem, count: float) ->
         return chosen
     rows = jacobian(problem, chosen.fit)
     information = np.linalg.pinv(rows @ rows.T, hermitian=True)
-    std = np.sqrt(max(information[0, 0], 0.0) * chosen.fit.cost / problem.counted)
+    std = np.sqrt(max(information[0, 0], 0.0) * chosen.fit.objective / problem.counted)
     for trial in trials:
         extra = trial.fit.structure.parameters - chosen.fit.structure.parameters
         if (

@@ -46,7 +46,7 @@ def widened(joint: JointFit, cov: NDArray[np.float64]) -> NDArray[np.float64]:
     -------
     ndarray, shape (p, p)
     """
-    fit, problem = joint.best.fit, joint.problem
+    fit, problem = joint.best.fit, joint.weighed
     simple = next(
         (
             trial.fit
@@ -75,8 +75,9 @@ def widened(joint: JointFit, cov: NDArray[np.float64]) -> NDArray[np.float64]:
 
 def _deviance(simple: Fit, joint: JointFit) -> float:
     """Twice the log-likelihood by which the chosen fit beats a simpler one."""
-    count = joint.problem.counted * joint.effective_share
-    return float(count * np.log(max(simple.cost / joint.best.fit.cost, 1.0)))
+    share = joint.effective_share if joint.weighed.noise is None else 1.0
+    count = joint.weighed.counted * share
+    return float(count * np.log(max(simple.objective / joint.best.fit.objective, 1.0)))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -136,6 +137,7 @@ def hidden_pole(
     row = problem.masked(fit.linear[0] * (there - here)) / added**2
     every = np.vstack([rows, row])
     freedom = max(problem.counted - every.shape[0], 1)
-    variance = covariance(every, fit.residual, freedom=freedom, white=white)[-1, -1]
-    squared = float(np.linalg.lstsq(every.T, fit.residual, rcond=None)[0][-1])
+    left = problem.innovations(fit.prediction, fit.residual)
+    variance = covariance(every, left, freedom=freedom, white=white)[-1, -1]
+    squared = float(np.linalg.lstsq(every.T, left, rcond=None)[0][-1])
     return HiddenPole(squared=squared, std=float(np.sqrt(variance)), scale=scale)

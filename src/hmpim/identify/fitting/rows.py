@@ -5,11 +5,12 @@ coefficient of B; the bias; whatever else is linear, such as a drift; and, where
 begin at rest, the free response of the state it begins with.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import irfft, rfft
+from scipy.signal import lfilter
 
 from hmpim.identify.fitting.sections import Expansion, Poles, poles_of
 from hmpim.model.dynamics import Structure
@@ -39,6 +40,10 @@ class Problem:
     whitening : ndarray, shape (n // 2 + 1,), or None
         Gain at each bin of the transform after which the noise is white; residuals and
         derivatives then are those of the whitened output. None for noise that is white.
+    noise : ndarray, shape (order + 1,), or None
+        Autoregression of the noise, 1 first: what it leaves of residual and derivatives is white.
+    told : ndarray of bool, shape (n,), or None
+        With `noise`, the samples whose whole past, as far as it reaches, counts.
     nuisance : ndarray, shape (k, n), or None
         Rows beside the bias that enter linearly, such as a drift's.
     begins : int or None
@@ -51,20 +56,37 @@ class Problem:
     valid: NDArray[np.bool_] | None
     longest_delay: float
     whitening: Real | None = None
+    noise: Real | None = None
+    told: NDArray[np.bool_] | None = None
     nuisance: Real | None = None
     begins: int | None = None
 
     @property
     def counted(self) -> int:
         """How many samples count."""
-        return self.y.size if self.valid is None else int(np.count_nonzero(self.valid))
+        counts = self.valid if self.told is None else self.told
+        return self.y.size if counts is None else int(np.count_nonzero(counts))
 
     def masked(self, rows: Real) -> Real:
         """Return `rows`, (k, n) or (n,), samples that do not count set to 0, noise whitened."""
+        if self.noise is not None and self.told is not None and rows.size:
+            return np.asarray(lfilter(self.noise, np.ones(1), rows) * self.told)
         counted = rows if self.valid is None else rows * self.valid
         if self.whitening is None:
             return counted
         return np.asarray(irfft(rfft(counted) * self.whitening, rows.shape[-1]))
+
+    def innovations(self, prediction: Real, residual: Real) -> Real:
+        """What of the output no past residual foresees; the residual itself of white noise."""
+        return residual if self.noise is None else self.masked(self.y - prediction)
+
+    def coloured(self, noise: Real) -> "Problem":
+        """The same with an autoregression for the noise; after a gap it starts anew."""
+        order, size = noise.size - 1, self.y.size
+        lost = np.zeros(size, dtype=np.int64) if self.valid is None else np.cumsum(~self.valid)
+        before = np.concatenate([np.zeros(order + 1, dtype=np.int64), lost])[:size]
+        told = (lost == before) & (np.arange(size) >= order)
+        return replace(self, noise=noise, told=told)
 
     def fixed(self) -> Real:
         """Bias and nuisance, shape (1 + k, n)."""

@@ -73,12 +73,12 @@ def coloured_noise(evidence: Evidence) -> tuple[Finding, ...]:
 
 def halves_disagree(evidence: Evidence) -> tuple[Finding, ...]:
     """Doubt a model that the halves of the record do not share."""
-    joint = evidence.joint
+    joint, readings = evidence.joint, evidence.readings
     halves = compare_halves(
-        evidence.readings.rows,
-        joint.best.fit.residual,
+        readings.rows,
+        readings.innovations,
         joint.problem.y,
-        share=joint.effective_share,
+        share=joint.effective_share if joint.weighed.noise is None else 1.0,
     )
     if halves.probability >= _PARTED or halves.owed <= _TOLERATED_MISFIT:
         return ()

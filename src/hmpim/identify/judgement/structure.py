@@ -124,7 +124,7 @@ def missed_pole(evidence: Evidence) -> tuple[Finding, ...]:
     if evidence.nonlinear or structure.name not in ("first_order", "second_order"):
         return ()
     readings = evidence.readings
-    hidden = hidden_pole(joint.problem, joint.best.fit, readings.rows, white=readings.white)
+    hidden = hidden_pole(joint.weighed, joint.best.fit, readings.rows, white=readings.whitened)
     moved = float(np.sqrt(abs(hidden.squared)))
     if abs(hidden.squared) > _ASKED * hidden.std and moved > _MATTERS * hidden.scale:
         message = (
