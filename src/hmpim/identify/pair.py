@@ -139,7 +139,7 @@ def described(
         parameters=parameters,
         paper=paper,
         frequency_response=response,
-        numerator=_descending(readings.system.numerator / readings.system.numerator[0]),
+        numerator=_descending(readings.system.numerator / _leading(readings.system.numerator)),
         denominator=_descending(readings.system.denominator),
         candidates=_candidates(joint),
         warnings=(*aligned.findings, *findings),
@@ -202,6 +202,11 @@ def _highest_first(readings: Readings) -> NDArray[np.float64] | None:
     above = 1 + readings.system.numerator.size
     order = [0, *range(1, above)[::-1], *range(above, covariance.shape[0])[::-1]]
     return covariance[np.ix_(order, order)]
+
+
+def _leading(numerator: NDArray[np.float64]) -> float:
+    """First coefficient that is not 0: the scale factor."""
+    return float(numerator[np.flatnonzero(numerator)[0]]) if numerator.any() else 1.0
 
 
 def _descending(coefficients: NDArray[np.float64]) -> tuple[float, ...]:

@@ -74,7 +74,8 @@ def system_of(structure: Structure, vector: _Vector, fs: float) -> RationalDelay
     """Build the system in seconds that a fit's vector stands for."""
     order = structure.order
     denominator = denominator_of(structure, coefficients_of(structure, vector[1 : 1 + order]))
-    numerator = vector[1 + order : -1] * fs**structure.integrators
+    told = vector[1 + order : -1] * fs**structure.integrators
+    numerator = np.concatenate([np.zeros(structure.dc_zeros), told])
     return RationalDelay(
         delay=float(vector[0]) / fs,
         numerator=numerator / fs ** np.arange(numerator.size),
@@ -138,7 +139,8 @@ def read_parameters(
     axis = np.eye(vector.size)
 
     order = structure.order
-    steady = structure.integrators == 0  # an integrator has no gain at DC to compare with
+    # Neither an integrator nor a washout has a gain at DC to compare with.
+    steady = structure.integrators == 0 and structure.dc_zeros == 0
     dynamic = order > 0 and steady
     peak = peak_gain(system, highest=highest) if dynamic else None
 
@@ -170,9 +172,11 @@ def read_parameters(
     mode = _lowest_mode(structure, vector)
     slow = dominant_time_constant(system)
     gain_unit = _ratio(output_unit, input_unit)
-    gain_rate = 1.0 if steady else fs
-    if not steady:
+    gain_rate = fs ** (structure.integrators - structure.dc_zeros)
+    if structure.integrators:
         gain_unit = f"{gain_unit or '1'}/s"
+    if structure.dc_zeros:
+        gain_unit = f"{gain_unit}*s" if gain_unit else "s"
     low_frequency = None
     if dynamic:
 
@@ -243,7 +247,8 @@ class _Sensitivity:
         self._places = np.array(frequencies)
 
         def curve(system: RationalDelay, f: _Vector) -> NDArray[np.complex128]:
-            return np.asarray(response(system, f) / system.numerator[0])
+            told = system.numerator[structure.dc_zeros]
+            return np.asarray(response(system, f) / told)
 
         def coefficients(system: RationalDelay) -> _Vector:
             varied = system.denominator[structure.integrators + 1 :]

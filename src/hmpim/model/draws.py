@@ -157,8 +157,9 @@ def _one(model: Model, vector: NDArray[np.float64], source: np.random.Generator)
     numerator = vector[1 : 1 + above]
     lowest = [1.0, 0.0] if model.denominator[-1] == 0.0 else [1.0]
     denominator = np.concatenate([vector[1 + above :], lowest])
-    if numerator[-1] == 0.0:
+    if not numerator.any():
         raise ArgumentError("a scale factor of 0 is no model")
+    scale = float(numerator[np.flatnonzero(numerator)[-1]])
 
     def moved(value: float | None, std: float) -> float | None:
         return None if value is None else float(value + std * source.standard_normal())
@@ -168,8 +169,8 @@ def _one(model: Model, vector: NDArray[np.float64], source: np.random.Generator)
     return replace(
         model,
         delay=float(vector[0]),
-        scale_factor=float(numerator[-1]),
-        numerator=tuple((numerator / numerator[-1]).tolist()),
+        scale_factor=scale,
+        numerator=tuple((numerator / scale).tolist()),
         denominator=tuple(denominator.tolist()),
         bias=moved(model.bias, spread.bias) or 0.0,
         noise_std=abs(noise),

@@ -25,12 +25,22 @@ StructureName = Literal[
     "static",
     "first_order",
     "second_order",
+    "first_order_zero",
     "second_order_zero",
+    "second_order_zeros",
     "third_order",
+    "third_order_zeros",
     "fourth_order",
+    "fifth_order",
+    "sixth_order",
     "two_modes",
+    "three_modes",
+    "four_modes",
+    "washout",
+    "band_pass",
     "integrator",
     "integrator_first_order",
+    "integrator_second_order",
 ]
 
 
@@ -49,7 +59,8 @@ class Structure:
     integrators : int
         Poles at zero, 0 or 1. With one, the scale factor is the output's rate per input.
     dc_zeros : int
-        Zeros at zero: the least power of the numerator. With one, a constant input does nothing.
+        Zeros at zero: the least power of the numerator. With one, a constant input does nothing,
+        and the scale factor is the output per rate of the input.
     """
 
     name: StructureName
@@ -75,12 +86,22 @@ STRUCTURES: dict[StructureName, Structure] = {
         Structure(name="static", sections=()),
         Structure(name="first_order", sections=(1,)),
         Structure(name="second_order", sections=(2,)),
+        Structure(name="first_order_zero", sections=(1,), zeros=1),
         Structure(name="second_order_zero", sections=(2,), zeros=1),
+        Structure(name="second_order_zeros", sections=(2,), zeros=2),
         Structure(name="third_order", sections=(2, 1)),
+        Structure(name="third_order_zeros", sections=(2, 1), zeros=2),
         Structure(name="fourth_order", sections=(2, 2)),
+        Structure(name="fifth_order", sections=(2, 2, 1)),
+        Structure(name="sixth_order", sections=(2, 2, 2)),
         Structure(name="two_modes", sections=(2, 2), zeros=2),
+        Structure(name="three_modes", sections=(2, 2, 2), zeros=4),
+        Structure(name="four_modes", sections=(2, 2, 2, 2), zeros=6),
+        Structure(name="washout", sections=(1,), zeros=1, dc_zeros=1),
+        Structure(name="band_pass", sections=(2,), zeros=1, dc_zeros=1),
         Structure(name="integrator", sections=(), integrators=1),
         Structure(name="integrator_first_order", sections=(1,), integrators=1),
+        Structure(name="integrator_second_order", sections=(2,), integrators=1),
     )
 }
 

@@ -95,10 +95,10 @@ class Model:
                 f"denominator {self.denominator} integrates more than once; one of its last two "
                 "coefficients must not be 0"
             )
-        if len(self.numerator) > max(len(self.denominator) - 1, 1):
+        if len(self.numerator) > len(self.denominator):
             raise ArgumentError(
                 f"numerator of degree {len(self.numerator) - 1} over denominator of degree "
-                f"{len(self.denominator) - 1} is not strictly proper; leave out its highest power"
+                f"{len(self.denominator) - 1} is not proper; leave out its highest power"
             )
         poles = np.roots(self.denominator)
         if np.any(poles[np.abs(poles) > 0].real >= 0):
@@ -311,7 +311,7 @@ def simulate(
         powers=powers,
     )
     weights = system.numerator * fs ** np.arange(powers)
-    level: float | NDArray[np.float64] = model.scale_factor * source.first
+    level: float | NDArray[np.float64] = float(system.numerator[0]) * source.first
     if system.denominator[0] == 0:
         level = level * np.maximum(np.arange(source.samples) / fs - system.delay, 0.0)
     y = weights @ rows + level + model.bias

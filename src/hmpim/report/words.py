@@ -170,7 +170,14 @@ _STRUCTURES = {
     "first_order": "first order",
     "second_order": "second order",
     "second_order_zero": "second order with a zero",
+    "first_order_zero": "first order with a zero",
+    "second_order_zeros": "second order with two zeros",
+    "third_order_zeros": "third order with two zeros",
     "two_modes": "two modes",
+    "three_modes": "three modes",
+    "four_modes": "four modes",
+    "washout": "a washout",
+    "band_pass": "a band-pass",
 }
 
 _PARTS = {

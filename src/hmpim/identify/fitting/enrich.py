@@ -5,6 +5,8 @@ is worth more than a small share of the output: every simulation pays for every 
 enough samples the smallest imperfection of real hardware is "significant".
 """
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -12,16 +14,32 @@ from hmpim.identify.fitting.fit import Fit
 from hmpim.identify.fitting.start import RoughResponse, starting_values
 from hmpim.model.dynamics import STRUCTURES, Structure, StructureName, theta_of
 
-__all__ = ["INTEGRATING", "PLAIN", "RICH", "integrator_starts", "members", "rich_starts"]
+__all__ = ["INTEGRATING", "PLAIN", "RICH", "Proposal", "integrator_starts", "members", "proposals"]
 
 PLAIN: tuple[StructureName, ...] = ("static", "first_order", "second_order")
 RICH: tuple[StructureName, ...] = (
+    "first_order_zero",
     "second_order_zero",
+    "second_order_zeros",
     "third_order",
+    "third_order_zeros",
     "fourth_order",
+    "fifth_order",
+    "sixth_order",
     "two_modes",
+    "three_modes",
+    "four_modes",
+    "washout",
+    "band_pass",
 )
-INTEGRATING: tuple[StructureName, ...] = ("integrator", "integrator_first_order")
+INTEGRATING: tuple[StructureName, ...] = (
+    "integrator",
+    "integrator_first_order",
+    "integrator_second_order",
+)
+
+_PLAIN_OF: tuple[StructureName, ...] = PLAIN
+"""The plain structure of each order."""
 
 _DELAYS = 7
 """How many delays to start from, about that of the best fit so far."""
@@ -39,14 +57,33 @@ def integrator_starts(rough: RoughResponse, structure: Structure) -> list[NDArra
     structure : Structure
         An integrator, alone or with a lag.
     """
-    rest = STRUCTURES["first_order" if structure.sections else "static"]
+    rest = STRUCTURES[_PLAIN_OF[structure.order]]
     return starting_values(rough, rest, earliest=-2)
 
 
-def rich_starts(
-    rough: RoughResponse, structure: Structure, fit: Fit, *, count: int = 3
-) -> list[NDArray[np.float64]]:
-    """Starts for a structure with zeros or more than two poles, the most promising first.
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Proposal:
+    """A structure with zeros or more than two poles, and where to start it.
+
+    Parameters
+    ----------
+    structure : Structure
+        What to fit.
+    starts : tuple of ndarray, shape (1 + order,)
+        Delay in samples, parameters of the denominator's sections; the most promising first.
+    criterion : float
+        Schwarz's criterion of the best start on the rough response, lower is better.
+    """
+
+    structure: Structure
+    starts: tuple[NDArray[np.float64], ...]
+    criterion: float
+
+
+def proposals(
+    rough: RoughResponse, structures: list[Structure], fit: Fit, *, count: int = 3
+) -> list[Proposal]:
+    """Structures with zeros or more than two poles, the most promising first.
 
     Sanathanan and Koerner's iteration on the rough response, at several delays about that of
     the best fit so far; poles in the right half plane are mirrored.
@@ -55,50 +92,55 @@ def rich_starts(
     ----------
     rough : RoughResponse
         From `hmpim.identify.fitting.start.rough_response`.
-    structure : Structure
-        What will be fitted.
+    structures : list of Structure
+        What may be fitted.
     fit : Fit
         The best fit so far.
     count : int
-        At most so many.
-
-    Returns
-    -------
-    list of ndarray, shape (1 + order,)
-        Delay in samples, parameters of the denominator's sections.
+        At most so many starts each.
     """
     reach = np.pi / rough.omega[-1]
     delays = np.maximum(fit.delay + reach * np.linspace(-1.5, 0.5, _DELAYS), -1.0)
     scale = float(np.sqrt(rough.weight @ rough.omega**2 / rough.weight.sum()))
     s = np.asarray(1j * rough.omega / scale, dtype=np.complex128)
-    found: list[tuple[float, NDArray[np.float64]]] = [_from_plain(rough, structure, fit)]
-    for delay in delays:
-        target = rough.response * np.exp(1j * rough.omega * (delay - rough.lag))
-        error, denominator = _reweighted(s, target, rough.weight, structure)
-        coefficients = _sections(denominator, structure)
-        if coefficients is None:
-            continue
-        powers = np.concatenate([np.arange(1, order + 1) for order in structure.sections])
-        theta = theta_of(structure, coefficients / scale**powers)
-        found.append((error, np.concatenate([[delay], theta])))
-    found.sort(key=lambda item: item[0])
-    return [theta for _, theta in found[:count]]
+    out = []
+    for structure in structures:
+        found: list[tuple[float, NDArray[np.float64]]] = []
+        for delay in delays:
+            target = rough.response * np.exp(1j * rough.omega * (delay - rough.lag))
+            error, denominator = _reweighted(s, target, rough.weight, structure)
+            coefficients = _sections(denominator, structure)
+            if coefficients is None:
+                continue
+            powers = np.concatenate([np.arange(1, order + 1) for order in structure.sections])
+            theta = theta_of(structure, coefficients / scale**powers)
+            found.append((error, np.concatenate([[delay], theta])))
+        found.sort(key=lambda item: item[0])
+        starts = [theta for _, theta in found[:count]]
+        if structure.dc_zeros == 0:
+            starts = [_from_plain(rough, structure, fit), *starts[: count - 1]]
+        error = found[0][0] if found else float(rough.weight.sum())
+        bins = float(rough.weight.sum() ** 2 / (rough.weight @ rough.weight))
+        criterion = bins * float(np.log(max(error, np.finfo(float).tiny)))
+        criterion += structure.parameters * float(np.log(max(bins, 2.0)))
+        out.append(Proposal(structure=structure, starts=tuple(starts), criterion=criterion))
+    return sorted(out, key=lambda proposal: proposal.criterion)
 
 
-def _from_plain(
-    rough: RoughResponse, structure: Structure, fit: Fit
-) -> tuple[float, NDArray[np.float64]]:
+def _from_plain(rough: RoughResponse, structure: Structure, fit: Fit) -> NDArray[np.float64]:
     """The best plain fit with its missing sections added where they hardly matter; tried first."""
     theta = list(fit.theta)
     have = fit.structure.sections
     if not have:
         theta += [0.0]
         have = (1,)
-    if have == (1,):
+    if structure.sections[0] == 1:
+        theta = theta[:2]
+    elif have == (1,):
         theta += [0.1875]  # (1 + 3/4 Ts)(1 + 1/4 Ts)
-    for order in structure.sections[1:]:
-        theta += [np.log(0.5 / rough.omega[-1])] + ([0.5] if order == 2 else [])
-    return 0.0, np.array(theta)
+    for k, order in enumerate(structure.sections[1:]):
+        theta += [np.log(0.5 / (k + 1) / rough.omega[-1])] + ([0.5] if order == 2 else [])
+    return np.array(theta)
 
 
 def _reweighted(
@@ -110,7 +152,7 @@ def _reweighted(
     """Fit target A = B; return the output error and A by rising powers, A(0) = 1."""
     order, zeros = structure.order, structure.zeros
     below = s[:, None] ** np.arange(1, order + 1)
-    above = s[:, None] ** np.arange(zeros + 1)
+    above = s[:, None] ** np.arange(structure.dc_zeros, zeros + 1)
     columns = np.hstack([target[:, None] * below, -above])
     root = np.sqrt(weight)
     best = (np.inf, np.ones(order + 1))
@@ -121,7 +163,7 @@ def _reweighted(
         denominator = np.concatenate([[1.0], solution[:order]])
         a = np.polynomial.polynomial.polyval(s, denominator)
         b = above @ solution[order:]
-        error = float(weight @ np.abs(target - b / a) ** 2)
+        error = float(weight @ np.abs(target - b / a) ** 2) if np.all(a != 0) else np.inf
         if error < best[0]:
             best = (error, denominator)
         root = np.sqrt(weight) / np.abs(a)

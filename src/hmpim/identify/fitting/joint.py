@@ -25,7 +25,7 @@ from hmpim.identify.fitting.enrich import (
     RICH,
     integrator_starts,
     members,
-    rich_starts,
+    proposals,
 )
 from hmpim.identify.fitting.fit import Fit, Problem, fit_structure, jacobian, solved
 from hmpim.identify.fitting.rows import Part
@@ -46,7 +46,7 @@ _HOPELESS = 2.0
 """A structure whose sum of squares is this many times the least is not tried again at once
 under the other assumptions."""
 
-_MATERIAL = 0.02
+_MATERIAL = 0.003
 """Share of the output (r.m.s.) below which a misfit is reported but not modelled."""
 
 _PARTLY = 0.08
@@ -57,6 +57,9 @@ _POOR = 0.2
 
 _LONG_TASTE = 12
 """Steps from each start of a richer structure, whose valleys are longer."""
+
+_AT_ONCE = 4
+"""Richer structures tried before it is asked whether more are needed."""
 
 _TASTE = 4
 """Steps taken from each start before the best one is followed to its end."""
@@ -169,9 +172,9 @@ def joint_fit(
     -------
     JointFit
     """
-    natural: Intersample = "zoh" if _looks_held(u) else "bandlimited"
-    if intersample is not None:
-        natural = intersample
+    if intersample is None and _looks_held(u):
+        intersample = "zoh"  # an input that stands still and jumps does nothing else
+    natural: Intersample = "bandlimited" if intersample is None else intersample
     level = y if nuisance is None else y - _regressed(nuisance, y, valid)
     data = _Data(
         u=u,
@@ -464,20 +467,27 @@ def _fit_all(
 def _enriched(
     data: _Data, problem: Problem, fits: list[Fit], structures: tuple[StructureName, ...]
 ) -> list[Fit]:
-    """Fits of the richer structures."""
+    """Fits of the richer structures, the most promising first, until nothing is left to explain."""
     best = min(fits, key=lambda fit: fit.objective)
     integrating = members(structures, INTEGRATING)
     found: list[Fit] = []
     if integrating:
         added = np.cumsum(data.u - data.u[0])
         rough = rough_response(added, data.y, longest_delay=data.y.size // 2)
-        found = [_best_of(problem, s, integrator_starts(rough, s)) for s in integrating]
+        for structure in integrating:
+            if found and is_white(min(found, key=lambda fit: fit.objective).residual):
+                return found
+            found.append(_best_of(problem, structure, integrator_starts(rough, structure)))
         if is_white(min(found, key=lambda fit: fit.objective).residual):
             return found
-    return found + [
-        _best_of(problem, structure, rich_starts(data.rough, structure, best))
-        for structure in members(structures, RICH)
-    ]
+    proposed = proposals(data.rough, members(structures, RICH), best)
+    for start in range(0, len(proposed), _AT_ONCE):
+        some = proposed[start : start + _AT_ONCE]
+        found += [_best_of(problem, p.structure, list(p.starts)) for p in some]
+        best = min(found, key=lambda fit: fit.objective)
+        if not _worth_explaining(problem, best, data) and is_white(best.residual):
+            break
+    return found
 
 
 def _best_of(problem: Problem, structure: Structure, starts: list[NDArray[np.float64]]) -> Fit:

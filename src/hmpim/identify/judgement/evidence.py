@@ -71,8 +71,17 @@ def structure_in_words(name: str) -> str:
         "second_order": "second-order",
         "third_order": "third-order",
         "fourth_order": "fourth-order",
+        "first_order_zero": "first-order (with a zero)",
         "second_order_zero": "second-order (with a zero)",
+        "second_order_zeros": "second-order (with two zeros)",
+        "third_order_zeros": "third-order (with two zeros)",
+        "fifth_order": "fifth-order",
+        "sixth_order": "sixth-order",
+        "three_modes": "three-mode",
+        "four_modes": "four-mode",
+        "band_pass": "band-pass",
         "two_modes": "two-mode",
         "integrator_first_order": "lagging integrator",
+        "integrator_second_order": "second-order lagging integrator",
     }
     return plain.get(name, name.replace("_", " "))

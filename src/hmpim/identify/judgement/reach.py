@@ -85,8 +85,20 @@ def natural_frequency_beyond(evidence: Evidence) -> tuple[Finding, ...]:
 
 
 def integrator(evidence: Evidence) -> tuple[Finding, ...]:
-    """Say what an integrating output cannot have."""
-    if not evidence.joint.best.fit.structure.integrators:
+    """Say what an integrating output, or one that forgets a constant input, cannot have."""
+    structure = evidence.joint.best.fit.structure
+    if structure.dc_zeros:
+        return (
+            Finding(
+                code="zero_at_dc",
+                message="A constant input does nothing to the output: it has no gain at DC to "
+                "measure bandwidths from, and the scale factor is the output per rate of the "
+                "input.",
+                severity="info",
+                parameters=("scale_factor", *_BANDWIDTHS),
+            ),
+        )
+    if not structure.integrators:
         return ()
     return (
         Finding(
@@ -108,7 +120,7 @@ def beyond_band(evidence: Evidence) -> tuple[Finding, ...]:
     if structure.order > 0:
         asked.append(("-3 dB frequency", "bandwidth_3db"))
     missing = [(words, name) for words, name in asked if getattr(p, name) is None]
-    if structure.integrators or not missing:
+    if structure.integrators or structure.dc_zeros or not missing:
         return ()
     return (
         Finding(
