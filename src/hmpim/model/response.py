@@ -164,8 +164,10 @@ class PeakGain:
     frequency: float
 
 
-def peak_gain(system: RationalDelay, *, highest: float) -> PeakGain:
+def peak_gain(system: RationalDelay, *, highest: float) -> PeakGain | None:
     """Greatest gain up to `highest` Hz over the gain at DC; 0 dB at 0 Hz without a hump.
+
+    None where the gain still rises at `highest`.
 
     For a second-order lag this is -20 lg(2ζ√(1-ζ²)) (paper, Fig. 16; Ogata, Modern Control
     Engineering, 1970, ch. 9).
@@ -175,6 +177,8 @@ def peak_gain(system: RationalDelay, *, highest: float) -> PeakGain:
     i = int(np.argmax(gain))
     if i == 0:
         return PeakGain(gain_db=0.0, frequency=0.0)
+    if i == grid.size - 1:
+        return None
     low, high = grid[max(i - 1, 0)], grid[min(i + 1, grid.size - 1)]
     for _ in range(3):
         fine = np.linspace(low, high, 21)

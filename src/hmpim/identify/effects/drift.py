@@ -124,7 +124,7 @@ def _asked_for(joint: JointFit) -> bool:
     """Whether what a fit leaves over is slow, or its model is as slow as a drift."""
     fit, problem = joint.best.fit, joint.problem
     slow = slowest_time_constant(fit.denominator) > _SLOW * problem.y.size
-    if slow or fit.structure.integrators:  # the model may have taken the drift for its own
+    if slow and not fit.structure.integrators:  # the model may have taken the drift for its own
         return True
     if is_white(fit.residual):
         return False

@@ -5,7 +5,7 @@ is worth more than a small share of the output: every simulation pays for every 
 enough samples the smallest imperfection of real hardware is "significant".
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,8 +41,11 @@ INTEGRATING: tuple[StructureName, ...] = (
 _PLAIN_OF: tuple[StructureName, ...] = PLAIN
 """The plain structure of each order."""
 
-_DELAYS = 7
+_DELAYS = 13
 """How many delays to start from, about that of the best fit so far."""
+
+_BINS = 160
+"""Frequencies at which the richer structures are held against the response."""
 
 _REWEIGHTINGS = 6
 
@@ -99,8 +102,9 @@ def proposals(
     count : int
         At most so many starts each.
     """
+    rough = _thinned(rough)
     reach = np.pi / rough.omega[-1]
-    delays = np.maximum(fit.delay + reach * np.linspace(-1.5, 0.5, _DELAYS), -1.0)
+    delays = np.maximum(fit.delay + reach * np.linspace(-1.5, 1.5, _DELAYS), -1.0)
     scale = float(np.sqrt(rough.weight @ rough.omega**2 / rough.weight.sum()))
     s = np.asarray(1j * rough.omega / scale, dtype=np.complex128)
     out = []
@@ -125,6 +129,24 @@ def proposals(
         criterion += structure.parameters * float(np.log(max(bins, 2.0)))
         out.append(Proposal(structure=structure, starts=tuple(starts), criterion=criterion))
     return sorted(out, key=lambda proposal: proposal.criterion)
+
+
+def _thinned(rough: RoughResponse) -> RoughResponse:
+    """The response averaged over neighbouring bins, no more of them than structures can use."""
+    width = -(-rough.bins.size // _BINS)
+    if width == 1:
+        return rough
+    starts = np.arange(0, rough.bins.size, width)
+    weight = np.add.reduceat(rough.weight, starts)
+    return replace(
+        rough,
+        bins=rough.bins[starts],
+        omega=np.add.reduceat(rough.weight * rough.omega, starts) / weight,
+        response=np.asarray(
+            np.add.reduceat(rough.weight * rough.response, starts) / weight, dtype=np.complex128
+        ),
+        weight=weight,
+    )
 
 
 def _from_plain(rough: RoughResponse, structure: Structure, fit: Fit) -> NDArray[np.float64]:

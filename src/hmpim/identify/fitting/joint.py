@@ -58,6 +58,9 @@ _POOR = 0.2
 _LONG_TASTE = 12
 """Steps from each start of a richer structure, whose valleys are longer."""
 
+_SLOW = 0.3
+"""Time constant, over the record's length, from which an integrator may explain it as well."""
+
 _AT_ONCE = 4
 """Richer structures tried before it is asked whether more are needed."""
 
@@ -198,7 +201,8 @@ def joint_fit(
     fitted = _under_each_assumption(data, natural, fits, counted, alone=intersample is not None)
     mode, best_fit = min(fitted, key=lambda item: item[1].objective)
     others = tuple(name for name in structures if name not in PLAIN)
-    if not plain or _worth_explaining(data.problem(mode, counted), best_fit, data):
+    asked = _worth_explaining(data.problem(mode, counted), best_fit, data)
+    if not plain or asked or _almost_integrates(best_fit):
         richer = _enriched(data, data.problem(natural, counted), fits, others)
         if richer and counted.begins is not None:
             resting = _counted(data, natural, richer, seen, known)
@@ -506,6 +510,11 @@ def _worth_explaining(problem: Problem, fit: Fit, data: _Data) -> bool:
     if left.probability < _FOLLOWS and (owed > _MATERIAL or _misses_part(problem, fit, data, band)):
         return True
     return fit.cost > _POOR * spread and not is_white(fit.residual)
+
+
+def _almost_integrates(fit: Fit) -> bool:
+    """Whether the slowest pole is as slow as the record is long."""
+    return slowest_time_constant(fit.denominator) > _SLOW * fit.residual.size
 
 
 def _misses_part(problem: Problem, fit: Fit, data: _Data, band: tuple[float, float]) -> bool:

@@ -173,7 +173,6 @@ def _parted(poles: Complex) -> Complex:
     """Poles of different sections that coincide, moved apart."""
     for i in range(1, poles.size):
         for j in range(i):
-            near = abs(poles[i] - poles[j]) < _APART * abs(poles[i])
-            if near and not np.isclose(poles[i], poles[j].conjugate(), rtol=1e-12, atol=0.0):
+            if abs(poles[i] - poles[j]) < _APART * abs(poles[i]):
                 poles[i] *= 1.0 + 2.0 * _APART
     return poles
