@@ -64,6 +64,9 @@ _SLOW = 0.3
 _AT_ONCE = 4
 """Richer structures tried before it is asked whether more are needed."""
 
+_RETURNS = 12
+"""Steps that a fit is taken once more when only the noise model has changed."""
+
 _TASTE = 4
 """Steps taken from each start before the best one is followed to its end."""
 
@@ -292,7 +295,7 @@ def _whitened(
     least = min(fit.objective for _, fit in fitted)
     out = []
     for mode, fit in fitted:
-        steps = 40 if fit.objective < _HOPELESS * least else 0
+        steps = _RETURNS if fit.objective < _HOPELESS * least else 0
         problem = data.problem(mode, seen)
         out.append((mode, fit_structure(problem, fit.structure, fit.theta, iterations=steps)))
     return out
@@ -402,7 +405,9 @@ def _under_each_assumption(
         return fitted
     least = min(fit.objective for fit in fits)
     leading = [fit for fit in fits if fit.objective < _HOPELESS * least]
-    trailing = [fit for fit in fits if fit.objective >= _HOPELESS * least]
+    trailing = [
+        fit for fit in fits if fit.objective >= _HOPELESS * least and fit.structure.name in PLAIN
+    ]
     others = [mode for mode in get_args(Intersample) if mode != natural]
 
     def moved(some: list[Fit]) -> list[tuple[Intersample, Fit]]:
@@ -485,6 +490,7 @@ def _enriched(
         if is_white(min(found, key=lambda fit: fit.objective).residual):
             return found
     proposed = proposals(data.rough, members(structures, RICH), best)
+    proposed.sort(key=lambda p: p.structure.order > 1)  # what is cheap and nested in others first
     for start in range(0, len(proposed), _AT_ONCE):
         some = proposed[start : start + _AT_ONCE]
         found += [_best_of(problem, p.structure, list(p.starts)) for p in some]
