@@ -10,6 +10,7 @@ from hmpim.identify.judgement.failed import attempt
 from hmpim.identify.judgement.reach import (
     beyond_band,
     fast_mode,
+    few_lines,
     initial_transient,
     integrator,
     natural_frequency_beyond,
@@ -41,6 +42,7 @@ CHECKS: tuple[Check, ...] = (
     weak_delay,
     fast_mode,
     natural_frequency_beyond,
+    few_lines,
     integrator,
     beyond_band,
     other_structure,

@@ -1,6 +1,9 @@
 """What lies outside the band, before the record's start or beyond its end."""
 
 import numpy as np
+from numpy.typing import NDArray
+from scipy.fft import rfft
+from scipy.signal.windows import blackmanharris
 
 from hmpim.identify.fitting.enrich import PLAIN
 from hmpim.identify.groups import MODELLED, PHASE_SPLIT, TIMING
@@ -10,7 +13,9 @@ from hmpim.record import Finding
 
 __all__ = [
     "beyond_band",
+    "count_lines",
     "fast_mode",
+    "few_lines",
     "initial_transient",
     "integrator",
     "natural_frequency_beyond",
@@ -26,6 +31,15 @@ _PAST = 1.2
 
 _LONG = 0.5
 """Settling time over the record's length, beyond which it is too short."""
+
+_FEET = 1e-5
+"""Power of an input over its greatest, below which it excites nothing."""
+
+_LINE = 9
+"""Width in bins of a line behind a Blackman-Harris window."""
+
+_SPARE = 2
+"""What lines must tell beyond the figures, for a wrong structure to show."""
 
 _BANDWIDTHS = ("bandwidth_phase90", "bandwidth_phase90_without_delay", "bandwidth_3db")
 
@@ -166,5 +180,46 @@ def negative_delay(evidence: Evidence) -> tuple[Finding, ...]:
             "input. Check that the input column is not stamped late, and which column is which.",
             severity="doubt",
             parameters=TIMING,
+        ),
+    )
+
+
+def count_lines(u: NDArray[np.float64]) -> int | None:
+    """How many lines an input's spectrum consists of; None where it is more than lines.
+
+    Examples
+    --------
+    >>> time = np.arange(1000) / 100
+    >>> count_lines(np.sin(2 * np.pi * 3.3 * time)), count_lines(np.sin(time**2))
+    (1, None)
+    """
+    power = np.abs(rfft((u - u.mean()) * blackmanharris(u.size, sym=False))) ** 2
+    above = power > _FEET * power.max()
+    edges = np.diff(np.concatenate([[0], above.astype(np.int8), [0]]))
+    widths = np.flatnonzero(edges == -1) - np.flatnonzero(edges == 1)
+    return None if widths.max() > _LINE else int(widths.size)
+
+
+def few_lines(evidence: Evidence) -> tuple[Finding, ...]:
+    """Doubt a model of more figures than the input's lines can tell.
+
+    A line tells gain and phase where it is, and nothing else.
+    """
+    lines = count_lines(evidence.u)
+    if lines is None:
+        return ()
+    fit = evidence.joint.best.fit
+    unknown = fit.theta.size + fit.linear.size - 1
+    if 2 * lines >= unknown + _SPARE:
+        return ()
+    return (
+        Finding(
+            code="few_lines",
+            message=f"The input excites {lines} frequenc{'y' if lines == 1 else 'ies'}, which tell "
+            f"gain and phase there and nothing else: {unknown} figures of a "
+            f"{structure_in_words(fit.structure.name)} model cannot be told from them. Sweep, or "
+            "add lines.",
+            severity="doubt",
+            parameters=MODELLED,
         ),
     )
