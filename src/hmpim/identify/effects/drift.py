@@ -18,7 +18,7 @@ from hmpim.identify.fitting.enrich import PLAIN
 from hmpim.identify.fitting.fit import jacobian, solved, without
 from hmpim.identify.fitting.joint import JointFit, Trial
 from hmpim.identify.uncertainty import covariance
-from hmpim.identify.whiteness import is_white
+from hmpim.identify.whiteness import innovation_gain, is_white
 from hmpim.model import slowest_time_constant
 from hmpim.record import Finding
 
@@ -128,8 +128,6 @@ def _asked_for(joint: JointFit) -> bool:
         return True
     if is_white(fit.residual):
         return False
-    if joint.forgotten:  # it may be the drift that parts the beginning from the rest
-        return True
     spread = problem.masked(problem.y - problem.y.mean())
     if fit.cost > _POOR * float(spread @ spread):
         return True
@@ -176,16 +174,12 @@ def _degree(joint: JointFit, columns: NDArray[np.float64]) -> int:
 
 
 def _gain(one: JointFit, degree: int, other: JointFit, other_degree: int) -> float:
-    """Schwarz's criterion of another fit less that of one, per sample that counts in either."""
-    count = max(one.weighed.counted, other.weighed.counted)
-
-    def criterion(joint: JointFit, order: int) -> float:
-        fit, noise = joint.best.fit, joint.weighed.noise
-        power = max(fit.objective, np.finfo(float).tiny) / joint.weighed.counted
-        unknown = fit.structure.parameters + order + (0 if noise is None else noise.size - 1)
-        return float(count * np.log(power) + unknown * np.log(count))
-
-    return criterion(other, other_degree) - criterion(one, degree)
+    """Schwarz's criterion of another fit less that of one, either residual an autoregression."""
+    counts = slice(None) if one.problem.valid is None else one.problem.valid
+    gained = 2.0 * innovation_gain(other.best.fit.residual[counts], one.best.fit.residual[counts])
+    unknown = one.best.fit.structure.parameters + degree
+    unknown -= other.best.fit.structure.parameters + other_degree
+    return gained - unknown * float(np.log(one.problem.counted))
 
 
 def _described(joint: JointFit, columns: NDArray[np.float64]) -> Drifting:

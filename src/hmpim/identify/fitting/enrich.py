@@ -5,7 +5,7 @@ is worth more than a small share of the output: every simulation pays for every 
 enough samples the smallest imperfection of real hardware is "significant".
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,11 +41,11 @@ INTEGRATING: tuple[StructureName, ...] = (
 _PLAIN_OF: tuple[StructureName, ...] = PLAIN
 """The plain structure of each order."""
 
-_DELAYS = 13
+_DELAYS = 7
 """How many delays to start from, about that of the best fit so far."""
 
-_BINS = 160
-"""Frequencies at which the richer structures are held against the response."""
+_PROMISING = 1e3
+"""Squared error on the rough response, over the least, up to which a structure is promising."""
 
 _REWEIGHTINGS = 6
 
@@ -74,19 +74,19 @@ class Proposal:
         What to fit.
     starts : tuple of ndarray, shape (1 + order,)
         Delay in samples, parameters of the denominator's sections; the most promising first.
-    criterion : float
-        Schwarz's criterion of the best start on the rough response, lower is better.
+    error : float
+        Of the best start on the rough response.
     """
 
     structure: Structure
     starts: tuple[NDArray[np.float64], ...]
-    criterion: float
+    error: float
 
 
 def proposals(
     rough: RoughResponse, structures: list[Structure], fit: Fit, *, count: int = 3
 ) -> list[Proposal]:
-    """Structures with zeros or more than two poles, the most promising first.
+    """Structures with zeros or more than two poles: those that the response allows, plainest first.
 
     Sanathanan and Koerner's iteration on the rough response, at several delays about that of
     the best fit so far; poles in the right half plane are mirrored.
@@ -102,15 +102,18 @@ def proposals(
     count : int
         At most so many starts each.
     """
-    rough = _thinned(rough)
+    if not structures:
+        return []
     reach = np.pi / rough.omega[-1]
-    delays = np.maximum(fit.delay + reach * np.linspace(-1.5, 1.5, _DELAYS), -1.0)
+    near = np.linspace(-1.5, 0.5, _DELAYS)
+    late = np.linspace(0.75, 1.5, 4)  # a zero as fast as its pole leads
     scale = float(np.sqrt(rough.weight @ rough.omega**2 / rough.weight.sum()))
     s = np.asarray(1j * rough.omega / scale, dtype=np.complex128)
     out = []
     for structure in structures:
         found: list[tuple[float, NDArray[np.float64]]] = []
-        for delay in delays:
+        turns = [*near, *late] if structure.zeros >= structure.order else near
+        for delay in np.maximum(fit.delay + reach * np.asarray(turns), -1.0):
             target = rough.response * np.exp(1j * rough.omega * (delay - rough.lag))
             error, denominator = _reweighted(s, target, rough.weight, structure)
             coefficients = _sections(denominator, structure)
@@ -123,30 +126,14 @@ def proposals(
         starts = [theta for _, theta in found[:count]]
         if structure.dc_zeros == 0:
             starts = [_from_plain(rough, structure, fit), *starts[: count - 1]]
-        error = found[0][0] if found else float(rough.weight.sum())
-        bins = float(rough.weight.sum() ** 2 / (rough.weight @ rough.weight))
-        criterion = bins * float(np.log(max(error, np.finfo(float).tiny)))
-        criterion += structure.parameters * float(np.log(max(bins, 2.0)))
-        out.append(Proposal(structure=structure, starts=tuple(starts), criterion=criterion))
-    return sorted(out, key=lambda proposal: proposal.criterion)
+        error = found[0][0] if found else float("inf")
+        out.append(Proposal(structure=structure, starts=tuple(starts), error=error))
+    least = min(proposal.error for proposal in out)
 
+    def rank(proposal: Proposal) -> tuple[bool, int]:
+        return proposal.error > _PROMISING * least, proposal.structure.parameters
 
-def _thinned(rough: RoughResponse) -> RoughResponse:
-    """The response averaged over neighbouring bins, no more of them than structures can use."""
-    width = -(-rough.bins.size // _BINS)
-    if width == 1:
-        return rough
-    starts = np.arange(0, rough.bins.size, width)
-    weight = np.add.reduceat(rough.weight, starts)
-    return replace(
-        rough,
-        bins=rough.bins[starts],
-        omega=np.add.reduceat(rough.weight * rough.omega, starts) / weight,
-        response=np.asarray(
-            np.add.reduceat(rough.weight * rough.response, starts) / weight, dtype=np.complex128
-        ),
-        weight=weight,
-    )
+    return sorted(out, key=rank)
 
 
 def _from_plain(rough: RoughResponse, structure: Structure, fit: Fit) -> NDArray[np.float64]:

@@ -31,6 +31,7 @@ from hmpim.identify.fitting.fit import Fit, Problem, fit_structure, jacobian, so
 from hmpim.identify.fitting.rows import Part
 from hmpim.identify.fitting.start import RoughResponse, rough_response, starting_values
 from hmpim.identify.fitting.unexplained import unexplained_response
+from hmpim.identify.uncertainty import covariance
 from hmpim.identify.whiteness import effective_share, is_white, misfit
 from hmpim.model.dynamics import STRUCTURES, Structure, StructureName
 from hmpim.model.response import slowest_time_constant
@@ -46,7 +47,7 @@ _HOPELESS = 2.0
 """A structure whose sum of squares is this many times the least is not tried again at once
 under the other assumptions."""
 
-_MATERIAL = 0.003
+_MATERIAL = 0.01
 """Share of the output (r.m.s.) below which a misfit is reported but not modelled."""
 
 _PARTLY = 0.08
@@ -196,8 +197,9 @@ def joint_fit(
     fits = _fit_all(data.problem(natural, seen), data.rough, plain or PLAIN)
     prewhitened = _prewhitened(data, natural, fits, seen)
     if prewhitened is not None:
-        data = prewhitened
-        fits = _fit_all(data.problem(natural, seen), data.rough, plain or PLAIN)
+        free = _fit_all(prewhitened.problem(natural, seen), prewhitened.rough, plain or PLAIN)
+        if not _follows(data, min(free, key=lambda f: f.objective)):
+            data, fits = prewhitened, free
     counted = _counted(data, natural, fits, seen, known)
     if counted is not seen:
         fits = [_refit(data.problem(natural, counted), f) for f in fits]
@@ -221,16 +223,12 @@ def joint_fit(
     if noise is not None or data.noise is not None:
         data = replace(data, noise=noise)
         fitted = _whitened(data, fitted, counted)
-    count = data.problem(natural, counted).counted * (share if noise is None else 1.0)
-    trials = [_trial(mode, fit, count) for mode, fit in fitted]
-    chosen = _chosen(trials, natural)
+    trials, chosen, likeliest, best = _decided(data, natural, fitted, counted, share)
+    if noise is not None and _contradicts(data, best, counted):
+        data = replace(data, noise=None)
+        fitted = _whitened(data, fitted, counted)
+        trials, chosen, likeliest, best = _decided(data, natural, fitted, counted, share)
     weighed = data.problem(chosen.intersample, counted)
-    likeliest = chosen
-    chosen = _wary(chosen, trials, weighed, count)
-    polished = fit_structure(
-        weighed, chosen.fit.structure, chosen.fit.theta, precision=_FINAL_PRECISION
-    )
-    best = _trial(chosen.intersample, polished, count)
     return JointFit(
         problem=replace(weighed, noise=None, told=None),
         weighed=weighed,
@@ -275,14 +273,56 @@ class _Data:
         return problem if self.noise is None else problem.coloured(self.noise)
 
 
+def _follows(data: _Data, fit: Fit) -> bool:
+    """Whether what a fit leaves over still follows the input."""
+    omega = data.rough.omega
+    band = (omega[0] / (2 * np.pi), omega[-1] / (2 * np.pi))
+    left = misfit(data.u, fit.residual, delay=fit.delay, band=band)
+    return left.probability < _FOLLOWS
+
+
+def _decided(
+    data: _Data,
+    natural: Intersample,
+    fitted: list[tuple[Intersample, Fit]],
+    seen: _Seen,
+    share: float,
+) -> tuple[list[Trial], Trial, Trial, Trial]:
+    """All trials, the chosen one, what the criterion alone would choose, the chosen polished."""
+    count = data.problem(natural, seen).counted * (share if data.noise is None else 1.0)
+    trials = [_trial(mode, fit, count) for mode, fit in fitted]
+    likeliest = _chosen(trials, natural)
+    weighed = data.problem(likeliest.intersample, seen)
+    chosen = _wary(likeliest, trials, weighed, count)
+    polished = fit_structure(
+        weighed, chosen.fit.structure, chosen.fit.theta, precision=_FINAL_PRECISION
+    )
+    return trials, chosen, likeliest, _trial(chosen.intersample, polished, count)
+
+
+def _contradicts(data: _Data, best: Trial, seen: _Seen) -> bool:
+    """Whether whitening moves the estimate farther than noise could.
+
+    A right model is estimated without bias with the noise whitened or not; where the two part,
+    what is left over is no noise but what the model lacks (J. A. Hausman, Econometrica 46, 1978).
+    """
+    problem = replace(data, noise=None).problem(best.intersample, seen)
+    plain = fit_structure(problem, best.fit.structure, best.fit.theta, precision=_FINAL_PRECISION)
+    rows = jacobian(problem, plain)
+    freedom = max(problem.counted - rows.shape[0], 1)
+    unknown = plain.theta.size
+    cov = covariance(rows, plain.residual, freedom=freedom, white=False)[:unknown, :unknown]
+    apart = plain.theta - best.fit.theta
+    statistic = float(apart @ np.linalg.pinv(cov, rcond=1e-12, hermitian=True) @ apart)
+    return not statistic < chdtri(unknown, _FOLLOWS)
+
+
 def _colour(problem: Problem, fit: Fit, data: _Data) -> NDArray[np.float64] | None:
     """Autoregression of what the best fit leaves over; None where that still follows the input.
 
     What follows the input is no noise, and whitening it would hide what a model lacks.
     """
-    omega = data.rough.omega
-    band = (omega[0] / (2 * np.pi), omega[-1] / (2 * np.pi))
-    if misfit(data.u, fit.residual, delay=fit.delay, band=band).probability < _FOLLOWS:
+    if _follows(data, fit):
         return None
     noise = autoregression(fit.residual, problem.valid)
     return noise if noise.size > 1 else None
@@ -476,7 +516,7 @@ def _fit_all(
 def _enriched(
     data: _Data, problem: Problem, fits: list[Fit], structures: tuple[StructureName, ...]
 ) -> list[Fit]:
-    """Fits of the richer structures, the most promising first, until nothing is left to explain."""
+    """Fits of the richer structures, the plainest first, until nothing is left to explain."""
     best = min(fits, key=lambda fit: fit.objective)
     integrating = members(structures, INTEGRATING)
     found: list[Fit] = []
@@ -490,7 +530,6 @@ def _enriched(
         if is_white(min(found, key=lambda fit: fit.objective).residual):
             return found
     proposed = proposals(data.rough, members(structures, RICH), best)
-    proposed.sort(key=lambda p: p.structure.order > 1)  # what is cheap and nested in others first
     for start in range(0, len(proposed), _AT_ONCE):
         some = proposed[start : start + _AT_ONCE]
         found += [_best_of(problem, p.structure, list(p.starts)) for p in some]
