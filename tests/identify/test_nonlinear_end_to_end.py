@@ -102,16 +102,34 @@ def test_a_linear_system_has_nothing_to_report():
     assert (found.share, found.noise, found.kinds, found.harmonics) == (0.0, 1.0, (), ())
 
 
-def test_the_harmonics_follow_the_describing_function():
-    """Friction F makes a third harmonic of a third of 4 F / π, as the dynamics pass it on."""
+def third_harmonic(f: float, level: float, grip: float) -> float:
+    """Amplitude that a steady sine of `level` has at 3 f behind friction, stepped in time."""
+    omega, steps = 2 * np.pi * 10.0, round(FS * SUBSTEPS / f)
+    step = 1 / FS / SUBSTEPS
+    u = np.tile(level * np.sin(2 * np.pi * np.arange(steps) / steps), 10).tolist()
+    y = v = 0.0
+    out = []
+    for target in u:
+        out.append(y)
+        v += step * (omega**2 * (target - y) - 0.8 * omega * v)
+        grasp = step * omega**2 * grip
+        v = 0.0 if abs(v) <= grasp else v - np.copysign(grasp, v)
+        y += step * v
+    return float(2 * np.abs(np.fft.rfft(out[-steps:])[3]) / steps)
+
+
+def test_the_harmonics_are_those_of_a_stepped_sine():
     curves = identified(motion("friction", 0.02), noise=0.0005)["y", "u"].nonlinearity.harmonics
     own, third = (next(c for c in curves if c.order == k) for k in (1, 3))
     inner = list(zip(third.frequency, third.amplitude, strict=True))[1:4]
     assert len(inner) == 3
     for f, amplitude in inner:
-        s = 3 * f / 10.0  # the third harmonic's frequency over the natural one
-        passed = 1 / abs(1 - s**2 + 0.8j * s)
-        assert amplitude == pytest.approx(4 * 0.02 / np.pi / 3 * passed, rel=0.3)
+        level = 1 / (1 + 0.3 * (f - 0.1) / 1.99)  # the sweep's, when it passes f
+        truth = third_harmonic(f, level, 0.02)
+        # Describing function: a third of 4 F / π, as the dynamics pass it on.
+        s = 3 * f / 10.0
+        assert truth == pytest.approx(4 * 0.02 / np.pi / 3 / abs(1 - s**2 + 0.8j * s), rel=0.02)
+        assert amplitude == pytest.approx(truth, rel=0.3)
     assert own.amplitude[0] == pytest.approx(1.0, rel=0.35)
 
 

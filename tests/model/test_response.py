@@ -93,7 +93,7 @@ def test_simulation_of_a_sine_meets_the_frequency_response():
 def test_unstable_or_improper_models_are_refused():
     with pytest.raises(ArgumentError, match="has a pole at 1"):
         Model(delay=0.0, scale_factor=1.0, denominator=(1.0, -1.0))
-    with pytest.raises(ArgumentError, match="not strictly proper"):
-        Model(delay=0.0, scale_factor=1.0, numerator=(1.0, 1.0), denominator=(1.0, 1.0))
+    with pytest.raises(ArgumentError, match="is not proper"):
+        Model(delay=0.0, scale_factor=1.0, numerator=(1.0, 1.0, 1.0), denominator=(1.0, 1.0))
     with pytest.raises(ArgumentError, match="integrates more than once"):
         Model(delay=0.0, scale_factor=1.0, denominator=(1.0, 0.0, 0.0))

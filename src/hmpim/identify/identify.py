@@ -21,7 +21,6 @@ from hmpim.identify.effects.imperfections import (
 from hmpim.identify.effects.lost import stands_out
 from hmpim.identify.fitting.enrich import PLAIN
 from hmpim.identify.fitting.joint import JointFit
-from hmpim.identify.fitting.unrelated import is_unrelated
 from hmpim.identify.groups import EVERY
 from hmpim.identify.judgement import judged
 from hmpim.identify.pair import described, untold
@@ -288,7 +287,7 @@ def _drifted(
 ) -> tuple[Joined, Drifting | None]:
     """Fit an output, with a bias that drifts where the residual asks for it."""
     joined = _joined(aligned, output, found, intersample, structures, inputs)
-    if len(aligned.inputs) > 1:
+    if len(aligned.inputs) > 1 or joined.fits[0].silent:
         return joined, None
 
     plain = tuple(name for name in structures if name in PLAIN) or structures
@@ -303,7 +302,7 @@ def _drifted(
     return replace(
         joined,
         fits=(drifting.joint,),
-        related=(not is_unrelated(drifting.joint),),
+        related=(drifting.joint.related,),
     ), drifting
 
 

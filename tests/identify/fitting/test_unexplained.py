@@ -78,5 +78,5 @@ def test_dynamics_at_the_far_end_of_a_sweep_are_found():
     s = 2j * np.pi * f
     phase = np.unwrap(np.angle(np.polyval(above, s) / np.polyval(below, s) * np.exp(-s * 1.5e-3)))
     truth = f[np.argmax(phase < -np.pi / 2)]
-    assert pair.structure == "two_modes"
+    assert pair.structure == "third_order_zeros"
     assert pair.parameters.bandwidth_phase90.value == pytest.approx(truth, rel=0.01)

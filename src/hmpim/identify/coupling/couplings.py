@@ -142,6 +142,7 @@ def coupling_fit(
         trials=trials,
         forgotten=0,
         effective_share=effective_share(best_trial.fit.residual),
+        related=True,
     )
 
 

@@ -20,7 +20,6 @@ from hmpim.identify.fitting.enrich import PLAIN
 from hmpim.identify.fitting.fit import Fit, Problem, jacobian
 from hmpim.identify.fitting.fit import fit_together as fit_all
 from hmpim.identify.fitting.joint import JointFit, joint_fit
-from hmpim.identify.fitting.unrelated import is_unrelated
 from hmpim.identify.whiteness import effective_share, is_white
 from hmpim.model.dynamics import StructureName
 from hmpim.model.response import slowest_time_constant
@@ -125,7 +124,7 @@ def fit_together(
         fit = fitted(inputs[0], y, structures)
         return Joined(
             fits=(fit,),
-            related=(not is_unrelated(fit),),
+            related=(fit.related,),
             covariances=(),
             strong=(True,),
             lags=(None,),
@@ -139,7 +138,7 @@ def fit_together(
     for names in (plain, structures):  # then again, the couplings known
         for i in strong:
             fits[i] = fitted(inputs[i], y - _others(fits, related, i), names)
-            related[i] = not is_unrelated(fits[i])
+            related[i] = fits[i].related
         before, found = found, tuple(fits[i].best.fit.structure.name for i in strong)
         if found != before:
             whitening = _fit_couplings(inputs, y, fits, related, strong, plain, alike)
@@ -186,7 +185,7 @@ def _strongest(
         fit = tried[i]
         waiting.remove(i)
         part = _part(fit)
-        if not fits or (float(np.std(part)) > _STRONG * spread and not is_unrelated(fit)):
+        if not fits or (float(np.std(part)) > _STRONG * spread and fit.related):
             fits[i] = fit
             rest = rest - part
     return fits

@@ -36,7 +36,7 @@ def autoregression(residual: Real, valid: NDArray[np.bool_] | None) -> Real:
     >>> from scipy.signal import lfilter
     >>> noise = lfilter([1.0], [1.0, -0.9], np.random.default_rng(0).standard_normal(5000))
     >>> autoregression(noise, None)[:2].round(2).tolist()
-    [1.0, -0.91]
+    [1.0, -0.9]
     """
     longest = min(_LONGEST, residual.size // 20, _reach(valid))
     if longest < 1:

@@ -47,6 +47,9 @@ _DELAYS = 7
 _PROMISING = 1e3
 """Squared error on the rough response, over the least, up to which a structure is promising."""
 
+_BEATS = 0.95
+"""Squared error on the rough response, over that of the best fit so far, which must be beaten."""
+
 _REWEIGHTINGS = 6
 
 
@@ -84,7 +87,12 @@ class Proposal:
 
 
 def proposals(
-    rough: RoughResponse, structures: list[Structure], fit: Fit, *, count: int = 3
+    rough: RoughResponse,
+    structures: list[Structure],
+    fit: Fit,
+    *,
+    count: int = 3,
+    all_of_them: bool = False,
 ) -> list[Proposal]:
     """Structures with zeros or more than two poles: those that the response allows, plainest first.
 
@@ -101,6 +109,8 @@ def proposals(
         The best fit so far.
     count : int
         At most so many starts each.
+    all_of_them : bool
+        Whether those too that the rough response gives no reason to try.
     """
     if not structures:
         return []
@@ -128,12 +138,22 @@ def proposals(
             starts = [_from_plain(rough, structure, fit), *starts[: count - 1]]
         error = found[0][0] if found else float("inf")
         out.append(Proposal(structure=structure, starts=tuple(starts), error=error))
-    least = min(proposal.error for proposal in out)
+    if not all_of_them:
+        out = [proposal for proposal in out if proposal.error < _BEATS * _error(rough, fit)]
+    least = min((proposal.error for proposal in out), default=0.0)
 
     def rank(proposal: Proposal) -> tuple[bool, int]:
         return proposal.error > _PROMISING * least, proposal.structure.parameters
 
     return sorted(out, key=rank)
+
+
+def _error(rough: RoughResponse, fit: Fit) -> float:
+    """Squared error of a fit on the rough response."""
+    s = 1j * rough.omega
+    b, a = (np.polynomial.polynomial.polyval(s, c) for c in (fit.linear[:-1], fit.denominator))
+    response = b / a * np.exp(-1j * rough.omega * (fit.delay - rough.lag))
+    return float(rough.weight @ np.abs(rough.response - response) ** 2)
 
 
 def _from_plain(rough: RoughResponse, structure: Structure, fit: Fit) -> NDArray[np.float64]:

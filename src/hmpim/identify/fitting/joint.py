@@ -31,6 +31,7 @@ from hmpim.identify.fitting.fit import Fit, Problem, fit_structure, jacobian, so
 from hmpim.identify.fitting.rows import Part
 from hmpim.identify.fitting.start import RoughResponse, rough_response, starting_values
 from hmpim.identify.fitting.unexplained import unexplained_response
+from hmpim.identify.fitting.unrelated import is_unrelated, says_nothing
 from hmpim.identify.uncertainty import covariance
 from hmpim.identify.whiteness import effective_share, is_white, misfit
 from hmpim.model.dynamics import STRUCTURES, Structure, StructureName
@@ -62,6 +63,9 @@ _LONG_TASTE = 12
 _SLOW = 0.3
 """Time constant, over the record's length, from which an integrator may explain it as well."""
 
+_SURE = 4
+"""Poles up to which a structure may leave more than white noise."""
+
 _AT_ONCE = 4
 """Richer structures tried before it is asked whether more are needed."""
 
@@ -82,6 +86,9 @@ _FAR = 4.0
 
 _JUMP = 0.05
 """Share of its range by which a held input jumps at least once."""
+
+_PRECISION = 1e-2
+"""Precision of a fit that is weighed against others, see `fit_structure`."""
 
 _FINAL_PRECISION = 1e-6
 """Precision of the chosen fit, see `fit_structure`."""
@@ -133,6 +140,10 @@ class JointFit:
         the output still depends on input before it.
     effective_share : float
         Independent samples per sample, from the best residual's correlation.
+    related : bool
+        Whether the best model explains more than a constant does.
+    silent : bool
+        Whether no model can: the output does not answer the input at all.
     simpler : Trial or None
         What the criterion alone would have chosen, where a richer structure was taken for its
         wider error bars.
@@ -144,6 +155,8 @@ class JointFit:
     trials: tuple[Trial, ...]
     forgotten: int
     effective_share: float
+    related: bool
+    silent: bool = False
     simpler: Trial | None = None
 
 
@@ -206,9 +219,12 @@ def joint_fit(
     fitted = _under_each_assumption(data, natural, fits, counted, alone=intersample is not None)
     mode, best_fit = min(fitted, key=lambda item: item[1].objective)
     others = tuple(name for name in structures if name not in PLAIN)
+    if says_nothing(data.u, data.problem(mode, counted), best_fit, _band(data)):
+        return _unanswered(data, natural, fitted, counted)
     asked = _worth_explaining(data.problem(mode, counted), best_fit, data)
     if not plain or asked or _almost_integrates(best_fit):
-        richer = _enriched(data, data.problem(natural, counted), fits, others)
+        problem = data.problem(natural, counted)
+        richer = _enriched(data, problem, fits, others, all_of_them=not plain)
         if richer and counted.begins is not None:
             resting = _counted(data, natural, richer, seen, known)
             if resting.begins is None:  # it was the structure that was wrong, not the beginning
@@ -236,6 +252,7 @@ def joint_fit(
         trials=tuple(best if trial is chosen else trial for trial in trials),
         forgotten=counted.begins or 0,
         effective_share=share,
+        related=not is_unrelated(replace(weighed, noise=None, told=None), best.fit, share),
         simpler=None if chosen is likeliest else likeliest,
     )
 
@@ -273,11 +290,36 @@ class _Data:
         return problem if self.noise is None else problem.coloured(self.noise)
 
 
+def _unanswered(
+    data: _Data, natural: Intersample, fitted: list[tuple[Intersample, Fit]], seen: _Seen
+) -> JointFit:
+    """The plain fits, of an output that no model explains."""
+    share = effective_share(min((fit for _, fit in fitted), key=lambda f: f.objective).residual)
+    count = data.problem(natural, seen).counted * share
+    trials = [_trial(mode, fit, count) for mode, fit in fitted]
+    best = _chosen(trials, natural)
+    weighed = data.problem(best.intersample, seen)
+    return JointFit(
+        problem=replace(weighed, noise=None, told=None),
+        weighed=weighed,
+        best=best,
+        trials=tuple(trials),
+        forgotten=seen.begins or 0,
+        effective_share=share,
+        related=False,
+        silent=True,
+    )
+
+
+def _band(data: _Data) -> tuple[float, float]:
+    """Band in which a response was sought, in cycles per sample."""
+    omega = data.rough.omega
+    return float(omega[0] / (2 * np.pi)), float(omega[-1] / (2 * np.pi))
+
+
 def _follows(data: _Data, fit: Fit) -> bool:
     """Whether what a fit leaves over still follows the input."""
-    omega = data.rough.omega
-    band = (omega[0] / (2 * np.pi), omega[-1] / (2 * np.pi))
-    left = misfit(data.u, fit.residual, delay=fit.delay, band=band)
+    left = misfit(data.u, fit.residual, delay=fit.delay, band=_band(data))
     return left.probability < _FOLLOWS
 
 
@@ -514,7 +556,12 @@ def _fit_all(
 
 
 def _enriched(
-    data: _Data, problem: Problem, fits: list[Fit], structures: tuple[StructureName, ...]
+    data: _Data,
+    problem: Problem,
+    fits: list[Fit],
+    structures: tuple[StructureName, ...],
+    *,
+    all_of_them: bool,
 ) -> list[Fit]:
     """Fits of the richer structures, the plainest first, until nothing is left to explain."""
     best = min(fits, key=lambda fit: fit.objective)
@@ -526,29 +573,47 @@ def _enriched(
         for structure in integrating:
             if found and is_white(min(found, key=lambda fit: fit.objective).residual):
                 return found
-            found.append(_best_of(problem, structure, integrator_starts(rough, structure)))
+            starts = integrator_starts(rough, structure)
+            found.append(_best_of(problem, structure, starts, [*fits, *found]))
         if is_white(min(found, key=lambda fit: fit.objective).residual):
             return found
-    proposed = proposals(data.rough, members(structures, RICH), best)
+    proposed = proposals(data.rough, members(structures, RICH), best, all_of_them=all_of_them)
     for start in range(0, len(proposed), _AT_ONCE):
         some = proposed[start : start + _AT_ONCE]
-        found += [_best_of(problem, p.structure, list(p.starts)) for p in some]
+        for p in some:
+            found.append(_best_of(problem, p.structure, list(p.starts), [*fits, *found]))
         best = min(found, key=lambda fit: fit.objective)
         if not _worth_explaining(problem, best, data) and is_white(best.residual):
             break
+    if found and not is_white(min(found, key=lambda fit: fit.objective).residual):
+        # Poles without end follow what no linear model describes: friction, rounding.
+        found = [fit for fit in found if fit.structure.order <= _SURE]
     return found
 
 
-def _best_of(problem: Problem, structure: Structure, starts: list[NDArray[np.float64]]) -> Fit:
-    tried = [fit_structure(problem, structure, theta, iterations=_LONG_TASTE) for theta in starts]
+def _best_of(
+    problem: Problem, structure: Structure, starts: list[NDArray[np.float64]], rivals: list[Fit]
+) -> Fit:
+    """The best of several starts, followed to its end if it may lead.
+
+    What is left over in colour has few independent samples: a step that gains less than one of
+    those could tell is not worth making.
+    """
+    leading = min(rivals, key=lambda fit: fit.objective)
+    precision = _PRECISION / effective_share(leading.residual)
+    tried = [
+        fit_structure(problem, structure, theta, iterations=_LONG_TASTE, precision=precision)
+        for theta in starts
+    ]
     best = min(tried, key=lambda fit: fit.objective)
-    return best if best.converged else fit_structure(problem, structure, best.theta)
+    if best.converged or best.objective > _HOPELESS * leading.objective:
+        return best
+    return fit_structure(problem, structure, best.theta, precision=precision)
 
 
 def _worth_explaining(problem: Problem, fit: Fit, data: _Data) -> bool:
     """Whether the residual follows the input by more than a small share of output or response."""
-    omega = data.rough.omega
-    band = (omega[0] / (2 * np.pi), omega[-1] / (2 * np.pi))
+    band = _band(data)
     left = misfit(data.u, fit.residual, delay=fit.delay, band=band)
     spread = float(np.sum((problem.masked(problem.y - problem.y.mean())) ** 2))
     owed = float(np.sqrt(left.share * fit.cost / spread)) if spread else 0.0

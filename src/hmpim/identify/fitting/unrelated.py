@@ -2,13 +2,14 @@
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.signal import lfilter
 
-from hmpim.identify.fitting.fit import solved
-from hmpim.identify.fitting.joint import JointFit
+from hmpim.identify.fitting.autoregression import autoregression
+from hmpim.identify.fitting.fit import Fit, Problem, solved
 from hmpim.identify.fitting.rows import Part
-from hmpim.identify.whiteness import innovation_gain
+from hmpim.identify.whiteness import effective_share, innovation_gain, misfit
 
-__all__ = ["is_unrelated"]
+__all__ = ["is_unrelated", "says_nothing"]
 
 _RELATED = 40.0
 """Log-likelihood by which a model must beat "the output is constant": looking at thousands
@@ -19,26 +20,70 @@ _INNOVATES = 60.0
 coloured that few of its samples are independent; another sweep reaches about 40."""
 
 
-def is_unrelated(joint: JointFit) -> bool:
-    """Whether a constant explains the output as well as the input does."""
-    problem = joint.problem
-    y = _without_input(joint)
+_SILENT = 1e-4
+"""Chance of an unrelated output that seems to answer, whatever its model."""
+
+
+def says_nothing(
+    u: NDArray[np.float64], problem: Problem, fit: Fit, band: tuple[float, float]
+) -> bool:
+    """Whether no model can be expected to explain an output that this fit does not.
+
+    A test without a model: input and output pass the filter that leaves white noise of the
+    output, so that neither wander nor lines hide an answer, and their coherence over groups of
+    neighbouring bins is held against chance, and against the likelihood that a model must gain.
+
+    Parameters
+    ----------
+    u : ndarray, shape (n,)
+        Input.
+    problem : Problem
+        The output, and the samples that count.
+    fit : Fit
+        The best so far; its delay aligns input and output.
+    band : tuple of float
+        Excited band, in cycles per sample.
+    """
+    if not is_unrelated(problem, fit, effective_share(fit.residual)):
+        return False
+    y = problem.y - problem.masked(problem.y).sum() / problem.counted
+    noise = autoregression(problem.masked(y), problem.valid)
+    heard, seen = (lfilter(noise, np.ones(1), x - x.mean()) for x in (u, y))
+    if problem.valid is not None:
+        seen = seen * problem.coloured(noise).told
+    seen[: noise.size] = 0.0
+    answer = misfit(heard, seen, delay=fit.delay, band=band)
+    reachable = -0.5 * problem.counted * float(np.log1p(-min(answer.share, 0.999)))
+    return answer.probability > _SILENT or reachable < _RELATED
+
+
+def is_unrelated(problem: Problem, fit: Fit, share: float) -> bool:
+    """Whether a constant explains the output as well as the input does.
+
+    Parameters
+    ----------
+    problem : Problem
+        The data.
+    fit : Fit
+        The best model of them.
+    share : float
+        Independent samples per sample of what it leaves over.
+    """
+    y = _without_input(problem, fit)
     y = y if problem.valid is None else y[problem.valid]
     spread = float(np.sum((y - y.mean()) ** 2))
-    if spread <= 0 or joint.best.fit.cost <= 0:
+    if spread <= 0 or fit.cost <= 0:
         return spread <= 0
-    gain = 0.5 * y.size * joint.effective_share * np.log(spread / joint.best.fit.cost)
+    gain = 0.5 * y.size * share * np.log(spread / fit.cost)
     if gain >= _RELATED and problem.begins is None:
         return False
-    residual = joint.best.fit.residual
-    residual = residual if problem.valid is None else residual[problem.valid]
+    residual = fit.residual if problem.valid is None else fit.residual[problem.valid]
     # A free response may be any sine or exponential: the input must tell what they cannot.
     return innovation_gain(y, residual) < _INNOVATES
 
 
-def _without_input(joint: JointFit) -> NDArray[np.float64]:
+def _without_input(problem: Problem, fit: Fit) -> NDArray[np.float64]:
     """The output less what free response alone makes of it: that needs no input."""
-    problem, fit = joint.problem, joint.best.fit
     if problem.begins is None:
         return problem.y
     free = Part(problem, fit.structure, fit.theta).free
