@@ -58,7 +58,7 @@ def score_figure(estimate: Any, truth: Figure, verdict: str) -> Scored:
     unless it is called ok: then the tolerance alone decides. An interval wider than `widest`
     is no answer either.
     """
-    if estimate is None:
+    if estimate is None or estimate.value is None:
         return Scored(cell="no_answer", ok=False, tellable=truth.tellable, holds=None)
     ok = getattr(estimate, "verdict", verdict) == "ok"
     error = float(estimate.value) - truth.value
@@ -169,6 +169,8 @@ def _measured_off(measured: Any, truth: Response) -> bool | None:
 
     Of a held input the ratio of the samples' spectra counts as true as well.
     """
+    if measured is None:
+        return None
     f = np.asarray(measured.frequency, float)
     inside = (f >= truth.band[0]) & (f <= truth.band[1])
     if not inside.any():

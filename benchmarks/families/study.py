@@ -79,9 +79,14 @@ def _knows_sampled() -> bool:
 
 def model_response(pair: Any, frequency: np.ndarray) -> np.ndarray | None:
     """Response of the model that a result stands for; None where it gives none."""
-    if pair.verdict == "not_identifiable" or pair.parameters.scale_factor is None:
+    if pair.verdict == "not_identifiable":
         return None
-    p = pair.parameters
+    try:
+        return hmpim.frequency_response(hmpim.to_model(pair), frequency)
+    except hmpim.HmpimError:  # a model that cannot be simulated has its coefficients all the same
+        p = pair.parameters
+    if p.scale_factor is None or not len(pair.denominator):
+        return None
     s = 2j * np.pi * frequency
     late = 0.0 if p.delay is None else p.delay.value
     top, below = np.polyval(pair.numerator, s), np.polyval(pair.denominator, s)

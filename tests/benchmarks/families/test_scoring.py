@@ -18,6 +18,7 @@ def estimate(value, std, ci95, **more):
     ("given", "verdict", "cell", "holds"),
     [
         (None, "ok", "no_answer", None),
+        (estimate(None, None, None), "ok", "no_answer", None),
         (estimate(10.01, 0.01, (9.99, 10.03)), "ok", "right_ok", True),
         (estimate(10.01, 0.01, (9.99, 10.03)), "doubtful", "right_not_ok", True),
         (estimate(10.1, 0.01, (10.08, 10.12)), "ok", "right_ok", False),  # 10 std, but 1 %
