@@ -58,17 +58,17 @@ def main() -> int:
         return 0
 
     def tell(name: str, scores: list) -> None:
-        cells = table.summary(scores)["cells"]
-        print(f"{name}: " + ", ".join(f"{n} {cell}" for cell, n in cells.items() if n),
-              file=sys.stderr, flush=True)  # fmt: skip
+        row = table.summary(scores)
+        seen = ", ".join(f"{n} {cell}" for cell, n in row["cells"].items() if n)
+        print(f"{name}: {seen}", file=sys.stderr, flush=True)
+        if given.json:
+            table.write({name: row}, given.json, seed=given.seed)
 
     scores = study.run(
         names, draws=given.draws, seed=given.seed, jobs=given.jobs, options=told, tell=tell
     )
     rows = {name: table.summary(found) for name, found in scores.items()}
     print("\n".join(table.markdown(rows)))
-    if given.json:
-        table.write(rows, given.json, seed=given.seed)
     if given.detail:
         table.write_detail(scores, given.detail)
     if given.against:

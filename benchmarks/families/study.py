@@ -7,8 +7,8 @@ import signal
 import time
 import warnings
 import zlib
-from collections.abc import Callable, Sequence
-from concurrent.futures import ProcessPoolExecutor
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import BrokenExecutor, ProcessPoolExecutor
 from types import FrameType
 from typing import Any
 
@@ -170,21 +170,42 @@ def run(
     tell: Callable[[str, list[Score]], None] | None = None,
 ) -> dict[str, list[Score]]:
     """All draws of the families named; `tell` is called as each family is done."""
-    found: dict[str, list[Score]] = {}
-    tasks = {n: min(draws, FAMILIES[n].most or draws) for n in names}
-    if jobs == 1:
-        for name, count in tasks.items():
-            found[name] = [one(name, seed, k, options) for k in range(count)]
-            if tell:
-                tell(name, found[name])
-        return found
-    with ProcessPoolExecutor(max_workers=jobs) as pool:
-        waiting = {
-            name: [pool.submit(one, name, seed, k, options) for k in range(count)]
-            for name, count in tasks.items()
-        }
-        for name, futures in waiting.items():
-            found[name] = [future.result() for future in futures]
-            if tell:
-                tell(name, found[name])
+    counts = {name: min(draws, FAMILIES[name].most or draws) for name in names}
+    tasks = [(name, seed, k, options) for name, count in counts.items() for k in range(count)]
+    found: dict[str, list[Score]] = {name: [] for name in names}
+    scores = (one(*task) for task in tasks) if jobs == 1 else _in_processes(tasks, jobs)
+    for (name, *_), score_ in zip(tasks, scores, strict=True):
+        found[name].append(score_)
+        if tell and len(found[name]) == counts[name]:
+            tell(name, found[name])
     return found
+
+
+Task = tuple[str, int, int, bool]
+
+
+def _in_processes(tasks: Sequence[Task], jobs: int) -> Iterator[Score]:
+    """Scores in order; a draw that takes its process down is a crash like any other."""
+    done = 0
+    while done < len(tasks):
+        with ProcessPoolExecutor(max_workers=jobs) as pool:
+            try:
+                for found in pool.map(one, *zip(*tasks[done:], strict=True)):
+                    yield found
+                    done += 1
+            except BrokenExecutor:  # by which draw is not known: the next one is tried alone
+                yield _alone(tasks[done])
+                done += 1
+
+
+def _alone(task: Task) -> Score:
+    with ProcessPoolExecutor(max_workers=1) as pool:
+        try:
+            return pool.submit(one, *task).result()
+        except BrokenExecutor:
+            return _died(*task)
+
+
+def _died(name: str, seed: int, index: int, _options: bool) -> Score:
+    figures = _unanswered(draw_of(FAMILIES[name], seed, index))
+    return Score(cell="no_answer", verdict="crash", failure="its process died", figures=figures)

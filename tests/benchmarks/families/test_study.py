@@ -1,8 +1,12 @@
 """Draws, failures, options and the command."""
 
+import os
 import subprocess
 import sys
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
+from functools import partial
+from multiprocessing import get_context
 from pathlib import Path
 
 import numpy as np
@@ -113,3 +117,20 @@ def test_a_draw_that_takes_too_long_is_a_failure(monkeypatch):
 
     monkeypatch.setattr(hmpim, "identify", slow)
     assert one("static", 1, 0, True).failure.startswith("TimeoutError")
+
+
+def dies_at_one(name, seed, index, options):
+    """In a process of its own."""
+    if index == 1:
+        os._exit(1)
+    return one(name, seed, index, options)
+
+
+def test_a_draw_that_takes_its_process_down_is_a_crash_and_the_others_go_on(monkeypatch):
+    monkeypatch.setattr(study, "one", dies_at_one)
+    monkeypatch.setattr(
+        study, "ProcessPoolExecutor", partial(ProcessPoolExecutor, mp_context=get_context("fork"))
+    )
+    found = run(["static, PRBS"], draws=3, jobs=2)["static, PRBS"]
+    assert [score.failure for score in found] == ["", "its process died", ""]
+    assert all(figure.cell == "no_answer" for figure in found[1].figures.values())
