@@ -223,7 +223,7 @@ def write(rows: Mapping[str, Mapping[str, Any]], path: Path, *, seed: int) -> No
         rows = read(path) | rows
     for name, row in rows.items():
         figures = {key: [n[c] for c in _COUNTS] for key, n in row["figures"].items()}
-        lines.append(f"{json.dumps(name)}: {json.dumps({**row, 'figures': figures})}")
+        lines.append(f"{json.dumps(name)}: {json.dumps({**row, 'figures': figures}, default=int)}")
     head = f'"seed": {seed}, "counts": {json.dumps(_COUNTS)}'
     text = "{" + head + ', "families": {\n' + ",\n".join(lines) + "\n}}\n"
     path.write_text(text, encoding="utf-8")
