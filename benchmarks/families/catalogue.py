@@ -375,6 +375,8 @@ FAMILIES = {
 
 def named(wanted: str) -> list[str]:
     """Families called so, or that have it in their names; all of them for nothing."""
+    if wanted in FAMILIES:
+        return [wanted]
     parts = [part.strip() for part in wanted.split(",") if part.strip()]
     chosen = set() if parts else set(FAMILIES)
     for part in parts:
