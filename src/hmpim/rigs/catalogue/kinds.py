@@ -101,6 +101,18 @@ KINDS: tuple[Kind, ...] = (
         words="a rig that speaks the datagrams of docs/rigs.md, such as hmpim table --udp",
         builder="hmpim.rigs.catalogue.wired:build_udp",
     ),
+    Kind(
+        name="serial",
+        form="serial:PORT",
+        words="the same datagrams over a serial line (extra 'serial'); option baud",
+        builder="hmpim.rigs.catalogue.wired:build_serial",
+    ),
+    Kind(
+        name="can",
+        form="can:CHANNEL",
+        words="the same datagrams over a CAN bus (extra 'can'); options interface, bitrate",
+        builder="hmpim.rigs.catalogue.wired:build_can",
+    ),
 )
 """Add a kind here; its builder's module may import what it needs."""
 

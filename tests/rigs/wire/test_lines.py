@@ -1,0 +1,111 @@
+"""A rig over a pseudo-terminal and over a CAN bus: found as it is, in real time."""
+
+import os
+import select
+import threading
+from contextlib import ExitStack, contextmanager
+
+import pytest
+
+from hmpim.errors import RigError
+from hmpim.experiment import run
+from hmpim.identify import identify
+from hmpim.rigs import SystemClock
+from hmpim.rigs.catalogue import describe, find_rig
+from hmpim.rigs.wire import CanServer, FarEnd, SerialServer, WireRig, serve
+from hmpim.stimulus import Limits, design
+from wire_support import Lag, hello
+
+RATE = 100.0
+LATE, TIME_CONSTANT = 3, 0.05
+SWEEP = design(
+    band=(0.3, 8), duration=4, fs=RATE, axis="roll",
+    limits=Limits(position=4, velocity=100, acceleration=2500, unit="deg"),
+)  # fmt: skip
+
+
+@contextmanager
+def cable():
+    """Two pseudo-terminals, what goes into one comes out of the other; yields their names."""
+    masters, ends, over = [], [], threading.Event()
+    for _ in range(2):
+        master, end = os.openpty()
+        masters.append(master)
+        ends.append(end)
+
+    def carry():
+        while not over.is_set():
+            for one in select.select(masters, [], [], 0.05)[0]:
+                os.write(masters[1 - masters.index(one)], os.read(one, 4096))
+
+    thread = threading.Thread(target=carry)
+    thread.start()
+    try:
+        yield tuple(map(os.ttyname, ends))
+    finally:
+        over.set()
+        thread.join()
+        for each in (*masters, *ends):
+            os.close(each)
+
+
+@contextmanager
+def serving(server, said):
+    """A far end in a thread of its own."""
+    over, faults = threading.Event(), []
+
+    def far():
+        plant = Lag(1, RATE, late=LATE, time_constant=TIME_CONSTANT, noise_std=0.003)
+        try:
+            with server:
+                serve(server, FarEnd(said), plant, clock=SystemClock(), until=over.is_set)
+        except BaseException as error:
+            faults.append(error)
+
+    thread = threading.Thread(target=far)
+    thread.start()
+    try:
+        yield
+    finally:
+        over.set()
+        thread.join()
+    assert not faults
+
+
+@pytest.mark.parametrize("kind", ["serial", "can"])
+def test_the_rig_is_found_over_the_line(kind):
+    pytest.importorskip(kind)
+    said = hello(rate=RATE, watchdog=1.0, axes=("roll",))  # a busy computer is not what is tested
+    with ExitStack() as stack:
+        times = {"stale": 5.0, "answer": 20.0}
+        if kind == "serial":
+            near, far = stack.enter_context(cable())
+            stack.enter_context(serving(SerialServer(far), said))
+            rig = find_rig(f"serial:{near}", description=describe({"options": times})).rig
+        else:
+            stack.enter_context(serving(CanServer("rigs", interface="virtual"), said))
+            options = times | {"interface": "virtual"}
+            rig = find_rig("can:rigs", description=describe({"options": options})).rig
+        assert isinstance(rig, WireRig)
+        record = run(rig, SWEEP)
+    pair = identify(record)["roll.position", "roll.command"]
+    for name, truth in (("delay", LATE / RATE), ("time_constant", TIME_CONSTANT)):
+        found = getattr(pair.parameters, name)
+        assert abs(found.value - truth) < max(4.5 * found.std, 2e-4), name
+    assert "clocks" in {finding.code for finding in record.findings}
+
+
+def test_what_is_not_there_is_said():
+    pytest.importorskip("serial")
+    with pytest.raises(
+        RigError, match=r"serial:/dev/no_such_port cannot be opened: .*No such file"
+    ):
+        run(find_rig("serial:/dev/no_such_port").rig, SWEEP)
+    pytest.importorskip("can")
+    with pytest.raises(RigError, match=r"can:none .no_such_thing. cannot be opened"):
+        run(
+            find_rig(
+                "can:none", description=describe({"options": {"interface": "no_such_thing"}})
+            ).rig,
+            SWEEP,
+        )
