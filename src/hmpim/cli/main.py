@@ -21,6 +21,7 @@ from hmpim.cli.identify import identify
 from hmpim.cli.paper import paper
 from hmpim.cli.rigs import rigs
 from hmpim.cli.run import run
+from hmpim.cli.runs import runs
 from hmpim.cli.table import table
 from hmpim.cli.validate import validate
 from hmpim.errors import HmpimError
@@ -142,6 +143,7 @@ app.command(epilog="Example: hmpim identify test.csv --input u --output y --repo
     identify
 )
 app.command(epilog="Example: hmpim channels test.csv --report channels.html")(channels)
+app.command(epilog="Example: hmpim runs out --where 'verdict = ok' --compare")(runs)
 app.command(epilog="Example: hmpim run --rig bench s.csv -o run.csv --report r.html")(run)
 app.command(epilog="Example: hmpim rigs --json rigs.json")(rigs)
 app.command(epilog="Example: hmpim table --udp 127.0.0.1:5005 --rate 1000")(table)
