@@ -12,6 +12,7 @@ from hmpim.model.dynamics import (
     second_order_coefficients,
     theta_of,
 )
+from hmpim.model.margin import AddedPhase, Margin, add_to_loop
 from hmpim.model.model import Model, frequency_response, simulate
 from hmpim.model.response import (
     PeakGain,
@@ -29,8 +30,10 @@ from hmpim.model.spread import Spread
 
 __all__ = [
     "STRUCTURES",
+    "AddedPhase",
     "Chain",
     "Discrete",
+    "Margin",
     "Model",
     "PeakGain",
     "RationalDelay",
@@ -40,6 +43,7 @@ __all__ = [
     "Spread",
     "Structure",
     "StructureName",
+    "add_to_loop",
     "bandwidth_3db",
     "bandwidth_phase",
     "chain_of",

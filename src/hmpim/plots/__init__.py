@@ -14,11 +14,13 @@ from hmpim.plots.histories import (
     time_histories,
 )
 from hmpim.plots.inputs import inputs_plot
+from hmpim.plots.margin import added_phase
 from hmpim.plots.spectra import draw_spectrum, shade_band, spectra
 
 __all__ = [
     "BodeCurve",
     "Mark",
+    "added_phase",
     "bode",
     "candidates",
     "cross_correlation",
