@@ -149,7 +149,8 @@ def test_samples_out_of_order_are_sorted_and_counted(file):
     record = read(file("time,u,y\n0,1,2\n0.2,3,4\n0.1,5,6\n0.1,5,7\n0.3,7,8\n"))
     assert record.inputs[0].time.tolist() == [0.0, 0.1, 0.2, 0.3]
     assert arrays(record) == {"u": [1, 5, 3, 7], "y": [2, 6, 4, 8]}
-    assert [f.code for f in record.findings] == ["backward_stamps", "doubled_stamps"]
+    codes = [f.code for f in record.findings]
+    assert codes == ["backward_stamps", "doubled_stamps", "assumed_roles"]
     assert "at 1 of 5 samples" in record.findings[0].message
     assert "1 of 5 stamps of 'u', 'y'" in record.findings[1].message
 
@@ -159,7 +160,7 @@ def test_missing_cells_are_gaps_of_their_channel_alone(file):
     record = read(file("time,u,y\n" + rows.replace("7,-7", "7,inf").replace("9,-9", "9,nan")))
     assert record.inputs[0].values.size == 20
     assert record.outputs[0].values.tolist() == [-k for k in range(20) if k not in (3, 4, 7, 9)]
-    (finding,) = record.findings
+    finding, _ = record.findings
     assert finding.code == "missing_samples"
     assert "4 of 20 samples of 'y' are missing (1 of them infinite), in 3 places" in finding.message
     aligned = uniform(record)
@@ -300,6 +301,24 @@ def test_every_role_comes_back_and_a_person_may_choose_otherwise(tmp_path):
         read(tmp_path / "r.csv", inputs=["u"], references=["u"])
 
 
+def test_roles_that_were_assumed_are_said_and_those_that_were_not_are_not(tmp_path):
+    path = tmp_path / "r.csv"
+    path.write_text("time,u,y\n" + "".join(f"{k / 10},{k % 3},{k}\n" for k in range(20)))
+    (finding,) = read(path).findings
+    assert (finding.code, finding.severity) == ("assumed_roles", "info")
+    assert finding.message == (
+        "'u' is taken as the input and 'y' as the output, by name; name another with "
+        "inputs=[...] or --input and outputs=[...] or --output"
+    )
+    (finding,) = read(path, inputs=["u"]).findings
+    assert finding.message == (
+        "'y' is taken as the output, by name; name another with outputs=[...] or --output"
+    )
+    assert read(path, inputs=["u"], outputs=["y"]).findings == ()
+    write_csv(read(path, inputs=["u"], outputs=["y"]), tmp_path / "ours.csv")
+    assert read(tmp_path / "ours.csv").findings == ()
+
+
 def test_channels_with_clocks_of_their_own_do_not_fit_a_table(tmp_path):
     u = Channel(name="u", time=[0.0, 1.0, 2.0], values=[1.0, 2.0, 3.0])
     y = Channel(name="y", time=[0.5, 1.5, 2.5], values=[1.0, 2.0, 3.0])
@@ -329,5 +348,5 @@ def test_measured_circuit(name, samples):
     assert np.array_equal(record.outputs[0].values, truth[:, 2])
     assert record.fs == 1000.0
     aligned = uniform(record)
-    assert aligned.findings == ()
+    assert [f.code for f in aligned.findings] == ["assumed_roles"]
     assert aligned.inputs[0].values is record.inputs[0].values

@@ -12,7 +12,7 @@ from hmpim.errors import ArgumentError, RecordError
 from hmpim.formats.assemble import assemble, check_units, cut_runs
 from hmpim.formats.options import ReadOptions
 from hmpim.formats.readers import Layout
-from hmpim.formats.roles import choose_roles
+from hmpim.formats.roles import assumed_roles, choose_roles
 from hmpim.formats.together import open_logs
 from hmpim.record import Finding, Motion, Record, find_motions
 from hmpim.record.sweeps import cut_alike
@@ -193,10 +193,12 @@ def _runs(wish: _Wish) -> tuple[list[Record], bool]:
         auxiliary=auxiliary,
     )
     series, said = logs.read(roles.names, options.offsets)
+    assumed = assumed_roles(roles, logs.contents, inputs=inputs, outputs=outputs)
     runs = [
         assemble(part, roles, logs.contents, file=file.name, fs=fs, units=wish.units, findings=said)
         for part in cut_runs(series)
     ]
+    runs = [replace(run, findings=(*run.findings, *assumed)) for run in runs]
     return _in_span(runs, options, file.name), bool(logs.contents.inputs)
 
 

@@ -5,8 +5,16 @@ from dataclasses import dataclass
 
 from hmpim.errors import ArgumentError, FormatError
 from hmpim.formats.readers import ChannelInfo, Contents, listed
+from hmpim.record import Finding
 
-__all__ = ["INPUT_NAMES", "OUTPUT_NAMES", "Roles", "choose_roles", "find_channel"]
+__all__ = [
+    "INPUT_NAMES",
+    "OUTPUT_NAMES",
+    "Roles",
+    "assumed_roles",
+    "choose_roles",
+    "find_channel",
+]
 
 INPUT_NAMES = ("u", "input", "command", "stimulus", "position")
 OUTPUT_NAMES = ("y", "output", "measured", "response")
@@ -89,6 +97,41 @@ def choose_roles(
     return Roles(
         inputs=tuple(into), outputs=tuple(out), references=tuple(asked), auxiliary=tuple(kept)
     )
+
+
+def assumed_roles(
+    roles: Roles,
+    contents: Contents,
+    *,
+    inputs: Sequence[str] | None,
+    outputs: Sequence[str] | None,
+) -> tuple[Finding, ...]:
+    """Say which channels were chosen by their names alone, neither named nor stated by the file.
+
+    Examples
+    --------
+    >>> names = [ChannelInfo(name=name) for name in ("u", "y")]
+    >>> told = Contents(format="text", channels=tuple(names))
+    >>> roles = choose_roles(told, "a.csv")
+    >>> assumed_roles(roles, told, inputs=None, outputs=["y"])[0].message[:55]
+    "'u' is taken as the input, by name; name another with i"
+    """
+    assumed = [
+        (names[0], kind)
+        for kind, names, wanted in (
+            ("input", roles.inputs, inputs),
+            ("output", roles.outputs, outputs),
+        )
+        if not wanted and not _stated(contents, kind)
+    ]
+    if not assumed:
+        return ()
+    (first, kind), *rest = assumed
+    taken = f"{first!r} is taken as the {kind}"
+    taken += "".join(f" and {name!r} as the {kind}" for name, kind in rest)
+    options = " and ".join(f"{kind}s=[...] or --{kind}" for _, kind in assumed)
+    message = f"{taken}, by name; name another with {options}"
+    return (Finding(code="assumed_roles", message=message, severity="info", parameters=()),)
 
 
 def find_channel(wanted: str, contents: Contents) -> ChannelInfo | None:

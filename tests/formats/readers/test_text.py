@@ -265,7 +265,7 @@ def test_a_last_line_that_is_cut_short_is_left_out_and_said(tmp_path):
     path.write_text("time,u,y\n0,1,2\n0.1,3,4\n0.2,5,6\n0.3,7")
     record = read(path)
     assert record.samples == 3
-    assert [f.code for f in record.findings] == ["cut_short"]
+    assert [f.code for f in record.findings] == ["cut_short", "assumed_roles"]
     assert "the last line of the file (5) is cut short" in record.findings[0].message
 
 
