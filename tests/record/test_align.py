@@ -202,3 +202,16 @@ def test_a_clock_that_was_set_is_refused_with_its_place():
     time[300:] += 1e9
     with pytest.raises(RecordError, match=r"time of 'y' jumps by 1e\+09 s after sample 299"):
         mend([Series(name="y", values=np.sin(np.arange(400.0)), time=time)])
+
+
+def test_samples_caught_up_in_a_burst_bend_no_curve():
+    """After a stall a machine reads several samples at nearly one instant, each with its noise."""
+    rng = np.random.default_rng(0)
+    time = np.arange(1000) / 200.0
+    time[400:417] = time[417] + 1e-5 * np.arange(-17, 0)
+    y = np.sin(2 * np.pi * time) + 0.01 * rng.standard_normal(time.size)
+    record = Record.from_arrays({"u": np.sin(2 * np.pi * time)}, {"y": y}, time=time)
+    aligned = uniform(record)
+    (found,) = aligned.outputs
+    error = (found.values - np.sin(2 * np.pi * aligned.time))[found.valid]
+    assert np.max(np.abs(error)) < 0.06

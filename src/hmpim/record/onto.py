@@ -1,5 +1,6 @@
 """One channel onto a grid: its own samples where they fit, interpolated or reduced where not."""
 
+from collections.abc import Callable
 from itertools import pairwise
 
 import numpy as np
@@ -14,6 +15,9 @@ __all__ = ["is_reduced", "on_grid"]
 
 _NOTHING = 1e-6
 """Share of power above what is passed that is let fold: 10⁻³ of the amplitude."""
+
+_AT_ONCE = 0.25
+"""Share of an interval within which stamps are of one instant."""
 
 
 def on_grid(
@@ -108,7 +112,7 @@ def _reduced(
             values[mine] = np.interp(grid[mine], channel.time[part], channel.values[part])
         else:
             stamps = channel.time[part] if clock.jittered else own[clock.index[part]]
-            whole = CubicSpline(stamps, channel.values[part])(own[low : high + 1])
+            whole = _curve(stamps, channel.values[part], clock)(own[low : high + 1])
             place = np.clip((grid[mine] - own[low]) * clock.fs, 0.0, high - low)
             values[mine] = band_limited(whole, place, ratio=ratio)
         known |= mine
@@ -153,10 +157,28 @@ def _interpolated(
         if edges[k + 1] - edges[k] == 1:
             out[mine] = values[part]
             continue
-        out[mine] = CubicSpline(time[part], values[part])(at[mine])
+        out[mine] = _curve(time[part], values[part], clock)(at[mine])
         if lively:
             _sharpen(out, mine, clock, part, values, at)
     return out
+
+
+def _curve(
+    time: NDArray[np.float64], values: NDArray[np.float64], clock: Clock
+) -> Callable[[NDArray[np.float64]], NDArray[np.float64]]:
+    """The curve through the samples; those stamped at nearly one instant count as their mean.
+
+    A stalled machine catches up in a burst. The noise of two samples a hundredth of an interval
+    apart is a slope, on which a spline leaves the signal by far.
+    """
+    bunch = np.concatenate([[0], np.cumsum(np.diff(time) >= _AT_ONCE / clock.fs)])
+    if bunch[-1] + 1 < time.size:
+        count = np.bincount(bunch)
+        time = time[0] + np.bincount(bunch, time - time[0]) / count
+        values = np.bincount(bunch, values) / count
+    if time.size < 2:
+        return lambda at: np.full(at.size, values[0])
+    return CubicSpline(time, values)
 
 
 def _sharpen(
