@@ -12,6 +12,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+import hmpim
 from hmpim.campaign import expand, parse_plan, read_plan, run_campaign, shipped_plan
 from hmpim.campaign.cases import prepare
 from hmpim.campaign.rig import make_rig
@@ -19,6 +20,7 @@ from hmpim.campaign.study import make_study, study_dict
 from hmpim.campaign.write import write_study
 from hmpim.errors import ArgumentError, FormatError, HmpimError, LimitsError
 from hmpim.experiment import run
+from hmpim.formats.recording import read_recording
 from hmpim.rigs import Sensor
 
 
@@ -70,6 +72,35 @@ def test_truth_is_found(finished):
             reading = row.parameters[name]
             assert abs(reading.value - getattr(sensor, name)) < 4.0 * reading.std
     assert study.met is True
+
+
+def test_the_raw_record_of_every_case_is_kept_and_can_be_identified_again(finished):
+    _, folder, cases = finished
+    assert {path.stem for path in (folder / "records").iterdir()} == {c["id"] for c in cases}
+    for case in cases:
+        path = folder / "records" / f"{case['id']}.h5"
+        again = hmpim.identify(hmpim.load(path)).to_dict()["pairs"][0]
+        (pair,) = case["pairs"]
+        for name in ("parameters", "structure", "verdict", "dynamics"):
+            assert again[name] == pair[name], name
+        (played,) = read_recording(path).stimuli
+        assert played.axis == pair["axis"]
+
+
+def test_a_case_that_cannot_be_identified_leaves_its_record(tmp_path):
+    def dead(case, stimuli, rng):
+        record = Stopping()(case, stimuli, rng)
+        (output,) = record.outputs
+        return replace(record, outputs=(replace(output, values=0.0 * output.values),))
+
+    plan = plan_of()
+    with pytest.raises(HmpimError, match="is constant"):
+        run_campaign(plan, tmp_path, player=dead)
+    (kept,) = (tmp_path / "records").iterdir()
+    assert np.ptp(hmpim.load(kept).outputs[0].values) == 0.0
+    assert list((tmp_path / "cases").iterdir()) == []
+    run_campaign(plan, tmp_path, player=Stopping())
+    assert np.ptp(hmpim.load(kept).outputs[0].values) > 0.0
 
 
 def test_interrupted_goes_on_and_repeats_nothing(tmp_path):

@@ -16,16 +16,20 @@ from hmpim.campaign.plan import Plan
 from hmpim.campaign.rig import CampaignRig, Player, make_rig
 from hmpim.errors import ArgumentError, FormatError, HmpimError
 from hmpim.formats.atomic import write_text
+from hmpim.formats.recording import save_recording
 from hmpim.identify import identify
 from hmpim.identify.frf.multivariable import response_matrix
 from hmpim.identify.spectrum import decibel, spectrum
 from hmpim.record import Record
 from hmpim.stimulus import Stimulus
 
-__all__ = ["CASE_SCHEMA", "STAMP", "run_campaign"]
+__all__ = ["CASE_SCHEMA", "RECORDS", "STAMP", "run_campaign"]
 
 STAMP = "campaign.json"
 """Name of the file that says of which plan a folder's cases are."""
+
+RECORDS = "records"
+"""Name of the folder that keeps the raw record of each case, ``ID.h5``."""
 
 CASE_SCHEMA = "hmpim/campaign-case/2"
 CAMPAIGN_SCHEMA = "hmpim/campaign/2"
@@ -92,7 +96,7 @@ def run_campaign(
     for i, (case, stimuli) in enumerate(ready):
         if progress is not None:
             progress(len(missing) + _PLAYED * i, steps, case.id)
-        done = _measured(plan, case, stimuli, rig)
+        done = _measured(plan, case, stimuli, rig, raw=folder / RECORDS / f"{case.id}.h5")
         _write(folder / "cases" / f"{case.id}.json", done)
         known[case.id] = done
     if progress is not None:
@@ -104,12 +108,13 @@ def _open(plan: Plan, folder: Path, *, fresh: bool) -> None:
     """Make the folder, or check that what it holds belongs to the plan."""
     if folder.exists() and not folder.is_dir():
         raise ArgumentError(f"{folder} is a file; name a folder")
-    (folder / "cases").mkdir(parents=True, exist_ok=True)
-    for half in (folder / "cases").glob(".hmpim-*"):  # of a run that was killed as it wrote
-        half.unlink()
+    for room in ("cases", RECORDS):
+        (folder / room).mkdir(parents=True, exist_ok=True)
+        for half in (folder / room).glob(".hmpim-*"):  # of a run that was killed as it wrote
+            half.unlink()
     stamp = folder / STAMP
     if fresh:
-        for old in (folder / "cases").glob("*.json"):
+        for old in (*(folder / "cases").glob("*.json"), *(folder / RECORDS).glob("*.h5")):
             old.unlink()
     elif stamp.exists() and any((folder / "cases").glob("*.json")):
         try:
@@ -154,11 +159,13 @@ def _read(folder: Path, case: Case) -> dict[str, Any] | None:
 
 
 def _measured(
-    plan: Plan, case: Case, stimuli: Sequence[Stimulus], rig: CampaignRig
+    plan: Plan, case: Case, stimuli: Sequence[Stimulus], rig: CampaignRig, *, raw: Path
 ) -> dict[str, Any]:
+    """Play a case, keep its record, and identify it."""
     seed = (plan.seed, zlib.crc32(case.id.encode()))
     torque = rig.check(case, stimuli)  # once more, right before anything moves
     record = rig.play(case, stimuli, np.random.default_rng(seed))
+    save_recording(record, raw, stimuli=stimuli, rig=f"{plan.name}: {case.id}")
     pairs = []
     for axis in case.axes:
         alone = _alone(record, axis, band=plan.axis(axis, test=case.test).band)
