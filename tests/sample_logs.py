@@ -131,7 +131,7 @@ def _ulog_message(kind, body):
     return struct.pack("<HB", len(body), ord(kind)) + body
 
 
-def ulog(path):
+def ulog(path, drive_and_answer=(U, Y), fs=FS):
     """By https://docs.px4.io/main/en/dev_log/ulog_file_format.html."""
     head = b"\x55\x4c\x6f\x67\x01\x12\x35\x01" + struct.pack("<Q", 1_000_000)
     forms = (
@@ -145,11 +145,11 @@ def ulog(path):
     out.append(_ulog_message("I", bytes([16]) + info))
     out.append(_ulog_message("A", struct.pack("<BH", 0, 0) + b"vehicle_rates_setpoint"))
     out.append(_ulog_message("A", struct.pack("<BH", 0, 1) + b"vehicle_angular_velocity"))
-    for k, t in enumerate(TIME):
-        stamp = 1_000_000 + round(1e6 * t)
-        out.append(_ulog_message("D", struct.pack("<HQf", 0, stamp, U[k])))
+    for k, (u, y) in enumerate(zip(*drive_and_answer, strict=True)):
+        stamp = 1_000_000 + round(1e6 * k / fs)
+        out.append(_ulog_message("D", struct.pack("<HQf", 0, stamp, u)))
         # Measured, and published 1.5 ms later.
-        row = struct.pack("<HQQ3f", 1, stamp + 1500, stamp, Y[k], 0.0, 1.0)
+        row = struct.pack("<HQQ3f", 1, stamp + 1500, stamp, y, 0.0, 1.0)
         out.append(_ulog_message("D", row))
         if k == N // 2:
             out.append(_ulog_message("O", struct.pack("<H", 12)))
@@ -382,6 +382,20 @@ def _write_uff58(file, binary):
 
 def uff58_text(path):
     uff58(path, binary=0)
+
+
+def oscilloscope(path, drive_and_answer=(U, Y), fs=FS):
+    """As a Tektronix scope saves two channels: lines of settings, then the samples."""
+    head = (
+        f"Model,MDO3024\nFirmware Version,1.26\n\nWaveform Type,ANALOG,,\nPoint Format,Y,,\n"
+        f"Horizontal Units,s,,\nHorizontal Scale,1,,\nSample Interval,{1 / fs:g},,\n"
+        f"Vertical Units,V,V,\n\nLabel,drive,current,\nTIME,CH1,CH2,\n"
+    )
+    rows = "".join(
+        f"{k / fs - 1:.6e},{u:.4e},{y:.4e},\n"
+        for k, (u, y) in enumerate(zip(*drive_and_answer, strict=True))
+    )
+    path.write_text(head + rows)
 
 
 KINDS = {
