@@ -43,18 +43,18 @@ def test_a_held_command_adds_half_its_period():
 
 
 def test_the_interval_is_that_of_what_is_uncertain():
-    std = 1e-3
+    f, std = F[::20], 1e-3
     known = Spread(covariance=((std**2, 0.0), (0.0, 1e-18)))
     table = Model(delay=0.02, scale_factor=1.0, spread=known)
-    found = add_to_loop((F, LOOP), [table], draws=2000, rng=1)
+    found = add_to_loop((f, LOOP[::20]), [table], draws=1000, rng=1)
     half = 1.96 * 360 * 2.0 * std
     low, high = found.margin_with.ci95
-    assert low == pytest.approx(75.6 - half, abs=0.1)
-    assert high == pytest.approx(75.6 + half, abs=0.1)
+    assert low == pytest.approx(75.6 - half, abs=0.15)
+    assert high == pytest.approx(75.6 + half, abs=0.15)
     assert found.margin_without.ci95 == (found.margin_without.value,) * 2
-    twice = add_to_loop((F, LOOP), [table, table], draws=2000, rng=1)
+    twice = add_to_loop((f, LOOP[::20]), [table, table], draws=1000, rng=1)
     low, high = twice.margin_with.ci95
-    assert high - low == pytest.approx(2 * np.sqrt(2) * half, rel=0.08)
+    assert high - low == pytest.approx(2 * np.sqrt(2) * half, rel=0.1)
 
 
 @pytest.mark.parametrize(
