@@ -1,6 +1,7 @@
 """``hmpim run``: a stimulus played on a rig, its record in a file, and if wanted the page."""
 
 import sys
+from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -85,6 +86,17 @@ def run(
     live: Annotated[
         bool, typer.Option("--live/--no-live", help="Draw the run in the terminal.")
     ] = True,
+    tick: Annotated[
+        str,
+        typer.Option(
+            "--tick",
+            metavar="SOURCE",
+            help="External tick that drives the run: udp://HOST:PORT or serial:PORT.",
+        ),
+    ] = "",
+    tick_rate: Annotated[
+        float, typer.Option("--tick-rate", metavar="HZ", help="Pulses a second of the tick.")
+    ] = 1000.0,
     seed: Annotated[
         int | None,
         typer.Option("--seed", min=0, help="Of what is random in a simulated rig."),
@@ -111,18 +123,21 @@ def run(
     from hmpim.experiment import Feel, RunLog, RunOptions
     from hmpim.experiment import run as play
     from hmpim.formats.stimulus_files import read_stimuli
+    from hmpim.rigs import TickClock, find_ticks
     from hmpim.rigs.catalogue import find_rig, read_description
 
     described = None if rig_file is None else read_description(rig_file)
     found = find_rig(rig, description=described)
     stimuli = _aimed(read_stimuli(stimulus), axis, found.description.axes)
+    clock = TickClock(find_ticks(tick), rate=tick_rate) if tick else None
     options = RunOptions(
+        clock=clock,
         watchdog=watchdog and found.description.watchdog is None,
         feel="unknown" if feel is None else Feel() if feel else None,
     )
     unit = found.rig if watchdog else _driven(found.rig, rig, described)
     stages = Stages()
-    with RunLog(log) as events, stages.stage("run"):
+    with clock or nullcontext(), RunLog(log) as events, stages.stage("run"):
         record = play(
             unit,
             stimuli,

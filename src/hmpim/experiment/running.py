@@ -19,6 +19,7 @@ from hmpim.experiment.timing import judge_timing, measure_timing
 from hmpim.experiment.watch import Watcher
 from hmpim.record import Finding, Record
 from hmpim.rigs import (
+    Clocked,
     Commands,
     Layout,
     LimitsOfAxes,
@@ -68,6 +69,8 @@ class Running:
 
     def through(self) -> Record:
         """Connect, check, play, stop, disconnect; errors of a driver become the rig's own."""
+        if self.options.clock is not None and isinstance(self.rig, Clocked):
+            self.rig.use_clock(self.options.clock)
         try:
             with self.rig:
                 with self._faults_logged():
@@ -158,7 +161,9 @@ class Running:
             self._stop()
         with self._faults_logged():
             report = self.rig.report() if isinstance(self.rig, Reporting) else RunReport()
-            findings += [*report.findings, *self._timing(ready, layout)]
+            clock = self.options.clock
+            ticked = clock.report().findings if isinstance(clock, Reporting) else ()
+            findings += [*report.findings, *ticked, *self._timing(ready, layout)]
             for finding in findings:
                 self.log.add("note", finding.message)
             said = RunReport(findings=tuple(findings), clocks=report.clocks)

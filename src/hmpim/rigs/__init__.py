@@ -5,16 +5,18 @@ from hmpim.rigs.clock import Clock, ManualClock, SkewedClock, SystemClock
 from hmpim.rigs.fake import FakeRig
 from hmpim.rigs.function import FunctionRig
 from hmpim.rigs.mounted import CarriedSensor, Mounted
-from hmpim.rigs.protocol import LimitsOfAxes, Reporting, Rig, Seeded, Stimuli
+from hmpim.rigs.protocol import Clocked, LimitsOfAxes, Reporting, Rig, Seeded, Stimuli
 from hmpim.rigs.sensor import Sensor
 from hmpim.rigs.stimuli import Commands, commands_of, shared_band, stimuli_by_axis
 from hmpim.rigs.table import MotionTable
+from hmpim.rigs.tick import SerialTicks, TickClock, UdpTicks, find_ticks
 
 __all__ = [
     "Block",
     "CarriedSensor",
     "ChannelSpec",
     "Clock",
+    "Clocked",
     "Commands",
     "FakeRig",
     "FunctionRig",
@@ -31,10 +33,14 @@ __all__ = [
     "Samples",
     "Seeded",
     "Sensor",
+    "SerialTicks",
     "SkewedClock",
     "Stimuli",
     "SystemClock",
+    "TickClock",
+    "UdpTicks",
     "commands_of",
+    "find_ticks",
     "shared_band",
     "stimuli_by_axis",
 ]

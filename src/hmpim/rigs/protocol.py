@@ -16,9 +16,10 @@ from typing import Protocol, Self, runtime_checkable
 import numpy as np
 
 from hmpim.rigs.block import Block, Layout, Reply, RunReport
+from hmpim.rigs.clock import Clock
 from hmpim.stimulus import Limits, Stimulus
 
-__all__ = ["LimitsOfAxes", "Reporting", "Rig", "Seeded", "Stimuli"]
+__all__ = ["Clocked", "LimitsOfAxes", "Reporting", "Rig", "Seeded", "Stimuli"]
 
 Stimuli = Stimulus | Mapping[str, Stimulus]
 """One stimulus, or one for each axis that moves."""
@@ -117,6 +118,15 @@ class Reporting(Protocol):
 
     def report(self) -> RunReport:
         """Say it; called after `stop`, before the rig is left."""
+        ...
+
+
+@runtime_checkable
+class Clocked(Protocol):
+    """A rig that waits and stamps by a clock: it is given that of the run before it is entered."""
+
+    def use_clock(self, clock: Clock, /) -> None:
+        """Go by this clock from now on."""
         ...
 
 

@@ -73,6 +73,10 @@ class WireRig:
         self._heard = 0.0
         self._account: Account | None = None
 
+    def use_clock(self, clock: Clock, /) -> None:
+        """Take the clock of the run as the near end's."""
+        self._clock = clock
+
     @property
     def name(self) -> str:
         """What the far end calls itself, or where it is."""

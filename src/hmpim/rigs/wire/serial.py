@@ -8,10 +8,19 @@ from typing import Any, Self
 from hmpim.errors import MissingExtraError, RigError
 from hmpim.rigs.wire.framing import Deframer, serial_frame
 
-__all__ = ["SerialClient", "SerialServer"]
+__all__ = ["SerialClient", "SerialServer", "open_line"]
 
 
-def _opened(port: str, baud: int) -> Any:
+def open_line(port: str, baud: int) -> Any:
+    """Open a serial port.
+
+    Raises
+    ------
+    MissingExtraError
+        If pyserial is not installed.
+    RigError
+        If there is no such port.
+    """
     try:
         import serial
     except ImportError as error:
@@ -48,7 +57,7 @@ class SerialClient:
 
     def open(self) -> None:
         """Open the port, and forget what came before."""
-        self._line = _opened(self._port, self._baud)
+        self._line = open_line(self._port, self._baud)
         self._line.reset_input_buffer()
         self._found.clear()
         self._deframer = Deframer()
