@@ -10,6 +10,7 @@ from hmpim.identify.groups import MODELLED, PHASE_SPLIT, TIMING
 from hmpim.identify.judgement.reach import (
     beyond_band,
     fast_mode,
+    few_lines,
     initial_transient,
     integrator,
     natural_frequency_beyond,
@@ -107,3 +108,15 @@ def test_an_output_before_its_input_casts_doubt_on_what_a_clock_moves(clean):
     assert negative_delay(at(-0.001)) == ()  # zero is within its error
     (found,) = negative_delay(at(-0.003))
     assert (found.code, found.severity, found.parameters) == ("negative_delay", "doubt", TIMING)
+
+
+@pytest.mark.parametrize(("lines", "doubted"), [(1, True), (2, True), (20, False)])
+def test_a_few_lines_tell_no_more_than_gain_and_phase_at_each(evidence_of, lines, doubted):
+    frequencies = np.linspace(1.0, 19.0, lines + 2)[1:-1].round(1)
+    u = np.sin(2 * np.pi * np.outer(TIME, frequencies) + np.arange(lines) ** 2).sum(axis=1)
+    y = np.concatenate([np.zeros(10), u[:-10]])
+    found = few_lines(evidence_of(u, y + 0.01 * WHITE, structures=("second_order",)))
+    assert [f.code for f in found] == ["few_lines"] * doubted
+    for finding in found:
+        assert (finding.severity, finding.parameters) == ("doubt", MODELLED)
+        assert f"excites {lines} frequenc" in finding.message
