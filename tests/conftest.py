@@ -1,6 +1,7 @@
 """What several rooms' tests share: the measured records, the paper's system, closed forms."""
 
 import os
+import signal
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -20,6 +21,10 @@ settings.register_profile(
     derandomize="HMPIM_EXAMPLES" not in os.environ,
 )
 settings.load_profile("hmpim")
+
+# A shell that starts a job in the background has it ignore Ctrl-C, and all that it starts with it.
+if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 DATA = Path(__file__).parents[2] / "shared" / "data"
 

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from hmpim.errors import ArgumentError, FormatError, RecordError, UnitError
 from hmpim.formats import read, write_csv
 from hmpim.record import Channel, Finding, Record, uniform
+from tests_support import examples
 
 DATA = Path(__file__).resolve().parents[2].parent / "shared" / "data"
 GAPS = Finding(code="gaps", message="3 are missing", severity="info", parameters=("delay",))
@@ -263,7 +264,7 @@ def test_written_and_read_back_is_the_same_bit_for_bit(tmp_path_factory, data, f
     assert [p.name for p in path.parent.iterdir()] == ["record.csv"]
 
 
-@settings(max_examples=200, deadline=None)
+@examples(60)
 @given(content=st.binary(max_size=200) | st.text('0123456789,;.\n\r\t-#"eu[]ty ', max_size=80))
 @example(content=b'"\n"')
 @example(content='t,u,y\n"0,1,2\n0,1,2')
