@@ -71,6 +71,7 @@ def _serve(requests: int, answers: int, memory: int) -> None:
     _limit_memory(memory)
     _forbid()
     pipe, reply = os.fdopen(requests, "rb"), os.fdopen(answers, "wb")
+    gc.freeze()  # what is imported stays: no collection need look at it again
     while (request := receive(pipe, limit=0)) is not None:
         with open(os.devnull, "w") as silent:
             # A thread that needs nothing of Python, so it also ends what never lets Python in.
