@@ -111,7 +111,7 @@ def fit_clock(time: NDArray[np.float64], *, nominal: float | None = None) -> Clo
     deviation = since - index * step
     rounded = by_rounding or float(np.ptp(deviation)) <= bend
     # Rounding may tilt the fit by what it shows; strayed stamps by 3.5 standard deviations.
-    tilt = float(np.ptp(deviation)) if rounded else 12 * float(np.std(deviation)) / np.sqrt(n)
+    tilt = float(np.ptp(deviation)) if rounded else 12 * _std(deviation) / np.sqrt(n)
     fs = 1 / step
     if nominal is not None and abs(1 / nominal - step) * index[-1] <= noise + tilt:
         fs, step = float(nominal), 1 / nominal
@@ -129,6 +129,16 @@ def fit_clock(time: NDArray[np.float64], *, nominal: float | None = None) -> Clo
     )
 
 
+def _std(deviation: NDArray[np.float64]) -> float:
+    """Standard deviation, of stamps of any size."""
+    with np.errstate(over="ignore"):
+        return float(np.std(deviation))
+
+
+_MOST_MISSING = 2.0**40
+"""Samples in one gap, beyond which stamps are damaged and the count only says so."""
+
+
 def _missing(since: NDArray[np.float64]) -> NDArray[np.int64]:
     """Number of samples missing in each interval; shape (n - 1,)."""
     steps = np.diff(since)
@@ -137,7 +147,9 @@ def _missing(since: NDArray[np.float64]) -> NDArray[np.int64]:
     # The mean of the whole intervals is a finer ruler for the long ones than the median is.
     if not sure.all():
         ruler = float(np.mean(steps[~sure]))
-    missing = np.where(sure, np.maximum(np.rint(steps / ruler) - 1, 1), 0).astype(np.int64)
+    with np.errstate(over="ignore"):
+        whole = np.clip(np.rint(steps / ruler) - 1, 1, _MOST_MISSING)
+    missing = np.where(sure, whole, 0).astype(np.int64)
     doubtful = np.flatnonzero((steps > 1.3 * ruler) & ~sure)
     while doubtful.size:
         closed = since - ruler * np.concatenate(([0], np.cumsum(missing)))

@@ -11,7 +11,7 @@ from hmpim.record.finding import Finding
 from hmpim.record.record import Channel
 from hmpim.record.series import Series
 
-__all__ = ["Mended", "mend", "restarts"]
+__all__ = ["Mended", "check_span", "mend", "restarts"]
 
 _LATE = 8
 """Samples that may follow a stamp that ran ahead before the stamps count as starting again.
@@ -98,7 +98,7 @@ def mend(series: Sequence[Series], *, fs: float | None = None) -> Mended:
             stamps, order = known[id(s.time)]
         values = s.values if order is None else s.values[order]
         made.append(_without_missing(s, stamps, values, findings))
-        _check_span(made[-1])
+        check_span(made[-1])
     return Mended(channels=tuple(made), findings=tuple(findings))
 
 
@@ -204,8 +204,14 @@ def _without_strays(time: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.where(far, np.nan, time)
 
 
-def _check_span(channel: Channel) -> None:
-    """Refuse stamps between which no clock can be laid for want of memory."""
+def check_span(channel: Channel) -> None:
+    """Refuse stamps between which no clock can be laid for want of memory.
+
+    Raises
+    ------
+    RecordError
+        If two stamps lie 10 million samples apart, and a thousand times the record.
+    """
     steps = np.diff(channel.time)
     most = _LONGEST_CLOCK + 1000 * channel.time.size
     if float(channel.time[-1] - channel.time[0]) <= most * float(np.median(steps)):

@@ -10,6 +10,7 @@ from scipy.signal import fftconvolve
 from scipy.stats import spearmanr
 
 from hmpim.record.clock import fit_clock
+from hmpim.record.mend import check_span
 from hmpim.record.record import Channel
 
 __all__ = ["Motion", "cut_alike", "find_motions"]
@@ -88,6 +89,7 @@ def find_motions(channel: Channel) -> tuple[Motion, ...]:
     ['sweep from 2 Hz to 8.26 Hz, 0 s to 3.999 s', \
 'sweep from 2 Hz to 8.26 Hz, 6 s to 9.999 s']
     """
+    check_span(channel)
     clock = fit_clock(channel.time)
     time = clock.start + np.arange(clock.length) / clock.fs
     values = np.interp(time, channel.time, channel.values)

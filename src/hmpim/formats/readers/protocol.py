@@ -153,6 +153,10 @@ class Reader:
 _LISTED = 20
 
 
+_LONGEST = 60
+"""Characters of a name that a message shows."""
+
+
 def listed(names: Sequence[str]) -> str:
     """Return names for a message, the first twenty of them.
 
@@ -164,7 +168,8 @@ def listed(names: Sequence[str]) -> str:
     '17, 18, 19 and 80 others'
     """
     more = f" and {len(names) - _LISTED} others" if len(names) > _LISTED else ""
-    return ", ".join(names[:_LISTED]) + more or "none beside time"
+    short = [n if len(n) <= _LONGEST else n[:_LONGEST] + "…" for n in names[:_LISTED]]
+    return ", ".join(short) + more or "none beside time"
 
 
 def need(module: str, *, extra: str, what: str) -> ModuleType:
