@@ -31,7 +31,7 @@ def plain():
     return found(SWEEP, lagged(SWEEP) + NOISE)
 
 
-@pytest.mark.parametrize("size", [1e-95, 1e95])
+@pytest.mark.parametrize("size", [1e-70, 1e70])
 @pytest.mark.parametrize("which", ["input", "output", "both", "time"])
 def test_a_unit_of_any_size_gives_the_same_result(plain, size, which):
     y = lagged(SWEEP) + NOISE
@@ -45,7 +45,7 @@ def test_a_unit_of_any_size_gives_the_same_result(plain, size, which):
         assert estimate.std == pytest.approx(wanted.std * unit, rel=1e-2)
 
 
-@pytest.mark.parametrize("size", [1e-300, 1e-150, 1e150, 1e300])
+@pytest.mark.parametrize("size", [1e-300, 1e-100, 1e100, 1e300])
 @pytest.mark.parametrize("which", ["u", "y", "time"])
 def test_numbers_that_cannot_be_squared_are_refused(size, which):
     u, y = (SWEEP, lagged(SWEEP) + NOISE)

@@ -41,8 +41,8 @@ __all__ = ["identify"]
 
 _FEWEST_SAMPLES = 50
 
-_LARGEST = 1e101
-"""Size of a sample, and one over the least: cubes stay in the range of doubles."""
+_LARGEST = 1e75
+"""Size of a sample, and one over the least: fourth powers stay in the range of doubles."""
 
 _BETTER = 0.7
 """Share of the noise's power under a drift below which a clipped level is taken instead."""

@@ -234,7 +234,7 @@ def misfit(
     E = spectrum_e[bins].reshape(groups, width)
     power = np.sum(np.abs(U) ** 2, axis=1)
     power = np.where(power > 0, power, 1.0)
-    taken = np.abs(np.sum(U.conj() * E, axis=1)) ** 2 / power
+    taken = np.abs(np.sum(U.conj() * E, axis=1) / np.sqrt(power)) ** 2  # of any unit
     total = np.sum(np.abs(E) ** 2, axis=1)
     noise = (total - taken) / (width - 1)
     if not np.all(noise > 0):
