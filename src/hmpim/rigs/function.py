@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Any, Literal, get_args
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,12 +10,12 @@ from numpy.typing import NDArray
 from hmpim.arguments import checked
 from hmpim.errors import RigError
 from hmpim.record import Intersample
-from hmpim.rigs.block import Block, ChannelSpec, Layout, Quantity
+from hmpim.rigs.block import Block, Layout, Quantity
 from hmpim.rigs.protocol import Stimuli
 from hmpim.rigs.simulated import Playing, Simulated
-from hmpim.rigs.stimuli import commands_of, stimuli_by_axis
+from hmpim.rigs.stimuli import feed_of
 from hmpim.stimulus import Limits
-from hmpim.units import check_unit, rate_unit
+from hmpim.units import check_unit
 
 __all__ = ["FunctionRig"]
 
@@ -81,25 +81,13 @@ class FunctionRig(Simulated):
 
     def prepare(self, stimulus: Stimuli, /) -> Layout:
         """Bring an algorithm with a memory back to its start, and say what will be recorded."""
-        named = stimuli_by_axis(stimulus, name=repr(self.name))
-        ((axis, only),) = named.items()
+        fed = feed_of(stimulus, measures=self.measures, rig=self.name, name=self.input_name)
         if self.reset is not None:
             self.reset()
-        commands = commands_of(named)
-        fed: FloatArray = getattr(commands, self.measures)[:, 0]
-        self._playing.state = {"fed": fed, "returned": None}
-        in_unit = rate_unit(only.unit, get_args(Quantity).index(self.measures))
-        out_unit = in_unit if self.output_unit is None else self.output_unit
-        given = ChannelSpec(
-            name=self.input_name,
-            role="input",
-            unit=in_unit,
-            axis=axis,
-            quantity=self.measures,
-            commanded=True,
-        )
-        return Layout(
-            channels=(given, ChannelSpec(name=self.output_name, role="output", unit=out_unit)),
+        self._playing.state = {"fed": fed.values, "returned": None}
+        return fed.layout(
+            output=self.output_name,
+            unit=fed.unit if self.output_unit is None else self.output_unit,
             intersample=self.intersample,
             source=f"function {self.name}",
         )

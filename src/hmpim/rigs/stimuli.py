@@ -1,18 +1,21 @@
-"""Stimuli by axis, and the commands of all axes together on one clock."""
+"""Stimuli by axis, the commands of all axes together on one clock, and what software is fed."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from typing import get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hmpim.arguments import shown
 from hmpim.errors import ArgumentError
-from hmpim.rigs.block import Block, Pace
+from hmpim.record import Intersample
+from hmpim.rigs.block import Block, ChannelSpec, Layout, Pace, Quantity
 from hmpim.stimulus import Stimulus
 from hmpim.stimulus.command import rounded
+from hmpim.units import rate_unit
 
-__all__ = ["Commands", "commands_of", "shared_band", "stimuli_by_axis"]
+__all__ = ["Commands", "Feed", "commands_of", "feed_of", "shared_band", "stimuli_by_axis"]
 
 FloatArray = NDArray[np.float64]
 
@@ -170,4 +173,61 @@ def commands_of(named: Mapping[str, Stimulus]) -> Commands:
         position=np.column_stack(columns["position"]),
         velocity=np.column_stack(columns["velocity"]),
         acceleration=np.column_stack(columns["acceleration"]),
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Feed:
+    """One quantity of one stimulus, as software under test is fed it.
+
+    Parameters
+    ----------
+    values : ndarray, shape (n,)
+        The samples.
+    fs : float
+        Their rate in Hz.
+    channel : ChannelSpec
+        The record's input.
+    """
+
+    values: FloatArray
+    fs: float
+    channel: ChannelSpec
+
+    @property
+    def unit(self) -> str:
+        """Of the samples."""
+        return self.channel.unit
+
+    def layout(
+        self, *, output: str, unit: str, intersample: Intersample | None, source: str
+    ) -> Layout:
+        """What will be recorded: this, and what the software makes of it."""
+        made = ChannelSpec(name=output, role="output", unit=unit)
+        return Layout(channels=(self.channel, made), intersample=intersample, source=source)
+
+
+def feed_of(
+    stimulus: Stimulus | Mapping[str, Stimulus], *, measures: Quantity, rig: str, name: str
+) -> Feed:
+    """Return what software is fed: the commanded quantity of the only stimulus.
+
+    Parameters
+    ----------
+    stimulus : Stimulus or mapping
+        As `stimuli_by_axis` takes it.
+    measures : {'position', 'velocity', 'acceleration'}
+        Which quantity.
+    rig, name : str
+        Of the rig, for messages, and of the record's input.
+    """
+    named = stimuli_by_axis(stimulus, name=repr(rig))
+    ((axis, only),) = named.items()
+    unit = rate_unit(only.unit, get_args(Quantity).index(measures))
+    return Feed(
+        values=getattr(commands_of(named), measures)[:, 0],
+        fs=only.fs,
+        channel=ChannelSpec(
+            name=name, role="input", unit=unit, axis=axis, quantity=measures, commanded=True
+        ),
     )

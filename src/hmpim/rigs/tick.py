@@ -5,7 +5,6 @@ computer's clock is read, at the pace that the pulses have shown so far.
 """
 
 import select
-import socket
 import threading
 from collections import deque
 from types import TracebackType
@@ -18,7 +17,7 @@ from hmpim.record import Finding
 from hmpim.rigs.block import RunReport
 from hmpim.rigs.clock import Clock, SystemClock
 from hmpim.rigs.mounted.arrivals import fit_one_way
-from hmpim.rigs.wire.transport import parse_address
+from hmpim.rigs.wire.transport import listening, parse_address
 
 __all__ = ["SerialTicks", "TickClock", "TickSource", "UdpTicks", "find_ticks"]
 
@@ -51,14 +50,7 @@ class UdpTicks:
     """
 
     def __init__(self, host: str, port: int) -> None:
-        try:
-            self._socket = socket.socket(
-                socket.AF_INET6 if ":" in host else socket.AF_INET, socket.SOCK_DGRAM
-            )
-            self._socket.bind((host, port))
-        except OSError as error:
-            raise RigError(f"tick udp://{host}:{port} cannot be heard: {error}") from error
-        self._socket.setblocking(False)
+        self._socket = listening(host, port, refused=f"tick udp://{host}:{port} cannot be heard")
 
     @property
     def port(self) -> int:

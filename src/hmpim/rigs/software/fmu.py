@@ -11,12 +11,12 @@ from numpy.typing import NDArray
 
 from hmpim.errors import ArgumentError, RigError, UnitError
 from hmpim.record import Intersample
-from hmpim.rigs.block import Block, ChannelSpec, Layout, Quantity
+from hmpim.rigs.block import Block, Layout, Quantity
 from hmpim.rigs.protocol import Stimuli
 from hmpim.rigs.simulated import Playing, Simulated
-from hmpim.rigs.stimuli import commands_of, stimuli_by_axis
+from hmpim.rigs.stimuli import feed_of
 from hmpim.stimulus import Limits
-from hmpim.units import check_unit, conversion_factor, rate_unit, read_unit
+from hmpim.units import check_unit, conversion_factor, read_unit
 
 __all__ = ["FmuRig", "Interface"]
 
@@ -111,14 +111,11 @@ class FmuRig(Simulated):
             If it cannot be read or run, or its input's unit is not the stimulus's.
         """
         self.stop()
-        named = stimuli_by_axis(stimulus, name=repr(self.name))
-        ((axis, only),) = named.items()
-        fed: FloatArray = getattr(commands_of(named), self.measures)[:, 0]
-        unit = rate_unit(only.unit, get_args(Quantity).index(self.measures))
+        fed = feed_of(stimulus, measures=self.measures, rig=self.name, name=self.input_name)
         described = read_described(self.path)
         taken = _chosen(described, "input", self.input, path=self.path)
         read = _chosen(described, "output", self.output, path=self.path)
-        _check_input_unit(taken, unit, path=self.path)
+        _check_input_unit(taken, fed.unit, path=self.path)
         exchange = _is_exchange(described, self.interface, path=self.path)
         work = tempfile.TemporaryDirectory(prefix="hmpim-fmu-")
         play: Callable[[slice], FloatArray]
@@ -128,29 +125,22 @@ class FmuRig(Simulated):
                 self.path, described, work.name, taken=taken, read=read, start=self.start
             )
             if exchange:
-                whole = unit_under_test.exchanged(fed, fs=only.fs, tolerance=self.tolerance)
+                whole = unit_under_test.exchanged(fed.values, fs=fed.fs, tolerance=self.tolerance)
                 play = whole.__getitem__
             else:
-                play = unit_under_test.cosimulated(fed, fs=only.fs)
+                play = unit_under_test.cosimulated(fed.values, fs=fed.fs)
         except BaseException:
             if unit_under_test is not None:
                 unit_under_test.close()
             work.cleanup()
             raise
         self._playing.state = (play, unit_under_test, work)
-        given = ChannelSpec(
-            name=self.input_name,
-            role="input",
-            unit=unit,
-            axis=axis,
-            quantity=self.measures,
-            commanded=True,
-        )
         stated = self.output_unit
         if stated is None:
-            stated = unit if not read.unit else (read_unit(read.unit) or unit)
-        return Layout(
-            channels=(given, ChannelSpec(name=self.output_name, role="output", unit=stated)),
+            stated = fed.unit if not read.unit else (read_unit(read.unit) or fed.unit)
+        return fed.layout(
+            output=self.output_name,
+            unit=stated,
             intersample="foh" if exchange else self.intersample,
             source=f"FMU {Path(self.path).name}, {read.name} from {taken.name}, "
             + ("model exchange" if exchange else "co-simulation"),

@@ -30,12 +30,12 @@ from numpy.typing import NDArray
 
 from hmpim.errors import ArgumentError, RigError
 from hmpim.record import Intersample
-from hmpim.rigs.block import Block, ChannelSpec, Layout, Quantity
+from hmpim.rigs.block import Block, Layout, Quantity
 from hmpim.rigs.protocol import Stimuli
 from hmpim.rigs.simulated import Playing, Simulated
-from hmpim.rigs.stimuli import commands_of, stimuli_by_axis
+from hmpim.rigs.stimuli import feed_of
 from hmpim.stimulus import Limits
-from hmpim.units import check_unit, rate_unit
+from hmpim.units import check_unit
 
 __all__ = ["ProcessRig"]
 
@@ -127,34 +127,21 @@ class ProcessRig(Simulated):
             If it cannot be started, or does not answer ``ready``.
         """
         self.stop()
-        named = stimuli_by_axis(stimulus, name=repr(self.name))
-        ((axis, only),) = named.items()
-        fed: FloatArray = getattr(commands_of(named), self.measures)[:, 0]
-        unit = rate_unit(only.unit, get_args(Quantity).index(self.measures))
+        fed = feed_of(stimulus, measures=self.measures, rig=self.name, name=self.input_name)
         talk = Talk(_arguments(self.command), name=self.name)
-        self._playing.state = (talk, fed)
+        self._playing.state = (talk, fed.values)
         said = talk.ask(
-            f"{_GREETING} rate={only.fs!r} samples={only.samples} unit={unit or '1'} "
+            f"{_GREETING} rate={fed.fs!r} samples={fed.values.size} unit={fed.unit or '1'} "
             f"quantity={self.measures}",
             within=self.startup,
         )
-        given = ChannelSpec(
-            name=self.input_name,
-            role="input",
-            unit=unit,
-            axis=axis,
-            quantity=self.measures,
-            commanded=True,
-        )
         out_unit = _unit_of(said, name=self.name)
-        stated = unit if out_unit is None else out_unit
-        read = ChannelSpec(
-            name=self.output_name,
-            role="output",
+        stated = fed.unit if out_unit is None else out_unit
+        return fed.layout(
+            output=self.output_name,
             unit=stated if self.output_unit is None else self.output_unit,
-        )
-        return Layout(
-            channels=(given, read), intersample=self.intersample, source=f"program {self.command}"
+            intersample=self.intersample,
+            source=f"program {self.command}",
         )
 
     def play(self, block: Block, /) -> dict[str, FloatArray]:

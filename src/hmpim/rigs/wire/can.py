@@ -1,11 +1,11 @@
 """Datagrams over a CAN bus."""
 
 import time
-from types import TracebackType
-from typing import Any, Self
+from typing import Any
 
 from hmpim.errors import MissingExtraError, RigError
 from hmpim.rigs.wire.framing import Reassembly, can_frames
+from hmpim.rigs.wire.transport import OneOtherEnd
 
 __all__ = ["CanClient", "CanServer"]
 
@@ -107,7 +107,7 @@ class CanClient:
                 return datagram
 
 
-class CanServer:
+class CanServer(OneOtherEnd):
     """The far end of a CAN bus, for `serve`.
 
     Parameters
@@ -119,28 +119,6 @@ class CanServer:
     def __init__(
         self, channel: str, *, interface: str = "socketcan", bitrate: int = 1_000_000
     ) -> None:
-        self._client = CanClient(
-            channel, interface=interface, bitrate=bitrate, there=_BACK, back=_THERE
+        super().__init__(
+            CanClient(channel, interface=interface, bitrate=bitrate, there=_BACK, back=_THERE)
         )
-
-    def __enter__(self) -> Self:
-        self._client.open()
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-        /,
-    ) -> None:
-        self._client.close()
-
-    def receive(self, timeout: float) -> tuple[bytes, object] | None:
-        """Return the next datagram and who sent it: there is one other end."""
-        data = self._client.receive(timeout)
-        return None if data is None else (data, self._client.name)
-
-    def send(self, data: bytes, to: object) -> None:
-        """Send one datagram."""
-        self._client.send(data)

@@ -2,11 +2,11 @@
 
 import time
 from collections import deque
-from types import TracebackType
-from typing import Any, Self
+from typing import Any
 
 from hmpim.errors import MissingExtraError, RigError
 from hmpim.rigs.wire.framing import Deframer, serial_frame
+from hmpim.rigs.wire.transport import OneOtherEnd
 
 __all__ = ["SerialClient", "SerialServer", "open_line"]
 
@@ -109,7 +109,7 @@ class SerialClient:
         return self._found.popleft()
 
 
-class SerialServer:
+class SerialServer(OneOtherEnd):
     """The far end of a serial line, for `serve`.
 
     Parameters
@@ -119,26 +119,4 @@ class SerialServer:
     """
 
     def __init__(self, port: str, *, baud: int = 921_600) -> None:
-        self._client = SerialClient(port, baud=baud)
-
-    def __enter__(self) -> Self:
-        self._client.open()
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-        /,
-    ) -> None:
-        self._client.close()
-
-    def receive(self, timeout: float) -> tuple[bytes, object] | None:
-        """Return the next datagram and who sent it: there is one other end."""
-        data = self._client.receive(timeout)
-        return None if data is None else (data, self._client.name)
-
-    def send(self, data: bytes, to: object) -> None:
-        """Send one datagram."""
-        self._client.send(data)
+        super().__init__(SerialClient(port, baud=baud))

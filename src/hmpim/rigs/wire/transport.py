@@ -7,7 +7,7 @@ from typing import Protocol, Self, cast
 
 from hmpim.errors import RigError
 
-__all__ = ["Transport", "UdpClient", "UdpServer", "parse_address"]
+__all__ = ["OneOtherEnd", "Transport", "UdpClient", "UdpServer", "listening", "parse_address"]
 
 _LARGEST = 65_507
 _BUFFER = 1 << 20  # bytes that the system may keep while nobody reads: a second of five axes
@@ -38,6 +38,41 @@ class Transport(Protocol):
         ...
 
 
+class OneOtherEnd:
+    """The far end, for `serve`, of what has two ends only: there is nobody else to answer.
+
+    Parameters
+    ----------
+    transport : Transport
+        Opened and closed with it.
+    """
+
+    def __init__(self, transport: Transport) -> None:
+        self._transport = transport
+
+    def __enter__(self) -> Self:
+        self._transport.open()
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+        /,
+    ) -> None:
+        self._transport.close()
+
+    def receive(self, timeout: float) -> tuple[bytes, object] | None:
+        """Return the next datagram and who sent it: there is one other end."""
+        data = self._transport.receive(timeout)
+        return None if data is None else (data, self._transport.name)
+
+    def send(self, data: bytes, to: object) -> None:
+        """Send one datagram."""
+        self._transport.send(data)
+
+
 def parse_address(text: str) -> tuple[str, int]:
     """Host and port of ``HOST:PORT``; an IPv6 address stands in brackets.
 
@@ -62,6 +97,34 @@ def parse_address(text: str) -> tuple[str, int]:
 
 def _family(host: str) -> socket.AddressFamily:
     return socket.AF_INET6 if ":" in host else socket.AF_INET
+
+
+def listening(host: str, port: int, *, refused: str, buffer: int = 0) -> socket.socket:
+    """Return a socket that listens for datagrams and never waits.
+
+    Parameters
+    ----------
+    host, port : str, int
+        To listen at; port 0 takes any that is free.
+    refused : str
+        What is said if the address cannot be taken, the system's reason behind it.
+    buffer : int
+        Bytes that the system may keep while nobody reads; 0 leaves its own number.
+
+    Raises
+    ------
+    RigError
+        If the address cannot be taken.
+    """
+    try:
+        one = socket.socket(_family(host), socket.SOCK_DGRAM)
+        if buffer:
+            one.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, buffer)
+        one.bind((host, port))
+    except OSError as error:
+        raise RigError(f"{refused}: {error}") from error
+    one.setblocking(False)
+    return one
 
 
 class UdpClient:
@@ -137,13 +200,9 @@ class UdpServer:
     """
 
     def __init__(self, host: str, port: int) -> None:
-        try:
-            self._socket = socket.socket(_family(host), socket.SOCK_DGRAM)
-            self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, _BUFFER)
-            self._socket.bind((host, port))
-        except OSError as error:
-            raise RigError(f"udp://{host}:{port} cannot be taken: {error}") from error
-        self._socket.setblocking(False)
+        self._socket = listening(
+            host, port, refused=f"udp://{host}:{port} cannot be taken", buffer=_BUFFER
+        )
         self.peer: object = None
 
     @property
