@@ -20,7 +20,7 @@ from hmpim.identify.effects.imperfections import (
 )
 from hmpim.identify.effects.lost import stands_out
 from hmpim.identify.fitting.enrich import PLAIN
-from hmpim.identify.fitting.joint import JointFit
+from hmpim.identify.fitting.trial import JointFit
 from hmpim.identify.groups import EVERY
 from hmpim.identify.judgement import judged
 from hmpim.identify.pair import described, untold

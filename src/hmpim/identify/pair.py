@@ -11,8 +11,8 @@ from hmpim.identify.coupling.several import Joined
 from hmpim.identify.effects.drift import Drifting, drift_finding
 from hmpim.identify.effects.imperfections import Imperfections, refine, with_imperfections
 from hmpim.identify.fitting.fit import Fit
-from hmpim.identify.fitting.joint import JointFit
 from hmpim.identify.fitting.plainer import plainer, taking
+from hmpim.identify.fitting.trial import JointFit
 from hmpim.identify.frf.local import local_response
 from hmpim.identify.judgement import Evidence, attempt, judge
 from hmpim.identify.nonlinear.nonlinearity import inspect_nonlinearity

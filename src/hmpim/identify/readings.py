@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hmpim.identify.fitting.fit import jacobian
-from hmpim.identify.fitting.joint import JointFit
 from hmpim.identify.fitting.nested import widened
+from hmpim.identify.fitting.trial import JointFit
 from hmpim.identify.result import Estimate, Parameters
 from hmpim.identify.uncertainty import covariance, estimate, gradient, noise_estimate
 from hmpim.identify.whiteness import autoregressive_spectrum, is_white
@@ -115,17 +115,15 @@ def read_parameters(
     vector = np.concatenate([fit.theta, fit.linear])
     weighed = joint.weighed
     freedom = max(weighed.counted - vector.size, 1)
-    share = joint.effective_share if weighed.noise is None else 1.0
     residual = weighed.innovations(fit.prediction, fit.residual)
-    counts = weighed.valid if weighed.told is None else weighed.told
-    white = is_white(residual if counts is None else residual[counts])
+    white = is_white(residual if weighed.counts is None else residual[weighed.counts])
     rows = jacobian(weighed, fit)
     cov = known_covariance
     if cov is None:
         cov = widened(joint, _covariance(joint, rows, residual, freedom=freedom, white=white))
     if weighed.noise is not None:
         cov = _wandering(cov, fit.residual, joint.problem.counted)
-    effective = freedom * share
+    effective = freedom * joint.weighed_share
     system = system_of(structure, vector, fs)
 
     def explicit(function: Callable[[_Vector], float], unit: str) -> Estimate:

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hmpim.identify.fitting.joint import Trial
+from hmpim.identify.fitting.trial import Trial
 from hmpim.identify.groups import PHASE_SPLIT
 from hmpim.identify.judgement.between_samples import other_intersample
 from hmpim.identify.judgement.structure import missed_pole, other_structure, undecided_order

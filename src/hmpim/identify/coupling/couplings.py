@@ -14,9 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import rfft
 
+from hmpim.identify.fitting.candidates import nested
 from hmpim.identify.fitting.fit import Fit, Problem, fit_structure
-from hmpim.identify.fitting.joint import JointFit, Trial, nested
 from hmpim.identify.fitting.start import RoughResponse, rough_response, starting_values
+from hmpim.identify.fitting.trial import JointFit, Trial
 from hmpim.identify.whiteness import effective_share, is_white
 from hmpim.model.dynamics import STRUCTURES, StructureName
 from hmpim.record import Intersample

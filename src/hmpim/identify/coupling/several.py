@@ -19,7 +19,8 @@ from hmpim.identify.coupling.lag import Lag, lag_of
 from hmpim.identify.fitting.enrich import PLAIN
 from hmpim.identify.fitting.fit import Fit, Problem, jacobian
 from hmpim.identify.fitting.fit import fit_together as fit_all
-from hmpim.identify.fitting.joint import JointFit, joint_fit
+from hmpim.identify.fitting.joint import joint_fit
+from hmpim.identify.fitting.trial import JointFit
 from hmpim.identify.whiteness import effective_share, is_white
 from hmpim.model.dynamics import StructureName
 from hmpim.model.response import slowest_time_constant

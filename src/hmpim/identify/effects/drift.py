@@ -16,7 +16,7 @@ from scipy.fft import rfft
 from hmpim.identify.effects.colour import bias_drift
 from hmpim.identify.fitting.enrich import PLAIN
 from hmpim.identify.fitting.fit import jacobian, solved, without
-from hmpim.identify.fitting.joint import JointFit, Trial
+from hmpim.identify.fitting.trial import JointFit, Trial
 from hmpim.identify.uncertainty import covariance
 from hmpim.identify.whiteness import innovation_gain, is_white
 from hmpim.model import slowest_time_constant

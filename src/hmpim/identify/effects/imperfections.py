@@ -18,11 +18,10 @@ from hmpim.identify.effects.lost import find_frozen, find_spikes
 from hmpim.identify.effects.quantization import Quantization, detect_quantization
 from hmpim.identify.effects.saturation import Saturation, detect_saturation
 from hmpim.identify.fitting.enrich import PLAIN
-from hmpim.identify.fitting.joint import JointFit, Trial
+from hmpim.identify.fitting.trial import JointFit, Trial
 from hmpim.identify.groups import EVERY, MODELLED
 from hmpim.identify.result import Parameters
 from hmpim.identify.uncertainty import estimate
-from hmpim.model import slowest_time_constant
 from hmpim.record import Finding
 
 __all__ = ["Imperfections", "count_levels", "find_imperfections", "refine", "with_imperfections"]
@@ -38,9 +37,6 @@ _MOST_CLIPPED = 0.85
 
 _MUCH_CLIPPED = 0.4
 """Share beyond which what is found is doubtful: a rectifier clips half."""
-
-_FORGETS = 5.0
-"""Time constants after which what came before the record is forgotten (0.7 % left)."""
 
 _FEWEST_LEVELS = 8
 """Levels that an output must take, unless its input takes as few."""
@@ -195,8 +191,7 @@ def refine(
 
 def _settled(joint: JointFit) -> int:
     """Samples after which the state that a record begins with is forgotten."""
-    slowest = slowest_time_constant(joint.best.fit.denominator)
-    return min(int(np.ceil(_FORGETS * slowest)), joint.problem.y.size // 4)
+    return min(int(np.ceil(joint.best.fit.memory)), joint.problem.y.size // 4)
 
 
 def _worth_refining(joint: JointFit, found: Imperfections) -> list[Trial]:

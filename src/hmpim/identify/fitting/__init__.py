@@ -1,12 +1,19 @@
 """The joint fit: every parameter at once, structure and starting values from the data.
 
-fit           one structure from one start, by least squares
-start         starting values: delay and denominator from spectra
-joint         all structures, all assumptions between the samples, and the choice
-enrich        the richer structures
-unexplained   what of the response a fit leaves over
-plainer       a plain structure beside a rich one
-nested        one pole or two: what the record cannot tell
-unrelated     whether an output follows its input at all
-halves        whether the halves of a record agree
+fit             one structure from one start, by least squares
+rows, sections  what each linear parameter multiplies; poles in sections
+start           starting values: delay and denominator from spectra
+joint           all structures, all assumptions between the samples, and the choice
+data            what all trials of a joint fit share
+candidates      fits of every structure, under each assumption
+enrich          which richer structures to try, and where from
+beginning       which samples count, and whether the record begins at rest
+whitening       the noise of all trials, and whether whitening may be trusted
+autoregression  the noise as an autoregression
+trial           what was tried, and what is chosen of it
+unexplained     what of the response a fit leaves over
+plainer         a plain structure beside a rich one
+nested          one pole or two: what the record cannot tell
+unrelated       whether an output follows its input at all
+halves          whether the halves of a record agree
 """

@@ -38,9 +38,6 @@ INTEGRATING: tuple[StructureName, ...] = (
     "integrator_second_order",
 )
 
-_PLAIN_OF: tuple[StructureName, ...] = PLAIN
-"""The plain structure of each order."""
-
 _DELAYS = 7
 """How many delays to start from, about that of the best fit so far."""
 
@@ -63,7 +60,7 @@ def integrator_starts(rough: RoughResponse, structure: Structure) -> list[NDArra
     structure : Structure
         An integrator, alone or with a lag.
     """
-    rest = STRUCTURES[_PLAIN_OF[structure.order]]
+    rest = STRUCTURES[PLAIN[structure.order]]  # the plain one of each order
     return starting_values(rough, rest, earliest=-2)
 
 

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from hmpim.identify.fitting.rows import Part, Problem
 from hmpim.model.dynamics import Structure, coefficients_of, denominator_of
+from hmpim.model.response import slowest_time_constant
 
 __all__ = ["Fit", "Problem", "fit_structure", "fit_together", "jacobian", "solved", "without"]
 
@@ -27,6 +28,9 @@ _SHORTEST_TIME_CONSTANT = 0.02
 
 _SHAPES = (1e-4, 1e6)
 """Bounds of 1 / (4ζ²): from a second pole 10 000 times as fast as the first, to ζ = 0.0005."""
+
+_FORGETS = 5.0
+"""Time constants after which what came before is forgotten (0.7 % left)."""
 
 _UNSEEN = 1e-13
 """Share of the greatest eigenvalue below which the record does not see a direction."""
@@ -84,6 +88,11 @@ class Fit:
     def denominator(self) -> Real:
         """A(s) by rising powers of s per sample, shape (order + 1,)."""
         return denominator_of(self.structure, coefficients_of(self.structure, self.theta[1:]))
+
+    @property
+    def memory(self) -> float:
+        """Samples after which a state is forgotten: five times the slowest time constant."""
+        return _FORGETS * slowest_time_constant(self.denominator)
 
 
 class _Evaluation:

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hmpim.identify.fitting.fit import Fit, Problem, fit_structure
-from hmpim.identify.fitting.joint import JointFit
+from hmpim.identify.fitting.trial import JointFit
 from hmpim.identify.uncertainty import covariance
 from hmpim.model.dynamics import STRUCTURES
 from hmpim.model.sampled import delayed_response
@@ -75,8 +75,7 @@ def widened(joint: JointFit, cov: NDArray[np.float64]) -> NDArray[np.float64]:
 
 def _deviance(simple: Fit, joint: JointFit) -> float:
     """Twice the log-likelihood by which the chosen fit beats a simpler one."""
-    share = joint.effective_share if joint.weighed.noise is None else 1.0
-    count = joint.weighed.counted * share
+    count = joint.weighed.counted * joint.weighed_share
     return float(count * np.log(max(simple.objective / joint.best.fit.objective, 1.0)))
 
 

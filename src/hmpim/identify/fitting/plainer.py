@@ -6,7 +6,7 @@ import numpy as np
 
 from hmpim.identify.fitting.enrich import PLAIN
 from hmpim.identify.fitting.fit import Fit, fit_structure
-from hmpim.identify.fitting.joint import JointFit, Trial
+from hmpim.identify.fitting.trial import JointFit, Trial
 from hmpim.identify.whiteness import effective_share
 
 __all__ = ["plainer", "taking"]

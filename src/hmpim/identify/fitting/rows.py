@@ -64,8 +64,12 @@ class Problem:
     @property
     def counted(self) -> int:
         """How many samples count."""
-        counts = self.valid if self.told is None else self.told
-        return self.y.size if counts is None else int(np.count_nonzero(counts))
+        return self.y.size if self.counts is None else int(np.count_nonzero(self.counts))
+
+    @property
+    def counts(self) -> NDArray[np.bool_] | None:
+        """Samples whose residual, whitened where noise is, counts; None when all do."""
+        return self.valid if self.told is None else self.told
 
     def masked(self, rows: Real) -> Real:
         """Return `rows`, (k, n) or (n,), samples that do not count set to 0, noise whitened."""

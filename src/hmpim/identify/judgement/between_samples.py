@@ -1,6 +1,6 @@
 """Other assumptions on what the input does between its samples, and what they would move."""
 
-from hmpim.identify.fitting.joint import CLEARLY, JointFit
+from hmpim.identify.fitting.trial import CLEARLY, JointFit
 from hmpim.identify.groups import PHASE_SPLIT
 from hmpim.identify.judgement.evidence import Evidence, structure_in_words
 from hmpim.record import Finding

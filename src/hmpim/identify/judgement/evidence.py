@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from hmpim.identify.fitting.joint import JointFit
+from hmpim.identify.fitting.trial import JointFit
 from hmpim.identify.readings import Readings
 from hmpim.identify.result import ResponseBandwidths
 from hmpim.identify.whiteness import Misfit

@@ -78,7 +78,7 @@ def halves_disagree(evidence: Evidence) -> tuple[Finding, ...]:
         readings.rows,
         readings.innovations,
         joint.problem.y,
-        share=joint.effective_share if joint.weighed.noise is None else 1.0,
+        share=joint.weighed_share,
     )
     if halves.probability >= _PARTED or halves.owed <= _TOLERATED_MISFIT:
         return ()

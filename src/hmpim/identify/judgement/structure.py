@@ -3,8 +3,8 @@
 import numpy as np
 
 from hmpim.identify.fitting.enrich import PLAIN
-from hmpim.identify.fitting.joint import Trial
 from hmpim.identify.fitting.nested import hidden_pole
+from hmpim.identify.fitting.trial import Trial
 from hmpim.identify.groups import PHASE_SPLIT
 from hmpim.identify.judgement.evidence import Evidence, structure_in_words
 from hmpim.identify.readings import system_of

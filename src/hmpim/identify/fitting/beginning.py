@@ -1,0 +1,96 @@
+"""Which samples count, and whether the record begins at rest."""
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import chdtri
+
+from hmpim.identify.fitting.data import Data, Seen
+from hmpim.identify.fitting.fit import Fit, Problem, jacobian, solved
+from hmpim.identify.fitting.rows import Part
+from hmpim.identify.whiteness import effective_share
+from hmpim.record import Intersample
+
+__all__ = ["count_in"]
+
+_REACH = 4
+"""Samples by which what lies between the samples reaches back: half of a spline's support."""
+
+_REST = 1e-4
+"""Chance of taking a record at rest for one in mid-motion."""
+
+_TWICE = 2.0
+"""Factor on what the beginning may hold, for noise that is not white or not Gaussian."""
+
+
+def count_in(
+    data: Data,
+    mode: Intersample,
+    fits: list[Fit],
+    seen: Seen,
+    known: NDArray[np.bool_] | None,
+) -> Seen:
+    """Samples that count once it is known how the system remembers, and where it begins."""
+    fit = min(fits, key=lambda f: f.objective)
+    ahead = _ahead(fits)
+    begins = _begins(data.problem(mode, seen), fit)
+    if begins is None and not ahead and known is None:
+        return seen
+    n = fit.residual.size
+    counted = np.ones(n, dtype=bool) if seen.valid is None else seen.valid.copy()
+    counted[: begins or 0] = False
+    counted[n - ahead :] = False
+    if known is not None:
+        counted &= _unaffected(known, _memory(fits))
+    return Seen(valid=counted, begins=begins)
+
+
+def _begins(problem: Problem, fit: Fit) -> int | None:
+    """Sample from which on an unknown state must be fitted; None for a record at rest.
+
+    A score test (C. R. Rao, Proc. Camb. Phil. Soc. 44, 1948) of the free responses beside all other
+    parameters, and a chi-squared test of what comes before them, when the output still answers
+    input before the record.
+    """
+    begins = int(np.ceil(max(fit.delay, 0.0))) + _REACH
+    if begins > problem.y.size // 2 or fit.objective <= 0.0:
+        return None
+    free = Part(replace(problem, begins=begins), fit.structure, fit.theta).free
+    late = np.arange(problem.y.size) >= begins
+    valid = late if problem.counts is None else problem.counts & late
+    innovations = problem.innovations(fit.prediction, fit.residual)
+    residual = innovations * late
+    count = int(np.count_nonzero(valid))
+    power = float(residual @ residual)
+    share = effective_share(residual[valid])
+    early = float(innovations[:begins] @ innovations[:begins]) if problem.valid is None else 0.0
+    level = float(np.median(residual[valid] ** 2)) / 0.455  # of a squared Gaussian
+    if early > _TWICE * level * chdtri(begins, _REST):
+        return begins
+    if not free.shape[0] or power <= 0.0:
+        return None
+    rows = np.vstack([jacobian(problem, fit), problem.masked(free)]) * valid
+    gained = float((rows @ residual) @ solved(rows @ rows.T, rows @ residual))
+    left = max(power - gained, np.finfo(float).tiny)
+    statistic = share * count * float(np.log(power / left))
+    return begins if statistic > chdtri(free.shape[0], _REST) else None
+
+
+def _memory(fits: list[Fit]) -> int:
+    """Samples after which the output has forgotten its input, by the best fit so far."""
+    fit = min(fits, key=lambda f: f.objective)
+    return min(int(np.ceil(max(fit.delay, 0.0) + fit.memory)) + 2, fit.residual.size // 4)
+
+
+def _ahead(fits: list[Fit]) -> int:
+    """Samples at the end that depend on input after the record, if the delay is negative."""
+    delay = min(fits, key=lambda f: f.objective).delay
+    return int(np.ceil(-delay)) + 3 if delay < 0 else 0
+
+
+def _unaffected(known: NDArray[np.bool_], memory: int) -> NDArray[np.bool_]:
+    """Samples whose output depends on measured input alone."""
+    unknown = np.concatenate([[0], np.cumsum(~known)])
+    index = np.arange(known.size)
+    return np.asarray(unknown[index + 1] == unknown[np.maximum(index - memory, 0)])

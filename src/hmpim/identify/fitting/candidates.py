@@ -1,0 +1,252 @@
+"""Fits of every structure: plain ones, richer ones where asked for, each between the samples."""
+
+from typing import get_args
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hmpim.identify.fitting.data import FOLLOWS, HOPELESS, POOR, Data, Seen, band_of
+from hmpim.identify.fitting.enrich import (
+    INTEGRATING,
+    PLAIN,
+    RICH,
+    integrator_starts,
+    members,
+    proposals,
+)
+from hmpim.identify.fitting.fit import Fit, Problem, fit_structure
+from hmpim.identify.fitting.start import RoughResponse, rough_response, starting_values
+from hmpim.identify.fitting.trial import CLEARLY
+from hmpim.identify.fitting.unexplained import unexplained_response
+from hmpim.identify.whiteness import effective_share, is_white, misfit
+from hmpim.model.dynamics import STRUCTURES, Structure, StructureName
+from hmpim.model.response import slowest_time_constant
+from hmpim.record import Intersample
+
+__all__ = [
+    "almost_integrates",
+    "fit_plain",
+    "fit_rich",
+    "fit_under_each_assumption",
+    "is_worth_explaining",
+    "nested",
+]
+
+_MATERIAL = 0.01
+"""Share of the output (r.m.s.) below which a misfit is reported but not modelled."""
+
+_PARTLY = 0.08
+"""Share of the response, evenly over the band, below which the same holds."""
+
+_LONG_TASTE = 12
+"""Steps from each start of a richer structure, whose valleys are longer."""
+
+_SLOW = 0.3
+"""Time constant, over the record's length, from which an integrator may explain it as well."""
+
+_SURE = 4
+"""Poles up to which a structure may leave more than white noise."""
+
+_AT_ONCE = 4
+"""Richer structures tried before it is asked whether more are needed."""
+
+_TASTE = 4
+"""Steps taken from each start before the best one is followed to its end."""
+
+_FALLING = 4.0
+"""After so many steps a structure is given up if its sum of squares is this far from hopeful."""
+
+_DELAY_SHIFT: dict[Intersample, float] = {"zoh": -0.5, "foh": 0.0, "bandlimited": 0.0}
+"""Samples by which the fitted delay moves when held, against the other two."""
+
+_PRECISION = 1e-2
+"""Precision of a fit that is weighed against others, see `fit_structure`."""
+
+
+def fit_plain(
+    problem: Problem, rough: RoughResponse, structures: tuple[StructureName, ...]
+) -> list[Fit]:
+    """Fit each structure, the richest first, from its own starts and then from the simpler ones.
+
+    A residual that is white needs no other start, and tells which simpler structures are
+    hopeless: those get one start and few steps.
+    """
+    fits: list[Fit] = []
+    settled = False
+    for name in sorted(structures, key=lambda name: -STRUCTURES[name].order):
+        structure = STRUCTURES[name]
+        if settled and name == "first_order":
+            starts = [_without_second_pole(fits[0])]
+        else:
+            starts = starting_values(rough, structure, earliest=-2, thorough=False)
+        steps = 2 if settled else _TASTE
+        fit = fit_structure(problem, structure, starts[0], iterations=steps)
+        hopeful = min((f.objective for f in fits), default=np.inf) * HOPELESS
+        white = fit.objective < hopeful and is_white(fit.residual)
+        if not white and fit.objective < _FALLING * hopeful:
+            rivals = starts[1:]
+            if not settled:
+                rivals += starting_values(rough, structure, earliest=-2)
+            for theta in rivals:
+                rival = fit_structure(problem, structure, theta, iterations=_TASTE)
+                fit = min(fit, rival, key=lambda f: f.objective)
+        settled = settled or white
+        fits.append(fit)
+    for i, fit in enumerate(fits):
+        for other in fits:
+            if _nests(other, fit):
+                rival = fit_structure(problem, fit.structure, nested(other), iterations=_TASTE)
+                fits[i] = min(fits[i], rival, key=lambda f: f.objective)
+    least = min(fit.objective for fit in fits)
+    return [
+        fit
+        if fit.converged or fit.objective > _FALLING * least
+        else fit_structure(problem, fit.structure, fit.theta)
+        for fit in fits
+    ]
+
+
+def fit_rich(
+    data: Data,
+    problem: Problem,
+    fits: list[Fit],
+    structures: tuple[StructureName, ...],
+    *,
+    all_of_them: bool,
+) -> list[Fit]:
+    """Fits of the richer structures, the plainest first, until nothing is left to explain."""
+    best = min(fits, key=lambda fit: fit.objective)
+    integrating = members(structures, INTEGRATING)
+    found: list[Fit] = []
+    if integrating:
+        added = np.cumsum(data.u - data.u[0])
+        rough = rough_response(added, data.y, longest_delay=data.y.size // 2)
+        for structure in integrating:
+            if found and is_white(min(found, key=lambda fit: fit.objective).residual):
+                return found
+            starts = integrator_starts(rough, structure)
+            found.append(_best_of(problem, structure, starts, [*fits, *found]))
+        if is_white(min(found, key=lambda fit: fit.objective).residual):
+            return found
+    proposed = proposals(data.rough, members(structures, RICH), best, all_of_them=all_of_them)
+    for start in range(0, len(proposed), _AT_ONCE):
+        some = proposed[start : start + _AT_ONCE]
+        for p in some:
+            found.append(_best_of(problem, p.structure, list(p.starts), [*fits, *found]))
+        best = min(found, key=lambda fit: fit.objective)
+        if not is_worth_explaining(problem, best, data) and is_white(best.residual):
+            break
+    if found and not is_white(min(found, key=lambda fit: fit.objective).residual):
+        # Poles without end follow what no linear model describes: friction, rounding.
+        found = [fit for fit in found if fit.structure.order <= _SURE]
+    return found
+
+
+def _best_of(
+    problem: Problem, structure: Structure, starts: list[NDArray[np.float64]], rivals: list[Fit]
+) -> Fit:
+    """The best of several starts, followed to its end if it may lead.
+
+    What is left over in colour has few independent samples: a step that gains less than one of
+    those could tell is not worth making.
+    """
+    leading = min(rivals, key=lambda fit: fit.objective)
+    precision = _PRECISION / effective_share(leading.residual)
+    tried = [
+        fit_structure(problem, structure, theta, iterations=_LONG_TASTE, precision=precision)
+        for theta in starts
+    ]
+    best = min(tried, key=lambda fit: fit.objective)
+    if best.converged or best.objective > HOPELESS * leading.objective:
+        return best
+    return fit_structure(problem, structure, best.theta, precision=precision)
+
+
+def is_worth_explaining(problem: Problem, fit: Fit, data: Data) -> bool:
+    """Whether the residual follows the input by more than a small share of output or response."""
+    band = band_of(data)
+    left = misfit(data.u, fit.residual, delay=fit.delay, band=band)
+    spread = float(np.sum((problem.masked(problem.y - problem.y.mean())) ** 2))
+    owed = float(np.sqrt(left.share * fit.cost / spread)) if spread else 0.0
+    if left.probability < FOLLOWS and (owed > _MATERIAL or _misses_part(problem, fit, data, band)):
+        return True
+    return fit.cost > POOR * spread and not is_white(fit.residual)
+
+
+def almost_integrates(fit: Fit) -> bool:
+    """Whether the slowest pole is as slow as the record is long."""
+    return slowest_time_constant(fit.denominator) > _SLOW * fit.residual.size
+
+
+def _misses_part(problem: Problem, fit: Fit, data: Data, band: tuple[float, float]) -> bool:
+    """Whether the response is missed where the output hardly moves, as at the end of a sweep."""
+    span = slice(None)
+    if problem.valid is not None:
+        counted = np.flatnonzero(problem.valid)
+        span = slice(int(counted[0]), int(counted[-1]) + 1)
+        if counted.size < counted[-1] + 1 - counted[0]:
+            return False  # spectra do not bear gaps
+    missed = unexplained_response(
+        data.u[span], data.y[span], fit.residual[span], delay=fit.delay, band=band
+    )
+    return missed > _PARTLY
+
+
+def _nests(simple: Fit, rich: Fit) -> bool:
+    """Whether the simpler structure is a start for a richer one that may have missed its best."""
+    return (
+        simple.structure.name == "first_order"
+        and rich.structure.name == "second_order"
+        and (simple.objective <= rich.objective or not is_white(rich.residual))
+    )
+
+
+def _without_second_pole(second_order: Fit) -> NDArray[np.float64]:
+    """First order from second: a fast second pole counts as delay."""
+    delay, log_lag, shape = second_order.theta
+    return np.array([delay + min(shape, 0.25) * np.exp(log_lag), log_lag])
+
+
+def nested(first_order: Fit) -> NDArray[np.float64]:
+    """First order as second: a quarter of its time constant moved into a second pole."""
+    return np.concatenate([first_order.theta, [0.1875]])  # (1 + 3/4 Ts)(1 + 1/4 Ts)
+
+
+def _moved(problem: Problem, fit: Fit, origin: Intersample, mode: Intersample) -> Fit:
+    """Fit the same structure under another assumption, from where the first one ended."""
+    theta = fit.theta.copy()
+    theta[0] += _DELAY_SHIFT[mode] - _DELAY_SHIFT[origin]
+    return fit_structure(problem, fit.structure, theta)
+
+
+def fit_under_each_assumption(
+    data: Data,
+    natural: Intersample,
+    fits: list[Fit],
+    seen: Seen,
+    *,
+    alone: bool,
+) -> list[tuple[Intersample, Fit]]:
+    """Add to fits under the natural assumption those under the others, unless it stands alone."""
+    fitted = [(natural, fit) for fit in fits]
+    if alone:
+        return fitted
+    least = min(fit.objective for fit in fits)
+    leading = [fit for fit in fits if fit.objective < HOPELESS * least]
+    trailing = [
+        fit for fit in fits if fit.objective >= HOPELESS * least and fit.structure.name in PLAIN
+    ]
+    others = [mode for mode in get_args(Intersample) if mode != natural]
+
+    def moved(some: list[Fit]) -> list[tuple[Intersample, Fit]]:
+        return [
+            (mode, _moved(data.problem(mode, seen), fit, natural, mode))
+            for mode in others
+            for fit in some
+        ]
+
+    fitted += moved(leading)
+    count = data.problem(natural, seen).counted
+    if min(fit.objective for _, fit in fitted) < least * (1.0 - 2 * CLEARLY / count):
+        fitted += moved(trailing)  # hopeless under a wrong assumption, perhaps not under this
+    return fitted

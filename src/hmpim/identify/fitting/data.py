@@ -1,0 +1,88 @@
+"""What all trials of one joint fit share."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hmpim.identify.fitting.fit import Fit, Problem, fit_structure
+from hmpim.identify.fitting.start import RoughResponse
+from hmpim.identify.whiteness import misfit
+from hmpim.model.sampled import SampledInput, prepare_input
+from hmpim.record import Intersample
+
+__all__ = [
+    "FINAL_PRECISION",
+    "FOLLOWS",
+    "HOPELESS",
+    "POOR",
+    "Data",
+    "Seen",
+    "band_of",
+    "follows",
+    "refit",
+]
+
+FOLLOWS = 1e-4
+"""Chance below which what is left over follows the input."""
+
+HOPELESS = 2.0
+"""A structure whose sum of squares is this many times the least is not tried again at once
+under the other assumptions."""
+
+POOR = 0.2
+"""Share of the output's power left over, in colour, that asks for a richer structure anyway."""
+
+FINAL_PRECISION = 1e-6
+"""Precision of the chosen fit, see `fit_structure`."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Seen:
+    """Which samples count, and from where on the state that a record begins with is fitted."""
+
+    valid: NDArray[np.bool_] | None
+    begins: int | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Data:
+    """What every trial shares; inputs are prepared for an assumption when first asked for."""
+
+    u: NDArray[np.float64]
+    y: NDArray[np.float64]
+    sources: dict[Intersample, SampledInput]
+    rough: RoughResponse
+    nuisance: NDArray[np.float64] | None
+    noise: NDArray[np.float64] | None = None
+
+    def problem(self, mode: Intersample, seen: Seen) -> Problem:
+        """The data under one assumption, with the samples that count."""
+        if mode not in self.sources:
+            self.sources[mode] = prepare_input(self.u, mode)
+        problem = Problem(
+            source=self.sources[mode],
+            y=self.y,
+            valid=seen.valid,
+            longest_delay=self.y.size // 2 + 2.0,
+            nuisance=self.nuisance,
+            begins=seen.begins,
+        )
+        return problem if self.noise is None else problem.coloured(self.noise)
+
+
+def band_of(data: Data) -> tuple[float, float]:
+    """Band in which a response was sought, in cycles per sample."""
+    omega = data.rough.omega
+    return float(omega[0] / (2 * np.pi)), float(omega[-1] / (2 * np.pi))
+
+
+def follows(data: Data, fit: Fit) -> bool:
+    """Whether what a fit leaves over still follows the input."""
+    left = misfit(data.u, fit.residual, delay=fit.delay, band=band_of(data))
+    return left.probability < FOLLOWS
+
+
+def refit(problem: Problem, fit: Fit) -> Fit:
+    """Fit the same structure to other data, from where it ended."""
+    return fit_structure(problem, fit.structure, fit.theta)

@@ -1,0 +1,95 @@
+"""The noise of a joint fit: one autoregression, for starts and for the weighing."""
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import lfilter
+from scipy.special import chdtri
+
+from hmpim.identify.fitting.autoregression import autoregression
+from hmpim.identify.fitting.data import (
+    FINAL_PRECISION,
+    FOLLOWS,
+    HOPELESS,
+    POOR,
+    Data,
+    Seen,
+    follows,
+)
+from hmpim.identify.fitting.fit import Fit, Problem, fit_structure, jacobian
+from hmpim.identify.fitting.start import rough_response
+from hmpim.identify.fitting.trial import Trial
+from hmpim.identify.uncertainty import covariance
+from hmpim.record import Intersample
+
+__all__ = ["is_contradicted", "noise_of", "prewhitened_of", "refit_whitened"]
+
+_HIDES = 0.1
+"""Share of a residual's power that is not foreseen, below which its colour may hide a response."""
+
+_RETURNS = 12
+"""Steps that a fit is taken once more when only the noise model has changed."""
+
+
+def prewhitened_of(data: Data, mode: Intersample, fits: list[Fit], seen: Seen) -> Data | None:
+    """Data with the noise whitened, where its colour hides the response; None elsewhere.
+
+    Input and output are filtered alike, so that the response stays: starts are sought in what a
+    wander or a line leaves free.
+    """
+    fit = min(fits, key=lambda f: f.objective)
+    noise = autoregression(fit.residual, seen.valid)
+    problem = data.problem(mode, seen)
+    spread = problem.masked(problem.y - problem.y.mean())
+    if noise.size == 1 or fit.cost < POOR * float(spread @ spread):
+        return None
+    whitened = problem.coloured(noise)
+    left = whitened.innovations(fit.prediction, fit.residual)
+    if float(left @ left) > _HIDES * fit.cost:
+        return None
+    u, y = (lfilter(noise, np.ones(1), x - x.mean()) for x in (data.u, data.y))
+    y = y if seen.valid is None else y * whitened.told
+    rough = rough_response(u[noise.size :], y[noise.size :], longest_delay=data.u.size // 2)
+    return replace(data, noise=noise, rough=rough)
+
+
+def noise_of(problem: Problem, fit: Fit, data: Data) -> NDArray[np.float64] | None:
+    """Autoregression of what the best fit leaves over; None where that still follows the input.
+
+    What follows the input is no noise, and whitening it would hide what a model lacks.
+    """
+    if follows(data, fit):
+        return None
+    noise = autoregression(fit.residual, problem.valid)
+    return noise if noise.size > 1 else None
+
+
+def refit_whitened(
+    data: Data, fitted: list[tuple[Intersample, Fit]], seen: Seen
+) -> list[tuple[Intersample, Fit]]:
+    """All fits once more under one noise model, the hopeless ones as they are."""
+    least = min(fit.objective for _, fit in fitted)
+    out = []
+    for mode, fit in fitted:
+        steps = _RETURNS if fit.objective < HOPELESS * least else 0
+        problem = data.problem(mode, seen)
+        out.append((mode, fit_structure(problem, fit.structure, fit.theta, iterations=steps)))
+    return out
+
+
+def is_contradicted(data: Data, best: Trial, seen: Seen) -> bool:
+    """Whether whitening moves the estimate farther than noise could.
+
+    A right model is estimated without bias with the noise whitened or not; where the two part,
+    what is left over is no noise but what the model lacks (J. A. Hausman, Econometrica 46, 1978).
+    """
+    problem = replace(data, noise=None).problem(best.intersample, seen)
+    plain = fit_structure(problem, best.fit.structure, best.fit.theta, precision=FINAL_PRECISION)
+    rows = jacobian(problem, plain)
+    freedom = max(problem.counted - rows.shape[0], 1)
+    unknown = plain.theta.size
+    cov = covariance(rows, plain.residual, freedom=freedom, white=False)[:unknown, :unknown]
+    apart = plain.theta - best.fit.theta
+    statistic = float(apart @ np.linalg.pinv(cov, rcond=1e-12, hermitian=True) @ apart)
+    return not statistic < chdtri(unknown, FOLLOWS)
