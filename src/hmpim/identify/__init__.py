@@ -1,5 +1,6 @@
 """Identification: from a record to every parameter, each with its error bar (paper, section IV)."""
 
+from hmpim.identify.alike import same_at_levels
 from hmpim.identify.compare import Change, compare
 from hmpim.identify.frf.averaged import Averaged, averaged_response, coherence_significance
 from hmpim.identify.frf.local import local_polynomial_response, local_response
@@ -21,7 +22,6 @@ from hmpim.identify.repeats import (
     RepeatedParameter,
     Repeats,
     identify_repeats,
-    same_at_levels,
 )
 from hmpim.identify.result import (
     Alike,

@@ -13,7 +13,8 @@ import numpy as np
 from scipy.stats import chi2
 
 from hmpim.arguments import checked
-from hmpim.errors import ArgumentError, RecordError
+from hmpim.errors import ArgumentError
+from hmpim.identify.alike import check_channels
 from hmpim.identify.identify import identify
 from hmpim.identify.result import Estimate, Identification, PairIdentification, Parameters
 from hmpim.model.dynamics import StructureName
@@ -189,13 +190,7 @@ def identify_levels(
             f"{len(given)} records and {len(amplitudes)} amplitudes do not go together; "
             "give one amplitude for each"
         )
-    names = [[c.name for c in (*r.inputs, *r.outputs)] for r in given]
-    for k, own in enumerate(names):
-        if own != names[0]:
-            raise RecordError(
-                f"record {k} has channels {', '.join(own)} and record 0 has "
-                f"{', '.join(names[0])}; give the same channels in the same order"
-            )
+    check_channels(given)
     results = [identify(r, intersample=intersample, structures=structures) for r in given]
     comparisons = []
     for pair in results[0].pairs:

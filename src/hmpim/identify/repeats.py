@@ -16,6 +16,7 @@ from scipy.stats import f as fisher
 
 from hmpim.arguments import checked
 from hmpim.errors import RecordError
+from hmpim.identify.alike import check_alike, check_apart
 from hmpim.identify.groups import EVERY, MODELLED, PHASE_SPLIT
 from hmpim.identify.identify import identify
 from hmpim.identify.judgement import judged_together
@@ -30,14 +31,12 @@ from hmpim.identify.result.lookup import find_pair
 from hmpim.identify.uncertainty import estimate, noise_estimate
 from hmpim.identify.whiteness import effective_share
 from hmpim.model.dynamics import StructureName
-from hmpim.record import Finding, Intersample, Record, uniform
+from hmpim.record import Finding, Intersample, Record
 
-__all__ = ["RepeatedPair", "RepeatedParameter", "Repeats", "identify_repeats", "same_at_levels"]
+__all__ = ["RepeatedPair", "RepeatedParameter", "Repeats", "identify_repeats"]
 
 SCHEMA = "hmpim/repeats/1"
 
-# Inputs of two repeats are the same if their difference is at most this share of their size.
-_SAME = 0.05
 # Chance of doubting right error bars, on either side.
 _DOUBT = 0.005
 # A whole number of samples, which may well be the same every time.
@@ -236,8 +235,8 @@ def identify_repeats(
         raise RecordError(
             f"{len(given)} record is given; repeatability needs at least 2 of one stimulus"
         )
-    _check_alike(given)
-    _check_apart(given)
+    check_alike(given)
+    check_apart(given)
     results = tuple(
         identify(record, intersample=intersample, structures=structures) for record in given
     )
@@ -248,82 +247,6 @@ def identify_repeats(
             for pair in results[0].pairs
         ),
     )
-
-
-def same_at_levels(records: Sequence[Record]) -> bool:
-    """Whether records are of one stimulus at several amplitudes, rather than repeats of it.
-
-    Parameters
-    ----------
-    records : sequence of Record
-        With the same channels.
-
-    Returns
-    -------
-    bool
-        True if the inputs are the same but for a factor, and that factor is not 1 for all.
-
-    Examples
-    --------
-    >>> u = np.sin(np.arange(100.0) ** 2 / 300)
-    >>> small, large = (Record.from_arrays({"u": k * u}, {"y": u}, fs=9.0) for k in (1, 3))
-    >>> same_at_levels([small, large]), same_at_levels([small, small])
-    (True, False)
-    """
-    aligned = [uniform(record) for record in records]
-    changed = False
-    for other in aligned[1:]:
-        if len(other.inputs) != len(aligned[0].inputs):
-            return False
-        for one, two in zip(aligned[0].inputs, other.inputs, strict=True):
-            length = min(one.values.size, two.values.size)
-            first, second = (x.values[:length] - x.values[:length].mean() for x in (one, two))
-            power = float(first @ first)
-            factor = float(first @ second) / power if power else 0.0
-            rest = float(np.linalg.norm(second - factor * first))
-            if not factor > 0 or rest > _SAME * float(np.linalg.norm(second)):
-                return False
-            changed = changed or abs(factor - 1) > _SAME
-    return changed
-
-
-def _check_alike(records: tuple[Record, ...]) -> None:
-    first = records[0]
-    names = [[c.name for c in (*r.inputs, *r.outputs)] for r in records]
-    aligned = [uniform(record) for record in records]
-    for k, record in enumerate(records[1:], start=1):
-        if names[k] != names[0]:
-            raise RecordError(
-                f"record {k} has channels {', '.join(names[k])} and record 0 has "
-                f"{', '.join(names[0])}; give the same channels in the same order"
-            )
-        if abs(record.fs / first.fs - 1) > 1e-3:
-            raise RecordError(
-                f"record {k} is at {record.fs:g} Hz and record 0 at {first.fs:g} Hz; resample one"
-            )
-        for one, other in zip(aligned[0].inputs, aligned[k].inputs, strict=True):
-            length = min(one.values.size, other.values.size)
-            apart = float(np.std(one.values[:length] - other.values[:length]))
-            size = float(np.std(one.values[:length]))
-            if apart > _SAME * size:
-                raise RecordError(
-                    f"input {one.name!r} of record {k} differs from that of record 0 by "
-                    f"{100 * apart / size if size else np.inf:.3g} % (r.m.s.); repeats need one "
-                    "stimulus, from the same start"
-                )
-
-
-def _check_apart(records: tuple[Record, ...]) -> None:
-    """One record given twice tells nothing of repeatability; its noise would be the same noise."""
-    seen: dict[bytes, int] = {}
-    for k, record in enumerate(records):
-        measured = b"".join(channel.values.tobytes() for channel in record.outputs)
-        if measured in seen:
-            raise RecordError(
-                f"records {seen[measured]} and {k} hold the same samples; one record given twice "
-                "is not two repeats, so repeat the test"
-            )
-        seen[measured] = k
 
 
 def _pair(found: tuple[PairIdentification, ...]) -> RepeatedPair:

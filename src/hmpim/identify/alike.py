@@ -1,0 +1,96 @@
+"""Whether records are of one test: repeats, one stimulus at several levels, or one record twice."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from hmpim.errors import RecordError
+from hmpim.record import Record, uniform
+
+__all__ = ["check_alike", "check_apart", "check_channels", "same_at_levels"]
+
+# Inputs of two repeats are the same if their difference is at most this share of their size.
+_SAME = 0.05
+
+
+def same_at_levels(records: Sequence[Record]) -> bool:
+    """Whether records are of one stimulus at several amplitudes, rather than repeats of it.
+
+    Parameters
+    ----------
+    records : sequence of Record
+        With the same channels.
+
+    Returns
+    -------
+    bool
+        True if the inputs are the same but for a factor, and that factor is not 1 for all.
+
+    Examples
+    --------
+    >>> u = np.sin(np.arange(100.0) ** 2 / 300)
+    >>> small, large = (Record.from_arrays({"u": k * u}, {"y": u}, fs=9.0) for k in (1, 3))
+    >>> same_at_levels([small, large]), same_at_levels([small, small])
+    (True, False)
+    """
+    aligned = [uniform(record) for record in records]
+    changed = False
+    for other in aligned[1:]:
+        if len(other.inputs) != len(aligned[0].inputs):
+            return False
+        for one, two in zip(aligned[0].inputs, other.inputs, strict=True):
+            length = min(one.values.size, two.values.size)
+            first, second = (x.values[:length] - x.values[:length].mean() for x in (one, two))
+            power = float(first @ first)
+            factor = float(first @ second) / power if power else 0.0
+            rest = float(np.linalg.norm(second - factor * first))
+            if not factor > 0 or rest > _SAME * float(np.linalg.norm(second)):
+                return False
+            changed = changed or abs(factor - 1) > _SAME
+    return changed
+
+
+def check_channels(records: Sequence[Record]) -> None:
+    """Refuse records of which one has other channels than the first."""
+    names = [[c.name for c in (*r.inputs, *r.outputs)] for r in records]
+    for k, own in enumerate(names):
+        if own != names[0]:
+            raise RecordError(
+                f"record {k} has channels {', '.join(own)} and record 0 has "
+                f"{', '.join(names[0])}; give the same channels in the same order"
+            )
+
+
+def check_alike(records: tuple[Record, ...]) -> None:
+    """Refuse records that are no repeats: other channels, rates or inputs."""
+    check_channels(records)
+    first = records[0]
+    aligned = [uniform(record) for record in records]
+    for k, record in enumerate(records[1:], start=1):
+        if abs(record.fs / first.fs - 1) > 1e-3:
+            raise RecordError(
+                f"record {k} is at {record.fs:g} Hz and record 0 at {first.fs:g} Hz; resample one"
+            )
+        for one, other in zip(aligned[0].inputs, aligned[k].inputs, strict=True):
+            length = min(one.values.size, other.values.size)
+            apart = float(np.std(one.values[:length] - other.values[:length]))
+            size = float(np.std(one.values[:length]))
+            if apart > _SAME * size:
+                raise RecordError(
+                    f"input {one.name!r} of record {k} differs from that of record 0 by "
+                    f"{100 * apart / size if size else np.inf:.3g} % (r.m.s.); repeats need one "
+                    "stimulus, from the same start"
+                )
+
+
+def check_apart(records: tuple[Record, ...]) -> None:
+    """One record given twice tells nothing of repeatability; its noise would be the same noise."""
+    seen: dict[bytes, int] = {}
+    for k, record in enumerate(records):
+        measured = b"".join(channel.values.tobytes() for channel in record.outputs)
+        if measured in seen:
+            raise RecordError(
+                f"records {seen[measured]} and {k} hold the same samples; one record given twice "
+                "is not two repeats, so repeat the test"
+            )
+        seen[measured] = k
