@@ -76,7 +76,8 @@ def timing() -> list[str]:
         record = read_recording(folder / "r.h5").record
         log = (folder / "run.log").read_text()
     said = {finding.code: finding.message for finding in record.findings}
-    within = float(re.search(r"([\d.]+) % of the periods", said["timing"])[1])  # type: ignore[index]
+    (share,) = re.findall(r"([\d.]+) % of the periods", said["timing"])
+    within = float(share)
     scheduling = re.search(r"(real-time|ordinary) scheduling[^\n]*", log)
     return [
         said["timing"],

@@ -84,7 +84,7 @@ class Running:
                 return self._kept(ready, findings)
         except HmpimError:
             raise
-        except _Watching as failure:
+        except _WatcherError as failure:
             raise failure.error from None
         except Exception as error:  # a driver may raise anything
             raise RigError(
@@ -209,7 +209,7 @@ class Running:
                 subscriber(played)
             return None if self.until is None else self.until(played)
         except Exception as error:
-            raise _Watching(error) from error
+            raise _WatcherError(error) from error
 
     def _timing(self, ready: _Ready, layout: Layout) -> tuple[Finding, ...]:
         timing = measure_timing(ready.pacer.sent, fs=ready.commands.fs)
@@ -246,7 +246,7 @@ def _ended_early(reason: str, seconds: float) -> Finding:
     )
 
 
-class _Watching(Exception):  # noqa: N818
+class _WatcherError(Exception):
     """A subscriber failed: its own error passes as it is, and is not the rig's."""
 
     def __init__(self, error: Exception) -> None:

@@ -152,15 +152,14 @@ class SeekerRig(Simulated):
         answers = self._followed(
             CubicSpline(moved.time, sight), CubicSpline(moved.time, body), moved.time[-1], rng
         )
-        newest = np.floor((moved.time - self.camera.latency) * self.camera.frame_rate + 1e-9)
-        index = newest.astype(int)
+        newest = self.camera.newest(moved.time)
         rates = {
             _SIGHT: moved.of("azimuth", "velocity"),
             _BODY: moved.of("yaw", "velocity"),
         }
         given = [name for name, axis in ((_SIGHT, "azimuth"), (_BODY, "yaw")) if axis in named]
         values = {name: rates[name] for name in given}
-        values["platform rate command"] = np.where(index < 0, 0.0, answers[np.clip(index, 0, None)])
+        values["platform rate command"] = np.where(newest < 0, 0.0, answers[np.maximum(newest, 0)])
         self._playing.state = values
         inputs = tuple(ChannelSpec(name=name, role="input", unit="deg/s") for name in given)
         output = ChannelSpec(name="platform rate command", role="output", unit="deg/s")
@@ -182,7 +181,7 @@ class SeekerRig(Simulated):
     ) -> FloatArray:
         """Rate command that each frame leads to, deg/s."""
         camera, scene = self.camera, self.scene
-        times = np.arange(math.floor(end * camera.frame_rate + 1e-9) + 1) / camera.frame_rate
+        times = camera.times(end)
         watching = Watching(camera, scene.backdrop(rng), self._made_tracker(), rng)
         platform = Platform(lag=self.lag)
         commands, errors = np.zeros(times.size), np.zeros(times.size)

@@ -4,6 +4,7 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hmpim.errors import ArgumentError, RigError
 from hmpim.rigs.tracker.scene import Backdrop, Image
@@ -51,6 +52,21 @@ class Camera:
                 raise ArgumentError(f"{name} = {getattr(self, name)!r} must be from 0 to below 1")
         if self.dropped + self.repeated >= 1.0:
             raise ArgumentError("dropped and repeated together must leave some frames: below 1")
+
+    def times(self, end: float) -> NDArray[np.float64]:
+        """When frames are taken from 0 to `end` (s), that included."""
+        return np.arange(math.floor(end * self.frame_rate + 1e-9) + 1) / self.frame_rate
+
+    def newest(self, instants: NDArray[np.float64]) -> NDArray[np.intp]:
+        """Newest frame whose answer is there at each instant (s); below 0: none yet.
+
+        Examples
+        --------
+        >>> Camera(frame_rate=50.0, latency=0.03).newest(np.array([0.0, 0.03, 0.06])).tolist()
+        [-2, 0, 1]
+        """
+        frames = np.floor((instants - self.latency) * self.frame_rate + 1e-9)
+        return frames.astype(np.intp)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

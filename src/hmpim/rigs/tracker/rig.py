@@ -144,8 +144,7 @@ class TrackerRig(Simulated):
         ((axis, only),) = stimuli_by_axis(stimulus, name=repr(self.name)).items()
         to_deg = conversion_factor(only.unit, to="deg") if only.unit else 1.0
         rng = self._playing.take_rng()
-        count = math.floor((only.samples - 1) / only.fs * self.camera.frame_rate + 1e-9) + 1
-        times = np.arange(count) / self.camera.frame_rate
+        times = self.camera.times((only.samples - 1) / only.fs)
         angles = to_deg * np.asarray(only.motion(times).position)
         if np.abs(angles).max() > self.scene.reach:
             raise LimitsError(
@@ -161,7 +160,7 @@ class TrackerRig(Simulated):
         self._counts.update(watching.counts)
         due = np.arange(only.samples) / only.fs
         # The newest answer that is there; none yet: on the axis, as when it was switched on.
-        newest = np.floor((due - self.camera.latency) * self.camera.frame_rate + 1e-9).astype(int)
+        newest = self.camera.newest(due)
         read = np.where(newest < 0, self.boresight / to_deg, said[np.maximum(newest, 0)])
         self._playing.state = (only.position, read)
         given = ChannelSpec(
