@@ -86,6 +86,14 @@ def test_every_kind_of_file(tmp_path, suffix):
     assert back.fs == 500.0
 
 
+def test_a_program_for_a_target_that_computes_its_own_command(tmp_path):
+    out = run(*FIG_12, "-o", str(tmp_path / "stimulus.c"))
+    assert out.exit_code == 0, out.output
+    text = (tmp_path / "stimulus.c").read_text()
+    assert "-DHMPIM_PRINT stimulus.c -lm" in text
+    assert "/* Equations (5) to (7): 0.1 to 10 Hz in 10 s," in text
+
+
 @pytest.mark.parametrize("kind", KINDS)
 def test_every_kind_of_waveform_with_a_jerk_limit(tmp_path, kind):
     path = tmp_path / "s.json"

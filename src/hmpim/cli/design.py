@@ -79,7 +79,10 @@ def design(
     output: Annotated[
         Path | None,
         typer.Option(
-            "-o", "--output", help="Samples as .csv, .h5, .mat or .h; specification as .toml."
+            "-o",
+            "--output",
+            help="Samples as .csv, .h5, .mat or .h; specification as .toml; C99 for a target that "
+            "computes the samples itself as .c.",
         ),
     ] = None,
     json_file: Annotated[

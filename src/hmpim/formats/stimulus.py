@@ -2,7 +2,8 @@
 
 import json
 import math
-from collections.abc import Sequence
+import re
+from collections.abc import Collection, Sequence
 from os import PathLike
 from typing import Any
 
@@ -17,6 +18,7 @@ from hmpim.stimulus.motion import FloatArray
 
 __all__ = [
     "check_together",
+    "identifier",
     "save_stimulus_csv",
     "save_stimulus_json",
     "stimulus_columns",
@@ -222,3 +224,20 @@ def check_together(stimuli: Stimulus | Sequence[Stimulus]) -> tuple[Stimulus, ..
                 f'axis {axis!r} cannot head a column; leave out , " # and new lines'
             )
     return stimuli
+
+
+def identifier(axis: str, *, taken: Collection[str] = ()) -> str:
+    """Name of an axis that C and MATLAB allow, of at most 31 letters, not used before.
+
+    Examples
+    --------
+    >>> identifier("2nd axis"), identifier(""), identifier("yaw_1", taken=["Yaw_1"])
+    ('axis_2nd_axis', 'stimulus', 'yaw_1_2')
+    """
+    name = re.sub(r"[^A-Za-z0-9_]", "_", axis)[:31] or "stimulus"
+    if not name[0].isalpha():
+        name = f"axis_{name}"[:31]
+    base, number = name, 2
+    while name.upper() in {other.upper() for other in taken}:
+        name, number = f"{base[:28]}_{number}", number + 1
+    return name

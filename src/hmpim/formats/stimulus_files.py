@@ -1,4 +1,7 @@
-"""Stimuli to players and back: HDF5, MAT, C header; each file whole or not there at all."""
+"""Stimuli to players and back: HDF5, MAT, C header; each file whole or not there at all.
+
+A `.c` is a program that computes the samples (`hmpim.formats.realtime`); it is not read back.
+"""
 
 import re
 from collections.abc import Callable, Sequence
@@ -11,8 +14,10 @@ import numpy as np
 
 from hmpim.errors import ArgumentError, FormatError
 from hmpim.formats.atomic import replacing, write_text
+from hmpim.formats.realtime import save_stimulus_program
 from hmpim.formats.stimulus import (
     check_together,
+    identifier,
     save_stimulus_csv,
     stimulus_columns,
 )
@@ -163,7 +168,7 @@ def save_stimulus_mat(stimuli: _Several, path: str | PathLike[str]) -> None:
     structs: dict[str, Any] = {}
     for stimulus in several:
         columns = stimulus_columns(stimulus, several)
-        structs[_identifier(stimulus.axis, taken=structs)] = {
+        structs[identifier(stimulus.axis, taken=structs)] = {
             **{name: values[:, None] for name, values in columns.items()},
             "fs": stimulus.fs,
             "unit": stimulus.unit,
@@ -200,7 +205,7 @@ def save_stimulus_c(stimuli: _Several, path: str | PathLike[str]) -> None:
     lines = ["/* hmpim stimulus */", f"#ifndef HMPIM_{guard}", f"#define HMPIM_{guard}", ""]
     names: dict[str, Any] = {}
     for stimulus in several:
-        name = _identifier(stimulus.axis, taken=names)
+        name = identifier(stimulus.axis, taken=names)
         names[name] = stimulus
         columns = stimulus_columns(stimulus, several)
         lines.append(f"#define {name.upper()}_SAMPLES {columns['time'].size}")
@@ -214,17 +219,6 @@ def save_stimulus_c(stimuli: _Several, path: str | PathLike[str]) -> None:
     lines.append("#endif")
     text = "\n".join(lines) + "\n"
     write_text(path, text)
-
-
-def _identifier(axis: str, *, taken: dict[str, Any]) -> str:
-    """Name that C and MATLAB allow, of at most 31 letters, not used before."""
-    name = re.sub(r"[^A-Za-z0-9_]", "_", axis)[:31] or "stimulus"
-    if not name[0].isalpha():
-        name = f"axis_{name}"[:31]
-    base, number = name, 2
-    while name.upper() in {other.upper() for other in taken}:
-        name, number = f"{base[:28]}_{number}", number + 1
-    return name
 
 
 def read_stimulus(path: str | PathLike[str]) -> list[Stimulus] | list[PlayedStimulus]:
@@ -426,6 +420,7 @@ _WRITERS: dict[str, Callable[[_Several, str | PathLike[str]], None]] = {
     ".hdf5": save_stimulus_hdf5,
     ".mat": save_stimulus_mat,
     ".h": save_stimulus_c,
+    ".c": save_stimulus_program,
     ".toml": save_stimulus_toml,
 }
 _READERS: dict[str, Callable[[Path], list[PlayedStimulus]]] = {

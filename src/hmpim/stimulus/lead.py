@@ -85,12 +85,13 @@ class RestToRest:
     def breaks(self) -> tuple[float, ...]:
         """Times in seconds at which one piece hands over to the next."""
         within = self.core.breaks if isinstance(self.core, Piecewise) else ()
-        begin, joined, left, end = self._joints
+        begin, joined, left, end = self.joints
         inner = (self.sweep_start + t for t in within if self.join < t < self.leave)
         return (begin, joined, *inner, left, end)
 
     @property
-    def _joints(self) -> tuple[float, float, float, float]:
+    def joints(self) -> tuple[float, float, float, float]:
+        """Times in seconds at which the lead-in begins and joins, the core is left, rest begins."""
         return (
             self.lead_in.start,
             self.sweep_start + self.join,
@@ -129,7 +130,7 @@ class RestToRest:
         t = np.asarray(time, dtype=np.float64)
         motion = np.zeros((4, *t.shape))
         known = True
-        begin, joined, left, end = self._joints
+        begin, joined, left, end = self.joints
         for piece, offset, inside in (
             (self.lead_in, 0.0, (t >= begin) & (t < joined)),
             (self.core, self.sweep_start, (t >= joined) & (t <= left)),

@@ -107,7 +107,7 @@ class Multisine:
 
     def _inside(self, t: FloatArray) -> Motion:
         position, velocity, acceleration, jerk = np.zeros((4, *t.shape))
-        step = _even_step(self.frequencies)
+        step = even_step(self.frequencies)
         turn_cos, turn_sin = np.cos(2.0 * math.pi * step * t), np.sin(2.0 * math.pi * step * t)
         first = 2.0 * math.pi * self.frequencies[0] * t
         c, s = np.cos(first), np.sin(first)
@@ -130,7 +130,7 @@ class Multisine:
         )
 
 
-def _even_step(frequencies: tuple[float, ...]) -> float:
+def even_step(frequencies: tuple[float, ...]) -> float:
     """Distance in Hz between lines that are evenly spaced, 0 where they are not."""
     steps = np.diff(frequencies)
     if steps.size < 2 or np.ptp(steps) > 1e-12 * frequencies[-1]:
