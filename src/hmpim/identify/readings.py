@@ -1,7 +1,7 @@
 """What is read off a fitted model: each parameter of the result, with its error bar."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,7 +22,7 @@ from hmpim.model.response import (
     response,
 )
 
-__all__ = ["Readings", "read_parameters", "system_of"]
+__all__ = ["Readings", "read_figures", "read_parameters", "system_of"]
 
 _Vector = NDArray[np.float64]
 
@@ -123,7 +123,74 @@ def read_parameters(
         cov = widened(joint, _covariance(joint, rows, residual, freedom=freedom, white=white))
     if weighed.noise is not None:
         cov = _wandering(cov, fit.residual, joint.problem.counted)
-    effective = freedom * joint.weighed_share
+    parameters, system, coefficients = read_figures(
+        structure,
+        vector,
+        cov,
+        fs=fs,
+        highest=highest,
+        effective=freedom * joint.weighed_share,
+        noise=noise_estimate(
+            fit.cost,
+            freedom=max(joint.problem.counted - vector.size, 1),
+            share=joint.effective_share,
+            unit=output_unit,
+        ),
+        units=(input_unit, output_unit),
+    )
+    return Readings(
+        parameters=replace(parameters, delay_correlation=_from_lag(delay_correlation, fs)),
+        system=system,
+        vector=vector,
+        covariance=cov,
+        white=white and weighed.noise is None,
+        rows=rows,
+        innovations=residual,
+        whitened=white,
+        coefficient_covariance=coefficients,
+    )
+
+
+def read_figures(
+    structure: Structure,
+    vector: _Vector,
+    cov: _Vector,
+    *,
+    fs: float,
+    highest: float,
+    effective: float,
+    noise: Estimate,
+    units: tuple[str, str],
+) -> tuple[Parameters, RationalDelay, _Vector]:
+    """Turn a fit's parameters and their covariance into estimates.
+
+    Parameters
+    ----------
+    structure : Structure
+        What was fitted.
+    vector : ndarray, shape (p,)
+        As `Readings` has it.
+    cov : ndarray, shape (p, p)
+        Of `vector`.
+    fs, highest : float
+        As for `read_parameters`.
+    effective : float
+        Independent samples less parameters.
+    noise : Estimate
+        Of the noise.
+    units : (str, str)
+        Of input and output.
+
+    Returns
+    -------
+    parameters : Parameters
+        Without the paper's delay.
+    system : RationalDelay
+        The system in seconds, the scale factor included.
+    spread : ndarray, shape (q, q)
+        Covariance of its delay and of the coefficients that may vary.
+    """
+    input_unit, output_unit = units
     system = system_of(structure, vector, fs)
 
     def explicit(function: Callable[[_Vector], float], unit: str) -> Estimate:
@@ -192,16 +259,10 @@ def read_parameters(
         stretch = axis[mode + 1] / (2 * vector[mode + 1])
     parameters = Parameters(
         delay=linear(vector[0] / fs, axis[0] / fs, "s"),
-        delay_correlation=_from_lag(delay_correlation, fs),
         delay_low_frequency=low_frequency or linear(vector[0] / fs, axis[0] / fs, "s"),
         scale_factor=linear(gain_rate * vector[1 + order], gain_rate * axis[1 + order], gain_unit),
         bias=linear(vector[-1], axis[-1], output_unit),
-        noise_std=noise_estimate(
-            fit.cost,
-            freedom=max(joint.problem.counted - vector.size, 1),
-            share=joint.effective_share,
-            unit=output_unit,
-        ),
+        noise_std=noise,
         natural_frequency=linear(natural, -natural * (axis[mode] + stretch), "Hz")
         if mode is not None
         else None,
@@ -223,17 +284,8 @@ def read_parameters(
         if peak is not None
         else None,
     )
-    return Readings(
-        parameters=parameters,
-        system=system,
-        vector=vector,
-        covariance=cov,
-        white=white and weighed.noise is None,
-        rows=rows,
-        innovations=residual,
-        whitened=white,
-        coefficient_covariance=sensitivity.coefficients.T @ cov @ sensitivity.coefficients,
-    )
+    slopes = sensitivity.coefficients
+    return parameters, system, slopes.T @ cov @ slopes
 
 
 class _Sensitivity:

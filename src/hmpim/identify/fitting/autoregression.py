@@ -10,9 +10,11 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
-__all__ = ["autoregression"]
+__all__ = ["LONGEST", "autoregression", "whitening_filter"]
 
-_LONGEST = 30
+LONGEST = 30
+"""Greatest order that is tried."""
+
 _BLOCK = 65_536
 
 _MOST_LOST = 0.2
@@ -38,10 +40,33 @@ def autoregression(residual: Real, valid: NDArray[np.bool_] | None) -> Real:
     >>> autoregression(noise, None)[:2].round(2).tolist()
     [1.0, -0.9]
     """
-    longest = min(_LONGEST, residual.size // 20, _reach(valid))
+    longest = min(LONGEST, residual.size // 20, _reach(valid))
     if longest < 1:
         return np.ones(1)
-    gram, count = _moments(residual, valid, longest)
+    return whitening_filter(*_moments(residual, valid, longest))
+
+
+def whitening_filter(gram: Real, count: int) -> Real:
+    """Filter that leaves white noise, from the products of a sample and its past.
+
+    Parameters
+    ----------
+    gram : ndarray, shape (k + 1, k + 1)
+        Sums of products of a sample and the k before it, the sample itself first.
+    count : int
+        Of samples that were summed.
+
+    Returns
+    -------
+    ndarray, shape (order + 1,)
+        1 first; the order, at most k, is Akaike's.
+
+    Examples
+    --------
+    >>> whitening_filter(100 * np.array([[1.0, 0.5], [0.5, 1.0]]), 100).tolist()
+    [1.0, -0.49...]
+    """
+    longest = gram.shape[0] - 1
     # Latest sample last: the factor's last row holds what each order explains of it.
     scale = np.sqrt(max(float(gram[0, 0]), np.finfo(float).tiny))
     ordered = np.roll(gram, -1, axis=(0, 1)) / scale**2
@@ -59,7 +84,7 @@ def autoregression(residual: Real, valid: NDArray[np.bool_] | None) -> Real:
 def _reach(valid: NDArray[np.bool_] | None) -> int:
     """Greatest order that leaves enough samples between the gaps."""
     if valid is None:
-        return _LONGEST
+        return LONGEST
     ends = int(np.count_nonzero(valid[:-1] & ~valid[1:])) + 1
     return int(_MOST_LOST * np.count_nonzero(valid) / ends)
 

@@ -8,8 +8,9 @@ closed form. One input or several, with a drift or without, from rest or in mid-
 one optimiser.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +19,17 @@ from hmpim.identify.fitting.rows import Part, Problem
 from hmpim.model.dynamics import Structure, coefficients_of, denominator_of
 from hmpim.model.response import slowest_time_constant
 
-__all__ = ["Fit", "Problem", "fit_structure", "fit_together", "jacobian", "solved", "without"]
+__all__ = [
+    "Fit",
+    "Problem",
+    "climb",
+    "fit_structure",
+    "fit_together",
+    "jacobian",
+    "solved",
+    "within_reach",
+    "without",
+]
 
 _LONGEST_TIME_CONSTANT = 2.0
 """In record lengths; a slower pole cannot be told from an integrator."""
@@ -123,6 +134,16 @@ class _Evaluation:
         ]
         return self.problems[0].masked(np.vstack(rows))
 
+    @property
+    def thetas(self) -> list[Real]:
+        """Delay and denominator of each input."""
+        return [part.theta for part in self.parts]
+
+    def normal(self) -> tuple[Real, Real]:
+        """Normal equations of delays and denominators: matrix, and derivative of the cost."""
+        rows = self.slopes()
+        return _projected(rows, self.counted), rows @ self.residual
+
     def fits(self, *, converged: bool) -> list[Fit]:
         """What each input makes of the output."""
         weights = self.weights()
@@ -204,11 +225,27 @@ def without(rows: Real, others: Real) -> Real:
 
 def _bounded(problem: Problem, structure: Structure, theta: Real, shortest_delay: float) -> Real:
     """Keep delay and time constants where the record can tell them."""
+    delays = (shortest_delay, problem.longest_delay)
+    return within_reach(structure, theta, delays=delays, samples=problem.y.size)
+
+
+def within_reach(
+    structure: Structure, theta: Real, *, delays: tuple[float, float], samples: int
+) -> Real:
+    """Keep a delay between two, and time constants where so many samples can tell them.
+
+    Examples
+    --------
+    >>> from hmpim.model.dynamics import STRUCTURES
+    >>> theta = np.array([-9.0, 0.0])
+    >>> within_reach(STRUCTURES["first_order"], theta, delays=(-4.0, 50.0), samples=100).tolist()
+    [-4.0, 0.0]
+    """
     bounded = theta.copy()
-    bounded[0] = np.clip(theta[0], shortest_delay, problem.longest_delay)
+    bounded[0] = np.clip(theta[0], *delays)
+    longest = np.log(_LONGEST_TIME_CONSTANT * samples)
     start = 1
     for order in structure.sections:
-        longest = np.log(_LONGEST_TIME_CONSTANT * problem.y.size)
         bounded[start] = np.clip(theta[start], np.log(_SHORTEST_TIME_CONSTANT), longest)
         if order == 2:
             bounded[start + 1] = np.clip(theta[start + 1], *_SHAPES)
@@ -294,8 +331,6 @@ def fit_together(
     list of Fit
         One for each input, residual and cost common to all.
     """
-    sizes = [theta.size for theta in thetas]
-    edges = np.cumsum(sizes)[:-1]
 
     def bounded(moved: Sequence[Real]) -> list[Real]:
         return [
@@ -303,33 +338,104 @@ def fit_together(
             for p, s, t in zip(problems, structures, moved, strict=True)
         ]
 
-    best = _evaluated(problems, structures, bounded(thetas))
+    def evaluated(moved: Sequence[Real]) -> _Evaluation:
+        return _evaluated(problems, structures, moved)
+
+    best, converged = climb(
+        evaluated,
+        bounded(thetas),
+        structures=structures,
+        bounded=bounded,
+        counted=problems[0].counted,
+        iterations=iterations,
+        precision=precision,
+    )
+    return best.fits(converged=converged)
+
+
+class Evaluated(Protocol):
+    """A model at given parameters: what all that is linear leaves over, and the way down."""
+
+    @property
+    def thetas(self) -> list[Real]:
+        """Parameters that are not linear, of each input."""
+
+    @property
+    def linear(self) -> Real:
+        """Parameters that are."""
+
+    @property
+    def cost(self) -> float:
+        """Sum of squares of what is left over."""
+
+    def normal(self) -> tuple[Real, Real]:
+        """Normal equations of the nonlinear parameters: matrix, and derivative of the cost."""
+
+
+E = TypeVar("E", bound=Evaluated)
+
+
+def climb(
+    evaluated: Callable[[Sequence[Real]], E],
+    thetas: Sequence[Real],
+    *,
+    structures: Sequence[Structure],
+    bounded: Callable[[Sequence[Real]], list[Real]],
+    counted: int,
+    iterations: int,
+    precision: float,
+) -> tuple[E, bool]:
+    """Levenberg and Marquardt's way to the least cost.
+
+    Parameters
+    ----------
+    evaluated : callable
+        From the nonlinear parameters of each input to an `Evaluated`.
+    thetas : sequence of ndarray
+        Where to begin, inside the bounds.
+    structures : sequence of Structure
+        One for each input.
+    bounded : callable
+        Keeps parameters where they can be told.
+    counted : int
+        Samples that count.
+    iterations, precision
+        As for `fit_structure`.
+
+    Returns
+    -------
+    Evaluated
+        Where it ended.
+    bool
+        Whether the last step was negligible.
+    """
+    sizes = [theta.size for theta in thetas]
+    edges = np.cumsum(sizes)[:-1]
+    best = evaluated(thetas)
     damping = 1e-4
-    freedom = max(problems[0].counted - sum(sizes) - best.linear.size, 1)
+    freedom = max(counted - sum(sizes) - best.linear.size, 1)
     for _ in range(iterations):
-        rows = best.slopes()
-        moment = rows @ best.residual
-        normal = _projected(rows, best.counted)
+        normal, moment = best.normal()
         negligible = precision * best.cost / freedom
         # Newton's decrement: what a full step would still gain
         if float(solved(normal, moment) @ moment) < negligible:
-            return best.fits(converged=True)
+            return best, True
         while True:
             steps = np.split(solved(normal, moment, damping), edges)
-            here = [part.theta for part in best.parts]
+            here = best.thetas
             share = min(_limited(s, t, d) for s, t, d in zip(structures, here, steps, strict=True))
             moved = bounded([t + share * d for t, d in zip(here, steps, strict=True)])
-            trial = _evaluated(problems, structures, moved)
+            trial = evaluated(moved)
             if trial.cost < best.cost:
                 damping = max(damping / 10, 1e-9)
                 break
             if damping > 1e6:  # no way down: a kink, a bound, or the arithmetic's own floor
-                return best.fits(converged=True)
+                return best, True
             damping *= 10
         fell, best = best.cost - trial.cost, trial
         if fell < negligible and damping < 1e-3:
-            return best.fits(converged=True)
-    return best.fits(converged=False)
+            return best, True
+    return best, False
 
 
 def _projected(rows: Real, linear: Real) -> Real:
