@@ -23,9 +23,8 @@ hmpim imports these packages and ships none of them. **Under the LGPL: {lgpl}.**
 imported as they are and changed nowhere, so that the LGPL asks nothing of code that uses hmpim;
 who ships them in an application must let them be replaced.
 
-One thing that no metadata tells: the file `DFReader.py` of pymavlink, by which ArduPilot logs are
-read, says in its head that it is under the GPL, version 3 or later, where the package says LGPL.
-Who ships an application with the extra `ardupilot` should ask its makers which it is.
+ArduPilot logs are read by hmpim itself. pymavlink states the LGPL, but its module `DFReader.py`,
+which reads such logs, is under the GPL by its own head: docs/decisions/0006-ardupilot-logs.md.
 """
 
 _CLASSIFIERS = {

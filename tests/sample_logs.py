@@ -48,24 +48,28 @@ def parquet(path):
     pq.write_table(table, path)
 
 
-def lerobot(path):
+def lerobot(path, episodes=((U, Y),), fs=FS):
+    """One file of several episodes, each with time from 0, as LeRobot 3 writes."""
     import pyarrow as pa
     import pyarrow.parquet as pq
 
-    action = np.stack([U, 2 * U], axis=1).astype(np.float32)
-    state = np.stack([Y, 2 * Y], axis=1).astype(np.float32)
+    sizes = [u.size for u, _ in episodes]
+    u, y = (np.concatenate([episode[k] for episode in episodes]) for k in (0, 1))
+    action = np.stack([u, 2 * u], axis=1).astype(np.float32)
+    state = np.stack([y, 2 * y], axis=1).astype(np.float32)
+    frames = np.concatenate([np.arange(size) for size in sizes])
     columns = {
         "action": pa.array(list(action), pa.list_(pa.float32(), 2)),
         "observation.state": pa.array(list(state), pa.list_(pa.float32())),
-        "timestamp": pa.array(TIME.astype(np.float32)),
-        "frame_index": pa.array(np.arange(N)),
-        "episode_index": pa.array(np.zeros(N, dtype=np.int64)),
+        "timestamp": pa.array((frames / fs).astype(np.float32)),
+        "frame_index": pa.array(frames),
+        "episode_index": pa.array(np.repeat(np.arange(len(sizes)), sizes)),
     }
     pq.write_table(pa.table(columns), path)
     names = {"names": {"motors": ["pan", "lift"]}, "shape": [2]}
     meta = path.parent / "meta"
     meta.mkdir(exist_ok=True)
-    info = {"fps": FS, "features": {"action": names, "observation.state": names}}
+    info = {"fps": fs, "features": {"action": names, "observation.state": names}}
     (meta / "info.json").write_text(json.dumps(info))
 
 
@@ -172,6 +176,8 @@ _BIN = {
     "n": "4s",
     "b": "b",
     "d": "d",
+    "H": "H",
+    "L": "l",
 }
 
 
@@ -184,19 +190,25 @@ def ardupilot(path):
         _bin_format(0x83, "FMTU", "QBNN", "TimeUS,FmtType,UnitIds,MultIds"),
         _bin_format(0x90, "RATE", "Qff", "TimeUS,RDes,R"),
         _bin_format(0x91, "IMU", "QBfc", "TimeUS,I,GyrX,T"),
+        _bin_format(0x92, "BAT", "QHL", "TimeUS,Volt,Lat"),
     ]
-    for letter, label in (("s", "s"), ("k", "deg/s"), ("E", "rad/s"), ("#", "instance")):
+    units = {"s": "s", "k": "deg/s", "E": "rad/s", "#": "instance", "O": "degC", "v": "V"}
+    for letter, label in {**units, "D": "deglatitude"}.items():
         out.append(b"\xa3\x95\x81" + struct.pack("<Qb64s", 0, ord(letter), label.encode()))
-    for letter, factor in (("-", 0.0), ("F", 1e-6)):
+    for letter, factor in {"-": 0.0, "F": 1e-6, "C": 1e-3, "B": 1e-2, "G": 1e-7}.items():
         out.append(b"\xa3\x95\x82" + struct.pack("<Qbd", 0, ord(letter), factor))
-    for kind, units in ((0x90, b"skk"), (0x91, b"s#E-")):
-        out.append(b"\xa3\x95\x83" + struct.pack("<QB16s16s", 0, kind, units, b"F---"))
+    stated = ((0x90, b"skk", b"F--"), (0x91, b"s#EO", b"F--B"), (0x92, b"svD", b"FCG"))
+    for kind, letters, factors in stated:
+        out.append(b"\xa3\x95\x83" + struct.pack("<QB16s16s", 0, kind, letters, factors))
     for k, t in enumerate(TIME):
         stamp = 5_000_000 + round(1e6 * t)
         out.append(b"\xa3\x95\x90" + struct.pack("<Qff", stamp, U[k], Y[k]))
         for number in (0, 1):
             row = struct.pack("<QBfh", stamp + number, number, Y[k] * (1 + number), 2550)
             out.append(b"\xa3\x95\x91" + row)
+        if k % 20 == 0:
+            row = struct.pack("<QHl", stamp, 16_000 - k, 473_977_420 + k)
+            out.append(b"\xa3\x95\x92" + row)
     path.write_bytes(b"".join(out))
 
 
@@ -247,8 +259,11 @@ def blackbox(path, flights=1, drive_and_answer=(U, Y), fs=FS):
     path.write_bytes(bytes(flight) * flights)
 
 
-def ros(path, storage="mcap", drive_and_answer=(U, Y), fs=FS, transport=0.004):
-    """A bag: a command and the sensor's answer, stamped, logged later by the transport."""
+def ros(path, storage="mcap", drive_and_answer=(U, Y), fs=FS, transport=0.004, stamped=True):
+    """A bag: a command and the sensor's answer, stamped, logged later by the transport.
+
+    Without `stamped` the command has only the log's stamp.
+    """
     from rosbags.rosbag2 import StoragePlugin, Writer
     from rosbags.typesys import Stores, get_typestore
 
@@ -265,17 +280,18 @@ def ros(path, storage="mcap", drive_and_answer=(U, Y), fs=FS, transport=0.004):
     point = store.types["geometry_msgs/msg/Vector3"]
     plugin = StoragePlugin.MCAP if storage == "mcap" else StoragePlugin.SQLITE3
     with Writer(path, version=9, storage_plugin=plugin) as writer:
-        command = writer.add_connection("/cmd", vector.__msgtype__, typestore=store)
+        kind = (vector if stamped else point).__msgtype__
+        command = writer.add_connection("/cmd", kind, typestore=store)
         state = writer.add_connection("/joint_states", joints.__msgtype__, typestore=store)
         start = 1_763_726_400 * 10**9
         for k in range(len(drive_and_answer[0])):
             ticks = start + round(1e9 * k / fs)
             stamp = stamp_of(sec=ticks // 10**9, nanosec=ticks % 10**9)
             u = float(drive_and_answer[0][k])
-            message = vector(
-                header=header(stamp=stamp, frame_id=""), vector=point(x=u, y=0.0, z=0.0)
-            )
-            writer.write(command, ticks, store.serialize_cdr(message, vector.__msgtype__))
+            message = point(x=u, y=0.0, z=0.0)
+            if stamped:
+                message = vector(header=header(stamp=stamp, frame_id=""), vector=message)
+            writer.write(command, ticks, store.serialize_cdr(message, message.__msgtype__))
             answer = joints(
                 header=header(stamp=stamp, frame_id=""),
                 name=["pan", "tilt"],
@@ -285,6 +301,43 @@ def ros(path, storage="mcap", drive_and_answer=(U, Y), fs=FS, transport=0.004):
             )
             late = ticks + round(1e9 * transport)
             writer.write(state, late, store.serialize_cdr(answer, joints.__msgtype__))
+
+
+def ros1(path):
+    """A bag of ROS 1, packed, whose sensor is logged later by the transport."""
+    from rosbags.rosbag1 import Writer
+    from rosbags.typesys import Stores, get_typestore
+
+    store = get_typestore(Stores.ROS1_NOETIC)
+    names = ("geometry_msgs/msg/Vector3Stamped", "sensor_msgs/msg/Imu", "std_msgs/msg/Header")
+    vector, imu, header = (store.types[name] for name in names)
+    stamp_of = store.types["builtin_interfaces/msg/Time"]
+    point = store.types["geometry_msgs/msg/Vector3"]
+    turn = store.types["geometry_msgs/msg/Quaternion"](x=0.0, y=0.0, z=0.0, w=1.0)
+    writer = Writer(path.with_suffix(".bag"))
+    writer.set_compression(Writer.CompressionFormat.LZ4)
+    still, unknown = point(x=0.0, y=0.0, z=0.0), np.zeros(9)
+    with writer:
+        command = writer.add_connection("/cmd", vector.__msgtype__, typestore=store)
+        sensor = writer.add_connection("/imu", imu.__msgtype__, typestore=store)
+        for k, (u, y) in enumerate(zip(U, Y, strict=True)):
+            ticks = 1_763_726_400 * 10**9 + round(1e9 * k / FS)
+            stamp = stamp_of(sec=ticks // 10**9, nanosec=ticks % 10**9)
+            head = header(seq=k, stamp=stamp, frame_id="")
+            message = vector(header=head, vector=point(x=float(u), y=0.0, z=0.0))
+            writer.write(command, ticks, store.serialize_ros1(message, vector.__msgtype__))
+            answer = imu(
+                header=head,
+                orientation=turn,
+                orientation_covariance=unknown,
+                angular_velocity=point(x=0.0, y=0.0, z=float(y)),
+                angular_velocity_covariance=unknown,
+                linear_acceleration=still,
+                linear_acceleration_covariance=unknown,
+            )
+            raw = store.serialize_ros1(answer, imu.__msgtype__)
+            writer.write(sensor, ticks + 4_000_000, raw)
+    path.with_suffix(".bag").rename(path)
 
 
 def mcap(path):
@@ -412,6 +465,7 @@ KINDS = {
     "mcap": (mcap, "/cmd.vector.x", "/joint_states.position[pan]"),
     "db3": (db3, "/cmd.vector.x", "/joint_states.position[pan]"),
     "rosbag": (ros, "/cmd.vector.x", "/joint_states.position[pan]"),
+    "ros1": (ros1, "/cmd.vector.x", "/imu.angular_velocity.z"),
     "wpilog": (wpilog, "/drive/voltage", "/gyro[0]"),
     "klipper": (klipper, "accel_x", "accel_y"),
     "wav": (wav, "1", "2"),

@@ -1,5 +1,8 @@
 """docs/licences.md is what the installed packages say."""
 
+import importlib.util
+from pathlib import Path
+
 import licences
 import pytest
 
@@ -11,7 +14,7 @@ def test_the_page_is_what_is_installed():
 
 @pytest.mark.parametrize(
     ("package", "words"),
-    [("asammdf", "LGPL"), ("npTDMS", "LGPL"), ("pymavlink", "LGPL"), ("pyulog", "BSD")],
+    [("asammdf", "LGPL"), ("npTDMS", "LGPL"), ("pyulog", "BSD")],
 )
 def test_a_licence_is_the_package_s_own(package, words):
     assert words in licences.licence_of(package)
@@ -19,7 +22,7 @@ def test_a_licence_is_the_package_s_own(package, words):
 
 def test_the_extras_under_the_lgpl_are_named():
     head = licences.page().partition("## ")[0]
-    for extra in ("mdf", "tdms", "ardupilot"):
+    for extra in ("mdf", "tdms"):
         assert f"(extra `{extra}`)" in head
 
 
@@ -29,3 +32,14 @@ def test_no_licence_is_strong_copyleft():
         for name, licence in rows:
             assert "GPL" not in licence.replace("LGPL", ""), (extra, name, licence)
             assert extra or "LGPL" not in licence, name
+
+
+def test_the_reader_of_ardupilot_logs_that_is_under_the_gpl_is_a_tool_of_tests_alone():
+    """What docs/decisions/0006 says of pymavlink is what its files say, and no extra brings it."""
+    spec = importlib.util.find_spec("pymavlink.DFReader")
+    assert spec is not None
+    assert spec.origin is not None
+    head = Path(spec.origin).read_text(encoding="utf-8")[:400]
+    assert "GNU GPL version 3" in head
+    assert "LGPL" in licences.licence_of("pymavlink")
+    assert "pymavlink" not in {name for rows in licences.tables().values() for name, _ in rows}

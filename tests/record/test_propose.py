@@ -48,6 +48,15 @@ def test_a_name_counts_before_the_order_in_time():
     assert "comes before 'motorCmd' by" in dict(found.reasons)["ref"]
 
 
+def test_the_field_s_own_name_counts_before_that_of_its_message():
+    """ArduPilot: the message of rates holds the desired rate and the measured one."""
+    named = {"RATE.R": moved(0.05), "RATE.RDes": moved(0.0), "IMU[0].GyrX": moved(0.05)}
+    found = propose(channels(**named))
+    assert found.inputs == ("RATE.RDes",)
+    assert found.outputs == ("RATE.R", "IMU[0].GyrX")
+    assert "its name says 'des'" in dict(found.reasons)["RATE.RDes"]
+
+
 def test_what_tells_nothing_is_left_out_with_its_reason():
     found = propose(
         channels(

@@ -16,7 +16,17 @@ __all__ = ["Proposal", "propose"]
 _ASKED = frozenset(
     [
         *("u", "input", "in", "command", "commanded", "cmd", "setpoint", "sp", "stimulus"),
-        *("drive", "demand", "desired", "target", "excitation", "sweep", "chirp", "actuator"),
+        *(
+            "drive",
+            "demand",
+            "desired",
+            "des",
+            "target",
+            "excitation",
+            "sweep",
+            "chirp",
+            "actuator",
+        ),
         *("motor", "throttle", "reference", "ref"),
     ]
 )
@@ -115,7 +125,7 @@ def propose(channels: Sequence[Channel]) -> Proposal:
             reasons[c.name] = (
                 f"does not move with {alive[chosen].name!r} (correlation {found.alike:.2f})"
             )
-        elif found.later < 0 and not _words(c.name) & _ANSWERED:
+        elif found.later < 0 and not _answers(c.name):
             reasons[c.name] = f"comes before {with_it.replace('-', '')}; perhaps a reference"
         else:
             outputs.append(c.name)
@@ -212,14 +222,22 @@ def _input(channels: Sequence[Channel], follows: Sequence[Sequence[_Follows]]) -
         return None
     named = [k for k in linked if _asked(channels[k].name)]
     plain = [k for k in named if not _words(channels[k].name) & {"reference", "ref", "sp"}]
-    pool = plain or named or [k for k in linked if not _words(channels[k].name) & _ANSWERED]
+    pool = plain or named or [k for k in linked if not _answers(channels[k].name)]
     pool = pool or linked
     return max(pool, key=lambda k: _leads(k, follows))
 
 
 def _asked(name: str) -> bool:
-    words = _words(name)
-    return bool(words & _ASKED) and not words & _ANSWERED
+    """Whether a name says what is asked; the last part of a path counts before the whole.
+
+    ``RATE.RDes`` is the desired roll in the message of rates.
+    """
+    last, words = _words(re.split(r"[./]", name)[-1]), _words(name)
+    return any(bool(part & _ASKED) and not part & _ANSWERED for part in (last, words))
+
+
+def _answers(name: str) -> bool:
+    return bool(_words(name) & _ANSWERED) and not _asked(name)
 
 
 def _leads(k: int, follows: Sequence[Sequence[_Follows]]) -> float:

@@ -31,12 +31,16 @@ class Column:
         Unit as the log states it.
     samples : int or None
         How many, where that is known without loading them.
+    scale : str
+        What one count in the file is, such as '0.01 degC', where its samples are multiplied;
+        else empty.
     """
 
     name: str
     load: Callable[[], NDArray[Any]] | None
     unit: str = ""
     samples: int | None = None
+    scale: str = ""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -134,6 +138,7 @@ def take_series(
     log = _parsed(parse, path, layout)
     places = {column.name: (group, column) for group in log.groups for column in group.columns}
     mixed = _mixed([places[name][0] for name in names])
+    scaled = _scaled([places[name][1] for name in names])
     out = []
     for name in names:
         group, column = places[name]
@@ -152,10 +157,29 @@ def take_series(
                 values=values,
                 time=time,
                 unit=column.unit,
-                findings=(*group.findings, *mixed),
+                findings=(*group.findings, *scaled.get(column.scale, ()), *mixed),
             )
         )
     return tuple(out)
+
+
+def _scaled(columns: Sequence[Column]) -> dict[str, tuple[Finding, ...]]:
+    """What is said of factors, by factor; channels that share it share one line."""
+    shared: dict[str, list[str]] = {}
+    for column in columns:
+        if column.scale:
+            shared.setdefault(column.scale, []).append(column.name)
+    said: dict[str, tuple[Finding, ...]] = {}
+    for scale, names in shared.items():
+        verb = "is" if len(names) == 1 else "are"
+        message = f"{_first(names)} {verb} read as {scale} per count, as the file states"
+        said[scale] = (Finding(code="scale", message=message, severity="info", parameters=()),)
+    return said
+
+
+def _first(names: Sequence[str]) -> str:
+    more = f" and {len(names) - 8} others" if len(names) > 8 else ""
+    return ", ".join(names[:8]) + more
 
 
 def _mixed(groups: Sequence[Group]) -> tuple[Finding, ...]:
