@@ -62,6 +62,22 @@ def test_a_designed_stimulus_with_leads_is_a_sweep():
     assert found.frequency[found.inside].max() == pytest.approx(20.0, abs=0.5)
 
 
+@pytest.mark.parametrize("step", [0.0, 1 / 128, 1 / 32])
+@pytest.mark.parametrize("rest", [0, 1, 333])
+def test_a_sweep_between_rests_is_a_sweep(rest, step):
+    """At rest zero is touched at every sample and crossed at none; a scope's steps touch it too."""
+    inside = CHIRP * np.sin(np.pi * np.arange(CHIRP.size) / CHIRP.size)
+    u = np.concatenate([np.zeros(rest), inside, np.zeros(rest)])
+    u = step * np.rint(u / step) if step else u
+    found = sweep_phase(u, FS)
+    assert found is not None
+    during = slice(rest, rest + CHIRP.size)
+    assert np.mean(found.inside[during]) > 0.8
+    truth = 0.1 + 1.99 * T
+    off = np.abs(found.frequency[during] / truth - 1.0)[found.inside[during]]
+    assert np.median(off) < (1e-2 if step else 1e-3)
+
+
 @pytest.mark.parametrize("kind", ["square", "triangle", "binary", "noise", "multisine", "constant"])
 def test_what_is_no_sweep(kind):
     rng = np.random.default_rng(0)

@@ -38,6 +38,10 @@ _FINER = 4
 _DEEPEST = 1e-3
 """Amplitude over the greatest below which nothing is looked at: leads, rests."""
 
+_REST = 1e-6
+"""Amplitude over the greatest that is zero: what resampling rings at rest, a scope's touch of zero.
+Crossings then lie apart by more than numbers of 10^8 samples are rounded."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class SweepPhase:
@@ -156,7 +160,7 @@ def _crossings(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
     """Times of the zero crossings in samples, peaks between them, phase at the first one."""
     fine = _finer(x)
-    sign = np.where(fine >= 0, 1, -1)
+    sign = _signs(fine)
     at = np.flatnonzero(np.diff(sign))
     while at.size > _FEWEST_CROSSINGS:
         peaks = np.maximum.reduceat(np.abs(fine), at)[:-1]
@@ -175,8 +179,19 @@ def _crossings(
         return np.zeros(0), np.zeros(0), 0.0
     times = (at + fine[at] / (fine[at] - fine[at + 1])) / _FINER
     peaks = np.maximum.reduceat(np.abs(fine), at)[:-1]
-    first = -0.5 * np.pi if fine[at[0]] < 0 else 0.5 * np.pi
+    first = -0.5 * np.pi if sign[at[0]] < 0 else 0.5 * np.pi
     return np.asarray(times), np.asarray(peaks), first
+
+
+def _signs(fine: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Sign of each sample; at rest, and where zero is touched and not crossed, that before it.
+
+    Between two crossings there is then a sample beyond the rest, so that no two coincide.
+    """
+    moving = np.abs(fine) > _REST * np.abs(fine).max()
+    place = np.maximum.accumulate(np.where(moving, np.arange(fine.size), 0))
+    place[: np.argmax(moving)] = np.argmax(moving)
+    return np.asarray(np.sign(fine[place]), dtype=np.float64)
 
 
 def _through(
