@@ -24,6 +24,7 @@ from hmpim.cli.run import run
 from hmpim.cli.runs import runs
 from hmpim.cli.table import table
 from hmpim.cli.validate import validate
+from hmpim.cli.workbench import workbench
 from hmpim.errors import HmpimError
 
 __all__ = ["app", "main"]
@@ -150,6 +151,7 @@ app.command(epilog="Example: hmpim table --udp 127.0.0.1:5005 --rate 1000")(tabl
 app.command(epilog="Example: hmpim demo --out out/demo --seed 7")(demo)
 app.command(epilog="Example: hmpim campaign section_v_reduced --out out/study")(campaign)
 app.command()(gentlest)
+app.command(epilog="Example: hmpim workbench --rig table --runs runs")(workbench)
 app.command(epilog="Example: hmpim export r.json --to c -o model/")(export)
 app.command(epilog="Example: hmpim validate r.json second.csv --fit 90")(validate)
 app.command(epilog="Example: hmpim paper --out docs/build --figures 12 13")(paper)

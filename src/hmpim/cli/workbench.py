@@ -1,0 +1,73 @@
+"""``hmpim workbench``: the whole job in a browser."""
+
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from hmpim.cli.terminal import say
+from hmpim.errors import ArgumentError
+
+__all__ = ["workbench"]
+
+
+def workbench(
+    runs: Annotated[
+        Path,
+        typer.Option(
+            "--runs", metavar="DIR", help="Folder of the runs; all that is written goes there."
+        ),
+    ] = Path("runs"),
+    port: Annotated[
+        int, typer.Option("--port", metavar="N", help="Where to listen; 0: any free port.")
+    ] = 0,
+    rig: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--rig",
+            metavar="RIG",
+            help="A rig to offer beside those of hmpim.toml; may be repeated.",
+        ),
+    ] = None,
+    rig_file: Annotated[
+        Path | None,
+        typer.Option("--rig-file", metavar="FILE", help="TOML that describes one more rig."),
+    ] = None,
+    browser: Annotated[
+        bool, typer.Option("--browser/--no-browser", help="Open it in the browser.")
+    ] = True,
+    max_upload: Annotated[
+        float, typer.Option("--max-upload", metavar="MB", help="Largest file that may be dropped.")
+    ] = 2000.0,
+) -> None:
+    """Open the workbench: design, check, run, analyse, compare and campaigns in a browser.
+
+    It listens on this computer alone. The address holds a token: whoever has it may move the rigs.
+    """
+    from hmpim.workbench import Settings
+    from hmpim.workbench.server import Address, serve
+
+    if not 0 <= port <= 65535:
+        raise ArgumentError(f"--port {port} is no port; give 0 to 65535")
+    if not max_upload > 0.0:
+        raise ArgumentError(f"--max-upload {max_upload:g} MB takes nothing; give a positive size")
+    if rig_file is not None:
+        from hmpim.rigs.catalogue import read_description
+
+        read_description(rig_file)
+
+    def ready(address: Address) -> None:
+        say(f"Workbench at {address.url}")
+        say(f"Runs in {runs.resolve()}; Ctrl-C ends it")
+        sys.stdout.flush()
+
+    settings = Settings(
+        runs=runs,
+        rigs=tuple(rig or ()),
+        rig_file=rig_file,
+        port=port,
+        largest=round(1e6 * max_upload),
+    )
+    serve(settings, ready=ready, browser=browser)
+    say("Workbench ended")

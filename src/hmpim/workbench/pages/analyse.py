@@ -1,0 +1,248 @@
+"""The page that analyses a file: dropped, channels chosen, identified, read by eye."""
+
+import shlex
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from nicegui import events, ui
+
+from hmpim.errors import ArgumentError
+from hmpim.identify import Identification
+from hmpim.model.dynamics import STRUCTURES
+from hmpim.report.words import by_weight, headline, structure_words
+from hmpim.workbench.bench import Window
+from hmpim.workbench.desks import Analysis
+from hmpim.workbench.names import free_place
+from hmpim.workbench.pages.frame import Command, card, failures_said
+from hmpim.workbench.parts.table import parameter_cells, plain_table
+from hmpim.workbench.work.record import Looked, Question, found, look, write_report
+
+__all__ = ["analyse"]
+
+
+async def analyse(window: Window) -> None:
+    """Make the page."""
+    await AnalysePage(window).open()
+
+
+class AnalysePage:
+    """The page in one window: its wishes are on the desk, its result is made again from them.
+
+    Parameters
+    ----------
+    window : Window
+        Whose it is.
+    """
+
+    def __init__(self, window: Window) -> None:
+        self.window = window
+        self.workers = window.workbench.workers
+        self.looked: Looked | None = None
+        self.result: Identification | None = None
+        with ui.element("div").classes("hm-side"):
+            with card("Record"):
+                self._uploader()
+                self.files = ui.select(
+                    self._known_files(),
+                    label="File in the folder of the runs",
+                    value=self.wish.file or None,
+                    with_input=True,
+                    on_change=lambda e: self._take(e.value),
+                ).props("clearable")
+            self.choices = ui.element("div").classes("hm-side")
+        with ui.element("div").classes("hm-body"):
+            self.shown = ui.element("div").classes("hm-body").props('aria-live="polite"')
+        self.command = Command()
+
+    @property
+    def wish(self) -> Analysis:
+        """What is to be analysed."""
+        return self.window.desk.analysis
+
+    def change(self, **changes: Any) -> None:
+        """Change what is to be analysed, and say how Python does it."""
+        self.window.change(analysis=replace(self.wish, **changes))
+        self.command.show(_command(self.wish))
+
+    async def open(self) -> None:
+        """Show what was there when the page was left."""
+        if self.wish.file:
+            await self._looked()
+            if self.wish.inputs and self.wish.outputs:
+                await self.identify()
+
+    def _known_files(self) -> list[str]:
+        root = self.window.workbench.settings.runs
+        files = [p for p in root.rglob("*") if p.is_file() and ".workbench" not in p.parts]
+        names = sorted(
+            str(p.relative_to(root)) for p in files if p.suffix not in (".html", ".json")
+        )
+        if self.wish.file and self.wish.file not in names:
+            names.append(self.wish.file)
+        return names[:2000]
+
+    def _uploader(self) -> None:
+        largest = self.window.workbench.settings.largest
+
+        async def uploaded(event: events.UploadEventArguments) -> None:
+            with failures_said():
+                place = free_place(self.window.workbench.settings.uploads, event.file.name)
+                await event.file.save(place)
+                name = str(place.relative_to(self.window.workbench.settings.runs))
+                self.files.set_options(sorted([*self.files.options, name]))
+                self.files.set_value(name)
+
+        def refused() -> None:
+            ui.notify(
+                f"The file is not taken: it has more than {largest / 1e6:g} MB, or did not arrive",
+                type="negative",
+            )
+
+        ui.upload(
+            label="Drop a file of any format here",
+            auto_upload=True,
+            on_upload=uploaded,
+            on_rejected=refused,
+        ).props('flat aria-label="Drop a file of any format"').on("failed", refused)
+
+    async def _take(self, file: str | None) -> None:
+        if not file or file == self.wish.file:
+            return
+        self.change(
+            file=file, inputs=(), outputs=(), fs=None, start=None, stop=None, pair=0, hand={}
+        )
+        self.result = None
+        self.shown.clear()
+        with failures_said():
+            await self._looked()
+
+    def _path(self) -> Path:
+        root = self.window.workbench.settings.runs.resolve()
+        path = (root / self.wish.file).resolve()
+        if not path.is_relative_to(root):
+            raise ArgumentError(f"{self.wish.file!r} is not in the folder of the runs")
+        return path
+
+    async def _looked(self) -> None:
+        self.choices.clear()
+        with self.choices, ui.row().classes("hm-row"):
+            ui.spinner()
+            ui.label("Reading …")
+        try:
+            self.looked = await self.workers.do(look, str(self._path()))
+        finally:
+            self.choices.clear()
+        if not self.wish.inputs and not self.wish.outputs:
+            self.change(inputs=self.looked.inputs[:1], outputs=self.looked.outputs)
+        with self.choices:
+            self._choices(self.looked)
+        self.command.show(_command(self.wish))
+
+    def _choices(self, looked: Looked) -> None:
+        named = {
+            name: f"{name} ({note})" if note else name
+            for name, note in zip(looked.names, looked.notes, strict=True)
+        }
+        with card("Channels"):
+            for field, words in (("inputs", "Inputs"), ("outputs", "Outputs")):
+                ui.select(
+                    named,
+                    label=words,
+                    multiple=True,
+                    value=[n for n in getattr(self.wish, field) if n in named],
+                    on_change=lambda e, field=field: self.change(**{field: tuple(e.value)}),
+                ).props("use-chips")
+            if looked.fs is None:
+                ui.number(
+                    "Rate (Hz); the file has no time",
+                    value=self.wish.fs,
+                    min=0,
+                    on_change=lambda e: self.change(fs=e.value),
+                )
+            with ui.element("div").classes("hm-row"):
+                ui.number("From (s)", value=self.wish.start,
+                          on_change=lambda e: self.change(start=e.value))  # fmt: skip
+                ui.number("To (s)", value=self.wish.stop,
+                          on_change=lambda e: self.change(stop=e.value))  # fmt: skip
+            known: dict[str, str] = {"": "any"}
+            known |= {str(name): structure_words(name) for name in STRUCTURES}
+            ui.select(
+                known,
+                label="Structure",
+                value=self.wish.structure or "",
+                on_change=lambda e: self.change(structure=e.value or None),
+            )
+            self.button = ui.button("Identify", on_click=self.identify)
+
+    async def identify(self) -> None:
+        """Identify what is chosen, and show it."""
+        wish = self.wish
+        with failures_said():
+            if not wish.inputs or not wish.outputs:
+                raise ArgumentError("choose at least one input and one output")
+            self.button.disable()
+            self.shown.clear()
+            with self.shown, ui.row().classes("hm-row"):
+                ui.spinner()
+                ui.label("Identifying …")
+            try:
+                self.result = await self.workers.do(found, self._question())
+            finally:
+                self.shown.clear()
+                self.button.enable()
+            self._show()
+
+    def _question(self) -> Question:
+        wish = self.wish
+        return Question(
+            file=str(self._path()),
+            inputs=wish.inputs,
+            outputs=wish.outputs,
+            fs=wish.fs,
+            start=wish.start,
+            stop=wish.stop,
+            structure=wish.structure,
+        )
+
+    def _show(self) -> None:
+        result = self.result
+        if result is None:
+            return
+        with self.shown:
+            with card("Verdict"):
+                classes = {"ok": "hm-ok", "doubtful": "hm-doubt"}.get(str(result.verdict), "hm-bad")
+                ui.label(headline(result)).classes(f"hm-verdict {classes}")
+                with ui.element("div").classes("hm-row"):
+                    ui.button("Report", icon="download", on_click=self._report)
+            pair = result.pairs[min(self.wish.pair, len(result.pairs) - 1)]
+            with card("Parameters"):
+                columns, rows = parameter_cells(pair, self.wish.hand)
+                plain_table(columns, rows, title="Parameters")
+            if pair.warnings:
+                with card("Findings"):
+                    for finding in by_weight(pair.warnings):
+                        mark = "hm-doubt" if finding.severity == "doubt" else ""
+                        ui.label(finding.message).classes(mark)
+
+    async def _report(self) -> None:
+        with failures_said():
+            if self.result is None:
+                raise ArgumentError("nothing is identified yet")
+            page = self._path().with_name(f"{self._path().stem}.report.html")
+            await self.workers.do(write_report, self.result, str(page), ())
+            ui.download.file(page)
+
+
+def _command(wish: Analysis) -> str:
+    words = ["hmpim", "identify", wish.file]
+    for name in wish.inputs:
+        words += ["--input", name]
+    for name in wish.outputs:
+        words += ["--output", name]
+    for option, value in (("--fs", wish.fs), ("--from", wish.start), ("--to", wish.stop)):
+        if value is not None:
+            words += [option, f"{value:g}"]
+    if wish.structure is not None:
+        words += ["--structure", wish.structure]
+    return shlex.join([*words, "--report", f"{Path(wish.file).stem}.report.html"])

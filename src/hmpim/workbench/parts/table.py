@@ -1,0 +1,90 @@
+"""Tables of plain text: every cell is text and nothing else, whatever a file calls its channels."""
+
+from collections.abc import Mapping, Sequence
+
+from nicegui import ui
+
+from hmpim.identify import PairIdentification
+from hmpim.report import format_number, format_value
+from hmpim.report.words import GLOSSARY, paper_value
+
+__all__ = ["parameter_cells", "plain_table"]
+
+_VERDICTS = {"ok": "ok", "doubtful": "doubtful"}
+_CLASSES = {"ok": "hm-ok", "doubtful": "hm-doubt", "not identifiable": "hm-bad", "fail": "hm-bad"}
+
+
+def plain_table(columns: Sequence[str], rows: Sequence[Sequence[str]], *, title: str) -> ui.element:
+    """Show a table.
+
+    Parameters
+    ----------
+    columns : sequence of str
+        Headings.
+    rows : sequence of sequence of str
+        Cells.
+    title : str
+        For those who hear it.
+    """
+    whole = ui.element("div").classes("hm-table").props("tabindex=0")
+    with whole, ui.element("table"):
+        with ui.element("caption").style("position:absolute;left:-100vw"):
+            ui.label(title)
+        with ui.element("thead"), ui.element("tr"):
+            for column in columns:
+                with ui.element("th").props('scope="col"'):
+                    ui.label(column)
+        with ui.element("tbody"):
+            for row in rows:
+                with ui.element("tr"):
+                    for cell in row:
+                        with ui.element("td").classes("hm-number"):
+                            ui.label(cell).classes(_CLASSES.get(cell, ""))
+    return whole
+
+
+def parameter_cells(
+    pair: PairIdentification, hand: Mapping[str, float]
+) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
+    """Return headings and rows of a pair's parameters, values set by hand beside the automatic.
+
+    Parameters
+    ----------
+    pair : PairIdentification
+        What was found.
+    hand : mapping of str to float
+        Values set by hand, by parameter.
+
+    Returns
+    -------
+    tuple
+        Headings, and a row for each parameter that has any value.
+    """
+    columns: tuple[str, ...] = ("Parameter", "Automatic", "Unit", "Verdict", "Paper's steps")
+    if hand:
+        columns = (*columns[:3], "By hand", *columns[3:])
+    rows = []
+    for words in GLOSSARY:
+        estimate = getattr(pair.parameters, words.name)
+        paper = paper_value(pair, words.name)
+        by_hand = hand.get(words.name)
+        if estimate is None and paper is None and by_hand is None:
+            continue
+        cells = [
+            words.label,
+            "–" if estimate is None else format_value(estimate),
+            _unit(words.name) if estimate is None else estimate.unit,
+        ]
+        if hand:
+            cells.append("" if by_hand is None else f"✎ {by_hand:.5g}, by hand")
+        cells.append("" if estimate is None else _VERDICTS[estimate.verdict])
+        cells.append("" if paper is None else format_number(paper))
+        rows.append(tuple(cells))
+    return columns, rows
+
+
+def _unit(name: str) -> str:
+    """The unit of a parameter that no estimate states."""
+    if name.startswith(("bandwidth", "natural")):
+        return "Hz"
+    return "s" if name.startswith(("delay", "time", "hold")) else ""

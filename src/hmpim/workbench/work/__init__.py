@@ -1,0 +1,1 @@
+"""What the workers do: plain functions of plain values, each a few calls of the package."""
