@@ -4,9 +4,9 @@ import asyncio
 
 import pytest
 
-from hmpim.workbench.lock import Lock, fresh_token
+from hmpim.workbench.lock import Lock
 
-TOKEN = fresh_token()
+TOKEN = "aT0ken_of-the-tests"
 HOST = (b"host", b"127.0.0.1:8080")
 OWN = (b"origin", b"http://127.0.0.1:8080")
 
