@@ -75,7 +75,7 @@ def test_demo_finds_all_five_axes_and_shows_them(demo):
         assert 0.95 < row.parameters["bandwidth_phase90"].value / row.exact_bandwidth < 1.01
     (section,) = study_page(study).sections
     (picture,) = section.pictures
-    labels = [line.get_label() for line in picture.figure.axes[0].lines]
+    labels = [item.label for item in picture.figure.panels[0].items]
     assert labels[:5] == ["roll", "yaw", "pitch", "azimuth", "elevation"]
     assert [grid.caption.split(" ")[0] for grid in section.grids] == ["Couplings"]
     page = (folder / "study.html").read_text(encoding="utf-8")
@@ -174,7 +174,7 @@ def test_without_figures_each_test_shows_all_its_cases_by_what_sets_them_apart(t
     plan = parse_plan(data)
     (section,) = study_page(make_study(plan, run_campaign(plan, tmp_path))).sections
     (picture,) = section.pictures
-    labels = [line.get_label() for line in picture.figure.axes[0].lines]
+    labels = [item.label for item in picture.figure.panels[0].items]
     assert labels == ["inner, 250 Hz", "outer, 250 Hz", "inner, 500 Hz", "outer, 500 Hz"]
     inner, outer = section.found
     assert inner.count("−90° at ") == outer.count("−90° at ") == 2

@@ -8,6 +8,7 @@ import pytest
 
 from hmpim import plots
 from hmpim.identify import Candidate, HarmonicCurve
+from hmpim.plots.draw.frames import frames
 from hmpim.plots.envelope import MOST_POINTS
 from hmpim.plots.style import COLOURS, axis_label, plain
 from hmpim.stimulus import Limits, design
@@ -40,9 +41,10 @@ def figures():
 
 def test_every_axis_has_a_unit(figures):
     for name, figure in figures.items():
-        for axes in figure.axes:
+        drawn = figure.to_matplotlib() if isinstance(figure, plots.Figure) else figure
+        for axes in drawn.axes:
             assert axes.get_ylabel().endswith(")"), name
-        assert figure.axes[-1].get_xlabel() in (
+        assert drawn.axes[-1].get_xlabel() in (
             "Time (s)",
             "Lag (s)",
             "Lag of the output (s)",
@@ -110,10 +112,9 @@ def test_marks_stand_at_their_frequencies_and_only_inside_the_band():
         plots.Mark(frequency=3.0, label="other axes", axes="magnitude"),
     )
     figure = plots.bode([("a", "model", curve)], marks=marks)
-    magnitude, phase = figure.axes
-    assert [text.get_text() for text in phase.texts] == ["in"]
-    assert [text.get_text() for text in magnitude.texts] == ["other axes"]
-    assert any(list(line.get_xdata()) == [1.5, 1.5] for line in phase.lines)
+    magnitude, phase = (panel.of(plots.Rule) for panel in figure.panels)
+    assert [(rule.at, rule.words) for rule in phase] == [(1.5, "in")]
+    assert [(rule.at, rule.words) for rule in magnitude] == [(3.0, "other axes")]
 
 
 def test_a_band_that_reaches_nothing_does_not_squash_the_picture():
@@ -126,7 +127,7 @@ def test_a_band_that_reaches_nothing_does_not_squash_the_picture():
         phase_low=np.full(F.size, -180.0),
         phase_high=np.full(F.size, 180.0),
     )
-    low, high = plots.bode([("a", "input", curve)]).axes[0].get_ylim()
+    low, high = frames(plots.bode([("a", "input", curve)]))[0].y
     assert -10 < low < high < 10
 
 

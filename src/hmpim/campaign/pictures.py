@@ -11,6 +11,7 @@ from hmpim.campaign.plan import FigurePlan
 from hmpim.campaign.study import Row
 from hmpim.identify import PairIdentification
 from hmpim.plots.curves import BodeCurve, measured_curve, model_curve
+from hmpim.plots.description import Figure as Description
 from hmpim.plots.fence import picket_fence
 from hmpim.plots.overlay import overlaid_bode, overlaid_levels
 from hmpim.report.figures import Picture
@@ -52,8 +53,8 @@ def section_pictures(
         return [_picture("axes", figure.title, words, drawn)] if every else []
     for axis in dict.fromkeys(row.axis for row in rows):
         if figure.compare == "fence":
-            drawn = _fence([row for row in rows if row.axis == axis])
-            pictures.append(_picture(axis, f"{figure.title}: {axis}", words, drawn))
+            fence = _fence([row for row in rows if row.axis == axis])
+            pictures.append(_picture(axis, f"{figure.title}: {axis}", words, fence))
             continue
         curves = [
             (case_label(row, figure.compare, rows), curve)
@@ -78,7 +79,7 @@ def _fence(rows: Sequence[Row]) -> "Figure":
     return picket_fence(records, band=(max(low, 0.55 * high), 0.75 * high))
 
 
-def _picture(key: str, title: str, words: str, drawn: "Figure") -> Picture:
+def _picture(key: str, title: str, words: str, drawn: "Figure | Description") -> Picture:
     return Picture(key=key, title=title, caption=title + ".", description=words, figure=drawn)
 
 

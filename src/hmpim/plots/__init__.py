@@ -1,9 +1,22 @@
-"""Pictures: one function for each, taking arrays or results, returning a matplotlib Figure."""
+"""Pictures: one function for each, taking arrays or results, returning a description of it."""
 
-from hmpim.plots.bode import Mark, bode, draw_bode, pair_bode, pair_deviation
+from hmpim.plots.bode import Mark, bode, bode_items, pair_bode, pair_deviation
 from hmpim.plots.candidates import candidates
 from hmpim.plots.correlation import cross_correlation, error_autocorrelation
 from hmpim.plots.curves import BodeCurve, deviation_curve, measured_curve, model_curve
+from hmpim.plots.description import (
+    Axis,
+    Band,
+    Bars,
+    Curve,
+    Figure,
+    Image,
+    Panel,
+    Points,
+    Rule,
+    Span,
+    Words,
+)
 from hmpim.plots.envelope import envelope
 from hmpim.plots.frames import tracked_frames
 from hmpim.plots.harmonics import harmonics
@@ -18,14 +31,25 @@ from hmpim.plots.margin import added_phase
 from hmpim.plots.spectra import draw_spectrum, shade_band, spectra
 
 __all__ = [
+    "Axis",
+    "Band",
+    "Bars",
     "BodeCurve",
+    "Curve",
+    "Figure",
+    "Image",
     "Mark",
+    "Panel",
+    "Points",
+    "Rule",
+    "Span",
+    "Words",
     "added_phase",
     "bode",
+    "bode_items",
     "candidates",
     "cross_correlation",
     "deviation_curve",
-    "draw_bode",
     "draw_spectrum",
     "envelope",
     "error_autocorrelation",

@@ -1,7 +1,7 @@
 """Bode plots: the measured response in its error band, the fitted model over it."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
@@ -10,52 +10,46 @@ from numpy.typing import NDArray
 from hmpim.errors import ArgumentError
 from hmpim.plots.candidates import INTERSAMPLE_WORDS
 from hmpim.plots.curves import BodeCurve, deviation_curve, measured_curve, model_curve
-from hmpim.plots.style import (
-    COLOURS,
-    Colour,
-    degree_ticks,
-    draw_legend,
-    draw_line,
-    draw_mark,
-    finish_axes,
-    new_figure,
-    plain,
-)
+from hmpim.plots.description import Axis, Band, Curve, Figure, Item, Panel, Points, Rule
+from hmpim.plots.style import Colour, plain
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
+    from hmpim.identify import Estimate, Identification, PairIdentification
 
-    from hmpim.identify import PairIdentification
+__all__ = ["Mark", "bode", "bode_items", "pair_bode", "pair_deviation"]
 
-__all__ = ["Mark", "bode", "draw_bode", "pair_bode", "pair_deviation"]
+MOST_POINTS = 70  # measured ones with bars of their own; more would hide the model
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Mark:
-    """A frequency worth naming, in Hz, the words for it, and the axes it belongs to."""
+    """A frequency worth naming, in Hz, its interval, the words for it, and where it belongs."""
 
     frequency: float
     label: str
     axes: Literal["magnitude", "phase"] = "phase"
+    low: float | None = None
+    high: float | None = None
 
 
 def bode(
-    curves: Sequence[tuple[str, Colour, BodeCurve]],
+    what: "Identification | PairIdentification | Sequence[tuple[str, Colour, BodeCurve]]",
     *,
     marks: Sequence[Mark] = (),
     magnitude_unit: str = "",
     band: tuple[float, float] | None = None,
     phase_level: float | None = None,
-) -> "Figure":
-    """Draw magnitude and phase of some curves (Figs 15 to 17, 19 to 21).
+) -> Figure:
+    """Describe magnitude and phase over frequency (Figs 15 to 17, 19 to 21).
 
     Parameters
     ----------
-    curves : sequence of (label, colour, BodeCurve)
-        Drawn in this order; a curve that has a band is drawn with it.
+    what : Identification, PairIdentification, or sequence of (label, colour, BodeCurve)
+        A result of one pair is drawn with all that is known of it, as `pair_bode` does; of
+        several pairs, their measured responses over each other. Curves are drawn in this
+        order; one that has a band is drawn with it.
     marks : sequence of Mark
-        Frequencies to name.
+        Frequencies to name beside curves.
     magnitude_unit : str
         Output unit per input unit, that 0 dB stands for; empty if they are the same.
     band : tuple of float, optional
@@ -63,52 +57,126 @@ def bode(
     phase_level : float, optional
         Phase in degrees at which a thin line is drawn, such as -90.
 
+    Raises
+    ------
+    ArgumentError
+        If a result holds no response to draw.
+
     Examples
     --------
     >>> f = np.geomspace(0.1, 10.0, 50)
     >>> curve = BodeCurve(frequency=f, magnitude_db=0.0 * f, phase=-54.0 * f)
     >>> figure = bode([("delay of 150 ms", "model", curve)])
-    >>> [axes.get_ylabel() for axes in figure.axes]
+    >>> [panel.y.label for panel in figure.panels]
     ['Magnitude (dB)', 'Phase (deg)']
     """
-    figure, (magnitude, phase) = new_figure(2, height=2.5)
-    for label, colour, curve in curves:
-        draw_bode(magnitude, phase, curve, label=label, colour=colour)
+    if not isinstance(what, Sequence):
+        figure = _result_bode(what)
+        panels = tuple(_with_marks(panel, marks, band) for panel in figure.panels)
+        return replace(figure, panels=panels)
+    curves = what
     shown = band or _whole_band([curve for _, _, curve in curves])
-    if shown is not None:
-        magnitude.set_xlim(*shown)
-        _fit_heights(magnitude, phase, [curve for _, _, curve in curves], shown)
-    degree_ticks(phase)
-    reference = f"dB re 1 {plain(magnitude_unit)}" if magnitude_unit else "dB"
-    finish_axes(magnitude, y=f"Magnitude ({reference})", log_x=True)
-    finish_axes(phase, x="Frequency (Hz)", y="Phase (deg)", log_x=True)
+    magnitude: list[Item] = []
+    phase: list[Item] = []
     if phase_level is not None:
-        phase.axhline(phase_level, color=COLOURS["muted"], linewidth=0.8, linestyle=(0, (1, 2)))
-    height = {"magnitude": 0.1, "phase": 0.1}  # below the curves of all that lags
+        phase.append(Rule(at=phase_level, axis="y", colour="muted", dashes=":", width=0.8))
+    for label, colour, curve in curves:
+        upper, lower = bode_items(curve, label=label, colour=colour)
+        magnitude += upper
+        phase += lower
+    heights = [_heights([c for _, _, c in curves], name, shown) for name in _QUANTITIES]
+    reference = f"dB re 1 {plain(magnitude_unit)}" if magnitude_unit else "dB"
+    low, high = shown or (None, None)
+    x = Axis(scale="log", low=low, high=high, numbered=False)
+    panels = (
+        Panel(
+            x=x,
+            y=Axis(label=f"Magnitude ({reference})", low=heights[0][0], high=heights[0][1]),
+            items=tuple(magnitude),
+        ),
+        Panel(
+            x=replace(x, label="Frequency (Hz)", numbered=True),
+            y=Axis(label="Phase (deg)", degrees=True, low=heights[1][0], high=heights[1][1]),
+            items=tuple(phase),
+            row=1,
+        ),
+    )
+    names = ", ".join(label for label, _, _ in curves) or "nothing"
+    words = [f"{mark.label} ({mark.axes})" for mark in marks]
+    span = "" if shown is None else f" from {shown[0]:.4g} to {shown[1]:.4g} Hz"
+    return Figure(
+        panels=tuple(_with_marks(panel, marks, shown) for panel in panels),
+        alt=". ".join([f"Bode plot{span}: {names}", *words]) + ".",
+        heights=(2.5, 2.5),
+    )
+
+
+_QUANTITIES: tuple[Literal["magnitude_db", "phase"], ...] = ("magnitude_db", "phase")
+
+
+def _result_bode(result: "Identification | PairIdentification") -> Figure:
+    from hmpim.identify import Identification
+    from hmpim.plots.overlay import overlaid_bode
+
+    if not isinstance(result, Identification):
+        return pair_bode(result)
+    pairs = [pair for pair in result.counted if np.any(pair.frequency_response.frequency > 0)]
+    if not pairs:
+        raise ArgumentError(
+            "this result has no pair with a measured frequency response; there is nothing to draw"
+        )
+    if len(pairs) > 1:
+        return overlaid_bode(
+            [
+                (f"{pair.input} → {pair.output}", _measured(pair, result.record.fs))
+                for pair in pairs
+            ],
+            pairs=False,
+        )
+    units = ("", "")
+    if result.data is not None:
+        units = (
+            result.data.channel(pairs[0].input).unit,
+            result.data.channel(pairs[0].output).unit,
+        )
+    return pair_bode(pairs[0], input_unit=units[0], output_unit=units[1], fs=result.record.fs)
+
+
+def _measured(pair: "PairIdentification", fs: float | None) -> BodeCurve:
+    """Return a pair's measured response, its phase unwrapped beside the model's."""
+    response = pair.frequency_response
+    near = model_curve(pair, response.frequency[response.frequency > 0], fs=fs)
+    return measured_curve(response, near=near)
+
+
+def _with_marks(panel: Panel, marks: Sequence[Mark], band: tuple[float, float] | None) -> Panel:
+    """Add the marks that belong to a panel, their words one under the other."""
+    which = "phase" if panel.y.label.startswith("Phase") else "magnitude"
+    rules: list[Rule] = []
     for mark in marks:
-        if shown is None or shown[0] <= mark.frequency <= shown[1]:
-            axes = phase if mark.axes == "phase" else magnitude
-            draw_mark(axes, mark.frequency, label=mark.label, text_at=height[mark.axes])
-            height[mark.axes] += 0.11
-    draw_legend(magnitude)
-    figure.align_ylabels([magnitude, phase])
-    return figure
+        if mark.axes == which and (band is None or band[0] <= mark.frequency <= band[1]):
+            rules.append(
+                Rule(
+                    at=mark.frequency,
+                    low=mark.low,
+                    high=mark.high,
+                    words=mark.label,
+                    words_at=0.1 + 0.11 * len(rules),  # below the curves of all that lags
+                )
+            )
+    return replace(panel, items=(*panel.items, *rules))
 
 
-def draw_bode(
-    magnitude: "Axes",
-    phase: "Axes",
-    curve: BodeCurve,
-    *,
-    label: str = "",
-    colour: Colour = "model",
-) -> None:
-    """Draw one curve, with its band if it has one, on axes that are there already.
+def bode_items(
+    curve: BodeCurve, *, label: str = "", colour: Colour = "model"
+) -> tuple[list[Item], list[Item]]:
+    """Return what is drawn of one curve in the magnitude's panel and in the phase's.
+
+    A measured curve, one with a band, is a line in its band, and some of its points stand out
+    with error bars of their own; a model's is a dashed line.
 
     Parameters
     ----------
-    magnitude, phase : matplotlib.axes.Axes
-        Where.
     curve : BodeCurve
         What.
     label : str
@@ -118,40 +186,39 @@ def draw_bode(
 
     Examples
     --------
-    >>> figure, (magnitude, phase) = new_figure(2)
     >>> f = np.geomspace(0.1, 10.0, 50)
     >>> curve = BodeCurve(frequency=f, magnitude_db=0.0 * f, phase=-54.0 * f)
-    >>> draw_bode(magnitude, phase, curve, label="delay")
-    >>> len(magnitude.lines), len(phase.lines)
-    (1, 1)
+    >>> [len(items) for items in bode_items(curve, label="delay")]
+    [1, 1]
     """
+    out: tuple[list[Item], list[Item]] = ([], [])
     panels = (
-        (magnitude, curve.magnitude_db, curve.magnitude_low, curve.magnitude_high),
-        (phase, curve.phase, curve.phase_low, curve.phase_high),
+        (out[0], curve.magnitude_db, curve.magnitude_low, curve.magnitude_high, label),
+        (out[1], curve.phase, curve.phase_low, curve.phase_high, ""),  # one legend serves both
     )
-    for axes, middle, low, high in panels:
-        measured = low is not None and high is not None
-        if low is not None and high is not None:
-            floor = np.where(np.isfinite(low), low, middle - 60.0)
-            axes.fill_between(
-                curve.frequency,
-                floor,
-                high,
-                color=COLOURS[colour],
-                alpha=0.22,
-                linewidth=0,
-                label="95 % band" if axes is magnitude else None,
-            )
-        draw_line(
-            axes,
-            curve.frequency,
-            middle,
-            colour=colour,
-            label=label if axes is magnitude else "",  # one legend serves both
-            dashes="-" if measured else "--",
-            width=1.0 if measured else 1.5,
-            spacing="log",
-        )
+    f = curve.frequency
+    for items, middle, low, high, words in panels:
+        if low is None or high is None:
+            items.append(Curve(x=f, y=middle, label=words, colour=colour, dashes="--", width=1.6))
+            continue
+        some = _spread(f)
+        items += [
+            Band(x=f, low=low, high=high, label=words and "95 % band", colour=colour, opacity=0.28),
+            Curve(x=f, y=middle, colour=colour, width=0.7, opacity=0.7),
+            Points(
+                x=f[some], y=middle[some], low=low[some], high=high[some], label=words,
+                colour=colour, size=3.2,
+            ),
+        ]  # fmt: skip
+    return out
+
+
+def _spread(frequency: NDArray[np.float64]) -> NDArray[np.intp]:
+    """Return indices of some frequencies, evenly spread along a logarithmic axis."""
+    if frequency.size <= MOST_POINTS:
+        return np.arange(frequency.size)
+    wanted = np.geomspace(frequency[0], frequency[-1], MOST_POINTS)
+    return np.unique(np.searchsorted(frequency, wanted).clip(0, frequency.size - 1))
 
 
 def pair_bode(
@@ -160,11 +227,12 @@ def pair_bode(
     input_unit: str = "",
     output_unit: str = "",
     fs: float | None = None,
-) -> "Figure":
-    """Draw all that is known of a pair's frequency response.
+) -> Figure:
+    """Describe all that is known of a pair's frequency response.
 
     The measured response with its 95 % band, the fitted model over it, the model's phase
-    without its delay, and marks at the -90° and -3 dB bandwidths and the natural frequency.
+    without its delay, and marks with their 95 % intervals at the -90° and -3 dB bandwidths and
+    the natural frequency.
 
     Parameters
     ----------
@@ -187,7 +255,7 @@ def pair_bode(
     ...     parameters=Parameters(), paper=PaperEstimates(), frequency_response=response,
     ...     numerator=(), denominator=(), candidates=(), verdict="doubtful", warnings=())
     >>> figure = pair_bode(pair)
-    >>> len(figure.axes)
+    >>> len(figure.panels)
     2
     """
     response = pair.frequency_response
@@ -195,8 +263,7 @@ def pair_bode(
     curves: list[tuple[str, Colour, BodeCurve]] = []
     grid = np.geomspace(0.1, 10.0, 400)
     if positive.size:
-        near = model_curve(pair, positive, fs=fs)
-        curves.append(("measured", "input", measured_curve(response, near=near)))
+        curves.append(("measured", "input", _measured(pair, fs)))
         grid = np.geomspace(positive[0], positive[-1], 400)
     whole = model_curve(pair, grid, fs=fs)
     if whole is not None:
@@ -208,15 +275,17 @@ def pair_bode(
     level = -90.0 if scale is None or scale.value > 0.0 else -270.0  # 90° later than at DC
     figure = bode(curves, marks=_marks(pair), magnitude_unit=ratio, phase_level=level)
     bare = model_curve(pair, grid, with_delay=False)
-    if bare is not None and pair.parameters.delay is not None:
-        phase = figure.axes[1]
-        draw_line(phase, grid, bare.phase, colour="other", label="model without delay", dashes="-.")
-        draw_legend(phase)
-    return figure
+    if bare is None or pair.parameters.delay is None:
+        return figure
+    magnitude, phase = figure.panels
+    without = Curve(
+        x=grid, y=bare.phase, colour="other", label="model without delay", dashes="-.", width=1.6
+    )
+    return replace(figure, panels=(magnitude, replace(phase, items=(*phase.items, without))))
 
 
-def pair_deviation(pair: "PairIdentification", *, fs: float | None = None) -> "Figure":
-    """Draw the measured response over the model's, where the 95 % band can be seen.
+def pair_deviation(pair: "PairIdentification", *, fs: float | None = None) -> Figure:
+    """Describe the measured response over the model's, where the 95 % band can be seen.
 
     Parameters
     ----------
@@ -242,7 +311,7 @@ def pair_deviation(pair: "PairIdentification", *, fs: float | None = None) -> "F
     ...     parameters=Parameters(scale_factor=one), paper=PaperEstimates(), candidates=(),
     ...     frequency_response=response, numerator=(1.0,), denominator=(1.0,), verdict="ok",
     ...     warnings=())
-    >>> [axes.get_ylabel() for axes in pair_deviation(pair).axes]
+    >>> [panel.y.label for panel in pair_deviation(pair).panels]
     ['Magnitude (dB)', 'Phase (deg)']
     """
     response = pair.frequency_response
@@ -253,23 +322,21 @@ def pair_deviation(pair: "PairIdentification", *, fs: float | None = None) -> "F
             f"pair {pair.input!r} → {pair.output!r} has no model or no measured response to compare"
         )
     curve = deviation_curve(measured_curve(response, near=model), model)
-    figure, (magnitude, phase) = new_figure(2, height=1.7)
-    draw_bode(magnitude, phase, curve, label="measured over model", colour="input")
-    for axes, low, high in (
-        (magnitude, curve.magnitude_low, curve.magnitude_high),
-        (phase, curve.phase_low, curve.phase_high),
-    ):
-        axes.axhline(0.0, color=COLOURS["model"], linewidth=1.2, linestyle="--")
-        if low is not None and high is not None:
-            reach = _common_reach(low, high)
-            axes.set_ylim(-reach, reach)
-    if positive.size > 1:
-        magnitude.set_xlim(float(positive[0]), float(positive[-1]))
-    finish_axes(magnitude, y="Magnitude (dB)", log_x=True)
-    finish_axes(phase, x="Frequency (Hz)", y="Phase (deg)", log_x=True)
-    draw_legend(magnitude)
-    figure.align_ylabels([magnitude, phase])
-    return figure
+    figure = bode([("measured over model", "input", curve)])
+    zero = Rule(at=0.0, axis="y", colour="model", width=1.2)
+    panels = []
+    for panel in figure.panels:
+        (band,) = panel.of(Band)
+        reach = _common_reach(band.low, band.high)
+        y = replace(panel.y, low=-reach, high=reach)
+        panels.append(replace(panel, y=y, items=(*panel.items, zero)))
+    return replace(
+        figure,
+        panels=tuple(panels),
+        heights=(1.7, 1.7),
+        alt="Magnitude and phase of the measured response over the model's, with the 95 % band "
+        f"around them, from {positive[0]:.4g} to {positive[-1]:.4g} Hz.",
+    )
 
 
 def _common_reach(low: NDArray[np.float64], high: NDArray[np.float64]) -> float:
@@ -283,19 +350,26 @@ def _common_reach(low: NDArray[np.float64], high: NDArray[np.float64]) -> float:
 
 def _marks(pair: "PairIdentification") -> list[Mark]:
     found = pair.parameters
+    named: tuple[tuple[Estimate | None, str, str, Literal["magnitude", "phase"]], ...] = (
+        (found.bandwidth_phase90, "−90° at ", "", "phase"),
+        (found.bandwidth_phase90_without_delay, "−90° at ", " without delay", "phase"),
+        (found.bandwidth_3db, "−3 dB at ", "", "magnitude"),
+        (found.natural_frequency, "natural frequency ", "", "magnitude"),
+    )
     marks = []
-    if found.bandwidth_phase90 is not None:
-        f = found.bandwidth_phase90.value
-        marks.append(Mark(frequency=f, label=f"−90° at {f:.3g} Hz"))
-    if found.bandwidth_phase90_without_delay is not None:
-        f = found.bandwidth_phase90_without_delay.value
-        marks.append(Mark(frequency=f, label=f"−90° at {f:.3g} Hz without delay"))
-    if found.bandwidth_3db is not None:
-        f = found.bandwidth_3db.value
-        marks.append(Mark(frequency=f, label=f"−3 dB at {f:.3g} Hz", axes="magnitude"))
-    if found.natural_frequency is not None:
-        f = found.natural_frequency.value
-        marks.append(Mark(frequency=f, label=f"natural frequency {f:.3g} Hz", axes="magnitude"))
+    for estimate, before, after, axes in named:
+        if estimate is None:
+            continue
+        low, high = estimate.ci95 or (None, None)
+        marks.append(
+            Mark(
+                frequency=estimate.value,
+                label=f"{before}{estimate.text}{after}",
+                axes=axes,
+                low=low,
+                high=high,
+            )
+        )
     return marks
 
 
@@ -306,18 +380,21 @@ def _whole_band(curves: Sequence[BodeCurve]) -> tuple[float, float] | None:
     return min(float(f[0]) for f in filled), max(float(f[-1]) for f in filled)
 
 
-def _fit_heights(
-    magnitude: "Axes", phase: "Axes", curves: Sequence[BodeCurve], band: tuple[float, float]
-) -> None:
-    """Fit both heights to the curves themselves: a band that reaches -inf must not set them."""
-    for axes, values_of in ((magnitude, "magnitude_db"), (phase, "phase")):
-        seen = []
-        for curve in curves:
-            values = getattr(curve, values_of)
-            inside = (curve.frequency >= band[0]) & (curve.frequency <= band[1])
-            seen.append(values[inside & np.isfinite(values)])
-        joined = np.concatenate(seen) if seen else np.empty(0)
-        if joined.size:
-            low, high = float(joined.min()), float(joined.max())
-            room = max(0.08 * (high - low), 1.0)
-            axes.set_ylim(low - room, high + 2.5 * room)
+def _heights(
+    curves: Sequence[BodeCurve],
+    quantity: Literal["magnitude_db", "phase"],
+    band: tuple[float, float] | None,
+) -> tuple[float | None, float | None]:
+    """Ends that fit the curves themselves: a band that reaches -inf must not set them."""
+    seen = [np.empty(0)]
+    for curve in curves:
+        values = getattr(curve, quantity)
+        low, high = band or (-np.inf, np.inf)
+        inside = (curve.frequency >= low) & (curve.frequency <= high)
+        seen.append(values[inside & np.isfinite(values)])
+    joined = np.concatenate(seen)
+    if not joined.size:
+        return None, None
+    first, last = float(joined.min()), float(joined.max())
+    room = max(0.05 * (last - first), 1.0)
+    return first - room, last + room

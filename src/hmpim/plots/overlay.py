@@ -1,29 +1,19 @@
 """Several measured responses, or stimuli's levels, over each other."""
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Literal
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hmpim.plots.curves import BodeCurve
-from hmpim.plots.style import (
-    COLOURS,
-    Colour,
-    degree_ticks,
-    draw_legend,
-    draw_line,
-    finish_axes,
-    new_figure,
-)
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+from hmpim.plots.description import Axis, Curve, Dashes, Figure, Item, Panel, Rule
+from hmpim.plots.style import Colour
 
 __all__ = ["overlaid_bode", "overlaid_levels"]
 
 _COLOURS: tuple[Colour, ...] = ("input", "output", "other", "limit", "model", "muted")
-_DASHES: tuple[Literal["-", "--", "-."], ...] = ("-", "--", "-.")
+_DASHES: tuple[Dashes, ...] = ("-", "--", "-.")
 
 
 def overlaid_bode(
@@ -31,8 +21,8 @@ def overlaid_bode(
     *,
     phase_level: float | None = -90.0,
     pairs: bool = True,
-) -> "Figure":
-    """Draw magnitude and phase of several curves over each other (Figs 19 to 22).
+) -> Figure:
+    """Describe magnitude and phase of several curves over each other (Figs 19 to 22).
 
     Parameters
     ----------
@@ -48,41 +38,49 @@ def overlaid_bode(
     >>> f = np.geomspace(0.1, 10.0, 50)
     >>> curve = BodeCurve(frequency=f, magnitude_db=0.0 * f, phase=-54.0 * f)
     >>> figure = overlaid_bode([("first", curve), ("second", curve)])
-    >>> len(figure.axes[0].lines)
+    >>> len(figure.panels[0].items)
     2
     """
-    figure, (magnitude, phase) = new_figure(2, height=2.5)
+    phase_items: list[Item] = []
+    magnitude_items: list[Item] = []
     for i, (label, curve) in enumerate(curves):
-        for axes, values in ((magnitude, curve.magnitude_db), (phase, curve.phase)):
-            draw_line(
-                axes,
-                curve.frequency,
-                values,
-                colour=_COLOURS[i % len(_COLOURS)],
-                label=label if axes is magnitude else "",
-                dashes=_DASHES[i // len(_COLOURS) % len(_DASHES)],
-                width=_width(i) if pairs else 1.2,
-                spacing="log",
-            )
+        look = Curve(
+            x=curve.frequency,
+            y=curve.magnitude_db,
+            label=label,
+            colour=_COLOURS[i % len(_COLOURS)],
+            dashes=_DASHES[i // len(_COLOURS) % len(_DASHES)],
+            width=_width(i) if pairs else 1.2,
+        )
+        magnitude_items.append(look)
+        phase_items.append(replace(look, y=curve.phase))
+    if phase_level is not None:
+        phase_items.append(Rule(at=phase_level, axis="y", colour="muted", dashes=":", width=0.8))
+    x = Axis(scale="log", numbered=False)
+    magnitude = Axis(label="Magnitude (dB)")
+    phase = Axis(label="Phase (deg)", degrees=True)
     filled = [curve for _, curve in curves if curve.frequency.size > 1]
     if filled:
-        low = min(float(c.frequency[0]) for c in filled)
-        high = max(float(c.frequency[-1]) for c in filled)
-        magnitude.set_xlim(low, high)
+        x = replace(
+            x,
+            low=min(float(c.frequency[0]) for c in filled),
+            high=max(float(c.frequency[-1]) for c in filled),
+        )
         # What noise makes of the far end must not set the heights.
         bottom = min(float(np.nanquantile(c.phase, 0.02)) for c in filled)
-        phase.set_ylim(max(bottom, -400.0) - 15.0, 20.0)
+        phase = replace(phase, low=max(bottom, -400.0) - 15.0, high=20.0)
         bottom = min(float(np.nanquantile(c.magnitude_db, 0.02)) for c in filled)
         top = max(float(np.nanmax(c.magnitude_db)) for c in filled)
-        magnitude.set_ylim(max(bottom, -50.0) - 2.0, min(top, 20.0) + 2.0)
-    if phase_level is not None:
-        phase.axhline(phase_level, color=COLOURS["muted"], linewidth=0.8, linestyle=(0, (1, 2)))
-    degree_ticks(phase)
-    finish_axes(magnitude, y="Magnitude (dB)", log_x=True)
-    finish_axes(phase, x="Frequency (Hz)", y="Phase (deg)", log_x=True)
-    draw_legend(magnitude, columns=2)
-    figure.align_ylabels([magnitude, phase])
-    return figure
+        magnitude = replace(magnitude, low=max(bottom, -50.0) - 2.0, high=min(top, 20.0) + 2.0)
+    lower = replace(x, label="Frequency (Hz)", numbered=True)
+    return Figure(
+        panels=(
+            Panel(x=x, y=magnitude, items=tuple(magnitude_items)),
+            Panel(x=lower, y=phase, items=tuple(phase_items), row=1, legend=False),
+        ),
+        alt="Bode plots over each other: " + ", ".join(label for label, _ in curves) + ".",
+        heights=(2.5, 2.5),
+    )
 
 
 def _width(place: int) -> float:
@@ -94,8 +92,8 @@ def overlaid_levels(
     *,
     unit: str = "",
     level: float | None = None,
-) -> "Figure":
-    """Draw the spectra of several stimuli over each other (Fig. 18).
+) -> Figure:
+    """Describe the spectra of several stimuli over each other (Fig. 18).
 
     Parameters
     ----------
@@ -109,23 +107,31 @@ def overlaid_levels(
     Examples
     --------
     >>> f = np.geomspace(0.1, 10.0, 50)
-    >>> len(overlaid_levels([("azimuth", f, 30.0 + 0.0 * f)]).axes[0].lines)
+    >>> len(overlaid_levels([("azimuth", f, 30.0 + 0.0 * f)]).panels[0].items)
     1
     """
-    figure, (axes,) = new_figure(1, height=2.8)
-    for i, (label, frequency, values) in enumerate(levels):
-        draw_line(
-            axes,
-            frequency,
-            values,
+    items: list[Item] = [
+        Curve(
+            x=frequency,
+            y=values,
             colour=_COLOURS[i % len(_COLOURS)],
+            dashes=_DASHES[i // len(_COLOURS) % len(_DASHES)],
             label=label,
             width=_width(i),
-            spacing="log",
         )
+        for i, (label, frequency, values) in enumerate(levels)
+    ]
     if level is not None:
-        axes.axhline(level, color=COLOURS["muted"], linewidth=0.8, linestyle=(0, (1, 2)))
+        items.append(Rule(at=level, axis="y", colour="muted", dashes=":", width=0.8))
     reference = f"dB re 1 {unit}" if unit else "dB"
-    finish_axes(axes, x="Frequency (Hz)", y=f"Level ({reference})", log_x=True)
-    draw_legend(axes, columns=2)
-    return figure
+    return Figure(
+        panels=(
+            Panel(
+                x=Axis(label="Frequency (Hz)", scale="log"),
+                y=Axis(label=f"Level ({reference})"),
+                items=tuple(items),
+            ),
+        ),
+        alt="Spectra over each other: " + ", ".join(label for label, _, _ in levels) + ".",
+        heights=(2.8,),
+    )

@@ -30,7 +30,7 @@ class Picture:
     title: str
     caption: str
     description: str
-    figure: "Figure"
+    figure: "Figure | plots.Figure"
 
 
 def stimulus_picture(stimulus: "Stimulus") -> Picture:

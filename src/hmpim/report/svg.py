@@ -6,6 +6,7 @@ import warnings
 import xml.etree.ElementTree as ET
 from typing import TYPE_CHECKING
 
+from hmpim.plots.description import Figure as Description
 from hmpim.plots.style import COLOURS
 
 if TYPE_CHECKING:
@@ -17,7 +18,7 @@ _DECIMALS = re.compile(r"(\.\d\d)\d+")
 _REFERENCE = re.compile(r"url\(#")
 
 
-def inline_svg(figure: "Figure", *, key: str, title: str, description: str) -> str:
+def inline_svg(figure: "Figure | Description", *, key: str, title: str, description: str) -> str:
     """Turn a figure into an ``<svg>`` element for a page, named for screen readers.
 
     Every id starts with `key`, so that several figures can stand in one page. Namespaces and
@@ -26,7 +27,7 @@ def inline_svg(figure: "Figure", *, key: str, title: str, description: str) -> s
 
     Parameters
     ----------
-    figure : matplotlib.figure.Figure
+    figure : Figure
         What to show.
     key : str
         Unique in the page; letters, digits and dashes.
@@ -45,7 +46,8 @@ def inline_svg(figure: "Figure", *, key: str, title: str, description: str) -> s
     >>> text.startswith('<svg aria-labelledby="f1-title f1-desc"'), "http" in text
     (True, False)
     """
-    root = ET.fromstring(_rendered(figure, key))
+    drawn = figure.to_matplotlib() if isinstance(figure, Description) else figure
+    root = ET.fromstring(_rendered(drawn, key))
     for parent in root.iter():
         for child in list(parent):
             if _local(child.tag) == "metadata":

@@ -5,15 +5,12 @@ import warnings
 from collections.abc import Callable
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from hmpim.formats.atomic import replacing, write_text
 from hmpim.report.paper.rows import COLUMNS, cells, markdown_table, table_dict
 from hmpim.report.paper.study import Study
 from hmpim.report.svg import inline_svg
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 __all__ = ["render_page", "write_study"]
 
@@ -127,7 +124,7 @@ def render_page(study: Study) -> str:
     )
 
 
-def _save(figure: "Figure", path: Path, kind: str) -> None:
+def _save(figure: Any, path: Path, kind: str) -> None:
     """Save a figure so that the same study gives the same bytes."""
     import matplotlib as mpl
 

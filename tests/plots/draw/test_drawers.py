@@ -1,0 +1,150 @@
+"""Every way of drawing shows the same: the data, the ends, the ticks, the words."""
+
+import json
+from itertools import combinations, pairwise
+
+import numpy as np
+import pytest
+
+from hmpim import plots
+from hmpim.plots import Axis, Band, Curve, Figure, Image, Panel, Points, Rule, Span, Words
+from hmpim.plots.draw.frames import frames, ticks
+from hmpim.plots.style import COLOURS
+
+F = np.geomspace(0.1, 100.0, 30)
+
+
+def everything() -> Figure:
+    """A picture with one of each."""
+    items = (
+        Span(low=0.2, high=20.0, label="excited band"),
+        Band(x=F, low=np.full(F.size, -np.inf), high=F, label="95 % band"),
+        Curve(x=F, y=F, label="a <b> $c$", dashes="-.", marker="o"),
+        Points(x=F, y=F, low=F - 1.0, high=F + 2.0, label="measured", marker="s", filled=False),
+        Rule(at=5.0, low=4.0, high=6.0, words="5.0 ± 0.5 Hz"),
+        Rule(at=50.0, axis="y", words="level", label="limit"),
+        Words(x=1.0, y=2.0, text="here"),
+    )
+    above = Panel(x=Axis(scale="log"), y=Axis(label="y (V)", low=0.0, high=90.0), items=items)
+    image = Image(values=np.eye(3), x=(0.0, 3.0), y=(0.0, 3.0), low=0.0, high=1.0)
+    below = Panel(x=Axis(label="x (m)"), y=Axis(), items=(image,), row=1)
+    return Figure(panels=(above, below), alt="One of each.", heights=(2.0, 2.0), share_x=False)
+
+
+def test_matplotlib_and_plotly_are_given_the_same_data_ends_and_words():
+    figure = everything()
+    upper = figure.to_matplotlib().axes[0]
+    plotly = figure.to_plotly()
+    layout = plotly["layout"]
+    assert list(upper.get_ylim()) == layout["yaxis"]["range"] == [0.0, 90.0]
+    np.testing.assert_allclose(np.log10(upper.get_xlim()), layout["xaxis"]["range"])
+    by_name = {trace["name"]: trace for trace in plotly["data"]}
+    line = next(line for line in upper.lines if line.get_label() == r"a <b> \$c\$")
+    np.testing.assert_array_equal(line.get_ydata(), by_name["a &lt;b&gt; $c$"]["y"])
+    assert {text.get_text() for text in upper.texts} == {
+        note["text"] for note in layout["annotations"]
+    }
+    assert layout["meta"]["alt"] == figure.alt
+
+
+def test_plotly_takes_words_by_the_logarithm_and_lines_by_the_value():
+    layout = everything().to_plotly()["layout"]
+    note = next(note for note in layout["annotations"] if note["text"] == "5.0 ± 0.5 Hz")
+    assert note["x"] == pytest.approx(np.log10(5.0))
+    assert [s["x0"] for s in layout["shapes"] if s["type"] == "line" and s["xref"] == "x"] == [5.0]
+
+
+def test_plotly_is_given_arrays_and_all_else_is_plain_json():
+    plotly = everything().to_plotly()
+    assert all(isinstance(t["x"], np.ndarray) for t in plotly["data"])
+
+    def arrays(value: object) -> object:
+        assert isinstance(value, np.ndarray)
+        return value.tolist()
+
+    assert json.loads(json.dumps(plotly, default=arrays))["layout"]["yaxis2"]["anchor"] == "x2"
+
+
+def test_a_band_without_end_is_drawn_to_the_edge():
+    trace = next(t for t in everything().to_plotly()["data"] if t.get("fill"))
+    assert np.isfinite(trace["y"]).all()
+    figure = everything().to_matplotlib()
+    (points,) = (p.vertices for p in figure.axes[0].collections[0].get_paths())
+    assert np.isfinite(points).all()
+
+
+@pytest.mark.parametrize(
+    ("axis", "ends", "most", "words"),
+    [
+        (Axis(degrees=True), (-380.0, 20.0), 7, "−360 −270 −180 −90 0"),
+        (Axis(degrees=True), (-1300.0, 90.0), 7, None),
+        (Axis(degrees=True), (-40.0, 5.0), 7, "−30 −15 0"),
+        (Axis(), (0.0, 10.0), 6, "0 2 4 6 8 10"),
+        (Axis(), (-2e-6, 2e-6), 5, "−2e−6 −1e−6 0 1e−6 2e−6"),
+        (Axis(scale="log"), (0.1, 1000.0), 5, "0.1 1 10 100 1000"),
+        (Axis(scale="log"), (8.0, 9.0), 5, "8 8.2 8.4 8.6 8.8 9"),
+        (Axis(scale="symlog"), (0.0, 2000.0), 7, "0 10 100 1000"),
+        (Axis(ticks=((1.0, "one"), (9.0, "nine"))), (0.0, 2.0), 7, "one"),
+        (Axis(ticks=()), (0.0, 2.0), 7, ""),
+    ],
+)
+def test_ticks_are_round_inside_and_few(axis, ends, most, words):
+    found = ticks(axis, ends, most=most)
+    assert all(ends[0] <= at <= ends[1] for at, _ in found)
+    if words is None:
+        assert {b[0] - a[0] for a, b in pairwise(found)} == {90.0}
+    else:
+        assert " ".join(word for _, word in found) == words
+
+
+def test_panels_of_a_column_share_their_horizontal_ends():
+    curve = Curve(x=np.array([0.0, 5.0]), y=np.zeros(2))
+    panels = (
+        Panel(x=Axis(), y=Axis(), items=(curve,)),
+        Panel(x=Axis(low=-1.0, high=9.0), y=Axis(), row=1),
+    )
+    shared = frames(Figure(panels=panels, alt="", heights=(1.0, 1.0)))
+    assert shared[0].x == shared[1].x == (-1.0, 9.0)
+    apart = frames(Figure(panels=panels, alt="", heights=(1.0, 1.0), share_x=False))
+    assert apart[0].x == pytest.approx((-0.05, 5.05))
+
+
+def test_a_result_is_drawn_with_its_marks_in_their_intervals(identified):
+    figure = plots.bode(identified)
+    pair = identified["y", "u"]
+    magnitude, phase = figure.panels
+    for panel, estimate in (
+        (phase, pair.parameters.bandwidth_phase90),
+        (magnitude, pair.parameters.bandwidth_3db),
+    ):
+        (rule,) = (r for r in panel.of(Rule) if r.axis == "x" and r.at == estimate.value)
+        assert (rule.low, rule.high) == estimate.ci95
+        assert estimate.text in rule.words
+        assert estimate.text in figure.alt
+    assert [curve.label for curve in phase.of(Curve)][-1] == "model without delay"
+    measured = phase.of(Points)[0]
+    assert (measured.low < measured.high).all()
+
+
+def linear(colour: str) -> np.ndarray:
+    shares = np.array([int(colour[k : k + 2], 16) for k in (1, 3, 5)]) / 255.0
+    return np.where(shares <= 0.04045, shares / 12.92, ((shares + 0.055) / 1.055) ** 2.4)
+
+
+# Of linear RGB, at full strength: Machado, Oliveira and Fernandes (2009), table 1.
+BLINDNESS = {
+    "none": np.eye(3),
+    "protanopia": [[0.152, 1.053, -0.205], [0.115, 0.786, 0.099], [-0.004, -0.048, 1.052]],
+    "deuteranopia": [[0.367, 0.861, -0.228], [0.280, 0.673, 0.047], [-0.012, 0.043, 0.969]],
+    "tritanopia": [[1.256, -0.077, -0.179], [-0.078, 0.931, 0.148], [0.005, 0.691, 0.304]],
+}
+
+
+@pytest.mark.parametrize("sight", BLINDNESS)
+def test_no_two_colours_of_curves_look_alike(sight):
+    seen = {
+        name: np.clip(np.array(BLINDNESS[sight]) @ linear(COLOURS[name]), 0.0, 1.0) ** (1 / 2.4)
+        for name in ("input", "output", "model", "limit", "other")
+    }
+    for one, other in combinations(seen, 2):
+        assert np.linalg.norm(seen[one] - seen[other]) > 0.1, (one, other)  # 25 of 255 steps
