@@ -9,6 +9,7 @@
 0.15
 """
 
+from hmpim.batch import batch
 from hmpim.errors import HmpimError
 from hmpim.experiment import run
 from hmpim.formats import load, read, save
@@ -61,6 +62,7 @@ __all__ = [
     "Stimulus",
     "SumOfSines",
     "Sweep",
+    "batch",
     "design",
     "design_axes",
     "draw_models",

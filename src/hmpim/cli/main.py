@@ -11,6 +11,7 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperGroup
 
+from hmpim.cli.batch import batch
 from hmpim.cli.campaign import campaign
 from hmpim.cli.channels import channels
 from hmpim.cli.demo import demo
@@ -150,6 +151,7 @@ app.command(epilog="Example: hmpim rigs --json rigs.json")(rigs)
 app.command(epilog="Example: hmpim table --udp 127.0.0.1:5005 --rate 1000")(table)
 app.command(epilog="Example: hmpim demo --out out/demo --seed 7")(demo)
 app.command(epilog="Example: hmpim campaign section_v_reduced --out out/study")(campaign)
+app.command(epilog="Example: hmpim batch records/ --input u --output y --out out/fleet")(batch)
 app.command()(gentlest)
 app.command(epilog="Example: hmpim workbench --rig table --runs runs")(workbench)
 app.command(epilog="Example: hmpim export r.json --to c -o model/")(export)

@@ -1,0 +1,311 @@
+"""Who does the tasks: Dask's workers, on this computer or on a cluster.
+
+On this computer the scheduler lives in this process and each worker in one of its own, on loopback
+alone; a worker that dies is started again. On a cluster the scheduler may go away: what was given
+to it is given again once it is back, and what was finished meanwhile is found done.
+"""
+
+import contextlib
+import logging
+import os
+import queue
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+from hmpim.batch.work import Done, Task, do_task
+from hmpim.errors import ArgumentError, HmpimError
+from hmpim.formats.readers.protocol import need
+
+__all__ = ["Finished", "Pool", "dask_pool", "here_pool"]
+
+_AHEAD = 2
+"""Tasks for each thread that are given out before the first is back: none waits for its next."""
+
+_LOOK = 1.0
+"""Seconds after which it is looked whether scheduler and workers are still there."""
+
+_RESTARTS = 200
+"""Workers of this computer started again, beyond which something else is wrong."""
+
+Say = Callable[[str], None]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Finished:
+    """A task that came back.
+
+    Parameters
+    ----------
+    task : Task
+        Which.
+    done : Done or None
+        What it did; None if its worker died, time and again.
+    reason : str
+        How it died.
+    """
+
+    task: Task
+    done: Done | None
+    reason: str = ""
+
+
+class Pool(Protocol):
+    """What does tasks."""
+
+    @property
+    def window(self) -> int:
+        """How many tasks may be under way at once."""
+
+    def submit(self, task: Task) -> None:
+        """Take a task."""
+
+    def next(self) -> Finished:
+        """Wait for a task that is finished."""
+
+
+class _Here:
+    """Tasks done in this process, one after the other."""
+
+    window = 1
+
+    def __init__(self) -> None:
+        self._waiting: list[Task] = []
+
+    def submit(self, task: Task) -> None:
+        self._waiting.append(task)
+
+    def next(self) -> Finished:
+        task = self._waiting.pop(0)
+        return Finished(task=task, done=do_task(task))
+
+
+@contextlib.contextmanager
+def here_pool() -> Iterator[Pool]:
+    """Do all in this process: for a handful of records, and to look for defects."""
+    yield _Here()
+
+
+class _Dask:
+    """Tasks done by Dask's workers."""
+
+    def __init__(
+        self, connect: Callable[[], Any], tend: Callable[[], None], patience: float, say: Say
+    ) -> None:
+        self._connect, self._tend = connect, tend
+        self._patience, self._say = patience, say
+        self._client = connect()
+        self._under_way: dict[str, tuple[Task, Any]] = {}
+        self._back: queue.SimpleQueue[tuple[str, Any]] = queue.SimpleQueue()
+        self._threads, self._looked = 1, 0.0
+        self._turn = 0
+
+    @property
+    def window(self) -> int:
+        now = time.monotonic()
+        if now - self._looked > _LOOK:
+            with contextlib.suppress(OSError, TimeoutError):
+                self._threads = max(sum(self._client.nthreads().values()), 1)
+            self._looked = now
+        return _AHEAD * self._threads
+
+    def submit(self, task: Task) -> None:
+        self._turn += 1
+        key = f"{task.name}-{self._turn}"
+        future = self._client.submit(do_task, task, key=key, pure=False)
+        self._under_way[key] = (task, future)
+        future.add_done_callback(lambda f: self._back.put((key, f)))
+
+    def next(self) -> Finished:
+        while True:
+            try:
+                key, future = self._back.get(timeout=_LOOK)
+            except queue.Empty:
+                self._tend()
+                if self._client.status not in ("running", "connecting"):
+                    self._again()
+                continue
+            if key not in self._under_way:
+                continue  # of a scheduler that is gone
+            if future.cancelled() or future.status in ("cancelled", "lost"):
+                self._again()
+                continue
+            task, _ = self._under_way.pop(key)
+            return _finished(task, future)
+
+    def _again(self) -> None:
+        """Connect anew, and give all that is under way again."""
+        self._say("the scheduler is gone; waiting for it to come back")
+        with contextlib.suppress(Exception):
+            self._client.close(timeout=2)
+        until = time.monotonic() + self._patience
+        while True:
+            try:
+                self._client = self._connect()
+                break
+            except ArgumentError:
+                if time.monotonic() > until:
+                    raise
+                time.sleep(1.0)
+        tasks = [task for task, _ in self._under_way.values()]
+        self._under_way.clear()
+        self._say(f"the scheduler is back; {len(tasks)} tasks are given again")
+        for task in tasks:
+            self.submit(task)
+
+    def close(self) -> None:
+        """Take back what is under way."""
+        with contextlib.suppress(Exception):
+            self._client.cancel([future for _, future in self._under_way.values()], force=True)
+        with contextlib.suppress(Exception):
+            self._client.close(timeout=5)
+
+
+def _finished(task: Task, future: Any) -> Finished:
+    from distributed.scheduler import KilledWorker
+
+    try:
+        done: Done = future.result()
+    except KilledWorker as error:
+        died = f"its worker died {error.allowed_failures + 1} times"
+        return Finished(task=task, done=None, reason=f"{died} (memory, or code that crashes)")
+    except HmpimError:
+        raise
+    except Exception as error:  # of a worker that cannot run the task at all
+        raise ArgumentError(
+            f"a worker cannot do its task: {type(error).__name__}: {error}; give it this version "
+            "of hmpim with the extra 'batch'"
+        ) from error
+    return Finished(task=task, done=done)
+
+
+@contextlib.contextmanager
+def dask_pool(
+    *,
+    scheduler: str | None = None,
+    workers: int | None = None,
+    patience: float = 600.0,
+    say: Say = lambda text: None,
+) -> Iterator[Pool]:
+    """Have tasks done by a cluster that is there, or by one on this computer.
+
+    Parameters
+    ----------
+    scheduler : str, optional
+        Address of a Dask scheduler; without, one is started here, on loopback.
+    workers : int, optional
+        Processes on this computer, one thread each; one for each core by default.
+    patience : float
+        Seconds to wait for a scheduler that went away, and for a first worker.
+    say : callable
+        Told what a person should know meanwhile.
+
+    Raises
+    ------
+    ArgumentError
+        If there is no such scheduler, or it has no workers.
+    """
+    distributed = need("distributed", extra="batch", what="a batch of records")
+    logging.getLogger("distributed").setLevel(logging.CRITICAL)
+    with contextlib.ExitStack() as stack:
+        tend: Callable[[], None] = lambda: None  # noqa: E731
+        if scheduler is None:
+            local = stack.enter_context(
+                distributed.LocalCluster(
+                    n_workers=0,
+                    host="127.0.0.1",
+                    dashboard_address=None,
+                    silence_logs=logging.CRITICAL,
+                )
+            )
+            scheduler = str(local.scheduler_address)
+            crew = _Crew(scheduler, workers or os.cpu_count() or 1)
+            stack.callback(crew.stop)
+            tend = crew.tend
+        where = scheduler
+
+        def connect() -> Any:
+            return _client(distributed, where, tend, patience)
+
+        pool = _Dask(connect, tend, patience, say)
+        stack.callback(pool.close)
+        yield pool
+
+
+def _client(distributed: Any, scheduler: str, tend: Callable[[], None], patience: float) -> Any:
+    try:
+        client = distributed.Client(scheduler, timeout=10, set_as_default=False)
+    except (OSError, ValueError, TimeoutError) as error:
+        raise ArgumentError(
+            f"there is no Dask scheduler at {scheduler!r} ({' '.join(str(error).split())[:100]}); "
+            "start one with: dask scheduler"
+        ) from None
+    until = time.monotonic() + min(patience, 60.0)
+    while not client.nthreads():
+        tend()
+        if time.monotonic() > until:
+            client.close()
+            raise ArgumentError(
+                f"the scheduler {scheduler} has no workers; start some with: dask worker "
+                f"{scheduler}"
+            )
+        time.sleep(0.05)
+    return client
+
+
+class _Crew:
+    """Workers of this computer, one process each; one that dies is started again."""
+
+    def __init__(self, scheduler: str, count: int) -> None:
+        self._scheduler = scheduler
+        self._left = _RESTARTS
+        self._processes = [self._start() for _ in range(count)]
+
+    def tend(self) -> None:
+        """Start again what died."""
+        for k, process in enumerate(self._processes):
+            if process.poll() is not None:
+                self._left -= 1
+                if self._left < 0:
+                    raise ArgumentError(
+                        f"workers died {_RESTARTS} times, the last with code {process.returncode}; "
+                        "look for what kills them (memory, most often)"
+                    )
+                self._processes[k] = self._start()
+
+    def _start(self) -> subprocess.Popen[bytes]:
+        command = [sys.executable, "-m", "distributed.cli.dask_worker", self._scheduler]
+        options = {
+            "--nthreads": "1",
+            "--host": "127.0.0.1",
+            "--death-timeout": "20",
+            "--preload": "hmpim.batch.work",
+        }
+        single = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
+        logs = {"DASK_LOGGING__DISTRIBUTED": "critical"}
+        return subprocess.Popen(
+            [
+                *command,
+                "--no-nanny",
+                "--no-dashboard",
+                *(x for pair in options.items() for x in pair),
+            ],
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+            env={**os.environ, **single, **logs},
+        )
+
+    def stop(self) -> None:
+        """End all of them."""
+        for process in self._processes:
+            process.terminate()
+        for process in self._processes:
+            try:
+                process.wait(timeout=5)
+            except subprocess.TimeoutExpired:
+                process.kill()
+                process.wait()

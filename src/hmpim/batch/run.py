@@ -1,0 +1,313 @@
+"""Run a batch: tasks given out a few at a time, each part kept as soon as it is done."""
+
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import AbstractContextManager
+from dataclasses import dataclass, replace
+from itertools import chain, islice
+from os import PathLike
+from pathlib import Path
+
+from hmpim.arguments import checked
+from hmpim.batch.addresses import Address, File, addresses_of, find_files
+from hmpim.batch.metadata import Beside, read_metadata
+from hmpim.batch.parts import Known, open_folder
+from hmpim.batch.pool import Finished, Pool, dask_pool, here_pool
+from hmpim.batch.reading import read_records
+from hmpim.batch.request import Request
+from hmpim.batch.table import BatchTable, open_table
+from hmpim.batch.work import Done, Task, give_up
+from hmpim.errors import ArgumentError
+from hmpim.formats.readers.protocol import need
+
+__all__ = ["Cluster", "Progress", "State", "batch"]
+
+
+@checked
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Cluster:
+    """Who does the work, and in what portions.
+
+    Parameters
+    ----------
+    scheduler : str or None
+        Address of a Dask scheduler, such as ``tcp://host:8786``. None starts one on this
+        computer, on loopback.
+    workers : int or None
+        Processes on this computer; one for each core if None, and 0 for this process itself,
+        without Dask.
+    per_task : int
+        Records that a worker does at once and that make one part.
+    patience : float
+        Seconds to wait for a scheduler that went away.
+
+    Examples
+    --------
+    >>> Cluster().per_task
+    100
+    """
+
+    scheduler: str | None = None
+    workers: int | None = None
+    per_task: int = 100
+    patience: float = 600.0
+
+    def __post_init__(self) -> None:
+        if not 1 <= self.per_task <= 10_000:
+            raise ArgumentError(
+                f"per_task = {self.per_task} records is no task; give 1 to 10000, usually 50 to 200"
+            )
+        if self.workers is not None and not 0 <= self.workers <= 1024:
+            raise ArgumentError(f"workers = {self.workers}; give a number of processes, or 0")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class State:
+    """How far a batch is.
+
+    Parameters
+    ----------
+    records, total : int
+        Done, earlier runs included, and known of so far.
+    repeated : int
+        How many of those done were done by earlier runs.
+    failures : int
+        Records of this run that have a reason instead of parameters.
+    elapsed : float
+        Seconds since the first task was given out.
+    message : str
+        What a person should know just now; empty for nothing.
+    """
+
+    records: int
+    total: int
+    repeated: int
+    failures: int
+    elapsed: float
+    message: str = ""
+
+    @property
+    def rate(self) -> float:
+        """Records a second in this run."""
+        return (self.records - self.repeated) / self.elapsed if self.elapsed > 0 else 0.0
+
+    @property
+    def left(self) -> float:
+        """Seconds left at this rate; infinite before the first task is back."""
+        return (self.total - self.records) / self.rate if self.rate > 0 else float("inf")
+
+
+Progress = Callable[[State], None]
+
+
+@checked
+def batch(
+    paths: str | PathLike[str] | Sequence[str | PathLike[str]],
+    *,
+    out: str | PathLike[str],
+    inputs: Sequence[str] = (),
+    outputs: Sequence[str] = (),
+    fs: float | None = None,
+    request: Request | None = None,
+    cluster: Cluster | None = None,
+    fresh: bool = False,
+    progress: Progress | None = None,
+) -> BatchTable:
+    """Identify many records, and return one table of what was found.
+
+    Each record becomes a row for each pair of its channels; one that cannot be read or identified
+    becomes a row with the reason. Stopped at any time, the same call goes on where it was and
+    repeats nothing.
+
+    Parameters
+    ----------
+    paths : path or sequence of paths
+        Folders, globs and files, local or any address that fsspec knows. A Parquet file with a
+        column ``record``, or with a list in each cell, and an HDF5 file with a group a record,
+        hold many.
+    out : path-like
+        Folder for the parts; made if need be.
+    inputs, outputs : sequence of str
+        Names of the channels; without, those that the files state, or the usual names.
+    fs : float, optional
+        Rate in Hz of records without time.
+    request : Request, optional
+        Everything else that may be asked; `inputs`, `outputs` and `fs` go before it.
+    cluster : Cluster, optional
+        Who does the work: one process for each core of this computer by default.
+    fresh : bool
+        True throws away what `out` holds of an earlier run.
+    progress : callable, optional
+        Told how far it is, after each task.
+
+    Returns
+    -------
+    BatchTable
+        Read lazily, by pandas or Polars.
+
+    Raises
+    ------
+    ArgumentError
+        If there are no records, `out` holds another batch, or a part cannot be written.
+    MissingExtraError
+        If the extra `batch` is not installed.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from hmpim.formats import save
+    >>> from hmpim.record import Record
+    >>> import numpy as np
+    >>> u = np.sin(np.arange(400) ** 2 / 1e3)
+    >>> record = Record.from_arrays({"u": u}, {"y": 2 * u + 0.1}, fs=100.0)
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     save(record, f"{folder}/unit1.h5")
+    ...     here = Cluster(workers=0)
+    ...     table = batch(f"{folder}/unit1.h5", out=f"{folder}/out", cluster=here)
+    ...     round(table.to_arrow()["scale_factor"][0].as_py(), 3)
+    2.0
+    """
+    need("pyarrow", extra="batch", what="a batch of records")
+    need("fsspec", extra="batch", what="a batch of records")
+    given = [paths] if isinstance(paths, (str, PathLike)) else list(paths)
+    asked = request or Request()
+    asked = replace(
+        asked,
+        inputs=tuple(inputs) or asked.inputs,
+        outputs=tuple(outputs) or asked.outputs,
+        fs=asked.fs if fs is None else fs,
+    )
+    run = _Run(
+        folder=Path(out).absolute(),
+        request=asked,
+        cluster=cluster or Cluster(),
+        progress=progress or (lambda state: None),
+    )
+    run.all_of([str(p) for p in given], fresh=fresh)
+    return open_table(out)
+
+
+class _Run:
+    """One run over a batch: counts, and what is still to be given out."""
+
+    def __init__(
+        self, *, folder: Path, request: Request, cluster: Cluster, progress: Progress
+    ) -> None:
+        self._folder, self._request, self._cluster = folder, request, cluster
+        self._progress = progress
+        self._beside = read_metadata(request.metadata, request.record_column)
+        self._known = self._records = self._repeated = self._failures = 0
+        self._begun = time.monotonic()
+
+    def all_of(self, paths: Sequence[str], *, fresh: bool) -> None:
+        """Do all records of these paths that are not done."""
+        files = list(find_files(paths, without=self._folder))
+        if not files:
+            raise ArgumentError(f"there are no records at {', '.join(map(repr, paths))}")
+        self._known = len(files)
+        addresses = chain.from_iterable(self._counted(file) for file in files)
+        first = next(addresses, None)
+        if first is None:
+            raise ArgumentError(f"the files at {', '.join(map(repr, paths))} hold no records")
+        columns = self._columns(first)
+        with open_folder(self._folder, self._request, columns, fresh=fresh) as metadata:
+            done = Known(self._folder)
+            tasks = self._tasks(chain([first], addresses), done, metadata)
+            ready = next(tasks, None)
+            if ready is None:
+                self._tell()
+                return
+            with self._pool() as pool:
+                self._begun = time.monotonic()
+                self._tell()
+                self._drive(pool, chain([ready], tasks))
+
+    def _pool(self) -> AbstractContextManager[Pool]:
+        if self._cluster.workers == 0:
+            return here_pool()
+        return dask_pool(
+            scheduler=self._cluster.scheduler,
+            workers=self._cluster.workers,
+            patience=self._cluster.patience,
+            say=self._tell,
+        )
+
+    def _drive(self, pool: Pool, tasks: Iterator[Task]) -> None:
+        """Keep the pool busy and no more than that."""
+        under_way = 0
+        again: list[Task] = []
+        more = True
+        while more or again or under_way:
+            while under_way < pool.window and (more or again):
+                task = again.pop() if again else next(tasks, None)
+                if task is None:
+                    more = False
+                    continue
+                pool.submit(task)
+                under_way += 1
+            if not under_way:
+                continue
+            finished = pool.next()
+            under_way -= 1
+            if finished.done is not None:
+                self._count(finished.done)
+            else:
+                again += self._after_death(finished)
+
+    def _after_death(self, finished: Finished) -> list[Task]:
+        """A task that no worker survives, one record at a time; a record alone is given up."""
+        task = finished.task
+        if len(task.addresses) == 1:
+            self._count(give_up(task, finished.reason))
+            return []
+        return [replace(task, addresses=(address,)) for address in task.addresses]
+
+    def _count(self, done: Done) -> None:
+        self._records += done.records
+        self._failures += done.failures
+        self._tell()
+
+    def _tell(self, message: str = "") -> None:
+        self._progress(
+            State(
+                records=self._records,
+                total=self._known,
+                repeated=self._repeated,
+                failures=self._failures,
+                elapsed=time.monotonic() - self._begun,
+                message=message,
+            )
+        )
+
+    def _counted(self, file: File) -> Iterator[Address]:
+        """Records of a file; what is known of in all grows with those beyond the first."""
+        for k, address in enumerate(addresses_of(file, self._request)):
+            self._known += k > 0
+            yield address
+
+    def _columns(self, first: Address) -> tuple[str, ...]:
+        """Columns of metadata: those of the table beside, and those of the first record."""
+        read = next(read_records([first], self._request), None)
+        own = () if read is None else tuple(read.metadata)
+        return tuple(dict.fromkeys((*self._beside.columns, *own)))
+
+    def _tasks(
+        self, addresses: Iterator[Address], done: Known, metadata: tuple[str, ...]
+    ) -> Iterator[Task]:
+        while some := tuple(islice(addresses, self._cluster.per_task)):
+            left = tuple(a for a in some if a not in done)
+            self._repeated += len(some) - len(left)
+            self._records += len(some) - len(left)
+            if left:
+                done.drop(left)
+                yield Task(
+                    addresses=left,
+                    request=self._request,
+                    folder=str(self._folder),
+                    metadata=metadata,
+                    joined=_joined(self._beside, left),
+                )
+
+
+def _joined(beside: Beside, addresses: Sequence[Address]) -> dict[str, dict[str, str]]:
+    return {a.digest: beside.of(a) for a in addresses} if beside.rows else {}

@@ -1,0 +1,140 @@
+"""A batch in figures: how each parameter is distributed, verdicts, and why records failed."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hmpim.batch.rows import PARAMETERS
+from hmpim.batch.table import BatchTable
+
+__all__ = ["ParameterSummary", "Summary", "column", "summary_of", "unit_of"]
+
+_UNITS = {
+    "delay": "s",
+    "delay_correlation": "s",
+    "delay_low_frequency": "s",
+    "natural_frequency": "Hz",
+    "time_constant": "s",
+    "bandwidth_phase90": "Hz",
+    "bandwidth_phase90_without_delay": "Hz",
+    "bandwidth_3db": "Hz",
+    "peak_gain_db": "dB",
+    "hold_period": "s",
+}
+"""Units that do not depend on the channels."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ParameterSummary:
+    """How one parameter is distributed over the rows that have it.
+
+    Parameters
+    ----------
+    name, unit : str
+        Which; the unit is empty for none, or where rows differ.
+    count, doubtful : int
+        Rows that have it, and how many of them are not to be relied on.
+    median, low, high : float
+        Median, and the quantiles at 5 and 95 %.
+    """
+
+    name: str
+    unit: str
+    count: int
+    doubtful: int
+    median: float
+    low: float
+    high: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Summary:
+    """A batch in figures.
+
+    Parameters
+    ----------
+    records : int
+        Records with rows, failed ones included.
+    parameters : tuple of ParameterSummary
+        Those that any row has.
+    verdicts : mapping of str to int
+        Rows by verdict.
+    reasons : tuple of (str, int)
+        Why records failed, the most frequent first.
+    """
+
+    records: int
+    parameters: tuple[ParameterSummary, ...]
+    verdicts: Mapping[str, int]
+    reasons: tuple[tuple[str, int], ...]
+
+
+def summary_of(table: BatchTable) -> Summary:
+    """Sum a batch up; one column after the other is read.
+
+    Parameters
+    ----------
+    table : BatchTable
+        What was found.
+    """
+    import pyarrow.compute as pc
+
+    words = table.to_arrow(["key", "verdict", "reason"])
+    verdicts = pc.value_counts(words.column("verdict").drop_null()).to_pylist()
+    reasons = pc.value_counts(words.column("reason").drop_null()).to_pylist()
+    return Summary(
+        records=pc.count_distinct(words.column("key")).as_py(),
+        parameters=tuple(_distributed(table)),
+        verdicts={v["values"]: v["counts"] for v in verdicts},
+        reasons=tuple(
+            sorted(((r["values"], r["counts"]) for r in reasons), key=lambda item: -item[1])
+        ),
+    )
+
+
+def column(table: BatchTable, name: str) -> NDArray[np.float64]:
+    """Values of a column of figures, NaN where a row has none, shape (rows,)."""
+    flat = table.to_arrow([name]).column(0)
+    return np.asarray(flat.to_numpy(zero_copy_only=False), dtype=np.float64)
+
+
+def unit_of(table: BatchTable, name: str) -> str:
+    """Unit of a parameter; empty for none, or where the rows differ."""
+    if name in _UNITS:
+        return _UNITS[name]
+    if name == "damping_ratio":
+        return ""
+    import pyarrow.compute as pc
+
+    units = table.to_arrow(["output_unit", "input_unit"])
+    pairs = [pc.unique(units.column(k).drop_null()).to_pylist() for k in range(2)]
+    if len(pairs[0]) != 1 or (name == "scale_factor" and len(pairs[1]) != 1):
+        return ""
+    if name != "scale_factor":
+        return str(pairs[0][0])
+    return "" if pairs[0] == pairs[1] else f"{pairs[0][0] or '1'}/{pairs[1][0] or '1'}"
+
+
+def _distributed(table: BatchTable) -> Sequence[ParameterSummary]:
+    found = []
+    for name in PARAMETERS:
+        values = column(table, name)
+        there = np.isfinite(values)
+        if not there.any():
+            continue
+        doubtful = table.to_arrow([f"{name}_doubtful"]).column(0).to_pylist()
+        low, median, high = np.quantile(values[there], (0.05, 0.5, 0.95))
+        found.append(
+            ParameterSummary(
+                name=name,
+                unit=unit_of(table, name),
+                count=int(np.count_nonzero(there)),
+                doubtful=sum(map(bool, doubtful)),
+                median=float(median),
+                low=float(low),
+                high=float(high),
+            )
+        )
+    return found

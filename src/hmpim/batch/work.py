@@ -1,0 +1,136 @@
+"""One task: some records read, identified, and written as one part."""
+
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from hmpim.batch.addresses import Address
+from hmpim.batch.parts import PARTS, part_name, write_part
+from hmpim.batch.reading import Read, read_records, reason_of
+from hmpim.batch.request import Request
+from hmpim.batch.rows import Row, failed, rows_of, table_of
+from hmpim.identify import identify
+
+__all__ = ["Done", "Task", "do_task", "give_up"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Task:
+    """Records that one worker does at once.
+
+    Parameters
+    ----------
+    addresses : tuple of Address
+        Where they are.
+    request : Request
+        What is asked of each.
+    folder : str
+        The batch's folder.
+    metadata : tuple of str
+        Columns of metadata.
+    joined : mapping of str to mapping of str to str
+        Metadata by the digest of a record, from a file beside.
+    """
+
+    addresses: tuple[Address, ...]
+    request: Request
+    folder: str
+    metadata: tuple[str, ...] = ()
+    joined: Mapping[str, Mapping[str, str]]
+
+    @property
+    def name(self) -> str:
+        """Name of the part that it writes."""
+        return part_name(self.addresses, self.request)
+
+    @property
+    def path(self) -> Path:
+        """Where it writes."""
+        return Path(self.folder) / PARTS / self.name
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Done:
+    """What a task did.
+
+    Parameters
+    ----------
+    records, failures : int
+        How many records, and how many of them have a reason instead of parameters.
+    reading, identifying, writing : float
+        Seconds.
+    """
+
+    records: int
+    failures: int = 0
+    reading: float = 0.0
+    identifying: float = 0.0
+    writing: float = 0.0
+
+
+def do_task(task: Task) -> Done:
+    """Do a task, unless its part is there; what is wrong with a record becomes its row.
+
+    Raises
+    ------
+    ArgumentError
+        If the part cannot be written.
+    """
+    if task.path.exists():
+        return Done(records=len(task.addresses))
+    begin = time.perf_counter()
+    rows: list[Row] = []
+    failures, reading = 0, 0.0
+    at = begin
+    for read in read_records(task.addresses, task.request):
+        got = time.perf_counter()
+        reading += got - at
+        found = _identified(_with_metadata(read, task), task.request)
+        failures += any(row.get("reason") for row in found)
+        rows += found
+        at = time.perf_counter()
+    before = time.perf_counter()
+    write_part(table_of(rows, task.metadata), task.path)
+    end = time.perf_counter()
+    return Done(
+        records=len(task.addresses),
+        failures=failures,
+        reading=reading,
+        identifying=before - begin - reading,
+        writing=end - before,
+    )
+
+
+def give_up(task: Task, reason: str) -> Done:
+    """Write rows that say why for the records of a task that no worker survived."""
+    if not task.path.exists():
+        rows = [failed(address, reason, _joined(address, task)) for address in task.addresses]
+        write_part(table_of(rows, task.metadata), task.path)
+    return Done(records=len(task.addresses), failures=len(task.addresses))
+
+
+def _with_metadata(read: Read, task: Task) -> Read:
+    told = {**read.metadata, **_joined(read.address, task)}
+    kept = {name: told[name] for name in task.metadata if name in told}
+    return Read(address=read.address, record=read.record, reason=read.reason, metadata=kept)
+
+
+def _joined(address: Address, task: Task) -> Mapping[str, str]:
+    return task.joined.get(address.digest, {})
+
+
+def _identified(read: Read, request: Request) -> Sequence[Row]:
+    if read.record is None:
+        return [failed(read.address, read.reason, read.metadata)]
+    begin = time.thread_time()  # of the processor: others may be at work on this computer
+    try:
+        result = identify(
+            read.record,
+            intersample=request.intersample,
+            structures=request.structures or None,  # type: ignore[arg-type]
+        )
+        seconds = time.thread_time() - begin
+        return rows_of(read, result, seconds=seconds, whole=request.keep == "results")
+    except Exception as error:  # bad data, or a defect that one record meets: the others go on
+        return [failed(read.address, reason_of(error), read.metadata)]

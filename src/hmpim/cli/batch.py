@@ -1,0 +1,194 @@
+"""``hmpim batch``: many records, one table, one page."""
+
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from hmpim.cli.files import check_files
+from hmpim.cli.identify import Between
+from hmpim.cli.reading import Input, Output, Rate, Time, Unit, units_of
+from hmpim.cli.terminal import output_console, say, warn
+from hmpim.errors import ArgumentError
+
+if TYPE_CHECKING:
+    from hmpim.batch.run import State
+    from hmpim.batch.table import BatchTable
+
+__all__ = ["batch"]
+
+
+class Kept(StrEnum):
+    """How much is kept of each record."""
+
+    RESULTS = "results"
+    PARAMETERS = "parameters"
+
+
+def batch(
+    paths: Annotated[
+        list[str],
+        typer.Argument(
+            metavar="PATHS...",
+            help="Folders, globs and files with records, local or any address of fsspec. A Parquet "
+            "file with a column of records, or an HDF5 file with a group a record, holds many.",
+        ),
+    ],
+    out: Annotated[
+        Path, typer.Option("--out", metavar="DIR", help="Folder for the table's parts.")
+    ],
+    input_: Input = None,
+    output: Output = None,
+    fs: Rate = None,
+    time: Time = None,
+    unit: Unit = None,
+    intersample: Annotated[
+        Between,
+        typer.Option("--intersample", help="What the input does between samples."),
+    ] = Between.AUTO,
+    keep: Annotated[
+        Kept,
+        typer.Option("--keep", help="All that identify says, or the parameters alone: quicker."),
+    ] = Kept.RESULTS,
+    metadata: Annotated[
+        Path | None,
+        typer.Option("--metadata", metavar="FILE", help="CSV or Parquet with one row a record."),
+    ] = None,
+    record_column: Annotated[
+        str,
+        typer.Option("--record-column", metavar="NAME", help="Column that names the record."),
+    ] = "record",
+    group: Annotated[
+        str, typer.Option("--group", metavar="PATH", help="HDF5 group that holds the records.")
+    ] = "/",
+    scheduler: Annotated[
+        str | None,
+        typer.Option("--scheduler", metavar="tcp://HOST:PORT", help="A Dask scheduler to use."),
+    ] = None,
+    workers: Annotated[
+        int | None, typer.Option("--workers", metavar="N", help="Processes on this computer.")
+    ] = None,
+    per_task: Annotated[
+        int, typer.Option("--per-task", metavar="N", help="Records a task, and a part.")
+    ] = 100,
+    resume: Annotated[
+        bool,
+        typer.Option(
+            "--resume/--fresh",
+            help="Go on where an earlier run of the same batch stopped, or start anew.",
+        ),
+    ] = True,
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No progress, no table.")] = False,
+) -> None:
+    """Identify many records, on all cores or on a cluster.
+
+    Writes Parquet parts that pandas, Polars and DuckDB read. A record that fails is a row with
+    the reason. Stopped at any time, the same command goes on where it was.
+    """
+    check_files(reads={"the metadata": metadata}, folders={"--out": out})
+    if scheduler is not None and workers is not None:
+        raise ArgumentError("--workers are those of this computer; --scheduler has its own")
+
+    from hmpim.batch import Request
+    from hmpim.batch.run import Cluster
+    from hmpim.batch.run import batch as run
+
+    request = Request(
+        inputs=tuple(input_ or ()),
+        outputs=tuple(output or ()),
+        fs=fs,
+        time=time,
+        units=units_of(unit),
+        intersample=intersample.value,
+        keep=keep.value,
+        record_column=record_column,
+        group=group,
+        metadata="" if metadata is None else str(metadata.absolute()),
+    )
+    cluster = Cluster(scheduler=scheduler, workers=workers, per_task=per_task)
+    with _stopping(out), _counting(quiet) as tick:
+        table = run(
+            paths, out=out, request=request, cluster=cluster, fresh=not resume, progress=tick
+        )
+    if not quiet:
+        _print(table)
+        say(f"Parts: {out / 'parts'}")
+
+
+def _print(table: "BatchTable") -> None:
+    """A line for each parameter: how many records have it, and how it is distributed."""
+    from rich.table import Table
+
+    from hmpim.batch.summary import summary_of
+
+    found = summary_of(table)
+    shown = Table(box=None, header_style="bold", pad_edge=False)
+    for name in ("Parameter", "Records", "Median", "5 %", "95 %", "Doubtful"):
+        shown.add_column(name, justify="left" if name == "Parameter" else "right")
+    for row in found.parameters:
+        shown.add_row(
+            f"{row.name} ({row.unit})" if row.unit else row.name,
+            str(row.count),
+            *(f"{value:.5g}" for value in (row.median, row.low, row.high)),
+            str(row.doubtful),
+        )
+    console = output_console()
+    console.print(shown)
+    console.print(
+        f"{found.records} records; verdicts: "
+        + (", ".join(f"{n} {v}" for v, n in found.verdicts.items()) or "none")
+    )
+    for reason, count in found.reasons[:5]:
+        console.print(f"{count} not identified: {reason}", markup=False)
+
+
+@contextmanager
+def _stopping(folder: Path) -> Iterator[None]:
+    """Say on Ctrl-C that nothing is lost."""
+    try:
+        yield
+    except KeyboardInterrupt:
+        done = len(list((folder / "parts").glob("*.parquet")))
+        print(
+            f"hmpim: stopped; {folder} keeps what is done (parts: {done}), and the same command "
+            "goes on from there",
+            file=sys.stderr,
+        )
+        raise
+
+
+@contextmanager
+def _counting(quiet: bool) -> Iterator[Callable[["State"], None]]:
+    """Give what is to be told of progress; a bar on a terminal, messages alone elsewhere."""
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn
+
+    columns = (
+        TextColumn("{task.completed:.0f} of {task.total:.0f}"),
+        BarColumn(),
+        TextColumn("{task.fields[rate]}"),
+    )
+    console = Console(stderr=True)
+    off = quiet or not console.is_terminal
+    with Progress(*columns, console=console, transient=True, disable=off) as bar:
+        task = bar.add_task("records", total=1, rate="starting")
+
+        def tick(state: "State") -> None:
+            if state.message and not quiet:
+                warn(state.message)
+            bar.update(task, completed=state.records, total=state.total, rate=_rate(state))
+
+        yield tick
+
+
+def _rate(state: "State") -> str:
+    if state.rate <= 0:
+        return "starting"
+    left = state.left
+    clock = f"{left / 3600:.1f} h" if left > 5400 else f"{left / 60:.0f} min" if left > 90 else ""
+    failed = f", {state.failures} failed" if state.failures else ""
+    return f"{state.rate:.1f}/s, {clock or f'{left:.0f} s'} left{failed}"
