@@ -303,8 +303,11 @@ def ros(path, storage="mcap", drive_and_answer=(U, Y), fs=FS, transport=0.004, s
             writer.write(state, late, store.serialize_cdr(answer, joints.__msgtype__))
 
 
-def ros1(path):
-    """A bag of ROS 1, packed, whose sensor is logged later by the transport."""
+def ros1(path, packing="lz4", packer=None):
+    """A bag of ROS 1, packed, whose sensor is logged later by the transport.
+
+    `packer` packs a chunk instead of the library.
+    """
     from rosbags.rosbag1 import Writer
     from rosbags.typesys import Stores, get_typestore
 
@@ -315,7 +318,9 @@ def ros1(path):
     point = store.types["geometry_msgs/msg/Vector3"]
     turn = store.types["geometry_msgs/msg/Quaternion"](x=0.0, y=0.0, z=0.0, w=1.0)
     writer = Writer(path.with_suffix(".bag"))
-    writer.set_compression(Writer.CompressionFormat.LZ4)
+    writer.set_compression(Writer.CompressionFormat[packing.upper()])
+    if packer is not None:
+        writer.compressor = packer
     still, unknown = point(x=0.0, y=0.0, z=0.0), np.zeros(9)
     with writer:
         command = writer.add_connection("/cmd", vector.__msgtype__, typestore=store)

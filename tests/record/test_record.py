@@ -31,6 +31,9 @@ def test_values_that_cannot_be_used(values, words):
     [
         ([0.0, 2.0, 1.0], "does not increase at sample 2: 2 s is followed by 1 s"),
         ([0.0, 1.0, 1.0], "does not increase at sample 2"),
+        # Seen in a damaged file: so far from the first stamp that the others are one.
+        ([-1.78e259, 1.0, 2.0], "does not increase at sample 2: 1 s is followed by 2 s"),
+        ([-1.7e308, 1.0, 1.7e308], "does not increase"),
         ([0.0, np.nan, 1.0], r"'u \(time\)' holds nan at sample 1"),
         ([0.0, 1.0], r"has 3 samples and 2 time stamps"),
     ],

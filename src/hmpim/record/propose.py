@@ -41,6 +41,9 @@ _ANSWERED = frozenset(
 _FOLLOWS = 0.3
 """Correlation from which a channel is said to move with another: 9 % of its power."""
 
+_AT_ONCE = 1e-6
+"""Samples by which two channels must differ to be told apart: sums round to less."""
+
 _MOST = 24  # channels that are held against each other
 _LONGEST = 2**16  # samples that are enough to tell
 
@@ -120,16 +123,17 @@ def propose(channels: Sequence[Channel]) -> Proposal:
         if k == chosen:
             continue
         found = follows[chosen][k]
-        with_it = f"{alive[chosen].name!r} by {_time(found.later)} (correlation {found.alike:.2f})"
+        shift = _time(abs(found.later))
+        with_it = f"{alive[chosen].name!r} by {shift} (correlation {found.alike:.2f})"
         if found.alike < _FOLLOWS:
             reasons[c.name] = (
                 f"does not move with {alive[chosen].name!r} (correlation {found.alike:.2f})"
             )
         elif found.later < 0 and not _answers(c.name):
-            reasons[c.name] = f"comes before {with_it.replace('-', '')}; perhaps a reference"
+            reasons[c.name] = f"comes before {with_it}; perhaps a reference"
         else:
             outputs.append(c.name)
-            reasons[c.name] = f"follows {with_it}"
+            reasons[c.name] = f"{'follows' if found.later >= 0 else 'comes before'} {with_it}"
     reasons[alive[chosen].name] = _why_input(chosen, alive, follows)
     return _told((alive[chosen].name,), tuple(outputs), channels, reasons)
 
@@ -207,8 +211,8 @@ def _follow(
     a, b, c = (abs(float(cross[(best + k) % n])) for k in (-1, 0, 1))
     curve = a - 2 * b + c
     part = 0.5 * (a - c) / curve if curve < 0 else 0.0
-    lag = best if best <= n // 2 else best - n
-    return _Follows(alike=min(b, 1.0), later=(lag + part) / fs)
+    lag = (best if best <= n // 2 else best - n) + part
+    return _Follows(alike=min(b, 1.0), later=0.0 if abs(lag) < _AT_ONCE else lag / fs)
 
 
 def _input(channels: Sequence[Channel], follows: Sequence[Sequence[_Follows]]) -> int | None:

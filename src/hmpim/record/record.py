@@ -96,9 +96,11 @@ class Channel(ByValue):
                     f"channel {label!r} holds {array[bad[0]]} at sample {bad[0]} "
                     f"({bad.size} such in all); cut them out or fill them before identifying"
                 )
-        step = np.diff(time)
-        if not np.all(step > 0):
-            k = int(np.argmin(step > 0))
+        with np.errstate(over="ignore", invalid="ignore"):
+            step = np.diff(time - time[0])  # stamps of a damaged file may lie too far apart to tell
+        onward = (step > 0) & (step < np.inf)
+        if not onward.all():
+            k = int(np.argmin(onward))
             raise RecordError(
                 f"time of channel {self.name!r} does not increase at sample {k + 1}: "
                 f"{time[k]:.9g} s is followed by {time[k + 1]:.9g} s; sort the record, "

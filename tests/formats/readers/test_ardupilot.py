@@ -67,9 +67,9 @@ def test_a_factor_is_applied_once_and_shown_with_its_unit(tmp_path):
     assert warm.values[0] == 25.5
     said = [f.message for f in record.findings if f.code == "scale"]
     assert sorted(said) == [
-        "BAT.Lat is read as 1e-07 deg per count, as the file states",
-        "BAT.Volt is read as 0.001 V per count, as the file states",
-        "IMU[0].T is read as 0.01 degC per count, as the file states",
+        "counts of BAT.Lat are read as 1e-07 deg each, as the file states",
+        "counts of BAT.Volt are read as 0.001 V each, as the file states",
+        "counts of IMU[0].T are read as 0.01 degC each, as the file states",
     ]
 
 

@@ -157,6 +157,57 @@ def test_the_gyro_s_scale_is_shown_with_its_unit(tmp_path):
     assert any("divided by 32768" in f.message for f in record.findings)
 
 
+def test_the_conversion_of_an_mdf_is_applied_and_shown_with_its_unit(tmp_path):
+    import asammdf
+
+    counts = np.rint(1000 * samples.U).astype(np.int16)
+    about = {"u": {"a": 0.002, "b": -0.5}, "y": {"formula": "X1*X1"}, "plain": None}
+    log = asammdf.MDF(version="4.10")
+    signals = [
+        asammdf.Signal(counts, samples.TIME, name=name, unit="V", conversion=conversion)
+        for name, conversion in about.items()
+    ]
+    log.append(signals)
+    path = tmp_path / "scaled.mf4"
+    log.save(path, overwrite=True)
+    log.close()
+    record = read(path, inputs=["u"], outputs=["y", "plain"])
+    assert record.inputs[0].values == pytest.approx(0.002 * counts - 0.5, abs=1e-12)
+    assert record.outputs[0].values == pytest.approx(counts.astype(float) ** 2)
+    assert {f.message for f in record.findings if f.code == "scale"} == {
+        "counts of u are read as 0.002 V each minus 0.5 V, as the file states",
+        "counts of y are read through the formula or table of its conversion, in V, "
+        "as the file states",
+    }
+
+
+def test_the_scale_of_a_tdms_file_is_applied_and_shown_with_its_unit(tmp_path):
+    from nptdms import ChannelObject, TdmsWriter
+
+    counts = np.rint(1000 * samples.U).astype(np.int16)
+    plain = {"wf_increment": 1 / samples.FS, "unit_string": "V"}
+    scale = "NI_Scale[0]"
+    about = {
+        **plain,
+        "NI_Number_Of_Scales": 1,
+        f"{scale}_Scale_Type": "Linear",
+        f"{scale}_Linear_Slope": 0.002,
+        f"{scale}_Linear_Y_Intercept": 0.5,
+        f"{scale}_Linear_Input_Source": 0xFFFFFFFF,
+    }
+    path = tmp_path / "scaled.tdms"
+    with TdmsWriter(path) as writer:
+        parts = [
+            ChannelObject("rig", n, counts, properties=p)
+            for n, p in zip("uy", (about, plain), strict=True)
+        ]
+        writer.write_segment(parts)
+    record = read(path, inputs=["rig/u"], outputs=["rig/y"])
+    assert record.inputs[0].values == pytest.approx(0.002 * counts + 0.5, abs=1e-12)
+    (said,) = [f.message for f in record.findings if f.code == "scale"]
+    assert said == "counts of rig/u are read as 0.002 V each plus 0.5 V, as the file states"
+
+
 def test_a_channel_of_words_is_no_signal(tmp_path):
     path = samples.make("wpilog", tmp_path)
     with pytest.raises(FormatError, match="holds words"):

@@ -77,10 +77,16 @@ def open_recording(path: Path) -> Opened:
         with h5py.File(path, "r") as file:
             heading, unchanged = read_heading(file)
             state = read_state(file)
+            _check_size(file["log/lines"], path.stat().st_size)
             log = tuple(line for line in file["log/lines"].asstr(errors="replace")[()] if line)
             findings: list[Finding] = []
             known: dict[int, FloatArray] = {}
-            tracks = [_track(group, known, findings) for group in _groups(file)]
+            groups = _groups(file)
+            for dataset in (
+                group[name] for group in groups for name in ("time", "values", "blocks")
+            ):
+                _check_size(dataset, path.stat().st_size)
+            tracks = [_track(group, known, findings) for group in groups]
         named = bool(findings) or state.sha256 in ("", digest_of(tracks))
         if not unchanged:
             findings.append(_changed(path.name, "its heading"))
@@ -173,6 +179,18 @@ def _sane(path: Path) -> Iterator[None]:
         raise FormatError(
             f"{path.name!r} is no record file that can be read, or is damaged: {reason}"
         ) from error
+
+
+_MOST_PACKED = 2**32
+"""Bytes to which a record that someone packed afterwards may unpack."""
+
+
+def _check_size(dataset: Any, size: int) -> None:
+    """Refuse a table that is stated larger than its file: all of it would be held in memory."""
+    if int(dataset.nbytes) > max(size, _MOST_PACKED):
+        raise FormatError(
+            f"{dataset.name} states {dataset.size} numbers, more than {size} bytes can hold"
+        )
 
 
 def _groups(file: Any) -> list[Any]:

@@ -20,6 +20,7 @@ from hmpim.formats.readers.logs.log import (
     Log,
     cut_short,
     list_log,
+    per_count,
     take_series,
     unit_of,
 )
@@ -251,10 +252,15 @@ def _group(
         plain = table.dtype[label].kind in "iuf" and not table.dtype[label].shape
         unit = _unit(form.kind, k, meanings)
         parts, factor = _factor(form, k, meanings)
-        scale = f"{factor:.6g} {unit}".strip() if factor != 1 else ""
         load = partial(_values, table, label, parts, factor) if plain else None
         columns.append(
-            Column(name=f"{name}.{label}", unit=unit, samples=table.size, load=load, scale=scale)
+            Column(
+                name=f"{name}.{label}",
+                unit=unit,
+                samples=table.size,
+                load=load,
+                scale=per_count(factor, unit),
+            )
         )
     per_second = 10**6 if clock == "TimeUS" else 1000
     return Group(

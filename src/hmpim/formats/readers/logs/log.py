@@ -14,7 +14,17 @@ from hmpim.formats.readers.protocol import ChannelInfo, Contents, Layout, listed
 from hmpim.record import Finding, Series
 from hmpim.units import read_unit
 
-__all__ = ["Column", "Group", "Log", "cut_short", "list_log", "numbers", "take_series", "unit_of"]
+__all__ = [
+    "Column",
+    "Group",
+    "Log",
+    "cut_short",
+    "list_log",
+    "numbers",
+    "per_count",
+    "take_series",
+    "unit_of",
+]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -32,8 +42,7 @@ class Column:
     samples : int or None
         How many, where that is known without loading them.
     scale : str
-        What one count in the file is, such as '0.01 degC', where its samples are multiplied;
-        else empty.
+        How counts become samples where they do, such as 'as 0.01 degC each'; else empty.
     """
 
     name: str
@@ -171,8 +180,7 @@ def _scaled(columns: Sequence[Column]) -> dict[str, tuple[Finding, ...]]:
             shared.setdefault(column.scale, []).append(column.name)
     said: dict[str, tuple[Finding, ...]] = {}
     for scale, names in shared.items():
-        verb = "is" if len(names) == 1 else "are"
-        message = f"{_first(names)} {verb} read as {scale} per count, as the file states"
+        message = f"counts of {_first(names)} are read {scale}, as the file states"
         said[scale] = (Finding(code="scale", message=message, severity="info", parameters=()),)
     return said
 
@@ -292,6 +300,28 @@ def unit_of(text: object) -> str:
     if plain in ("", "-", "1", "–", "n/a", "N/A", "none", "None"):
         return ""
     return read_unit(plain) or plain
+
+
+def per_count(factor: float, unit: str, *, offset: float = 0.0) -> str:
+    """Return in words how counts become samples; empty where they are samples already.
+
+    Parameters
+    ----------
+    factor, offset : float
+        What a count is multiplied by, and what is added, in the unit.
+    unit : str
+        Unit of the samples.
+
+    Examples
+    --------
+    >>> per_count(0.01, "degC"), per_count(0.5, "V", offset=-2.0), per_count(1.0, "V")
+    ('as 0.01 degC each', 'as 0.5 V each minus 2 V', '')
+    """
+    if factor == 1 and offset == 0:
+        return ""
+    sign = "plus" if offset > 0 else "minus"
+    more = f" {sign} {abs(offset):.6g} {unit}".rstrip() if offset else ""
+    return f"as {f'{factor:.6g} {unit}'.strip()} each{more}"
 
 
 def cut_short(message: str) -> tuple[Finding, ...]:

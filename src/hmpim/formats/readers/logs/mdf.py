@@ -14,6 +14,7 @@ from hmpim.formats.readers.logs.log import (
     Log,
     cut_short,
     list_log,
+    per_count,
     take_series,
     unit_of,
 )
@@ -106,10 +107,30 @@ def _columns(
             twin = f", {seen[name]}" if seen[name] > 1 else ""
             name = f"{name} (group {place + 1}{twin})"
         conversion = channel.conversion
-        unit = channel.unit or (getattr(conversion, "unit", "") if conversion else "")
-        load = partial(_samples, file, place, k, time.size)
-        words = _words(file, place, k)
-        yield Column(name=name, unit=unit_of(unit), samples=time.size, load=None if words else load)
+        unit = unit_of(channel.unit or (getattr(conversion, "unit", "") if conversion else ""))
+        load = None if _words(file, place, k) else partial(_samples, file, place, k, time.size)
+        scale = _scale(conversion, unit)
+        yield Column(name=name, unit=unit, samples=time.size, load=load, scale=scale)
+
+
+_NO_CONVERSION = (None, 0xFFFF)  # of MDF 3; MDF 4 has 0, which is linear there
+
+
+def _scale(conversion: Any, unit: str) -> str:
+    """How counts become samples, in words; empty if they are samples already."""
+    if conversion is None:
+        return ""
+    factor, offset = getattr(conversion, "a", None), getattr(conversion, "b", None)
+    if isinstance(factor, float) and isinstance(offset, float):
+        return per_count(factor, unit, offset=offset)
+    if getattr(conversion, "conversion_type", None) in _NO_CONVERSION or _plain(conversion):
+        return ""
+    return f"through the formula or table of its conversion{f', in {unit}' if unit else ''}"
+
+
+def _plain(conversion: Any) -> bool:
+    """Whether a conversion of MDF 4 changes nothing."""
+    return hasattr(conversion, "val_param_nr") and conversion.conversion_type == 0
 
 
 def _words(file: Any, place: int, channel: int) -> bool:

@@ -1,6 +1,6 @@
 """TDMS, LabVIEW's measurement files (extra `tdms`: npTDMS)."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -14,6 +14,7 @@ from hmpim.formats.readers.logs.log import (
     Log,
     cut_short,
     list_log,
+    per_count,
     take_series,
     unit_of,
 )
@@ -95,12 +96,28 @@ def _group(key: tuple[Any, ...], parts: Sequence[Any]) -> Group:
 def _column(channel: Any) -> Column:
     kind = np.dtype(channel.dtype).kind
     unit = unit_of(channel.properties.get("unit_string") or channel.properties.get("unit"))
+    unit = unit or named(channel.name)[1]
     return Column(
         name=f"{channel.group_name}/{channel.name}",
-        unit=unit or named(channel.name)[1],
+        unit=unit,
         samples=len(channel),
         load=partial(_values, channel) if kind in "biufM" else None,
+        scale=_scale(channel.properties, unit),
     )
+
+
+def _scale(properties: Mapping[str, Any], unit: str) -> str:
+    """How counts become samples, in words; empty if they are samples already."""
+    kinds = {k: v for k, v in properties.items() if k.endswith("_Scale_Type")}
+    if not kinds:
+        return ""
+    place = "NI_Scale[0]"
+    if list(kinds.items()) == [(f"{place}_Scale_Type", "Linear")]:
+        factor = properties.get(f"{place}_Linear_Slope", 1.0)
+        offset = properties.get(f"{place}_Linear_Y_Intercept", 0.0)
+        return per_count(float(factor), unit, offset=float(offset))
+    names = ", ".join(dict.fromkeys(str(kind) for kind in kinds.values()))
+    return f"through the scales of its properties ({names}){f', in {unit}' if unit else ''}"
 
 
 def _values(channel: Any) -> NDArray[Any]:

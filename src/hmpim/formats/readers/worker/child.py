@@ -6,6 +6,7 @@ files, and unpickles nothing.
 """
 
 import contextlib
+import errno
 import faulthandler
 import gc
 import importlib
@@ -122,10 +123,15 @@ def _is_memory(error: BaseException) -> bool:
     seen: BaseException | None = error
     while seen is not None:
         words = str(seen)
-        if isinstance(seen, MemoryError) or "bad_alloc" in words or "Cannot allocate" in words:
+        if isinstance(seen, MemoryError) or any(said in words for said in _OUT_OF_MEMORY):
+            return True
+        if isinstance(seen, OSError) and seen.errno == errno.EFBIG:  # a temporary file
             return True
         seen = seen.__cause__ or seen.__context__
     return False
+
+
+_OUT_OF_MEMORY = ("bad_alloc", "Cannot allocate", "resize buffer")  # C++, POSIX, lz4
 
 
 def _in_short(error: BaseException) -> str:
@@ -142,13 +148,15 @@ def _function(address: str) -> Any:
 
 
 def _limit_memory(size: int) -> None:
-    """Allow so many bytes of address space, and no dump of it."""
+    """Allow so many bytes of address space and in a temporary file, and no dump of them."""
     with contextlib.suppress(ImportError):  # Windows has no such limit
         import resource
 
         # Linux keeps it; other systems take the call and may not.
         with contextlib.suppress(ValueError, OSError):
             resource.setrlimit(resource.RLIMIT_AS, (size, size))
+        with contextlib.suppress(ValueError, OSError):
+            resource.setrlimit(resource.RLIMIT_FSIZE, (size, size))
         with contextlib.suppress(ValueError, OSError):
             resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
 
