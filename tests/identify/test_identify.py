@@ -22,7 +22,7 @@ def record(u, y, **options) -> hmpim.Record:
 def result(field_record):
     _, u, y = field_record
     noisy = y + 0.1 * np.random.default_rng(0).standard_normal(y.size)
-    return hmpim.identify(record(u, noisy, units={"u": "deg", "y": "V"}))
+    return hmpim.identify(record(u, noisy, units={"u": "deg", "y": "V"}, intersample="bandlimited"))
 
 
 def test_every_figure_of_the_field_record(result):
@@ -163,7 +163,9 @@ def test_a_gap_is_said_and_does_no_harm(field_record):
     time, u, y = field_record
     noisy = y + 0.05 * np.random.default_rng(1).standard_normal(y.size)
     keep = (time < 4.0) | (time > 4.4)
-    gapped = hmpim.Record.from_arrays({"u": u[keep]}, {"y": noisy[keep]}, time=time[keep])
+    gapped = hmpim.Record.from_arrays(
+        {"u": u[keep]}, {"y": noisy[keep]}, time=time[keep], intersample="bandlimited"
+    )
     pair = identify(gapped)["y", "u"]
     assert "gaps" in [w.code for w in pair.warnings]
     for name, value in (("delay", 0.15), ("natural_frequency", 10.0), ("bias", 0.6)):
@@ -251,7 +253,9 @@ def test_a_level_behind_the_noise_is_not_taken_for_a_drift(field_record, seed):
     level = float(np.quantile(ideal, 2 / 3))
     noise = 0.05 * np.random.default_rng([3, seed]).standard_normal(u.size)
     y = np.minimum(ideal, level) + noise
-    pair = hmpim.identify(hmpim.Record.from_arrays({"u": u}, {"y": y}, fs=200.0))["y", "u"]
+    pair = hmpim.identify(
+        hmpim.Record.from_arrays({"u": u}, {"y": y}, fs=200.0, intersample="bandlimited")
+    )["y", "u"]
     assert pair.saturation_high.value == pytest.approx(level, abs=4 * pair.saturation_high.std)
     for name, truth in (("scale_factor", 1.0), ("bias", 0.6), ("natural_frequency", 10.0)):
         found = getattr(pair, name)

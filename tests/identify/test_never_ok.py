@@ -151,7 +151,8 @@ def assert_sound(pair):
     for name in PARAMETERS:
         estimate = getattr(pair, name)
         if estimate is not None:
-            assert np.isfinite([estimate.value, estimate.std, *estimate.ci95]).all(), name
+            numbers = [estimate.value, estimate.std, *(estimate.ci95 or ())]
+            assert np.isfinite([n for n in numbers if n is not None]).all(), name
     for warning in pair.warnings:
         assert warning.message.endswith("."), warning
         assert "nan" not in warning.message.split(), warning

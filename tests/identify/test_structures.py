@@ -62,7 +62,10 @@ def found(request):
     y = signal.lsim((numerator, denominator), chirp(fine - delay), fine)[1][::FINE]
     noise = np.random.default_rng(0).standard_normal(y.size)
     record = hmpim.Record.from_arrays(
-        {"u": chirp(fine[::FINE])}, {"y": y + 0.3 + 0.01 * np.std(y) * noise}, fs=FS
+        {"u": chirp(fine[::FINE])},
+        {"y": y + 0.3 + 0.01 * np.std(y) * noise},
+        fs=FS,
+        intersample="bandlimited",
     )
     return request.param, record, hmpim.identify(record)["y", "u"]
 

@@ -26,6 +26,7 @@ from hmpim.identify.result import (
     Parameters,
     ResponseBandwidths,
 )
+from hmpim.identify.spanned import spanned
 from hmpim.identify.spectrum import excited_band
 from hmpim.identify.uncertainty import estimate, noise_estimate, response_std
 from hmpim.identify.whiteness import Misfit, misfit
@@ -117,7 +118,8 @@ def described(
         held=found.hold is not None,
         measured=from_response,
     )
-    parameters, seen = with_imperfections(readings.parameters, found, censored, output.unit)
+    spread = spanned(readings.parameters, joint, fs=fs, highest=min(band[1], fs / 2))
+    parameters, seen = with_imperfections(spread, found, censored, output.unit)
     known = {finding.code for finding in seen}
     bent = () if inspection is None else inspection.findings
     drifts = () if drifting is None else (drift_finding(drifting, fs, output.unit),)

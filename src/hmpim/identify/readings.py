@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from hmpim.identify.fitting.fit import jacobian
+from hmpim.identify.fitting.fit import Fit, jacobian
 from hmpim.identify.fitting.nested import widened
 from hmpim.identify.fitting.trial import JointFit
 from hmpim.identify.result import Estimate, Parameters
@@ -14,6 +14,7 @@ from hmpim.identify.uncertainty import covariance, estimate, gradient, noise_est
 from hmpim.identify.whiteness import autoregressive_spectrum, is_white
 from hmpim.model.dynamics import Structure, coefficients_of, denominator_of
 from hmpim.model.response import (
+    PeakGain,
     RationalDelay,
     bandwidth_3db,
     bandwidth_phase,
@@ -22,7 +23,7 @@ from hmpim.model.response import (
     response,
 )
 
-__all__ = ["Readings", "read_figures", "read_parameters", "system_of"]
+__all__ = ["Readings", "figures_of", "read_figures", "read_parameters", "system_of"]
 
 _Vector = NDArray[np.float64]
 
@@ -207,14 +208,7 @@ def read_figures(
     # Neither an integrator nor a washout has a gain at DC to compare with.
     steady = structure.integrators == 0 and structure.dc_zeros == 0
     dynamic = order > 0 and steady
-    peak = peak_gain(system, highest=highest) if dynamic else None
-
-    marks = (
-        bandwidth_phase(system, highest=highest) if steady else None,
-        bandwidth_phase(system, highest=highest, delay=False) if dynamic else None,
-        bandwidth_3db(system, highest=highest) if dynamic else None,
-        peak.frequency if peak is not None else None,
-    )
+    marks, peak = _marks_of(structure, system, highest=highest)
     sensitivity = _Sensitivity(structure, vector, fs, tuple(f for f in marks if f is not None))
 
     def crossing(value: float | None, delay: bool | None) -> Estimate | None:
@@ -246,16 +240,13 @@ def read_figures(
     if dynamic:
 
         def slope_at_dc(v: _Vector) -> float:
-            here = system_of(structure, v, fs)
-            lead = here.numerator[1] / here.numerator[0] if here.numerator.size > 1 else 0.0
-            return float(here.delay + here.denominator[1] - lead)
+            return _slope_at_dc(system_of(structure, v, fs))
 
         low_frequency = explicit(slope_at_dc, "s")
     natural = damping = 0.0
     stretch = np.zeros(vector.size)
-    if mode is not None:  # 1 + c1 s + c2 s²: ω = c2^(-1/2), ζ = c1 ω / 2
-        damping = 0.5 / float(np.sqrt(vector[mode + 1]))  # it holds c2 / c1²
-        natural = 2 * damping * float(np.exp(-vector[mode])) * fs / (2 * np.pi)
+    if mode is not None:
+        natural, damping = _mode_at(vector, mode, fs)
         stretch = axis[mode + 1] / (2 * vector[mode + 1])
     parameters = Parameters(
         delay=linear(vector[0] / fs, axis[0] / fs, "s"),
@@ -286,6 +277,67 @@ def read_figures(
     )
     slopes = sensitivity.coefficients
     return parameters, system, slopes.T @ cov @ slopes
+
+
+def _marks_of(
+    structure: Structure, system: RationalDelay, *, highest: float
+) -> tuple[tuple[float | None, float | None, float | None, float | None], PeakGain | None]:
+    """-90° with the delay and without, -3 dB, the peak's frequency; and the peak."""
+    steady = structure.integrators == 0 and structure.dc_zeros == 0
+    dynamic = structure.order > 0 and steady
+    peak = peak_gain(system, highest=highest) if dynamic else None
+    marks = (
+        bandwidth_phase(system, highest=highest) if steady else None,
+        bandwidth_phase(system, highest=highest, delay=False) if dynamic else None,
+        bandwidth_3db(system, highest=highest) if dynamic else None,
+        peak.frequency if peak is not None else None,
+    )
+    return marks, peak
+
+
+def figures_of(fit: Fit, *, fs: float, highest: float) -> dict[str, float | None]:
+    """Values alone of what `read_parameters` gives with error bars, the noise apart.
+
+    Parameters
+    ----------
+    fit : Fit
+        Any fit.
+    fs, highest : float
+        As for `read_parameters`.
+    """
+    structure = fit.structure
+    vector = np.concatenate([fit.theta, fit.linear])
+    system = system_of(structure, vector, fs)
+    marks, peak = _marks_of(structure, system, highest=highest)
+    mode = _lowest_mode(structure, vector)
+    natural, damping = (None, None) if mode is None else _mode_at(vector, mode, fs)
+    steady = structure.integrators == 0 and structure.dc_zeros == 0
+    return {
+        "delay": system.delay,
+        "delay_low_frequency": _slope_at_dc(system) if steady else system.delay,
+        "scale_factor": fs ** (structure.integrators - structure.dc_zeros) * float(fit.linear[0]),
+        "bias": float(fit.linear[-1]),
+        "natural_frequency": natural,
+        "damping_ratio": damping,
+        "time_constant": dominant_time_constant(system),
+        "bandwidth_phase90": marks[0],
+        "bandwidth_phase90_without_delay": marks[1],
+        "bandwidth_3db": marks[2],
+        "peak_gain_db": None if peak is None else peak.gain_db,
+    }
+
+
+def _slope_at_dc(system: RationalDelay) -> float:
+    """Delay that the phase shows at low frequency, in s."""
+    first = 0.0 if system.denominator.size < 2 else float(system.denominator[1])
+    lead = system.numerator[1] / system.numerator[0] if system.numerator.size > 1 else 0.0
+    return float(system.delay + first - lead)
+
+
+def _mode_at(vector: _Vector, mode: int, fs: float) -> tuple[float, float]:
+    """Natural frequency in Hz and damping ratio of 1 + c1 s + c2 s²: c2^(-1/2), c1 ω / 2."""
+    damping = 0.5 / float(np.sqrt(vector[mode + 1]))  # it holds c2 / c1²
+    return 2 * damping * float(np.exp(-vector[mode])) * fs / (2 * np.pi), damping
 
 
 class _Sensitivity:

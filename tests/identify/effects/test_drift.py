@@ -26,7 +26,9 @@ def identified(drift, seed=1, **parts):
     )
     record = hmpim.run(sensor, STIMULUS, rng=seed)
     y = record.outputs[0].values + drift
-    bare = hmpim.Record.from_arrays({"u": record.inputs[0].values}, {"y": y}, fs=FS)
+    bare = hmpim.Record.from_arrays(
+        {"u": record.inputs[0].values}, {"y": y}, fs=FS, intersample="bandlimited"
+    )
     return hmpim.identify(bare)["y", "u"]
 
 
@@ -77,7 +79,9 @@ def test_a_clipped_output_may_drift():
     noise = 0.05 * np.random.default_rng(5).standard_normal(T.size)
     y = np.minimum(record.outputs[0].values + drift + noise, 1.2)
     pair = hmpim.identify(
-        hmpim.Record.from_arrays({"u": record.inputs[0].values}, {"y": y}, fs=FS)
+        hmpim.Record.from_arrays(
+            {"u": record.inputs[0].values}, {"y": y}, fs=FS, intersample="bandlimited"
+        )
     )["y", "u"]
     assert pair.saturation_high.value == pytest.approx(1.2)
     assert said(pair)

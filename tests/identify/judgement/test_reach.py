@@ -118,5 +118,6 @@ def test_a_few_lines_tell_no_more_than_gain_and_phase_at_each(evidence_of, lines
     found = few_lines(evidence_of(u, y + 0.01 * WHITE, structures=("second_order",)))
     assert [f.code for f in found] == ["few_lines"] * doubted
     for finding in found:
-        assert (finding.severity, finding.parameters) == ("doubt", MODELLED)
+        assert finding.severity == "doubt"
+        assert set(MODELLED) - set(finding.parameters) == {"bias", "noise_std"}
         assert f"excites {lines} frequenc" in finding.message

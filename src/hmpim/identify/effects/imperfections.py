@@ -14,7 +14,7 @@ from hmpim.errors import RecordError
 from hmpim.identify.effects.censored import CensoredFit, fit_censored
 from hmpim.identify.effects.drift import Drifting
 from hmpim.identify.effects.hold import Hold, Updates, detect_hold, updates
-from hmpim.identify.effects.lost import find_frozen, find_spikes
+from hmpim.identify.effects.lost import find_frozen, find_repeated, find_spikes
 from hmpim.identify.effects.quantization import Quantization, detect_quantization
 from hmpim.identify.effects.saturation import Saturation, detect_saturation
 from hmpim.identify.fitting.enrich import PLAIN
@@ -51,14 +51,14 @@ class Imperfections:
     quantization: Quantization | None
     spikes: NDArray[np.bool_] | None
     frozen: NDArray[np.bool_] | None
+    repeated: NDArray[np.bool_] | None
     levels: int | None
 
     @property
     def lost(self) -> NDArray[np.bool_] | None:
-        """Samples that say nothing at all: spikes, and where the output stood still."""
-        if self.spikes is None or self.frozen is None:
-            return self.spikes if self.frozen is None else self.frozen
-        return self.spikes | self.frozen
+        """Samples that say nothing at all: spikes, copies, and where the output stood still."""
+        seen = [s for s in (self.spikes, self.frozen, self.repeated) if s is not None]
+        return np.logical_or.reduce(seen) if seen else None
 
     @property
     def rounding(self) -> float:
@@ -126,6 +126,7 @@ def find_imperfections(
         quantization=rounding,
         spikes=spikes,
         frozen=frozen,
+        repeated=find_repeated(y) if rounding is None and hold is None else None,
         levels=_few_levels(y, clipping, richest),
     )
 
@@ -312,6 +313,18 @@ def with_imperfections(
 
 def _lost_findings(found: Imperfections) -> list[Finding]:
     findings = []
+    if found.repeated is not None:
+        count = int(np.count_nonzero(found.repeated))
+        findings.append(
+            Finding(
+                code="repeated_frames",
+                message=f"{count} samples ({100 * float(np.mean(found.repeated)):.2g} %) repeat "
+                "the one before them to the last digit, as frames do that were lost on the way; "
+                "they are left out.",
+                severity="info",
+                parameters=(),
+            )
+        )
     if found.spikes is not None:
         count = int(np.count_nonzero(found.spikes))
         findings.append(

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
-__all__ = ["find_frozen", "find_spikes", "stands_out"]
+__all__ = ["find_frozen", "find_repeated", "find_spikes", "stands_out"]
 
 _FAR = 8.0
 """Standard deviations, by the samples around it, from which a sample is a spike."""
@@ -29,6 +29,12 @@ _MOVES = 0.05
 
 _REPEATS = 0.3
 """Share of repeats among the other samples beyond which standing still is the output's habit."""
+
+_LONGEST_COPY = 3
+"""Samples in a row that may be copies of a frame before a lost one."""
+
+_MOST_COPIES = 0.2
+"""Share of copies beyond which they are the output's habit."""
 
 
 def stands_out(residual: NDArray[np.float64]) -> bool:
@@ -122,6 +128,36 @@ def find_frozen(
     if not frozen.any() or others.size == 0 or np.mean(others) > _REPEATS:
         return None
     return frozen
+
+
+def find_repeated(y: NDArray[np.float64]) -> NDArray[np.bool_] | None:
+    """Return the samples that repeat the one before to the last digit, while all around moves.
+
+    A frame that was lost is often filled by the one before it. An output that is rounded, held or
+    at rest repeats itself too, but not for a sample or two now and then.
+
+    Parameters
+    ----------
+    y : ndarray, shape (n,)
+        Output.
+
+    Examples
+    --------
+    >>> moving = np.random.default_rng(0).standard_normal(1000)
+    >>> find_repeated(moving) is None
+    True
+    >>> moving[[100, 200, 201]] = moving[[99, 199, 199]]
+    >>> np.flatnonzero(find_repeated(moving)).tolist()
+    [100, 200, 201]
+    """
+    copies = np.concatenate([[False], np.diff(y) == 0.0])
+    if not copies.any() or np.mean(copies) > _MOST_COPIES:
+        return None
+    first, last = _runs(copies)
+    for a, b in zip(first, last, strict=True):
+        if b - a >= _LONGEST_COPY or y[a] in (y.min(), y.max()):
+            copies[a : b + 1] = False
+    return copies if copies.any() else None
 
 
 def _runs(flags: NDArray[np.bool_]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:

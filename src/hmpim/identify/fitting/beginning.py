@@ -20,6 +20,9 @@ _REACH = 4
 _REST = 1e-4
 """Chance of taking a record at rest for one in mid-motion."""
 
+_SPARED = 0.1
+"""Share of the record that may be left out at the beginning for a delay not known yet."""
+
 _TWICE = 2.0
 """Factor on what the beginning may hold, for noise that is not white or not Gaussian."""
 
@@ -34,7 +37,7 @@ def count_in(
     """Samples that count once it is known how the system remembers, and where it begins."""
     fit = min(fits, key=lambda f: f.objective)
     ahead = _ahead(fits)
-    begins = _begins(data.problem(mode, seen), fit)
+    begins = _begins(data.problem(mode, seen), fit, lag=data.rough.lag)
     if begins is None and not ahead and known is None:
         return seen
     n = fit.residual.size
@@ -46,14 +49,16 @@ def count_in(
     return Seen(valid=counted, begins=begins)
 
 
-def _begins(problem: Problem, fit: Fit) -> int | None:
+def _begins(problem: Problem, fit: Fit, *, lag: int) -> int | None:
     """Sample from which on an unknown state must be fitted; None for a record at rest.
 
     A score test (C. R. Rao, Proc. Camb. Phil. Soc. 44, 1948) of the free responses beside all other
     parameters, and a chi-squared test of what comes before them, when the output still answers
-    input before the record.
+    input before the record. A fit from rest may have any delay where it was not at rest; that of
+    the cross-correlation, `lag`, is the later one, and costs a few samples.
     """
-    begins = int(np.ceil(max(fit.delay, 0.0))) + _REACH
+    late = max(fit.delay, float(lag) if lag <= problem.y.size * _SPARED else 0.0)
+    begins = int(np.ceil(late)) + _REACH
     if begins > problem.y.size // 2 or fit.objective <= 0.0:
         return None
     free = Part(replace(problem, begins=begins), fit.structure, fit.theta).free

@@ -104,6 +104,10 @@ def joint_fit(
         if not follows(data, min(free, key=lambda f: f.objective)):
             data, fits = prewhitened, free
     counted = count_in(data, natural, fits, seen, known)
+    if counted.begins is not None:  # from rest those fits ended anywhere
+        fits = fit_plain(data.problem(natural, counted), data.rough, plain or PLAIN)
+        later = count_in(data, natural, fits, seen, known)
+        counted = counted if later.begins is None else later
     if counted is not seen:
         fits = [refit(data.problem(natural, counted), f) for f in fits]
     fitted = fit_under_each_assumption(data, natural, fits, counted, alone=intersample is not None)
@@ -206,7 +210,16 @@ def _bridged(y: NDArray[np.float64], valid: NDArray[np.bool_]) -> NDArray[np.flo
 
 
 def _looks_held(u: NDArray[np.float64]) -> bool:
-    """Whether an input stands still most of the time and then jumps, as a held one does."""
+    """Whether an input stands still most of the time and then jumps, as a held one does.
+
+    What moves between two samples moves at one instant only if it stood before and stands after.
+    """
     jumps = np.abs(np.diff(u))
-    moving = jumps[jumps > 0]
-    return bool(moving.size < 0.5 * jumps.size and moving.max() > _JUMP * np.ptp(u))
+    moves = jumps > 0
+    count = int(np.count_nonzero(moves))
+    alone = moves & ~np.append(moves[1:], False) & ~np.append(False, moves[:-1])
+    return bool(
+        2 * count < moves.size
+        and jumps.max() > _JUMP * np.ptp(u)
+        and 2 * np.count_nonzero(alone) > count
+    )

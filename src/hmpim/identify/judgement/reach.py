@@ -8,7 +8,7 @@ from scipy.signal.windows import blackmanharris
 from hmpim.identify.fitting.enrich import PLAIN
 from hmpim.identify.groups import MODELLED, PHASE_SPLIT, TIMING
 from hmpim.identify.judgement.evidence import Evidence, structure_in_words
-from hmpim.model import slowest_time_constant
+from hmpim.model import response, slowest_time_constant
 from hmpim.record import Finding
 
 __all__ = [
@@ -35,8 +35,8 @@ _LONG = 0.5
 _FEET = 1e-5
 """Power of an input over its greatest, below which it excites nothing."""
 
-_LINE = 9
-"""Width in bins of a line behind a Blackman-Harris window."""
+_LINE, _APART = 7, 4
+"""Width in bins of a line behind a Blackman-Harris window, and bins by which two are told apart."""
 
 _SPARE = 2
 """What lines must tell beyond the figures, for a wrong structure to show."""
@@ -184,20 +184,38 @@ def negative_delay(evidence: Evidence) -> tuple[Finding, ...]:
     )
 
 
-def count_lines(u: NDArray[np.float64]) -> int | None:
-    """How many lines an input's spectrum consists of; None where it is more than lines.
+def _at_the_line(evidence: Evidence) -> str:
+    """Gain and phase at the only line, in a sentence."""
+    power = _windowed_power(evidence.u)
+    near = int(np.argmax(power)) + np.arange(-3, 4)
+    place = float(near @ power[near] / power[near].sum()) * evidence.fs / evidence.u.size
+    value = complex(response(evidence.readings.system, np.array([place]))[0])
+    return (
+        f" At {place:.4g} Hz the gain is {abs(value):.4g} and the phase "
+        f"{np.degrees(np.angle(value)):.4g}°."
+    )
+
+
+def _windowed_power(u: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Power behind a Blackman-Harris window, without what a constant has there."""
+    window = blackmanharris(u.size, sym=False)
+    return np.asarray(np.abs(rfft((u - window @ u / window.sum()) * window)) ** 2)
+
+
+def count_lines(u: NDArray[np.float64]) -> int:
+    """How many frequencies an input has that can be told apart.
 
     Examples
     --------
     >>> time = np.arange(1000) / 100
-    >>> count_lines(np.sin(2 * np.pi * 3.3 * time)), count_lines(np.sin(time**2))
-    (1, None)
+    >>> count_lines(np.sin(2 * np.pi * 3.3 * time)), count_lines(np.sin(time**2)) > 8
+    (1, True)
     """
-    power = np.abs(rfft((u - u.mean()) * blackmanharris(u.size, sym=False))) ** 2
+    power = _windowed_power(u)
     above = power > _FEET * power.max()
     edges = np.diff(np.concatenate([[0], above.astype(np.int8), [0]]))
     widths = np.flatnonzero(edges == -1) - np.flatnonzero(edges == 1)
-    return None if widths.max() > _LINE else int(widths.size)
+    return int(np.sum(1 + np.maximum(widths - _LINE, 0) // _APART))
 
 
 def few_lines(evidence: Evidence) -> tuple[Finding, ...]:
@@ -206,8 +224,6 @@ def few_lines(evidence: Evidence) -> tuple[Finding, ...]:
     A line tells gain and phase where it is, and nothing else.
     """
     lines = count_lines(evidence.u)
-    if lines is None:
-        return ()
     fit = evidence.joint.best.fit
     unknown = fit.theta.size + fit.linear.size - 1
     if 2 * lines >= unknown + _SPARE:
@@ -217,9 +233,9 @@ def few_lines(evidence: Evidence) -> tuple[Finding, ...]:
             code="few_lines",
             message=f"The input excites {lines} frequenc{'y' if lines == 1 else 'ies'}, which tell "
             f"gain and phase there and nothing else: {unknown} figures of a "
-            f"{structure_in_words(fit.structure.name)} model cannot be told from them. Sweep, or "
-            "add lines.",
+            f"{structure_in_words(fit.structure.name)} model cannot be told from them."
+            f"{_at_the_line(evidence) if lines == 1 else ''} Sweep, or add lines.",
             severity="doubt",
-            parameters=MODELLED,
+            parameters=tuple(n for n in MODELLED if n not in ("bias", "noise_std")),
         ),
     )

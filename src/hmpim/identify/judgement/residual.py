@@ -24,6 +24,9 @@ _CHANCE = 1e-4
 _TOLERATED_MISFIT = 0.03
 """Misfit, over the output's own r.m.s., beyond which a result is doubtful."""
 
+_OF_THE_NOISE = 0.1
+"""Share of the residual's power that follows the input, beyond which it is not the noise's."""
+
 _MOSTLY_NOISE = 0.5
 """R.m.s. of the residual over that of the output beyond which its colour matters too."""
 
@@ -43,6 +46,17 @@ def lack_of_fit(evidence: Evidence) -> tuple[Finding, ...]:
         return ()
     owed = float(np.sqrt(evidence.misfit.share)) * evidence.unexplained
     name = structure_in_words(evidence.joint.best.fit.structure.name)
+    if owed <= _TOLERATED_MISFIT and evidence.misfit.share > _OF_THE_NOISE:
+        return (
+            Finding(
+                code="lack_of_fit",
+                message="Much of the residual follows the input: the noise is less than it seems, "
+                f"as about {100 * owed:.2g} % of the output (r.m.s.) is not described by the "
+                f"{name} model.",
+                severity="doubt",
+                parameters=("noise_std",),
+            ),
+        )
     return (
         Finding(
             code="lack_of_fit",

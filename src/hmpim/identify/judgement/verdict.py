@@ -26,6 +26,9 @@ _OF_THE_RECORD = frozenset(
 )
 """Codes of doubts that the measured response shares; the others are about the model."""
 
+_WITHHELD = frozenset({"few_lines"})
+"""Codes of doubts under which a figure's error is not known: its interval is withheld."""
+
 
 def judged(pair: PairIdentification) -> PairIdentification:
     """Return the pair with the verdicts that its findings ask for.
@@ -39,7 +42,8 @@ def judged(pair: PairIdentification) -> PairIdentification:
         With all its findings; the verdicts that it has do not count.
     """
     names = doubted(pair.warnings)
-    parameters = _all_weighed(pair.parameters, names)
+    unknown = doubted(w for w in pair.warnings if w.code in _WITHHELD)
+    parameters = _all_weighed(_withheld(pair.parameters, unknown), names)
     shared = doubted(w for w in pair.warnings if w.code in _OF_THE_RECORD)
     return replace(
         pair,
@@ -93,6 +97,15 @@ def _all_weighed(holder: H, names: frozenset[str]) -> H:
             for name, estimate in given.items()
             if estimate is not None
         },
+    )
+
+
+def _withheld(parameters: Parameters, names: frozenset[str]) -> Parameters:
+    """Take the intervals away whose figures are named."""
+    given = {name: getattr(parameters, name) for name in names}
+    known = {name: estimate for name, estimate in given.items() if estimate is not None}
+    return replace(
+        parameters, **{name: replace(e, std=None, ci95=None) for name, e in known.items()}
     )
 
 

@@ -1,0 +1,64 @@
+"""Intervals that cover every assumption on what the input does between its samples.
+
+Held, linear and band-limited are three models without a parameter between them. Where the record
+cannot tell them apart and nothing is stated, the figure stays at the likelier one, and its
+interval is the hull of the intervals under each that the likelihood does not exclude (a union of
+confidence sets: R. L. Berger and D. D. Boos, JASA 89, 1994).
+"""
+
+from dataclasses import fields, replace
+
+from hmpim.identify.fitting.trial import CLEARLY, JointFit, Trial
+from hmpim.identify.readings import figures_of
+from hmpim.identify.result import Estimate, Parameters
+
+__all__ = ["rivals_of", "spanned"]
+
+_MOVES = 0.05
+"""Share of an interval's half width from which another assumption widens it."""
+
+
+def rivals_of(joint: JointFit) -> tuple[Trial, ...]:
+    """The likeliest trial under each other assumption that the record does not exclude."""
+    best = joint.best
+    others: dict[str, Trial] = {}
+    for trial in sorted(joint.trials, key=lambda trial: trial.criterion):
+        if trial.intersample != best.intersample:
+            others.setdefault(trial.intersample, trial)
+    return tuple(t for t in others.values() if t.criterion - best.criterion < 2 * CLEARLY)
+
+
+def spanned(parameters: Parameters, joint: JointFit, *, fs: float, highest: float) -> Parameters:
+    """Widen each interval to what it would be under the other assumptions.
+
+    The other fits see the same data with all but the same sensitivity, so that each interval is
+    moved to their value, its width kept.
+
+    Parameters
+    ----------
+    parameters : Parameters
+        Read off the best trial.
+    joint : JointFit
+        With the other trials.
+    fs, highest : float
+        Rate, and frequency beyond which no bandwidth is read off, in Hz.
+    """
+    found = [figures_of(trial.fit, fs=fs, highest=highest) for trial in rivals_of(joint)]
+    moved = {}
+    for name in (field.name for field in fields(parameters)):
+        own = getattr(parameters, name)
+        values = [other[name] for other in found if other.get(name) is not None]
+        if own is not None and values:
+            moved[name] = _hull(own, [float(value) for value in values if value is not None])
+    return replace(parameters, **moved)
+
+
+def _hull(own: Estimate, values: list[float]) -> Estimate:
+    """An interval that holds those around all values; the deviation only where none widens it."""
+    if own.ci95 is None or own.ci95[0] is None or own.ci95[1] is None:
+        return own
+    low, high = own.ci95
+    below, above = min([own.value, *values]) - own.value, max([own.value, *values]) - own.value
+    if max(above, -below) <= _MOVES * (high - low) / 2:
+        return own
+    return replace(own, std=None, ci95=(low + below, high + above))
