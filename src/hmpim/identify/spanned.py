@@ -55,9 +55,9 @@ def spanned(parameters: Parameters, joint: JointFit, *, fs: float, highest: floa
 
 def _hull(own: Estimate, values: list[float]) -> Estimate:
     """An interval that holds those around all values; the deviation only where none widens it."""
-    if own.ci95 is None or own.ci95[0] is None or own.ci95[1] is None:
+    low, high = own.ci95 or (None, None)
+    if low is None or high is None:
         return own
-    low, high = own.ci95
     below, above = min([own.value, *values]) - own.value, max([own.value, *values]) - own.value
     if max(above, -below) <= _MOVES * (high - low) / 2:
         return own

@@ -57,8 +57,8 @@ def _begins(problem: Problem, fit: Fit, *, lag: int) -> int | None:
     input before the record. A fit from rest may have any delay where it was not at rest; that of
     the cross-correlation, `lag`, is the later one, and costs a few samples.
     """
-    late = max(fit.delay, float(lag) if lag <= problem.y.size * _SPARED else 0.0)
-    begins = int(np.ceil(late)) + _REACH
+    latest = max(fit.delay, float(lag) if lag <= problem.y.size * _SPARED else 0.0)
+    begins = int(np.ceil(latest)) + _REACH
     if begins > problem.y.size // 2 or fit.objective <= 0.0:
         return None
     free = Part(replace(problem, begins=begins), fit.structure, fit.theta).free
