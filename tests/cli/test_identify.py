@@ -86,7 +86,8 @@ def test_bad_options_are_refused_in_one_line(good, arguments, reason):
 
 def test_a_good_record_is_printed_and_written(good, tmp_path):
     saved, page = tmp_path / "r.json", tmp_path / "r.html"
-    done = run("identify", good, *NAMED, "--json", saved, "--report", page)
+    stated = ("--intersample", "bandlimited")
+    done = run("identify", good, *NAMED, *stated, "--json", saved, "--report", page)
     assert done.exit_code == 0, done.stderr
     assert done.stderr == ""
     assert "u → y" in done.stdout

@@ -1,5 +1,6 @@
 """What every export starts from: one pair of a result, with its errors and where it comes from."""
 
+import math
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass, fields, replace
@@ -82,7 +83,8 @@ class Source:
         if delay >= 0.0:
             return self.model
         estimate = self.pair.parameters.delay
-        std = (estimate.std or 0.0) if estimate is not None else 0.0
+        spread = 0.0 if estimate is None else estimate.spread
+        std = spread if math.isfinite(spread) else 0.0
         if -delay <= _NEGLIGIBLE * std:
             return replace(self.model, delay=0.0)
         raise ArgumentError(
