@@ -141,7 +141,7 @@ def _thinned(
     block = max(1, min(block, u.size // (2 * _FEWEST)))
     whole = u.size // block * block
     u, y = (x[:whole].reshape(-1, block).mean(axis=1) for x in (u, y))
-    return u, y, valid[:whole].reshape(-1, block).all(axis=1)
+    return u, y, np.asarray(valid[:whole].reshape(-1, block).all(axis=1))
 
 
 def _evidence(
