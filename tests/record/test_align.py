@@ -1,5 +1,7 @@
 """All channels on one uniform clock: unchanged where they can be, honest where not."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -162,18 +164,30 @@ def test_a_gap_in_a_clock_of_its_own_is_masked_there_only():
     assert "of 'u' are missing" in aligned.findings[0].message
 
 
-def test_a_held_input_on_its_own_clock_keeps_its_last_value():
-    u = Channel(name="u", time=[0.0, 0.1, 0.2, 0.3], values=[1.0, 2.0, 3.0, 4.0])
-    y = Channel(name="y", time=[0.05, 0.15, 0.25], values=[0.0, 0.0, 0.0])
-    record = Record(inputs=(u,), outputs=(y,), fs=10.0, intersample="zoh")
-    assert uniform(record).inputs[0].values.tolist() == [1.0, 2.0, 3.0]
-
-
-def test_a_linear_input_on_its_own_clock_is_joined():
+@pytest.mark.parametrize("intersample", ["zoh", "foh"])
+def test_an_input_that_switches_at_its_own_instants_keeps_them(intersample):
+    """The output, which is smooth, is taken at the input's instants instead."""
     u = Channel(name="u", time=[0.0, 0.1, 0.2, 0.3], values=[1.0, 2.0, 4.0, 4.0])
-    y = Channel(name="y", time=[0.05, 0.15, 0.25], values=[0.0, 0.0, 0.0])
-    record = Record(inputs=(u,), outputs=(y,), fs=10.0, intersample="foh")
-    assert uniform(record).inputs[0].values == pytest.approx([1.5, 3.0, 4.0], abs=1e-12)
+    y = Channel(name="y", time=[0.05, 0.15, 0.25], values=[0.0, 1.0, 2.0])
+    aligned = uniform(Record(inputs=(u,), outputs=(y,), fs=10.0, intersample=intersample))
+    assert aligned.time == pytest.approx([0.1, 0.2], abs=1e-12)
+    assert aligned.inputs[0].values.tolist() == [2.0, 4.0]
+    assert aligned.outputs[0].values == pytest.approx([0.5, 1.5], abs=1e-9)
+
+
+def test_a_held_input_of_another_rate_is_the_mean_of_what_it_holds():
+    u = Channel(name="u", time=np.arange(0, 1, 0.03), values=np.arange(34.0))
+    y = Channel(name="y", time=np.arange(0, 1, 0.1), values=np.zeros(10))
+    aligned = uniform(Record(inputs=(u,), outputs=(y,), fs=10.0, intersample="zoh"))
+    # 0.1 s hold three intervals and a third of one.
+    assert aligned.inputs[0].values[0] == pytest.approx((0 + 1 + 2 + 3 / 3) * 0.03 / 0.1)
+    assert aligned.inputs[0].values[3] == pytest.approx((10 + 11 + 12 + 13 / 3) * 0.03 / 0.1)
+    (doubt,) = [f for f in aligned.findings if f.severity == "doubt"]
+    assert (doubt.code, doubt.parameters[0]) == ("held_between", "delay")
+    # Sampled where it switches nothing is doubtful.
+    there = replace(y, time=u.time[:10])
+    fine = uniform(Record(inputs=(u,), outputs=(there,), fs=10.0, intersample="zoh"))
+    assert not [f for f in fine.findings if f.severity == "doubt"]
 
 
 def test_clocks_that_never_meet_are_refused():

@@ -5,6 +5,7 @@ import re
 import numpy as np
 import pytest
 
+from hmpim.identify import identify
 from hmpim.record import Channel, Record, Series, uniform
 from hmpim.record.mend import mend
 
@@ -159,3 +160,37 @@ def test_what_folds_is_said():
     seen = np.hanning(t_u.size) ** 2
     tone, swept = 0.09 / 2 * seen.mean(), np.mean(seen * sweep(t_u) ** 2)
     assert float(said[1]) == pytest.approx(100 * tone / (tone + swept), rel=0.02)
+
+
+LAG = 0.05
+
+
+def lagged(time, u, at):
+    """What a lag of first order answers to an input that is held, exactly, at any instants."""
+    state = np.zeros(time.size)
+    decay = np.exp(-np.diff(time) / LAG)
+    for k, part in enumerate(decay):
+        state[k + 1] = u[k] + (state[k] - u[k]) * part
+    place = np.searchsorted(time, at + 1e-12, side="right") - 1
+    since = at - time[place]
+    return u[place] + (state[place] - u[place]) * np.exp(-since / LAG)
+
+
+@pytest.mark.parametrize("beside", [0.0, 0.004])
+def test_a_delay_behind_a_hold_of_another_clock_is_never_called_sure(beside):
+    """What is answered between samples has corners: no curve through the samples shows them."""
+    t_u, t_y = every(FS, late=beside), every(FS)
+    t_y = t_y[t_y > beside + DELAY]
+    u = sweep(t_u)
+    y = lagged(t_u, u, t_y - DELAY) + 0.003 * np.random.default_rng(1).standard_normal(t_y.size)
+    record = Record(
+        inputs=(Channel(name="u", time=t_u, values=u),),
+        outputs=(Channel(name="y", time=t_y, values=y),),
+        fs=FS,
+        intersample="zoh",
+    )
+    found = identify(record)["y", "u"]
+    assert found.delay.verdict == ("doubtful" if beside else "ok")
+    assert any(w.code == "held_between" for w in found.warnings) == bool(beside)
+    if not beside:
+        assert abs(found.delay.value - DELAY) < 0.01 / FS

@@ -5,6 +5,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from hmpim.errors import RecordError
 from hmpim.record import Channel, find_motions
 from hmpim.record.sweeps import cut_alike
 
@@ -99,3 +100,10 @@ def test_another_sweep_keeps_its_own_span():
     motions = find_motions(u)
     spans = cut_alike(u, motions)
     assert spans[1] == (motions[1].start, motions[1].stop)
+
+
+def test_a_first_stamp_that_is_damaged_is_no_clock():
+    """Seen in a damaged log of three samples: half of both intervals is the jump itself."""
+    channel = Channel(name="u", time=[-8.2e12, 0.0, 0.005], values=[0.0, 0.5, 0.4])
+    with pytest.raises(RecordError, match=r"jumps by 8.2e\+12 s after sample 0.*0.005 s apart"):
+        find_motions(channel)

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from hmpim.errors import RecordError
 from hmpim.record.clock import Clock, fit_clock
 from hmpim.record.finding import Finding
+from hmpim.record.held import switching_clock
 from hmpim.record.onto import is_reduced, on_grid
 from hmpim.record.quality import clock_findings
 from hmpim.record.record import Channel, Intersample, Record
@@ -107,6 +108,10 @@ def uniform(record: Record) -> Aligned:
     * Channels with clocks of their own: interpolated likewise, over the span that all share. One
       that is sampled faster loses what lies above half the lower rate first, by a symmetric
       filter: no path moves the delay (see `hmpim.record.resample`).
+    * Inputs stated as 'zoh' or 'foh' that have a clock of their own, of the output's rate or a
+      whole fraction of it: the outputs are interpolated onto that clock instead, as such an input
+      is right only where it switches (see `hmpim.record.held`). At any other ratio of rates the
+      input is the mean of what it holds over each interval.
 
     Inside a gap the filling is a cubic (Hermite) between the two edges, with slopes limited so
     that it never leaves the range between them.
@@ -155,8 +160,10 @@ def uniform(record: Record) -> Aligned:
     if shared:
         grid = clock.start + np.arange(clock.length) / clock.fs
     else:
+        own_of_output = clock
+        clock = switching_clock(record.inputs, clocks, clock, record.intersample)
         grid = _common_grid(channels, clocks, clock)
-        findings.extend(_clock_differences(record, clocks, clock))
+        findings.extend(_clock_differences(record, clocks, own_of_output))
 
     def signal(channel: Channel, intersample: Intersample | None) -> Signal:
         own = clocks[id(channel.time)]
@@ -232,25 +239,49 @@ def _clock_differences(record: Record, clocks: dict[int, Clock], clock: Clock) -
         same = abs(own.fs / clock.fs - 1.0) * own.length < 0.01
         if same and beside <= (own.rounding + clock.rounding) * clock.fs and not own.jittered:
             continue  # one clock, of which this channel misses some samples
-        findings.append(_resampled(c, own, channels[0], clock, record.intersample))
+        between = record.intersample if c in record.inputs else None
+        findings.append(_resampled(c, own, channels[0], clock, between))
         if c in record.inputs:
             findings.extend(_folded(c, own, channels[0], clock))
+            findings.extend(_held_between(c, own, channels[0], clock, record.intersample))
     return findings
+
+
+def _held_between(
+    channel: Channel, own: Clock, first: Channel, clock: Clock, intersample: Intersample | None
+) -> list[Finding]:
+    """An input that is held, or linear, by another clock: its corners lie where none is sampled."""
+    if intersample not in ("zoh", "foh"):
+        return []
+    how = "is held" if intersample == "zoh" else "turns"
+    return [
+        Finding(
+            code="held_between",
+            message=(
+                f"{channel.name!r} {how} by a clock of {own.fs:.6g} Hz, beside that of "
+                f"{first.name!r} at {clock.fs:.6g} Hz: what is answered between samples is not "
+                "known well enough for the delay; record both by one clock"
+            ),
+            severity="doubt",
+            parameters=("delay", "delay_correlation", "delay_low_frequency"),
+        )
+    ]
 
 
 def _resampled(
     channel: Channel, own: Clock, first: Channel, clock: Clock, intersample: Intersample | None
 ) -> Finding:
     place = (own.start - clock.start) * clock.fs
+    held = intersample in ("zoh", "foh")
     how = "was interpolated"
-    if intersample not in ("zoh", "foh") and is_reduced(channel, own, clock.fs):
+    if not held and is_reduced(channel, own, clock.fs):
         how = f"was reduced to it, with what it holds above {clock.fs / 2:.6g} Hz taken out"
     return Finding(
         code="resampled",
         message=(
             f"{channel.name!r} has a clock of its own ({own.fs:.6g} Hz, "
             f"{place - np.floor(place):.2g} of an interval beside that of {first.name!r} at "
-            f"{clock.fs:.6g} Hz) and {how}; neither moves its delay"
+            f"{clock.fs:.6g} Hz) and {how}{'' if held else '; neither moves its delay'}"
         ),
         severity="info",
         parameters=(),

@@ -294,5 +294,6 @@ def _factor(form: _Form, place: int, meanings: _Meanings) -> tuple[int, float]:
 
 def _values(table: NDArray[Any], label: str, parts: int, factor: float) -> NDArray[np.float64]:
     """Values in the unit of the field, divided by a whole number where there is one."""
-    values = np.asarray(table[label].astype(np.float64))
-    return values / parts if parts else values * factor
+    with np.errstate(invalid="ignore", over="ignore"):  # a damaged number stays one
+        values = np.asarray(table[label].astype(np.float64))
+        return values / parts if parts else values * factor
