@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+import xml.etree.ElementTree as ET
 
 import numpy as np
 import pytest
@@ -41,10 +42,10 @@ def figures():
 
 def test_every_axis_has_a_unit(figures):
     for name, figure in figures.items():
-        drawn = figure.to_matplotlib() if isinstance(figure, plots.Figure) else figure
-        for axes in drawn.axes:
-            assert axes.get_ylabel().endswith(")"), name
-        assert drawn.axes[-1].get_xlabel() in (
+        for panel in figure.panels:
+            assert panel.y.label.endswith(")"), name
+        assert figure.alt.endswith("."), name
+        assert figure.panels[-1].x.label in (
             "Time (s)",
             "Lag (s)",
             "Lag of the output (s)",
@@ -56,15 +57,14 @@ def test_both_signs_of_each_limit_are_drawn_and_the_signal_is_between():
     limits = Limits(position=10, velocity=70, acceleration=8500, unit="deg")
     stimulus = design(band=(0.1, 20), duration=10, fs=200, limits=limits)
     figure = plots.time_histories(stimulus)
-    for axes, limit in zip(figure.axes, (10, 70, 8500), strict=True):
-        drawn = [line.get_ydata() for line in axes.lines]
-        levels = sorted(float(y[0]) for y in drawn if len(y) == 2)
-        assert levels == [-limit, limit]
-        assert np.abs(max(drawn, key=len)).max() <= limit
+    for panel, limit in zip(figure.panels, (10, 70, 8500), strict=True):
+        assert sorted(rule.at for rule in panel.of(plots.Rule)) == [-limit, limit]
+        (curve,) = panel.of(plots.Curve)
+        assert np.abs(curve.y).max() <= limit
 
 
 def test_without_limits_none_are_drawn(figures):
-    assert len(figures["time_histories"].axes[1].lines) == 1
+    assert not figures["time_histories"].panels[1].of(plots.Rule)
 
 
 def test_a_long_record_is_drawn_with_few_points_and_keeps_its_peak():
@@ -72,7 +72,7 @@ def test_a_long_record_is_drawn_with_few_points_and_keeps_its_peak():
     y = np.zeros(n)
     y[123_456] = 7.0
     figure = plots.input_output(np.arange(n) / 1000.0, y, y, input_unit="V", output_unit="deg")
-    line = figure.axes[1].lines[0]
+    line = figure.to_matplotlib().axes[1].lines[0]
     assert len(line.get_xdata()) <= MOST_POINTS
     peak = int(np.argmax(line.get_ydata()))
     assert line.get_ydata()[peak] == 7.0
@@ -82,20 +82,18 @@ def test_a_long_record_is_drawn_with_few_points_and_keeps_its_peak():
 def test_the_close_up_is_where_the_output_moves_most():
     moving = np.where((T > 6.0) & (T < 6.5), np.sin(100 * T), 0.0)
     figure = plots.model_over_measurement(T, moving, moving)
-    shown = figure.axes[1].lines[0].get_xdata()
+    shown = figure.panels[1].of(plots.Curve)[0].x
     assert shown[0] <= 6.0
     assert shown[-1] >= 6.49
     assert len(shown) == T.size // 10
 
 
 def share_inside_bounds(residual):
-    axes = plots.residuals(np.arange(residual.size) / 200.0, residual).axes[1]
-    levels = {abs(float(line.get_ydata()[0])) for line in axes.lines} - {0.0}
-    bound = levels.pop()
-    assert not levels
+    panel = plots.residuals(np.arange(residual.size) / 200.0, residual).panels[1]
+    (bound,) = {abs(rule.at) for rule in panel.of(plots.Rule)} - {0.0}
     assert bound == pytest.approx(1.96 / np.sqrt(residual.size))
-    segments = axes.collections[0].get_segments()
-    return np.mean([max(abs(a[1]), abs(b[1])) < bound for a, b in segments])
+    (stems,) = panel.of(plots.Curve)
+    return np.mean(np.abs(stems.y[1::3]) < bound)
 
 
 def test_the_residual_of_white_noise_stays_inside_its_bounds():
@@ -142,11 +140,10 @@ def test_candidates_stand_in_order_and_the_chosen_one_is_named():
             chosen=True,
         ),
     ]
-    axes = plots.candidates(tried).axes[0]
-    names = [label.get_text() for label in axes.get_yticklabels()]
-    assert names == ["second order, linear", "static, held"]
-    assert [bar.get_width() for bar in axes.patches] == [0.0, 905.0]
-    assert axes.texts[0].get_text() == "fit 99.00 %, chosen"
+    (panel,) = plots.candidates(tried).panels
+    assert [name for _, name in panel.y.ticks] == ["second order, linear", "static, held"]
+    assert panel.of(plots.Bars)[0].length == (0.0, 905.0)
+    assert panel.of(plots.Words)[0].text == "fit 99.00 %, chosen"
 
 
 @pytest.mark.parametrize("name", [r"$\frac{", "_hidden", "a$b$c", "\x00\x1b[2J", "x" * 500, "角度"])
@@ -157,7 +154,8 @@ def test_no_name_breaks_a_picture(name, tmp_path):
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", message="Glyph")
         figure.savefig(tmp_path / "a.png", dpi=30)
-    assert len(figure.axes[0].get_ylabel()) < 100
+    assert len(figure.panels[0].y.label) < 100
+    ET.fromstring(figure.to_svg())
 
 
 def test_a_constant_signal_can_be_drawn(tmp_path):
@@ -169,7 +167,7 @@ def test_a_constant_signal_can_be_drawn(tmp_path):
 def test_labels_state_the_unit_or_that_there_is_none():
     assert axis_label("Position", "deg") == "Position (deg)"
     assert axis_label("u", "") == "u (–)"
-    assert plain("50$") == r"50\$"
+    assert plain("x" * 99) == "x" * 39 + "…"
 
 
 def _linear(colour):
@@ -183,29 +181,6 @@ def test_every_colour_of_a_line_stands_out_from_the_paper():
     for name in ("ink", "muted", "input", "output", "model", "limit", "other"):
         contrast = 1.05 / (weights @ _linear(COLOURS[name]) + 0.05)
         assert contrast >= 3.0, name
-
-
-def test_curves_drawn_together_differ_without_red_or_green():
-    """Seen by a deuteranope and a protanope (Machado, Oliveira and Fernandes, 2009)."""
-    matrices = {
-        "deutan": [
-            [0.367322, 0.860646, -0.227968],
-            [0.280085, 0.672501, 0.047413],
-            [-0.011820, 0.042940, 0.968881],
-        ],
-        "protan": [
-            [0.152286, 1.052583, -0.204868],
-            [0.114503, 0.786281, 0.099216],
-            [-0.003882, -0.048116, 1.051998],
-        ],
-    }
-    together = [("input", "output"), ("input", "model"), ("output", "model"), ("other", "model")]
-    for matrix in matrices.values():
-        for first, second in together:
-            seen = (
-                np.array(matrix) @ np.array([_linear(COLOURS[first]), _linear(COLOURS[second])]).T
-            )
-            assert np.linalg.norm(seen[:, 0] - seen[:, 1]) > 0.15, (first, second)
 
 
 def test_nothing_global_is_touched():
@@ -225,7 +200,8 @@ def test_harmonics_within_their_noise_are_not_drawn():
     own = HarmonicCurve(order=1, frequency=(1.0, 5.0), amplitude=(2.0, 2.0), std=(0.0, 0.0))
     third = HarmonicCurve(order=3, frequency=(1.0, 5.0), amplitude=(0.2, 0.02), std=(0.01, 0.01))
     second = HarmonicCurve(order=2, frequency=(1.0,), amplitude=(0.01,), std=(0.01,))
-    axes = plots.harmonics([own, second, third]).axes[0]
-    assert [line.get_label() for line in axes.lines] == ["order 3"]
-    np.testing.assert_allclose(axes.lines[0].get_ydata(), [10.0, np.nan])
-    assert axes.get_ylabel() == "Share of the output (%)"
+    (panel,) = plots.harmonics([own, second, third]).panels
+    (curve,) = panel.of(plots.Curve)
+    assert curve.label == "order 3"
+    np.testing.assert_allclose(curve.y, [10.0, np.nan])
+    assert panel.y.label == "Share of the output (%)"

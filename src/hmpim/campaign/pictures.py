@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -15,9 +14,6 @@ from hmpim.plots.description import Figure as Description
 from hmpim.plots.fence import picket_fence
 from hmpim.plots.overlay import overlaid_bode, overlaid_levels
 from hmpim.report.figures import Picture
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 __all__ = ["section_pictures"]
 
@@ -66,7 +62,7 @@ def section_pictures(
     return pictures
 
 
-def _fence(rows: Sequence[Row]) -> "Figure":
+def _fence(rows: Sequence[Row]) -> Description:
     """Close-up of the upper half of the band, bin by bin."""
     low, high = rows[0].stimulus["band"]
     records = []
@@ -79,7 +75,7 @@ def _fence(rows: Sequence[Row]) -> "Figure":
     return picket_fence(records, band=(max(low, 0.55 * high), 0.75 * high))
 
 
-def _picture(key: str, title: str, words: str, drawn: "Figure | Description") -> Picture:
+def _picture(key: str, title: str, words: str, drawn: Description) -> Picture:
     return Picture(key=key, title=title, caption=title + ".", description=words, figure=drawn)
 
 

@@ -65,8 +65,8 @@ def write_study(study: Study, folder: Path, *, document: Path | None = None) -> 
         pictures.mkdir(parents=True, exist_ok=True)
         for number, section in enumerate(page.sections, start=1):
             for picture in section.pictures:
-                with replacing(pictures / f"{number}-{picture.key}.png") as path:
-                    picture.figure.savefig(path, format="png", dpi=110)
+                with replacing(pictures / f"{number}-{picture.key}.svg") as path:
+                    picture.figure.savefig(path, format="svg")
         write_text(place, markdown(page, pictures.name))
 
 
@@ -195,7 +195,7 @@ def markdown(page: StudyPage, pictures: str) -> str:
         lines += [f"- {sentence}" for sentence in section.found]
         lines += [""]
         for picture in section.pictures:
-            lines += [f"![{picture.title}]({pictures}/{number}-{picture.key}.png)", ""]
+            lines += [f"![{picture.title}]({pictures}/{number}-{picture.key}.svg)", ""]
         for grid in section.grids:
             if grid.caption != _CASES:
                 lines += _grid(grid)

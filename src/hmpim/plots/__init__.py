@@ -28,7 +28,7 @@ from hmpim.plots.histories import (
 )
 from hmpim.plots.inputs import inputs_plot
 from hmpim.plots.margin import added_phase
-from hmpim.plots.spectra import draw_spectrum, shade_band, spectra
+from hmpim.plots.spectra import excited_band, spectra, spectrum_curve
 
 __all__ = [
     "Axis",
@@ -50,9 +50,9 @@ __all__ = [
     "candidates",
     "cross_correlation",
     "deviation_curve",
-    "draw_spectrum",
     "envelope",
     "error_autocorrelation",
+    "excited_band",
     "harmonics",
     "input_output",
     "inputs_plot",
@@ -62,8 +62,8 @@ __all__ = [
     "pair_bode",
     "pair_deviation",
     "residuals",
-    "shade_band",
     "spectra",
+    "spectrum_curve",
     "time_histories",
     "tracked_frames",
 ]

@@ -107,7 +107,7 @@ def bode(
     return Figure(
         panels=tuple(_with_marks(panel, marks, shown) for panel in panels),
         alt=". ".join([f"Bode plot{span}: {names}", *words]) + ".",
-        heights=(2.5, 2.5),
+        heights=(2.3, 2.9),
     )
 
 
@@ -207,7 +207,7 @@ def bode_items(
             Curve(x=f, y=middle, colour=colour, width=0.7, opacity=0.7),
             Points(
                 x=f[some], y=middle[some], low=low[some], high=high[some], label=words,
-                colour=colour, size=3.2,
+                colour=colour, size=4.6, filled=False,
             ),
         ]  # fmt: skip
     return out

@@ -3,13 +3,9 @@
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-import numpy as np
-
-from hmpim.plots.style import COLOURS, FONT_SIZE, finish_axes, new_figure
+from hmpim.plots.description import Axis, Bars, Figure, Panel, Words
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
     from hmpim.identify import Candidate
     from hmpim.record import Intersample
 
@@ -25,8 +21,8 @@ INTERSAMPLE_WORDS: "dict[Intersample, str]" = {
 MOST_BARS = 12
 
 
-def candidates(tried: "Sequence[Candidate]") -> "Figure":
-    """Draw how much each structure's criterion is above the lowest.
+def candidates(tried: "Sequence[Candidate]") -> Figure:
+    """Describe how much each structure's criterion is above the lowest.
 
     Parameters
     ----------
@@ -40,33 +36,42 @@ def candidates(tried: "Sequence[Candidate]") -> "Figure":
     ...     Candidate(structure="static", intersample="zoh", criterion=90.0, fit_percent=50.0),
     ...     Candidate(structure="first_order", intersample="zoh", criterion=10.0,
     ...               fit_percent=99.0, chosen=True)])
-    >>> [label.get_text() for label in figure.axes[0].get_yticklabels()]
+    >>> [words for _, words in figure.panels[0].y.ticks]
     ['first order, held', 'static, held']
     """
     ranked = sorted(tried, key=lambda c: c.criterion)[:MOST_BARS]
-    lead = np.array([c.criterion - ranked[0].criterion for c in ranked])
-    places = np.arange(len(ranked))
-    figure, (axes,) = new_figure(1, height=0.7 + 0.26 * len(ranked))
-    colours = [COLOURS["other"] if c.chosen else COLOURS["muted"] for c in ranked]
-    axes.barh(places, lead, height=0.6, color=colours)
-    axes.set_xscale("symlog", linthresh=10.0)
-    axes.set_xlim(0.0, max(float(lead.max()) * 6.0, 10.0))
-    for place, value, tried_one in zip(places, lead, ranked, strict=True):
-        words = f"fit {tried_one.fit_percent:.2f} %" + (", chosen" if tried_one.chosen else "")
-        axes.annotate(
-            words,
-            xy=(float(value), float(place)),
-            xytext=(4, 0),
-            textcoords="offset points",
-            va="center",
-            fontsize=FONT_SIZE - 1,
-            color=COLOURS["ink"],
-        )
-    labels = [
-        f"{c.structure.replace('_', ' ')}, {INTERSAMPLE_WORDS[c.intersample]}" for c in ranked
+    lead = [float(c.criterion - ranked[0].criterion) for c in ranked]
+    names = [f"{c.structure.replace('_', ' ')}, {INTERSAMPLE_WORDS[c.intersample]}" for c in ranked]
+    places = tuple(float(k) for k in range(len(ranked)))
+    bars = Bars(
+        y=places,
+        length=tuple(lead),
+        colours=tuple("other" if c.chosen else "muted" for c in ranked),
+    )
+    words = [
+        Words(x=x, y=y, text=f"fit {c.fit_percent:.2f} %" + (", chosen" if c.chosen else ""))
+        for c, x, y in zip(ranked, lead, places, strict=True)
     ]
-    axes.set_yticks(places, labels)
-    axes.invert_yaxis()
-    finish_axes(axes, x="Criterion above the lowest (BIC, lower is better)")
-    axes.grid(visible=False, axis="y")
-    return figure
+    return Figure(
+        panels=(
+            Panel(
+                x=Axis(
+                    label="Criterion above the lowest (BIC, lower is better)",
+                    scale="symlog",
+                    low=0.0,
+                    high=max(max(lead) * 6.0, 10.0),
+                ),
+                y=Axis(
+                    low=len(ranked) - 0.5,
+                    high=-0.5,
+                    ticks=tuple(zip(places, names, strict=True)),
+                    grid=False,
+                ),
+                items=(bars, *words),
+            ),
+        ),
+        alt="Structures by how far their criterion is above the lowest: "
+        + ", ".join(f"{name} {above:.3g}" for name, above in zip(names, lead, strict=True))
+        + ".",
+        heights=(0.7 + 0.26 * len(ranked),),
+    )

@@ -1,15 +1,12 @@
 """A picture of each channel of a file: small, whole, its gaps shown as gaps."""
 
 from itertools import pairwise
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from hmpim.plots.style import COLOURS, Colour, axis_label, draw_line, finish_axes, new_figure
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+from hmpim.plots.description import Axis, Curve, Figure, Item, Panel, Points, Span
+from hmpim.plots.style import Colour, axis_label, plain
 
 __all__ = ["braille", "channel_picture", "pieces"]
 
@@ -53,8 +50,8 @@ def channel_picture(
     name: str,
     unit: str = "",
     colour: Colour = "model",
-) -> "Figure":
-    """Draw a channel over time, small.
+) -> Figure:
+    """Describe a channel over time, small.
 
     Parameters
     ----------
@@ -68,20 +65,28 @@ def channel_picture(
     Examples
     --------
     >>> t = np.linspace(0.0, 1.0, 50)
-    >>> channel_picture(t, np.sin(t), name="gyro", unit="deg/s").axes[0].get_ylabel()
+    >>> channel_picture(t, np.sin(t), name="gyro", unit="deg/s").panels[0].y.label
     'gyro (deg/s)'
     """
-    figure, (axes,) = new_figure(1, height=1.15)
     parts = pieces(time, values)
+    items: list[Item] = [
+        Span(low=before[-1], high=after[0], colour="grid", opacity=0.6)
+        for (before, _), (after, _) in pairwise(parts)
+    ]
     for t, v in parts:
         if t.size == 1:
-            axes.plot(t, v, ".", color=COLOURS[colour], markersize=2)
+            items.append(Points(x=t, y=v, colour=colour, size=2.0))
         else:
-            draw_line(axes, t, v, colour=colour, width=0.9)
-    for (before, _), (after, _) in pairwise(parts):
-        axes.axvspan(before[-1], after[0], color=COLOURS["grid"], linewidth=0, alpha=0.6)
-    finish_axes(axes, x="Time (s)", y=axis_label(name, unit))
-    return figure
+            items.append(Curve(x=t, y=v, colour=colour, width=0.9))
+    return Figure(
+        panels=(
+            Panel(
+                x=Axis(label="Time (s)"), y=Axis(label=axis_label(name, unit)), items=tuple(items)
+            ),
+        ),
+        alt=f"Channel {plain(name)} over time.",
+        heights=(1.15,),
+    )
 
 
 def braille(values: NDArray[np.float64], *, width: int = 24) -> str:

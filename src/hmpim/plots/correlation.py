@@ -1,21 +1,10 @@
 """Correlations of section IV: the delay's (8) and the error's own (10)."""
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from numpy.typing import NDArray
 
-from hmpim.plots.style import (
-    axis_label,
-    draw_legend,
-    draw_line,
-    draw_mark,
-    finish_axes,
-    new_figure,
-)
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+from hmpim.plots.description import Axis, Curve, Figure, Item, Panel, Rule
+from hmpim.plots.style import axis_label
 
 __all__ = ["cross_correlation", "error_autocorrelation"]
 
@@ -27,8 +16,8 @@ def cross_correlation(
     peak: float | None = None,
     delay: float | None = None,
     unit: str = "",
-) -> "Figure":
-    """Draw the cross-correlation of input and output (Eq. 8, Fig. 8).
+) -> Figure:
+    """Describe the cross-correlation of input and output (Eq. 8, Fig. 8).
 
     Parameters
     ----------
@@ -47,17 +36,30 @@ def cross_correlation(
     --------
     >>> lags = np.linspace(-1.0, 1.0, 201)
     >>> figure = cross_correlation(lags, np.exp(-(lags - 0.15) ** 2), peak=0.15, unit="deg²")
-    >>> figure.axes[0].get_ylabel()
+    >>> figure.panels[0].y.label
     'Cross-correlation (deg²)'
     """
-    figure, (axes,) = new_figure(1, height=2.4)
-    draw_line(axes, lags, correlation, colour="input")
-    finish_axes(axes, x="Lag of the output (s)", y=axis_label("Cross-correlation", unit))
+    items: list[Item] = [Curve(x=lags, y=correlation)]
+    words = []
     if peak is not None:
-        draw_mark(axes, peak, label=f"peak at {peak:.4g} s", colour="output", side="right")
+        words.append(f"peak at {peak:.4g} s")
+        items.append(Rule(at=peak, words=words[-1], colour="output", side="right"))
     if delay is not None:
-        draw_mark(axes, delay, label=f"pure delay {delay:.4g} s", colour="ink", side="left")
-    return figure
+        words.append(f"pure delay {delay:.4g} s")
+        items.append(
+            Rule(at=delay, words=words[-1], colour="ink", dashes=":", side="left", words_at=0.86)
+        )
+    return Figure(
+        panels=(
+            Panel(
+                x=Axis(label="Lag of the output (s)"),
+                y=Axis(label=axis_label("Cross-correlation", unit)),
+                items=tuple(items),
+            ),
+        ),
+        alt=", ".join(["Cross-correlation of input and output over the lag", *words]) + ".",
+        heights=(2.4,),
+    )
 
 
 def error_autocorrelation(
@@ -67,8 +69,8 @@ def error_autocorrelation(
     bias: float | None = None,
     duration: float | None = None,
     unit: str = "",
-) -> "Figure":
-    """Draw the autocorrelation of the time-corrected error (Eqs 9 to 11, Figs 9 and 11).
+) -> Figure:
+    """Describe the autocorrelation of the time-corrected error (Eqs 9 to 11, Figs 9 and 11).
 
     Parameters
     ----------
@@ -88,16 +90,23 @@ def error_autocorrelation(
     --------
     >>> lags = np.linspace(-1.0, 1.0, 201)
     >>> figure = error_autocorrelation(lags, 0.36 * np.ones(201), bias=0.6, unit="deg")
-    >>> figure.axes[0].get_ylabel()
+    >>> figure.panels[0].y.label
     'Autocorrelation of the error (deg²)'
     """
-    figure, (axes,) = new_figure(1, height=2.4)
-    draw_line(axes, lags, correlation, colour="output")
+    items: list[Item] = [Curve(x=lags, y=correlation, colour="output")]
     if bias is not None:
         fall = np.ones_like(lags) if duration is None else 1.0 - np.abs(lags) / duration
         words = "what the jointly fitted bias alone would give"
-        draw_line(axes, lags, bias**2 * fall, label=words, colour="ink", dashes="--")
-        draw_legend(axes)
+        items.append(Curve(x=lags, y=bias**2 * fall, label=words, colour="ink", dashes="--"))
     squared = f"{unit}²" if unit else ""
-    finish_axes(axes, x="Lag (s)", y=axis_label("Autocorrelation of the error", squared))
-    return figure
+    return Figure(
+        panels=(
+            Panel(
+                x=Axis(label="Lag (s)"),
+                y=Axis(label=axis_label("Autocorrelation of the error", squared)),
+                items=tuple(items),
+            ),
+        ),
+        alt="Autocorrelation of the time-corrected error over the lag.",
+        heights=(2.4,),
+    )

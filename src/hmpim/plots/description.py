@@ -6,7 +6,8 @@ matplotlib for papers, Plotly for the workbench. None of them knows what a Bode 
 
 from dataclasses import dataclass
 from os import PathLike
-from typing import TYPE_CHECKING, Any, Literal, TypeVar
+from pathlib import Path
+from typing import IO, TYPE_CHECKING, Any, Literal, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -275,7 +276,7 @@ class Figure:
 
     def savefig(
         self,
-        path: str | PathLike[str],
+        path: str | PathLike[str] | IO[bytes],
         *,
         dpi: float = 150.0,
         format: str | None = None,  # noqa: A002
@@ -284,8 +285,8 @@ class Figure:
 
         Parameters
         ----------
-        path : path-like
-            The file to write.
+        path : path-like or binary file
+            What to write to.
         dpi : float
             Dots per inch, where the format has dots.
         format : str, optional
@@ -308,7 +309,11 @@ class Figure:
         """
         from hmpim.plots.draw.with_matplotlib import save
 
-        save(self, path, dpi=dpi, format=format)
+        kind = format or str(path).rpartition(".")[2].lower()
+        if kind == "svg" and isinstance(path, str | PathLike):
+            Path(path).write_text(self.to_svg() + "\n", encoding="utf-8")
+        else:
+            save(self, path, dpi=dpi, format=format)
 
     def to_matplotlib(self) -> "MatplotlibFigure":
         """Draw it as a `matplotlib.figure.Figure`.
@@ -340,3 +345,26 @@ class Figure:
         from hmpim.plots.draw.with_plotly import draw
 
         return draw(self, most_points=most_points)
+
+    def to_svg(self, *, width: float | None = None, key: str = "figure") -> str:
+        """Return it as SVG text, of so many pixels across.
+
+        Parameters
+        ----------
+        width : float, optional
+            In px; letters keep their size.
+        key : str
+            Beginning of every id, unique in a page.
+
+        Examples
+        --------
+        >>> empty = Figure(panels=(Panel(x=Axis(), y=Axis()),), alt="Empty axes.")
+        >>> "Empty axes." in empty.to_svg(width=360.0)
+        True
+        """
+        from hmpim.plots.draw.with_svg import draw
+
+        return draw(self, width=width, key=key)
+
+    def _repr_html_(self) -> str:
+        return self.to_svg(key=f"figure-{id(self):x}")

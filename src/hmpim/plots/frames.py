@@ -1,15 +1,13 @@
 """Frames of a camera, with where the target was and where the tracker saw it."""
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Protocol
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from hmpim.plots.style import COLOURS, FONT_SIZE, WIDTH
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+from hmpim.plots.description import Axis, Figure, Image, Item, Marker, Panel, Points
+from hmpim.plots.style import WIDTH, Colour
 
 __all__ = ["Frame", "tracked_frames"]
 
@@ -40,8 +38,8 @@ class Frame(Protocol):
         ...
 
 
-def tracked_frames(frames: Sequence[Frame]) -> "Figure":
-    """Draw frames side by side: a ring where the target was, a cross where the tracker saw it.
+def tracked_frames(frames: Sequence[Frame]) -> Figure:
+    """Describe frames side by side: a ring where the target was, a cross where the tracker saw it.
 
     Parameters
     ----------
@@ -53,39 +51,61 @@ def tracked_frames(frames: Sequence[Frame]) -> "Figure":
     >>> from hmpim.rigs.tracker import TrackedFrame
     >>> image = np.zeros((40, 60), dtype=np.uint8)
     >>> frame = TrackedFrame(time=0.5, image=image, target=(30.0, 20.0), point=(30.2, 20.0))
-    >>> tracked_frames([frame]).axes[0].get_title()
+    >>> tracked_frames([frame]).panels[0].title
     '0.500 s: 0.20 pixels off'
     """
-    from matplotlib.figure import Figure
-
-    rows = -(-len(frames) // _ACROSS)
     high, wide = frames[0].image.shape
-    each = WIDTH / _ACROSS
-    figure = Figure(figsize=(WIDTH, rows * (each * high / wide + 0.35) + 0.3), layout="constrained")
+    rows = -(-len(frames) // _ACROSS)
+    panels = []
     for place, frame in enumerate(frames):
-        axes = figure.add_subplot(rows, _ACROSS, place + 1)
-        axes.imshow(
-            frame.image, cmap="gray", vmin=0, vmax=255, extent=(0, wide, high, 0),
-            interpolation="nearest",
-        )  # fmt: skip
-        axes.plot(
-            *frame.target, "o", color=COLOURS["input"], markersize=13, fillstyle="none",
-            markeredgewidth=1.4, label="target",
-        )  # fmt: skip
+        x, y = frame.target
+        items: list[Item] = [
+            Image(
+                values=frame.image[::-1].astype(np.float64),
+                x=(0.0, float(wide)),
+                y=(float(high), 0.0),
+                low=0.0,
+                high=255.0,
+                palette="grey",
+            ),
+            _point(x, y, label="target", colour="input", marker="o", size=12.0),
+        ]
         text = f"{frame.time:.3f} s: lost"
         if frame.point is not None:
-            axes.plot(
-                *frame.point, "+", color=COLOURS["output"], markersize=11, markeredgewidth=1.4,
-                label="tracked",
-            )  # fmt: skip
+            seen = _point(*frame.point, label="tracked", colour="output", marker="+", size=11.0)
+            items.append(seen)
             off = float(np.hypot(*np.subtract(frame.point, frame.target)))
             text = f"{frame.time:.3f} s: {off:.2f} pixels off"
-        axes.set_title(text, fontsize=FONT_SIZE - 1)
-        axes.set_xlim(0, wide)
-        axes.set_ylim(high, 0)
-        axes.set_xticks([])
-        axes.set_yticks([])
-    handles, labels = figure.axes[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=2, frameon=False,
-                  fontsize=FONT_SIZE - 1)  # fmt: skip
-    return figure
+        panels.append(
+            Panel(
+                x=Axis(low=0.0, high=float(wide), ticks=()),
+                y=Axis(low=float(high), high=0.0, ticks=()),
+                items=tuple(items),
+                title=text,
+                row=place // _ACROSS,
+                column=place % _ACROSS,
+                legend=place == 0,
+            )
+        )
+    words = "; ".join(panel.title for panel in panels)
+    return Figure(
+        panels=tuple(panels),
+        alt=f"Frames of the camera, the target ringed and where it was seen crossed: {words}.",
+        heights=(WIDTH / _ACROSS * high / wide + 0.5,) * rows,
+        columns=min(_ACROSS, len(frames)),
+        share_x=False,
+    )
+
+
+def _point(
+    x: float, y: float, *, label: str, colour: Colour, marker: Marker, size: float
+) -> Points:
+    return Points(
+        x=np.array([float(x)]),
+        y=np.array([float(y)]),
+        label=label,
+        colour=colour,
+        marker=marker,
+        size=size,
+        filled=False,
+    )

@@ -5,26 +5,25 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hmpim.plots.style import COLOURS, Colour, draw_legend, finish_axes, new_figure
+from hmpim.plots.description import Axis, Band, Curve, Dashes, Figure, Item, Marker, Panel
+from hmpim.plots.style import Colour
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
     from hmpim.identify import HarmonicCurve
 
 __all__ = ["harmonics"]
 
-LOOKS: dict[int, tuple[Colour, str]] = {
-    2: ("input", "--"),
-    3: ("output", "-"),
-    4: ("other", ":"),
-    5: ("limit", "-."),
+LOOKS: dict[int, tuple[Colour, Dashes, Marker]] = {
+    2: ("input", "--", "s"),
+    3: ("output", "-", "o"),
+    4: ("other", ":", "^"),
+    5: ("limit", "-.", "v"),
 }
 SEEN = 3.0  # standard deviations from which an amplitude is no noise
 
 
-def harmonics(curves: "Sequence[HarmonicCurve]") -> "Figure":
-    """Draw each harmonic's amplitude as a share of the output's own, in per cent.
+def harmonics(curves: "Sequence[HarmonicCurve]") -> Figure:
+    """Describe each harmonic's amplitude as a share of the output's own, in per cent.
 
     What stands out of the noise by three standard deviations is drawn, and the level of three
     standard deviations itself.
@@ -40,18 +39,18 @@ def harmonics(curves: "Sequence[HarmonicCurve]") -> "Figure":
     >>> own = HarmonicCurve(order=1, frequency=(1.0, 10.0), amplitude=(1.0, 2.0), std=(0.0, 0.0))
     >>> third = HarmonicCurve(
     ...     order=3, frequency=(1.0, 10.0), amplitude=(0.1, 0.1), std=(0.01, 0.01))
-    >>> line = harmonics([own, third]).axes[0].lines[0]
-    >>> [round(float(value), 2) for value in line.get_ydata()]
+    >>> line = harmonics([own, third]).panels[0].items[0]
+    >>> [round(float(value), 2) for value in line.y]
     [10.0, 5.0]
     """
     own = next(curve for curve in curves if curve.order == 1)
-    figure, (axes,) = new_figure(1, height=2.6)
+    items: list[Item] = []
     floor: dict[float, float] = {}
     lowest = np.inf
     for curve in curves:
         if curve.order == 1 or not curve.frequency:
             continue
-        colour, dashes = LOOKS[curve.order]
+        colour, dashes, marker = LOOKS[curve.order]
         frequency = np.array(curve.frequency)
         level = np.interp(frequency, *_rising(own)) / 100.0
         amplitude, noise = np.array(curve.amplitude), SEEN * np.array(curve.std)
@@ -62,32 +61,44 @@ def harmonics(curves: "Sequence[HarmonicCurve]") -> "Figure":
         if not seen.any():
             continue
         lowest = min(lowest, float(np.min((amplitude / level)[seen])))
-        axes.plot(
-            frequency[turn],
-            np.where(seen, amplitude / level, np.nan)[turn],
-            color=COLOURS[colour],
-            linestyle=dashes,
-            marker="o",
-            markersize=3.0,
-            linewidth=1.2,
-            label=f"order {curve.order}",
+        items.append(
+            Curve(
+                x=frequency[turn],
+                y=np.where(seen, amplitude / level, np.nan)[turn],
+                colour=colour,
+                dashes=dashes,
+                marker=marker,
+                size=3.5,
+                label=f"order {curve.order}",
+            )
         )
-    along = sorted(floor)
-    axes.fill_between(
-        along,
-        [floor[at] for at in along],
-        color=COLOURS["muted"],
-        alpha=0.15,
-        linewidth=0.0,
-        label="within noise",
-    )
-    axes.set_yscale("log")
+    along = np.array(sorted(floor))
     lowest = min([lowest, *(level for level in floor.values() if level > 0)])
-    if np.isfinite(lowest):
-        axes.set_ylim(bottom=0.5 * lowest)
-    finish_axes(axes, x="Frequency of the sweep (Hz)", y="Share of the output (%)", log_x=True)
-    draw_legend(axes)
-    return figure
+    bottom = 0.5 * lowest if np.isfinite(lowest) else None
+    noise = np.array([floor[at] for at in along])
+    items.append(
+        Band(
+            x=along,
+            low=np.full(along.size, bottom or 0.0),
+            high=noise,
+            label="within noise",
+            colour="muted",
+            opacity=0.15,
+        )
+    )
+    return Figure(
+        panels=(
+            Panel(
+                x=Axis(label="Frequency of the sweep (Hz)", scale="log"),
+                y=Axis(label="Share of the output (%)", scale="log", low=bottom),
+                items=tuple(items),
+            ),
+        ),
+        alt="Harmonics of the sweep as shares of the output, over the frequency of the sweep: "
+        + (", ".join(item.label for item in items if isinstance(item, Curve)) or "none")
+        + " stand out of the noise.",
+        heights=(2.6,),
+    )
 
 
 def _rising(curve: "HarmonicCurve") -> "tuple[Sequence[float], Sequence[float]]":

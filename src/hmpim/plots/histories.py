@@ -1,25 +1,17 @@
 """Signals over time: the stimulus in its limits, input and output, model, residual."""
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hmpim.identify.correlation import autocorrelation
-from hmpim.plots.style import (
-    COLOURS,
-    axis_label,
-    draw_legend,
-    draw_level,
-    draw_line,
-    finish_axes,
-    new_figure,
-)
+from hmpim.plots.description import Axis, Curve, Figure, Item, Panel, Rule
+from hmpim.plots.style import axis_label, plain
 from hmpim.units import rate_label
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
     from hmpim.stimulus import Stimulus
 
 __all__ = ["input_output", "model_over_measurement", "residuals", "time_histories"]
@@ -27,8 +19,8 @@ __all__ = ["input_output", "model_over_measurement", "residuals", "time_historie
 MOST_LAGS = 100  # of the residual's autocorrelation; more cannot be told apart on a page
 
 
-def time_histories(stimulus: "Stimulus") -> "Figure":
-    """Draw a stimulus's position, velocity and acceleration, each with its limit (Fig. 3).
+def time_histories(stimulus: "Stimulus") -> Figure:
+    """Describe a stimulus's position, velocity and acceleration, each with its limit (Fig. 3).
 
     Parameters
     ----------
@@ -40,26 +32,36 @@ def time_histories(stimulus: "Stimulus") -> "Figure":
     >>> from hmpim.stimulus import Limits, design
     >>> limits = Limits(position=10, velocity=1000, acceleration=40000, unit="deg")
     >>> figure = time_histories(design(band=(0.1, 10), duration=5, fs=500, limits=limits))
-    >>> [axes.get_ylabel() for axes in figure.axes]
+    >>> [panel.y.label for panel in figure.panels]
     ['Position (deg)', 'Velocity (deg/s)', 'Acceleration (deg/s²)']
     """
-    figure, axes = new_figure(3, height=1.7)
     limits = stimulus.limits
-    panels = (
+    parts = (
         ("Position", stimulus.position, None if limits is None else limits.position),
         ("Velocity", stimulus.velocity, None if limits is None else limits.velocity),
         ("Acceleration", stimulus.acceleration, None if limits is None else limits.acceleration),
     )
-    for order, (panel, (quantity, values, limit)) in enumerate(zip(axes, panels, strict=True)):
-        draw_line(panel, stimulus.time, values, colour="input", width=1.0)
+    panels = []
+    for order, (quantity, values, limit) in enumerate(parts):
+        items: list[Item] = [Curve(x=stimulus.time, y=values, width=1.0)]
         if limit is not None and np.isfinite(limit):
-            draw_level(panel, (-limit, limit), label="limit")
-        last = "Time (s)" if order == 2 else ""
-        finish_axes(panel, x=last, y=axis_label(quantity, rate_label(stimulus.unit, order)))
-    if axes[0].get_legend_handles_labels()[0]:
-        draw_legend(axes[0])
-    figure.align_ylabels(axes)
-    return figure
+            label = "" if order else "limit"
+            items += [Rule(at=at, axis="y", label=label) for at in (-limit, limit)]
+        last = order == 2
+        panels.append(
+            Panel(
+                x=Axis(label="Time (s)" if last else "", numbered=last),
+                y=Axis(label=axis_label(quantity, rate_label(stimulus.unit, order))),
+                items=tuple(items),
+                row=order,
+            )
+        )
+    return Figure(
+        panels=tuple(panels),
+        alt=f"Position, velocity and acceleration of the stimulus over {stimulus.duration:g} s"
+        + ("." if limits is None else ", each inside its limit."),
+        heights=(1.7,) * 3,
+    )
 
 
 def input_output(
@@ -71,8 +73,8 @@ def input_output(
     output_name: str = "output",
     input_unit: str = "",
     output_unit: str = "",
-) -> "Figure":
-    """Draw what went in over what came out (Figs 2 and 7).
+) -> Figure:
+    """Describe what went in over what came out (Figs 2 and 7).
 
     Channels of one unit share one pair of axes, so that lag and scale can be seen.
 
@@ -91,24 +93,35 @@ def input_output(
     --------
     >>> t = np.linspace(0.0, 1.0, 50)
     >>> figure = input_output(t, np.sin(t), np.cos(t), input_unit="deg", output_unit="V")
-    >>> len(figure.axes)
+    >>> len(figure.panels)
     2
     """
+    into = Curve(x=time, y=u, label="input")
+    out = Curve(x=time, y=y, label="output", colour="output", dashes="--", width=1.0)
+    alt = f"{plain(input_name)} and {plain(output_name)} over time."
+    below = Axis(label="Time (s)")
     if input_unit == output_unit:
-        figure, (axes,) = new_figure(1, height=2.8)
-        draw_line(axes, time, u, colour="input", label="input")
-        draw_line(axes, time, y, colour="output", label="output", width=0.9)
-        both = f"{input_name}, {output_name}"
-        finish_axes(axes, x="Time (s)", y=axis_label(both, input_unit))
-        draw_legend(axes)
-        return figure
-    figure, axes_pair = new_figure(2, height=1.8)
-    draw_line(axes_pair[0], time, u, colour="input")
-    draw_line(axes_pair[1], time, y, colour="output", width=0.9)
-    finish_axes(axes_pair[0], y=axis_label(input_name, input_unit), title="Input")
-    finish_axes(axes_pair[1], x="Time (s)", y=axis_label(output_name, output_unit), title="Output")
-    figure.align_ylabels(axes_pair)
-    return figure
+        both = axis_label(f"{input_name}, {output_name}", input_unit)
+        panel = Panel(x=below, y=Axis(label=both), items=(into, out))
+        return Figure(panels=(panel,), alt=alt, heights=(2.8,))
+    panels = (
+        Panel(
+            x=Axis(numbered=False),
+            y=Axis(label=axis_label(input_name, input_unit)),
+            items=(into,),
+            title="Input",
+            legend=False,
+        ),
+        Panel(
+            x=below,
+            y=Axis(label=axis_label(output_name, output_unit)),
+            items=(replace(out, dashes="-"),),
+            title="Output",
+            row=1,
+            legend=False,
+        ),
+    )
+    return Figure(panels=panels, alt=alt, heights=(1.8, 1.8))
 
 
 def model_over_measurement(
@@ -118,8 +131,8 @@ def model_over_measurement(
     *,
     output_name: str = "output",
     unit: str = "",
-) -> "Figure":
-    """Draw the model's output over the measured one, whole and its liveliest part.
+) -> Figure:
+    """Describe the model's output over the measured one, whole and its liveliest part.
 
     Parameters
     ----------
@@ -134,21 +147,39 @@ def model_over_measurement(
     --------
     >>> t = np.linspace(0.0, 1.0, 50)
     >>> figure = model_over_measurement(t, np.sin(t), np.sin(t), unit="deg")
-    >>> len(figure.axes)
+    >>> len(figure.panels)
     2
     """
-    figure, axes = new_figure(2, height=2.0, share_x=False)
     start, stop = _busiest_tenth(predicted)
-    for panel, part, title in (
-        (axes[0], slice(None), "Whole record"),
-        (axes[1], slice(start, stop), "A tenth of it, where the output moves most"),
+    panels = []
+    for row, (part, title) in enumerate(
+        (
+            (slice(None), "Whole record"),
+            (slice(start, stop), "A tenth of it, where the output moves most"),
+        )
     ):
-        draw_line(panel, time[part], measured[part], colour="output", label="measured", width=1.4)
-        draw_line(panel, time[part], predicted[part], colour="model", label="model", dashes="--")
-        finish_axes(panel, x="Time (s)", y=axis_label(output_name, unit), title=title)
-    draw_legend(axes[0])
-    figure.align_ylabels(axes)
-    return figure
+        there = time[part]
+        items = (
+            Curve(x=there, y=measured[part], label="measured", colour="output", width=1.4),
+            Curve(x=there, y=predicted[part], label="model", colour="model", dashes="--"),
+        )
+        panels.append(
+            Panel(
+                x=Axis(label="Time (s)" if row else ""),
+                y=Axis(label=axis_label(output_name, unit)),
+                items=items,
+                title=title,
+                row=row,
+                legend=not row,
+            )
+        )
+    return Figure(
+        panels=tuple(panels),
+        alt=f"{plain(output_name)} as measured and as the model says, over time: the whole record, "
+        f"and {time[start]:.4g} to {time[stop - 1]:.4g} s.",
+        heights=(2.0, 2.0),
+        share_x=False,
+    )
 
 
 def residuals(
@@ -157,8 +188,8 @@ def residuals(
     *,
     output_name: str = "output",
     unit: str = "",
-) -> "Figure":
-    """Draw what the model leaves over, and whether it is white.
+) -> Figure:
+    """Describe what the model leaves over, and whether it is white.
 
     The lower axes show the residual's autocorrelation with the bounds ±1.96/√n inside which
     95 % of it lies when the residual is white noise.
@@ -176,25 +207,47 @@ def residuals(
     --------
     >>> noise = np.random.default_rng(1).standard_normal(500)
     >>> figure = residuals(np.arange(500) / 100.0, noise, unit="deg")
-    >>> figure.axes[1].get_ylabel()
+    >>> figure.panels[1].y.label
     'Autocorrelation (–)'
     """
-    figure, axes = new_figure(2, height=1.9, share_x=False)
-    draw_line(axes[0], time, residual, colour="output", width=0.8)
-    finish_axes(axes[0], x="Time (s)", y=axis_label(f"Residual of {output_name}", unit))
     step = float(np.median(np.diff(time)))
     most = min(residual.size - 1, MOST_LAGS)
     whole = autocorrelation(residual - residual.mean()).value[residual.size - 1 :]
     correlation = whole[1 : most + 1] / (whole[0] or 1.0)
     lags = np.arange(1, most + 1) * step
-    axes[1].vlines(lags, 0.0, correlation, colors=COLOURS["output"], linewidth=1.2)
-    axes[1].axhline(0.0, color=COLOURS["muted"], linewidth=0.8)
     bound = 1.96 / np.sqrt(residual.size)
-    draw_level(axes[1], (-bound, bound), label="95 % of white noise lies inside")
-    finish_axes(axes[1], x="Lag (s)", y="Autocorrelation (–)", title="Residual against itself")
-    draw_legend(axes[1])
-    figure.align_ylabels(axes)
-    return figure
+    words = "95 % of white noise lies inside"
+    stems = Curve(
+        x=np.repeat(lags, 3),
+        y=np.stack((0.0 * lags, correlation, np.nan * lags), axis=1).ravel(),
+        colour="output",
+    )
+    panels = (
+        Panel(
+            x=Axis(label="Time (s)"),
+            y=Axis(label=axis_label(f"Residual of {output_name}", unit)),
+            items=(Curve(x=time, y=residual, colour="output", width=0.8),),
+        ),
+        Panel(
+            x=Axis(label="Lag (s)"),
+            y=Axis(label="Autocorrelation (–)"),
+            items=(
+                stems,
+                Rule(at=0.0, axis="y", colour="muted", dashes="-", width=0.8),
+                *(Rule(at=at, axis="y", label=words) for at in (-bound, bound)),
+            ),
+            title="Residual against itself",
+            row=1,
+        ),
+    )
+    outside = int(np.sum(np.abs(correlation) > bound))
+    return Figure(
+        panels=panels,
+        alt=f"Residual of {plain(output_name)} over time, and its autocorrelation: {outside} of "
+        f"{most} lags outside of what holds 95 % of white noise.",
+        heights=(1.9, 1.9),
+        share_x=False,
+    )
 
 
 def _busiest_tenth(values: NDArray[np.float64]) -> tuple[int, int]:

@@ -1,30 +1,26 @@
 """Does the table spoil my test? What it adds to a loop, and the phase margin it leaves (V.B)."""
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from hmpim.model.margin import AddedPhase, Margin
-from hmpim.plots.style import (
-    COLOURS,
-    FONT_SIZE,
-    Colour,
-    axis_label,
-    draw_legend,
-    draw_line,
-    finish_axes,
-    new_figure,
+from hmpim.plots.description import (
+    Axis,
+    Band,
+    Curve,
+    Dashes,
+    Figure,
+    Item,
+    Panel,
+    Rule,
+    Words,
 )
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
+from hmpim.plots.style import Colour, axis_label
 
 __all__ = ["added_phase"]
 
 
-def added_phase(added: AddedPhase) -> "Figure":
-    """Draw added gain and phase with their 95 % bands, and both crossovers with their margins.
+def added_phase(added: AddedPhase) -> Figure:
+    """Describe added gain and phase with their 95 % bands, and both crossovers with their margins.
 
     Parameters
     ----------
@@ -37,41 +33,54 @@ def added_phase(added: AddedPhase) -> "Figure":
     >>> f = np.linspace(0.1, 10, 500)
     >>> table = Model(delay=0.05, scale_factor=1.0)
     >>> figure = added_phase(add_to_loop((f, 2 * np.pi / (2j * np.pi * f)), [table]))
-    >>> figure.axes[1].get_ylabel()
+    >>> figure.panels[1].y.label
     'Added phase (deg)'
     """
-    figure, (gain, phase) = new_figure(2)
     f = added.frequency
-    crossovers: tuple[tuple[Margin, Colour, str], ...] = (
-        (added.crossover_without, "muted", "loop alone"),
-        (added.crossover_with, "output", "with the equipment"),
+    crossovers: tuple[tuple[Margin, Colour, Dashes, str], ...] = (
+        (added.crossover_without, "muted", ":", "loop alone"),
+        (added.crossover_with, "output", "--", "with the equipment"),
     )
-    for axes, values, band in (
-        (gain, added.gain_db, added.gain_db_ci95),
-        (phase, added.phase, added.phase_ci95),
-    ):
-        draw_line(axes, f, values, label="added")
-        axes.fill_between(f, band[0], band[1], color=COLOURS["input"], alpha=0.25, linewidth=0)
-        for crossover, colour, words in crossovers:
-            axes.axvline(
-                crossover.value, color=COLOURS[colour], linewidth=1.0, linestyle="--",
-                label=f"crossover, {words}",
-            )  # fmt: skip
-        axes.set_xlim(f[0], f[-1])
-    _frame(gain, added.gain_db, least=1.0)
-    _frame(phase, added.phase, least=5.0)
-    phase.text(
-        0.02, 0.06,
+    margins = (
         f"Phase margin: {_said(added.margin_without)} alone, "
-        f"{_said(added.margin_with)} with the equipment",
-        transform=phase.transAxes, fontsize=FONT_SIZE, color=COLOURS["ink"],
-    )  # fmt: skip
-    finish_axes(gain, y=axis_label("Added gain", "dB"), log_x=True)
-    finish_axes(
-        phase, x=axis_label("Frequency", "Hz"), y=axis_label("Added phase", "deg"), log_x=True
+        f"{_said(added.margin_with)} with the equipment"
     )
-    draw_legend(gain)
-    return figure
+    panels = []
+    for row, (values, band, quantity, unit, least) in enumerate(
+        (
+            (added.gain_db, added.gain_db_ci95, "Added gain", "dB", 1.0),
+            (added.phase, added.phase_ci95, "Added phase", "deg", 5.0),
+        )
+    ):
+        items: list[Item] = [
+            Band(x=f, low=band[0], high=band[1], opacity=0.25),
+            Curve(x=f, y=values, label="" if row else "added"),
+        ]
+        for crossover, colour, dashes, words in crossovers:
+            label = "" if row else f"crossover, {words}"
+            items.append(Rule(at=crossover.value, colour=colour, dashes=dashes, label=label))
+        if row:
+            items.append(Words(x=0.02, y=0.06, at="share", text=margins))
+        low, high = _ends(values, least=least)
+        panels.append(
+            Panel(
+                x=Axis(
+                    label=axis_label("Frequency", "Hz") if row else "",
+                    scale="log",
+                    low=float(f[0]),
+                    high=float(f[-1]),
+                    numbered=bool(row),
+                ),
+                y=Axis(label=axis_label(quantity, unit), low=low, high=high),
+                items=tuple(items),
+                row=row,
+            )
+        )
+    return Figure(
+        panels=tuple(panels),
+        alt=f"Gain and phase that the equipment adds to the loop. {margins}.",
+        heights=(2.2, 2.2),
+    )
 
 
 def _said(margin: Margin) -> str:
@@ -81,8 +90,8 @@ def _said(margin: Margin) -> str:
     return f"{margin.value:.1f}° ({low:.1f} to {high:.1f})"
 
 
-def _frame(axes: "Axes", values: "np.ndarray", *, least: float) -> None:
+def _ends(values: "np.ndarray", *, least: float) -> tuple[float, float]:
     """Room around the curve; a flat one is not stretched to noise."""
     low, high = min(float(values.min()), 0.0), max(float(values.max()), 0.0)
     room = max(0.12 * (high - low), least)
-    axes.set_ylim(low - 2.0 * room, high + room)
+    return low - 2.0 * room, high + room

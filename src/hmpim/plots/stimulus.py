@@ -1,19 +1,18 @@
 """What a stimulus holds: its spectrum, its spectrogram, how near it comes to its limits."""
 
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import ShortTimeFFT
 
 from hmpim.identify.spectrum import decibel, spectrum
+from hmpim.plots.description import Axis, Curve, Dashes, Figure, Image, Panel
 from hmpim.plots.spectra import spectra
-from hmpim.plots.style import Colour, draw_legend, draw_line, finish_axes, new_figure
+from hmpim.plots.style import Colour
 from hmpim.stimulus.limits import QUANTITIES
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
     from hmpim.stimulus import Stimulus
 
 __all__ = ["share_beyond", "stimulus_spectrogram", "stimulus_spectrum", "time_near_limits"]
@@ -23,11 +22,11 @@ DEPTH = 60.0  # dB shown of a spectrogram
 _OVERSAMPLING = 4  # so that peaks between samples are seen
 _COLUMNS = 300  # of a spectrogram; no page shows more
 _COLOURS: tuple[Colour, ...] = ("input", "output", "other", "limit")
-_DASHES: tuple[Literal["-", "--", "-.", ":"], ...] = ("-", "--", "-.", ":")
+_DASHES: tuple[Dashes, ...] = ("-", "--", "-.", ":")
 
 
-def stimulus_spectrum(stimulus: "Stimulus", *, alpha: float = ALPHA) -> "Figure":
-    """Draw the spectrum of a stimulus with and without the window (Figs 12, 13, 18).
+def stimulus_spectrum(stimulus: "Stimulus", *, alpha: float = ALPHA) -> Figure:
+    """Describe the spectrum of a stimulus with and without the window (Figs 12, 13, 18).
 
     Parameters
     ----------
@@ -40,7 +39,7 @@ def stimulus_spectrum(stimulus: "Stimulus", *, alpha: float = ALPHA) -> "Figure"
     --------
     >>> from hmpim.stimulus import Limits, design
     >>> stimulus = design(band=(0.1, 10), duration=5, fs=100, limits=Limits(position=1))
-    >>> len(stimulus_spectrum(stimulus).axes[0].lines)
+    >>> len(stimulus_spectrum(stimulus).panels[0].of(Curve))
     2
     """
     plain = spectrum(stimulus.position, stimulus.fs, window="rectangular")
@@ -54,8 +53,8 @@ def stimulus_spectrum(stimulus: "Stimulus", *, alpha: float = ALPHA) -> "Figure"
     )
 
 
-def stimulus_spectrogram(stimulus: "Stimulus") -> "Figure":
-    """Draw the spectrum of a stimulus as it changes over time.
+def stimulus_spectrogram(stimulus: "Stimulus") -> Figure:
+    """Describe the spectrum of a stimulus as it changes over time.
 
     Parameters
     ----------
@@ -66,10 +65,9 @@ def stimulus_spectrogram(stimulus: "Stimulus") -> "Figure":
     --------
     >>> from hmpim.stimulus import Limits, design
     >>> stimulus = design(band=(0.1, 10), duration=5, fs=100, limits=Limits(position=1))
-    >>> stimulus_spectrogram(stimulus).axes[0].get_ylabel()
+    >>> stimulus_spectrogram(stimulus).panels[0].y.label
     'Frequency (Hz)'
     """
-    figure, (axes,) = new_figure(height=3.0)
     n, fs = stimulus.samples, stimulus.fs
     band = stimulus.band or (0.0, 0.5 * fs)
     # as long as a sweep stays within its own resolution
@@ -85,22 +83,31 @@ def stimulus_spectrogram(stimulus: "Stimulus") -> "Figure":
     seen = (times >= 0.0) & (times <= stimulus.duration)
     highest = min(1.5 * band[1], 0.5 * fs)
     low = transform.f <= highest
-    mesh = axes.pcolormesh(
-        times[seen],
-        transform.f[low],
-        level[np.ix_(low, seen)],
-        vmin=-DEPTH,
-        vmax=0.0,
-        cmap="viridis",
-        shading="nearest",
-        rasterized=True,
+    shown = times[seen]
+    half = 0.5 * float(np.median(np.diff(shown))) if shown.size > 1 else 0.5
+    spacing = 0.5 * float(transform.f[1] - transform.f[0])
+    image = Image(
+        values=level[np.ix_(low, seen)],
+        x=(float(shown[0]) - half, float(shown[-1]) + half),
+        y=(float(transform.f[0]) - spacing, float(transform.f[low][-1]) + spacing),
+        low=-DEPTH,
+        high=0.0,
+        label="Level re highest (dB)",
     )
-    bar = figure.colorbar(mesh, ax=axes, pad=0.01)
-    bar.set_label("Level re highest (dB)", fontsize=9)
-    bar.ax.tick_params(labelsize=8)
-    finish_axes(axes, x="Time (s)", y="Frequency (Hz)")
-    axes.grid(visible=False)
-    return figure
+    return Figure(
+        panels=(
+            Panel(
+                x=Axis(label="Time (s)", low=float(shown[0]), high=float(shown[-1]), grid=False),
+                y=Axis(
+                    label="Frequency (Hz)", low=0.0, high=float(transform.f[low][-1]), grid=False
+                ),
+                items=(image,),
+            ),
+        ),
+        alt=f"Spectrogram of the stimulus: from {band[0]:g} to {band[1]:g} Hz in "
+        f"{stimulus.duration:g} s.",
+        heights=(3.0,),
+    )
 
 
 def share_beyond(values: NDArray[np.float64], levels: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -128,8 +135,8 @@ def share_beyond(values: NDArray[np.float64], levels: NDArray[np.float64]) -> ND
     return beyond
 
 
-def time_near_limits(stimulus: "Stimulus") -> "Figure":
-    """Draw how long a stimulus is near each of its limits.
+def time_near_limits(stimulus: "Stimulus") -> Figure:
+    """Describe how long a stimulus is near each of its limits.
 
     For each limit, the share of the time that the motion spends beyond a share of the limit:
     at 90 % the curve tells how long the axis is within a tenth of what it may do.
@@ -144,13 +151,13 @@ def time_near_limits(stimulus: "Stimulus") -> "Figure":
     >>> from hmpim.stimulus import Limits, design
     >>> limits = Limits(position=1, velocity=20)
     >>> figure = time_near_limits(design(band=(0.1, 10), duration=5, fs=100, limits=limits))
-    >>> [line.get_label() for line in figure.axes[0].lines]
+    >>> [curve.label for curve in figure.panels[0].items]
     ['position', 'velocity']
     """
-    figure, (axes,) = new_figure(height=2.6)
     steps = np.arange(_OVERSAMPLING * stimulus.samples)
     motion = stimulus.motion(steps / (_OVERSAMPLING * stimulus.fs))
     share = np.linspace(0.0, 1.0, 501)
+    items = []
     for name, colour, dashes in zip(QUANTITIES, _COLOURS, _DASHES, strict=True):
         values = getattr(motion, name)
         limit = np.inf if stimulus.limits is None else getattr(stimulus.limits, name)
@@ -158,12 +165,17 @@ def time_near_limits(stimulus: "Stimulus") -> "Figure":
             continue
         beyond = 100.0 * share_beyond(values / limit, share)
         seen = beyond > 0.0
-        draw_line(axes, 100.0 * share[seen], beyond[seen], colour=colour, label=name, dashes=dashes)
-    axes.set_xlim(0.0, 100.0)
-    axes.set_yscale("log")
-    axes.set_ylim(0.05, 100.0)
-    finish_axes(axes, x="Share of the limit (%)", y="Time at or beyond it (%)")
-    axes.set_yticks([0.1, 1.0, 10.0, 100.0], ["0.1", "1", "10", "100"])
-    if axes.lines:
-        draw_legend(axes, columns=4)
-    return figure
+        x, y = 100.0 * share[seen], beyond[seen]
+        items.append(Curve(x=x, y=y, colour=colour, label=name, dashes=dashes))
+    names = ", ".join(item.label for item in items) or "no quantity"
+    return Figure(
+        panels=(
+            Panel(
+                x=Axis(label="Share of the limit (%)", low=0.0, high=100.0),
+                y=Axis(label="Time at or beyond it (%)", scale="log", low=0.05, high=100.0),
+                items=tuple(items),
+            ),
+        ),
+        alt=f"Share of the time that {names} of the stimulus is at or beyond a share of its limit.",
+        heights=(2.6,),
+    )

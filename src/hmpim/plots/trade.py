@@ -5,12 +5,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hmpim.plots.style import COLOURS, FONT_SIZE, draw_legend, draw_line, finish_axes, new_figure
+from hmpim.plots.description import Axis, Curve, Figure, Item, Panel, Points, Span, Words
 from hmpim.units import rate_label
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
     from hmpim.optimal import Gentle, Gentlest, TradePoint
 
 __all__ = ["gentle_label", "trade_plot"]
@@ -36,8 +34,8 @@ def gentle_label(gentle: "Gentle", unit: str) -> str:
     return f"{_WORDS[gentle]} ({of or '–'})"
 
 
-def trade_plot(found: "Gentlest", points: "Sequence[TradePoint]") -> "Figure":
-    """Draw what each accuracy costs, what was wanted, and what the other families cost.
+def trade_plot(found: "Gentlest", points: "Sequence[TradePoint]") -> Figure:
+    """Describe what each accuracy costs, what was wanted, and what the other families cost.
 
     Parameters
     ----------
@@ -53,53 +51,44 @@ def trade_plot(found: "Gentlest", points: "Sequence[TradePoint]") -> "Figure":
     >>> found = gentlest(accuracy=Accuracy(), noise_std=0.1, fs=100.0, duration=3.0,
     ...     model=RoughModel(natural_frequency=5, damping_ratio=0.5),
     ...     limits=Limits(position=10, unit="deg"), families=("multisine",))
-    >>> trade_plot(found, trade(found, factors=(1.0,))).axes[0].get_ylabel()
+    >>> trade_plot(found, trade(found, factors=(1.0,))).panels[0].y.label
     'Peak acceleration (deg/s²)'
     """
-    figure, (axes,) = new_figure(1, height=3.2)
     met = sorted((p.factor, p.value) for p in points if p.value is not None)
     factor = np.array([f for f, _ in met])
     value = np.array([v for _, v in met])
-    draw_line(axes, factor, value, label=found.family)
-    axes.plot(factor, value, "o", color=COLOURS["input"], markersize=4)
     missed = [p.factor for p in points if p.value is None]
     all_factors = [p.factor for p in points] + [1.0]
-    axes.set_xscale("log")
-    axes.set_yscale("log")
-    axes.set_xlim(min(all_factors) / 1.15, max(all_factors) * 1.15)
+    left, right = min(all_factors) / 1.15, max(all_factors) * 1.15
+    items: list[Item] = []
     if missed:
-        axes.axvspan(
-            min(all_factors) / 1.15,
-            max(missed),
-            color=COLOURS["limit"],
-            alpha=0.10,
-            linewidth=0,
-            label="beyond the limits",
+        beyond = Span(
+            low=left, high=max(missed), colour="limit", opacity=0.10, label="beyond the limits"
         )
+        items.append(beyond)
+    items.append(Curve(x=factor, y=value, label=found.family, marker="o"))
     for candidate in found.candidates[1:]:
         if candidate.use <= 1.0:
-            axes.plot(1.0, candidate.value, "s", color=COLOURS["muted"], markersize=5)
-            axes.annotate(
-                candidate.family,
-                xy=(1.0, candidate.value),
-                xytext=(6, 0),
-                textcoords="offset points",
-                va="center",
-                fontsize=FONT_SIZE - 1,
-                color=COLOURS["ink"],
-            )
-    axes.plot(1.0, found.value, "o", color=COLOURS["output"], markersize=7, label="wanted")
-    finish_axes(
-        axes,
-        x="Errors allowed, in times those wanted (–)",
-        y=gentle_label(found.wish.gentle, found.wish.limits.unit),
-        title="Gentleness against accuracy",
+            there = np.array([1.0]), np.array([candidate.value])
+            items.append(Points(x=there[0], y=there[1], colour="muted", marker="s", size=5.0))
+            items.append(Words(x=1.0, y=candidate.value, text=candidate.family))
+    wanted = np.array([1.0]), np.array([found.value])
+    items.append(Points(x=wanted[0], y=wanted[1], colour="output", size=7.0, label="wanted"))
+    return Figure(
+        panels=(
+            Panel(
+                x=Axis(
+                    label="Errors allowed, in times those wanted (–)",
+                    scale="log",
+                    low=left,
+                    high=right,
+                ),
+                y=Axis(label=gentle_label(found.wish.gentle, found.wish.limits.unit), scale="log"),
+                items=tuple(items),
+                title="Gentleness against accuracy",
+            ),
+        ),
+        alt=f"{gentle_label(found.wish.gentle, found.wish.limits.unit)} over the errors allowed; "
+        f"{found.value:.4g} for those wanted, by a {found.family}.",
+        heights=(3.2,),
     )
-    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
-
-    for axis in (axes.xaxis, axes.yaxis):
-        axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-        axis.set_major_formatter(FuncFormatter(lambda number, _: f"{number:g}"))
-        axis.set_minor_formatter(NullFormatter())
-    draw_legend(axes)
-    return figure

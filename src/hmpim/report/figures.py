@@ -12,8 +12,6 @@ from hmpim.record import Intersample, Record, Signal, uniform
 from hmpim.report.numbers import format_number
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
     from hmpim.stimulus import Stimulus
 
 __all__ = ["Picture", "pair_pictures", "stimulus_picture"]
@@ -30,7 +28,7 @@ class Picture:
     title: str
     caption: str
     description: str
-    figure: "Figure | plots.Figure"
+    figure: plots.Figure
 
 
 def stimulus_picture(stimulus: "Stimulus") -> Picture:

@@ -1,29 +1,24 @@
-"""Figures as inline SVG: no address outside, ids of their own, colours that follow the page."""
+"""Pictures for a page: one for its own width, one for a phone, colours that follow the page."""
 
-import io
-import re
-import warnings
-import xml.etree.ElementTree as ET
-from typing import TYPE_CHECKING
+from dataclasses import replace
 
-from hmpim.plots.description import Figure as Description
-from hmpim.plots.style import COLOURS
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+from hmpim.plots.description import Figure
+from hmpim.plots.draw.with_svg import draw
 
 __all__ = ["inline_svg"]
 
-_DECIMALS = re.compile(r"(\.\d\d)\d+")
-_REFERENCE = re.compile(r"url\(#")
+PHONE = 350.0  # px; what a screen of 390 leaves between its margins
 
 
-def inline_svg(figure: "Figure | Description", *, key: str, title: str, description: str) -> str:
-    """Turn a figure into an ``<svg>`` element for a page, named for screen readers.
+def inline_svg(
+    figure: Figure, *, key: str, title: str, description: str, phone: bool = True
+) -> str:
+    """Turn a figure into ``<svg>`` elements for a page, named for screen readers.
 
-    Every id starts with `key`, so that several figures can stand in one page. Namespaces and
-    metadata are dropped: HTML needs neither, and so no address is left in the page. Colours of
-    the style become CSS variables (``--input``, ``--ink``, …), which a dark page can change.
+    Every id starts with `key`, so that several figures can stand in one page, and no address
+    outside is left in it. Colours are CSS variables (``--input``, ``--ink``, …), which a dark
+    page can change. A second drawing, made for a phone, has the class ``narrow`` and the first
+    ``wide``: the page's style shows one of them.
 
     Parameters
     ----------
@@ -33,6 +28,8 @@ def inline_svg(figure: "Figure | Description", *, key: str, title: str, descript
         Unique in the page; letters, digits and dashes.
     title, description : str
         Short name, and what is to be seen, in words.
+    phone : bool
+        Whether to draw the narrow one as well.
 
     Returns
     -------
@@ -40,61 +37,19 @@ def inline_svg(figure: "Figure | Description", *, key: str, title: str, descript
 
     Examples
     --------
-    >>> from hmpim.plots.style import new_figure
-    >>> figure, _ = new_figure()
+    >>> from hmpim.plots.description import Axis, Panel
+    >>> figure = Figure(panels=(Panel(x=Axis(), y=Axis()),), alt="")
     >>> text = inline_svg(figure, key="f1", title="Nothing", description="Empty axes.")
     >>> text.startswith('<svg aria-labelledby="f1-title f1-desc"'), "http" in text
     (True, False)
+    >>> text.count('class="plot wide"'), text.count('class="plot narrow"')
+    (1, 1)
     """
-    drawn = figure.to_matplotlib() if isinstance(figure, Description) else figure
-    root = ET.fromstring(_rendered(drawn, key))
-    for parent in root.iter():
-        for child in list(parent):
-            if _local(child.tag) == "metadata":
-                parent.remove(child)
-    variables = {colour: f"var(--{name})" for name, colour in COLOURS.items()}
-    for element in root.iter():
-        element.tag = _local(element.tag)
-        element.attrib = {
-            _local(name): _rewritten(_local(name), value, key, variables)
-            for name, value in element.attrib.items()
-        }
-        if element.tag == "style" and element.text:
-            # A style element is global in a page; its one rule goes to the page's own sheet.
-            element.text = None
-    kept = {"viewBox": root.attrib["viewBox"], "class": "plot", "role": "img"}
-    root.attrib = {"aria-labelledby": f"{key}-title {key}-desc", **kept}
-    for place, (tag, text) in enumerate((("title", title), ("desc", description))):
-        named = ET.Element(tag, {"id": f"{key}-{tag}"})
-        named.text = text
-        root.insert(place, named)
-    return ET.tostring(root, encoding="unicode")
-
-
-def _rendered(figure: "Figure", key: str) -> bytes:
-    import matplotlib as mpl
-
-    buffer = io.BytesIO()
-    # Text stays text: smaller, searchable, and in the reader's own font.
-    with mpl.rc_context({"svg.fonttype": "none", "svg.hashsalt": key}), warnings.catch_warnings():
-        warnings.filterwarnings("ignore", message="Glyph .* missing from")
-        figure.savefig(buffer, format="svg", transparent=True, metadata={"Date": None})
-    return buffer.getvalue()
-
-
-def _local(name: str) -> str:
-    return name.rpartition("}")[2]
-
-
-def _rewritten(name: str, value: str, key: str, variables: dict[str, str]) -> str:
-    if name == "id":
-        return f"{key}-{value}"
-    if name == "href":
-        return value.replace("#", f"#{key}-", 1)
-    if name in ("d", "points"):
-        return _DECIMALS.sub(r"\1", value)
-    value = _REFERENCE.sub(f"url(#{key}-", value)
-    if name in ("style", "fill", "stroke"):
-        for colour, variable in variables.items():
-            value = value.replace(colour, variable)
-    return value
+    told = replace(figure, alt=description or figure.alt)
+    wide = draw(told, key=key, title=title, themed=True)
+    if not phone:
+        return wide
+    narrow = draw(told, key=f"{key}-n", title=title, width=PHONE, themed=True)
+    return wide.replace('class="plot"', 'class="plot wide"', 1) + narrow.replace(
+        'class="plot"', 'class="plot narrow"', 1
+    )

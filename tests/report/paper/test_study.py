@@ -4,6 +4,8 @@ import numpy as np
 import pytest
 
 from hmpim.errors import ArgumentError
+from hmpim.plots import Curve
+from hmpim.plots.draw.frames import frames
 from hmpim.report.paper import FIGURES, make_study
 
 
@@ -28,15 +30,14 @@ def test_every_figure_that_needs_no_motion_table_is_made(study):
 
 def test_no_panel_is_empty_or_without_its_unit(study):
     for number, picture in study.pictures.items():
-        assert picture.figure.axes, number
-        for axes in picture.figure.axes:
-            drawn = [line for line in axes.lines if np.ptp(line.get_xdata()) > 0]
+        assert picture.figure.panels, number
+        ends = frames(picture.figure)
+        for panel, frame in zip(picture.figure.panels, ends, strict=True):
+            drawn = [curve for curve in panel.of(Curve) if np.ptp(curve.x) > 0]
             assert drawn, number
-            assert axes.get_ylabel().endswith(")"), number
-            lower, upper = axes.get_ylim()
-            assert any(
-                np.any((line.get_ydata() > lower) & (line.get_ydata() < upper)) for line in drawn
-            ), number
+            assert panel.y.label.endswith(")") or panel.column, number
+            lower, upper = frame.y
+            assert any(np.any((curve.y > lower) & (curve.y < upper)) for curve in drawn), number
 
 
 def test_equation_7_has_a_plus(study):

@@ -8,7 +8,7 @@ import warnings
 from functools import partial
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import IO, TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -43,7 +43,7 @@ _DASHES: dict[str, Any] = {"-": "-", "--": (0, (5, 2)), "-.": (0, (6, 2, 1, 2)),
 
 def save(
     figure: Figure,
-    path: str | PathLike[str],
+    path: str | PathLike[str] | IO[bytes],
     *,
     dpi: float = 150.0,
     format: str | None = None,  # noqa: A002
@@ -74,16 +74,16 @@ def save(
     """
     import matplotlib as mpl
 
-    place = Path(path)
-    kind = format or place.suffix.lower().removeprefix(".") or "png"
+    name = str(path) if isinstance(path, str | PathLike) else ""
+    kind = format or Path(name).suffix.lower().removeprefix(".") or "png"
     drawn = draw(figure)
     if kind not in drawn.canvas.get_supported_filetypes():
-        raise ArgumentError(f"{str(path)!r} is no picture; name it .svg, .png or .pdf")
-    settings: dict[Any, Any] = {"svg.hashsalt": place.name, "svg.fonttype": "none"}
+        raise ArgumentError(f"{name!r} is no picture; name it .svg, .png or .pdf")
+    settings: dict[Any, Any] = {"svg.hashsalt": Path(name).name}
     stamp = {"svg": {"Date": None}, "png": {"Software": None}, "pdf": {"CreationDate": None}}
     with mpl.rc_context(settings), warnings.catch_warnings():
         warnings.filterwarnings("ignore", message="Glyph .* missing from")
-        drawn.savefig(place, format=kind, dpi=dpi, metadata=stamp.get(kind))
+        drawn.savefig(path, format=kind, dpi=dpi, metadata=stamp.get(kind))
 
 
 def draw(figure: Figure) -> "MatplotlibFigure":
@@ -176,10 +176,12 @@ def _draw_item(axes: "Axes", item: Item, panel: Panel, frame: Frame) -> None:
             label=_label(item.label),
         )  # fmt: skip
     elif isinstance(item, Words):
-        axes.text(
-            item.x, item.y, _safe(item.text), fontsize=_SMALL, color=COLOURS[item.colour],
+        shift = {"left": 4, "middle": 0, "right": -4}[item.anchor] if item.at == "data" else 0
+        axes.annotate(
+            _safe(item.text), xy=(item.x, item.y), xytext=(shift, 0), textcoords="offset points",
+            xycoords="axes fraction" if item.at == "share" else "data", fontsize=_SMALL,
             ha={"left": "left", "middle": "center", "right": "right"}[item.anchor], va="center",
-            transform=axes.transAxes if item.at == "share" else axes.transData, clip_on=True,
+            color=COLOURS[item.colour], annotation_clip=True,
         )  # fmt: skip
     elif isinstance(item, Bars):
         axes.barh(item.y, item.length, height=0.6, color=[COLOURS[c] for c in item.colours])

@@ -1,7 +1,6 @@
 """Fig. 23: the picket fence, on a light resonance driven by held commands."""
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,17 +8,13 @@ from numpy.typing import NDArray
 from hmpim.experiment import run
 from hmpim.identify.response import phase
 from hmpim.identify.spectrum import TransferFunction, decibel, spectrum, transfer_function
-from hmpim.plots.style import COLOURS, draw_legend, draw_line, finish_axes
+from hmpim.plots.description import Axis, Curve, Figure, Item, Panel
 from hmpim.report.figures import Picture
 from hmpim.report.paper.bound import resonance_db
 from hmpim.report.paper.chapter import Chapter
-from hmpim.report.paper.panels import grid_figure
 from hmpim.report.paper.rows import Row, agreement
 from hmpim.rigs import Sensor
 from hmpim.stimulus import Limits, Stimulus, design
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 __all__ = ["fence_chapter"]
 
@@ -174,38 +169,54 @@ def _rows(cases: list[_Case]) -> list[Row]:
     return rows
 
 
-def _figure(cases: list[_Case]) -> "Figure":
-    figure, (magnitudes, phases) = grid_figure(2, height=2.4)
-    for case, magnitude, lag in zip(cases, magnitudes, phases, strict=True):
+def _figure(cases: list[_Case]) -> Figure:
+    panels = []
+    for column, case in enumerate(cases):
+        magnitude: list[Item] = []
+        lag: list[Item] = []
         for response, marked in ((case.padded, False), (case.bins, True)):
             seen = _around(response)
             f, g = response.frequency[seen], response.response[seen]
-            turning = phase(g)
-            for axes, curve in ((magnitude, decibel(g)), (lag, turning)):
-                if marked:
-                    axes.plot(
-                        f,
-                        curve,
-                        color=COLOURS["output"],
-                        linestyle=":",
-                        linewidth=0.9,
-                        marker="o",
-                        markersize=3.5,
-                        label="bins",
-                    )
-                else:
-                    draw_line(axes, f, curve, colour="input", label="padded")
+            curve = Curve(x=f, y=decibel(g), label="padded")
+            if marked:
+                curve = replace(
+                    curve,
+                    label="bins",
+                    colour="output",
+                    dashes=":",
+                    width=0.9,
+                    marker="o",
+                    size=3.5,
+                )
+            magnitude.append(replace(curve, label=""))
+            lag.append(replace(curve, y=phase(g)))
         f = np.linspace(*SEEN, 1001)
         truth = _true(f)
-        draw_line(magnitude, f, decibel(truth), colour="model", dashes="--", label="truth")
-        draw_line(lag, f, phase(truth), colour="model", dashes="--", label="truth")
-        magnitude.set_ylim(resonance_db(DAMPING) - 12.0, resonance_db(DAMPING) + 1.0)
-        finish_axes(magnitude, x="Frequency (Hz)", y="Magnitude (dB)", title=f"{case.rate:g} Hz")
-        finish_axes(lag, x="Frequency (Hz)", y="Phase (deg)")
-        magnitude.set_xlim(*NEAR)
-        magnitude.set_xticks(np.arange(24.5, 26.1, 0.5))
-        lag.set_xlim(*SEEN)
-        lag.set_ylim(-260.0, 0.0)
-    draw_legend(phases[0])
-    figure.align_ylabels([magnitudes[0], phases[0]])
-    return figure
+        true = Curve(x=f, y=decibel(truth), colour="model", dashes="--", label="truth")
+        magnitude.append(replace(true, label=""))
+        lag.append(replace(true, y=phase(truth)))
+        top = resonance_db(DAMPING)
+        panels += [
+            Panel(
+                x=Axis(label="Frequency (Hz)", low=NEAR[0], high=NEAR[1]),
+                y=Axis(label="" if column else "Magnitude (dB)", low=top - 12.0, high=top + 1.0),
+                items=tuple(magnitude),
+                title=f"{case.rate:g} Hz",
+                column=column,
+            ),
+            Panel(
+                x=Axis(label="Frequency (Hz)", low=SEEN[0], high=SEEN[1]),
+                y=Axis(label="" if column else "Phase (deg)", degrees=True, low=-260.0, high=0.0),
+                items=tuple(lag),
+                row=1,
+                column=column,
+                legend=not column,
+            ),
+        ]
+    return Figure(
+        panels=tuple(panels),
+        alt="Magnitude and phase about a resonance, at the bins and between them.",
+        heights=(2.4, 2.4),
+        columns=len(cases),
+        share_x=False,
+    )

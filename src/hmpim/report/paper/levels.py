@@ -1,38 +1,27 @@
 """Figs 12 to 14: sweeps inside limits, their levels, and what a window does."""
 
 import math
-from typing import TYPE_CHECKING, Literal
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hmpim.identify.spectrum import decibel, spectrum
 from hmpim.identify.windows import WindowName, window_samples
-from hmpim.plots import draw_spectrum
-from hmpim.plots.style import (
-    Colour,
-    axis_label,
-    draw_legend,
-    draw_level,
-    draw_line,
-    draw_mark,
-    finish_axes,
-)
+from hmpim.plots import Axis, Curve, Figure, Panel, Rule, spectrum_curve
+from hmpim.plots.description import Dashes, Item
+from hmpim.plots.style import Colour, axis_label
 from hmpim.report.figures import Picture
 from hmpim.report.paper.chapter import Chapter
-from hmpim.report.paper.panels import grid_figure, wide_figure
 from hmpim.report.paper.rows import Row, agreement, shown
 from hmpim.stimulus import Limits, Stimulus, design
 from hmpim.units import rate_label
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 __all__ = ["levels_chapter"]
 
 FS = 500.0  # Hz
 ALPHA = 1.5
-WINDOWS: tuple[tuple[WindowName, str, Colour, Literal["-", "--", "-."]], ...] = (
+WINDOWS: tuple[tuple[WindowName, str, Colour, Dashes], ...] = (
     ("rectangular", "Rectangular", "muted", "-"),
     ("gaussian", f"Gaussian, α = {ALPHA:g}", "input", "-"),
     ("hann", "Hann", "output", "--"),
@@ -260,58 +249,88 @@ def _level_picture(number: int, stimulus: Stimulus) -> Picture:
     )
 
 
-def _level_figure(stimulus: Stimulus) -> "Figure":
-    figure, upper, lower = wide_figure(3, height=1.65)
+def _level_figure(stimulus: Stimulus) -> Figure:
+    panels = []
     limits = stimulus.limits
-    for order, (axes, quantity) in enumerate(
-        zip(upper, ("position", "velocity", "acceleration"), strict=True)
-    ):
-        draw_line(axes, stimulus.time, getattr(stimulus, quantity), width=1.0)
+    for order, quantity in enumerate(("position", "velocity", "acceleration")):
+        values = getattr(stimulus, quantity)
+        items: list[Item] = [Curve(x=stimulus.time, y=values, width=1.0)]
         if limits is not None:
             bound = getattr(limits, quantity)
-            draw_level(axes, (-bound, bound), label="limit")
-        label = axis_label(quantity.capitalize(), rate_label(stimulus.unit, order))
-        finish_axes(axes, x="Time (s)" if order == 2 else "", y=label)
-    draw_legend(upper[0])
+            label = "" if order else "limit"
+            items += [Rule(at=at, axis="y", label=label) for at in (-bound, bound)]
+        panels.append(
+            Panel(
+                x=Axis(label="Time (s)" if order == 2 else "", numbered=order == 2),
+                y=Axis(label=axis_label(quantity.capitalize(), rate_label(stimulus.unit, order))),
+                items=tuple(items),
+                row=order,
+                columns=2,
+            )
+        )
     band = stimulus.band or (0.1, stimulus.fs / 2)
     kinds: tuple[tuple[str, WindowName], ...] = (
         ("No window", "rectangular"),
         (f"Gaussian window, α = {ALPHA:g}", "gaussian"),
     )
-    for axes, (title, window) in zip(lower, kinds, strict=True):
+    for column, (title, window) in enumerate(kinds):
         bins = spectrum(stimulus.position, stimulus.fs, window=window, alpha=ALPHA)
-        axes.set_xlim(band[0] / 2, band[1] * 2.5)
-        axes.set_ylim(-10.0, 85.0)
-        draw_spectrum(axes, bins.frequency, decibel(bins.value))
-        finish_axes(axes, x="Frequency (Hz)", y="Level (dB re 1 deg)", title=title, log_x=True)
-        axes.set_xlim(band[0] / 2, band[1] * 2.5)
         level = _level(stimulus, band[1], window=window)
-        draw_mark(axes, band[1], label=f"{level:.1f} dB at {band[1]:g} Hz", text_at=0.22)
-    figure.align_ylabels(upper)
-    return figure
+        words = f"{level:.1f} dB at {band[1]:g} Hz"
+        panels.append(
+            Panel(
+                x=Axis(label="Frequency (Hz)", scale="log", low=band[0] / 2, high=band[1] * 2.5),
+                y=Axis(label="Level (dB re 1 deg)", low=-10.0, high=85.0),
+                items=(
+                    spectrum_curve(bins.frequency, decibel(bins.value)),
+                    Rule(at=band[1], words=words, words_at=0.22),
+                ),
+                title=title,
+                row=3,
+                column=column,
+            )
+        )
+    return Figure(
+        panels=tuple(panels),
+        alt="A sweep inside its limits, and its spectra without and with a window.",
+        heights=(1.65, 1.65, 1.65, 2.3),
+        columns=2,
+        share_x=False,
+    )
 
 
 def _window_picture() -> Picture:
     n = 1001
     ends = float(window_samples("gaussian", n, alpha=ALPHA)[0])
-    figure, (time_row, level_row) = grid_figure(2, 1, height=2.5)
-    (in_time,), (in_frequency,) = time_row, level_row
     place = np.linspace(-0.5, 0.5, n)
+    in_time, in_frequency = [], []
     for name, label, colour, dashes in WINDOWS:
         samples = window_samples(name, n, alpha=ALPHA)
-        draw_line(in_time, place, samples, colour=colour, label=label, dashes=dashes)
+        window = Curve(x=place, y=samples, colour=colour, label=label, dashes=dashes)
         # one unit of this axis is one bin of the record's own transform
         bins = spectrum(samples, float(n), window="rectangular", pad=31 * n)
         seen = bins.frequency <= 8.0
         level = decibel(bins.value[seen] / samples.sum())
-        draw_line(
-            in_frequency, bins.frequency[seen], level, colour=colour, width=1.0, dashes=dashes
-        )
-    in_frequency.set_ylim(-110.0, 5.0)
-    finish_axes(in_time, x="Time (share of the record)", y="Window (–)")
-    finish_axes(in_frequency, x="Frequency (bins of the record, 1/T)", y="Level re DC (dB)")
-    draw_legend(in_time, columns=6)
-    figure.align_ylabels([in_time, in_frequency])
+        in_time.append(window)
+        in_frequency.append(replace(window, x=bins.frequency[seen], y=level, label="", width=1.0))
+    figure = Figure(
+        panels=(
+            Panel(
+                x=Axis(label="Time (share of the record)"),
+                y=Axis(label="Window (–)"),
+                items=tuple(in_time),
+            ),
+            Panel(
+                x=Axis(label="Frequency (bins of the record, 1/T)"),
+                y=Axis(label="Level re DC (dB)", low=-110.0, high=5.0),
+                items=tuple(in_frequency),
+                row=1,
+            ),
+        ),
+        alt="Windows over time, and the levels of their transforms.",
+        heights=(2.5, 2.5),
+        share_x=False,
+    )
     return Picture(
         key="fig14",
         title="Time and frequency domain windowing examples",

@@ -1,33 +1,22 @@
 """Figs 16 and 17: the sample system by the paper's steps, by the joint fit, and at best."""
 
-from typing import TYPE_CHECKING
+from dataclasses import replace
 
 import numpy as np
 
 from hmpim.experiment import run
 from hmpim.identify import identify, paper_analysis
 from hmpim.identify.response import delay_phase
-from hmpim.plots import draw_spectrum, model_curve
-from hmpim.plots.style import (
-    COLOURS,
-    FONT_SIZE,
-    draw_legend,
-    draw_line,
-    draw_mark,
-    finish_axes,
-    new_figure,
-)
+from hmpim.plots import Axis, Curve, Figure, Panel, Rule, model_curve, spectrum_curve
+from hmpim.plots.description import Item
 from hmpim.report.figures import Picture
 from hmpim.report.numbers import format_number
 from hmpim.report.paper.bound import cramer_rao
 from hmpim.report.paper.chapter import Chapter
-from hmpim.report.paper.panels import grid_figure, response_axes
+from hmpim.report.paper.panels import response_panels
 from hmpim.report.paper.sample_rows import Sample, sample_rows
 from hmpim.rigs import Sensor
 from hmpim.stimulus import Limits, Stimulus, design
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 __all__ = ["SEED", "SYSTEM", "sample_chapter"]
 
@@ -85,22 +74,40 @@ def _sample(stimulus: Stimulus) -> Sample:
 def _picture_16(sample: Sample) -> Picture:
     analysis, delay = sample.analysis, sample.pure_delay
     hump, natural = analysis.estimates.peak_gain_db, sample.natural_by_pure_delay
-    figure, (magnitude, phase) = new_figure(2, height=2.6)
-    response_axes(figure, magnitude, phase, analysis, log_x=False)
-    magnitude.set_ylim(-15.0, 6.0)
-    for axes in (magnitude, phase):
-        axes.set_xlim(analysis.band[0], CLEAR)
+    magnitude, phase = response_panels(analysis, scale="linear")
+    upper: list[Item] = list(magnitude.items)
     if hump is not None:
         top = float(analysis.band_frequency[int(np.argmax(analysis.magnitude))])
-        draw_mark(magnitude, top, label=f"hump, {hump:.2f} dB above DC", text_at=0.35)
-    phase.set_ylim(-1100.0, 50.0)
+        upper.append(Rule(at=top, words=f"hump, {hump:.2f} dB above DC", words_at=0.35))
     f = analysis.band_frequency
     lag = delay_phase(f, delay)
-    draw_line(phase, f, lag, label=f"lag of the delay, {1e3 * delay:.1f} ms", colour="other")
-    draw_line(phase, f, lag - 90.0, label="90° below it", colour="output", dashes="--")
+    name = f"lag of the delay, {1e3 * delay:.1f} ms"
+    lower: list[Item] = [
+        *phase.items,
+        Curve(x=f, y=lag, label=name, colour="other", dashes="-."),
+        Curve(x=f, y=lag - 90.0, label="90° below it", colour="output", dashes="--"),
+    ]
     if natural is not None:
-        draw_mark(phase, natural, label=f"natural frequency {natural:.2f} Hz", text_at=0.97)
-    draw_legend(phase)
+        lower.append(Rule(at=natural, words=f"natural frequency {natural:.2f} Hz"))
+    low = analysis.band[0]
+    figure = Figure(
+        panels=(
+            replace(
+                magnitude,
+                x=replace(magnitude.x, low=low, high=CLEAR),
+                y=replace(magnitude.y, low=-15.0, high=6.0),
+                items=tuple(upper),
+            ),
+            replace(
+                phase,
+                x=replace(phase.x, low=low, high=CLEAR),
+                y=replace(phase.y, low=-1100.0, high=50.0),
+                items=tuple(lower),
+            ),
+        ),
+        alt="Magnitude and phase of the sample system.",
+        heights=(2.6, 2.6),
+    )
     words = f"{format_number(natural)} Hz"
     return Picture(
         key="fig16",
@@ -144,57 +151,106 @@ def _picture_17(sample: Sample) -> Picture:
     )
 
 
-def _figure_17(sample: Sample) -> "Figure":
-    analysis, pair = sample.analysis, sample.pair
+def _figure_17(sample: Sample) -> Figure:
+    analysis = sample.analysis
     u, y = sample.record.inputs[0], sample.record.outputs[0]
-    figure, ((time, correlation), (error, levels), (magnitude, phase)) = grid_figure(3, height=2.4)
-    draw_line(time, u.time, u.values, colour="input", label="input", width=0.9)
-    draw_line(time, y.time, y.values, colour="output", label="output", width=0.8)
-    finish_axes(time, x="Time (s)", y="Angle (deg)")
+    time = Panel(
+        x=Axis(label="Time (s)"),
+        y=Axis(label="Angle (deg)"),
+        items=(
+            Curve(x=u.time, y=u.values, label="input", width=0.9),
+            Curve(x=y.time, y=y.values, label="output", colour="output", dashes="--", width=0.8),
+        ),
+    )
     near = np.abs(analysis.lag) <= 1.0
-    draw_line(correlation, analysis.lag[near], analysis.cross_correlation[near])
-    finish_axes(correlation, x="Lag of the output (s)", y="Cross-correlation (deg²)")
+    peaks = [
+        Rule(
+            at=sample.pure_delay,
+            colour="ink",
+            dashes=":",
+            side="left",
+            words=f"pure delay {1e3 * sample.pure_delay:.1f} ms",
+            words_at=0.85,
+        )
+    ]
     delay = analysis.estimates.delay
     if delay is not None:
-        draw_mark(correlation, delay, label=f"peak {1e3 * delay:.0f} ms", colour="output")
-    pure = f"pure delay {1e3 * sample.pure_delay:.1f} ms"
-    draw_mark(correlation, sample.pure_delay, label=pure, colour="ink", side="left")
-    draw_line(error, analysis.error_lag, analysis.error_autocorrelation, colour="output")
+        peaks.append(Rule(at=delay, words=f"peak {1e3 * delay:.0f} ms", colour="output"))
+    correlation = Panel(
+        x=Axis(label="Lag of the output (s)"),
+        y=Axis(label="Cross-correlation (deg²)"),
+        items=(Curve(x=analysis.lag[near], y=analysis.cross_correlation[near]), *peaks),
+        column=1,
+    )
     length = analysis.error.size / analysis.fs
     alone = sample.system.bias**2 * (1.0 - np.abs(analysis.error_lag) / length)
-    draw_line(error, analysis.error_lag, alone, colour="ink", dashes="--", label="true bias alone")
-    finish_axes(error, x="Lag (s)", y="Error autocorr. (deg²)")
-    levels.set_xlim(analysis.band[0] / 2, analysis.fs / 2)
-    for label, level in (
-        ("input", analysis.input_windowed_db),
-        ("output", analysis.output_windowed_db),
-    ):
-        draw_spectrum(
-            levels,
-            analysis.frequency,
-            level,
-            label=label,
-            colour="input" if label == "input" else "output",
-        )
-    finish_axes(levels, x="Frequency (Hz)", y="Level (dB re 1 deg)", log_x=True)
-    levels.set_xlim(analysis.band[0] / 2, analysis.fs / 2)
-    levels.set_ylim(-20.0, 70.0)
-    response_axes(figure, magnitude, phase, analysis)
+    error = Panel(
+        x=Axis(label="Lag (s)"),
+        y=Axis(label="Error autocorr. (deg²)"),
+        items=(
+            Curve(x=analysis.error_lag, y=analysis.error_autocorrelation, colour="output"),
+            Curve(
+                x=analysis.error_lag, y=alone, colour="ink", dashes="--", label="true bias alone"
+            ),
+        ),
+        row=1,
+    )
+    levels = Panel(
+        x=Axis(label="Frequency (Hz)", scale="log", low=analysis.band[0] / 2, high=analysis.fs / 2),
+        y=Axis(label="Level (dB re 1 deg)", low=-20.0, high=70.0),
+        items=(
+            spectrum_curve(analysis.frequency, analysis.input_windowed_db, label="input"),
+            replace(
+                spectrum_curve(analysis.frequency, analysis.output_windowed_db, label="output"),
+                colour="output",
+                dashes="--",
+            ),
+        ),
+        row=1,
+        column=1,
+    )
+    return Figure(
+        panels=(time, correlation, error, levels, *_responses_17(sample)),
+        alt="The whole analysis of the sample system.",
+        heights=(2.4,) * 3,
+        columns=2,
+        share_x=False,
+    )
+
+
+def _responses_17(sample: Sample) -> tuple[Panel, Panel]:
+    """Magnitude and phase side by side, with the joint fit's model over them."""
+    analysis, pair = sample.analysis, sample.pair
+    magnitude, phase = response_panels(analysis)
+    upper: list[Item] = list(magnitude.items)
+    lower: list[Item] = [
+        *phase.items,
+        Rule(at=-90.0, axis="y", colour="muted", dashes=":", width=0.8),
+    ]
     grid = np.geomspace(*analysis.band, 400)
     model = model_curve(pair, grid)
     if model is not None:
-        for axes, curve in ((magnitude, model.magnitude_db), (phase, model.phase)):
-            draw_line(
-                axes, grid, curve, colour="model", dashes="--", label="joint fit", spacing="log"
-            )
-    magnitude.set_xlabel("Frequency (Hz)", fontsize=FONT_SIZE)
-    magnitude.set_ylim(-25.0, 6.0)
-    phase.set_ylim(-1300.0, 60.0)
-    phase.axhline(-90.0, color=COLOURS["muted"], linewidth=0.8)
+        fitted = Curve(x=grid, y=model.magnitude_db, colour="model", dashes="--", label="joint fit")
+        upper.append(fitted)
+        lower.append(replace(fitted, y=model.phase, label=""))
     bandwidth = pair.parameters.bandwidth_phase90
     if bandwidth is not None:
-        label = f"−90° at {bandwidth.value:.3f} Hz"
-        draw_mark(phase, bandwidth.value, label=label, text_at=0.3, side="left")
-    for axes in (time, error, levels, magnitude):
-        draw_legend(axes)
-    return figure
+        words = f"−90° at {bandwidth.value:.3f} Hz"
+        lower.append(Rule(at=bandwidth.value, words=words, words_at=0.3, side="left"))
+    below = replace(magnitude.x, label="Frequency (Hz)", numbered=True)
+    return (
+        replace(
+            magnitude,
+            x=below,
+            y=replace(magnitude.y, low=-25.0, high=6.0),
+            items=tuple(upper),
+            row=2,
+        ),
+        replace(
+            phase,
+            y=replace(phase.y, low=-1300.0, high=60.0),
+            items=tuple(lower),
+            row=2,
+            column=1,
+        ),
+    )

@@ -1,20 +1,17 @@
 """Fig. 15: a seeker and its tracker, stimulated by a line-of-sight rate."""
 
-from typing import TYPE_CHECKING
+from dataclasses import replace
 
 from hmpim.experiment import run
 from hmpim.identify import PaperAnalysis, paper_analysis
-from hmpim.plots.style import draw_level, draw_mark, new_figure
+from hmpim.plots.description import Figure, Item, Rule
 from hmpim.report.figures import Picture
 from hmpim.report.paper.chapter import Chapter
-from hmpim.report.paper.panels import response_axes
+from hmpim.report.paper.panels import response_panels
 from hmpim.report.paper.rows import Row, agreement
 from hmpim.rigs import FunctionRig
 from hmpim.rigs.seeker import Seeker
 from hmpim.stimulus import Limits, design
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 __all__ = ["seeker_chapter"]
 
@@ -80,11 +77,15 @@ def seeker_chapter() -> Chapter:
     return Chapter(pictures={15: picture}, rows=(row,))
 
 
-def _figure_15(analysis: PaperAnalysis) -> "Figure":
-    figure, (magnitude, phase) = new_figure(2, height=2.3)
-    response_axes(figure, magnitude, phase, analysis)
-    draw_level(phase, (-90.0,), label="−90°", colour="muted")
+def _figure_15(analysis: PaperAnalysis) -> Figure:
+    magnitude, phase = response_panels(analysis)
+    items: list[Item] = [Rule(at=-90.0, axis="y", label="−90°", colour="muted", dashes=":")]
     found = analysis.estimates.bandwidth_phase90
     if found is not None:
-        draw_mark(phase, found, label=f"−90° at {found:.3g} Hz", text_at=0.3, side="left")
-    return figure
+        words = f"−90° at {found:.3g} Hz"
+        items.append(Rule(at=found, words=words, words_at=0.3, side="left"))
+    return Figure(
+        panels=(magnitude, replace(phase, items=(*phase.items, *items))),
+        alt="Magnitude and phase of a seeker.",
+        heights=(2.3, 2.3),
+    )

@@ -1,6 +1,6 @@
 """Figs 2 and 7 to 11: a sensor with no dynamics, on which the paper's steps are right."""
 
-from typing import TYPE_CHECKING
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,25 +9,14 @@ from hmpim.experiment import run
 from hmpim.identify import PaperAnalysis, paper_analysis
 from hmpim.identify.static import initial_period
 from hmpim.plots import cross_correlation, error_autocorrelation, input_output
-from hmpim.plots.style import (
-    COLOURS,
-    draw_legend,
-    draw_level,
-    draw_line,
-    draw_mark,
-    finish_axes,
-    new_figure,
-)
+from hmpim.plots.description import Axis, Curve, Figure, Item, Panel, Points, Rule
 from hmpim.record import Record
 from hmpim.report.figures import Picture
 from hmpim.report.paper.chapter import Chapter
-from hmpim.report.paper.panels import response_axes
+from hmpim.report.paper.panels import response_panels
 from hmpim.report.paper.rows import Row, agreement
 from hmpim.rigs import Sensor
 from hmpim.stimulus import Limits, design
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 __all__ = ["sensor_chapter"]
 
@@ -169,35 +158,49 @@ def _rows(analysis: PaperAnalysis) -> tuple[Row, ...]:
     )
 
 
-def _seen(figure: "Figure") -> "Figure":
-    axes = figure.axes[0]
-    axes.set_ylabel("Angle (deg)")
-    return figure
+def _seen(figure: Figure) -> Figure:
+    (panel,) = figure.panels
+    return replace(figure, panels=(replace(panel, y=Axis(label="Angle (deg)")),))
 
 
-def _relabelled(figure: "Figure") -> "Figure":
+def _relabelled(figure: Figure) -> Figure:
     """Name the dashed line by what it is here, where the truth is known."""
-    axes = figure.axes[0]
-    axes.lines[1].set_label("what the true bias alone would give")
-    draw_legend(axes)
-    return figure
+    (panel,) = figure.panels
+    measured, alone = panel.of(Curve)
+    alone = replace(alone, label="what the true bias alone would give")
+    return replace(figure, panels=(replace(panel, items=(measured, alone)),))
 
 
 def _picture_2() -> Picture:
     record = _record(SERVO, last=20.0, duration=5.0, amplitude=10.0)
     u, y = record.inputs[0], record.outputs[0]
     analysis = paper_analysis(u.values, y.values, 200.0, band=record.band)
-    figure, axes = new_figure(3, height=1.8, share_x=False)
-    draw_line(axes[0], u.time, u.values, colour="input", label="stimulus")
-    draw_line(axes[0], y.time, y.values, colour="output", label="measured output", width=0.9)
-    finish_axes(axes[0], x="Time (s)", y="Angle (deg)")
-    draw_legend(axes[0])
-    response_axes(figure, axes[1], axes[2], analysis)
-    axes[1].tick_params(labelbottom=False)
+    time = Panel(
+        x=Axis(label="Time (s)"),
+        y=Axis(label="Angle (deg)"),
+        items=(
+            Curve(x=u.time, y=u.values, label="stimulus"),
+            Curve(
+                x=y.time,
+                y=y.values,
+                label="measured output",
+                colour="output",
+                dashes="--",
+                width=1.0,
+            ),
+        ),
+    )
+    magnitude, phase = response_panels(analysis, row=1)
     found = analysis.estimates.bandwidth_phase90
     if found is not None:
-        draw_mark(axes[2], found, label=f"−90° at {found:.3g} Hz", text_at=0.45, side="left")
-    figure.align_ylabels(axes)
+        mark = Rule(at=found, words=f"−90° at {found:.3g} Hz", words_at=0.45, side="left")
+        phase = replace(phase, items=(*phase.items, mark))
+    figure = Figure(
+        panels=(time, magnitude, phase),
+        alt="Stimulus and output over time; magnitude and phase over frequency.",
+        heights=(1.8,) * 3,
+        share_x=False,
+    )
     made = (
         f"a servo of {SERVO.natural_frequency:g} Hz with damping ratio {SERVO.damping_ratio:g}, "
         f"{1e3 * SERVO.delay:g} ms delay and {SERVO.noise_std:g} deg noise"
@@ -217,50 +220,69 @@ def _figure_10(
     corrected: NDArray[np.float64],
     analysis: PaperAnalysis,
     fs: float,
-) -> "Figure":
+) -> Figure:
     found = analysis.estimates
-    figure, (over_time, straight) = new_figure(2, height=2.2, share_x=False)
     time = np.arange(excitation.size) / fs
-    draw_line(over_time, time, excitation, colour="input", label="excitation")
-    draw_line(
-        over_time, time, corrected, colour="output", label="measurement, time-corrected", width=0.9
+    over_time = Panel(
+        x=Axis(label="Time (s)"),
+        y=Axis(label="Angle (deg)"),
+        items=(
+            Rule(at=0.0, axis="y", colour="muted", dashes="-", width=0.8),
+            Curve(x=time, y=excitation, label="excitation"),
+            Curve(
+                x=time,
+                y=corrected,
+                label="measurement, time-corrected",
+                colour="output",
+                dashes="--",
+                width=1.0,
+            ),
+        ),
     )
-    over_time.axhline(0.0, color=COLOURS["muted"], linewidth=0.8)
-    finish_axes(over_time, x="Time (s)", y="Angle (deg)")
-    draw_legend(over_time)
-    straight.plot(
-        excitation,
-        corrected,
-        linestyle="none",
-        marker=".",
-        markersize=3,
-        color=COLOURS["output"],
-        label="samples",
-    )
+    items: list[Item] = [
+        Points(x=excitation, y=corrected, label="samples", colour="output", size=1.6)
+    ]
     if found.scale_factor is not None and found.bias is not None:
         ends = np.array([excitation.min(), excitation.max()])
-        draw_line(
-            straight,
-            ends,
-            found.scale_factor * ends + found.bias,
-            colour="model",
-            dashes="--",
-            label=f"{found.scale_factor:.4f} × excitation + {found.bias:.3f} deg",
+        items.append(
+            Curve(
+                x=ends,
+                y=found.scale_factor * ends + found.bias,
+                colour="model",
+                dashes="--",
+                label=f"{found.scale_factor:.4f} × excitation + {found.bias:.3f} deg",
+            )
         )
-    finish_axes(straight, x="Excitation (deg)", y="Measurement (deg)")
-    draw_legend(straight)
-    figure.align_ylabels([over_time, straight])
-    return figure
+    straight = Panel(
+        x=Axis(label="Excitation (deg)"),
+        y=Axis(label="Measurement (deg)"),
+        items=tuple(items),
+        row=1,
+    )
+    return Figure(
+        panels=(over_time, straight),
+        alt="Excitation and measurement over time; measurement over excitation.",
+        heights=(2.2, 2.2),
+        share_x=False,
+    )
 
 
-def _figure_11(analysis: PaperAnalysis) -> "Figure":
+def _figure_11(analysis: PaperAnalysis) -> Figure:
     mean_square = float(np.mean(analysis.error**2))
     squared_mean = float(np.mean(analysis.error)) ** 2
     near = np.abs(analysis.error_lag) <= 0.5
-    figure, (axes,) = new_figure(1, height=2.4)
-    draw_line(axes, analysis.error_lag[near], analysis.error_autocorrelation[near], colour="output")
-    draw_level(axes, (mean_square,), label=f"R(0) = {mean_square:.4f} deg²", colour="ink")
-    draw_level(axes, (squared_mean,), label=f"R(∞) = {squared_mean:.4f} deg²")
-    finish_axes(axes, x="Lag (s)", y="Autocorrelation of the error (deg²)")
-    draw_legend(axes)
-    return figure
+    items = (
+        Curve(x=analysis.error_lag[near], y=analysis.error_autocorrelation[near], colour="output"),
+        Rule(at=mean_square, axis="y", label=f"R(0) = {mean_square:.4f} deg²", colour="ink"),
+        Rule(
+            at=squared_mean,
+            axis="y",
+            label=f"R(∞) = {squared_mean:.4f} deg²",
+            dashes=":",
+            width=1.4,
+        ),
+    )
+    panel = Panel(
+        x=Axis(label="Lag (s)"), y=Axis(label="Autocorrelation of the error (deg²)"), items=items
+    )
+    return Figure(panels=(panel,), alt="Autocorrelation of the error.", heights=(2.4,))

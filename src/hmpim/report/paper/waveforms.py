@@ -1,16 +1,12 @@
 """Figs 3 and 5, and equations (1) to (7): stimuli in time and frequency."""
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from numpy.typing import NDArray
 
 from hmpim.identify.spectrum import decibel, spectrum
-from hmpim.plots import draw_spectrum, time_histories
-from hmpim.plots.style import draw_line, finish_axes
+from hmpim.plots import Axis, Curve, Figure, Panel, spectrum_curve, time_histories
 from hmpim.report.figures import Picture
 from hmpim.report.paper.chapter import Chapter
-from hmpim.report.paper.panels import grid_figure
 from hmpim.report.paper.rows import Row, shown
 from hmpim.stimulus import (
     Chirp,
@@ -24,9 +20,6 @@ from hmpim.stimulus import (
     Waveform,
     design,
 )
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 __all__ = ["waveforms_chapter"]
 
@@ -113,23 +106,40 @@ def _persistence(waveform: Waveform) -> float:
     return float(np.mean(level >= level.max() + PERSISTENT))
 
 
-def _figure_5(waves: dict[str, Waveform]) -> "Figure":
-    figure, axes = grid_figure(len(waves), height=1.35)
-    for (name, wave), (left, right) in zip(waves.items(), axes, strict=True):
+def _figure_5(waves: dict[str, Waveform]) -> Figure:
+    panels = []
+    for row, (name, wave) in enumerate(waves.items()):
         stimulus = Stimulus(waveform=wave, fs=FS)
-        draw_line(left, stimulus.time, stimulus.position, width=1.0)
         bins = spectrum(stimulus.position, FS, window="rectangular")
-        draw_spectrum(right, bins.frequency, decibel(bins.value))
-        right.set_xlim(BAND[0] / 2, FS / 2)
-        right.set_ylim(-30.0, 75.0)
-        last = name == "Chirp"
-        finish_axes(left, x="Time (s)" if last else "", y="Position (–)", title=name)
-        finish_axes(right, x="Frequency (Hz)" if last else "", y="Level (dB)", log_x=True)
-        for panel in (left, right):
-            panel.tick_params(labelbottom=last)
-    figure.align_ylabels([row[0] for row in axes])
-    figure.align_ylabels([row[1] for row in axes])
-    return figure
+        last = row == len(waves) - 1
+        panels += [
+            Panel(
+                x=Axis(label="Time (s)" if last else "", numbered=last),
+                y=Axis(label="Position (–)"),
+                items=(Curve(x=stimulus.time, y=stimulus.position, width=1.0),),
+                title=name,
+                row=row,
+            ),
+            Panel(
+                x=Axis(
+                    label="Frequency (Hz)" if last else "",
+                    scale="log",
+                    low=BAND[0] / 2,
+                    high=FS / 2,
+                    numbered=last,
+                ),
+                y=Axis(label="Level (dB)", low=-30.0, high=75.0),
+                items=(spectrum_curve(bins.frequency, decibel(bins.value)),),
+                row=row,
+                column=1,
+            ),
+        ]
+    return Figure(
+        panels=tuple(panels),
+        alt="Five waveforms over time and their spectra: " + ", ".join(waves) + ".",
+        heights=(1.35,) * len(waves),
+        columns=2,
+    )
 
 
 def _row_plain_chirp() -> Row:

@@ -1,13 +1,13 @@
 """A study in a folder: pictures, the table three ways, and one page with all of it."""
 
 import json
-import warnings
 from collections.abc import Callable
 from os import PathLike
 from pathlib import Path
 from typing import Any
 
 from hmpim.formats.atomic import replacing, write_text
+from hmpim.plots.description import Figure
 from hmpim.report.paper.rows import COLUMNS, cells, markdown_table, table_dict
 from hmpim.report.paper.study import Study
 from hmpim.report.svg import inline_svg
@@ -124,12 +124,7 @@ def render_page(study: Study) -> str:
     )
 
 
-def _save(figure: Any, path: Path, kind: str) -> None:
+def _save(figure: Figure, path: Path, kind: str) -> None:
     """Save a figure so that the same study gives the same bytes."""
-    import matplotlib as mpl
-
-    settings: dict[Any, Any] = {"svg.hashsalt": path.name, "svg.fonttype": "path"}
-    metadata = {"Date": None} if kind == "svg" else {"Software": None}
-    with replacing(path) as place, mpl.rc_context(settings), warnings.catch_warnings():
-        warnings.filterwarnings("ignore", message="Glyph .* missing from")
-        figure.savefig(place, format=kind, dpi=DPI, metadata=metadata)
+    with replacing(path) as place:
+        figure.savefig(place, dpi=DPI, format=kind)

@@ -1,0 +1,156 @@
+"""Where the panels of a page's picture stand, in pixels, with room for all that is written."""
+
+from dataclasses import dataclass
+
+from hmpim.plots.description import Axis, Figure, Image, Panel
+from hmpim.plots.draw.frames import Frame, legend_items, ticks
+
+__all__ = ["LINE", "SIZE", "Place", "legend_lines", "places", "text_width"]
+
+SIZE = 12.0  # of the letters, px
+LINE = 17.0  # from one line of words to the next
+_PER_INCH = 96.0
+_HANDLE = 30.0  # of a legend's entry, gaps included
+_BAR = 66.0  # of an image's colours
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Place:
+    """The field of a panel that holds data, px from the top left, and the ticks on its edges."""
+
+    edge: float  # left of all that is written beside it
+    left: float
+    top: float
+    width: float
+    height: float
+    x_ticks: list[tuple[float, str]]
+    y_ticks: list[tuple[float, str]]
+
+
+def text_width(text: str) -> float:
+    """Room that words take, px: no font is at hand, so the wide ones are allowed for.
+
+    Examples
+    --------
+    >>> 25.0 < text_width("Time") < 35.0
+    True
+    """
+    narrow = sum(c in "iljtfI.,:;'|!()[] −-1" for c in text)
+    return SIZE * (0.64 * (len(text) - narrow) + 0.42 * narrow)
+
+
+def legend_lines(panel: Panel, width: float) -> list[list[str]]:
+    """Return a legend's labels line by line, as many in each as fit.
+
+    Examples
+    --------
+    >>> from hmpim.plots.description import Rule
+    >>> rules = tuple(Rule(at=0.0, label=label) for label in ("one", "two", "three"))
+    >>> legend_lines(Panel(x=Axis(), y=Axis(), items=rules), 140.0)
+    [['one', 'two'], ['three']]
+    """
+    lines: list[list[str]] = []
+    used = width
+    for item in legend_items(panel):
+        label = getattr(item, "label", "")
+        needed = _HANDLE + text_width(label)
+        if not lines or used + needed > width:
+            lines.append([])
+            used = 0.0
+        lines[-1].append(label)
+        used += needed + 8.0
+    return lines
+
+
+def places(figure: Figure, shown: list[Frame], *, width: float) -> tuple[list[Place], float]:
+    """Return where each panel stands, and the height of the whole.
+
+    Parameters
+    ----------
+    figure : Figure
+        What to draw.
+    shown : list of Frame
+        From `frames`.
+    width : float
+        Of the whole, px.
+
+    Examples
+    --------
+    >>> from hmpim.plots.draw.frames import frames
+    >>> figure = Figure(panels=(Panel(x=Axis(label="Time (s)"), y=Axis()),), alt="")
+    >>> (place,), height = places(figure, frames(figure), width=700.0)
+    >>> place.left + place.width < 700.0 and place.top + place.height < height
+    True
+    """
+    panels = list(zip(figure.panels, shown, strict=True))
+    narrow = width < 0.75 * _PER_INCH * figure.width
+    columns = 1 if narrow else figure.columns
+    rows = _rows(figure, columns)
+    lefts = [0.0] * columns
+    for panel, frame in panels:
+        labels = [words for _, words in _y_ticks(panel, frame, 200.0)]
+        room = max((text_width(words) for words in labels if panel.y.numbered), default=0.0)
+        column = 0 if columns == 1 else panel.column
+        lefts[column] = max(lefts[column], room + 12.0 + LINE * bool(panel.y.label))
+    each = (width - 4.0) / columns
+    tops = dict.fromkeys(set(rows), 0.0)
+    bottoms = dict(tops)
+    heights = dict(tops)
+    for (panel, _), row in zip(panels, rows, strict=True):
+        inner = each * (1 if columns == 1 else panel.columns) - lefts[0] - 14.0
+        legend = legend_lines(panel, inner)
+        beside = len(legend) == 1 and panel.title and _fits(panel, legend[0], inner)
+        lines = len(legend) + bool(panel.title) - bool(beside)
+        tops[row] = max(tops[row], LINE * lines + 8.0)
+        below = LINE * (panel.x.numbered + bool(panel.x.label)) + 8.0
+        bottoms[row] = max(bottoms[row], below)
+        heights[row] = max(heights[row], _PER_INCH * figure.heights[panel.row])
+    out = []
+    start = {}
+    at = 0.0
+    for row in sorted(heights):
+        start[row] = at
+        at += max(heights[row], tops[row] + bottoms[row] + 70.0)
+    ends = [*sorted(start.values())[1:], at]
+    row_ends = dict(zip(sorted(start), ends, strict=True))
+    for (panel, frame), row in zip(panels, rows, strict=True):
+        column, span = (0, 1) if columns == 1 else (panel.column, panel.columns)
+        bar = _BAR if any(image.label for image in panel.of(Image)) else 0.0
+        left = column * each + lefts[column]
+        inner = column * each + span * each - left - 14.0 - bar
+        height = row_ends[row] - start[row] - tops[row] - bottoms[row]
+        out.append(
+            Place(
+                edge=column * each,
+                left=left,
+                top=start[row] + tops[row],
+                width=inner,
+                height=height,
+                x_ticks=ticks(
+                    panel.x, frame.x, most=max(int(inner / _tick_room(panel.x, frame)), 2)
+                ),
+                y_ticks=_y_ticks(panel, frame, height),
+            )
+        )
+    return out, at + 2.0
+
+
+def _fits(panel: Panel, labels: list[str], width: float) -> bool:
+    used = sum(_HANDLE + 8.0 + text_width(label) for label in labels)
+    return used + text_width(panel.title) + 16.0 < width
+
+
+def _rows(figure: Figure, columns: int) -> list[int]:
+    """Rows of the panels; on a narrow page all stand one under the other."""
+    if columns == figure.columns:
+        return [panel.row for panel in figure.panels]
+    return list(range(len(figure.panels)))
+
+
+def _tick_room(axis: Axis, frame: Frame) -> float:
+    longest = max((text_width(words) for _, words in ticks(axis, frame.x, most=8)), default=20.0)
+    return max(longest + 14.0, 34.0)
+
+
+def _y_ticks(panel: Panel, frame: Frame, height: float) -> list[tuple[float, str]]:
+    return ticks(panel.y, frame.y, most=max(int(height / 26.0), 3))
