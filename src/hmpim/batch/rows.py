@@ -1,16 +1,17 @@
 """What is kept of each record: one row for each pair of channels, or one that says what failed."""
 
 import json
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import fields
 from functools import cache
 from typing import Any
 
 from hmpim.batch.addresses import Address
 from hmpim.batch.reading import Read
-from hmpim.identify import Estimate, Identification, PairIdentification, Parameters
+from hmpim.identify import Estimate, Identification, Parameters
+from hmpim.identify.fleet import Fleet, FleetFit
 
-__all__ = ["PARAMETERS", "Row", "failed", "rows_of", "schema", "table_of"]
+__all__ = ["PARAMETERS", "Row", "failed", "fleet_rows", "rows_of", "schema", "table_of"]
 
 PARAMETERS = tuple(f.name for f in fields(Parameters))
 """Columns of values; each has four more: `NAME_std`, `_low`, `_high` and `_doubtful`."""
@@ -86,7 +87,9 @@ def rows_of(
             "warnings": [warning.code for warning in pair.warnings],
             "result": text if k == 0 else None,
         }
-        row |= _figures(pair)
+        row |= _figures(pair.parameters)
+        if pair.covariance is not None:
+            row["covariance"] = pair.covariance.ravel().tolist()
         rows.append(row)
     return rows
 
@@ -108,16 +111,53 @@ def _common(address: Address, metadata: Mapping[str, str]) -> dict[str, Any]:
     return {"key": address.digest, "record": address.name, **told}
 
 
-def _figures(pair: PairIdentification) -> dict[str, Any]:
+def fleet_rows(
+    reads: Sequence[Read], fleet: Fleet, fit: FleetFit, *, seconds: float
+) -> Iterator[dict[str, Any]]:
+    """Rows of the records that a fit of all together tells of; those it does not are left out.
+
+    Parameters
+    ----------
+    reads : sequence of Read
+        The records, in the order of the fit.
+    fleet : Fleet
+        What they share.
+    fit : FleetFit
+        Their parameters.
+    seconds : float
+        Processor time for each.
+    """
+    for read, parameters, percent in zip(reads, fit.parameters, fit.fit_percent, strict=True):
+        if parameters is None or read.record is None:
+            continue
+        source, output = read.record.inputs[0], read.record.outputs[0]
+        yield {
+            **_common(read.address, read.metadata),
+            "sha256": read.record.sha256,
+            "input": source.name,
+            "output": output.name,
+            "input_unit": source.unit,
+            "output_unit": output.unit,
+            "structure": fleet.structure.name,
+            "intersample": fleet.intersample,
+            "verdict": "ok",
+            "fs": fleet.fs,
+            "samples": read.record.samples,
+            "fit_percent": float(percent),
+            "seconds": seconds,
+            "warnings": [finding.code for finding in read.record.findings],
+            **_figures(parameters),
+        }
+
+
+def _figures(parameters: Parameters) -> dict[str, Any]:
     found: dict[str, Any] = {}
     for name in PARAMETERS:
-        estimate: Estimate | None = getattr(pair.parameters, name)
+        estimate: Estimate | None = getattr(parameters, name)
         if estimate is None:
             continue
         low, high = estimate.ci95 or (None, None)
         found[name], found[f"{name}_std"] = estimate.value, estimate.std
         found[f"{name}_low"], found[f"{name}_high"] = low, high
         found[f"{name}_doubtful"] = estimate.verdict != "ok"
-    if pair.covariance is not None:
-        found["covariance"] = pair.covariance.ravel().tolist()
     return found

@@ -6,11 +6,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from hmpim.batch.addresses import Address
+from hmpim.batch.alike import identified_together
 from hmpim.batch.parts import PARTS, part_name, write_part
 from hmpim.batch.reading import Read, read_records, reason_of
 from hmpim.batch.request import Request
 from hmpim.batch.rows import Row, failed, rows_of, table_of
-from hmpim.identify import identify
+from hmpim.identify import PairIdentification, identify
 
 __all__ = ["Done", "Task", "do_task", "give_up"]
 
@@ -80,25 +81,22 @@ def do_task(task: Task) -> Done:
     if task.path.exists():
         return Done(records=len(task.addresses))
     begin = time.perf_counter()
-    rows: list[Row] = []
-    failures, reading = 0, 0.0
-    at = begin
-    for read in read_records(task.addresses, task.request):
-        got = time.perf_counter()
-        reading += got - at
-        found = _identified(_with_metadata(read, task), task.request)
-        failures += any(row.get("reason") for row in found)
-        rows += found
-        at = time.perf_counter()
-    before = time.perf_counter()
+    reads = [_with_metadata(read, task) for read in read_records(task.addresses, task.request)]
+    read_by = time.perf_counter()
+    if task.request.keep == "parameters":
+        rows = list(
+            identified_together(reads, task.request, lambda read: _identified(read, task.request))
+        )
+    else:
+        rows = [row for read in reads for row in _identified(read, task.request)[0]]
+    done_by = time.perf_counter()
     write_part(table_of(rows, task.metadata), task.path)
-    end = time.perf_counter()
     return Done(
         records=len(task.addresses),
-        failures=failures,
-        reading=reading,
-        identifying=before - begin - reading,
-        writing=end - before,
+        failures=sum(row.get("reason") is not None for row in rows),
+        reading=read_by - begin,
+        identifying=done_by - read_by,
+        writing=time.perf_counter() - done_by,
     )
 
 
@@ -120,9 +118,10 @@ def _joined(address: Address, task: Task) -> Mapping[str, str]:
     return task.joined.get(address.digest, {})
 
 
-def _identified(read: Read, request: Request) -> Sequence[Row]:
+def _identified(read: Read, request: Request) -> tuple[Sequence[Row], PairIdentification | None]:
+    """Rows of one record, and its pair if it has one."""
     if read.record is None:
-        return [failed(read.address, read.reason, read.metadata)]
+        return [failed(read.address, read.reason, read.metadata)], None
     begin = time.thread_time()  # of the processor: others may be at work on this computer
     try:
         result = identify(
@@ -131,6 +130,7 @@ def _identified(read: Read, request: Request) -> Sequence[Row]:
             structures=request.structures or None,  # type: ignore[arg-type]
         )
         seconds = time.thread_time() - begin
-        return rows_of(read, result, seconds=seconds, whole=request.keep == "results")
+        rows = rows_of(read, result, seconds=seconds, whole=request.keep == "results")
     except Exception as error:  # bad data, or a defect that one record meets: the others go on
-        return [failed(read.address, reason_of(error), read.metadata)]
+        return [failed(read.address, reason_of(error), read.metadata)], None
+    return rows, result.pairs[0] if len(result.pairs) == 1 else None

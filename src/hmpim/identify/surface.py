@@ -1,0 +1,138 @@
+"""Smooth functions on a box as polynomials: evaluated for many points at once, with slopes.
+
+A function of a few parameters that is dear to evaluate is sampled once over a box, and its
+polynomial of Chebyshev products of one total degree is evaluated instead. How far that is off is
+measured at points that took no part in the fit.
+"""
+
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import qmc
+
+__all__ = ["Surface", "places_in"]
+
+Real = NDArray[np.float64]
+
+_OVER = 2.5
+"""Points of the fit for each coefficient."""
+
+_CHECKS = 40
+"""Points at which the error is measured."""
+
+
+def places_in(low: Real, high: Real, degree: int) -> Real:
+    """Points of a box at which to sample a function, dense towards its faces.
+
+    Parameters
+    ----------
+    low, high : ndarray, shape (p,)
+        The box.
+    degree : int
+        Total degree of the polynomial that is to be fitted.
+
+    Returns
+    -------
+    ndarray, shape (m, p)
+        Always the same; the last 40 are for the error.
+    """
+    count = int(_OVER * len(_powers(low.size, degree))) + _CHECKS
+    points = qmc.Halton(d=low.size, scramble=False).random(count + 1)[1:]
+    return np.asarray((low + high) / 2 - (high - low) / 2 * np.cos(np.pi * points))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Surface:
+    """A function on a box, with values of k numbers.
+
+    Parameters
+    ----------
+    low, high : ndarray, shape (p,)
+        The box.
+    powers : ndarray of int, shape (c, p)
+        Degrees of each product of Chebyshev polynomials.
+    weights : ndarray, shape (c, k)
+        Their factors.
+    error : ndarray, shape (k,)
+        Largest error at points that took no part in the fit.
+
+    Examples
+    --------
+    >>> low, high = np.array([1.0, 0.0]), np.array([2.0, 0.5])
+    >>> at = places_in(low, high, 8)
+    >>> told = Surface.fitted(low, high, at, np.exp(at[:, :1] * at[:, 1:]), degree=8)
+    >>> value, slope = told.at(np.array([[1.5, 0.2]]))
+    >>> bool(abs(value[0, 0] - np.exp(0.3)) < 1e-9), bool(abs(slope[0, 1, 0] / 1.5 - value) < 1e-8)
+    (True, True)
+    """
+
+    low: Real
+    high: Real
+    powers: NDArray[np.int64]
+    weights: Real
+    error: Real
+
+    @classmethod
+    def fitted(cls, low: Real, high: Real, places: Real, values: Real, *, degree: int) -> "Surface":
+        """Fit the polynomial.
+
+        Parameters
+        ----------
+        low, high : ndarray, shape (p,)
+            The box.
+        places : ndarray, shape (m, p)
+            From `places_in`.
+        values : ndarray, shape (m, k)
+            The function there.
+        degree : int
+            The total degree.
+        """
+        powers = _powers(low.size, degree)
+        rows, _ = _products(_scaled(places, low, high), powers)
+        weights = np.linalg.lstsq(rows[:-_CHECKS], values[:-_CHECKS], rcond=None)[0]
+        off = np.abs(rows[-_CHECKS:] @ weights - values[-_CHECKS:])
+        worst = np.asarray(off.max(axis=0))
+        return cls(low=low, high=high, powers=powers, weights=np.asarray(weights), error=worst)
+
+    def at(self, places: Real) -> tuple[Real, Real]:
+        """Values, shape (n, k), and slopes, shape (n, p, k), at places of shape (n, p)."""
+        rows, slopes = _products(_scaled(places, self.low, self.high), self.powers)
+        rate = 2.0 / (self.high - self.low)
+        return rows @ self.weights, (slopes @ self.weights) * rate[None, :, None]
+
+    def holds(self, places: Real) -> NDArray[np.bool_]:
+        """Which places are inside the box, shape (n,)."""
+        return np.asarray(((places > self.low) & (places < self.high)).all(axis=1))
+
+
+def _powers(size: int, degree: int) -> NDArray[np.int64]:
+    every = product(range(degree + 1), repeat=size)
+    return np.array([p for p in every if sum(p) <= degree], dtype=np.int64)
+
+
+def _scaled(places: Real, low: Real, high: Real) -> Real:
+    return np.asarray((2.0 * places - low - high) / (high - low))
+
+
+def _products(x: Real, powers: NDArray[np.int64]) -> tuple[Real, Real]:
+    """Products of Chebyshev polynomials, (n, c), and their slopes, (n, p, c), at (n, p)."""
+    degree = int(powers.max(initial=0))
+    first = np.ones((degree + 1, *x.shape))
+    rate = np.zeros_like(first)
+    if degree:
+        first[1], rate[1] = x, 1.0
+    for k in range(2, degree + 1):
+        first[k] = 2 * x * first[k - 1] - first[k - 2]
+        rate[k] = 2 * first[k - 1] + 2 * x * rate[k - 1] - rate[k - 2]
+    size = x.shape[1]
+    each = [first[powers[:, j], :, j].T for j in range(size)]
+    turned = [rate[powers[:, j], :, j].T for j in range(size)]
+    rows = np.prod(each, axis=0)
+    slopes = np.stack(
+        [np.prod([turned[i] if i == j else each[i] for i in range(size)], axis=0)
+         for j in range(size)],
+        axis=1,
+    )  # fmt: skip
+    return rows, slopes

@@ -1,0 +1,72 @@
+"""Records of one stimulus, parameters alone: quicker, and the same."""
+
+import numpy as np
+import pytest
+
+import hmpim
+from hmpim.batch import Request, alike
+from hmpim.batch.run import Cluster
+
+FS, SAMPLES, UNITS = 100.0, 400, 14
+
+
+def write_fleet(path) -> None:
+    import pyarrow as pa
+    from pyarrow import parquet
+
+    time = np.arange(SAMPLES) / FS
+    u = np.sin(2 * np.pi * (0.3 * time + 19.7 / 8 * time**2))
+    rng = np.random.default_rng(5)
+    outputs = []
+    for k in range(UNITS):
+        omega = 2 * np.pi * 7 * (1 + 0.03 * rng.standard_normal())
+        model = hmpim.Model(
+            delay=0.02, scale_factor=1 + 0.01 * k, denominator=(omega**-2, 1 / omega, 1.0)
+        )
+        y = hmpim.simulate(model, u, fs=FS, intersample="bandlimited")
+        outputs.append(y + 0.005 * rng.standard_normal(SAMPLES))
+    outputs[9] = np.minimum(outputs[9], 0.8)  # clipped: not as the others
+    outputs[11][5] = np.nan
+    cells = {"u": [u.tolist()] * UNITS, "y": [y.tolist() for y in outputs]}
+    parquet.write_table(pa.table(cells), path)
+
+
+def test_one_stimulus_is_shared(tmp_path, monkeypatch):
+    path = tmp_path / "fleet.parquet"
+    write_fleet(path)
+    monkeypatch.setattr(alike, "_LEARNT_FROM", 6)
+    monkeypatch.setattr(alike, "_WORTH", UNITS - 2)
+    monkeypatch.setattr(alike, "_FLEETS", {})
+    together = []
+    fit = alike.fit_fleet
+
+    def counted(fleet, outputs, **options):
+        found = fit(fleet, outputs, **options)
+        together.append(found.sound.tolist())
+        return found
+
+    monkeypatch.setattr(alike, "fit_fleet", counted)
+    tables = [
+        hmpim.batch(
+            path,
+            out=tmp_path / keep,
+            fs=FS,
+            request=Request(keep=keep),
+            cluster=Cluster(workers=0),
+        )
+        .to_pandas()
+        .set_index("record")
+        for keep in ("parameters", "results")
+    ]
+    quick, whole = (table.sort_index() for table in tables)
+    assert len(together) == 1
+    assert len(together[0]) == UNITS - 7  # all but those learnt from and the one with a gap
+    assert together[0].count(False) >= 1  # the clipped one, at least
+    assert quick.index.tolist() == whole.index.tolist()
+    for name in ("delay", "natural_frequency", "scale_factor", "saturation_high"):
+        error = whole[f"{name}_std"].fillna(0.0)
+        off = (quick[name] - whole[name]).abs()
+        assert (quick[name].isna() == whole[name].isna()).all(), name
+        assert (off.dropna() <= 0.01 * error[off.notna()] + 1e-12).all(), name
+    assert quick["verdict"].tolist() == pytest.approx(whole["verdict"].tolist())
+    assert quick["result"].isna().all()

@@ -1,0 +1,86 @@
+"""Records fitted together say what each says alone, or that they do not."""
+
+import numpy as np
+import pytest
+
+import hmpim
+from hmpim.identify.fleet import fit_fleet, learn_fleet
+from hmpim.identify.surface import Surface, places_in
+
+FS, SAMPLES, LEARNT = 100.0, 600, 6
+NAMES = ("delay", "scale_factor", "bias", "noise_std", "natural_frequency", "damping_ratio",
+         "bandwidth_phase90", "bandwidth_3db", "peak_gain_db", "delay_low_frequency")  # fmt: skip
+
+
+def sweep() -> np.ndarray:
+    time = np.arange(SAMPLES) / FS
+    return np.sin(2 * np.pi * (0.2 * time + 19.8 / 12 * time**2))
+
+
+def output(seed: int, delay: float = 0.03, natural: float = 6.0) -> np.ndarray:
+    rng = np.random.default_rng([3, seed])
+    delay *= 1 + 0.03 * rng.standard_normal()
+    omega = 2 * np.pi * natural * (1 + 0.03 * rng.standard_normal())
+    model = hmpim.Model(
+        delay=delay, scale_factor=2.0, denominator=(omega**-2, 0.8 / omega, 1.0), bias=0.3
+    )
+    y = hmpim.simulate(model, sweep(), fs=FS, intersample="bandlimited")
+    return y + 0.02 * rng.standard_normal(SAMPLES)
+
+
+def alone(y: np.ndarray):
+    record = hmpim.Record.from_arrays({"u": sweep()}, {"y": y}, fs=FS)
+    return hmpim.identify(record)["y", "u"]
+
+
+@pytest.fixture(scope="module")
+def fleet():
+    pairs = [alone(output(seed)) for seed in range(LEARNT)]
+    found = learn_fleet(sweep(), pairs, fs=FS, band=(0.2, 20.0))
+    assert found is not None
+    return found
+
+
+def test_together_is_as_alone(fleet):
+    """To a hundredth of a standard deviation, and the standard deviations to a thousandth."""
+    outputs = np.stack([output(seed) for seed in range(20, 32)])
+    fit = fit_fleet(fleet, outputs)
+    assert np.count_nonzero(fit.sound) >= 11
+    for y, parameters in zip(outputs[:4], fit.parameters[:4], strict=True):
+        pair = alone(y)
+        for name in NAMES:
+            one, other = getattr(pair, name), getattr(parameters, name)
+            assert other.value == pytest.approx(one.value, abs=0.01 * one.std), name
+            assert other.std == pytest.approx(one.std, rel=1e-3), name
+            assert other.ci95 == pytest.approx(one.ci95, abs=0.02 * one.std), name
+
+
+def test_what_is_not_of_the_kind_is_left_to_itself(fleet):
+    far, faster = output(40, delay=0.06), output(41, natural=12.0)
+    clipped = np.minimum(output(42), 1.2)
+    stray = output(43)
+    stray[300:] += 0.4  # a step of its own
+    fit = fit_fleet(fleet, np.stack([far, faster, clipped, stray, output(44)]))
+    assert fit.sound.tolist() == [False, False, False, False, True]
+    assert fit.parameters[:4] == (None,) * 4
+
+
+def test_units_of_two_kinds_teach_nothing():
+    pairs = [alone(output(seed)) for seed in range(LEARNT - 1)]
+    other = alone(sweep() + 0.02 * np.random.default_rng(0).standard_normal(SAMPLES))
+    assert other.structure == "static"
+    assert learn_fleet(sweep(), [*pairs, other], fs=FS, band=(0.2, 20.0)) is None
+    assert learn_fleet(sweep(), pairs[:3], fs=FS, band=(0.2, 20.0)) is None
+
+
+def test_a_surface_knows_its_error():
+    """A bend sharper than its degree is seen by points that took no part in the fit."""
+    low, high = np.array([-1.0]), np.array([1.0])
+    places = places_in(low, high, 6)
+    smooth = Surface.fitted(low, high, places, np.exp(places), degree=6)
+    bent = Surface.fitted(low, high, places, np.abs(places - 0.1), degree=6)
+    assert smooth.error[0] < 1e-5 < 0.01 < bent.error[0]
+    at = np.array([[0.37]])
+    value, slope = smooth.at(at)
+    assert value[0, 0] == pytest.approx(np.exp(0.37), abs=1e-5)
+    assert slope[0, 0, 0] == pytest.approx(np.exp(0.37), abs=1e-4)
