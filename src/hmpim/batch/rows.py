@@ -88,6 +88,8 @@ def rows_of(
             "result": text if k == 0 else None,
         }
         row |= _figures(pair.parameters)
+        if not whole:  # what the paper's steps give is no parameter of the fit
+            row = {k: v for k, v in row.items() if not k.startswith("delay_correlation")}
         if pair.covariance is not None:
             row["covariance"] = pair.covariance.ravel().tolist()
         rows.append(row)

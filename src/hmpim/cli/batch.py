@@ -75,6 +75,22 @@ def batch(
     per_task: Annotated[
         int, typer.Option("--per-task", metavar="N", help="Records a task, and a part.")
     ] = 100,
+    expect: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--expect",
+            metavar="BOUND",
+            help="Hold each record against it: 'delay < 5ms'; may be repeated.",
+        ),
+    ] = None,
+    by: Annotated[
+        list[str] | None,
+        typer.Option("--by", metavar="NAME", help="Column of metadata to group by, on the page."),
+    ] = None,
+    report: Annotated[
+        Path | None,
+        typer.Option("--report", metavar="FILE", help="The page; DIR/study.html without."),
+    ] = None,
     resume: Annotated[
         bool,
         typer.Option(
@@ -86,16 +102,22 @@ def batch(
 ) -> None:
     """Identify many records, on all cores or on a cluster.
 
-    Writes Parquet parts that pandas, Polars and DuckDB read. A record that fails is a row with
-    the reason. Stopped at any time, the same command goes on where it was.
+    Writes Parquet parts that pandas, Polars and DuckDB read, and one page. A record that fails is
+    a row with the reason. Stopped at any time, the same command goes on where it was. Exit code 1:
+    a record does not meet a bound.
     """
-    check_files(reads={"the metadata": metadata}, folders={"--out": out})
+    page = out / "study.html" if report is None else report
+    check_files(reads={"the metadata": metadata}, writes={"--report": page}, folders={"--out": out})
     if scheduler is not None and workers is not None:
         raise ArgumentError("--workers are those of this computer; --scheduler has its own")
 
     from hmpim.batch import Request
+    from hmpim.batch.expect import read_bound
     from hmpim.batch.run import Cluster
     from hmpim.batch.run import batch as run
+    from hmpim.batch.study import write_study
+
+    bounds = [read_bound(text) for text in expect or ()]
 
     request = Request(
         inputs=tuple(input_ or ()),
@@ -114,9 +136,22 @@ def batch(
         table = run(
             paths, out=out, request=request, cluster=cluster, fresh=not resume, progress=tick
         )
+    for name in by or ():
+        if name not in table.metadata:
+            known = ", ".join(table.metadata) or "none"
+            raise ArgumentError(f"--by {name!r} is no column of metadata; those are {known}")
+    outcomes = write_study(table, page, bounds=bounds, by=by or ())
     if not quiet:
         _print(table)
+        for outcome in outcomes:
+            say(
+                f"{outcome.bound.text}: {outcome.passed} meet it, {outcome.failed} do not, "
+                f"{outcome.unsure} not sure"
+            )
         say(f"Parts: {out / 'parts'}")
+        say(f"Page:  {page}")
+    if any(outcome.failed for outcome in outcomes):
+        raise typer.Exit(1)
 
 
 def _print(table: "BatchTable") -> None:

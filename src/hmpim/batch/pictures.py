@@ -1,0 +1,127 @@
+"""Pictures of many values: how they are distributed, in which order, and in which groups."""
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hmpim.plots import Axis, Band, Curve, Figure, Panel, Points, Rule
+from hmpim.plots.description import Item
+from hmpim.plots.style import axis_label, plain
+
+__all__ = ["distribution", "groups", "sequence"]
+
+Real = NDArray[np.float64]
+
+_MOST_POINTS = 1500
+_MOST_GROUPS = 24
+
+
+def distribution(values: Real, *, name: str, unit: str, bounds: tuple[float, ...] = ()) -> Figure:
+    """Describe a histogram; what lies far out is counted in the outermost bars.
+
+    Parameters
+    ----------
+    values : ndarray, shape (n,)
+        Finite.
+    name, unit : str
+        Of the quantity.
+    bounds : tuple of float
+        Limits to be drawn.
+
+    Examples
+    --------
+    >>> figure = distribution(np.arange(10.0), name="delay", unit="s")
+    >>> figure.panels[0].x.label
+    'delay (s)'
+    """
+    tail = 0.01 if values.size > 50 else 0.0
+    low, high = (float(end) for end in np.quantile(values, (tail, 1.0 - tail)))
+    if not high > low:
+        low, high = float(values.min()), float(values.max())
+    reach = (high - low) * 0.25 or max(abs(low), 1e-12) * 1e-3
+    count = int(np.clip(np.sqrt(values.size), 8, 60))
+    edges = np.linspace(low - reach, high + reach, count + 1)
+    heights, _ = np.histogram(np.clip(values, edges[0], edges[-1]), edges)
+    x, top = np.repeat(edges, 2)[1:-1], np.repeat(heights.astype(float), 2)
+    items: tuple[Item, ...] = (
+        Band(x=x, low=np.zeros_like(top), high=top, opacity=0.35),
+        Rule(at=float(np.median(values)), words="median", colour="model", dashes="-"),
+        *(Rule(at=bound, words="limit", words_at=0.8) for bound in bounds),
+    )
+    return Figure(
+        panels=(
+            Panel(
+                x=Axis(label=axis_label(name.replace("_", " "), unit)),
+                y=Axis(label="Records", low=0.0),
+                items=items,
+            ),
+        ),
+        alt=f"Histogram of {name} over {values.size} records.",
+    )
+
+
+def sequence(
+    places: Real, values: Real, *, name: str, unit: str, along: str, bounds: tuple[float, ...] = ()
+) -> Figure:
+    """Describe values one after the other, with their running median.
+
+    Parameters
+    ----------
+    places : ndarray, shape (n,)
+        Where they stand, such as days; rising.
+    values : ndarray, shape (n,)
+        Finite.
+    name, unit, along : str
+        Of the quantity, and of the places.
+    bounds : tuple of float
+        Limits to be drawn.
+    """
+    every = np.unique(np.linspace(0, values.size - 1, _MOST_POINTS).astype(int))
+    far = np.argsort(np.abs(values - np.median(values)))[-50:]
+    shown = np.union1d(every, far)
+    items: list[Points | Curve | Rule] = [
+        Points(x=places[shown], y=values[shown], size=2.0, colour="input")
+    ]
+    blocks = np.array_split(np.arange(values.size), int(np.clip(values.size // 20, 1, 60)))
+    if len(blocks) > 2:
+        middle = np.array([np.median(places[b]) for b in blocks])
+        median = np.array([np.median(values[b]) for b in blocks])
+        items.append(Curve(x=middle, y=median, label="running median", colour="output", width=1.8))
+    items += [Rule(at=bound, axis="y", words="limit") for bound in bounds]
+    return Figure(
+        panels=(
+            Panel(
+                x=Axis(label=along),
+                y=Axis(label=axis_label(name.replace("_", " "), unit)),
+                items=tuple(items),
+            ),
+        ),
+        alt=f"{name} of {values.size} records along {along}, with the running median.",
+    )
+
+
+def groups(some: Mapping[str, Real], *, name: str, unit: str, by: str) -> Figure:
+    """Describe medians of groups, with the range that holds nine tenths of each.
+
+    Parameters
+    ----------
+    some : mapping of str to ndarray
+        Values of each group, none of them empty; the first 24 are drawn.
+    name, unit, by : str
+        Of the quantity, and what the groups are.
+    """
+    shown = list(some.items())[:_MOST_GROUPS]
+    low, median, high = np.array([np.quantile(v, (0.05, 0.5, 0.95)) for _, v in shown]).T
+    at = np.arange(len(shown), dtype=np.float64)
+    words = tuple((float(k), plain(label)[:14]) for k, (label, _) in enumerate(shown))
+    return Figure(
+        panels=(
+            Panel(
+                x=Axis(label=by, ticks=words, low=-0.5, high=len(shown) - 0.5, grid=False),
+                y=Axis(label=axis_label(name.replace("_", " "), unit)),
+                items=(Points(x=at, y=median, low=low, high=high, size=5.0, colour="output"),),
+            ),
+        ),
+        alt=f"Median of {name} and the range of nine tenths, by {by}, for {len(shown)} groups.",
+    )

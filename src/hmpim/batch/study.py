@@ -1,0 +1,284 @@
+"""The page of a batch: each parameter's distribution, what stands out, trends, groups, bounds."""
+
+from collections.abc import Sequence
+from datetime import UTC, datetime
+from importlib.metadata import version
+from os import PathLike
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import ndtri
+
+from hmpim.batch.expect import Bound, Outcome, held_against
+from hmpim.batch.pictures import distribution, groups, sequence
+from hmpim.batch.summary import ParameterSummary, Summary, column, summary_of
+from hmpim.batch.table import BatchTable
+from hmpim.formats.atomic import write_text
+from hmpim.report.figures import Picture
+from hmpim.report.study import Grid, Section, StudyPage, render_study
+from hmpim.units import conversion_factor
+
+__all__ = ["outliers", "study_page", "write_study"]
+
+_TIMES = ("created", "recorded", "date", "time", "datetime", "timestamp")
+"""Columns of metadata that may say when a record was made."""
+
+_FALSE_ALARM = 0.01
+"""Chance that any of a fleet of equal units, normally distributed, stands out."""
+
+_MOST_ROWS = 30
+_FEWEST_IN_GROUP = 3
+_MOST_GROUPS = 24
+
+Real = NDArray[np.float64]
+
+
+def write_study(
+    table: BatchTable,
+    path: str | PathLike[str],
+    *,
+    bounds: Sequence[Bound] = (),
+    by: Sequence[str] = (),
+) -> tuple[Outcome, ...]:
+    """Write the page, and return how the bounds are met.
+
+    Parameters
+    ----------
+    table : BatchTable
+        What was found.
+    path : path-like
+        The HTML file.
+    bounds : sequence of Bound
+        What each record is held against.
+    by : sequence of str
+        Columns of metadata to group by; all that have 2 to 24 values by default.
+    """
+    outcomes = tuple(held_against(table, bound) for bound in bounds)
+    write_text(path, render_study(study_page(table, outcomes=outcomes, by=by)))
+    return outcomes
+
+
+def study_page(
+    table: BatchTable, *, outcomes: Sequence[Outcome] = (), by: Sequence[str] = ()
+) -> StudyPage:
+    """Put the page together.
+
+    Parameters
+    ----------
+    table : BatchTable
+        What was found.
+    outcomes : sequence of Outcome
+        How the bounds are met.
+    by : sequence of str
+        Columns of metadata to group by.
+    """
+    found = summary_of(table)
+    failed = sum(count for _, count in found.reasons)
+    missed = sum(outcome.failed for outcome in outcomes)
+    ok = found.verdicts.get("ok", 0)
+    rows = sum(found.verdicts.values())
+    headline = f"{found.records - failed} of {found.records} records identified; {ok} of {rows} ok."
+    if outcomes:
+        headline += f" {missed} outside the specification." if missed else " All bounds are met."
+    labels = _labels(table, by)
+    return StudyPage(
+        title=f"{found.records} records",
+        description="",
+        headline=headline,
+        met=None if not outcomes else missed == 0,
+        grids=(_figures(found), *_specified(outcomes), *_reasons(found)),
+        sections=tuple(_section(table, row, outcomes, labels) for row in found.parameters),
+        facts=(
+            ("Folder", str(table.folder)),
+            ("Parts", str(len(table.paths))),
+            ("Asked", f"{table.request.keep}; inputs {table.request.inputs or 'as stated'}; "
+             f"outputs {table.request.outputs or 'as stated'}"),
+            ("Made by", f"hmpim {version('hmpim')}, {datetime.now(UTC):%Y-%m-%d %H:%M UTC}"),
+        ),
+    )  # fmt: skip
+
+
+def outliers(values: Real) -> tuple[Real, float]:
+    """How far each value is from the middle, in robust deviations, and how far is too far.
+
+    The deviation is 1.4826 times the median distance from the median. The threshold is the one
+    that the farthest of so many normal values passes with a chance of 1 %.
+
+    Parameters
+    ----------
+    values : ndarray, shape (n,)
+        Finite.
+
+    Examples
+    --------
+    >>> away, limit = outliers(np.append(np.linspace(-1, 1, 99), 50.0))
+    >>> np.flatnonzero(away > limit).tolist(), round(limit, 2)
+    ([99], 3.89)
+    """
+    middle = np.median(values)
+    spread = 1.4826 * float(np.median(np.abs(values - middle)))
+    limit = float(-ndtri(_FALSE_ALARM / 2 / max(values.size, 1)))
+    if spread == 0.0:
+        return np.where(values == middle, 0.0, np.inf), limit
+    return np.abs(values - middle) / spread, limit
+
+
+def _figures(found: Summary) -> Grid:
+    return Grid(
+        caption="What was found",
+        columns=("Parameter", "Records", "Median", "5 %", "95 %", "Doubtful"),
+        rows=tuple(
+            (
+                row.name.replace("_", " ") + (f" ({row.unit})" if row.unit else ""),
+                str(row.count),
+                *(f"{value:.5g}" for value in (row.median, row.low, row.high)),
+                str(row.doubtful),
+            )
+            for row in found.parameters
+        ),
+    )  # fmt: skip
+
+
+def _specified(outcomes: Sequence[Outcome]) -> tuple[Grid, ...]:
+    if not outcomes:
+        return ()
+    grid = Grid(
+        caption="Specification",
+        columns=("Bound", "Met", "Not met", "Not sure", "Not told", "Outcome"),
+        rows=tuple(
+            (
+                o.bound.text,
+                *(str(n) for n in (o.passed, o.failed, o.unsure, o.untold)),
+                "fail" if o.failed else "pass",
+            )
+            for o in outcomes
+        ),
+        note="Met and not met: the whole 95 % interval is on one side of the bound.",
+    )
+    return (grid,)
+
+
+def _reasons(found: Summary) -> tuple[Grid, ...]:
+    if not found.reasons:
+        return ()
+    rows = tuple((str(count), reason) for reason, count in found.reasons[:_MOST_ROWS])
+    return (Grid(caption="Not identified", columns=("Records", "Reason"), rows=rows),)
+
+
+def _labels(table: BatchTable, by: Sequence[str]) -> dict[str, list[str | None]]:
+    """Columns to group by, with the value of each row."""
+    labels = {}
+    for name in by or table.metadata:
+        values = table.to_arrow([f"meta_{name}"]).column(0).to_pylist()
+        kinds = {v for v in values if v is not None}
+        if by or 2 <= len(kinds) <= _MOST_GROUPS:
+            labels[name] = values
+    return labels
+
+
+def _section(
+    table: BatchTable,
+    row: ParameterSummary,
+    outcomes: Sequence[Outcome],
+    labels: dict[str, list[str | None]],
+) -> Section:
+    values = column(table, row.name)
+    there = np.flatnonzero(np.isfinite(values))
+    bounds = tuple(
+        o.bound.number * (conversion_factor(o.bound.unit, to=row.unit) if o.bound.unit else 1.0)
+        for o in outcomes
+        if o.bound.name == row.name
+    )
+    some = values[there]
+    title = row.name.replace("_", " ").capitalize()
+    pictures = [
+        Picture(
+            key=f"{row.name}-distribution",
+            title=f"{title}: distribution",
+            caption="Number of records; what lies far out is counted in the outermost bars.",
+            description=f"Histogram of {row.name}.",
+            figure=distribution(some, name=row.name, unit=row.unit, bounds=bounds),
+        )
+    ]
+    places, along = _order(table, there)
+    order = np.argsort(places, kind="stable")
+    pictures.append(
+        Picture(
+            key=f"{row.name}-trend",
+            title=f"{title}: one after the other",
+            caption=f"Each record, along {along.lower()}, with the running median.",
+            description=f"{row.name} along {along.lower()}.",
+            figure=sequence(
+                places[order], some[order], name=row.name, unit=row.unit, along=along, bounds=bounds
+            ),
+        )
+    )
+    for by, words in labels.items():
+        grouped = _grouped(some, [words[k] for k in there])
+        if len(grouped) < 2:
+            continue
+        pictures.append(
+            Picture(
+                key=f"{row.name}-by-{len(pictures)}",
+                title=f"{title} by {by}",
+                caption="Median of each group, and the range that holds nine tenths of it.",
+                description=f"{row.name} by {by}.",
+                figure=groups(grouped, name=row.name, unit=row.unit, by=by),
+            )
+        )
+    said, grids = _standing_out(table, row, some, there)
+    return Section(title=title, observed="", found=said, grids=grids, pictures=tuple(pictures))
+
+
+def _standing_out(
+    table: BatchTable, row: ParameterSummary, some: Real, there: NDArray[np.int64]
+) -> tuple[tuple[str, ...], tuple[Grid, ...]]:
+    """What is said of records far from the others, and the farthest of them."""
+    away, limit = outliers(some)
+    far = np.flatnonzero(away > limit)
+    if not far.size:
+        return (f"No record stands out (none beyond {limit:.1f} robust deviations).",), ()
+    worst = far[np.argsort(-away[far], kind="stable")][:_MOST_ROWS]
+    names = table.to_arrow(["record"]).column(0).take(there[worst]).to_pylist()
+    own = column(table, f"{row.name}_std")[there[worst]]
+    grid = Grid(
+        caption="Records that stand out",
+        columns=("Record", "Value", "± (standard deviation)", "Robust deviations"),
+        rows=tuple(
+            (name, f"{some[k]:.6g}", f"{std:.2g}", f"{min(away[k], 1e6):.1f}")
+            for name, k, std in zip(names, worst, own, strict=True)
+        ),
+    )
+    return (f"{far.size} records lie beyond {limit:.1f} robust deviations.",), (grid,)
+
+
+def _order(table: BatchTable, there: NDArray[np.int64]) -> tuple[Real, str]:
+    """When each record was made, in days; without that, its place in the alphabet."""
+    for name in _TIMES:
+        if name not in table.metadata:
+            continue
+        words = table.to_arrow([f"meta_{name}"]).column(0).take(there).to_pylist()
+        stamps = [_stamp(word) for word in words]
+        if all(stamp is not None for stamp in stamps):
+            days = np.array(stamps, dtype=np.float64) / 86_400.0
+            return days - days.min(), f"Days since the first ({name})"
+    names = np.array(table.to_arrow(["record"]).column(0).take(there).to_pylist())
+    places = np.empty(names.size)
+    places[np.argsort(names, kind="stable")] = np.arange(names.size)
+    return places, "Record, by name"
+
+
+def _stamp(word: str | None) -> float | None:
+    try:
+        return None if not word else datetime.fromisoformat(word).timestamp()
+    except ValueError:
+        return None
+
+
+def _grouped(values: Real, labels: Sequence[str | None]) -> dict[str, Real]:
+    """Values by label, groups of three and more, in the order of their names."""
+    kinds: dict[str, list[float]] = {}
+    for value, label in zip(values, labels, strict=True):
+        if label is not None:
+            kinds.setdefault(label, []).append(float(value))
+    return {k: np.array(kinds[k]) for k in sorted(kinds) if len(kinds[k]) >= _FEWEST_IN_GROUP}
