@@ -1,0 +1,111 @@
+"""A wish made a design: stimuli, what they reach, what they will tell."""
+
+import hashlib
+import json
+from dataclasses import asdict, dataclass
+
+from hmpim.optimal import PARAMETERS, RoughModel, predict_errors
+from hmpim.optimal.wish import Z95
+from hmpim.stimulus import Limits, Stimulus, design
+from hmpim.stimulus.axes import AxisPlan, design_axes
+from hmpim.stimulus.limits import QUANTITIES
+from hmpim.units import rate_unit
+from hmpim.workbench.desks import AxisRow, Model, Wish
+
+__all__ = ["PeakRow", "digest", "error_rows", "limits_of", "peak_rows", "rough", "stimuli_of"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PeakRow:
+    """A peak against its limit."""
+
+    axis: str
+    quantity: str
+    peak: float
+    limit: float
+    unit: str
+
+
+def digest(wish: Wish, rig: str) -> str:
+    """Return what tells one design on one rig from any other.
+
+    Examples
+    --------
+    >>> digest(Wish(), "bench") == digest(Wish(), "bench"), digest(Wish(), "table")[:8]
+    (True, '3be7e1dd')
+    """
+    text = json.dumps([asdict(wish), rig], sort_keys=True)
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def limits_of(row: AxisRow, unit: str) -> Limits:
+    """Limits of a row, with the position that is to be used."""
+    return Limits(
+        position=min(row.amplitude, row.position),
+        velocity=row.velocity,
+        acceleration=row.acceleration,
+        unit=unit,
+    )
+
+
+def stimuli_of(wish: Wish) -> tuple[Stimulus, ...]:
+    """Design what is wished: one axis with the sliders, or several that can be told apart.
+
+    Parameters
+    ----------
+    wish : Wish
+        As it is on the page.
+
+    Raises
+    ------
+    HmpimError
+        If it cannot be met; the message says what would do.
+    """
+    if len(wish.rows) > 1:
+        plans = [
+            AxisPlan(axis=r.name, limits=limits_of(r, wish.unit), band=(r.low, r.high))
+            for r in wish.rows
+        ]
+        return design_axes(plans, duration=wish.duration, fs=wish.fs)
+    (row,) = wish.rows
+    return (
+        design(
+            band=(row.low, row.high),
+            duration=wish.duration,
+            fs=wish.fs,
+            limits=limits_of(row, wish.unit),
+            extinction="auto" if wish.extinction is None else wish.extinction,
+            lead="auto" if wish.lead is None else wish.lead,
+            axis=row.name,
+        ),
+    )
+
+
+def peak_rows(wish: Wish, stimuli: tuple[Stimulus, ...]) -> tuple[PeakRow, ...]:
+    """Return the true peaks of each axis beside its limits."""
+    return tuple(
+        PeakRow(
+            axis=stimulus.axis,
+            quantity=quantity,
+            peak=float(getattr(stimulus.peaks, quantity)),
+            limit=float(getattr(row, quantity)),
+            unit=rate_unit(wish.unit, order),
+        )
+        for row, stimulus in zip(wish.rows, stimuli, strict=True)
+        for order, quantity in enumerate(QUANTITIES[:3])
+    )
+
+
+def rough(model: Model) -> RoughModel:
+    """Return what is roughly known of the unit."""
+    return RoughModel(
+        delay=model.delay,
+        natural_frequency=model.natural_frequency,
+        damping_ratio=model.damping_ratio,
+    )
+
+
+def error_rows(wish: Wish, stimulus: Stimulus) -> tuple[tuple[str, float], ...]:
+    """Return the error bars (95 %) that a stimulus will allow, parameter by parameter."""
+    found = predict_errors(stimulus, model=rough(wish.model), noise_std=wish.model.noise_std)
+    return tuple((name, Z95 * float(getattr(found, name))) for name in PARAMETERS)
