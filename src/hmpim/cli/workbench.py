@@ -40,6 +40,14 @@ def workbench(
     max_upload: Annotated[
         float, typer.Option("--max-upload", metavar="MB", help="Largest file that may be dropped.")
     ] = 2000.0,
+    grace: Annotated[
+        float,
+        typer.Option(
+            "--grace",
+            metavar="S",
+            help="A run ends when the window that armed its rig is gone for so long.",
+        ),
+    ] = 5.0,
 ) -> None:
     """Open the workbench: design, check, run, analyse, compare and campaigns in a browser.
 
@@ -52,6 +60,8 @@ def workbench(
         raise ArgumentError(f"--port {port} is no port; give 0 to 65535")
     if not max_upload > 0.0:
         raise ArgumentError(f"--max-upload {max_upload:g} MB takes nothing; give a positive size")
+    if not 0.0 < grace <= 60.0:
+        raise ArgumentError(f"--grace {grace:g} s must be more than 0 and at most 60")
     if rig_file is not None:
         from hmpim.rigs.catalogue import read_description
 
@@ -68,6 +78,7 @@ def workbench(
         rig_file=rig_file,
         port=port,
         largest=round(1e6 * max_upload),
+        grace=grace,
     )
     serve(settings, ready=ready, browser=browser)
     say("Workbench ended")

@@ -5,6 +5,7 @@ from dataclasses import replace
 from typing import Any
 
 from hmpim.workbench.desks import Desk, Desks
+from hmpim.workbench.rig import RigBench
 from hmpim.workbench.settings import Settings
 from hmpim.workbench.workers import Workers
 
@@ -24,14 +25,17 @@ class Workbench:
         self.settings = settings
         self.desks = Desks(settings.desks)
         self.workers = Workers()
+        self.rig = RigBench(settings, present=lambda desk: desk in self.open_desks)
         self._tabs: dict[str, Counter[str]] = {}
 
     def start(self) -> None:
         """Begin what runs beside the pages."""
         self.workers.start()
+        self.rig.prepare()
 
     def stop(self) -> None:
-        """End it."""
+        """End it; a rig that moves comes to rest first."""
+        self.rig.close()
         self.workers.stop()
 
     def opened(self, desk: str, tab: str) -> bool:

@@ -36,7 +36,8 @@ def thinned(x: FloatArray, y: FloatArray, most: int) -> tuple[FloatArray, FloatA
         return x, y
     from tsdownsample import MinMaxDownsampler
 
-    kept = MinMaxDownsampler().downsample(np.ascontiguousarray(y), n_out=most - most % 2)
+    thinner = MinMaxDownsampler()  # type: ignore[no-untyped-call, unused-ignore]
+    kept = thinner.downsample(np.ascontiguousarray(y), n_out=most - most % 2)
     return x[kept], y[kept]
 
 
@@ -84,6 +85,7 @@ class Live:
 
     def __init__(self) -> None:
         self.channels: dict[str, Channel] = {}
+        self.limits: dict[str, float] = {}
         self.end = 0.0
         self.seconds = 0.0
         self.blocks = 0
@@ -94,6 +96,7 @@ class Live:
             name: Channel(name=name, role=role, axis=axis, unit=unit)
             for name, role, axis, unit in begun.channels
         }
+        self.limits = begun.limits
         self.end, self.seconds, self.blocks = 0.0, begun.seconds, 0
 
     def take(self, block: Block) -> None:

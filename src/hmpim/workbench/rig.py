@@ -4,7 +4,6 @@ import contextlib
 import multiprocessing
 import threading
 import time
-from collections import deque
 from collections.abc import Callable
 from dataclasses import replace
 from multiprocessing.connection import Connection
@@ -12,16 +11,40 @@ from pathlib import Path
 from typing import Any, Literal
 
 from hmpim.errors import RigError
+from hmpim.experiment.readiness import Light
+from hmpim.rigs.catalogue import Description, describe, named_rigs, read_description
 from hmpim.stimulus import Stimulus
 from hmpim.workbench.live import Live
 from hmpim.workbench.names import harmless_name
 from hmpim.workbench.settings import Settings
-from hmpim.workbench.work.driving import Begun, Block, Ended, Order, Said, drive
+from hmpim.workbench.work.driving import (
+    Begun,
+    Block,
+    Ended,
+    Order,
+    Questions,
+    drive,
+)
 
 __all__ = ["RigBench", "State", "known_rigs"]
 
 State = Literal["idle", "armed", "running"]
-_LINES = 200  # of the log that are kept for the page
+DEMO = "demo"
+"""The rig that is there without any description: the sensor of the paper's Fig. 17."""
+_DEMO = describe(
+    {
+        "rig": "sensor",
+        "unlimited": True,
+        "options": {
+            "delay": 0.15,
+            "natural_frequency": 10.0,
+            "damping_ratio": 0.4,
+            "bias": 0.6,
+            "noise_std": 0.1,
+        },
+    }
+)
+_LINES = 12  # of the log that are shown
 
 
 def known_rigs(settings: Settings) -> dict[str, str]:
@@ -32,18 +55,30 @@ def known_rigs(settings: Settings) -> dict[str, str]:
     settings : Settings
         How the workbench was started.
     """
-    from hmpim.rigs.catalogue import named_rigs, read_description
-
-    found = {"sensor": "sensor: simulated, nothing moves"}
-    found |= {
+    found = {
         name: f"{name}: {named.fault or (named.description and named.description.rig) or ''}"
         for name, named in named_rigs().items()
     }
     if settings.rig_file is not None:
         described = read_description(settings.rig_file)
-        found[str(settings.rig_file)] = f"{settings.rig_file.name}: {described.rig}"
+        found[settings.rig_file.name] = f"{settings.rig_file.name}: {described.rig}"
     found |= {rig: rig for rig in settings.rigs}
-    return found
+    return found | {DEMO: "demo: a simulated sensor, nothing moves"}
+
+
+def described_rig(settings: Settings, rig: str) -> tuple[str, Description | None]:
+    """Return how a rig is found: what `hmpim run --rig` takes, and what describes it.
+
+    Raises
+    ------
+    RigError
+        If there is no such rig.
+    """
+    if rig not in known_rigs(settings):
+        raise RigError(f"there is no rig {rig!r}; describe it in hmpim.toml, or start with --rig")
+    if settings.rig_file is not None and rig == settings.rig_file.name:
+        return "", read_description(settings.rig_file)
+    return ("", _DEMO) if rig == DEMO else (rig, None)
 
 
 class RigBench:
@@ -60,15 +95,18 @@ class RigBench:
     def __init__(self, settings: Settings, *, present: Callable[[str], bool]) -> None:
         self._settings, self._present = settings, present
         self.live = Live()
-        self.lines: deque[str] = deque(maxlen=_LINES)
         self.owner = ""
         self.rig = ""
         self.folder: Path | None = None
         self.ended: Ended | None = None
+        self.lights: dict[str, Light] = {}
+        self.checking = False
         self.count = 0
         self._running = False
         self._pipe: Connection | None = None
         self._process: Any = None
+        self._spare: tuple[Connection, Any] | None = None
+        self._closed = False
         self._lock = threading.Lock()
         self._seen = time.monotonic()
 
@@ -92,10 +130,7 @@ class RigBench:
                 raise RigError("a run goes on; wait until it has ended, or stop it")
             if self.owner and self.owner != desk:
                 raise RigError("another window has armed a rig; disarm it there first")
-            if rig not in known_rigs(self._settings):
-                raise RigError(
-                    f"there is no rig {rig!r}; describe it in hmpim.toml, or start with --rig"
-                )
+            described_rig(self._settings, rig)
             self.owner, self.rig = desk, rig
             self._seen = time.monotonic()
 
@@ -106,9 +141,14 @@ class RigBench:
                 self.owner = ""
 
     def start(
-        self, desk: str, stimuli: tuple[Stimulus, ...], *, outliving: bool = False
+        self,
+        desk: str,
+        stimuli: tuple[Stimulus, ...],
+        *,
+        outliving: bool = False,
+        questions: Questions | None = None,
     ) -> Path:
-        """Begin a run of the armed rig; return the folder of its record.
+        """Begin a run of the armed rig, or a check of it; return the folder of its record.
 
         Raises
         ------
@@ -120,28 +160,27 @@ class RigBench:
                 raise RigError("a run goes on already; a second one is not started")
             if not self.owner or self.owner != desk:
                 raise RigError("this window has not armed the rig; arm it first")
-            folder = self._fresh_folder()
-            own = self._settings.rig_file
-            described = own is not None and self.rig == str(own)
+            folder = self._fresh_folder("check" if questions is not None else "")
+            text, description = described_rig(self._settings, self.rig)
             order = Order(
-                rig="" if described else self.rig,
-                rig_file=own if described else None,
+                rig=text,
+                description=description,
                 stimuli=stimuli,
                 path=folder / "run.h5",
                 log=folder / "run.log",
                 outliving=outliving,
+                questions=questions,
             )
-            context = multiprocessing.get_context("spawn")
-            here, there = context.Pipe()
+            here, process = self._spare or _spawned()
+            self._spare = None
+            here.send(order)
             self.live, self.ended, self.folder = Live(), None, folder
-            self.lines.clear()
-            self._process = context.Process(target=drive, args=(order, there), daemon=False)
-            self._process.start()
-            there.close()
-            self._pipe, self._running = here, True
+            self.lights = {}
+            self.checking = questions is not None
+            self._pipe, self._process, self._running = here, process, True
             self.count += 1
             self._seen = time.monotonic()
-        threading.Thread(target=self._listen, args=(here, self._process), daemon=True).start()
+        threading.Thread(target=self._listen, args=(here, process), daemon=True).start()
         threading.Thread(target=self._look_after, args=(self.count,), daemon=True).start()
         return folder
 
@@ -154,17 +193,26 @@ class RigBench:
 
     def close(self) -> None:
         """End the run and wait until its rig is at rest."""
+        self._closed = True
+        if self._spare is not None:
+            self._spare[1].kill()  # it has done nothing yet
+            self._spare[0].close()
         self.stop("the workbench ended")
         if self._process is not None and self._running:
             self._process.join(timeout=30.0)
 
-    def _fresh_folder(self) -> Path:
-        stem = time.strftime("%Y-%m-%d_%H%M%S")
-        name = f"{stem}_{harmless_name(Path(self.rig).stem or 'rig')}"
-        folder, number = self._settings.runs / name, 1
+    def _fresh_folder(self, kind: str) -> Path:
+        words = [
+            time.strftime("%Y-%m-%d_%H%M%S"),
+            harmless_name(Path(self.rig).stem or "rig"),
+            kind,
+        ]
+        name = "_".join(word for word in words if word)
+        within = self._settings.checks if kind else self._settings.runs
+        folder, number = within / name, 1
         while folder.exists():
             number += 1
-            folder = self._settings.runs / f"{name}-{number}"
+            folder = within / f"{name}-{number}"
         folder.mkdir(parents=True)
         return folder
 
@@ -178,8 +226,8 @@ class RigBench:
                     self.live.take(message)
                 elif isinstance(message, Begun):
                     self.live.begin(message)
-                elif isinstance(message, Said):
-                    self.lines.append(f"{message.kind}: {message.text}")
+                elif isinstance(message, Light):
+                    self.lights[message.name] = message
                 elif isinstance(message, Ended):
                     ended = message
                     break
@@ -192,6 +240,22 @@ class RigBench:
         self._running, self._pipe = False, None
         self._seen = time.monotonic()
         pipe.close()
+        self.prepare()
+
+    def prepare(self) -> None:
+        """Have a process wait for the next order, so that a run begins at once."""
+        if self._spare is None and not self._closed:
+            self._spare = _spawned()
+
+    @property
+    def lines(self) -> list[str]:
+        """The last lines of the log."""
+        if self.folder is None:
+            return []
+        try:
+            return (self.folder / "run.log").read_text(encoding="utf-8").splitlines()[-_LINES:]
+        except (OSError, ValueError):
+            return []
 
     def _look_after(self, count: int) -> None:
         """End a run whose window is gone for too long."""
@@ -210,3 +274,12 @@ class RigBench:
                 self._seen = time.monotonic()
             elif time.monotonic() - self._seen > self._settings.grace:
                 self.owner = ""
+
+
+def _spawned() -> tuple[Connection, Any]:
+    context = multiprocessing.get_context("spawn")
+    here, there = context.Pipe()
+    process = context.Process(target=drive, args=(there,), daemon=False)
+    process.start()
+    there.close()
+    return here, process

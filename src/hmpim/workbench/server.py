@@ -128,7 +128,7 @@ def application(settings: Settings, *, begun: Callable[[], object]) -> Any:
         dark=None,
         language="en-US",
         tailwind=False,
-        reconnect_timeout=settings.grace,
+        reconnect_timeout=max(settings.grace, 3.0),
         show_welcome_message=False,
     )
     return whole

@@ -39,6 +39,11 @@ class Settings:
         return self.runs / "uploads"
 
     @property
+    def checks(self) -> Path:
+        """Folder of the small runs by which rigs were checked."""
+        return self.desks / "checks"
+
+    @property
     def desks(self) -> Path:
         """Folder of what was typed and set on the pages."""
         return self.runs / ".workbench"

@@ -10,20 +10,22 @@ from nicegui import events, ui
 from hmpim.errors import ArgumentError
 from hmpim.identify import Identification
 from hmpim.model.dynamics import STRUCTURES
+from hmpim.plots import pair_bode
 from hmpim.report.words import by_weight, headline, structure_words
 from hmpim.workbench.bench import Window
 from hmpim.workbench.desks import Analysis
 from hmpim.workbench.names import free_place
-from hmpim.workbench.pages.frame import Command, card, failures_said
+from hmpim.workbench.pages.frame import Command, Later, card, failures_said
+from hmpim.workbench.parts.picture import Picture
 from hmpim.workbench.parts.table import parameter_cells, plain_table
 from hmpim.workbench.work.record import Looked, Question, found, look, write_report
 
 __all__ = ["analyse"]
 
 
-async def analyse(window: Window) -> None:
+def analyse(window: Window) -> Later:
     """Make the page."""
-    await AnalysePage(window).open()
+    return AnalysePage(window).open
 
 
 class AnalysePage:
@@ -216,6 +218,8 @@ class AnalysePage:
                 with ui.element("div").classes("hm-row"):
                     ui.button("Report", icon="download", on_click=self._report)
             pair = result.pairs[min(self.wish.pair, len(result.pairs) - 1)]
+            with card("Bode plot"):
+                Picture(pair_bode(pair, fs=result.record.fs))
             with card("Parameters"):
                 columns, rows = parameter_cells(pair, self.wish.hand)
                 plain_table(columns, rows, title="Parameters")

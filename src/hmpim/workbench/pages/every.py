@@ -4,15 +4,20 @@ from pathlib import Path
 
 from fastapi import FastAPI
 from fastapi.responses import FileResponse, PlainTextResponse, Response
+from fastapi.staticfiles import StaticFiles
 from nicegui import ui
 
 from hmpim.workbench.bench import Workbench
 from hmpim.workbench.pages.analyse import analyse
+from hmpim.workbench.pages.check import check
+from hmpim.workbench.pages.design import design
 from hmpim.workbench.pages.frame import add_front, add_page
+from hmpim.workbench.pages.run import run
 
 __all__ = ["add_pages"]
 
-_STYLE = Path(__file__).parents[1] / "static" / "workbench.css"
+_PAGES = {"design": design, "check": check, "run": run, "analyse": analyse}
+_STATIC = Path(__file__).parents[1] / "static"
 _SANDBOX = {"content-security-policy": "sandbox allow-scripts; default-src 'none'; "
             "img-src data:; style-src 'unsafe-inline'; script-src 'unsafe-inline'"}  # fmt: skip
 
@@ -27,9 +32,11 @@ def add_pages(workbench: Workbench, app: FastAPI) -> None:
     app : FastAPI
         Into which NiceGUI is mounted; what is added here is asked first.
     """
-    ui.add_css(_STYLE.read_text(encoding="utf-8"), shared=True)
+    ui.add_css((_STATIC / "workbench.css").read_text(encoding="utf-8"), shared=True)
     add_front(workbench)
-    add_page(workbench, "analyse", analyse)
+    for name, build in _PAGES.items():
+        add_page(workbench, name, build)
+    app.mount("/static", StaticFiles(directory=_STATIC))
 
     @app.get("/files/{path:path}")
     def hand_out(path: str) -> Response:

@@ -11,7 +11,7 @@ from nicegui import Client, ui
 from hmpim.errors import HmpimError
 from hmpim.workbench.bench import Window, Workbench
 
-__all__ = ["PAGES", "Command", "add_front", "add_page", "card", "failures_said", "heading"]
+__all__ = ["PAGES", "Command", "Later", "add_front", "add_page", "card", "failures_said", "heading"]
 
 PAGES = {
     "design": "Design",
@@ -22,7 +22,9 @@ PAGES = {
     "campaign": "Campaign",
 }
 
-Build = Callable[[Window], Awaitable[None]]
+Later = Callable[[], Awaitable[None]]
+Build = Callable[[Window], Later | None]
+"""Makes a page at once; what it returns is done when the browser shows it, and may take long."""
 
 
 def add_page(workbench: Workbench, name: str, build: Build) -> None:
@@ -34,8 +36,8 @@ def add_page(workbench: Workbench, name: str, build: Build) -> None:
         Shared by all.
     name : str
         Last part of its address, one of `PAGES`.
-    build : coroutine function
-        Makes what stands on it.
+    build : callable
+        Makes what stands on it, at once; returns what is to be done when it is shown, or None.
     """
 
     @ui.page(f"/{name}", title=f"{PAGES[name]} · hmpim")
@@ -48,9 +50,12 @@ def add_page(workbench: Workbench, name: str, build: Build) -> None:
         _frame(window, name)
         with ui.element("main").classes("hm-main").props('id="main"'):
             ui.label(PAGES[name]).props('role="heading" aria-level="1"').classes("hm-title")
-            with failures_said():
-                await build(window)
+            later = build(window)
         _watch(window, client, name)
+        if later is not None:
+            await client.connected(timeout=60.0)
+            with failures_said():
+                await later()
         return None
 
 

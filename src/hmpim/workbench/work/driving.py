@@ -5,9 +5,11 @@ the run ends as if it had been stopped: the rig comes to rest and the record is 
 """
 
 import _thread
+import math
 import signal
 import threading
 import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from multiprocessing.connection import Connection
 from pathlib import Path
@@ -17,13 +19,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hmpim.errors import ArgumentError, HmpimError
-from hmpim.experiment import Event, OutlivingRig, Played, RunLog, RunOptions, run
+from hmpim.experiment import OutlivingRig, Played, RunLog, RunOptions, run
 from hmpim.experiment.checks import moves
-from hmpim.rigs import Rig
-from hmpim.rigs.catalogue import Description, FoundRig, find_rig, read_description
+from hmpim.experiment.readiness import (
+    Light,
+    answer_light,
+    error_light,
+    independence_light,
+    limits_light,
+)
+from hmpim.optimal import RoughModel
+from hmpim.record import Record
+from hmpim.rigs import LimitsOfAxes, Rig
+from hmpim.rigs.catalogue import Description, FoundRig, find_rig
 from hmpim.stimulus import Limits, Stimulus
 
-__all__ = ["Begun", "Block", "Ended", "Order", "Said", "drive", "find_one"]
+__all__ = ["Begun", "Block", "Ended", "Order", "Questions", "drive"]
 
 FloatArray = NDArray[np.float64]
 _PATIENCE = 0.5  # s between a wish to end and an interruption, where nobody asks for the wish
@@ -40,15 +51,26 @@ class Order:
     stimuli: tuple[Stimulus, ...]
     path: Path
     log: Path
-    rig_file: Path | None = None
+    description: Description | None = None
     outliving: bool = False
+    questions: "Questions | None" = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Questions:
+    """What is asked before a run: error bars for a rough model; `wanted` in Hz (95 %)."""
+
+    model: RoughModel
+    noise_std: float
+    wanted: float
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Begun:
-    """A run has begun: its channels as (name, role, axis, unit), its limits by axis, its length."""
+    """A run has begun: channels as (name, role, axis, unit), largest positions by axis, length."""
 
     channels: tuple[tuple[str, str, str, str], ...]
+    limits: dict[str, float]
     seconds: float
 
 
@@ -61,14 +83,6 @@ class Block:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Said:
-    """A line of the run's log."""
-
-    kind: str
-    text: str
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
 class Ended:
     """The run is over: why, where that was not as planned, and whether a record was kept."""
 
@@ -77,24 +91,20 @@ class Ended:
     kept: bool
 
 
-def find_one(rig: str, rig_file: Path | None) -> FoundRig:
-    """Make the rig that is meant: by name, by kind, or as a file describes it."""
-    described: Description | None = None
-    if rig_file is not None:
-        described = read_description(rig_file)
-    return find_rig(rig, description=described)
-
-
-def drive(order: Order, pipe: Connection) -> None:
-    """Play an order, and tell of it; the body of the process.
+def drive(pipe: Connection) -> None:
+    """Wait for an order, play it, and tell of it; the body of the process.
 
     Parameters
     ----------
-    order : Order
-        What to do.
     pipe : Connection
-        To the workbench: a string that comes through it ends the run, and is the reason.
+        To the workbench: an `Order` comes through it first; a string that follows ends the run,
+        and is the reason.
     """
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # also where a shell ignores it
+    try:
+        order = pipe.recv()
+    except (EOFError, OSError, KeyboardInterrupt):
+        return
     wish = _Wish(pipe)
     fault, interrupted = "", False
     try:
@@ -113,26 +123,61 @@ def drive(order: Order, pipe: Connection) -> None:
 
 
 def _played(order: Order, pipe: Connection, wish: "_Wish") -> None:
-    found = find_one(order.rig, order.rig_file)
+    found = find_rig(order.rig, description=order.description)
     stimuli = _aimed(order.stimuli, found.description.axes or found.rig.axes)
     rig: Rig = found.rig
     if order.outliving and moves(rig) and found.description.watchdog is None:
-        rig = OutlivingRig(_again, order.rig, order.rig_file)
+        rig = OutlivingRig(_again, order.rig, order.description)
+    stated = _stated(found)
+    options = RunOptions(
+        watchdog=not order.outliving and found.description.watchdog is None,
+        feel="unknown" if order.questions is None else None,
+    )
     with RunLog(order.log) as log:
-        log.follow(lambda event: _tell(pipe, _said(event)))
-        run(
-            rig,
-            stimuli,
-            path=order.path,
-            limits=_stated(found),
-            until=wish.asked,
-            subscribers=[_Teller(pipe)],
-            log=log,
-            options=RunOptions(
-                watchdog=not order.outliving and found.description.watchdog is None,
-                feel="unknown",
-            ),
-        )
+
+        def play(given: Sequence[Stimulus]) -> Record:
+            return run(
+                rig,
+                given,
+                path=order.path,
+                limits=stated,
+                until=wish.asked,
+                subscribers=[_Teller(pipe, rig, stated)],
+                log=log,
+                options=options,
+            )
+
+        if order.questions is None:
+            play(stimuli)
+        else:
+            for light in _lights(order.questions, rig, stimuli, stated, play, wish):
+                _tell(pipe, light)
+
+
+def _lights(
+    asked: Questions,
+    rig: Rig,
+    stimuli: list[Stimulus],
+    stated: Any,
+    play: Callable[[Sequence[Stimulus]], Record],
+    wish: "_Wish",
+) -> Iterator[Light]:
+    """Ask one question after another; the rig is moved only if all else is well."""
+    lights = [limits_light(rig, stimuli, stated=stated)]
+    yield lights[-1]
+    lights.append(
+        error_light(stimuli, model=asked.model, noise_std=asked.noise_std, wanted=asked.wanted)
+    )
+    yield lights[-1]
+    lights.append(independence_light(stimuli))
+    yield lights[-1]
+    if all(light.green for light in lights):
+        light = answer_light(rig, stimuli, lambda named: play([*named.values()]), stated=stated)
+        if wish.reason:
+            light = Light(name="answer", green=False, words=f"stopped: {wish.reason}")
+        yield light
+    else:
+        yield Light(name="answer", green=False, words="not asked: the rig is not moved yet")
 
 
 def _stated(found: FoundRig) -> Any:
@@ -140,8 +185,8 @@ def _stated(found: FoundRig) -> Any:
     return limits if limits is None or isinstance(limits, Limits) else dict(limits)
 
 
-def _again(rig: str, rig_file: Path | None) -> Rig:
-    return find_one(rig, rig_file).rig
+def _again(rig: str, description: Description | None) -> Rig:
+    return find_rig(rig, description=description).rig
 
 
 def _aimed(stimuli: tuple[Stimulus, ...], axes: tuple[str, ...]) -> list[Stimulus]:
@@ -156,10 +201,6 @@ def _aimed(stimuli: tuple[Stimulus, ...], axes: tuple[str, ...]) -> list[Stimulu
     return list(stimuli)
 
 
-def _said(event: Event) -> Said:
-    return Said(kind=event.kind, text=event.message)
-
-
 def _tell(pipe: Connection, message: object) -> None:
     """Say something; a workbench that is gone is told by the wish to end, not by a fault."""
     try:
@@ -171,19 +212,23 @@ def _tell(pipe: Connection, message: object) -> None:
 class _Teller:
     """A subscriber that hands every block on."""
 
-    def __init__(self, pipe: Connection) -> None:
-        self._pipe = pipe
-        self._begun = False
+    def __init__(self, pipe: Connection, rig: Rig, stated: LimitsOfAxes) -> None:
+        self._pipe, self._rig, self._stated = pipe, rig, stated
 
     def __call__(self, played: Played) -> None:
-        if not self._begun or played.block.start == 0:
-            self._begun = True
-            channels = tuple(
-                (c.name, c.role, c.axis or "", c.unit) for c in played.layout.channels
-            )
-            _tell(self._pipe, Begun(channels=channels, seconds=played.seconds))
+        if played.block.start == 0:
+            channels = tuple((c.name, c.role, c.axis or "", c.unit) for c in played.layout.channels)
+            limits = dict(self._limits({axis for _, role, axis, _ in channels if role == "input"}))
+            _tell(self._pipe, Begun(channels=channels, limits=limits, seconds=played.seconds))
         samples = {name: (s.time, s.values) for name, s in played.samples.items()}
         _tell(self._pipe, Block(end=float(played.block.time[-1]), samples=samples))
+
+    def _limits(self, axes: set[str]) -> Iterator[tuple[str, float]]:
+        for axis in axes:
+            for limits in (self._rig.limits, self._stated):
+                own = limits.get(axis) if isinstance(limits, Mapping) else limits
+                if own is not None and math.isfinite(own.position):
+                    yield axis, own.position
 
 
 class _Wish:

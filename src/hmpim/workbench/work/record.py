@@ -3,16 +3,23 @@
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+import numpy as np
+from numpy.typing import NDArray
+
 from hmpim.formats.files import read
 from hmpim.formats.options import ReadOptions
 from hmpim.formats.saving import save
 from hmpim.formats.survey import survey
-from hmpim.identify import Identification, identify
+from hmpim.identify import Identification, PairIdentification, identify
 from hmpim.model.dynamics import StructureName
-from hmpim.record import Record
+from hmpim.plots import Figure, pair_bode
+from hmpim.record import Channel, Record
+from hmpim.record.clock import fit_clock
 from hmpim.report import report
 
-__all__ = ["Looked", "Question", "found", "look", "read_record", "write_report"]
+__all__ = ["Looked", "Question", "found", "look", "read_record", "so_far", "write_report"]
+
+Samples = tuple[NDArray[np.float64], NDArray[np.float64]]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -88,3 +95,27 @@ def write_report(result: Identification, path: str, notes: tuple[str, ...]) -> N
     """Write the page of a result, and the result beside it."""
     report(result, path, notes=notes)
     save(replace(result), Path(path).with_suffix(".json"))
+
+
+def so_far(
+    command: Samples, response: Samples, names: tuple[str, str], units: tuple[str, str]
+) -> tuple[PairIdentification, Figure]:
+    """Identify what has come in of one axis so far, and describe its Bode plot.
+
+    Parameters
+    ----------
+    command, response : (ndarray, ndarray)
+        Times in s and values.
+    names, units : (str, str)
+        Of the two.
+    """
+    (t, u), (s, y) = command, response
+    record = Record(
+        inputs=(Channel(name=names[0], time=t, values=u, unit=units[0]),),
+        outputs=(Channel(name=names[1], time=s, values=y, unit=units[1]),),
+        fs=fit_clock(t).fs,
+    )
+    pair = identify(record).pairs[0]
+    fs = record.fs
+    slim = replace(pair, time=None, prediction=None, residual=None)
+    return slim, pair_bode(pair, input_unit=units[0], output_unit=units[1], fs=fs)

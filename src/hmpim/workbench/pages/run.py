@@ -1,0 +1,234 @@
+"""The page that runs: arm a rig, start, watch, stop."""
+
+import asyncio
+
+from nicegui import events, ui
+
+from hmpim.errors import HmpimError, RigError
+from hmpim.plots import Figure
+from hmpim.workbench.bench import Window
+from hmpim.workbench.desks import Analysis
+from hmpim.workbench.pages.frame import Command, card, failures_said
+from hmpim.workbench.parts.picture import Picture
+from hmpim.workbench.parts.strip import Strip
+from hmpim.workbench.parts.table import parameter_cells, plain_table
+from hmpim.workbench.rig import known_rigs
+from hmpim.workbench.work.design import digest, stimuli_of
+from hmpim.workbench.work.record import so_far
+
+__all__ = ["ready_to_run", "run"]
+
+NO_WATCHDOG = "Rig without a watchdog: drive it by a further process"
+_EVERY = 0.1  # s between two looks at what has come in
+_FEWEST = 200  # samples before the first estimate
+
+
+def run(window: Window) -> None:
+    """Make the page."""
+    RunPage(window)
+
+
+def ready_to_run(window: Window) -> str:
+    """Say why the design may not be run on the rig; '' where every light is green."""
+    from hmpim.experiment.readiness import LIGHTS
+
+    desk = window.desk
+    if not desk.rig:
+        return "Choose a rig."
+    if desk.checked.digest != digest(desk.wish, desk.rig):
+        return "The design or the rig has changed since the last check: make a new check."
+    left = [name for name in LIGHTS if name not in desk.checked.green]
+    return f"Not green in the check: {', '.join(left)}." if left else ""
+
+
+class RunPage:
+    """The page in one window.
+
+    Parameters
+    ----------
+    window : Window
+        Whose it is.
+    """
+
+    def __init__(self, window: Window) -> None:
+        self.window, self.bench = window, window.workbench.rig
+        self.strips: dict[str, Strip] = {}
+        self.shown = -1
+        self.estimating = False
+        self.bode: Picture | None = None
+        with ui.element("div").classes("hm-side"):
+            with card("Rig"):
+                self.choice = rig_choice(window)
+                self.state = (
+                    ui.label().props('role="status" aria-live="polite"').classes("hm-verdict")
+                )
+                with ui.element("div").classes("hm-row"):
+                    self.arm = ui.button("Arm", on_click=self._arm)
+                    self.start = ui.button("Start", on_click=self._start).props("color=positive")
+                self.outliving = ui.checkbox(NO_WATCHDOG)
+                self.why = ui.label().classes("hm-soft")
+                self.stop = (
+                    ui.button("Stop", on_click=lambda: self.bench.stop("stopped by hand"))
+                    .props('color=negative aria-keyshortcuts="Escape"')
+                    .classes("hm-stop")
+                )
+                ui.label("The Escape key stops too.").classes("hm-soft")
+            with card("Estimate so far"):
+                self.axis = ui.select([], label="Axis").props("dense")
+                self.estimates = ui.element("div").props('aria-live="polite"')
+            with card("Log"):
+                self.log = ui.label().classes("hm-pre").props("tabindex=0")
+        with ui.element("div").classes("hm-body"):
+            with card("Command and response"):
+                self.progress = ui.label("Nothing is running.").classes("hm-soft")
+                self.chart = ui.element("div")
+            with card("Bode plot so far"):
+                self.plot = ui.element("div")
+            self.after = ui.element("div").classes("hm-body")
+        self.command = Command(_command(window))
+        ui.keyboard(on_key=self._key, ignore=[])
+        ui.timer(_EVERY, self._tick)
+        ui.timer(0.7, self._estimate)
+        ui.timer(0.5, lambda: self.log.set_text("\n".join(self.bench.lines)))
+        self._tick()
+
+    def _key(self, event: events.KeyEventArguments) -> None:
+        if event.key.escape and event.action.keydown:
+            self.bench.stop("stopped by hand")
+
+    def _arm(self) -> None:
+        with failures_said():
+            if self.bench.owner == self.window.name:
+                self.bench.disarm(self.window.name)
+            else:
+                self.bench.arm(self.window.name, self.window.desk.rig)
+        self._tick()
+
+    async def _start(self) -> None:
+        with failures_said():
+            reason = ready_to_run(self.window)
+            if reason:
+                raise RigError(reason)
+            stimuli = await self.window.workbench.workers.soon(stimuli_of, self.window.desk.wish)
+            self.bench.start(self.window.name, stimuli, outliving=bool(self.outliving.value))
+        self._tick()
+
+    def _tick(self) -> None:
+        """Show what is so now; everything is read off the bench, so any window may come late."""
+        bench, mine = self.bench, self.bench.owner == self.window.name
+        bench.release()
+        words = {
+            "idle": "Not armed",
+            "armed": f"Armed: {bench.rig}" if mine else f"Armed by another window: {bench.rig}",
+            "running": f"{'Checking' if bench.checking else 'Running'}: {bench.rig}",
+        }
+        state = bench.state
+        self.state.set_text(words[state])
+        self.state.classes(replace=f"hm-verdict {'hm-doubt' if state != 'idle' else ''}")
+        why = ready_to_run(self.window)
+        self.why.set_text(why)
+        self.arm.set_text("Disarm" if mine else "Arm")
+        self.arm.set_enabled(state == "idle" or (state == "armed" and mine))
+        self.choice.set_enabled(state == "idle")
+        self.start.set_enabled(state == "armed" and mine and not why)
+        self.stop.set_enabled(state == "running")
+        self._follow()
+
+    def _follow(self) -> None:
+        live, bench = self.bench.live, self.bench
+        if bench.count != self.shown or (live.channels and not self.strips):
+            self.shown = bench.count
+            self.strips = {}
+            self.chart.clear()
+            self.after.clear()
+            self.estimates.clear()
+            with self.chart:
+                for axis in live.axes:
+                    self.strips[axis] = Strip(live, axis, limit=live.limits.get(axis))
+            axes = list(live.axes)
+            self.axis.set_options(
+                {a: a or "the only one" for a in axes}, value=axes[0] if axes else None
+            )
+        for strip in self.strips.values():
+            strip.follow(live)
+        if live.seconds:
+            self.progress.set_text(f"{live.end:.1f} of {live.seconds:.1f} s")
+        if bench.ended is not None and not list(self.after):
+            self._ended()
+
+    def _ended(self) -> None:
+        ended, folder = self.bench.ended, self.bench.folder
+        if ended is None or folder is None or self.bench.checking:
+            return
+        with self.after, card("The run is over"):
+            if ended.fault:
+                ui.label(ended.fault).classes("hm-bad hm-verdict")
+            elif ended.reason:
+                ui.label(f"Ended early: {ended.reason}.").classes("hm-doubt hm-verdict")
+            else:
+                ui.label("Played to its end.").classes("hm-ok hm-verdict")
+            if ended.kept:
+                name = str((folder / "run.h5").relative_to(self.window.workbench.settings.runs))
+                ui.label(f"Record: {name}")
+
+                def analyse() -> None:
+                    self.window.change(analysis=Analysis(file=name))
+                    ui.navigate.to(f"/analyse?desk={self.window.name}")
+
+                ui.button("Analyse it", on_click=analyse).style("align-self: flex-start")
+
+    async def _estimate(self) -> None:
+        """Estimate from what has come in; the next begins when this one is done."""
+        live = self.bench.live
+        channels = live.of(self.axis.value or "") if self.axis.value is not None else {}
+        if self.estimating or self.bench.state != "running" or len(channels) < 2:
+            return
+        command, response = channels["input"], channels["output"]
+        if min(command.size, response.size) < _FEWEST:
+            return
+        self.estimating = True
+        try:
+            pair, figure = await self.window.workbench.workers.do(
+                so_far,
+                (command.time.copy(), command.values.copy()),
+                (response.time.copy(), response.values.copy()),
+                (command.name, response.name),
+                (command.unit, response.unit),
+            )
+            self._show(figure)
+            self.estimates.clear()
+            with self.estimates:
+                columns, rows = parameter_cells(pair, {})
+                plain_table(columns[:4], [row[:4] for row in rows], title="Estimate so far")
+        except HmpimError:
+            await asyncio.sleep(0.3)  # too little yet
+        finally:
+            self.estimating = False
+
+    def _show(self, figure: Figure) -> None:
+        if self.bode is None:
+            with self.plot:
+                self.bode = Picture(figure)
+        else:
+            self.bode.show(figure)
+
+
+def rig_choice(window: Window) -> ui.select:
+    """Choose one of the rigs there are; no other can be typed."""
+    known = known_rigs(window.workbench.settings)
+    value = window.desk.rig if window.desk.rig in known else None
+    return ui.select(
+        known,
+        label="Rig",
+        value=value,
+        on_change=lambda e: window.change(rig=e.value or ""),
+    )
+
+
+def _command(window: Window) -> str:
+    desk = window.desk
+    rig = desk.rig or "RIG"
+    return (
+        f"hmpim run --rig {rig} design.csv -o run.h5 --report run.html\n\n"
+        "record = hmpim.run(rig, stimuli, path='run.h5')"
+    )

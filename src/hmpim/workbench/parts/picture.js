@@ -1,0 +1,105 @@
+// A described picture drawn by Plotly, with cursors that can be dragged and a server that refills
+// curves on zoom. Arrays come as base64 of their bytes and become typed arrays, never lists.
+const KINDS = { f4: Float32Array, f8: Float64Array, i4: Int32Array };
+const DARK = {
+  "#1f2328": "#e6edf3", "#111827": "#f0f3f6", "#5b636b": "#a5b0bb", "#d5d9de": "#3a434d",
+  "#0072b2": "#56b4e9", "#d55e00": "#ff9d5c", "#b0417f": "#e58ac0", "#009e73": "#3ecfa3",
+  "rgba(255,255,255,0.8)": "rgba(27,33,40,0.8)",
+};
+
+export function unpacked(value) {
+  if (Array.isArray(value)) return value.map(unpacked);
+  if (value === null || typeof value !== "object") return value;
+  if (value.bdata !== undefined) {
+    const bytes = Uint8Array.from(atob(value.bdata), (c) => c.charCodeAt(0));
+    const flat = new KINDS[value.dtype](bytes.buffer);
+    if (!value.shape || value.shape.length < 2) return flat;
+    const [rows, columns] = value.shape;
+    return Array.from({ length: rows }, (_, r) => flat.subarray(r * columns, (r + 1) * columns));
+  }
+  return Object.fromEntries(Object.entries(value).map(([k, v]) => [k, unpacked(v)]));
+}
+
+function recoloured(value) {
+  if (typeof value === "string") return DARK[value.toLowerCase()] ?? value;
+  if (Array.isArray(value)) return value.map(recoloured);
+  if (value === null || typeof value !== "object" || ArrayBuffer.isView(value)) return value;
+  return Object.fromEntries(Object.entries(value).map(([k, v]) => [k, recoloured(v)]));
+}
+
+export default {
+  template: '<div class="hm-picture" role="figure" :aria-label="alt"></div>',
+  props: { figure: Object, cursors: Array, alt: String },
+  async mounted() {
+    const { Plotly } = await import("nicegui-plotly");
+    this.Plotly = Plotly;
+    this.drawn = 0;
+    this.update();
+    this.sizes = new ResizeObserver(() => this.drawn && Plotly.Plots.resize(this.$el));
+    this.sizes.observe(this.$el);
+    this.theme = new MutationObserver(() => this.update());
+    this.theme.observe(document.body, { attributes: true, attributeFilter: ["class"] });
+  },
+  unmounted() {
+    this.sizes?.disconnect();
+    this.theme?.disconnect();
+    this.Plotly?.purge(this.$el);
+  },
+  methods: {
+    async update() {
+      if (!this.Plotly || !this.figure) return;
+      const dark = document.body.classList.contains("body--dark");
+      const plain = { data: unpacked(this.figure.data), layout: unpacked(this.figure.layout) };
+      const { data, layout } = dark ? recoloured(plain) : plain;
+      layout.font = { ...(layout.font ?? {}), color: dark ? "#e6edf3" : "#1f2328" };
+      if (this.$el.clientWidth < 600) {
+        layout.margin = { ...layout.margin, l: 8, r: 6 };
+        layout.legend = { ...layout.legend, font: { size: 10 } };
+      }
+      this.fixed = (layout.shapes ?? []).length;
+      layout.shapes = [...(layout.shapes ?? []), ...(this.cursors ?? []).map(this.shape)];
+      const config = { displaylogo: false, responsive: true, scrollZoom: false };
+      await this.Plotly.react(this.$el, data, layout, config);
+      if (!this.drawn) this.$el.on("plotly_relayout", this.moved);
+      this.drawn += 1;
+      this.$el.dataset.drawn = this.drawn;
+    },
+    shape(c) {
+      const across = c.axis === "y";
+      const along = { [across ? "y0" : "x0"]: c.at, [across ? "y1" : "x1"]: c.at };
+      const ends = across ? { x0: 0, x1: 1 } : { y0: 0, y1: 1 };
+      return {
+        type: "line", ...along, ...ends, editable: true, name: c.name,
+        xref: across ? `x${c.panel} domain` : `x${c.panel}`,
+        yref: across ? `y${c.panel}` : `y${c.panel} domain`,
+        line: { color: c.colour ?? "#b0417f", width: 4, dash: "solid" },
+        label: { text: c.label, textposition: "start", font: { size: 12 }, textangle: 0 },
+      };
+    },
+    moved(event) {
+      const zoomed = {};
+      for (const [key, value] of Object.entries(event)) {
+        const dragged = key.match(/^shapes\[(\d+)\]\.(x0|y0)$/);
+        if (dragged && Number(dragged[1]) >= this.fixed) {
+          const cursor = this.cursors[Number(dragged[1]) - this.fixed];
+          const own = cursor.axis === "y" ? "y0" : "x0";
+          if (own === dragged[2]) this.$emit("cursor", { name: cursor.name, at: Number(value) });
+        }
+        const range = key.match(/^xaxis(\d*)\.range\[([01])\]$/);
+        if (range) (zoomed[range[1]] ??= [null, null])[Number(range[2])] = Number(value);
+        const whole = key.match(/^xaxis(\d*)\.autorange$/);
+        if (whole) zoomed[whole[1]] = [null, null];
+      }
+      const [first] = Object.entries(zoomed);
+      if (first) this.$emit("zoom", { panel: first[0], low: first[1][0], high: first[1][1] });
+    },
+    refill(curves) {
+      if (!this.drawn) return;
+      const numbers = curves.map((c) => c.index);
+      const x = curves.map((c) => unpacked(c.x));
+      const y = curves.map((c) => unpacked(c.y));
+      this.Plotly.restyle(this.$el, { x, y }, numbers);
+      this.$el.dataset.refilled = Number(this.$el.dataset.refilled ?? 0) + 1;
+    },
+  },
+};

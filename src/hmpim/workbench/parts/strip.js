@@ -1,0 +1,78 @@
+// A strip of command and response of one axis, drawn by uPlot.
+let loading;
+
+function library() {
+  loading ??= new Promise((done, failed) => {
+    const base = `${window.path_prefix ?? ""}/static/uplot/`;
+    const style = Object.assign(document.createElement("link"), {
+      rel: "stylesheet", href: `${base}uPlot.min.css`,
+    });
+    const script = Object.assign(document.createElement("script"), {
+      src: `${base}uPlot.iife.min.js`, onload: () => done(window.uPlot), onerror: failed,
+    });
+    document.head.append(style, script);
+  });
+  return loading;
+}
+
+function floats(text) {
+  return new Float32Array(Uint8Array.from(atob(text), (c) => c.charCodeAt(0)).buffer);
+}
+
+export default {
+  template: '<div class="hm-strip" role="figure" :aria-label="label"></div>',
+  props: { label: String, unit: String, names: Array, limit: Number, span: Number },
+  async mounted() {
+    await new Promise((done) => setTimeout(done, 0)); // until the page knows its own address
+    this.uPlot = await library();
+    this.build();
+    this.sizes = new ResizeObserver(() => this.plot?.setSize(this.size()));
+    this.sizes.observe(this.$el);
+  },
+  unmounted() {
+    this.sizes?.disconnect();
+    this.plot?.destroy();
+  },
+  methods: {
+    size() {
+      return { width: Math.max(this.$el.clientWidth, 100), height: 150 };
+    },
+    build() {
+      const ink = () => getComputedStyle(this.$el).color;
+      const axis = { stroke: ink, grid: { stroke: "rgba(128,128,128,0.25)", width: 1 } };
+      const line = (label, stroke, dash) => ({ label, stroke, dash, width: 1.5, spanGaps: true });
+      const limits = this.limit
+        ? [line("limit", "#b0417f", [6, 4]), line("−limit", "#b0417f", [6, 4])]
+        : [];
+      this.plot = new this.uPlot(
+        {
+          ...this.size(), title: "", legend: { live: false }, cursor: { show: false },
+          scales: { x: { time: false } },
+          axes: [axis, { ...axis, size: 64, label: this.unit, labelSize: 16 }],
+          series: [{}, line(this.names[0], "#0072b2"), line(this.names[1], "#d55e00"), ...limits],
+        },
+        [[0], [null], [null], ...limits.map(() => [null])],
+        this.$el,
+      );
+    },
+    show(end, command, response) {
+      if (!this.plot) return;
+      const tables = [command, response]
+        .map((pair) => pair.map(floats))
+        .map(([x, y]) => (x.length ? [x, y] : [new Float32Array([end]), [null]]));
+      const begin = Math.max(0, end - this.span);
+      if (this.limit) {
+        const ends = [begin, Math.max(end, begin + 0.01)];
+        tables.push([ends, [this.limit, this.limit]], [ends, [-this.limit, -this.limit]]);
+      }
+      this.plot.setData(this.uPlot.join(tables), false);
+      this.plot.setScale("x", { min: begin, max: Math.max(end, begin + 0.01) });
+      let top = 0;
+      for (const [, y] of tables.slice(0, 2)) for (const v of y) top = Math.max(top, Math.abs(v));
+      const near = this.limit && top > 0.3 * this.limit;
+      top = 1.1 * (near ? Math.max(top, this.limit) : top || 1);
+      this.plot.setScale("y", { min: -top, max: top });
+      this.$el.dataset.end = end;
+    },
+  },
+};
