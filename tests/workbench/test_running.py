@@ -1,11 +1,12 @@
 """In a browser: design, check, run; stopped by hand and by a lost window; one owner at a time."""
 
 import re
+from dataclasses import replace
 
 import hmpim
 from hmpim.experiment.readiness import LIGHTS
 from hmpim.formats.stimulus_files import read_stimulus
-from hmpim.workbench.desks import AxisRow, Checked, Desk, Desks, Wish
+from hmpim.workbench.desks import AxisRow, Checked, Desk, Desks, Model, Wish
 from hmpim.workbench.work.design import digest
 from hmpim.workbench.work.designed import five_axes
 from workbench_support import desk_of, go
@@ -61,7 +62,8 @@ def test_a_design_follows_its_sliders_and_stays_inside_its_limits(page, served):
 
 
 def test_five_axes_run_once_every_light_is_green(page, served):
-    wish = Wish(rows=five_axes(), duration=4.0, fs=500.0)
+    rows = tuple(replace(row, low=0.5, amplitude=1.0) for row in five_axes())
+    wish = Wish(rows=rows, duration=4.0, fs=500.0, model=Model(noise_std=0.01))
     desk = Desk(name="f1fe0a0e5f1fe0a0", wish=wish, rig="table")
     Desks(served.runs / ".workbench").put(desk)
     go(page, served, "run", desk.name)
@@ -80,6 +82,7 @@ def test_five_axes_run_once_every_light_is_green(page, served):
     assert [c.name for c in record.inputs] == [f"{r.name}.command" for r in wish.rows]
     page.get_by_role("button", name="Disarm").click()
     page.get_by_role("link", name="Design").click()
+    page.get_by_text("inside all limits").wait_for()
     page.get_by_label("Duration (s)").fill("5")
     page.get_by_text("5 s, 2500 samples").wait_for()
     page.get_by_role("link", name="Run", exact=True).click()

@@ -97,6 +97,21 @@ def identify(
             help="Say gain and phase at this frequency, measured and modelled; may be repeated.",
         ),
     ] = None,
+    structure: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--structure", metavar="NAME", help="Try this structure alone; may be repeated."
+        ),
+    ] = None,
+    hand: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--hand",
+            metavar="NAME=VALUE",
+            help="A value read by eye, such as bandwidth_phase90=33: said beside the automatic "
+            "one; may be repeated.",
+        ),
+    ] = None,
     json: Annotated[
         Path | None, typer.Option("--json", metavar="FILE", help="Write the result as JSON.")
     ] = None,
@@ -117,6 +132,8 @@ def identify(
         raise ArgumentError(f"--holdout {holdout:g} is not a share between 0 and 1; give 0.5, say")
 
     single = {"--report": report, "--holdout": holdout, "--at": at or None}
+    single |= {"--structure": structure or None, "--hand": hand or None}
+    by_hand = _by_hand(hand or [])
     _check_single(len(records), single)
 
     from hmpim.identify import identify as find
@@ -151,14 +168,32 @@ def identify(
     measurable(at or [], data.fs)
     part, split = (data, None) if holdout is None else _first_part(data, holdout)
     with working("Identifying"):
-        result = find(part, intersample=intersample.value)
+        result = find(part, intersample=intersample.value, structures=structure or None)
     notes = [] if split is None else _predictions(result, data, split)
     notes += _readings(result, at or [])
+    if by_hand:
+        from hmpim.report.by_hand import hand_notes
+
+        notes += [n for pair in result.pairs for n in hand_notes(pair, by_hand, fs=data.fs)]
     if not quiet:
         print_result(result, output_console())
         for note in notes:
             say(note)
     write_result(result, json=json, report=report, notes=notes)
+
+
+def _by_hand(given: Sequence[str]) -> dict[str, float]:
+    """Values by parameter of NAME=VALUE."""
+    values = {}
+    for text in given:
+        name, _, value = text.partition("=")
+        try:
+            values[name.strip()] = float(value)
+        except ValueError:
+            raise ArgumentError(
+                f"--hand {text!r} is no NAME=VALUE; write bandwidth_phase90=33"
+            ) from None
+    return values
 
 
 def _check_single(count: int, options: Mapping[str, object]) -> None:

@@ -8,17 +8,14 @@ from typing import Any
 from nicegui import events, ui
 
 from hmpim.errors import ArgumentError
-from hmpim.identify import Identification
 from hmpim.model.dynamics import STRUCTURES
-from hmpim.plots import pair_bode
-from hmpim.report.words import by_weight, headline, structure_words
+from hmpim.report.words import structure_words
 from hmpim.workbench.bench import Window
 from hmpim.workbench.desks import Analysis
 from hmpim.workbench.names import free_place
 from hmpim.workbench.pages.frame import Command, Later, card, failures_said
-from hmpim.workbench.parts.picture import Picture
-from hmpim.workbench.parts.table import parameter_cells, plain_table
-from hmpim.workbench.work.record import Looked, Question, found, look, write_report
+from hmpim.workbench.pages.result import ResultView
+from hmpim.workbench.work.record import Looked, Question, View, found, look
 
 __all__ = ["analyse"]
 
@@ -41,7 +38,7 @@ class AnalysePage:
         self.window = window
         self.workers = window.workbench.workers
         self.looked: Looked | None = None
-        self.result: Identification | None = None
+        self.result: ResultView | None = None
         with ui.element("div").classes("hm-side"):
             with card("Record"):
                 self._uploader()
@@ -71,7 +68,7 @@ class AnalysePage:
         """Show what was there when the page was left."""
         if self.wish.file:
             await self._looked()
-            if self.wish.inputs and self.wish.outputs:
+            if self.wish.inputs and self.wish.outputs and not self.shown.is_deleted:
                 await self.identify()
 
     def _known_files(self) -> list[str]:
@@ -119,7 +116,9 @@ class AnalysePage:
         with failures_said():
             await self._looked()
 
-    def _path(self) -> Path:
+    @property
+    def path(self) -> Path:
+        """The file, inside the folder of the runs."""
         root = self.window.workbench.settings.runs.resolve()
         path = (root / self.wish.file).resolve()
         if not path.is_relative_to(root):
@@ -132,9 +131,12 @@ class AnalysePage:
             ui.spinner()
             ui.label("Reading …")
         try:
-            self.looked = await self.workers.do(look, str(self._path()))
+            self.looked = await self.workers.do(look, str(self.path))
         finally:
-            self.choices.clear()
+            if not self.choices.is_deleted:
+                self.choices.clear()
+        if self.choices.is_deleted:
+            return
         if not self.wish.inputs and not self.wish.outputs:
             self.change(inputs=self.looked.inputs[:1], outputs=self.looked.outputs)
         with self.choices:
@@ -163,10 +165,14 @@ class AnalysePage:
                     on_change=lambda e: self.change(fs=e.value),
                 )
             with ui.element("div").classes("hm-row"):
-                ui.number("From (s)", value=self.wish.start,
-                          on_change=lambda e: self.change(start=e.value))  # fmt: skip
-                ui.number("To (s)", value=self.wish.stop,
-                          on_change=lambda e: self.change(stop=e.value))  # fmt: skip
+                self.ends = {
+                    name: ui.number(
+                        words,
+                        value=getattr(self.wish, name),
+                        on_change=lambda e, name=name: self.change(**{name: e.value}),
+                    ).props("step=any")
+                    for name, words in (("start", "From (s)"), ("stop", "To (s)"))
+                }
             known: dict[str, str] = {"": "any"}
             known |= {str(name): structure_words(name) for name in STRUCTURES}
             ui.select(
@@ -189,16 +195,24 @@ class AnalysePage:
                 ui.spinner()
                 ui.label("Identifying …")
             try:
-                self.result = await self.workers.do(found, self._question())
+                made = await self.workers.do(found, self.question, View(pair=wish.pair))
             finally:
-                self.shown.clear()
-                self.button.enable()
-            self._show()
+                if not self.shown.is_deleted:  # else the page was left meanwhile
+                    self.shown.clear()
+                    self.button.enable()
+            if self.shown.is_deleted:
+                return
+            with self.shown:
+                self.result = ResultView(self, made)
+            if (wish.window, wish.alpha) != ("gaussian", 1.5):
+                await self.result.see_through()
 
-    def _question(self) -> Question:
+    @property
+    def question(self) -> Question:
+        """What is asked, of which file."""
         wish = self.wish
         return Question(
-            file=str(self._path()),
+            file=str(self.path),
             inputs=wish.inputs,
             outputs=wish.outputs,
             fs=wish.fs,
@@ -206,36 +220,6 @@ class AnalysePage:
             stop=wish.stop,
             structure=wish.structure,
         )
-
-    def _show(self) -> None:
-        result = self.result
-        if result is None:
-            return
-        with self.shown:
-            with card("Verdict"):
-                classes = {"ok": "hm-ok", "doubtful": "hm-doubt"}.get(str(result.verdict), "hm-bad")
-                ui.label(headline(result)).classes(f"hm-verdict {classes}")
-                with ui.element("div").classes("hm-row"):
-                    ui.button("Report", icon="download", on_click=self._report)
-            pair = result.pairs[min(self.wish.pair, len(result.pairs) - 1)]
-            with card("Bode plot"):
-                Picture(pair_bode(pair, fs=result.record.fs))
-            with card("Parameters"):
-                columns, rows = parameter_cells(pair, self.wish.hand)
-                plain_table(columns, rows, title="Parameters")
-            if pair.warnings:
-                with card("Findings"):
-                    for finding in by_weight(pair.warnings):
-                        mark = "hm-doubt" if finding.severity == "doubt" else ""
-                        ui.label(finding.message).classes(mark)
-
-    async def _report(self) -> None:
-        with failures_said():
-            if self.result is None:
-                raise ArgumentError("nothing is identified yet")
-            page = self._path().with_name(f"{self._path().stem}.report.html")
-            await self.workers.do(write_report, self.result, str(page), ())
-            ui.download.file(page)
 
 
 def _command(wish: Analysis) -> str:
@@ -249,4 +233,6 @@ def _command(wish: Analysis) -> str:
             words += [option, f"{value:g}"]
     if wish.structure is not None:
         words += ["--structure", wish.structure]
+    for name, value in wish.hand.items():
+        words += ["--hand", f"{name}={value:.6g}"]
     return shlex.join([*words, "--report", f"{Path(wish.file).stem}.report.html"])

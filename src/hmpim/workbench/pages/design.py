@@ -157,10 +157,13 @@ class DesignPage:
         try:
             found = await self.window.workbench.workers.soon(designed, self.wish)
         except HmpimError as error:
+            if self.said.is_deleted:  # the page was left meanwhile
+                return
             self.said.set_text(" ".join(str(error).split()))
             self.said.classes(replace="hm-verdict hm-bad")
             return
-        self._show(found)
+        if not self.said.is_deleted:
+            self._show(found)
 
     def _show(self, found: Designed) -> None:
         self.said.set_text(found.words)

@@ -195,6 +195,8 @@ class RunPage:
                 (command.name, response.name),
                 (command.unit, response.unit),
             )
+            if self.estimates.is_deleted:
+                return
             self._show(figure)
             self.estimates.clear()
             with self.estimates:

@@ -1,5 +1,6 @@
 """A file looked at, read and identified."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -10,14 +11,29 @@ from hmpim.formats.files import read
 from hmpim.formats.options import ReadOptions
 from hmpim.formats.saving import save
 from hmpim.formats.survey import survey
-from hmpim.identify import Identification, PairIdentification, identify
+from hmpim.identify import Identification, PairIdentification, PaperEstimates, identify
+from hmpim.identify.paper import paper_analysis
 from hmpim.model.dynamics import StructureName
-from hmpim.plots import Figure, pair_bode
-from hmpim.record import Channel, Record
+from hmpim.plots import Figure, pair_bode, spectra
+from hmpim.record import Channel, Record, uniform
 from hmpim.record.clock import fit_clock
 from hmpim.report import report
+from hmpim.report.by_hand import hand_notes
+from hmpim.report.figures import Picture, pair_pictures
 
-__all__ = ["Looked", "Question", "found", "look", "read_record", "so_far", "write_report"]
+__all__ = [
+    "Found",
+    "Looked",
+    "Question",
+    "View",
+    "Windowed",
+    "found",
+    "look",
+    "read_record",
+    "so_far",
+    "windowed",
+    "write_report",
+]
 
 Samples = tuple[NDArray[np.float64], NDArray[np.float64]]
 
@@ -47,6 +63,31 @@ class Question:
     start: float | None = None
     stop: float | None = None
     structure: str | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class View:
+    """How a result is looked at: which pair, through which window."""
+
+    pair: int = 0
+    window: str = "gaussian"
+    alpha: float = 1.5
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Found:
+    """A result without its samples, and the pictures of one pair, as the report has them."""
+
+    result: Identification
+    pictures: tuple[Picture, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Windowed:
+    """The paper's figures through another window, and its spectra."""
+
+    estimates: PaperEstimates
+    spectra: Figure
 
 
 def look(path: str) -> Looked:
@@ -83,18 +124,66 @@ def read_record(question: Question) -> Record:
     )
 
 
-def found(question: Question) -> Identification:
-    """Identify what is asked about."""
+def found(question: Question, view: View) -> Found:
+    """Identify what is asked about, and describe its pictures.
+
+    Parameters
+    ----------
+    question : Question
+        Which file, which part.
+    view : View
+        How it is looked at.
+    """
+    result = _identified(question)
+    pairs = tuple(replace(p, time=None, prediction=None, residual=None) for p in result.pairs)
+    return Found(
+        result=replace(result, pairs=pairs, data=None),
+        pictures=tuple(pair_pictures(result, result.pairs[min(view.pair, len(pairs) - 1)])),
+    )
+
+
+def _identified(question: Question) -> Identification:
     only: tuple[StructureName, ...] | None = None
     if question.structure is not None:
         only = (question.structure,)  # type: ignore[assignment]
     return identify(read_record(question), structures=only)
 
 
-def write_report(result: Identification, path: str, notes: tuple[str, ...]) -> None:
-    """Write the page of a result, and the result beside it."""
+def windowed(question: Question, view: View, pair: PairIdentification) -> Windowed:
+    """Do the paper's steps with another window, and describe the spectra that they see."""
+    record = read_record(question)
+    aligned = uniform(record)
+    u, y = aligned.signal(pair.input), aligned.signal(pair.output)
+    done = paper_analysis(
+        u.values,
+        y.values,
+        aligned.fs,
+        band=record.band,
+        window=view.window,  # type: ignore[arg-type]
+        alpha=view.alpha,
+    )
+    figure = spectra(
+        done.frequency,
+        input_plain=done.input_db,
+        input_windowed=done.input_windowed_db,
+        output_plain=done.output_db,
+        output_windowed=done.output_windowed_db,
+        band=done.band,
+        input_name=pair.input,
+        output_name=pair.output,
+    )
+    return Windowed(estimates=done.estimates, spectra=figure)
+
+
+def write_report(
+    question: Question, path: str, pair: int, hand: Mapping[str, float]
+) -> tuple[str, ...]:
+    """Identify once more, and write the page and the result beside it; return the notes."""
+    result = _identified(question)
+    notes = hand_notes(result.pairs[min(pair, len(result.pairs) - 1)], hand, fs=result.record.fs)
     report(result, path, notes=notes)
-    save(replace(result), Path(path).with_suffix(".json"))
+    save(result, Path(path).with_suffix(".json"))
+    return notes
 
 
 def so_far(

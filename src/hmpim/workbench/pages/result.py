@@ -1,0 +1,229 @@
+"""A result on the page: verdict, table, pictures, and cursors to read them by eye."""
+
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any, Protocol
+
+from nicegui import ui
+
+from hmpim.identify import PairIdentification
+from hmpim.identify.windows import WindowName
+from hmpim.plots import Figure
+from hmpim.plots.by_hand import with_hand_values
+from hmpim.report.by_hand import reading_at
+from hmpim.report.figures import Picture as Described
+from hmpim.report.words import by_weight, headline
+from hmpim.workbench.bench import Window
+from hmpim.workbench.desks import Analysis
+from hmpim.workbench.pages.frame import card, failures_said
+from hmpim.workbench.parts.picture import Cursor, Picture
+from hmpim.workbench.parts.table import parameter_cells, plain_table
+from hmpim.workbench.work.record import Found, Question, View, windowed, write_report
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+__all__ = ["Owner", "ResultView"]
+
+_CLASSES = {"ok": "hm-ok", "doubtful": "hm-doubt"}
+_BY_HAND = {
+    "bandwidth_phase90": "−90° by hand (Hz)",
+    "bandwidth_3db": "−3 dB by hand (Hz)",
+    "delay": "Delay by hand (s)",
+}
+
+
+class Owner(Protocol):
+    """The page on which a result stands."""
+
+    window: Window
+    ends: dict[str, ui.number]
+
+    @property
+    def wish(self) -> Analysis:
+        """What is analysed, and what was set by hand."""
+
+    @property
+    def question(self) -> Question:
+        """What is asked, of which file."""
+
+    @property
+    def path(self) -> "Path":
+        """The file."""
+
+    def change(self, **changes: Any) -> None:
+        """Change the wish."""
+
+    async def identify(self) -> None:
+        """Identify anew."""
+
+
+class ResultView:
+    """What was found, and what is read off it by hand.
+
+    Parameters
+    ----------
+    owner : Owner
+        The page.
+    found : Found
+        The result and its pictures.
+    """
+
+    def __init__(self, owner: Owner, found: Found) -> None:
+        self.owner, self.found = owner, found
+        self.pair: PairIdentification = found.result.pairs[
+            min(owner.wish.pair, len(found.result.pairs) - 1)
+        ]
+        self.described = {picture.key: picture for picture in found.pictures}
+        self.pictures: dict[str, Picture] = {}
+        self.fields: dict[str, ui.number] = {}
+        self._verdict()
+        with card("Parameters"):
+            self.table = ui.element("div")
+        self._hand()
+        for picture in sorted(found.pictures, key=lambda p: p.key != "bode"):
+            self._picture(picture)
+        self._table()
+
+    def _verdict(self) -> None:
+        result = self.found.result
+        with card("Verdict"):
+            classes = _CLASSES.get(str(result.verdict), "hm-bad")
+            ui.label(headline(result)).classes(f"hm-verdict {classes}")
+            for finding in by_weight(self.pair.warnings)[:3]:
+                mark = "hm-doubt" if finding.severity == "doubt" else "hm-soft"
+                ui.label(finding.message).classes(mark)
+            with ui.element("div").classes("hm-row"):
+                ui.button("Report", icon="download", on_click=self._report)
+                if len(result.pairs) > 1:
+                    named = {k: f"{p.output} from {p.input}" for k, p in enumerate(result.pairs)}
+                    ui.select(
+                        named, label="Pair", value=self.owner.wish.pair, on_change=self._other
+                    )
+
+    async def _other(self, event: object) -> None:
+        self.owner.change(pair=int(getattr(event, "value", 0)), hand={})
+        await self.owner.identify()
+
+    def _hand(self) -> None:
+        wish = self.owner.wish
+        with card("By hand"):
+            ui.label(
+                "Drag the lines in the plots, or type; the automatic values stay beside."
+            ).classes("hm-soft")
+            with ui.element("div").classes("hm-row"):
+                for name, words in _BY_HAND.items():
+                    self.fields[name] = ui.number(
+                        words,
+                        value=wish.hand.get(name),
+                        on_change=lambda e, name=name: self.set(name, e.value),
+                    ).props("step=any debounce=300 clearable")
+                ui.select(
+                    list(WindowName.__args__),
+                    label="Window",
+                    value=wish.window,
+                    on_change=lambda e: self._through(window=e.value),
+                )
+                ui.number(
+                    "α", value=wish.alpha, min=0.1, max=20, step=0.1,
+                    on_change=lambda e: self._through(alpha=e.value),
+                ).props("debounce=300")  # fmt: skip
+            self.reading = ui.label().props('role="status"')
+
+    def _picture(self, picture: Described) -> None:
+        with card(picture.title):
+            self.pictures[picture.key] = Picture(
+                self._figure(picture.key), cursors=self._cursors(picture.key), on_cursor=self._drop
+            )
+            ui.label(picture.caption).classes("hm-soft")
+
+    def _figure(self, key: str) -> Figure:
+        figure = self.described[key].figure
+        if key == "bode":
+            return with_hand_values(figure, self.pair, self.owner.wish.hand)
+        return figure
+
+    def _cursors(self, key: str) -> list[Cursor]:
+        found, wish = self.pair.parameters, self.owner.wish
+        if key == "bode":
+            frequency = self.pair.frequency_response.frequency
+            middle = float(frequency[frequency.size // 2]) if frequency.size else 1.0
+            places = {"bandwidth_phase90": (1, "−90°"), "bandwidth_3db": (0, "−3 dB")}
+            return [
+                Cursor(name=name, at=self._value(name, middle), label=label, panel=panel)
+                for name, (panel, label) in places.items()
+            ]
+        if key == "correlation":
+            return [Cursor(name="delay", at=self._value("delay", 0.0), label="delay")]
+        if key == "signals" and found is not None:
+            time = self.described[key].figure.panels[0].items[0].x  # type: ignore[union-attr]
+            ends = {"start": float(time[0]), "stop": float(time[-1])}
+            words = {"start": "from", "stop": "to"}
+            return [
+                Cursor(name=name, at=getattr(wish, name) or end, label=words[name])
+                for name, end in ends.items()
+            ]
+        return []
+
+    def _value(self, name: str, otherwise: float) -> float:
+        by_hand = self.owner.wish.hand.get(name)
+        found = getattr(self.pair.parameters, name)
+        return by_hand if by_hand is not None else otherwise if found is None else found.value
+
+    async def _drop(self, name: str, at: float) -> None:
+        if name in ("start", "stop"):
+            self.owner.ends[name].set_value(float(f"{at:.6g}"))
+            await self.owner.identify()
+        else:
+            self.fields[name].set_value(float(f"{at:.5g}"))
+
+    def set(self, name: str, value: float | None) -> None:
+        """Set a value by hand, or take it back; table and plots follow."""
+        hand = {k: v for k, v in self.owner.wish.hand.items() if k != name}
+        if value is not None:
+            hand[name] = float(value)
+        self.owner.change(hand=hand)
+        self._table()
+        for key in ("bode", "correlation"):
+            if key in self.pictures:
+                self.pictures[key].show(self._figure(key), cursors=self._cursors(key))
+        if value is not None and name != "delay":
+            fs = self.found.result.record.fs
+            self.reading.set_text(reading_at(self.pair, float(value), fs=fs))
+
+    def _table(self) -> None:
+        self.table.clear()
+        columns, rows = parameter_cells(self.pair, self.owner.wish.hand)
+        with self.table:
+            plain_table(columns, rows, title="Parameters")
+
+    async def _through(self, **changes: object) -> None:
+        if None in changes.values():
+            return
+        self.owner.change(**changes)
+        await self.see_through()
+
+    async def see_through(self) -> None:
+        """Do the paper's steps through the chosen window; its column and spectra follow."""
+        wish = self.owner.wish
+        with failures_said():
+            seen = await self.owner.window.workbench.workers.do(
+                windowed,
+                self.owner.question,
+                View(window=wish.window, alpha=wish.alpha),
+                self.pair,
+            )
+            if self.table.is_deleted:
+                return
+            self.pair = replace(self.pair, paper=seen.estimates)
+            self._table()
+            if "spectra" in self.pictures:
+                self.pictures["spectra"].show(seen.spectra)
+
+    async def _report(self) -> None:
+        with failures_said():
+            page = self.owner.path.with_name(f"{self.owner.path.stem}.report.html")
+            wish = self.owner.wish
+            await self.owner.window.workbench.workers.do(
+                write_report, self.owner.question, str(page), wish.pair, wish.hand
+            )
+            ui.download.file(page)
