@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, cast
 
 import typer
 
@@ -34,6 +34,7 @@ from hmpim.errors import ArgumentError
 
 if TYPE_CHECKING:
     from hmpim.identify import Estimate, Identification
+    from hmpim.model.dynamics import StructureName
     from hmpim.record import Record
     from hmpim.report.figures import Picture
     from hmpim.stimulus import Stimulus
@@ -131,7 +132,7 @@ def identify(
     if holdout is not None and not 0.0 < holdout < 1.0:
         raise ArgumentError(f"--holdout {holdout:g} is not a share between 0 and 1; give 0.5, say")
 
-    single = {"--report": report, "--holdout": holdout, "--at": at or None}
+    single: dict[str, object] = {"--report": report, "--holdout": holdout, "--at": at or None}
     single |= {"--structure": structure or None, "--hand": hand or None}
     by_hand = _by_hand(hand or [])
     _check_single(len(records), single)
@@ -168,7 +169,7 @@ def identify(
     measurable(at or [], data.fs)
     part, split = (data, None) if holdout is None else _first_part(data, holdout)
     with working("Identifying"):
-        result = find(part, intersample=intersample.value, structures=structure or None)
+        result = find(part, intersample=intersample.value, structures=_structures(structure))
     notes = [] if split is None else _predictions(result, data, split)
     notes += _readings(result, at or [])
     if by_hand:
@@ -180,6 +181,11 @@ def identify(
         for note in notes:
             say(note)
     write_result(result, json=json, report=report, notes=notes)
+
+
+def _structures(given: "Sequence[str] | None") -> "list[StructureName] | None":
+    """Structures to try; None for all. The package says which one is not known."""
+    return cast("list[StructureName]", list(given)) if given else None
 
 
 def _by_hand(given: Sequence[str]) -> dict[str, float]:

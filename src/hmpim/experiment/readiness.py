@@ -116,7 +116,7 @@ def error_light(
     >>> model = RoughModel(delay=0.15, natural_frequency=10, damping_ratio=0.4)
     >>> light = error_light([stimulus], model=model, noise_std=0.1, wanted=0.1)
     >>> light.green, light.words
-    (True, 'natural frequency ± 0.0134 Hz (95 %), at most 0.1 Hz wanted')
+    (True, 'natural frequency ± 0.00629 Hz (95 %), at most 0.1 Hz wanted')
     """
     try:
         found = [

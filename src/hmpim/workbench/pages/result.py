@@ -1,13 +1,13 @@
 """A result on the page: verdict, table, pictures, and cursors to read them by eye."""
 
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol, get_args
 
 from nicegui import ui
 
 from hmpim.identify import PairIdentification
 from hmpim.identify.windows import WindowName
-from hmpim.plots import Figure
+from hmpim.plots import Curve, Figure
 from hmpim.plots.by_hand import with_hand_values
 from hmpim.report.by_hand import reading_at
 from hmpim.report.figures import Picture as Described
@@ -118,7 +118,7 @@ class ResultView:
                         on_change=lambda e, name=name: self.set(name, e.value),
                     ).props("step=any debounce=300 clearable")
                 ui.select(
-                    list(WindowName.__args__),
+                    list(get_args(WindowName)),
                     label="Window",
                     value=wish.window,
                     on_change=lambda e: self._through(window=e.value),
@@ -155,7 +155,7 @@ class ResultView:
         if key == "correlation":
             return [Cursor(name="delay", at=self._value("delay", 0.0), label="delay")]
         if key == "signals" and found is not None:
-            time = self.described[key].figure.panels[0].items[0].x  # type: ignore[union-attr]
+            time = self.described[key].figure.panels[0].of(Curve)[0].x
             ends = {"start": float(time[0]), "stop": float(time[-1])}
             words = {"start": "from", "stop": "to"}
             return [
