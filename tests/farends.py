@@ -136,9 +136,36 @@ class Cable:
             one.close()
 
 
-def begin(folder, port):
-    """Begin `hmpim run` of the sweep, its record in r.h5."""
+RAISING = """
+import sys, time
+from hmpim.experiment import RunLog, run
+from hmpim.formats.stimulus_files import read_stimuli
+from hmpim.rigs.catalogue import find_rig
+
+def watch(played):
+    if played.block.time[-1] >= float(sys.argv[2]):
+        open("raised.txt", "w").write(repr(time.perf_counter()))
+        raise ZeroDivisionError("from a watcher")
+
+with RunLog("run.log") as log:
+    run(
+        find_rig("udp://127.0.0.1:" + sys.argv[1]).rig, read_stimuli("s.csv")[0],
+        path="r.h5", subscribers=[watch], log=log,
+    )
+"""
+
+
+def begin(folder, port, *, raises_at=None):
+    """Begin `hmpim run` of the sweep, its record in r.h5.
+
+    With `raises_at`, a program of one's own instead, whose watcher raises at this time (s).
+    """
     save_stimulus(SWEEP, folder / "s.csv")
+    if raises_at is not None:
+        return subprocess.Popen(
+            [sys.executable, "-c", RAISING, str(port), str(raises_at)],
+            cwd=folder, stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True,
+        )  # fmt: skip
     return subprocess.Popen(
         [*HMPIM, "run", "--rig", f"udp://127.0.0.1:{port}", "--axis", AXIS, "s.csv",
          "-o", "r.h5", "--log", "run.log"],

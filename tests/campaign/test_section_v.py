@@ -34,12 +34,7 @@ def check(study):
     free = row("acceptance", "azimuth")
     ratio = free.inertia / row("loaded", "azimuth").inertia
     assert ratio < fast / bandwidth("acceptance", "azimuth") < ratio**0.4
-    # Fig. 22: friction lowers the bandwidth of small motions
-    levels = sorted((r for r in study.rows if r.test == "levels"), key=lambda r: r.peaks[2])
-    read = [samples_reading(r).value for r in levels]
-    assert read == sorted(read)
-    assert read[0] < 0.9 * read[-1]
-    assert levels[0].peaks[2] < linear_from(levels).peaks[2] < levels[-1].peaks[2]
+    check_levels(study)
     # Figs 24 and 25: all at once says the same
     joint = bandwidth("together", "roll", together=True)
     assert joint == pytest.approx(bandwidth("loaded", "roll"), rel=0.03)
@@ -47,6 +42,15 @@ def check(study):
     moved = [r.axis for r in study.rows if r.together]
     assert len(seen) == len(moved) * (len(moved) - 1)
     assert max(seen.values()) < 0.02
+
+
+def check_levels(study):
+    """Fig. 22: friction lowers the bandwidth of small motions."""
+    levels = sorted((r for r in study.rows if r.test == "levels"), key=lambda r: r.peaks[2])
+    read = [samples_reading(r).value for r in levels]
+    assert read == sorted(read)
+    assert read[0] < 0.9 * read[-1]
+    assert levels[0].peaks[2] < linear_from(levels).peaks[2] < levels[-1].peaks[2]
 
 
 def check_feedforward(study):
@@ -76,18 +80,29 @@ def test_stimuli_of_fig_18_are_above_30_db_up_to_10_hz(rate):
         assert stimulus.extinction > 1.5  # the paper's "severe extinction"
 
 
-def test_half_as_long(tmp_path):
-    """The reduced plan in 5 s, without what takes longest: feedforward, and the outer sweeps."""
+def half_as_long(*names):
+    """These tests of the reduced plan, in 5 s."""
     plan = read_plan(shipped_plan("section_v_reduced"))
-    left_out = {"outer", "acceleration"}
-    small = replace(
+    return replace(
         plan,
         duration=5.0,
         axes=tuple(replace(axis, travel=2.0) for axis in plan.axes),
-        tests=tuple(test for test in plan.tests if test.name not in left_out),
-        figures=tuple(f for f in plan.figures if not left_out & set(f.tests)),
+        tests=tuple(test for test in plan.tests if test.name in names),
+        figures=tuple(f for f in plan.figures if set(f.tests) <= set(names)),
+        specifications=tuple(s for s in plan.specifications if s.test in names),
     )
-    check(make_study(small, run_campaign(small, tmp_path)))
+
+
+def test_friction_lowers_the_bandwidth_of_small_motions(tmp_path):
+    plan = half_as_long("levels")
+    check_levels(make_study(plan, run_campaign(plan, tmp_path)))
+
+
+@pytest.mark.study
+def test_half_as_long(tmp_path):
+    """Without what takes longest: feedforward, and the outer sweeps."""
+    plan = half_as_long("acceptance", "loaded", "levels", "together")
+    check(make_study(plan, run_campaign(plan, tmp_path)))
 
 
 @pytest.mark.study

@@ -7,6 +7,9 @@ import sys
 from pathlib import Path
 
 import pytest
+from typer.testing import CliRunner
+
+from hmpim.cli.main import app
 
 DOC = Path(__file__).parents[2] / "docs" / "campaign.md"
 
@@ -41,19 +44,14 @@ def test_a_rig_of_ones_own_beside_its_plan(tmp_path):
         assert row["parameters"]["delay"]["value"] == pytest.approx(3 / row["rate"], abs=1e-4)
 
 
-def test_what_the_rig_raises_is_one_sentence(tmp_path):
+def test_what_the_rig_raises_is_one_sentence(tmp_path, monkeypatch):
     (tmp_path / "my_gimbal.py").write_text(
         "def play(case, stimuli, rng):\n    raise OSError('cable pulled')\n", encoding="utf-8"
     )
     (tmp_path / "my_gimbal.toml").write_text(block("toml"), encoding="utf-8")
-    done = subprocess.run(
-        [sys.executable, "-m", "hmpim.cli.main", "campaign", "my_gimbal.toml", "--out", "out"],
-        cwd=tmp_path,
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert done.returncode == 2
+    monkeypatch.chdir(tmp_path)
+    done = CliRunner().invoke(app, ["campaign", "my_gimbal.toml", "--out", "out"])
+    assert done.exit_code == 2
     assert done.stdout == ""
     words = r"hmpim: the rig failed in case bench\.\S+: OSError: cable pulled\n"
     assert re.fullmatch(words, done.stderr)

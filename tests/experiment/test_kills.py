@@ -7,11 +7,13 @@ import time
 import numpy as np
 import pytest
 
-from farends import AXIS, SWEEP, Cable, Table, Ticks, begin, check_rest, moving_since
+from farends import AXIS, SWEEP, Cable, Table, Ticks, begin, check_rest, moving_since, wait_for
 from hmpim.formats.recording import read_recording
 from hmpim.identify import identify
+from tests_support import in_studies
 
-KINDS = ("kill", "interrupt", "cable")
+KINDS = ("kill", "interrupt", "cable", "exception")
+SHARES = (0.6, 0.15, 0.15, 0.1)
 
 
 @pytest.fixture(scope="module")
@@ -24,15 +26,23 @@ def table(tmp_path_factory):
 def ended(table, folder, kind, at):
     """Begin a run, end it in some way `at` s into the motion, and return all that was done."""
     cable = Cable(table.port) if kind == "cable" else None
-    process = begin(folder, table.port if cable is None else cable.port)
+    process = begin(
+        folder,
+        table.port if cable is None else cable.port,
+        raises_at=at if kind == "exception" else None,
+    )
     try:
-        parts = moving_since(table, at, process)
-        if cable is not None:
+        parts = moving_since(table, 0.5 * at if kind == "exception" else at, process)
+        if kind == "exception":
+            wait_for((folder / "raised.txt").exists)
+        elif cable is not None:
             cable.plugged = False
         else:
             os.kill(process.pid, signal.SIGKILL if kind == "kill" else signal.SIGINT)
         now = time.perf_counter()
         _, said = process.communicate(timeout=60)
+        if kind == "exception":
+            now = float((folder / "raised.txt").read_text())
     finally:
         process.kill()
         process.wait()
@@ -59,6 +69,14 @@ def check(table, folder, kind, at):
         assert code == 130
         assert "ended early (KeyboardInterrupt)" in str(kept.record.findings)
         assert "table was told to stop" in (folder / "run.log").read_text()
+    elif kind == "exception":
+        assert code == 1
+        assert "ZeroDivisionError: from a watcher" in said
+        words = "a subscriber failed: ZeroDivisionError: from a watcher"
+        assert f"ended early ({words})" in str(kept.record.findings)
+        log = (folder / "run.log").read_text()
+        assert f"fault  {words}" in log or f"fault {words}" in log
+        assert "told to stop" in log
     else:
         assert code == 2
         assert "its watchdog" in said
@@ -72,7 +90,10 @@ def check_identified(record):
     assert pair.fit_percent > 95
 
 
-@pytest.mark.parametrize(("kind", "at"), [("kill", 2.6), ("interrupt", 0.8), ("cable", 1.1)])
+@pytest.mark.parametrize(
+    ("kind", "at"),
+    [("kill", 2.6), ("exception", 0.8), ("cable", 0.8), *in_studies(("interrupt", 0.8))],
+)
 def test_at_rest_inside_the_limits_and_the_record_kept_and_identified(table, tmp_path, kind, at):
     record = check(table, tmp_path, kind, at)
     if kind == "kill":  # the others in the study
@@ -87,7 +108,7 @@ def test_at_any_moment(table, tmp_path):
         folder = tmp_path / str(number)
         folder.mkdir()
         at = rng.uniform(0.0, SWEEP.samples / SWEEP.fs - 0.6)
-        kind = KINDS[int(rng.choice(3, p=[0.7, 0.15, 0.15]))]
+        kind = KINDS[int(rng.choice(4, p=SHARES))]
         if kind == "kill" and at < 0.6:
             ticks, now, *_ = ended(table, folder, kind, at)
             check_rest(ticks, ended=now)

@@ -45,6 +45,7 @@ def test_bandwidths_are_those_of_each_axis_alone(stimuli):
             assert pair.parameters.scale_factor is None  # inertia couples nothing at rest
 
 
+@pytest.mark.study  # small: tests/campaign/test_compare.py, test_five_axes.py
 def test_couplings_by_inertia_are_seen_where_they_are_and_nowhere_else(stimuli):
     table, _, found = together(stimuli, friction=False)
     seen = 0

@@ -141,7 +141,7 @@ class Running:
             record = self._played(ready, findings, recorder)
         except BaseException as error:
             with undisturbed():
-                kept = recorder.fail(f"{type(error).__name__}: {error}".rstrip(": "))
+                kept = recorder.fail(_words(error))
             if kept:
                 self.log.add("note", f"what was recorded until then is in {self.path}")
             raise
@@ -233,8 +233,15 @@ class Running:
         try:
             yield
         except BaseException as error:
-            self.log.add("fault", f"{type(error).__name__}: {error}")
+            self.log.add("fault", _words(error))
             raise
+
+
+def _words(error: BaseException) -> str:
+    """What failed, by its own name."""
+    if isinstance(error, _WatcherError):
+        return str(error)
+    return f"{type(error).__name__}: {error}".rstrip(": ")
 
 
 def _ended_early(reason: str, seconds: float) -> Finding:
