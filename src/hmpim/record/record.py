@@ -13,6 +13,7 @@ from hmpim.equality import ByValue
 from hmpim.errors import ArgumentError, RecordError
 from hmpim.record.clock import fit_clock
 from hmpim.record.finding import Finding
+from hmpim.tables import html_table, shortened
 from hmpim.units import check_unit
 
 __all__ = ["ROLES", "Channel", "Intersample", "Record", "Role"]
@@ -107,6 +108,11 @@ class Channel(ByValue):
                 "or cut it there"
             )
 
+    def __repr__(self) -> str:
+        unit = f" {self.unit}" if self.unit else ""
+        span = f"{self.time[0]:.6g} to {self.time[-1]:.6g} s"
+        return f"Channel({shortened([self.name])}{unit}, {self.values.size} samples, {span})"
+
 
 @checked
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -162,6 +168,32 @@ class Record(ByValue):
         _check_rate(self.fs)
         if self.band is not None:
             object.__setattr__(self, "band", _rising(self.band))
+
+    def __repr__(self) -> str:
+        inputs, outputs = (shortened([c.name for c in p]) for p in (self.inputs, self.outputs))
+        found = f", {len(self.findings)} findings" if self.findings else ""
+        size = self.outputs[0].values.size
+        return (
+            f"Record({inputs} → {outputs}, {size} samples, {self.duration:.6g} s at "
+            f"{self.fs:.6g} Hz{found})"
+        )
+
+    def _repr_html_(self) -> str:
+        """Return a table of the channels, as a notebook shows it."""
+        roles = ("input", "output", "reference", "auxiliary")
+        parts = (self.inputs, self.outputs, self.references, self.auxiliary)
+        rows = [
+            [role, c.name, c.unit, str(c.values.size), *_spans(c)]
+            for role, part in zip(roles, parts, strict=True)
+            for c in part
+        ]
+        heads = ["role", "channel", "unit", "samples", "time in s", "values"]
+        return html_table(
+            f"Record, {self.duration:.6g} s at {self.fs:.6g} Hz",
+            heads,
+            rows,
+            notes=[*([self.source] if self.source else []), *(f.message for f in self.findings)],
+        )
 
     @classmethod
     @checked
@@ -380,6 +412,12 @@ class Record(ByValue):
             auxiliary=tuple(free),
             intersample=self.intersample if same else None,
         )
+
+
+def _spans(channel: Channel) -> tuple[str, str]:
+    """From when to when, and from what to what."""
+    time, values = channel.time, channel.values
+    return f"{time[0]:.6g} to {time[-1]:.6g}", f"{values.min():.6g} to {values.max():.6g}"
 
 
 def _hidden(values: ArrayLike) -> NDArray[np.bool_] | None:

@@ -19,6 +19,7 @@ from hmpim.stimulus.reverse import Reversed
 from hmpim.stimulus.sampled import SampledMotion
 from hmpim.stimulus.solve import sweep_peaks
 from hmpim.stimulus.sweep import Sweep, check_positive
+from hmpim.tables import html_table, shortened
 from hmpim.units import check_unit, rate_label
 
 __all__ = ["Stimulus", "blocks"]
@@ -107,6 +108,25 @@ class Stimulus(ByValue):
             _keep(peaks, limits)
             if self.resolution > 0.0:
                 self.commanded()
+
+    def __repr__(self) -> str:
+        axis = f"{shortened([self.axis])}: " if self.axis else ""
+        band = f" {self.band[0]:.6g} to {self.band[1]:.6g} Hz" if self.band else ""
+        return (
+            f"Stimulus({axis}{type(self.core).__name__}{band}, {self.duration:.6g} s at "
+            f"{self.fs:.6g} Hz, {self.peaks.position:.6g} {self.unit}".rstrip()
+            + ")"
+        )
+
+    def _repr_html_(self) -> str:
+        """Return a table of peaks and limits, as a notebook shows it."""
+        rows = []
+        for order, name in enumerate(QUANTITIES):
+            limit = math.inf if self.limits is None else getattr(self.limits, name)
+            peak = getattr(self.peaks, name)
+            cells = [f"{each:.6g}" if math.isfinite(each) else "–" for each in (peak, limit)]
+            rows.append([name, *cells, rate_label(self.unit, order)])
+        return html_table(repr(self), ["quantity", "peak", "limit", "unit"], rows)
 
     @property
     def duration(self) -> float:

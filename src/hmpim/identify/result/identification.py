@@ -10,8 +10,9 @@ from hmpim.identify.result.estimate import Verdict
 from hmpim.identify.result.first_schema import FIRST_SCHEMA, upgraded
 from hmpim.identify.result.inputs import InputSet
 from hmpim.identify.result.lookup import find_pair
-from hmpim.identify.result.pair import PairIdentification
+from hmpim.identify.result.pair import PairIdentification, pair_rows
 from hmpim.record import Record
+from hmpim.tables import html_table, shortened
 
 __all__ = ["SCHEMA", "Identification", "RecordSummary"]
 
@@ -52,6 +53,28 @@ class Identification(ByValue):
 
     def __len__(self) -> int:
         return len(self.pairs)
+
+    def __repr__(self) -> str:
+        if len(self.pairs) == 1:
+            return f"Identification({self.pairs[0]!r})"
+        names = [f"{pair.output}/{pair.input}" for pair in self.pairs]
+        return f"Identification({len(names)} pairs, {self.verdict}: {shortened(names)})"
+
+    def _repr_html_(self) -> str:
+        """Return a table of the figures of every pair, as a notebook shows it."""
+        rows = [
+            [f"{pair.input} → {pair.output}", *row]
+            for pair in self.pairs
+            for row in pair_rows(pair) or [["–", "–", "–", pair.verdict]]
+        ]
+        said = dict.fromkeys(w.message for pair in self.pairs for w in pair.warnings)
+        source = f" of {self.record.source}" if self.record.source else ""
+        return html_table(
+            f"Identification{source}: {self.verdict}",
+            ["from → to", "parameter", "value", "95 %", "verdict"],
+            rows,
+            notes=list(said),
+        )
 
     @property
     def verdict(self) -> Verdict:

@@ -8,12 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hmpim.equality import ByValue
+from hmpim.identify.result.digits import interval
 from hmpim.identify.result.estimate import Estimate, Verdict
 from hmpim.identify.result.measured import FrequencyResponse, Nonlinearity, ResponseBandwidths
 from hmpim.identify.result.parameters import PaperEstimates, Parameters
 from hmpim.record import Finding, Intersample
+from hmpim.tables import html_table, shortened
 
-__all__ = ["Candidate", "PairIdentification"]
+__all__ = ["Candidate", "PairIdentification", "pair_rows"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -65,6 +67,21 @@ class PairIdentification(ByValue):
     residual: NDArray[np.float64] | None = field(default=None, compare=False)
     nonlinearity: Nonlinearity | None = None
     covariance: NDArray[np.float64] | None = None
+
+    def __repr__(self) -> str:
+        told = dict(_given(self.parameters))
+        said = [f"{name} {told[name]}" for name in _FIRST if name in told]
+        what = ", ".join([self.structure, self.verdict, *said])
+        return f"PairIdentification({shortened([self.input])} → {shortened([self.output])}: {what})"
+
+    def _repr_html_(self) -> str:
+        """Return a table of the figures, as a notebook shows it."""
+        return html_table(
+            f"{self.input} → {self.output}: {self.verdict}",
+            ["parameter", "value", "95 %", "verdict"],
+            pair_rows(self),
+            notes=[finding.message for finding in self.warnings],
+        )
 
     def to_dict(self) -> dict[str, Any]:
         """Return the pair as plain JSON values (DESIGN.md, Result JSON)."""
@@ -200,3 +217,22 @@ class PairIdentification(ByValue):
     def quantization_step(self) -> Estimate | None:
         """Smallest step of the output."""
         return self.parameters.quantization_step
+
+
+_FIRST = ("delay", "natural_frequency", "time_constant", "damping_ratio")
+"""Figures that a line has room for."""
+
+
+def _given(parameters: Parameters) -> list[tuple[str, Estimate]]:
+    named = ((each.name, getattr(parameters, each.name)) for each in fields(parameters))
+    return [(name, estimate) for name, estimate in named if estimate is not None]
+
+
+def pair_rows(pair: PairIdentification) -> list[list[str]]:
+    """Name, value with its error, interval and verdict of each figure that there is."""
+    rows = []
+    for name, estimate in _given(pair.parameters):
+        low, high = estimate.ci95 or (None, None)
+        between = interval(low, high, value=estimate.value, std=estimate.std)
+        rows.append([name.replace("_", " "), estimate.text, between, estimate.verdict])
+    return rows

@@ -1,0 +1,103 @@
+"""What a notebook shows of a value: a short line, a plain table, nothing of a file that acts."""
+
+from dataclasses import replace
+from html.parser import HTMLParser
+
+import numpy as np
+import pytest
+
+import hmpim
+from hmpim.record import Channel, Finding, Record
+from hmpim.tables import html_table
+
+LIMITS = hmpim.Limits(position=10, velocity=1000, acceleration=40000, unit="deg")
+EVIL = "<script>alert('1')</script>"
+
+
+@pytest.fixture(scope="module")
+def shown():
+    stimulus = hmpim.design(band=(0.5, 20), duration=4, fs=200, limits=LIMITS)
+    sensor = hmpim.Sensor(delay=0.15, natural_frequency=10, damping_ratio=0.4, noise_std=0.1)
+    record = hmpim.run(sensor, stimulus, rng=1)
+    result = hmpim.identify(record)
+    return {"stimulus": stimulus, "record": record, "result": result, "pair": result["y", "u"]}
+
+
+class Cells(HTMLParser):
+    """Tags and texts of a page, as a browser sees them."""
+
+    def __init__(self):
+        super().__init__()
+        self.tags, self.words = [], []
+
+    def handle_starttag(self, tag, attrs):
+        self.tags.append(tag)
+
+    def handle_data(self, data):
+        self.words.append(data)
+
+
+def parsed(value):
+    cells = Cells()
+    cells.feed(value._repr_html_())
+    return cells
+
+
+def test_a_value_is_one_short_line(shown):
+    for name, value in shown.items():
+        line = repr(value)
+        assert len(line) < 300, name
+        assert "\n" not in line
+        assert "array" not in line
+    assert repr(shown["record"]).startswith("Record(u → y, ")
+    assert "Sweep 0.5 to 20 Hz" in repr(shown["stimulus"])
+    assert "delay 0.1" in repr(shown["pair"])
+    assert "±" in repr(shown["result"])
+
+
+def test_a_notebook_shows_a_plain_table(shown):
+    for value in shown.values():
+        cells = parsed(value)
+        assert cells.tags.count("table") == 1
+        assert set(cells.tags) <= {"table", "caption", "thead", "tbody", "tr", "th", "td", "p"}
+    pair = shown["pair"]
+    words = parsed(pair).words
+    assert str(pair.delay) in words
+    assert "natural frequency" in words
+    assert f"{shown['stimulus'].peaks.velocity:.6g}" in parsed(shown["stimulus"]).words
+    assert {"u", "y", "deg"} <= set(parsed(shown["record"]).words)
+
+
+def test_names_from_a_file_are_words_and_nothing_else():
+    t = np.arange(200) / 100.0
+    u = np.sin(2 * np.pi * (0.5 * t + 2 * t**2))
+    record = Record(
+        inputs=(Channel(name=EVIL, time=t, values=u),),
+        outputs=(Channel(name="y" * 5000, time=t, values=u),),
+        fs=100.0,
+        source=EVIL,
+        findings=(Finding(code="x", message=EVIL, severity="info", parameters=()),),
+    )
+    result = hmpim.identify(record)
+    for value in (record, result, *result):
+        cells = parsed(value)
+        assert "script" not in cells.tags
+        assert "<script" not in value._repr_html_()
+        assert any(EVIL in words for words in cells.words)
+        assert len(repr(value)) < 600
+
+
+def test_a_cell_holds_no_control_character_and_has_an_end():
+    page = html_table("a\x1b[31mb", ["x"], [["y" * 10_000]])
+    assert "\x1b" not in page
+    assert len(page) < 500
+
+
+def test_a_result_of_many_pairs_names_a_few(shown):
+    pairs = tuple(
+        replace(shown["pair"], input=f"u{j}", output=f"y{k}") for j in range(5) for k in range(5)
+    )
+    result = replace(shown["result"], pairs=pairs)
+    assert "25 pairs" in repr(result)
+    assert "and 21 more" in repr(result)
+    assert parsed(result).words.count("natural frequency") == 25
