@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import hmpim
+from hmpim import plots
 from hmpim.record import Channel, Finding, Record
 from hmpim.tables import html_table
 
@@ -101,3 +102,32 @@ def test_a_result_of_many_pairs_names_a_few(shown):
     assert "25 pairs" in repr(result)
     assert "and 21 more" in repr(result)
     assert parsed(result).words.count("natural frequency") == 25
+
+
+def test_pictures_take_results_and_records_as_they_are(shown):
+    record, result = shown["record"], shown["result"]
+    assert len(plots.bode(result).panels) >= 2
+    pair = shown["pair"]
+    for draw in (plots.residuals, plots.model_over_measurement, plots.bode):
+        assert draw(result).to_svg() == draw(pair).to_svg()
+    whole = plots.model_over_measurement(pair).panels[0]
+    assert whole.y.label == "y (deg)"
+    assert np.array_equal(whole.items[0].y, pair.prediction + pair.residual)
+    both = plots.input_output(record)
+    assert np.array_equal(both.panels[0].items[0].y, record.inputs[0].values)
+    assert "<svg" in both._repr_html_()
+
+
+def test_a_picture_that_cannot_be_chosen_says_how(shown):
+    pair = shown["pair"]
+    several = replace(shown["result"], pairs=(pair, replace(pair, output="z")))
+    with pytest.raises(hmpim.HmpimError, match=r'2 pairs; give one of them: result\["y", "u"\]'):
+        plots.residuals(several)
+    read_back = type(shown["result"]).from_dict(shown["result"].to_dict())
+    with pytest.raises(hmpim.HmpimError, match=r"no time histories.*identify the record again"):
+        plots.model_over_measurement(read_back)
+    with pytest.raises(hmpim.HmpimError, match="u and y are missing"):
+        plots.input_output(pair.time)
+    two = Record.from_arrays({"u": [0.0, 1.0], "v": [0.0, 1.0]}, {"y": [0.0, 1.0]}, fs=1.0)
+    with pytest.raises(hmpim.HmpimError, match=r"several channels \(u, v, y\).*with_roles"):
+        plots.input_output(two)

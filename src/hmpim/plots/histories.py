@@ -6,12 +6,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from hmpim.errors import ArgumentError
 from hmpim.identify.correlation import autocorrelation
 from hmpim.plots.description import Axis, Curve, Figure, Item, Panel, Rule
+from hmpim.plots.results import model_of, residual_of, signals_of
 from hmpim.plots.style import axis_label, plain
 from hmpim.units import rate_label
 
 if TYPE_CHECKING:
+    from hmpim.identify import Identification, PairIdentification
+    from hmpim.record import Record
     from hmpim.stimulus import Stimulus
 
 __all__ = ["input_output", "model_over_measurement", "residuals", "time_histories"]
@@ -65,9 +69,9 @@ def time_histories(stimulus: "Stimulus") -> Figure:
 
 
 def input_output(
-    time: NDArray[np.float64],
-    u: NDArray[np.float64],
-    y: NDArray[np.float64],
+    time: "NDArray[np.float64] | Record",
+    u: NDArray[np.float64] | None = None,
+    y: NDArray[np.float64] | None = None,
     *,
     input_name: str = "input",
     output_name: str = "output",
@@ -80,8 +84,8 @@ def input_output(
 
     Parameters
     ----------
-    time : ndarray, shape (n,)
-        Seconds.
+    time : ndarray, shape (n,), or Record
+        Seconds; or a record of one input and one output, which tells all the rest.
     u, y : ndarray, shape (n,)
         Input and output.
     input_name, output_name : str
@@ -96,6 +100,10 @@ def input_output(
     >>> len(figure.panels)
     2
     """
+    if not isinstance(time, np.ndarray):
+        return input_output(**signals_of(time))
+    if u is None or y is None:
+        raise ArgumentError("u and y are missing; give both, or a record alone")
     into = Curve(x=time, y=u, label="input")
     out = Curve(x=time, y=y, label="output", colour="output", dashes="--", width=1.0)
     alt = f"{plain(input_name)} and {plain(output_name)} over time."
@@ -125,9 +133,9 @@ def input_output(
 
 
 def model_over_measurement(
-    time: NDArray[np.float64],
-    measured: NDArray[np.float64],
-    predicted: NDArray[np.float64],
+    time: "NDArray[np.float64] | Identification | PairIdentification",
+    measured: NDArray[np.float64] | None = None,
+    predicted: NDArray[np.float64] | None = None,
     *,
     output_name: str = "output",
     unit: str = "",
@@ -136,8 +144,8 @@ def model_over_measurement(
 
     Parameters
     ----------
-    time : ndarray, shape (n,)
-        Seconds.
+    time : ndarray, shape (n,), Identification or PairIdentification
+        Seconds; or a result of one pair, which tells all the rest.
     measured, predicted : ndarray, shape (n,)
         The output as recorded and as the fitted model says.
     output_name, unit : str
@@ -150,6 +158,10 @@ def model_over_measurement(
     >>> len(figure.panels)
     2
     """
+    if not isinstance(time, np.ndarray):
+        return model_over_measurement(**model_of(time))
+    if measured is None or predicted is None:
+        raise ArgumentError("measured and predicted are missing; give both, or a result alone")
     start, stop = _busiest_tenth(predicted)
     panels = []
     for row, (part, title) in enumerate(
@@ -183,8 +195,8 @@ def model_over_measurement(
 
 
 def residuals(
-    time: NDArray[np.float64],
-    residual: NDArray[np.float64],
+    time: "NDArray[np.float64] | Identification | PairIdentification",
+    residual: NDArray[np.float64] | None = None,
     *,
     output_name: str = "output",
     unit: str = "",
@@ -196,8 +208,8 @@ def residuals(
 
     Parameters
     ----------
-    time : ndarray, shape (n,)
-        Seconds.
+    time : ndarray, shape (n,), Identification or PairIdentification
+        Seconds; or a result of one pair, which tells all the rest.
     residual : ndarray, shape (n,)
         Measured minus predicted.
     output_name, unit : str
@@ -210,6 +222,10 @@ def residuals(
     >>> figure.panels[1].y.label
     'Autocorrelation (–)'
     """
+    if not isinstance(time, np.ndarray):
+        return residuals(**residual_of(time))
+    if residual is None:
+        raise ArgumentError("residual is missing; give it, or a result alone")
     step = float(np.median(np.diff(time)))
     most = min(residual.size - 1, MOST_LAGS)
     whole = autocorrelation(residual - residual.mean()).value[residual.size - 1 :]
