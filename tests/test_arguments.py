@@ -137,6 +137,11 @@ def calls(result):
             {"model": hmpim.to_model(pair), "count": 2, "rng": 1},
         ),
         "identify": (hmpim.identify, {"record": record, **intersample}),
+        "compress": (
+            hmpim.compress,
+            {"record": record, "lags": 20, "channels": ("u", "y"), "knots": (0.0, 1.0)}
+            | {"bias": "own"},
+        ),
         "identify_levels": (
             hmpim.identify_levels,
             {"records": [record, recorded(2.0, 2)], "amplitudes": None, **intersample},
@@ -240,6 +245,7 @@ TABLE = (
     "simulate",
     "draw_models",
     "identify",
+    "compress",
     "identify_levels",
     "identify_repeats",
     "paper_analysis",

@@ -18,30 +18,32 @@ from hmpim.formats.csv import write_csv
 from hmpim.formats.files import read
 from hmpim.formats.readers.text import read_text
 from hmpim.formats.recording import read_recording, save_recording
+from hmpim.formats.statistics_files import SCHEMA as STATISTICS
+from hmpim.formats.statistics_files import read_statistics, save_statistics
 from hmpim.formats.stimulus_files import STIMULUS_SUFFIXES, save_stimulus
 from hmpim.formats.stimulus_spec import read_stimulus_toml
-from hmpim.identify import Identification
+from hmpim.identify import Identification, Statistics
 from hmpim.record import Record
 from hmpim.stimulus import Stimulus
 
 __all__ = ["Saved", "load", "save", "suffixes_of"]
 
-Saved = Record | Stimulus | Identification
+Saved = Record | Stimulus | Identification | Statistics
 """What can be saved."""
 
 
 @checked
 def save(thing: Saved, path: str | PathLike[str]) -> None:
-    """Write a record, a stimulus or a result to a file, so that `load` gives it back.
+    """Write a record, a stimulus, a result or statistics to a file, so that `load` gives it back.
 
     Parameters
     ----------
-    thing : Record, Stimulus or Identification
+    thing : Record, Stimulus, Identification or Statistics
         What to save.
     path : str or path-like
         The file; replaced as a whole, or not at all. Its suffix says in which form: `.h5` for a
         record (docs/files.md), or `.csv` if all its channels have one clock; `.toml` for a
-        stimulus; `.json` for a result.
+        stimulus; `.json` for a result; `.h5` for statistics.
 
     Raises
     ------
@@ -156,6 +158,10 @@ def _read_record(path: Path) -> Record:
     return read_recording(path).record if ours else read(path)
 
 
+def _knows_statistics(head: bytes) -> bool:
+    return STATISTICS.encode() in head
+
+
 def _write_result(result: Identification, path: str | PathLike[str]) -> None:
     write_text(path, json.dumps(result.to_dict(), indent=1, allow_nan=False) + "\n")
 
@@ -204,6 +210,14 @@ _KINDS = (
         write=_write_record,
         knows=_knows_record,
         read=_read_record,
+    ),
+    _Kind(
+        name="statistics",
+        type=Statistics,
+        suffixes=(".h5", ".hdf5"),
+        write=save_statistics,
+        knows=_knows_statistics,
+        read=read_statistics,
     ),
     _Kind(
         name="a stimulus",

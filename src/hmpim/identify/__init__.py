@@ -42,6 +42,7 @@ from hmpim.identify.result import (
     Verdict,
 )
 from hmpim.identify.spectrum import excited_band
+from hmpim.identify.statistics import Statistics, compress
 from hmpim.identify.validate import Bounds, Check, OutputValidation, Validation, validate
 
 __all__ = [
@@ -75,6 +76,7 @@ __all__ = [
     "Repeats",
     "ResponseBandwidths",
     "ResponseMatrix",
+    "Statistics",
     "Trend",
     "Validation",
     "Verdict",
@@ -82,6 +84,7 @@ __all__ = [
     "coherence_significance",
     "compare",
     "compare_levels",
+    "compress",
     "excited_band",
     "gain_and_phase",
     "identify",

@@ -31,6 +31,8 @@ from hmpim.identify.result import (
     PairIdentification,
     RecordSummary,
 )
+from hmpim.identify.statistics.describe import identify_statistics
+from hmpim.identify.statistics.statistics import Statistics
 from hmpim.identify.swapped import is_swapped, swapped_finding
 from hmpim.identify.threads import one_thread
 from hmpim.identify.whiteness import is_white
@@ -50,7 +52,7 @@ _BETTER = 0.7
 
 @checked
 def identify(
-    record: Record,
+    record: Record | Statistics,
     *,
     intersample: Intersample | str = "auto",
     structures: Sequence[StructureName] | None = None,
@@ -62,8 +64,9 @@ def identify(
 
     Parameters
     ----------
-    record : Record
-        Inputs and outputs of one test; every pair is identified.
+    record : Record or Statistics
+        Inputs and outputs of one test; every pair is identified. Of `hmpim.compress`ed records,
+        what needs samples is left out and said.
     intersample : {'auto', 'zoh', 'foh', 'bandlimited'}
         Whether the input is held, linear or band-limited between its samples. 'auto' takes
         what the record states, and else the likeliest.
@@ -103,6 +106,9 @@ def identify(
     for name in names:
         if name not in STRUCTURES:
             raise ArgumentError(f"structure {name!r} is not known; choose of {list(STRUCTURES)}")
+    if isinstance(record, Statistics):
+        with one_thread():
+            return identify_statistics(record, intersample=chosen, structures=names)
     _check_length(record)
     _check_size(record)
     aligned = uniform(record)
@@ -137,7 +143,7 @@ def identify(
     )
 
 
-def _checked_intersample(intersample: str, record: Record) -> Intersample | None:
+def _checked_intersample(intersample: str, record: Record | Statistics) -> Intersample | None:
     if intersample == "auto":
         return record.intersample
     for known in get_args(Intersample):

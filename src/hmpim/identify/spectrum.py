@@ -13,6 +13,7 @@ from hmpim.identify.windows import WindowName, window_samples
 __all__ = [
     "Spectrum",
     "TransferFunction",
+    "band_of_levels",
     "decibel",
     "excited_band",
     "padding",
@@ -300,7 +301,25 @@ def excited_band(u: ArrayLike, fs: float) -> tuple[float, float]:
     running = np.concatenate(([0.0], np.cumsum(np.concatenate(([0, 0], power, [0, 0])))))
     level = np.sqrt(np.maximum(running[5:] - running[:-5], 0.0))
     level[0] = 0.0
-    frequency = np.arange(level.size) * (fs / length)
+    return band_of_levels(level, fs / length)
+
+
+def band_of_levels(level: NDArray[np.float64], step: float) -> tuple[float, float]:
+    """Excited band in Hz of an amplitude spectrum, by the rules of `excited_band`.
+
+    Parameters
+    ----------
+    level : ndarray, shape (m,)
+        Amplitude from 0 Hz to half the rate, the mean left out.
+    step : float
+        Hz from one to the next.
+
+    Examples
+    --------
+    >>> band_of_levels(np.array([0.0, 1.0, 1.0, 1.0, 0.0, 0.0]), 2.0)
+    (2.0, 6.0)
+    """
+    frequency = np.arange(level.size) * step
     top = float(level.max())
     floor = _DEEPEST * top
     ceiling = float(np.median(level[-max(level.size // 20, 1) :]))
@@ -310,4 +329,4 @@ def excited_band(u: ArrayLike, fs: float) -> tuple[float, float]:
     low = int(np.argmax(level >= _EDGE * top))
     high = int(np.flatnonzero(velocity >= _EDGE * velocity.max())[-1])
     high = max(high, low + 1)
-    return float(frequency[low]), min(float(frequency[high]), fs / 2)
+    return float(frequency[low]), min(float(frequency[high]), float(frequency[-1]))

@@ -19,9 +19,9 @@ from hmpim.identify.uncertainty import covariance
 from hmpim.model.dynamics import STRUCTURES
 from hmpim.model.sampled import delayed_response
 
-__all__ = ["HiddenPole", "hidden_pole", "widened"]
+__all__ = ["FAR", "HiddenPole", "hidden_pole", "stretched", "widened"]
 
-_FAR = 30.0
+FAR = 30.0
 """Deviance beyond which the simpler structure is out of the question."""
 
 _PROBE = 0.3
@@ -58,12 +58,29 @@ def widened(joint: JointFit, cov: NDArray[np.float64]) -> NDArray[np.float64]:
     )
     if fit.structure.name != "second_order" or simple is None or not np.isfinite(cov).all():
         return cov
-    if _deviance(simple, joint) > 2 * _FAR:
+    if _deviance(simple, joint) > 2 * FAR:
         return cov
     simple = fit_structure(problem, STRUCTURES["first_order"], simple.theta)
     deviance = _deviance(simple, joint)
-    if deviance > _FAR:
+    if deviance > FAR:
         return cov
+    return stretched(cov, simple, fit, deviance)
+
+
+def stretched(
+    cov: NDArray[np.float64], simple: Fit, fit: Fit, deviance: float
+) -> NDArray[np.float64]:
+    """Widen the covariance of a second-order fit until a first-order one lies √deviance away.
+
+    Parameters
+    ----------
+    cov : ndarray, shape (p, p)
+        Of theta and the linear parameters.
+    simple, fit : Fit
+        Of first and of second order.
+    deviance : float
+        Twice the difference of their log-likelihoods; at least 1 is taken.
+    """
     deviance = max(deviance, 1.0)
     there = np.concatenate([simple.theta, [0.0], simple.linear])
     apart = there - np.concatenate([fit.theta, fit.linear])

@@ -3,7 +3,7 @@
 import numpy as np
 
 from hmpim.identify.fitting.enrich import PLAIN
-from hmpim.identify.fitting.nested import hidden_pole
+from hmpim.identify.fitting.nested import HiddenPole, hidden_pole
 from hmpim.identify.fitting.trial import Trial
 from hmpim.identify.groups import PHASE_SPLIT
 from hmpim.identify.judgement.evidence import Evidence, structure_in_words
@@ -11,7 +11,7 @@ from hmpim.identify.readings import system_of
 from hmpim.model import bandwidth_3db, bandwidth_phase
 from hmpim.record import Finding
 
-__all__ = ["missed_pole", "other_structure", "undecided_order"]
+__all__ = ["missed_pole", "one_more_pole", "other_structure", "undecided_order"]
 
 _AMBIGUOUS = 4.0
 """Difference of the criterion within which another plain structure is worth naming."""
@@ -119,22 +119,36 @@ def undecided_order(evidence: Evidence) -> tuple[Finding, ...]:
 
 def missed_pole(evidence: Evidence) -> tuple[Finding, ...]:
     """Doubt the delay where the record asks for one more pole, or cannot exclude it."""
-    joint, fs = evidence.joint, evidence.fs
+    joint = evidence.joint
     structure = joint.best.fit.structure
     if evidence.nonlinear or structure.name not in ("first_order", "second_order"):
         return ()
     readings = evidence.readings
     hidden = hidden_pole(joint.weighed, joint.best.fit, readings.rows, white=readings.whitened)
+    return one_more_pole(hidden, structure.order, evidence.fs)
+
+
+def one_more_pole(hidden: HiddenPole, order: int, fs: float) -> tuple[Finding, ...]:
+    """Say what one more pole beside those of a first- or second-order fit would change.
+
+    Parameters
+    ----------
+    hidden : HiddenPole
+        What a score test says of it.
+    order : int
+        Of the fit.
+    fs : float
+        Rate in Hz.
+    """
     moved = float(np.sqrt(abs(hidden.squared)))
     if abs(hidden.squared) > _ASKED * hidden.std and moved > _MATTERS * hidden.scale:
         message = (
-            f"The record asks for more than {structure.order} "
-            f"pole{'s' if structure.order > 1 else ''} "
+            f"The record asks for more than {order} pole{'s' if order > 1 else ''} "
             f"({abs(hidden.squared) / hidden.std:.0f} standard deviations), and the delay may be "
             f"{moved / fs:.2g} s off. Lower the noise, or sweep higher, until a richer structure "
             "can be told."
         )
-    elif structure.order == 1 and hidden.limit > _SECOND_POLE * hidden.scale:
+    elif order == 1 and hidden.limit > _SECOND_POLE * hidden.scale:
         message = (
             f"A second pole of up to {hidden.limit / fs:.3g} s beside the time constant would not "
             "show in this record, and would shorten the delay by as much. Lower the noise, or "

@@ -1,0 +1,103 @@
+"""Statistics in a file: arrays in HDF5, one group for each run."""
+
+import hashlib
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+
+from hmpim.errors import FormatError
+from hmpim.formats.atomic import replacing
+from hmpim.identify import Statistics
+from hmpim.identify.statistics.reach import Reach
+from hmpim.identify.statistics.run import Run
+
+__all__ = ["SCHEMA", "read_statistics", "save_statistics"]
+
+SCHEMA = "hmpim/statistics/1"
+
+_ARRAYS = tuple(name for name in Run.__dataclass_fields__ if name != "samples")
+
+
+def save_statistics(statistics: Statistics, path: str | PathLike[str]) -> None:
+    """Write statistics to a file, whole or not at all.
+
+    Parameters
+    ----------
+    statistics : Statistics
+        What to save.
+    path : path-like
+        Ends in .h5 or .hdf5; replaced if there.
+
+    Raises
+    ------
+    ArgumentError
+        If the file cannot be written.
+    """
+    with replacing(path) as place, h5py.File(place, "w", libver="latest") as file:
+        file.attrs["schema"] = SCHEMA
+        file.attrs["fs"] = statistics.fs
+        file.attrs["lags"] = statistics.reach.lags
+        file.attrs["knots"] = np.array(statistics.reach.knots, dtype=np.int64)
+        file.attrs["names"] = list(statistics.names)
+        file.attrs["units"] = list(statistics.units)
+        file.attrs["bias"] = statistics.bias
+        file.attrs["intersample"] = statistics.intersample or ""
+        file.attrs["band"] = np.array(statistics.band or (), dtype=np.float64)
+        for i, run in enumerate(statistics.runs):
+            group = file.create_group(f"run {i}")
+            group.attrs["samples"] = run.samples
+            for name in _ARRAYS:
+                group[name] = getattr(run, name)
+        file.attrs["runs"] = len(statistics.runs)
+        file.attrs["sha256"] = _digest(statistics.runs)
+
+
+def read_statistics(path: str | PathLike[str]) -> Statistics:
+    """Read back what `save_statistics` wrote.
+
+    Raises
+    ------
+    FormatError
+        If the file is not whole, or was changed.
+    """
+    try:
+        with h5py.File(Path(path), "r") as file:
+            statistics = _read(file)
+            digest = str(file.attrs["sha256"])
+    except Exception as error:  # whatever HDF5 says of a damaged file
+        raise FormatError(f"{str(path)!r} holds no whole statistics: {error}") from error
+    if digest != _digest(statistics.runs):
+        raise FormatError(f"{str(path)!r} was changed after it was written; compress again")
+    return statistics
+
+
+def _read(file: Any) -> Statistics:
+    told = file.attrs
+    runs = []
+    for i in range(int(told["runs"])):
+        group = file[f"run {i}"]
+        arrays = {name: np.asarray(group[name][()], dtype=np.float64) for name in _ARRAYS}
+        runs.append(Run(samples=int(group.attrs["samples"]), **arrays))
+    band = [float(edge) for edge in told["band"]]
+    return Statistics(
+        fs=float(told["fs"]),
+        reach=Reach(lags=int(told["lags"]), knots=tuple(int(knot) for knot in told["knots"])),
+        runs=tuple(runs),
+        names=(str(told["names"][0]), str(told["names"][1])),
+        units=(str(told["units"][0]), str(told["units"][1])),
+        intersample=str(told["intersample"]) or None,  # type: ignore[arg-type]
+        band=(band[0], band[1]) if band else None,
+        bias=str(told["bias"]),  # type: ignore[arg-type]
+    )
+
+
+def _digest(runs: tuple[Run, ...]) -> str:
+    digest = hashlib.sha256()
+    for run in runs:
+        digest.update(str(run.samples).encode())
+        for name in _ARRAYS:
+            digest.update(np.ascontiguousarray(getattr(run, name)).tobytes())
+    return digest.hexdigest()

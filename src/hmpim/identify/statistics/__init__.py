@@ -1,0 +1,17 @@
+"""Statistics: a record compressed to what identification needs, additive, block by block.
+
+reach       the lags that are kept, and the rows of the bias
+run         one run: products of its samples, and its two ends
+statistics  runs of one input and one output: compress, update, join
+products    products of filtered signals over the samples that count
+residual    what a model leaves over: its autocorrelation, and both ends
+start       a response without a model, from which the starts are found
+fit         one structure, by the joint fit's own way down
+misfit      whether what is left over follows the input; one more pole
+choose      the structure, the assumption between the samples, the noise
+describe    what is said of the pair
+"""
+
+from hmpim.identify.statistics.statistics import Statistics, compress
+
+__all__ = ["Statistics", "compress"]

@@ -1,0 +1,355 @@
+"""All that is said of a pair that was identified from statistics."""
+
+import hashlib
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import chdtri
+
+from hmpim.errors import RecordError
+from hmpim.identify.fitting.nested import FAR, stretched
+from hmpim.identify.fitting.rows import Problem
+from hmpim.identify.fitting.trial import JointFit
+from hmpim.identify.groups import EVERY
+from hmpim.identify.judgement import Evidence, judge, judged
+from hmpim.identify.judgement.between_samples import other_intersample
+from hmpim.identify.judgement.checks import Check
+from hmpim.identify.judgement.errors import not_converged, weak_delay, weak_excitation
+from hmpim.identify.judgement.reach import (
+    beyond_band,
+    fast_mode,
+    initial_transient,
+    integrator,
+    natural_frequency_beyond,
+    negative_delay,
+)
+from hmpim.identify.judgement.residual import lack_of_fit
+from hmpim.identify.judgement.structure import one_more_pole, other_structure, undecided_order
+from hmpim.identify.readings import Readings, read_figures
+from hmpim.identify.result import (
+    Candidate,
+    FrequencyResponse,
+    Identification,
+    PairIdentification,
+    PaperEstimates,
+    Parameters,
+    RecordSummary,
+    ResponseBandwidths,
+)
+from hmpim.identify.statistics.choose import Chosen, choose
+from hmpim.identify.statistics.misfit import hidden_pole_of
+from hmpim.identify.statistics.run import Run
+from hmpim.identify.statistics.start import correlations
+from hmpim.identify.statistics.statistics import Statistics
+from hmpim.identify.uncertainty import estimate, noise_estimate, response_std
+from hmpim.model.dynamics import StructureName
+from hmpim.model.response import response, slowest_time_constant
+from hmpim.record import Finding, Intersample
+
+__all__ = ["identify_statistics"]
+
+_CHECKS: tuple[Check, ...] = (
+    initial_transient,
+    lack_of_fit,
+    not_converged,
+    weak_excitation,
+    weak_delay,
+    fast_mode,
+    natural_frequency_beyond,
+    integrator,
+    beyond_band,
+    other_structure,
+    undecided_order,
+    other_intersample,
+    negative_delay,
+)
+"""Those that need no samples."""
+
+_OVER = 1e-3
+"""Share of an impulse response's peak that may be left at the end of the window."""
+
+_SETTLES = 7.0
+"""Time constants after which less than that is left."""
+
+_UNRELATED = 1e-6
+"""Chance of an unrelated output being taken for one that follows."""
+
+_FREQUENCIES = 200
+
+Real = NDArray[np.float64]
+
+
+def identify_statistics(
+    statistics: Statistics,
+    *,
+    intersample: Intersample | None = None,
+    structures: tuple[StructureName, ...] | None = None,
+) -> Identification:
+    """Identify one pair from what was kept of its records.
+
+    Parameters
+    ----------
+    statistics : Statistics
+        From `hmpim.compress`.
+    intersample : {'zoh', 'foh', 'bandlimited'}, optional
+        What the input does between its samples; as the statistics say, or the likeliest.
+    structures : tuple of str, optional
+        Which to try; all but integrators by default.
+
+    Raises
+    ------
+    RecordError
+        If the channels do not move, too little was read, or the memory is longer than the window.
+    """
+    _check_moves(statistics)
+    chosen = choose(
+        statistics,
+        intersample=intersample or statistics.intersample,
+        structures=structures,
+    )
+    pair = _unrelated(statistics, chosen) or _related(statistics, chosen)
+    digest = hashlib.sha256()
+    for run in statistics.runs:
+        for name in Run.__dataclass_fields__:
+            digest.update(np.asarray(getattr(run, name)).tobytes())
+    summary = RecordSummary(
+        fs=statistics.fs,
+        samples=statistics.samples,
+        sha256=digest.hexdigest(),
+        source=f"statistics of {len(statistics.runs)} run{'s' * (len(statistics.runs) > 1)}",
+    )
+    return Identification(record=summary, pairs=(judged(pair),))
+
+
+def _check_moves(statistics: Statistics) -> None:
+    names = dict(zip(("input", "output"), statistics.names, strict=True))
+    still = {
+        "input": all(run.uu[0] == 0.0 for run in statistics.runs),
+        "output": all(run.vv[-1, -1, 0] == 0.0 for run in statistics.runs),
+    }
+    for role, name in names.items():
+        if still[role]:
+            level = statistics.runs[0].level[int(role == "output")] if statistics.runs else 0.0
+            raise RecordError(
+                f"{role} {name!r} is constant at {level:g}; nothing can be identified from it"
+            )
+
+
+def _related(statistics: Statistics, chosen: Chosen) -> PairIdentification:
+    """Say all that is known of an output that follows its input."""
+    _check_window(statistics, chosen)
+    best, fs, band = chosen.best, statistics.fs, chosen.band
+    fit, left = best.fit, chosen.left
+    vector = np.concatenate([fit.theta, fit.linear])
+    cov = _covariance(chosen)
+    weighed = best.products.order > 0
+    share = 1.0 if weighed else left.share
+    parameters, system, spread = read_figures(
+        fit.structure,
+        vector,
+        cov if share == 1.0 else cov / share,
+        fs=fs,
+        highest=min(band[1], fs / 2),
+        effective=max(best.products.counted - vector.size, 1) * share,
+        noise=noise_estimate(
+            left.power * left.counted,
+            freedom=max(left.counted - vector.size, 1),
+            share=left.share,
+            unit=statistics.units[1],
+        ),
+        units=statistics.units,
+    )
+    joint = _joint(statistics, chosen)
+    readings = Readings(
+        parameters=parameters,
+        system=system,
+        vector=vector,
+        covariance=cov,
+        white=left.noise.size == 1,
+        rows=np.empty((vector.size, 0)),
+        innovations=np.empty(0),
+        whitened=True,
+        coefficient_covariance=spread,
+    )
+    evidence = Evidence(
+        joint=joint,
+        readings=readings,
+        misfit=chosen.misfit,
+        u=np.empty(0),
+        fs=fs,
+        band=band,
+        fit_percent=_fit_percent(statistics, left.power),
+        measured=ResponseBandwidths(),
+    )
+    findings = judge(evidence, checks=_CHECKS)
+    if fit.structure.name in ("first_order", "second_order"):
+        hidden = hidden_pole_of(best, chosen.problem)
+        findings += one_more_pole(hidden, fit.structure.order, fs)
+    finite = bool(np.isfinite(spread).all())
+    above = 1 + system.numerator.size
+    order = [0, *range(1, above)[::-1], *range(above, spread.shape[0])[::-1]]
+    leading = float(system.numerator[np.flatnonzero(system.numerator)[0]])
+    frequency = np.geomspace(max(band[0], 1e-3 * band[1]), band[1], _FREQUENCIES)
+    return PairIdentification(
+        input=statistics.names[0],
+        output=statistics.names[1],
+        structure=fit.structure.name,
+        intersample=best.intersample,
+        fit_percent=evidence.fit_percent,
+        parameters=parameters,
+        paper=_paper(statistics),
+        frequency_response=FrequencyResponse(
+            frequency=frequency,
+            response=np.asarray(response(system, frequency)),
+            std=response_std(system, spread, frequency)
+            if finite
+            else np.full(frequency.size, np.inf),
+        ),
+        numerator=tuple((system.numerator[::-1] / leading).tolist()),
+        denominator=tuple(system.denominator[::-1].tolist()),
+        candidates=_candidates(statistics, chosen),
+        warnings=(*findings, _no_samples(statistics)),
+        covariance=spread[np.ix_(order, order)] if finite else None,
+    )
+
+
+def _check_window(statistics: Statistics, chosen: Chosen) -> None:
+    """Refuse a model whose memory is longer than the window."""
+    made = np.abs(chosen.best.response)
+    end = made[-max(statistics.lags // 20, 2) :].max()
+    if end <= _OVER * made.max():
+        return
+    fit = chosen.best.fit
+    slowest = slowest_time_constant(fit.denominator)
+    needed = int(np.ceil(max(fit.delay, 0.0) + _SETTLES * slowest)) + 1
+    needed = max(needed, 2 * statistics.lags)
+    raise RecordError(
+        f"the response has not settled within the window of {statistics.lags} samples: delay and "
+        f"settling take longer (time constant {slowest / statistics.fs:.3g} s or more); compress "
+        f"with lags={needed} or more, or identify the record itself if the output integrates the "
+        "input"
+    )
+
+
+def _covariance(chosen: Chosen) -> Real:
+    """The bound, widened where a first-order model is hardly farther away than it says."""
+    cov, best, simple = chosen.best.covariance, chosen.best, chosen.first_order
+    if best.fit.structure.name != "second_order" or simple is None:
+        return cov
+    count = best.products.counted * (1.0 if best.products.order else chosen.left.share)
+    deviance = float(count * np.log(max(simple.fit.objective / best.fit.objective, 1.0)))
+    return cov if deviance > FAR else stretched(cov, simple.fit, best.fit, deviance)
+
+
+def _joint(statistics: Statistics, chosen: Chosen) -> JointFit:
+    """What the checks look at; it has as many samples as were read, and keeps none."""
+    samples = np.broadcast_to(np.float64(0.0), (statistics.samples,))
+    problem = Problem(
+        source=chosen.problem.source,
+        y=samples,
+        valid=None,
+        longest_delay=chosen.problem.longest_delay,
+    )
+    polished = chosen.best.fit
+    return JointFit(
+        problem=problem,
+        weighed=problem,
+        best=next(trial for trial in chosen.trials if trial.fit is polished),
+        trials=chosen.trials,
+        forgotten=statistics.lags if chosen.best.products.conditioned else 0,
+        effective_share=chosen.left.share,
+        related=True,
+        simpler=chosen.simpler,
+    )
+
+
+def _fit_percent(statistics: Statistics, power: float) -> float:
+    spread = 0.0
+    for run in statistics.runs:
+        total = float(run.vv[:-1, -1, 0].sum())
+        spread += float(run.vv[-1, -1, 0]) - total**2 / run.samples
+    return float(100.0 * (1.0 - np.sqrt(power * statistics.samples / spread)))
+
+
+def _candidates(statistics: Statistics, chosen: Chosen) -> tuple[Candidate, ...]:
+    """All trials; the fit is said of the whitened output where the noise is coloured."""
+    best = chosen.best.fit.objective
+    return tuple(
+        Candidate(
+            structure=trial.fit.structure.name,
+            intersample=trial.intersample,
+            criterion=trial.criterion,
+            fit_percent=_fit_percent(
+                statistics, chosen.left.power * trial.fit.objective / max(best, 1e-300)
+            ),
+            chosen=trial.fit is chosen.best.fit,
+        )
+        for trial in sorted(chosen.trials, key=lambda trial: trial.criterion)
+    )
+
+
+def _paper(statistics: Statistics) -> PaperEstimates:
+    """Equation (8): the lag of the cross-correlation's peak; the other steps need samples."""
+    _, cross = correlations(statistics)
+    late = np.abs(cross[statistics.reach.forth :])
+    return PaperEstimates(delay=float(np.argmax(late) / statistics.fs))
+
+
+def _no_samples(statistics: Statistics) -> Finding:
+    return Finding(
+        code="no_samples",
+        message=f"This is identified from statistics of {statistics.samples} samples, which are "
+        "not kept: the frequency response is the model's own, and clipping, holds, rounding, "
+        "spikes and harmonics were not looked for. Identify a record to see them.",
+        severity="info",
+        parameters=(),
+    )
+
+
+def _unrelated(statistics: Statistics, chosen: Chosen) -> PairIdentification | None:
+    """Say what little can be said of an output that a constant explains as well."""
+    best = chosen.best
+    products = best.products
+    spread = products.moments(best.rows, best.steady).energy
+    share = 1.0 if products.order else chosen.left.share
+    gained = products.counted * share * float(np.log(max(spread / best.fit.objective, 1.0)))
+    if gained > chdtri(best.fit.structure.parameters, _UNRELATED):
+        return None
+    mean = best.moments.bias
+    variance = spread / max(products.counted - 1, 1)
+    name, source = statistics.names[1], statistics.names[0]
+    frequency = np.array([chosen.band[1]])
+    return PairIdentification(
+        input=source,
+        output=name,
+        structure="static",
+        intersample=best.intersample,
+        fit_percent=0.0,
+        parameters=Parameters(
+            bias=estimate(
+                mean,
+                variance * best.moments.bias_variance,
+                freedom=products.counted - 1,
+                unit=statistics.units[1],
+            ),
+        ),
+        paper=PaperEstimates(),
+        frequency_response=FrequencyResponse(
+            frequency=frequency,
+            response=np.zeros(1, dtype=np.complex128),
+            std=np.full(1, np.sqrt(variance)),
+        ),
+        numerator=(0.0,),
+        denominator=(1.0,),
+        candidates=(),
+        warnings=(
+            Finding(
+                code="unrelated",
+                message=f"Output {name!r} does not follow input {source!r}: a constant explains it "
+                "as well. Check the channels, or excite more.",
+                severity="doubt",
+                parameters=EVERY,
+            ),
+            _no_samples(statistics),
+        ),
+    )

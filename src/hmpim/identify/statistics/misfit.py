@@ -1,0 +1,119 @@
+"""Whether what a model leaves over still follows the input: a score test, from statistics alone.
+
+Short responses of their own, one pair (cosine and sine) for each of several frequencies across the
+excited band, are asked for beside all parameters of the model (C. R. Rao, Proc. Camb. Phil. Soc.
+44, 1948). Under a right model what they gain is chi-squared.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import chdtrc
+
+from hmpim.identify.fitting.nested import HiddenPole
+from hmpim.identify.fitting.rows import Problem
+from hmpim.identify.statistics.fit import Fitted
+from hmpim.identify.statistics.products import Products
+from hmpim.identify.statistics.reach import AHEAD
+from hmpim.identify.whiteness import Misfit
+from hmpim.model.sampled import delayed_response
+
+__all__ = ["hidden_pole_of", "misfit_of"]
+
+_GROUPS = 12
+"""Frequencies that are asked for."""
+
+_SEEN = 1e-6
+"""Share of a direction that the model's own parameters leave, below which it is not asked for."""
+
+_PROBE = 0.3
+"""Time constant, over the fit's own, by which the derivative by its square is taken."""
+
+Real = NDArray[np.float64]
+
+
+def misfit_of(fitted: Fitted, products: Products, band: tuple[float, float]) -> Misfit:
+    """Test whether the residual of a fit is still coherent with the input.
+
+    Parameters
+    ----------
+    fitted : Fitted
+        The fit.
+    products : Products
+        With what the fit leaves over whitened, so that its colour does no harm.
+    band : (float, float)
+        Excited band, in cycles per sample.
+    """
+    asked = _responses(fitted.fit.delay, band, fitted.response.size)
+    gain, left, cost = _beside(fitted, products, asked)
+    variance = cost / max(products.counted - fitted.rows.shape[0] - 1, 1)
+    size = np.sqrt(np.maximum(np.diag(left), np.finfo(float).tiny))
+    values, vectors = np.linalg.eigh(left / np.outer(size, size))
+    kept = values > _SEEN * values[-1]
+    projected = (vectors.T @ (gain / size))[kept]
+    power = float(np.sum(projected**2 / values[kept]))
+    freedom = int(kept.sum())
+    beyond = (power - freedom * variance) / cost
+    return Misfit(share=max(beyond, 0.0), probability=float(chdtrc(freedom, power / variance)))
+
+
+def hidden_pole_of(fitted: Fitted, problem: Problem) -> HiddenPole:
+    """Test a first- or second-order fit for one more pole, the delay shortened by as much.
+
+    As `hmpim.identify.fitting.nested.hidden_pole`, from statistics.
+
+    Parameters
+    ----------
+    fitted : Fitted
+        The fit.
+    problem : Problem
+        From `hmpim.identify.statistics.fit.pulse`.
+    """
+    fit = fitted.fit
+    denominator = fit.denominator
+    scale = float(denominator[fit.structure.order] ** (1.0 / fit.structure.order))
+    added = _PROBE * scale
+    here, there = (
+        delayed_response(problem.source, delay=delay, denominator=poles, powers=1)[0]
+        for delay, poles in (
+            (fit.delay, denominator),
+            (max(fit.delay - added, -19.0), np.convolve(denominator, [1.0, added])),
+        )
+    )
+    gain, left, _ = _beside(
+        fitted, fitted.products, (fit.linear[0] * (there - here) / added**2)[None]
+    )
+    size = max(float(left[0, 0]), np.finfo(float).tiny)
+    return HiddenPole(
+        squared=float(gain[0]) / size, std=float(np.sqrt(fitted.variance / size)), scale=scale
+    )
+
+
+def _beside(fitted: Fitted, products: Products, asked: Real) -> tuple[Real, Real, float]:
+    """Products of the residual and more responses, of these without the model's own, its power."""
+    count = asked.shape[0]
+    own = fitted.rows
+    steady = np.concatenate([asked.sum(axis=1), fitted.steady])
+    moments = products.moments(np.vstack([asked, own]), steady)
+    linear = np.concatenate([np.zeros(fitted.fit.theta.size), fitted.fit.linear[:-1]])
+    mixed, inner = moments.gram[:count, count:], moments.gram[count:, count:]
+    size = np.sqrt(np.maximum(np.diag(inner), np.finfo(float).tiny))
+    scaled = mixed / size
+    told = np.linalg.pinv(inner / np.outer(size, size), rcond=1e-12, hermitian=True)
+    left = moments.gram[:count, :count] - scaled @ told @ scaled.T
+    residual = moments.cross - moments.gram[:, count:] @ linear
+    gain = residual[:count] - scaled @ told @ (residual[count:] / size)
+    cost = moments.energy - linear @ (moments.cross[count:] + residual[count:])
+    return gain, left, max(float(cost), np.finfo(float).eps * moments.energy)
+
+
+def _responses(delay: float, band: tuple[float, float], taps: int) -> Real:
+    """Cosines and sines behind a window about the delay, shape (2 groups, taps)."""
+    low, high = band
+    lag = np.arange(taps) - AHEAD - delay
+    width = _GROUPS / max(high - low, 1e-9)
+    before, after = min(width, AHEAD + delay + 1.0), min(width, taps - AHEAD - delay)
+    edge = np.where(lag < 0, before, max(after, 1.0))
+    window = np.where(np.abs(lag) < edge, 0.5 + 0.5 * np.cos(np.pi * lag / edge), 0.0)
+    centres = low + (high - low) * (np.arange(_GROUPS) + 0.5) / _GROUPS
+    phase = 2 * np.pi * np.outer(centres, lag)
+    return np.asarray(np.vstack([np.cos(phase), np.sin(phase)]) * window)

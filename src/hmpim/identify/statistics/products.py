@@ -1,0 +1,266 @@
+"""Products of what filters make of an input, over the samples that count, from statistics alone.
+
+With F the impulse responses, whitened or not, and R the Toeplitz matrix of the input's
+autocorrelation, F R Fᵀ are the products of the full convolutions. Those samples of them that do not
+count lie at the two ends of each run, where the input itself is kept: they are made and taken off.
+The bias is solved for each run, or for all, and taken off too.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.fft import irfft, next_fast_len, rfft
+
+from hmpim.identify.fitting.autoregression import LONGEST
+from hmpim.identify.statistics.reach import AHEAD
+from hmpim.identify.statistics.residual import Residual
+from hmpim.identify.statistics.run import Run, closed
+from hmpim.identify.statistics.statistics import Statistics
+
+__all__ = ["Moments", "Products"]
+
+Real = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Moments:
+    """Products of rows and output, the bias solved and taken off.
+
+    Parameters
+    ----------
+    gram : ndarray, shape (q, q)
+        Of the rows.
+    cross : ndarray, shape (q,)
+        Of rows and output.
+    energy : float
+        Of the output.
+    fixed, fixed_rows : ndarray, shape (runs, rows of the bias) and (…, q)
+        What multiplies the rows of each run's bias is `fixed` less `fixed_rows` times what
+        multiplies the rows.
+    bias : float
+        Mean bias of all runs, without what the rows bring to it.
+    bias_rows : ndarray, shape (q,)
+        What each row takes from it.
+    bias_variance : float
+        Of `bias`, for noise of variance 1.
+    """
+
+    gram: Real
+    cross: Real
+    energy: float
+    fixed: Real
+    fixed_rows: Real
+    bias: float
+    bias_rows: Real
+    bias_variance: float
+
+
+class Products:
+    """Products over the samples that count, under one noise model.
+
+    Parameters
+    ----------
+    statistics : Statistics
+        What was read.
+    conditioned : bool
+        Whether the first `lags` outputs of each run do not count, since they answer what came
+        before it; else each run begins at rest.
+    noise : ndarray, shape (order + 1,)
+        Autoregression of the noise, 1 first.
+    """
+
+    def __init__(
+        self, statistics: Statistics, *, conditioned: bool, noise: Real | None = None
+    ) -> None:
+        self.statistics, self.conditioned = statistics, conditioned
+        self.noise = np.ones(1) if noise is None else noise
+        reach = statistics.reach
+        self.order = self.noise.size - 1
+        self.first = self.order + (reach.lags if conditioned else 0)
+        """Sample of a run from which on its whitened outputs count."""
+        self._length = int(next_fast_len(2 * reach.span + 1, real=True))
+        self._runs = runs = tuple(closed(run, reach) for run in statistics.runs)
+        self._power = self._spectrum(sum((run.uu for run in runs), np.zeros(reach.span + 1)))
+        self._white = rfft(self.noise, self._length)
+        self._cross = np.stack([self._lagged(run) for run in runs])
+        ends = [end for run in runs for end in self._ends_of(run)]
+        self._inputs = rfft(np.stack([end[0] for end in ends]), self._length)
+        self._apart = np.stack([end[1] for end in ends])
+        self._around = np.stack([end[2] for end in ends])
+        self._out = self._around * self._apart[:, None]
+        self._inner = np.stack([self._outputs(run) for run in runs]) - np.einsum(
+            "rect,redt->rcd",
+            *2 * [self._out.reshape(len(runs), 2, reach.rows + 1, -1)],
+        )
+
+    @property
+    def counted(self) -> int:
+        """How many samples count."""
+        return sum(run.samples - AHEAD - self.first for run in self._runs)
+
+    def _spectrum(self, autocorrelation: Real) -> Real:
+        """Eigenvalues of the circulant that holds the Toeplitz matrix."""
+        around = np.zeros(self._length)
+        around[: autocorrelation.size] = autocorrelation
+        around[-autocorrelation.size + 1 :] += autocorrelation[:0:-1]
+        return np.asarray(rfft(around).real)
+
+    def _lagged(self, run: Run) -> Real:
+        """Products of whitened outputs and the whitened input at each tap, (rows + 1, taps)."""
+        reach, order = self.statistics.reach, self.order
+        once = np.zeros((run.vu.shape[0], reach.taps + order))
+        # Σ aᵢ Σ v(t-i) u(t-j), j from -AHEAD to lags + order
+        for i, a in enumerate(self.noise):
+            start = reach.forth - AHEAD - i
+            once += a * run.vu[:, start : start + once.shape[1]]
+        out = np.zeros((run.vu.shape[0], reach.taps))
+        for i, a in enumerate(self.noise):
+            out += a * once[:, i : i + reach.taps]
+        return out
+
+    def _outputs(self, run: Run) -> Real:
+        """Products of whitened outputs, of the whole run, (rows + 1)²."""
+        weight = np.correlate(self.noise, self.noise, "full")[self.order :]
+        later = run.vv[:, :, 1 : weight.size] @ weight[1:]
+        return np.asarray(weight[0] * run.vv[:, :, 0] + later + later.T)
+
+    def _ends_of(self, run: Run) -> list[tuple[Real, Real, Real]]:
+        """Input, which samples of its full convolution do not count, and outputs there."""
+        reach = self.statistics.reach
+        n, span, count = run.samples, reach.span, reach.rows + 1
+        # Sample c of a convolution with the head is sample c - AHEAD of the run, and of one with
+        # the tail n - span - AHEAD + c.
+        index = np.arange(self._length)
+        head, tail = (np.zeros((count, self._length)) for _ in range(2))
+        size = min(reach.back, n)
+        early = np.vstack([reach.fixed(0, size), run.head_y[:size]])
+        early[:, max(n - AHEAD, 0) :] = 0.0
+        head[:, AHEAD : AHEAD + size] = early
+        late = np.vstack([reach.fixed(n - reach.forth, reach.forth), run.tail_y])
+        late[:, reach.forth - AHEAD :] = 0.0  # of a closed run
+        tail[:, span + AHEAD - reach.forth : span + AHEAD] = late
+        out = []
+        for u, v, apart in (
+            (run.head_u, head, index < self.first + AHEAD),
+            (run.tail_u, tail, index >= span),
+        ):
+            white = np.zeros_like(v)
+            for i, a in enumerate(self.noise):
+                white[:, i:] += a * v[:, : v.shape[1] - i]
+            padded = np.zeros(self._length)
+            padded[:span] = u
+            out.append((padded, apart.astype(np.float64), white))
+        return out
+
+    def moments(self, rows: Real, steady: Real) -> Moments:
+        """Products of what impulse responses make of the input.
+
+        Parameters
+        ----------
+        rows : ndarray, shape (q, taps)
+            Impulse responses, from `AHEAD` samples before the input on.
+        steady : ndarray, shape (q,)
+            What each makes of a constant input of 1.
+        """
+        runs, count = self._runs, rows.shape[0]
+        spectra = rfft(rows, self._length) * self._white
+        ends = irfft(spectra[:, None] * self._inputs, self._length) * self._apart
+        flat = ends.reshape(count, -1)
+        gram = _products(spectra, self._power, self._length) - flat @ flat.T
+        lost = np.einsum("qet,ect->eqc", ends, self._out).reshape(len(runs), 2, count, -1).sum(1)
+        mixed = np.einsum("rct,qt->rqc", self._cross, rows) - lost
+        return self._without_bias(gram, mixed, steady)
+
+    def residual(self, response: Real, bias: Real) -> Residual:
+        """What a model leaves over; of products without a noise model only.
+
+        Parameters
+        ----------
+        response : ndarray, shape (taps,)
+            Impulse response.
+        bias : ndarray, shape (runs, rows)
+            What multiplies the rows of each run's bias.
+        """
+        runs = self._runs
+        weights = np.hstack([-bias, np.ones((len(runs), 1))])
+        reach, longest = self.statistics.reach, LONGEST
+        spectrum = rfft(response, self._length)
+        made = irfft(spectrum * spectrum.conj() * self._power, self._length)[: longest + 1]
+        whole = np.zeros(longest + 1)
+        for run, c in zip(runs, weights, strict=True):
+            follows = c @ run.vu
+            for k in range(longest + 1):
+                start = reach.forth - AHEAD
+                ahead = follows[start + k : start + k + reach.taps]
+                behind = follows[start - k : start - k + reach.taps]
+                whole[k] += c @ run.vv[:, :, k] @ c - response @ (ahead + behind)
+        doubled = np.repeat(weights, 2, axis=0)
+        ends = np.einsum("ec,ect->et", doubled, self._around) - irfft(
+            spectrum * self._inputs, self._length
+        )
+        return Residual(
+            whole=whole + made,
+            ends=ends.reshape(len(runs), 2, -1),
+            span=reach.span,
+            counted=sum(run.samples - AHEAD for run in runs),
+        )
+
+    def _without_bias(self, gram: Real, mixed: Real, steady: Real) -> Moments:
+        """Solve the biases and take them off."""
+        statistics = self.statistics
+        inner, outer = self._inner[:, :-1, :-1], self._inner[:, :-1, -1]
+        energy = float(self._inner[:, -1, -1].sum())
+        beside, cross = mixed[:, :, :-1], mixed[:, :, -1].sum(axis=0)
+        if statistics.bias == "common":
+            u, y = np.array([run.level for run in statistics.runs]).T
+            weight, with_y, with_rows = inner[:, 0, 0], outer[:, 0], beside[:, :, 0]
+            first = np.outer(steady, u @ with_rows)
+            gram = gram + first + first.T + u**2 @ weight * np.outer(steady, steady)
+            cross = cross + steady * (u @ with_y) + y @ with_rows + steady * (u * y @ weight)
+            energy += float(2 * y @ with_y + y**2 @ weight)
+            beside = (with_rows + np.outer(u * weight, steady)).sum(axis=0)[None, :, None]
+            outer = (with_y + y * weight).sum()[None, None]
+            inner = weight.sum()[None, None, None]
+        solved = np.linalg.pinv(inner, hermitian=True)
+        told = np.einsum("rjk,rqk->rjq", solved, beside)
+        fixed = np.einsum("rjk,rk->rj", solved, outer)
+        average = self._average()
+        levels = np.array([run.level for run in statistics.runs])
+        bias = np.einsum("rj,rj->r", average, fixed)
+        taken = np.einsum("rj,rjq->rq", average, told)
+        if statistics.bias == "common":
+            each = fixed[0] - levels[:, 1:]
+            each_rows = (told[0] - np.outer(levels[:, 0], steady))[:, None]
+        else:
+            each, each_rows = fixed, told
+            bias, taken = bias + levels[:, 1], taken + np.outer(levels[:, 0], steady)
+        return Moments(
+            gram=gram - np.einsum("rjq,rpj->qp", told, beside),
+            cross=cross - np.einsum("rj,rqj->q", fixed, beside),
+            energy=energy - float(np.einsum("rj,rj->", fixed, outer)),
+            fixed=each,
+            fixed_rows=each_rows,
+            bias=float(bias.mean()),
+            bias_rows=taken.mean(axis=0),
+            bias_variance=float(np.einsum("rj,rjk,rk->", average, solved, average))
+            / average.shape[0] ** 2,
+        )
+
+    def _average(self) -> Real:
+        """Mean over its run of each row of the bias, shape (biases, rows)."""
+        statistics = self.statistics
+        if statistics.reach.rows == 1:
+            return np.ones((1 if statistics.bias == "common" else len(statistics.runs), 1))
+        sums = [run.vv[:-1, :-1, 0].sum(axis=1) / (run.samples - AHEAD) for run in self._runs]
+        return np.stack(sums)
+
+
+def _products(spectra: Complex, power: Real, length: int) -> Real:
+    """F R Fᵀ by Parseval's theorem."""
+    twice = np.full(power.size, 2.0)
+    twice[0] = 1.0
+    if length % 2 == 0:
+        twice[-1] = 1.0
+    return np.asarray((spectra * (power * twice / length)) @ spectra.conj().T).real

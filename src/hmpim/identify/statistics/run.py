@@ -1,0 +1,156 @@
+"""One run, compressed: products of its samples at a window of lags, and its two ends.
+
+Everything is a sum over all samples, 0 taken for what lies outside the run; what of it a fit does
+not want, the samples at either end tell. So a run is read once, block by block.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.fft import irfft, next_fast_len, rfft
+
+from hmpim.equality import ByValue
+from hmpim.identify.fitting.autoregression import LONGEST
+from hmpim.identify.statistics.reach import AHEAD, Reach
+
+__all__ = ["Run", "begun", "closed", "continued"]
+
+_PIECE = 16_384
+"""Samples that are read at once, at least."""
+
+Real = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Run(ByValue):
+    """Products of one run's input u and outputs v: the bias' rows, then the measured output.
+
+    Both as deviations from their first samples.
+
+    Parameters
+    ----------
+    samples : int
+        How many have been read.
+    level : ndarray, shape (2,)
+        First samples of input and output.
+    uu : ndarray, shape (span + 1,)
+        Σ u(t) u(t-k).
+    vu : ndarray, shape (rows + 1, forth + back + 1)
+        Σ v(t) u(t-k), k from -forth on.
+    vv : ndarray, shape (rows + 1, rows + 1, LONGEST + 1)
+        Σ v_i(t) v_j(t-k).
+    head_u, tail_u : ndarray, shape (span,)
+        First and last samples of the input; 0 where there are none.
+    head_y : ndarray, shape (back,)
+        First samples of the output.
+    tail_y : ndarray, shape (forth,)
+        Its last ones.
+    """
+
+    samples: int
+    level: Real
+    uu: Real
+    vu: Real
+    vv: Real
+    head_u: Real
+    tail_u: Real
+    head_y: Real
+    tail_y: Real
+
+
+def begun(reach: Reach, u: float, y: float) -> Run:
+    """An empty run that will begin with these samples."""
+    count = reach.rows + 1
+    return Run(
+        samples=0,
+        level=np.array([u, y]),
+        uu=np.zeros(reach.span + 1),
+        vu=np.zeros((count, reach.forth + reach.back + 1)),
+        vv=np.zeros((count, count, LONGEST + 1)),
+        head_u=np.zeros(reach.span),
+        tail_u=np.zeros(reach.span),
+        head_y=np.zeros(reach.back),
+        tail_y=np.zeros(reach.forth),
+    )
+
+
+def continued(run: Run, reach: Reach, u: Real, y: Real) -> Run:
+    """A run and the samples that follow it.
+
+    Parameters
+    ----------
+    run : Run
+        What was read so far.
+    reach : Reach
+        What is kept.
+    u, y : ndarray, shape (n,)
+        The samples that follow.
+    """
+    piece = max(_PIECE, 4 * reach.span)
+    for first in range(0, u.size, piece):
+        some = slice(first, first + piece)
+        rows = reach.fixed(run.samples, u[some].size)
+        v = np.vstack([rows, y[some] - run.level[1]])
+        run = _added(run, reach, u[some] - run.level[0], v)
+    return run
+
+
+def closed(run: Run, reach: Reach) -> Run:
+    """A run with its input continued by `AHEAD` samples, odd about the last; its outputs are 0.
+
+    What a band-limited input does at its end depends on samples to come; `prepare_input` continues
+    a record alike.
+    """
+    known = min(AHEAD, run.samples - 1)
+    last = run.tail_u[-1]
+    after = 2.0 * last - run.tail_u[-2 : -2 - known : -1]
+    after = np.concatenate([after, np.full(AHEAD - known, after[-1] if known else last)])
+    return _added(run, reach, after, np.zeros((reach.rows + 1, AHEAD)))
+
+
+def _added(run: Run, reach: Reach, u: Real, v: Real) -> Run:
+    before_u, before_v = run.tail_u, _before(run, reach)
+    whole_u = np.concatenate([before_u, u])
+    whole_v = np.hstack([before_v, v])
+    length = next_fast_len(u.size + reach.span, real=True)
+    new_u, new_v = _late(u, reach.span, length), _late(v, reach.span, length)
+    all_u, all_v = rfft(whole_u, length), _late(whole_v, reach.span - reach.forth, length)
+    uu = irfft(new_u * all_u.conj(), length)[: reach.span + 1]
+    after = irfft(new_v * all_u.conj(), length)[:, : reach.back + 1]
+    ahead = irfft(new_u * all_v.conj(), length)[:, 1 : reach.forth + 1]
+    vv = irfft(new_v[:, None] * all_v.conj()[None], length)[:, :, : LONGEST + 1]
+    room_u, room_y = reach.span - run.samples, reach.back - run.samples
+    return replace(
+        run,
+        samples=run.samples + u.size,
+        uu=run.uu + uu,
+        vu=run.vu + np.hstack([ahead[:, ::-1], after]),
+        vv=run.vv + vv,
+        head_u=_filled(run.head_u, run.samples, u[: max(room_u, 0)]),
+        tail_u=whole_u[-reach.span :],
+        head_y=_filled(run.head_y, run.samples, v[-1, : max(room_y, 0)]),
+        tail_y=whole_v[-1, -reach.forth :],
+    )
+
+
+def _before(run: Run, reach: Reach) -> Real:
+    """The outputs just before what follows, shape (rows + 1, forth)."""
+    fixed = reach.fixed(run.samples - reach.forth, reach.forth)
+    return np.vstack([fixed, run.tail_y])
+
+
+def _late(x: Real, by: int, length: int) -> NDArray[np.complex128]:
+    """Transform of what begins `by` samples late."""
+    shifted = np.zeros((*x.shape[:-1], length))
+    shifted[..., by : by + x.shape[-1]] = x
+    return np.asarray(rfft(shifted, length))
+
+
+def _filled(head: Real, count: int, more: Real) -> Real:
+    """First samples, the following put in place."""
+    if not more.size:
+        return head
+    out = head.copy()
+    out[count : count + more.size] = more
+    return out

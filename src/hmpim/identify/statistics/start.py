@@ -1,0 +1,129 @@
+"""Where to begin: a rough response from statistics alone.
+
+The impulse response with the least squared error, of any shape, solves the Toeplitz system of the
+auto- and the cross-correlation; conjugate gradients with FFTs find it, a small ridge keeps it quiet
+where nothing is excited. From its transform the starts of the joint fit are found.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.fft import irfft, next_fast_len, rfft
+from scipy.signal.windows import blackman
+
+from hmpim.identify.fitting.start import RoughResponse
+from hmpim.identify.spectrum import band_of_levels
+from hmpim.identify.statistics.reach import AHEAD
+from hmpim.identify.statistics.statistics import Statistics
+
+__all__ = ["correlations", "excited", "power_of", "rough_of"]
+
+_RIDGE = 1e-5
+"""Of the greatest power of the input; where there is less, the response is pulled to 0."""
+
+_STEPS = 200
+_FLOOR = 1e-5
+"""Power of the input, over its greatest, below which a frequency is not excited."""
+
+Real = NDArray[np.float64]
+
+
+def correlations(statistics: Statistics) -> tuple[Real, Real]:
+    """Auto- and cross-correlation about the means, lags 0 … span and -forth … back."""
+    reach = statistics.reach
+    uu, yu = np.zeros(reach.span + 1), np.zeros(reach.forth + reach.back + 1)
+    for run in statistics.runs:
+        mean_u = run.vu[:-1, reach.forth].sum() / run.samples
+        mean_y = run.vv[:-1, -1, 0].sum() / run.samples
+        # Sums without the first k samples, and without the last k.
+        late_u, early_u = (
+            _without(run.samples * mean_u, x) for x in (run.head_u, run.tail_u[::-1])
+        )
+        late_y, early_y = (
+            _without(run.samples * mean_y, x) for x in (run.head_y, run.tail_y[::-1])
+        )
+        left = np.maximum(run.samples - np.arange(reach.span + 1), 0)
+        uu += run.uu - mean_u * (late_u + early_u - left * mean_u)
+        behind, ahead = slice(None, reach.back + 1), slice(reach.forth, 0, -1)
+        taken_u = np.concatenate([late_u[ahead], early_u[behind]])
+        taken_y = np.concatenate([early_y[ahead], late_y[behind]])
+        both = np.concatenate([left[ahead], left[behind]])
+        yu += run.vu[-1] - mean_y * taken_u - mean_u * (taken_y - both * mean_y)
+    return uu, yu
+
+
+def _without(total: float, samples: Real) -> Real:
+    """A sum less the first 0, 1, … of some samples."""
+    return np.asarray(total - np.concatenate([[0.0], np.cumsum(samples)]))
+
+
+def power_of(statistics: Statistics, length: int) -> Real:
+    """Power spectrum of the input at length // 2 + 1 frequencies, smoothed by its lag window."""
+    uu, _ = correlations(statistics)
+    windowed = uu * blackman(2 * uu.size - 1)[uu.size - 1 :]
+    around = np.zeros(length)
+    around[: uu.size] = windowed
+    around[length - uu.size + 1 :] += windowed[:0:-1]
+    return np.asarray(np.maximum(rfft(around).real, 0.0))
+
+
+def excited(statistics: Statistics) -> tuple[float, float]:
+    """Excited band in Hz: as stated, or where the input's power is not negligible."""
+    if statistics.band is not None:
+        return statistics.band
+    length = next_fast_len(4 * statistics.reach.span, real=True)
+    level = np.sqrt(power_of(statistics, length))
+    level[0] = 0.0
+    return band_of_levels(level, statistics.fs / length)
+
+
+def rough_of(statistics: Statistics) -> RoughResponse:
+    """Divide what the output has of the input by the input, without a model."""
+    reach = statistics.reach
+    uu, yu = correlations(statistics)
+    cross = yu[reach.forth - AHEAD :][: reach.taps]
+    length = int(next_fast_len(2 * reach.span + 1, real=True))
+    around = np.zeros(length)
+    around[: uu.size] = uu
+    around[length - uu.size + 1 :] += uu[:0:-1]
+    spectrum = rfft(around).real
+    power = power_of(statistics, length)
+    ridge = _RIDGE * float(power.max())
+    answer = _solved(spectrum, ridge, cross, length)
+    moved = rfft(answer, length) * np.exp(2j * np.pi * np.arange(power.size) * AHEAD / length)
+    power[0] = 0.0
+    bins = np.flatnonzero(power > _FLOOR * power.max())
+    omega = 2 * np.pi * bins / length
+    # The longest lag at which the output follows counts as the delay to begin from.
+    lag = int(np.argmax(np.abs(cross[AHEAD:])))
+    response = moved[bins] * (1.0 + ridge / power[bins]) * np.exp(1j * omega * lag)
+    return RoughResponse(
+        lag=lag,
+        length=length,
+        bins=bins,
+        omega=omega,
+        response=response,
+        weight=power[bins] / power[bins].max(),
+    )
+
+
+def _solved(spectrum: Real, ridge: float, right: Real, length: int) -> Real:
+    """Conjugate gradients on a Toeplitz matrix and a ridge."""
+
+    def times(x: Real) -> Real:
+        return np.asarray(irfft(rfft(x, length) * spectrum, length)[: x.size] + ridge * x)
+
+    x, left = np.zeros_like(right), right.copy()
+    way, size = left.copy(), float(left @ left)
+    least = 1e-12 * size
+    for _ in range(_STEPS):
+        if size <= least:
+            break
+        turned = times(way)
+        slope = float(way @ turned)
+        if slope <= 0.0:  # ends of a run make the matrix not quite definite
+            break
+        step = size / slope
+        x, left = x + step * way, left - step * turned
+        before, size = size, float(left @ left)
+        way = left + size / before * way
+    return x

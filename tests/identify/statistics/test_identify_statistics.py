@@ -1,0 +1,179 @@
+"""Identification from statistics: the same figures as from the samples, and honest bars."""
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+
+import hmpim
+from hmpim import HmpimError, Record, compress, identify
+from hmpim.identify.fitting.rows import Part, Problem
+from hmpim.model.dynamics import STRUCTURES
+from hmpim.model.sampled import prepare_input
+
+FS, TRUE = 200.0, {"delay": 0.15, "natural_frequency": 10.0, "damping_ratio": 0.4}
+MODEL = hmpim.Model(
+    delay=0.15,
+    scale_factor=1.0,
+    bias=0.6,
+    noise_std=0.1,
+    denominator=(1 / (20 * np.pi) ** 2, 0.8 / (20 * np.pi), 1.0),
+)
+FIGURES = ("delay", "scale_factor", "bias", "natural_frequency", "damping_ratio", "bandwidth_3db")
+
+
+def chirped(seed, size=2000, *, model=MODEL, colour=0.0, intersample="bandlimited"):
+    t = np.arange(size) / FS
+    u = np.sin(2 * np.pi * (0.1 * t + 19.9 / (2 * size / FS) * t**2))
+    rng = np.random.default_rng(seed)
+    y = np.asarray(hmpim.simulate(model, u, fs=FS, intersample=intersample, rng=rng))
+    if colour:
+        y = y + lfilter([1.0], [1.0, -colour], 0.03 * rng.standard_normal(size))
+    return Record.from_arrays({"u": u}, {"y": y}, fs=FS, intersample=intersample, band=(0.1, 20))
+
+
+@pytest.mark.parametrize("colour", [0.0, 0.9])
+def test_figures_are_those_of_the_record(colour):
+    record = chirped(3, colour=colour)
+    compressed, whole = identify(compress(record))["y", "u"], identify(record)["y", "u"]
+    assert compressed.structure == whole.structure == "second_order"
+    assert compressed.verdict == whole.verdict == "ok"
+    for name in FIGURES:
+        here, there = getattr(compressed, name), getattr(whole, name)
+        assert abs(here.value - there.value) < 0.05 * there.std, name
+        assert here.std == pytest.approx(there.std, rel=0.03), name
+    assert compressed.noise_std.value == pytest.approx(whole.noise_std.value, rel=0.02)
+    assert "no_samples" in [finding.code for finding in compressed.warnings]
+    assert compressed.residual is None
+
+
+def test_a_run_in_mid_motion_is_conditioned_and_says_so():
+    record = chirped(5, 6000)
+    u, y = record.inputs[0].values[2000:], record.outputs[0].values[2000:]
+    cut = Record.from_arrays({"u": u}, {"y": y}, fs=FS, intersample="bandlimited", band=(6, 20))
+    pair = identify(compress(cut, lags=400))["y", "u"]
+    assert "initial_transient" in [finding.code for finding in pair.warnings]
+    for name, value in TRUE.items():
+        estimate = getattr(pair, name)
+        assert abs(estimate.value - value) < 4 * estimate.std, name
+
+
+def jointly(records, theta, lags, common):
+    """Gauss-Newton on the samples of several records, each conditioned on its first ones."""
+    structure = STRUCTURES["second_order"]
+    for _ in range(30):
+        x, d, y, n = [], [], [], []
+        for i, record in enumerate(records):
+            u, out = record.inputs[0].values, record.outputs[0].values
+            source = prepare_input(u, "zoh")
+            problem = Problem(source=source, y=out, valid=None, longest_delay=100.0)
+            part = Part(problem, structure, theta)
+            bias = np.zeros((1 if common else len(records), out.size))
+            bias[0 if common else i] = 1.0
+            x.append(part.rows[:, lags:])
+            d.append(part.slopes(np.ones(1), np.empty(0))[:, lags:])
+            y.append(out[lags:])
+            n.append(bias[:, lags:])
+        rows = np.vstack([np.hstack(x), np.hstack(n)])
+        linear = np.linalg.lstsq(rows.T, np.hstack(y), rcond=None)[0]
+        left = np.hstack(y) - linear @ rows
+        every = np.vstack([np.hstack(d) * linear[0], rows])
+        step = np.linalg.lstsq(every.T, left, rcond=None)[0]
+        theta = theta + step[:3]
+    cov = np.linalg.inv(every @ every.T) * (left @ left) / (left.size - every.shape[0])
+    return theta, np.sqrt(np.diag(cov)[:3]), linear
+
+
+@pytest.mark.parametrize("bias", ["own", "common"])
+def test_joined_runs_give_what_a_joint_fit_gives(bias):
+    shifted = hmpim.Model(
+        delay=0.15,
+        scale_factor=1.0,
+        bias=0.6 if bias == "common" else -2.0,
+        noise_std=0.1,
+        denominator=MODEL.denominator,
+    )
+    records = [
+        chirped(1, intersample="zoh"),
+        chirped(2, 1400, model=shifted, intersample="zoh"),
+    ]
+    first, second = (compress(r, lags=250, bias=bias) for r in records)
+    pair = identify(first + second, structures=["second_order"])["y", "u"]
+    zeta, omega = pair.damping_ratio.value, 2 * np.pi * pair.natural_frequency.value / FS
+    start = np.array([pair.delay.value * FS, np.log(2 * zeta / omega), 0.25 / zeta**2])
+    theta, std, linear = jointly(
+        records, start + 0.3 * np.array([0.1, 0.05, 0.1]), 250, bias == "common"
+    )
+    assert np.all(np.abs(theta - start) < 1e-4 * std)
+    assert pair.delay.std * FS == pytest.approx(std[0], rel=1e-3)
+    expected = linear[1] if bias == "common" else linear[1:].mean()
+    assert pair.bias.value == pytest.approx(expected, abs=1e-4 * pair.bias.std)
+
+
+def test_a_drifting_bias_on_knots_is_no_response():
+    record = chirped(4)
+    drift = np.interp(np.arange(2000), [0, 800, 2000], [0.0, 3.0, -1.0])
+    moved = Record.from_arrays(
+        {"u": record.inputs[0].values},
+        {"y": record.outputs[0].values + drift},
+        fs=FS,
+        intersample="bandlimited",
+        band=(0.1, 20),
+    )
+    pair = identify(compress(moved, knots=(0, 4, 10)))["y", "u"]
+    assert pair.verdict == "ok"
+    for name, value in TRUE.items():
+        estimate = getattr(pair, name)
+        assert abs(estimate.value - value) < 4 * estimate.std, name
+    assert pair.bias.value == pytest.approx(0.6 + drift.mean(), abs=4 * pair.bias.std)
+
+
+def test_noise_alone_is_unrelated():
+    rng = np.random.default_rng(0)
+    record = Record.from_arrays(
+        {"u": chirped(0).inputs[0].values}, {"y": rng.standard_normal(2000)}, fs=FS
+    )
+    assert identify(compress(record)).verdict == "not_identifiable"
+
+
+def test_memory_beyond_the_window_is_refused_by_name():
+    rng = np.random.default_rng(0)
+    u = rng.standard_normal(4000)
+    y = lfilter([0.0, 0.01], [1.0, -0.995], u) + 0.001 * rng.standard_normal(4000)
+    slow = Record.from_arrays({"u": u}, {"y": y}, fs=100.0, intersample="zoh")
+    with pytest.raises(
+        HmpimError, match=r"window of 150 samples.*compress with lags=3\d\d or more"
+    ):
+        identify(compress(slow, lags=150), structures=["first_order"])
+    integrated = Record.from_arrays({"u": u}, {"y": np.cumsum(u)}, fs=100.0, intersample="zoh")
+    with pytest.raises(HmpimError, match="if the output integrates the input"):
+        identify(compress(integrated, lags=150), structures=["first_order"])
+    with pytest.raises(HmpimError, match="input 'u' is constant at 2"):
+        identify(compress(Record.from_arrays({"u": np.full(99, 2.0)}, {"y": u[:99]}, fs=1.0)))
+    with pytest.raises(HmpimError, match="40 samples were read; at least 50"):
+        identify(compress(Record.from_arrays({"u": u[:40]}, {"y": y[:40]}, fs=100.0)))
+
+
+def held(seeds):
+    """Share of 95 % intervals that hold, by parameter; and errors over their bars, squared."""
+    inside, squared = [], []
+    for seed in seeds:
+        pair = identify(compress(chirped(seed)), structures=["second_order"])["y", "u"]
+        errors = {name: getattr(pair, name) for name in TRUE}
+        inside.append([e.ci95[0] <= TRUE[name] <= e.ci95[1] for name, e in errors.items()])
+        squared.append([((e.value - TRUE[name]) / e.std) ** 2 for name, e in errors.items()])
+    return np.mean(inside, axis=0), np.mean(squared, axis=0)
+
+
+def test_intervals_hold():
+    inside, squared = held(range(16))
+    assert inside.mean() > 0.8
+    assert np.all(squared > 0.25)
+    assert np.all(squared < 2.6)
+
+
+@pytest.mark.study
+def test_intervals_hold_over_many_seeds_and_reach_the_bound():
+    inside, squared = held(range(400))
+    assert np.all(inside > 0.92)
+    assert np.all(inside < 0.98)
+    assert squared == pytest.approx(1.0, abs=0.22)
