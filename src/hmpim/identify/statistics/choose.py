@@ -9,6 +9,7 @@ from typing import get_args
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.signal import lfilter
 from scipy.special import chdtrc, chdtri
 
 from hmpim.errors import RecordError
@@ -65,6 +66,8 @@ class LeftOver:
         Mean square.
     counted : int
         Samples of which it is.
+    innovation : float
+        Mean square of what its past does not foresee.
     share : float
         Independent samples per sample.
     noise : ndarray, shape (order + 1,)
@@ -73,6 +76,7 @@ class LeftOver:
 
     power: float
     counted: int
+    innovation: float
     share: float
     noise: Real
 
@@ -267,19 +271,19 @@ def _rests(search: _Search, fits: list[Fitted]) -> bool:
     Its power is chi-squared, and so is what a free response of the state explains of it.
     """
     best, lags = _least(fits), search.statistics.reach.lags
-    head = best.residual(search.products).head(0, lags)
-    count = head.size
-    variance = best.variance
-    if float(head @ head) > 2.0 * variance * chdtri(count, _REST):
-        return False
+    left = left_over(search, best)
     begins = int(np.ceil(max(best.fit.delay, 0.0))) + 4
     problem = replace(search.problem(best.intersample), begins=begins)
-    free = Part(problem, best.fit.structure, best.fit.theta).free[:, :count]
-    if not free.shape[0] or begins >= count:
+    free = Part(problem, best.fit.structure, best.fit.theta).free[:, :lags]
+    head = best.residual(search.products).head(0, lags)
+    head, free = (lfilter(left.noise, 1.0, x)[..., left.noise.size :] for x in (head, free))
+    if float(head @ head) > 2.0 * left.innovation * chdtri(head.size, _REST):
+        return False
+    if not free.shape[0] or begins >= lags:
         return True
     moment = free @ head
     told = float(moment @ solved(free @ free.T, moment))
-    return told < variance * float(chdtri(free.shape[0], _REST))
+    return told < left.innovation * float(chdtri(free.shape[0], _REST))
 
 
 def _enriched(
@@ -341,11 +345,13 @@ def left_over(search: "_Search", fitted: Fitted) -> LeftOver:
     if white and not products.order:
         power, count = fitted.fit.objective, products.counted
     clear = rho[np.abs(rho) > 3.0 / np.sqrt(count)]
+    noise = np.ones(1) if white else whitening_filter(gram, count)
     return LeftOver(
         power=power / count,
         counted=count,
+        innovation=float(noise @ gram[: noise.size, : noise.size] @ noise) / count,
         share=1.0 if white else float(1.0 / (1.0 + 2.0 * np.sum(clear**2))),
-        noise=np.ones(1) if white else whitening_filter(gram, count),
+        noise=noise,
     )
 
 

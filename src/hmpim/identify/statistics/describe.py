@@ -36,8 +36,9 @@ from hmpim.identify.result import (
     RecordSummary,
     ResponseBandwidths,
 )
+from hmpim.identify.spanned import spanned
 from hmpim.identify.statistics.choose import Chosen, choose
-from hmpim.identify.statistics.misfit import hidden_pole_of
+from hmpim.identify.statistics.misfit import hidden_pole_of, integrated_share
 from hmpim.identify.statistics.run import Run
 from hmpim.identify.statistics.start import correlations
 from hmpim.identify.statistics.statistics import Statistics
@@ -74,6 +75,9 @@ _SETTLES = 7.0
 _UNRELATED = 1e-6
 """Chance of an unrelated output being taken for one that follows."""
 
+_INTEGRATES = 0.1
+"""Share of what is left over that steps in the response may explain."""
+
 _FREQUENCIES = 200
 
 Real = NDArray[np.float64]
@@ -107,7 +111,14 @@ def identify_statistics(
         intersample=intersample or statistics.intersample,
         structures=structures,
     )
-    pair = _unrelated(statistics, chosen) or _related(statistics, chosen)
+    nothing = _unrelated(statistics, chosen)
+    if integrated_share(chosen.best) > (0.0 if nothing else _INTEGRATES):
+        raise RecordError(
+            f"the output still moves at the end of the window of {statistics.lags} samples, as if "
+            "it integrated the input; compress with more lags, or identify the record itself if it "
+            "does"
+        )
+    pair = nothing or _related(statistics, chosen)
     digest = hashlib.sha256()
     for run in statistics.runs:
         for name in Run.__dataclass_fields__:
@@ -160,6 +171,7 @@ def _related(statistics: Statistics, chosen: Chosen) -> PairIdentification:
         units=statistics.units,
     )
     joint = _joint(statistics, chosen)
+    parameters = spanned(parameters, joint, fs=fs, highest=min(band[1], fs / 2))
     readings = Readings(
         parameters=parameters,
         system=system,

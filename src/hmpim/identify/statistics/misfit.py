@@ -17,13 +17,19 @@ from hmpim.identify.statistics.reach import AHEAD
 from hmpim.identify.whiteness import Misfit
 from hmpim.model.sampled import delayed_response
 
-__all__ = ["hidden_pole_of", "misfit_of"]
+__all__ = ["hidden_pole_of", "integrated_share", "misfit_of"]
 
 _GROUPS = 12
 """Frequencies that are asked for."""
 
 _SEEN = 1e-6
 """Share of a direction that the model's own parameters leave, below which it is not asked for."""
+
+_STEPS = 48
+"""Delays at which a step is looked for."""
+
+_CLEAR = 50.0
+"""Squared standard deviations from which a step is seen, by whatever chance."""
 
 _PROBE = 0.3
 """Time constant, over the fit's own, by which the derivative by its square is taken."""
@@ -86,6 +92,29 @@ def hidden_pole_of(fitted: Fitted, problem: Problem) -> HiddenPole:
     return HiddenPole(
         squared=float(gain[0]) / size, std=float(np.sqrt(fitted.variance / size)), scale=scale
     )
+
+
+def integrated_share(fitted: Fitted) -> float:
+    """Share of what is left over, from one sample to the next, that steps in the response explain.
+
+    A response that does not end within the window is a step there; the differences of an output
+    that integrates do not wander.
+
+    Parameters
+    ----------
+    fitted : Fitted
+        The fit.
+    """
+    products = fitted.products
+    steps = Products(
+        products.statistics, conditioned=products.conditioned, noise=np.array([1.0, -1.0])
+    )
+    taps = np.arange(fitted.response.size)
+    begins = np.linspace(AHEAD, taps.size // 2, _STEPS).astype(int)
+    gain, left, cost = _beside(fitted, steps, (taps >= begins[:, None]).astype(np.float64))
+    power = gain**2 / np.maximum(np.diag(left), np.finfo(float).tiny * np.diag(left).max())
+    clear = power > _CLEAR * cost / steps.counted
+    return float(np.max(np.where(clear, power, 0.0)) / cost) if cost > 0.0 else 0.0
 
 
 def _beside(fitted: Fitted, products: Products, asked: Real) -> tuple[Real, Real, float]:
