@@ -38,15 +38,15 @@ def stacked(records, statistics, products, rows, steady):
 
 
 @pytest.mark.parametrize("noise", [[1.0], [1.0, -0.5, 0.3, 0.1]])
-@pytest.mark.parametrize("conditioned", [True, False])
+@pytest.mark.parametrize("skipped", [LAGS, 0])
 @pytest.mark.parametrize("kind", ["own", "common", "knots"])
-def test_products_are_those_of_the_samples(kind, conditioned, noise):
+def test_products_are_those_of_the_samples(kind, skipped, noise):
     records = [recorded(1, 700), recorded(2, 900)]
     knots = (0.0, 3.0, 6.0) if kind == "knots" else ()
     bias = "common" if kind == "common" else "own"
     parts = [compress(r, lags=LAGS, knots=knots, bias=bias) for r in records]
     statistics = parts[0] + parts[1]
-    products = Products(statistics, conditioned=conditioned, noise=np.array(noise))
+    products = Products(statistics, skipped=skipped, noise=np.array(noise))
     rng = np.random.default_rng(5)
     decay = np.exp(-np.arange(statistics.reach.taps) / 9.0)
     rows = rng.standard_normal((3, decay.size)) * decay
@@ -68,20 +68,19 @@ def test_products_are_those_of_the_samples(kind, conditioned, noise):
         )
 
 
-@pytest.mark.parametrize("conditioned", [True, False])
-def test_what_is_left_over_is_that_of_the_samples(conditioned):
+@pytest.mark.parametrize("skipped", [LAGS, 0])
+def test_what_is_left_over_is_that_of_the_samples(skipped):
     record = recorded(1, 700)
     statistics = compress(record, lags=LAGS)
-    plain = Products(statistics, conditioned=conditioned)
+    plain = Products(statistics, skipped=skipped)
     response = np.zeros(statistics.reach.taps)
     response[AHEAD + 2 :] = 0.3 * 0.8 ** np.arange(response.size - AHEAD - 2)
     u, y = record.inputs[0].values, record.outputs[0].values
     left = y - y[0] - np.convolve(u - u[0], response)[AHEAD : AHEAD + u.size] - 0.2
     residual = plain.residual(response, np.array([[0.2]]))
-    first = LAGS if conditioned else 0
-    gram, count = residual.gram(first)
+    gram, count = residual.gram(skipped)
     order = gram.shape[0] - 1
-    past = np.stack([left[first + order - k : left.size - k] for k in range(order + 1)])
+    past = np.stack([left[skipped + order - k : left.size - k] for k in range(order + 1)])
     assert count == past.shape[1]
     assert gram == pytest.approx(past @ past.T, rel=1e-8)
     assert residual.head(0, 50) == pytest.approx(left[:50], rel=1e-9)

@@ -24,6 +24,7 @@ from hmpim.identify.fitting.trial import Trial, likeliest_of, trial_of
 from hmpim.identify.statistics.fit import Fitted, fit_products, pulse
 from hmpim.identify.statistics.misfit import misfit_of
 from hmpim.identify.statistics.products import Products
+from hmpim.identify.statistics.reach import AHEAD
 from hmpim.identify.statistics.start import excited, rough_of
 from hmpim.identify.statistics.statistics import Statistics
 from hmpim.identify.whiteness import Misfit
@@ -47,6 +48,9 @@ _FINAL_PRECISION = 1e-10
 
 _REST = 1e-4
 """Chance of taking a run at rest for one in mid-motion."""
+
+_FORGOTTEN = 1e-4
+"""Of an impulse response's peak, below which it is over."""
 
 _WHITE = 1e-3
 """Chance of calling white noise coloured (Ljung and Box)."""
@@ -169,7 +173,7 @@ class _Search:
 
     def whitened(self, noise: Real) -> Products:
         """The same samples under a noise model."""
-        return Products(self.statistics, conditioned=self.products.conditioned, noise=noise)
+        return Products(self.statistics, skipped=self.products.skipped, noise=noise)
 
 
 def choose(
@@ -196,14 +200,17 @@ def choose(
     """
     conditioned = _is_conditioned(statistics)
     band = excited(statistics)
-    search = _Search(statistics, Products(statistics, conditioned=conditioned), band)
+    search = _Search(
+        statistics, Products(statistics, skipped=statistics.lags if conditioned else 0), band
+    )
     names = tuple(n for n in structures or (*PLAIN, *RICH) if n not in INTEGRATING)
     natural: Intersample = intersample or ("zoh" if _looks_held(statistics) else "bandlimited")
     alone = intersample is not None or natural == "zoh"
     rough = rough_of(statistics)
     fits = _plain(search, natural, rough, tuple(n for n in names if n in PLAIN) or PLAIN)
-    if conditioned and len(statistics.runs) == 1 and _rests(search, fits):
-        search.products = Products(statistics, conditioned=False)
+    if conditioned and len(statistics.runs) == 1:
+        skipped = 0 if _rests(search, fits) else _memory(_least(fits))
+        search.products = Products(statistics, skipped=skipped)
         fits = [search.again(f) for f in fits]
     fits = _enriched(search, natural, rough, fits, members(names, RICH))
     fits = [f for f in fits if f.fit.structure.name in names] or fits
@@ -276,7 +283,7 @@ def _rests(search: _Search, fits: list[Fitted]) -> bool:
     problem = replace(search.problem(best.intersample), begins=begins)
     free = Part(problem, best.fit.structure, best.fit.theta).free[:, :lags]
     head = best.residual(search.products).head(0, lags)
-    head, free = (lfilter(left.noise, 1.0, x)[..., left.noise.size :] for x in (head, free))
+    head, free = (lfilter(left.noise, np.ones(1), x)[..., left.noise.size :] for x in (head, free))
     if float(head @ head) > 2.0 * left.innovation * chdtri(head.size, _REST):
         return False
     if not free.shape[0] or begins >= lags:
@@ -284,6 +291,13 @@ def _rests(search: _Search, fits: list[Fitted]) -> bool:
     moment = free @ head
     told = float(moment @ solved(free @ free.T, moment))
     return told < left.innovation * float(chdtri(free.shape[0], _REST))
+
+
+def _memory(fitted: Fitted) -> int:
+    """Outputs that answer what came before a run, by the best fit so far and half as many again."""
+    size = np.abs(fitted.response)
+    last = int(np.flatnonzero(size > _FORGOTTEN * size.max())[-1]) - AHEAD
+    return int(np.clip(1.5 * last, 1, fitted.products.statistics.lags))
 
 
 def _enriched(
@@ -334,9 +348,8 @@ def left_over(search: "_Search", fitted: Fitted) -> LeftOver:
     products = search.products
     plain = products
     if products.order:
-        plain = Products(search.statistics, conditioned=products.conditioned)
-    first = search.statistics.reach.lags if products.conditioned else 0
-    gram, count = fitted.residual(plain).gram(first)
+        plain = Products(search.statistics, skipped=products.skipped)
+    gram, count = fitted.residual(plain).gram(products.skipped)
     power = max(float(gram[0, 0]), np.finfo(float).tiny)
     rho = gram[0, 1:] / power
     lags = np.arange(1, rho.size + 1)

@@ -268,7 +268,7 @@ def _joint(statistics: Statistics, chosen: Chosen) -> JointFit:
         weighed=problem,
         best=next(trial for trial in chosen.trials if trial.fit is polished),
         trials=chosen.trials,
-        forgotten=statistics.lags if chosen.best.products.conditioned else 0,
+        forgotten=chosen.best.products.skipped,
         effective_share=chosen.left.share,
         related=True,
         simpler=chosen.simpler,

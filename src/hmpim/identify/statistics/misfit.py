@@ -106,9 +106,7 @@ def integrated_share(fitted: Fitted) -> float:
         The fit.
     """
     products = fitted.products
-    steps = Products(
-        products.statistics, conditioned=products.conditioned, noise=np.array([1.0, -1.0])
-    )
+    steps = Products(products.statistics, skipped=products.skipped, noise=np.array([1.0, -1.0]))
     taps = np.arange(fitted.response.size)
     begins = np.linspace(AHEAD, taps.size // 2, _STEPS).astype(int)
     gain, left, cost = _beside(fitted, steps, (taps >= begins[:, None]).astype(np.float64))

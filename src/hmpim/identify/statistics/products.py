@@ -64,21 +64,19 @@ class Products:
     ----------
     statistics : Statistics
         What was read.
-    conditioned : bool
-        Whether the first `lags` outputs of each run do not count, since they answer what came
-        before it; else each run begins at rest.
+    skipped : int
+        First outputs of each run that do not count, since they answer what came before it, at most
+        `lags`; 0 where each run begins at rest.
     noise : ndarray, shape (order + 1,)
         Autoregression of the noise, 1 first.
     """
 
-    def __init__(
-        self, statistics: Statistics, *, conditioned: bool, noise: Real | None = None
-    ) -> None:
-        self.statistics, self.conditioned = statistics, conditioned
+    def __init__(self, statistics: Statistics, *, skipped: int, noise: Real | None = None) -> None:
+        self.statistics, self.skipped = statistics, skipped
         self.noise = np.ones(1) if noise is None else noise
         reach = statistics.reach
         self.order = self.noise.size - 1
-        self.first = self.order + (reach.lags if conditioned else 0)
+        self.first = self.order + skipped
         """Sample of a run from which on its whitened outputs count."""
         self._length = int(next_fast_len(2 * reach.span + 1, real=True))
         self._runs = runs = tuple(closed(run, reach) for run in statistics.runs)
