@@ -283,11 +283,13 @@ def _rests(search: _Search, fits: list[Fitted]) -> bool:
     problem = replace(search.problem(best.intersample), begins=begins)
     free = Part(problem, best.fit.structure, best.fit.theta).free[:, :lags]
     head = best.residual(search.products).head(0, lags)
-    head, free = (lfilter(left.noise, np.ones(1), x)[..., left.noise.size :] for x in (head, free))
+    every = np.vstack([head, free])
+    head, *free_rows = lfilter(left.noise, np.ones(1), every)[:, left.noise.size :]
     if float(head @ head) > 2.0 * left.innovation * chdtri(head.size, _REST):
         return False
-    if not free.shape[0] or begins >= lags:
+    if not free_rows or begins >= lags:
         return True
+    free = np.array(free_rows)
     moment = free @ head
     told = float(moment @ solved(free @ free.T, moment))
     return told < left.innovation * float(chdtri(free.shape[0], _REST))
