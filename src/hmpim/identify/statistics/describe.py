@@ -112,6 +112,8 @@ def identify_statistics(
         structures=structures,
     )
     nothing = _unrelated(statistics, chosen)
+    if nothing is None:
+        _check_window(statistics, chosen)
     if integrated_share(chosen.best) > (0.0 if nothing else _INTEGRATES):
         raise RecordError(
             f"the output still moves at the end of the window of {statistics.lags} samples, as if "
@@ -148,7 +150,6 @@ def _check_moves(statistics: Statistics) -> None:
 
 def _related(statistics: Statistics, chosen: Chosen) -> PairIdentification:
     """Say all that is known of an output that follows its input."""
-    _check_window(statistics, chosen)
     best, fs, band = chosen.best, statistics.fs, chosen.band
     fit, left = best.fit, chosen.left
     vector = np.concatenate([fit.theta, fit.linear])
