@@ -139,7 +139,8 @@ class Fitted:
 
 def _inverse(gram: Real) -> Real:
     """Inverse of a Gram matrix, very large along a direction that is not seen."""
-    scale = np.sqrt(np.maximum(np.diag(gram), np.finfo(float).tiny))
+    size = np.diag(gram)
+    scale = np.sqrt(np.where(size > 1e-200 * size.max(), size, 1.0))
     values, vectors = np.linalg.eigh(gram / np.outer(scale, scale))
     values = np.maximum(values, 1e-14 * values[-1])
     return np.asarray((vectors / values) @ vectors.T / np.outer(scale, scale))

@@ -52,7 +52,8 @@ def misfit_of(fitted: Fitted, products: Products, band: tuple[float, float]) -> 
     asked = _responses(fitted.fit.delay, band, fitted.response.size)
     gain, left, cost = _beside(fitted, products, asked)
     variance = cost / max(products.counted - fitted.rows.shape[0] - 1, 1)
-    size = np.sqrt(np.maximum(np.diag(left), np.finfo(float).tiny))
+    power_left = np.diag(left)
+    size = np.sqrt(np.where(power_left > 1e-200 * power_left.max(), power_left, 1.0))
     values, vectors = np.linalg.eigh(left / np.outer(size, size))
     kept = values > _SEEN * values[-1]
     projected = (vectors.T @ (gain / size))[kept]
@@ -123,7 +124,8 @@ def _beside(fitted: Fitted, products: Products, asked: Real) -> tuple[Real, Real
     moments = products.moments(np.vstack([asked, own]), steady)
     linear = np.concatenate([np.zeros(fitted.fit.theta.size), fitted.fit.linear[:-1]])
     mixed, inner = moments.gram[:count, count:], moments.gram[count:, count:]
-    size = np.sqrt(np.maximum(np.diag(inner), np.finfo(float).tiny))
+    own_size = np.diag(inner)
+    size = np.sqrt(np.where(own_size > 1e-200 * own_size.max(), own_size, 1.0))
     scaled = mixed / size
     told = np.linalg.pinv(inner / np.outer(size, size), rcond=1e-12, hermitian=True)
     left = moments.gram[:count, :count] - scaled @ told @ scaled.T
