@@ -16,7 +16,6 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any, Protocol
 
-from hmpim.batch.work import Done, Task, do_task
 from hmpim.errors import ArgumentError, HmpimError
 from hmpim.formats.readers.protocol import need
 
@@ -34,22 +33,38 @@ _RESTARTS = 200
 Say = Callable[[str], None]
 
 
+class Job(Protocol):
+    """Some work that travels: its name, unlike any other's, and how it is done."""
+
+    @property
+    def name(self) -> str:
+        """Name of the part that it writes."""
+
+    def do(self) -> Any:
+        """Do it; what is given back is small."""
+
+
+def do_job(job: Job) -> Any:
+    """Do a job; this is what a worker is told to call."""
+    return job.do()
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Finished:
     """A task that came back.
 
     Parameters
     ----------
-    task : Task
+    task : Job
         Which.
-    done : Done or None
-        What it did; None if its worker died, time and again.
+    done : object
+        What it gave back; None if its worker died, time and again.
     reason : str
         How it died.
     """
 
-    task: Task
-    done: Done | None
+    task: Any
+    done: Any
     reason: str = ""
 
 
@@ -60,7 +75,7 @@ class Pool(Protocol):
     def window(self) -> int:
         """How many tasks may be under way at once."""
 
-    def submit(self, task: Task) -> None:
+    def submit(self, task: Job) -> None:
         """Take a task."""
 
     def next(self) -> Finished:
@@ -73,14 +88,14 @@ class _Here:
     window = 1
 
     def __init__(self) -> None:
-        self._waiting: list[Task] = []
+        self._waiting: list[Job] = []
 
-    def submit(self, task: Task) -> None:
+    def submit(self, task: Job) -> None:
         self._waiting.append(task)
 
     def next(self) -> Finished:
         task = self._waiting.pop(0)
-        return Finished(task=task, done=do_task(task))
+        return Finished(task=task, done=task.do())
 
 
 @contextlib.contextmanager
@@ -98,7 +113,7 @@ class _Dask:
         self._connect, self._tend = connect, tend
         self._patience, self._say = patience, say
         self._client = connect()
-        self._under_way: dict[str, tuple[Task, Any]] = {}
+        self._under_way: dict[str, tuple[Job, Any]] = {}
         self._back: queue.SimpleQueue[tuple[str, Any]] = queue.SimpleQueue()
         self._threads, self._looked = 1, 0.0
         self._turn = 0
@@ -112,10 +127,10 @@ class _Dask:
             self._looked = now
         return _AHEAD * self._threads
 
-    def submit(self, task: Task) -> None:
+    def submit(self, task: Job) -> None:
         self._turn += 1
         key = f"{task.name}-{self._turn}"
-        future = self._client.submit(do_task, task, key=key, pure=False)
+        future = self._client.submit(do_job, task, key=key, pure=False)
         self._under_way[key] = (task, future)
         future.add_done_callback(lambda f: self._back.put((key, f)))
 
@@ -164,11 +179,11 @@ class _Dask:
             self._client.close(timeout=5)
 
 
-def _finished(task: Task, future: Any) -> Finished:
+def _finished(task: Job, future: Any) -> Finished:
     from distributed.scheduler import KilledWorker
 
     try:
-        done: Done = future.result()
+        done = future.result()
     except KilledWorker as error:
         died = f"its worker died {error.allowed_failures + 1} times"
         return Finished(task=task, done=None, reason=f"{died} (memory, or code that crashes)")

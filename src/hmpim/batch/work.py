@@ -50,6 +50,10 @@ class Task:
         """Where it writes."""
         return Path(self.folder) / PARTS / self.name
 
+    def do(self) -> "Done":
+        """Do it, as `do_task`."""
+        return do_task(self)
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Done:

@@ -19,6 +19,7 @@ from hmpim.cli.design import design
 from hmpim.cli.export import export
 from hmpim.cli.gentlest import gentlest
 from hmpim.cli.identify import identify
+from hmpim.cli.montecarlo import montecarlo
 from hmpim.cli.paper import paper
 from hmpim.cli.rigs import rigs
 from hmpim.cli.run import run
@@ -152,6 +153,7 @@ app.command(epilog="Example: hmpim table --udp 127.0.0.1:5005 --rate 1000")(tabl
 app.command(epilog="Example: hmpim demo --out out/demo --seed 7")(demo)
 app.command(epilog="Example: hmpim campaign section_v_reduced --out out/study")(campaign)
 app.command(epilog="Example: hmpim batch records/ --input u --output y --out out/fleet")(batch)
+app.command(epilog="Example: hmpim montecarlo field --draws 100 --out out/field")(montecarlo)
 app.command()(gentlest)
 app.command(epilog="Example: hmpim workbench --rig table --runs runs")(workbench)
 app.command(epilog="Example: hmpim export r.json --to c -o model/")(export)

@@ -1,0 +1,107 @@
+"""``hmpim montecarlo``: systems drawn and identified, held against the truth."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from hmpim.cli.files import check_files
+from hmpim.cli.terminal import output_console, say, warn
+from hmpim.errors import ArgumentError
+
+__all__ = ["montecarlo"]
+
+
+def montecarlo(
+    plan: Annotated[
+        str,
+        typer.Argument(
+            metavar="PLAN.toml", help="A plan, or one that ships: field, random_systems."
+        ),
+    ],
+    out: Annotated[
+        Path, typer.Option("--out", metavar="DIR", help="Folder for the draws and the page.")
+    ] = Path("out/montecarlo"),
+    draws: Annotated[
+        int | None, typer.Option("--draws", metavar="N", help="So many, whatever the plan says.")
+    ] = None,
+    scheduler: Annotated[
+        str | None,
+        typer.Option("--scheduler", metavar="tcp://HOST:PORT", help="A Dask scheduler to use."),
+    ] = None,
+    workers: Annotated[
+        int | None, typer.Option("--workers", metavar="N", help="Processes on this computer.")
+    ] = None,
+    json: Annotated[
+        Path | None, typer.Option("--json", metavar="FILE", help="Write the figures as JSON.")
+    ] = None,
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No progress, no table.")] = False,
+) -> None:
+    """Draw systems, stimuli and noise; identify each; hold what is found against the truth.
+
+    The same seed gives the same figures, whatever the number of workers. Stopped at any time, the
+    same command goes on where it was.
+    """
+    from dataclasses import replace
+    from json import dumps
+
+    from rich.console import Console
+    from rich.progress import Progress
+
+    from hmpim.batch.montecarlo import (
+        PLANS,
+        montecarlo_page,
+        read_plan,
+        run_montecarlo,
+        shipped_plan,
+        sum_up,
+    )
+    from hmpim.batch.pool import dask_pool, here_pool
+    from hmpim.formats.atomic import write_text
+    from hmpim.report.study import render_study
+
+    path = Path(plan)
+    if plan not in PLANS and not path.exists():
+        raise ArgumentError(
+            f"there is no plan {plan}; give a file, or one that ships: {', '.join(PLANS)}"
+        )
+    wanted = read_plan(shipped_plan(plan) if plan in PLANS and not path.exists() else path)
+    if draws is not None:
+        if draws < 1:
+            raise ArgumentError(f"--draws {draws}: give 1 or more")
+        wanted = replace(wanted, draws=draws)
+    page = out / "study.html"
+    check_files(
+        reads={"the plan": path}, writes={"--json": json, "--out": page}, folders={"--out": out}
+    )
+
+    def pool():  # type: ignore[no-untyped-def]
+        if workers == 0:
+            return here_pool()
+        return dask_pool(scheduler=scheduler, workers=workers, say=warn)
+
+    console = Console(stderr=True)
+    off = quiet or not console.is_terminal
+    with Progress(console=console, transient=True, disable=off) as bar:
+        task = bar.add_task("draws", total=wanted.draws)
+        table = run_montecarlo(
+            wanted, out, pool=pool, progress=lambda done, total: bar.update(task, completed=done)
+        )
+    found = sum_up(wanted, table)
+    shown = montecarlo_page(wanted, found)
+    write_text(page, render_study(shown))
+    if json is not None:
+        write_text(json, dumps(found.to_dict(), indent=1, allow_nan=False) + "\n")
+    if quiet:
+        return
+    from rich.table import Table
+
+    for grid in shown.grids:
+        text = Table(title=grid.caption, box=None, header_style="bold", pad_edge=False)
+        for name in grid.columns:
+            text.add_column(name)
+        for row in grid.rows:
+            text.add_row(*row)
+        output_console().print(text)
+    say(shown.headline)
+    say(f"Page: {page}")

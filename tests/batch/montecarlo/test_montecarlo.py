@@ -1,0 +1,93 @@
+"""Studies that depend on seed and plan alone, and are held against the bound."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import hmpim
+from hmpim.batch.montecarlo import read_plan, run, run_montecarlo, shipped_plan, sum_up
+from hmpim.batch.montecarlo.draw import one_draw
+from hmpim.batch.pool import here_pool
+
+PLAN = """
+name = "short"
+seed = 3
+draws = 6
+regions = ["system.delay"]
+[stimulus]
+fs = 100
+duration = 4
+high = 15
+[system]
+structure = ["first_order", "second_order"]
+delay = { uniform = [0.0, 0.1] }
+natural_frequency = 4
+damping_ratio = 0.5
+[noise]
+std = 0.02
+"""
+
+
+@pytest.fixture
+def plan(tmp_path):
+    path = tmp_path / "plan.toml"
+    path.write_text(PLAN)
+    return read_plan(path)
+
+
+def test_the_same_seed_gives_the_same_rows(plan, tmp_path, monkeypatch):
+    """However the draws are cut into tasks, and in whichever order they come back."""
+    one = run_montecarlo(plan, tmp_path / "a", pool=here_pool)
+    monkeypatch.setattr(run, "_PER_TASK", 4)
+    told = []
+    other = run_montecarlo(
+        plan, tmp_path / "b", pool=here_pool, progress=lambda done, total: told.append(done)
+    )
+    assert one.equals(other)
+    assert told == [0, 4, 6]
+    assert one.column("draw").to_pylist() == list(range(6))
+    assert one.to_pylist()[2] == {**dict.fromkeys(one.column_names), **one_draw(plan, 2)}
+    assert one_draw(replace(plan, seed=4), 2)["system.delay"] != one_draw(plan, 2)["system.delay"]
+    again = []
+    run_montecarlo(plan, tmp_path / "b", pool=None, progress=lambda d, t: again.append(d))
+    assert again == [6]  # all there: nobody is asked to work
+
+    found = sum_up(plan, one)
+    assert found.draws == 6
+    assert sum(map(sum, found.verdicts.values())) == 6
+    assert sum(region.right_structure.count for region in found.regions) == 6
+
+
+@pytest.mark.few(12)
+def test_the_bound_is_met(seeds, tmp_path):
+    """Errors of an efficient estimator scatter as the bound says."""
+    plan = replace(read_plan(shipped_plan("field")), draws=seeds)
+    found = sum_up(plan, run_montecarlo(plan, tmp_path, pool=here_pool))
+    by_name = {score.name: score for score in found.parameters}
+    for name in ("delay", "natural_frequency", "damping_ratio", "scale_factor", "bias"):
+        score = by_name[name]
+        few = 4.0 / np.sqrt(2 * score.coverage.count)
+        assert abs(score.over_bound - 1) < few, name
+        assert score.coverage.high > 0.9, name
+    assert found.right_structure.share == 1.0
+    assert found.verdicts["ok"][1] == 0
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "told"),
+    [
+        ("seed = 3", "seed = -1", "seed = -1"),
+        ("fs = 100", "speed = 100", r"\[stimulus\] has no 'speed'"),
+        ("high = 15", "", "must say one of high and high_of_fs"),
+        ("{ uniform = [0.0, 0.1] }", "{ even = [0, 1] }", "is no value and no law"),
+        ("system.delay", "system.bias", "is no quantity that is drawn"),
+        ('"first_order", ', '"third", ', "'third' is no value"),
+        ("[noise]", "[noise", "is no plan"),
+    ],
+)
+def test_plans_that_are_wrong_are_refused(tmp_path, old, new, told):
+    path = tmp_path / "plan.toml"
+    path.write_text(PLAN.replace(old, new, 1))
+    with pytest.raises(hmpim.HmpimError, match=told):
+        read_plan(path)
