@@ -4,6 +4,7 @@ from collections import Counter
 from dataclasses import replace
 from typing import Any
 
+from hmpim.workbench.campaigns import Campaigns
 from hmpim.workbench.desks import Desk, Desks
 from hmpim.workbench.rig import RigBench
 from hmpim.workbench.settings import Settings
@@ -26,6 +27,7 @@ class Workbench:
         self.desks = Desks(settings.desks)
         self.workers = Workers()
         self.rig = RigBench(settings, present=lambda desk: desk in self.open_desks)
+        self.campaigns = Campaigns(settings)
         self._tabs: dict[str, Counter[str]] = {}
 
     def start(self) -> None:
@@ -36,6 +38,7 @@ class Workbench:
     def stop(self) -> None:
         """End it; a rig that moves comes to rest first."""
         self.rig.close()
+        self.campaigns.stop()
         self.workers.stop()
 
     def opened(self, desk: str, tab: str) -> bool:

@@ -9,14 +9,23 @@ from nicegui import ui
 
 from hmpim.workbench.bench import Workbench
 from hmpim.workbench.pages.analyse import analyse
+from hmpim.workbench.pages.campaign import campaign
 from hmpim.workbench.pages.check import check
 from hmpim.workbench.pages.design import design
-from hmpim.workbench.pages.frame import add_front, add_page
+from hmpim.workbench.pages.frame import Build, add_front, add_page
 from hmpim.workbench.pages.run import run
+from hmpim.workbench.pages.runs import runs
 
 __all__ = ["add_pages"]
 
-_PAGES = {"design": design, "check": check, "run": run, "analyse": analyse}
+_PAGES: dict[str, Build] = {
+    "design": design,
+    "check": check,
+    "run": run,
+    "analyse": analyse,
+    "runs": runs,
+    "campaign": campaign,
+}
 _STATIC = Path(__file__).parents[1] / "static"
 _SANDBOX = {"content-security-policy": "sandbox allow-scripts; default-src 'none'; "
             "img-src data:; style-src 'unsafe-inline'; script-src 'unsafe-inline'"}  # fmt: skip

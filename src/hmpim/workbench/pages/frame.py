@@ -11,7 +11,17 @@ from nicegui import Client, ui
 from hmpim.errors import HmpimError
 from hmpim.workbench.bench import Window, Workbench
 
-__all__ = ["PAGES", "Command", "Later", "add_front", "add_page", "card", "failures_said", "heading"]
+__all__ = [
+    "PAGES",
+    "Build",
+    "Command",
+    "Later",
+    "add_front",
+    "add_page",
+    "card",
+    "failures_said",
+    "heading",
+]
 
 PAGES = {
     "design": "Design",
