@@ -49,6 +49,7 @@ class Between(StrEnum):
     ZOH = "zoh"
     FOH = "foh"
     BANDLIMITED = "bandlimited"
+    SAMPLED = "sampled"
 
 
 def identify(

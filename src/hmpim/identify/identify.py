@@ -20,6 +20,8 @@ from hmpim.identify.effects.imperfections import (
 )
 from hmpim.identify.effects.lost import stands_out
 from hmpim.identify.fitting.enrich import PLAIN
+from hmpim.identify.fitting.joint import joint_fit
+from hmpim.identify.fitting.software import is_exact, software_fit
 from hmpim.identify.fitting.trial import JointFit
 from hmpim.identify.groups import EVERY
 from hmpim.identify.judgement import judged
@@ -36,7 +38,7 @@ from hmpim.identify.statistics.statistics import Statistics
 from hmpim.identify.swapped import is_swapped, swapped_finding
 from hmpim.identify.threads import one_thread
 from hmpim.identify.whiteness import is_white
-from hmpim.model.dynamics import STRUCTURES, StructureName
+from hmpim.model.dynamics import FILTERS, STRUCTURES, StructureName
 from hmpim.record import Aligned, Finding, Intersample, Record, Signal, uniform
 
 __all__ = ["identify"]
@@ -45,6 +47,9 @@ _FEWEST_SAMPLES = 50
 
 _LARGEST = 1e75
 """Size of a sample, and one over the least: fourth powers stay in the range of doubles."""
+
+_EXACT = 1e-9
+"""Share of the output (r.m.s.) up to which a model explains a record to rounding."""
 
 _BETTER = 0.7
 """Share of the noise's power under a drift below which a clipped level is taken instead."""
@@ -55,7 +60,7 @@ def identify(
     record: Record | Statistics,
     *,
     intersample: Intersample | str = "auto",
-    structures: Sequence[StructureName] | None = None,
+    structures: Sequence[str] | None = None,
 ) -> Identification:
     """Find delay, scale factor, bias, noise, dynamics and bandwidth, with error bars.
 
@@ -67,11 +72,14 @@ def identify(
     record : Record or Statistics
         Inputs and outputs of one test; every pair is identified. Of `hmpim.compress`ed records,
         what needs samples is left out and said.
-    intersample : {'auto', 'zoh', 'foh', 'bandlimited'}
-        Whether the input is held, linear or band-limited between its samples. 'auto' takes
-        what the record states, and else the likeliest.
+    intersample : {'auto', 'zoh', 'foh', 'bandlimited', 'sampled'}
+        Whether the input is held, linear or band-limited between its samples; 'sampled' for
+        software, whose output sample follows from samples of its input. 'auto' takes what the
+        record states, and else the likeliest; where rounding is all the noise there is, and no
+        system in continuous time explains the record to that, it is software.
     structures : sequence of str, optional
-        Dynamics to try; all of `hmpim.model.STRUCTURES` by default.
+        Dynamics to try; all of `hmpim.model.STRUCTURES` by default, or of software all of
+        `hmpim.model.dynamics.FILTERS`.
 
     Returns
     -------
@@ -102,11 +110,17 @@ def identify(
     0.05
     """
     chosen = _checked_intersample(intersample, record)
-    names = tuple(structures) if structures is not None else tuple(STRUCTURES)
-    for name in names:
-        if name not in STRUCTURES:
-            raise ArgumentError(f"structure {name!r} is not known; choose of {list(STRUCTURES)}")
+    known = list(FILTERS) if chosen == "sampled" else list(STRUCTURES)
+    asked = tuple(structures) if structures is not None else tuple(known)
+    for name in asked:
+        if name not in known:
+            raise ArgumentError(f"structure {name!r} is not known; choose of {known}")
+    names = cast(tuple[StructureName, ...], asked)
     if isinstance(record, Statistics):
+        if chosen == "sampled":
+            raise ArgumentError(
+                "statistics do not know software (intersample='sampled'); identify the record itself"
+            )
         with one_thread():
             return identify_statistics(record, intersample=chosen, structures=names)
     _check_length(record)
@@ -150,7 +164,7 @@ def _checked_intersample(intersample: str, record: Record | Statistics) -> Inter
         if intersample == known:
             return cast(Intersample, known)
     raise ArgumentError(
-        f"intersample {intersample!r} is not known; choose of auto, zoh, foh, bandlimited"
+        f"intersample {intersample!r} is not known; choose of auto, zoh, foh, bandlimited, sampled"
     )
 
 
@@ -201,6 +215,13 @@ def _identify_output(
     backwards = _backwards(aligned, output)
     if backwards:
         structures = tuple(name for name in structures if name in PLAIN) or structures
+    if intersample is None and len(aligned.inputs) == 1 and not backwards:
+        (source,) = aligned.inputs
+        if bool(source.valid.all() and output.valid.all()) and _is_software(
+            source.values, output.values
+        ):
+            intersample = "sampled"
+            structures = cast(tuple[StructureName, ...], tuple(FILTERS))
     richest = max(count_levels(source.values) for source in aligned.inputs)
     found = find_imperfections(output.values, aligned.fs, richest=richest)
     joined, drifting = (
@@ -247,6 +268,17 @@ def _identify_output(
     )
     (said,) = backwards or (unfollowed,)
     return [untold(aligned, source, output, record, said)], None
+
+
+def _is_software(u: NDArray[np.float64], y: NDArray[np.float64]) -> bool:
+    """Whether rounding is all the noise there is, and no plainer system explains the record."""
+    if not is_exact(u, y):
+        return False
+    filters = software_fit(u, y).best.fit
+    enough = _EXACT**2 * float(np.sum((y - y.mean()) ** 2))
+    plain = [trial.fit for trial in joint_fit(u, y, structures=PLAIN).trials]
+    exact = [fit.structure.parameters for fit in plain if fit.cost <= enough]
+    return filters.cost <= enough and filters.structure.parameters <= min(exact, default=np.inf)
 
 
 def _backwards(aligned: Aligned, output: Signal) -> tuple[Finding, ...]:

@@ -14,7 +14,7 @@ from hmpim.identify.fitting.fit import Fit
 from hmpim.identify.fitting.plainer import plainer, taking
 from hmpim.identify.fitting.trial import JointFit
 from hmpim.identify.frf.local import local_response
-from hmpim.identify.judgement import Evidence, attempt, judge
+from hmpim.identify.judgement import ROUNDING, Evidence, attempt, judge
 from hmpim.identify.nonlinear.nonlinearity import inspect_nonlinearity
 from hmpim.identify.paper import paper_estimates
 from hmpim.identify.readings import Readings, read_parameters
@@ -30,6 +30,8 @@ from hmpim.identify.spanned import spanned
 from hmpim.identify.spectrum import excited_band
 from hmpim.identify.uncertainty import estimate, noise_estimate, response_std
 from hmpim.identify.whiteness import Misfit, misfit
+from hmpim.model.filters import in_z
+from hmpim.model.response import RationalDelay
 from hmpim.record import Aligned, Finding, Record, Signal
 
 __all__ = ["described", "untold"]
@@ -49,7 +51,8 @@ def described(
     """Say all that is known of an output that follows an input."""
     fs, joint = aligned.fs, joined.fits[i]
     covariance = joined.covariances[i] if joined.covariances else None
-    refined = refine(joint, found, fs, drifting) if matrix is None else None
+    software = joint.best.fit.structure.sampled  # it holds what it said at a sample
+    refined = refine(joint, found, fs, drifting) if matrix is None and not software else None
     censored = None
     if refined is not None:
         joint, censored = refined
@@ -63,7 +66,7 @@ def described(
             fs=fs,
             plain=plainer(joint) if matrix is None and covariance is None else None,
             others=[other.values for other in aligned.inputs if other is not source],
-            floor=found.rounding,
+            floor=max(found.rounding, ROUNDING * float(np.std(output.values))),
             unit=output.unit,
         ),
         None,
@@ -132,6 +135,7 @@ def described(
         *unread,
         *untested,
     )
+    numerator, denominator = _coefficients(readings.system)
     return PairIdentification(
         input=source.name,
         output=output.name,
@@ -141,15 +145,15 @@ def described(
         parameters=parameters,
         paper=paper,
         frequency_response=response,
-        numerator=_descending(readings.system.numerator / _leading(readings.system.numerator)),
-        denominator=_descending(readings.system.denominator),
+        numerator=numerator,
+        denominator=denominator,
         candidates=_candidates(joint),
         warnings=(*aligned.findings, *findings),
         from_response=from_response,
         time=aligned.time,
         prediction=fit.prediction if drifting is None else fit.prediction + drifting.trend,
         residual=fit.residual,
-        covariance=_highest_first(readings),
+        covariance=None if readings.system.step is not None else _highest_first(readings),
         nonlinearity=None if inspection is None else inspection.summary,
     )
 
@@ -204,6 +208,16 @@ def _highest_first(readings: Readings) -> NDArray[np.float64] | None:
     above = 1 + readings.system.numerator.size
     order = [0, *range(1, above)[::-1], *range(above, covariance.shape[0])[::-1]]
     return covariance[np.ix_(order, order)]
+
+
+def _coefficients(system: RationalDelay) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """Numerator and denominator of unit gain, highest power first: of s, or of software's z."""
+    above, below = system.numerator / _leading(system.numerator), system.denominator
+    if system.step is None:
+        return _descending(above), _descending(below)
+    length = max(above.size, below.size)
+    above, below = (np.pad(in_z(c), (0, length - c.size)) for c in (above, below))
+    return tuple(above.tolist()), tuple(below.tolist())
 
 
 def _leading(numerator: NDArray[np.float64]) -> float:

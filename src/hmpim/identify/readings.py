@@ -13,6 +13,7 @@ from hmpim.identify.result import Estimate, Parameters
 from hmpim.identify.uncertainty import covariance, estimate, gradient, noise_estimate
 from hmpim.identify.whiteness import autoregressive_spectrum, is_white
 from hmpim.model.dynamics import Structure, coefficients_of, denominator_of
+from hmpim.model.filters import in_delta
 from hmpim.model.response import (
     PeakGain,
     RationalDelay,
@@ -26,6 +27,9 @@ from hmpim.model.response import (
 __all__ = ["Readings", "figures_of", "read_figures", "read_parameters", "system_of"]
 
 _Vector = NDArray[np.float64]
+
+_ROUNDING = 1e-13
+"""Share of the output (r.m.s.) by which rounding may move it, whatever the residual shows."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -74,6 +78,13 @@ class Readings:
 def system_of(structure: Structure, vector: _Vector, fs: float) -> RationalDelay:
     """Build the system in seconds that a fit's vector stands for."""
     order = structure.order
+    if structure.sampled:
+        above, below = in_delta(
+            structure, coefficients_of(structure, vector[1 : 1 + order]), vector[1 + order : -1]
+        )
+        return RationalDelay(
+            delay=float(vector[0]) / fs, numerator=above, denominator=below, step=1.0 / fs
+        )
     denominator = denominator_of(structure, coefficients_of(structure, vector[1 : 1 + order]))
     told = vector[1 + order : -1] * fs**structure.integrators
     numerator = np.concatenate([np.zeros(structure.dc_zeros), told])
@@ -331,7 +342,7 @@ def _slope_at_dc(system: RationalDelay) -> float:
     """Delay that the phase shows at low frequency, in s."""
     first = 0.0 if system.denominator.size < 2 else float(system.denominator[1])
     lead = system.numerator[1] / system.numerator[0] if system.numerator.size > 1 else 0.0
-    return float(system.delay + first - lead)
+    return float(system.delay + (first - lead) * (system.step or 1.0))
 
 
 def _mode_at(vector: _Vector, mode: int, fs: float) -> tuple[float, float]:
@@ -394,6 +405,12 @@ def _covariance(
 ) -> _Vector:
     """Covariance of theta and linear; a held, static system moves in whole samples only."""
     fit = joint.best.fit
+    if fit.structure.sampled:  # its delay is a whole number of samples
+        inner = covariance(rows[1:], residual, freedom=freedom, white=white)
+        rounding = _ROUNDING**2 * float(joint.problem.y @ joint.problem.y)
+        full = np.zeros((rows.shape[0], rows.shape[0]))
+        full[1:, 1:] = inner * (1.0 + rounding / max(fit.cost, 1e-3 * rounding))
+        return full
     if fit.structure.name == "static" and joint.best.intersample == "zoh":
         inner = covariance(rows[1:], residual, freedom=freedom, white=white)
         full = np.zeros((rows.shape[0], rows.shape[0]))

@@ -8,24 +8,45 @@ confidence sets: R. L. Berger and D. D. Boos, JASA 89, 1994).
 
 from dataclasses import fields, replace
 
+import numpy as np
+
 from hmpim.identify.fitting.trial import CLEARLY, JointFit, Trial
 from hmpim.identify.readings import figures_of
 from hmpim.identify.result import Estimate, Parameters
 
 __all__ = ["rivals_of", "spanned"]
 
+_AS_LIKELY = 6.0
+"""Difference of the criterion within which another filter is about as likely (odds of 20)."""
+
+_SEEN = 3.84
+"""Twice the log-likelihood that a coefficient must add to be seen (chance of 5 %)."""
+
 _MOVES = 0.05
 """Share of an interval's half width from which another assumption widens it."""
 
 
 def rivals_of(joint: JointFit) -> tuple[Trial, ...]:
-    """The likeliest trial under each other assumption that the record does not exclude."""
+    """The likeliest trial under each other assumption that the record does not exclude.
+
+    Of software there is one assumption: then every filter and delay about as likely.
+    """
     best = joint.best
+    if best.fit.structure.sampled:
+        return tuple(t for t in joint.trials if t is not best and _is_as_likely(t, joint))
     others: dict[str, Trial] = {}
     for trial in sorted(joint.trials, key=lambda trial: trial.criterion):
         if trial.intersample != best.intersample:
             others.setdefault(trial.intersample, trial)
     return tuple(t for t in others.values() if t.criterion - best.criterion < 2 * CLEARLY)
+
+
+def _is_as_likely(trial: Trial, joint: JointFit) -> bool:
+    """Whether another filter or delay may be the true one; more taps than are seen say nothing."""
+    behind = trial.criterion - joint.best.criterion
+    extra = trial.fit.structure.parameters - joint.best.fit.structure.parameters
+    price = float(np.log(joint.problem.counted * joint.effective_share))
+    return behind < _AS_LIKELY and (extra <= 0 or extra * price - behind > _SEEN * extra)
 
 
 def spanned(parameters: Parameters, joint: JointFit, *, fs: float, highest: float) -> Parameters:

@@ -149,7 +149,10 @@ def response_std(
     [0.006283]
     """
     s = 2j * np.pi * frequency
-    powers = s[None, :] ** np.arange(max(system.numerator.size, system.denominator.size))[:, None]
+    powers = (
+        system.variable(frequency)[None, :]
+        ** np.arange(max(system.numerator.size, system.denominator.size))[:, None]
+    )
     above, below = system.numerator, system.denominator
     first = int(np.flatnonzero(below)[0]) + 1
     slopes = np.concatenate(

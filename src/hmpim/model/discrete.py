@@ -19,6 +19,7 @@ from scipy.signal import tf2ss
 
 from hmpim.errors import ArgumentError
 from hmpim.model.causal import causal_filter
+from hmpim.model.filters import in_z
 from hmpim.model.response import RationalDelay, response
 from hmpim.record import Intersample
 
@@ -35,6 +36,9 @@ LOOKAHEAD = 32
 One sample is left alone: what is late by a sample or more never depends on the newest input, so
 that a loop can be closed over it.
 """
+
+_NOUGHT = 1e-13
+"""Share of the largest coefficient of a filter below which one is what rounding left of 0."""
 
 _WHOLE = 1e-9
 """Part of a sample below which a delay counts as whole."""
@@ -166,6 +170,8 @@ def discretise(
             f"delay {system.delay:.6g} s is negative; no program can run ahead of its input, so "
             "take the delay as 0, or add one"
         )
+    if system.step is not None:
+        return _filter(system, fs)
     reach = min(band, 0.45 * fs) if band else 0.2 * fs
     total = system.delay * fs
     ahead = 0
@@ -201,6 +207,48 @@ def discretise(
     if not n and fraction == 0.0:  # a gain and whole samples: nothing lies between
         return replace(plain, delay=whole + ahead)
     return _prefiltered(plain, system, ahead)
+
+
+def _filter(system: RationalDelay, fs: float) -> Discrete:
+    """A filter in z at its own rate: its poles in the state, or its taps before a plain gain."""
+    if system.step is None or abs(system.step * fs - 1.0) > 1e-6:
+        rate = 0.0 if system.step is None else 1.0 / system.step
+        raise ArgumentError(
+            f"fs = {fs:g} Hz is not the rate of this software, {rate:g} Hz; it is the same at no "
+            "other rate, so give that one"
+        )
+    below = in_z(system.denominator)
+    above, below = in_z(system.numerator) / below[0], below / below[0]
+    n = int(np.flatnonzero(np.abs(below) > _NOUGHT * np.abs(below).max())[-1])
+    below = below[: n + 1]
+    taps, direct = np.ones(1), 0.0
+    output = np.zeros(n)
+    if n == 0:
+        taps, direct = above, 1.0
+    else:  # B = direct A + Σ output[i] z^-i, so that the state holds what it takes
+        above = np.concatenate([above, np.zeros(max(n + 1 - above.size, 0))])
+        direct = float(above[n] / below[n])
+        output = (above - direct * below)[:n]
+    transition = np.eye(n, k=-1)
+    transition[:1] = -below[1:]
+    entry = np.eye(n)[:, 0] if n else np.zeros(0)
+    return Discrete(
+        fs=fs,
+        intersample="sampled",
+        prefilter=taps,
+        delay=round(system.delay * fs),
+        fraction=0.0,
+        transition=transition,
+        drive=np.outer(entry, [1.0, 0.0, 0.0]),
+        output=output,
+        feed=np.array([direct, 0.0, 0.0]),
+        generator=np.zeros((n, n)),
+        entry=entry,
+        through=direct,
+        error=0.0,
+        gain=float(np.abs(taps).sum()),
+        band=0.5 * fs,
+    )
 
 
 def _prefiltered(plain: Discrete, system: RationalDelay, ahead: int) -> Discrete:
@@ -326,6 +374,9 @@ def rows_between(step: Discrete) -> tuple[RowPiece, ...]:
     >>> [(p.start, p.stop, p.coefficients[:, 0].round(9).tolist()) for p in pieces]
     [(0.0, 0.5, [0.0, 1.0, 0.0]), (0.5, 1.0, [0.0, 0.0, 1.0])]
     """
+    if step.intersample == "sampled":  # it is read when it has been calculated, as it then is
+        now = np.concatenate([step.output @ step.transition, step.output @ step.drive + step.feed])
+        return (RowPiece(start=0.0, stop=1.0, coefficients=now[None, :]),)
     between: Intersample = "zoh" if step.intersample == "zoh" else "foh"
     bend = 1.0 - step.fraction
     edges = [0.0, bend, 1.0] if _WHOLE < bend < 1.0 - _WHOLE else [0.0, 1.0]

@@ -6,12 +6,13 @@ an integrator has s A(s) below instead. A(s) is a product of sections ``1 + c1 s
 """
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 __all__ = [
+    "FILTERS",
     "STRUCTURES",
     "Structure",
     "StructureName",
@@ -41,6 +42,19 @@ StructureName = Literal[
     "integrator",
     "integrator_first_order",
     "integrator_second_order",
+    "fir",
+    "iir_1",
+    "iir_2",
+    "iir_3",
+    "iir_4",
+    "iir_1_zeros",
+    "iir_2_zeros",
+    "iir_3_zeros",
+    "iir_4_zeros",
+    "bilinear_1",
+    "bilinear_2",
+    "bilinear_3",
+    "bilinear_4",
 ]
 
 
@@ -61,6 +75,11 @@ class Structure:
     dc_zeros : int
         Zeros at zero: the least power of the numerator. With one, a constant input does nothing,
         and the scale factor is the output per rate of the input.
+    nyquist_zeros : int
+        Of a filter in z: zeros at z = -1, as the bilinear transform puts them.
+    sampled : bool
+        Whether it is a filter in z: a pole then is at z = e^s of its section's, zeros are powers
+        of 1 - 1/z, and the delay is a whole number of samples (`hmpim.model.filters`).
     """
 
     name: StructureName
@@ -68,6 +87,8 @@ class Structure:
     zeros: int = 0
     integrators: int = 0
     dc_zeros: int = 0
+    nyquist_zeros: int = 0
+    sampled: bool = False
 
     @property
     def order(self) -> int:
@@ -104,6 +125,28 @@ STRUCTURES: dict[StructureName, Structure] = {
         Structure(name="integrator_second_order", sections=(2,), integrators=1),
     )
 }
+
+_SECTIONS: dict[int, tuple[int, ...]] = {1: (1,), 2: (2,), 3: (2, 1), 4: (2, 2)}
+
+FILTERS: dict[str, Structure] = {
+    "static": Structure(name="static", sections=(), sampled=True),
+    **{
+        f"fir_{taps}": Structure(name="fir", sections=(), zeros=taps - 1, sampled=True)
+        for taps in range(2, 17)
+    },
+    **{
+        f"{kind}_{n}{end}": Structure(
+            name=cast(StructureName, f"{kind}_{n}{end}"),
+            sections=sections,
+            zeros=n if end else 0,
+            nyquist_zeros=n if kind == "bilinear" else 0,
+            sampled=True,
+        )
+        for kind, end in (("iir", ""), ("bilinear", ""), ("iir", "_zeros"))
+        for n, sections in _SECTIONS.items()
+    },
+}
+"""What software may do, sample over sample: z⁻ᵏ B/A, each pole of A the z = e^s of a section's."""
 
 
 def denominator_of(structure: Structure, coefficients: ArrayLike) -> NDArray[np.float64]:

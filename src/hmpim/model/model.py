@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from hmpim.arguments import checked, generator, numbers_of
 from hmpim.errors import ArgumentError
 from hmpim.model.chain import Chain, Readout, chain_of, run_chain
+from hmpim.model.filters import in_z
 from hmpim.model.response import RationalDelay, response
 from hmpim.model.sampled import delayed_response, prepare_input
 from hmpim.model.spread import Spread
@@ -31,7 +32,7 @@ class Model:
         Output at DC per input, bias aside; with an integrator, the output's rate per input.
     numerator, denominator : tuple of float
         Dynamics without delay and with unit gain at DC, in powers of s (rad/s), highest first.
-        A denominator that ends in 0 integrates.
+        A denominator that ends in 0 integrates. Of software ('sampled'), in powers of z.
     bias : float
         Output at zero input.
     noise_std : float
@@ -45,8 +46,9 @@ class Model:
         None for a reading at every sample.
     quantization_step : float or None
         The output is rounded to whole steps of this size, in its unit.
-    intersample : {'zoh', 'foh', 'bandlimited'}
-        What the input does between its samples, as it was identified.
+    intersample : {'zoh', 'foh', 'bandlimited', 'sampled'}
+        What the input does between its samples, as it was identified; 'sampled' for software,
+        which sees the samples alone and runs at `fs`.
     fs : float or None
         Rate in Hz at which it was identified.
     band : float or None
@@ -90,6 +92,9 @@ class Model:
         for name in ("delay", "scale_factor", "bias", "noise_std", "hold_phase"):
             numbers_of(name, getattr(self, name))
         _check_readout(self)
+        if self.intersample == "sampled":
+            _check_filter(self)
+            return
         if not any(self.denominator[-2:]):
             raise ArgumentError(
                 f"denominator {self.denominator} integrates more than once; one of its last two "
@@ -109,7 +114,18 @@ class Model:
 
     @property
     def system(self) -> RationalDelay:
-        """Rising powers of s, scale factor included, the first that is not 0 of A made 1."""
+        """Rising powers of s, scale factor included, the first that is not 0 of A made 1.
+
+        Of software ('sampled') they are powers of 1 - 1/z, and `step` is the time of a sample.
+        """
+        if self.intersample == "sampled" and self.fs is not None:
+            constant = sum(self.denominator)
+            return RationalDelay(
+                delay=self.delay,
+                numerator=self.scale_factor * in_z(np.asarray(self.numerator)) / constant,
+                denominator=in_z(np.asarray(self.denominator)) / constant,
+                step=1.0 / self.fs,
+            )
         constant = self.denominator[-1] or self.denominator[-2]
         return RationalDelay(
             delay=self.delay,
@@ -206,7 +222,7 @@ def _known(intersample: str) -> Intersample:
         if intersample == name:
             return name  # type: ignore[no-any-return]
     raise ArgumentError(
-        f"intersample = {intersample!r} is not known; use 'zoh', 'foh' or 'bandlimited'"
+        f"intersample = {intersample!r} is not known; use 'zoh', 'foh', 'bandlimited' or 'sampled'"
     )
 
 
@@ -232,6 +248,31 @@ def _evenly(u: ArrayLike, t: ArrayLike) -> tuple[NDArray[np.float64], float, flo
             f"{step:.6g} s on average; resample the input first"
         )
     return values, float(1.0 / step), float(time[0])
+
+
+def _check_filter(model: "Model") -> None:
+    """Software: a filter in z at a rate, causal and stable, late by whole samples."""
+    if model.fs is None or not model.fs > 0:
+        raise ArgumentError(
+            f"fs = {model.fs!r} Hz is not the rate of software; a model with intersample='sampled' "
+            "needs it"
+        )
+    late = model.delay * model.fs
+    if abs(late - round(late)) > 1e-6 or late < -1e-6:
+        raise ArgumentError(
+            f"delay = {model.delay!r} s is {late:.6g} samples; software is late by a whole number"
+        )
+    if not model.denominator[0] or len(model.numerator) > len(model.denominator):
+        raise ArgumentError(
+            f"a filter of numerator {model.numerator} over denominator {model.denominator} needs "
+            "input from after its output; give as many powers of z below as above"
+        )
+    poles = np.roots(model.denominator)
+    if np.any(np.abs(poles) >= 1.0):
+        raise ArgumentError(
+            f"denominator {model.denominator} has a pole at z = "
+            f"{poles[np.argmax(np.abs(poles))]:.4g}; only stable dynamics can be simulated"
+        )
 
 
 def _check_readout(model: Model) -> None:
@@ -298,6 +339,8 @@ def simulate(
     """
     if not (np.isfinite(fs) and fs > 0):
         raise ArgumentError(f"fs = {fs:g} Hz is no sampling rate; give a positive number of Hz")
+    if model.intersample == "sampled" or intersample == "sampled":
+        return _run(replace(model, fs=fs, intersample="sampled"), numbers_of("u", u), rng)
     samples = np.atleast_1d(numbers_of("u", u))
     if samples.size < 2:
         raise ArgumentError(f"u has {samples.size} samples; give two or more")
@@ -318,3 +361,21 @@ def simulate(
     if rng is not None:
         y = y + model.noise_std * generator(rng).standard_normal(y.size)
     return np.asarray(y)
+
+
+def _run(
+    model: Model, u: NDArray[np.float64], rng: np.random.Generator | int | None
+) -> NDArray[np.float64]:
+    """Output of the linear part of software."""
+    bare = Model(
+        delay=model.delay,
+        scale_factor=model.scale_factor,
+        numerator=model.numerator,
+        denominator=model.denominator,
+        bias=model.bias,
+        noise_std=model.noise_std,
+        intersample="sampled",
+        fs=model.fs,
+    )
+    chain = bare.at_rate(float(model.fs or 0.0))
+    return run_chain(chain, u, rng=None if rng is None else generator(rng))

@@ -10,6 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
+from hmpim.model.filters import delta_of
+
 __all__ = [
     "PeakGain",
     "RationalDelay",
@@ -33,11 +35,20 @@ class RationalDelay:
         τ in seconds.
     numerator, denominator : ndarray, shapes (m + 1,) and (n + 1,)
         B and A by rising powers of s, in seconds; A(0) = 1.
+    step: float or None
+        Of a filter in z, its sample time in s: powers are those of 1 - 1/z then, not of s.
     """
 
     delay: float
     numerator: NDArray[np.float64]
     denominator: NDArray[np.float64]
+    step: float | None = None
+
+    def variable(self, frequency: NDArray[np.float64]) -> NDArray[np.complex128]:
+        """What the polynomials are in, at `frequency` in Hz: s, or 1 - 1/z."""
+        if self.step is not None:
+            return delta_of(frequency, self.step)
+        return np.asarray(2j * np.pi * np.asarray(frequency, dtype=np.float64), dtype=np.complex128)
 
 
 def response(system: RationalDelay, frequency: NDArray[np.float64]) -> NDArray[np.complex128]:
@@ -49,9 +60,10 @@ def response(system: RationalDelay, frequency: NDArray[np.float64]) -> NDArray[n
     >>> abs(response(lag, np.array([1 / (2 * np.pi)]))).round(6).tolist()
     [0.707107]
     """
-    s = np.asarray(2j * np.pi * np.asarray(frequency, dtype=np.float64), dtype=np.complex128)
-    ratio = _polynomial(system.numerator, s) / _polynomial(system.denominator, s)
-    return np.asarray(ratio * np.exp(-s * system.delay))
+    x = system.variable(frequency)
+    ratio = _polynomial(system.numerator, x) / _polynomial(system.denominator, x)
+    late = np.exp(-2j * np.pi * np.asarray(frequency, dtype=np.float64) * system.delay)
+    return np.asarray(ratio * late)
 
 
 def _polynomial(
@@ -83,6 +95,16 @@ def _turn(roots: NDArray[np.complex128], omega: NDArray[np.float64]) -> NDArray[
     return np.asarray(turned.sum(axis=0))
 
 
+def _turn_in_z(roots: NDArray[np.complex128], omega: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Continuous phase of a polynomial in 1 - 1/z, zero at DC, at radians per sample."""
+    places = 1.0 / (1.0 - roots)[:, None]  # 1 - δ/r is 1 - q/z but for a factor
+    outside = np.abs(places) > 1.0 + 1e-9
+    inner = np.where(outside, 1.0 / places, places)
+    sign = np.where(outside, 1.0, -1.0)
+    turned = np.angle(1.0 - inner * np.exp(1j * sign * omega)) - np.angle(1.0 - inner)
+    return np.asarray((turned - np.where(outside, omega, 0.0)).sum(axis=0))
+
+
 def phase(
     system: RationalDelay, frequency: NDArray[np.float64], *, delay: bool = True
 ) -> NDArray[np.float64]:
@@ -109,6 +131,9 @@ def _phase_of(
 
     def at(frequency: NDArray[np.float64]) -> NDArray[np.float64]:
         omega = 2 * np.pi * frequency
+        if system.step is not None:
+            turn = omega * system.step
+            return _turn_in_z(zeros, turn) - _turn_in_z(poles, turn) - omega * late
         return _turn(zeros, omega) - _turn(poles, omega) - omega * late
 
     return at
@@ -218,6 +243,8 @@ def slowest_time_constant(denominator: NDArray[np.float64]) -> float:
 def dominant_time_constant(system: RationalDelay) -> float | None:
     """Slowest time constant in seconds where the slowest pole is real, else None."""
     poles = _moving_poles(system.denominator)
+    if system.step is not None:
+        poles = np.asarray(-np.log(1.0 - poles) / system.step, dtype=np.complex128)
     if not poles.size:
         return None
     slowest = poles[np.argmax(poles.real)]

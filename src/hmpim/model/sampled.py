@@ -30,6 +30,7 @@ from hmpim.record import Intersample
 
 __all__ = [
     "MARGIN",
+    "SAMPLES_ALONE",
     "SampledInput",
     "delayed_response",
     "prepare_input",
@@ -46,7 +47,10 @@ _BAND_PER_RATE = 0.16
 _ENERGY_BEYOND = 1e-5
 """Share of the input's amplitude spectrum (r.m.s.) that may lie beyond that frequency."""
 
-_DEGREE: dict[Intersample, int] = {"zoh": 0, "foh": 1, "bandlimited": 5}
+SAMPLES_ALONE = -1
+"""Degree that stands for an input of which nothing but its samples is seen."""
+
+_DEGREE: dict[Intersample, int] = {"zoh": 0, "foh": 1, "bandlimited": 5, "sampled": SAMPLES_ALONE}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -60,7 +64,7 @@ class SampledInput:
     first : float
         First sample; before the record the input stood there.
     degree : int
-        Degree of the spline between the samples.
+        Degree of the spline between the samples; `SAMPLES_ALONE` for software.
     oversampling : int
         Fine samples per sample of the record.
     samples : int
@@ -81,8 +85,8 @@ def prepare_input(u: NDArray[np.float64], intersample: Intersample) -> SampledIn
     ----------
     u : ndarray, shape (n,)
         Uniform samples.
-    intersample : {'zoh', 'foh', 'bandlimited'}
-        Held, linear, or band-limited.
+    intersample : {'zoh', 'foh', 'bandlimited', 'sampled'}
+        Held, linear, or band-limited; 'sampled' for software, which sees the samples alone.
 
     Examples
     --------
@@ -94,7 +98,7 @@ def prepare_input(u: NDArray[np.float64], intersample: Intersample) -> SampledIn
     reach = min(MARGIN, u.size - 1)
     after = 2.0 * deviation[-1] - deviation[-2 : -2 - reach : -1]  # odd about the last sample
     after = np.concatenate([after, np.full(MARGIN - reach, after[-1] if reach else 0.0)])
-    if intersample == "zoh":
+    if intersample in ("zoh", "sampled"):
         after[:] = deviation[-1]
     extended = np.concatenate([before, deviation, after])
     oversampling = 1

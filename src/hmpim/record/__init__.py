@@ -7,11 +7,12 @@ from hmpim.record.finding import Finding, Severity
 from hmpim.record.offset import ClockOffset, clock_offset
 from hmpim.record.propose import Proposal, propose
 from hmpim.record.quality import inspect_record, inspect_timing, inspect_values
-from hmpim.record.record import ROLES, Channel, Intersample, Record, Role
+from hmpim.record.record import BETWEEN, ROLES, Channel, Intersample, Record, Role
 from hmpim.record.series import Series
 from hmpim.record.sweeps import Motion, find_motions
 
 __all__ = [
+    "BETWEEN",
     "ROLES",
     "Aligned",
     "Channel",

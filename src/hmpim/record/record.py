@@ -18,7 +18,11 @@ from hmpim.units import check_unit
 
 __all__ = ["ROLES", "Channel", "Intersample", "Record", "Role"]
 
-Intersample = Literal["zoh", "foh", "bandlimited"]
+Intersample = Literal["zoh", "foh", "bandlimited", "sampled"]
+"""Held, linear or band-limited between its samples; or software, which sees the samples alone."""
+
+BETWEEN: tuple[Intersample, ...] = ("zoh", "foh", "bandlimited")
+"""What a signal in continuous time may do between its samples."""
 """What an input does between its samples: held, linear, or band-limited."""
 
 Role = Literal["input", "output", "reference", "auxiliary"]

@@ -21,7 +21,12 @@ def accuracy(chain: Chain) -> str:
     """
     step = chain.step
     if chain.error == 0.0:
-        between = {"zoh": "held", "foh": "linear", "bandlimited": "band-limited"}[step.intersample]
+        between = {
+            "zoh": "held",
+            "foh": "linear",
+            "bandlimited": "band-limited",
+            "sampled": "sampled",
+        }[step.intersample]
         return (
             f"Exact at {step.fs:.9g} Hz for an input that is {between} between its samples, "
             "delay included."

@@ -43,6 +43,9 @@ Target = Literal[
 ]
 """What a result can be exported to."""
 
+_CONTINUOUS = ("control", "scipy", "matlab", "mat", "mujoco", "isaac", "modelica")
+"""Those that are written as transfer functions of s."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Choices:
@@ -173,6 +176,11 @@ def export(
     writer = TARGETS.get(to)
     if writer is None:
         raise ArgumentError(f"target {to!r} is not known; choose of {', '.join(get_args(Target))}")
+    if to in _CONTINUOUS and any(pair.intersample == "sampled" for pair in result.pairs):
+        raise ArgumentError(
+            f"target {to!r} takes systems in continuous time, and this result is of software, which "
+            "knows samples alone; export it to c, python, fmu, json or csv"
+        )
     choices = _Choices(pade=pade, fmi=fmi, timestep=timestep)
     for name in ("pade", "fmi", "timestep"):
         if getattr(choices, name) is not None and name not in writer.choices:

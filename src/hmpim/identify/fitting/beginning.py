@@ -8,11 +8,11 @@ from scipy.special import chdtri
 
 from hmpim.identify.fitting.data import Data, Seen
 from hmpim.identify.fitting.fit import Fit, Problem, jacobian, solved
-from hmpim.identify.fitting.rows import Part
+from hmpim.identify.fitting.sampled_rows import part_of
 from hmpim.identify.whiteness import effective_share
 from hmpim.record import Intersample
 
-__all__ = ["count_in"]
+__all__ = ["begins_of", "count_in"]
 
 _REACH = 4
 """Samples by which what lies between the samples reaches back: half of a spline's support."""
@@ -37,7 +37,7 @@ def count_in(
     """Samples that count once it is known how the system remembers, and where it begins."""
     fit = min(fits, key=lambda f: f.objective)
     ahead = _ahead(fits)
-    begins = _begins(data.problem(mode, seen), fit, lag=data.rough.lag)
+    begins = begins_of(data.problem(mode, seen), fit, lag=data.rough.lag)
     if begins is None and not ahead and known is None:
         return seen
     n = fit.residual.size
@@ -49,7 +49,7 @@ def count_in(
     return Seen(valid=counted, begins=begins)
 
 
-def _begins(problem: Problem, fit: Fit, *, lag: int) -> int | None:
+def begins_of(problem: Problem, fit: Fit, *, lag: int) -> int | None:
     """Sample from which on an unknown state must be fitted; None for a record at rest.
 
     A score test (C. R. Rao, Proc. Camb. Phil. Soc. 44, 1948) of the free responses beside all other
@@ -61,7 +61,7 @@ def _begins(problem: Problem, fit: Fit, *, lag: int) -> int | None:
     begins = int(np.ceil(latest)) + _REACH
     if begins > problem.y.size // 2 or fit.objective <= 0.0:
         return None
-    free = Part(replace(problem, begins=begins), fit.structure, fit.theta).free
+    free = part_of(replace(problem, begins=begins), fit.structure, fit.theta).free
     late = np.arange(problem.y.size) >= begins
     valid = late if problem.counts is None else problem.counts & late
     innovations = problem.innovations(fit.prediction, fit.residual)

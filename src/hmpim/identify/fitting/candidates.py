@@ -1,7 +1,5 @@
 """Fits of every structure: plain ones, richer ones where asked for, each between the samples."""
 
-from typing import get_args
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -21,7 +19,7 @@ from hmpim.identify.fitting.unexplained import unexplained_response
 from hmpim.identify.whiteness import effective_share, is_white, misfit
 from hmpim.model.dynamics import STRUCTURES, Structure, StructureName
 from hmpim.model.response import slowest_time_constant
-from hmpim.record import Intersample
+from hmpim.record import BETWEEN, Intersample
 
 __all__ = [
     "almost_integrates",
@@ -56,7 +54,12 @@ _TASTE = 4
 _FALLING = 4.0
 """After so many steps a structure is given up if its sum of squares is this far from hopeful."""
 
-_DELAY_SHIFT: dict[Intersample, float] = {"zoh": -0.5, "foh": 0.0, "bandlimited": 0.0}
+_DELAY_SHIFT: dict[Intersample, float] = {
+    "zoh": -0.5,
+    "foh": 0.0,
+    "bandlimited": 0.0,
+    "sampled": 0.0,
+}
 """Samples by which the fitted delay moves when held, against the other two."""
 
 _PRECISION = 1e-2
@@ -236,7 +239,7 @@ def fit_under_each_assumption(
     trailing = [
         fit for fit in fits if fit.objective >= HOPELESS * least and fit.structure.name in PLAIN
     ]
-    others = [mode for mode in get_args(Intersample) if mode != natural]
+    others = [mode for mode in BETWEEN if mode != natural]
 
     def moved(some: list[Fit]) -> list[tuple[Intersample, Fit]]:
         return [

@@ -16,8 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hmpim.identify.fitting.rows import Part, Problem
+from hmpim.identify.fitting.sampled_rows import SampledPart, part_of
 from hmpim.model.dynamics import Structure, coefficients_of, denominator_of
 from hmpim.model.response import slowest_time_constant
+from hmpim.model.sampled import SAMPLES_ALONE
 
 __all__ = [
     "Fit",
@@ -109,15 +111,17 @@ class Fit:
 class _Evaluation:
     """All inputs at given parameters: linear parameters solved, residual, derivatives on demand."""
 
-    def __init__(self, problems: Sequence[Problem], parts: Sequence[Part]) -> None:
+    def __init__(self, problems: Sequence[Problem], parts: Sequence[Part | SampledPart]) -> None:
         self.problems, self.parts = problems, parts
         first = problems[0]
         self._blocks = [rows for part in parts for rows in (part.rows, part.free)]
         self.rows = np.vstack([*self._blocks, first.fixed()])
         self.counted = first.masked(self.rows)
         target = first.masked(first.y)
-        gram = self.counted @ self.counted.T
-        self.linear = solved(gram, self.counted @ target)
+        if first.source.degree == SAMPLES_ALONE:  # rounding is all the noise there may be
+            self.linear = _solved_exactly(self.counted, target)
+        else:
+            self.linear = solved(self.counted @ self.counted.T, self.counted @ target)
         self.residual = target - self.linear @ self.counted
         self.cost = float(self.residual @ self.residual)
 
@@ -178,8 +182,15 @@ class _Evaluation:
 def _evaluated(
     problems: Sequence[Problem], structures: Sequence[Structure], thetas: Sequence[Real]
 ) -> _Evaluation:
-    parts = [Part(p, s, t) for p, s, t in zip(problems, structures, thetas, strict=True)]
+    parts = [part_of(p, s, t) for p, s, t in zip(problems, structures, thetas, strict=True)]
     return _Evaluation(problems, parts)
+
+
+def _solved_exactly(rows: Real, target: Real) -> Real:
+    """Least squares without normal equations, whose rounding is the square root of this one's."""
+    scale = np.sqrt(np.maximum(np.sum(rows**2, axis=1), np.finfo(float).tiny))
+    found = np.linalg.lstsq((rows / scale[:, None]).T, target, rcond=1e-13)[0]
+    return np.asarray(found / scale)
 
 
 def solved(gram: Real, moment: Real, damping: float = 0.0) -> Real:
@@ -204,7 +215,7 @@ def jacobian(problem: Problem, fit: Fit) -> Real:
     ndarray, shape (1 + order + m + 1, n)
         Zero where a sample does not count.
     """
-    part = Part(problem, fit.structure, fit.theta)
+    part = part_of(problem, fit.structure, fit.theta)
     bias = np.ones((1, problem.y.size))
     rows = np.vstack([part.slopes(fit.linear[:-1], fit.initial), part.rows, bias])
     counted = problem.masked(rows)

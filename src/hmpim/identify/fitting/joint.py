@@ -30,6 +30,7 @@ from hmpim.identify.fitting.enrich import (
     RICH,
 )
 from hmpim.identify.fitting.fit import Fit, fit_structure, solved
+from hmpim.identify.fitting.software import software_fit
 from hmpim.identify.fitting.start import rough_response
 from hmpim.identify.fitting.trial import JointFit, Trial, likeliest_of, trial_of, wary_of
 from hmpim.identify.fitting.unrelated import is_unrelated, says_nothing
@@ -40,7 +41,7 @@ from hmpim.identify.fitting.whitening import (
     refit_whitened,
 )
 from hmpim.identify.whiteness import effective_share
-from hmpim.model.dynamics import StructureName
+from hmpim.model.dynamics import FILTERS, StructureName
 from hmpim.model.sampled import prepare_input
 from hmpim.record import Intersample
 
@@ -71,8 +72,9 @@ def joint_fit(
     known : ndarray of bool, shape (n,), optional
         Input samples that were measured, not filled in; what the output does until it has
         forgotten the others does not count. All if None.
-    intersample : {'zoh', 'foh', 'bandlimited'}, optional
-        What the input does between samples; chosen by likelihood if None.
+    intersample : {'zoh', 'foh', 'bandlimited', 'sampled'}, optional
+        What the input does between samples, or 'sampled' for software, whose structures are
+        filters; chosen by likelihood among the first three if None.
     structures : tuple of str
         Which to try.
     nuisance : ndarray, shape (k, n), optional
@@ -82,6 +84,12 @@ def joint_fit(
     -------
     JointFit
     """
+    if intersample == "sampled":
+        named: tuple[str, ...] = structures
+        filters = tuple(name for name in named if name in FILTERS)
+        return software_fit(
+            u, y, valid=valid, structures=filters or tuple(FILTERS), nuisance=nuisance
+        )
     if intersample is None and _looks_held(u):
         intersample = "zoh"  # an input that stands still and jumps does nothing else
     natural: Intersample = "bandlimited" if intersample is None else intersample

@@ -20,7 +20,7 @@ from scipy.fft import irfft, next_fast_len, rfft
 
 from hmpim.model.dynamics import Structure, theta_of
 
-__all__ = ["RoughResponse", "rough_response", "starting_values"]
+__all__ = ["RoughResponse", "coarse_lag", "rough_response", "starting_values"]
 
 _TAPER = 0.1
 """Share of the record tapered at either end."""

@@ -6,7 +6,7 @@ from scipy.signal import lfilter
 
 from hmpim.identify.fitting.autoregression import autoregression
 from hmpim.identify.fitting.fit import Fit, Problem, solved
-from hmpim.identify.fitting.rows import Part
+from hmpim.identify.fitting.sampled_rows import part_of
 from hmpim.identify.whiteness import effective_share, innovation_gain, misfit
 
 __all__ = ["is_unrelated", "says_nothing"]
@@ -86,7 +86,7 @@ def _without_input(problem: Problem, fit: Fit) -> NDArray[np.float64]:
     """The output less what free response alone makes of it: that needs no input."""
     if problem.begins is None:
         return problem.y
-    free = Part(problem, fit.structure, fit.theta).free
+    free = part_of(problem, fit.structure, fit.theta).free
     rows = np.vstack([free, np.ones(problem.y.size)])
     counted = problem.masked(rows)
     weights = solved(counted @ counted.T, counted @ problem.masked(problem.y))

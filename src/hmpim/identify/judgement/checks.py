@@ -30,6 +30,9 @@ from hmpim.record import Finding
 
 __all__ = ["CHECKS", "Check", "judge"]
 
+ROUNDING = 1e-9
+"""Share of the output (r.m.s.) below which what is left over is rounding, and says nothing."""
+
 Check = Callable[[Evidence], tuple[Finding, ...]]
 """Looks at the evidence and says what it finds, if anything."""
 
@@ -58,22 +61,41 @@ CHECKS: tuple[Check, ...] = (
 )
 """All checks of one pair; each one's findings come in this order."""
 
+SAMPLED: tuple[Check, ...] = (
+    initial_transient,
+    lack_of_fit,
+    coloured_noise,
+    few_lines,
+    beyond_band,
+    halves_disagree,
+    noise_colour_of,
+)
+"""Those that ask something of software, which has neither poles beyond the band nor a clock."""
 
-def judge(evidence: Evidence, *, checks: Sequence[Check] = CHECKS) -> tuple[Finding, ...]:
+
+EXACT: tuple[Check, ...] = (initial_transient, few_lines, beyond_band)
+"""Those that ask something of software that is explained to the last digit."""
+
+
+def judge(evidence: Evidence, *, checks: Sequence[Check] | None = None) -> tuple[Finding, ...]:
     """Make every check; one that raises costs itself and is said.
 
     Parameters
     ----------
     evidence : Evidence
         What there is to look at.
-    checks : sequence of callable
-        What to look for.
+    checks : sequence of callable, optional
+        What to look for; by default `CHECKS`, of software `SAMPLED` or `EXACT`.
 
     Returns
     -------
     tuple of Finding
         In the order of the checks; a check that raised stands as 'check_failed'.
     """
+    if checks is None:
+        checks = CHECKS
+        if evidence.joint.best.fit.structure.sampled:
+            checks = SAMPLED if evidence.unexplained > ROUNDING else EXACT
     found: list[Finding] = []
     for check in checks:
         name = getattr(check, "__name__", type(check).__name__)

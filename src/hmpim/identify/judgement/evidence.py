@@ -84,4 +84,6 @@ def structure_in_words(name: str) -> str:
         "integrator_first_order": "lagging integrator",
         "integrator_second_order": "second-order lagging integrator",
     }
+    if name.startswith(("iir", "bilinear")):
+        return f"{name.split('_')[1]}-pole filter"
     return plain.get(name, name.replace("_", " "))

@@ -94,7 +94,7 @@ def _checked(noted: object, headings: Sequence[Heading]) -> Notes | None:
     pairs = {
         kind: [(str(c["name"]), str(c["unit"])) for c in noted.get(kind, [])] for kind in KINDS
     }
-    if noted["intersample"] not in (None, "zoh", "foh", "bandlimited"):
+    if noted["intersample"] not in (None, "zoh", "foh", "bandlimited", "sampled"):
         raise ValueError(f"intersample {noted['intersample']!r}")
     band = None
     if noted["band"] is not None:

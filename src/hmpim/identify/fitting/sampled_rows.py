@@ -1,0 +1,96 @@
+"""The rows of software under test: what a filter in z makes of the samples, and the derivatives."""
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import lfilter
+
+from hmpim.identify.fitting.rows import Part, Problem
+from hmpim.model.dynamics import Structure, coefficients_of
+from hmpim.model.filters import poles_in_z
+from hmpim.model.sampled import MARGIN, SAMPLES_ALONE
+
+__all__ = ["SampledPart", "part_of"]
+
+Real = NDArray[np.float64]
+
+_STEP = 1e-6
+
+
+class SampledPart:
+    """What software makes of its input at given parameters; the same face as `Part`.
+
+    Parameters
+    ----------
+    problem : Problem
+        Its source, and where it begins.
+    structure : Structure
+        One of `hmpim.model.dynamics.FILTERS`.
+    theta : ndarray, shape (1 + order,)
+        Delay in whole samples, then the parameters of the sections.
+    """
+
+    def __init__(self, problem: Problem, structure: Structure, theta: Real) -> None:
+        self.structure, self.theta = structure, theta
+        source, n = problem.source, problem.y.size
+        late = min(max(round(float(theta[0])), 0), n)
+        deviation = source.coefficients[MARGIN : MARGIN + n]
+        moved = np.concatenate([np.zeros(late), deviation])[:n]
+        self._below = _below(structure, theta[1:])
+        gain = self._below.sum()
+        above = np.array([gain])
+        for _ in range(structure.nyquist_zeros):
+            above = np.convolve(above, [0.5, 0.5])
+        row = lfilter(above, self._below, moved)
+        rows = [row]
+        for _ in range(structure.zeros):
+            rows.append(np.diff(rows[-1], prepend=0.0))
+        self._moving = np.stack(rows)
+        self.rows = self._moving.copy()
+        """Responses that the numerator's coefficients multiply, shape (m, n)."""
+        self.rows[0] += source.first
+        self.free = np.empty((0, n))
+        """Free responses, shape (order, n)."""
+        if problem.begins is not None and structure.order:
+            blows = np.zeros((structure.order, n))
+            for k in range(min(structure.order, n - problem.begins)):
+                blows[k, problem.begins + k] = 1.0
+            self.free = np.asarray(lfilter(np.ones(1), self._below, blows))
+
+    def slopes(self, numerator: Real, initial: Real) -> Real:
+        """Derivatives by theta, shape (1 + order, n); a whole number of samples has none."""
+        order = self.structure.order
+        out = np.zeros((1 + order, self.rows.shape[1]))
+        if not order:
+            return out
+        forced = numerator @ self._moving
+        free = initial @ self.free if initial.size else np.zeros(forced.size)
+        turned = -lfilter(np.ones(1), self._below, forced + free)
+        by_coefficient = np.stack(
+            [
+                forced / self._below.sum()
+                + np.concatenate([np.zeros(k), turned[: turned.size - k]])
+                for k in range(1, order + 1)
+            ]
+        )
+        for j in range(order):
+            step = np.zeros(order)
+            step[j] = _STEP
+            up = _below(self.structure, self.theta[1:] + step)
+            down = _below(self.structure, self.theta[1:] - step)
+            out[1 + j] = (up - down)[1:] / (2 * _STEP) @ by_coefficient
+        return out
+
+
+def _below(structure: Structure, theta: Real) -> Real:
+    """A by rising powers of 1/z, 1 first."""
+    below = np.ones(1, dtype=np.complex128)
+    for pole in poles_in_z(structure, coefficients_of(structure, theta)):
+        below = np.convolve(below, [1.0, -pole])
+    return np.asarray(below.real)
+
+
+def part_of(problem: Problem, structure: Structure, theta: Real) -> Part | SampledPart:
+    """Rows of a system in continuous time, or of software."""
+    if problem.source.degree == SAMPLES_ALONE:
+        return SampledPart(problem, structure, theta)
+    return Part(problem, structure, theta)

@@ -1,0 +1,275 @@
+"""The joint fit of software under test: sample over sample, in z, the delay a whole number.
+
+Output sample k follows from input samples up to k. Poles start from an equation in the samples
+themselves, y[k] = Σ b u[k-d-j] - Σ a y[k-i], which is linear in all coefficients and exact where
+rounding is all the noise (Söderström and Stoica, System Identification, 1989, ch. 7); filtering
+input and output by the poles found removes most of its bias under noise (K. Steiglitz and L. E.
+McBride, IEEE TAC 10, 1965); the climb is the one of all fits. One triangular factor of all lagged
+samples serves every structure and every delay.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import lfilter
+
+from hmpim.identify.fitting.beginning import begins_of
+from hmpim.identify.fitting.fit import Fit, Problem, fit_structure
+from hmpim.identify.fitting.start import coarse_lag
+from hmpim.identify.fitting.trial import JointFit, Trial
+from hmpim.identify.fitting.unrelated import is_unrelated
+from hmpim.identify.whiteness import effective_share
+from hmpim.model.dynamics import FILTERS, Structure
+from hmpim.model.filters import section_parameters
+from hmpim.model.sampled import prepare_input
+
+__all__ = ["is_exact", "software_fit"]
+
+Real = NDArray[np.float64]
+
+_ORDER = 4
+"""Output samples that an equation reaches back to."""
+
+_TAPS = 16
+"""Input samples that it may take."""
+
+_EARLIER = 40
+"""Samples by which the delay may be below the lag of the greatest cross-correlation."""
+
+_NEAR = 3
+"""Delays of a structure that are followed to their end."""
+
+_ROUNDING = 1e-11
+"""Share of the output (r.m.s.) down to which nothing is told from rounding."""
+
+_EXACT = 1e-9
+"""Share of the output (r.m.s.) up to which an equation holds exactly."""
+
+_REFINED = 4
+"""Times that input and output are filtered by the poles found."""
+
+_TASTE, _HOPEFUL = 6, 2.0
+"""Steps from each start, and sum of squares over the least up to which it is followed on."""
+
+_POLISHED = 1e-6
+"""Precision of the chosen fits, see `fit_structure`."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Equations:
+    """Lagged samples as columns of one triangular factor.
+
+    Columns: y[k-1] … y[k-_ORDER], u[k-first] … u[k-first-count+1], 1, y[k].
+    """
+
+    factor: Real
+    first: int
+    count: int
+    ar: bool
+
+    def cost(self, structure: Structure, delay: int) -> tuple[float, Real]:
+        """Least sum of squares of the equation's error, and A's coefficients behind the 1."""
+        columns = [self.factor[:, k] for k in range(structure.order)]
+        start = _ORDER + delay - self.first
+        if structure.nyquist_zeros:
+            weights = _binomial(structure.nyquist_zeros)
+            columns.append(self.factor[:, start : start + weights.size] @ weights)
+        else:
+            columns += [self.factor[:, start + k] for k in range(structure.zeros + 1)]
+        columns.append(self.factor[:, -2])
+        matrix, target = np.stack(columns, axis=1), self.factor[:, -1]
+        scale = np.maximum(np.linalg.norm(matrix, axis=0), np.finfo(float).tiny)
+        found = np.linalg.lstsq(matrix / scale, target, rcond=1e-14)[0] / scale
+        left = target - matrix @ found
+        return float(left @ left), -found[: structure.order]
+
+    def delays(self, structure: Structure) -> range:
+        """Delays at which it has all samples that a structure takes."""
+        taken = max(structure.zeros, structure.nyquist_zeros)
+        return range(self.first, self.first + self.count - taken)
+
+
+def _binomial(n: int) -> Real:
+    weights = np.ones(1)
+    for _ in range(n):
+        weights = np.convolve(weights, [1.0, 1.0])
+    return weights
+
+
+def _equations(u: Real, y: Real, valid: NDArray[np.bool_] | None, lag: int) -> _Equations:
+    """Factor what one output sample may follow from; of masked samples, those told alone."""
+    first = max(lag - _EARLIER, 0)
+    last = min(lag + 2 + _TAPS, u.size // 2)
+    before = np.concatenate([np.full(last + 1, u[0]), u])
+    rows = [np.concatenate([np.full(k, y[0]), y[:-k]]) for k in range(1, _ORDER + 1)]
+    rows += [before[last + 1 - k : last + 1 - k + u.size] for k in range(first, last + 1)]
+    every = np.stack([*rows, np.ones(u.size), y], axis=1)
+    ar = True
+    told = np.arange(u.size) >= _ORDER
+    if valid is not None:
+        unbroken = told & valid
+        for k in range(1, _ORDER + 1):
+            unbroken[k:] &= valid[:-k]
+        ar = bool(np.count_nonzero(unbroken) > u.size // 2)
+        told = unbroken if ar else valid.copy()
+    factor = np.asarray(np.linalg.qr(every[told], mode="r"), dtype=np.float64)
+    return _Equations(factor=factor, first=first, count=last + 1 - first, ar=ar)
+
+
+def is_exact(u: Real, y: Real) -> bool:
+    """Whether an equation between samples holds to rounding: only software has no noise at all.
+
+    Parameters
+    ----------
+    u, y : ndarray, shape (n,)
+        Samples of input and output.
+
+    Examples
+    --------
+    >>> u = np.sin(np.arange(400) ** 2 / 2000)
+    >>> y = lfilter([0.2], [1.0, -0.8], np.concatenate([np.zeros(6), u[:-6]]))
+    >>> is_exact(u, y), is_exact(u, y + 1e-6 * np.cos(np.arange(400) ** 2))
+    (True, False)
+    """
+    equations = _equations(u, y, None, coarse_lag(u, y, u.size // 2))
+    inside = equations.factor[:, :-1]
+    scale = np.maximum(np.linalg.norm(inside, axis=0), np.finfo(float).tiny)
+    target = equations.factor[:, -1]
+    found = np.linalg.lstsq(inside / scale, target, rcond=1e-14)[0]
+    left = target - inside / scale @ found
+    spread = float(np.sum((y - y.mean()) ** 2))
+    return bool(left @ left < _EXACT**2 * spread)
+
+
+def software_fit(
+    u: Real,
+    y: Real,
+    *,
+    valid: NDArray[np.bool_] | None = None,
+    structures: tuple[str, ...] = tuple(FILTERS),
+    nuisance: Real | None = None,
+) -> JointFit:
+    """Fit every filter at every delay that may be, and keep the one that the record supports.
+
+    Parameters
+    ----------
+    u, y, valid, nuisance
+        As for `hmpim.identify.fitting.joint.joint_fit`.
+    structures : tuple of str
+        Names in `FILTERS`.
+
+    Returns
+    -------
+    JointFit
+        A trial for each structure and delay followed to its end.
+    """
+    lag = coarse_lag(u, y, u.size // 2)
+    equations = _equations(u, y, valid, lag)
+    problem = Problem(
+        source=prepare_input(u, "sampled"),
+        y=y,
+        valid=valid,
+        longest_delay=u.size // 2,
+        nuisance=nuisance,
+    )
+    fits = _followed(problem, equations, u, structures)
+    spread = float(np.sum(problem.masked(y - y.mean()) ** 2))
+    floor = _ROUNDING**2 * spread
+    first = min(fits, key=lambda fit: fit.cost)
+    begins = None if first.cost <= floor else begins_of(problem, first, lag=0)
+    if begins is not None:
+        late = np.arange(y.size) >= begins
+        counted = late if valid is None else valid & late
+        problem = Problem(
+            source=problem.source,
+            y=y,
+            valid=counted,
+            longest_delay=problem.longest_delay,
+            nuisance=nuisance,
+            begins=begins,
+        )
+        fits = [fit_structure(problem, fit.structure, fit.theta) for fit in fits]
+    share = effective_share(min(fits, key=lambda fit: fit.cost).residual)
+    count = problem.counted * share
+    trials = [
+        Trial(
+            intersample="sampled",
+            fit=fit,
+            criterion=float(
+                count * np.log(max(fit.cost, floor, np.finfo(float).tiny) / count)
+                + fit.structure.parameters * np.log(count)
+            ),
+        )
+        for fit in fits
+    ]
+    best = min(trials, key=lambda trial: trial.criterion)
+    return JointFit(
+        problem=problem,
+        weighed=problem,
+        best=best,
+        trials=tuple(trials),
+        forgotten=begins or 0,
+        effective_share=share,
+        related=not is_unrelated(problem, best.fit, share),
+    )
+
+
+def _followed(
+    problem: Problem, equations: _Equations, u: Real, structures: tuple[str, ...]
+) -> list[Fit]:
+    """Each structure at its likeliest delays, fitted to the end."""
+    fits: list[Fit] = []
+    exact = _ROUNDING**2 * float(np.sum(problem.masked(problem.y - problem.y.mean()) ** 2))
+    for structure in sorted((FILTERS[name] for name in structures), key=lambda s: s.parameters):
+        if structure.order and not equations.ar:
+            continue
+        found = [fit.structure.parameters for fit in fits if fit.cost <= exact]
+        if found and structure.parameters > min(found):
+            break  # nothing but rounding is left to explain
+        costs = {delay: equations.cost(structure, delay) for delay in equations.delays(structure)}
+        ranked = sorted(costs, key=lambda delay: costs[delay][0])[:_NEAR]
+        for delay in ranked:
+            theta = np.array([float(delay)])
+            if structure.order:
+                below = np.concatenate([[1.0], costs[delay][1]])
+                below = _refined(problem, u, structure, delay, below)
+                theta = np.append(
+                    theta,
+                    section_parameters(structure, np.asarray(np.roots(below), dtype=np.complex128)),
+                )
+            fits.append(fit_structure(problem, structure, theta, iterations=_TASTE))
+    least = min(fit.cost for fit in fits)
+    return [
+        fit
+        if fit.cost > _HOPEFUL * least or not fit.structure.order
+        else fit_structure(problem, fit.structure, fit.theta, precision=_POLISHED)
+        for fit in fits
+    ]
+
+
+def _refined(problem: Problem, u: Real, structure: Structure, delay: int, below: Real) -> Real:
+    """A after filtering input and output by 1/A some times; the one that leaves least."""
+    y, n = problem.y, u.size
+    moved = np.concatenate([np.full(delay, u[0]), u])[:n] - u[0]
+    weights = _binomial(structure.nyquist_zeros)
+    best, least = below, np.inf
+    for _ in range(_REFINED):
+        if np.max(np.abs(np.roots(below))) >= 1.0:
+            break
+        x = lfilter(weights, below, moved)
+        z = lfilter([1.0], below, y - y[0])
+        level = lfilter([1.0], below, np.ones(n))
+        rows = [np.concatenate([np.zeros(k), z[: n - k]]) for k in range(1, structure.order + 1)]
+        rows += [np.concatenate([np.zeros(k), x[: n - k]]) for k in range(structure.zeros + 1)]
+        matrix = np.stack([*rows, level], axis=1)
+        told = slice(None) if problem.valid is None else problem.valid
+        matrix, target = matrix[told], z[told]
+        scale = np.maximum(np.linalg.norm(matrix, axis=0), np.finfo(float).tiny)
+        found = np.linalg.lstsq(matrix / scale, target, rcond=1e-14)[0] / scale
+        left = target - matrix @ found
+        if float(left @ left) >= least:
+            break
+        best, least = below, float(left @ left)
+        below = np.concatenate([[1.0], -found[: structure.order]])
+    return below if np.max(np.abs(np.roots(below))) < 1.0 else best
