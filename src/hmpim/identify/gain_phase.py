@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 from hmpim.arguments import numbers_of
 from hmpim.errors import ArgumentError
 from hmpim.identify.bandwidth import ratio_at
+from hmpim.identify.predict import to_model
 from hmpim.identify.result import Estimate, PairIdentification
 from hmpim.identify.uncertainty import estimate
 from hmpim.model import RationalDelay, phase, response
@@ -94,9 +95,14 @@ def gain_and_phase(
             f"{pair.output!r} from {pair.input!r} was not identifiable, so it has no gain and "
             "phase to read off; see its warnings"
         )
-    integrators = int(pair.denominator[-1] == 0.0)
-    numerator = p.scale_factor.value * np.array(pair.numerator)
-    vector = np.concatenate([[p.delay.value], numerator, pair.denominator[: -1 - integrators]])
+    sampled = pair.intersample == "sampled"
+    integrators = 0 if sampled else int(pair.denominator[-1] == 0.0)
+    above, below = np.array(pair.numerator), np.array(pair.denominator)
+    if sampled:  # in powers of 1 - 1/z, as the covariance is
+        whole = to_model(pair, fs=fs).system
+        above, below = _told(whole.numerator / p.scale_factor.value), _told(whole.denominator)
+    numerator = p.scale_factor.value * above
+    vector = np.concatenate([[p.delay.value], numerator, below[: below.size - 1 - integrators]])
 
     def system(v: NDArray[np.float64]) -> RationalDelay:
         lowest = [0.0] * integrators + [1.0]
@@ -104,9 +110,16 @@ def gain_and_phase(
             delay=float(v[0]),
             numerator=v[1 : 1 + numerator.size][::-1],
             denominator=np.concatenate([lowest, v[1 + numerator.size :][::-1]]),
+            step=1.0 / fs if sampled else None,
         )
 
     return tuple(_at(pair, float(f), system, vector, pair.covariance, fs) for f in places)
+
+
+def _told(rising: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Coefficients, the highest power first, without the powers that only z needs."""
+    seen = np.flatnonzero(np.abs(rising) > 1e-12 * np.abs(rising).max())
+    return rising[: seen[-1] + 1][::-1]
 
 
 def measurable(frequency: ArrayLike, fs: float) -> NDArray[np.float64]:

@@ -153,7 +153,7 @@ def described(
         time=aligned.time,
         prediction=fit.prediction if drifting is None else fit.prediction + drifting.trend,
         residual=fit.residual,
-        covariance=None if readings.system.step is not None else _highest_first(readings),
+        covariance=_highest_first(readings),
         nonlinearity=None if inspection is None else inspection.summary,
     )
 
@@ -211,13 +211,16 @@ def _highest_first(readings: Readings) -> NDArray[np.float64] | None:
 
 
 def _coefficients(system: RationalDelay) -> tuple[tuple[float, ...], tuple[float, ...]]:
-    """Numerator and denominator of unit gain, highest power first: of s, or of software's z."""
+    """Numerator and denominator of unit gain, highest power first: of s, or of software's z.
+
+    Below, the coefficient 1 is that of s⁰, or that of the highest power of z.
+    """
     above, below = system.numerator / _leading(system.numerator), system.denominator
     if system.step is None:
         return _descending(above), _descending(below)
     length = max(above.size, below.size)
     above, below = (np.pad(in_z(c), (0, length - c.size)) for c in (above, below))
-    return tuple(above.tolist()), tuple(below.tolist())
+    return tuple((above / below[0]).tolist()), tuple((below / below[0]).tolist())
 
 
 def _leading(numerator: NDArray[np.float64]) -> float:

@@ -74,10 +74,25 @@ def to_model(pair: PairIdentification, *, fs: float | None = None) -> Model:
         hold_period=_value(p.hold_period),
         quantization_step=_value(p.quantization_step),
         intersample=pair.intersample,
-        fs=fs,
+        fs=_rate(pair) if fs is None else fs,
         band=float(frequency[-1]) if frequency.size else None,
         spread=_spread(pair),
     )
+
+
+def _rate(pair: PairIdentification) -> float | None:
+    """Rate in Hz at which software was identified, where the result still has its samples."""
+    if pair.intersample != "sampled" or pair.time is None or pair.time.size < 2:
+        return None
+    return float((pair.time.size - 1) / (pair.time[-1] - pair.time[0]))
+
+
+def _slowest(model: Model) -> float:
+    """Slowest time constant of a model, in s."""
+    if model.intersample != "sampled" or model.fs is None:
+        return slowest_time_constant(np.asarray(model.denominator[::-1]))
+    size = np.abs(np.roots(model.denominator))
+    return float(np.max(-1.0 / np.log(np.clip(size, 1e-12, 1 - 1e-12)), initial=0.0) / model.fs)
 
 
 def _value(estimate: Estimate | None) -> float | None:
@@ -86,7 +101,7 @@ def _value(estimate: Estimate | None) -> float | None:
 
 def _spread(pair: PairIdentification) -> Spread | None:
     """Errors of a model's figures; None where the record does not tell them."""
-    if pair.covariance is None:
+    if pair.covariance is None or pair.intersample == "sampled":
         return None
     p = pair.parameters
     given = {
@@ -122,12 +137,12 @@ def predict(pair: PairIdentification, record: Record, *, start: float | None = N
     RecordError
         If a channel is missing, or nothing is left to score.
     """
-    model = to_model(pair)
     aligned = uniform(record)
+    model = to_model(pair, fs=aligned.fs)
     u, y = aligned.signal(pair.input), aligned.signal(pair.output)
     predicted = simulate(model, u.values, fs=aligned.fs, intersample=pair.intersample)
     if start is None:
-        slowest = slowest_time_constant(np.asarray(model.denominator[::-1]))
+        slowest = _slowest(model)
         start = aligned.start + max(model.delay, 0.0) + 5.0 * slowest
     scored = y.valid & (aligned.time >= start)
     if np.count_nonzero(scored) < 2:

@@ -267,7 +267,7 @@ def pair_bode(
         grid = np.geomspace(positive[0], positive[-1], 400)
     whole = model_curve(pair, grid, fs=fs)
     if whole is not None:
-        held = fs is not None and pair.intersample != "bandlimited"
+        held = fs is not None and pair.intersample in ("zoh", "foh")
         word = f"model, input {INTERSAMPLE_WORDS[pair.intersample]}" if held else "model"
         curves.append((word, "model", whole))
     ratio = "" if input_unit == output_unit else f"{output_unit or '1'}/{input_unit or '1'}"

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from hmpim.model.filters import in_z
 from hmpim.model.response import RationalDelay, phase, response
 
 if TYPE_CHECKING:
@@ -92,14 +93,22 @@ def model_curve(
     if scale is None or scale.value == 0.0 or not pair.numerator or not pair.denominator:
         return None
     delay = pair.parameters.delay
+    step = None
+    if pair.intersample == "sampled" and pair.time is not None and pair.time.size > 1:
+        step = float(pair.time[1] - pair.time[0])
+    elif pair.intersample == "sampled":
+        step = None if fs is None else 1.0 / fs
+        if step is None:
+            return None
     system = RationalDelay(
+        step=step,
         delay=0.0 if delay is None else delay.value,
-        numerator=np.array(pair.numerator[::-1]),
-        denominator=np.array(pair.denominator[::-1]),
+        numerator=in_z(np.array(pair.numerator)) if step else np.array(pair.numerator[::-1]),
+        denominator=in_z(np.array(pair.denominator)) if step else np.array(pair.denominator[::-1]),
     )
     lag = np.degrees(phase(system, frequency, delay=with_delay))
     values = response(system, frequency)
-    if fs is not None and with_delay and pair.intersample != "bandlimited":
+    if fs is not None and with_delay and pair.intersample in ("zoh", "foh"):
         values = _as_sampled(system, frequency, fs=fs, linear=pair.intersample == "foh")
         held = lag if pair.intersample == "foh" else lag - 180.0 * frequency / fs
         lag = _near(np.degrees(np.angle(values)), held)

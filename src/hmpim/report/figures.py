@@ -207,7 +207,7 @@ def _response_pictures(
     )
     marks = [f"{words} at {f.value:.4g} Hz" for words, f in named if f is not None]
     between = ""
-    if found.scale_factor is not None and pair.intersample != "bandlimited":
+    if found.scale_factor is not None and pair.intersample in _BETWEEN:
         between = (
             f" The model is seen as the samples see it, its input {_BETWEEN[pair.intersample]} "
             "them; the marks are of the system itself."

@@ -178,8 +178,8 @@ def export(
         raise ArgumentError(f"target {to!r} is not known; choose of {', '.join(get_args(Target))}")
     if to in _CONTINUOUS and any(pair.intersample == "sampled" for pair in result.pairs):
         raise ArgumentError(
-            f"target {to!r} takes systems in continuous time, and this result is of software, which "
-            "knows samples alone; export it to c, python, fmu, json or csv"
+            f"target {to!r} takes systems in continuous time, and this result is of software, "
+            "which knows samples alone; export it to c, python, fmu, json or csv"
         )
     choices = _Choices(pade=pade, fmi=fmi, timestep=timestep)
     for name in ("pade", "fmi", "timestep"):
