@@ -131,7 +131,7 @@ def _identified(read: Read, request: Request) -> tuple[Sequence[Row], PairIdenti
         result = identify(
             read.record,
             intersample=request.intersample,
-            structures=request.structures or None,  # type: ignore[arg-type]
+            structures=request.structures or None,
         )
         seconds = time.thread_time() - begin
         rows = rows_of(read, result, seconds=seconds, whole=request.keep == "results")

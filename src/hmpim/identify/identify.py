@@ -119,7 +119,7 @@ def identify(
     if isinstance(record, Statistics):
         if chosen == "sampled":
             raise ArgumentError(
-                "statistics do not know software (intersample='sampled'); identify the record itself"
+                "statistics do not know software (intersample='sampled'); identify the record"
             )
         with one_thread():
             return identify_statistics(record, intersample=chosen, structures=names)
