@@ -155,20 +155,22 @@ with RunLog("run.log") as log:
 """
 
 
-def begin(folder, port, *, raises_at=None):
+def begin(folder, port, *, raises_at=None, nursery=None):
     """Begin `hmpim run` of the sweep, its record in r.h5.
 
     With `raises_at`, a program of one's own instead, whose watcher raises at this time (s).
     """
     save_stimulus(SWEEP, folder / "s.csv")
     if raises_at is not None:
-        return subprocess.Popen(
-            [sys.executable, "-c", RAISING, str(port), str(raises_at)],
-            cwd=folder, stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True,
-        )  # fmt: skip
+        source, arguments = RAISING, [str(port), str(raises_at)]
+    else:
+        source = None
+        arguments = ["run", "--rig", f"udp://127.0.0.1:{port}", "--axis", AXIS, "s.csv"]
+        arguments += ["-o", "r.h5", "--log", "run.log"]
+    if nursery is not None:
+        return nursery.begin(folder, *arguments, source=source)
     return subprocess.Popen(
-        [*HMPIM, "run", "--rig", f"udp://127.0.0.1:{port}", "--axis", AXIS, "s.csv",
-         "-o", "r.h5", "--log", "run.log"],
+        [*HMPIM, *arguments] if source is None else [sys.executable, "-c", source, *arguments],
         cwd=folder, stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True,
     )  # fmt: skip
 
@@ -178,7 +180,7 @@ def moving_since(table, at, process):
     parts = []
 
     def enough():
-        assert process.poll() is None, process.stderr.read()
+        assert process.poll() is None, process.communicate(timeout=60)
         parts.append(table.rows())
         ticks = Ticks.joined(parts)
         moving = ticks.time[ticks.state == "MOVING"]

@@ -1,5 +1,8 @@
 """An external tick: its time is the run's, whatever the computer's clock does."""
 
+import os
+import pty
+import re
 import socket
 import threading
 import time
@@ -9,8 +12,16 @@ import pytest
 
 from hmpim.errors import RigError
 from hmpim.experiment import RunOptions, run
-from hmpim.rigs import FakeRig, ManualClock, TickClock, UdpTicks
+from hmpim.rigs import (
+    FakeRig,
+    ManualClock,
+    SerialTicks,
+    TickClock,
+    UdpTicks,
+    pulse_bytes,
+)
 from hmpim.stimulus import Ramp, Stimulus
+from tests_support import in_studies
 
 RATE = 500.0
 RAMP = Stimulus(waveform=Ramp(duration=1.5), fs=100.0)
@@ -23,7 +34,12 @@ def paced(block):
 class Pulses:
     """Pulses on a clock turned by hand: off by `ppm`, late by chance, some lost."""
 
-    def __init__(self, clock, *, ppm=0.0, jitter=2e-4, lost=(), until=np.inf, rate=RATE):
+    modulus = 256
+
+    def __init__(
+        self, clock, *, ppm=0.0, jitter=2e-4, lost=(), until=np.inf, rate=RATE, numbered=True
+    ):
+        self.numbered = numbered
         self.clock, self.lost, self.until = clock, set(lost), until
         self.period = 1.0 / (rate * (1.0 + 1e-6 * ppm))  # in the computer's time
         self.rng, self.jitter, self.number = np.random.default_rng(0), jitter, 0
@@ -37,31 +53,142 @@ class Pulses:
         self.at = self.begun + self.number * self.period + late
 
     def wait(self, timeout):
-        limit, came = self.clock.now() + timeout, 0
+        limit, came = self.clock.now() + timeout, []
         while (
             self.at <= limit and self.at < self.until and (not came or self.at <= self.clock.now())
         ):
             self.clock.sleep_until(self.at)
-            self.number, came = self.number + 1, came + 1
+            came.append((self.number + 250) % 256 if self.numbered else None)
+            self.number += 1
             self._next()
         if not came:
             self.clock.sleep_until(limit)
         return came
 
 
-@pytest.mark.parametrize("ppm", [30.0, -30.0, 2000.0])
+@pytest.mark.parametrize("ppm", [30.0, *in_studies(-30.0, 2000.0)])
 @pytest.mark.parametrize("lost", [(), (700, 1900, 1901)])
-def test_its_time_is_that_of_the_pulses_and_the_computers_drift_is_told(ppm, lost):
+@pytest.mark.parametrize("numbered", [True, False])
+def test_its_time_is_that_of_the_pulses_and_the_computers_drift_is_told(ppm, lost, numbered):
     computer = ManualClock()
-    pulses = Pulses(computer, ppm=ppm, lost=lost)
+    pulses = Pulses(computer, ppm=ppm, lost=lost, numbered=numbered)
     ticked = TickClock(pulses, rate=RATE, clock=computer)
     for k in range(1, 5001):
         ticked.sleep_until(k / RATE)
     assert computer.now() == pytest.approx(5000 * pulses.period, abs=3e-4)
     message = ticked.report().findings[0].message
-    drift = float(message.split("gains ")[1].split(" ppm")[0])
-    assert drift == pytest.approx(-ppm, abs=0.02 * abs(ppm) + 1.0)
-    assert (f", {len(lost)} of" in message) == bool(lost)
+    assert (f", {len(lost)} lost of 500" in message) == bool(lost)
+    if numbered:
+        assert drift_of(message) == pytest.approx(-ppm, abs=0.02 * abs(ppm) + 1.0)
+    else:
+        assert "is not told, as its pulses hold no numbers" in message
+
+
+def drift_of(message):
+    return float(message.split("gains ")[1].split(" ppm")[0])
+
+
+class Datagrams:
+    """A sender on loopback, 30 ppm off; it sends when it is told to."""
+
+    def __init__(self):
+        self.ticks = UdpTicks("127.0.0.1", 0)
+        self.out = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self.out.connect(("127.0.0.1", self.ticks.port))
+
+    def send(self, number):
+        self.out.send(pulse_bytes(number))
+
+    def close(self):
+        self.out.close()
+
+
+class Bytes:
+    """The same at the far end of a pseudo-terminal."""
+
+    def __init__(self):
+        pytest.importorskip("serial")
+        self.far, self.near = pty.openpty()
+        self.ticks = SerialTicks(os.ttyname(self.near))
+
+    def send(self, number):
+        os.write(self.far, bytes([number % 256]))
+
+    def close(self):
+        os.close(self.far)
+        os.close(self.near)
+
+
+def heard(line, numbers, *, ppm=30.0, rate=1000.0):
+    """What is said of pulses that come over a real line, by a computer's clock turned by hand.
+
+    `numbers` are those of the pulses in the order in which they are sent, each when it is due.
+    """
+    computer = ManualClock()
+    begun, ticked = computer.now(), TickClock(line.ticks, rate=rate, clock=computer)
+    rng = np.random.default_rng(1)
+    try:
+        for k, number in enumerate(numbers):
+            due = begun + max(number, k) / (rate * (1.0 + 1e-6 * ppm)) + 5e-5 * rng.random()
+            computer.sleep_until(max(due, computer.now()))
+            line.send(number)
+            while not ticked._take(1.0):  # a late one moves nothing on
+                if number < max(numbers[:k], default=-1) or number in numbers[:k]:
+                    break
+    finally:
+        line.ticks.close()
+        line.close()
+    return ticked.report().findings[0].message, ticked._count
+
+
+STEADY = list(range(3000))
+
+
+@pytest.mark.parametrize("line", [Datagrams, Bytes])
+def test_thirty_ppm_over_a_real_line(line):
+    message, count = heard(line(), STEADY)
+    assert count == 2999
+    assert drift_of(message) == pytest.approx(-30.0, abs=3.0)
+    assert "lost" not in message
+
+
+@pytest.mark.parametrize("line", [Datagrams, Bytes])
+def test_pulses_lost_and_out_of_order_are_told_from_their_numbers(line):
+    sent = [n for n in STEADY if n not in (5, 700, *range(1000, 1090))]
+    sent[2000], sent[2001] = sent[2001], sent[2000]
+    message, count = heard(line(), sent)
+    assert count == 2999
+    assert ", 92 lost and 1 out of order of 3000;" in message
+    assert drift_of(message) == pytest.approx(-30.0, abs=3.0)
+
+
+def test_over_datagrams_one_may_come_twice():
+    message, count = heard(Datagrams(), [*STEADY[:50], 49, *STEADY[50:200]])
+    assert count == 199
+    assert ", 1 doubled of 200;" in message
+
+
+@pytest.mark.parametrize(
+    ("numbers", "why"),
+    [
+        (STEADY[:60], "as 60 pulses are too few, and 100 are needed"),
+        (STEADY[::2], "as more than 5 % of its pulses are in disorder"),
+        ([n ^ 1 for n in STEADY], "1500 out of order of 3000; .* as more than 5 % of its pulses"),
+    ],
+)
+def test_figures_of_ragged_ticks_are_withheld_with_a_sentence(numbers, why):
+    message, _ = heard(Datagrams(), numbers)
+    assert "clock gains" not in message
+    assert re.search(f"{why}|how this computer's clock runs against it is not told, {why}", message)
+
+
+def test_pulses_that_come_too_unevenly_tell_no_drift():
+    computer = ManualClock()
+    pulses = Pulses(computer, jitter=0.02)
+    ticked = TickClock(pulses, rate=RATE, clock=computer)
+    for k in range(1, 300):
+        ticked.sleep_until(k / RATE)
+    assert "pulses come too unevenly: the first half" in ticked.report().findings[0].message
 
 
 def test_between_two_pulses_the_computers_clock_is_read_and_never_goes_beyond_the_next():
@@ -89,7 +216,7 @@ def test_pulses_over_udp():
     ticks = UdpTicks("127.0.0.1", 0)
     over = threading.Event()
 
-    def send():
+    def send():  # always the same: no numbers
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as out:
             while not over.is_set():
                 out.sendto(b"tick", ("127.0.0.1", ticks.port))

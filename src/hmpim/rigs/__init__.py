@@ -6,10 +6,11 @@ from hmpim.rigs.fake import FakeRig
 from hmpim.rigs.function import FunctionRig
 from hmpim.rigs.mounted import CarriedSensor, Mounted
 from hmpim.rigs.protocol import Clocked, LimitsOfAxes, Reporting, Rig, Seeded, Stimuli
+from hmpim.rigs.pulses import SerialTicks, UdpTicks, find_ticks, pulse_bytes
 from hmpim.rigs.sensor import Sensor
 from hmpim.rigs.stimuli import Commands, commands_of, shared_band, stimuli_by_axis
 from hmpim.rigs.table import MotionTable
-from hmpim.rigs.tick import SerialTicks, TickClock, UdpTicks, find_ticks
+from hmpim.rigs.tick import TickClock
 
 __all__ = [
     "Block",
@@ -41,6 +42,7 @@ __all__ = [
     "UdpTicks",
     "commands_of",
     "find_ticks",
+    "pulse_bytes",
     "shared_band",
     "stimuli_by_axis",
 ]

@@ -1,14 +1,15 @@
 """An external tick as the clock of a run, such as an interrupt that is locked to GPS.
 
-Each pulse is a datagram or a byte; what it holds does not matter. Between two pulses the
-computer's clock is read, at the pace that the pulses have shown so far.
+Each pulse is a datagram or a byte, and should hold its number (`hmpim.rigs.pulses`): then one that
+is lost, doubled or late is known at once. Between two pulses the computer's clock is read, at the
+pace that the pulses have shown so far.
 """
 
-import select
 import threading
 from collections import deque
+from collections.abc import Sequence
 from types import TracebackType
-from typing import Protocol, Self
+from typing import Self
 
 import numpy as np
 
@@ -17,114 +18,24 @@ from hmpim.record import Finding
 from hmpim.rigs.block import RunReport
 from hmpim.rigs.clock import Clock, SystemClock
 from hmpim.rigs.mounted.arrivals import fit_one_way
-from hmpim.rigs.wire.transport import listening, parse_address
+from hmpim.rigs.pulses import TickSource
+from hmpim.rigs.wire.sequence import Sequence as Numbers
 
-__all__ = ["SerialTicks", "TickClock", "TickSource", "UdpTicks", "find_ticks"]
+__all__ = ["TickClock"]
 
 _AGREE = 20  # pulses in a row that must seem late before one is taken for lost
 _GRACE = 0.25  # periods
 _EARLY, _NEARLY = 0.97, 0.99  # of a period: from the one on, the other is shown until a pulse
 _FEWEST = 100  # pulses before the pace of the computer's clock between two of them is corrected
-
-
-class TickSource(Protocol):
-    """Where pulses come from."""
-
-    def wait(self, timeout: float) -> int:
-        """Return how many pulses have come; none yet: wait for the first at most so long (s)."""
-        ...
-
-
-class UdpTicks:
-    """Pulses that are datagrams.
-
-    Parameters
-    ----------
-    host, port : str, int
-        To listen at; port 0 takes any that is free.
-
-    Raises
-    ------
-    RigError
-        If the address cannot be taken.
-    """
-
-    def __init__(self, host: str, port: int) -> None:
-        self._socket = listening(host, port, refused=f"tick udp://{host}:{port} cannot be heard")
-
-    @property
-    def port(self) -> int:
-        """Port that it listens at."""
-        return int(self._socket.getsockname()[1])
-
-    def wait(self, timeout: float) -> int:
-        """Return how many have come."""
-        select.select([self._socket], [], [], max(0.0, timeout))
-        came = 0
-        while True:
-            try:
-                self._socket.recv(64)
-            except BlockingIOError:
-                return came
-            came += 1
-
-    def close(self) -> None:
-        """Listen no more."""
-        self._socket.close()
-
-
-class SerialTicks:
-    """Pulses that are bytes on a serial line.
-
-    Parameters
-    ----------
-    port : str
-        Of the computer, such as /dev/ttyS0.
-    baud : int
-        Bits a second.
-    """
-
-    def __init__(self, port: str, *, baud: int = 115_200) -> None:
-        from hmpim.rigs.wire.serial import open_line
-
-        self._line = open_line(port, baud)
-
-    def wait(self, timeout: float) -> int:
-        """Return how many have come."""
-        self._line.timeout = max(0.0, timeout)
-        return len(self._line.read(max(1, self._line.in_waiting)))
-
-    def close(self) -> None:
-        """Listen no more."""
-        self._line.close()
-
-
-def find_ticks(text: str) -> UdpTicks | SerialTicks:
-    """Return the source that ``udp://HOST:PORT`` or ``serial:PORT`` names.
-
-    Raises
-    ------
-    ArgumentError
-        If it is neither.
-
-    Examples
-    --------
-    >>> find_ticks("sundial")
-    Traceback (most recent call last):
-    hmpim.errors.ArgumentError: 'sundial' is no tick; write udp://HOST:PORT or serial:PORT
-    """
-    if text.startswith("udp://"):
-        return UdpTicks(*parse_address(text.removeprefix("udp://")))
-    if text.startswith("serial:"):
-        return SerialTicks(text.removeprefix("serial:"))
-    raise ArgumentError(f"{text!r} is no tick; write udp://HOST:PORT or serial:PORT")
+_RAGGED = 0.05  # share of pulses lost, doubled or out of order, from where on no drift is told
+_PART = 1e-5  # by which the drift of one half of the run may differ from that of the other
 
 
 class TickClock:
     """A clock that pulses turn; a context manager, inside which a thread notes when they come.
 
-    Pulse k is at k/rate. A pulse that is lost shows in those after it, which all seem late by a
-    period; after 20 of them it is counted in.
+    Pulse k is at k/rate. Where pulses hold no number, one that is lost shows in those after it,
+    which all seem late by a period; after 20 of them it is counted in.
 
     Parameters
     ----------
@@ -153,12 +64,15 @@ class TickClock:
         self._patience = patience
         self._stamps: list[float] = []  # by the pulses
         self._came: list[float] = []  # by the computer
-        self._heard: deque[tuple[int, float]] = deque()  # by the thread: how many, and when
+        self._heard: deque[tuple[Sequence[int | None], float]] = deque()  # by the thread; when
         self._woken, self._over = threading.Event(), threading.Event()
         self._thread: threading.Thread | None = None
         self._count = 0  # periods since the first pulse
         self._late: deque[float] = deque(maxlen=_AGREE)  # periods by which pulses seem late
-        self._lost = 0
+        self._first = 0  # number of the first pulse
+        self._numbers = Numbers()
+        self._unnumbered = 0
+        self._guessed = 0  # lost, as far as pulses without numbers tell
         self._pace = 1.0  # seconds of the pulses in one of the computer
 
     def now(self) -> float:
@@ -190,13 +104,10 @@ class TickClock:
                 self._await_one()
 
     def report(self) -> RunReport:
-        """Say how the computer's clock runs against the pulses."""
-        if len(self._stamps) < _FEWEST:
-            return RunReport()
-        lost = f", {self._lost} of {len(self._stamps) + self._lost} lost" if self._lost else ""
+        """Say how the computer's clock runs against the pulses, or why that cannot be told."""
         message = (
-            f"The run was driven by an external tick of {self._rate:g} Hz{lost}; this computer's "
-            f"clock gains {1e6 * self._drift():+.1f} ppm on it."
+            f"The run was driven by an external tick of {self._rate:g} Hz{self._ragged()}; "
+            f"{self._compared()}."
         )
         finding = Finding(code="tick", message=message, severity="info", parameters=())
         return RunReport(findings=(finding,))
@@ -221,9 +132,46 @@ class TickClock:
         if close is not None:
             close()
 
-    def _drift(self) -> float:
-        """Seconds that the computer gains in one of the pulses: the fastest arrivals tell."""
-        return -fit_one_way(np.array(self._stamps), np.array(self._came)).drift
+    def _ragged(self) -> str:
+        """What became of the pulses, if not each came once and in its turn."""
+        counts = self._numbers.counts
+        words = [
+            f"{count} {what}"
+            for count, what in (
+                (counts.lost + self._guessed, "lost"),
+                (counts.doubled, "doubled"),
+                (counts.swapped, "out of order"),
+            )
+            if count
+        ]
+        return f", {' and '.join(words)} of {self._expected()}" if words else ""
+
+    def _expected(self) -> int:
+        return self._count + 1 if self._stamps else 0
+
+    def _compared(self) -> str:
+        """How the computer's clock runs against the pulses, or why that is not told."""
+        unknown = "how this computer's clock runs against it is not told, as"
+        counts = self._numbers.counts
+        odd = counts.lost + counts.doubled + counts.swapped
+        if len(self._stamps) < _FEWEST:
+            return f"{unknown} {len(self._stamps)} pulses are too few, and {_FEWEST} are needed"
+        if self._unnumbered:
+            return f"{unknown} its pulses hold no numbers, so that a lost one is only guessed at"
+        if odd > _RAGGED * self._expected():
+            return f"{unknown} more than {100 * _RAGGED:g} % of its pulses are in disorder"
+        stamps, came = np.array(self._stamps), np.array(self._came)
+        half = stamps.size // 2
+        whole, first, second = (
+            -fit_one_way(stamps[part], came[part]).drift  # the fastest arrivals tell
+            for part in (slice(None), slice(half), slice(half, None))
+        )
+        if abs(first - second) > max(_PART, abs(whole)):
+            return (
+                f"{unknown} pulses come too unevenly: the first half of the run says "
+                f"{1e6 * first:+.1f} ppm, the second {1e6 * second:+.1f}"
+            )
+        return f"this computer's clock gains {1e6 * whole:+.1f} ppm on it"
 
     def _await_one(self) -> None:
         begun = self._clock.now()
@@ -246,32 +194,64 @@ class TickClock:
         """Take what has come; none yet: wait for the first at most so long (s)."""
         if self._thread is None:
             came = self._source.wait(timeout)
-            return came > 0 and self._pulse(came, self._clock.now())
+            return self._pulses(came, self._clock.now())
         if not self._heard and timeout > 0.0:
             self._woken.wait(timeout)
         self._woken.clear()
         any_came = False
         while self._heard:
-            any_came = self._pulse(*self._heard.popleft())
+            any_came |= self._pulses(*self._heard.popleft())
         return any_came
 
-    def _pulse(self, came: int, now: float) -> bool:
+    def _pulses(self, numbers: Sequence[int | None], now: float) -> bool:
+        """Take pulses; False if time did not go on by them."""
+        gone_on = [self._pulse(number, now) for number in numbers]
+        return any(gone_on)
+
+    def _pulse(self, number: int | None, now: float) -> bool:
         if not self._stamps:
-            self._stamps, self._came = [0.0], [now]
+            self._stamps, self._came, self._first = [0.0], [now], number or 0
+            self._numbers.arrived(0)
+            self._unnumbered += number is None
             return True
-        self._count += came
-        # A pulse may come late, but never early: only if all of many are late, one is missing.
         due = self._pace * (now - self._came[0]) * self._rate
-        self._late.append(due - self._count)
-        if len(self._late) == _AGREE:
-            missing = round(min(self._late) - _GRACE)
-            if missing > 0:
-                self._lost += missing
-                self._count += missing
-                self._late.clear()
+        if number is None:
+            self._unnumbered += 1
+            self._count += 1
+            self._late.append(due - self._count)
+            self._guess()
+        else:
+            place = self._place(number)
+            if not self._numbers.arrived(place) or place <= self._count:
+                return False
+            self._count = place
+            self._late.append(due - place)
+            self._count += self._whole_rounds()
         self._stamps.append(self._count / self._rate)
         self._came.append(now)
         if len(self._stamps) % _FEWEST == 0 and max(self._late, default=1.0) < 0.5:
             span = self._came[-1] - self._came[0]
             self._pace = (self._stamps[-1] - self._stamps[0]) / span
         return True
+
+    def _place(self, number: int) -> int:
+        """Periods from the first pulse to this one, whose number may have begun anew."""
+        modulus, due = self._source.modulus, self._count + 1
+        apart = (number - self._first - due + modulus // 2) % modulus - modulus // 2
+        return due + apart
+
+    def _whole_rounds(self) -> int:
+        """Periods lost while the numbers went round: all of many pulses are late by as much."""
+        rounds = round(min(self._late) / self._source.modulus) if len(self._late) == _AGREE else 0
+        if rounds > 0:
+            self._late.clear()
+        return max(0, rounds) * self._source.modulus
+
+    def _guess(self) -> None:
+        """A pulse may come late, but never early: only if all of many are late, one is missing."""
+        if len(self._late) == _AGREE:
+            missing = round(min(self._late) - _GRACE)
+            if missing > 0:
+                self._guessed += missing
+                self._count += missing
+                self._late.clear()
