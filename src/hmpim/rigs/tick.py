@@ -147,7 +147,8 @@ class TickClock:
         return f", {' and '.join(words)} of {self._expected()}" if words else ""
 
     def _expected(self) -> int:
-        return self._count + 1 if self._stamps else 0
+        counts = self._numbers.counts
+        return max(self._count + 1, counts.received + counts.lost) if self._stamps else 0
 
     def _compared(self) -> str:
         """How the computer's clock runs against the pulses, or why that is not told."""
