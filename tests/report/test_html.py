@@ -1,28 +1,34 @@
 """The page: well formed, self-contained, readable by all, and not to be broken by a name."""
 
+import csv
 import importlib
+import io
 import re
 from dataclasses import replace
 from html.parser import HTMLParser
 from itertools import pairwise
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from hmpim.identify import Identification
+import hmpim
+from hmpim.identify import HarmonicCurve, Identification, Nonlinearity
 from hmpim.identify.identify import identify
-from hmpim.record import Record
-from hmpim.report import render, report
+from hmpim.plots import Figure
+from hmpim.record import Finding, Record
+from hmpim.report import About, render, report, sheet, write_figures
+from hmpim.report.advice import advice
 from hmpim.stimulus import Limits, design
 
 VOID = {"meta", "link", "br", "hr", "img", "input"}
 PICTURES = (
+    "bode",
+    "deviation",
     "signals",
     "correlation",
     "error",
     "spectra",
-    "bode",
-    "deviation",
     "model",
     "residual",
     "candidates",
@@ -138,8 +144,6 @@ def test_estimates_and_the_papers_figures_stand_beside_each_other(found, page_te
 
 
 def test_every_warning_is_shown(found):
-    from hmpim.record import Finding
-
     warned = replace(
         found.pairs[0],
         warnings=(
@@ -177,12 +181,12 @@ def test_a_result_read_back_has_its_tables_and_bode_plot_and_says_so(found):
 def test_the_stimulus_is_shown_in_its_limits(found):
     limits = Limits(position=10, velocity=70, acceleration=8500, unit="deg")
     text = render(found, stimulus=design(band=(0.1, 20), duration=10, fs=200, limits=limits))
-    assert check_sound(text).all("svg")[0]["aria-labelledby"].startswith("stimulus-title")
+    assert check_sound(text).pictures[-1]["aria-labelledby"].startswith("stimulus-title")
     assert "Peaks: 10 deg" in text
 
 
-def test_several_pairs_each_have_their_section_and_a_dead_one_its_reason(field_record):
-    _, u, y = field_record
+def test_several_pairs_each_have_their_section_and_a_dead_one_its_reason(found):
+    u, y = found.data.inputs[0].values, found.data.outputs[0].values
     record = Record.from_arrays({"u": u}, {"y": y, "dead": np.full(y.size, 3.0)}, fs=200.0)
     text = render(identify(record, intersample="bandlimited"))
     page = check_sound(text)
@@ -209,7 +213,7 @@ def test_the_file_is_replaced_whole_or_not_at_all(found, tmp_path, monkeypatch):
     path = tmp_path / "r.html"
     path.write_text("old")
     page = importlib.import_module("hmpim.report.html")
-    monkeypatch.setattr(page, "render", lambda *_, **__: "half \ud800")
+    monkeypatch.setattr(page, "_page", lambda *_: "half \ud800")
     with pytest.raises(UnicodeEncodeError):
         report(found, path)
     assert path.read_text() == "old"
@@ -223,14 +227,90 @@ def test_the_page_is_written_where_it_is_wanted(found, tmp_path, page_text):
     assert len(written) == pytest.approx(len(page_text), abs=20)
 
 
-def test_a_nonlinearity_has_its_section_and_a_linear_system_none(page_text):
+def test_a_nonlinearity_has_its_section_and_a_linear_system_none(found, page_text):
     assert "<h3>Nonlinearity</h3>" not in page_text
-    time = np.arange(2000) / 200.0
-    u = np.sin(2 * np.pi * (0.1 * time + time**2)) / (1 + 0.3 * time)
-    noise = 0.002 * np.random.default_rng(0).standard_normal(time.size)
-    bent = Record.from_arrays({"u": u}, {"y": u - 0.1 * u**3 + noise}, fs=200.0)
-    text = render(identify(bent))
+    curves = tuple(
+        HarmonicCurve(order=k, frequency=(1.0, 9.0), amplitude=(size, size), std=(0.01, 0.01))
+        for k, size in ((1, 2.0), (3, 0.2))
+    )
+    bent = Nonlinearity(
+        share=0.02, even=0.0, odd=0.02, noise=0.7, linear=0.1, nonlinear=0.2,
+        kinds=("curvature",), harmonics=curves,
+    )  # fmt: skip
+    warned = Finding(code="nonlinear", message="Bent.", severity="info", parameters=())
+    pair = replace(found.pairs[0], nonlinearity=bent, warnings=(warned,))
+    text = render(replace(found, pairs=(pair,)))
     section = text[text.index("<h3>Nonlinearity</h3>") :]
     assert "<dt>Kind</dt><dd>curvature" in section
     assert "order 3" in section
     assert re.search(r"<dt>Nonlinear part</dt><dd>[\d.]+\u00a0% of the output", section)
+
+
+def test_the_page_opens_with_who_tested_what_and_its_verdict(found):
+    about = About(
+        title="Acceptance", under_test="Gyro <12>", test="T-7", operator="M. Ohm", date="1 May"
+    )
+    text = render(found, about=about, notes=["Warm."], truth={"delay": 0.15, "bias": 0.5})
+    check_sound(text)
+    first = [
+        text.index(words) for words in ("Acceptance</h1>", "Gyro &lt;12&gt;", "M. Ohm", "1 May")
+    ]
+    then = [text.index(words) for words in (">What was found<", ">Bode plot<", ">The rest<")]
+    assert first == sorted(first)
+    assert first[-1] < text.index('class="verdict ok"') < text.index("<p>Warm.</p>") < then[0]
+    assert then == sorted(then)
+    bias = found["y", "u"].bias
+    assert f"{(bias.value - 0.5) / bias.std:+.1f} std" in text
+
+
+def test_each_row_of_the_parameters_has_its_verdict(found, page_text):
+    given = [e for e in found["y", "u"].parameters.to_dict().values() if e is not None]
+    assert page_text.count('<td class="verdict-cell ') == len(given)
+
+
+def doubt(code):
+    return Finding(code=code, message=f"About {code}.", severity="doubt", parameters=("delay",))
+
+
+def test_at_most_three_findings_are_above_the_fold_causes_first(found):
+    codes = ("lack_of_fit", "halves_disagree", "structure", "saturation", "gaps")
+    warned = replace(found.pairs[0], warnings=tuple(map(doubt, codes)))
+    text = render(replace(found, pairs=(warned,)))
+    above = text[text.index('<ol class="findings">') : text.index("</ol>")]
+    assert re.findall(r"About (\w+)\.", above) == ["gaps", "saturation", "structure"]
+    assert above.count('class="todo"') == 3
+    assert "Everything remarked (5)" in text
+
+
+def test_every_doubt_that_can_be_raised_has_something_to_do():
+    source = "".join(p.read_text("utf-8") for p in Path(hmpim.__file__).parent.rglob("*.py"))
+    raised = re.findall(r'Finding\(\s*code="(\w+)",[^)]*?severity="doubt"', source)
+    assert len(set(raised)) > 10
+    assert [code for code in sorted(set(raised) - {"x"}) if not advice(doubt(code))] == []
+
+
+def test_a_pdf_holds_the_same_and_a_sheet_is_one_page(found, hostile, tmp_path):
+    report(hostile, tmp_path / "r.pdf", about=About(title="#panic() $x$ \\"), truth={"delay": 0.1})
+    sheet(found, tmp_path / "s.pdf", about=About(operator="M. Ohm"))
+    many, one = ((tmp_path / name).read_bytes() for name in ("r.pdf", "s.pdf"))
+    assert many.startswith(b"%PDF-")
+    assert len(re.findall(rb"/Type\s*/Page\b", one)) == 1
+    assert len(re.findall(rb"/Type\s*/Page\b", many)) > 2
+
+
+def test_figures_and_numbers_are_files_of_their_own(found, tmp_path, monkeypatch):
+    drawn = []
+
+    def savefig(_, path, **options):
+        drawn.append((options["format"], path.write_text("")))
+
+    monkeypatch.setattr(Figure, "savefig", savefig)
+    names = {path.name for path in write_figures(found, tmp_path)}
+    assert {f"1-{key}.{kind}" for key in PICTURES for kind in ("svg", "png")} < names
+    assert [kind for kind, _ in drawn].count("png") == len(PICTURES)
+    rows = list(csv.DictReader(io.StringIO((tmp_path / "parameters.csv").read_text("utf-8"))))
+    (delay,) = [row for row in rows if row["parameter"] == "delay"]
+    assert float(delay["value"]) == found["y", "u"].delay.value
+    response = np.genfromtxt(tmp_path / "response-1.csv", delimiter=",", names=True)
+    measured = found["y", "u"].frequency_response
+    np.testing.assert_allclose(response["real"] + 1j * response["imag"], measured.response)

@@ -40,7 +40,7 @@ def demo(
     check_files(folders={"--out": out})
     from hmpim.experiment import run
     from hmpim.identify import identify
-    from hmpim.report import print_result
+    from hmpim.report import About, print_result
     from hmpim.rigs import Sensor
     from hmpim.stimulus import Limits, design
 
@@ -68,6 +68,9 @@ def demo(
     )
     print_result(result, output_console(), truth=TRUTH)
     page, saved = out / "report.html", out / "result.json"
-    write_result(result, json=saved, report=page, stimulus=stimulus)
+    about = About(
+        title="Demonstration", under_test="Simulated sensor of Fig. 17", test=f"Seed {seed}"
+    )
+    write_result(result, json=saved, report=page, stimulus=stimulus, truth=TRUTH, about=about)
     say(f"Page:   {page}")
     say(f"Result: {saved}")

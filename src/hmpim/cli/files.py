@@ -91,7 +91,7 @@ def _check_file(option: str, path: Path) -> None:
     if not path.parent.is_dir():
         raise ArgumentError(f"{option}: {path.parent} is a file, not a folder; name another folder")
     try:
-        if option == "--report":
+        if option in ("--report", "--sign"):
             from hmpim.report import check_page
 
             check_page(path)

@@ -8,6 +8,19 @@ from typing import TYPE_CHECKING, Annotated, cast
 import typer
 
 from hmpim.cli.files import check_files
+from hmpim.cli.paging import (
+    Date,
+    Figures,
+    Note,
+    Operator,
+    Sign,
+    Test,
+    Title,
+    UnderTest,
+    about_of,
+    check_paper,
+    write_beside,
+)
 from hmpim.cli.reading import (
     Auxiliary,
     Beside,
@@ -36,6 +49,7 @@ if TYPE_CHECKING:
     from hmpim.identify import Estimate, Identification
     from hmpim.model.dynamics import StructureName
     from hmpim.record import Record
+    from hmpim.report import About
     from hmpim.report.figures import Picture
     from hmpim.stimulus import Stimulus
 
@@ -118,8 +132,17 @@ def identify(
         Path | None, typer.Option("--json", metavar="FILE", help="Write the result as JSON.")
     ] = None,
     report: Annotated[
-        Path | None, typer.Option("--report", metavar="FILE", help="Write one HTML page.")
+        Path | None,
+        typer.Option("--report", metavar="FILE", help="Write one page, .html or .pdf."),
     ] = None,
+    sign: Sign = None,
+    figures: Figures = None,
+    title: Title = "",
+    under_test: UnderTest = "",
+    test: Test = "",
+    operator: Operator = "",
+    date: Date = "",
+    note: Note = None,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print no table.")] = False,
 ) -> None:
     """Find every parameter of a measured record, each with its error bar.
@@ -128,12 +151,15 @@ def identify(
     """
     check_files(
         reads={"the record": [*records, *(beside or [])]},
-        writes={"--json": json, "--report": report},
+        writes={"--json": json, "--report": report, "--sign": sign},
+        folders={"--figures": figures},
     )
+    check_paper(report, sign)
     if holdout is not None and not 0.0 < holdout < 1.0:
         raise ArgumentError(f"--holdout {holdout:g} is not a share between 0 and 1; give 0.5, say")
 
-    single: dict[str, object] = {"--report": report, "--holdout": holdout, "--at": at or None}
+    paper = {"--report": report, "--sign": sign, "--figures": figures}
+    single: dict[str, object] = {**paper, "--holdout": holdout, "--at": at or None}
     single |= {"--structure": structure or None, "--hand": hand or None}
     by_hand = _by_hand(hand or [])
     _check_single(len(records), single)
@@ -171,17 +197,20 @@ def identify(
     part, split = (data, None) if holdout is None else _first_part(data, holdout)
     with working("Identifying"):
         result = find(part, intersample=intersample.value, structures=_structures(structure))
-    notes = [] if split is None else _predictions(result, data, split)
-    notes += _readings(result, at or [])
+    said = [] if split is None else _predictions(result, data, split)
+    said += _readings(result, at or [])
     if by_hand:
         from hmpim.report.by_hand import hand_notes
 
-        notes += [n for pair in result.pairs for n in hand_notes(pair, by_hand, fs=data.fs)]
+        said += [n for pair in result.pairs for n in hand_notes(pair, by_hand, fs=data.fs)]
     if not quiet:
         print_result(result, output_console())
-        for note in notes:
-            say(note)
-    write_result(result, json=json, report=report, notes=notes)
+        for sentence in said:
+            say(sentence)
+    about = about_of(title, under_test, test, operator, date)
+    notes = [*(note or ()), *said]
+    write_result(result, json=json, report=report, notes=notes, about=about)
+    write_beside(result, sign=sign, figures=figures, about=about, notes=notes)
 
 
 def _structures(given: "Sequence[str] | None") -> "list[StructureName] | None":
@@ -220,6 +249,8 @@ def write_result(
     stimulus: "Stimulus | None" = None,
     notes: Sequence[str] = (),
     pictures: "Sequence[Picture]" = (),
+    about: "About | None" = None,
+    truth: Mapping[str, float] | None = None,
 ) -> None:
     """Write a result to the files that are wanted, each as a whole or not at all."""
     from hmpim.formats import save
@@ -229,7 +260,15 @@ def write_result(
         save(result, json)
     if report is not None:
         with working("Drawing the page"):
-            write_page(result, report, stimulus=stimulus, notes=notes, pictures=pictures)
+            write_page(
+                result,
+                report,
+                stimulus=stimulus,
+                notes=notes,
+                pictures=pictures,
+                about=about,
+                truth=truth,
+            )
 
 
 def _named(records: Sequence[Path], given: "Sequence[Record]") -> list[Path]:

@@ -21,6 +21,7 @@ from hmpim.cli.gentlest import gentlest
 from hmpim.cli.identify import identify
 from hmpim.cli.montecarlo import montecarlo
 from hmpim.cli.paper import paper
+from hmpim.cli.report import report
 from hmpim.cli.rigs import rigs
 from hmpim.cli.run import run
 from hmpim.cli.runs import runs
@@ -144,6 +145,9 @@ def _start(
 app.command()(design)
 app.command(epilog="Example: hmpim identify test.csv --input u --output y --report r.html")(
     identify
+)
+app.command(epilog="Example: hmpim report r.json -o r.pdf --sign sheet.pdf --operator 'M. Ohm'")(
+    report
 )
 app.command(epilog="Example: hmpim channels test.csv --report channels.html")(channels)
 app.command(epilog="Example: hmpim runs out --where 'verdict = ok' --compare")(runs)

@@ -1,37 +1,27 @@
-"""One page, one file: what was found, how sure it is, and every picture of section IV."""
+"""One page, one file: the verdict, the figures, the Bode plot, what to do, and the rest folded."""
 
-from collections.abc import Sequence
-from datetime import UTC, datetime
-from importlib.metadata import version
+from collections.abc import Mapping, Sequence
 from os import PathLike
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from hmpim.arguments import checked
 from hmpim.errors import ArgumentError
-from hmpim.formats.atomic import check_writable, write_text
-from hmpim.identify import Identification, PairIdentification
-from hmpim.plots.candidates import INTERSAMPLE_WORDS
+from hmpim.formats.atomic import check_writable, replacing, write_text
+from hmpim.identify import Identification
 from hmpim.plots.style import printable
-from hmpim.report.figures import Picture, pair_pictures, stimulus_picture
-from hmpim.report.inputs import inputs_view
-from hmpim.report.numbers import format_interval, format_number, format_value
+from hmpim.report.about import About
+from hmpim.report.figures import Picture
 from hmpim.report.svg import inline_svg
-from hmpim.report.words import (
-    GLOSSARY,
-    VERDICTS,
-    by_weight,
-    headline,
-    nonlinear_facts,
-    pair_sentence,
-    paper_value,
-    remark,
-    structure_words,
-    untold,
-)
+from hmpim.report.view import report_view
 from hmpim.stimulus import Stimulus
 
-__all__ = ["check_page", "render", "report"]
+if TYPE_CHECKING:
+    from jinja2 import Environment
+
+__all__ = ["check_page", "page_environment", "render", "report", "sheet"]
+
+_PAGES = ("", ".html", ".htm")
 
 
 @checked
@@ -39,11 +29,13 @@ def report(
     result: Identification,
     path: str | PathLike[str],
     *,
+    about: About | None = None,
+    truth: Mapping[str, float] | None = None,
     stimulus: Stimulus | None = None,
     notes: Sequence[str] = (),
     pictures: Sequence[Picture] = (),
 ) -> None:
-    """Write a result as one HTML page that needs no other file and no network.
+    """Write a result as one HTML page that needs no other file and no network, or as a PDF.
 
     Parameters
     ----------
@@ -51,7 +43,11 @@ def report(
         What was found. One that was read back from JSON has no record any more: its page has
         the tables and the Bode plot, and says so.
     path : path-like
-        The file to write; replaced as a whole, or not at all.
+        The file to write, .html or .pdf; replaced as a whole, or not at all.
+    about : About, optional
+        Title, unit under test, test, operator, date.
+    truth : mapping of str to float, optional
+        True values by the parameters' names, shown beside the estimates where they are known.
     stimulus : Stimulus, optional
         What was sent, to be shown inside its limits.
     notes : sequence of str
@@ -63,7 +59,9 @@ def report(
     Raises
     ------
     ArgumentError
-        If `path` cannot be written, or is named as something else than a page.
+        If `path` cannot be written, or is named as something else than a page or a PDF.
+    MissingExtraError
+        If a PDF is wanted and the extra ``pdf`` is not installed.
 
     Examples
     --------
@@ -79,8 +77,65 @@ def report(
     """
     check_page(path)
     check_writable(path)
-    text = render(result, stimulus=stimulus, notes=notes, pictures=pictures)
-    write_text(path, text)
+    view = report_view(
+        result, about=about, truth=truth, stimulus=stimulus, notes=notes, pictures=pictures
+    )
+    _write(view, path, template="report.html.j2")
+
+
+@checked
+def sheet(
+    result: Identification,
+    path: str | PathLike[str],
+    *,
+    about: About | None = None,
+    notes: Sequence[str] = (),
+) -> None:
+    """Write one page to sign: the verdict, the figures, the Bode plot, and two lines for names.
+
+    Parameters
+    ----------
+    result : Identification
+        What was found.
+    path : path-like
+        The file to write, .html or .pdf.
+    about : About, optional
+        Title, unit under test, test, operator, date; what is left empty can be filled in by hand.
+    notes : sequence of str
+        Plain sentences under the verdict.
+
+    Raises
+    ------
+    ArgumentError
+        If `path` cannot be written, or is named as something else than a page or a PDF.
+    MissingExtraError
+        If a PDF is wanted and the extra ``pdf`` is not installed.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from pathlib import Path
+    >>> from hmpim.identify import RecordSummary
+    >>> summary = RecordSummary(fs=200.0, samples=2000, sha256="")
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     sheet(Identification(record=summary, pairs=()), Path(folder) / "s.html")
+    ...     "Checked by" in (Path(folder) / "s.html").read_text(encoding="utf-8")
+    True
+    """
+    check_page(path)
+    check_writable(path)
+    view = report_view(result, about=about, notes=notes)
+    _write(view, path, template="sheet.html.j2")
+
+
+def _write(view: dict[str, Any], path: str | PathLike[str], *, template: str) -> None:
+    if Path(path).suffix.lower() == ".pdf":
+        from hmpim.report.pdf import pdf
+
+        with replacing(path) as place:
+            place.write_bytes(pdf(view, sheet=template.startswith("sheet")))
+    else:
+        write_text(path, _page(view, template))
 
 
 def check_page(path: str | PathLike[str]) -> None:
@@ -89,7 +144,7 @@ def check_page(path: str | PathLike[str]) -> None:
     Raises
     ------
     ArgumentError
-        If the suffix is neither .html nor .htm; none is as good.
+        If the suffix is none of .html, .htm and .pdf; none at all is a page.
 
     Examples
     --------
@@ -98,7 +153,7 @@ def check_page(path: str | PathLike[str]) -> None:
     hmpim.errors.ArgumentError: 'r.docx' ends in .docx, and a report is an HTML page; name it r.html
     """
     place = Path(path)
-    if place.suffix.lower() not in ("", ".html", ".htm"):
+    if place.suffix.lower() not in (*_PAGES, ".pdf"):
         raise ArgumentError(
             f"{str(place)!r} ends in {place.suffix}, and a report is an HTML page; name it "
             f"{place.with_suffix('.html').name}"
@@ -108,6 +163,8 @@ def check_page(path: str | PathLike[str]) -> None:
 def render(
     result: Identification,
     *,
+    about: About | None = None,
+    truth: Mapping[str, float] | None = None,
     stimulus: Stimulus | None = None,
     notes: Sequence[str] = (),
     pictures: Sequence[Picture] = (),
@@ -118,6 +175,10 @@ def render(
     ----------
     result : Identification
         What was found.
+    about : About, optional
+        Title, unit under test, test, operator, date.
+    truth : mapping of str to float, optional
+        True values by the parameters' names.
     stimulus : Stimulus, optional
         What was sent.
     notes : sequence of str
@@ -132,11 +193,30 @@ def render(
     >>> "Nothing was identified" in render(Identification(record=summary, pairs=()))
     True
     """
-    from jinja2 import Environment, PackageLoader, StrictUndefined
+    view = report_view(
+        result, about=about, truth=truth, stimulus=stimulus, notes=notes, pictures=pictures
+    )
+    return _page(view, "report.html.j2")
+
+
+def _page(view: dict[str, Any], template: str) -> str:
+    page = page_environment().get_template(template).render(**view)
+    return "\n".join(printable(line) for line in page.splitlines()) + "\n"
+
+
+def page_environment(*packages: str) -> "Environment":
+    """Return what turns the templates of some packages, and of the report, into pages.
+
+    Examples
+    --------
+    >>> page_environment().from_string("{{ name }}").render(name="<b>")
+    '&lt;b&gt;'
+    """
+    from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined
     from markupsafe import Markup
 
     def svg(picture: Picture, key: str) -> Markup:
-        # The only text that is not escaped: made by an XML writer, which has escaped it.
+        # The only text that is not escaped: the drawer has escaped what others wrote.
         return Markup(
             inline_svg(
                 picture.figure, key=key, title=picture.title, description=picture.description
@@ -144,94 +224,11 @@ def render(
         )
 
     environment = Environment(
-        loader=PackageLoader("hmpim.report"),
+        loader=ChoiceLoader([PackageLoader(name) for name in (*packages, "hmpim.report")]),
         autoescape=True,
         undefined=StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,
     )
     environment.globals["svg"] = svg
-    page = environment.get_template("report.html.j2").render(
-        title=_title(result),
-        headline=headline(result),
-        verdict=result.verdict if result.pairs else "not_identifiable",
-        notes=notes,
-        facts=_facts(result),
-        pairs=[_pair_view(result, pair) for pair in result.pairs],
-        inputs=inputs_view(result),
-        stimulus=None if stimulus is None else stimulus_picture(stimulus),
-        pictures=pictures,
-        without_record=result.data is None,
-        glossary=GLOSSARY,
-    )
-    return "\n".join(printable(line) for line in page.splitlines()) + "\n"
-
-
-def _title(result: Identification) -> str:
-    if len(result.pairs) == 1:
-        pair = result.pairs[0]
-        return f"{pair.input} → {pair.output}"
-    return f"{len(result.pairs)} pairs of channels"
-
-
-def _facts(result: Identification) -> list[tuple[str, str]]:
-    record = result.record
-    facts = [
-        ("Source", record.source or "given as arrays"),
-        ("Sampling rate", f"{record.fs:.7g} Hz"),
-        ("Samples", str(record.samples)),
-        ("Length", f"{record.samples / record.fs:.6g} s"),
-    ]
-    if result.data is not None and result.data.band is not None:
-        low, high = result.data.band
-        facts.append(("Excited band", f"{low:g} to {high:g} Hz"))
-    now = datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC")
-    return [
-        *facts,
-        ("SHA-256 of the record", record.sha256 or "unknown"),
-        ("Made by", f"hmpim {version('hmpim')}, {now}"),
-    ]
-
-
-def _pair_view(result: Identification, pair: PairIdentification) -> dict[str, Any]:
-    """Everything the template shows of a pair, as text."""
-    rows = []
-    for words in GLOSSARY:
-        estimate = getattr(pair.parameters, words.name)
-        paper = paper_value(pair, words.name)
-        if estimate is None and paper is None:
-            continue
-        rows.append(
-            {
-                "name": words.name,
-                "label": words.label,
-                "value": "–" if estimate is None else format_value(estimate),
-                "unit": "" if estimate is None else estimate.unit,
-                "interval": "" if estimate is None else format_interval(estimate),
-                "verdict": "" if estimate is None else estimate.verdict,
-                "paper": format_number(paper) if words.differs else "",
-                "remark": remark(words, estimate, paper),
-            }
-        )
-    lowest = min((c.criterion for c in pair.candidates), default=0.0)
-    return {
-        "name": f"{pair.input} → {pair.output}",
-        "verdict": pair.verdict,
-        "verdict_words": VERDICTS[pair.verdict],
-        "sentence": pair_sentence(pair),
-        "warnings": by_weight(pair.warnings),
-        "rows": rows,
-        "untold": untold(pair),
-        "candidates": [
-            {
-                "structure": structure_words(c.structure),
-                "between": INTERSAMPLE_WORDS[c.intersample],
-                "behind": f"{c.criterion - lowest:.1f}",
-                "fit": f"{c.fit_percent:.2f}",
-                "chosen": c.chosen,
-            }
-            for c in sorted(pair.candidates, key=lambda c: c.criterion)
-        ],
-        "nonlinear": nonlinear_facts(pair),
-        "pictures": pair_pictures(result, pair),
-    }
+    return environment

@@ -303,6 +303,8 @@ def _trust(pair: PairIdentification) -> str:
     given = [w for w in given if w.name != "delay_correlation"]
     bad = [w.inline for w in given if getattr(pair.parameters, w.name).verdict == "doubtful"]
     good = [w.inline for w in given if getattr(pair.parameters, w.name).verdict == "ok"]
+    if not bad:
+        return "Every figure stands as it is"
     if not good:
         return "No figure of the model can be relied on"
     if len(good) < len(bad):

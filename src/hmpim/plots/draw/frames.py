@@ -24,6 +24,7 @@ __all__ = ["Frame", "frames", "legend_items", "placed", "ticks", "unplaced"]
 FloatArray = NDArray[np.float64]
 _LINEAR_TO = 10.0  # of 'symlog'
 _TURNS = (1.0, 2.0, 5.0, 15.0, 30.0, 45.0, 90.0, 180.0, 360.0, 720.0)
+_FEW_DEGREES = 20.0  # below, a phase is numbered as anything else
 _MOST_TURNS = 16  # of a phase; a quarter turn each as long as there is room
 _FROM_QUARTERS = 135.0  # a phase that spans more has ticks of quarter turns at least
 
@@ -181,7 +182,7 @@ def ticks(axis: Axis, ends: tuple[float, float], *, most: int = 7) -> list[tuple
     elif axis.scale == "symlog":
         values = [0.0] * (low <= 0.0) + [10.0**k for k in range(1, 13) if low <= 10.0**k <= high]
         values = values[:1] + values[1 :: -(-len(values) // most)]
-    elif axis.degrees:
+    elif axis.degrees and high - low > _FEW_DEGREES:
         span = high - low
         steps = [s for s in _TURNS if span <= _MOST_TURNS * s]
         if span > _FROM_QUARTERS:

@@ -88,7 +88,7 @@ def places(figure: Figure, shown: list[Frame], *, width: float) -> tuple[list[Pl
     rows = _rows(figure, columns)
     lefts = [0.0] * columns
     for panel, frame in panels:
-        labels = [words for _, words in _y_ticks(panel, frame, 200.0)]
+        labels = [words for height in (80.0, 200.0) for _, words in _y_ticks(panel, frame, height)]
         room = max((text_width(words) for words in labels if panel.y.numbered), default=0.0)
         column = 0 if columns == 1 else panel.column
         lefts[column] = max(lefts[column], room + 12.0 + LINE * bool(panel.y.label))

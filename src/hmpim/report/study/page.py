@@ -1,11 +1,10 @@
 """One page for a whole study: what passed, every case, and what was compared."""
 
-import re
 from dataclasses import dataclass
 
 from hmpim.plots.style import printable
 from hmpim.report.figures import Picture
-from hmpim.report.svg import inline_svg
+from hmpim.report.html import page_environment
 
 __all__ = ["Grid", "Section", "StudyPage", "render_study"]
 
@@ -57,31 +56,9 @@ def render_study(page: StudyPage) -> str:
     >>> "All met." in render_study(page)
     True
     """
-    from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined
-    from markupsafe import Markup
-
-    def svg(picture: Picture, key: str) -> Markup:
-        # The only text that is not escaped: made by an XML writer, which has escaped it.
-        return Markup(
-            inline_svg(
-                picture.figure, key=key, title=picture.title, description=picture.description
-            )
-        )
-
-    environment = Environment(
-        loader=ChoiceLoader([PackageLoader("hmpim.report.study"), PackageLoader("hmpim.report")]),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    # One look for all pages: the style of the report of a single test.
-    source = environment.loader.get_source(environment, "report.html.j2")[0]  # type: ignore[union-attr]
-    style = re.search(r"<style>(.*?)</style>", source, re.DOTALL)
-    environment.globals["svg"] = svg
-    text = environment.get_template("study.html.j2").render(
-        page=page,
-        look=Markup(style.group(1)) if style else "",
-        verdict={True: "ok", False: "not_identifiable", None: ""}[page.met],
+    text = (
+        page_environment("hmpim.report.study")
+        .get_template("study.html.j2")
+        .render(page=page, verdict={True: "ok", False: "not_identifiable", None: ""}[page.met])
     )
     return "\n".join(printable(line) for line in text.splitlines()) + "\n"

@@ -1,0 +1,112 @@
+"""What to do about a finding, and which finding is the cause of which."""
+
+from collections.abc import Sequence
+
+from hmpim.record import Finding
+
+__all__ = ["MOST_FINDINGS", "advice", "leading_findings"]
+
+MOST_FINDINGS = 3
+
+# From causes to what they cause: a fault of the channels comes before one of the clock, that
+# before one of the stimulus, that before one of the model, and what only describes comes last.
+_ADVICE = {
+    "dead_channel": "Check the wiring and the choice of the channel, and record again.",
+    "swapped": "Name input and output the other way round: `--input`, `--output`.",
+    "unrelated": "Check that both channels belong to one test.",
+    "check_failed": "Report this, with the record: a check broke down on it.",
+    "not_identifiable": "Check the channels first; then excite more strongly or for longer.",
+    "time_unit": "Say what unit the time stamps have, or give the rate with `--fs`.",
+    "mixed_stamps": "Record with one clock for each channel.",
+    "backward_stamps": "Sort the samples, or find out why the clock ran backwards.",
+    "doubled_stamps": "Check the recorder: samples share a time stamp.",
+    "timing": "State the rate, or record with time stamps taken at the samples.",
+    "clocks": "Record both channels with one clock.",
+    "clock_offset": "State the offset with `--offset`, or record with one clock.",
+    "jitter": "Stamp the samples where they are taken.",
+    "rate": "State the rate with `--fs`.",
+    "tick": "Record finer time stamps.",
+    "dropouts": "Find out why samples were lost; the rest was used.",
+    "missing_samples": "Find out why samples were lost; the rest was used.",
+    "gaps": "Record without a pause, or cut the pause out with `--from` and `--to`.",
+    "datagrams": "Shorten the way of the datagrams, or lower the rate.",
+    "repeated_frames": "Raise the frame rate, or read the camera less often.",
+    "repeated_samples": "Read the sensor no faster than it renews its value.",
+    "frozen": "Find out why the channel stood still, and record again.",
+    "stuck": "Find out why the channel stood still, and record again.",
+    "damaged_parts": "Look at the parts named; record again if they matter.",
+    "spikes": "Look for loose contacts and interference; the spikes were left out.",
+    "saturation": "Lower the level of the stimulus, or widen the range.",
+    "quantization": "Raise the level of the stimulus, or use a finer range.",
+    "drift": "Let the unit warm up; the drift was taken out.",
+    "cut_short": "Record until the output has come to rest.",
+    "ended_early": "Record until the stimulus is over.",
+    "short_record": "Record for longer.",
+    "several_sweeps": "Choose one sweep with `--sweep`, or give all of them as repeats.",
+    "weak_excitation": "Raise the level or the duration of the stimulus.",
+    "few_lines": "Excite more frequencies: a sweep rather than some tones.",
+    "input_noise": "Measure the command itself, or raise the level of the stimulus.",
+    "coupled_inputs": "Drive the axes one after another, or with stimuli that differ.",
+    "elsewhere": "Widen the band of the stimulus to where the response changes.",
+    "beyond_band": "Widen the band of the stimulus.",
+    "extrapolated": "Widen the band of the stimulus to the frequency named.",
+    "intersample": "State what the input does between samples: `--intersample`.",
+    "held_between": "State what the input does between samples: `--intersample`.",
+    "hold": "Nothing, if the unit is known to hold its output.",
+    "friction": "Test at a larger level as well, and compare.",
+    "hardening": "Test at several levels, and state the one that each figure is for.",
+    "nonlinear": "Test at a smaller level, and compare: where the figures move, state the level.",
+    "structure": "Record for longer or excite more, if the number of poles matters.",
+    "unmodelled": "Use the measured response where it and the model part.",
+    "lack_of_fit": "Use the measured response where it and the model part.",
+    "bandwidth_disagrees": "Take the bandwidth of the measured response.",
+    "halves_disagree": "Repeat the test: the unit may have changed while it ran.",
+    "not_converged": "Repeat the test with a stronger stimulus.",
+    "negative_delay": "Read delay and dynamics together: feedforward may lead.",
+    "folded": "Sample faster: there is response beyond half of the rate.",
+    "scatter": "Repeat the test under the same conditions.",
+    "noise_colour": "Nothing: the error bars allow for it.",
+    "coloured_noise": "Nothing: the error bars allow for it.",
+    "initial_transient": "Begin at rest.",
+    "weak_coupling": "Nothing, if a coupling this small is expected.",
+    "assumed_roles": "Check the roles of the channels, and state them if they are others.",
+    "unit_declared": "Check the units of the channels.",
+}  # fmt: skip
+_ORDER = {code: place for place, code in enumerate(_ADVICE)}
+
+
+def advice(finding: Finding) -> str:
+    """Say what to do about a finding; empty where there is nothing but to know it.
+
+    Examples
+    --------
+    >>> advice(Finding(code="saturation", message="…", severity="doubt", parameters=()))
+    'Lower the level of the stimulus, or widen the range.'
+    """
+    return _ADVICE.get(finding.code, "")
+
+
+def leading_findings(findings: Sequence[Finding]) -> list[Finding]:
+    """Return the three findings that matter most: doubts first, causes before their effects.
+
+    Parameters
+    ----------
+    findings : sequence of Finding
+        All of them; of one code the first is taken.
+
+    Examples
+    --------
+    >>> def of(code, severity):
+    ...     return Finding(code=code, message="…", severity=severity, parameters=())
+    >>> found = [of("lack_of_fit", "doubt"), of("jitter", "info"), of("saturation", "doubt")]
+    >>> [finding.code for finding in leading_findings(found)]
+    ['saturation', 'lack_of_fit', 'jitter']
+    """
+    once: dict[str, Finding] = {}
+    for finding in sorted(findings, key=lambda f: f.severity != "doubt"):
+        once.setdefault(finding.code, finding)
+    ranked = sorted(
+        once.values(),
+        key=lambda f: (f.severity != "doubt", _ORDER.get(f.code, len(_ORDER))),
+    )
+    return ranked[:MOST_FINDINGS]

@@ -1,0 +1,216 @@
+"""Everything that a report shows, as text and pictures: for the page, the PDF and the sheet."""
+
+from collections.abc import Mapping, Sequence
+from datetime import UTC, datetime
+from importlib.metadata import version
+from typing import Any
+
+from hmpim.identify import Identification, PairIdentification
+from hmpim.plots.candidates import INTERSAMPLE_WORDS
+from hmpim.report.about import About
+from hmpim.report.advice import advice, leading_findings
+from hmpim.report.figures import Picture, pair_pictures, stimulus_picture
+from hmpim.report.inputs import inputs_view
+from hmpim.report.numbers import format_estimate, format_interval, format_number, format_value
+from hmpim.report.words import (
+    GLOSSARY,
+    VERDICTS,
+    by_weight,
+    headline,
+    nonlinear_facts,
+    off_by,
+    pair_sentence,
+    paper_value,
+    remark,
+    structure_words,
+    untold,
+)
+from hmpim.stimulus import Stimulus
+
+__all__ = ["report_view"]
+
+_FIRST = ("bode", "deviation")  # pictures that are never folded away
+_SUMMARY = ("bandwidth_phase90", "bandwidth_3db", "delay", "scale_factor")
+
+
+def report_view(
+    result: Identification,
+    *,
+    about: About | None = None,
+    truth: Mapping[str, float] | None = None,
+    stimulus: Stimulus | None = None,
+    notes: Sequence[str] = (),
+    pictures: Sequence[Picture] = (),
+) -> dict[str, Any]:
+    """Return what a report shows, in its order.
+
+    Parameters
+    ----------
+    result : Identification
+        What was found.
+    about : About, optional
+        Unit under test, test, operator, date.
+    truth : mapping of str to float, optional
+        True values of parameters, where they are known.
+    stimulus : Stimulus, optional
+        What was sent.
+    notes : sequence of str
+        Plain sentences under the verdict.
+    pictures : sequence of Picture
+        What else was seen in the run.
+
+    Examples
+    --------
+    >>> from hmpim.identify import RecordSummary
+    >>> summary = RecordSummary(fs=200.0, samples=2000, sha256="")
+    >>> report_view(Identification(record=summary, pairs=()))["headline"]
+    'Nothing was identified.'
+    """
+    about = about or About()
+    every = [finding for pair in result.pairs for finding in pair.warnings]
+    leading = leading_findings(every)
+    main = list(result.counted) or list(result.pairs)
+    return {
+        "title": about.title or _title(result),
+        "about": _about(about, result),
+        "headline": headline(result),
+        "verdict": result.verdict if result.pairs else "not_identifiable",
+        "notes": list(notes),
+        "findings": [
+            {"message": f.message, "code": f.code, "severity": f.severity, "advice": advice(f)}
+            for f in leading
+        ],
+        "remarks": len(every),
+        "summary": _summary(main) if len(result.pairs) > 1 else None,
+        "facts": _facts(result),
+        "pairs": [_pair_view(result, pair, truth or {}) for pair in result.pairs],
+        "inputs": inputs_view(result),
+        "stimulus": None if stimulus is None else stimulus_picture(stimulus),
+        "pictures": list(pictures),
+        "without_record": result.data is None,
+        "with_truth": bool(truth),
+        "glossary": GLOSSARY,
+    }
+
+
+def _title(result: Identification) -> str:
+    if len(result.pairs) == 1:
+        pair = result.pairs[0]
+        return f"{pair.input} → {pair.output}"
+    return f"{len(result.pairs)} pairs of channels"
+
+
+def _about(about: About, result: Identification) -> list[tuple[str, str]]:
+    """Head of the report; what is not known has a line to be filled in on the sheet."""
+    source = result.record.source
+    return [
+        ("Unit under test", about.under_test),
+        ("Test", about.test or (str(source) if source else "")),
+        ("Operator", about.operator),
+        ("Date", about.date or datetime.now(UTC).strftime("%Y-%m-%d")),
+    ]
+
+
+def _summary(pairs: Sequence[PairIdentification]) -> dict[str, Any]:
+    """One row for each pair that counts: its leading figures and its verdict."""
+    labels = {words.name: words.label for words in GLOSSARY}
+    names = [n for n in _SUMMARY if any(getattr(p.parameters, n) is not None for p in pairs)]
+    return {
+        "columns": [labels[name] for name in names],
+        "rows": [
+            {
+                "name": f"{pair.input} → {pair.output}",
+                "cells": [_told(pair, name) for name in names],
+                "verdict": pair.verdict,
+                "verdict_words": VERDICTS[pair.verdict],
+            }
+            for pair in pairs
+        ],
+    }
+
+
+def _told(pair: PairIdentification, name: str) -> str:
+    estimate = getattr(pair.parameters, name)
+    if estimate is None:
+        return "–"
+    return format_estimate(estimate) + ("" if estimate.verdict == "ok" else " (doubtful)")
+
+
+def _facts(result: Identification) -> list[tuple[str, str]]:
+    record = result.record
+    facts = [
+        ("Source", record.source or "given as arrays"),
+        ("Sampling rate", f"{record.fs:.7g} Hz"),
+        ("Samples", str(record.samples)),
+        ("Length", f"{record.samples / record.fs:.6g} s"),
+    ]
+    if result.data is not None and result.data.band is not None:
+        low, high = result.data.band
+        facts.append(("Excited band", f"{low:g} to {high:g} Hz"))
+    now = datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC")
+    return [
+        *facts,
+        ("SHA-256 of the record", record.sha256 or "unknown"),
+        ("Made by", f"hmpim {version('hmpim')}, {now}"),
+    ]
+
+
+def _pair_view(
+    result: Identification, pair: PairIdentification, truth: Mapping[str, float]
+) -> dict[str, Any]:
+    """Everything that is shown of a pair, as text."""
+    lowest = min((c.criterion for c in pair.candidates), default=0.0)
+    drawn = pair_pictures(result, pair)
+    return {
+        "name": f"{pair.input} → {pair.output}",
+        "verdict": pair.verdict,
+        "verdict_words": VERDICTS[pair.verdict],
+        "sentence": pair_sentence(pair),
+        "warnings": [
+            {"message": w.message, "code": w.code, "severity": w.severity, "advice": advice(w)}
+            for w in by_weight(pair.warnings)
+        ],
+        "rows": _rows(pair, truth),
+        "untold": untold(pair),
+        "candidates": [
+            {
+                "structure": structure_words(c.structure),
+                "between": INTERSAMPLE_WORDS[c.intersample],
+                "behind": f"{c.criterion - lowest:.1f}",
+                "fit": f"{c.fit_percent:.2f}",
+                "chosen": c.chosen,
+            }
+            for c in sorted(pair.candidates, key=lambda c: c.criterion)
+        ],
+        "nonlinear": nonlinear_facts(pair),
+        "counted": pair in result.counted,
+        "first": [picture for picture in drawn if picture.key in _FIRST],
+        "rest": [p for p in drawn if p.key not in (*_FIRST, "candidates", "harmonics")],
+        "named": {p.key: p for p in drawn if p.key in ("candidates", "harmonics")},
+    }
+
+
+def _rows(pair: PairIdentification, truth: Mapping[str, float]) -> list[dict[str, str]]:
+    rows = []
+    for words in GLOSSARY:
+        estimate = getattr(pair.parameters, words.name)
+        paper = paper_value(pair, words.name)
+        if estimate is None and paper is None:
+            continue
+        true = truth.get(words.name)
+        off = "" if true is None or estimate is None else off_by(estimate, true)
+        rows.append(
+            {
+                "name": words.name,
+                "label": words.label,
+                "value": "–" if estimate is None else format_value(estimate),
+                "unit": "" if estimate is None else estimate.unit,
+                "interval": "" if estimate is None else format_interval(estimate),
+                "verdict": "" if estimate is None else estimate.verdict,
+                "paper": format_number(paper) if words.differs else "",
+                "remark": remark(words, estimate, paper),
+                "truth": format_number(true) if true is not None else "",
+                "off": off,
+            }
+        )
+    return rows
