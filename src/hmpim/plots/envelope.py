@@ -54,8 +54,12 @@ def envelope(
         inner = np.linspace(x[0], x[-1], slices + 1)[1:-1]
     starts = np.unique(np.concatenate(([0], np.searchsorted(x, inner))))
     slice_of = np.repeat(np.arange(starts.size), np.diff(starts, append=x.size))
-    order = np.lexsort((y, slice_of))  # by slice, then by height
-    lowest = order[starts]
-    highest = order[np.append(starts[1:], x.size) - 1]
-    kept = np.unique(np.concatenate((lowest, highest)))
+    ends = []
+    extreme = y[starts]
+    for extreme in (np.fmin.reduceat(y, starts), np.fmax.reduceat(y, starts)):
+        there = np.flatnonzero(y == extreme[slice_of])
+        _, first = np.unique(slice_of[there], return_index=True)
+        ends.append(there[first])
+    missing = starts[np.isnan(extreme)]  # a slice without any sample stays a gap
+    kept = np.unique(np.concatenate((*ends, missing)))
     return x[kept], y[kept]

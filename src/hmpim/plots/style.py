@@ -46,6 +46,8 @@ def printable(text: str) -> str:
     >>> printable("a\x1b[31m\u202eb")
     'a�[31m�b'
     """
+    if text.isprintable():
+        return text
     return "".join(
         "\N{REPLACEMENT CHARACTER}" if category(c) in ("Cc", "Cf", "Cs") else c for c in text
     )

@@ -1,6 +1,7 @@
 """One page, one file: the verdict, the figures, the Bode plot, what to do, and the rest folded."""
 
 from collections.abc import Mapping, Sequence
+from functools import cache
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -204,6 +205,7 @@ def _page(view: dict[str, Any], template: str) -> str:
     return "\n".join(printable(line) for line in page.splitlines()) + "\n"
 
 
+@cache
 def page_environment(*packages: str) -> "Environment":
     """Return what turns the templates of some packages, and of the report, into pages.
 
