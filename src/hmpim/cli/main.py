@@ -110,7 +110,6 @@ def _given(parameter: Any, arguments: Sequence[str]) -> str | None:
 app = typer.Typer(
     name="hmpim",
     cls=CommandGroup,
-    add_completion=False,
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from hmpim.cli.complete import complete_rig
 from hmpim.cli.files import check_files
 from hmpim.cli.stages import Stages
 from hmpim.cli.terminal import output_console, say, working
@@ -35,6 +36,7 @@ def run(
         typer.Option(
             "--rig",
             metavar="RIG",
+            autocompletion=complete_rig,
             help="Name from hmpim.toml, or a kind such as sensor, table; see hmpim rigs.",
         ),
     ] = "",

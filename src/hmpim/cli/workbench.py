@@ -6,6 +6,7 @@ from typing import Annotated
 
 import typer
 
+from hmpim.cli.complete import complete_rig
 from hmpim.cli.terminal import say
 from hmpim.errors import ArgumentError
 
@@ -27,6 +28,7 @@ def workbench(
         typer.Option(
             "--rig",
             metavar="RIG",
+            autocompletion=complete_rig,
             help="A rig to offer beside those of hmpim.toml; may be repeated.",
         ),
     ] = None,

@@ -1,0 +1,74 @@
+"""What Tab offers: commands, options, and the rigs that a person described."""
+
+import os
+import subprocess
+import sys
+
+import pytest
+
+from hmpim.cli.main import app
+
+RIGS = '[rigs.bench7]\nrig = "sensor"\n\n[rigs.bench9]\nrig = "table"\n'
+
+
+def offered(words, monkeypatch, capsys):
+    """What the shell is told when Tab is pressed at the end of the last word."""
+    monkeypatch.setenv("_HMPIM_COMPLETE", "complete_bash")
+    monkeypatch.setenv("COMP_WORDS", " ".join(words))
+    monkeypatch.setenv("COMP_CWORD", str(len(words) - 1))
+    with pytest.raises(SystemExit) as ended:
+        app(prog_name="hmpim")
+    assert ended.value.code in (0, None)
+    return capsys.readouterr().out.split()
+
+
+def test_tab_completes_commands_and_options(monkeypatch, capsys):
+    assert offered(["hmpim", "ide"], monkeypatch, capsys) == ["identify"]
+    options = offered(["hmpim", "run", "s.csv", "--ri"], monkeypatch, capsys)
+    assert options == ["--rig", "--rig-file"]
+
+
+@pytest.mark.parametrize("command", [["run", "s.csv"], ["workbench"]])
+def test_tab_completes_rigs(command, tmp_path, monkeypatch, capsys):
+    (tmp_path / "hmpim.toml").write_text(RIGS)
+    monkeypatch.chdir(tmp_path)
+    line = ["hmpim", *command, "--rig"]
+    assert offered([*line, "ben"], monkeypatch, capsys) == ["bench7", "bench9"]
+    assert offered([*line, "tab"], monkeypatch, capsys) == ["table"]
+
+
+def test_a_broken_file_of_rigs_says_nothing_to_the_shell(tmp_path, monkeypatch, capsys):
+    (tmp_path / "hmpim.toml").write_text("[rigs.bench7")
+    monkeypatch.chdir(tmp_path)
+    assert offered(["hmpim", "run", "s.csv", "--rig", "sen"], monkeypatch, capsys) == ["sensor"]
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="bash is not there")
+def test_completion_installs_itself_for_bash(tmp_path):
+    """In a home of its own: the script lies there, .bashrc reads it, and bash completes by it."""
+    home = {
+        **os.environ,
+        "HOME": str(tmp_path),
+        "SHELL": "/bin/bash",
+        "_TYPER_COMPLETE_TEST_DISABLE_SHELL_DETECTION": "1",
+    }
+    main = "import sys; sys.argv[0] = 'hmpim'; from hmpim.cli.main import main; main()"
+    installed = subprocess.run(
+        [sys.executable, "-c", main, "--install-completion", "bash"],
+        env=home, capture_output=True, text=True, check=True, cwd=tmp_path,
+    )  # fmt: skip
+    assert "bash completion installed" in installed.stdout
+    script = tmp_path / ".bash_completions" / "hmpim.sh"
+    assert str(script) in (tmp_path / ".bashrc").read_text()
+    (tmp_path / "hmpim.toml").write_text(RIGS)
+    hmpim = tmp_path / "hmpim"
+    hmpim.write_text(f"#!{sys.executable}\n{main}\n")
+    hmpim.chmod(0o755)
+    pressed = (
+        f"source '{script}'; COMP_WORDS=(hmpim run s.csv --rig bench9); COMP_CWORD=4; "
+        f'_hmpim_completion {hmpim}; echo "${{COMPREPLY[@]}}"'
+    )
+    done = subprocess.run(
+        ["bash", "-c", pressed], env=home, capture_output=True, text=True, check=True, cwd=tmp_path
+    )
+    assert done.stdout.split() == ["bench9"]
