@@ -122,21 +122,42 @@ class Median:
         return float(np.median(self.last))
 
 
+class Kalman:
+    """Position and rate at constant rate, by the gain of its steady state."""
+
+    def __init__(self) -> None:
+        step, noise = np.array([[1.0, 1.0], [0.0, 1.0]]), 0.05
+        drive = noise * np.array([[0.25, 0.5], [0.5, 1.0]])
+        spread = 10.0 * np.eye(2)
+        for _ in range(500):
+            spread = step @ spread @ step.T + drive
+            gain = spread[:, 0] / (spread[0, 0] + 1.0)
+            spread = spread - np.outer(gain, spread[0])
+        self.gain, self.step, self.x = gain, step, np.zeros(2)
+
+    def __call__(self, u: float) -> float:
+        ahead = self.step @ self.x
+        self.x = ahead + self.gain * (u - ahead[0])
+        return float(self.x[0])
+
+
 ALGORITHMS: dict[str, tuple[Callable[[], Callable[[float], float]], int]] = {
     "z⁻³": (lambda: Filter(3, 0.0), 3),
     "IIR, pole 0.8": (lambda: Filter(0, 0.8), 0),
     "IIR, pole 0.8, behind z⁻⁴": (lambda: Filter(4, 0.8), 4),
     "α-β, 0.5 and 0.1": (AlphaBeta, 0),
+    "Kalman filter, constant rate": (Kalman, 0),
     "median of 5": (Median, 2),
 }
 
 
 def software() -> Iterator[str]:
-    """Delay in samples as it is found, held input and all."""
-    yield "| algorithm | true delay | rate, length | delay found, samples | verdict | remarks |"
-    yield "| --- | --- | --- | --- | --- | --- |"
+    """Delay in samples as it is found, and the gain's error."""
+    heads = "algorithm", "true delay", "rate, length", "delay found, samples", "gain", "verdict"
+    yield f"| {' | '.join(heads)} | remarks |"
+    yield "| --- | --- | --- | --- | --- | --- | --- |"
     for name, (make, late) in ALGORITHMS.items():
-        for fs, seconds in ((50.0, 10.0), (200.0, 5.0)):
+        for fs, seconds in ((50.0, 5.0), (50.0, 10.0), (200.0, 5.0), (200.0, 10.0), (1000.0, 5.0)):
             limits = hmpim.Limits(position=10, unit="deg")
             sweep = hmpim.design(band=(0.1, fs / 10), duration=seconds, fs=fs, limits=limits)
             record = hmpim.run(FunctionRig(function=make(), mode="sample"), sweep)
@@ -144,7 +165,8 @@ def software() -> Iterator[str]:
             remarks = ", ".join(dict.fromkeys(w.code for w in pair.warnings))
             yield (
                 f"| {name} | {late} | {fs:g} Hz, {seconds:g} s | "
-                f"{said(pair.parameters.delay, fs)} | {pair.verdict} | {remarks} |"
+                f"{said(pair.parameters.delay, fs)} | {said(pair.parameters.scale_factor)} | "
+                f"{pair.verdict} | {remarks or '–'} |"
             )
 
 

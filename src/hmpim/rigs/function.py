@@ -40,9 +40,10 @@ class FunctionRig(Simulated):
         Which quantity of the motion is fed.
     output_unit : str or None
         None takes the input's.
-    intersample : {'zoh', 'foh', 'bandlimited'} or None
-        What the record says of the input between samples. An algorithm sees samples only, so
-        that None, the default, leaves it open.
+    intersample : {'zoh', 'foh', 'bandlimited', 'sampled'} or None
+        What the record says of the input between samples. None, the default, says 'sampled' of
+        an algorithm that is called sample by sample, and leaves it open of one that sees all
+        samples at once, as it may look ahead.
     name, input_name, output_name : str
         Name of the rig, and of its record's channels.
     limits : Limits or None
@@ -88,7 +89,7 @@ class FunctionRig(Simulated):
         return fed.layout(
             output=self.output_name,
             unit=fed.unit if self.output_unit is None else self.output_unit,
-            intersample=self.intersample,
+            intersample=self.intersample or ("sampled" if self.mode == "sample" else None),
             source=f"function {self.name}",
         )
 

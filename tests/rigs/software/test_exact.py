@@ -1,8 +1,4 @@
-"""Software under test, sample over sample: the delay is a whole number of samples, found exactly.
-
-These tests run as soon as `hmpim.identify` takes ``intersample="sampled"``; until then they say
-that they wait for it.
-"""
+"""Software under test, sample over sample: the delay is a whole number of samples, found exactly."""
 
 import shlex
 import subprocess
@@ -12,7 +8,6 @@ import numpy as np
 import pytest
 
 import hmpim
-from hmpim.errors import ArgumentError
 from hmpim.rigs import FunctionRig
 from hmpim.rigs.software import FmuRig, ProcessRig
 from tests_support import c_compiler, in_studies
@@ -103,12 +98,7 @@ def sweep_of(fs, seconds):
 
 def sampled(record):
     """The pair, sample over sample."""
-    try:
-        return hmpim.identify(record, intersample="sampled").pairs[0]
-    except ArgumentError as error:
-        if "'sampled' is not known" not in str(error):
-            raise
-        pytest.skip("hmpim.identify does not take intersample='sampled' yet")
+    return hmpim.identify(record, intersample="sampled").pairs[0]
 
 
 def assert_exact(record, late, fs):

@@ -57,9 +57,9 @@ class ProcessRig(Simulated):
         Which quantity of the motion is fed.
     output_unit : str or None
         None takes what the program says, or else the input's.
-    intersample : {'zoh', 'foh', 'bandlimited'} or None
+    intersample : {'zoh', 'foh', 'bandlimited', 'sampled'} or None
         What the record says of the input between samples; a program sees samples only, so that
-        None, the default, leaves it open.
+        None, the default, says 'sampled'.
     startup, answer : float
         Seconds that the program may take to say ``ready``, and for each sample.
     name, input_name, output_name : str
@@ -140,7 +140,7 @@ class ProcessRig(Simulated):
         return fed.layout(
             output=self.output_name,
             unit=stated if self.output_unit is None else self.output_unit,
-            intersample=self.intersample,
+            intersample=self.intersample or "sampled",
             source=f"program {self.command}",
         )
 
