@@ -1,4 +1,4 @@
-"""Software under test, sample over sample: the delay is a whole number of samples, found exactly."""
+"""Software under test, sample over sample: its delay is a whole number of samples, and exact."""
 
 import shlex
 import subprocess
