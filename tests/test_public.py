@@ -9,7 +9,7 @@ import hmpim
 PUBLIC = {
     "Channel", "Chirp", "Estimate", "FunctionRig", "HmpimError", "Identification", "Limits",
     "Model", "Ramp", "Record", "Sensor", "Sine", "Step", "Stimulus", "SumOfSines", "Sweep",
-    "Statistics", "batch", "compress",
+    "LiveEstimator", "Statistics", "batch", "compress",
     "design", "design_axes", "draw_models", "export", "frequency_response", "gentlest",
     "identify", "identify_levels", "identify_repeats", "load", "paper_analysis", "predict",
     "read", "report", "run", "save", "simulate", "to_model", "validate",

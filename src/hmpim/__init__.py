@@ -17,6 +17,7 @@ from hmpim.formats.models import export
 from hmpim.identify import (
     Estimate,
     Identification,
+    LiveEstimator,
     Statistics,
     compress,
     identify,
@@ -55,6 +56,7 @@ __all__ = [
     "HmpimError",
     "Identification",
     "Limits",
+    "LiveEstimator",
     "Model",
     "Ramp",
     "Record",

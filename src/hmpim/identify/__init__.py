@@ -42,7 +42,7 @@ from hmpim.identify.result import (
     Verdict,
 )
 from hmpim.identify.spectrum import excited_band
-from hmpim.identify.statistics import Statistics, compress
+from hmpim.identify.statistics import LiveEstimator, Look, Statistics, compress
 from hmpim.identify.validate import Bounds, Check, OutputValidation, Validation, validate
 
 __all__ = [
@@ -61,6 +61,8 @@ __all__ = [
     "Level",
     "LevelComparison",
     "Levels",
+    "LiveEstimator",
+    "Look",
     "Nonlinearity",
     "OutputCoherence",
     "OutputValidation",

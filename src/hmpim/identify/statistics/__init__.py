@@ -10,8 +10,10 @@ fit         one structure, by the joint fit's own way down
 misfit      whether what is left over follows the input; one more pole
 choose      the structure, the assumption between the samples, the noise
 describe    what is said of the pair
+live        the estimate so far, while samples come
 """
 
+from hmpim.identify.statistics.live import LiveEstimator, Look
 from hmpim.identify.statistics.statistics import Statistics, compress
 
-__all__ = ["Statistics", "compress"]
+__all__ = ["LiveEstimator", "Look", "Statistics", "compress"]

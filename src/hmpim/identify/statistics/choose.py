@@ -353,10 +353,10 @@ def left_over(search: "_Search", fitted: Fitted) -> LeftOver:
         plain = Products(search.statistics, skipped=products.skipped)
     gram, count = fitted.residual(plain).gram(products.skipped)
     power = max(float(gram[0, 0]), np.finfo(float).tiny)
-    rho = gram[0, 1:] / power
+    rho = gram[0, 1 : max(min(gram.shape[0], count // 4), 1)] / power
     lags = np.arange(1, rho.size + 1)
     box = count * (count + 2.0) * float(np.sum(rho**2 / (count - lags)))
-    white = chdtrc(rho.size, box) > _WHITE
+    white = rho.size == 0 or chdtrc(rho.size, box) > _WHITE
     if white and not products.order:
         power, count = fitted.fit.objective, products.counted
     clear = rho[np.abs(rho) > 3.0 / np.sqrt(count)]

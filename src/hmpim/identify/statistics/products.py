@@ -221,7 +221,10 @@ class Products:
             beside = (with_rows + np.outer(u * weight, steady)).sum(axis=0)[None, :, None]
             outer = (with_y + y * weight).sum()[None, None]
             inner = weight.sum()[None, None, None]
-        solved = np.linalg.pinv(inner, hermitian=True)
+        if inner.shape[1] == 1:
+            solved = np.divide(1.0, inner, out=np.zeros_like(inner), where=inner > 0.0)
+        else:
+            solved = np.linalg.pinv(inner, hermitian=True)
         told = np.einsum("rjk,rqk->rjq", solved, beside)
         fixed = np.einsum("rjk,rk->rj", solved, outer)
         average = self._average()

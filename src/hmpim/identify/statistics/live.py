@@ -1,0 +1,253 @@
+"""The estimate so far, while samples come."""
+
+from dataclasses import dataclass, fields, replace
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from hmpim.arguments import check_argument, numbers_of
+from hmpim.errors import ArgumentError
+from hmpim.identify.fitting.data import FOLLOWS
+from hmpim.identify.fitting.enrich import PLAIN
+from hmpim.identify.fitting.rows import Problem
+from hmpim.identify.result import Estimate, Identification, Parameters
+from hmpim.identify.statistics.choose import choose
+from hmpim.identify.statistics.describe import identify_statistics
+from hmpim.identify.statistics.fit import Fitted, fit_products, pulse
+from hmpim.identify.statistics.misfit import misfit_of
+from hmpim.identify.statistics.products import Products
+from hmpim.identify.statistics.reach import Reach
+from hmpim.identify.statistics.statistics import Statistics
+from hmpim.identify.uncertainty import estimate, noise_estimate
+from hmpim.record import Intersample
+from hmpim.stimulus import Stimulus
+
+__all__ = ["LiveEstimator", "Look"]
+
+_WINDOW = 1.0
+"""Seconds that delay and settling may take."""
+
+_FEWEST = 60
+"""Samples before the first look."""
+
+_PAUSE = 1.1
+"""Growth of the record before another new start is tried."""
+
+_STEPS = 3
+"""Of the fit, at each look."""
+
+_BETWEEN = 1.05
+"""Growth of the record before it is asked again whether the residual follows the input."""
+
+_PAST = 1.2
+"""Natural frequency, over the end of the band, up to which the band still tells it."""
+
+Real = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Look:
+    """What is known at one time.
+
+    Parameters
+    ----------
+    time : float
+        Seconds read.
+    structure : str
+        What was fitted.
+    parameters : Parameters
+        Doubtful where the residual still follows the input, where a frequency is below one over
+        the time so far, or where it lies beyond what was excited.
+    """
+
+    time: float
+    structure: str
+    parameters: Parameters
+
+
+class LiveEstimator:
+    """Estimate while a stimulus is played: the estimate so far, with its error bars.
+
+    The output begins at rest. Each block is added to the statistics of the run; the fit goes on
+    from where it was. A new start is made at the first look and whenever the residual follows
+    the input.
+
+    Parameters
+    ----------
+    stimulus : Stimulus
+        What is played: its rate and its band are used.
+    window : float
+        Seconds that delay and settling may take together.
+    intersample : {'zoh', 'foh', 'bandlimited'}
+        What the input does between its samples.
+
+    Examples
+    --------
+    >>> from hmpim.stimulus import Chirp
+    >>> chirp = Chirp(band=(0.5, 20.0), duration=3.0)
+    >>> stimulus = Stimulus(waveform=chirp, fs=200.0)
+    >>> u = stimulus.position
+    >>> y = np.concatenate([np.zeros(10), u[:-10]]) + 0.01 * np.sin(37.0 * np.arange(u.size) ** 2)
+    >>> live = LiveEstimator(stimulus)
+    >>> for block in np.split(np.arange(600), 30):
+    ...     look = live.update(u[block], y[block])
+    >>> round(look.parameters.delay.value, 3)
+    0.05
+    """
+
+    def __init__(
+        self,
+        stimulus: Stimulus,
+        *,
+        window: float = _WINDOW,
+        intersample: Intersample = "bandlimited",
+    ) -> None:
+        check_argument("stimulus", stimulus, Stimulus)
+        check_argument("window", window, float)
+        check_argument("intersample", intersample, Intersample)
+        lags = round(window * stimulus.fs)
+        if lags < 8:
+            raise ArgumentError(
+                f"window = {window!r} s is {lags} samples at {stimulus.fs:g} Hz; give the time "
+                "that delay and settling take, 8 samples or more"
+            )
+        self._statistics = Statistics(
+            fs=stimulus.fs,
+            reach=Reach(lags=lags),
+            runs=(),
+            units=(stimulus.unit, ""),
+            intersample=intersample,
+            band=stimulus.waveform.band,
+        )
+        self._mode: Intersample = intersample
+        self._problem: Problem = pulse(self._statistics.reach, intersample)
+        self._fitted: Fitted | None = None
+        self._tried = self._asked = 0
+        self._follows = True
+        self._look: Look | None = None
+
+    @property
+    def statistics(self) -> Statistics:
+        """All that was read, compressed."""
+        return self._statistics
+
+    def update(self, u: ArrayLike, y: ArrayLike) -> Look | None:
+        """Read the samples that follow, and look.
+
+        Parameters
+        ----------
+        u, y : array_like, shape (n,)
+            The input's and the output's samples after the last ones read.
+
+        Returns
+        -------
+        Look or None
+            None while there is too little to fit.
+        """
+        if np.atleast_1d(numbers_of("u", u)).size == 0:
+            return self._look
+        statistics = self._statistics.update(u, y)
+        moves = bool(statistics.runs[0].uu[0] and statistics.runs[0].vv[-1, -1, 0])
+        if statistics.samples < _FEWEST or not moves:
+            return None
+        fitted = self._again()
+        if statistics.samples >= _BETWEEN * self._asked:
+            self._asked = statistics.samples
+            self._follows = self._lacks(fitted)
+            if self._follows and statistics.samples >= _PAUSE * self._tried:
+                fitted = self._begin()
+                self._follows = self._lacks(fitted)
+        self._fitted = fitted
+        self._look = self._read(fitted)
+        return self._look
+
+    def _lacks(self, fitted: Fitted) -> bool:
+        """Whether what is left over follows the input."""
+        low, high = self._excited()
+        fs = self._statistics.fs
+        return misfit_of(fitted, fitted.products, (low / fs, high / fs)).probability < FOLLOWS
+
+    def identification(self) -> Identification:
+        """The whole identification of what was read, with every structure and every check."""
+        return identify_statistics(self._statistics, intersample=self._mode)
+
+    def _again(self) -> Fitted:
+        """The same structure, a few steps from where it was."""
+        before = self._fitted
+        if before is None:
+            return self._begin()
+        return fit_products(
+            Products(self._statistics, skipped=0),
+            self._problem,
+            self._mode,
+            before.fit.structure,
+            before.fit.theta,
+            iterations=_STEPS,
+        )
+
+    def _begin(self) -> Fitted:
+        """A new start: every plain structure from the data alone."""
+        self._tried = self._statistics.samples
+        chosen = choose(self._statistics, intersample=self._mode, structures=PLAIN)
+        fit = chosen.best.fit
+        products = Products(self._statistics, skipped=0)
+        return fit_products(products, self._problem, self._mode, fit.structure, fit.theta)
+
+    def _excited(self) -> tuple[float, float]:
+        statistics = self._statistics
+        stated = statistics.band
+        return (0.0, statistics.fs / 2) if stated is None else stated
+
+    def _read(self, fitted: Fitted) -> Look:
+        statistics, fit = self._statistics, fitted.fit
+        time = statistics.samples / statistics.fs
+        parameters = _figures(fitted, statistics)
+        return Look(
+            time=time,
+            structure=fit.structure.name,
+            parameters=_doubted(parameters, time, self._excited()[1], follows=self._follows),
+        )
+
+
+def _figures(fitted: Fitted, statistics: Statistics) -> Parameters:
+    """The parameters themselves; what is read off the response costs more than a look may take."""
+    fit, fs, cov = fitted.fit, statistics.fs, fitted.covariance
+    order, unit = fit.structure.order, statistics.units[1]
+    freedom = max(fitted.products.counted - cov.shape[0], 1)
+    axis = np.eye(cov.shape[0])
+
+    def linear(value: float, slope: Real, unit: str) -> Estimate:
+        return estimate(value, float(slope @ cov @ slope), freedom=freedom, unit=unit)
+
+    natural = damping = lag = None
+    if order == 2:
+        zeta = 0.5 / float(np.sqrt(fit.theta[2]))  # it holds 1 / (4ζ²)
+        hertz = 2 * zeta * float(np.exp(-fit.theta[1])) * fs / (2 * np.pi)
+        bent = axis[2] / (2 * fit.theta[2])
+        natural = linear(hertz, -hertz * (axis[1] + bent), "Hz")
+        damping = linear(zeta, -zeta * bent, "")
+    elif order == 1:
+        seconds = float(np.exp(fit.theta[1])) / fs
+        lag = linear(seconds, seconds * axis[1], "s")
+    return Parameters(
+        delay=linear(fit.delay / fs, axis[0] / fs, "s"),
+        scale_factor=linear(float(fit.linear[0]), axis[1 + order], ""),
+        bias=linear(float(fit.linear[-1]), axis[-1], unit),
+        noise_std=noise_estimate(fit.objective, freedom=freedom, share=1.0, unit=unit),
+        natural_frequency=natural,
+        damping_ratio=damping,
+        time_constant=lag,
+    )
+
+
+def _doubted(parameters: Parameters, time: float, highest: float, *, follows: bool) -> Parameters:
+    """Nothing is claimed below 1/time, beyond the band, or while the residual follows the input."""
+    natural = parameters.natural_frequency
+    outside = natural is not None and not 1.0 / time < natural.value < _PAST * highest
+    if not (follows or outside):
+        return parameters
+    named = {field.name: getattr(parameters, field.name) for field in fields(parameters)}
+    return replace(
+        parameters,
+        **{n: replace(e, verdict="doubtful") for n, e in named.items() if e is not None},
+    )
