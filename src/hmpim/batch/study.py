@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtri
 
+from hmpim.batch.between import between_units
 from hmpim.batch.expect import Bound, Outcome, held_against
 from hmpim.batch.pictures import distribution, groups, sequence
 from hmpim.batch.summary import ParameterSummary, Summary, column, summary_of
@@ -86,7 +87,12 @@ def study_page(
         description="",
         headline=headline,
         met=None if not outcomes else missed == 0,
-        grids=(_figures(found), *_specified(outcomes), *_reasons(found)),
+        grids=(
+            _figures(found),
+            *_between(table, found),
+            *_specified(outcomes),
+            *_reasons(found),
+        ),
         sections=tuple(_section(table, row, outcomes, labels) for row in found.parameters),
         facts=(
             ("Folder", str(table.folder)),
@@ -137,6 +143,40 @@ def _figures(found: Summary) -> Grid:
             for row in found.parameters
         ),
     )  # fmt: skip
+
+
+def _between(table: BatchTable, found: Summary) -> tuple[Grid, ...]:
+    """Mean of all records, and how much they differ beyond their error bars."""
+    rows = []
+    for row in found.parameters:
+        values, errors = column(table, row.name), column(table, f"{row.name}_std")
+        kept = np.isfinite(values) & np.isfinite(errors) & (errors > 0)
+        if np.count_nonzero(kept) < _FEWEST_IN_GROUP:
+            continue
+        told = between_units(values[kept], errors[kept])
+        low, high = told.spread_ci95
+        rows.append(
+            (
+                row.name.replace("_", " ") + (f" ({row.unit})" if row.unit else ""),
+                str(told.units),
+                f"{told.mean:.6g} ± {told.mean_std:.2g}",
+                f"{told.spread:.3g}",
+                f"{low:.3g} to {high:.3g}",
+                f"{100 * told.share:.0f} %",
+            )
+        )
+    if not rows:
+        return ()
+    grid = Grid(
+        caption="Between records",
+        columns=("Parameter", "Records", "Mean", "Spread", "95 % interval", "Share"),
+        rows=tuple(rows),
+        note=(
+            "Spread: standard deviation between records beyond their error bars (random effects, "
+            "restricted maximum likelihood). Share: of the variance that is between records."
+        ),
+    )
+    return (grid,)
 
 
 def _specified(outcomes: Sequence[Outcome]) -> tuple[Grid, ...]:
