@@ -6,14 +6,18 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from hmpim.identify.spectrum import excited_band
 from hmpim.optimal.fisher import fisher_information, standard_deviations
 from hmpim.optimal.wish import PARAMETERS, Family, Gentle, Wish
 from hmpim.stimulus import Stimulus, Waveform
 from hmpim.stimulus.motion import Scalable
 
-__all__ = ["Candidate", "cost_of", "gentleness", "needed_gain", "try_out"]
+__all__ = ["COVERED", "Candidate", "cost_of", "gentleness", "needed_gain", "shortfall", "try_out"]
 
 FloatArray = NDArray[np.float64]
+
+COVERED = 1.005
+"""Shortfall up to which a band counts as reached: its end is seen in bins."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -67,8 +71,38 @@ def needed_gain(position: FloatArray, wish: Wish, *, finer: int = 1) -> float:
             position, model=model, noise_std=wish.noise_std, fs=wish.fs
         )
         std = standard_deviations(information)[: len(PARAMETERS)]
-        worst = max(worst, float(np.max(std / wish.accuracy.std(model))))
+        worst = max(worst, float(np.max(std / wish.wanted(model))))
     return worst
+
+
+def shortfall(position: FloatArray, wish: Wish) -> float:
+    """How far the band that a stimulus excites ends below what the wish must reach, 1 or more.
+
+    It is the band that `hmpim.identify` sees in the samples alone: a sweep whose amplitude
+    falls steeply excites less than it sweeps, and a figure beyond is doubted.
+
+    Parameters
+    ----------
+    position : ndarray, shape (n,)
+        Samples.
+    wish : Wish
+        What is wanted.
+
+    Examples
+    --------
+    >>> from hmpim.optimal.wish import Accuracy, ModelRange, RoughModel
+    >>> from hmpim.stimulus import Limits, Sweep
+    >>> wish = Wish(accuracy=Accuracy(), model_range=ModelRange(), noise_std=0.1, fs=200.0,
+    ...             model=RoughModel(natural_frequency=10, damping_ratio=0.4), limits=Limits(),
+    ...             gentle="peak_acceleration", duration=10.0)
+    >>> time = np.arange(2000) / 200
+    >>> for n in (1.0, 1.9):
+    ...     sweep = Sweep(band=(0.65, 11.8), duration=10.0, extinction=n)
+    ...     print(round(shortfall(sweep.motion(time).position, wish), 2))
+    1.0
+    1.34
+    """
+    return max(1.0, wish.reach / excited_band(position, wish.fs)[1])
 
 
 def gentleness(stimulus: Stimulus, gentle: Gentle) -> float:
@@ -132,12 +166,14 @@ def try_out(
     Returns
     -------
     Candidate or None
-        None if no gain will do.
+        None if no gain will do, or the band ends below what must be told.
     """
     sized = _sized(waveform, wish, total=total, finer=finer)
     if sized is None or not isinstance(waveform, Scalable):
         return None
     first, gain = sized
+    if shortfall(first.position, wish) > COVERED:
+        return None
     stimulus = replace(first, waveform=waveform.scaled(gain))
     return Candidate(
         family=family,
@@ -148,8 +184,8 @@ def try_out(
     )
 
 
-def cost_of(waveform: Waveform, wish: Wish, *, total: float) -> tuple[float, float] | None:
-    """Share of the limits and value that `try_out` would find, without making the stimulus.
+def cost_of(waveform: Waveform, wish: Wish, *, total: float) -> tuple[float, float, float] | None:
+    """Share of the limits, value and shortfall that `try_out` would find, at less expense.
 
     Both grow with the gain, the duration aside, so that the stimulus of gain 1 tells them.
 
@@ -161,7 +197,7 @@ def cost_of(waveform: Waveform, wish: Wish, *, total: float) -> tuple[float, flo
     Returns
     -------
     tuple of float, or None
-        Largest share of a limit; what is to be small. None if no gain will do.
+        Largest share of a limit; what is to be small; `shortfall`. None if no gain will do.
     """
     sized = _sized(waveform, wish, total=total, finer=1)
     if sized is None:
@@ -169,7 +205,8 @@ def cost_of(waveform: Waveform, wish: Wish, *, total: float) -> tuple[float, flo
     first, gain = sized
     value = gentleness(first, wish.gentle)
     use = gain * wish.limits.use(first.peaks)
-    return use, value if wish.gentle == "duration" else gain * value
+    short = shortfall(first.position, wish)
+    return use, value if wish.gentle == "duration" else gain * value, short
 
 
 def _sized(

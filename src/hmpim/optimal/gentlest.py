@@ -6,6 +6,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import get_args
 
+import numpy as np
+
 from hmpim.arguments import checked
 from hmpim.errors import ArgumentError, LimitsError
 from hmpim.optimal.candidate import Candidate, gentleness
@@ -161,6 +163,12 @@ def gentlest(
         gentle=gentle,
         duration=(_LONGEST if gentle == "duration" else _LENGTH) if duration is None else duration,
     )
+    if wish.duration < wish.shortest:
+        raise LimitsError(
+            f"duration = {wish.duration:g} s is too short: delay and settling take "
+            f"{wish.shortest / 2.2:.3g} s, and no record of less than twice that is trusted; "
+            f"allow {three_digits(wish.shortest, up=True)} s or more"
+        )
     chosen = tuple(families)
     for family in chosen:
         if family not in FAMILIES:
@@ -223,22 +231,32 @@ def trade(
     for k, factor in enumerate(factors):
         step = _steps(progress, f"errors times {factor:g}", k, len(factors))
         wish = replace(found.wish, accuracy=found.wish.accuracy.times(factor))
-        best = _rescaled(shape, factor, wish) or _best(found.family, wish, near=shape, step=step)
+        best = _rescaled(shape, factor, found.wish, wish) or _best(
+            found.family, wish, near=shape, step=step
+        )
         inside = best is not None and best.use <= _FULL
         points.append(TradePoint(factor=factor, value=best.value if best and inside else None))
     _tell(progress, 1.0, "done")
     return tuple(points)
 
 
-def _rescaled(best: Candidate, factor: float, wish: Wish) -> Candidate | None:
+def _rescaled(best: Candidate, factor: float, before: Wish, wish: Wish) -> Candidate | None:
     """The stimulus for `factor` times the errors, where it has the shape of the best one.
 
     Errors are inverse to its size; so where no limit shapes either, only the size differs.
     """
     free = wish.gentle != "duration" and max(best.use, best.use / factor) < _FREE
-    if factor != 1.0 and not free:
+    if factor != 1.0 and not (free and _in_proportion(factor, before, wish)):
         return None
     return replace(best, use=best.use / factor, value=best.value / factor)
+
+
+def _in_proportion(factor: float, before: Wish, wish: Wish) -> bool:
+    """Whether all errors allowed grow by `factor`, none held by what a verdict needs."""
+    return all(
+        np.allclose(wish.wanted(model), factor * before.wanted(model), rtol=1e-9)
+        for model in wish.models()
+    )
 
 
 def _tell(progress: Progress | None, share: float, what: str) -> None:
@@ -294,7 +312,7 @@ def _at(
     start = None if near is None else near.shape
     if family == "multisine":
         return best_multisine(wish, total, start=start, step=step)
-    trials = 60 if near is None else 25
+    trials = 40 if near is None else 15
     return best_sweep(wish, total, family=family, start=start, trials=trials, step=step)
 
 
@@ -315,7 +333,8 @@ def _shortest(family: Family, wish: Wish, step: Step) -> Candidate | None:
     enough: Candidate | None = None
     enough_at, short_at = wish.duration, 0.0
     short_use = math.inf
-    total = min(wish.duration, 2.0 * wish.tail + 10.0 / wish.model.natural_frequency)
+    total = max(2.0 * wish.tail + 10.0 / wish.model.natural_frequency, wish.shortest)
+    total = min(wish.duration, total)
     near: Candidate | None = None
     for _ in range(_ROUNDS):
         total = math.ceil(total * wish.fs - 1e-6) / wish.fs
@@ -331,7 +350,9 @@ def _shortest(family: Family, wish: Wish, step: Step) -> Candidate | None:
             short_use = math.inf if tried is None else tried.use
         if short_at >= wish.duration - 0.5 / wish.fs:
             return _better(enough, tried)
-        if enough is not None and enough_at - short_at <= max(_CLOSE * enough_at, 1.0 / wish.fs):
+        if enough is not None and enough_at - max(short_at, wish.shortest) <= max(
+            _CLOSE * enough_at, 1.0 / wish.fs
+        ):
             break
         total = _next_duration(total, tried, enough, (short_at, short_use, enough_at), wish)
     return enough if enough is not None else near
@@ -353,7 +374,7 @@ def _next_duration(
         factor = 2.0 if tried is None else min(max(tried.use**2, 1.05), 4.0)
         return min(total * factor, wish.duration)
     if short_at == 0.0:
-        return max(total * max(enough.use**2, 0.3), 2.0 / wish.fs)
+        return max(total * max(enough.use**2, 0.3), 2.0 / wish.fs, wish.shortest)
     share = 0.5
     if math.isfinite(short_use):
         low, high = math.log(short_use), math.log(enough.use)

@@ -14,7 +14,7 @@ Optimization, 2nd ed., 1987, section 14.4).
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,6 +38,7 @@ _PATIENCE = 5  # good steps
 _LITTLE = 2e-3  # of the cost: less gained in so many steps ends a descent
 _FIRST_ROWS = 4  # per unknown, that a linear programme is begun with
 _BROKEN = 1e-9  # of a bound: what a solution may exceed it by
+_END = 0.3  # of the greatest velocity of a line, which one past the reach must have
 _FEWEST = 4  # lines that leave freedom beside the three conditions of rest
 
 
@@ -52,6 +53,8 @@ class _Programme:
     rest: FloatArray  # (3, 2m)
     bounds: FloatArray  # (4,) of the motion
     moving: float  # share of the record in which it moves
+    omega: FloatArray  # of the lines, rad/s, shape (m,)
+    edge: bool = False  # whether the end of the band seen counts
 
     def log_ratios(self, z: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return log(std / wanted) of each parameter of each model, and its slope by z."""
@@ -59,12 +62,10 @@ class _Programme:
         for matrix, wanted in zip(self.information, self.wanted, strict=True):
             applied = matrix @ z  # (4, 4, 2m)
             inverse = np.linalg.pinv(applied @ z, hermitian=True)
-            asked = np.flatnonzero(np.isfinite(wanted))
-            variance = np.diag(inverse)[asked]
-            values.append(0.5 * np.log(variance) - np.log(wanted[asked]))
-            column = inverse[:, asked]
-            slope = np.tensordot(column, applied, axes=(0, 0))  # (p, 4, 2m)
-            slope = np.einsum("pb,pbi->pi", column.T, slope)
+            variance = np.diag(inverse)
+            values.append(0.5 * np.log(variance) - np.log(wanted))
+            slope = np.tensordot(inverse, applied, axes=(0, 0))  # (p, 4, 2m)
+            slope = np.einsum("pb,pbi->pi", inverse, slope)
             slopes.append(-slope / variance[:, None])
         return np.concatenate(values), np.concatenate(slopes)
 
@@ -73,10 +74,23 @@ class _Programme:
         gain = math.exp(float(self.log_ratios(z)[0].max()))
         peaks = np.abs(self.motion @ z).max(axis=1) * gain
         use = peaks / self.bounds
+        short = max(self._edge(z)[0], 1.0) ** 3 if self.edge else 1.0
         if self.wish.gentle == "duration":
-            return float(use.max())
+            return float(use.max()) * short
         beyond = max(float(use.max()), 1.0) ** 3
-        return gain * self._size(z)[0] * beyond
+        return gain * self._size(z)[0] * beyond * short
+
+    def _edge(self, z: FloatArray) -> tuple[float, int]:
+        """What the strongest line past the reach lacks of what ends a band, and its number.
+
+        The band seen in samples ends where the velocity's spectrum falls below a quarter.
+        """
+        velocity = np.hypot(*z.reshape(2, -1)) / self.omega
+        past = np.flatnonzero(self.omega >= 2.0 * np.pi * self.wish.reach)
+        if past.size == 0:
+            return math.inf, -1
+        best = int(past[np.argmax(velocity[past])])
+        return _END * float(velocity.max()) / max(float(velocity[best]), 1e-300), best
 
     def _size(self, z: FloatArray) -> tuple[float, FloatArray]:
         """What is to be small, and its slope by z."""
@@ -115,6 +129,10 @@ class _Programme:
             extra = np.full((len(held), 1), -free)
             rows += [np.hstack([held, extra]), np.hstack([-held, extra])]
             right.append(np.full(2 * len(held), 1.0 - free))
+        if self.edge:
+            held, most = self._edge_rows(z, trust)
+            rows.append(held)
+            right.append(most)
         objective = np.zeros(count + 1)
         objective[-1] = 1.0
         if self.wish.gentle in ("rms_acceleration", "travel"):
@@ -129,6 +147,26 @@ class _Programme:
             np.hstack([self.rest, np.zeros((3, 1))]),
             (np.append(z - reach, 0.0), np.append(z + reach, math.inf)),
         )
+
+    def _edge_rows(self, z: FloatArray, trust: float) -> tuple[FloatArray, FloatArray]:
+        """Rows that keep the end of the band: a line past the reach held up, strong ones down."""
+        size = np.hypot(*z.reshape(2, -1))
+        lacks, line = self._edge(z)
+        if line < 0 or lacks <= 1.0 - trust or size[line] == 0.0:
+            return np.zeros((0, z.size + 1)), np.zeros(0)
+        direction = z.reshape(2, -1) / np.maximum(size, 1e-300)
+        velocity = size / self.omega
+        wanted = min(lacks, 1.0 + 0.5 * trust) * velocity[line]
+        cap = np.maximum(wanted / _END, (1.0 - 0.5 * trust) * velocity)
+        strong = np.flatnonzero(velocity > (1.0 - trust) * cap)
+        numbers = np.append(strong, line)
+        signs = np.append(np.ones(strong.size), -1.0)
+        held = np.zeros((numbers.size, z.size + 1))
+        at = np.arange(numbers.size)
+        for part in range(2):
+            held[at, numbers + part * size.size] = signs * direction[part, numbers]
+        most = np.append(cap[strong] * self.omega[strong], -wanted * self.omega[line])
+        return held, most
 
 
 def _solved(
@@ -222,19 +260,43 @@ def best_multisine(
     repeats, lines = multisine_lines(wish, moving)
     if lines < _FEWEST:
         return None
-    programme = _programme(wish, moving, total, repeats, lines)
-    best: FloatArray | None = None
     begins = [_spread(lines, turn) for turn in range(starts)]
     if start is not None:
         begins = [_resized(start, lines)]
-    for begin in begins:
-        found = _descend(programme, begin, steps, step)
-        if found is not None and (best is None or programme.cost(found) < programme.cost(best)):
-            best = found
-    if best is None:
-        return None
-    waveform = _waveform(best, repeats, moving, wish.fs)
-    return try_out(waveform, wish, family="multisine", total=total, shape=best, finer=3)
+    best, plain = None, begins[0]
+    # as it comes; then with the end of the band held up; then without its lowest lines
+    for first, edge in ((1, False), (1, True), (2, False), (3, False), (4, False), (5, False)):
+        if lines - first < _FEWEST or (best is not None and best.use <= 1.0):
+            break
+        numbers = np.arange(first, lines + 1)
+        programme = replace(_programme(wish, moving, total, repeats, numbers), edge=edge)
+        descended = [_descend(programme, _without(b, first), steps, step) for b in begins]
+        found = [z for z in descended if z is not None]
+        if not found:
+            break
+        z = min(found, key=programme.cost)
+        waveform = _waveform(z, repeats * numbers, moving, wish.fs)
+        whole = _with(z, first)
+        tried = try_out(waveform, wish, family="multisine", total=total, shape=whole, finer=3)
+        if tried is not None and not edge and first == 1:
+            return tried
+        if tried is not None and (best is None or tried.use < best.use):
+            best = tried
+        if not edge:
+            plain = whole  # what was found without holding the band: on from there, a line less
+        if edge or first > 1:
+            begins = [plain]
+    return best
+
+
+def _without(z: FloatArray, first: int) -> FloatArray:
+    """Leave out the lines before number `first`."""
+    return np.ascontiguousarray(z.reshape(2, -1)[:, first - 1 :]).ravel()
+
+
+def _with(z: FloatArray, first: int) -> FloatArray:
+    """Put the lines before number `first` back, as nothing."""
+    return np.concatenate([np.zeros((2, first - 1)), z.reshape(2, -1)], axis=1).ravel()
 
 
 def _descend(
@@ -283,8 +345,10 @@ def _spread(lines: int, turn: int) -> FloatArray:
     return np.concatenate([size * np.cos(phase), size * np.sin(phase)])
 
 
-def _programme(wish: Wish, moving: float, total: float, repeats: int, lines: int) -> _Programme:
-    k = np.arange(1, lines + 1)
+def _programme(
+    wish: Wish, moving: float, total: float, repeats: int, k: NDArray[np.int_]
+) -> _Programme:
+    lines = k.size
     omega = 2.0 * np.pi * repeats * k / moving
     count = round(total * wish.fs)
     time = (np.arange(count) - 1) / wish.fs
@@ -296,9 +360,10 @@ def _programme(wish: Wish, moving: float, total: float, repeats: int, lines: int
         rows = sensitivities(basis, model=model, fs=wish.fs)
         rows -= rows.mean(axis=2, keepdims=True)  # the bias takes the mean away
         information.append(_grams(rows) / wish.noise_std**2)
-        wanted.append(wish.accuracy.std(model))
+        wanted.append(wish.wanted(model))
     # peaks: one period, the same as all
-    instants = np.arange(_POINTS * lines) * (moving / repeats / (_POINTS * lines))
+    points = _POINTS * int(k[-1])
+    instants = np.arange(points) * (moving / repeats / points)
     angle = np.outer(instants, omega)
     cosine, sine = np.cos(angle), np.sin(angle)
     motion = np.array(
@@ -327,6 +392,7 @@ def _programme(wish: Wish, moving: float, total: float, repeats: int, lines: int
         rest=rest,
         bounds=_INSIDE * np.array(bounds),
         moving=moving / total,
+        omega=np.asarray(omega, dtype=np.float64),
     )
 
 
@@ -339,9 +405,8 @@ def _grams(rows: FloatArray) -> FloatArray:
     return np.asarray(0.5 * (gram + gram.transpose(0, 1, 3, 2)))
 
 
-def _waveform(z: FloatArray, repeats: int, moving: float, fs: float) -> RestToRest:
+def _waveform(z: FloatArray, k: NDArray[np.int_], moving: float, fs: float) -> RestToRest:
     lines = z.size // 2
-    k = repeats * np.arange(1, lines + 1)
     omega = 2.0 * np.pi * k / moving
     cosine, sine = z[:lines] / omega**2, z[lines:] / omega**2
     size = np.hypot(cosine, sine)

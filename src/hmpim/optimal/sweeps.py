@@ -21,7 +21,7 @@ __all__ = ["best_sweep"]
 FloatArray = NDArray[np.float64]
 
 _DEAREST = 1e3  # log of the cost of what cannot be made
-_DEAR = 5.0  # power of the excess over a limit
+_DEAR = 5.0  # power of the excess over a limit, and of what the band ends too soon
 _EXTINCTIONS = (0.0, 4.0)
 _LENGTHS = 6  # tried until one fills the record
 _LOWEST_CYCLES = 1.0  # that a sweep makes at least, as a lead needs
@@ -50,7 +50,7 @@ def best_sweep(
         Shape of an earlier candidate to begin at: logarithms of first frequency and width
         of the band (Hz), extinction.
     trials : int
-        At most so many from each start.
+        At most so many from the better start, after a third as many from each.
     step : callable, optional
         Called at each trial.
 
@@ -62,26 +62,32 @@ def best_sweep(
     search = _Search(wish, total, family, step)
     natural = wish.model.natural_frequency
     begins = [start] if start is not None else list(_starts(natural, total, family))
-    found: list[tuple[float, FloatArray]] = []
-    for begin in begins:
-        simplex = begin + np.array(
-            [[0.0, 0.0, 0.0], [0.3, 0.0, 0.0], [0.0, 0.2, 0.0], [0.0, 0.0, 0.3]]
-        )
-        ended = minimize(
-            search.cost,
-            begin,
-            method="Nelder-Mead",
-            options={"maxfev": trials, "xatol": 2e-3, "fatol": 2e-4, "initial_simplex": simplex},
-        )
-        found.append((float(ended.fun), np.asarray(ended.x)))
+    first = trials if len(begins) == 1 else max(trials // 3, 5)
+    found = [_descended(search, begin, first) for begin in begins]
     cost, shape = min(found, key=lambda item: item[0])
+    if len(begins) > 1 and cost < _DEAREST:  # the better start alone is followed to its end
+        cost, shape = min(
+            (cost, shape), _descended(search, shape, trials), key=lambda item: item[0]
+        )
     return None if cost >= _DEAREST else search.candidate(shape, finer=3)
+
+
+def _descended(search: "_Search", begin: FloatArray, trials: int) -> tuple[float, FloatArray]:
+    """Lowest cost and its shape, by a simplex that begins at a shape."""
+    simplex = begin + np.array([[0.0, 0.0, 0.0], [0.3, 0.0, 0.0], [0.0, 0.2, 0.0], [0.0, 0.0, 0.3]])
+    ended = minimize(
+        search.cost,
+        begin,
+        method="Nelder-Mead",
+        options={"maxfev": trials, "xatol": 2e-3, "fatol": 2e-4, "initial_simplex": simplex},
+    )
+    return float(ended.fun), np.asarray(ended.x)
 
 
 def _starts(natural: float, total: float, family: Family) -> list[FloatArray]:
     """A sweep from far below the natural frequency, and one around it."""
     slowest = max(0.1 * natural, 2.0 / total)
-    extinction = 1.5 if family == "sweep" else 1.0
+    extinction = 1.2 if family == "sweep" else 0.8
     return [
         np.array([math.log(low), math.log(high - low), extinction])
         for low, high in (
@@ -136,9 +142,9 @@ class _Search:
         tried = cost_of(waveform, self._wish, total=length)
         if tried is None:
             return _DEAREST
-        use, value = tried
+        use, value, short = tried
         # the record is a little too long or short: its information goes with its length
-        even = 0.5 * math.log(length / self._total)
+        even = 0.5 * math.log(length / self._total) + _DEAR * math.log(short)
         if self._wish.gentle == "duration":
             return math.log(use) + even
         return math.log(value) + even + _DEAR * math.log(max(use, 1.0))

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hmpim.arguments import checked, size_of
 from hmpim.errors import ArgumentError
@@ -38,6 +39,27 @@ PARAMETERS = ("delay", "natural_frequency", "damping_ratio", "scale_factor")
 
 Z95 = 1.959963984540054
 """97.5 % point of the normal distribution."""
+
+
+_TOLD = {
+    "delay": 0.1,
+    "natural_frequency": 0.05,
+    "damping_ratio": 0.12,
+    "scale_factor": 0.1,
+}
+"""Largest standard deviation of what is not asked for, as a share of its value: a third of the
+30 % from which `hmpim.identify` doubts a figure; less for what says where the band must end."""
+
+_REACH = 0.95
+"""End of the band over the natural frequency, the edge that is read off a spectrum being soft."""
+
+_PAST = 1.18
+"""Natural frequency over the end of the band; `hmpim.identify` doubts one beyond 1.2."""
+
+_SETTLED = 2.2
+"""Record over delay and settling time; `hmpim.identify` doubts what is read off less than 2."""
+
+FloatArray = NDArray[np.float64]
 
 
 def _positive(name: str, value: float, unit: str = "") -> None:
@@ -131,7 +153,9 @@ class RoughModel:
 @checked
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Accuracy:
-    """Errors that are wanted at 95 %: the half width of each interval; None for any.
+    """Errors that are wanted at 95 %: the half width of each interval.
+
+    None asks for no more than that the record tells the figure at all (`Wish.wanted`).
 
     Parameters
     ----------
@@ -331,6 +355,41 @@ class Wish:
     def models(self, *, finer: int = 1) -> tuple[RoughModel, ...]:
         """Models over the range, the accuracy being wanted of each."""
         return self.model_range.models(self.model, finer=finer)
+
+    def wanted(self, model: RoughModel) -> FloatArray:
+        """Return the standard deviations wanted, in the order of `PARAMETERS`, all finite.
+
+        What is not asked for must still be told, or the verdict on the record is doubtful: no
+        standard deviation may be beyond `_TOLD` of its figure, or, of a short delay, a sample.
+        """
+        told = np.array(
+            [
+                max(_TOLD["delay"] * model.delay, 1.0 / self.fs),
+                _TOLD["natural_frequency"] * model.natural_frequency,
+                _TOLD["damping_ratio"] * model.damping_ratio,
+                _TOLD["scale_factor"] * abs(model.scale_factor),
+            ]
+        )
+        return np.asarray(np.minimum(self.accuracy.std(model), told), dtype=np.float64)
+
+    @property
+    def reach(self) -> float:
+        """Frequency in Hz at which the band that is seen in a stimulus may end at the soonest.
+
+        Three standard deviations keep the natural frequency inside what the band still tells.
+        """
+        ends = []
+        for model in self.models():
+            spread = 3.0 * float(self.wanted(model)[PARAMETERS.index("natural_frequency")])
+            ends.append(
+                max(_REACH * model.natural_frequency, (model.natural_frequency + spread) / _PAST)
+            )
+        return max(ends)
+
+    @property
+    def shortest(self) -> float:
+        """Shortest record in s from which a settled response can be read off."""
+        return _SETTLED * max(m.delay + 5.0 * m.settling for m in self.models())
 
     @property
     def unlimited(self) -> bool:

@@ -20,6 +20,7 @@ ends, as a binary sequence, needs no lead; time at rest is put around it.
 """
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -247,17 +248,17 @@ def rest_to_rest(
     if isinstance(core, Reversed):
         forward = rest_to_rest(core.waveform, limits=limits, fs=fs, longest=longest)
         return _mirrored(forward, fs)
-    joins, leaves, first, last = _handovers(core, jerk=math.isfinite(limits.jerk))
-    start_peaks = true_peaks(core, start=joins[0], stop=first)
-    end_peaks = true_peaks(core, start=last, stop=leaves[0])
+    earliest, first, last = _spans(core, jerk=math.isfinite(limits.jerk))
+    start_peaks = true_peaks(core, start=earliest, stop=first)
+    end_peaks = true_peaks(core, start=last, stop=core.duration)
     rest = np.zeros(3)
     entry = exit_ = None
-    for join in joins.tolist():
+    for join in _handovers(core, earliest, first, 0):
         state = _state(core, join)
         entry = _gentlest(rest, state, start_peaks, limits, longest + join)
         if entry is not None:
             break
-    for leave in leaves.tolist():
+    for leave in _handovers(core, core.duration, last, -1):
         state = _state(core, leave)
         exit_ = _gentlest(state, rest, end_peaks, limits, longest + core.duration - leave)
         if exit_ is not None:
@@ -360,26 +361,30 @@ def _state(waveform: Waveform, time: float) -> FloatArray:
     return np.array([at.position[0], at.velocity[0], at.acceleration[0]])
 
 
-def _handovers(core: Waveform, *, jerk: bool) -> tuple[FloatArray, FloatArray, float, float]:
-    """Instants to join and to leave, best first, and the spans that a lead is compared with."""
+def _spans(core: Waveform, *, jerk: bool) -> tuple[float, float, float]:
+    """Earliest instant to join, and the ends of the two spans that a lead is compared with."""
     T = core.duration
     if isinstance(core, Sweep):
         total = 2.0 * math.pi * core.cycles
         earliest = join_time(core, jerk=jerk)
         first = core.time_of_phase(min(2.5 * math.pi, total))
-        last = core.time_of_phase(max(total - 2.0 * math.pi, 0.0))
-    elif core.band is None:
+        return earliest, first, core.time_of_phase(max(total - 2.0 * math.pi, 0.0))
+    if core.band is None:
         raise ArgumentError(
             f"a {type(core).__name__} jumps within itself, which no lead can smooth; "
             "take a waveform that has a band"
         )
-    else:
-        low, high = core.band
-        earliest, first, last = 0.0, min(1.0 / low, T), max(T - 1.0 / high, 0.0)
-    turn_in = _turning(core, np.linspace(earliest, max(first, earliest), 1024), 0)
-    turn_out = _turning(core, np.linspace(last, T, 1024), -1)
-    share = np.linspace(0.0, 1.0, _STEPS + 1)
-    return earliest + (turn_in - earliest) * share, T + (turn_out - T) * share, first, last
+    low, high = core.band
+    return 0.0, min(1.0 / low, T), max(T - 1.0 / high, 0.0)
+
+
+def _handovers(core: Waveform, best: float, far: float, which: int) -> Iterator[float]:
+    """Instants to join (`which` 0) or to leave (-1), best first, towards where the core turns."""
+    yield best
+    times = np.linspace(best, max(far, best), 1024) if which == 0 else np.linspace(far, best, 1024)
+    turn = _turning(core, times, which)
+    for share in np.linspace(0.0, 1.0, _STEPS + 1)[1:].tolist():
+        yield best + (turn - best) * share
 
 
 def _turning(core: Waveform, times: FloatArray, which: int) -> float:
