@@ -194,13 +194,15 @@ def check_rest(ticks, *, ended):
     """From `ended` (s of the clock) on: braked in time, smoothly, to rest, inside all limits."""
     assert np.abs(ticks.order).max() <= LIMITS.position
     assert np.abs(ticks.true).max() <= LIMITS.position
-    braking = np.flatnonzero(ticks.state == "BRAKING")
-    assert braking.size
-    assert ticks.time[braking[0]] - ended < 0.1
-    change = np.abs(np.diff(ticks.rate[braking[0] - 1 :])) * RATE
+    moving = np.flatnonzero(ticks.state == "MOVING")
+    after = np.flatnonzero(ticks.state[moving[0] :] != "MOVING")
+    assert after.size
+    first = moving[0] + after[0]  # braking; or at rest at once, where it was just turning round
+    assert ticks.time[first] - ended < 0.1
+    change = np.abs(np.diff(ticks.rate[first - 1 :])) * RATE
     assert change.max() < 1.01 * LIMITS.acceleration
     assert ticks.rate[-1] == 0.0
-    return ticks.time[braking[0]]
+    return ticks.time[first]
 
 
 def folder_of(path: Path, name: str) -> Path:
