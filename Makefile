@@ -47,6 +47,7 @@ bench: $(DEV)  ## speed, against a hand-written fit in the same run
 	$(BIN)/python benchmarks/identification_speed.py
 	$(BIN)/python benchmarks/response_accuracy.py
 	$(BIN)/python benchmarks/live.py
+	$(BIN)/python benchmarks/workbench.py
 
 accuracy: $(DEV)  ## every figure of docs/accuracy.md, from scratch
 	$(BIN)/python benchmarks/accuracy.py

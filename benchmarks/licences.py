@@ -19,7 +19,11 @@ hmpim itself is under BSD-3-Clause. What it needs, and what each extra adds, is 
 installed packages state it. `python benchmarks/licences.py` writes this page, and a test holds it
 against what is installed.
 
-hmpim imports these packages and ships none of them. **Under the LGPL: {lgpl}.** They are extras,
+hmpim imports these packages and ships none of them. It ships one file of another project, for
+the live strip of the workbench: uPlot 1.6.32 (MIT, © 2022 Leon Sorokin), unchanged, with its
+licence beside it in `src/hmpim/workbench/static/uplot`.
+
+**Under the LGPL: {lgpl}.** They are extras,
 imported as they are and changed nowhere, so that the LGPL asks nothing of code that uses hmpim;
 who ships them in an application must let them be replaced.
 

@@ -50,7 +50,10 @@ def test_a_foreign_file_is_dropped_identified_read_by_eye_and_reported(page, ser
     file.write_text(f"# rig 7\ntime [s];kommando [deg];{SCRIPT}\n{rows}\n")
     go(page, served, "analyse")
     page.set_input_files("input[type=file]", file)
-    page.get_by_text("kommando (deg, 200 Hz)").first.wait_for()
+    for role, channel in (("Inputs", "kommando"), ("Outputs", "<img")):
+        page.get_by_role("combobox", name=role).click()
+        page.get_by_role("option", name=re.compile(channel)).click()
+        page.keyboard.press("Escape")
     page.get_by_role("button", name="Identify").click()
     line = page.get_by_role("row", name=re.compile("^Bandwidth, −90° [0-9]"))
     line.wait_for()

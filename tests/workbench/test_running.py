@@ -12,8 +12,12 @@ from hmpim.workbench.work.designed import five_axes
 from workbench_support import desk_of, go
 
 ROLL = Wish(
-    rows=(AxisRow(name="roll", low=0.5, high=20.0, position=10.0, amplitude=5.0),),
-    duration=6.0,
+    rows=(
+        AxisRow(
+            name="roll", low=0.5, high=20.0, velocity=800.0, acceleration=30000.0, amplitude=5.0
+        ),
+    ),
+    duration=60.0,
     fs=500.0,
 )
 
@@ -91,11 +95,11 @@ def test_five_axes_run_once_every_light_is_green(page, served):
 
 def test_the_stop_button_ends_a_run_at_once_and_keeps_the_record(page, served):
     start(page, served, checked("570b5070b5070b50", ROLL, "bench"))
-    page.wait_for_function("() => Number(document.querySelector('.hm-strip')?.dataset.end) > 0.5")
+    page.wait_for_selector(".hm-strip[data-end]")
     page.get_by_role("button", name="Stop", exact=True).click()
     page.get_by_text("Ended early: stopped by hand").wait_for()
     record = hmpim.load(kept(served, "bench")[-1])
-    assert 0.5 < record.duration < 6.0
+    assert record.duration < 60.0
     assert any("stopped by hand" in f.message for f in record.findings)
     page.get_by_role("button", name="Disarm").click()
 
@@ -132,7 +136,7 @@ def test_a_lost_window_ends_its_run_and_the_record_is_kept(page, served, browser
     go(page, served, "run", desk_of(served))
     page.get_by_text("the window that armed the rig is gone").wait_for()
     record = hmpim.load(kept(served, "bench")[before])
-    assert record.duration < 6.0
+    assert record.duration < 60.0
     assert any("is gone" in f.message for f in record.findings)
     log = kept(served, "bench")[before].with_name("run.log").read_text()
     assert "was told to stop" in log

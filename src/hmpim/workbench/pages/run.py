@@ -88,7 +88,7 @@ class RunPage:
         self.command = Command(_command(window))
         ui.keyboard(on_key=self._key, ignore=[])
         ui.timer(_EVERY, self._tick)
-        ui.timer(0.7, self._estimate)
+        ui.timer(2.0, self._estimate)
         ui.timer(0.5, lambda: self.log.set_text("\n".join(self.bench.lines)))
         self._tick()
 

@@ -73,6 +73,7 @@ export default {
       top = 1.1 * (near ? Math.max(top, this.limit) : top || 1);
       this.plot.setScale("y", { min: -top, max: top });
       this.$el.dataset.end = end;
+      this.$emit("shown"); // the next one may come: a slow browser is not flooded
     },
   },
 };

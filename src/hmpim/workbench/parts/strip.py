@@ -1,6 +1,7 @@
 """A live strip of one axis: command and response in the last seconds, and their limit."""
 
 import base64
+import time
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,7 @@ __all__ = ["SPAN", "Strip"]
 
 SPAN = 5.0
 """Seconds of a run that are seen."""
+_PATIENCE = 2.0  # s after which a frame that was not drawn counts as lost
 _MOST = 600  # samples of a channel that are sent at a time: more than a strip has columns
 
 
@@ -32,6 +34,9 @@ class Strip(Element, component="strip.js"):
     def __init__(self, live: Live, axis: str, *, limit: float | None) -> None:
         super().__init__()
         self._axis = axis
+        self._sent = 0.0
+        self._shown = True
+        self.on("shown", self._seen, [])
         channels = live.of(axis)
         names = [channels[role].name if role in channels else role for role in _ROLES]
         self._props["label"] = f"Command and response of {axis or names[1]}, live"
@@ -41,7 +46,11 @@ class Strip(Element, component="strip.js"):
         self._props["span"] = SPAN
 
     def follow(self, live: Live) -> None:
-        """Show the last seconds of what has come in."""
+        """Show the last seconds of what has come in, once the browser has drawn what it got."""
+        now = time.monotonic()
+        if not self._shown and now - self._sent < _PATIENCE:
+            return
+        self._shown, self._sent = False, now
         channels = live.of(self._axis)
         sent: list[Any] = []
         for role in _ROLES:
@@ -51,6 +60,9 @@ class Strip(Element, component="strip.js"):
             else:
                 sent.append(["", ""])
         self.run_method("show", live.end, *sent)
+
+    def _seen(self) -> None:
+        self._shown = True
 
 
 _ROLES = ("input", "output")

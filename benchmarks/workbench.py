@@ -1,0 +1,149 @@
+"""How quickly the workbench answers: slider, live strip, a million samples.
+
+Run on an idle machine: python benchmarks/workbench.py. It needs Chromium and Playwright.
+"""
+
+import os
+import re
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+import urllib.request
+from pathlib import Path
+
+import numpy as np
+from playwright.sync_api import Page, sync_playwright
+
+import hmpim
+from hmpim.experiment.readiness import LIGHTS
+from hmpim.formats import save
+from hmpim.workbench.desks import Analysis, AxisRow, Checked, Desk, Desks, Wish
+from hmpim.workbench.work.design import digest
+
+SLIDES = 30
+MINUTE = 60.0  # s of the live strip
+MILLION = 1_000_000
+RIGS = '[rigs.bench]\nrig = "table"\n[rigs.bench.options]\nrealtime = true\n'
+
+CLOCKED = """() => {
+    const plot = document.querySelector(".hm-picture[data-drawn]");
+    const slider = document.querySelector('[role=slider][aria-label="Window α"] [tabindex]');
+    return new Promise((done) => {
+        const begun = performance.now();
+        new MutationObserver((_, observer) => {
+            observer.disconnect();
+            done(performance.now() - begun);
+        }).observe(plot, { attributes: true, attributeFilter: ["data-drawn"] });
+        for (const type of ["keydown", "keyup"]) {
+            slider.dispatchEvent(new KeyboardEvent(type, { keyCode: KEY, bubbles: true }));
+        }
+    });
+}"""
+
+
+def slider(page: Page, url: str, desks: Desks) -> None:
+    """Time from a slider's step to the redrawn plot, 10 s at 1 kHz."""
+    for what, label in (
+        ("window α", "Window α"),
+        ("extinction", "Extinction n (0: as small as fits)"),
+    ):
+        desk = desks.put(Desk(name="5110e25110e25110", wish=Wish(extinction=0.5)))
+        page.goto(f"{url}design?desk={desk.name}")
+        page.wait_for_selector(".hm-picture[data-drawn]")
+        times = []
+        for k in range(SLIDES):
+            key = "39" if k % 2 else "37"
+            script = CLOCKED.replace("Window α", label).replace("KEY", key)
+            times.append(page.evaluate(script))
+            time.sleep(0.2)
+        print(
+            f"slider, {what}: median {statistics.median(times):.0f} ms, worst {max(times):.0f} ms"
+        )
+
+
+def strip(page: Page, url: str, desks: Desks) -> None:
+    """How far a strip of five axes at 1 kHz is behind the run, for a minute."""
+    from hmpim.workbench.work.designed import five_axes
+
+    rows = tuple(AxisRow(**{**_fields(row), "low": 0.1, "amplitude": 2.0}) for row in five_axes())
+    wish = Wish(rows=rows, duration=MINUTE, fs=1000.0)
+    checked = Checked(rig="bench", digest=digest(wish, "bench"), green=LIGHTS)
+    desk = desks.put(Desk(name="571b571b571b571b", wish=wish, rig="bench", checked=checked))
+    page.goto(f"{url}run?desk={desk.name}")
+    page.get_by_role("button", name="Arm", exact=True).click()
+    page.get_by_role("button", name="Start").click(timeout=120_000)
+    page.wait_for_selector(".hm-strip canvas", timeout=120_000)
+    behind = []
+    begun, first = time.perf_counter(), _end(page)
+    while (end := _end(page)) < MINUTE - 2.0:
+        behind.append((time.perf_counter() - begun) - (end - first))
+        time.sleep(0.25)
+    middle, worst = statistics.median(behind), max(behind)
+    print(f"strip, five axes at 1 kHz, {MINUTE:g} s: {middle:.2f} s behind, {worst:.2f} s at most")
+
+
+def _fields(row: AxisRow) -> dict[str, object]:
+    return {name: getattr(row, name) for name in AxisRow.__dataclass_fields__}
+
+
+def _end(page: Page) -> float:
+    return float(page.evaluate("() => document.querySelector('.hm-strip')?.dataset.end ?? 0"))
+
+
+def million(page: Page, url: str, desks: Desks, runs: Path) -> None:
+    """A record of a million samples: opened and identified, and what the page does meanwhile."""
+    rng = np.random.default_rng(1)
+    t = np.arange(MILLION) / 1000.0
+    u = np.sin(2 * np.pi * (0.1 * t + 0.5 * 20.0 / t[-1] * t**2))
+    y = np.interp(t - 0.05, t, u, left=0.0) + 0.01 * rng.standard_normal(MILLION)
+    save(hmpim.Record.from_arrays({"u": u}, {"y": y}, fs=1000.0), runs / "million.h5")
+    analysis = Analysis(file="million.h5", inputs=("u",), outputs=("y",))
+    desk = desks.put(Desk(name="a1110a1110a1110a", analysis=analysis))
+    begun = time.perf_counter()
+    page.goto(f"{url}analyse?desk={desk.name}")
+    slowest, done = 0.0, page.get_by_text("Delay, pure")
+    while done.count() == 0:
+        asked = time.perf_counter()
+        with urllib.request.urlopen(f"{url}static/workbench.css") as answer:
+            answer.read()
+        slowest = max(slowest, time.perf_counter() - asked)
+        time.sleep(0.05)
+    page.wait_for_selector(".hm-picture[data-drawn]", timeout=120_000)
+    seconds = time.perf_counter() - begun
+    print(f"{MILLION} samples: opened, identified and drawn in {seconds:.1f} s;")
+    print(f"  the server answered within {1e3 * slowest:.0f} ms meanwhile")
+
+
+def main() -> None:
+    """Serve a workbench, and measure it."""
+    with tempfile.TemporaryDirectory() as place, sync_playwright() as playwright:
+        folder = Path(place)
+        (folder / "hmpim.toml").write_text(RIGS, encoding="utf-8")
+        served = subprocess.Popen(
+            [sys.executable, "-m", "hmpim.cli.main", "workbench", "--no-browser", "--runs", "runs"],
+            cwd=folder, stdout=subprocess.PIPE, text=True,
+            env={**os.environ, "PYTHONUNBUFFERED": "1"},
+        )  # fmt: skip
+        assert served.stdout is not None
+        found = re.search(r"http://\S+", served.stdout.readline())
+        assert found is not None
+        browser = playwright.chromium.launch(
+            executable_path="/usr/bin/chromium", args=["--no-sandbox"]
+        )
+        page = browser.new_page(viewport={"width": 1280, "height": 800})
+        page.set_default_timeout(300_000)
+        desks = Desks(folder / "runs" / ".workbench")
+        try:
+            slider(page, found.group(), desks)
+            million(page, found.group(), desks, folder / "runs")
+            strip(page, found.group(), desks)
+        finally:
+            browser.close()
+            served.terminate()
+            served.wait()
+
+
+if __name__ == "__main__":
+    main()
