@@ -42,6 +42,7 @@ def recorded(delay=0.15, rng=1):
     return hmpim.run(sensor, stimulus, rng=rng)
 
 
+@pytest.mark.study
 def test_a_foreign_file_is_dropped_identified_read_by_eye_and_reported(page, served, tmp_path):
     record = recorded()
     u, y = record.inputs[0].values, record.outputs[0].values
@@ -142,6 +143,7 @@ def test_two_runs_are_compared_and_held_against_a_specification(page, served):
     assert page.get_by_role("row", name=re.compile("unit2.* ok ok ")).count() == 1
 
 
+@pytest.mark.study
 def test_a_campaign_is_stopped_and_resumed_and_its_study_downloaded(page, served):
     desk = Desk(name="ca3ba19ca3ba19ca", campaign=Campaign(plan=PLAN, out="../study one"))
     go(page, served, "campaign", desk_of(served, desk))
@@ -160,6 +162,7 @@ def test_a_campaign_is_stopped_and_resumed_and_its_study_downloaded(page, served
     assert all((cases / name).stat().st_mtime_ns == t for name, t in first.items())
 
 
+@pytest.mark.study
 def test_a_plan_may_not_name_code(page, served):
     code = PLAN.replace('kind = "sensor"', 'kind = "python"\nentry = "os:system"')
     assert code != PLAN
@@ -170,6 +173,7 @@ def test_a_plan_may_not_name_code(page, served):
     assert not (served.runs / "campaign").exists()
 
 
+@pytest.mark.study
 def test_nothing_is_lost_by_a_reload_and_a_second_window_gets_a_desk_of_its_own(
     page, served, browser
 ):
