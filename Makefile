@@ -48,6 +48,7 @@ bench: $(DEV)  ## speed, against a hand-written fit in the same run
 	$(BIN)/python benchmarks/response_accuracy.py
 	$(BIN)/python benchmarks/live.py
 	$(BIN)/python benchmarks/workbench.py
+	$(BIN)/python benchmarks/pages_time.py
 
 accuracy: $(DEV)  ## every figure of docs/accuracy.md, from scratch
 	$(BIN)/python benchmarks/accuracy.py

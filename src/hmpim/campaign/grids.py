@@ -12,11 +12,13 @@ from hmpim.report.words import GLOSSARY
 
 __all__ = [
     "PARAMETERS",
+    "axis_grid",
     "bounds",
     "case_grid",
     "change_grid",
     "check_grid",
     "coupling_grid",
+    "doubtful_words",
     "remark_grid",
 ]
 
@@ -96,6 +98,66 @@ def case_grid(rows: Sequence[Row], caption: str, *, explained: bool = False) -> 
     )
 
 
+def axis_grid(study: Study) -> Grid:
+    """What is asked first: each axis, its bandwidth, what was specified, and the verdict.
+
+    An axis that misses its specification shows the first case that does; else its first
+    specified case, or its first case.
+    """
+    rows = []
+    for axis in dict.fromkeys(row.axis for row in study.rows):
+        checks = [check for check in study.checks if check.row.axis == axis]
+        failed = [check for check in checks if check.outcome == "fail"]
+        shown = next((check.row for check in [*failed, *checks]), None)
+        row = shown or next(row for row in study.rows if row.axis == axis)
+        wanted = [
+            f"{_LABELS.get(c.wanted.quantity, c.wanted.quantity)} "
+            f"{bounds(c.wanted.low, c.wanted.high)}"
+            for c in checks
+            if c.row is row
+        ]
+        rows.append(
+            (
+                axis,
+                row.test,
+                _cell(row, "bandwidth_phase90"),
+                "; ".join(wanted) or "–",
+                ("fail" if failed else "pass") if checks else "–",
+                f"{len(checks) - len(failed)} of {len(checks)}" if checks else "–",
+                row.verdict.replace("_", " "),
+                doubtful_words([row]) or "–",
+            )
+        )
+    columns = (
+        "Axis",
+        "Test",
+        "−90° (Hz)",
+        "Specification",
+        "Outcome",
+        "Checks met",
+        "Verdict",
+        "Doubtful",
+    )
+    return Grid(caption="Each axis: value ± standard deviation", columns=columns, rows=tuple(rows))
+
+
+def doubtful_words(rows: Sequence[Row]) -> str:
+    """Names of the figures that are doubtful in some rows, the most frequent first.
+
+    Examples
+    --------
+    >>> doubtful_words([])
+    ''
+    """
+    count: dict[str, int] = {}
+    for row in rows:
+        for name, reading in row.parameters.items():
+            if reading.verdict != "ok" and name in _LABELS:
+                count[name] = count.get(name, 0) + 1
+    names = sorted(count, key=lambda name: -count[name])
+    return ", ".join(_LABELS[name].lower() for name in names)
+
+
 def _named(row: Row) -> tuple[str, ...]:
     """What a row is about, and what it is worth."""
     return (
@@ -149,7 +211,13 @@ def check_grid(study: Study) -> Grid:
             )
         )
     columns = ("Axis", "Case", "Quantity", "Wanted", "Found", "Outcome")
-    return Grid(caption="Specification", columns=columns, rows=tuple(rows))
+    failed = sum(check.outcome == "fail" for check in study.checks)
+    return Grid(
+        caption=f"Specification: {len(rows) - failed} of {len(rows)} checks met",
+        columns=columns,
+        rows=tuple(rows),
+        folded=not failed,
+    )
 
 
 def bounds(low: float, high: float) -> str:

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from hmpim.campaign.compare import HEARD, case_label
-from hmpim.campaign.plan import FigurePlan
+from hmpim.campaign.plan import Compare, FigurePlan
 from hmpim.campaign.study import Row
 from hmpim.identify import PairIdentification
 from hmpim.plots.curves import BodeCurve, measured_curve, model_curve
@@ -15,7 +15,7 @@ from hmpim.plots.fence import picket_fence
 from hmpim.plots.overlay import overlaid_bode, overlaid_levels
 from hmpim.report.figures import Picture
 
-__all__ = ["section_pictures"]
+__all__ = ["pair_of", "section_pictures"]
 
 _CLEAR = 0.3  # share of the response: what is less sure is left out
 
@@ -40,26 +40,29 @@ def section_pictures(
             _picture("levels", figure.title, words, overlaid_levels(levels, unit=unit, level=HEARD))
         ]
     if figure.compare == "axes":
-        every = [
-            (case_label(row, "axes", rows), curve)
-            for row in rows
-            if (curve := _curve(row)) is not None
-        ]
-        drawn = overlaid_bode(every, pairs=False)
-        return [_picture("axes", figure.title, words, drawn)] if every else []
+        drawn = _overlaid(rows, rows, "axes")
+        return [] if drawn is None else [_picture("axes", figure.title, words, drawn)]
     for axis in dict.fromkeys(row.axis for row in rows):
         if figure.compare == "fence":
             fence = _fence([row for row in rows if row.axis == axis])
             pictures.append(_picture(axis, f"{figure.title}: {axis}", words, fence))
             continue
-        curves = [
-            (case_label(row, figure.compare, rows), curve)
-            for row in rows
-            if row.axis == axis and (curve := _curve(row)) is not None
-        ]
-        if curves:
-            pictures.append(_picture(axis, f"{figure.title}: {axis}", words, overlaid_bode(curves)))
+        drawn = _overlaid([row for row in rows if row.axis == axis], rows, figure.compare)
+        if drawn is not None:
+            pictures.append(_picture(axis, f"{figure.title}: {axis}", words, drawn))
     return pictures
+
+
+def _overlaid(rows: Sequence[Row], every: Sequence[Row], compare: Compare) -> Description | None:
+    """Responses over each other, each bandwidth marked with its error."""
+    seen = [(row, curve) for row in rows if (curve := _curve(row)) is not None]
+    if not seen:
+        return None
+    return overlaid_bode(
+        [(case_label(row, compare, every), curve) for row, curve in seen],
+        bandwidths=[_bandwidth(row) for row, _ in seen],
+        pairs=compare != "axes",
+    )
 
 
 def _fence(rows: Sequence[Row]) -> Description:
@@ -79,28 +82,37 @@ def _picture(key: str, title: str, words: str, drawn: Description) -> Picture:
     return Picture(key=key, title=title, caption=title + ".", description=words, figure=drawn)
 
 
-def _curve(row: Row) -> BodeCurve | None:
-    """Measured response of a row; its phase unwrapped beside the model's."""
+def pair_of(row: Row, *, clear: bool = False) -> PairIdentification:
+    """Return what was identified in a row, as a pair that can be drawn.
+
+    Parameters
+    ----------
+    row : Row
+        As read back from JSON, where an unknown error is None.
+    clear : bool
+        True keeps the longest run of frequencies at which the response is clear.
+    """
     parameters = {
         name: estimate if estimate and estimate["std"] is not None else None
         for name, estimate in row.pair["parameters"].items()
     }
     scale = row.pair["parameters"]["scale_factor"]
-    if scale is not None:  # a curve needs its value alone
+    if scale is not None and parameters["scale_factor"] is None:  # a curve needs its value alone
         parameters["scale_factor"] = {**scale, "std": 0.0, "ci95": [scale["value"]] * 2}
     response = dict(row.pair["frequency_response"])
     response["std"] = [math.inf if std is None else std for std in response["std"]]
     response["coherence"] = None
     runs: list[list[int]] = [[]]  # of neighbouring frequencies that are clear
     for k, std in enumerate(response["std"]):
-        if std < _CLEAR * math.hypot(response["real"][k], response["imag"][k]):
+        size = math.hypot(response["real"][k], response["imag"][k])
+        if std < _CLEAR * size or (not clear and math.isfinite(std)):
             runs[-1].append(k)
         else:
             runs.append([])
-    clear = max(runs, key=len)
+    kept = max(runs, key=len)
     for name in ("frequency", "real", "imag", "std"):
-        response[name] = [response[name][k] for k in clear]
-    pair = PairIdentification.from_dict(
+        response[name] = [response[name][k] for k in kept]
+    return PairIdentification.from_dict(
         {
             **row.pair,
             "parameters": parameters,
@@ -109,8 +121,19 @@ def _curve(row: Row) -> BodeCurve | None:
             "candidates": [],
         }
     )
+
+
+def _curve(row: Row) -> BodeCurve | None:
+    """Measured response of a row; its phase unwrapped beside the model's."""
+    pair = pair_of(row, clear=True)
     seen = pair.frequency_response.frequency
     seen = seen[seen > 0]
     if not seen.size:
         return None
     return measured_curve(pair.frequency_response, near=model_curve(pair, seen, fs=row.rate))
+
+
+def _bandwidth(row: Row) -> tuple[float, float] | None:
+    """-90° of a row and its standard deviation, where both are known."""
+    found = row.parameters.get("bandwidth_phase90") or row.measured_bandwidth
+    return None if found is None or not math.isfinite(found.std) else (found.value, found.std)

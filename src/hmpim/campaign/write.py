@@ -5,20 +5,24 @@ import io
 import json
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from importlib.metadata import version
 from pathlib import Path
 
 from hmpim.campaign.compare import findings
 from hmpim.campaign.grids import (
     PARAMETERS,
+    axis_grid,
     case_grid,
     change_grid,
     check_grid,
     coupling_grid,
+    doubtful_words,
     remark_grid,
 )
 from hmpim.campaign.pictures import section_pictures
 from hmpim.campaign.plan import FigurePlan
+from hmpim.campaign.sheets import write_sheets
 from hmpim.campaign.study import Study, study_dict
 from hmpim.formats.atomic import replacing, write_text
 from hmpim.report.study import Grid, Section, StudyPage, render_study
@@ -52,7 +56,7 @@ def write_study(study: Study, folder: Path, *, document: Path | None = None) -> 
     document : Path, optional
         A second place for the Markdown; its pictures go to a folder of its name beside it.
     """
-    page = study_page(study)
+    page = replace(study_page(study), sheets=write_sheets(study, folder))
     text = json.dumps(study_dict(study), indent=1, ensure_ascii=False, allow_nan=False)
     json_file, csv_file, html_file, markdown_file = (folder / name for name in STUDY_FILES)
     write_text(json_file, text + "\n")
@@ -82,26 +86,42 @@ def pictures_folder(document: Path) -> Path:
 
 
 def headline(study: Study) -> str:
-    """Whether the specification is met, in one sentence."""
+    """Whether the specification is met, and what is doubtful all the same."""
     count = len(study.checks)
+    unsure = [row for row in study.rows if row.verdict != "ok"]
+    resting = sum(
+        check.reading is not None and check.reading.verdict != "ok" for check in study.checks
+    )
     if study.met is None:
-        return f"{len(study.rows)} identifications; nothing was specified."
-    if study.met and count == 1:
-        return "The one check of the specification is met."
-    if study.met:
-        return f"All {count} checks of the specification are met."
-    failed = sum(check.outcome == "fail" for check in study.checks)
-    return f"{failed} of {count} checks are not met."
+        said = f"{len(study.rows)} identifications; nothing was specified."
+    elif study.met and count == 1:
+        said = "The one check of the specification is met."
+    elif study.met:
+        said = f"All {count} checks of the specification are met."
+    else:
+        failed = sum(check.outcome == "fail" for check in study.checks)
+        said = f"{failed} of {count} checks are not met."
+    if resting:
+        said += f" {resting} of them rest on a doubtful figure."
+    if unsure:
+        names = doubtful_words(unsure)
+        said += f" {len(unsure)} of {len(study.rows)} rows hold doubtful figures"
+        said += f": {names}." if names else "."
+    return said
 
 
 def study_page(study: Study) -> StudyPage:
     """Put a study into words, tables and pictures."""
     remarks = remark_grid(study.rows)
     grids = [
+        *([axis_grid(study)] if study.rows else []),
         *([check_grid(study)] if study.checks else []),
         *([change_grid(study)] if study.changes else []),
-        case_grid(study.rows, "Every case: value ± standard deviation", explained=True),
-        *([] if remarks is None else [remarks]),
+        replace(
+            case_grid(study.rows, "Every case: value ± standard deviation", explained=True),
+            folded=True,
+        ),
+        *([] if remarks is None else [replace(remarks, folded=True)]),
     ]
     return StudyPage(
         title=study.plan.name,

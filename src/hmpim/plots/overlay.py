@@ -19,6 +19,7 @@ _DASHES: tuple[Dashes, ...] = ("-", "--", "-.")
 def overlaid_bode(
     curves: Sequence[tuple[str, BodeCurve]],
     *,
+    bandwidths: Sequence[tuple[float, float] | None] = (),
     phase_level: float | None = -90.0,
     pairs: bool = True,
 ) -> Figure:
@@ -28,6 +29,9 @@ def overlaid_bode(
     ----------
     curves : sequence of (label, BodeCurve)
         Drawn in this order, told apart by colour and then by dashes; their bands are left out.
+    bandwidths : sequence of (float, float) or None
+        -90° frequency of each curve and its standard deviation, in Hz: a thin line in the
+        phase's panel, its 95 % interval shaded.
     phase_level : float, optional
         Phase in degrees at which a thin line is drawn.
     pairs : bool
@@ -54,6 +58,17 @@ def overlaid_bode(
         )
         magnitude_items.append(look)
         phase_items.append(replace(look, y=curve.phase))
+    for i, bandwidth in enumerate(bandwidths):
+        if bandwidth is not None:
+            value, reach = bandwidth[0], 1.96 * bandwidth[1]
+            mark = Rule(
+                at=value,
+                low=value - reach,
+                high=value + reach,
+                colour=_COLOURS[i % len(_COLOURS)],
+                dashes=":",
+            )
+            phase_items.append(mark)
     if phase_level is not None:
         phase_items.append(Rule(at=phase_level, axis="y", colour="muted", dashes=":", width=0.8))
     x = Axis(scale="log", numbered=False)

@@ -13,13 +13,15 @@ __all__ = ["Grid", "Section", "StudyPage", "render_study"]
 class Grid:
     """A table of text: its caption, its columns, its rows; the first column names the row.
 
-    `note` stands below it: how it is to be read.
+    `note` stands below it: how it is to be read. A `folded` one shows its caption until it is
+    opened.
     """
 
     caption: str
     columns: tuple[str, ...]
     rows: tuple[tuple[str, ...], ...]
     note: str = ""
+    folded: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -35,7 +37,10 @@ class Section:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class StudyPage:
-    """Everything that the page shows; `met` is None where nothing was specified."""
+    """Everything that the page shows, its first table above all.
+
+    `met` is None where nothing was specified; `sheets` are names and addresses of pages beside it.
+    """
 
     title: str
     description: str
@@ -44,6 +49,7 @@ class StudyPage:
     grids: tuple[Grid, ...]
     sections: tuple[Section, ...]
     facts: tuple[tuple[str, str], ...]
+    sheets: tuple[tuple[str, str], ...] = ()
 
 
 def render_study(page: StudyPage) -> str:
