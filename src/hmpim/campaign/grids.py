@@ -36,6 +36,7 @@ PARAMETERS = (
 _TOLD = ("delay", "natural_frequency", "damping_ratio", "bandwidth_phase90")
 _VAGUE = 10.0  # times its own size: an error that leaves nothing told
 _LABELS = {words.name: words.label for words in GLOSSARY}
+_INLINE = {words.name: words.inline for words in GLOSSARY}
 
 _READING = (
     "−90° is that of the fitted model: behind the hold where the record says that its input is "
@@ -141,7 +142,7 @@ def axis_grid(study: Study) -> Grid:
     return Grid(caption="Each axis: value ± standard deviation", columns=columns, rows=tuple(rows))
 
 
-def doubtful_words(rows: Sequence[Row]) -> str:
+def doubtful_words(rows: Sequence[Row], *, most: int = 4) -> str:
     """Names of the figures that are doubtful in some rows, the most frequent first.
 
     Examples
@@ -155,7 +156,8 @@ def doubtful_words(rows: Sequence[Row]) -> str:
             if reading.verdict != "ok" and name in _LABELS:
                 count[name] = count.get(name, 0) + 1
     names = sorted(count, key=lambda name: -count[name])
-    return ", ".join(_LABELS[name].lower() for name in names)
+    told = [_INLINE[name] for name in names[:most]]
+    return ", ".join([*told, f"{len(names) - most} more"] if len(names) > most else told)
 
 
 def _named(row: Row) -> tuple[str, ...]:

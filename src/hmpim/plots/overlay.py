@@ -53,7 +53,7 @@ def overlaid_bode(
             y=curve.magnitude_db,
             label=label,
             colour=_COLOURS[i % len(_COLOURS)],
-            dashes=_DASHES[i // len(_COLOURS) % len(_DASHES)],
+            dashes=_DASHES[(i + i // len(_COLOURS)) % len(_DASHES)],
             width=_width(i) if pairs else 1.2,
         )
         magnitude_items.append(look)
@@ -130,7 +130,7 @@ def overlaid_levels(
             x=frequency,
             y=values,
             colour=_COLOURS[i % len(_COLOURS)],
-            dashes=_DASHES[i // len(_COLOURS) % len(_DASHES)],
+            dashes=_DASHES[(i + i // len(_COLOURS)) % len(_DASHES)],
             label=label,
             width=_width(i),
         )
