@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hmpim.arguments import checked, numbers_of
+from hmpim.arguments import checked, numbers_of, shown
 from hmpim.equality import ByValue
 from hmpim.errors import ArgumentError, RecordError
 from hmpim.identify.statistics.reach import Reach
@@ -21,6 +21,10 @@ _SHARE = 5
 _LONGEST = 16_384
 _SHORTEST = 32
 """A fifth of the record is the window by default, between these."""
+
+_MOST = 10_000_000
+_FARTHEST = 1e15
+"""Largest window, and sample of the last knot."""
 
 Sharing = Literal["own", "common"]
 
@@ -242,6 +246,8 @@ def compress(
                 "compress the stretches between the gaps one by one and join them with +"
             )
     window = _window(lags, aligned.samples)
+    if not all(abs(knot) * aligned.fs < _FARTHEST for knot in knots):
+        raise ArgumentError(f"knots = {shown(knots)} are no times in s; give finite numbers")
     places = tuple(round(knot * aligned.fs) for knot in knots)
     if any(b <= a for a, b in pairwise(places)):
         raise ArgumentError(f"knots = {list(knots)} do not increase; give times in s, in order")
@@ -265,8 +271,10 @@ def compress(
 def _window(lags: int | None, samples: int) -> int:
     if lags is None:
         return int(np.clip(samples // _SHARE, _SHORTEST, _LONGEST))
-    if lags < 1:
-        raise ArgumentError(f"lags = {lags} is no window; give a number of samples, 1 or more")
+    if not 1 <= lags <= _MOST:
+        raise ArgumentError(
+            f"lags = {lags} is no window; give a number of samples from 1 to {_MOST}"
+        )
     return lags
 
 
