@@ -215,7 +215,7 @@ def _quantities(sample: Sample) -> list[_Quantity]:
             unit="Hz",
             why=f"The stated system passes −90° at {phase90(system.delay, natural, damping):.3f} "
             f"Hz; its {1e3 * system.delay:g} ms delay alone would at {most:.3f} Hz. {printed:g} Hz "
-            "lies above both and cannot be reproduced. The window shifts the steps' figure.",
+            "lies above both and cannot be reproduced. No system as stated gives it.",
         ),
     ]
 
