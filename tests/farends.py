@@ -2,10 +2,8 @@
 
 import os
 import signal
-import socket
 import subprocess
 import sys
-import threading
 import time
 from dataclasses import dataclass
 from pathlib import Path
@@ -100,40 +98,49 @@ class Ticks:
         return cls(**{name: np.concatenate([getattr(p, name) for p in parts]) for name in names})
 
 
+RELAY = """
+import os, select, socket, sys, time
+near = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+near.bind(("127.0.0.1", 0))
+far = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+far.connect(("127.0.0.1", int(sys.argv[1])))
+try:
+    os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(10))
+except (AttributeError, OSError):
+    pass
+print(near.getsockname()[1], flush=True)
+peer = None
+while True:
+    came = select.select([0, near, far], [], [])[0]
+    if 0 in came:
+        break
+    if near in came:
+        data, peer = near.recvfrom(65507)
+        far.send(data)
+    if far in came:
+        near.sendto(far.recv(65507), peer)
+while True:
+    time.sleep(1)
+"""
+
+
 class Cable:
-    """UDP passed on from one port to another, until it is pulled."""
+    """UDP passed on from one port to another, until it is pulled; in a process of its own."""
 
     def __init__(self, port):
-        self.near = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-        self.near.bind(("127.0.0.1", 0))
-        self.far = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-        self.far.connect(("127.0.0.1", port))
-        self.port = self.near.getsockname()[1]
-        self.plugged, self.peer = True, None
-        for ways in ((self.near, self._forth), (self.far, self._back)):
-            threading.Thread(target=self._pass, args=ways, daemon=True).start()
+        self.process = subprocess.Popen(
+            [sys.executable, "-S", "-c", RELAY, str(port)],
+            stdin=subprocess.PIPE, stdout=subprocess.PIPE,
+        )  # fmt: skip
+        self.port = int(self.process.stdout.readline())
 
-    def _pass(self, source, on):
-        while True:
-            try:
-                data, sender = source.recvfrom(65_507)
-                if self.plugged:
-                    on(data, sender)
-            except OSError:
-                if source.fileno() < 0:
-                    return
-
-    def _forth(self, data, sender):
-        self.peer = sender
-        self.far.send(data)
-
-    def _back(self, data, _sender):
-        self.near.sendto(data, self.peer)
+    def pull(self):
+        self.process.stdin.close()
 
     def close(self):
-        for one in (self.near, self.far):
-            one.shutdown(socket.SHUT_RDWR) if one is self.far else None
-            one.close()
+        self.process.kill()
+        self.process.wait()
+        self.process.stdout.close()
 
 
 RAISING = """

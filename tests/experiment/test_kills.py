@@ -41,7 +41,7 @@ def ended(table, folder, kind, at, nursery=None):
         if kind == "exception":
             wait_for((folder / "raised.txt").exists)
         elif cable is not None:
-            cable.plugged = False
+            cable.pull()
         else:
             os.kill(process.pid, signal.SIGKILL if kind == "kill" else signal.SIGINT)
         now = time.perf_counter()
