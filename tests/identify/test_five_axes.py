@@ -105,6 +105,7 @@ def identified(clean, seed):
                 for a, y in zip(AXES, outputs, strict=True)
             },
             fs=FS,
+            intersample="bandlimited",
         )
     )
 

@@ -82,8 +82,9 @@ def test_a_tiny_one_is_said_and_leaves_the_verdict():
     pair = identified(motion("hardening", 0.02), noise=0.0005)["y", "u"]
     assert "nonlinear" in codes(pair)
     assert pair.nonlinearity.share < 0.005
-    assert pair.verdict == "ok"
+    assert pair.natural_frequency.verdict == "ok"
     assert pair.natural_frequency.value == pytest.approx(10.0, rel=0.01)
+    assert pair.noise_std.verdict == "doubtful"  # most of what is left over is no noise
 
 
 def test_a_rich_structure_gives_way_to_a_plain_one_with_friction():

@@ -40,6 +40,7 @@ def record(signals):
         {f"u{j}": u for j, u in enumerate(INPUTS)},
         {f"y{i}": y for i, y in enumerate(signals)},
         fs=FS,
+        intersample="bandlimited",
     )
 
 
@@ -116,7 +117,9 @@ def test_a_coupling_is_given_back_by_the_stronger_one_however_little_noise(noise
         w = 2 * np.pi * natural
         model = hmpim.Model(delay=delay, scale_factor=gain, denominator=(1 / w**2, 1 / w, 1.0))
         y = y + hmpim.simulate(model, u, fs=FS, intersample="bandlimited")
-    both = hmpim.Record.from_arrays({"u0": INPUTS[0], "u1": INPUTS[1]}, {"y": y}, fs=FS)
+    both = hmpim.Record.from_arrays(
+        {"u0": INPUTS[0], "u1": INPUTS[1]}, {"y": y}, fs=FS, intersample="bandlimited"
+    )
     pair = hmpim.identify(both)["y", "u1"]
     for name, value in {"scale_factor": 0.05, "natural_frequency": 6.0, "delay": 0.05}.items():
         estimate = getattr(pair, name)

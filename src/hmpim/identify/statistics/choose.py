@@ -5,7 +5,6 @@ whiten, choose.
 """
 
 from dataclasses import dataclass, replace
-from typing import get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,7 +28,7 @@ from hmpim.identify.statistics.start import excited, rough_of
 from hmpim.identify.statistics.statistics import Statistics
 from hmpim.identify.whiteness import Misfit
 from hmpim.model.dynamics import STRUCTURES, Structure, StructureName
-from hmpim.record import Intersample
+from hmpim.record import BETWEEN, Intersample
 
 __all__ = ["Chosen", "choose", "left_over"]
 
@@ -55,7 +54,12 @@ _FORGOTTEN = 1e-4
 _WHITE = 1e-3
 """Chance of calling white noise coloured (Ljung and Box)."""
 
-_DELAY_SHIFT: dict[Intersample, float] = {"zoh": -0.5, "foh": 0.0, "bandlimited": 0.0}
+_DELAY_SHIFT: dict[Intersample, float] = {
+    "zoh": -0.5,
+    "foh": 0.0,
+    "bandlimited": 0.0,
+    "sampled": 0.0,
+}
 
 Real = NDArray[np.float64]
 
@@ -336,7 +340,7 @@ def _moved(
         return []
     least = _least(fits).fit.objective
     out = []
-    for mode in (m for m in get_args(Intersample) if m != natural):
+    for mode in (m for m in BETWEEN if m != natural):
         for fitted in fits:
             if fitted.fit.objective < HOPELESS * least:
                 theta = fitted.fit.theta.copy()
