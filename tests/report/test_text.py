@@ -5,7 +5,8 @@ from rich.console import Console
 
 from hmpim.identify.judgement import judged
 from hmpim.record import Finding
-from hmpim.report import plus_minus, print_result
+from hmpim.report import print_result
+from hmpim.report.numbers import format_value
 from hmpim.report.words import GLOSSARY, off_by
 
 
@@ -22,7 +23,7 @@ def test_each_estimate_is_printed_with_its_error_and_the_papers_figure(found):
         estimate = getattr(pair.parameters, words.name)
         if estimate is not None:
             row = next(line for line in text.splitlines() if words.label in line)
-            assert plus_minus(estimate.value, estimate.std) in row
+            assert format_value(estimate) in row
     assert f"{pair.paper.bias:.4g}" in text
     assert "Truth" not in text
 
