@@ -135,7 +135,15 @@ LONG = {
     "another input as well",
     *("a sweep downwards", "the input rectified", "noise over a trace", "resonant noise"),
     *("a record that ends before the response", "a sweep a little different", "gain changes"),
-    *("stuck before half", "many spikes", "held for 0.2 s", "clocks part by 0.2 %", "slow sine"),
+    *(
+        "stuck after half",
+        "dynamics change",
+        "stuck before half",
+        "many spikes",
+        "held for 0.2 s",
+        "clocks part by 0.2 %",
+        "slow sine",
+    ),
 }
 """Long to identify, or like another one that is not here: in `make studies` only."""
 
