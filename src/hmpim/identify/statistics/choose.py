@@ -202,6 +202,10 @@ def choose(
     RecordError
         If too few samples count.
     """
+    if intersample == "sampled":
+        raise RecordError(
+            "intersample='sampled' needs the samples; identify the record itself, not its statistics"
+        )
     conditioned = _is_conditioned(statistics)
     band = excited(statistics)
     search = _Search(
