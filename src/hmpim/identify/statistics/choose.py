@@ -203,9 +203,7 @@ def choose(
         If too few samples count.
     """
     if intersample == "sampled":
-        raise RecordError(
-            "intersample='sampled' needs the samples; identify the record itself, not its statistics"
-        )
+        raise RecordError("intersample='sampled' needs the samples; identify the record itself")
     conditioned = _is_conditioned(statistics)
     band = excited(statistics)
     search = _Search(
