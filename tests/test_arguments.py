@@ -294,8 +294,8 @@ def test_names_that_the_table_lacks_refuse_nonsense_too():
 @pytest.mark.parametrize(
     ("call", "words"),
     [
-        (lambda: hmpim.identify(None), "record = None is not a Record; read a file with hmpim.rea"),
-        (lambda: hmpim.identify("x.csv"), "record = 'x.csv' is not a Record; read a file with hmp"),
+        (lambda: hmpim.identify(None), "record = None is not a Record or a Statistics; read a fil"),
+        (lambda: hmpim.identify("x.csv"), "record = 'x.csv' is not a Record or a Statistics; read"),
         (lambda: recorded().between(2.0, 1.0), "fewer than 2 samples between 2 s and 1 s"),
         (
             lambda: hmpim.Record.from_arrays([0, 1], [1, 2], fs="200"),
@@ -303,7 +303,7 @@ def test_names_that_the_table_lacks_refuse_nonsense_too():
         ),
         (
             lambda: hmpim.Record.from_arrays([0, 1], [1, 2], fs=1.0, intersample="foo"),
-            "intersample = 'foo' is not one of 'zoh', 'foh', 'bandlimited' or None",
+            "intersample = 'foo' is not one of 'zoh', 'foh', 'bandlimited', 'sampled' or None",
         ),
         (
             lambda: hmpim.Record.from_arrays([0, 1], [1, 2], fs=1.0, band=(5, 1)),

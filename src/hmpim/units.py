@@ -5,21 +5,35 @@ The empty string means "no unit stated" and is taken as dimensionless.
 
 import re
 from functools import cache
-
-import pint
+from typing import TYPE_CHECKING
 
 from hmpim.errors import UnitError
+
+if TYPE_CHECKING:
+    import pint
 
 __all__ = ["check_unit", "conversion_factor", "rate_label", "rate_unit", "read_unit"]
 
 
+_PLAIN = frozenset({"", "deg", "rad", "m", "mm", "V", "A", "N", "s", "Hz", "N*m"})
+"""Units that need no registry to be known, which takes long to load."""
+
+
 @cache
 def _registry() -> "pint.UnitRegistry[float]":
+    import pint  # half a second where Dask is installed, which it then loads
+
     return pint.UnitRegistry()
 
 
+def _mismatch() -> type[Exception]:
+    import pint
+
+    return pint.DimensionalityError
+
+
 @cache
-def _parsed(unit: str) -> pint.Unit:
+def _parsed(unit: str) -> "pint.Unit":
     try:
         return _registry().Unit(unit)
     except Exception as error:  # pint raises a dozen kinds, tokenize errors among them
@@ -43,7 +57,8 @@ def check_unit(unit: str) -> str:
     """
     if not isinstance(unit, str):
         raise UnitError(f"unit {unit!r} is not a string; write it as 'deg' or 'm/s'")
-    _parsed(unit)
+    if unit not in _PLAIN:
+        _parsed(unit)
     return unit
 
 
@@ -89,7 +104,7 @@ def conversion_factor(unit: str, *, to: str) -> float:
         return 1.0
     try:
         return float(_registry().Quantity(1.0, _parsed(unit)).to(_parsed(to)).magnitude)
-    except pint.DimensionalityError as error:
+    except _mismatch() as error:
         raise UnitError(f"unit {unit!r} cannot be turned into {to!r}: {error}") from error
 
 

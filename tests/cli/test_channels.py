@@ -61,7 +61,7 @@ def test_page_and_json(log, tmp_path):
     done = run("channels", log, "--report", page, "--json", data, "--quiet")
     assert (done.exit_code, done.stdout) == (0, "")
     html = page.read_text()
-    assert html.count("<svg") == 3
+    assert html.count("<svg") == 2 * 3  # of each, one for a phone
     assert "http" not in html
     assert "n &lt;&amp;&gt;" in html
     assert "n <&>" not in html

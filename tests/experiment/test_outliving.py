@@ -90,7 +90,7 @@ def test_killed_it_comes_to_rest_and_the_record_is_kept_and_identified(tmp_path,
     assert rows[-1, 0] < there + 1.0
     pair = identify(kept.record)["y", "u"]
     found = pair.parameters.time_constant
-    assert abs(found.value - 0.05) < 4 * found.std
+    assert abs(found.value - 0.05) < 4 * found.spread
 
 
 def test_where_a_watchdog_is_needed_a_rig_without_one_is_refused(tmp_path):

@@ -7,7 +7,6 @@ they move, tell where the linear range ends and what ends it.
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, fields
-from typing import get_args
 
 import numpy as np
 from scipy.stats import chi2
@@ -17,7 +16,7 @@ from hmpim.errors import ArgumentError
 from hmpim.identify.alike import check_channels
 from hmpim.identify.identify import identify
 from hmpim.identify.result import Estimate, Identification, PairIdentification, Parameters
-from hmpim.model.dynamics import StructureName
+from hmpim.model.dynamics import FILTERS, STRUCTURES
 from hmpim.record import Finding, Intersample, Record
 
 __all__ = [
@@ -143,7 +142,7 @@ def identify_levels(
     *,
     amplitudes: Sequence[float] | None = None,
     intersample: Intersample | str = "auto",
-    structures: Sequence[StructureName] | None = None,
+    structures: Sequence[str] | None = None,
 ) -> Levels:
     """Identify one test at several amplitudes, and say where it stops being linear (Fig. 22).
 
@@ -211,8 +210,9 @@ def identify_levels(
     return Levels(results=tuple(results), comparisons=tuple(comparisons))
 
 
-def _only(structure: str) -> list[StructureName]:
-    return [name for name in get_args(StructureName) if name == structure]
+def _only(structure: str) -> list[str]:
+    every = STRUCTURES if structure in STRUCTURES else FILTERS
+    return [name for name, known in every.items() if known.name == structure]
 
 
 def compare_levels(

@@ -30,7 +30,6 @@ from hmpim.identify.result import (
 from hmpim.identify.result.lookup import find_pair
 from hmpim.identify.uncertainty import estimate, noise_estimate
 from hmpim.identify.whiteness import effective_share
-from hmpim.model.dynamics import StructureName
 from hmpim.record import Finding, Intersample, Record
 
 __all__ = ["RepeatedPair", "RepeatedParameter", "Repeats", "identify_repeats"]
@@ -193,7 +192,7 @@ def identify_repeats(
     records: Sequence[Record],
     *,
     intersample: Intersample | str = "auto",
-    structures: Sequence[StructureName] | None = None,
+    structures: Sequence[str] | None = None,
 ) -> Repeats:
     """Identify each record, average, and test the stated errors against the scatter seen.
 

@@ -60,7 +60,7 @@ class Axis:
 
 
 def near(estimate, truth, *, at_least=0.0):
-    return abs(estimate.value - truth) < max(4.5 * estimate.std, at_least)
+    return abs(estimate.value - truth) < max(4.5 * estimate.spread, at_least)
 
 
 def test_the_table_and_the_seeker_with_20_ms_between_their_clocks():

@@ -33,6 +33,9 @@ _REPEATS = 0.3
 _LONGEST_COPY = 3
 """Samples in a row that may be copies of a frame before a lost one."""
 
+_FEWEST_COPIES = 0.002
+"""Share of copies below which they are chance: at a crest two samples may be alike."""
+
 _MOST_COPIES = 0.2
 """Share of copies beyond which they are the output's habit."""
 
@@ -134,8 +137,8 @@ def find_repeated(y: NDArray[np.float64]) -> NDArray[np.bool_] | None:
     """Return the samples that repeat the one before to the last digit, while all around moves.
 
     A frame that was lost is often filled by the one before it. An output that is rounded, held or
-    at rest repeats itself too, but not for a sample or two now and then; at a crest two samples may
-    be alike by themselves, where it hardly moves.
+    at rest repeats itself too, but not for a sample or two now and then; at a crest two may be
+    alike by chance.
 
     Parameters
     ----------
@@ -155,12 +158,10 @@ def find_repeated(y: NDArray[np.float64]) -> NDArray[np.bool_] | None:
     if not copies.any() or np.mean(copies) > _MOST_COPIES:
         return None
     first, last = _runs(copies)
-    moving = np.median(np.abs(np.diff(y)))
     for a, b in zip(first, last, strict=True):
-        around = max(abs(y[a] - y[max(a - 2, 0)]), abs(y[min(b + 1, y.size - 1)] - y[b]))
-        if b - a >= _LONGEST_COPY or around < moving or y[a] in (y.min(), y.max()):
+        if b - a >= _LONGEST_COPY or y[a] in (y.min(), y.max()):
             copies[a : b + 1] = False
-    return copies if copies.any() else None
+    return copies if np.count_nonzero(copies) >= max(3.0, _FEWEST_COPIES * y.size) else None
 
 
 def _runs(flags: NDArray[np.bool_]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:

@@ -208,7 +208,7 @@ def count_lines(u: NDArray[np.float64]) -> int:
     Examples
     --------
     >>> time = np.arange(1000) / 100
-    >>> count_lines(np.sin(2 * np.pi * 3.3 * time)), count_lines(np.sin(time**2)) > 8
+    >>> count_lines(np.sin(2 * np.pi * 3.3 * time)), count_lines(np.sin(time**2)) > 4
     (1, True)
     """
     power = _windowed_power(u)

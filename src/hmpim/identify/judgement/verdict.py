@@ -13,7 +13,7 @@ from hmpim.identify.result import (
 )
 from hmpim.record import Finding
 
-__all__ = ["doubted", "judged", "judged_together"]
+__all__ = ["all_doubted", "doubted", "judged", "judged_together"]
 
 H = TypeVar("H", Parameters, ResponseBandwidths)
 
@@ -71,6 +71,11 @@ def judged_together(
     """
     doubtful = name in doubted(findings) or any(part.verdict == "doubtful" for part in parts)
     return _weighed(mean, doubtful=doubtful)
+
+
+def all_doubted(parameters: Parameters) -> Parameters:
+    """Return the parameters with a doubt on each: nothing is claimed yet."""
+    return _all_weighed(parameters, frozenset(field.name for field in fields(parameters)))
 
 
 def doubted(findings: Iterable[Finding]) -> frozenset[str]:

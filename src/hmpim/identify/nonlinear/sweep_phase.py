@@ -199,7 +199,8 @@ def _through(
 ) -> NDArray[np.float64]:
     """Phase by a smooth curve through the half turns, going on at the last rate beyond them."""
     turns = first + np.pi * np.arange(crossings.size)
-    curve = CubicSpline(crossings, turns)
+    apart = np.diff(crossings, prepend=-np.inf) > 0.0  # rounding may put two at one instant
+    curve = CubicSpline(crossings[apart], turns[apart])
     inside = np.clip(sample, crossings[0], crossings[-1])
     beyond = sample - inside
     return np.asarray(curve(inside) + beyond * curve(inside, 1))

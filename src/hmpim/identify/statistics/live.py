@@ -1,6 +1,6 @@
 """The estimate so far, while samples come."""
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -10,6 +10,7 @@ from hmpim.errors import ArgumentError
 from hmpim.identify.fitting.data import FOLLOWS
 from hmpim.identify.fitting.enrich import PLAIN
 from hmpim.identify.fitting.rows import Problem
+from hmpim.identify.judgement import all_doubted
 from hmpim.identify.result import Estimate, Identification, Parameters
 from hmpim.identify.statistics.choose import choose
 from hmpim.identify.statistics.describe import identify_statistics
@@ -246,8 +247,4 @@ def _doubted(parameters: Parameters, time: float, highest: float, *, follows: bo
     outside = natural is not None and not 1.0 / time < natural.value < _PAST * highest
     if not (follows or outside):
         return parameters
-    named = {field.name: getattr(parameters, field.name) for field in fields(parameters)}
-    return replace(
-        parameters,
-        **{n: replace(e, verdict="doubtful") for n, e in named.items() if e is not None},
-    )
+    return all_doubted(parameters)
