@@ -28,7 +28,7 @@ imported as they are and changed nowhere, so that the LGPL asks nothing of code 
 who ships them in an application must let them be replaced.
 
 ArduPilot logs are read by hmpim itself. pymavlink states the LGPL, but its module `DFReader.py`,
-which reads such logs, is under the GPL by its own head: docs/decisions/0006-ardupilot-logs.md.
+which reads such logs, is under the GPL by its own head: docs/decisions/0007-ardupilot-logs.md.
 """
 
 _CLASSIFIERS = {
