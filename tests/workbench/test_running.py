@@ -35,6 +35,15 @@ def kept(served, rig):
     return sorted(served.runs.glob(f"*_{rig}*/run.h5"))
 
 
+def wait_until(page, true):
+    """Let the browser go on until something is true, for half a minute at most."""
+    for _ in range(300):
+        if true():
+            return
+        page.wait_for_timeout(100)
+    raise AssertionError("it did not come true")
+
+
 def start(page, served, desk):
     """Arm and start a desk's rig."""
     Desks(served.runs / ".workbench").put(desk)
@@ -91,6 +100,7 @@ def test_five_axes_run_once_every_light_is_green(page, served):
 
 def test_the_stop_button_ends_a_run_at_once_and_keeps_the_record(page, served):
     start(page, served, checked("570b5070b5070b50", ROLL, "bench"))
+    wait_until(page, lambda: kept(served, "bench"))  # the strip may still show an earlier run
     page.wait_for_selector(".hm-strip[data-end]")
     page.get_by_role("button", name="Stop", exact=True).click()
     page.get_by_text("Ended early: stopped by hand").wait_for()

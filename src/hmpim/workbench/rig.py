@@ -186,10 +186,11 @@ class RigBench:
 
     def stop(self, reason: str) -> None:
         """End the run that goes on, smoothly and at once; anyone may."""
-        pipe = self._pipe
-        if self._running and pipe is not None:
-            with contextlib.suppress(OSError, ValueError):
-                pipe.send(reason)
+        with self._lock:  # a run that is just being started is ended as well
+            pipe = self._pipe
+            if self._running and pipe is not None:
+                with contextlib.suppress(OSError, ValueError):
+                    pipe.send(reason)
 
     def close(self) -> None:
         """End the run and wait until its rig is at rest."""
