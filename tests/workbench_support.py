@@ -76,4 +76,4 @@ def go(page, served: Served, name: str, desk: str = "") -> None:
     """Open a page of the workbench at a desk, a fresh one by default."""
     page.goto(f"{served.url}{name}?desk={desk or desk_of(served)}")
     page.wait_for_selector("main")
-    page.wait_for_function("() => window.socket?.connected ?? true")
+    page.wait_for_function("() => window.did_handshake === true")  # before it clicks are lost

@@ -1,5 +1,6 @@
 """The lock as it stands in front of a served workbench, seen from outside."""
 
+import contextlib
 import http.client
 import json
 
@@ -23,7 +24,9 @@ def asked(served, path, headers=None, *, host=None, method="GET", body=None):
             line.putheader(name, value)
         if body is not None:
             line.putheader("Content-Length", str(len(body)))
-        line.endheaders(body)
+        line.endheaders()
+        with contextlib.suppress(BrokenPipeError, ConnectionResetError):
+            line.send(body or b"")  # it may be refused before it is all sent
         answer = line.getresponse()
         return answer.status, b"" if answer.status == 101 else answer.read()
     finally:
