@@ -11,7 +11,14 @@ from numpy.typing import ArrayLike, NDArray
 
 from hmpim.model.dynamics import Structure
 
-__all__ = ["delta_of", "in_delta", "in_z", "poles_in_z", "section_parameters"]
+__all__ = [
+    "delta_of",
+    "in_delta",
+    "in_z",
+    "nyquist_taps",
+    "poles_in_z",
+    "section_parameters",
+]
 
 _Real = NDArray[np.float64]
 _Complex = NDArray[np.complex128]
@@ -59,13 +66,17 @@ def in_delta(structure: Structure, coefficients: ArrayLike, taps: _Real) -> tupl
     taps : ndarray, shape (zeros + 1,)
         Of the numerator beside the zeros at z = -1, by rising powers of δ.
     """
-    numerator = np.asarray(taps, dtype=np.float64)
-    for _ in range(structure.nyquist_zeros):
-        numerator = np.convolve(numerator, [1.0, -0.5])  # (1 + 1/z) / 2
+    numerator = np.convolve(taps, in_z(nyquist_taps(structure)))  # and back: it is its own inverse
     denominator = np.ones(1, dtype=np.complex128)
     for pole in poles_in_z(structure, coefficients):
         denominator = np.convolve(denominator, [1.0, pole / (1.0 - pole)])
     return numerator, np.asarray(denominator.real)
+
+
+def nyquist_taps(structure: Structure) -> _Real:
+    """((1 + 1/z) / 2)ⁿ by rising powers of 1/z: what zeros at z = -1 do, of unit gain at DC."""
+    taps = np.atleast_1d(np.poly(np.full(structure.nyquist_zeros, -1.0)))
+    return np.asarray(taps / taps.sum(), dtype=np.float64)
 
 
 def in_z(coefficients: _Real) -> _Real:

@@ -29,6 +29,7 @@ __all__ = [
     "fit_together",
     "jacobian",
     "solved",
+    "solved_exactly",
     "within_reach",
     "without",
 ]
@@ -47,6 +48,9 @@ _FORGETS = 5.0
 
 _UNSEEN = 1e-13
 """Share of the greatest eigenvalue below which the record does not see a direction."""
+
+_EXACTLY = 1e-14
+"""The same share where no normal equations are made."""
 
 Real = NDArray[np.float64]
 
@@ -119,7 +123,7 @@ class _Evaluation:
         self.counted = first.masked(self.rows)
         target = first.masked(first.y)
         if first.source.degree == SAMPLES_ALONE:  # rounding is all the noise there may be
-            self.linear = _solved_exactly(self.counted, target)
+            self.linear, _ = solved_exactly(self.counted, target)
         else:
             self.linear = solved(self.counted @ self.counted.T, self.counted @ target)
         self.residual = target - self.linear @ self.counted
@@ -186,11 +190,20 @@ def _evaluated(
     return _Evaluation(problems, parts)
 
 
-def _solved_exactly(rows: Real, target: Real) -> Real:
-    """Least squares without normal equations, whose rounding is the square root of this one's."""
+def solved_exactly(rows: Real, target: Real) -> tuple[Real, float]:
+    """Least squares without normal equations, whose rounding is the square root of this one's.
+
+    Returns
+    -------
+    weights : ndarray, shape (k,)
+        Of `rows`, (k, n).
+    left : float
+        Sum of squares that they leave of `target`, (n,).
+    """
     scale = np.sqrt(np.maximum(np.sum(rows**2, axis=1), np.finfo(float).tiny))
-    found = np.linalg.lstsq((rows / scale[:, None]).T, target, rcond=1e-13)[0]
-    return np.asarray(found / scale)
+    found = np.linalg.lstsq((rows / scale[:, None]).T, target, rcond=_EXACTLY)[0] / scale
+    residual = target - found @ rows
+    return np.asarray(found), float(residual @ residual)
 
 
 def solved(gram: Real, moment: Real, damping: float = 0.0) -> Real:

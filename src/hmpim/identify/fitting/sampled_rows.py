@@ -6,7 +6,7 @@ from scipy.signal import lfilter
 
 from hmpim.identify.fitting.rows import Part, Problem
 from hmpim.model.dynamics import Structure, coefficients_of
-from hmpim.model.filters import poles_in_z
+from hmpim.model.filters import nyquist_taps, poles_in_z
 from hmpim.model.sampled import MARGIN, SAMPLES_ALONE
 
 __all__ = ["SampledPart", "part_of"]
@@ -36,12 +36,7 @@ class SampledPart:
         deviation = source.coefficients[MARGIN : MARGIN + n]
         moved = np.concatenate([np.zeros(late), deviation])[:n]
         self._below = _below(structure, theta[1:])
-        gain = self._below.sum()
-        above = np.array([gain])
-        for _ in range(structure.nyquist_zeros):
-            above = np.convolve(above, [0.5, 0.5])
-        row = lfilter(above, self._below, moved)
-        rows = [row]
+        rows = [lfilter(self._below.sum() * nyquist_taps(structure), self._below, moved)]
         for _ in range(structure.zeros):
             rows.append(np.diff(rows[-1], prepend=0.0))
         self._moving = np.stack(rows)

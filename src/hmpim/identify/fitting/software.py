@@ -8,20 +8,20 @@ McBride, IEEE TAC 10, 1965); the climb is the one of all fits. One triangular fa
 samples serves every structure and every delay.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
 from hmpim.identify.fitting.beginning import begins_of
-from hmpim.identify.fitting.fit import Fit, Problem, fit_structure
+from hmpim.identify.fitting.fit import Fit, Problem, fit_structure, solved_exactly
 from hmpim.identify.fitting.start import coarse_lag
-from hmpim.identify.fitting.trial import JointFit, Trial
+from hmpim.identify.fitting.trial import JointFit, trial_of
 from hmpim.identify.fitting.unrelated import is_unrelated
 from hmpim.identify.whiteness import effective_share
 from hmpim.model.dynamics import FILTERS, Structure
-from hmpim.model.filters import section_parameters
+from hmpim.model.filters import nyquist_taps, section_parameters
 from hmpim.model.sampled import prepare_input
 
 __all__ = ["is_exact", "software_fit"]
@@ -33,6 +33,9 @@ _ORDER = 4
 
 _TAPS = 16
 """Input samples that it may take."""
+
+_ROWS, _GLANCE = 20_000, 1000
+"""Equations, evenly over the record, for starts, and to see whether they hold at all."""
 
 _EARLIER = 40
 """Samples by which the delay may be below the lag of the greatest cross-correlation."""
@@ -60,10 +63,11 @@ _POLISHED = 1e-6
 class _Equations:
     """Lagged samples as columns of one triangular factor.
 
-    Columns: y[k-1] … y[k-_ORDER], u[k-first] … u[k-first-count+1], 1, y[k].
+    Columns: y[k-1] … y[k-_ORDER], u[k-first] … u[k-first-count+1], 1, y[k]; `rows` were factored.
     """
 
     factor: Real
+    rows: int
     first: int
     count: int
     ar: bool
@@ -73,16 +77,13 @@ class _Equations:
         columns = [self.factor[:, k] for k in range(structure.order)]
         start = _ORDER + delay - self.first
         if structure.nyquist_zeros:
-            weights = _binomial(structure.nyquist_zeros)
+            weights = nyquist_taps(structure)
             columns.append(self.factor[:, start : start + weights.size] @ weights)
         else:
             columns += [self.factor[:, start + k] for k in range(structure.zeros + 1)]
         columns.append(self.factor[:, -2])
-        matrix, target = np.stack(columns, axis=1), self.factor[:, -1]
-        scale = np.maximum(np.linalg.norm(matrix, axis=0), np.finfo(float).tiny)
-        found = np.linalg.lstsq(matrix / scale, target, rcond=1e-14)[0] / scale
-        left = target - matrix @ found
-        return float(left @ left), -found[: structure.order]
+        found, left = solved_exactly(np.stack(columns), self.factor[:, -1])
+        return left, -found[: structure.order]
 
     def delays(self, structure: Structure) -> range:
         """Delays at which it has all samples that a structure takes."""
@@ -90,31 +91,27 @@ class _Equations:
         return range(self.first, self.first + self.count - taken)
 
 
-def _binomial(n: int) -> Real:
-    weights = np.ones(1)
-    for _ in range(n):
-        weights = np.convolve(weights, [1.0, 1.0])
-    return weights
-
-
-def _equations(u: Real, y: Real, valid: NDArray[np.bool_] | None, lag: int) -> _Equations:
+def _equations(
+    u: Real, y: Real, valid: NDArray[np.bool_] | None, *, most: int = _ROWS
+) -> _Equations:
     """Factor what one output sample may follow from; of masked samples, those told alone."""
+    lag = coarse_lag(u, y, u.size // 2)
     first = max(lag - _EARLIER, 0)
     last = min(lag + 2 + _TAPS, u.size // 2)
-    before = np.concatenate([np.full(last + 1, u[0]), u])
-    rows = [np.concatenate([np.full(k, y[0]), y[:-k]]) for k in range(1, _ORDER + 1)]
-    rows += [before[last + 1 - k : last + 1 - k + u.size] for k in range(first, last + 1)]
-    every = np.stack([*rows, np.ones(u.size), y], axis=1)
-    ar = True
-    told = np.arange(u.size) >= _ORDER
+    told, ar = np.arange(u.size) >= _ORDER, True
     if valid is not None:
         unbroken = told & valid
         for k in range(1, _ORDER + 1):
             unbroken[k:] &= valid[:-k]
         ar = bool(np.count_nonzero(unbroken) > u.size // 2)
-        told = unbroken if ar else valid.copy()
-    factor = np.asarray(np.linalg.qr(every[told], mode="r"), dtype=np.float64)
-    return _Equations(factor=factor, first=first, count=last + 1 - first, ar=ar)
+        told = unbroken if ar else valid
+    index = np.flatnonzero(told)
+    index = index[:: -(-index.size // most)]
+    rows = [y[np.maximum(index - k, 0)] for k in range(1, _ORDER + 1)]
+    rows += [u[np.maximum(index - k, 0)] for k in range(first, last + 1)]
+    every = np.stack([*rows, np.ones(index.size), y[index]], axis=1)
+    factor = np.asarray(np.linalg.qr(every, mode="r"), dtype=np.float64)
+    return _Equations(factor=factor, rows=index.size, first=first, count=last + 1 - first, ar=ar)
 
 
 def is_exact(u: Real, y: Real) -> bool:
@@ -132,14 +129,9 @@ def is_exact(u: Real, y: Real) -> bool:
     >>> is_exact(u, y), is_exact(u, y + 1e-6 * np.cos(np.arange(400) ** 2))
     (True, False)
     """
-    equations = _equations(u, y, None, coarse_lag(u, y, u.size // 2))
-    inside = equations.factor[:, :-1]
-    scale = np.maximum(np.linalg.norm(inside, axis=0), np.finfo(float).tiny)
-    target = equations.factor[:, -1]
-    found = np.linalg.lstsq(inside / scale, target, rcond=1e-14)[0]
-    left = target - inside / scale @ found
-    spread = float(np.sum((y - y.mean()) ** 2))
-    return bool(left @ left < _EXACT**2 * spread)
+    equations = _equations(u, y, None, most=_GLANCE)
+    _, left = solved_exactly(equations.factor[:, :-1].T, equations.factor[:, -1])
+    return bool(left < _EXACT**2 * float(y.var()) * equations.rows)
 
 
 def software_fit(
@@ -164,8 +156,7 @@ def software_fit(
     JointFit
         A trial for each structure and delay followed to its end.
     """
-    lag = coarse_lag(u, y, u.size // 2)
-    equations = _equations(u, y, valid, lag)
+    equations = _equations(u, y, valid)
     problem = Problem(
         source=prepare_input(u, "sampled"),
         y=y,
@@ -173,36 +164,18 @@ def software_fit(
         longest_delay=u.size // 2,
         nuisance=nuisance,
     )
-    fits = _followed(problem, equations, u, structures)
-    spread = float(np.sum(problem.masked(y - y.mean()) ** 2))
-    floor = _ROUNDING**2 * spread
+    floor = _ROUNDING**2 * float(np.sum(problem.masked(y - y.mean()) ** 2))
+    fits = _followed(problem, equations, u, structures, exact=floor)
     first = min(fits, key=lambda fit: fit.cost)
     begins = None if first.cost <= floor else begins_of(problem, first, lag=0)
     if begins is not None:
         late = np.arange(y.size) >= begins
         counted = late if valid is None else valid & late
-        problem = Problem(
-            source=problem.source,
-            y=y,
-            valid=counted,
-            longest_delay=problem.longest_delay,
-            nuisance=nuisance,
-            begins=begins,
-        )
+        problem = replace(problem, valid=counted, begins=begins)
         fits = [fit_structure(problem, fit.structure, fit.theta) for fit in fits]
     share = effective_share(min(fits, key=lambda fit: fit.cost).residual)
     count = problem.counted * share
-    trials = [
-        Trial(
-            intersample="sampled",
-            fit=fit,
-            criterion=float(
-                count * np.log(max(fit.cost, floor, np.finfo(float).tiny) / count)
-                + fit.structure.parameters * np.log(count)
-            ),
-        )
-        for fit in fits
-    ]
+    trials = [trial_of("sampled", fit, count, floor=floor) for fit in fits]
     best = min(trials, key=lambda trial: trial.criterion)
     return JointFit(
         problem=problem,
@@ -216,11 +189,10 @@ def software_fit(
 
 
 def _followed(
-    problem: Problem, equations: _Equations, u: Real, structures: tuple[str, ...]
+    problem: Problem, equations: _Equations, u: Real, structures: tuple[str, ...], *, exact: float
 ) -> list[Fit]:
-    """Each structure at its likeliest delays, fitted to the end."""
+    """Each structure at its likeliest delays, fitted to the end; none richer than an exact one."""
     fits: list[Fit] = []
-    exact = _ROUNDING**2 * float(np.sum(problem.masked(problem.y - problem.y.mean()) ** 2))
     for structure in sorted((FILTERS[name] for name in structures), key=lambda s: s.parameters):
         if structure.order and not equations.ar:
             continue
@@ -252,7 +224,7 @@ def _refined(problem: Problem, u: Real, structure: Structure, delay: int, below:
     """A after filtering input and output by 1/A some times; the one that leaves least."""
     y, n = problem.y, u.size
     moved = np.concatenate([np.full(delay, u[0]), u])[:n] - u[0]
-    weights = _binomial(structure.nyquist_zeros)
+    weights = nyquist_taps(structure)
     best, least = below, np.inf
     for _ in range(_REFINED):
         if np.max(np.abs(np.roots(below))) >= 1.0:
@@ -262,14 +234,10 @@ def _refined(problem: Problem, u: Real, structure: Structure, delay: int, below:
         level = lfilter([1.0], below, np.ones(n))
         rows = [np.concatenate([np.zeros(k), z[: n - k]]) for k in range(1, structure.order + 1)]
         rows += [np.concatenate([np.zeros(k), x[: n - k]]) for k in range(structure.zeros + 1)]
-        matrix = np.stack([*rows, level], axis=1)
         told = slice(None) if problem.valid is None else problem.valid
-        matrix, target = matrix[told], z[told]
-        scale = np.maximum(np.linalg.norm(matrix, axis=0), np.finfo(float).tiny)
-        found = np.linalg.lstsq(matrix / scale, target, rcond=1e-14)[0] / scale
-        left = target - matrix @ found
-        if float(left @ left) >= least:
+        found, left = solved_exactly(np.stack([*rows, level])[:, told], z[told])
+        if left >= least:
             break
-        best, least = below, float(left @ left)
+        best, least = below, left
         below = np.concatenate([[1.0], -found[: structure.order]])
     return below if np.max(np.abs(np.roots(below))) < 1.0 else best

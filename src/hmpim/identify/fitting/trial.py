@@ -72,11 +72,14 @@ class JointFit:
         return self.effective_share if self.weighed.noise is None else 1.0
 
 
-def trial_of(mode: Intersample, fit: Fit, count: float) -> Trial:
-    """A fit weighed by Schwarz's criterion, of so many independent samples."""
-    tiny = np.finfo(float).tiny
+def trial_of(mode: Intersample, fit: Fit, count: float, *, floor: float = 0.0) -> Trial:
+    """A fit weighed by Schwarz's criterion, of so many independent samples.
+
+    No sum of squares counts as less than `floor`, where rounding tells nothing.
+    """
+    least = max(floor, float(np.finfo(float).tiny))
     criterion = count * np.log(
-        max(fit.objective, tiny) / count
+        max(fit.objective, least) / count
     ) + fit.structure.parameters * np.log(count)
     return Trial(intersample=mode, fit=fit, criterion=float(criterion))
 
