@@ -197,6 +197,10 @@ def _finished(task: Job, future: Any) -> Finished:
     return Finished(task=task, done=done)
 
 
+def _nothing() -> None:
+    """What a cluster of somebody else asks to be done for it."""
+
+
 @contextlib.contextmanager
 def dask_pool(
     *,
@@ -226,7 +230,7 @@ def dask_pool(
     distributed = need("distributed", extra="batch", what="a batch of records")
     logging.getLogger("distributed").setLevel(logging.CRITICAL)
     with contextlib.ExitStack() as stack:
-        tend: Callable[[], None] = lambda: None  # noqa: E731
+        tend = _nothing
         if scheduler is None:
             local = stack.enter_context(
                 distributed.LocalCluster(

@@ -1,6 +1,5 @@
 """``hmpim batch``: many records, one table, one page."""
 
-import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from enum import StrEnum
@@ -9,10 +8,11 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from hmpim.cli.crew import Scheduler, Workers
 from hmpim.cli.files import check_files
 from hmpim.cli.identify import Between
 from hmpim.cli.reading import Input, Output, Rate, Time, Unit, units_of
-from hmpim.cli.terminal import output_console, say, warn
+from hmpim.cli.terminal import output_console, say, stopping, warn
 from hmpim.errors import ArgumentError
 
 if TYPE_CHECKING:
@@ -65,13 +65,8 @@ def batch(
     group: Annotated[
         str, typer.Option("--group", metavar="PATH", help="HDF5 group that holds the records.")
     ] = "/",
-    scheduler: Annotated[
-        str | None,
-        typer.Option("--scheduler", metavar="tcp://HOST:PORT", help="A Dask scheduler to use."),
-    ] = None,
-    workers: Annotated[
-        int | None, typer.Option("--workers", metavar="N", help="Processes on this computer.")
-    ] = None,
+    scheduler: Scheduler = None,
+    workers: Workers = None,
     per_task: Annotated[
         int, typer.Option("--per-task", metavar="N", help="Records a task, and a part.")
     ] = 100,
@@ -132,7 +127,7 @@ def batch(
         metadata="" if metadata is None else str(metadata.absolute()),
     )
     cluster = Cluster(scheduler=scheduler, workers=workers, per_task=per_task)
-    with _stopping(out), _counting(quiet) as tick:
+    with stopping(out, "parts/*.parquet", "parts"), _counting(quiet) as tick:
         table = run(
             paths, out=out, request=request, cluster=cluster, fresh=not resume, progress=tick
         )
@@ -179,21 +174,6 @@ def _print(table: "BatchTable") -> None:
     )
     for reason, count in found.reasons[:5]:
         console.print(f"{count} not identified: {reason}", markup=False)
-
-
-@contextmanager
-def _stopping(folder: Path) -> Iterator[None]:
-    """Say on Ctrl-C that nothing is lost."""
-    try:
-        yield
-    except KeyboardInterrupt:
-        done = len(list((folder / "parts").glob("*.parquet")))
-        print(
-            f"hmpim: stopped; {folder} keeps what is done (parts: {done}), and the same command "
-            "goes on from there",
-            file=sys.stderr,
-        )
-        raise
 
 
 @contextmanager

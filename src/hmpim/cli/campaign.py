@@ -1,6 +1,5 @@
 """``hmpim campaign``: a whole study from one plan."""
 
-import sys
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -9,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from hmpim.cli.files import check_files
-from hmpim.cli.terminal import output_console, say
+from hmpim.cli.terminal import output_console, say, stopping
 from hmpim.errors import ArgumentError
 
 if TYPE_CHECKING:
@@ -80,7 +79,7 @@ def campaign(
     _check_files(out, {"the plan": path, "the earlier study": earlier}, json_file, document)
     if earlier is not None:
         check_earlier(wanted, earlier)
-    with _stopping(out), _counting(quiet) as tick:
+    with stopping(out, "cases/*.json", "cases"), _counting(quiet) as tick:
         cases = run_campaign(wanted, out, fresh=not resume, progress=tick)
         study = make_study(wanted, cases, earlier=earlier)
         write_study(study, out, document=document)
@@ -169,21 +168,6 @@ def _varied(study: "Study") -> tuple[str, ...]:
         if any(len({getattr(r, field) for r in study.rows if r.test == test}) > 1 for test in tests)
     )
     return (*(("Test",) if len(tests) > 1 else ()), *within)
-
-
-@contextmanager
-def _stopping(folder: Path) -> Iterator[None]:
-    """Say on Ctrl-C that nothing is lost."""
-    try:
-        yield
-    except KeyboardInterrupt:
-        done = len(list((folder / "cases").glob("*.json")))
-        print(
-            f"hmpim: stopped; {folder} keeps what is done (cases: {done}), and the same command "
-            "goes on from there",
-            file=sys.stderr,
-        )
-        raise
 
 
 @contextmanager

@@ -1,13 +1,19 @@
 """``hmpim montecarlo``: systems drawn and identified, held against the truth."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from hmpim.cli.crew import Scheduler, Workers
 from hmpim.cli.files import check_files
 from hmpim.cli.terminal import output_console, say, warn
 from hmpim.errors import ArgumentError
+
+if TYPE_CHECKING:
+    from contextlib import AbstractContextManager
+
+    from hmpim.batch.pool import Pool
 
 __all__ = ["montecarlo"]
 
@@ -25,13 +31,8 @@ def montecarlo(
     draws: Annotated[
         int | None, typer.Option("--draws", metavar="N", help="So many, whatever the plan says.")
     ] = None,
-    scheduler: Annotated[
-        str | None,
-        typer.Option("--scheduler", metavar="tcp://HOST:PORT", help="A Dask scheduler to use."),
-    ] = None,
-    workers: Annotated[
-        int | None, typer.Option("--workers", metavar="N", help="Processes on this computer.")
-    ] = None,
+    scheduler: Scheduler = None,
+    workers: Workers = None,
     json: Annotated[
         Path | None, typer.Option("--json", metavar="FILE", help="Write the figures as JSON.")
     ] = None,
@@ -75,7 +76,7 @@ def montecarlo(
         reads={"the plan": path}, writes={"--json": json, "--out": page}, folders={"--out": out}
     )
 
-    def pool():  # type: ignore[no-untyped-def]
+    def pool() -> "AbstractContextManager[Pool]":
         if workers == 0:
             return here_pool()
         return dask_pool(scheduler=scheduler, workers=workers, say=warn)

@@ -3,12 +3,13 @@
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from rich.console import Console
 
-__all__ = ["output_console", "say", "warn", "working"]
+__all__ = ["output_console", "say", "stopping", "warn", "working"]
 
 _WIDTH_OF_FILES = 120  # columns where the output is no terminal, so that no row is cut
 
@@ -71,3 +72,27 @@ def working(what: str) -> Iterator[None]:
         return
     with console.status(f"{what} …"):
         yield
+
+
+@contextmanager
+def stopping(folder: Path, files: str, what: str) -> Iterator[None]:
+    """Say on Ctrl-C that nothing is lost, and how many `files` of the folder there are.
+
+    Parameters
+    ----------
+    folder : Path
+        Where the work is kept.
+    files : str
+        Pattern of what is done, below the folder.
+    what : str
+        What they are called.
+    """
+    try:
+        yield
+    except KeyboardInterrupt:
+        done = len(list(folder.glob(files)))
+        warn(
+            f"stopped; {folder} keeps what is done ({what}: {done}), and the same command "
+            "goes on from there"
+        )
+        raise

@@ -12,7 +12,7 @@ from hmpim.identify.result import Estimate, PairIdentification
 from hmpim.model import Model, Spread, simulate, slowest_time_constant
 from hmpim.record import Record, uniform
 
-__all__ = ["Prediction", "predict", "to_model"]
+__all__ = ["Prediction", "predict", "rate_of", "to_model"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -74,13 +74,13 @@ def to_model(pair: PairIdentification, *, fs: float | None = None) -> Model:
         hold_period=_value(p.hold_period),
         quantization_step=_value(p.quantization_step),
         intersample=pair.intersample,
-        fs=_rate(pair) if fs is None else fs,
+        fs=rate_of(pair) if fs is None else fs,
         band=float(frequency[-1]) if frequency.size else None,
         spread=_spread(pair),
     )
 
 
-def _rate(pair: PairIdentification) -> float | None:
+def rate_of(pair: PairIdentification) -> float | None:
     """Rate in Hz at which software was identified, where the result still has its samples."""
     if pair.intersample != "sampled" or pair.time is None or pair.time.size < 2:
         return None

@@ -93,18 +93,20 @@ def model_curve(
     if scale is None or scale.value == 0.0 or not pair.numerator or not pair.denominator:
         return None
     delay = pair.parameters.delay
-    step = None
-    if pair.intersample == "sampled" and pair.time is not None and pair.time.size > 1:
-        step = float(pair.time[1] - pair.time[0])
-    elif pair.intersample == "sampled":
-        step = None if fs is None else 1.0 / fs
-        if step is None:
+    above, below = np.array(pair.numerator[::-1]), np.array(pair.denominator[::-1])
+    rate = None
+    if pair.intersample == "sampled":
+        from hmpim.identify.predict import rate_of
+
+        rate = rate_of(pair) or fs
+        if rate is None:
             return None
+        above, below = in_z(above[::-1]), in_z(below[::-1])
     system = RationalDelay(
-        step=step,
         delay=0.0 if delay is None else delay.value,
-        numerator=in_z(np.array(pair.numerator)) if step else np.array(pair.numerator[::-1]),
-        denominator=in_z(np.array(pair.denominator)) if step else np.array(pair.denominator[::-1]),
+        numerator=above,
+        denominator=below,
+        step=None if rate is None else 1.0 / rate,
     )
     lag = np.degrees(phase(system, frequency, delay=with_delay))
     values = response(system, frequency)

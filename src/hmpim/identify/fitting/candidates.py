@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from hmpim.identify.fitting.data import FOLLOWS, HOPELESS, POOR, Data, Seen, band_of
+from hmpim.identify.fitting.data import FOLLOWS, HOPELESS, POOR, Data, Seen, band_of, shifted
 from hmpim.identify.fitting.enrich import (
     INTEGRATING,
     PLAIN,
@@ -53,14 +53,6 @@ _TASTE = 4
 
 _FALLING = 4.0
 """After so many steps a structure is given up if its sum of squares is this far from hopeful."""
-
-_DELAY_SHIFT: dict[Intersample, float] = {
-    "zoh": -0.5,
-    "foh": 0.0,
-    "bandlimited": 0.0,
-    "sampled": 0.0,
-}
-"""Samples by which the fitted delay moves when held, against the other two."""
 
 _PRECISION = 1e-2
 """Precision of a fit that is weighed against others, see `fit_structure`."""
@@ -217,9 +209,7 @@ def nested(first_order: Fit) -> NDArray[np.float64]:
 
 def _moved(problem: Problem, fit: Fit, origin: Intersample, mode: Intersample) -> Fit:
     """Fit the same structure under another assumption, from where the first one ended."""
-    theta = fit.theta.copy()
-    theta[0] += _DELAY_SHIFT[mode] - _DELAY_SHIFT[origin]
-    return fit_structure(problem, fit.structure, theta)
+    return fit_structure(problem, fit.structure, shifted(fit.theta, origin, mode))
 
 
 def fit_under_each_assumption(

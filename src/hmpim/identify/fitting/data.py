@@ -21,6 +21,7 @@ __all__ = [
     "band_of",
     "follows",
     "refit",
+    "shifted",
 ]
 
 FOLLOWS = 1e-4
@@ -81,6 +82,14 @@ def follows(data: Data, fit: Fit) -> bool:
     """Whether what a fit leaves over still follows the input."""
     left = misfit(data.u, fit.residual, delay=fit.delay, band=band_of(data))
     return left.probability < FOLLOWS
+
+
+def shifted(
+    theta: NDArray[np.float64], origin: Intersample, mode: Intersample
+) -> NDArray[np.float64]:
+    """Parameters as a start under another assumption: held, the delay fits half a sample less."""
+    held = 0.5 * (float(origin == "zoh") - float(mode == "zoh"))
+    return np.asarray(theta + held * (np.arange(theta.size) == 0))
 
 
 def refit(problem: Problem, fit: Fit) -> Fit:

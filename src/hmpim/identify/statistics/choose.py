@@ -14,7 +14,7 @@ from scipy.special import chdtrc, chdtri
 from hmpim.errors import RecordError
 from hmpim.identify.fitting.autoregression import whitening_filter
 from hmpim.identify.fitting.candidates import nested
-from hmpim.identify.fitting.data import FOLLOWS, HOPELESS
+from hmpim.identify.fitting.data import FOLLOWS, HOPELESS, shifted
 from hmpim.identify.fitting.enrich import INTEGRATING, PLAIN, RICH, members, proposals
 from hmpim.identify.fitting.fit import solved
 from hmpim.identify.fitting.rows import Part, Problem
@@ -53,13 +53,6 @@ _FORGOTTEN = 1e-4
 
 _WHITE = 1e-3
 """Chance of calling white noise coloured (Ljung and Box)."""
-
-_DELAY_SHIFT: dict[Intersample, float] = {
-    "zoh": -0.5,
-    "foh": 0.0,
-    "bandlimited": 0.0,
-    "sampled": 0.0,
-}
 
 Real = NDArray[np.float64]
 
@@ -345,8 +338,7 @@ def _moved(
     for mode in (m for m in BETWEEN if m != natural):
         for fitted in fits:
             if fitted.fit.objective < HOPELESS * least:
-                theta = fitted.fit.theta.copy()
-                theta[0] += _DELAY_SHIFT[mode] - _DELAY_SHIFT[natural]
+                theta = shifted(fitted.fit.theta, natural, mode)
                 out.append(search.fit(mode, fitted.fit.structure, theta))
     return out
 

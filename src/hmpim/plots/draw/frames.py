@@ -19,7 +19,7 @@ from hmpim.plots.description import (
     Scale,
 )
 
-__all__ = ["Frame", "frames", "legend_items", "placed", "ticks", "unplaced"]
+__all__ = ["Frame", "frames", "legend_items", "on_left", "placed", "ticks", "unplaced"]
 
 FloatArray = NDArray[np.float64]
 _LINEAR_TO = 10.0  # of 'symlog'
@@ -248,3 +248,17 @@ def legend_items(panel: Panel) -> list[Item]:
         if label and label not in named:
             named[label] = item
     return list(named.values())
+
+
+def on_left(item: Rule, axis: Axis, ends: tuple[float, float]) -> bool:
+    """Whether the words of an upright line stand on its left.
+
+    Examples
+    --------
+    >>> on_left(Rule(at=9.0), Axis(), (0.0, 10.0)), on_left(Rule(at=1.0), Axis(), (0.0, 10.0))
+    (True, False)
+    """
+    if item.side != "auto":
+        return item.side == "left"
+    at, low, high = placed(np.array([item.at, *ends]), axis.scale)
+    return bool((at - low) > 0.7 * (high - low))

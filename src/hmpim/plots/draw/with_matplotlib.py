@@ -14,7 +14,6 @@ import numpy as np
 
 from hmpim.errors import ArgumentError
 from hmpim.plots.description import (
-    Axis,
     Band,
     Bars,
     Curve,
@@ -27,7 +26,7 @@ from hmpim.plots.description import (
     Span,
     Words,
 )
-from hmpim.plots.draw.frames import Frame, frames, legend_items, placed, ticks, unplaced
+from hmpim.plots.draw.frames import Frame, frames, legend_items, on_left, placed, ticks, unplaced
 from hmpim.plots.envelope import envelope
 from hmpim.plots.style import COLOURS, FONT_SIZE
 
@@ -68,6 +67,7 @@ def save(
 
     Examples
     --------
+    >>> from hmpim.plots.description import Axis
     >>> save(Figure(panels=(Panel(x=Axis(), y=Axis()),), alt=""), "a.docx")
     Traceback (most recent call last):
     hmpim.errors.ArgumentError: 'a.docx' is no picture; name it .svg, .png or .pdf
@@ -96,6 +96,7 @@ def draw(figure: Figure) -> "MatplotlibFigure":
 
     Examples
     --------
+    >>> from hmpim.plots.description import Axis
     >>> curve = Curve(x=np.arange(3.0), y=np.zeros(3), label="nothing")
     >>> panel = Panel(x=Axis(label="Time (s)"), y=Axis(label="y (V)"), items=(curve,))
     >>> drawn = draw(Figure(panels=(panel,), alt="A line."))
@@ -145,6 +146,7 @@ def panel_share(panel: Panel) -> int:
 
     Examples
     --------
+    >>> from hmpim.plots.description import Axis
     >>> panel_share(Panel(x=Axis(), y=Axis()))
     1
     """
@@ -232,20 +234,6 @@ def _draw_rule(axes: "Axes", item: Rule, panel: Panel, frame: Frame) -> None:
         annotation_clip=True,
         bbox={"facecolor": COLOURS["paper"], "edgecolor": "none", "pad": 0.8, "alpha": 0.85},
     )  # fmt: skip
-
-
-def on_left(item: Rule, axis: Axis, ends: tuple[float, float]) -> bool:
-    """Whether the words of an upright line stand on its left.
-
-    Examples
-    --------
-    >>> on_left(Rule(at=9.0), Axis(), (0.0, 10.0)), on_left(Rule(at=1.0), Axis(), (0.0, 10.0))
-    (True, False)
-    """
-    if item.side != "auto":
-        return item.side == "left"
-    at, low, high = placed(np.array([item.at, *ends]), axis.scale)
-    return bool((at - low) > 0.7 * (high - low))
 
 
 def _draw_image(axes: "Axes", item: Image) -> None:

@@ -25,8 +25,7 @@ from hmpim.plots.description import (
     Span,
     Words,
 )
-from hmpim.plots.draw.frames import Frame, frames, placed, ticks
-from hmpim.plots.draw.with_matplotlib import on_left
+from hmpim.plots.draw.frames import Frame, frames, on_left, placed, ticks
 from hmpim.plots.envelope import envelope
 from hmpim.plots.style import COLOURS, Colour
 

@@ -4,9 +4,6 @@ A Bode plot takes some milliseconds. Words stay words, in the reader's own font;
 thinned to what the width can show, its peaks kept.
 """
 
-import base64
-import struct
-import zlib
 from collections.abc import Callable
 from typing import Any
 from xml.sax.saxutils import escape
@@ -32,6 +29,7 @@ from hmpim.plots.description import (
 )
 from hmpim.plots.draw.frames import Frame, frames, legend_items, placed, ticks
 from hmpim.plots.draw.layout import LINE, SIZE, Place, legend_lines, places, text_width
+from hmpim.plots.draw.raster import picture_of
 from hmpim.plots.envelope import envelope
 from hmpim.plots.style import COLOURS, Colour
 
@@ -42,17 +40,6 @@ _PER_INCH = 96.0
 _POINT = 96.0 / 72.0
 _FAR = 9999.0  # px; what lies beyond is not seen and must not overflow
 _DASHES: dict[Dashes, str] = {"-": "", "--": "6 3", "-.": "8 3 2 3", ":": "1.5 2.5"}
-_VIRIDIS = (
-    "440154",
-    "472d7b",
-    "3b528b",
-    "2c728e",
-    "21918c",
-    "28ae80",
-    "5ec962",
-    "addc30",
-    "fde725",
-)
 
 
 def draw(
@@ -422,35 +409,10 @@ def _image(item: Image, field: _Field) -> str:
 def _picture(
     values: FloatArray, item: Image, left: float, top: float, width: float, height: float
 ) -> str:
-    share = np.clip((values - item.low) / ((item.high - item.low) or 1.0), 0.0, 1.0)
-    if item.palette == "grey":
-        pixels = np.repeat((255 * share)[..., np.newaxis], 3, axis=2)
-    else:
-        anchors = np.array([[int(c[k : k + 2], 16) for k in (0, 2, 4)] for c in _VIRIDIS])
-        steps = np.linspace(0.0, 1.0, len(anchors))
-        pixels = np.stack([np.interp(share, steps, anchors[:, k]) for k in range(3)], axis=2)
-    data = base64.b64encode(_png(np.round(pixels).astype(np.uint8))).decode()
     return (
         f'<image x="{left:.1f}" y="{top:.1f}" width="{width:.1f}" height="{height:.1f}" '
         f'preserveAspectRatio="none" style="image-rendering:pixelated" '
-        f'href="data:image/png;base64,{data}"/>'
-    )
-
-
-def _png(pixels: NDArray[np.uint8]) -> bytes:
-    """Return an RGB image as a PNG file (W3C, Portable Network Graphics, 3rd ed., section 5)."""
-    high, wide, _ = pixels.shape
-    rows = np.concatenate((np.zeros((high, 1), np.uint8), pixels.reshape(high, -1)), axis=1)
-
-    def chunk(name: bytes, data: bytes) -> bytes:
-        body = name + data
-        return struct.pack(">I", len(data)) + body + struct.pack(">I", zlib.crc32(body))
-
-    return (
-        b"\x89PNG\r\n\x1a\n"
-        + chunk(b"IHDR", struct.pack(">IIBBBBB", wide, high, 8, 2, 0, 0, 0))
-        + chunk(b"IDAT", zlib.compress(rows.tobytes(), 6))
-        + chunk(b"IEND", b"")
+        f'href="{picture_of(values, item)}"/>'
     )
 
 
