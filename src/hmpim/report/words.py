@@ -187,6 +187,17 @@ _PARTS = {
     "second_order_zero": "second-order dynamics with a zero",
 }
 
+_COUNTS = {1: "one pole", 2: "two poles", 3: "three poles", 4: "four poles"}
+
+_FILTERS = {
+    "fir": "a filter without poles",
+    **{f"iir_{n}": f"a filter of {poles}" for n, poles in _COUNTS.items()},
+    **{f"iir_{n}_zeros": f"a filter of {poles} and zeros" for n, poles in _COUNTS.items()},
+    **{f"bilinear_{n}": f"a bilinear filter of {poles}" for n, poles in _COUNTS.items()},
+}
+_STRUCTURES |= _FILTERS
+_PARTS |= _FILTERS
+
 
 def structure_words(structure: str) -> str:
     """Return a structure's name in plain words.
@@ -195,6 +206,8 @@ def structure_words(structure: str) -> str:
     --------
     >>> structure_words("second_order"), structure_words("fourth_order")
     ('second order', 'fourth order')
+    >>> structure_words("iir_2_zeros")
+    'a filter of two poles and zeros'
     """
     return _STRUCTURES.get(structure, structure.replace("_", " "))
 
@@ -278,6 +291,8 @@ def pair_sentence(pair: PairIdentification) -> str:
     text = f"{' and '.join(model)} {verb} {pair.fit_percent:.1f} % of the output"
     if cause is not None:
         return f"{text}. {_trust(pair)}. {cause.message}"
+    if pair.intersample == "sampled":
+        return f"{text}, sample over sample, as software does."
     between = INTERSAMPLE_WORDS[pair.intersample]
     return f"{text}, the input taken as {between} between its samples."
 

@@ -7,6 +7,9 @@ __all__ = ["aside", "interval", "plus_minus"]
 _MOST_PLACES = 7
 _LARGEST_PLAIN = 1e7
 
+_ROUNDING = 1e-10
+"""Error over value below which the value's digits are no longer written out to it."""
+
 _ONE_DIGIT = 355
 """First three digits of an error from which one digit of it is enough (Particle Data Group)."""
 
@@ -33,8 +36,12 @@ def plus_minus(value: float, std: float, *, short: bool = False) -> str:
     '(1.500 ± 0.020)e-09'
     >>> plus_minus(3.0, math.inf)
     '3 ± ?'
+    >>> plus_minus(0.9999999999999996, 1.1e-14)  # exact but for rounding
+    '1 ± 1e-14'
     """
     places = _places(std, short=short)
+    if 0.0 < std < _ROUNDING * abs(value):
+        return f"{value:.10g} ± {std:.0e}"
     if places is None:
         return f"{_plain(value)} ± {'0' if std == 0 else '?'}"
     exponent = _exponent(value, std, places)
@@ -75,7 +82,8 @@ def interval(low: float | None, high: float | None, *, value: float, std: float 
     >>> interval(0.1474, None, value=0.15, std=None), interval(None, None, value=0.15, std=None)
     ('0.1474 or more', 'not known')
     """
-    places = None if std is None else _places(std)
+    exact = std is None or 0.0 < std < _ROUNDING * abs(value)
+    places = None if exact or std is None else _places(std)
     plainly = std is None or places is None or _exponent(value, std, places) != 0
 
     def written(end: float) -> str:
