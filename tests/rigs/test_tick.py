@@ -4,11 +4,14 @@ import os
 import pty
 import re
 import socket
+import subprocess
+import sys
 import threading
 import time
 
 import numpy as np
 import pytest
+from scipy.stats import t
 
 from hmpim.errors import RigError
 from hmpim.experiment import RunOptions, run
@@ -20,8 +23,8 @@ from hmpim.rigs import (
     UdpTicks,
     pulse_bytes,
 )
-from hmpim.stimulus import Ramp, Stimulus
-from tests_support import in_studies
+from hmpim.stimulus import Limits, Ramp, Stimulus
+from tests_support import FALSE_ALARM, in_studies
 
 RATE = 500.0
 RAMP = Stimulus(waveform=Ramp(duration=1.5), fs=100.0)
@@ -85,7 +88,13 @@ def test_its_time_is_that_of_the_pulses_and_the_computers_drift_is_told(ppm, los
 
 
 def drift_of(message):
-    return float(message.split("gains ")[1].split(" ppm")[0])
+    return figure_of(message)[0]
+
+
+def figure_of(message):
+    """Drift and its standard deviation, ppm."""
+    value, std = message.split("gains ")[1].split(" ppm")[0].split(" ± ")
+    return float(value), float(std)
 
 
 class Datagrams:
@@ -202,6 +211,19 @@ def test_between_two_pulses_the_computers_clock_is_read_and_never_goes_beyond_th
     assert before <= ticked.now() <= before + 0.5 + 0.02
 
 
+def test_while_a_pulse_is_overdue_time_goes_on_and_does_not_reach_it():
+    computer = ManualClock()
+    ticked = TickClock(Pulses(computer, jitter=0.0, until=0.5), rate=RATE, clock=computer)
+    ticked.sleep_until(0.4)
+    computer.advance(0.15)  # the last pulse is seen now, late
+    shown = []
+    for _ in range(400):
+        computer.advance(1e-6)
+        shown.append(ticked.now())
+    assert np.all(np.diff(shown) > 0.0)
+    assert shown[-1] < ticked._stamps[-1] + 1.0 / RATE
+
+
 def test_a_tick_that_stops_is_said_and_time_goes_on_so_that_a_rig_can_be_stopped():
     computer = ManualClock()
     ticked = TickClock(Pulses(computer, until=computer.now() + 1.0), rate=RATE, clock=computer)
@@ -234,3 +256,54 @@ def test_pulses_over_udp():
     finally:
         over.set()
         thread.join()
+
+
+SENDER = """
+import socket, sys
+from hmpim.experiment.priority import undelayed
+from hmpim.rigs import SkewedClock, SystemClock, pulse_bytes
+
+clock, rate = SkewedClock(SystemClock(), drift=float(sys.argv[2]) * 1e-6), float(sys.argv[3])
+out, number = socket.socket(socket.AF_INET, socket.SOCK_DGRAM), 0
+out.connect(("127.0.0.1", int(sys.argv[1])))
+begun = clock.now()
+with undelayed(realtime=True):
+    while True:
+        clock.sleep_until(begun + number / rate)
+        try:
+            out.send(pulse_bytes(number))
+        except ConnectionRefusedError:
+            pass
+        number += 1
+"""
+
+
+@pytest.mark.study
+@pytest.mark.parametrize("ppm", [30.0, -30.0])
+def test_in_real_time_over_udp_the_drift_is_found_within_its_error(ppm):
+    """A sender of its own, 30 ppm off, for 10 s; the run goes by its pulses."""
+    rate = 1000.0
+    ticks = UdpTicks("127.0.0.1", 0)
+    sender = subprocess.Popen(
+        [sys.executable, "-c", SENDER, str(ticks.port), f"{ppm}", f"{rate}"], env=os.environ
+    )
+    try:
+        with TickClock(ticks, rate=rate, patience=20.0) as clock:
+            stimulus = Stimulus(waveform=Ramp(duration=10.0), fs=rate)
+            computer = time.perf_counter()
+            record = run(
+                FakeRig(answer=paced, moves=True),
+                stimulus,
+                limits=Limits(position=100.0, velocity=100.0, acceleration=100.0),
+                options=RunOptions(clock=clock),
+            )
+            computer = time.perf_counter() - computer
+    finally:
+        sender.kill()
+        sender.wait()
+    assert computer > 9.9
+    (said,) = [f.message for f in record.findings if f.code == "tick"]
+    print(f"\n{ppm:+g} ppm: {said}")
+    found, std = figure_of(said)
+    assert std < 5.0  # told apart from a clock that is right
+    assert abs(found + ppm) < t.isf(FALSE_ALARM / 2, 8) * std + 0.05  # printed to 0.1
