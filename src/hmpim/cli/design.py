@@ -50,6 +50,10 @@ def design(
     kind: Annotated[
         str, typer.Option(metavar="KIND", help=f"Waveform: {', '.join(KINDS)}.")
     ] = "hmpim",
+    sweep: Annotated[
+        float | None,
+        typer.Option(metavar="S", help="Length of each sweep of kind repeated, seconds."),
+    ] = None,
     extinction: Annotated[
         str, typer.Option(metavar="auto|N", help="Extinction factor n; auto: the smallest.")
     ] = "auto",
@@ -128,6 +132,7 @@ def design(
         fs=fs,
         limits=limits,
         kind=_known_kind(kind),
+        sweep=sweep,
         extinction=_number_or_auto("--extinction", extinction),
         lead=_number_or_auto("--lead", lead),
         tail=_number_or_auto("--tail", tail),

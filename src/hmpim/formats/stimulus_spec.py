@@ -32,6 +32,7 @@ from hmpim.stimulus import (
     Prbs,
     Quintic,
     Ramp,
+    Repeated,
     RestToRest,
     Reversed,
     SampledMotion,
@@ -50,14 +51,14 @@ _FORMAT = "hmpim/stimulus/1"
 _TYPES: dict[str, Any] = {
     kind.__name__: kind
     for kind in (
-        *(Chirp, ExponentialSweep, Multisine, Prbs, Quintic, Ramp, RestToRest, Reversed),
-        *(SampledMotion, Sine, Step, Steps, SumOfSines, Sweep),
+        *(Chirp, ExponentialSweep, Multisine, Prbs, Quintic, Ramp, Repeated, RestToRest),
+        *(Reversed, SampledMotion, Sine, Step, Steps, SumOfSines, Sweep),
     )
 }
 _STATED = ("axis", "unit", "fs", "tail", "resolution")
 _WISHES = {
-    *("band", "duration", "fs", "limits", "kind", "extinction", "lead", "tail", "axis"),
-    *("resolution", "seed", "wanted_snr", "noise"),
+    *("band", "duration", "fs", "limits", "kind", "sweep", "extinction", "lead", "tail"),
+    *("axis", "resolution", "seed", "wanted_snr", "noise"),
 }
 
 

@@ -17,6 +17,7 @@ from hmpim.stimulus.multisine import (
 from hmpim.stimulus.peaks import true_peaks
 from hmpim.stimulus.profile import Prbs, Steps, smooth_prbs, smooth_steps
 from hmpim.stimulus.quintic import Quintic
+from hmpim.stimulus.repeated import Repeated, repeated_sweeps
 from hmpim.stimulus.reverse import Reversed
 from hmpim.stimulus.sampled import SampledMotion
 from hmpim.stimulus.scale import scale_to_limits
@@ -49,6 +50,7 @@ __all__ = [
     "Quintic",
     "Ramp",
     "Redesign",
+    "Repeated",
     "RestToRest",
     "Reversed",
     "SampledMotion",
@@ -68,6 +70,7 @@ __all__ = [
     "leave_room",
     "measured_noise",
     "random_phase_multisine",
+    "repeated_sweeps",
     "rest_to_rest",
     "scale_to_limits",
     "scaled_stimulus",

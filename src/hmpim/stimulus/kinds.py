@@ -15,6 +15,7 @@ from hmpim.stimulus.limits import Limits, three_digits
 from hmpim.stimulus.motion import Scalable, Waveform
 from hmpim.stimulus.multisine import random_phase_multisine, schroeder_multisine
 from hmpim.stimulus.profile import smooth_prbs, smooth_steps
+from hmpim.stimulus.repeated import repeated_sweeps
 from hmpim.stimulus.reverse import Reversed
 from hmpim.stimulus.scale import check_limits_given
 from hmpim.stimulus.solve import largest_gain, smallest_extinction
@@ -24,9 +25,12 @@ from hmpim.stimulus.sweep import Sweep, check_band, check_positive
 
 __all__ = ["KINDS", "Kind", "design"]
 
-Kind = Literal["hmpim", "exponential", "reversed", "schroeder", "random_phase", "prbs", "steps"]
+Kind = Literal[
+    "hmpim", "exponential", "reversed", "repeated", "schroeder", "random_phase", "prbs", "steps"
+]
 KINDS: tuple[Kind, ...] = get_args(Kind)
 _SWEEPS = ("hmpim", "exponential", "reversed")
+_CYCLES = 6.0  # of each repeated sweep: 0.6 s from 0.1 to 20 Hz, the study in docs/live.md
 _SETTLING = 0.5  # seconds at rest that a led stimulus appends, so that a late response is caught
 _SMALLER = (0.98, 0.95, 0.9, 0.8, 0.7, 0.6, 0.5)  # scales that leave room for a lead
 
@@ -39,6 +43,7 @@ def design(
     fs: float,
     limits: Limits,
     kind: Kind = "hmpim",
+    sweep: float | None = None,
     extinction: float | Literal["auto"] = "auto",
     lead: float | Literal["auto"] = "auto",
     tail: float | Literal["auto"] = "auto",
@@ -67,8 +72,11 @@ def design(
         What the axis may do; its unit is the stimulus's.
     kind : str
         'hmpim', the linear sweep of the paper; 'exponential' sweep; 'reversed', the paper's
-        from high to low; 'schroeder' and 'random_phase' multisines; 'prbs', a binary sequence,
-        and 'steps', both through smooth transitions.
+        from high to low; 'repeated', short sweeps up and down in turn; 'schroeder' and
+        'random_phase' multisines; 'prbs', a binary sequence, and 'steps', both through smooth
+        transitions.
+    sweep : float, optional
+        Length of each sweep of kind 'repeated', in seconds; that of six cycles by default.
     extinction : 'auto' or float
         n of a sweep; a number is taken as given, and only the gain is solved.
     lead : 'auto' or float
@@ -125,6 +133,8 @@ def design(
     again = copy.deepcopy(rng)  # a second design must draw the same phases
     if kind not in KINDS:
         raise ArgumentError(f"kind = {kind!r} must be one of {', '.join(map(repr, KINDS))}")
+    if sweep is not None and kind != "repeated":
+        raise ArgumentError(f"sweep = {sweep!r} s is for kind = 'repeated', and kind = {kind!r}")
     room = leave_room(limits, resolution=resolution, fs=rate)
     core: Waveform
     if kind in _SWEEPS:
@@ -134,6 +144,9 @@ def design(
         raise ArgumentError(
             f"extinction = {extinction!r} is for sweeps; the limits shape kind = {kind!r}"
         )
+    elif kind == "repeated":
+        each = min(2.0 * _CYCLES / (low + high), length) if sweep is None else sweep
+        core = repeated_sweeps(band=(low, high), duration=length, sweep=each, limits=room)
     elif kind == "schroeder":
         core = schroeder_multisine(band=(low, high), duration=length, limits=room)
     elif kind == "random_phase":
@@ -166,6 +179,7 @@ def design(
                 fs=fs,
                 limits=others,
                 kind=kind,
+                sweep=sweep,
                 extinction=extinction,
                 lead=lead,
                 tail=tail,

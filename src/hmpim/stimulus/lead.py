@@ -32,6 +32,7 @@ from hmpim.stimulus.limits import QUANTITIES, Limits, three_digits
 from hmpim.stimulus.motion import FloatArray, Motion, Peaks, Piecewise, Scalable, Waveform
 from hmpim.stimulus.peaks import true_peaks
 from hmpim.stimulus.quintic import Quintic, between, coefficients_between, largest
+from hmpim.stimulus.repeated import Repeated
 from hmpim.stimulus.reverse import Reversed
 from hmpim.stimulus.sweep import Sweep
 
@@ -369,6 +370,9 @@ def _spans(core: Waveform, *, jerk: bool) -> tuple[float, float, float]:
         earliest = join_time(core, jerk=jerk)
         first = core.time_of_phase(min(2.5 * math.pi, total))
         return earliest, first, core.time_of_phase(max(total - 2.0 * math.pi, 0.0))
+    if isinstance(core, Repeated):
+        first = core.time_of_phase(min(2.5 * math.pi, core.end_phase))
+        return 0.0, first, core.time_of_phase(max(core.end_phase - 2.0 * math.pi, 0.0))
     if core.band is None:
         raise ArgumentError(
             f"a {type(core).__name__} jumps within itself, which no lead can smooth; "

@@ -20,6 +20,7 @@ from hmpim.stimulus import (
     Prbs,
     Quintic,
     Ramp,
+    Repeated,
     RestToRest,
     Reversed,
     SampledMotion,
@@ -31,6 +32,7 @@ from hmpim.stimulus import (
     Waveform,
 )
 from hmpim.stimulus.multisine import even_step
+from hmpim.stimulus.repeated import CORNER
 
 __all__ = ["functions_of"]
 
@@ -190,6 +192,59 @@ def _exponential(sweep: ExponentialSweep, written: _Written) -> _Made:
         f"G = {sweep.gain:.9g}, n = {sweep.extinction:.9g}."
     )
     return what, [], _around(sweep.duration, formula)
+
+
+def _repeated(waveform: Repeated, written: _Written) -> _Made:
+    low, high = (2.0 * math.pi * f for f in waveform.band)
+    powers = [4.0 * (k + 1) for k, corner in enumerate(waveform.corners) if math.isfinite(corner)]
+    bends = [2.0 * math.pi * corner for corner in waveform.corners if math.isfinite(corner)]
+    terms = "".join(
+        f"""
+    term = pow(omega / {c_number(bend)}, {c_number(power)});
+    s0 += term;
+    s1 += term * {c_number(power)} / omega;
+    s2 += term * {c_number(power)} * {c_number(power - 1.0)} / (omega * omega);
+"""
+        for bend, power in zip(bends, powers, strict=True)
+    )
+    formula = f"""
+{{
+    const double sweep = {c_number(waveform.sweep)}, span = {c_number(waveform.span)};
+    const double corner = {c_number(CORNER)}, turn = rint(t / sweep), x = t / sweep - turn;
+    const int up = (long)turn % 2 == 0;
+    const double base = up ? {c_number(low)} : {c_number(high)}, way = up ? 1.0 : -1.0;
+    const double size = fabs(x), z = x / corner, side = x < 0.0 ? -1.0 : 1.0;
+    const int near = size < corner;
+    const double value = near ? corner * (0.375 + 0.75 * z * z - 0.125 * z * z * z * z) : size;
+    const double slope = near ? 1.5 * z - 0.5 * z * z * z : side;
+    const double curve = near ? 1.5 * (1.0 - z * z) / corner : 0.0;
+    const double e = near ? z : side;
+    const double inner = corner * corner * (0.375 * e + 0.25 * e * e * e
+        - 0.025 * e * e * e * e * e);
+    const double outer = near ? 0.0 : 0.5 * side * (x * x - corner * corner);
+    const double omega = base + way * span * (value - 0.375 * corner);
+    const double rate = way * span * slope / sweep, bend = way * span * curve / (sweep * sweep);
+    const double phase = sweep * ({c_number(0.5 * (low + high))} * turn + base * x
+        + way * span * (inner + outer - 0.375 * corner * x));
+    const double sine = sin(phase), cosine = cos(phase);
+    double s0 = 1.0, s1 = 0.0, s2 = 0.0{", term" if terms else ""}, a0, a1, a2, by1, by2;
+{terms}
+    a0 = {c_number(waveform.amplitude)} * pow(s0, -0.25);
+    by1 = -0.25 * a0 * s1 / s0;
+    by2 = -0.25 * a0 * (s2 / s0 - 1.25 * s1 / s0 * s1 / s0);
+    a1 = by1 * rate;
+    a2 = by2 * rate * rate + by1 * bend;
+    m.position = a0 * sine;
+    m.velocity = a1 * sine + a0 * omega * cosine;
+    m.acceleration = a2 * sine + 2.0 * a1 * omega * cosine
+        + a0 * (rate * cosine - omega * omega * sine);
+}}
+"""
+    what = (
+        f"Sweeps up and down, {waveform.band[0]:.9g} to {waveform.band[1]:.9g} Hz in "
+        f"{waveform.sweep:.9g} s each."
+    )
+    return what, [], _around(waveform.duration, formula)
 
 
 def _reversed(waveform: Reversed, written: _Written) -> _Made:
@@ -387,6 +442,7 @@ _WRITERS: dict[type, Callable[[Any, _Written], _Made]] = {
     Prbs: _prbs,
     Quintic: _quintic,
     Ramp: _ramp,
+    Repeated: _repeated,
     RestToRest: _led,
     Reversed: _reversed,
     Sine: _sine,

@@ -147,7 +147,24 @@ class LiveEstimator:
         """
         if np.atleast_1d(numbers_of("u", u)).size == 0:
             return self._look
-        statistics = self._statistics.update(u, y)
+        self.read(u, y)
+        return self.look()
+
+    def read(self, u: ArrayLike, y: ArrayLike) -> None:
+        """Read the samples that follow, without a look: that costs next to nothing.
+
+        Parameters
+        ----------
+        u, y : array_like, shape (n,)
+            As for `update`.
+        """
+        self._statistics.update(u, y)
+
+    def look(self) -> Look | None:
+        """Look at what was read so far; None while there is too little to fit."""
+        statistics = self._statistics
+        if not statistics.runs:
+            return None
         moves = bool(statistics.runs[0].uu[0] and statistics.runs[0].vv[-1, -1, 0])
         if statistics.samples < _FEWEST or not moves:
             return None
