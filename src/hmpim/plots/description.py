@@ -232,6 +232,17 @@ class Panel:
     columns: int = 1
     legend: bool = True
 
+    @property
+    def bare(self) -> bool:
+        """Whether neither axis has a tick or a label: a drawing, which needs no edges.
+
+        Examples
+        --------
+        >>> Panel(x=Axis(ticks=()), y=Axis(ticks=())).bare, Panel(x=Axis(), y=Axis()).bare
+        (True, False)
+        """
+        return all(axis.ticks == () and not axis.label for axis in (self.x, self.y))
+
     def of(self, kind: type[_T]) -> tuple[_T, ...]:
         """Return the items of one kind.
 

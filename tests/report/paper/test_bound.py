@@ -9,13 +9,13 @@ from hypothesis import strategies as st
 from hmpim.errors import ArgumentError
 from hmpim.model import Model, simulate
 from hmpim.report.paper.bound import cramer_rao, phase90, resonance_db
-from hmpim.report.paper.sample import SYSTEM, _stimulus
+from hmpim.report.paper.sample import SYSTEM, sample_stimulus
 from hmpim.rigs import Sensor
 
 
 @pytest.fixture(scope="module")
 def stimulus():
-    return _stimulus()
+    return sample_stimulus()
 
 
 def test_bound_of_fig_17(stimulus):

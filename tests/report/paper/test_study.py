@@ -25,7 +25,7 @@ def value(study):
 
 
 def test_every_figure_that_needs_no_motion_table_is_made(study):
-    assert tuple(study.pictures) == FIGURES == (2, 3, 5, *range(7, 18), 23)
+    assert tuple(study.pictures) == FIGURES == (1, 2, 3, *range(5, 18), 23, 26)
 
 
 def test_no_panel_is_empty_or_without_its_unit(study):
@@ -35,7 +35,7 @@ def test_no_panel_is_empty_or_without_its_unit(study):
         for panel, frame in zip(picture.figure.panels, ends, strict=True):
             drawn = [curve for curve in panel.of(Curve) if np.ptp(curve.x) > 0]
             assert drawn, number
-            assert panel.y.label.endswith(")") or panel.column, number
+            assert panel.y.label.endswith(")") or panel.column or panel.bare, number
             lower, upper = frame.y
             assert any(np.any((curve.y > lower) & (curve.y < upper)) for curve in drawn), number
 
@@ -67,12 +67,36 @@ def test_fig_12(value, T, decibels):
     assert value(12, f"Peak acceleration, T = {T}") == pytest.approx(39400.0, rel=0.01)
 
 
-@pytest.mark.parametrize(("T", "n"), [("10", 0.83), ("12", 0.81)])
-def test_fig_13(value, T, n):
+@pytest.mark.parametrize(
+    ("T", "n", "decibels"), [("5", 0.918, 19.9), ("10", 0.83, 22.7), ("12", 0.81, 23.4)]
+)
+def test_fig_13(value, T, n, decibels):
     found = value(13, f"Smallest extinction factor n, T = {T} s")
     assert found == pytest.approx(n, abs=0.005)
-    assert 0.80 <= found <= 0.84
-    assert value(13, f"Level at 40 Hz with the window, T = {T} s") == pytest.approx(23.0, abs=1.0)
+    level = value(13, f"Level at 40 Hz with the window, T = {T} s")
+    assert level == pytest.approx(decibels, abs=0.2)
+
+
+def test_signs_as_printed_do_not_give_what_the_paper_finds(study):
+    row = {r.where: r for r in study.rows if r.where.startswith("Eq. (")}
+    assert row["Eq. (8)"].value == -150.0
+    # a motion that is shifted the wrong way is hardly like itself
+    assert row["Eq. (9)"].value > 2.5 * row["Eq. (9)"].truth
+    assert abs(row["Eq. (13)"].value) < 0.2
+    assert row["Eq. (11)"].value == pytest.approx(0.6, rel=0.03)
+    assert row["Eq. (11)"].truth == -0.6
+
+
+def test_every_lag_divided_by_the_same_n(value):
+    # R at the last lag is nothing, so that (14) gives (11); one lag apart the slope is nothing
+    assert value(11, "Noise with R(∞)") == pytest.approx(value(9, "Bias of"), rel=0.01)
+    assert value(11, "Noise by the spike") == pytest.approx(0.1, rel=0.1)
+
+
+def test_the_phase_of_fig_17_has_no_false_turns(study):
+    phase = study.pictures[17].figure.panels[-1].of(Curve)[0]
+    high = phase.x > 18.0
+    assert phase.y[high].max() < -800.0
 
 
 def test_amplitude_at_the_end_of_fig_13(value):
@@ -95,7 +119,7 @@ def test_fig_17_step_by_step(value):
     assert value(17, "Delay, by") == pytest.approx(170.0, abs=1e-9)
     assert value(17, "Bias, by") == pytest.approx(0.68, abs=0.01)
     assert value(17, "Noise, 1σ, by") == pytest.approx(0.31, abs=0.02)
-    assert value(17, "Natural frequency, by") is None
+    assert value(17, "Natural frequency, by") is None  # fewer than half of the records have one
     assert value(17, "Hump above DC, by") == pytest.approx(2.7, abs=0.3)
     assert value(17, "Bandwidth (−90°), by") == pytest.approx(1.534, abs=0.05)
 
@@ -132,7 +156,7 @@ def test_a_part_has_its_own_rows_only():
 
 
 def test_a_figure_of_the_motion_table_is_refused():
-    with pytest.raises(ArgumentError, match=r"figure 24 is not made here; choose of 2, 3, 5"):
+    with pytest.raises(ArgumentError, match=r"figure 24 is not made here; choose of 1, 2, 3"):
         make_study([12, 24])
 
 

@@ -254,7 +254,7 @@ def _finish(axes: "Axes", panel: Panel) -> None:
             axes.grid(visible=True, axis=which, color=COLOURS["grid"], linewidth=0.6)  # type: ignore[arg-type]
     axes.set_axisbelow(True)
     for side, spine in axes.spines.items():
-        spine.set_visible(side in ("left", "bottom"))
+        spine.set_visible(side in ("left", "bottom") and not panel.bare)
         spine.set_color(COLOURS["muted"])
         spine.set_linewidth(0.8)
     axes.tick_params(labelsize=_SMALL, colors=COLOURS["muted"], labelcolor=COLOURS["ink"])

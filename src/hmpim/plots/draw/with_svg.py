@@ -197,7 +197,8 @@ def _axes(pen: _Pen, panel: Panel, field: _Field, place: Place) -> list[str]:
     edge = f"M{left:.1f} {top:.1f}V{bottom:.1f}H{right:.1f}"
     edge += "".join(f"M{x:.1f} {bottom:.1f}v4" for x in xs)
     edge += "".join(f"M{left:.1f} {y:.1f}h-4" for y in ys)
-    parts.append(f'<path d="{edge}" fill="none" stroke="{pen.colour("muted")}"/>')
+    if not panel.bare:
+        parts.append(f'<path d="{edge}" fill="none" stroke="{pen.colour("muted")}"/>')
     if panel.x.numbered:
         parts += [
             pen.words(x, bottom + LINE, words, anchor="middle")

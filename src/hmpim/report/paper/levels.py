@@ -41,7 +41,7 @@ def levels_chapter() -> Chapter:
     ('Extinction factor n, T = 5 s', 0.0)
     """
     twelve = {T: _sweep(10.0, 1000.0, T) for T in (5.0, 10.0)}
-    thirteen = {T: _sweep(40.0, 500.0, T) for T in (10.0, 12.0)}
+    thirteen = {T: _sweep(40.0, 500.0, T) for T in (5.0, 10.0, 12.0)}
     pictures = {
         12: _level_picture(12, twelve[5.0]),
         13: _level_picture(13, thirteen[12.0]),
@@ -168,7 +168,7 @@ def _rows_13(sweeps: dict[float, Stimulus]) -> list[Row]:
                 stimulus.extinction,
                 0.81,
                 within=0.005,
-                otherwise="T is not printed; 12 s comes nearest.",
+                otherwise="T is not printed; 12 s comes nearest in n, 5 s in level.",
             ),
         )
         for T, stimulus in sweeps.items()
@@ -191,8 +191,10 @@ def _rows_13(sweeps: dict[float, Stimulus]) -> list[Row]:
             paper="~1 deg",
             value=float(amplitude[-1]),
             unit="deg",
-            why=f"The amplitude G/σ₂ passes 1 deg at {frequency:.3g} Hz, so that ~1 deg holds for "
-            "the higher frequencies as a whole.",
+            why="Cannot be: the acceleration limit allows 40 000/(2π·40)² = "
+            f"{40000.0 / (2.0 * math.pi * 40.0) ** 2:.2f} deg there. The amplitude G/σ₂ passes "
+            f"1 deg at {frequency:.3g} Hz, so that ~1 deg holds for the higher frequencies as a "
+            "whole.",
         ),
     ]
     rows += [
@@ -207,7 +209,7 @@ def _rows_13(sweeps: dict[float, Stimulus]) -> list[Row]:
                 value,
                 20.0,
                 within=1.0,
-                otherwise="The paper reads its own off a plot.",
+                otherwise="The paper reads its own off a plot; no T has both its n and its level.",
             ),
         )
         for T, value in level.items()

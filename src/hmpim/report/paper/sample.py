@@ -3,9 +3,10 @@
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hmpim.experiment import run
-from hmpim.identify import identify, paper_analysis
+from hmpim.identify import PairIdentification, identify, paper_analysis
 from hmpim.identify.response import delay_phase
 from hmpim.plots import Axis, Curve, Figure, Panel, Rule, model_curve, spectrum_curve
 from hmpim.plots.description import Item
@@ -13,14 +14,16 @@ from hmpim.report.figures import Picture
 from hmpim.report.numbers import format_number
 from hmpim.report.paper.bound import cramer_rao
 from hmpim.report.paper.chapter import Chapter
+from hmpim.report.paper.odds import read_many
 from hmpim.report.paper.panels import response_panels
 from hmpim.report.paper.sample_rows import Sample, sample_rows
 from hmpim.rigs import Sensor
 from hmpim.stimulus import Limits, Stimulus, design
 
-__all__ = ["SEED", "SYSTEM", "sample_chapter"]
+__all__ = ["SEED", "SYSTEM", "sample_chapter", "sample_stimulus"]
 
 SEED = 7
+RECORDS = 40  # whose readings by the paper's steps are averaged
 CLEAR = 16.0  # Hz; beyond, the windowed output sinks into the noise
 SYSTEM = Sensor(
     delay=0.15,
@@ -41,18 +44,24 @@ def sample_chapter() -> Chapter:
     >>> [row.ours for row in chapter.rows if row.quantity == "Delay, by the paper's steps"]
     ['170 ms']
     """
-    sample = _sample(_stimulus())
+    sample = _sample(sample_stimulus())
     pictures = {16: _picture_16(sample), 17: _picture_17(sample)}
     return Chapter(pictures=pictures, rows=sample_rows(sample))
 
 
-def _stimulus() -> Stimulus:
-    """The paper's sweep, as printed; it prints no amplitude, and 10 deg is Fig. 12's."""
+def sample_stimulus(amplitude: float = 10.0) -> Stimulus:
+    """Return the paper's sweep, as printed; it prints no amplitude, and 10 deg is Fig. 12's.
+
+    Examples
+    --------
+    >>> sample_stimulus(3.0).peaks.position
+    3.0
+    """
     return design(
         band=(0.1, 20.0),
         duration=10.0,
         fs=200.0,
-        limits=Limits(position=10.0, unit="deg"),
+        limits=Limits(position=amplitude, unit="deg"),
         extinction=1.0,
         lead=0,
     )
@@ -68,6 +77,7 @@ def _sample(stimulus: Stimulus) -> Sample:
         analysis=paper_analysis(u, y, stimulus.fs, band=stimulus.band),
         pair=identify(record)["y", "u"],
         bound=cramer_rao(SYSTEM, stimulus),
+        many=read_many(SYSTEM, stimulus, range(RECORDS)),
     )
 
 
@@ -145,7 +155,9 @@ def _picture_17(sample: Sample) -> Picture:
         title="Sample model parameter ID using HMPIM analyses",
         caption="Quadratic lag of 10 Hz with damping ratio 0.4, delay 150 ms, bias 0.6 deg, noise "
         f"0.1 deg; seed {SEED}. The paper's steps, one after another: {steps}. The joint fit: "
-        f"{joint}. At the end of the sweep the output sinks into the noise, and the phase with it.",
+        f"{joint}. At the end of the sweep the output sinks into the noise, and the phase with "
+        "it: each bin is drawn on the turn nearest the joint fit's, since followed from bin to bin "
+        "the phase would jump by whole turns at 19 Hz.",
         description=f"The whole analysis. Paper's steps: {steps}. Joint fit: {joint}.",
         figure=_figure_17(sample),
     )
@@ -224,7 +236,7 @@ def _responses_17(sample: Sample) -> tuple[Panel, Panel]:
     magnitude, phase = response_panels(analysis)
     upper: list[Item] = list(magnitude.items)
     lower: list[Item] = [
-        *phase.items,
+        *(replace(curve, y=_nearest_turn(curve.x, curve.y, pair)) for curve in phase.of(Curve)),
         Rule(at=-90.0, axis="y", colour="muted", dashes=":", width=0.8),
     ]
     grid = np.geomspace(*analysis.band, 400)
@@ -254,3 +266,17 @@ def _responses_17(sample: Sample) -> tuple[Panel, Panel]:
             column=1,
         ),
     )
+
+
+def _nearest_turn(
+    frequency: NDArray[np.float64], phase: NDArray[np.float64], pair: PairIdentification
+) -> NDArray[np.float64]:
+    """Put each bin's phase on the turn nearest the joint fit's.
+
+    Followed from bin to bin, the phase jumps by whole turns at 19 Hz, where the output has sunk
+    into the noise and the angle from one bin to the next is chance.
+    """
+    model = model_curve(pair, frequency)
+    if model is None:
+        return phase
+    return np.asarray(phase - 360.0 * np.round((phase - model.phase) / 360.0))

@@ -15,6 +15,7 @@ from hmpim.report.figures import Picture
 from hmpim.report.paper.chapter import Chapter
 from hmpim.report.paper.panels import response_panels
 from hmpim.report.paper.rows import Row, agreement
+from hmpim.report.paper.signs import sign_rows
 from hmpim.rigs import Sensor
 from hmpim.stimulus import Limits, design
 
@@ -88,9 +89,12 @@ def sensor_chapter() -> Chapter:
             key="fig10",
             title="Scale factor computation example",
             caption="The first cycle of the sweep and the measurement, time-corrected: at the "
-            "excitation's zero crossings stands the bias, at the non-zero points equation (13) "
-            f"gives the scale factor, {found.scale_factor:.4g}.",
-            description="Measurement over excitation: a straight line above the origin.",
+            "excitation's zero crossings stands the bias, "
+            f"{_words_of(_at_crossings(u[:cycle], y[lag : lag + cycle])[1])} deg here, noise "
+            "and all; at the non-zero points equation (13) gives the scale factor, "
+            f"{found.scale_factor:.4g}.",
+            description="Measurement over excitation: a straight line above the origin; at the "
+            "excitation's zero crossings, which are marked, it shows the bias.",
             figure=_figure_10(u[:cycle], y[lag : lag + cycle], analysis, fs),
         ),
         11: Picture(
@@ -103,7 +107,8 @@ def sensor_chapter() -> Chapter:
             figure=_figure_11(analysis),
         ),
     }
-    return Chapter(pictures=pictures, rows=_rows(analysis))
+    rows = (*_rows(analysis), *sign_rows(u, y, analysis, SENSOR))
+    return Chapter(pictures=pictures, rows=rows)
 
 
 def _record(rig: Sensor, *, last: float, duration: float, amplitude: float) -> Record:
@@ -223,6 +228,7 @@ def _figure_10(
 ) -> Figure:
     found = analysis.estimates
     time = np.arange(excitation.size) / fs
+    at, read = _at_crossings(excitation, corrected)
     over_time = Panel(
         x=Axis(label="Time (s)"),
         y=Axis(label="Angle (deg)"),
@@ -236,6 +242,14 @@ def _figure_10(
                 colour="output",
                 dashes="--",
                 width=1.0,
+            ),
+            Points(
+                x=at / fs,
+                y=read,
+                label=f"at the zero crossings: {_words_of(read)} deg",
+                colour="limit",
+                marker="s",
+                size=5.0,
             ),
         ),
     )
@@ -265,6 +279,21 @@ def _figure_10(
         heights=(2.2, 2.2),
         share_x=False,
     )
+
+
+def _at_crossings(
+    excitation: NDArray[np.float64], corrected: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Where the excitation crosses zero, in samples, and the measurement there."""
+    before = np.flatnonzero(excitation[:-1] * excitation[1:] < 0.0)
+    share = excitation[before] / (excitation[before] - excitation[before + 1])
+    on = np.flatnonzero(excitation == 0.0)
+    at = np.asarray(np.unique(np.concatenate((on, before + share))), dtype=np.float64)
+    return at, np.asarray(np.interp(at, np.arange(corrected.size), corrected), dtype=np.float64)
+
+
+def _words_of(values: NDArray[np.float64]) -> str:
+    return " and ".join(f"{value:.2f}" for value in values)
 
 
 def _figure_11(analysis: PaperAnalysis) -> Figure:

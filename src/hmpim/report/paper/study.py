@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 from hmpim.errors import ArgumentError
 from hmpim.report.figures import Picture
+from hmpim.report.paper.chains import ALIASING, chains_chapter
 from hmpim.report.paper.chapter import Chapter
 from hmpim.report.paper.fence import fence_chapter
 from hmpim.report.paper.levels import levels_chapter
@@ -17,6 +18,7 @@ from hmpim.report.paper.waveforms import waveforms_chapter
 __all__ = ["CHAPTERS", "FIGURES", "Chapter", "Study", "check_figures", "make_study"]
 
 CHAPTERS: Mapping[Callable[[], Chapter], tuple[int, ...]] = {
+    chains_chapter: (1, 6, ALIASING),
     sensor_chapter: (2, 7, 8, 9, 10, 11),
     waveforms_chapter: (3, 5),
     levels_chapter: (12, 13, 14),
@@ -25,7 +27,7 @@ CHAPTERS: Mapping[Callable[[], Chapter], tuple[int, ...]] = {
     fence_chapter: (23,),
 }
 FIGURES = tuple(sorted(number for numbers in CHAPTERS.values() for number in numbers))
-"""Numbers of the figures that need no motion table."""
+"""Numbers of the figures that need no motion table, and `ALIASING`, which the paper lacks."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

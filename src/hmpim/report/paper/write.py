@@ -8,6 +8,7 @@ from typing import Any
 
 from hmpim.formats.atomic import replacing, write_text
 from hmpim.plots.description import Figure
+from hmpim.report.paper.chains import ALIASING
 from hmpim.report.paper.rows import COLUMNS, cells, markdown_table, table_dict
 from hmpim.report.paper.study import Study
 from hmpim.report.svg import inline_svg
@@ -99,7 +100,7 @@ def render_page(study: Study) -> str:
     )
     figures: list[dict[str, Any]] = [
         {
-            "number": number,
+            "name": picture.title if number == ALIASING else f"Fig. {number}",
             "key": picture.key,
             "title": picture.title,
             "caption": picture.caption,

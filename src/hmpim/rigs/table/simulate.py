@@ -91,6 +91,8 @@ class Motion:
         Which commands count.
     timing : Timing
         Of commands and controller.
+    supply : float
+        Share of their torque limits that the actuators really give.
     resolution, noise_std : float
         Step of the encoders, and standard deviation of what each reading errs by, rad.
     rng : numpy.random.Generator
@@ -106,6 +108,7 @@ class Motion:
         start: FloatArray,
         mode: CommandMode,
         timing: Timing,
+        supply: float,
         resolution: float,
         noise_std: float,
         rng: np.random.Generator,
@@ -121,7 +124,7 @@ class Motion:
         limits = [axis.limits.to("rad") for axis in axes]
         self._rate_limit = RESERVE * np.array([x.velocity for x in limits])[joint]
         self._acceleration_limit = RESERVE * np.array([x.acceleration for x in limits])[joint]
-        self._torque_limit = np.array([x.torque_limit for x in axes])[joint]
+        self._torque_limit = supply * np.array([x.torque_limit for x in axes])[joint]
         self._overspeed = _OVERSPEED * np.array([x.velocity for x in limits])[joint]
         # Commands come late: those before the newest are needed, at rest the first of all.
         before = -(-timing.late // timing.hold)

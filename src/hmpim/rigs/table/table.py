@@ -57,6 +57,10 @@ class MotionTable(Simulated):
         Ticks of the servos per second, Hz; the stimulus's rate must divide it.
     delay : float
         Transport of a command to the servo, s; it takes force at the next tick.
+    supply : float
+        Share of the rated torques that the oil's pressure really gives, more than 0 and at most
+        1. Checks know the rating alone. A weak supply lowers the bandwidth at large levels,
+        where friction lowers it at small ones.
     encoder_resolution : float
         Step of the encoders, deg.
     encoder_noise_std : float
@@ -96,6 +100,7 @@ class MotionTable(Simulated):
     base: Base = _BLOCK
     controller_rate: float = 2000.0
     delay: float = 1e-3
+    supply: float = 1.0
     encoder_resolution: float = 0.003
     encoder_noise_std: float = 0.0005
     realtime: bool = False
@@ -117,6 +122,8 @@ class MotionTable(Simulated):
             value = getattr(self, name)
             if not (math.isfinite(value) and value >= 0.0):
                 raise ArgumentError(f"{name} = {value!r} must be 0 or positive, and finite")
+        if not 0.0 < self.supply <= 1.0:
+            raise ArgumentError(f"supply = {self.supply!r} must be more than 0 and at most 1")
         load_named("uut", self.uut_load)
         load_named("target", self.target_load)
         for axis in self.observe or ():
@@ -305,6 +312,7 @@ class MotionTable(Simulated):
             start=self.start_angles,
             mode=self.mode,
             timing=self.timing(fs),
+            supply=self.supply,
             resolution=math.radians(self.encoder_resolution),
             noise_std=math.radians(self.encoder_noise_std),
             rng=rng,
