@@ -89,8 +89,8 @@ def test_signs_as_printed_do_not_give_what_the_paper_finds(study):
 
 def test_every_lag_divided_by_the_same_n(value):
     # R at the last lag is nothing, so that (14) gives (11); one lag apart the slope is nothing
-    assert value(11, "Noise with R(∞)") == pytest.approx(value(9, "Bias of"), rel=0.01)
-    assert value(11, "Noise by the spike") == pytest.approx(0.1, rel=0.1)
+    assert value(11, "What (14)") == pytest.approx(value(9, "Bias of"), rel=0.01)
+    assert value(11, "Root of the spike") == pytest.approx(0.1, rel=0.1)
 
 
 def test_the_phase_of_fig_17_has_no_false_turns(study):

@@ -49,7 +49,7 @@ def sign_rows(
         Row(
             figure=9,
             where="Eq. (11)",
-            quantity=f"Bias read where the true one is −{sensor.bias:g} deg",
+            quantity=f"What (11) reads of a bias of −{sensor.bias:g} deg",
             paper="√R(0)",
             value=math.sqrt(float(np.nanmean((u - (meant - 2.0 * sensor.bias)) ** 2))),
             truth=-sensor.bias,
@@ -60,7 +60,7 @@ def sign_rows(
         Row(
             figure=10,
             where="Eq. (13)",
-            quantity="Scale factor by ε̃(n − δ)",
+            quantity="What (13) gives with ε̃(n − δ)",
             paper="n − δ",
             value=_slope(u, as_printed, bias),
             truth=sensor.scale_factor,
@@ -82,7 +82,7 @@ def _taper_rows(analysis: PaperAnalysis, sensor: Sensor) -> tuple[Row, ...]:
         Row(
             figure=11,
             where="Fig. 11, (14)",
-            quantity="Noise with R(∞) read at the last lag",
+            quantity="What (14) gives with R(∞) at the last lag",
             paper="R(∞)",
             value=last,
             truth=truth,
@@ -94,7 +94,7 @@ def _taper_rows(analysis: PaperAnalysis, sensor: Sensor) -> tuple[Row, ...]:
         Row(
             figure=11,
             where="Fig. 11, (14)",
-            quantity="Noise by the spike, R(0) − R(1)",
+            quantity="Root of the spike, R(0) − R(1)",
             value=spike(analysis),
             truth=truth,
             unit="deg",
