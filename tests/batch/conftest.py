@@ -1,9 +1,12 @@
 """Small fleets of records as files."""
 
+from dataclasses import replace
+
 import pytest
 
 import hmpim
-from batch_support import SAMPLES, gain_record
+from batch_support import gain_record, write_rows
+from hmpim.batch import work
 
 
 @pytest.fixture
@@ -18,23 +21,33 @@ def folder_of_records(tmp_path):
 
 @pytest.fixture
 def rows_file(tmp_path):
-    """A Parquet file of eight records, three to a row group, gains 1 to 8, with a bench each."""
-    import pyarrow as pa
-    from pyarrow import parquet
-
+    """Eight records in one Parquet file, as `write_rows` makes it."""
     path = tmp_path / "fleet.parquet"
-    tables = []
-    for k in range(1, 9):
-        record = gain_record(k, seed=k)
-        tables.append(
-            pa.table(
-                {
-                    "record": [f"unit{k}"] * SAMPLES,
-                    "u": record.inputs[0].values,
-                    "y": record.outputs[0].values,
-                    "bench": ["left" if k % 2 else "right"] * SAMPLES,
-                }
-            )
-        )
-    parquet.write_table(pa.concat_tables(tables), path, row_group_size=SAMPLES * 5 // 2)
+    write_rows(path)
     return path
+
+
+@pytest.fixture(scope="session")
+def first_unit():
+    """What is identified of the unit of gain 1, once."""
+    return hmpim.identify(gain_record(1))
+
+
+@pytest.fixture
+def gain_alone(monkeypatch, first_unit):
+    """For tests whose subject is not identification: the first unit's result, with each one's gain.
+
+    Gives the records that it was asked for.
+    """
+    pair, reference = first_unit.pairs[0], gain_record(1).outputs[0].values
+    asked = []
+
+    def told(record, **options):
+        asked.append(record)
+        gain = float(record.outputs[0].values @ reference / (reference @ reference))
+        scale = replace(pair.parameters.scale_factor, value=gain, ci95=(gain, gain))
+        parameters = replace(pair.parameters, scale_factor=scale)
+        return replace(first_unit, pairs=(replace(pair, parameters=parameters),))
+
+    monkeypatch.setattr(work, "identify", told)
+    return asked

@@ -7,7 +7,7 @@ import hmpim
 from hmpim.batch import Request, alike
 from hmpim.batch.run import Cluster
 
-FS, SAMPLES, UNITS = 100.0, 400, 14
+FS, SAMPLES, UNITS = 100.0, 300, 12
 
 
 def write_fleet(path) -> None:
@@ -15,7 +15,7 @@ def write_fleet(path) -> None:
     from pyarrow import parquet
 
     time = np.arange(SAMPLES) / FS
-    u = np.sin(2 * np.pi * (0.3 * time + 19.7 / 8 * time**2))
+    u = np.sin(2 * np.pi * (0.3 * time + 19.7 / 6 * time**2))
     rng = np.random.default_rng(5)
     outputs = []
     for k in range(UNITS):
@@ -26,7 +26,7 @@ def write_fleet(path) -> None:
         y = hmpim.simulate(model, u, fs=FS, intersample="bandlimited")
         outputs.append(y + 0.005 * rng.standard_normal(SAMPLES))
     outputs[9] = np.minimum(outputs[9], 0.8)  # clipped: not as the others
-    outputs[11][5] = np.nan
+    outputs[10][5] = np.nan
     cells = {"u": [u.tolist()] * UNITS, "y": [y.tolist() for y in outputs]}
     parquet.write_table(pa.table(cells), path)
 

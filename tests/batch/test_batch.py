@@ -39,7 +39,7 @@ def _named(table, end):
     return pc.ends_with(table.to_arrow(["record"]).column(0), end)
 
 
-def test_rows_of_one_file_are_records(rows_file, tmp_path):
+def test_rows_of_one_file_are_records(rows_file, tmp_path, gain_alone):
     """Row groups end in the middle of records."""
     table = hmpim.batch(rows_file, out=tmp_path / "out", fs=FS, cluster=HERE)
     assert gains(table) == {f"{rows_file}#unit{k}": float(k) for k in range(1, 9)}
@@ -47,7 +47,7 @@ def test_rows_of_one_file_are_records(rows_file, tmp_path):
     assert frame["meta_bench"].tolist().count("left") == 4
 
 
-def test_groups_of_one_file_are_records(tmp_path):
+def test_groups_of_one_file_are_records(tmp_path, gain_alone):
     path = tmp_path / "fleet.h5"
     with h5py.File(path, "w") as file:
         for k in (1, 2):
@@ -61,7 +61,7 @@ def test_groups_of_one_file_are_records(tmp_path):
     assert sorted(table.to_pandas(["meta_serial"])["meta_serial"]) == ["S1", "S2"]
 
 
-def test_lists_in_cells_are_records(tmp_path):
+def test_lists_in_cells_are_records(tmp_path, gain_alone):
     import pyarrow as pa
     from pyarrow import parquet
 
@@ -88,7 +88,7 @@ def test_a_record_that_fails_is_a_row_with_its_reason(folder_of_records, tmp_pat
     assert len(gains(table)) == 5
 
 
-def test_what_is_done_is_not_done_again(folder_of_records, tmp_path, monkeypatch):
+def test_what_is_done_is_not_done_again(folder_of_records, tmp_path, gain_alone):
     out = tmp_path / "out"
     hmpim.batch(folder_of_records, out=out, cluster=HERE)
     before = {p.name: p.stat().st_mtime_ns for p in parts_in(out)}
@@ -96,21 +96,14 @@ def test_what_is_done_is_not_done_again(folder_of_records, tmp_path, monkeypatch
     hmpim.save(gain_record(6), folder_of_records / "unit6.h5")
     hmpim.save(gain_record(7), folder_of_records / "unit7.h5")
 
-    asked = []
-    from hmpim.batch import work
-
-    def counted(record, **options):
-        asked.append(record)
-        return hmpim.identify(record, **options)
-
-    monkeypatch.setattr(work, "identify", counted)
+    gain_alone.clear()
     table = hmpim.batch(folder_of_records, out=out, cluster=HERE)
-    assert len(asked) == 2
+    assert len(gain_alone) == 2
     assert sorted(gains(table).values()) == [1, 2, 3, 4, 5, 6, 7]
     assert before.items() <= {p.name: p.stat().st_mtime_ns for p in parts_in(out)}.items()
 
 
-def test_a_file_that_was_changed_is_done_again(folder_of_records, tmp_path):
+def test_a_file_that_was_changed_is_done_again(folder_of_records, tmp_path, gain_alone):
     out = tmp_path / "out"
     hmpim.batch(folder_of_records / "unit1.h5", out=out, cluster=HERE)
     hmpim.save(gain_record(2.5), folder_of_records / "unit1.h5")
@@ -118,7 +111,7 @@ def test_a_file_that_was_changed_is_done_again(folder_of_records, tmp_path):
     assert gains(table)[str(folder_of_records / "unit1.h5")] == 2.5
 
 
-def test_another_request_is_refused(folder_of_records, tmp_path):
+def test_another_request_is_refused(folder_of_records, tmp_path, gain_alone):
     out = tmp_path / "out"
     hmpim.batch(folder_of_records / "unit1.h5", out=out, cluster=HERE)
     other = Request(intersample="zoh")
@@ -129,7 +122,7 @@ def test_another_request_is_refused(folder_of_records, tmp_path):
     assert open_table(out) == again
 
 
-def test_two_runs_do_not_write_to_one_folder(folder_of_records, tmp_path):
+def test_two_runs_do_not_write_to_one_folder(folder_of_records, tmp_path, gain_alone):
     def second(state):
         with pytest.raises(hmpim.HmpimError, match="another run is writing"):
             hmpim.batch(folder_of_records, out=tmp_path / "out", cluster=HERE)
@@ -142,7 +135,7 @@ def test_no_records_are_refused(tmp_path):
         hmpim.batch(tmp_path / "nothing", out=tmp_path / "out", cluster=HERE)
 
 
-def test_a_full_disk_loses_nothing(folder_of_records, tmp_path, monkeypatch):
+def test_a_full_disk_loses_nothing(folder_of_records, tmp_path, monkeypatch, gain_alone):
     """The part that does not fit is said; what was written stays, and the rest follows."""
     from pyarrow import parquet
 
@@ -164,7 +157,7 @@ def test_a_full_disk_loses_nothing(folder_of_records, tmp_path, monkeypatch):
     assert sorted(gains(table).values()) == [1, 2, 3, 4, 5]
 
 
-def test_metadata_comes_from_a_table_beside(folder_of_records, tmp_path):
+def test_metadata_comes_from_a_table_beside(folder_of_records, tmp_path, gain_alone):
     beside = tmp_path / "units.csv"
     beside.write_text("record,serial\nunit2.h5,B\nunit1,A\n")
     request = Request(metadata=str(beside))
@@ -174,7 +167,7 @@ def test_metadata_comes_from_a_table_beside(folder_of_records, tmp_path):
     assert frame[str(folder_of_records / "unit1.h5")] == "A"
 
 
-def test_polars_reads_it_lazily(rows_file, tmp_path):
+def test_polars_reads_it_lazily(rows_file, tmp_path, gain_alone):
     polars = pytest.importorskip("polars")
     table = hmpim.batch(rows_file, out=tmp_path / "out", fs=FS, cluster=HERE)
     lazy = table.scan()
@@ -184,7 +177,7 @@ def test_polars_reads_it_lazily(rows_file, tmp_path):
     assert means["left"] == pytest.approx(4.0, abs=0.01)
 
 
-def test_progress_counts_what_earlier_runs_did(folder_of_records, tmp_path):
+def test_progress_counts_what_earlier_runs_did(folder_of_records, tmp_path, gain_alone):
     told = []
     out = tmp_path / "out"
     hmpim.batch(folder_of_records / "unit1.h5", out=out, cluster=HERE)
@@ -193,7 +186,7 @@ def test_progress_counts_what_earlier_runs_did(folder_of_records, tmp_path):
     assert (last.records, last.total, last.repeated, last.failures) == (5, 5, 1, 0)
 
 
-def test_records_away_are_read_through_fsspec(tmp_path):
+def test_records_away_are_read_through_fsspec(tmp_path, gain_alone):
     import fsspec
 
     record = gain_record(2)
@@ -207,7 +200,7 @@ def test_records_away_are_read_through_fsspec(tmp_path):
     assert list(gains(table).values()) == [2.0]
 
 
-def test_rows_of_a_record_in_two_places_are_refused(tmp_path):
+def test_rows_of_a_record_in_two_places_are_refused(tmp_path, gain_alone):
     import pyarrow as pa
     from pyarrow import parquet
 
@@ -222,7 +215,7 @@ def test_rows_of_a_record_in_two_places_are_refused(tmp_path):
     assert "sort it by its column 'record'" in reasons[0]
 
 
-def test_the_stamp_is_plain(folder_of_records, tmp_path):
+def test_the_stamp_is_plain(folder_of_records, tmp_path, gain_alone):
     hmpim.batch(folder_of_records / "unit1.h5", out=tmp_path / "out", cluster=HERE)
     told = json.loads((tmp_path / "out" / "batch.json").read_text())
     assert told["schema"] == "hmpim/batch/1"

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.special import stdtrit
 
 import hmpim
 from hmpim.batch.between import between_units
@@ -12,7 +13,12 @@ from hmpim.batch.pooled import identify_groups
 @pytest.mark.few(150)
 @pytest.mark.parametrize("spread", [0.0, 0.05, 0.5])
 def test_intervals_hold_the_spread_and_the_mean(seeds, spread):
-    """Error bars of unequal length, 15 units; 95 % to four of its own deviations."""
+    """Error bars of unequal length, 15 units; each share to four of its own deviations.
+
+    The spread's interval holds with 95 %; with 97.5 % where there is none, since nothing lies
+    below. The mean's takes the estimated spread for the true one, which costs it most where the
+    spread is as large as the error bars: 93.1 % in 1500 draws.
+    """
     holds = mean = 0
     for seed in range(seeds):
         rng = np.random.default_rng([11, seed])
@@ -21,10 +27,10 @@ def test_intervals_hold_the_spread_and_the_mean(seeds, spread):
         found = between_units(values, errors)
         low, high = found.spread_ci95
         holds += low <= spread <= high
-        mean += abs(found.mean - 3) < 2.2 * found.mean_std
-    slack = 4 * np.sqrt(0.95 * 0.05 / seeds)
-    assert abs(holds / seeds - 0.95) < slack + 0.03 * (spread == 0)
-    assert mean / seeds > 0.93 - slack
+        mean += abs(found.mean - 3) < stdtrit(14, 0.975) * found.mean_std
+    share = 0.95 if spread else 0.975
+    assert abs(holds / seeds - share) < 4 * np.sqrt(share * (1 - share) / seeds)
+    assert mean / seeds > 0.93 - 4 * np.sqrt(0.95 * 0.05 / seeds)
 
 
 def test_units_do_not_depend_on_the_unit():
@@ -62,7 +68,11 @@ def test_a_history_is_one_identification(tmp_path):
     assert [name.rpartition("#")[2] for name, _ in reasons] == ["5"]
     for group, gain in zip(groups, (1.0, 2.0), strict=True):
         pair = group.result["y", "u"]
+        # White input and noise: least squares knows the gain to this. Its interval is no shorter
+        # than 1.96 times that, less four deviations of a noise level told from 1600 samples, 7 %.
+        error = 0.1 / np.sqrt(group.statistics.samples)
         low, high = pair.scale_factor.ci95
-        assert low - 0.01 <= gain <= high + 0.01
+        assert abs(pair.scale_factor.value - gain) < 4 * error
+        assert low + 1.82 * error < pair.scale_factor.value < high - 1.82 * error
         assert pair.delay.value == pytest.approx(0.04, abs=0.006)
         assert group.statistics.samples == 800 * group.records

@@ -4,6 +4,9 @@ import os
 import signal
 import subprocess
 import sys
+from types import SimpleNamespace
+
+import pytest
 
 import hmpim
 from batch_support import FS, rounded
@@ -13,8 +16,14 @@ from hmpim.batch.run import Cluster
 
 
 def test_a_worker_that_is_killed_loses_nothing(rows_file, tmp_path, monkeypatch):
-    """It is killed once it has work; the others, and the one in its place, do the rest."""
-    out = tmp_path / "out"
+    """It is killed once it has work; the one in its place does the rest.
+
+    Workers are started anew, and import nothing of the script that asked for them: here one that
+    ends every process that imports it, as multiprocessing's would.
+    """
+    out, script = tmp_path / "out", tmp_path / "script.py"
+    script.write_text("raise SystemExit('imported')\n")
+    monkeypatch.setitem(sys.modules, "__main__", SimpleNamespace(__file__=str(script)))
     crews = []
     begin = pool._Crew.__init__
 
@@ -40,8 +49,8 @@ def test_a_worker_that_is_killed_loses_nothing(rows_file, tmp_path, monkeypatch)
     assert len(table) == len(parts_in(out)) == 8
 
 
+@pytest.mark.study
 def test_a_script_without_a_guard_runs(rows_file, tmp_path):
-    """Workers are started anew, and import nothing of the script that asked for them."""
     script = tmp_path / "script.py"
     script.write_text(
         "import hmpim\n"

@@ -4,16 +4,19 @@ import numpy as np
 import pytest
 
 import hmpim
-from batch_support import FS
+from batch_support import FS, write_rows
 from hmpim.batch.expect import held_against, read_bound
 from hmpim.batch.run import Cluster
 from hmpim.batch.study import outliers, write_study
 from hmpim.batch.summary import summary_of
 
 
-@pytest.fixture
-def table(rows_file, tmp_path):
-    return hmpim.batch(rows_file, out=tmp_path / "out", fs=FS, cluster=Cluster(workers=0))
+@pytest.fixture(scope="module")
+def table(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("study")
+    write_rows(folder / "fleet.parquet")
+    here = Cluster(workers=0)
+    return hmpim.batch(folder / "fleet.parquet", out=folder / "out", fs=FS, cluster=here)
 
 
 def test_bounds_are_held_against_intervals(table, tmp_path):
@@ -31,7 +34,9 @@ def test_bounds_are_held_against_intervals(table, tmp_path):
 
 
 def test_units_of_bounds(table):
-    assert held_against(table, read_bound("delay > 1ms")).failed == 8
+    """Delays of 20 ms."""
+    assert held_against(table, read_bound("delay > 1ms")).passed == 8
+    assert held_against(table, read_bound("delay > 0.03 s")).failed == 8
     with pytest.raises(hmpim.HmpimError, match="'delay > 1Hz'"):
         held_against(table, read_bound("delay > 1Hz"))
     with pytest.raises(hmpim.HmpimError, match="is no bound"):
