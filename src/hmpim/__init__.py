@@ -11,7 +11,7 @@
 
 from hmpim.batch import batch
 from hmpim.errors import HmpimError
-from hmpim.experiment import run
+from hmpim.experiment import Until, run
 from hmpim.formats import load, read, save
 from hmpim.formats.models import export
 from hmpim.identify import (
@@ -67,6 +67,7 @@ __all__ = [
     "Stimulus",
     "SumOfSines",
     "Sweep",
+    "Until",
     "batch",
     "compress",
     "design",

@@ -63,6 +63,23 @@ def run(
             help="Where the record goes; one in .h5 is written as it comes, and survives a kill.",
         ),
     ] = None,
+    until: Annotated[
+        str,
+        typer.Option(
+            "--until",
+            metavar="RULE",
+            help="End as soon as these standard deviations are reached: "
+            "delay=0.4ms,natural_frequency=1%.",
+        ),
+    ] = "",
+    pair: Annotated[
+        tuple[str, str] | None,
+        typer.Option(
+            "--pair",
+            metavar="OUTPUT INPUT",
+            help="What --until is about, where several channels are recorded.",
+        ),
+    ] = None,
     log: Annotated[
         Path | None,
         typer.Option(
@@ -122,12 +139,15 @@ def run(
         writes={"-o": output, "--log": log, "--json": json, "--report": report},
     )
     _check_kept(output, kept=json is not None or report is not None)
-    from hmpim.experiment import Feel, RunLog, RunOptions
+    from hmpim.experiment import Feel, RunLog, RunOptions, until_of
     from hmpim.experiment import run as play
     from hmpim.formats.stimulus_files import read_stimuli
     from hmpim.rigs import TickClock, find_ticks
     from hmpim.rigs.catalogue import find_rig, read_description
 
+    rule = until_of(until, pair=pair) if until else None
+    if pair is not None and rule is None:
+        raise ArgumentError(f"--pair {pair[0]} {pair[1]} belongs to --until; give a rule too")
     described = None if rig_file is None else read_description(rig_file)
     found = find_rig(rig, description=described)
     stimuli = _aimed(read_stimuli(stimulus), axis, found.description.axes)
@@ -146,6 +166,7 @@ def run(
             path=output,
             rng=seed,
             limits=found.limits,
+            until=rule,
             subscribers=_watching(live=live),
             log=events,
             options=options,
@@ -154,6 +175,14 @@ def run(
         f"{record.samples} samples of {', '.join(c.name for c in record.outputs)} in "
         f"{record.duration:g} s from {record.source}"
     )
+    if record.stopping is not None:
+        stopped = record.stopping
+        say(
+            f"Sure after {stopped.time:.3g} s and {stopped.looks} looks ({stopped.rule}); "
+            f"{stopped.saved:.3g} s saved"
+        )
+    elif rule is not None:
+        say(f"Played to its end: not sure before ({rule})")
     if output is not None:
         say(f"Record: {output}")
     if json is None and report is None:

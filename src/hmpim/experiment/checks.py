@@ -14,7 +14,14 @@ from hmpim.stimulus import Limits, Stimulus, check_inside
 from hmpim.stimulus.limits import QUANTITIES
 from hmpim.units import rate_unit
 
-__all__ = ["check_rig", "check_stimuli", "check_watched", "limits_by_axis", "moves"]
+__all__ = [
+    "check_rig",
+    "check_stimuli",
+    "check_watched",
+    "follows_commands",
+    "limits_by_axis",
+    "moves",
+]
 
 
 def check_rig(rig: object) -> Rig:
@@ -51,6 +58,21 @@ def moves(rig: Rig) -> bool:
     False
     """
     return bool(getattr(rig, "moves", True))
+
+
+def follows_commands(rig: Rig) -> bool:
+    """Whether a rig plays what each block says, and not what it was prepared for.
+
+    What moves does. A simulation computes its answer to the whole stimulus beforehand, unless it
+    says `follows_commands = True`.
+
+    Examples
+    --------
+    >>> from hmpim.rigs import MotionTable, Sensor
+    >>> follows_commands(MotionTable()), follows_commands(Sensor())
+    (True, False)
+    """
+    return bool(getattr(rig, "follows_commands", moves(rig)))
 
 
 def check_watched(rig: Rig, *, needed: bool, log: RunLog) -> None:

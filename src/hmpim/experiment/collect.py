@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hmpim.errors import RecordError, RigError
-from hmpim.record import Channel, Record
+from hmpim.record import Channel, Record, Stopping
 from hmpim.rigs import Block, ChannelSpec, Commands, Layout, Reply, RunReport, Samples
 
 __all__ = ["Collected", "Played", "default_layout"]
@@ -78,6 +78,8 @@ class Collected:
         self._name = name
         self._specs = {spec.name: spec for spec in layout.channels}
         self._parts: dict[str, list[Samples]] = {spec.name: [] for spec in layout.channels}
+        self.stopping: Stopping | None = None
+        """That the run ends because it is sure."""
 
     def take(
         self, block: Block, reply: Reply, *, sent: FloatArray | None = None
@@ -141,6 +143,7 @@ class Collected:
                 references=tuple(channel(spec) for spec in self._layout.of("reference")),
                 auxiliary=tuple(channel(spec) for spec in self._layout.of("auxiliary")),
                 findings=said.findings,
+                stopping=self.stopping,
             )
         except RecordError as error:
             raise RigError(f"rig {self._name!r} delivered no usable record: {error}") from error

@@ -1,11 +1,13 @@
 """As undisturbed as the system allows: real-time scheduling, and no garbage collection."""
 
+import contextlib
 import gc
 import os
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-__all__ = ["undelayed"]
+__all__ = ["ordinary", "quick_to_switch", "undelayed"]
 
 _PRIORITY = 10  # of 1 to 99: above everything ordinary, below the system's own threads
 
@@ -39,6 +41,37 @@ def undelayed(*, realtime: bool) -> Iterator[str]:
             os.sched_setscheduler(0, policy, parameters)
         if collecting:
             gc.enable()
+
+
+@contextmanager
+def quick_to_switch(seconds: float | None) -> Iterator[None]:
+    """Let another thread of this process keep this one waiting for so many s at most.
+
+    Parameters
+    ----------
+    seconds : float or None
+        None leaves it as it is, which is 5 ms.
+
+    Examples
+    --------
+    >>> with quick_to_switch(5e-4):
+    ...     round(1e3 * sys.getswitchinterval(), 3)
+    0.5
+    """
+    before = sys.getswitchinterval()
+    if seconds is not None:
+        sys.setswitchinterval(seconds)
+    try:
+        yield
+    finally:
+        sys.setswitchinterval(before)
+
+
+def ordinary() -> None:
+    """Give up real-time scheduling in this thread, which has it from the one that began it."""
+    if hasattr(os, "sched_setscheduler"):
+        with contextlib.suppress(OSError):
+            os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
 
 
 def _raise() -> "tuple[tuple[int, os.sched_param] | None, str]":

@@ -11,7 +11,8 @@ from hmpim.experiment.checks import check_rig
 from hmpim.experiment.interrupt import ending_politely
 from hmpim.experiment.log import RunLog
 from hmpim.experiment.options import RunOptions
-from hmpim.experiment.running import Running, Subscriber, Until
+from hmpim.experiment.running import EndsWhen, Running, Subscriber
+from hmpim.experiment.until import Until
 from hmpim.record import Record
 from hmpim.rigs import LimitsOfAxes, Rig, Seeded
 from hmpim.stimulus import Stimulus
@@ -26,7 +27,7 @@ def run(
     path: str | PathLike[str] | None = None,
     rng: np.random.Generator | int | None = None,
     limits: LimitsOfAxes = None,
-    until: Until | None = None,
+    until: Until | EndsWhen | None = None,
     subscribers: Sequence[Subscriber] = (),
     log: RunLog | None = None,
     options: RunOptions | None = None,
@@ -50,9 +51,10 @@ def run(
         Source of what is random in a simulated unit, or its seed; None draws fresh.
     limits : Limits, or mapping of axis to Limits, or None
         To be kept beside the rig's own, whichever is smaller; the only ones if it states none.
-    until : callable or None
-        Called with every block that was played; a string that it returns ends the run, which is
-        no error, and stands in the record as the reason.
+    until : Until, callable or None
+        What must be known before the run may end: then what moves is led smoothly to rest, inside
+        the limits, and `Record.stopping` says so. Or called with every block that was played; a
+        string that it returns ends the run at once, and stands in the record as the reason.
     subscribers : sequence of callable
         Each is called with every block that was played. One that raises ends the run.
     log : RunLog or None
@@ -90,7 +92,7 @@ def run(
         ("path", path, str | PathLike[str] | None),
         ("limits", limits, LimitsOfAxes),
         ("subscribers", subscribers, Sequence[Subscriber]),
-        ("until", until, Until | None),
+        ("until", until, Until | EndsWhen | None),
         ("log", log, RunLog | None),
         ("options", options, RunOptions | None),
     ):

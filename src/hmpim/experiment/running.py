@@ -6,23 +6,33 @@ from dataclasses import dataclass, replace
 from os import PathLike
 
 from hmpim.errors import HmpimError, RigError
-from hmpim.experiment.checks import check_stimuli, check_watched, limits_by_axis, moves
+from hmpim.experiment.checks import (
+    check_stimuli,
+    check_watched,
+    follows_commands,
+    limits_by_axis,
+    moves,
+)
 from hmpim.experiment.collect import Collected, Played, default_layout
 from hmpim.experiment.feel import Feel, feel
 from hmpim.experiment.interrupt import undisturbed
 from hmpim.experiment.log import RunLog
 from hmpim.experiment.options import RunOptions
 from hmpim.experiment.pacer import Pacer
-from hmpim.experiment.priority import undelayed
+from hmpim.experiment.priority import quick_to_switch, undelayed
 from hmpim.experiment.recorder import Recorder
+from hmpim.experiment.sure import Leave, Sure
 from hmpim.experiment.timing import judge_timing, measure_timing
+from hmpim.experiment.until import Until
 from hmpim.experiment.watch import Watcher
-from hmpim.record import Finding, Record
+from hmpim.record import Finding, Record, Stopping
 from hmpim.rigs import (
+    Block,
     Clocked,
     Commands,
     Layout,
     LimitsOfAxes,
+    ManualClock,
     Reporting,
     Rig,
     RunReport,
@@ -31,16 +41,19 @@ from hmpim.rigs import (
     shared_band,
     stimuli_by_axis,
 )
+from hmpim.rigs.block import Pace
 from hmpim.stimulus import Limits, Stimulus, scaled_stimulus
 
-__all__ = ["Running", "Subscriber", "Until"]
+__all__ = ["EndsWhen", "Running", "Subscriber"]
 
 Subscriber = Callable[[Played], object]
 """Called with each block as it was played; what it returns is not looked at."""
 
-Until = Callable[[Played], str | None]
+EndsWhen = Callable[[Played], str | None]
 """Called with each block as it was played; a string ends the run, and is the reason."""
 
+_AHEAD = 0.2  # s of commands between a decision beside the run and what follows from it
+_SWITCH = 5e-4  # s that whoever looks at the estimate may keep the commands waiting
 _BLOCK = 0.02  # s: commands handed to a rig at once, and how often anybody watching is told
 
 
@@ -62,7 +75,7 @@ class Running:
     given: Stimulus | Mapping[str, Stimulus]
     limits: LimitsOfAxes
     subscribers: tuple[Subscriber, ...]
-    until: Until | None
+    until: Until | EndsWhen | None
     path: str | PathLike[str] | None
     log: RunLog
     options: RunOptions
@@ -156,7 +169,8 @@ class Running:
             ):
                 if moves(self.rig):
                     self.log.add("note", scheduling)
-                layout, collected = self._play(ready, findings, recorder)
+                with quick_to_switch(_SWITCH if isinstance(self.until, Until) else None):
+                    layout, collected = self._play(ready, findings, recorder)
         finally:
             self._stop()
         with self._faults_logged():
@@ -184,10 +198,12 @@ class Running:
         watcher = Watcher(
             self.options.watch, ready.limits, name=self.rig.name, real=moves(self.rig)
         )
+        sure = self._sure(ready, layout)
         size = max(1, round(_BLOCK * commands.fs))
         seconds = len(commands) / commands.fs
         self.log.add("start", f"{len(commands)} commands at {commands.fs:g} Hz, {seconds:g} s")
-        for block in commands.blocks(size, pace=ready.pacer):
+        playing = _Playing(commands, size=size, pace=ready.pacer)
+        for block in playing:
             reply = self.rig.play(block)
             samples = collected.take(block, reply, sent=ready.pacer.sent_of(block))
             recorder.take(samples, now=float(block.time[-1]))
@@ -198,16 +214,49 @@ class Running:
                 findings.append(_ended_early(reason, float(block.time[-1])))
                 self.log.add("done", f"ended after {block.stop} commands: {reason}")
                 break
+            leave = None if sure is None else sure(played)
+            if leave is not None:
+                sure = None
+                collected.stopping = self._left(leave, ready, playing)
         else:
-            self.log.add("done", f"{len(commands)} commands played")
+            self.log.add("done", f"{len(playing.commands)} commands played")
         return layout, collected
+
+    def _sure(self, ready: _Ready, layout: Layout) -> Sure | None:
+        """Whoever looks whether enough is known, beside the run if that is in real time."""
+        if not isinstance(self.until, Until):
+            return None
+        waits = not moves(self.rig) or isinstance(self.options.clock, ManualClock)
+        return Sure(self.until, ready.stimuli, ready.limits, layout, ahead=0.0 if waits else _AHEAD)
+
+    def _left(self, leave: Leave, ready: _Ready, playing: "_Playing") -> Stopping:
+        """Play the way to rest instead of what is left; what nothing moves ends at once."""
+        before = len(ready.commands)
+        if follows_commands(self.rig):
+            playing.commands = commands_of(dict(leave.stimuli))
+            left = len(playing.commands)
+        else:
+            left = playing.commands_until(leave.after)
+        fs = ready.commands.fs
+        stopping = Stopping(
+            rule=str(self.until),
+            looks=leave.looks,
+            time=leave.after / fs,
+            saved=(before - left) / fs,
+        )
+        self.log.add(
+            "note",
+            f"sure after {stopping.time:.3g} s and {stopping.looks} looks: {stopping.rule}; "
+            f"{stopping.saved:.3g} s saved",
+        )
+        return stopping
 
     def _told(self, played: Played) -> str | None:
         """Tell whoever watches; return the reason to end, if there is one."""
         try:
             for subscriber in self.subscribers:
                 subscriber(played)
-            return None if self.until is None else self.until(played)
+            return None if isinstance(self.until, Until | None) else self.until(played)
         except Exception as error:
             raise _WatcherError(error) from error
 
@@ -235,6 +284,25 @@ class Running:
         except BaseException as error:
             self.log.add("fault", _words(error))
             raise
+
+
+class _Playing:
+    """Blocks of commands, which may be exchanged for others that begin alike."""
+
+    def __init__(self, commands: Commands, *, size: int, pace: Pace) -> None:
+        self.commands, self._size, self._pace = commands, size, pace
+
+    def __iter__(self) -> Iterator[Block]:
+        first = 0
+        while first < len(self.commands):
+            block = self.commands.block(first, self._size, pace=self._pace)
+            yield block
+            first = block.stop
+
+    def commands_until(self, count: int) -> int:
+        """Leave out all commands from `count` on; return how many are left."""
+        self.commands = self.commands.cut(count)
+        return len(self.commands)
 
 
 def _words(error: BaseException) -> str:

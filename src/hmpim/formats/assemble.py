@@ -83,6 +83,7 @@ def assemble(
         findings=(*contents.findings, *findings, *said, *mended.findings),
         references=of(roles.references),
         auxiliary=of(roles.auxiliary),
+        stopping=contents.stopping,
     )
 
 

@@ -63,6 +63,7 @@ def write_csv(record: Record, path: str | PathLike[str]) -> None:
         "intersample": record.intersample,
         "source": record.source,
         "findings": [finding.to_dict() for finding in record.findings],
+        "stopping": None if record.stopping is None else record.stopping.to_dict(),
     }
     lines = [
         f"# {MARK}{json.dumps(notes)}",

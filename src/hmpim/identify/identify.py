@@ -151,7 +151,9 @@ def identify(
         record=RecordSummary(
             fs=aligned.fs, samples=record.samples, sha256=record.sha256, source=record.source
         ),
-        pairs=tuple(judged(pair) for pairs, _ in found for pair in pairs),
+        pairs=tuple(
+            replace(judged(pair), stopping=record.stopping) for pairs, _ in found for pair in pairs
+        ),
         inputs=inputs,
         data=record,
     )

@@ -9,6 +9,7 @@ from hmpim.record.propose import Proposal, propose
 from hmpim.record.quality import inspect_record, inspect_timing, inspect_values
 from hmpim.record.record import BETWEEN, ROLES, Channel, Intersample, Record, Role
 from hmpim.record.series import Series
+from hmpim.record.stopping import Stopping
 from hmpim.record.sweeps import Motion, find_motions
 
 __all__ = [
@@ -28,6 +29,7 @@ __all__ = [
     "Series",
     "Severity",
     "Signal",
+    "Stopping",
     "clock_offset",
     "describe",
     "find_motions",

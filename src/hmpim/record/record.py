@@ -13,6 +13,7 @@ from hmpim.equality import ByValue
 from hmpim.errors import ArgumentError, RecordError
 from hmpim.record.clock import fit_clock
 from hmpim.record.finding import Finding
+from hmpim.record.stopping import Stopping
 from hmpim.tables import html_table, shortened
 from hmpim.units import check_unit
 
@@ -142,6 +143,8 @@ class Record(ByValue):
     auxiliary : tuple of Channel
         What is kept beside, such as feedforward commands or a temperature; never fitted unless
         it is named.
+    stopping : Stopping or None
+        That the run was ended because it was sure, and when; None where it was not.
 
     Raises
     ------
@@ -158,6 +161,7 @@ class Record(ByValue):
     findings: tuple[Finding, ...] = ()
     references: tuple[Channel, ...] = ()
     auxiliary: tuple[Channel, ...] = ()
+    stopping: Stopping | None = None
 
     def __post_init__(self) -> None:
         if not len(self.inputs) or not len(self.outputs):

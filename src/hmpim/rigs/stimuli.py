@@ -1,7 +1,7 @@
 """Stimuli by axis, the commands of all axes together on one clock, and what software is fed."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import get_args
 
 import numpy as np
@@ -125,20 +125,33 @@ class Commands:
 
     def blocks(self, size: int, *, pace: Pace | None = None) -> Iterator[Block]:
         """Cut into blocks of `size` commands; the last may be shorter."""
-        count = len(self)
-        for first in range(0, count, size):
-            part = slice(first, min(first + size, count))
-            yield Block(
-                axes=self.axes,
-                start=first,
-                time=self.time[part],
-                position=self.position[part],
-                velocity=self.velocity[part],
-                acceleration=self.acceleration[part],
-                units=self.units,
-                last=first + size >= count,
-                pace=pace,
-            )
+        for first in range(0, len(self), size):
+            yield self.block(first, size, pace=pace)
+
+    def block(self, first: int, size: int, *, pace: Pace | None = None) -> Block:
+        """Return `size` commands from number `first` on, or as many as there are."""
+        part = slice(first, min(first + size, len(self)))
+        return Block(
+            axes=self.axes,
+            start=first,
+            time=self.time[part],
+            position=self.position[part],
+            velocity=self.velocity[part],
+            acceleration=self.acceleration[part],
+            units=self.units,
+            last=first + size >= len(self),
+            pace=pace,
+        )
+
+    def cut(self, count: int) -> "Commands":
+        """Return the first `count` commands."""
+        return replace(
+            self,
+            time=self.time[:count],
+            position=self.position[:count],
+            velocity=self.velocity[:count],
+            acceleration=self.acceleration[:count],
+        )
 
 
 def commands_of(named: Mapping[str, Stimulus]) -> Commands:

@@ -2,6 +2,7 @@
 
 from hmpim.stimulus.classical import Chirp, Ramp, Sine, Step, SumOfSines
 from hmpim.stimulus.command import Command, leave_room
+from hmpim.stimulus.ending import left_early, passes_band_at
 from hmpim.stimulus.exponential import ExponentialSweep
 from hmpim.stimulus.inside import check_inside
 from hmpim.stimulus.kinds import KINDS, Kind, design
@@ -68,7 +69,9 @@ __all__ = [
     "design",
     "interleaved_multisines",
     "leave_room",
+    "left_early",
     "measured_noise",
+    "passes_band_at",
     "random_phase_multisine",
     "repeated_sweeps",
     "rest_to_rest",

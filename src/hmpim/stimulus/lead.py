@@ -256,12 +256,12 @@ def rest_to_rest(
     entry = exit_ = None
     for join in _handovers(core, earliest, first, 0):
         state = _state(core, join)
-        entry = _gentlest(rest, state, start_peaks, limits, longest + join)
+        entry = gentlest_between(rest, state, start_peaks, limits, longest + join)
         if entry is not None:
             break
     for leave in _handovers(core, core.duration, last, -1):
         state = _state(core, leave)
-        exit_ = _gentlest(state, rest, end_peaks, limits, longest + core.duration - leave)
+        exit_ = gentlest_between(state, rest, end_peaks, limits, longest + core.duration - leave)
         if exit_ is not None:
             break
     if entry is None or exit_ is None:
@@ -406,7 +406,7 @@ def _turning(core: Waveform, times: FloatArray, which: int) -> float:
     return 0.5 * (low + high)
 
 
-def _gentlest(
+def gentlest_between(
     first: FloatArray, last: FloatArray, beside: Peaks, limits: Limits, longest: float
 ) -> Quintic | None:
     """The gentlest quintic beside its neighbour's peaks, of those that keep the limits."""

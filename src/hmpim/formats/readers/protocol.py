@@ -8,7 +8,7 @@ from types import ModuleType
 from typing import Literal
 
 from hmpim.errors import MissingExtraError
-from hmpim.record import Finding, Intersample, Series
+from hmpim.record import Finding, Intersample, Series, Stopping
 
 __all__ = ["ChannelInfo", "Contents", "Layout", "Reader", "Stamps", "listed", "need"]
 
@@ -111,6 +111,7 @@ class Contents:
     intersample: Intersample | None = None
     source: str | None = None
     findings: tuple[Finding, ...] = ()
+    stopping: Stopping | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -46,6 +46,7 @@ def channels(path: Path, layout: Layout) -> Contents:
         intersample=heading.intersample,
         source=heading.source,
         findings=tuple(findings),
+        stopping=heading.stopping,
     )
 
 

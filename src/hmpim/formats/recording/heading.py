@@ -14,7 +14,7 @@ import numpy as np
 from hmpim.equality import ByValue
 from hmpim.errors import FormatError
 from hmpim.formats.recording.text import put_text, put_text_dataset, text_of
-from hmpim.record import Finding, Intersample
+from hmpim.record import Finding, Intersample, Stopping
 from hmpim.stimulus import Limits
 from hmpim.stimulus.limits import QUANTITIES
 
@@ -56,6 +56,8 @@ class Heading(ByValue):
         On what.
     limits : mapping of str to Limits
         What the rig bears, by axis; the axis is '' where it has one only.
+    stopping : Stopping or None
+        That the run was ended because it was sure.
     created, version : str
         When the file was begun (ISO 8601), and by which version of hmpim.
     """
@@ -68,6 +70,7 @@ class Heading(ByValue):
     specification: str = ""
     rig: str = ""
     limits: Mapping[str, Limits] = field(default_factory=dict)
+    stopping: Stopping | None = None
     created: str = ""
     version: str = field(default_factory=lambda: installed_version())
 
@@ -106,6 +109,8 @@ def checksum(heading: Heading) -> int:
         heading.created,
         heading.version,
     ]
+    if heading.stopping is not None:  # files of before have none, and keep their checksum
+        said.append(heading.stopping.to_dict())
     return zlib.crc32(json.dumps(said).encode())
 
 
@@ -153,6 +158,8 @@ def write_details(file: Any, heading: Heading) -> None:
     if heading.findings:
         lines = [json.dumps(finding.to_dict(), ensure_ascii=False) for finding in heading.findings]
         put_text_dataset(file, "findings", lines)
+    if heading.stopping is not None:
+        put_text_dataset(file, "stopping", json.dumps(heading.stopping.to_dict()))
     if heading.specification:
         put_text_dataset(file, "stimulus", heading.specification)
     for number, (axis, limits) in enumerate(heading.limits.items()):
@@ -193,6 +200,9 @@ def read_heading(file: Any) -> tuple[Heading, bool]:
         specification=file["stimulus"].asstr()[()] if "stimulus" in file else "",
         rig=text_of(attributes["rig"]),
         limits=_read_limits(file),
+        stopping=Stopping.from_dict(json.loads(file["stopping"].asstr()[()]))
+        if "stopping" in file
+        else None,
         created=text_of(attributes["created"]),
         version=text_of(attributes["version"]),
     )

@@ -115,6 +115,7 @@ def save_recording(
             limits=limits,
         ),
         findings=record.findings,
+        stopping=record.stopping,
     )
     tracks = [
         Track(role=role, series=Series(name=c.name, values=c.values, time=c.time, unit=c.unit))
@@ -223,6 +224,7 @@ def _record(opened: Opened, file: str) -> Record:
         findings=(*findings, *mended.findings),
         references=tuple(by_role["reference"]),
         auxiliary=tuple(by_role["auxiliary"]),
+        stopping=heading.stopping,
     )
 
 

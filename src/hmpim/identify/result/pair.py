@@ -12,7 +12,7 @@ from hmpim.identify.result.digits import interval
 from hmpim.identify.result.estimate import Estimate, Verdict
 from hmpim.identify.result.measured import FrequencyResponse, Nonlinearity, ResponseBandwidths
 from hmpim.identify.result.parameters import PaperEstimates, Parameters
-from hmpim.record import Finding, Intersample
+from hmpim.record import Finding, Intersample, Stopping
 from hmpim.tables import html_table, shortened
 
 __all__ = ["Candidate", "PairIdentification", "pair_rows"]
@@ -45,7 +45,7 @@ class PairIdentification(ByValue):
     are on the record's own uniform clock `time`; they follow from the record, and are part neither
     of the JSON nor of equality. `from_response` holds bandwidths read off the measured response, to
     be held against the model's. `nonlinearity` is None where the output does not follow the input
-    at all.
+    at all. `stopping` says that the run was ended because it was sure.
     """
 
     input: str
@@ -67,6 +67,7 @@ class PairIdentification(ByValue):
     residual: NDArray[np.float64] | None = field(default=None, compare=False)
     nonlinearity: Nonlinearity | None = None
     covariance: NDArray[np.float64] | None = None
+    stopping: Stopping | None = None
 
     def __repr__(self) -> str:
         told = dict(_given(self.parameters))
@@ -106,7 +107,7 @@ class PairIdentification(ByValue):
             "nonlinearity": None if self.nonlinearity is None else self.nonlinearity.to_dict(),
             "verdict": self.verdict,
             "warnings": [warning.to_dict() for warning in self.warnings],
-            "stopping": None,
+            "stopping": None if self.stopping is None else self.stopping.to_dict(),
         }
 
     @classmethod
@@ -131,6 +132,7 @@ class PairIdentification(ByValue):
             warnings=tuple(Finding.from_dict(w) for w in data["warnings"]),
             nonlinearity=None if nonlinearity is None else Nonlinearity.from_dict(nonlinearity),
             covariance=None if covariance is None else np.array(covariance, dtype=np.float64),
+            stopping=Stopping.from_dict(data["stopping"]) if data.get("stopping") else None,
         )
 
     @property

@@ -133,6 +133,11 @@ class Mounted:
         return bool(getattr(self._carrier, "moves", True))
 
     @property
+    def follows_commands(self) -> bool:
+        """Whether the carrier plays what each block says."""
+        return bool(getattr(self._carrier, "follows_commands", self.moves))
+
+    @property
     def watchdog(self) -> float | None:
         """Watchdog of the carrier."""
         watchdog: float | None = getattr(self._carrier, "watchdog", None)

@@ -132,6 +132,11 @@ class MotionTable(Simulated):
             self.limits_of(axis)
 
     @property
+    def follows_commands(self) -> bool:
+        """True: each block is played as it comes."""
+        return True
+
+    @property
     def axes(self) -> tuple[str, ...]:
         """Names of the five axes."""
         return AXES

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 from hmpim.errors import FormatError
 from hmpim.formats.readers.text.headings import Heading
-from hmpim.record import Finding, Intersample, Role
+from hmpim.record import Finding, Intersample, Role, Stopping
 
 __all__ = ["KINDS", "MARK", "Notes", "heading_of", "read_notes"]
 
@@ -43,6 +43,8 @@ class Notes:
         Where the record comes from.
     findings : tuple of Finding
         What was noticed when the record was first read.
+    stopping : Stopping or None
+        That the run was ended because it was sure.
     """
 
     headings: tuple[Heading, ...]
@@ -52,6 +54,7 @@ class Notes:
     intersample: Intersample | None
     source: str
     findings: tuple[Finding, ...]
+    stopping: Stopping | None
 
 
 def heading_of(name: str, unit: str) -> str:
@@ -115,4 +118,5 @@ def _checked(noted: object, headings: Sequence[Heading]) -> Notes | None:
         intersample=noted["intersample"],
         source=str(noted["source"]),
         findings=tuple(Finding.from_dict(f) for f in noted.get("findings", [])),
+        stopping=Stopping.from_dict(noted["stopping"]) if noted.get("stopping") else None,
     )

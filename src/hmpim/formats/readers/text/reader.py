@@ -84,6 +84,7 @@ def list_table(lines: Lines, layout: Layout, *, form: str) -> Contents:
         intersample=notes.intersample,
         source=notes.source,
         findings=(*notes.findings, *findings),
+        stopping=notes.stopping,
     )
 
 

@@ -1,0 +1,273 @@
+"""Whether enough is known to end a run: looks at the estimate so far, while samples come.
+
+Fixed-width intervals at a random time (Y. S. Chow and H. Robbins, Ann. Math. Stat. 36, 1965;
+R. A. Khan, Ann. Math. Stat. 40, 1969): sampling ends at the first look at which the estimated
+standard deviation is as small as wanted. See docs/live.md for what has to be added to that for
+a sweep.
+"""
+
+import threading
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hmpim.errors import ArgumentError, HmpimError, LimitsError
+from hmpim.experiment.collect import Played
+from hmpim.experiment.priority import ordinary
+from hmpim.experiment.until import Until
+from hmpim.identify import LiveEstimator
+from hmpim.identify.statistics import Look
+from hmpim.record import Channel, Record, uniform
+from hmpim.rigs import ChannelSpec, Layout, Samples
+from hmpim.stimulus import Limits, Stimulus, left_early, passes_band_at
+
+__all__ = ["Leave", "Sure", "pair_of"]
+
+Real = NDArray[np.float64]
+
+_BACK = 8  # samples held back where channels must be interpolated: the next ones change them
+_HOLE = 10  # samples missing in a row after which nothing is claimed any more
+_EVEN = 0.1  # of an interval by which stamps of one clock may be uneven
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Leave:
+    """How a run ends: what is played instead, and how often was looked.
+
+    Parameters
+    ----------
+    stimuli : mapping of axis to Stimulus
+        The same as played so far, and then on to rest.
+    after : int
+        Commands that are still the old ones.
+    looks : int
+        At the estimate, so far.
+    look : Look
+        The last one.
+    """
+
+    stimuli: Mapping[str, Stimulus]
+    after: int
+    looks: int
+    look: Look
+
+
+def pair_of(until: Until, layout: Layout) -> tuple[ChannelSpec, ChannelSpec]:
+    """Input and output that a rule is about.
+
+    Parameters
+    ----------
+    until : Until
+        The rule.
+    layout : Layout
+        What is recorded.
+
+    Raises
+    ------
+    ArgumentError
+        If there are several and none is named, or the name is not there.
+
+    Examples
+    --------
+    >>> layout = Layout(
+    ...     channels=(ChannelSpec(name="u", role="input"), ChannelSpec(name="y", role="output"))
+    ... )
+    >>> [spec.name for spec in pair_of(Until(delay=1e-3), layout)]
+    ['u', 'y']
+    """
+    inputs, outputs = layout.of("input"), layout.of("output")
+    known = ", ".join(repr(spec.name) for spec in layout.channels)
+    if until.pair is None:
+        if len(inputs) > 1 or len(outputs) > 1:
+            raise ArgumentError(
+                f"the run has {len(inputs)} inputs and {len(outputs)} outputs; say which pair "
+                f"--until is about, output first; the channels are {known}"
+            )
+        return inputs[0], outputs[0]
+    by_name = {spec.name: spec for spec in layout.channels}
+    for name in until.pair:
+        if name not in by_name:
+            raise ArgumentError(f"--until is about {name!r}, and the channels are {known}")
+    output, source = until.pair
+    return by_name[source], by_name[output]
+
+
+class _Pair:
+    """Samples of an input and an output, put on one uniform clock as they come."""
+
+    def __init__(self, names: tuple[str, str], *, fs: float) -> None:
+        self._names, self._fs = names, fs
+        self._parts: dict[str, list[Samples]] = {name: [] for name in names}
+        self._given = 0
+        self.whole = True
+        """Whether no more than a few samples are missing."""
+
+    def add(self, samples: Mapping[str, Samples], *, now: float) -> None:
+        """Take what has come; a clock that is far from the run's begins with its first arrival."""
+        for name in self._names:
+            part = samples.get(name)
+            if part is None or not part.time.size:
+                continue
+            self._parts[name].append(part)
+
+    def fresh(self) -> tuple[Real, Real]:
+        """Samples of both that were not given before."""
+        whole = [Samples.joined(self._parts[name]) for name in self._names if self._parts[name]]
+        if len(whole) < 2 or min(part.time.size for part in whole) < 4 * _BACK:
+            return np.empty(0), np.empty(0)
+        u, y = whole
+        if u.time.size == y.time.size and np.array_equal(u.time, y.time) and self._even(u.time):
+            values, known = (u.values, y.values), u.time.size
+        else:
+            aligned = uniform(self._record(u, y))
+            one, other = aligned.inputs[0], aligned.outputs[0]
+            self._look_for_holes(one.valid & other.valid)
+            values, known = (one.values, other.values), aligned.samples - _BACK
+        fresh = slice(self._given, max(known, self._given))
+        self._given = fresh.stop
+        return values[0][fresh], values[1][fresh]
+
+    def _even(self, time: Real) -> bool:
+        return bool(np.abs(np.diff(time) * self._fs - 1.0).max() < _EVEN)
+
+    def _record(self, u: Samples, y: Samples) -> Record:
+        late = float(y.time[0] - u.time[0])
+        shift = late if abs(late) > 1.0 else 0.0
+        source, answer = (
+            Channel(name=name, time=part.time - by, values=part.values)
+            for name, part, by in zip(("u", "y"), (u, y), (0.0, shift), strict=True)
+        )
+        return Record(inputs=(source,), outputs=(answer,), fs=self._fs)
+
+    def _look_for_holes(self, valid: NDArray[np.bool_]) -> None:
+        edges = np.flatnonzero(np.diff(np.concatenate(([True], valid, [True])).astype(np.int8)))
+        if edges.size and int(np.diff(edges.reshape(-1, 2), axis=1).max()) > _HOLE:
+            self.whole = False
+
+
+class Sure:
+    """Looks on while a run is played, and says how to leave it as soon as enough is known.
+
+    Parameters
+    ----------
+    until : Until
+        What must be known.
+    stimuli : mapping of axis to Stimulus
+        What is played.
+    limits : mapping of axis to Limits or None
+        To be kept on the way to rest.
+    layout : Layout
+        What is recorded.
+    ahead : float
+        Seconds of commands that are played while a look is taken; 0 where the run waits for it.
+    """
+
+    def __init__(
+        self,
+        until: Until,
+        stimuli: Mapping[str, Stimulus],
+        limits: Mapping[str, Limits | None],
+        layout: Layout,
+        *,
+        ahead: float = 0.0,
+    ) -> None:
+        source, output = pair_of(until, layout)
+        if len(stimuli) > 1:
+            raise ArgumentError(
+                f"--until is for one axis at a time, and {', '.join(stimuli)} move together; run "
+                "them one after another"
+            )
+        self._until, self._stimuli, self._limits = until, dict(stimuli), dict(limits)
+        self._stimulus = next(iter(stimuli.values()))
+        if self._stimulus.band is None:
+            raise ArgumentError(
+                "the stimulus has no band, so that nobody knows when it has passed it; take one "
+                "that has, design(kind='repeated') for instance"
+            )
+        self._pair = _Pair((source.name, output.name), fs=self._stimulus.fs)
+        mode = layout.intersample or "bandlimited"
+        self._live = LiveEstimator(
+            self._stimulus, intersample="bandlimited" if mode == "sampled" else mode
+        )
+        self._passed = passes_band_at(self._stimulus)
+        self._ahead = ahead
+        self._next = 0.0
+        self._met = self._looks = 0
+        self._waiting: list[tuple[Mapping[str, Samples], float]] = []
+        self._busy: threading.Thread | None = None
+        self._found: Leave | None = None
+        self._failed: HmpimError | None = None
+
+    def __call__(self, played: Played) -> Leave | None:
+        """Take a block; return how to leave the run once enough is known.
+
+        Raises
+        ------
+        HmpimError
+            If the samples cannot be read.
+        """
+        now = float(played.block.time[-1])
+        self._waiting.append((played.samples, now))
+        if self._failed is not None:
+            raise self._failed
+        if self._found is not None:
+            found, self._found = self._found, None
+            if found.after >= played.block.stop:
+                return found
+            self._met = self._until.looks - 1  # it came too late; the next look decides
+        if now < self._next or (self._busy is not None and self._busy.is_alive()):
+            return None
+        self._next = max(self._next + self._until.every, now)
+        waiting, self._waiting = self._waiting, []
+        after = played.block.stop + round(self._ahead * self._stimulus.fs)
+        if self._ahead == 0.0:
+            return self._looked(waiting, after)
+        self._busy = threading.Thread(target=self._beside, args=(waiting, after), daemon=True)
+        self._busy.start()
+        return None
+
+    def _beside(self, waiting: list[tuple[Mapping[str, Samples], float]], after: int) -> None:
+        """Look beside the run, which goes on."""
+        ordinary()
+        try:
+            self._found = self._looked(waiting, after)
+        except HmpimError as error:
+            self._failed = error
+
+    def _looked(
+        self, waiting: list[tuple[Mapping[str, Samples], float]], after: int
+    ) -> Leave | None:
+        for samples, now in waiting:
+            self._pair.add(samples, now=now)
+        u, y = self._pair.fresh()
+        self._live.read(u, y)
+        time = self._live.statistics.samples / self._stimulus.fs
+        if not u.size or time < self._passed:
+            return None
+        look = self._live.look()
+        self._looks += 1
+        self._met = self._met + 1 if look is not None and self._is_enough(look) else 0
+        if look is None or self._met < self._until.looks:
+            return None
+        try:
+            stimuli = {
+                axis: left_early(one, after=after, limits=self._limits[axis], whose=axis or "it")
+                for axis, one in self._stimuli.items()
+            }
+        except LimitsError:
+            return None  # later, perhaps; or it is played to its end
+        if all(short is self._stimuli[axis] for axis, short in stimuli.items()):
+            return None  # it ends by itself as soon
+        return Leave(stimuli=stimuli, after=after, looks=self._looks, look=look)
+
+    def _is_enough(self, look: Look) -> bool:
+        """Whether the rule holds, and the answer to the whole band is in."""
+        delay = look.parameters.delay
+        answered = 0.0 if delay is None else max(delay.value, 0.0)
+        return (
+            self._pair.whole
+            and look.time >= self._passed + answered
+            and self._until.is_met(look.parameters)
+        )
