@@ -8,7 +8,7 @@ import hmpim
 
 PUBLIC = {
     "Channel", "Chirp", "Estimate", "FunctionRig", "HmpimError", "Identification", "Limits",
-    "Model", "Ramp", "Record", "Sensor", "Sine", "Step", "Stimulus", "SumOfSines", "Sweep",
+    "Model", "Ramp", "Record", "Sensor", "Sine", "Step", "Stimulus", "SumOfSines", "Sweep", "Until",
     "LiveEstimator", "Statistics", "batch", "compress",
     "design", "design_axes", "draw_models", "export", "frequency_response", "gentlest",
     "identify", "identify_levels", "identify_repeats", "load", "paper_analysis", "predict",

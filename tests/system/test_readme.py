@@ -89,6 +89,7 @@ def test_the_public_names():
         "Stimulus",
         "SumOfSines",
         "Sweep",
+        "Until",
         "batch",
         "compress",
         "design",
