@@ -97,7 +97,7 @@ def checksum(heading: Heading) -> int:
     >>> checksum(Heading(fs=100.0)) == checksum(Heading(fs=100.1))
     False
     """
-    said = [
+    said: list[Any] = [
         repr(float(heading.fs)),
         None if heading.band is None else [repr(float(f)) for f in heading.band],
         heading.intersample,
