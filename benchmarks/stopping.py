@@ -1,8 +1,8 @@
 """Runs that end when they are sure: when they end, and whether their intervals hold there.
 
 ``stopping.py RULE FIRST LAST --out FILE`` plays one system (second order 10 Hz, ζ 0.4, delay
-150 ms, bias 0.6, noise 0.1; 0.1 to 20 Hz, 200 Hz, amplitude 1) for each seed, and adds a line of JSON to
-FILE. ``stopping.py table FILE`` makes the table of docs/live.md of it. Rules:
+150 ms, bias 0.6, noise 0.1; 0.1 to 20 Hz, 200 Hz, amplitude 1) for each seed, and adds a
+line of JSON to FILE. ``stopping.py table FILE`` makes the table of docs/live.md of it. Rules:
 
 repeated    sweeps of 0.6 s up and down, as `hmpim.run(until=...)` ends them
 beyond      the same with a mode of 35 Hz
