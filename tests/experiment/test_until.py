@@ -158,7 +158,8 @@ def test_what_moves_is_led_to_rest_inside_its_limits():
 
 
 def test_beside_a_run_in_real_time_nobody_waits_for_a_look():
-    record, unit, _ = followed(clock=False)
+    rule = Until(delay=2e-3, looks=1)  # soon met: a busy machine takes its time for a look
+    record, unit, _ = followed(until=rule, clock=False)
     assert record.stopping is not None
     ends_at_rest_inside(unit, record.stopping)
 

@@ -29,6 +29,7 @@ Real = NDArray[np.float64]
 
 _BACK = 8  # samples held back where channels must be interpolated: the next ones change them
 _HOLE = 10  # samples missing in a row after which nothing is claimed any more
+_FARTHEST = 2.0  # s of commands that are played at most while a look is taken
 _EVEN = 0.1  # of an interval by which stamps of one clock may be uneven
 
 
@@ -104,8 +105,8 @@ class _Pair:
         self.whole = True
         """Whether no more than a few samples are missing."""
 
-    def add(self, samples: Mapping[str, Samples], *, now: float) -> None:
-        """Take what has come; a clock that is far from the run's begins with its first arrival."""
+    def add(self, samples: Mapping[str, Samples]) -> None:
+        """Take what has come."""
         for name in self._names:
             part = samples.get(name)
             if part is None or not part.time.size:
@@ -133,6 +134,7 @@ class _Pair:
         return bool(np.abs(np.diff(time) * self._fs - 1.0).max() < _EVEN)
 
     def _record(self, u: Samples, y: Samples) -> Record:
+        """Both; a clock of its own that is far from the run's begins with its first sample."""
         late = float(y.time[0] - u.time[0])
         shift = late if abs(late) > 1.0 else 0.0
         source, answer = (
@@ -195,7 +197,8 @@ class Sure:
         self._ahead = ahead
         self._next = 0.0
         self._met = self._looks = 0
-        self._waiting: list[tuple[Mapping[str, Samples], float]] = []
+        self._waiting: list[Mapping[str, Samples]] = []
+        self._stop = 0
         self._busy: threading.Thread | None = None
         self._found: Leave | None = None
         self._failed: HmpimError | None = None
@@ -209,38 +212,38 @@ class Sure:
             If the samples cannot be read.
         """
         now = float(played.block.time[-1])
-        self._waiting.append((played.samples, now))
+        self._stop = played.block.stop
+        self._waiting.append(played.samples)
         if self._failed is not None:
             raise self._failed
         if self._found is not None:
             found, self._found = self._found, None
-            if found.after >= played.block.stop:
+            late = (played.block.stop - found.after) / self._stimulus.fs
+            if late <= 0.0:
                 return found
             self._met = self._until.looks - 1  # it came too late; the next look decides
+            self._ahead = min(2.0 * (self._ahead + late), _FARTHEST)
         if now < self._next or (self._busy is not None and self._busy.is_alive()):
             return None
         self._next = max(self._next + self._until.every, now)
         waiting, self._waiting = self._waiting, []
-        after = played.block.stop + round(self._ahead * self._stimulus.fs)
         if self._ahead == 0.0:
-            return self._looked(waiting, after)
-        self._busy = threading.Thread(target=self._beside, args=(waiting, after), daemon=True)
+            return self._looked(waiting)
+        self._busy = threading.Thread(target=self._beside, args=(waiting,), daemon=True)
         self._busy.start()
         return None
 
-    def _beside(self, waiting: list[tuple[Mapping[str, Samples], float]], after: int) -> None:
+    def _beside(self, waiting: list[Mapping[str, Samples]]) -> None:
         """Look beside the run, which goes on."""
         ordinary()
         try:
-            self._found = self._looked(waiting, after)
+            self._found = self._looked(waiting)
         except HmpimError as error:
             self._failed = error
 
-    def _looked(
-        self, waiting: list[tuple[Mapping[str, Samples], float]], after: int
-    ) -> Leave | None:
-        for samples, now in waiting:
-            self._pair.add(samples, now=now)
+    def _looked(self, waiting: list[Mapping[str, Samples]]) -> Leave | None:
+        for samples in waiting:
+            self._pair.add(samples)
         u, y = self._pair.fresh()
         self._live.read(u, y)
         time = self._live.statistics.samples / self._stimulus.fs
@@ -251,6 +254,7 @@ class Sure:
         self._met = self._met + 1 if look is not None and self._is_enough(look) else 0
         if look is None or self._met < self._until.looks:
             return None
+        after = self._stop + round(self._ahead * self._stimulus.fs)
         try:
             stimuli = {
                 axis: left_early(one, after=after, limits=self._limits[axis], whose=axis or "it")
