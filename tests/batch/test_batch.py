@@ -1,6 +1,7 @@
 """A batch: every record once, whatever happens to it; the same as one at a time."""
 
 import json
+from itertools import islice
 
 import h5py
 import numpy as np
@@ -8,9 +9,11 @@ import pytest
 
 import hmpim
 from batch_support import FS, SAMPLES, gain_record, rounded
-from hmpim.batch import Request, open_table
+from hmpim.batch import Request, open_table, reading
+from hmpim.batch.addresses import addresses_of, find_files
 from hmpim.batch.parts import parts_in
 from hmpim.batch.run import Cluster
+from hmpim.batch.work import Task
 
 HERE = Cluster(workers=0, per_task=2)
 
@@ -37,6 +40,23 @@ def _named(table, end):
     import pyarrow.compute as pc
 
     return pc.ends_with(table.to_arrow(["record"]).column(0), end)
+
+
+def test_a_file_that_breaks_in_the_middle_gives_each_record_once(rows_file, monkeypatch):
+    """Those read before it broke are not said to have failed as well."""
+    request = Request(fs=FS)
+    (file,) = find_files([str(rows_file)])
+    addresses = list(addresses_of(file, request))
+    whole = reading._from_parquet
+
+    def breaking(some, request):
+        yield from islice(whole(some, request), 3)
+        raise OSError("the line is cut")
+
+    monkeypatch.setattr(reading, "_from_parquet", breaking)
+    told = list(reading.read_records(addresses, request))
+    assert [read.address for read in told] == addresses
+    assert [read.reason for read in told] == [""] * 3 + ["OSError: the line is cut"] * 5
 
 
 def test_rows_of_one_file_are_records(rows_file, tmp_path, gain_alone):
@@ -101,6 +121,18 @@ def test_what_is_done_is_not_done_again(folder_of_records, tmp_path, gain_alone)
     assert len(gain_alone) == 2
     assert sorted(gains(table).values()) == [1, 2, 3, 4, 5, 6, 7]
     assert before.items() <= {p.name: p.stat().st_mtime_ns for p in parts_in(out)}.items()
+
+
+def test_a_task_given_twice_is_done_once(folder_of_records, tmp_path, gain_alone):
+    """A scheduler that lost sight of a worker gives its task to another."""
+    request = Request()
+    files = find_files([str(folder_of_records)])
+    addresses = tuple(a for file in files for a in addresses_of(file, request))
+    task = Task(addresses=addresses, request=request, folder=str(tmp_path), joined={})
+    task.path.parent.mkdir()
+    assert (task.do().records, task.do().records) == (5, 5)
+    assert len(gain_alone) == 5
+    assert parts_in(tmp_path) == [task.path]
 
 
 def test_a_file_that_was_changed_is_done_again(folder_of_records, tmp_path, gain_alone):

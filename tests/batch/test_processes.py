@@ -1,5 +1,6 @@
 """Real processes: workers that die, and a command that is stopped."""
 
+import json
 import os
 import signal
 import subprocess
@@ -15,6 +16,17 @@ from hmpim.batch.parts import parts_in
 from hmpim.batch.run import Cluster
 
 
+def _keep_crews(patch, crews):
+    """Have the workers' crews in a list as well, to find whom to kill."""
+    begin = pool._Crew.__init__
+
+    def kept(self, *arguments):
+        begin(self, *arguments)
+        crews.append(self)
+
+    patch.setattr(pool._Crew, "__init__", kept)
+
+
 def test_a_worker_that_is_killed_loses_nothing(rows_file, tmp_path, monkeypatch):
     """It is killed once it has work; the one in its place does the rest.
 
@@ -24,15 +36,8 @@ def test_a_worker_that_is_killed_loses_nothing(rows_file, tmp_path, monkeypatch)
     out, script = tmp_path / "out", tmp_path / "script.py"
     script.write_text("raise SystemExit('imported')\n")
     monkeypatch.setitem(sys.modules, "__main__", SimpleNamespace(__file__=str(script)))
-    crews = []
-    begin = pool._Crew.__init__
-
-    def kept(self, *arguments):
-        begin(self, *arguments)
-        crews.append(self)
-
-    monkeypatch.setattr(pool._Crew, "__init__", kept)
-    killed = []
+    crews, killed = [], []
+    _keep_crews(monkeypatch, crews)
 
     def kill(state):
         if 0 < state.records < 8 and not killed:
@@ -61,3 +66,54 @@ def test_a_script_without_a_guard_runs(rows_file, tmp_path):
     )
     done = subprocess.run([sys.executable, str(script)], capture_output=True, text=True)
     assert (done.stdout.strip(), done.stderr) == ("8", "")
+
+
+FULL_AND_FREE = """
+import json, pathlib, subprocess
+from hmpim.batch import open_table
+
+def mount(*options):
+    subprocess.run(["mount", *options, out], check=True)
+
+def run():
+    done = subprocess.run(command, capture_output=True, text=True)
+    parts = pathlib.Path(out, "parts").glob("*.parquet")
+    return done.returncode, done.stderr, {p.name: p.stat().st_mtime_ns for p in parts}
+
+mount("-t", "tmpfs", "-o", "size=160k", "none")
+full = run()
+half = [p.name for p in pathlib.Path(out, "parts").glob(".hmpim-*")]
+mount("-o", "remount,size=64m")
+free = run()
+table = open_table(out).to_pandas(["record", "reason"])
+rows = [sorted(table["record"]), int(table["reason"].notna().sum())]
+print(json.dumps([full, half, free, rows]))
+"""
+
+
+@pytest.mark.study
+def test_a_disk_that_is_full_and_then_is_not(rows_file, tmp_path):
+    """A file system of 160 kB, in a name space of its own: half the parts fit."""
+    out = tmp_path / "disk"
+    out.mkdir()
+    command = [sys.executable, "-m", "hmpim.cli.main", "batch", str(rows_file), "--fs", str(FS)]
+    command += ["--out", str(out), "--workers", "2", "--per-task", "1"]
+    script = tmp_path / "script.py"
+    script.write_text(f"out, command = {str(out)!r}, {command!r}\n{FULL_AND_FREE}")
+    apart = ["unshare", "--user", "--map-root-user", "--mount"]
+    try:
+        allowed = subprocess.run([*apart, "true"], capture_output=True).returncode == 0
+    except FileNotFoundError:
+        allowed = False
+    if not allowed:
+        pytest.skip("this system allows no mount name space of one's own (unshare)")
+    told = subprocess.run([*apart, sys.executable, str(script)], capture_output=True, text=True)
+    assert told.returncode == 0, told.stderr
+    (code, said, before), half, (again, silent, after), (names, failures) = json.loads(told.stdout)
+    assert (code, half) == (2, [])
+    assert "No space left" in said
+    assert said.count("\n") == 1
+    assert 0 < len(before) < 8
+    assert (again, silent, len(after)) == (0, "", 8)
+    assert before.items() <= after.items()  # kept, and not written again
+    assert (names, failures) == ([f"{rows_file}#unit{k}" for k in range(1, 9)], 0)

@@ -64,16 +64,22 @@ def read_records(addresses: Sequence[Address], request: Request) -> Iterator[Rea
     """
     for (_, form), some in groupby(addresses, key=lambda a: (a.file.url, a.form)):
         here = list(some)
+        told = 0
         try:
-            if form == "rows" or form == "lists":
-                yield from _from_parquet(here, request)
-            elif form == "group":
-                yield from _from_hdf5(here, request)
-            else:
-                yield from (_from_file(address, request) for address in here)
+            for read_ in _from_one_file(here, form, request):
+                told += 1
+                yield read_
         except Exception as error:
-            # The file as a whole: each of its records says so.
-            yield from (Read(address=a, reason=reason_of(error)) for a in here)
+            # The file as a whole: each record that has not been read says so.
+            yield from (Read(address=a, reason=reason_of(error)) for a in here[told:])
+
+
+def _from_one_file(addresses: Sequence[Address], form: str, request: Request) -> Iterator[Read]:
+    if form in ("rows", "lists"):
+        return _from_parquet(addresses, request)
+    if form == "group":
+        return _from_hdf5(addresses, request)
+    return (_from_file(address, request) for address in addresses)
 
 
 def reason_of(error: BaseException) -> str:
