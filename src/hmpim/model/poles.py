@@ -149,33 +149,62 @@ class PoleResponses:
     def __init__(self, source: SampledInput, delay: float, poles: Complex) -> None:
         factor = source.oversampling
         begin, lag = placed(source, delay)
-        self._source, self._poles = source, poles
+        self._source, self._real = source, poles.imag == 0.0
         self._c, self._first = _reaching(source, begin)
-        taps, self._turned = pole_taps(poles / factor, lag, source.degree)
-        self._decay = np.exp(poles / factor)
-        self._answers = [self._filtered(taps[k], k, self._c) for k in range(poles.size)]
-        self.values = self._stacked(self._answers) / factor
+        self._taps, self._turned = pole_taps(poles / factor, lag, source.degree)
+        self._powers = np.exp(poles[:, None] / factor * np.arange(factor + 1))
+        self._answers = self._recursive(self._filtered(_products(self._taps, self._powers)))
+        self.values = self._kept(self._answers) / factor
         """Complex, shape (k, n)."""
 
     def slopes(self) -> Complex:
         """Derivatives by p: the responses of e^(-sτ)/(s - p)², shape (k, n)."""
-        found = []
-        for k, answer in enumerate(self._answers):
-            again = self._filtered(np.array([0.0, self._decay[k]]), k, answer)
-            found.append(self._filtered(self._turned[k], k, self._c) + again)
-        return self._stacked(found) / self._source.oversampling**2
+        powers = self._powers
+        factor = powers.shape[1] - 1
+        weights = _products(self._turned, powers)
+        weights += _products(self._taps, powers * np.arange(factor + 1))
+        driven = self._filtered(weights)
+        driven[:, 1:] += factor * powers[:, -1:] * self._answers[:, :-1]
+        return np.asarray(self._kept(self._recursive(driven)) / factor**2)
 
-    def _filtered(self, taps: Complex, k: int, x: NDArray[Any]) -> NDArray[Any]:
-        q = self._decay[k]
-        if self._poles[k].imag == 0.0:
-            return np.asarray(lfilter(taps.real, np.array([1.0, -q.real]), x))
-        return np.asarray(lfilter(taps, np.array([1.0, -q]), x))
-
-    def _stacked(self, fine: list[NDArray[Any]]) -> Complex:
-        out = np.empty((len(fine), self._source.samples), dtype=np.complex128)
-        for k, answer in enumerate(fine):
-            out[k] = _kept(answer, self._source, self._first)
+    def _filtered(self, weights: Complex) -> Complex:
+        """Weighted sums of the coefficients up to each sample of the record and before it."""
+        reach, factor = weights.shape[1] - 1, self._source.oversampling
+        before, start = divmod(self._first, factor)
+        c = np.concatenate([np.zeros(reach), self._c])
+        count = before + self._source.samples
+        under = np.empty((reach + 1, count))
+        for tap in range(reach + 1):
+            under[tap] = c[start + reach - tap :: factor][:count]
+        out = np.empty((weights.shape[0], count), dtype=np.complex128)
+        out.real = weights.real @ under
+        out.imag = weights.imag @ under
         return out
+
+    def _recursive(self, driven: Complex) -> Complex:
+        """Each row over 1 - q^factor/z, in which z is one sample of the record."""
+        for k, q in enumerate(self._powers[:, -1]):
+            if self._real[k]:
+                driven[k].real = lfilter([1.0], [1.0, -q.real], driven[k].real)
+            else:
+                driven[k] = lfilter([1.0], [1.0, -q], driven[k])
+        return driven
+
+    def _kept(self, answers: Complex) -> Complex:
+        return np.asarray(answers[:, self._first // self._source.oversampling :])
+
+
+def _products(taps: Complex, powers: Complex) -> Complex:
+    """Taps of each row times its powers q^j z^-j, j below the oversampling.
+
+    The recursion over 1 - q/z then needs one step per sample of the record: 1/(1 - q/z) is
+    Σ q^j z^-j / (1 - q^f z^-f).
+    """
+    factor = powers.shape[1] - 1
+    out = np.zeros((taps.shape[0], taps.shape[1] + factor - 1), dtype=np.complex128)
+    for j in range(factor):
+        out[:, j : j + taps.shape[1]] += powers[:, j : j + 1] * taps
+    return out
 
 
 def input_responses(source: SampledInput, delay: float, *, slopes: bool) -> Real:
