@@ -7,6 +7,9 @@ line of JSON to FILE. ``stopping.py table FILE`` makes the table of docs/live.md
 repeated    sweeps of 0.6 s up and down, as `hmpim.run(until=...)` ends them
 beyond      the same with a mode of 35 Hz
 slow        one sweep of 10 s, ended at the first look at which the bars look small
+
+``stopping.py exact DRAWS`` asks what ending itself does to intervals, without the estimator: the
+model is linear in its parameters about the truth, and its errors are those of least squares.
 """
 
 from __future__ import annotations
@@ -146,6 +149,53 @@ def _line(name: str, z: Any) -> str:
     return f"| {name} | {held:.1f} | {z.mean():+.2f} | {rms:.2f} | {np.abs(z).max():.1f} |"
 
 
+def exact(draws: int) -> list[str]:
+    """Ends of a linear model, by how many looks in a row are asked for and how far apart."""
+    slopes = _slopes(repeated(duration=4.8))[:480]
+    noise = NOISE * np.random.default_rng(1).standard_normal((draws, 480))
+    lines = ["| looks in a row | every, s | median end, s | " + " | ".join(TRUTH) + " | all |",
+             "| --- " * (4 + len(TRUTH)) + "|"]  # fmt: skip
+    for step in (4, 10, 20):
+        for needed in (1, 3):
+            ends, z = _ends(slopes, noise, step=step, needed=needed)
+            held = [100.0 * float(np.mean(np.abs(row) < 1.96)) for row in z.T]
+            cells = [needed, f"{step / FS:g}", f"{np.median(ends):.3g}"]
+            cells += [f"{share:.1f}" for share in (*held, np.mean(held))]
+            lines.append("| " + " | ".join(map(str, cells)) + " |")
+    return lines
+
+
+def _slopes(stimulus: hmpim.Stimulus) -> Any:
+    """Derivatives of the output by each parameter, shape (n, 5)."""
+
+    def answer(name: str, by: float) -> Any:
+        other = {name: TRUTH[name] + by, "noise_std": 0.0}
+        return hmpim.run(sensor(**other), stimulus).outputs[0].values
+
+    step = 1e-4
+    columns = [(answer(name, step) - answer(name, -step)) / (2 * step) for name in TRUTH]
+    return np.column_stack(columns)
+
+
+def _ends(slopes: Any, noise: Any, *, step: int, needed: int) -> tuple[Any, Any]:
+    """Time of each end, and errors there in standard deviations."""
+    targets = np.array([TARGETS.get(name, np.inf) for name in TRUTH])
+    ends, z = np.full(len(noise), np.nan), np.full((len(noise), len(TRUTH)), np.nan)
+    row = np.zeros(len(noise), dtype=int)
+    for count in range(140, slopes.shape[0] + 1, step):
+        known = slopes[:count]
+        inverse = np.linalg.inv(known.T @ known)
+        error = noise[:, :count] @ known @ inverse
+        left = np.sum(noise[:, :count] ** 2, axis=1)
+        left -= np.einsum("mi,ij,mj->m", error, known.T @ known, error)
+        std = np.sqrt(np.outer(left / (count - len(TRUTH)), np.diag(inverse)))
+        row = np.where(np.all(std <= targets, axis=1), row + 1, 0)
+        now = (row >= needed) & np.isnan(ends)
+        ends[now], z[now] = count / FS, (error / std)[now]
+    done = ~np.isnan(ends)
+    return ends[done], z[done]
+
+
 def played(rule: str, seed: int) -> dict[str, Any]:
     """One seed of one rule."""
     if rule == "slow":
@@ -159,13 +209,16 @@ def played(rule: str, seed: int) -> dict[str, Any]:
 def main() -> None:
     """Play seeds, or print a table."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("rule", choices=("repeated", "beyond", "slow", "table"))
+    parser.add_argument("rule", choices=("repeated", "beyond", "slow", "exact", "table"))
     parser.add_argument("seeds", nargs="*", help="FIRST LAST, or the file to make a table of")
     parser.add_argument("--out", type=Path)
     given = parser.parse_args()
     if given.rule == "table":
         rows = [json.loads(line) for line in Path(given.seeds[0]).read_text().splitlines()]
         print("\n".join(table(rows)))
+        return
+    if given.rule == "exact":
+        print("\n".join(exact(int(given.seeds[0]))))
         return
     first, last = map(int, given.seeds)
     for seed in range(first, last):

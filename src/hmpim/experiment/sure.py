@@ -189,9 +189,9 @@ class Sure:
                 "that has, design(kind='repeated') for instance"
             )
         self._pair = _Pair((source.name, output.name), fs=self._stimulus.fs)
-        mode = layout.intersample or "bandlimited"
+        mode = layout.intersample if source.role == "input" else None  # a measured one is smooth
         self._live = LiveEstimator(
-            self._stimulus, intersample="bandlimited" if mode == "sampled" else mode
+            self._stimulus, intersample="bandlimited" if mode in (None, "sampled") else mode
         )
         self._passed = passes_band_at(self._stimulus)
         self._ahead = ahead
