@@ -10,7 +10,23 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
-from hmpim.workbench.desks import Desk, Desks
+import hmpim
+from hmpim.experiment.readiness import LIGHTS
+from hmpim.workbench.desks import AxisRow, Checked, Desk, Desks, Wish
+from hmpim.workbench.work.design import digest
+from tests_support import designed_once
+
+LIMITS = hmpim.Limits(position=10, velocity=1000, acceleration=40000, unit="deg")
+ROLL = Wish(
+    rows=(
+        AxisRow(
+            name="roll", low=0.5, high=20.0, velocity=800.0, acceleration=30000.0, amplitude=5.0
+        ),
+    ),
+    duration=60.0,
+    fs=500.0,
+)
+"""A design for one axis of the table, longer than any test waits."""
 
 
 @dataclass
@@ -58,12 +74,12 @@ def ended(served: Served) -> None:
     served.process.wait()
 
 
-def wait_until(true, *, seconds: float = 30.0) -> None:
-    """Wait until something is so."""
+def wait_until(true, *, page, seconds: float = 60.0) -> None:
+    """Wait until something outside the browser is so; the page goes on meanwhile."""
     end = time.monotonic() + seconds
     while not true():
         assert time.monotonic() < end, "it did not come true"
-        time.sleep(0.05)
+        page.wait_for_timeout(50)
 
 
 def desk_of(served: Served, desk: Desk | None = None) -> str:
@@ -77,3 +93,24 @@ def go(page, served: Served, name: str, desk: str = "") -> None:
     page.goto(f"{served.url}{name}?desk={desk or desk_of(served)}")
     page.wait_for_selector("main")
     page.wait_for_function("() => window.did_handshake === true")  # before it clicks are lost
+
+
+def checked(wish: Wish, rig: str) -> Desk:
+    """A desk at which all lights are green for a design on a rig."""
+    done = Checked(rig=rig, digest=digest(wish, rig), green=LIGHTS)
+    return Desk(name=secrets.token_hex(8), wish=wish, rig=rig, checked=done)
+
+
+def kept(served: Served, rig: str) -> list[Path]:
+    """Records of a rig in the folder of the runs, in the order in which they were made."""
+    found = served.runs.glob(f"*_{rig}*/run.h5")
+    return sorted(found, key=lambda path: path.parent.stat().st_ctime_ns)
+
+
+def recorded(delay: float = 0.15, *, rng: int = 1) -> hmpim.Record:
+    """The paper's sensor under a sweep of 10 s."""
+    stimulus = designed_once(band=(0.1, 20), duration=10, fs=200, limits=LIMITS)
+    sensor = hmpim.Sensor(
+        delay=delay, natural_frequency=10, damping_ratio=0.4, bias=0.6, noise_std=0.1
+    )
+    return hmpim.run(sensor, stimulus, rng=rng)

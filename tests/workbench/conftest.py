@@ -1,4 +1,8 @@
-"""A workbench that is served in a process of its own, and a browser that looks at it."""
+"""One workbench, served in a process of its own, and one browser that looks at it.
+
+All tests that need them stand in one file: a file's tests share a process, and so both are started
+once.
+"""
 
 import os
 import shutil
@@ -16,12 +20,12 @@ realtime = true
 """
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def served(tmp_path_factory):
     """A workbench with a motion table that moves in real time, and uploads of at most 1 MB."""
     folder = tmp_path_factory.mktemp("workbench")
     (folder / "hmpim.toml").write_text(RIGS)
-    bench = serve(folder, "--max-upload", "1", "--grace", "1", "--rig", "table")
+    bench = serve(folder, "--max-upload", "1", "--grace", "2", "--rig", "table")
     yield bench
     ended(bench)
     errors = (folder / "errors.txt").read_text()
@@ -48,15 +52,27 @@ def _must() -> bool:
 
 
 @pytest.fixture
-def page(browser, served):
-    """A page in a window of its own; an error in its scripts fails the test."""
-    context = browser.new_context(viewport={"width": 1280, "height": 800})
-    context.set_default_timeout(60_000)
-    shown = context.new_page()
-    faults = []
-    shown.on("pageerror", lambda error: faults.append(str(error)))
-    shown.on("request", lambda r: r.url.startswith(("http://127.0.0.1", "data:", "blob:"))
-             or faults.append(f"asked {r.url}"))  # fmt: skip
-    yield shown
-    context.close()
+def window(browser, served):
+    """Makes pages in windows of their own; an error in a page's scripts fails the test."""
+    contexts, faults = [], []
+
+    def opened():
+        context = browser.new_context(viewport={"width": 1280, "height": 800})
+        context.set_default_timeout(90_000)
+        contexts.append(context)
+        page = context.new_page()
+        page.on("pageerror", lambda error: faults.append(str(error)))
+        page.on("request", lambda r: r.url.startswith(("http://127.0.0.1", "data:", "blob:"))
+                or faults.append(f"asked {r.url}"))  # fmt: skip
+        return page
+
+    yield opened
+    for context in contexts:
+        context.close()
     assert not faults
+
+
+@pytest.fixture
+def page(window):
+    """A page in a window of its own."""
+    return window()

@@ -1,17 +1,44 @@
-"""The lock as it stands in front of a served workbench, seen from outside."""
+"""A served workbench: its lock seen from outside, and each of its jobs done in a browser."""
 
 import contextlib
 import http.client
 import json
+import re
+import secrets
+from dataclasses import replace
 
 import pytest
-from typer.testing import CliRunner
 
-from hmpim.cli.main import app
+import hmpim
+from hmpim.formats import save
+from hmpim.formats.stimulus_files import read_stimulus
+from hmpim.workbench.desks import Analysis, Campaign, Desk, Desks, Model, Wish
+from hmpim.workbench.work.designed import five_axes
+from workbench_support import ROLL, checked, desk_of, go, kept, recorded, wait_until
 
 KEY = {"Upgrade": "websocket", "Connection": "Upgrade", "Sec-WebSocket-Version": "13",
        "Sec-WebSocket-Key": "dGhlIHNhbXBsZSBub25jZQ=="}  # fmt: skip
 SOCKET = "/_nicegui_ws/socket.io/?EIO=4&transport=websocket"
+SCRIPT = "<img src=x onerror=window.hacked=1>"
+PLAN = """
+name = "One sensor"
+[rig]
+kind = "sensor"
+[stimulus]
+duration = 3.0
+[axes.a]
+band = [0.5, 20.0]
+limits = { position = 10.0, velocity = 1000.0, acceleration = 40000.0, unit = "deg" }
+sensor = { delay = 0.05, noise_std = 0.1 }
+[[test]]
+name = "levels"
+axes = ["a"]
+rates = [200.0]
+levels = [0.2, 0.25, 0.3, 0.35, 0.4, 0.45, 0.5, 0.55, 0.6, 0.65]
+"""
+
+
+# The lock, from outside.
 
 
 def asked(served, path, headers=None, *, host=None, method="GET", body=None):
@@ -70,18 +97,244 @@ def test_files_are_handed_out_from_the_folder_of_the_runs_alone(served):
         assert asked(served, f"{root}/{path}")[0] == 404
 
 
-@pytest.mark.parametrize(
-    ("arguments", "reason"),
-    [
-        (["--port", "70000"], "--port 70000 is no port"),
-        (["--max-upload", "0"], "--max-upload 0 MB takes nothing"),
-        (["--grace", "0"], "--grace 0 s"),
-        (["--rig-file", "nowhere.toml"], "'nowhere.toml' cannot be read"),
-    ],
-)
-def test_bad_options_are_one_line(tmp_path, monkeypatch, arguments, reason):
-    monkeypatch.chdir(tmp_path)
-    done = CliRunner().invoke(app, ["workbench", "--no-browser", *arguments])
-    assert done.exit_code == 2
-    assert reason in done.stderr
-    assert done.stderr.count("\n") == 1
+# Design, check, run.
+
+
+def start(page, served, desk):
+    """Arm and start a desk's rig; return the folder of its run."""
+    before = kept(served, desk.rig)
+    go(page, served, "run", desk_of(served, desk))
+    page.get_by_role("button", name="Arm", exact=True).click()
+    page.get_by_role("button", name="Start").click()
+    wait_until(lambda: len(kept(served, desk.rig)) > len(before), seconds=60, page=page)
+    page.wait_for_selector(".hm-strip[data-end]")
+    return kept(served, desk.rig)[-1].parent
+
+
+def test_a_design_follows_its_sliders_and_stays_inside_its_limits(page, served):
+    go(page, served, "design")
+    page.get_by_text("inside all limits").wait_for()
+    slider = page.get_by_role("slider", name="Amplitude")
+    slider.click(position={"x": 1, "y": 10})
+    page.get_by_role("cell", name="0.1", exact=True).wait_for()
+    slider.locator("[tabindex='0']").press("ArrowRight")
+    page.get_by_role("cell", name="0.2", exact=True).wait_for()
+    cells = (
+        page.get_by_role("row", name=re.compile("velocity")).get_by_role("cell").all_inner_texts()
+    )
+    assert float(cells[2]) <= float(cells[3])
+    page.get_by_label("To (Hz)").fill("900")
+    page.get_by_text("reaches the Nyquist frequency").wait_for()
+    page.get_by_label("To (Hz)").fill("15")
+    page.get_by_text("inside all limits").wait_for()
+    with page.expect_download() as download:
+        page.get_by_role("button", name="Save and download").click()
+    played = read_stimulus(download.value.path().rename(served.runs / "d.csv"))[0]
+    assert abs(played.position).max() <= 0.2 * (1 + 1e-9)
+    page.reload()
+    assert page.get_by_label("To (Hz)").input_value() == "15"
+
+
+def test_five_axes_run_once_every_light_is_green(page, served):
+    rows = tuple(replace(row, low=0.5, amplitude=1.0) for row in five_axes())
+    wish = Wish(rows=rows, duration=4.0, fs=500.0, model=Model(noise_std=0.01))
+    desk = Desk(name=secrets.token_hex(8), wish=wish, rig="table")
+    go(page, served, "run", desk_of(served, desk))
+    page.get_by_text("make a new check").wait_for()
+    assert page.get_by_role("button", name="Start").is_disabled()
+    page.get_by_role("link", name="Check").click()
+    page.get_by_role("button", name="Check", exact=True).click()
+    page.get_by_text("All green").wait_for()
+    page.get_by_role("link", name="To the run").click()
+    page.get_by_role("button", name="Arm", exact=True).click()
+    page.get_by_role("button", name="Start").click()
+    page.get_by_text("Played to its end").wait_for()
+    assert page.locator(".hm-strip canvas").count() == 5
+    (path,) = kept(served, "table")
+    record = hmpim.load(path)
+    assert [c.name for c in record.inputs] == [f"{r.name}.command" for r in wish.rows]
+    page.get_by_role("button", name="Disarm").click()
+
+
+@pytest.mark.study
+def test_a_second_window_looks_on_cannot_start_and_may_stop(page, served, window):
+    folder = start(page, served, checked(ROLL, "bench"))
+    other = window()
+    go(other, served, "run", desk_of(served, checked(ROLL, "bench")))
+    other.get_by_text("Running: bench").wait_for()
+    assert other.get_by_role("button", name="Arm", exact=True).is_disabled()
+    assert other.get_by_role("button", name="Start").is_disabled()
+    other.wait_for_selector(".hm-strip[data-end]")
+    other.keyboard.press("Escape")
+    page.get_by_text("Ended early: stopped by hand").wait_for()
+    assert kept(served, "bench")[-1].parent == folder
+    other.get_by_text("Armed by another window").wait_for()
+    assert other.get_by_role("button", name="Arm", exact=True).is_disabled()
+    page.get_by_role("button", name="Disarm").click()
+    other.get_by_text("Not armed").wait_for()
+
+
+def test_the_stop_button_ends_a_run_at_once_and_keeps_the_record(page, served):
+    folder = start(page, served, checked(ROLL, "bench"))
+    page.get_by_role("button", name="Stop", exact=True).click()
+    page.get_by_text("Ended early: stopped by hand").wait_for()
+    record = hmpim.load(folder / "run.h5")
+    assert record.duration < 60.0
+    assert any("stopped by hand" in f.message for f in record.findings)
+    page.get_by_role("button", name="Disarm").click()
+
+
+def test_a_lost_window_ends_its_run_and_the_record_is_kept(page, served, window):
+    lost = window()
+    folder = start(lost, served, checked(ROLL, "bench"))
+    lost.reload()
+    lost.wait_for_selector(".hm-strip[data-end]")
+    lost.context.close()
+    go(page, served, "run")
+    page.get_by_text("the window that armed the rig is gone").first.wait_for()
+    record = hmpim.load(folder / "run.h5")
+    assert record.duration < 60.0
+    assert any("is gone" in f.message for f in record.findings)
+    assert "was told to stop" in (folder / "run.log").read_text()
+    page.get_by_text("Not armed").wait_for()
+
+
+# Analyse, compare, campaigns.
+
+DRAG = """(factor) => {
+    const plot = document.querySelector(".hm-picture"), layout = plot._fullLayout;
+    const k = layout.shapes.findIndex((s) => s.name === "bandwidth_phase90");
+    const x = layout.xaxis2, y = layout.yaxis2, box = plot.getBoundingClientRect();
+    const at = layout.shapes[k].x0;
+    const where = (f) => box.left + x._offset + x.d2p(f);
+    return [where(at), where(factor * at), box.top + y._offset + 0.3 * y._length];
+}"""
+
+
+@pytest.mark.study
+def test_a_foreign_file_is_dropped_identified_read_by_eye_and_reported(page, served, tmp_path):
+    record = recorded()
+    u, y = record.inputs[0].values, record.outputs[0].values
+    rows = "\n".join(f"{k / 200};{a};{b}" for k, (a, b) in enumerate(zip(u, y, strict=True)))
+    file = tmp_path / "bench log.txt"
+    file.write_text(f"# rig 7\ntime [s];kommando [deg];{SCRIPT}\n{rows}\n")
+    go(page, served, "analyse")
+    page.set_input_files("input[type=file]", file)
+    page.get_by_role("combobox", name="Outputs").wait_for()
+    page.locator(".q-chip").filter(has_text=SCRIPT).wait_for()  # as proposed
+    page.get_by_role("button", name="Identify").click()
+    line = page.get_by_role("row", name=re.compile("^Bandwidth, −90° [0-9]"))
+    line.wait_for()
+    automatic = float(line.get_by_role("cell").nth(1).inner_text().split()[0])
+    assert automatic == pytest.approx(1.534, abs=0.01)
+    page.wait_for_selector(".hm-picture[data-drawn]")
+    assert page.evaluate("window.hacked") is None
+    assert page.locator("main img").count() == 0
+    assert page.get_by_text(SCRIPT).first.is_visible()
+
+    # The line at −90° is dragged to twice the frequency: a third of a decade on a logarithmic axis.
+    page.locator(".hm-picture").first.scroll_into_view_if_needed()
+    x0, x1, height = page.evaluate(DRAG, 2.0)
+    page.mouse.move(x0, height)
+    page.mouse.down()
+    page.mouse.move((x0 + x1) / 2, height, steps=4)
+    page.mouse.move(x1, height, steps=4)
+    page.mouse.up()
+    by_hand = line.get_by_text("by hand")
+    by_hand.wait_for()
+    value = float(re.search(r"[\d.]+", by_hand.inner_text()).group())
+    assert value == pytest.approx(2.0 * automatic, rel=0.05)
+    assert float(line.get_by_role("cell").nth(1).inner_text().split()[0]) == automatic
+
+    page.get_by_label("Delay by hand (s)").fill("0.15")
+    page.get_by_text("0.15, by hand").wait_for()
+    with page.expect_download() as download:
+        page.get_by_role("button", name="Report").click()
+    text = download.value.path().read_text(encoding="utf-8")
+    assert "by hand: −90° bandwidth" in text
+    assert SCRIPT not in text
+    page.reload()
+    page.get_by_text("0.15, by hand").wait_for()
+
+
+def test_a_file_too_large_is_refused_and_a_hostile_name_stays_inside(page, served):
+    go(page, served, "analyse")
+    before = {p for p in served.runs.parent.rglob("*") if p.is_file()}
+    page.set_input_files(
+        "input[type=file]", {"name": "big.csv", "mimeType": "text/csv", "buffer": b"0" * 1_200_000}
+    )
+    page.get_by_text("more than 1 MB").wait_for()
+    page.set_input_files(
+        "input[type=file]",
+        {"name": "<script>..\\alert(1).csv", "mimeType": "text/csv", "buffer": b"t,u,y\n"},
+    )
+    wait_until(lambda: list((served.runs / "uploads").glob("*script*")), page=page)
+    new = {p for p in served.runs.parent.rglob("*") if p.is_file()} - before
+    assert all(served.runs in p.parents for p in new)
+    assert not any("<" in p.name or p.name == "big.csv" for p in new)
+
+
+def test_two_runs_are_compared_and_held_against_a_specification(page, served):
+    for k, delay in enumerate((0.15, 0.12), start=1):
+        (served.runs / f"unit{k}").mkdir()
+        save(recorded(delay, rng=k), served.runs / f"unit{k}" / "run.h5")
+    go(page, served, "runs")
+    for k in (1, 2):
+        page.get_by_label(f"Choose unit{k}/run.h5").check()
+    page.get_by_role("button", name="Compare those chosen").click()
+    page.get_by_text("Bode plots over each other").wait_for()
+    cells = page.get_by_role("row", name=re.compile("^Delay, pure")).get_by_role("cell")
+    values = [float(t.split()[0]) for t in cells.all_inner_texts()[1:]]
+    assert values == pytest.approx([0.15, 0.12], abs=1e-3)
+    page.get_by_label("Specification").fill("delay < 0.13")
+    page.get_by_role("button", name="Look again").click()
+    page.get_by_role("row", name=re.compile("unit1.*fail")).wait_for()
+    assert page.get_by_role("row", name=re.compile("unit2.* ok ok ")).count() == 1
+
+
+@pytest.mark.study
+def test_a_campaign_names_no_code_is_stopped_and_resumed(page, served):
+    code = PLAN.replace('kind = "sensor"', 'kind = "python"\nentry = "os:system"')
+    desk = Desk(name=secrets.token_hex(8), campaign=Campaign(plan=code, out="../study one"))
+    go(page, served, "campaign", desk_of(served, desk))
+    page.get_by_role("button", name="Start or resume").click()
+    page.get_by_text("may not name code").first.wait_for()
+    assert not (served.runs / "study one").exists()
+    page.get_by_role("textbox", name="The plan").fill(PLAN)
+    wait_until(lambda: 'kind = "sensor"' in desk_text(served, desk.name), page=page)
+    page.get_by_role("button", name="Start or resume").click()
+    cases = served.runs / "study one" / "cases"
+    wait_until(lambda: list(cases.glob("*.json")), page=page)
+    page.get_by_role("button", name="Stop", exact=True).click()
+    page.get_by_text("start it again to go on").wait_for()
+    first = {p.name: p.stat().st_mtime_ns for p in cases.glob("*.json")}
+    page.reload()
+    page.get_by_role("button", name="Start or resume").click()
+    with page.expect_download() as download:
+        page.get_by_role("button", name="study.json").click()
+    study = json.loads(download.value.path().read_text(encoding="utf-8"))
+    assert 0 < len(first) < len(study["rows"]) == 10
+    assert all((cases / name).stat().st_mtime_ns == t for name, t in first.items())
+
+
+def desk_text(served, name):
+    """The plan as the desk keeps it."""
+    return Desks(served.runs / ".workbench").get(name).campaign.plan
+
+
+def test_nothing_is_lost_by_a_reload_and_a_second_window_gets_a_desk_of_its_own(
+    page, served, window
+):
+    save(recorded(), served.runs / "kept.csv")
+    desk = Desk(name=secrets.token_hex(8), analysis=Analysis(file="kept.csv", alpha=2.0))
+    go(page, served, "analyse", desk_of(served, desk))
+    page.get_by_label("To (s)").fill("8")
+    page.get_by_label("To (s)").press("Tab")
+    other = window()
+    go(other, served, "analyse", desk.name)
+    other.wait_for_url(lambda url: desk.name not in url)
+    other.get_by_label("To (s)").fill("5")
+    other.get_by_label("To (s)").press("Tab")
+    page.reload()
+    page.wait_for_function("() => document.querySelector('[aria-label=\"To (s)\"]')?.value === '8'")
+    assert desk.name in page.url

@@ -1,6 +1,5 @@
 """The one campaign that goes on, watched by every window."""
 
-import multiprocessing
 import threading
 from multiprocessing.connection import Connection
 from pathlib import Path
@@ -8,6 +7,7 @@ from typing import Any
 
 from hmpim.errors import ArgumentError
 from hmpim.workbench.names import harmless_name
+from hmpim.workbench.processes import process_context
 from hmpim.workbench.settings import Settings
 from hmpim.workbench.work.conducting import Done, Failed, Step, checked_plan, conduct
 
@@ -48,7 +48,7 @@ class Campaigns:
             raise ArgumentError("a campaign goes on; stop it first")
         checked_plan(text)
         self.folder = self._settings.runs / harmless_name(name or "campaign")
-        context = multiprocessing.get_context("spawn")
+        context = process_context()
         here, there = context.Pipe()
         arguments = (there, text, str(self.folder), fresh)
         self._process = context.Process(target=conduct, args=arguments, daemon=True)

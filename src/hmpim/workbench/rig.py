@@ -1,7 +1,6 @@
 """The one rig that is armed and run: who holds it, what it does, how it is stopped."""
 
 import contextlib
-import multiprocessing
 import threading
 import time
 from collections.abc import Callable
@@ -16,6 +15,7 @@ from hmpim.rigs.catalogue import Description, describe, named_rigs, read_descrip
 from hmpim.stimulus import Stimulus
 from hmpim.workbench.live import Live
 from hmpim.workbench.names import harmless_name
+from hmpim.workbench.processes import process_context
 from hmpim.workbench.settings import Settings
 from hmpim.workbench.work.driving import (
     Begun,
@@ -278,7 +278,7 @@ class RigBench:
 
 
 def _spawned() -> tuple[Connection, Any]:
-    context = multiprocessing.get_context("spawn")
+    context = process_context()
     here, there = context.Pipe()
     process = context.Process(target=drive, args=(there,), daemon=False)
     process.start()

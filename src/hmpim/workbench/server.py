@@ -15,6 +15,9 @@ from hmpim.workbench.settings import Settings
 __all__ = ["Address", "serve"]
 
 _HOST = "127.0.0.1"
+_PING = 3.0  # s between two signs of life that a page is asked for
+_SILENCE = 12.0  # s without one after which a page counts as gone: a busy browser is not
+_REMEMBERED = 30.0  # s for which a page that is gone may come back to what it showed
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -103,7 +106,7 @@ def application(settings: Settings, *, begun: Callable[[], object]) -> Any:
     try:
         from fastapi import FastAPI
         from nicegui import app as pages
-        from nicegui import ui
+        from nicegui import core, ui
     except ImportError as error:
         raise MissingExtraError(
             "the workbench needs NiceGUI; install it with pip install 'hmpim[workbench]'"
@@ -117,6 +120,8 @@ def application(settings: Settings, *, begun: Callable[[], object]) -> Any:
     add_pages(workbench, whole)
 
     async def start() -> None:
+        core.sio.eio.ping_interval = _PING
+        core.sio.eio.ping_timeout = _SILENCE
         workbench.start()
         asyncio.get_running_loop().call_soon(begun)
 
@@ -128,7 +133,7 @@ def application(settings: Settings, *, begun: Callable[[], object]) -> Any:
         dark=None,
         language="en-US",
         tailwind=False,
-        reconnect_timeout=max(settings.grace, 3.0),
+        reconnect_timeout=_REMEMBERED,
         show_welcome_message=False,
     )
     return whole

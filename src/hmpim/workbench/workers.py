@@ -1,7 +1,6 @@
 """Heavy work in processes of its own, so that no page ever waits for another's fit."""
 
 import asyncio
-import multiprocessing
 import os
 from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor
@@ -9,6 +8,7 @@ from concurrent.futures.process import BrokenProcessPool
 from typing import ParamSpec, TypeVar
 
 from hmpim.errors import HmpimError
+from hmpim.workbench.processes import process_context
 
 __all__ = ["Latest", "Workers"]
 
@@ -32,7 +32,7 @@ class Workers:
 
     def start(self) -> None:
         """Begin the processes before the first work comes."""
-        context = multiprocessing.get_context("spawn")
+        context = process_context()
         self._pool = ProcessPoolExecutor(self._count, mp_context=context, initializer=_ready)
         self._quick = ProcessPoolExecutor(1, mp_context=context, initializer=_ready)
         self._quick.submit(_nothing)

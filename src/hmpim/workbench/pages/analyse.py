@@ -101,6 +101,7 @@ class AnalysePage:
         ui.upload(
             label="Drop a file of any format here",
             auto_upload=True,
+            max_file_size=largest,
             on_upload=uploaded,
             on_rejected=refused,
         ).props('flat aria-label="Drop a file of any format"').on("failed", refused)

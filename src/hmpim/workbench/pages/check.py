@@ -1,5 +1,7 @@
 """The page that checks: four lights, all of which must be green before a run."""
 
+import asyncio
+
 from nicegui import ui
 
 from hmpim.experiment.readiness import LIGHTS
@@ -77,7 +79,8 @@ class CheckPage:
             model = desk.wish.model
             self.bench.arm(name, desk.rig)
             try:
-                self.bench.start(
+                await asyncio.to_thread(
+                    self.bench.start,
                     name,
                     stimuli,
                     outliving=bool(self.outliving.value),

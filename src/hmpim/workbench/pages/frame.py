@@ -84,6 +84,7 @@ def _root(request: Request) -> str:
 def _watch(window: Window, client: Client, name: str) -> None:
     """Give a second window on the same desk a desk of its own."""
     workbench = window.workbench
+    open_tabs: list[str] = []  # a client that has gone no longer says which tab it was
 
     async def came() -> None:
         tab = client.tab_id or client.id
@@ -91,9 +92,12 @@ def _watch(window: Window, client: Client, name: str) -> None:
             workbench.closed(window.name, tab)
             copy = workbench.desks.copy(window.desk)
             client.open(f"/{name}?desk={copy.name}")
+        else:
+            open_tabs.append(tab)
 
     def went() -> None:
-        workbench.closed(window.name, client.tab_id or client.id)
+        if open_tabs:
+            workbench.closed(window.name, open_tabs.pop())
 
     client.on_connect(came)
     client.on_disconnect(went)

@@ -110,7 +110,10 @@ class RunPage:
             if reason:
                 raise RigError(reason)
             stimuli = await self.window.workbench.workers.soon(stimuli_of, self.window.desk.wish)
-            self.bench.start(self.window.name, stimuli, outliving=bool(self.outliving.value))
+            outliving = bool(self.outliving.value)
+            await asyncio.to_thread(
+                self.bench.start, self.window.name, stimuli, outliving=outliving
+            )
         self._tick()
 
     def _tick(self) -> None:
