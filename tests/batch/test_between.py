@@ -3,11 +3,14 @@
 import numpy as np
 import pytest
 from scipy.special import stdtrit
+from typer.testing import CliRunner
 
 import hmpim
+from hmpim.batch import Request, open_table
 from hmpim.batch.between import between_units
-from hmpim.batch.pool import here_pool
-from hmpim.batch.pooled import identify_groups
+from hmpim.batch.pooled import Sums
+from hmpim.batch.run import Cluster
+from hmpim.cli.main import app
 
 
 @pytest.mark.few(150)
@@ -46,12 +49,13 @@ def test_too_few_units_are_refused():
         between_units(np.ones(1), np.ones(1))
 
 
-def test_a_history_is_one_identification(tmp_path):
-    """Three runs of each of two units in one file: each unit's model, from sums alone."""
+@pytest.fixture
+def history(tmp_path):
+    """Three runs of each of two units in one file, one of them with a gap."""
     import pyarrow as pa
     from pyarrow import parquet
 
-    fs, rng = 100.0, np.random.default_rng(2)
+    rng = np.random.default_rng(2)
     rows = {"u": [], "y": [], "unit": []}
     for unit, gain in (("A", 1.0), ("B", 2.0)):
         for run in range(3):
@@ -62,17 +66,57 @@ def test_a_history_is_one_identification(tmp_path):
             rows["unit"].append(unit)
     rows["y"][5][3:9] = [float("nan")] * 6
     path = tmp_path / "history.parquet"
-    parquet.write_table(pa.table({**rows, "fs": [fs] * 6}), path)
-    groups, reasons = identify_groups([str(path)], lags=60, by="unit", pool=here_pool, per_task=2)
-    assert [(g.name, g.records) for g in groups] == [("A", 3), ("B", 2)]
-    assert [name.rpartition("#")[2] for name, _ in reasons] == ["5"]
-    for group, gain in zip(groups, (1.0, 2.0), strict=True):
-        pair = group.result["y", "u"]
+    parquet.write_table(pa.table({**rows, "fs": [100.0] * 6}), path)
+    return path
+
+
+def test_a_history_is_one_identification(history, tmp_path):
+    """Each unit's model from sums alone: a row a unit, and one that says what was left out."""
+    asked = ["batch", history, "--out", tmp_path / "out", "--pool-by", "unit", "--lags", 60]
+    told = CliRunner().invoke(app, [*map(str, asked), "--workers", "0", "--per-task", "2"])
+    assert told.exit_code == 0, told.output
+    table = open_table(tmp_path / "out")
+    rows = {row["record"]: row for row in table.to_arrow().to_pylist()}
+    assert set(rows) == {"A", "B", f"{history}#5"}
+    assert rows[f"{history}#5"]["reason"]
+    for unit, records, gain in (("A", 3, 1.0), ("B", 2, 2.0)):
+        row, pair = rows[unit], table.result(unit)["y", "u"]
+        assert (row["meta_unit"], row["meta_records"]) == (unit, str(records))
+        assert row["samples"] == 800 * records
+        assert row["scale_factor"] == pair.scale_factor.value
         # White input and noise: least squares knows the gain to this. Its interval is no shorter
         # than 1.96 times that, less four deviations of a noise level told from 1600 samples, 7 %.
-        error = 0.1 / np.sqrt(group.statistics.samples)
+        error = 0.1 / np.sqrt(row["samples"])
         low, high = pair.scale_factor.ci95
         assert abs(pair.scale_factor.value - gain) < 4 * error
         assert low + 1.82 * error < pair.scale_factor.value < high - 1.82 * error
         assert pair.delay.value == pytest.approx(0.04, abs=0.006)
-        assert group.statistics.samples == 800 * group.records
+    assert (tmp_path / "out" / "study.html").exists()
+
+
+def test_a_column_that_no_record_has_is_told(history, tmp_path):
+    request = Request(pool_by="serial")
+    table = hmpim.batch(history, out=tmp_path / "out", request=request, cluster=Cluster(workers=0))
+    reasons = table.to_arrow(["reason"]).column(0).to_pylist()
+    assert reasons[:5] == ["it has no metadata 'serial'; it has unit, fs"] * 5
+    assert "has 6 samples missing" in reasons[5]
+    other = Request(pool_by="unit")
+    with pytest.raises(hmpim.HmpimError, match=r"pool_by = 'serial'.*'unit'"):
+        hmpim.batch(history, out=tmp_path / "out", request=other, cluster=Cluster(workers=0))
+
+
+def test_sums_of_another_rate_are_left_out():
+    rng = np.random.default_rng(0)
+    one, other = (
+        hmpim.compress(hmpim.Record.from_arrays({"u": u}, {"y": u}, fs=fs), lags=40)
+        for fs, u in ((100.0, rng.standard_normal(200)), (200.0, rng.standard_normal(200)))
+    )
+    total = Sums(groups={"A": (2, one)}) + Sums(groups={"A": (1, other)})
+    assert total.groups["A"] == (2, one)
+    assert total.reasons[0][0] == "A: 1 of its records"
+    assert "fs is 100.0 here and 200.0 there" in total.reasons[0][1]
+
+
+def test_windows_without_groups_are_refused():
+    with pytest.raises(hmpim.HmpimError, match="lags = 40 is for records identified as one"):
+        Request(lags=40)

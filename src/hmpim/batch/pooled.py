@@ -1,14 +1,16 @@
 """Records of one unit, or of a fleet, added up where they lie: one identification for each group.
 
 Each task compresses its records to their statistics and adds up those of one group; what travels
-is a few kilobytes for each group, never a sample. The sum is what one record of the whole history
-would give, a bias for each record apart.
+has the size of the window, whatever the length of the records. The sum is what one record of the
+whole history would give, a bias for each record apart.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from itertools import chain, islice
+from pathlib import Path
 from typing import Any
 
 from hmpim.batch.addresses import Address, addresses_of, find_files
@@ -16,6 +18,7 @@ from hmpim.batch.metadata import Beside, read_metadata
 from hmpim.batch.pool import Pool
 from hmpim.batch.reading import read_records, reason_of
 from hmpim.batch.request import Request
+from hmpim.batch.rows import group_rows
 from hmpim.errors import ArgumentError
 from hmpim.identify import Identification, Statistics, compress, identify
 
@@ -30,14 +33,16 @@ class Sums:
     reasons: tuple[tuple[str, str], ...] = ()
 
     def __add__(self, other: "Sums") -> "Sums":
-        groups = dict(self.groups)
+        groups, reasons = dict(self.groups), [*self.reasons, *other.reasons]
         for name, (count, statistics) in other.groups.items():
-            if name in groups:
-                before, known = groups[name]
-                groups[name] = (before + count, known + statistics)
+            before, known = groups.get(name, (0, None))
+            try:
+                total = statistics if known is None else known + statistics
+            except ArgumentError as error:  # of another rate, or of other channels
+                reasons.append((f"{name}: {count} of its records", reason_of(error)))
             else:
-                groups[name] = (count, statistics)
-        return Sums(groups=groups, reasons=(*self.reasons, *other.reasons))
+                groups[name] = (before + count, total)
+        return Sums(groups=groups, reasons=tuple(reasons))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -54,12 +59,35 @@ class Group:
         Their sum.
     result : Identification
         What was identified.
+    seconds : float
+        Processor time of that identification.
     """
 
     name: str
     records: int
     statistics: Statistics
     result: Identification
+    seconds: float = 0.0
+
+    def rows(self, column: str, *, whole: bool) -> list[dict[str, Any]]:
+        """Return a row for each pair, as of one record.
+
+        Parameters
+        ----------
+        column : str
+            What the records of a group share.
+        whole : bool
+            Whether all that was found is kept.
+        """
+        names, units = self.statistics.names, self.statistics.units
+        return group_rows(
+            self.name,
+            self.result,
+            units=dict(zip(names, units, strict=True)),
+            metadata={column: self.name, "records": str(self.records)},
+            seconds=self.seconds,
+            whole=whole,
+        )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -83,22 +111,30 @@ class _Compress:
             try:
                 if read.record is None:
                     raise ArgumentError(read.reason)
-                statistics = compress(read.record, lags=self.lags)
-                one = {told.get(self.by, "") if self.by else "all": (1, statistics)}
-                total = total + Sums(groups=one)
+                one = (1, compress(read.record, lags=self.lags))
+                total = total + Sums(groups={_group_of(told, self.by): one})
             except Exception as error:  # it is said, and the others go on
                 total = total + Sums(groups={}, reasons=((read.address.name, reason_of(error)),))
         return total
 
 
+def _group_of(told: Mapping[str, str], by: str) -> str:
+    if by and by not in told:
+        known = ", ".join(told) or "none"
+        raise ArgumentError(f"it has no metadata {by!r}; it has {known}")
+    return told[by] if by else "all"
+
+
 def identify_groups(
     paths: Sequence[str],
     *,
-    lags: int,
+    lags: int | None = None,
     by: str = "",
     request: Request | None = None,
     pool: Callable[[], AbstractContextManager[Pool]],
     per_task: int = 100,
+    progress: Callable[[int], None] = lambda records: None,
+    without: Path | None = None,
 ) -> tuple[tuple[Group, ...], tuple[tuple[str, str], ...]]:
     """Identify each group of records as one, without moving a sample.
 
@@ -106,8 +142,9 @@ def identify_groups(
     ----------
     paths : sequence of str
         As for `hmpim.batch`.
-    lags : int
-        Window in samples, the same for all: delay and settling time must fit into it.
+    lags : int, optional
+        Window in samples, the same for all: delay and settling time must fit into it. A fifth of
+        the first record that can be read by default.
     by : str
         Column of metadata whose values are the groups, such as a unit's serial number; empty for
         one model of all.
@@ -117,6 +154,10 @@ def identify_groups(
         Gives who does the work, such as `hmpim.batch.pool.dask_pool`.
     per_task : int
         Records that a worker adds up at once.
+    progress : callable
+        Told how many records are added up, after each task.
+    without : Path, optional
+        Folder in which no records are looked for.
 
     Returns
     -------
@@ -127,28 +168,59 @@ def identify_groups(
     """
     asked = request or Request()
     beside = read_metadata(asked.metadata, asked.record_column)
-    addresses = chain.from_iterable(addresses_of(file, asked) for file in find_files(paths))
-    total: Any = Sums(groups={})
-    with pool() as crew:
-        under_way, more = 0, True
-        while more or under_way:
-            while more and under_way < crew.window:
-                some = tuple(islice(addresses, per_task))
-                if not some:
-                    more = False
-                    break
-                crew.submit(
-                    _Compress(addresses=some, request=asked, by=by, beside=beside, lags=lags)
-                )
-                under_way += 1
-            if under_way:
-                finished = crew.next()
-                under_way -= 1
-                if finished.done is None:
-                    raise ArgumentError(f"records cannot be compressed: {finished.reason}")
-                total = total + finished.done
-    groups = tuple(
-        Group(name=name, records=count, statistics=statistics, result=identify(statistics))
-        for name, (count, statistics) in sorted(total.groups.items())
+    addresses = chain.from_iterable(
+        addresses_of(file, asked) for file in find_files(paths, without=without)
     )
-    return groups, total.reasons
+    ahead: list[Address] = []
+    window = lags or _window(addresses, asked, ahead)
+
+    def tasks() -> Iterator[_Compress]:
+        left = chain(ahead, addresses)
+        while some := tuple(islice(left, per_task)):
+            yield _Compress(addresses=some, request=asked, by=by, beside=beside, lags=window)
+
+    with pool() as crew:
+        total = _added_up(crew, tasks(), progress)
+    groups, reasons = [], list(total.reasons)
+    for name, (count, statistics) in sorted(total.groups.items()):
+        begin = time.thread_time()
+        try:
+            result = identify(statistics)
+        except Exception as error:  # it is said, and the others go on
+            reasons.append((name, reason_of(error)))
+            continue
+        seconds = time.thread_time() - begin
+        groups.append(
+            Group(name=name, records=count, statistics=statistics, result=result, seconds=seconds)
+        )
+    return tuple(groups), tuple(reasons)
+
+
+def _added_up(crew: Pool, tasks: Iterator[_Compress], progress: Callable[[int], None]) -> Sums:
+    """Sums of all tasks, as they come back."""
+    total, under_way, count = Sums(groups={}), 0, 0
+    ready = next(tasks, None)
+    while ready is not None or under_way:
+        while ready is not None and under_way < crew.window:
+            crew.submit(ready)
+            under_way, ready = under_way + 1, next(tasks, None)
+        finished = crew.next()
+        under_way -= 1
+        if finished.done is None:
+            raise ArgumentError(f"records cannot be compressed: {finished.reason}")
+        count += len(finished.task.addresses)
+        total = total + finished.done
+        progress(count)
+    return total
+
+
+def _window(addresses: Iterator[Address], request: Request, seen: list[Address]) -> int:
+    """A window for all: that of the first record that can be read; `seen` gets what was tried."""
+    reason = "there are none"
+    for address in addresses:
+        seen.append(address)
+        for read in read_records([address], request):
+            if read.record is not None:
+                return compress(read.record).lags
+            reason = read.reason
+    raise ArgumentError(f"none of {len(seen)} records can be read; the last: {reason}")

@@ -45,6 +45,12 @@ class Request:
     metadata : str
         A CSV or Parquet file with one row a record; empty for none. Its column `record` holds
         the records' names, or the ends of them.
+    pool_by : str
+        Column of metadata whose records are identified as one, such as a unit's serial number;
+        ``all`` for one model of all; empty for each record by itself.
+    lags : int or None
+        Window in samples of records identified as one: delay and settling time must fit into it.
+        None for a fifth of the first record.
 
     Raises
     ------
@@ -68,10 +74,21 @@ class Request:
     record_column: str = "record"
     group: str = "/"
     metadata: str = ""
+    pool_by: str = ""
+    lags: int | None = None
 
     def __post_init__(self) -> None:
         if self.fs is not None and not 0.0 < self.fs < float("inf"):
             raise ArgumentError(f"fs = {self.fs} Hz is not a sampling rate; it must be positive")
+        if self.lags is not None and not self.pool_by:
+            raise ArgumentError(
+                f"lags = {self.lags} is for records identified as one; say which: pool_by='serial'"
+            )
+        if self.pool_by and (self.structures or self.intersample != "auto"):
+            raise ArgumentError(
+                "records identified as one take every structure and find what lies between the "
+                "samples; leave out structures and intersample"
+            )
         for name in self.structures:
             if name not in STRUCTURES:
                 raise ArgumentError(
@@ -86,6 +103,8 @@ class Request:
     def to_dict(self) -> dict[str, Any]:
         """Return the request as plain JSON values."""
         values = {f.name: getattr(self, f.name) for f in fields(self)}
+        if not self.pool_by:  # each by itself: nothing to say
+            del values["pool_by"], values["lags"]
         listed = {k: list(v) if isinstance(v, tuple) else v for k, v in values.items()}
         return {**listed, "units": dict(self.units)}
 

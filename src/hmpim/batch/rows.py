@@ -1,5 +1,6 @@
 """What is kept of each record: one row for each pair of channels, or one that says what failed."""
 
+import hashlib
 import json
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import fields
@@ -11,7 +12,17 @@ from hmpim.batch.reading import Read
 from hmpim.identify import Estimate, Identification, Parameters
 from hmpim.identify.fleet import Fleet, FleetFit
 
-__all__ = ["PARAMETERS", "Row", "failed", "fleet_rows", "rows_of", "schema", "table_of"]
+__all__ = [
+    "PARAMETERS",
+    "Row",
+    "failed",
+    "fleet_rows",
+    "group_rows",
+    "left_out",
+    "rows_of",
+    "schema",
+    "table_of",
+]
 
 PARAMETERS = tuple(f.name for f in fields(Parameters))
 """Columns of values; each has four more: `NAME_std`, `_low`, `_high` and `_doubtful`."""
@@ -67,11 +78,58 @@ def rows_of(
     """
     record = read.record
     units = {c.name: c.unit for c in record.channels} if record is not None else {}
+    common = _common(read.address, read.metadata)
+    return _of_pairs(common, result, units, seconds=seconds, whole=whole)
+
+
+def group_rows(
+    name: str,
+    result: Identification,
+    *,
+    units: Mapping[str, str],
+    metadata: Mapping[str, str],
+    seconds: float,
+    whole: bool,
+) -> list[dict[str, Any]]:
+    """One row for each pair of what a group of records says together.
+
+    Parameters
+    ----------
+    name : str
+        What the group is called.
+    result : Identification
+        What was found of all its records.
+    units : mapping of str to str
+        Unit by channel.
+    metadata : mapping of str to str
+        What is said of it.
+    seconds : float
+        Processor time that it took.
+    whole : bool
+        Whether all that was found is kept as JSON.
+    """
+    common = {"key": _key(name), "record": name, **_told(metadata)}
+    return _of_pairs(common, result, units, seconds=seconds, whole=whole)
+
+
+def left_out(name: str, reason: str) -> Row:
+    """The row of a record that is in no group."""
+    return {"key": _key(name), "record": name, "reason": reason}
+
+
+def _of_pairs(
+    common: Row,
+    result: Identification,
+    units: Mapping[str, str],
+    *,
+    seconds: float,
+    whole: bool,
+) -> list[dict[str, Any]]:
     text = json.dumps(result.to_dict(), allow_nan=False) if whole else None
     rows = []
     for k, pair in enumerate(result.pairs):
-        row = _common(read.address, read.metadata)
-        row |= {
+        row = {
+            **common,
             "sha256": result.record.sha256,
             "input": pair.input,
             "output": pair.output,
@@ -109,8 +167,15 @@ def table_of(rows: Iterable[Row], metadata: Sequence[str]) -> Any:
 
 
 def _common(address: Address, metadata: Mapping[str, str]) -> dict[str, Any]:
-    told = {f"meta_{name}": value for name, value in metadata.items()}
-    return {"key": address.digest, "record": address.name, **told}
+    return {"key": address.digest, "record": address.name, **_told(metadata)}
+
+
+def _told(metadata: Mapping[str, str]) -> Row:
+    return {f"meta_{name}": value for name, value in metadata.items()}
+
+
+def _key(name: str) -> str:
+    return hashlib.sha256(name.encode()).hexdigest()[:32]
 
 
 def fleet_rows(

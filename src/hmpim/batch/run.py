@@ -11,10 +11,12 @@ from pathlib import Path
 from hmpim.arguments import checked
 from hmpim.batch.addresses import Address, File, addresses_of, find_files
 from hmpim.batch.metadata import Beside, read_metadata
-from hmpim.batch.parts import Known, open_folder
+from hmpim.batch.parts import PARTS, Known, open_folder, write_part
 from hmpim.batch.pool import Finished, Pool, dask_pool, here_pool
+from hmpim.batch.pooled import identify_groups
 from hmpim.batch.reading import read_records
 from hmpim.batch.request import Request
+from hmpim.batch.rows import left_out, table_of
 from hmpim.batch.table import BatchTable, open_table
 from hmpim.batch.work import Done, Task, give_up
 from hmpim.errors import ArgumentError
@@ -183,7 +185,10 @@ def batch(
         cluster=cluster or Cluster(),
         progress=progress or (lambda state: None),
     )
-    run.all_of([str(p) for p in given], fresh=fresh)
+    if asked.pool_by:
+        run.pooled([str(p) for p in given], fresh=fresh)
+    else:
+        run.all_of([str(p) for p in given], fresh=fresh)
     return open_table(out)
 
 
@@ -221,6 +226,34 @@ class _Run:
                 self._begun = time.monotonic()
                 self._tell()
                 self._drive(pool, chain([ready], tasks))
+
+    def pooled(self, paths: Sequence[str], *, fresh: bool) -> None:
+        """Identify the records of each group as one; a group is a row."""
+        if not any(True for _ in find_files(paths, without=self._folder)):
+            raise ArgumentError(f"there are no records at {', '.join(map(repr, paths))}")
+        asked = self._request
+        columns = (asked.pool_by, "records")
+
+        def tell(records: int) -> None:
+            self._records = self._known = records
+            self._tell()
+
+        with open_folder(self._folder, asked, columns, fresh=fresh):
+            groups, reasons = identify_groups(
+                paths,
+                lags=asked.lags,
+                by="" if asked.pool_by == "all" else asked.pool_by,
+                request=asked,
+                pool=self._pool,
+                per_task=self._cluster.per_task,
+                progress=tell,
+                without=self._folder,
+            )
+            whole = asked.keep == "results"
+            rows = [row for group in groups for row in group.rows(asked.pool_by, whole=whole)]
+            rows += [dict(left_out(name, reason)) for name, reason in reasons]
+            part = self._folder / PARTS / f"{asked.digest[:24]}.parquet"
+            write_part(table_of(rows, columns), part)
 
     def _pool(self) -> AbstractContextManager[Pool]:
         if self._cluster.workers == 0:

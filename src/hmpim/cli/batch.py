@@ -65,6 +65,24 @@ def batch(
     group: Annotated[
         str, typer.Option("--group", metavar="PATH", help="HDF5 group that holds the records.")
     ] = "/",
+    pool_by: Annotated[
+        str,
+        typer.Option(
+            "--pool-by",
+            metavar="NAME",
+            help="Identify the records that share this column of metadata as one, such as a "
+            "unit's serial number; all: one model of all. Samples stay where they are.",
+        ),
+    ] = "",
+    lags: Annotated[
+        int | None,
+        typer.Option(
+            "--lags",
+            metavar="N",
+            help="With --pool-by: window in samples, into which delay and settling time fit; a "
+            "fifth of the first record without.",
+        ),
+    ] = None,
     scheduler: Scheduler = None,
     workers: Workers = None,
     per_task: Annotated[
@@ -125,6 +143,8 @@ def batch(
         record_column=record_column,
         group=group,
         metadata="" if metadata is None else str(metadata.absolute()),
+        pool_by=pool_by,
+        lags=lags,
     )
     cluster = Cluster(scheduler=scheduler, workers=workers, per_task=per_task)
     with stopping(out, "parts/*.parquet", "parts"), _counting(quiet) as tick:
