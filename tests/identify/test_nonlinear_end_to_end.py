@@ -39,9 +39,16 @@ def motion(kind: str, size: float) -> np.ndarray:
     return out[::SUBSTEPS]
 
 
-def identified(y: np.ndarray, *, noise: float = 0.002, seed: int = 1) -> hmpim.Identification:
+def identified(
+    y: np.ndarray, *, noise: float = 0.002, seed: int = 1, structures: list[str] | None = None
+) -> hmpim.Identification:
     noisy = y + noise * np.random.default_rng(seed).standard_normal(y.size)
-    return hmpim.identify(hmpim.Record.from_arrays({"u": sweep(T)}, {"y": noisy}, fs=FS))
+    record = hmpim.Record.from_arrays({"u": sweep(T)}, {"y": noisy}, fs=FS)
+    return hmpim.identify(record, structures=structures)
+
+
+PLAIN = ["second_order"]
+"""For tests of what is said of the rest, not of which structure is chosen."""
 
 
 def codes(pair) -> set[str]:
@@ -120,7 +127,8 @@ def third_harmonic(f: float, level: float, grip: float) -> float:
 
 
 def test_the_harmonics_are_those_of_a_stepped_sine():
-    curves = identified(motion("friction", 0.02), noise=0.0005)["y", "u"].nonlinearity.harmonics
+    pair = identified(motion("friction", 0.02), noise=0.0005, structures=PLAIN)["y", "u"]
+    curves = pair.nonlinearity.harmonics
     own, third = (next(c for c in curves if c.order == k) for k in (1, 3))
     inner = list(zip(third.frequency, third.amplitude, strict=True))[1:4]
     assert len(inner) == 3
@@ -135,7 +143,7 @@ def test_the_harmonics_are_those_of_a_stepped_sine():
 
 
 def test_json_keeps_it_and_older_results_lack_it():
-    result = identified(motion("backlash", 0.02))
+    result = identified(motion("backlash", 0.02), structures=PLAIN)
     data = result.to_dict()
     back = hmpim.Identification.from_dict(data)
     assert back["y", "u"].nonlinearity == result["y", "u"].nonlinearity
@@ -164,7 +172,7 @@ def test_one_of_several_inputs_that_is_bent_is_told_by_its_harmonics():
     down = up[::-1].copy()
     y = up - 0.2 * up**3 + 0.5 * down + 0.005 * rng.standard_normal(T.size)
     record = hmpim.Record.from_arrays({"a": up, "b": down}, {"y": y}, fs=FS)
-    result = hmpim.identify(record)
+    result = hmpim.identify(record, structures=["static", "first_order"])
     assert "nonlinear" in codes(result["y", "a"])
     assert "nonlinear" not in codes(result["y", "b"])
     said = next(w.message for w in result["y", "a"].warnings if w.code == "nonlinear")
@@ -172,11 +180,12 @@ def test_one_of_several_inputs_that_is_bent_is_told_by_its_harmonics():
 
 
 def test_a_long_record_is_looked_at_in_blocks(monkeypatch):
-    whole = identified(motion("friction", 0.02))["y", "u"].nonlinearity
+    y = motion("friction", 0.02)
+    whole = identified(y, structures=PLAIN)["y", "u"].nonlinearity
     monkeypatch.setattr(
         importlib.import_module("hmpim.identify.nonlinear.nonlinearity"), "_LONGEST", 1000
     )
-    halved = identified(motion("friction", 0.02))["y", "u"].nonlinearity
+    halved = identified(y, structures=PLAIN)["y", "u"].nonlinearity
     assert halved.kinds == whole.kinds
     assert halved.size.value == pytest.approx(whole.size.value, rel=0.1)
     assert halved.odd == pytest.approx(whole.odd, rel=0.3)
@@ -190,7 +199,7 @@ def test_levels_of_a_hard_spring_name_it_and_end_the_linear_range():
         y = gain * motion("hardening", 0.002 * gain**2)
         noisy = y + 0.002 * rng.standard_normal(T.size)
         records.append(hmpim.Record.from_arrays({"u": gain * sweep(T)}, {"y": noisy}, fs=FS))
-    levels = hmpim.identify_levels(records)
+    levels = hmpim.identify_levels(records, structures=PLAIN)
     found = levels["y", "u"]
     assert found.findings[0].code == "nonlinear"
     reach = next(t for t in found.trends if t.name == "scale_factor")
@@ -211,7 +220,7 @@ def test_levels_of_a_linear_system_are_all_alike():
         )
         for gain in (2.0, 1.0, 4.0)
     ]
-    found = hmpim.identify_levels(records)["y", "u"]
+    found = hmpim.identify_levels(records, structures=PLAIN)["y", "u"]
     assert found.findings == ()
     assert found.linear_up_to == pytest.approx(4.0 * np.ptp(sweep(T)) / 2)
 
@@ -237,12 +246,13 @@ def test_the_silverbox_hardens_in_one_record_and_over_levels(measured):
             {"u": data["input"][start:stop]}, {"y": data["output"][start:stop]}, fs=fs
         )
 
-    arrow = hmpim.identify(part(0, 40_000))["y", "u"]
+    arrow = hmpim.identify(part(0, 40_000), structures=PLAIN)["y", "u"]
     assert {"nonlinear", "hardening"} <= codes(arrow)
     assert arrow.verdict == "doubtful"
     assert arrow.nonlinearity.odd > 0.1
     assert arrow.nonlinearity.even == 0.0
-    levels = hmpim.identify_levels([part(k, k + 6000) for k in (2000, 20_000, 32_000)])
+    parts = [part(k, k + 6000) for k in (2000, 20_000, 32_000)]
+    levels = hmpim.identify_levels(parts, structures=PLAIN)
     found = levels["y", "u"]
     assert [f.code for f in found.findings] == ["nonlinear", "hardening"]
     frequency = next(t for t in found.trends if t.name == "natural_frequency")

@@ -37,8 +37,8 @@ def pick(record, axis):
     )
 
 
-def identified(record, axis):
-    return identify(record)[f"{axis}.position", f"{axis}.command"]
+def identified(record, axis, **options):
+    return identify(record, **options)[f"{axis}.position", f"{axis}.command"]
 
 
 def crossing(pair):
@@ -57,7 +57,7 @@ def crossing(pair):
 def test_it_is_a_rig_and_run_plays_it():
     table = MotionTable()
     assert isinstance(table, Rig)
-    stimulus = sweep("pitch", upto=30.0, duration=2.0)
+    stimulus = sweep("pitch", upto=20.0, duration=0.5)
     assert run(table, stimulus, rng=3).sha256 == run(table, stimulus, rng=3).sha256
     assert run(table, stimulus, rng=3).sha256 != run(table, stimulus, rng=4).sha256
 
@@ -93,8 +93,8 @@ def test_encoders_read_the_truth_to_their_resolution():
     assert gap[:, 1].std() == pytest.approx(0.003 / np.sqrt(12), rel=0.1)
 
 
-EACH = [("roll", "PVA"), ("yaw", "P"), ("pitch", "PV"), ("azimuth", "P"), ("elevation", "P")]
-"""Each axis once and each mode; the others take as long again each, in `make studies`."""
+EACH = [("roll", "PVA"), ("yaw", "P"), ("azimuth", "P"), ("elevation", "P")]
+"""Each axis and each mode, pitch in PV below; the others in `make studies`."""
 OTHERS = [case for case in product(AXES, MODES) if case not in EACH]
 
 
@@ -163,8 +163,9 @@ def all_at_once():
 def test_all_axes_at_once_give_the_bandwidths_of_each_alone(all_at_once, axis):
     """Fig. 24: there the automatic roll bandwidth came out a third too low."""
     table, stimuli, together = all_at_once
-    alone = identified(run(table, stimuli[axis], rng=3), axis).bandwidth_phase90
-    among = identified(pick(together, axis), axis).bandwidth_phase90
+    plain = {"structures": ["second_order", "third_order"]}
+    alone = identified(run(table, stimuli[axis], rng=3), axis, **plain).bandwidth_phase90
+    among = identified(pick(together, axis), axis, **plain).bandwidth_phase90
     assert abs(among.value / alone.value - 1.0) < 0.03
 
 
@@ -175,7 +176,9 @@ def test_friction_lowers_the_apparent_bandwidth_of_small_motions(levels):
     for acceleration in levels:
         limits = Limits(position=2.0, velocity=200.0, acceleration=acceleration, unit="deg")
         stimulus = design(band=(0.1, 40), duration=10, fs=1000, limits=limits, axis="pitch")
-        found.append(crossing(identified(run(MotionTable(), stimulus, rng=1), "pitch")))
+        record = run(MotionTable(), stimulus, rng=1)
+        # What is read is the measured response: which structure fits best does not matter.
+        found.append(crossing(identified(record, "pitch", structures=["second_order"])))
     linear = exact_bandwidth(MotionTable(), axis="pitch", hold="included")
     assert sorted(found) == found
     assert found[0] < found[-1] < linear
