@@ -6,6 +6,7 @@ import tomllib
 import numpy as np
 import pytest
 
+import hmpim
 from hmpim.campaign import parse_plan, read_plan, run_campaign, shipped_plan
 from hmpim.campaign.crossing import samples_bandwidth
 from hmpim.campaign.grids import PARAMETERS
@@ -81,6 +82,21 @@ def test_demo_finds_all_five_axes_and_shows_them(demo):
     page = (folder / "study.html").read_text(encoding="utf-8")
     assert page.count('class="pass"') == 10  # in the table of the axes, and check by check
     assert "<svg" in page
+
+
+def test_all_in_one_fit_have_the_bandwidths_of_each_alone(demo):
+    """The rows come of one axis at a time; here all inputs of the raw record are fitted at once."""
+    study, folder = demo
+    (path,) = (folder / "records").glob("*.h5")
+    plain = ["static", "first_order", "second_order", "third_order"]
+    found = hmpim.identify(hmpim.load(path), structures=plain)
+    for row in study.rows:
+        pair = found[f"{row.axis}.position", f"{row.axis}.command"]
+        single = row.parameters["bandwidth_phase90"].value
+        assert pair.bandwidth_phase90.value == pytest.approx(single, rel=0.02)
+    for pair in found.pairs:
+        if pair.input.split(".")[0] != pair.output.split(".")[0]:
+            assert pair.parameters.scale_factor is None  # inertia couples nothing at rest
 
 
 def test_couplings_stand_beside_the_exact_ones(demo):

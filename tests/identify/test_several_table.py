@@ -27,6 +27,7 @@ def together(stimuli, *, friction):
     return table, record, hmpim.identify(record)
 
 
+@pytest.mark.study  # small: tests/campaign/test_compare.py
 def test_bandwidths_are_those_of_each_axis_alone(stimuli):
     _, record, found = together(stimuli, friction=True)
     for axis in AXES:
