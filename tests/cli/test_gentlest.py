@@ -23,8 +23,9 @@ def run(*arguments):
     return CliRunner().invoke(app, [*arguments])
 
 
-def test_to_files(tmp_path):
+def test_to_files_with_a_picture_of_the_trade(tmp_path):
     files = ("-o", str(tmp_path / "s.csv"), "--json", str(tmp_path / "s.json"))
+    files = (*files, "--plot", str(tmp_path / "t.png"))
     out = run(*ROUGH, "--range", "9", "11", *files)
     assert out.exit_code == 0, out.output
     data = json.loads((tmp_path / "s.json").read_text())
@@ -39,14 +40,8 @@ def test_to_files(tmp_path):
     assert data["errors"]["delay"]["ci95"] <= 0.005
     assert "Predicted errors at 95 %" in out.output
     assert f"{data['value']:.4g}" in out.output
-
-
-def test_picture_of_the_trade(tmp_path):
-    out = run(*ROUGH, "--plot", str(tmp_path / "t.png"), "--json", str(tmp_path / "t.json"))
-    assert out.exit_code == 0, out.output
     assert (tmp_path / "t.png").read_bytes().startswith(b"\x89PNG")
-    points = json.loads((tmp_path / "t.json").read_text())["trade"]
-    values = [p["value"] for p in points if p["value"] is not None]
+    values = [p["value"] for p in data["trade"] if p["value"] is not None]
     assert values == sorted(values, reverse=True)
 
 

@@ -2,7 +2,6 @@
 
 import json
 import re
-import subprocess
 import sys
 from pathlib import Path
 
@@ -14,12 +13,19 @@ from hmpim.cli.main import app
 DOC = Path(__file__).parents[2] / "docs" / "campaign.md"
 
 
+@pytest.fixture(autouse=True)
+def _each_its_own_rig():
+    """Python keeps a module that was imported: a rig of the same name would be the first one."""
+    yield
+    sys.modules.pop("my_gimbal", None)
+
+
 def block(kind):
     (found,) = re.findall(rf"```{kind}\n(.*?)```", DOC.read_text(encoding="utf-8"), re.DOTALL)
     return found
 
 
-def test_a_rig_of_ones_own_beside_its_plan(tmp_path):
+def test_a_rig_of_ones_own_beside_its_plan(tmp_path, monkeypatch):
     (tmp_path / "bench").mkdir()
     (tmp_path / "bench" / "my_gimbal.py").write_text(block("python"), encoding="utf-8")
     (tmp_path / "bench" / "my_gimbal.toml").write_text(block("toml"), encoding="utf-8")
@@ -27,14 +33,9 @@ def test_a_rig_of_ones_own_beside_its_plan(tmp_path):
     assert program == "hmpim"
     # From another folder than the plan's: the rig is found beside the plan.
     arguments[1] = "bench/my_gimbal.toml"
-    done = subprocess.run(
-        [sys.executable, "-m", "hmpim.cli.main", *arguments],
-        cwd=tmp_path,
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert done.returncode == 0, done.stderr
+    monkeypatch.chdir(tmp_path)
+    done = CliRunner().invoke(app, arguments)
+    assert done.exit_code == 0, done.stderr
     assert "All 2 checks of the specification are met." in done.stdout
     study = json.loads((tmp_path / "out" / "my-gimbal" / "study.json").read_text())
     assert [row["rate"] for row in study["rows"]] == [500.0, 1000.0]

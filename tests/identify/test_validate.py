@@ -30,7 +30,7 @@ def checks(validation) -> dict[str, bool]:
 def test_a_right_model_passes_on_other_records(result):
     passed = [
         hmpim.validate(result, hmpim.run(SENSOR, stimulus, rng=seed)).passed
-        for seed in range(20, 26)
+        for seed in range(20, 23)
         for stimulus in (SWEEP, OTHER)
     ]
     assert all(passed)
@@ -38,10 +38,10 @@ def test_a_right_model_passes_on_other_records(result):
 
 def test_the_band_holds_95_percent(result):
     shares = []
-    for seed in range(40, 50):
+    for seed in range(40, 45):
         (output,) = hmpim.validate(result, hmpim.run(SENSOR, OTHER, rng=seed)).outputs
         shares.append(next(c.value for c in output.checks if c.name == "coverage"))
-    samples = 10 * OTHER.samples
+    samples = 5 * OTHER.samples
     assert np.mean(shares) == pytest.approx(0.95, abs=4 * np.sqrt(0.95 * 0.05 / samples) + 0.008)
 
 
@@ -69,7 +69,7 @@ def test_a_model_that_is_off_within_its_bars_passes_a_long_record():
     long = hmpim.design(band=(0.1, 15), duration=60, fs=100, limits=LIMITS)
     noisy = replace(SENSOR, noise_std=0.5)
     record = hmpim.run(noisy, long, rng=3)
-    for seed in range(6):
+    for seed in range(3):
         found = hmpim.identify(hmpim.run(noisy, short, rng=seed), structures=["second_order"])
         assert checks(hmpim.validate(found, record))["follows_input"]
 
@@ -116,7 +116,7 @@ def test_an_output_of_two_inputs_is_predicted_from_both():
         y = first + second + 0.3 + 0.05 * noise.standard_normal(t.size)
         return hmpim.Record.from_arrays({"a": a, "b": b}, {"y": y}, fs=100.0)
 
-    found = hmpim.identify(record(0.03, 1))
+    found = hmpim.identify(record(0.03, 1), structures=["static", "first_order"])
     right = hmpim.validate(found, record(0.03, 2))
     assert right.passed, [c for o in right.outputs for c in o.checks if not c.passed]
     assert right.outputs[0].inputs == ("a", "b")
@@ -157,7 +157,7 @@ def test_what_cannot_be_validated_is_refused(result):
 
 
 def test_two_results_of_one_unit_differ_by_chance_only(result):
-    for seed in range(60, 66):
+    for seed in range(60, 63):
         again = hmpim.identify(hmpim.run(SENSOR, SWEEP, rng=seed))
         assert not any(change.changed for change in compare(again, result))
 

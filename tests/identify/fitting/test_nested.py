@@ -9,6 +9,7 @@ from hmpim.identify.fitting.nested import hidden_pole, widened
 from hmpim.identify.uncertainty import covariance
 from hmpim.identify.whiteness import is_white
 from hmpim.model.sampled import delayed_response, prepare_input
+from tests_support import rms_between, room
 
 FS, N, DELAY = 200.0, 2000, 14.56
 
@@ -77,7 +78,8 @@ def test_the_limit_holds_the_pole_and_narrows_with_the_noise(u):
     assert loud == pytest.approx(quiet * np.sqrt(10), rel=0.25)  # q, its square, is as the noise
 
 
-def test_a_pole_left_out_is_asked_for_and_none_where_there_is_none(u):
+@pytest.mark.few(12)
+def test_a_pole_left_out_is_asked_for_and_none_where_there_is_none(u, seeds):
     """A third pole that the misfit does not show: second order alone puts the delay far off."""
     denominator = np.convolve([1.0, 2 * 0.4 * 6.0, 36.0], [1.0, 3.0])
     source = prepare_input(u, "bandlimited")
@@ -86,12 +88,13 @@ def test_a_pole_left_out_is_asked_for_and_none_where_there_is_none(u):
     scores = {}
     for name, clean in (("third", third), ("second", second + u[0])):
         scores[name] = []
-        for seed in range(40):
+        for seed in range(seeds):
             y = clean + 0.03 * np.random.default_rng(seed).standard_normal(N)
             joint = joint_fit(u, y, intersample="bandlimited", structures=("second_order",))
             rows = jacobian(joint.problem, joint.best.fit)
             hidden = hidden_pole(joint.problem, joint.best.fit, rows, white=True)
             scores[name].append(hidden.squared / hidden.std)
     assert np.min(scores["third"]) > 4.0
-    assert np.std(scores["second"]) == pytest.approx(1.0, abs=0.3)
-    assert abs(np.mean(scores["second"])) < 0.5
+    low, high = rms_between(seeds)
+    assert low < np.sqrt(np.mean(np.square(scores["second"]))) < high
+    assert abs(np.mean(scores["second"])) < room(seeds)
