@@ -97,7 +97,7 @@ def check_identified(record):
 
 @pytest.mark.parametrize(
     ("kind", "at"),
-    [("kill", 2.6), ("exception", 0.8), ("cable", 0.8), *in_studies(("interrupt", 0.8))],
+    [("kill", 2.6), ("cable", 0.8), *in_studies(("interrupt", 0.8), ("exception", 0.8))],
 )
 def test_at_rest_inside_the_limits_and_the_record_kept_and_identified(table, tmp_path, kind, at):
     record = check(table, tmp_path, kind, at)

@@ -94,7 +94,7 @@ def clean():
     return inputs, outputs
 
 
-def identified(clean, seed):
+def identified(clean, seed, structures=None):
     inputs, outputs = clean
     rng = np.random.default_rng(seed)
     return hmpim.identify(
@@ -106,7 +106,8 @@ def identified(clean, seed):
             },
             fs=FS,
             intersample="bandlimited",
-        )
+        ),
+        structures=structures,
     )
 
 
@@ -116,7 +117,7 @@ def pair_of(result, i, j):
 
 @pytest.fixture(scope="module")
 def result(clean):
-    return identified(clean, 0)
+    return identified(clean, 0, structures=["static", "first_order", "second_order"])
 
 
 def test_couplings_are_found_and_none_is_invented(result):

@@ -116,6 +116,7 @@ def test_a_noisy_clipped_static_sensor_stays_static():
     assert abs(pair.delay.value - 0.05) < 4 * pair.delay.std
 
 
+@pytest.mark.few(8)
 def test_a_third_clipped_leaves_no_bias(seeds):
     pairs = [found(seed, saturation_high=0.6) for seed in range(seeds)]
     for name, value in TRUTH.items():

@@ -17,7 +17,7 @@ from hmpim.model import (
     simulate,
     theta_of,
 )
-from tests_support import assert_share, holds, rms_between, room
+from tests_support import assert_share, holds, in_studies, rms_between, room
 
 FS = 200.0
 TRUTH = {
@@ -121,6 +121,7 @@ def test_the_bound_is_the_published_one(field_record):
     assert bound["bias"] == pytest.approx(0.0022, rel=0.03)
 
 
+@pytest.mark.few(10)
 def test_at_the_bound_with_honest_intervals(field_record, seeds):
     _, u, y = field_record
     bound = cramer_rao(u, y)
@@ -198,7 +199,7 @@ def test_samples_that_do_not_count_do_not_count(field_record):
 
 def test_noise_alone_is_unrelated(field_record):
     _, u, _ = field_record
-    for seed in range(10):
+    for seed in range(4):
         fit = joint_fit(u, np.random.default_rng(seed).standard_normal(u.size))
         assert fit.silent
         assert not fit.related
@@ -217,7 +218,8 @@ def test_scaling_the_output_scales_gain_bias_and_noise_only(field_record):
         assert getattr(other, name).std == pytest.approx(getattr(one, name).std, rel=1e-3)
 
 
-@pytest.mark.parametrize("colour", [0.9, -0.6])
+@pytest.mark.few(10)
+@pytest.mark.parametrize("colour", [0.9, *in_studies(-0.6)])
 def test_intervals_hold_under_coloured_noise(field_record, seeds, colour):
     from scipy.signal import lfilter
 
