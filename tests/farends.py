@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
+from forking import PATIENCE
 from hmpim.formats.stimulus_files import save_stimulus
 from hmpim.rigs import MotionTable
 from hmpim.stimulus import design
@@ -24,7 +25,7 @@ SWEEP = design(
 )  # fmt: skip
 
 
-def wait_for(condition, seconds=60.0):
+def wait_for(condition, seconds=PATIENCE):
     deadline = time.monotonic() + seconds
     while not (found := condition()):
         assert time.monotonic() < deadline, "nothing happened"
@@ -44,13 +45,23 @@ class Table:
                  "--trace", str(self.trace)],
                 stdout=out, env=os.environ | {"PYTHONUNBUFFERED": "1"},
             )  # fmt: skip
-        wait_for(lambda: "udp://" in said.read_text())
+        try:
+            wait_for(lambda: "udp://" in said.read_text())
+        except BaseException:  # left alone, it would run on for ever, before all others
+            self.process.kill()
+            self.process.wait()
+            raise
         self.port = int(said.read_text().split("udp://127.0.0.1:")[1].split(",")[0])
         self.read_to = 0
 
     def close(self):
         self.process.send_signal(signal.SIGINT)
-        assert self.process.wait(60) == 0
+        try:
+            code = self.process.wait(PATIENCE)
+        finally:
+            self.process.kill()
+            self.process.wait()
+        assert code == 0
 
     def rows(self):
         """What it has done since the last call, as far as whole lines are written."""
@@ -71,7 +82,7 @@ class Table:
             true=np.array([float(r[column[f"{AXIS}.true"]]) for r in rows]),
         )
 
-    def until_rest(self, *, within=60.0):
+    def until_rest(self, *, within=PATIENCE):
         """All that it does until it stands."""
         parts = []
 
@@ -187,7 +198,7 @@ def moving_since(table, at, process):
     parts = []
 
     def enough():
-        assert process.poll() is None, process.communicate(timeout=60)
+        assert process.poll() is None, process.communicate(timeout=PATIENCE)
         parts.append(table.rows())
         ticks = Ticks.joined(parts)
         moving = ticks.time[ticks.state == "MOVING"]

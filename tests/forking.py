@@ -14,6 +14,9 @@ import time
 import traceback
 from pathlib import Path
 
+PATIENCE = 300.0
+"""Seconds after which something counts as hung, on a machine however busy."""
+
 
 class Nursery:
     """The process that forks the runs."""
@@ -29,7 +32,7 @@ class Nursery:
 
     def close(self):
         self.process.stdin.close()
-        assert self.process.wait(60) == 0
+        assert self.process.wait(PATIENCE) == 0
 
 
 class Forked:
@@ -61,7 +64,7 @@ class Forked:
             os.kill(self.pid, signal.SIGKILL)
 
     def wait(self):
-        self.communicate(60)
+        self.communicate(PATIENCE)
 
 
 def written(path, text):

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from farends import AXIS, SWEEP, Cable, Table, Ticks, begin, check_rest, moving_since, wait_for
-from forking import Nursery
+from forking import PATIENCE, Nursery
 from hmpim.formats.recording import read_recording
 from hmpim.identify import identify
 from tests_support import in_studies
@@ -45,7 +45,7 @@ def ended(table, folder, kind, at, nursery=None):
         else:
             os.kill(process.pid, signal.SIGKILL if kind == "kill" else signal.SIGINT)
         now = time.perf_counter()
-        _, said = process.communicate(timeout=60)
+        _, said = process.communicate(timeout=PATIENCE)
         if kind == "exception":
             now = float((folder / "raised.txt").read_text())
     finally:
@@ -142,9 +142,9 @@ def test_at_any_moment(tmp_path):
         for number in range(int(os.environ.get("HMPIM_KILLS", "200")))
     )
     nursery = Nursery()
-    with ThreadPoolExecutor(LANES) as lanes:
+    with ThreadPoolExecutor(LANES) as lanes:  # one that fails is told before anything else
         works = [lanes.submit(worked_through, k, jobs, nursery, tmp_path) for k in range(LANES)]
-    nursery.close()
     kept = [record for work in works for record in work.result()]
+    nursery.close()
     for record in kept:
         check_identified(record)
