@@ -1,7 +1,5 @@
 """All channels on one uniform clock: unchanged where they can be, honest where not."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -164,30 +162,38 @@ def test_a_gap_in_a_clock_of_its_own_is_masked_there_only():
     assert "of 'u' are missing" in aligned.findings[0].message
 
 
+def held_at(t_u, t_y, intersample):
+    """A sweep that is held or joined between its samples, and any output."""
+    u = Channel(name="u", time=t_u, values=sine(np.asarray(t_u), 2.0))
+    y = Channel(name="y", time=t_y, values=np.zeros(np.asarray(t_y).size))
+    return Record(inputs=(u,), outputs=(y,), fs=100.0, intersample=intersample)
+
+
 @pytest.mark.parametrize("intersample", ["zoh", "foh"])
-def test_an_input_that_switches_at_its_own_instants_keeps_them(intersample):
-    """The output, which is smooth, is taken at the input's instants instead."""
-    u = Channel(name="u", time=[0.0, 0.1, 0.2, 0.3], values=[1.0, 2.0, 4.0, 4.0])
-    y = Channel(name="y", time=[0.05, 0.15, 0.25], values=[0.0, 1.0, 2.0])
-    aligned = uniform(Record(inputs=(u,), outputs=(y,), fs=10.0, intersample=intersample))
-    assert aligned.time == pytest.approx([0.1, 0.2], abs=1e-12)
-    assert aligned.inputs[0].values.tolist() == [2.0, 4.0]
-    assert aligned.outputs[0].values == pytest.approx([0.5, 1.5], abs=1e-9)
-
-
-def test_a_held_input_of_another_rate_is_the_mean_of_what_it_holds():
-    u = Channel(name="u", time=np.arange(0, 1, 0.03), values=np.arange(34.0))
-    y = Channel(name="y", time=np.arange(0, 1, 0.1), values=np.zeros(10))
-    aligned = uniform(Record(inputs=(u,), outputs=(y,), fs=10.0, intersample="zoh"))
-    # 0.1 s hold three intervals and a third of one.
-    assert aligned.inputs[0].values[0] == pytest.approx((0 + 1 + 2 + 3 / 3) * 0.03 / 0.1)
-    assert aligned.inputs[0].values[3] == pytest.approx((10 + 11 + 12 + 13 / 3) * 0.03 / 0.1)
+@pytest.mark.parametrize("beside", [0.002, 0.0075])
+def test_of_an_input_that_changes_beside_the_samples_comes_what_lies_below_half_the_rate(
+    intersample, beside
+):
+    """A hold delays by half an interval and by its sinc lessens; joining lessens by its square."""
+    aligned = uniform(held_at(np.arange(400) / 100 + beside, np.arange(400) / 100, intersample))
+    lessened = np.sinc(0.02) ** (1 if intersample == "zoh" else 2)
+    late = 0.005 if intersample == "zoh" else 0.0
+    inner = slice(50, -50)
+    expected = lessened * sine(aligned.time - late, 2.0)
+    assert np.abs(aligned.inputs[0].values - expected)[inner].max() < 1e-3
+    assert aligned.intersample == "bandlimited"
     (doubt,) = [f for f in aligned.findings if f.severity == "doubt"]
     assert (doubt.code, doubt.parameters[0]) == ("held_between", "delay")
-    # Sampled where it switches nothing is doubtful.
-    there = replace(y, time=u.time[:10])
-    fine = uniform(Record(inputs=(u,), outputs=(there,), fs=10.0, intersample="zoh"))
-    assert not [f for f in fine.findings if f.severity == "doubt"]
+
+
+def test_a_hold_whose_steps_are_samples_of_the_output_is_left_as_it_is():
+    """At half the rate, from the same instant on: each value twice, and nothing is doubtful."""
+    record = held_at(np.arange(200) / 50, np.arange(398) / 100, "zoh")
+    aligned = uniform(record)
+    twice = np.repeat(record.inputs[0].values, 2)[:398]
+    assert aligned.inputs[0].values == pytest.approx(twice, abs=1e-9)
+    assert aligned.intersample == "zoh"
+    assert not [f for f in aligned.findings if f.severity == "doubt"]
 
 
 def test_clocks_that_never_meet_are_refused():

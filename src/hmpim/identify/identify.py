@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from hmpim.arguments import checked
 from hmpim.errors import ArgumentError, RecordError
+from hmpim.identify.between import moved_by, settled_finding, unfolded
 from hmpim.identify.coupling.coupled import inputs_of, responses_of, settled, unrelated
 from hmpim.identify.coupling.several import Joined, fit_together
 from hmpim.identify.effects.drift import Drifting, with_drift
@@ -50,6 +51,12 @@ _LARGEST = 1e75
 
 _EXACT = 1e-9
 """Share of the output (r.m.s.) up to which a model explains a record to rounding."""
+
+_ROUNDS = 3
+"""Times that what folds between two clocks is taken out and all is identified again, at most."""
+
+_STILL = 0.003
+"""Samples by which the delay may still move with it: less than a third of one hundredth."""
 
 _BETTER = 0.7
 """Share of the noise's power under a drift below which a clipped level is taken instead."""
@@ -125,7 +132,8 @@ def identify(
             return identify_statistics(record, intersample=chosen, structures=names)
     _check_length(record)
     _check_size(record)
-    aligned = uniform(record)
+    stated = record if chosen == record.intersample else replace(record, intersample=chosen)
+    aligned = uniform(stated)
     for signal in aligned.inputs:
         if np.ptp(signal.values) == 0:
             raise RecordError(
@@ -139,11 +147,41 @@ def identify(
             "stuck or not connected, or the wrong column is taken as output"
         )
     with one_thread():
-        inputs = inputs_of(aligned, record) if len(aligned.inputs) > 1 else None
-        found = [
-            _identify_output(aligned, output, record, chosen, names, inputs)
-            for output in aligned.outputs
-        ]
+        if aligned.waveforms:
+            return _between_clocks(record, aligned, names)
+        return _identified(record, aligned, chosen, names)
+
+
+def _between_clocks(
+    record: Record, aligned: Aligned, structures: tuple[StructureName, ...]
+) -> Identification:
+    """Identify, what folds between the clocks taken out by the models found, until it stays."""
+    names = ", ".join(repr(signal.name) for signal in aligned.inputs)
+    said = settled_finding(names, _STILL / aligned.fs)
+    told = tuple(f for f in aligned.findings if f.code != said.code)
+    plain = tuple(name for name in structures if name in PLAIN) or structures
+    taken = unfolded(record, aligned, _identified(record, aligned, "bandlimited", plain))
+    for _ in range(_ROUNDS):
+        settled = replace(taken.aligned, findings=(*told, said))
+        found = _identified(record, settled, "bandlimited", structures)
+        before, taken = taken, unfolded(record, aligned, found)
+        if moved_by(before, taken) < _STILL:
+            return found
+    return _identified(record, before.aligned, "bandlimited", structures)  # with the doubt
+
+
+def _identified(
+    record: Record,
+    aligned: Aligned,
+    chosen: Intersample | None,
+    names: tuple[StructureName, ...],
+) -> Identification:
+    """Identify every output of a record on its common clock."""
+    inputs = inputs_of(aligned, record) if len(aligned.inputs) > 1 else None
+    found = [
+        _identify_output(aligned, output, record, chosen, names, inputs)
+        for output in aligned.outputs
+    ]
     if inputs is not None:
         coherence = tuple(seen for _, seen in found if seen is not None)
         inputs = replace(inputs, coherence=coherence)

@@ -4,7 +4,9 @@ from hmpim.record.align import Aligned, Signal, uniform
 from hmpim.record.clock import Clock, fit_clock
 from hmpim.record.describe import Description, describe
 from hmpim.record.finding import Finding, Severity
+from hmpim.record.held import Waveform
 from hmpim.record.offset import ClockOffset, clock_offset
+from hmpim.record.onto import on_grid
 from hmpim.record.propose import Proposal, propose
 from hmpim.record.quality import inspect_record, inspect_timing, inspect_values
 from hmpim.record.record import BETWEEN, ROLES, Channel, Intersample, Record, Role
@@ -30,6 +32,7 @@ __all__ = [
     "Severity",
     "Signal",
     "Stopping",
+    "Waveform",
     "clock_offset",
     "describe",
     "find_motions",
@@ -37,6 +40,7 @@ __all__ = [
     "inspect_record",
     "inspect_timing",
     "inspect_values",
+    "on_grid",
     "propose",
     "uniform",
 ]

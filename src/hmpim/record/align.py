@@ -1,6 +1,7 @@
 """One uniform clock for all channels of a record, which is what identification needs."""
 
 from dataclasses import dataclass
+from itertools import zip_longest
 from typing import TypeVar
 
 import numpy as np
@@ -9,7 +10,7 @@ from numpy.typing import NDArray
 from hmpim.errors import RecordError
 from hmpim.record.clock import Clock, fit_clock
 from hmpim.record.finding import Finding
-from hmpim.record.held import switching_clock
+from hmpim.record.held import Waveform, switches_beside, waveform_of
 from hmpim.record.onto import is_reduced, on_grid
 from hmpim.record.quality import clock_findings
 from hmpim.record.record import Channel, Intersample, Record
@@ -60,6 +61,11 @@ class Aligned:
     findings : tuple of Finding
         What was found when the record was read, then what had to be repaired here: 'gaps',
         'jitter', 'rate', 'resampled'. Empty if nothing.
+    intersample : {'zoh', 'foh', 'bandlimited', 'sampled'} or None
+        What the inputs do between the samples here: as the record states, but 'bandlimited'
+        where a held or linear one has its corners by a clock of its own.
+    waveforms : tuple of Waveform
+        What the inputs truly were, where that is so; empty else.
     """
 
     time: NDArray[np.float64]
@@ -67,6 +73,8 @@ class Aligned:
     inputs: tuple[Signal, ...]
     outputs: tuple[Signal, ...]
     findings: tuple[Finding, ...]
+    intersample: Intersample | None = None
+    waveforms: tuple[Waveform, ...] = ()
 
     @property
     def start(self) -> float:
@@ -103,15 +111,13 @@ def uniform(record: Record) -> Aligned:
       values are filled in and marked in `Signal.valid`.
     * Jitter: values are interpolated from their own stamps with a cubic spline (not-a-knot).
       With stamps strewn by ±30 % of the interval it errs by 5e-4 of the amplitude (r.m.s.) at
-      a tenth of the rate. A gap ends one spline and begins the next. An input stated as 'zoh'
-      keeps its last value instead, and one stated as 'foh' is joined linearly.
+      a tenth of the rate. A gap ends one spline and begins the next.
     * Channels with clocks of their own: interpolated likewise, over the span that all share. One
       that is sampled faster loses what lies above half the lower rate first, by a symmetric
       filter: no path moves the delay (see `hmpim.record.resample`).
-    * Inputs stated as 'zoh' or 'foh' that have a clock of their own, of the output's rate or a
-      whole fraction of it: the outputs are interpolated onto that clock instead, as such an input
-      is right only where it switches (see `hmpim.record.held`). At any other ratio of rates the
-      input is the mean of what it holds over each interval.
+    * Inputs stated as 'zoh' or 'foh' whose corners lie beside the instants of the output's clock:
+      what of them lies below half the output's rate, by the same filter, for a band-limited input
+      (see `hmpim.record.held`). The rest folds in the output, which `identify` puts right.
 
     Inside a gap the filling is a cubic (Hermite) between the two edges, with slopes limited so
     that it never leaves the range between them.
@@ -156,18 +162,27 @@ def uniform(record: Record) -> Aligned:
             inputs=tuple(_unchanged(c, everywhere) for c in record.inputs),
             outputs=tuple(_unchanged(c, everywhere) for c in record.outputs),
             findings=tuple(findings),
+            intersample=record.intersample,
         )
     if shared:
         grid = clock.start + np.arange(clock.length) / clock.fs
     else:
-        own_of_output = clock
-        clock = switching_clock(record.inputs, clocks, clock, record.intersample)
         grid = _common_grid(channels, clocks, clock)
-        findings.extend(_clock_differences(record, clocks, own_of_output))
+        findings.extend(_clock_differences(record, clocks, clock))
+    between = record.intersample
+    waveforms: tuple[Waveform, ...] = ()
+    if (between == "zoh" or between == "foh") and switches_beside(
+        record.inputs, clocks, clock, between
+    ):
+        waveforms = tuple(waveform_of(c, clocks[id(c.time)], between) for c in record.inputs)
+        findings.append(_held_between(record, clock, between))
+        between = "bandlimited"
 
-    def signal(channel: Channel, intersample: Intersample | None) -> Signal:
+    def signal(channel: Channel, intersample: Intersample | None, true: Waveform | None) -> Signal:
         own = clocks[id(channel.time)]
         values, valid = on_grid(channel, own, grid, fs=clock.fs, intersample=intersample)
+        if true is not None:
+            values = true.below_half(grid, fs=clock.fs)
         return Signal(
             name=channel.name, values=_frozen(values), valid=_frozen(valid), unit=channel.unit
         )
@@ -175,9 +190,11 @@ def uniform(record: Record) -> Aligned:
     return Aligned(
         time=_frozen(grid),
         fs=clock.fs,
-        inputs=tuple(signal(c, record.intersample) for c in record.inputs),
-        outputs=tuple(signal(c, None) for c in record.outputs),
+        inputs=tuple(signal(c, between, true) for c, true in zip_longest(record.inputs, waveforms)),
+        outputs=tuple(signal(c, None, None) for c in record.outputs),
         findings=tuple(findings),
+        intersample=between,
+        waveforms=waveforms,
     )
 
 
@@ -243,29 +260,23 @@ def _clock_differences(record: Record, clocks: dict[int, Clock], clock: Clock) -
         findings.append(_resampled(c, own, channels[0], clock, between))
         if c in record.inputs:
             findings.extend(_folded(c, own, channels[0], clock))
-            findings.extend(_held_between(c, own, channels[0], clock, record.intersample))
     return findings
 
 
-def _held_between(
-    channel: Channel, own: Clock, first: Channel, clock: Clock, intersample: Intersample | None
-) -> list[Finding]:
+def _held_between(record: Record, clock: Clock, intersample: Intersample) -> Finding:
     """An input that is held, or linear, by another clock: its corners lie where none is sampled."""
-    if intersample not in ("zoh", "foh"):
-        return []
-    how = "is held" if intersample == "zoh" else "turns"
-    return [
-        Finding(
-            code="held_between",
-            message=(
-                f"{channel.name!r} {how} by a clock of {own.fs:.6g} Hz, beside that of "
-                f"{first.name!r} at {clock.fs:.6g} Hz: what is answered between samples is not "
-                "known well enough for the delay; record both by one clock"
-            ),
-            severity="doubt",
-            parameters=("delay", "delay_correlation", "delay_low_frequency"),
-        )
-    ]
+    how = "are held" if intersample == "zoh" else "turn"
+    names = ", ".join(repr(c.name) for c in record.inputs)
+    return Finding(
+        code="held_between",
+        message=(
+            f"Values of {names} {how} beside the samples of {record.outputs[0].name!r} at "
+            f"{clock.fs:.6g} Hz; what is answered between samples folds in these, which only "
+            "identification of the record itself puts right"
+        ),
+        severity="doubt",
+        parameters=("delay", "delay_correlation", "delay_low_frequency"),
+    )
 
 
 def _resampled(
@@ -274,6 +285,8 @@ def _resampled(
     place = (own.start - clock.start) * clock.fs
     held = intersample in ("zoh", "foh")
     how = "was interpolated"
+    if held:
+        how = f"was brought onto it as it is {'held' if intersample == 'zoh' else 'joined'}"
     if not held and is_reduced(channel, own, clock.fs):
         how = f"was reduced to it, with what it holds above {clock.fs / 2:.6g} Hz taken out"
     return Finding(

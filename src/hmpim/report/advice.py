@@ -51,7 +51,7 @@ _ADVICE = {
     "beyond_band": "Widen the band of the stimulus.",
     "extrapolated": "Widen the band of the stimulus to the frequency named.",
     "intersample": "State what the input does between samples: `--intersample`.",
-    "held_between": "State what the input does between samples: `--intersample`.",
+    "held_between": "Record input and output by one clock.",
     "hold": "Nothing, if the unit is known to hold its output.",
     "friction": "Test at a larger level as well, and compare.",
     "hardening": "Test at several levels, and state the one that each figure is for.",

@@ -261,7 +261,7 @@ def compress(
         runs=(),
         names=(source.name, answer.name),
         units=(source.unit, answer.unit),
-        intersample=record.intersample,
+        intersample=aligned.intersample,
         band=record.band,
         bias=bias,
     )
