@@ -31,6 +31,9 @@ Real = NDArray[np.float64]
 _STEPS = 15
 """Evaluations of all derivatives in which the models are moved."""
 
+_APART = 1e-5
+"""Relative step of the derivatives: of a delay of a sample a thousandth of what matters."""
+
 _HOPELESS = 1e3
 """Times the output's range that stands for a model that cannot be simulated."""
 
@@ -193,7 +196,8 @@ def _refined(
     for part, model, cut in zip(parts, models, [0, *cuts], strict=True):
         scale[cut] = max(abs(model.delay), 1.0 / waveforms[0].fs)
         scale[cut + part.size - len(_moved_coefficients(model)) : cut + part.size] = 1.0
-    done = least_squares(left, begun, x_scale=scale, diff_step=1e-5, max_nfev=_STEPS)
+    small = np.full(begun.size, _APART)
+    done = least_squares(left, begun, x_scale=scale, diff_step=small, max_nfev=_STEPS)
     return made(np.asarray(done.x))
 
 
