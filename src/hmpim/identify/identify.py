@@ -162,8 +162,8 @@ def _between_clocks(
     plain = tuple(name for name in structures if name in PLAIN) or structures
     taken = unfolded(record, aligned, _identified(record, aligned, "bandlimited", plain))
     for _ in range(_ROUNDS):
-        settled = replace(taken.aligned, findings=(*told, said))
-        found = _identified(record, settled, "bandlimited", structures)
+        cleared = replace(taken.aligned, findings=(*told, said))
+        found = _identified(record, cleared, "bandlimited", structures)
         before, taken = taken, unfolded(record, aligned, found)
         if moved_by(before, taken) < _STILL:
             return found
