@@ -11,12 +11,15 @@ from hmpim.campaign.study import Row
 from hmpim.identify import PairIdentification
 from hmpim.plots.curves import BodeCurve, measured_curve, model_curve
 from hmpim.plots.description import Figure as Description
+from hmpim.plots.description import Panel
 from hmpim.plots.fence import picket_fence
-from hmpim.plots.overlay import overlaid_bode, overlaid_levels
+from hmpim.plots.overlay import beside_bode, overlaid_bode, overlaid_levels, waveform_panels
 from hmpim.report.figures import Picture
 
 __all__ = ["pair_of", "section_pictures"]
 
+_BESIDE: tuple[Compare, ...] = ("rates", "loads", "excitation")
+_MOST_BESIDE = 3  # columns that a page has room for
 _CLEAR = 0.3  # share of the response: what is less sure is left out
 
 
@@ -36,32 +39,50 @@ def section_pictures(
             for row in rows
         ]
         unit = rows[0].stimulus["unit"] if rows else ""
-        return [
-            _picture("levels", figure.title, words, overlaid_levels(levels, unit=unit, level=HEARD))
-        ]
+        drawn = overlaid_levels(levels, unit=unit, level=HEARD, above=_waveforms(rows, unit))
+        return [_picture("levels", figure.title, words, drawn)]
     if figure.compare == "axes":
-        drawn = _overlaid(rows, rows, "axes")
-        return [] if drawn is None else [_picture("axes", figure.title, words, drawn)]
+        over = _overlaid(rows, rows, "axes")
+        return [] if over is None else [_picture("axes", figure.title, words, over)]
     for axis in dict.fromkeys(row.axis for row in rows):
         if figure.compare == "fence":
             fence = _fence([row for row in rows if row.axis == axis])
             pictures.append(_picture(axis, f"{figure.title}: {axis}", words, fence))
             continue
-        drawn = _overlaid([row for row in rows if row.axis == axis], rows, figure.compare)
-        if drawn is not None:
-            pictures.append(_picture(axis, f"{figure.title}: {axis}", words, drawn))
+        over = _overlaid([row for row in rows if row.axis == axis], rows, figure.compare)
+        if over is not None:
+            pictures.append(_picture(axis, f"{figure.title}: {axis}", words, over))
     return pictures
 
 
 def _overlaid(rows: Sequence[Row], every: Sequence[Row], compare: Compare) -> Description | None:
-    """Responses over each other, each bandwidth marked with its error."""
+    """Responses side by side where they are few, else over each other; bandwidths marked."""
     seen = [(row, curve) for row in rows if (curve := _curve(row)) is not None]
     if not seen:
         return None
+    if compare in _BESIDE and len(seen) <= _MOST_BESIDE:
+        return beside_bode(
+            [(case_label(row, compare, every), curve) for row, curve in seen],
+            bandwidths=[_bandwidth(row) for row, _ in seen],
+        )
     return overlaid_bode(
         [(case_label(row, compare, every), curve) for row, curve in seen],
         bandwidths=[_bandwidth(row) for row, _ in seen],
         pairs=compare != "axes",
+    )
+
+
+def _waveforms(rows: Sequence[Row], unit: str) -> tuple[Panel, ...]:
+    """Each axis's motion once: at another rate it is the same. None of studies without it."""
+    first = {row.axis: row for row in reversed(rows)}
+    seen = {axis: row.stimulus.get("history") for axis, row in sorted(first.items())}
+    return waveform_panels(
+        [
+            (axis, np.array(history["time"]), np.array(history["position"]))
+            for axis, history in seen.items()
+            if history
+        ],
+        unit=unit,
     )
 
 

@@ -34,6 +34,7 @@ RECORDS = "records"
 CASE_SCHEMA = "hmpim/campaign-case/2"
 CAMPAIGN_SCHEMA = "hmpim/campaign/2"
 _PLAYED = 5  # times as long as a design takes: what is left is told from it
+_A_PERIOD = 10.0  # samples kept of each period of the fastest motion
 _WAIT = 0.5  # s at rest before and after the motion of an axis that count
 Progress = Callable[[int, int, str], None]
 
@@ -285,6 +286,16 @@ def _described(stimulus: Stimulus) -> dict[str, Any]:
         "peaks": [peaks.position, peaks.velocity, peaks.acceleration],
         "frequency": grid.tolist(),
         "level_db": level.tolist(),
+        "history": _history(stimulus, high),
+    }
+
+
+def _history(stimulus: Stimulus, high: float) -> dict[str, list[float]]:
+    """Time (s) and position, as few samples as a picture needs: ten a period at the band's end."""
+    step = max(1, int(stimulus.fs / (_A_PERIOD * high)))
+    return {
+        "time": [float(f"{t:.6g}") for t in stimulus.time[::step].tolist()],
+        "position": [float(f"{x:.4g}") for x in stimulus.position[::step].tolist()],
     }
 
 

@@ -16,6 +16,8 @@ if TYPE_CHECKING:
 
 __all__ = ["campaign"]
 
+_MOST_TOLD = 8  # doubtful rows that the terminal names
+
 
 def campaign(
     plan: Annotated[
@@ -119,7 +121,7 @@ def _check_files(
 def _print(study: "Study") -> None:
     from rich.table import Table
 
-    from hmpim.campaign.grids import bounds, case_grid, change_grid
+    from hmpim.campaign.grids import bounds, case_grid, change_grid, doubtful_words
     from hmpim.campaign.write import headline
 
     whole = case_grid(study.rows, "")
@@ -139,9 +141,13 @@ def _print(study: "Study") -> None:
         met = ["fail" if "fail" in outcomes else "pass" if outcomes else ""]
         shown.add_row(*(cells[i] for i in at), *(met if study.checks else ()))
     console.print(shown)
-    unsure = sum(row.verdict != "ok" for row in study.rows)
-    if unsure:
-        console.print(f"{unsure} of {len(study.rows)} verdicts are not ok; the page says why.")
+    unsure = [row for row in study.rows if row.verdict != "ok"]
+    for row in unsure[:_MOST_TOLD]:
+        where = f"{row.axis}, {row.test}" if len({r.test for r in study.rows}) > 1 else row.axis
+        names = doubtful_words([row]) or "every figure"
+        console.print(f"{row.verdict.replace('_', ' ')}: {where}: {names}")
+    if len(unsure) > _MOST_TOLD:
+        console.print(f"and {len(unsure) - _MOST_TOLD} more rows, which the page names")
     for check in study.checks:
         if check.outcome == "fail":
             read = check.reading

@@ -6,11 +6,12 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from hmpim.identify.result.digits import plus_minus
 from hmpim.plots.curves import BodeCurve
 from hmpim.plots.description import Axis, Curve, Dashes, Figure, Item, Panel, Rule
-from hmpim.plots.style import Colour
+from hmpim.plots.style import Colour, axis_label
 
-__all__ = ["overlaid_bode", "overlaid_levels"]
+__all__ = ["beside_bode", "overlaid_bode", "overlaid_levels", "waveform_panels"]
 
 _COLOURS: tuple[Colour, ...] = ("input", "output", "other", "limit", "model", "muted")
 _DASHES: tuple[Dashes, ...] = ("-", "--", "-.")
@@ -98,6 +99,99 @@ def overlaid_bode(
     )
 
 
+def beside_bode(
+    curves: Sequence[tuple[str, BodeCurve]],
+    *,
+    bandwidths: Sequence[tuple[float, float] | None],
+) -> Figure:
+    """Describe two or three responses side by side, on the same axes (Figs 19 to 21, 24, 25).
+
+    Parameters
+    ----------
+    curves : sequence of (label, BodeCurve)
+        A column for each.
+    bandwidths : sequence of (float, float) or None
+        -90° frequency of each curve and its standard deviation, in Hz: marked with its 95 %
+        interval, and said in words.
+
+    Examples
+    --------
+    >>> f = np.geomspace(0.1, 10.0, 50)
+    >>> curve = BodeCurve(frequency=f, magnitude_db=0.0 * f, phase=-54.0 * f)
+    >>> figure = beside_bode([("500 Hz", curve), ("1000 Hz", curve)], bandwidths=[(1.67, 0.01)] * 2)
+    >>> [panel.title for panel in figure.panels[::2]], figure.panels[1].items[-1].words
+    (['500 Hz', '1000 Hz'], '−90° at 1.670 ± 0.010 Hz')
+    """
+    together = overlaid_bode(curves)  # for its axes, which are the same for all
+    panels = []
+    for column, ((label, _), bandwidth) in enumerate(zip(curves, bandwidths, strict=True)):
+        for panel in together.panels:
+            line = replace(panel.of(Curve)[column], label="", colour="input", dashes="-", width=1.2)
+            items: list[Item] = [line]
+            if panel.row:
+                items.append(Rule(at=-90.0, axis="y", colour="muted", dashes=":", width=0.8))
+                items += [] if bandwidth is None else [_marked(*bandwidth)]
+            elif bandwidth is not None:
+                items.append(replace(_marked(*bandwidth), words=""))
+            panels.append(
+                replace(
+                    panel,
+                    items=tuple(items),
+                    title="" if panel.row else label,
+                    y=panel.y if column == 0 else replace(panel.y, label="", numbered=False),
+                    column=column,
+                    legend=False,
+                )
+            )
+    return Figure(
+        panels=tuple(panels),
+        alt="Bode plots side by side: " + ", ".join(label for label, _ in curves) + ".",
+        heights=together.heights,
+        columns=len(curves),
+    )
+
+
+def _marked(value: float, std: float) -> Rule:
+    return Rule(
+        at=value,
+        low=value - 1.96 * std,
+        high=value + 1.96 * std,
+        words=f"−90° at {plus_minus(value, std)} Hz",
+        words_at=0.2,
+        side="left",
+    )
+
+
+def waveform_panels(
+    waveforms: Sequence[tuple[str, NDArray[np.float64], NDArray[np.float64]]], *, unit: str = ""
+) -> tuple[Panel, ...]:
+    """Describe the stimuli of several axes over time, one panel under the other (Fig. 18).
+
+    Parameters
+    ----------
+    waveforms : sequence of (label, time, position)
+        Time in s, each shape (m,).
+    unit : str
+        Of the positions.
+
+    Examples
+    --------
+    >>> t = np.linspace(0.0, 10.0, 100)
+    >>> [panel.title for panel in waveform_panels([("azimuth", t, np.sin(t))], unit="deg")]
+    ['azimuth']
+    """
+    return tuple(
+        Panel(
+            x=Axis(label="Time (s)" if row == len(waveforms) - 1 else ""),
+            y=Axis(label=axis_label("Position", unit)),
+            items=(Curve(x=time, y=position, width=0.9),),
+            title=label,
+            row=row,
+        )
+        for row, (label, time, position) in enumerate(waveforms)
+    )
+
+
 def _width(place: int) -> float:
     return 1.0 if place % 2 else 2.6
 
@@ -107,6 +201,7 @@ def overlaid_levels(
     *,
     unit: str = "",
     level: float | None = None,
+    above: tuple[Panel, ...] = (),
 ) -> Figure:
     """Describe the spectra of several stimuli over each other (Fig. 18).
 
@@ -118,6 +213,8 @@ def overlaid_levels(
         What 0 dB stands for one of.
     level : float, optional
         A level to mark with a thin line.
+    above : tuple of Panel
+        Drawn above, as of `waveform_panels`.
 
     Examples
     --------
@@ -141,12 +238,18 @@ def overlaid_levels(
     reference = f"dB re 1 {unit}" if unit else "dB"
     return Figure(
         panels=(
+            *above,
             Panel(
                 x=Axis(label="Frequency (Hz)", scale="log"),
                 y=Axis(label=f"Level ({reference})"),
                 items=tuple(items),
+                row=len(above),
             ),
         ),
-        alt="Spectra over each other: " + ", ".join(label for label, _, _ in levels) + ".",
-        heights=(2.8,),
+        alt=("Waveforms, and spectra" if above else "Spectra")
+        + " over each other: "
+        + ", ".join(label for label, _, _ in levels)
+        + ".",
+        heights=((1.4,) * len(above)) + (2.8,),
+        share_x=False,
     )
