@@ -53,8 +53,10 @@ bench: $(DEV)  ## speed, against a hand-written fit in the same run
 accuracy: $(DEV)  ## every figure of docs/accuracy.md, from scratch
 	$(BIN)/python benchmarks/accuracy.py
 
-docs: $(DEV)  ## every figure and table of the paper, into docs/build
-	$(BIN)/hmpim paper --out docs/build
+docs: $(DEV)  ## the documents as a site, and the paper made again, into docs/build
+	$(BIN)/sphinx-build -W --keep-going -q -b html -d docs/build/.doctrees docs docs/build
+	$(BIN)/hmpim paper --out docs/build/paper
+	@echo "Site: docs/build/index.html, paper: docs/build/paper/index.html"
 
 clean:  ## remove .venv and what the commands made
 	rm -rf $(VENV) docs/build out

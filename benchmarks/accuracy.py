@@ -44,7 +44,7 @@ TRUTH = {
 
 @cache
 def field_record() -> tuple[np.ndarray, np.ndarray]:
-    """FIELD.md's record without noise, stepped in time by the sensor rig."""
+    """field.md's record without noise, stepped in time by the sensor rig."""
     stimulus = hmpim.Stimulus(waveform=hmpim.Chirp(band=(0.1, 20.0), duration=10.0), fs=FS)
     sensor = hmpim.Sensor(delay=0.15, natural_frequency=10.0, damping_ratio=0.4, bias=0.6)
     record = hmpim.run(sensor, stimulus, rng=0)
@@ -80,7 +80,7 @@ def field_result(kind: str, seed: int) -> hmpim.Identification:
 
 
 def cramer_rao() -> dict[str, float]:
-    """Smallest standard deviation of each parameter on FIELD.md's record, white noise 0.1."""
+    """Smallest standard deviation of each parameter on field.md's record, white noise 0.1."""
     u, y = field_record()
     structure = STRUCTURES["second_order"]
     theta = theta_of(structure, second_order_coefficients(10.0, 0.4) * np.array([FS, FS**2]))
@@ -176,7 +176,7 @@ EFFECTS = (
 
 
 def with_effect(kind: str, seed: int) -> tuple[np.ndarray, np.ndarray, float]:
-    """Input, output and true bias of FIELD.md's sensor, noise 0.05, with one effect."""
+    """Input, output and true bias of field.md's sensor, noise 0.05, with one effect."""
     rng = np.random.default_rng([3, seed])
     u, ideal = field_record()
     white = 0.05 * rng.standard_normal(ideal.size)
@@ -244,7 +244,7 @@ def sensor_effects(count: int, mapped: Callable) -> list[str]:
     return [
         *lines,
         "",
-        "FIELD.md's sensor with noise 0.05. Mean error in its own standard deviations (0 is "
+        "field.md's sensor with noise 0.05. Mean error in its own standard deviations (0 is "
         f"without bias), and the share of {count} stated 95 % intervals that hold the truth. With "
         "a drift the bias is its mean over the record. Noise on the input counts as noise of the "
         "output, where the response passes it on.",
@@ -551,7 +551,7 @@ def put(page: str, title: str, body: str) -> str:
 
 HEAD = """# Accuracy
 
-`make accuracy` makes this page from scratch; every figure is from that run. FIELD.md's record:
+`make accuracy` makes this page from scratch; every figure is from that run. field.md's record:
 second order 10 Hz, ζ 0.4, delay 150 ms, bias 0.6, white noise 0.1, linear chirp 0.1 to 20 Hz of
 amplitude 1, 10 s at 200 Hz. `hmpim.identify` is given the samples and the rate.
 """

@@ -47,7 +47,3 @@ def test_a_how_to_does_what_it_prints(name, tmp_path, monkeypatch):
                 if line.startswith(words):
                     figure = next(float(w) for w in line.split() if NUMBER.match(w))
                     assert figure == pytest.approx(truth, rel=5e-3)
-
-
-def test_every_how_to_is_followed():
-    assert {path.stem for path in FOLDER.glob("*.md")} == set(howto_files.FILES)

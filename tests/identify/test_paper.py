@@ -51,7 +51,7 @@ def figure_17(
 
 @pytest.mark.parametrize("seed", range(5))
 def test_literal_steps_on_figure_17(seed: int) -> None:
-    # DESIGN.md: "Its own steps, done literally, give delay 170 ms, bias 0.68, noise 0.31". At
+    # docs/paper.md: its own steps, done literally, give delay 170 ms, bias 0.68, noise 0.31. At
     # a peak of 10°, the position limit of all the paper's examples, it is 170 ms, 0.678 and
     # 0.317 over many seeds. What the extra 20 ms leave of the sweep in the error grows with
     # the peak: at 1° the bias is 0.61.
@@ -75,7 +75,7 @@ def test_literal_steps_at_a_tenth_of_the_amplitude() -> None:
 
 @pytest.mark.parametrize("seed", range(3))
 def test_literal_steps_on_a_linear_chirp_of_amplitude_1(seed: int) -> None:
-    # FIELD.md: 175 ms; 0.68 and 0.32 there, 0.67 and 0.29 with the input's true motion.
+    # docs/field.md: 175 ms; 0.68 and 0.32 there, 0.67 and 0.29 with the input's true motion.
     found = paper_estimates(*figure_17(linear_chirp, seed), FS, BAND)
     assert found.delay == pytest.approx(0.175, abs=1e-9)
     assert found.bias == pytest.approx(0.667, abs=0.01)

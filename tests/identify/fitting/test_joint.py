@@ -111,7 +111,7 @@ def cramer_rao(u, y) -> dict[str, float]:
 
 
 def test_the_bound_is_the_published_one(field_record):
-    """FIELD.md's bounds: τ 0.106 ms, fn 0.032 Hz, ζ 0.0029, gain 0.0046, bias 0.0022."""
+    """docs/field.md's bounds: τ 0.106 ms, fn 0.032 Hz, ζ 0.0029, gain 0.0046, bias 0.0022."""
     _, u, y = field_record
     bound = cramer_rao(u, y)
     assert bound["delay"] == pytest.approx(0.106e-3, rel=0.02)

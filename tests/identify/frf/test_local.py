@@ -24,7 +24,7 @@ def second_order(f: np.ndarray, delay: float = 0.15) -> np.ndarray:
 
 
 def clean_output(delay: float = 0.15, seconds: float = 10.0) -> np.ndarray:
-    """FIELD.md's system without noise: 10 Hz, ζ 0.4, bias 0.6; input linear over 1/6400 s."""
+    """docs/field.md's system without noise: 10 Hz, ζ 0.4, bias 0.6; input linear over 1/6400 s."""
     fine, w = 32, 2 * np.pi * 10
     t = np.arange(round(seconds * FS) * fine) / (FS * fine)
     matrices = ([[0, 1], [-(w**2), -0.8 * w]], [[0], [w**2]], [[1.0, 0]], [[0.0]])

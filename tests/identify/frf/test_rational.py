@@ -23,7 +23,7 @@ def second_order(f: np.ndarray, damping: float = 0.4) -> np.ndarray:
 
 
 def clean_record(damping: float) -> Record:
-    """FIELD.md's system without noise; the input is linear over 1/6400 s."""
+    """docs/field.md's system without noise; the input is linear over 1/6400 s."""
     fine, w = FINE, 2 * np.pi * 10
     t = np.arange(2000 * fine) / (FS * fine)
     matrices = ([[0, 1], [-(w**2), -2 * damping * w]], [[0], [w**2]], [[1.0, 0]], [[0.0]])

@@ -1,0 +1,60 @@
+"""The documents as a site: every page has its place, every public name its entry, the build warns of nothing."""
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import hmpim
+
+DOCS = Path(__file__).parents[2] / "docs"
+TREES = (DOCS / "index.md", DOCS / "decisions" / "index.md")
+
+
+def test_every_page_has_its_place():
+    placed = ["index"]
+    for tree in TREES:
+        room = tree.parent.relative_to(DOCS)
+        for block in re.findall(r"```{toctree}\n(.*?)```", tree.read_text(), re.DOTALL):
+            names = [line for line in block.splitlines() if line and not line.startswith(":")]
+            placed += [(room / name).as_posix() for name in names]
+    pages = {
+        path.relative_to(DOCS).with_suffix("").as_posix()
+        for path in DOCS.rglob("*.md")
+        if "build" not in path.relative_to(DOCS).parts
+    }
+    assert sorted(placed) == sorted(pages)
+
+
+def test_every_public_name_has_its_entry():
+    text = (DOCS / "api.md").read_text(encoding="utf-8")
+    first = text.partition("## `hmpim.plots`")[0]
+    assert sorted(re.findall(r"\.\. auto\w+:: (\w+)", first)) == sorted(hmpim.__all__)
+
+
+def test_the_layers_of_the_page_are_those_that_are_checked():
+    project = (DOCS.parent / "pyproject.toml").read_text(encoding="utf-8")
+    contract = project.partition("Layers of docs/architecture.md")[2].partition("]\n")[0]
+    checked = [re.findall(r"\((\w+)\)", line) for line in contract.splitlines() if "(" in line]
+    page = (DOCS / "architecture.md").read_text(encoding="utf-8")
+    block = page.partition("## Who may ask whom")[2].partition("```text\n")[2].partition("```")[0]
+    assert [line.split(" | ") for line in block.splitlines()] == checked
+
+
+@pytest.mark.study
+def test_the_site_is_built_without_a_warning_and_read_without_a_network(tmp_path):
+    command = [sys.executable, "-m", "sphinx", "-W", "--keep-going", "-q", "-b", "html"]
+    done = subprocess.run(
+        [*command, str(DOCS), str(tmp_path)], capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    index = (tmp_path / "searchindex.js").read_text(encoding="utf-8")
+    assert index.startswith("Search.setIndex(")
+    assert "extinct" in index  # stems of words
+    for page in tmp_path.rglob("*.html"):
+        for loaded in re.findall(
+            r'<(?:script|link|img)[^>]*(?:src|href)="([^"]+)"', page.read_text()
+        ):
+            assert not re.match(r"(https?:)?//", loaded), (page, loaded)
