@@ -6,7 +6,7 @@ from importlib.metadata import version as version_of
 
 project = "hmpim"
 author = "The hmpim developers"
-copyright = f"{datetime.date.today().year}, {author}"  # noqa: A001
+copyright = f"{datetime.date.today().year}, {author}"
 release = version = version_of("hmpim")
 
 extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.autosummary", "sphinx.ext.napoleon"]

@@ -15,7 +15,13 @@ from hmpim.identify import (
     Parameters,
 )
 from hmpim.model import delayed_response, prepare_input
-from hmpim.plots.curves import decibels, deviation_curve, measured_curve, model_curve
+from hmpim.plots.curves import (
+    decibels,
+    deviation_curve,
+    measured_curve,
+    model_curve,
+    output_hold,
+)
 
 NOTHING = np.empty(0)
 
@@ -143,3 +149,26 @@ def test_the_measured_phase_follows_the_model_over_many_turns_and_gaps():
     np.testing.assert_allclose(
         deviation.phase_high - deviation.phase, deviation.phase - deviation.phase_low
     )
+
+
+@pytest.mark.parametrize(("period", "fs"), [(0.02, 200.0), (1 / 60, 200.0), (0.05, 1000.0)])
+def test_an_output_that_is_held_is_late_by_the_mean_age_of_its_values(period, fs):
+    """A tone sampled through a hold, against the tone itself, over many updates."""
+    n = 60_000
+    t = np.arange(n) / fs
+    taken = np.floor(t / period + 1e-9) * period  # when the value shown was taken
+    f = np.array([0.3, 2.0, 7.0])
+    tone = np.exp(2j * np.pi * np.outer(f, taken))
+    seen = np.mean(tone * np.exp(-2j * np.pi * np.outer(f, t)), axis=1)
+    np.testing.assert_allclose(output_hold(f, period=period, fs=fs), seen, atol=3e-3)
+
+
+def test_seen_through_samples_a_held_output_is_in_the_model():
+    pair = a_pair(delay=0.01)
+    held = replace(pair, parameters=replace(pair.parameters, hold_period=known(0.05)))
+    f = np.array([1.0, 4.0])
+    late = output_hold(f, period=0.05, fs=200.0)
+    plain, seen = (model_curve(each, f, fs=200.0) for each in (pair, held))
+    np.testing.assert_allclose(seen.phase - plain.phase, np.degrees(np.angle(late)))
+    np.testing.assert_allclose(seen.magnitude_db - plain.magnitude_db, decibels(late))
+    np.testing.assert_array_equal(model_curve(held, f).phase, model_curve(pair, f).phase)

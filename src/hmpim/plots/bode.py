@@ -269,6 +269,9 @@ def pair_bode(
     if whole is not None:
         held = fs is not None and pair.intersample in ("zoh", "foh")
         word = f"model, input {INTERSAMPLE_WORDS[pair.intersample]}" if held else "model"
+        period = pair.parameters.hold_period
+        if fs is not None and period is not None:
+            word += f", output held for {1e3 * period.value:.3g} ms"
         curves.append((word, "model", whole))
     ratio = "" if input_unit == output_unit else f"{output_unit or '1'}/{input_unit or '1'}"
     scale = pair.parameters.scale_factor

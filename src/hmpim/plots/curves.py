@@ -12,9 +12,10 @@ from hmpim.model.response import RationalDelay, phase, response
 if TYPE_CHECKING:
     from hmpim.identify import FrequencyResponse, PairIdentification
 
-__all__ = ["BodeCurve", "deviation_curve", "measured_curve", "model_curve"]
+__all__ = ["BodeCurve", "deviation_curve", "measured_curve", "model_curve", "output_hold"]
 
 ALIASES = 60  # on either side; what is left out is below 0.3 % even without dynamics
+_WHOLE = 1e-4  # of a sample: a period this near to a whole number of samples counts as one
 Z95 = 1.959963984540054  # 97.5 % point of the normal distribution
 
 
@@ -70,7 +71,8 @@ def model_curve(
     with_delay : bool
         False leaves the delay's phase out.
     fs : float, optional
-        Sampling rate in Hz, to see the model as the samples do.
+        Sampling rate in Hz, to see the model as the samples do, an output that is updated more
+        slowly included.
 
     Examples
     --------
@@ -114,6 +116,11 @@ def model_curve(
         values = _as_sampled(system, frequency, fs=fs, linear=pair.intersample == "foh")
         held = lag if pair.intersample == "foh" else lag - 180.0 * frequency / fs
         lag = _near(np.degrees(np.angle(values)), held)
+    period = pair.parameters.hold_period
+    if fs is not None and with_delay and period is not None:
+        late = output_hold(frequency, period=period.value, fs=fs)
+        values = values * late
+        lag = lag + np.degrees(np.unwrap(np.angle(late)))
     return BodeCurve(
         frequency=frequency,
         magnitude_db=decibels(scale.value * values),
@@ -132,6 +139,36 @@ def _as_sampled(
         hold = hold**2 * np.exp(turn)
     each = response(system, folded.ravel()).reshape(folded.shape)
     return np.asarray((each * hold).sum(axis=1))
+
+
+def output_hold(
+    frequency: NDArray[np.float64], *, period: float, fs: float
+) -> NDArray[np.complex128]:
+    """Return what an output that is updated every `period` adds, as samples at `fs` see it.
+
+    A sample shows a value that is between nothing and one period old: where the period is a whole
+    number of samples, one of as many ages; elsewhere, over the record, every age alike.
+
+    Parameters
+    ----------
+    frequency : ndarray, shape (m,)
+        Hz, positive.
+    period, fs : float
+        s, and Hz.
+
+    Examples
+    --------
+    >>> late = output_hold(np.array([0.1]), period=0.02, fs=200.0)  # 0, 5, 10 or 15 ms old
+    >>> round(float(-np.angle(late[0]) / (2 * np.pi * 0.1)), 6)
+    0.0075
+    """
+    ages = period * fs
+    whole = abs(ages - round(ages)) < _WHOLE
+    turn = np.pi * frequency
+    below = ages * np.sin(turn / fs) if whole else turn * period
+    size = np.sin(turn * period) / below
+    mean_age = 0.5 * (period - 1.0 / fs) if whole else 0.5 * period
+    return np.asarray(size * np.exp(-2j * turn * mean_age))
 
 
 def _near(angle: NDArray[np.float64], phase: NDArray[np.float64]) -> NDArray[np.float64]:
