@@ -2,8 +2,8 @@
 
 A block of TOML or Python under a line that ends with "`NAME`:" is a file. A block `console` holds
 commands and lines of what they print: the words of a line must stand in one line of the output,
-in their order, numbers to two parts in a thousand or to the last digit shown. Other Python is executed, in
-one space for the whole page, and prints what stands in the block `text` below it.
+in their order, numbers to two parts in a thousand or to the last digit shown. Other Python is
+executed, in one space for the whole page, and prints what stands in the block `text` below it.
 """
 
 import contextlib
