@@ -142,10 +142,11 @@ def _print(study: "Study") -> None:
         shown.add_row(*(cells[i] for i in at), *(met if study.checks else ()))
     console.print(shown)
     unsure = [row for row in study.rows if row.verdict != "ok"]
+    several = len({row.test for row in study.rows}) > 1
     for row in unsure[:_MOST_TOLD]:
-        where = f"{row.axis}, {row.test}" if len({r.test for r in study.rows}) > 1 else row.axis
-        names = doubtful_words([row]) or "every figure"
-        console.print(f"{row.verdict.replace('_', ' ')}: {where}: {names}")
+        where = f"{row.axis}, {row.test}" if several else row.axis
+        figures = doubtful_words([row]) or "every figure"
+        console.print(f"{row.verdict.replace('_', ' ')}: {where}: {figures}")
     if len(unsure) > _MOST_TOLD:
         console.print(f"and {len(unsure) - _MOST_TOLD} more rows, which the page names")
     for check in study.checks:
