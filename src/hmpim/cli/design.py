@@ -29,6 +29,14 @@ def _known_kind(text: str) -> Kind:
     raise ArgumentError(f"--kind {text!r} must be one of {', '.join(KINDS)}")
 
 
+def _known_base(text: str) -> Literal["auto"] | None:
+    if text == "auto":
+        return "auto"
+    if text == "none":
+        return None
+    raise ArgumentError(f"--base {text!r} must be auto or none")
+
+
 def design(
     band: Annotated[
         tuple[float, float],
@@ -67,6 +75,13 @@ def design(
     tail: Annotated[
         str, typer.Option(metavar="auto|S", help="Seconds at rest appended at the end.")
     ] = "auto",
+    base: Annotated[
+        str,
+        typer.Option(
+            metavar="auto|none",
+            help="auto: a slow motion to and fro under the waveform, against stiction.",
+        ),
+    ] = "none",
     unit: Annotated[str, typer.Option(help="Unit of the position, such as deg.")] = "",
     resolution: Annotated[
         float, typer.Option(help="Step to which the rig rounds positions; 0: none.")
@@ -136,6 +151,7 @@ def design(
         extinction=_number_or_auto("--extinction", extinction),
         lead=_number_or_auto("--lead", lead),
         tail=_number_or_auto("--tail", tail),
+        base=_known_base(base),
         resolution=resolution,
         rng=seed,
         wanted_snr=wanted_snr,

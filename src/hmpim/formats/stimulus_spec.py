@@ -36,11 +36,13 @@ from hmpim.stimulus import (
     RestToRest,
     Reversed,
     SampledMotion,
+    Shuttle,
     Sine,
     Step,
     Steps,
     Stimulus,
     SumOfSines,
+    Superposed,
     Sweep,
     design,
 )
@@ -52,12 +54,12 @@ _TYPES: dict[str, Any] = {
     kind.__name__: kind
     for kind in (
         *(Chirp, ExponentialSweep, Multisine, Prbs, Quintic, Ramp, Repeated, RestToRest),
-        *(Reversed, SampledMotion, Sine, Step, Steps, SumOfSines, Sweep),
+        *(Reversed, SampledMotion, Shuttle, Sine, Step, Steps, SumOfSines, Superposed, Sweep),
     )
 }
 _STATED = ("axis", "unit", "fs", "tail", "resolution")
 _WISHES = {
-    *("band", "duration", "fs", "limits", "kind", "sweep", "extinction", "lead", "tail"),
+    *("band", "duration", "fs", "limits", "kind", "sweep", "extinction", "lead", "tail", "base"),
     *("axis", "resolution", "seed", "wanted_snr", "noise"),
 }
 

@@ -1,5 +1,6 @@
 """Section III: stimuli in closed form, inside limits, sampled for a rig."""
 
+from hmpim.stimulus.base import BaseRoom, Shuttle, Superposed, room_beside_base, shuttle_for
 from hmpim.stimulus.classical import Chirp, Ramp, Sine, Step, SumOfSines
 from hmpim.stimulus.command import Command, leave_room
 from hmpim.stimulus.ending import left_early, passes_band_at
@@ -38,6 +39,7 @@ from hmpim.stimulus.sweep import Sweep
 __all__ = [
     "FIG_4",
     "KINDS",
+    "BaseRoom",
     "Chirp",
     "Command",
     "ExponentialSweep",
@@ -55,12 +57,14 @@ __all__ = [
     "RestToRest",
     "Reversed",
     "SampledMotion",
+    "Shuttle",
     "SignalToNoise",
     "Sine",
     "Step",
     "Steps",
     "Stimulus",
     "SumOfSines",
+    "Superposed",
     "Sweep",
     "Waveform",
     "blocks",
@@ -75,10 +79,12 @@ __all__ = [
     "random_phase_multisine",
     "repeated_sweeps",
     "rest_to_rest",
+    "room_beside_base",
     "scale_to_limits",
     "scaled_stimulus",
     "schroeder_multisine",
     "section_v",
+    "shuttle_for",
     "signal_to_noise",
     "smooth_prbs",
     "smooth_steps",

@@ -8,6 +8,7 @@ import numpy as np
 
 from hmpim.arguments import checked, generator, size_of
 from hmpim.errors import ArgumentError, LimitsError
+from hmpim.stimulus.base import Superposed, room_beside_base, shuttle_for
 from hmpim.stimulus.command import leave_room
 from hmpim.stimulus.exponential import ExponentialSweep
 from hmpim.stimulus.lead import rest_to_rest, starts_and_ends_at_rest
@@ -18,7 +19,7 @@ from hmpim.stimulus.profile import smooth_prbs, smooth_steps
 from hmpim.stimulus.repeated import repeated_sweeps
 from hmpim.stimulus.reverse import Reversed
 from hmpim.stimulus.scale import check_limits_given
-from hmpim.stimulus.solve import largest_gain, smallest_extinction
+from hmpim.stimulus.solve import largest_gain, smallest_extinction, sweep_peaks
 from hmpim.stimulus.spectrum import OverFrequency, Redesign, check_spectrum
 from hmpim.stimulus.stimulus import Stimulus
 from hmpim.stimulus.sweep import Sweep, check_band, check_positive
@@ -32,6 +33,7 @@ KINDS: tuple[Kind, ...] = get_args(Kind)
 _SWEEPS = ("hmpim", "exponential", "reversed")
 _CYCLES = 6.0  # of each repeated sweep: 0.6 s from 0.1 to 20 Hz, the study in docs/live.md
 _SETTLING = 0.5  # seconds at rest that a led stimulus appends, so that a late response is caught
+_EXTINCTIONS = (0.0, 0.25, 0.5, 0.75, 1.0, 1.25, 1.5, 1.75, 2.0)  # tried of a sweep on a base
 _SMALLER = (0.98, 0.95, 0.9, 0.8, 0.7, 0.6, 0.5)  # scales that leave room for a lead
 
 
@@ -47,6 +49,7 @@ def design(
     extinction: float | Literal["auto"] = "auto",
     lead: float | Literal["auto"] = "auto",
     tail: float | Literal["auto"] = "auto",
+    base: Literal["auto"] | None = None,
     axis: str = "",
     resolution: float = 0.0,
     rng: np.random.Generator | int | None = None,
@@ -84,6 +87,9 @@ def design(
         takes what is gentle; 0 is the waveform as printed, with its velocity step.
     tail : 'auto' or float
         Seconds at rest at the end; 'auto' is 0.5 s with a lead and 0 without.
+    base : 'auto' or None
+        'auto' puts a slow motion to and fro under the waveform, which keeps an axis with dry
+        friction out of stiction; the limits are kept by the sum (`hmpim.stimulus.base`).
     axis : str
         Name of the axis, where there are several.
     resolution : float
@@ -136,9 +142,16 @@ def design(
     if sweep is not None and kind != "repeated":
         raise ArgumentError(f"sweep = {sweep!r} s is for kind = 'repeated', and kind = {kind!r}")
     room = leave_room(limits, resolution=resolution, fs=rate)
+    under = room_beside_base(room) if base == "auto" else None
+    if under is not None:
+        if ahead == 0.0:
+            raise ArgumentError("lead = 0 starts in motion, and a base starts at rest; lead='auto'")
+        room = under.upper
     core: Waveform
     if kind in _SWEEPS:
         start = 1.0 / rate if ahead == 0.0 else None
+        if under is not None and extinction == "auto":
+            extinction = _largest_extinction(kind, (low, high), length, room)
         core = _sweep(kind, (low, high), length, room, extinction, start)
     elif extinction != "auto":
         raise ArgumentError(
@@ -158,6 +171,8 @@ def design(
     else:
         core = smooth_steps(band=(low, high), duration=length, fs=rate, limits=room)
     waveform = _led(core, room, rate, ahead)
+    if under is not None:
+        waveform = Superposed(upper=waveform, base=shuttle_for(under, waveform.duration))
     settling = _seconds("tail", tail)
     if settling is None:
         settling = 0.0 if ahead == 0.0 else max(_SETTLING, 2.0 / rate)  # a sample at rest at least
@@ -183,6 +198,7 @@ def design(
                 extinction=extinction,
                 lead=lead,
                 tail=tail,
+                base=base,
                 resolution=resolution,
                 rng=copy.deepcopy(again),
             )
@@ -196,6 +212,22 @@ def design(
             redesign=Redesign(duration=length, make=make),
         )
     return stimulus
+
+
+def _largest_extinction(
+    kind: Kind, band: tuple[float, float], duration: float, room: Limits
+) -> float:
+    """The n with which a sweep on a base is largest: its velocity, not its travel, is scarce."""
+    found = []
+    for n in _EXTINCTIONS:
+        one: Sweep | ExponentialSweep = (
+            ExponentialSweep(band=band, duration=duration, extinction=n)
+            if kind == "exponential"
+            else Sweep(band=band, duration=duration, extinction=n)
+        )
+        peaks = sweep_peaks(one, start=None, jerk=math.isfinite(room.jerk))
+        found.append((peaks.position / room.use(peaks), -n))
+    return -max(found)[1]
 
 
 def _sweep(

@@ -9,6 +9,7 @@ import numpy as np
 from hmpim.arguments import checked, size_of
 from hmpim.equality import ByValue
 from hmpim.errors import ArgumentError, LimitsError
+from hmpim.stimulus.base import Superposed
 from hmpim.stimulus.command import Command, check_resolution, difference_peaks, rounded
 from hmpim.stimulus.exponential import ExponentialSweep
 from hmpim.stimulus.lead import RestToRest
@@ -146,12 +147,14 @@ class Stimulus(ByValue):
     @property
     def core(self) -> Waveform:
         """The waveform without its leads."""
-        return self.waveform.core if isinstance(self.waveform, RestToRest) else self.waveform
+        led = _without_base(self.waveform)
+        return led.core if isinstance(led, RestToRest) else led
 
     @property
     def sweep_start(self) -> float:
         """Where time 0 of the waveform without its leads lies, in seconds."""
-        return self.waveform.sweep_start if isinstance(self.waveform, RestToRest) else 0.0
+        led = _without_base(self.waveform)
+        return led.sweep_start if isinstance(led, RestToRest) else 0.0
 
     @property
     def sweep_duration(self) -> float:
@@ -267,6 +270,10 @@ def _blocks(stimulus: Stimulus, size: int, rate: float) -> Iterator[Motion]:
 def _count(duration: float, fs: float) -> int:
     """Number of samples at k/fs in a duration."""
     return math.ceil(duration * fs - 1e-6)
+
+
+def _without_base(waveform: Waveform) -> Waveform:
+    return waveform.upper if isinstance(waveform, Superposed) else waveform
 
 
 def _unreversed(waveform: Waveform) -> Waveform:
