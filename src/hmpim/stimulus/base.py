@@ -56,8 +56,8 @@ class Shuttle:
     --------
     >>> import numpy as np
     >>> base = Shuttle(speed=10.0, duration=6.0, turns=3, turning=0.5)
-    >>> base.motion(np.array([0.0, 0.75, 2.0, 3.0, 6.0])).velocity.tolist()
-    [0.0, 10.0, -10.0, 0.0, 0.0]
+    >>> base.motion(np.array([0.0, 0.75, 2.0, 3.7, 6.0])).velocity.round(9).tolist()
+    [0.0, 10.0, -10.0, 10.0, 0.0]
     """
 
     speed: float
@@ -84,13 +84,13 @@ class Shuttle:
     @property
     def between(self) -> float:
         """Seconds from one turn to the next, h."""
-        return self.duration / self.turns
+        return (self.duration - self.turning) / self.turns
 
     @property
     def _centres(self) -> tuple[FloatArray, FloatArray]:
         """Middles of start, turns and end, s, and by what each changes the velocity."""
         half = 0.5 * self.turning
-        turns = (np.arange(self.turns) + 0.5) * self.between
+        turns = half + (np.arange(self.turns) + 0.5) * self.between
         change = np.where(np.arange(self.turns) % 2 == 0, -2.0, 2.0)
         return (
             np.concatenate(([half], turns, [self.duration - half])),
