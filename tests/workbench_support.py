@@ -23,8 +23,8 @@ ROLL = Wish(
             name="roll", low=0.5, high=20.0, velocity=800.0, acceleration=30000.0, amplitude=5.0
         ),
     ),
-    duration=60.0,
-    fs=500.0,
+    duration=300.0,
+    fs=100.0,
 )
 """A design for one axis of the table, longer than any test waits."""
 

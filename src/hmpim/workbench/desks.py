@@ -57,10 +57,12 @@ class Model:
 class Wish:
     """A design: rows of axes, length in s, rate in Hz, and the sliders.
 
-    `extinction` and `lead` are None where they are solved.
+    `extinction` and `lead` are None where they are solved. `gentlest` asks for the gentlest
+    stimulus that tells what is wanted, in place of a sweep that uses the limits.
     """
 
     rows: tuple[AxisRow, ...] = (AxisRow(),)
+    gentlest: bool = False
     duration: float = 10.0
     fs: float = 1000.0
     unit: str = "deg"

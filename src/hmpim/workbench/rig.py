@@ -100,6 +100,7 @@ class RigBench:
         self.folder: Path | None = None
         self.ended: Ended | None = None
         self.lights: dict[str, Light] = {}
+        self.looks: dict[str, list[tuple[float, float]]] = {}  # time, ± % of the natural frequency
         self.checking = False
         self.count = 0
         self._running = False
@@ -175,7 +176,7 @@ class RigBench:
             self._spare = None
             here.send(order)
             self.live, self.ended, self.folder = Live(), None, folder
-            self.lights = {}
+            self.lights, self.looks = {}, {}
             self.checking = questions is not None
             self._pipe, self._process, self._running = here, process, True
             self.count += 1

@@ -89,6 +89,11 @@ class Latest:
         self._busy = False
         self._next: Callable[[], object] | None = None
 
+    @property
+    def newer(self) -> bool:
+        """Whether a newer wish waits: what is left of this one need not be done."""
+        return self._next is not None
+
     async def __call__(self, step: Callable[[], object]) -> None:
         """Take a coroutine function; run it now, or after the one that runs."""
         self._next = step

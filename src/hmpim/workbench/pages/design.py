@@ -6,12 +6,20 @@ from typing import Any
 from nicegui import ui
 
 from hmpim.errors import HmpimError
+from hmpim.plots import Figure
 from hmpim.workbench.bench import Window
 from hmpim.workbench.desks import AxisRow, Wish
 from hmpim.workbench.pages.frame import Command, Later, card, failures_said
 from hmpim.workbench.parts.picture import Picture
 from hmpim.workbench.parts.table import plain_table
-from hmpim.workbench.work.designed import Designed, designed, five_axes, save_design
+from hmpim.workbench.work.design import stimulus_part
+from hmpim.workbench.work.designed import (
+    Designed,
+    designed,
+    five_axes,
+    save_design,
+    spectrogram,
+)
 from hmpim.workbench.workers import Latest
 
 __all__ = ["design"]
@@ -35,9 +43,18 @@ class DesignPage:
         self.window = window
         self.latest = Latest()
         self.pictures: dict[str, Picture] = {}
+        self.sliders: dict[str, tuple[ui.slider, ui.label]] = {}
+        self.drawn: tuple[Wish, int] | None = None  # whose spectrogram is shown
         with ui.element("div").classes("hm-side"):
             with card("Sliders"):
                 self._sliders()
+                with ui.element("div").classes("hm-row"):
+                    ui.button("Solve", on_click=self._solve).tooltip(
+                        "The largest motion and the smallest extinction inside the limits"
+                    )
+                    ui.button("Gentlest", on_click=self._gentlest).tooltip(
+                        "The smallest peak acceleration that tells the natural frequency as wanted"
+                    )
             with card("Test"):
                 self._numbers(self.wish, self._set, _TEST)
                 ui.input("Unit", value=self.wish.unit, on_change=lambda e: self._set(unit=e.value))
@@ -51,6 +68,7 @@ class DesignPage:
                 with ui.element("div").classes("hm-row"):
                     ui.button("Save and download", icon="download", on_click=self._save)
             with card("Pictures"):
+                self.axis = ui.select({0: ""}, label="Axis", value=0, on_change=self.draw)
                 self.plot = ui.element("div")
         self.command = Command()
         self._axes()
@@ -69,6 +87,29 @@ class DesignPage:
             return None
         self.window.change(wish=replace(self.wish, **changes))
         return self.draw()
+
+    async def _solve(self) -> None:
+        """As large as the limits allow, and as even as they do."""
+        rows = tuple(replace(row, amplitude=row.position) for row in self.wish.rows)
+        self.window.change(
+            wish=replace(self.wish, rows=rows, gentlest=False, extinction=None, lead=None)
+        )
+        await self._anew()
+
+    async def _gentlest(self) -> None:
+        self.window.change(wish=replace(self.wish, gentlest=True, extinction=None, lead=None))
+        await self._anew()
+
+    async def _anew(self) -> None:
+        """Show a wish that no slider made."""
+        row = self.wish.rows[0]
+        values = {"amplitude": row.amplitude / row.position, "extinction": 0.0, "lead": 0.0}
+        for name, value in values.items():
+            slider, shown = self.sliders[name]
+            slider.set_value(round(value, 2))
+            shown.set_text(f"{value:g}")
+        self._axes()
+        await self.draw()
 
     def _model(self, **changes: Any) -> Any:
         if None in changes.values():
@@ -93,28 +134,38 @@ class DesignPage:
 
     def _sliders(self) -> None:
         row = self.wish.rows[0]
-        self._slider("Amplitude", 0.01, 1.0, row.amplitude / row.position, self._amplitude)
-        self._slider("Extinction n (0: as small as fits)", 0.0, 3.0, self.wish.extinction or 0.0,
-                     lambda v: self._set(extinction=v or None))  # fmt: skip
-        self._slider("Lead, s (0: as gentle as fits)", 0.0, 2.0, self.wish.lead or 0.0,
-                     lambda v: self._set(lead=v or None))  # fmt: skip
-        self._slider("Window α", 0.1, 5.0, self.wish.alpha, lambda v: self._set(alpha=v))
+        self._slider("amplitude", "Amplitude", (0.01, 1.0), row.amplitude / row.position)
+        self._slider(
+            "extinction", "Extinction n (0: as small as fits)", (0.0, 3.0),
+            self.wish.extinction or 0.0,
+        )  # fmt: skip
+        self._slider("lead", "Lead, s (0: as gentle as fits)", (0.0, 2.0), self.wish.lead or 0.0)
+        self._slider("alpha", "Window α", (0.1, 5.0), self.wish.alpha)
 
-    def _slider(self, words: str, low: float, high: float, value: float, change: Any) -> None:
+    def _slider(self, name: str, words: str, ends: tuple[float, float], value: float) -> None:
         with ui.element("div"):
             with ui.element("div").classes("hm-row"):
                 ui.label(words)
-                shown = ui.label().classes("hm-soft")
-            slider = ui.slider(min=low, max=high, step=0.01, value=round(value, 2))
+                shown = ui.label(f"{value:g}").classes("hm-soft")
+            slider = ui.slider(min=ends[0], max=ends[1], step=0.01, value=round(value, 2))
             slider.props(f'aria-label="{words}" label')
-            shown.bind_text_from(slider, "value", lambda v: f"{v:g}")
-            slider.on_value_change(lambda e: change(float(e.value)))
+            # only a hand on the slider changes the wish; set from here, the slider shows it
+            slider.on(
+                "update:model-value", lambda e: self._slid(name, float(e.args)), throttle=0.03
+            )
+            self.sliders[name] = (slider, shown)
 
-    def _amplitude(self, share: float) -> Any:
-        rows = tuple(replace(r, amplitude=share * r.position) for r in self.wish.rows)
-        return self._set(rows=rows)
+    def _slid(self, name: str, value: float) -> Any:
+        self.sliders[name][1].set_text(f"{value:g}")
+        if name == "alpha":
+            return self._set(alpha=value)
+        if name == "amplitude":
+            rows = tuple(replace(r, amplitude=value * r.position) for r in self.wish.rows)
+            return self._set(rows=rows, gentlest=self.wish.gentlest)
+        return self._set(**{name: value or None}, gentlest=False)
 
     def _axes(self) -> None:
+        self._name_axes()
         self.rows.clear()
         with self.rows:
             for k, row in enumerate(self.wish.rows):
@@ -130,6 +181,13 @@ class DesignPage:
                 if len(self.wish.rows) > 1:
                     ui.button("Remove the last", on_click=self._fewer).props("flat")
                 ui.button("The five axes of Fig. 4", on_click=self._five).props("flat")
+
+    def _name_axes(self) -> None:
+        """Offer the axes there are to be drawn; nothing to choose where there is one."""
+        names = {k: row.name or f"axis {k + 1}" for k, row in enumerate(self.wish.rows)}
+        chosen = self.axis.value if self.axis.value in names else 0
+        self.axis.set_options(names, value=chosen)
+        self.axis.set_visibility(len(names) > 1)
 
     async def _more(self) -> None:
         rows = self.wish.rows
@@ -154,18 +212,30 @@ class DesignPage:
         await self.draw()
 
     async def _draw(self) -> None:
+        wish, axis, soon = self.wish, int(self.axis.value or 0), self.window.workbench.workers.soon
+        if wish.gentlest:
+            self.said.set_text("Searching for the gentlest …")
+            self.said.classes(replace="hm-verdict hm-soft")
         try:
-            found = await self.window.workbench.workers.soon(designed, self.wish)
-        except HmpimError as error:
+            found = await soon(designed, wish, axis)
             if self.said.is_deleted:  # the page was left meanwhile
                 return
-            self.said.set_text(" ".join(str(error).split()))
-            self.said.classes(replace="hm-verdict hm-bad")
-            return
-        if not self.said.is_deleted:
             self._show(found)
+            shown = (stimulus_part(wish), axis)
+            if shown == self.drawn or self.latest.newer:
+                return
+            figure = await soon(spectrogram, wish, axis)
+            if not self.said.is_deleted:
+                self.drawn = shown
+                self._picture("spectrogram", figure)
+        except HmpimError as error:
+            if not self.said.is_deleted:
+                self.said.set_text(" ".join(str(error).split()))
+                self.said.classes(replace="hm-verdict hm-bad")
 
     def _show(self, found: Designed) -> None:
+        for name, value in found.solved.items():
+            self.sliders[name][1].set_text(f"solved: {value:.3g}")
         self.said.set_text(found.words)
         self.said.classes(replace="hm-verdict hm-ok" if found.inside else "hm-verdict hm-bad")
         self.command.show(found.command)
@@ -178,16 +248,19 @@ class DesignPage:
                 ("Axis", "Parameter", "Predicted ± (95 %)"), found.errors, title="Error bars"
             )
         for name, figure in found.figures.items():
-            if name in self.pictures:
-                self.pictures[name].show(figure)
-            else:
-                with self.plot:
-                    self.pictures[name] = Picture(figure)
+            self._picture(name, figure)
+
+    def _picture(self, name: str, figure: Figure) -> None:
+        if name in self.pictures:
+            self.pictures[name].show(figure)
+        else:
+            with self.plot:
+                self.pictures[name] = Picture(figure)
 
     async def _save(self) -> None:
         with failures_said():
             folder = self.window.workbench.settings.runs / "designs"
-            path = await self.window.workbench.workers.do(save_design, self.wish, str(folder))
+            path = await self.window.workbench.workers.soon(save_design, self.wish, str(folder))
             ui.download.file(path)
             ui.notify(f"Saved as {path}")
 

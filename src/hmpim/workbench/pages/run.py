@@ -5,7 +5,9 @@ import asyncio
 from nicegui import events, ui
 
 from hmpim.errors import HmpimError, RigError
+from hmpim.identify import PairIdentification
 from hmpim.plots import Figure
+from hmpim.plots.closing import closing_bars
 from hmpim.workbench.bench import Window
 from hmpim.workbench.desks import Analysis
 from hmpim.workbench.pages.frame import Command, card, failures_said
@@ -55,7 +57,8 @@ class RunPage:
         self.strips: dict[str, Strip] = {}
         self.shown = -1
         self.estimating = False
-        self.bode: Picture | None = None
+        self.pictures: dict[str, Picture] = {}
+        self.estimated = -1  # samples of the last estimate
         with ui.element("div").classes("hm-side"):
             with card("Rig"):
                 self.choice = rig_choice(window)
@@ -82,6 +85,8 @@ class RunPage:
             with card("Command and response"):
                 self.progress = ui.label("Nothing is running.").classes("hm-soft")
                 self.chart = ui.element("div")
+            with card("Error bar, closing in on what was asked"):
+                self.bars = ui.element("div")
             with card("Bode plot so far"):
                 self.plot = ui.element("div")
             self.after = ui.element("div").classes("hm-body")
@@ -141,6 +146,7 @@ class RunPage:
         live, bench = self.bench.live, self.bench
         if bench.count != self.shown or (live.channels and not self.strips):
             self.shown = bench.count
+            self.estimated = -1
             self.strips = {}
             self.chart.clear()
             self.after.clear()
@@ -184,11 +190,13 @@ class RunPage:
         """Estimate from what has come in; the next begins when this one is done."""
         live = self.bench.live
         channels = live.of(self.axis.value or "") if self.axis.value is not None else {}
-        if self.estimating or self.bench.state != "running" or len(channels) < 2:
+        if self.estimating or self.bench.checking or len(channels) < 2:
             return
         command, response = channels["input"], channels["output"]
-        if min(command.size, response.size) < _FEWEST:
+        size = min(command.size, response.size)
+        if size < _FEWEST or size == self.estimated:
             return
+        self.estimated, axis, count = size, str(self.axis.value), self.bench.count
         self.estimating = True
         try:
             pair, figure = await self.window.workbench.workers.do(
@@ -198,9 +206,10 @@ class RunPage:
                 (command.name, response.name),
                 (command.unit, response.unit),
             )
-            if self.estimates.is_deleted:
+            if self.estimates.is_deleted or self.bench.count != count:
                 return
-            self._show(figure)
+            self._show("bode", self.plot, figure)
+            self._closing(axis, live.end, pair)
             self.estimates.clear()
             with self.estimates:
                 columns, rows = parameter_cells(pair, {})
@@ -210,12 +219,28 @@ class RunPage:
         finally:
             self.estimating = False
 
-    def _show(self, figure: Figure) -> None:
-        if self.bode is None:
-            with self.plot:
-                self.bode = Picture(figure)
+    def _closing(self, axis: str, time: float, pair: PairIdentification) -> None:
+        """Note how wide the bar is now, for every window, and show how it went so far."""
+        looks = self.bench.looks.setdefault(axis, [])
+        found = pair.parameters.natural_frequency
+        if found is not None and found.ci95 is not None and None not in found.ci95:
+            low, high = found.ci95
+            if high is not None and low is not None and (not looks or time > looks[-1][0]):
+                looks.append((time, 50.0 * (high - low) / found.value))
+        figure = closing_bars(
+            [t for t, _ in looks],
+            [error for _, error in looks],
+            wanted=self.window.desk.wish.model.wanted,
+            name="Natural frequency",
+        )
+        self._show("bars", self.bars, figure)
+
+    def _show(self, name: str, place: ui.element, figure: Figure) -> None:
+        if name in self.pictures:
+            self.pictures[name].show(figure)
         else:
-            self.bode.show(figure)
+            with place:
+                self.pictures[name] = Picture(figure)
 
 
 def rig_choice(window: Window) -> ui.select:

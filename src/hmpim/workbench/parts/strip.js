@@ -26,6 +26,7 @@ export default {
     await new Promise((done) => setTimeout(done, 0)); // until the page knows its own address
     this.uPlot = await library();
     this.build();
+    if (this.early) this.show(...this.early);
     this.sizes = new ResizeObserver(() => this.plot?.setSize(this.size()));
     this.sizes.observe(this.$el);
   },
@@ -56,7 +57,10 @@ export default {
       );
     },
     show(end, command, response) {
-      if (!this.plot) return;
+      if (!this.plot) {
+        this.early = [end, command, response]; // the library still comes
+        return;
+      }
       const tables = [command, response]
         .map((pair) => pair.map(floats))
         .map(([x, y]) => (x.length ? [x, y] : [new Float32Array([end]), [null]]));

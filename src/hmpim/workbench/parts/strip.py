@@ -36,6 +36,7 @@ class Strip(Element, component="strip.js"):
         self._axis = axis
         self._sent = 0.0
         self._shown = True
+        self._blocks = -1
         self.on("shown", self._seen, [])
         channels = live.of(axis)
         names = [channels[role].name if role in channels else role for role in _ROLES]
@@ -48,9 +49,11 @@ class Strip(Element, component="strip.js"):
     def follow(self, live: Live) -> None:
         """Show the last seconds of what has come in, once the browser has drawn what it got."""
         now = time.monotonic()
+        if live.blocks == self._blocks and (self._shown or not live.blocks):
+            return  # nothing has come since
         if not self._shown and now - self._sent < _PATIENCE:
             return
-        self._shown, self._sent = False, now
+        self._shown, self._sent, self._blocks = False, now, live.blocks
         channels = live.of(self._axis)
         sent: list[Any] = []
         for role in _ROLES:

@@ -2,9 +2,11 @@
 
 import hashlib
 import json
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
+from functools import lru_cache
 
-from hmpim.optimal import PARAMETERS, RoughModel, predict_errors
+from hmpim.errors import ArgumentError
+from hmpim.optimal import FAMILIES, PARAMETERS, Accuracy, RoughModel, gentlest, predict_errors
 from hmpim.optimal.wish import Z95
 from hmpim.stimulus import Limits, Stimulus, design
 from hmpim.stimulus.axes import AxisPlan, design_axes
@@ -12,7 +14,16 @@ from hmpim.stimulus.limits import QUANTITIES
 from hmpim.units import rate_unit
 from hmpim.workbench.desks import AxisRow, Model, Wish
 
-__all__ = ["PeakRow", "digest", "error_rows", "limits_of", "peak_rows", "rough", "stimuli_of"]
+__all__ = [
+    "PeakRow",
+    "digest",
+    "error_rows",
+    "limits_of",
+    "peak_rows",
+    "rough",
+    "stimuli_of",
+    "stimulus_part",
+]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -53,6 +64,9 @@ def limits_of(row: AxisRow, unit: str) -> Limits:
 def stimuli_of(wish: Wish) -> tuple[Stimulus, ...]:
     """Design what is wished: one axis with the sliders, or several that can be told apart.
 
+    What was designed last is kept: the window's α changes no stimulus, and a rough model changes
+    the gentlest alone.
+
     Parameters
     ----------
     wish : Wish
@@ -63,6 +77,25 @@ def stimuli_of(wish: Wish) -> tuple[Stimulus, ...]:
     HmpimError
         If it cannot be met; the message says what would do.
     """
+    return _designed_once(stimulus_part(wish))
+
+
+def stimulus_part(wish: Wish) -> Wish:
+    """Return a wish without what changes no stimulus.
+
+    Examples
+    --------
+    >>> stimulus_part(Wish(alpha=2.0)) == stimulus_part(Wish(alpha=3.0))
+    True
+    """
+    model = wish.model if wish.gentlest else Model()
+    return replace(wish, alpha=Wish().alpha, model=model)
+
+
+@lru_cache(maxsize=16)
+def _designed_once(wish: Wish) -> tuple[Stimulus, ...]:
+    if wish.gentlest:
+        return (_gentlest(wish),)
     if len(wish.rows) > 1:
         plans = [
             AxisPlan(axis=r.name, limits=limits_of(r, wish.unit), band=(r.low, r.high))
@@ -81,6 +114,26 @@ def stimuli_of(wish: Wish) -> tuple[Stimulus, ...]:
             axis=row.name,
         ),
     )
+
+
+def _gentlest(wish: Wish) -> Stimulus:
+    """Return the stimulus of the smallest peak acceleration that tells what is wanted."""
+    if len(wish.rows) > 1:
+        raise ArgumentError(
+            f"the gentlest stimulus is sought for one axis, and the design has {len(wish.rows)}; "
+            "remove the others, or solve the sweeps"
+        )
+    (row,) = wish.rows
+    found = gentlest(
+        accuracy=Accuracy(natural_frequency=0.01 * wish.model.wanted),
+        model=rough(wish.model),
+        noise_std=wish.model.noise_std,
+        limits=limits_of(row, wish.unit),
+        fs=wish.fs,
+        duration=wish.duration,
+        families=FAMILIES,
+    )
+    return replace(found.stimulus, axis=row.name)
 
 
 def peak_rows(wish: Wish, stimuli: tuple[Stimulus, ...]) -> tuple[PeakRow, ...]:

@@ -1,0 +1,71 @@
+"""Designs behind the page: what is kept, what is solved, what the gentlest saves."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from hmpim.errors import ArgumentError
+from hmpim.workbench.desks import AxisRow, Model, Wish
+from hmpim.workbench.parts.picture import MOST, packed
+from hmpim.workbench.work.design import error_rows, stimuli_of
+from hmpim.workbench.work.designed import designed, five_axes, spectrogram
+
+WISH = Wish(rows=(AxisRow(name="roll"),), duration=5.0, fs=200.0, model=Model(wanted=2.0))
+
+
+def test_only_what_changes_a_stimulus_designs_it_anew():
+    stimulus = stimuli_of(WISH)[0]
+    assert stimuli_of(replace(WISH, alpha=4.0))[0] is stimulus
+    assert stimuli_of(replace(WISH, model=Model(delay=0.2)))[0] is stimulus
+    assert stimuli_of(replace(WISH, duration=4.0))[0] is not stimulus
+
+
+def test_what_is_solved_is_what_the_stimulus_has():
+    found = designed(WISH)
+    stimulus = stimuli_of(WISH)[0]
+    assert found.solved["extinction"] == stimulus.extinction
+    assert 0.0 < found.solved["lead"] < stimulus.duration
+    assert designed(replace(WISH, extinction=1.5, lead=0.4)).solved == {}
+
+
+def test_the_gentlest_tells_as_much_as_is_wanted_at_less_acceleration(monkeypatch):
+    monkeypatch.setattr("hmpim.workbench.work.design.FAMILIES", ("multisine",))  # one of three
+    gentle = replace(WISH, gentlest=True)
+    (softer,), (full,) = stimuli_of(gentle), stimuli_of(WISH)
+    assert softer.peaks.acceleration < 0.2 * full.peaks.acceleration
+    told = dict(error_rows(gentle, softer))
+    assert told["natural_frequency"] <= 0.02 * WISH.model.natural_frequency * (1 + 1e-6)
+    assert softer.axis == "roll"
+    assert designed(gentle).command.startswith("hmpim gentlest --natural-frequency 10 ")
+    with pytest.raises(ArgumentError, match="for one axis, and the design has 5"):
+        stimuli_of(replace(gentle, rows=five_axes()))
+
+
+def test_pictures_go_to_a_page_as_bytes_and_never_as_lists():
+    figures = [*designed(replace(WISH, fs=5000.0)).figures.values(), spectrogram(WISH)]
+    for figure in figures:
+        drawn = packed(figure.to_plotly(most_points=MOST))
+        for trace in drawn["data"]:
+            arrays = [trace[key] for key in ("x", "y", "z") if key in trace]
+            assert all(len(a) <= 8 for a in arrays if isinstance(a, list))
+            counts = [len(a["bdata"]) * 3 // 4 // 8 for a in arrays if isinstance(a, dict)]
+            assert trace["type"] == "heatmap" or all(n <= 2 * MOST for n in counts)
+
+
+def test_a_million_samples_go_thinned_with_their_peaks_and_are_thinned_again_on_zoom():
+    from hmpim.plots import Axis, Curve, Figure, Panel
+    from hmpim.workbench.parts.picture import zoomed
+
+    y = np.sin(np.linspace(0.0, 40.0, 1_000_000))
+    y[123_456], y[123_460] = 7.0, 3.0
+    curve = Curve(x=np.arange(1e6) / 1000.0, y=y)
+    whole = Figure(panels=(Panel(x=Axis(), y=Axis(), items=(curve,)),), alt="A long record.")
+    sent = packed(whole.to_plotly(most_points=MOST))["data"][0]
+    assert set(sent["x"]) == set(sent["y"]) == {"dtype", "bdata"}
+    drawn = whole.to_plotly(most_points=MOST)["data"][0]
+    assert drawn["y"].size <= MOST
+    assert drawn["y"].max() == 7.0
+    near = zoomed(whole, 0, 123.4, 123.5).to_plotly(most_points=MOST)["data"][0]
+    assert near["y"].size == 103  # every sample of a tenth of a second, and one beyond each end
+    assert {7.0, 3.0} <= set(near["y"])
