@@ -11,6 +11,7 @@ from hmpim.cli.main import app
 from hmpim.formats import load
 from hmpim.formats.stimulus_files import save_stimulus
 from hmpim.stimulus import Limits, design
+from tests_support import designed_once
 
 LIMITS = Limits(position=10, velocity=300, acceleration=5000, unit="deg")
 RIG = """
@@ -33,7 +34,7 @@ def run(*arguments):
 def folder(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr("platformdirs.user_config_path", lambda *_a, **_k: tmp_path / "nobody")
-    save_stimulus(design(band=(0.1, 20), duration=4, fs=200, limits=LIMITS), "s.csv")
+    save_stimulus(designed_once(band=(0.1, 20), duration=4, fs=200, limits=LIMITS), "s.csv")
     (tmp_path / "rig.toml").write_text(RIG)
     (tmp_path / "hmpim.toml").write_text("[rigs.eye]\n" + RIG.replace("[opt", "[rigs.eye.opt"))
     return tmp_path
