@@ -164,7 +164,10 @@ def _ordered(series: Series) -> "np.ndarray[Any, np.dtype[np.float64]]":
 
 def _time_words(found: Survey) -> str:
     time = found.contents.time
-    return f"time from {time!r}" if time is not None else "no time"
+    if time is not None:
+        return f"time from {time!r}"
+    stamped = any(series.time is not None for series in found.series)
+    return "each sample with its time" if stamped else "no time"
 
 
 def _rate(d: Description) -> str:
