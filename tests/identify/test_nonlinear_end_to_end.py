@@ -7,6 +7,7 @@ import pytest
 
 import hmpim
 from hmpim.identify.nonlinear.mechanisms import play, rate_limited
+from tests_support import in_studies
 
 FS, SUBSTEPS, DELAY = 200.0, 16, 0.03
 T = np.arange(2000) / FS
@@ -56,17 +57,18 @@ def codes(pair) -> set[str]:
 
 
 @pytest.mark.parametrize(
-    ("kind", "size", "within"),
+    ("kind", "size", "within", "structures"),
     [
-        ("friction", 0.01, 0.2),
-        ("backlash", 0.01, 0.25),
-        ("rate_limit", 20.0, 0.15),
-        ("hardening", 0.1, 0.25),
-        ("softening", 0.1, 0.25),
+        ("friction", 0.01, 0.2, None),
+        ("backlash", 0.01, 0.25, PLAIN),
+        ("rate_limit", 20.0, 0.15, PLAIN),
+        ("hardening", 0.1, 0.25, None),
+        ("softening", 0.1, 0.25, None),
+        *in_studies(("backlash", 0.01, 0.25, None), ("rate_limit", 20.0, 0.15, None)),
     ],
 )
-def test_kind_and_size_are_said_and_the_verdict_is_never_ok(kind, size, within):
-    pair = identified(motion(kind, size))["y", "u"]
+def test_kind_and_size_are_said_and_the_verdict_is_never_ok(kind, size, within, structures):
+    pair = identified(motion(kind, size), structures=structures)["y", "u"]
     assert {"nonlinear", kind} <= codes(pair)
     assert pair.verdict == "doubtful"
     found = pair.nonlinearity

@@ -153,7 +153,14 @@ def test_feedforward_commands_are_kept_and_never_fitted(mode):
 def all_at_once():
     table = MotionTable()
     stimuli = {
-        axis.name: sweep(axis.name, upto=1.8 * axis.bandwidth, share=0.3, fs=500.0, table=table)
+        axis.name: sweep(
+            axis.name,
+            upto=1.8 * axis.bandwidth,
+            duration=6.0,
+            share=0.3,
+            fs=500.0,
+            table=table,
+        )
         for axis in FIG_4
     }
     return table, stimuli, run(table, stimuli, rng=2)
