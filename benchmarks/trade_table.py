@@ -42,7 +42,7 @@ def row(name: str, stimulus: Stimulus) -> str:
 
 
 def given_rows() -> list[str]:
-    """Stimuli that take the paper's peaks in full."""
+    """Stimuli that take the paper's peaks in full; of repeated sweeps also a short record."""
     wide = Limits(position=10, unit="deg")
     printed = design(band=BAND, duration=10, fs=FS, limits=wide, extinction=1.0, lead=0)
     rows = [row("HMPIM as printed, n = 1", printed)]
@@ -50,6 +50,8 @@ def given_rows() -> list[str]:
         ("HMPIM, n solved", "hmpim", 9.0),
         ("exponential sweep", "exponential", 8.0),
         ("Schroeder multisine", "schroeder", 9.0),
+        ("repeated sweeps of 0.6 s", "repeated", 9.0),
+        ("repeated sweeps of 0.6 s", "repeated", 1.8),
     ):
         stimulus = design(band=BAND, duration=length, fs=FS, limits=PAPERS_PEAKS, kind=kind)
         if stimulus.extinction is not None:

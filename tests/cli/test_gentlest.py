@@ -2,13 +2,16 @@
 
 import csv
 import json
+import re
 
 import pytest
 import typer
 from typer.testing import CliRunner
 
-from hmpim.cli.gentlest import gentlest
+from hmpim.cli.gentlest import _as_dict, _print, gentlest
 from hmpim.errors import ArgumentError
+from hmpim.optimal import Accuracy, Errors, Gentlest, ModelRange, RoughModel, Wish
+from hmpim.stimulus import Limits, Sine, Stimulus
 
 ROUGH = [
     *("--natural-frequency", "10", "--damping", "0.4", "--delay", "0.15", "--noise", "0.1"),
@@ -82,3 +85,29 @@ def test_bad_input(more, message):
 
 def test_help_shows_an_example():
     assert "hmpim gentlest --natural-frequency 10" in run("--help").output
+
+
+def test_a_figure_that_is_not_asked_for_is_not_infinite(capsys):
+    told = Errors(
+        delay=1e-3, natural_frequency=0.1, damping_ratio=0.01, scale_factor=0.01, bias=1.0
+    )
+    sine = Stimulus(waveform=Sine(frequency=1.0, duration=1.0), fs=100.0)
+    wish = Wish(
+        accuracy=Accuracy(delay=None),
+        model=RoughModel(natural_frequency=10, damping_ratio=0.4),
+        model_range=ModelRange(),
+        noise_std=0.1,
+        limits=Limits(),
+        fs=100.0,
+        gentle="travel",
+        duration=10.0,
+    )
+    found = Gentlest(
+        stimulus=sine, family="sweep", value=4.0, errors=told, worst=told, wish=wish, candidates=()
+    )
+    _print(found)
+    shown = capsys.readouterr().out
+    assert "inf" not in shown
+    assert re.search(r"delay\W+–", shown)
+    assert _as_dict(found, ())["errors"]["delay"]["wanted_ci95"] is None
+    assert _as_dict(found, ())["errors"]["damping_ratio"]["wanted_ci95"] == 0.04

@@ -189,8 +189,8 @@ def _bar(what: str) -> "Iterator[Progress]":
         yield tell
 
 
-def _rows(found: "Gentlest") -> list[tuple[str, str, float, float, float]]:
-    """Parameter, unit, wanted, predicted, and worst half widths at 95 %."""
+def _rows(found: "Gentlest") -> list[tuple[str, str, float | None, float, float]]:
+    """Parameter, unit, wanted (None if not asked for), predicted, and worst half widths at 95 %."""
     accuracy, model = found.wish.accuracy, found.wish.model
     wanted = {
         "delay": accuracy.delay,
@@ -204,7 +204,7 @@ def _rows(found: "Gentlest") -> list[tuple[str, str, float, float, float]]:
         (
             name,
             units.get(name, ""),
-            _INFINITE if asked is None else asked * size.get(name, 1.0),
+            None if asked is None else asked * size.get(name, 1.0),
             found.errors.ci95(name),
             found.worst.ci95(name),
         )
@@ -224,9 +224,8 @@ def _print(found: "Gentlest") -> None:
     for heading in ("parameter", "wanted", "predicted", "worst in range", "unit"):
         table.add_column(heading, justify="left" if heading in ("parameter", "unit") else "right")
     for name, of, wanted, predicted, worst in _rows(found):
-        table.add_row(
-            name.replace("_", " "), f"{wanted:.3g}", f"{predicted:.3g}", f"{worst:.3g}", of
-        )
+        asked = "–" if wanted is None else f"{wanted:.3g}"
+        table.add_row(name.replace("_", " "), asked, f"{predicted:.3g}", f"{worst:.3g}", of)
     console.print(table)
     console.print(
         f"{found.family}, {stimulus.samples} samples at {stimulus.fs:g} Hz, "
