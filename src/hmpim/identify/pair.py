@@ -109,9 +109,11 @@ def described(
         lambda: misfit(u, fit.residual, delay=fit.delay, band=(band[0] / fs, band[1] / fs)),
         Misfit(share=0.0, probability=1.0),
     )
+    spread = spanned(readings.parameters, joint, fs=fs, highest=min(band[1], fs / 2))
     evidence = Evidence(
         joint=joint,
         readings=readings,
+        spanned=spread,
         misfit=left,
         u=u,
         fs=fs,
@@ -121,7 +123,6 @@ def described(
         held=found.hold is not None,
         measured=from_response,
     )
-    spread = spanned(readings.parameters, joint, fs=fs, highest=min(band[1], fs / 2))
     parameters, seen = with_imperfections(spread, found, censored, output.unit)
     known = {finding.code for finding in seen}
     bent = () if inspection is None else inspection.findings

@@ -1,16 +1,19 @@
-"""Intervals that cover every assumption on what the input does between its samples.
+"""Intervals that cover every model that the record does not exclude.
 
 Held, linear and band-limited are three models without a parameter between them. Where the record
 cannot tell them apart and nothing is stated, the figure stays at the likelier one, and its
 interval is the hull of the intervals under each that the likelihood does not exclude (a union of
-confidence sets: R. L. Berger and D. D. Boos, JASA 89, 1994).
+confidence sets: R. L. Berger and D. D. Boos, JASA 89, 1994). So it is with one more pole that is as
+likely but for its price, or that is slow and would not show.
 """
 
 from dataclasses import fields, replace
 
 import numpy as np
 
+from hmpim.identify.fitting.growth import as_if_hidden
 from hmpim.identify.fitting.trial import CLEARLY, JointFit, Trial
+from hmpim.identify.groups import PHASE_SPLIT
 from hmpim.identify.readings import figures_of
 from hmpim.identify.result import Estimate, Parameters
 
@@ -50,7 +53,7 @@ def _is_as_likely(trial: Trial, joint: JointFit) -> bool:
 
 
 def spanned(parameters: Parameters, joint: JointFit, *, fs: float, highest: float) -> Parameters:
-    """Widen each interval to what it would be under the other assumptions.
+    """Widen each interval to what it would be under the other assumptions, or with one more pole.
 
     The other fits see the same data with all but the same sensitivity, so that each interval is
     moved to their value, its width kept.
@@ -64,7 +67,12 @@ def spanned(parameters: Parameters, joint: JointFit, *, fs: float, highest: floa
     fs, highest : float
         Rate, and frequency beyond which no bandwidth is read off, in Hz.
     """
-    found = [figures_of(trial.fit, fs=fs, highest=highest) for trial in rivals_of(joint)]
+    fits = [trial.fit for trial in (*rivals_of(joint), *joint.rivals)]
+    found = [figures_of(fit, fs=fs, highest=highest) for fit in fits]
+    hidden, fit = joint.hidden, joint.best.fit
+    if hidden is not None and (joint.rivals or hidden.may_hide(fit.structure)):
+        longest = figures_of(as_if_hidden(fit, hidden), fs=fs, highest=highest)
+        found.append({name: longest[name] for name in PHASE_SPLIT})
     moved = {}
     for name in (field.name for field in fields(parameters)):
         own = getattr(parameters, name)

@@ -105,7 +105,7 @@ def test_every_check_may_raise_and_the_result_stands(field_record, monkeypatch, 
         ("hmpim.identify.pair", "misfit"),
         (f"{room}.residual", "compare_halves"),
         (f"{room}.residual", "input_noise"),
-        (f"{room}.structure", "hidden_pole"),
+        (f"{room}.between_samples", "rivals_of"),
         (f"{room}.reach", "slowest_time_constant"),
     ):
         monkeypatch.setattr(sys.modules[place], name, broken)

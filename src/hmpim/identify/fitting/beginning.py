@@ -9,13 +9,17 @@ from scipy.special import chdtri
 from hmpim.identify.fitting.data import Data, Seen
 from hmpim.identify.fitting.fit import Fit, Problem, jacobian, solved
 from hmpim.identify.fitting.sampled_rows import part_of
+from hmpim.identify.fitting.trial import Trial
 from hmpim.identify.whiteness import effective_share
 from hmpim.record import Intersample
 
-__all__ = ["begins_of", "count_in"]
+__all__ = ["begins_of", "count_in", "look_again"]
 
 _REACH = 4
 """Samples by which what lies between the samples reaches back: half of a spline's support."""
+
+_RINGS = 8
+"""Samples about a corner over which a spline through it rings."""
 
 _REST = 1e-4
 """Chance of taking a record at rest for one in mid-motion."""
@@ -69,9 +73,8 @@ def begins_of(problem: Problem, fit: Fit, *, lag: int) -> int | None:
     count = int(np.count_nonzero(valid))
     power = float(residual @ residual)
     share = effective_share(residual[valid])
-    early = float(innovations[:begins] @ innovations[:begins]) if problem.valid is None else 0.0
-    level = float(np.median(residual[valid] ** 2)) / 0.455  # of a squared Gaussian
-    if early > _TWICE * level * chdtri(begins, _REST):
+    told = np.ones(problem.y.size, dtype=bool) if problem.counts is None else problem.counts
+    if _stands_out(innovations, told & ~late, told & late):
         return begins
     if not free.shape[0] or power <= 0.0:
         return None
@@ -80,6 +83,53 @@ def begins_of(problem: Problem, fit: Fit, *, lag: int) -> int | None:
     left = max(power - gained, np.finfo(float).tiny)
     statistic = share * count * float(np.log(power / left))
     return begins if statistic > chdtri(free.shape[0], _REST) else None
+
+
+def look_again(problem: Problem, trial: Trial, seen: Seen, *, lag: int) -> Seen | None:
+    """Samples that count after all, now that the structure is known; None if they are the same.
+
+    What a band-limited input does at the ends of a record is not known: a command that starts from
+    rest has a corner there, and a spline rings about it for a few samples. Where the residual is
+    far above the noise at samples that answer those, they do not count. If what is before is
+    still no noise, the record does not begin at rest.
+
+    Parameters
+    ----------
+    problem : Problem
+        What the trial was fitted to.
+    trial : Trial
+        The best one.
+    seen : Seen
+        The samples that counted.
+    lag : int
+        As for `begins_of`.
+    """
+    count = problem.y.size
+    told = np.ones(count, dtype=bool) if problem.counts is None else problem.counts
+    innovations = problem.innovations(trial.fit.prediction, trial.fit.residual)
+    if trial.intersample == "bandlimited":
+        late = np.arange(count) - trial.fit.delay
+        ringing = (np.abs(late) <= _RINGS) | (late >= count - 1 - _RINGS)
+        if _stands_out(innovations, told & ringing, told & ~ringing):
+            return replace(seen, valid=~ringing if seen.valid is None else seen.valid & ~ringing)
+    if seen.begins is not None:
+        return None
+    begins = begins_of(problem, trial.fit, lag=lag)
+    if begins is None:
+        return None
+    after = np.arange(count) >= begins
+    return Seen(valid=after if seen.valid is None else seen.valid & after, begins=begins)
+
+
+def _stands_out(
+    innovations: NDArray[np.float64], some: NDArray[np.bool_], others: NDArray[np.bool_]
+) -> bool:
+    """Whether some samples hold more than the noise that the others show."""
+    if not some.any() or not others.any():
+        return False
+    level = float(np.median(innovations[others] ** 2)) / 0.455  # of a squared Gaussian
+    limit = _TWICE * level * float(chdtri(int(np.count_nonzero(some)), _REST))
+    return float(np.sum(innovations[some] ** 2)) > limit
 
 
 def _memory(fits: list[Fit]) -> int:

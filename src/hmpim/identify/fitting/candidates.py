@@ -13,6 +13,7 @@ from hmpim.identify.fitting.enrich import (
     proposals,
 )
 from hmpim.identify.fitting.fit import Fit, Problem, fit_structure
+from hmpim.identify.fitting.growth import one_more_pole, scale_of, with_pole
 from hmpim.identify.fitting.start import RoughResponse, rough_response, starting_values
 from hmpim.identify.fitting.trial import CLEARLY
 from hmpim.identify.fitting.unexplained import unexplained_response
@@ -38,6 +39,9 @@ _PARTLY = 0.08
 
 _LONG_TASTE = 12
 """Steps from each start of a richer structure, whose valleys are longer."""
+
+_PARTNER = 0.3
+"""Time constant of a pole that is added, over the fit's own."""
 
 _SLOW = 0.3
 """Time constant, over the record's length, from which an integrator may explain it as well."""
@@ -127,7 +131,8 @@ def fit_rich(
     for start in range(0, len(proposed), _AT_ONCE):
         some = proposed[start : start + _AT_ONCE]
         for p in some:
-            found.append(_best_of(problem, p.structure, list(p.starts), [*fits, *found]))
+            starts = [*_grown(p.structure, [*fits, *found]), *p.starts]
+            found.append(_best_of(problem, p.structure, starts, [*fits, *found]))
         best = min(found, key=lambda fit: fit.objective)
         if not is_worth_explaining(problem, best, data) and is_white(best.residual):
             break
@@ -135,6 +140,15 @@ def fit_rich(
         # Poles without end follow what no linear model describes: friction, rounding.
         found = [fit for fit in found if fit.structure.order <= _SURE]
     return found
+
+
+def _grown(structure: Structure, fits: list[Fit]) -> list[NDArray[np.float64]]:
+    """Starts from fits that have one pole less."""
+    return [
+        with_pole(fit.structure, fit.theta, _PARTNER * scale_of(fit))
+        for fit in fits
+        if one_more_pole(fit.structure) == structure
+    ]
 
 
 def _best_of(

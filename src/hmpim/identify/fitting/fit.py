@@ -217,20 +217,29 @@ def solved(gram: Real, moment: Real, damping: float = 0.0) -> Real:
     return np.asarray(vectors[:, keep] @ projected / scale)
 
 
-def jacobian(problem: Problem, fit: Fit) -> Real:
+def jacobian(problem: Problem, fit: Fit, *more: Real) -> Real:
     """Derivatives of the prediction with respect to theta, then to `fit.linear`.
 
     Drift and initial state, where they are fitted, are projected out: the inverse of the rows'
     Gram matrix then is the covariance with them unknown.
 
+    Parameters
+    ----------
+    problem : Problem
+        The data.
+    fit : Fit
+        Where the derivatives are taken.
+    *more : ndarray, shape (n,)
+        Rows of other parameters, treated alike.
+
     Returns
     -------
-    ndarray, shape (1 + order + m + 1, n)
+    ndarray, shape (1 + order + m + 1 + len(more), n)
         Zero where a sample does not count.
     """
     part = part_of(problem, fit.structure, fit.theta)
     bias = np.ones((1, problem.y.size))
-    rows = np.vstack([part.slopes(fit.linear[:-1], fit.initial), part.rows, bias])
+    rows = np.vstack([part.slopes(fit.linear[:-1], fit.initial), part.rows, bias, *more])
     counted = problem.masked(rows)
     others = [part.free] if problem.nuisance is None else [part.free, problem.nuisance]
     return without(counted, problem.masked(np.vstack(others)))

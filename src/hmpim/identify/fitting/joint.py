@@ -15,7 +15,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from hmpim.identify.fitting.beginning import count_in
+from hmpim.identify.fitting.beginning import count_in, look_again
 from hmpim.identify.fitting.candidates import (
     almost_integrates,
     fit_plain,
@@ -23,16 +23,26 @@ from hmpim.identify.fitting.candidates import (
     fit_under_each_assumption,
     is_worth_explaining,
 )
-from hmpim.identify.fitting.data import FINAL_PRECISION, Data, Seen, band_of, follows, refit
+from hmpim.identify.fitting.data import (
+    FINAL_PRECISION,
+    HOPELESS,
+    Data,
+    Seen,
+    band_of,
+    follows,
+    refit,
+    shifted,
+)
 from hmpim.identify.fitting.enrich import (
     INTEGRATING,
     PLAIN,
     RICH,
 )
 from hmpim.identify.fitting.fit import Fit, fit_structure, solved
+from hmpim.identify.fitting.growth import grow, hidden_pole
 from hmpim.identify.fitting.software import software_fit
 from hmpim.identify.fitting.start import rough_response
-from hmpim.identify.fitting.trial import JointFit, Trial, likeliest_of, trial_of, wary_of
+from hmpim.identify.fitting.trial import JointFit, Trial, likeliest_of, trial_of
 from hmpim.identify.fitting.unrelated import is_unrelated, says_nothing
 from hmpim.identify.fitting.whitening import (
     is_contradicted,
@@ -40,12 +50,15 @@ from hmpim.identify.fitting.whitening import (
     prewhitened_of,
     refit_whitened,
 )
-from hmpim.identify.whiteness import effective_share
-from hmpim.model.dynamics import FILTERS, StructureName
+from hmpim.identify.whiteness import effective_share, is_white
+from hmpim.model.dynamics import FILTERS, Structure, StructureName
 from hmpim.model.sampled import prepare_input
-from hmpim.record import Intersample
+from hmpim.record import BETWEEN, Intersample
 
 __all__ = ["joint_fit"]
+
+_LOOKS = 2
+"""How often the samples that count are looked at again, once there is a structure."""
 
 _JUMP = 0.05
 """Share of its range by which a held input jumps at least once."""
@@ -137,27 +150,79 @@ def joint_fit(
         fitted = fit_under_each_assumption(
             data, natural, kept, counted, alone=intersample is not None
         )
-    mode, leading = min(fitted, key=lambda item: item[1].objective)
-    share = effective_share(leading.residual)
-    noise = noise_of(data.problem(mode, counted), leading, data) if share < 1.0 else None
-    if noise is not None or data.noise is not None:
-        data = replace(data, noise=noise)
-        fitted = refit_whitened(data, fitted, counted)
-    trials, chosen, likeliest, best = _decided(data, natural, fitted, counted, share)
-    if noise is not None and is_contradicted(data, best, counted):
-        data = replace(data, noise=None)
-        fitted = refit_whitened(data, fitted, counted)
-        trials, chosen, likeliest, best = _decided(data, natural, fitted, counted, share)
-    weighed = data.problem(chosen.intersample, counted)
-    return JointFit(
+    data, trials, best, share = _weighed(data, natural, fitted, counted)
+    for _ in range(_LOOKS):
+        again = look_again(
+            data.problem(best.intersample, counted), best, counted, lag=data.rough.lag
+        )
+        if again is None:
+            break
+        counted, data = again, replace(data, noise=None)
+        fitted = [
+            (mode, refit(data.problem(mode, counted), fit))
+            for mode, fit in fitted
+            if fit.objective < HOPELESS**2 * best.fit.objective or fit.structure.name in PLAIN
+        ]
+        data, trials, best, share = _weighed(data, natural, fitted, counted)
+    weighed = data.problem(best.intersample, counted)
+    joint = JointFit(
         problem=replace(weighed, noise=None, told=None),
         weighed=weighed,
         best=best,
-        trials=tuple(best if trial is chosen else trial for trial in trials),
+        trials=tuple(trials),
         forgotten=counted.begins or 0,
         effective_share=share,
         related=not is_unrelated(replace(weighed, noise=None, told=None), best.fit, share),
-        simpler=None if chosen is likeliest else likeliest,
+    )
+    modes = [mode for mode in BETWEEN if intersample is None and mode != best.intersample]
+    return _grown(joint, data, counted, structures, modes)
+
+
+def _grown(
+    joint: JointFit,
+    data: Data,
+    seen: Seen,
+    structures: tuple[StructureName, ...],
+    others: list[Intersample],
+) -> JointFit:
+    """Add poles that the likelihood pays for, and note what it leaves open."""
+    best, weighed = joint.best, joint.weighed
+    count = weighed.counted * joint.weighed_share
+
+    def refit(structure: Structure, theta: NDArray[np.float64]) -> Trial:
+        return trial_of(best.intersample, fit_structure(weighed, structure, theta), count)
+
+    growth = grow(
+        best,
+        hidden=lambda trial: hidden_pole(weighed, trial.fit),
+        refit=refit,
+        count=count,
+        names=structures,
+        white=lambda trial: is_white(trial.fit.residual),
+    )
+    if not growth.grown:
+        return replace(joint, rivals=growth.rivals, hidden=growth.hidden)
+    *between, last = growth.grown
+    polished = fit_structure(weighed, last.fit.structure, last.fit.theta, precision=FINAL_PRECISION)
+    best = trial_of(last.intersample, polished, count)
+    moved = [
+        trial_of(
+            mode,
+            fit_structure(
+                data.problem(mode, seen),
+                polished.structure,
+                shifted(polished.theta, best.intersample, mode),
+            ),
+            count,
+        )
+        for mode in others
+    ]
+    return replace(
+        joint,
+        best=best,
+        trials=(*joint.trials, *between, *moved, best),
+        rivals=growth.rivals,
+        hidden=growth.hidden,
     )
 
 
@@ -182,23 +247,42 @@ def _unanswered(
     )
 
 
+def _weighed(
+    data: Data, natural: Intersample, fitted: list[tuple[Intersample, Fit]], seen: Seen
+) -> tuple[Data, list[Trial], Trial, float]:
+    """Weigh all fits under one noise model: it, the trials, the best, independent samples each."""
+    mode, leading = min(fitted, key=lambda item: item[1].objective)
+    share = effective_share(leading.residual)
+    noise = noise_of(data.problem(mode, seen), leading, data) if share < 1.0 else None
+    if noise is not None or data.noise is not None:
+        data = replace(data, noise=noise)
+        fitted = refit_whitened(data, fitted, seen)
+    trials, best = _decided(data, natural, fitted, seen, share)
+    if noise is not None and is_contradicted(data, best, seen):
+        data = replace(data, noise=None)
+        trials, best = _decided(data, natural, refit_whitened(data, fitted, seen), seen, share)
+    return data, trials, best, share
+
+
 def _decided(
     data: Data,
     natural: Intersample,
     fitted: list[tuple[Intersample, Fit]],
     seen: Seen,
     share: float,
-) -> tuple[list[Trial], Trial, Trial, Trial]:
-    """All trials, the chosen one, what the criterion alone would choose, the chosen polished."""
+) -> tuple[list[Trial], Trial]:
+    """All trials, and the chosen one among them, polished."""
     count = data.problem(natural, seen).counted * (share if data.noise is None else 1.0)
     trials = [trial_of(mode, fit, count) for mode, fit in fitted]
-    likeliest = likeliest_of(trials, natural)
-    weighed = data.problem(likeliest.intersample, seen)
-    chosen = wary_of(likeliest, trials, weighed, count)
+    chosen = likeliest_of(trials, natural)
     polished = fit_structure(
-        weighed, chosen.fit.structure, chosen.fit.theta, precision=FINAL_PRECISION
+        data.problem(chosen.intersample, seen),
+        chosen.fit.structure,
+        chosen.fit.theta,
+        precision=FINAL_PRECISION,
     )
-    return trials, chosen, likeliest, trial_of(chosen.intersample, polished, count)
+    best = trial_of(chosen.intersample, polished, count)
+    return [best if trial is chosen else trial for trial in trials], best
 
 
 def _regressed(

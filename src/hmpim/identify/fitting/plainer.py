@@ -58,4 +58,11 @@ def taking(joint: JointFit, fit: Fit) -> JointFit:
         for trial in joint.trials
         if (trial.fit.structure.name, trial.intersample) != (fit.structure.name, mode)
     ]
-    return replace(joint, best=best, trials=(*others, best), effective_share=share, simpler=None)
+    return replace(
+        joint,
+        best=best,
+        trials=(*others, best),
+        effective_share=share,
+        rivals=(),
+        hidden=None,
+    )

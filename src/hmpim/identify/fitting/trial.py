@@ -4,19 +4,18 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hmpim.identify.fitting.enrich import (
-    PLAIN,
-)
-from hmpim.identify.fitting.fit import Fit, Problem, jacobian
+from hmpim.identify.fitting.fit import Fit, Problem
+from hmpim.identify.fitting.growth import HiddenPole
 from hmpim.record import Intersample
 
-__all__ = ["CLEARLY", "JointFit", "Trial", "likeliest_of", "trial_of", "wary_of"]
+__all__ = ["CLEARLY", "JointFit", "Trial", "likeliest_of", "trial_of"]
 
 CLEARLY = 6.0
-"""Difference in log-likelihood that decides against the natural assumption (odds of 400)."""
+"""Difference in log-likelihood that excludes an assumption (odds of 400)."""
 
-_FAR = 4.0
-"""Standard deviations of the delay beyond which another structure contradicts the chosen one."""
+_LIKELIER = 3.0
+"""Difference in log-likelihood from which another assumption is taken than the natural one (odds
+of 20): either's figures then lie inside the intervals."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -51,9 +50,10 @@ class JointFit:
         Whether the best model explains more than a constant does.
     silent : bool
         Whether no model can: the output does not answer the input at all.
-    simpler : Trial or None
-        What the criterion alone would have chosen, where a richer structure was taken for its
-        wider error bars.
+    rivals : tuple of Trial
+        Fits with one more pole, under the chosen assumption, that are as likely but for its price.
+    hidden : HiddenPole or None
+        What the record says of one more pole; None where it was not asked.
     """
 
     problem: Problem
@@ -64,7 +64,8 @@ class JointFit:
     effective_share: float
     related: bool
     silent: bool = False
-    simpler: Trial | None = None
+    rivals: tuple[Trial, ...] = ()
+    hidden: HiddenPole | None = None
 
     @property
     def weighed_share(self) -> float:
@@ -85,35 +86,10 @@ def trial_of(mode: Intersample, fit: Fit, count: float, *, floor: float = 0.0) -
 
 
 def likeliest_of(trials: list[Trial], natural: Intersample) -> Trial:
-    """The likeliest trial, under the natural assumption unless another is clearly likelier."""
+    """The likeliest trial; under the natural assumption unless the odds are beyond 20."""
     best = min(trials, key=lambda trial: trial.criterion)
     rivals = [trial for trial in trials if trial.intersample == natural]
     if not rivals or best in rivals:
         return best
     rival = min(rivals, key=lambda trial: trial.criterion)
-    return best if rival.criterion - best.criterion > 2 * CLEARLY else rival
-
-
-def wary_of(chosen: Trial, trials: list[Trial], problem: Problem, count: float) -> Trial:
-    """Prefer second order to first where it may well be right and would move the delay.
-
-    The criterion keeps a simpler structure until the evidence is strong, and the simpler one's
-    error bars take it for certain. Where the record half speaks for another pole and that
-    pole would take the delay far outside those bars, the wider bars are the honest ones.
-    """
-    if chosen.fit.structure.name != "first_order":
-        return chosen
-    rows = jacobian(problem, chosen.fit)
-    information = np.linalg.pinv(rows @ rows.T, hermitian=True)
-    std = np.sqrt(max(information[0, 0], 0.0) * chosen.fit.objective / problem.counted)
-    for trial in trials:
-        extra = trial.fit.structure.parameters - chosen.fit.structure.parameters
-        if (
-            trial.intersample == chosen.intersample
-            and trial.fit.structure.name in PLAIN
-            and extra > 0
-            and extra * np.log(count) - (trial.criterion - chosen.criterion) > 0.5 * extra
-            and abs(trial.fit.delay - chosen.fit.delay) > _FAR * std
-        ):
-            return trial
-    return chosen
+    return best if rival.criterion - best.criterion > 2 * _LIKELIER else rival

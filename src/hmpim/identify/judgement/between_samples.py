@@ -5,10 +5,24 @@ from hmpim.identify.judgement.evidence import Evidence, structure_in_words
 from hmpim.identify.spanned import rivals_of
 from hmpim.record import Finding
 
-__all__ = ["other_intersample"]
+__all__ = ["other_intersample", "wide_span"]
 
 _SHIFT = 0.05
 """Difference of the delay, in samples, from which another assumption is worth a word."""
+
+_WIDE = 0.1
+"""Half width of an interval over its figure, from which what it covers is no figure any more."""
+
+_SIZES = (
+    "scale_factor",
+    "natural_frequency",
+    "damping_ratio",
+    "time_constant",
+    "bandwidth_phase90",
+    "bandwidth_phase90_without_delay",
+    "bandwidth_3db",
+)
+"""Figures that a share says something of."""
 
 _SHIFTED = (*PHASE_SPLIT, "delay_low_frequency", "bandwidth_phase90")
 """What moves with the delay, or with the structure that goes with it."""
@@ -36,5 +50,36 @@ def other_intersample(evidence: Evidence) -> tuple[Finding, ...]:
             f"{', and if '.join(moves)}. The intervals cover this. State it with intersample=.",
             severity="info",
             parameters=_SHIFTED,
+        ),
+    )
+
+
+def wide_span(evidence: Evidence) -> tuple[Finding, ...]:
+    """Doubt figures that the models which this record allows put far apart."""
+    if evidence.spanned is None:
+        return ()
+    wide: dict[str, tuple[float, float]] = {}
+    for name in _SIZES:
+        estimate = getattr(evidence.spanned, name)
+        if estimate is None or estimate.std is not None or estimate.ci95 is None:
+            continue
+        low, high = estimate.ci95
+        if high - low > 2 * _WIDE * abs(estimate.value):
+            wide[name] = (low, high)
+    if not wide:
+        return ()
+    named = ", ".join(
+        f"{name.replace('_', ' ')} from {low:.4g} to {high:.4g}"
+        for name, (low, high) in wide.items()
+    )
+    between = bool(rivals_of(evidence.joint))
+    return (
+        Finding(
+            code="intersample" if between else "structure",
+            message=f"Models that this record does not tell apart differ widely: {named}. "
+            + ("State what the input does between its samples" if between else "Sweep higher")
+            + ", or lower the noise.",
+            severity="doubt",
+            parameters=tuple(wide),
         ),
     )

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Sequence
 from functools import partial
 
-from hmpim.identify.judgement.between_samples import other_intersample
+from hmpim.identify.judgement.between_samples import other_intersample, wide_span
 from hmpim.identify.judgement.errors import not_converged, weak_delay, weak_excitation
 from hmpim.identify.judgement.evidence import Evidence
 from hmpim.identify.judgement.failed import attempt
@@ -23,9 +23,10 @@ from hmpim.identify.judgement.residual import (
     lack_of_fit,
     noise_colour_of,
     noise_on_the_input,
+    uneven_noise,
 )
 from hmpim.identify.judgement.response import bandwidth_disagrees
-from hmpim.identify.judgement.structure import missed_pole, other_structure, undecided_order
+from hmpim.identify.judgement.structure import missed_pole, other_order
 from hmpim.record import Finding
 
 __all__ = ["CHECKS", "Check", "judge"]
@@ -48,15 +49,16 @@ CHECKS: tuple[Check, ...] = (
     few_lines,
     integrator,
     beyond_band,
-    other_structure,
     halves_disagree,
-    undecided_order,
+    other_order,
     missed_pole,
     other_intersample,
+    wide_span,
     short_record,
     negative_delay,
     noise_colour_of,
     noise_on_the_input,
+    uneven_noise,
     bandwidth_disagrees,
 )
 """All checks of one pair; each one's findings come in this order."""

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from hmpim.identify.fitting.trial import JointFit
 from hmpim.identify.readings import Readings
-from hmpim.identify.result import ResponseBandwidths
+from hmpim.identify.result import Parameters, ResponseBandwidths
 from hmpim.identify.whiteness import Misfit
 
 __all__ = ["Evidence", "structure_in_words"]
@@ -35,6 +35,9 @@ class Evidence:
         100 (1 - ‖residual‖ / ‖deviation of the output‖).
     measured : ResponseBandwidths
         Bandwidths read off the measured response.
+    spanned : Parameters or None
+        What was read off it, with intervals that cover every model the record allows; None where
+        it allows no other.
     nonlinear : bool
         Whether the residual is known to be nonlinear, and so asks for no pole.
     held : bool
@@ -49,6 +52,7 @@ class Evidence:
     band: tuple[float, float]
     fit_percent: float
     measured: ResponseBandwidths
+    spanned: Parameters | None = None
     nonlinear: bool = False
     held: bool = False
 

@@ -16,6 +16,7 @@ __all__ = [
     "lack_of_fit",
     "noise_colour_of",
     "noise_on_the_input",
+    "uneven_noise",
 ]
 
 _CHANCE = 1e-4
@@ -32,6 +33,12 @@ _MOSTLY_NOISE = 0.5
 
 _PARTED = 1e-6
 """Chance of halves so far apart, below which they are said to disagree."""
+
+_FAST = 9
+"""Samples over which the size of what is fast in the input is taken."""
+
+_GROWS = 5.0
+"""Standard deviations of a correlation from which the noise is said to grow with it."""
 
 _ATTENUATES = 0.002
 """Share by which noise on the input must lower the gain to be worth a word."""
@@ -81,6 +88,36 @@ def coloured_noise(evidence: Evidence) -> tuple[Finding, ...]:
             f"{1 / evidence.joint.effective_share:.3g}); the error bars are widened for it.",
             severity="doubt" if evidence.unexplained > _MOSTLY_NOISE and follows else "info",
             parameters=MODELLED,
+        ),
+    )
+
+
+def uneven_noise(evidence: Evidence) -> tuple[Finding, ...]:
+    """Doubt the noise where it grows with what is fast in the input: stamps that jitter.
+
+    A sample taken late by δ is off by δ times the signal's rate, so that the power of what is left
+    over is a constant and a share of the fast input's; the constant is the noise's.
+    """
+    residual, u = evidence.joint.best.fit.residual, evidence.u
+    fast = np.convolve(np.diff(u, 4) ** 2, np.ones(_FAST) / _FAST, mode="full")[2 : 2 + u.size]
+    valid = evidence.joint.problem.valid
+    told = slice(None) if valid is None else valid
+    power, fast = residual[told] ** 2, fast[told]
+    if power.size < _FAST or np.ptp(power) == 0.0 or np.ptp(fast) == 0.0:
+        return ()
+    related = float(np.corrcoef(power, fast)[0, 1])
+    slope = related * float(power.std() / fast.std())
+    share = slope * float(fast.mean() / power.mean())
+    if related * np.sqrt(power.size) <= _GROWS or share <= _OF_THE_NOISE:
+        return ()
+    return (
+        Finding(
+            code="uneven_noise",
+            message=f"What the model leaves over grows with what is fast in the input: about "
+            f"{100 * min(share, 1.0):.0f} % of its power is not the sensor's noise, as with time "
+            "stamps that jitter. Record with a hardware clock.",
+            severity="doubt",
+            parameters=("noise_std",),
         ),
     )
 

@@ -17,11 +17,12 @@ from hmpim.identify.fitting.candidates import nested
 from hmpim.identify.fitting.data import FOLLOWS, HOPELESS, shifted
 from hmpim.identify.fitting.enrich import INTEGRATING, PLAIN, RICH, members, proposals
 from hmpim.identify.fitting.fit import solved
+from hmpim.identify.fitting.growth import HiddenPole, grow
 from hmpim.identify.fitting.rows import Part, Problem
 from hmpim.identify.fitting.start import RoughResponse, starting_values
 from hmpim.identify.fitting.trial import Trial, likeliest_of, trial_of
 from hmpim.identify.statistics.fit import Fitted, fit_products, pulse
-from hmpim.identify.statistics.misfit import misfit_of
+from hmpim.identify.statistics.misfit import hidden_pole_of, misfit_of
 from hmpim.identify.statistics.products import Products
 from hmpim.identify.statistics.reach import AHEAD
 from hmpim.identify.statistics.start import excited, rough_of
@@ -100,8 +101,10 @@ class Chosen:
         Excited band in Hz.
     problem : Problem
         The pulse under the chosen assumption.
-    simpler : Trial or None
-        What the criterion alone would have chosen.
+    rivals : tuple of Trial
+        Fits with one more pole that are as likely, but for its price.
+    hidden : HiddenPole
+        What the statistics say of one more pole.
     first_order : Fitted or None
         The best of first order, under the same assumption.
     """
@@ -112,7 +115,8 @@ class Chosen:
     misfit: Misfit
     band: tuple[float, float]
     problem: Problem
-    simpler: Trial | None
+    rivals: tuple[Trial, ...]
+    hidden: HiddenPole
     first_order: Fitted | None
 
 
@@ -219,7 +223,7 @@ def choose(
         search.products = search.whitened(left.noise)
         least = _least(fits).fit.objective
         fits = [search.again(f) for f in fits if f.fit.objective < HOPELESS**2 * least]
-    return _decided(search, natural, fits, band)
+    return _decided(search, natural, fits, band, names=names, alone=alone)
 
 
 def _is_conditioned(statistics: Statistics) -> bool:
@@ -369,17 +373,36 @@ def left_over(search: "_Search", fitted: Fitted) -> LeftOver:
 
 
 def _decided(
-    search: _Search, natural: Intersample, fits: list[Fitted], band: tuple[float, float]
+    search: _Search,
+    natural: Intersample,
+    fits: list[Fitted],
+    band: tuple[float, float],
+    *,
+    names: tuple[StructureName, ...],
+    alone: bool,
 ) -> Chosen:
-    """Weigh all fits alike, and polish the chosen one."""
+    """Weigh all fits alike, add poles that the likelihood pays for, and polish the chosen one."""
     left = left_over(search, _least(fits))
     count = search.products.counted * (1.0 if search.products.order else left.share)
     trials = [trial_of(f.intersample, f.fit, count) for f in fits]
     likeliest = likeliest_of(trials, natural)
-    taken = _wary(likeliest, trials, fits, count)
-    chosen = fits[trials.index(taken)]
+    growth = grow(
+        fits[trials.index(likeliest)],
+        hidden=lambda f: hidden_pole_of(f, search.problem(f.intersample)),
+        refit=lambda structure, theta: search.fit(likeliest.intersample, structure, theta),
+        count=count,
+        names=names,
+        white=lambda f: left_over(search, f).noise.size == 1,
+    )
+    chosen = growth.grown[-1] if growth.grown else fits[trials.index(likeliest)]
     best = search.again(chosen, precision=_FINAL_PRECISION)
     polished = trial_of(best.intersample, best.fit, count)
+    if growth.grown:
+        moved = [] if alone else _moved(search, best.intersample, [best], alone=False)
+        trials += [trial_of(f.intersample, f.fit, count) for f in (*growth.grown[:-1], *moved)]
+        trials.append(polished)
+    else:
+        trials[trials.index(likeliest)] = polished
     simple = [
         f
         for f in fits
@@ -387,30 +410,12 @@ def _decided(
     ]
     return Chosen(
         best=best,
-        trials=tuple(polished if trial is taken else trial for trial in trials),
+        trials=tuple(trials),
         left=left_over(search, best),
         misfit=search.follows(best),
         band=band,
         problem=search.problem(best.intersample),
-        simpler=None if taken is likeliest else likeliest,
+        rivals=tuple(trial_of(f.intersample, f.fit, count) for f in growth.rivals),
+        hidden=growth.hidden,
         first_order=simple[0] if simple else None,
     )
-
-
-def _wary(likeliest: Trial, trials: list[Trial], fits: list[Fitted], count: float) -> Trial:
-    """Prefer second order to first where it may well be right and would move the delay."""
-    fit = likeliest.fit
-    if fit.structure.name != "first_order":
-        return likeliest
-    std = float(np.sqrt(fits[trials.index(likeliest)].covariance[0, 0]))
-    for trial in trials:
-        extra = trial.fit.structure.parameters - fit.structure.parameters
-        gained = extra * np.log(count) - (trial.criterion - likeliest.criterion)
-        if (
-            trial.intersample == likeliest.intersample
-            and trial.fit.structure.name == "second_order"
-            and gained > 0.5 * extra
-            and abs(trial.fit.delay - fit.delay) > 4.0 * std
-        ):
-            return trial
-    return likeliest

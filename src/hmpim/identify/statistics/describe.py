@@ -12,7 +12,7 @@ from hmpim.identify.fitting.rows import Problem
 from hmpim.identify.fitting.trial import JointFit
 from hmpim.identify.groups import EVERY
 from hmpim.identify.judgement import Evidence, judge, judged
-from hmpim.identify.judgement.between_samples import other_intersample
+from hmpim.identify.judgement.between_samples import other_intersample, wide_span
 from hmpim.identify.judgement.checks import Check
 from hmpim.identify.judgement.errors import not_converged, weak_delay, weak_excitation
 from hmpim.identify.judgement.reach import (
@@ -24,7 +24,7 @@ from hmpim.identify.judgement.reach import (
     negative_delay,
 )
 from hmpim.identify.judgement.residual import lack_of_fit
-from hmpim.identify.judgement.structure import one_more_pole, other_structure, undecided_order
+from hmpim.identify.judgement.structure import missed_pole, other_order
 from hmpim.identify.readings import Readings, read_figures
 from hmpim.identify.result import (
     Candidate,
@@ -38,7 +38,7 @@ from hmpim.identify.result import (
 )
 from hmpim.identify.spanned import spanned
 from hmpim.identify.statistics.choose import Chosen, choose
-from hmpim.identify.statistics.misfit import hidden_pole_of, integrated_share
+from hmpim.identify.statistics.misfit import integrated_share
 from hmpim.identify.statistics.run import Run
 from hmpim.identify.statistics.start import correlations
 from hmpim.identify.statistics.statistics import Statistics
@@ -59,9 +59,10 @@ _CHECKS: tuple[Check, ...] = (
     natural_frequency_beyond,
     integrator,
     beyond_band,
-    other_structure,
-    undecided_order,
+    other_order,
+    missed_pole,
     other_intersample,
+    wide_span,
     negative_delay,
 )
 """Those that need no samples."""
@@ -187,6 +188,7 @@ def _related(statistics: Statistics, chosen: Chosen) -> PairIdentification:
     evidence = Evidence(
         joint=joint,
         readings=readings,
+        spanned=parameters,
         misfit=chosen.misfit,
         u=np.empty(0),
         fs=fs,
@@ -195,9 +197,6 @@ def _related(statistics: Statistics, chosen: Chosen) -> PairIdentification:
         measured=ResponseBandwidths(),
     )
     findings = judge(evidence, checks=_CHECKS)
-    if fit.structure.name in ("first_order", "second_order"):
-        hidden = hidden_pole_of(best, chosen.problem)
-        findings += one_more_pole(hidden, fit.structure.order, fs)
     finite = bool(np.isfinite(spread).all())
     above = 1 + system.numerator.size
     order = [0, *range(1, above)[::-1], *range(above, spread.shape[0])[::-1]]
@@ -272,7 +271,8 @@ def _joint(statistics: Statistics, chosen: Chosen) -> JointFit:
         forgotten=chosen.best.products.skipped,
         effective_share=chosen.left.share,
         related=True,
-        simpler=chosen.simpler,
+        rivals=chosen.rivals,
+        hidden=chosen.hidden,
     )
 
 

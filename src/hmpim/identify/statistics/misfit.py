@@ -9,13 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import chdtrc
 
-from hmpim.identify.fitting.nested import HiddenPole
+from hmpim.identify.fitting.fit import solved
+from hmpim.identify.fitting.growth import HiddenPole, response_to_square, scale_of
 from hmpim.identify.fitting.rows import Problem
 from hmpim.identify.statistics.fit import Fitted
 from hmpim.identify.statistics.products import Products
 from hmpim.identify.statistics.reach import AHEAD
 from hmpim.identify.whiteness import Misfit
-from hmpim.model.sampled import delayed_response
 
 __all__ = ["hidden_pole_of", "integrated_share", "misfit_of"]
 
@@ -30,9 +30,6 @@ _STEPS = 48
 
 _CLEAR = 50.0
 """Squared standard deviations from which a step is seen, by whatever chance."""
-
-_PROBE = 0.3
-"""Time constant, over the fit's own, by which the derivative by its square is taken."""
 
 Real = NDArray[np.float64]
 
@@ -64,9 +61,9 @@ def misfit_of(fitted: Fitted, products: Products, band: tuple[float, float]) -> 
 
 
 def hidden_pole_of(fitted: Fitted, problem: Problem) -> HiddenPole:
-    """Test a first- or second-order fit for one more pole, the delay shortened by as much.
+    """Test a fit for one more pole, the delay shortened by as much.
 
-    As `hmpim.identify.fitting.nested.hidden_pole`, from statistics.
+    As `hmpim.identify.fitting.growth.hidden_pole`, from statistics.
 
     Parameters
     ----------
@@ -76,23 +73,23 @@ def hidden_pole_of(fitted: Fitted, problem: Problem) -> HiddenPole:
         From `hmpim.identify.statistics.fit.pulse`.
     """
     fit = fitted.fit
-    denominator = fit.denominator
-    scale = float(denominator[fit.structure.order] ** (1.0 / fit.structure.order))
-    added = _PROBE * scale
-    here, there = (
-        delayed_response(problem.source, delay=delay, denominator=poles, powers=1)[0]
-        for delay, poles in (
-            (fit.delay, denominator),
-            (max(fit.delay - added, -19.0), np.convolve(denominator, [1.0, added])),
-        )
-    )
-    gain, left, _ = _beside(
-        fitted, fitted.products, (fit.linear[0] * (there - here) / added**2)[None]
-    )
+    row = response_to_square(problem, fit)
+    gain, left, _ = _beside(fitted, fitted.products, row[None])
     size = max(float(left[0, 0]), np.finfo(float).tiny)
+    shift = _moved_by(fitted, row)
     return HiddenPole(
-        squared=float(gain[0]) / size, std=float(np.sqrt(fitted.variance / size)), scale=scale
+        squared=float(gain[0]) / size,
+        std=float(np.sqrt(fitted.variance / size)),
+        scale=scale_of(fit),
+        shift=np.append(shift, 0.0),  # the bias is solved apart
     )
+
+
+def _moved_by(fitted: Fitted, row: Real) -> Real:
+    """Change of theta and numerator with what multiplies one more response."""
+    steady = np.concatenate([[row.sum()], fitted.steady])
+    gram = fitted.products.moments(np.vstack([row[None], fitted.rows]), steady).gram
+    return np.asarray(-solved(gram[1:, 1:], gram[1:, 0]))
 
 
 def integrated_share(fitted: Fitted) -> float:

@@ -1,0 +1,300 @@
+"""One more pole, at any order: chosen, left open, or excluded, as the likelihood says.
+
+A pole much faster than the others looks like delay. With a pure delay τ - T beside it,
+
+    e^(sT) / (1 + sT) = 1 + (sT)² / 2 + ...,
+
+so the record sees q = T², not T. Its likelihood is quadratic in q, and a score test of q (C. R.
+Rao, Proc. Camb. Phil. Soc. 44, 1948) costs one response. Where that test is passed by more than
+chance, the richer structure is fitted. Schwarz's criterion chooses; a structure that is as likely,
+but for the price of its pole, is a rival that the intervals cover.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Generic, Protocol, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hmpim.identify.fitting.fit import Fit, Problem, jacobian
+from hmpim.identify.fitting.sampled_rows import part_of
+from hmpim.identify.uncertainty import covariance
+from hmpim.identify.whiteness import is_white
+from hmpim.model.dynamics import STRUCTURES, Structure, StructureName, coefficients_of, theta_of
+
+__all__ = [
+    "Growth",
+    "HiddenPole",
+    "as_if_hidden",
+    "grow",
+    "hidden_pole",
+    "one_more_pole",
+    "response_to_square",
+    "scale_of",
+    "with_pole",
+]
+
+_BY_CHANCE = 1.645
+"""Standard deviations of q that chance exceeds in 5 % of records without one more pole."""
+
+_SEEN = _BY_CHANCE**2
+"""Twice the log-likelihood that a fit of one more pole must gain, for the same chance."""
+
+_MATTERS = 0.01
+"""Time constant, over the fit's own, below which one more pole moves nothing."""
+
+_HIDES = 0.2
+"""Time constant, over the fit's own, up to which one more pole may hide without a word."""
+
+_PROBE = 0.3
+"""Time constant, over the fit's own, by which the derivative with respect to q is taken."""
+
+_FARTHEST = 1.0
+"""Logarithm by which a time constant moves at most beside a pole that would not show."""
+
+_MOST = 7
+"""Poles up to which one more is asked for."""
+
+_SURE = 4
+"""Poles up to which a structure may leave more than white noise."""
+
+Real = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class HiddenPole:
+    """What a record says of one more pole beside a fit, T its time constant in samples.
+
+    Parameters
+    ----------
+    squared, std : float
+        q = T² as a score test finds it, and its standard deviation. Below 0 it stands for what
+        one more pole cannot be: a zero, or a pair of poles.
+    scale : float
+        Time in samples that the fit itself has: the time constant, or the poles' geometric mean;
+        of a fit without a pole, its delay.
+    shift : ndarray, shape (p,)
+        Change of the fit's vector with q.
+    """
+
+    squared: float
+    std: float
+    scale: float
+    shift: Real
+
+    @property
+    def limit(self) -> float:
+        """Longest time constant, in samples, that the record does not exclude."""
+        return float(np.sqrt(max(self.squared, 0.0) + 2.0 * self.std))
+
+    @property
+    def is_asked_for(self) -> bool:
+        """Whether the record asks for a pole by more than chance, and one that matters."""
+        return self.squared > _BY_CHANCE * self.std and self.squared > (_MATTERS * self.scale) ** 2
+
+    def may_hide(self, structure: Structure) -> bool:
+        """Whether a pole that moves the delay by much would not show, beside none or one."""
+        return structure.order <= 1 and self.limit > _HIDES * self.scale
+
+
+class Fitted(Protocol):
+    """A fit, whatever it was made from."""
+
+    @property
+    def fit(self) -> Fit:
+        """Structure, parameters, and what was least."""
+
+
+F = TypeVar("F", bound=Fitted)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Growth(Generic[F]):
+    """Where growing ended.
+
+    Parameters
+    ----------
+    grown : tuple
+        Fits that beat the one before, the best last; empty if none did.
+    rivals : tuple
+        Fits of one more pole that are as likely, but for its price.
+    hidden : HiddenPole
+        What the record says of one more pole beside the best fit.
+    """
+
+    grown: tuple[F, ...]
+    rivals: tuple[F, ...]
+    hidden: HiddenPole
+
+
+def one_more_pole(structure: Structure) -> Structure:
+    """Return a structure with one more pole; a real pole that is alone gets it as partner.
+
+    Examples
+    --------
+    >>> one_more_pole(STRUCTURES["first_order"]).name
+    'second_order'
+    >>> one_more_pole(STRUCTURES["two_modes"]).sections
+    (2, 2, 1)
+    """
+    pairs = [order for order in structure.sections if order == 2]
+    sections = (*pairs, *((2,) if 1 in structure.sections else (1,)))
+    richer = replace(structure, sections=sections)
+    return _named(richer) or richer
+
+
+def _named(structure: Structure) -> Structure | None:
+    """The structure that has these poles and zeros and a name."""
+    return next(
+        (known for known in STRUCTURES.values() if replace(structure, name=known.name) == known),
+        None,
+    )
+
+
+def with_pole(structure: Structure, theta: Real, lag: float) -> Real:
+    """Parameters of `one_more_pole(structure)`: a pole of time constant `lag` for as much delay.
+
+    Parameters
+    ----------
+    structure : Structure
+        Before.
+    theta : ndarray, shape (1 + order,)
+        Its parameters, in samples.
+    lag : float
+        Time constant in samples.
+
+    Examples
+    --------
+    >>> with_pole(STRUCTURES["static"], np.array([9.0]), 1.0).tolist()
+    [8.0, 0.0]
+    """
+    own = coefficients_of(structure, theta[1:])
+    if 1 in structure.sections:  # the last section
+        added = [own[-1] + lag, own[-1] * lag]
+        own = own[:-1]
+    else:
+        added = [lag]
+    richer = one_more_pole(structure)
+    return np.concatenate([[theta[0] - lag], theta_of(richer, np.concatenate([own, added]))])
+
+
+def hidden_pole(problem: Problem, fit: Fit) -> HiddenPole:
+    """Test a fit for one more pole, the delay shortened by as much.
+
+    Parameters
+    ----------
+    problem : Problem
+        The data.
+    fit : Fit
+        Any fit to them but a filter in z.
+    """
+    every = jacobian(problem, fit, response_to_square(problem, fit))
+    freedom = max(problem.counted - every.shape[0], 1)
+    left = problem.innovations(fit.prediction, fit.residual)
+    white = is_white(left if problem.counts is None else left[problem.counts])
+    variance = covariance(every, left, freedom=freedom, white=white)[-1, -1]
+    rows, row = every[:-1], every[-1]
+    size = np.sqrt(np.maximum(np.sum(rows**2, axis=1), np.finfo(float).tiny))
+    basis = (rows / size[:, None]).T
+    shift = -np.linalg.lstsq(basis, row, rcond=1e-10)[0] / size
+    own = row + shift @ rows  # what no other parameter can do
+    power = max(float(own @ own), np.finfo(float).tiny)
+    return HiddenPole(
+        squared=float(own @ left) / power,
+        std=float(np.sqrt(variance)),
+        scale=scale_of(fit),
+        shift=shift,
+    )
+
+
+def response_to_square(problem: Problem, fit: Fit) -> Real:
+    """Derivative of the prediction with respect to q, shape (n,).
+
+    Parameters
+    ----------
+    problem, fit
+        As for `hidden_pole`.
+    """
+    lag = _PROBE * scale_of(fit)
+    richer, theta = one_more_pole(fit.structure), with_pole(fit.structure, fit.theta, lag)
+    there = part_of(problem, richer, theta).rows
+    here = part_of(problem, fit.structure, fit.theta).rows
+    return np.asarray(fit.linear[:-1] @ (there - here) / lag**2)
+
+
+def scale_of(fit: Fit) -> float:
+    """Time in samples that a fit has: its poles', or its delay."""
+    order = fit.structure.order
+    if not order:
+        return max(fit.delay, 0.1)
+    return float(fit.denominator[fit.structure.order] ** (1.0 / order))
+
+
+def as_if_hidden(fit: Fit, hidden: HiddenPole) -> Fit:
+    """Return a fit with the longest pole that the record does not exclude, the rest moved along.
+
+    Parameters
+    ----------
+    fit : Fit
+        Without it.
+    hidden : HiddenPole
+        What `hidden_pole` says of it.
+    """
+    lag = hidden.limit
+    moved = lag**2 * hidden.shift
+    moved[1 : fit.theta.size] = np.clip(moved[1 : fit.theta.size], -_FARTHEST, _FARTHEST)
+    theta, linear = np.split(np.concatenate([fit.theta, fit.linear]) + moved, [fit.theta.size])
+    return replace(
+        fit,
+        structure=one_more_pole(fit.structure),
+        theta=with_pole(fit.structure, theta, lag),
+        linear=linear,
+    )
+
+
+def grow(
+    best: F,
+    *,
+    hidden: Callable[[F], HiddenPole],
+    refit: Callable[[Structure, Real], F],
+    count: float,
+    names: tuple[StructureName, ...],
+    white: Callable[[F], bool],
+) -> Growth[F]:
+    """Add poles to a fit as long as the likelihood pays for them.
+
+    Parameters
+    ----------
+    best : Fitted
+        The chosen fit.
+    hidden : callable
+        Tests a fit for one more pole.
+    refit : callable
+        Fits a structure from a start.
+    count : float
+        Independent samples.
+    names : tuple of str
+        Structures that may be chosen; of others a fit is a rival at most.
+    white : callable
+        Whether a fit leaves white noise, as one of many poles must.
+    """
+    grown: list[F] = []
+    while True:
+        test = hidden(best)
+        structure = best.fit.structure
+        if not test.is_asked_for or structure.order >= _MOST:
+            return Growth(grown=tuple(grown), rivals=(), hidden=test)
+        richer = one_more_pole(structure)
+        starts = (float(np.sqrt(test.squared)), _PROBE * test.scale)
+        tried = [refit(richer, with_pole(structure, best.fit.theta, lag)) for lag in starts]
+        found = min(tried, key=lambda f: f.fit.objective)
+        gain = count * float(np.log(best.fit.objective / found.fit.objective))
+        if gain < _SEEN:
+            return Growth(grown=tuple(grown), rivals=(), hidden=test)
+        may_be_chosen = richer.name != structure.name and richer.name in names
+        sure = richer.order <= _SURE or white(found)
+        if gain < np.log(count) or not may_be_chosen or not sure:
+            return Growth(grown=tuple(grown), rivals=(found,), hidden=test)
+        grown.append(found)
+        best = found
