@@ -97,6 +97,14 @@ def identify(
             help="What the input does between samples: held, linear, band-limited, or found.",
         ),
     ] = Between.AUTO,
+    reference: Annotated[
+        str | None,
+        typer.Option(
+            "--reference",
+            metavar="NAME",
+            help="Channel that drives a loop around the unit: identify the unit through it.",
+        ),
+    ] = None,
     holdout: Annotated[
         float | None,
         typer.Option(
@@ -161,6 +169,7 @@ def identify(
     paper = {"--report": report, "--sign": sign, "--figures": figures}
     single: dict[str, object] = {**paper, "--holdout": holdout, "--at": at or None}
     single |= {"--structure": structure or None, "--hand": hand or None}
+    single["--reference"] = reference
     by_hand = _by_hand(hand or [])
     _check_single(len(records), single)
 
@@ -170,7 +179,12 @@ def identify(
 
     given = read_records(
         records,
-        roles={"inputs": input_, "outputs": output, "auxiliary": auxiliary},
+        roles={
+            "inputs": input_,
+            "outputs": output,
+            "references": None if reference is None else [reference],
+            "auxiliary": auxiliary,
+        },
         fs=fs,
         time=time,
         units=units_of(unit),
@@ -196,7 +210,12 @@ def identify(
     measurable(at or [], data.fs)
     part, split = (data, None) if holdout is None else _first_part(data, holdout)
     with working("Identifying"):
-        result = find(part, intersample=intersample.value, structures=_structures(structure))
+        result = find(
+            part,
+            intersample=intersample.value,
+            structures=_structures(structure),
+            reference=reference,
+        )
     said = [] if split is None else _predictions(result, data, split)
     said += _readings(result, at or [])
     if by_hand:

@@ -38,6 +38,7 @@ from hmpim.identify.statistics.describe import identify_statistics
 from hmpim.identify.statistics.statistics import Statistics
 from hmpim.identify.swapped import is_swapped, swapped_finding
 from hmpim.identify.threads import one_thread
+from hmpim.identify.through import Instrument, fit_through, instrument_of
 from hmpim.identify.whiteness import is_white
 from hmpim.model.dynamics import FILTERS, STRUCTURES, StructureName
 from hmpim.record import Aligned, Finding, Intersample, Record, Signal, uniform
@@ -68,6 +69,7 @@ def identify(
     *,
     intersample: Intersample | str = "auto",
     structures: Sequence[str] | None = None,
+    reference: str | None = None,
 ) -> Identification:
     """Find delay, scale factor, bias, noise, dynamics and bandwidth, with error bars.
 
@@ -98,7 +100,7 @@ def identify(
     RecordError
         If the record is too short, an input is constant, or all outputs are.
     ArgumentError
-        If `intersample` or a structure is not known.
+        If `intersample` or a structure is not known, or `reference` is no channel of the record.
 
     Notes
     -----
@@ -128,12 +130,17 @@ def identify(
             raise ArgumentError(
                 "statistics do not know software (intersample='sampled'); identify the record"
             )
+        if reference is not None:
+            raise ArgumentError(
+                f"statistics keep no reference, and reference={reference!r} is asked for; identify "
+                "the record"
+            )
         with one_thread():
             return identify_statistics(record, intersample=chosen, structures=names)
     _check_length(record)
     _check_size(record)
     stated = record if chosen == record.intersample else replace(record, intersample=chosen)
-    aligned = uniform(stated)
+    aligned, instrument = _aligned(stated, reference)
     for signal in aligned.inputs:
         if np.ptp(signal.values) == 0:
             raise RecordError(
@@ -147,9 +154,9 @@ def identify(
             "stuck or not connected, or the wrong column is taken as output"
         )
     with one_thread():
-        if aligned.waveforms:
+        if aligned.waveforms and instrument is None:
             return _between_clocks(record, aligned, names)
-        return _identified(record, aligned, chosen, names)
+        return _identified(record, aligned, chosen, names, instrument)
 
 
 def _between_clocks(
@@ -175,11 +182,12 @@ def _identified(
     aligned: Aligned,
     chosen: Intersample | None,
     names: tuple[StructureName, ...],
+    instrument: Instrument | None = None,
 ) -> Identification:
     """Identify every output of a record on its common clock."""
     inputs = inputs_of(aligned, record) if len(aligned.inputs) > 1 else None
     found = [
-        _identify_output(aligned, output, record, chosen, names, inputs)
+        _identify_output(aligned, output, record, chosen, names, inputs, instrument)
         for output in aligned.outputs
     ]
     if inputs is not None:
@@ -195,6 +203,32 @@ def _identified(
         inputs=inputs,
         data=record,
     )
+
+
+def _aligned(record: Record, reference: str | None) -> tuple[Aligned, Instrument | None]:
+    """All channels on one clock; with a reference, the input is what the reference moves of it."""
+    if reference is None:
+        return uniform(record), None
+    if len(record.inputs) > 1:
+        raise ArgumentError(
+            f"reference={reference!r} takes a record of one input; this one has "
+            f"{len(record.inputs)}: leave the others out"
+        )
+    if record.intersample == "sampled":
+        raise ArgumentError(
+            f"reference={reference!r} takes a plant, not software (intersample='sampled'); leave "
+            "one of the two out"
+        )
+    driver = next((c for c in record.channels if c.name == reference), None)
+    if driver is None or driver in record.outputs or driver in record.inputs:
+        known = ", ".join(c.name for c in (*record.references, *record.auxiliary)) or "none"
+        raise ArgumentError(
+            f"reference {reference!r} is no channel beside inputs and outputs; there are: {known}"
+        )
+    aligned = uniform(replace(record, inputs=(*record.inputs, driver), references=(), auxiliary=()))
+    source, moves = aligned.inputs
+    instrument = instrument_of(reference, moves.values, source.values)
+    return replace(aligned, inputs=(replace(source, values=instrument.moved),)), instrument
 
 
 def _checked_intersample(intersample: str, record: Record | Statistics) -> Intersample | None:
@@ -241,6 +275,7 @@ def _identify_output(
     intersample: Intersample | None,
     structures: tuple[StructureName, ...],
     inputs: InputSet | None,
+    instrument: Instrument | None,
 ) -> tuple[list[PairIdentification], OutputCoherence | None]:
     """Identify one output against every input, together where there are several."""
     if np.ptp(output.values[output.valid]) == 0:
@@ -252,10 +287,10 @@ def _identify_output(
             parameters=EVERY,
         )
         return [untold(aligned, source, output, record, dead) for source in aligned.inputs], None
-    backwards = _backwards(aligned, output)
+    backwards = _backwards(aligned, output) if instrument is None else ()
     if backwards:
         structures = tuple(name for name in structures if name in PLAIN) or structures
-    if intersample is None and len(aligned.inputs) == 1 and not backwards:
+    if intersample is None and len(aligned.inputs) == 1 and not backwards and instrument is None:
         (source,) = aligned.inputs
         if bool(source.valid.all() and output.valid.all()) and _is_software(
             source.values, output.values
@@ -297,7 +332,12 @@ def _identify_output(
         return _each_input(aligned, output, record, joined, found, inputs)
     (source,) = aligned.inputs
     if joined.related[0]:
-        pair = described(aligned, source, output, record, joined, 0, None, found, drifting)
+        if instrument is not None:
+            joint, own = fit_through(joined.fits[0], instrument)
+            joined = replace(joined, fits=(joint,), covariances=(own,))
+        pair = described(
+            aligned, source, output, record, joined, 0, None, found, drifting, instrument
+        )
         return [replace(pair, warnings=(*backwards, *pair.warnings))], None
     unfollowed = Finding(
         code="unrelated",

@@ -28,6 +28,7 @@ from hmpim.identify.result import (
 )
 from hmpim.identify.spanned import spanned
 from hmpim.identify.spectrum import excited_band
+from hmpim.identify.through import Instrument, response_through
 from hmpim.identify.uncertainty import estimate, noise_estimate, response_std
 from hmpim.identify.whiteness import Misfit, misfit
 from hmpim.model.filters import in_z
@@ -47,27 +48,33 @@ def described(
     matrix: Responses | None,
     found: Imperfections,
     drifting: Drifting | None = None,
+    instrument: Instrument | None = None,
 ) -> PairIdentification:
     """Say all that is known of an output that follows an input."""
     fs, joint = aligned.fs, joined.fits[i]
     covariance = joined.covariances[i] if joined.covariances else None
     software = joint.best.fit.structure.sampled  # it holds what it said at a sample
-    refined = refine(joint, found, fs, drifting) if matrix is None and not software else None
+    alone = matrix is None and instrument is None
+    refined = refine(joint, found, fs, drifting) if alone and not software else None
     censored = None
     if refined is not None:
         joint, censored = refined
         covariance = censored.covariance
     inspection, unseen = attempt(
         "nonlinearity",
-        lambda: inspect_nonlinearity(
-            source.values,
-            joint.problem,
-            joint.best.fit,
-            fs=fs,
-            plain=plainer(joint) if matrix is None and covariance is None else None,
-            others=[other.values for other in aligned.inputs if other is not source],
-            floor=max(found.rounding, ROUNDING * float(np.std(output.values))),
-            unit=output.unit,
+        lambda: (
+            None
+            if instrument is not None
+            else inspect_nonlinearity(
+                source.values,
+                joint.problem,
+                joint.best.fit,
+                fs=fs,
+                plain=plainer(joint) if matrix is None and covariance is None else None,
+                others=[other.values for other in aligned.inputs if other is not source],
+                floor=max(found.rounding, ROUNDING * float(np.std(output.values))),
+                unit=output.unit,
+            )
         ),
         None,
     )
@@ -85,7 +92,9 @@ def described(
         input_unit=source.unit,
         output_unit=output.unit,
     )
-    if matrix is None:
+    if instrument is not None:
+        response = response_through(instrument, y, fs, band=band)
+    elif matrix is None:
         told = found.telling(y.size, fs)
         whole = y if told is None else np.where(told, y, _expected(fit, censored is not None))
         response = _measured(u, whole, fit, fs, band)
@@ -122,12 +131,15 @@ def described(
         nonlinear=inspection is not None and bool(inspection.findings),
         held=found.hold is not None,
         measured=from_response,
+        through=instrument is not None,
     )
     parameters, seen = with_imperfections(spread, found, censored, output.unit)
     known = {finding.code for finding in seen}
     bent = () if inspection is None else inspection.findings
     drifts = () if drifting is None else (drift_finding(drifting, fs, output.unit),)
+    through = () if instrument is None else (instrument.finding(),)
     findings = (
+        *through,
         *judge(evidence),
         *seen,
         *(finding for finding in bent if finding.code not in known),

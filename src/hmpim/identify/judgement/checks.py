@@ -7,6 +7,7 @@ from hmpim.identify.judgement.between_samples import other_intersample, wide_spa
 from hmpim.identify.judgement.errors import not_converged, weak_delay, weak_excitation
 from hmpim.identify.judgement.evidence import Evidence
 from hmpim.identify.judgement.failed import attempt
+from hmpim.identify.judgement.feedback import feedback
 from hmpim.identify.judgement.reach import (
     beyond_band,
     fast_mode,
@@ -59,6 +60,7 @@ CHECKS: tuple[Check, ...] = (
     noise_colour_of,
     noise_on_the_input,
     uneven_noise,
+    feedback,
     bandwidth_disagrees,
 )
 """All checks of one pair; each one's findings come in this order."""

@@ -42,6 +42,8 @@ class Evidence:
         Whether the residual is known to be nonlinear, and so asks for no pole.
     held : bool
         Whether the output is held, so that its measured response shows the hold too.
+    through : bool
+        Whether the pair was identified through a loop's reference.
     """
 
     joint: JointFit
@@ -55,6 +57,7 @@ class Evidence:
     spanned: Parameters | None = None
     nonlinear: bool = False
     held: bool = False
+    through: bool = False
 
     @property
     def unexplained(self) -> float:

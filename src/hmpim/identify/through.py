@@ -1,0 +1,222 @@
+"""A plant in a loop, identified through the loop's reference.
+
+What the loop feeds back makes the input follow the noise, so that a fit of output to input takes
+noise for answer. The reference does not know the noise. So the output is fitted first to the part
+of the input that the reference moves (two stages: P. Van den Hof and R. Schrama, Automatica 29,
+1993). That part then is an instrument: the parameters are moved to where the residual of output and
+*input* is orthogonal to their derivatives made from the *instrument* (refined instrumental
+variables: T. Söderström and P. Stoica, System Identification, 1989, ch. 8; M. Gilson and P. Van den
+Hof, Automatica 41, 2005). An instrument that is not exact widens the error bars and moves nothing.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import toeplitz
+
+from hmpim.errors import RecordError
+from hmpim.identify.fitting.fit import Fit, Problem, jacobian, within_reach
+from hmpim.identify.fitting.sampled_rows import part_of
+from hmpim.identify.fitting.trial import JointFit
+from hmpim.identify.frf.local import local_response
+from hmpim.identify.result import FrequencyResponse
+from hmpim.identify.uncertainty import covariance
+from hmpim.identify.whiteness import is_white
+from hmpim.model.sampled import prepare_input
+from hmpim.record import Finding
+
+__all__ = ["Instrument", "fit_through", "instrument_of", "response_through"]
+
+_LONGEST = 256
+"""Samples over which the input is taken to answer the reference, at most."""
+
+_SHARE = 8
+"""Samples for each of its weights, at least."""
+
+_MOVES = 0.01
+"""Share of the input's power that the reference must move."""
+
+_STEPS = 40
+_NEGLIGIBLE = 1e-4
+"""Standard deviations by which the last step moves any parameter."""
+
+_LEADS = 4.0
+"""Samples by which an output may lead, as for every fit."""
+
+Real = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Instrument:
+    """A reference, and what it moves.
+
+    Parameters
+    ----------
+    name : str
+        Of the reference.
+    reference, u : ndarray, shape (n,)
+        Its samples, and the input's.
+    moved : ndarray, shape (n,)
+        The part of the input that it moves.
+    """
+
+    name: str
+    reference: Real
+    u: Real
+    moved: Real
+
+    def finding(self) -> Finding:
+        """Say how the pair was identified."""
+        return Finding(
+            code="through_reference",
+            message=f"The plant is identified through reference {self.name!r}: noise that goes "
+            "round the loop moves no figure.",
+            severity="info",
+            parameters=(),
+        )
+
+
+def instrument_of(name: str, reference: Real, u: Real) -> Instrument:
+    """Take the part of an input that a reference moves: weights over the past, as Akaike chooses.
+
+    Parameters
+    ----------
+    name : str
+        Of the reference.
+    reference, u : ndarray, shape (n,)
+        Reference and input.
+
+    Raises
+    ------
+    RecordError
+        If the reference does not move, or does not move the input.
+    """
+    if np.ptp(reference) == 0.0:
+        raise RecordError(
+            f"reference {name!r} is constant at {reference[0]:g}; it moves nothing, so leave it out"
+        )
+    since = reference - reference[0]
+    level = u - u.mean()
+    best, least = np.zeros(u.size), np.inf
+    lags = 8
+    while lags <= min(_LONGEST, max(8, u.size // _SHARE)):
+        rows = np.column_stack([toeplitz(since, np.zeros(lags)), np.ones(u.size)])
+        found = rows @ np.linalg.lstsq(rows, level, rcond=None)[0]
+        left = float(np.sum((level - found) ** 2))
+        criterion = u.size * np.log(max(left, np.finfo(float).tiny)) + 2 * lags
+        if criterion < least:
+            best, least = found, criterion
+        lags *= 2
+    if float(best.var()) < _MOVES * float(level.var()):
+        raise RecordError(
+            f"reference {name!r} moves hardly any of the input; check which channel it is"
+        )
+    return Instrument(name=name, reference=reference, u=u, moved=np.asarray(best + u.mean()))
+
+
+def fit_through(joint: JointFit, instrument: Instrument) -> tuple[JointFit, Real]:
+    """Move a fit to the instrument to where the input's own residual is orthogonal to it.
+
+    Parameters
+    ----------
+    joint : JointFit
+        Of the output to the part of the input that the reference moves; its structure and its
+        noise model are kept.
+    instrument : Instrument
+        From `instrument_of`.
+
+    Returns
+    -------
+    joint : JointFit
+        Its best fit moved.
+    cov : ndarray, shape (p, p)
+        Of the fit's parameters.
+    """
+    asked = joint.weighed
+    problem = replace(asked, source=prepare_input(instrument.u, joint.best.intersample))
+    fit = _moved(
+        problem, joint.best.fit, np.zeros(joint.best.fit.theta.size + joint.best.fit.linear.size)
+    )
+    for _ in range(_STEPS):
+        rows, told = jacobian(problem, fit), jacobian(asked, fit)
+        left = problem.innovations(fit.prediction, fit.residual)
+        # Scaled to unit size, as the parameters' own differ by many decades.
+        size = np.sqrt(np.maximum(np.sum(told**2, axis=1), np.finfo(float).tiny))
+        mixed = (told / size[:, None]) @ (rows / size[:, None]).T
+        step = np.linalg.lstsq(mixed, (told @ left) / size, rcond=1e-12)[0] / size
+        fit = _moved(problem, fit, step)
+        spread = np.sqrt(float(left @ left) / max(problem.counted, 1)) / size
+        if np.all(np.abs(step) < _NEGLIGIBLE * spread):
+            break
+    else:
+        fit = replace(fit, converged=False)
+    rows, told = jacobian(problem, fit), jacobian(asked, fit)
+    left = problem.innovations(fit.prediction, fit.residual)
+    freedom = max(problem.counted - rows.shape[0], 1)
+    white = is_white(left if problem.counts is None else left[problem.counts])
+    # (told rowsᵀ)⁻¹ told R toldᵀ (…)⁻ᵀ: the bound for the instrument, turned to the input.
+    turn = np.linalg.lstsq(told @ rows.T, told @ told.T, rcond=1e-14)[0]
+    cov = turn @ covariance(told, left, freedom=freedom, white=white) @ turn.T
+    best = replace(joint.best, fit=fit)
+    trials = tuple(best if trial is joint.best else trial for trial in joint.trials)
+    return replace(joint, best=best, trials=trials), np.asarray(cov)
+
+
+def _moved(problem: Problem, fit: Fit, step: Real) -> Fit:
+    """The fit at other parameters; what is linear beside them is solved."""
+    unknown = fit.theta.size
+    theta = within_reach(
+        fit.structure,
+        fit.theta + step[:unknown],
+        delays=(-_LEADS, problem.longest_delay),
+        samples=problem.y.size,
+    )
+    linear = fit.linear + step[unknown:]
+    part = part_of(problem, fit.structure, theta)
+    own = linear[:-1] @ part.rows + linear[-1]
+    others = part.free if problem.nuisance is None else np.vstack([part.free, problem.nuisance])
+    if others.shape[0]:
+        counted, target = problem.masked(others), problem.masked(problem.y - own)
+        own = own + np.linalg.lstsq(counted.T, target, rcond=None)[0] @ others
+    residual = problem.y - own
+    if problem.valid is not None:
+        residual = residual * problem.valid
+    innovations = problem.masked(problem.y - own)
+    return replace(
+        fit,
+        theta=theta,
+        linear=linear,
+        prediction=own,
+        residual=residual,
+        cost=float(residual @ residual),
+        objective=float(innovations @ innovations),
+        converged=True,
+    )
+
+
+def response_through(
+    instrument: Instrument, y: Real, fs: float, *, band: tuple[float, float]
+) -> FrequencyResponse:
+    """Return the plant's measured response: that from reference to output, over that to input.
+
+    Parameters
+    ----------
+    instrument : Instrument
+        Reference and input.
+    y : ndarray, shape (n,)
+        Output.
+    fs : float
+        Rate in Hz.
+    band : (float, float)
+        Excited band in Hz.
+
+    Returns
+    -------
+    FrequencyResponse
+        Its error is at most the two errors together.
+    """
+    into, out = (local_response(instrument.reference, x, fs, band=band) for x in (instrument.u, y))
+    ratio = out.response / into.response
+    std = np.hypot(out.std, np.abs(ratio) * into.std) / np.abs(into.response)
+    return FrequencyResponse(frequency=out.frequency, response=ratio, std=std)

@@ -1,0 +1,143 @@
+"""A plant in a loop, identified through the loop's reference."""
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+
+import hmpim
+from hmpim.errors import ArgumentError, RecordError
+from hmpim.identify.through import instrument_of
+
+FS, N = 200.0, 2000
+POLE, GAIN, LATE = (
+    0.9,
+    1.5,
+    3,
+)  # y_k = 0.9 y_(k-1) + 0.15 u_(k-3): a held lag of 1.5 behind 2 samples
+TIME = np.arange(N) / FS
+SWEEP = np.sin(2 * np.pi * (0.1 * TIME + 1.5 * TIME**2))
+
+
+def looped(seed, *, noise=0.3):
+    """A held command of a proportional controller, and what slow noise does to both."""
+    rng = np.random.default_rng(seed)
+    disturbance = lfilter([noise], [1.0, -0.95], 0.3 * rng.standard_normal(N))
+    u, y, x = np.zeros(N), np.zeros(N), 0.0
+    for k in range(N):
+        x = POLE * x + (1 - POLE) * GAIN * (u[k - LATE] if k >= LATE else 0.0)
+        y[k] = x + disturbance[k]
+        u[k] = 1.5 * (SWEEP[k] - y[k])
+    return hmpim.Record.from_arrays(
+        {"u": u}, {"y": y}, references={"r": SWEEP}, fs=FS, intersample="zoh"
+    )
+
+
+TRUTH = {
+    "delay": (LATE - 1) / FS,
+    "scale_factor": GAIN,
+    "time_constant": -1 / (FS * np.log(POLE)),
+}
+
+
+def held(seeds, **options):
+    """Share of intervals that hold the truth."""
+    told = []
+    for seed in seeds:
+        pair = hmpim.identify(looped(seed), structures=["first_order"], **options)["y", "u"]
+        for name, value in TRUTH.items():
+            low, high = getattr(pair.parameters, name).ci95
+            told.append(low <= value <= high)
+    return np.mean(told)
+
+
+def test_intervals_through_the_reference_hold():
+    share = held(range(30), reference="r")
+    assert share > 0.95 - 3 * np.sqrt(
+        0.95 * 0.05 / 30
+    )  # the three figures of a record err together
+
+
+@pytest.mark.study
+def test_intervals_through_the_reference_hold_over_many_seeds(study_seeds):
+    count = len(study_seeds)
+    bound = 3 * np.sqrt(0.95 * 0.05 / count)
+    assert abs(held(study_seeds, reference="r") - 0.95) < bound + 0.01
+
+
+def test_an_instrument_of_the_wrong_shape_moves_nothing():
+    """The reference three samples late: the bars grow, the figures stay."""
+    record = looped(3)
+    (right,) = record.references
+    late = hmpim.Record.from_arrays(
+        {"u": record.inputs[0].values},
+        {"y": record.outputs[0].values},
+        references={"r": np.roll(right.values, 3)},
+        fs=FS,
+        intersample="zoh",
+    )
+    a, b = (
+        hmpim.identify(r, reference="r", structures=["first_order"])["y", "u"]
+        for r in (record, late)
+    )
+    for name in TRUTH:
+        one, other = getattr(a.parameters, name), getattr(b.parameters, name)
+        assert abs(one.value - other.value) < np.ptp(one.ci95) + np.ptp(other.ci95)
+
+
+def test_a_loop_without_its_reference_is_noticed_and_an_open_one_is_not():
+    pair = hmpim.identify(looped(1), structures=["first_order"])["y", "u"]
+    (found,) = [w for w in pair.warnings if w.code == "feedback"]
+    assert found.severity == "doubt"
+    assert pair.verdict == "doubtful"
+    through = hmpim.identify(looped(1), reference="r", structures=["first_order"])["y", "u"]
+    codes = {w.code for w in through.warnings}
+    assert "through_reference" in codes
+    assert "feedback" not in codes
+    rng = np.random.default_rng(0)
+    disturbance = lfilter([0.3], [1.0, -0.95], 0.3 * rng.standard_normal(N))
+    y = lfilter([0.0] * LATE + [(1 - POLE) * GAIN], [1.0, -POLE], SWEEP) + disturbance
+    open_ = hmpim.Record.from_arrays({"u": SWEEP}, {"y": y}, fs=FS, intersample="zoh")
+    assert "feedback" not in {
+        w.code for w in hmpim.identify(open_, structures=["first_order"])["y", "u"].warnings
+    }
+
+
+def test_the_measured_response_is_the_plants():
+    found = hmpim.identify(looped(2), reference="r", structures=["first_order"])["y", "u"]
+    response = found.frequency_response
+    z = np.exp(2j * np.pi * response.frequency / FS)
+    truth = (1 - POLE) * GAIN * z**-LATE / (1 - POLE / z)
+    off = np.abs(response.response - truth) / response.std
+    assert np.median(off) < 2.0
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("s", "reference 's' is no channel beside inputs and outputs; there are: r"),
+        ("u", "reference 'u' is no channel beside"),
+    ],
+)
+def test_a_reference_that_is_not_there_is_refused(name, words):
+    with pytest.raises(ArgumentError, match=words):
+        hmpim.identify(looped(1), reference=name)
+
+
+def test_a_reference_that_moves_nothing_is_refused():
+    with pytest.raises(RecordError, match=r"reference 'r' is constant at 1"):
+        instrument_of("r", np.ones(N), SWEEP)
+    noise = np.random.default_rng(1).standard_normal(N)
+    with pytest.raises(RecordError, match="moves hardly any of the input"):
+        instrument_of("r", noise, SWEEP)
+
+
+def test_what_has_no_reference_or_two_inputs_is_refused():
+    record = looped(1)
+    two = hmpim.Record.from_arrays(
+        {"a": SWEEP, "b": SWEEP[::-1].copy()}, {"y": SWEEP}, references={"r": SWEEP}, fs=FS
+    )
+    with pytest.raises(ArgumentError, match="takes a record of one input; this one has 2"):
+        hmpim.identify(two, reference="r")
+    statistics = hmpim.compress(record, lags=100)
+    with pytest.raises(ArgumentError, match="statistics keep no reference"):
+        hmpim.identify(statistics, reference="r")
