@@ -142,6 +142,8 @@ def test_a_doubtful_figure_is_marked_and_the_others_of_its_row_are_not(demo):
         shown = dict(zip(cases.columns, cells, strict=True))
         for name, label in PARAMETERS:
             cell = next(text for title, text in shown.items() if title.startswith(label))
+            if cell == "–":  # too vague to be told
+                continue
             assert cell.endswith(" ?") == (row.parameters[name].verdict == "doubtful")
             marked += cell.endswith(" ?")
     assert 0 < marked < len(study.rows) * len(PARAMETERS)

@@ -83,7 +83,7 @@ def test_it_is_named_and_all_its_figures_hold(found):
     for parameter, value in truth.items():
         if value is not None:
             estimate = getattr(pair, parameter)
-            assert abs(estimate.value - value) < 4.5 * estimate.std, parameter
+            assert abs(estimate.value - value) < 4.5 * estimate.spread, parameter
 
 
 def test_why_it_was_chosen_is_said(found):

@@ -65,19 +65,19 @@ def test_intervals_through_the_reference_hold_over_many_seeds(study_seeds):
 
 
 def test_an_instrument_of_the_wrong_shape_moves_nothing():
-    """The reference three samples late: the bars grow, the figures stay."""
+    """The reference three samples early: the bars may grow, the figures stay."""
     record = looped(3)
     (right,) = record.references
-    late = hmpim.Record.from_arrays(
+    early = hmpim.Record.from_arrays(
         {"u": record.inputs[0].values},
         {"y": record.outputs[0].values},
-        references={"r": np.roll(right.values, 3)},
+        references={"r": np.roll(right.values, -3)},
         fs=FS,
         intersample="zoh",
     )
     a, b = (
         hmpim.identify(r, reference="r", structures=["first_order"])["y", "u"]
-        for r in (record, late)
+        for r in (record, early)
     )
     for name in TRUTH:
         one, other = getattr(a.parameters, name), getattr(b.parameters, name)

@@ -101,7 +101,7 @@ def test_a_clipped_output_may_drift():
     assert said(pair)
     for name, value in TRUTH.items():
         estimate = getattr(pair, name)
-        assert abs(estimate.value - value) < 4 * estimate.std, name
+        assert abs(estimate.value - value) < 4 * estimate.spread, name
 
 
 @pytest.mark.study  # small: test_everything_else_is_found_as_without_the_drift

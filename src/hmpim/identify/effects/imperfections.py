@@ -186,6 +186,8 @@ def refine(
         weighed=replace(problem, valid=counted),
         best=best,
         trials=tuple(best if trial is chosen else trial for trial in joint.trials),
+        rivals=(),
+        hidden=None,
     )
     return refined, censored
 
