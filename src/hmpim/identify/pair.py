@@ -132,6 +132,7 @@ def described(
         held=found.hold is not None,
         measured=from_response,
         through=instrument is not None,
+        jittered=any(finding.code == "jitter" for finding in aligned.findings),
     )
     parameters, seen = with_imperfections(spread, found, censored, output.unit)
     known = {finding.code for finding in seen}

@@ -12,6 +12,7 @@ from hmpim.identify.judgement.residual import (
     lack_of_fit,
     noise_colour_of,
     noise_on_the_input,
+    uneven_noise,
 )
 from hmpim.identify.whiteness import Misfit
 
@@ -19,7 +20,11 @@ WHITE = 0.1 * np.random.default_rng(3).standard_normal(2000)
 
 
 @pytest.mark.parametrize(
-    "check", [lack_of_fit, coloured_noise, halves_disagree, noise_colour_of, noise_on_the_input]
+    "check",
+    [
+        *(lack_of_fit, coloured_noise, halves_disagree),
+        *(noise_colour_of, noise_on_the_input, uneven_noise),
+    ],
 )
 def test_a_clean_record_gives_no_finding(clean, check):
     assert check(clean) == ()
@@ -77,3 +82,21 @@ def test_noise_on_the_input_touches_the_size_of_the_response_alone(clean, std, s
     lowered = 100 / (1 + 0.5 / (0.2 * std**2))
     said = float(found.message.split("about ")[1].split(" %")[0])
     assert said == pytest.approx(lowered, rel=0.25)
+
+
+def test_noise_that_grows_with_a_fast_input_is_doubted_where_stamps_jitter(clean):
+    u, residual = clean.u, clean.joint.best.fit.residual
+    fast = np.abs(np.diff(u, 4, prepend=np.zeros(4)))
+    grown = residual + 3 * np.std(residual) * fast / np.std(fast) * np.sign(residual)
+    fit = replace(clean.joint.best.fit, residual=grown)
+    strewn = replace(
+        clean, joint=replace(clean.joint, best=replace(clean.joint.best, fit=fit)), jittered=True
+    )
+    (found,) = uneven_noise(strewn)
+    assert (found.code, found.severity, found.parameters) == (
+        "uneven_noise",
+        "doubt",
+        ("noise_std",),
+    )
+    assert uneven_noise(replace(strewn, jittered=False)) == ()
+    assert uneven_noise(replace(clean, jittered=True)) == ()

@@ -44,6 +44,8 @@ class Evidence:
         Whether the output is held, so that its measured response shows the hold too.
     through : bool
         Whether the pair was identified through a loop's reference.
+    jittered : bool
+        Whether the stamps strayed from a uniform clock, so that samples are interpolated.
     """
 
     joint: JointFit
@@ -58,6 +60,7 @@ class Evidence:
     nonlinear: bool = False
     held: bool = False
     through: bool = False
+    jittered: bool = False
 
     @property
     def unexplained(self) -> float:

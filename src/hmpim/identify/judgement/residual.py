@@ -40,9 +40,6 @@ _FAST = 9
 _GROWS = 5.0
 """Standard deviations of a correlation from which the noise is said to grow with it."""
 
-_MOST_COUNT = 0.95
-"""Share of the samples that must count."""
-
 _ATTENUATES = 0.002
 """Share by which noise on the input must lower the gain to be worth a word."""
 
@@ -101,11 +98,11 @@ def uneven_noise(evidence: Evidence) -> tuple[Finding, ...]:
     A sample taken late by δ is off by δ times the signal's rate, so that the power of what is left
     over is a constant and a share of the fast input's; the constant is the noise's.
     """
+    if not evidence.jittered:
+        return ()
     residual, u = evidence.joint.best.fit.residual, evidence.u
     fast = np.convolve(np.diff(u, 4) ** 2, np.ones(_FAST) / _FAST, mode="full")[2 : 2 + u.size]
     valid = evidence.joint.problem.valid
-    if valid is not None and np.mean(valid) < _MOST_COUNT:
-        return ()  # what is left out, as by clipping, is no fair choice
     told = slice(None) if valid is None else valid
     power, fast = residual[told] ** 2, fast[told]
     if power.size < _FAST or np.ptp(power) == 0.0 or np.ptp(fast) == 0.0:
