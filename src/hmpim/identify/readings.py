@@ -129,7 +129,8 @@ def read_parameters(
     freedom = max(weighed.counted - vector.size, 1)
     residual = weighed.innovations(fit.prediction, fit.residual)
     white = is_white(residual if weighed.counts is None else residual[weighed.counts])
-    rows = jacobian(weighed, fit)
+    tested = joint.hidden
+    rows = tested.rows if tested is not None and tested.fit is fit else jacobian(weighed, fit)
     cov = known_covariance
     if cov is None:
         cov = widened(joint, _covariance(joint, rows, residual, freedom=freedom, white=white))

@@ -38,6 +38,9 @@ __all__ = [
 _BY_CHANCE = 1.645
 """Standard deviations of q that chance exceeds in 5 % of records without one more pole."""
 
+_CLEAR = 4.0
+"""Standard deviations of q from which it is looked for elsewhere too."""
+
 _SEEN = _BY_CHANCE**2
 """Twice the log-likelihood that a fit of one more pole must gain, for the same chance."""
 
@@ -76,12 +79,18 @@ class HiddenPole:
         of a fit without a pole, its delay.
     shift : ndarray, shape (p,)
         Change of the fit's vector with q.
+    fit : Fit
+        The fit.
+    rows : ndarray, shape (p, n)
+        Its derivatives, from `hmpim.identify.fitting.fit.jacobian`.
     """
 
     squared: float
     std: float
     scale: float
     shift: Real
+    fit: Fit
+    rows: Real
 
     @property
     def limit(self) -> float:
@@ -205,6 +214,8 @@ def hidden_pole(problem: Problem, fit: Fit) -> HiddenPole:
         std=float(np.sqrt(variance)),
         scale=scale_of(fit),
         shift=shift,
+        fit=fit,
+        rows=rows,
     )
 
 
@@ -218,9 +229,14 @@ def response_to_square(problem: Problem, fit: Fit) -> Real:
     """
     lag = _PROBE * scale_of(fit)
     richer, theta = one_more_pole(fit.structure), with_pole(fit.structure, fit.theta, lag)
-    there = part_of(problem, richer, theta).rows
-    here = part_of(problem, fit.structure, fit.theta).rows
-    return np.asarray(fit.linear[:-1] @ (there - here) / lag**2)
+    there = fit.linear[:-1] @ part_of(problem, richer, theta).rows
+    if fit.initial.size or not fit.prediction.size:
+        here = fit.linear[:-1] @ part_of(problem, fit.structure, fit.theta).rows
+    else:  # what was predicted, less what is beside the input
+        here = fit.prediction - fit.linear[-1]
+        if problem.nuisance is not None:
+            here = here - fit.nuisance @ problem.nuisance
+    return np.asarray((there - here) / lag**2)
 
 
 def scale_of(fit: Fit) -> float:
@@ -286,7 +302,9 @@ def grow(
         if not test.is_asked_for or structure.order >= _MOST:
             return Growth(grown=tuple(grown), rivals=(), hidden=test)
         richer = one_more_pole(structure)
-        starts = (float(np.sqrt(test.squared)), _PROBE * test.scale)
+        starts = [float(np.sqrt(test.squared))]
+        if test.squared > _CLEAR * test.std:  # so far away the test's own figure may be far off
+            starts.append(_PROBE * test.scale)
         tried = [refit(richer, with_pole(structure, best.fit.theta, lag)) for lag in starts]
         found = min(tried, key=lambda f: f.fit.objective)
         gain = count * float(np.log(best.fit.objective / found.fit.objective))

@@ -82,6 +82,8 @@ def hidden_pole_of(fitted: Fitted, problem: Problem) -> HiddenPole:
         std=float(np.sqrt(fitted.variance / size)),
         scale=scale_of(fit),
         shift=np.append(shift, 0.0),  # the bias is solved apart
+        fit=fit,
+        rows=fitted.rows,
     )
 
 
