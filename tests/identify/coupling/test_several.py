@@ -124,3 +124,17 @@ def test_a_coupling_is_given_back_by_the_stronger_one_however_little_noise(noise
     for name, value in {"scale_factor": 0.05, "natural_frequency": 6.0, "delay": 0.05}.items():
         estimate = getattr(pair, name)
         assert abs(estimate.value - value) < 4 * estimate.std + 1e-4 * value
+
+
+def test_couplings_are_found_where_no_plainer_structure_is_asked_for():
+    """A weak coupling is tried as second order at most, whatever else is asked for."""
+    weak = [[1.0 if i == j else 0.1 for j in range(3)] for i in range(3)]
+    signals = outputs(weak, 0.02, seed=1)
+    result = hmpim.identify(
+        hmpim.Record.from_arrays(
+            {"u0": INPUTS[0], "u1": INPUTS[1]}, {"y0": signals[0]}, fs=FS, intersample="bandlimited"
+        ),
+        structures=["second_order", "third_order"],
+    )
+    assert result["y0", "u0"].structure in ("second_order", "third_order")
+    assert result["y0", "u1"].scale_factor.value == pytest.approx(0.1, abs=0.05)

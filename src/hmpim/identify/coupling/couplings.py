@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from scipy.fft import rfft
 
 from hmpim.identify.fitting.candidates import nested
+from hmpim.identify.fitting.enrich import PLAIN
 from hmpim.identify.fitting.fit import Fit, Problem, fit_structure
 from hmpim.identify.fitting.start import RoughResponse, rough_response, starting_values
 from hmpim.identify.fitting.trial import JointFit, Trial
@@ -119,14 +120,15 @@ def coupling_fit(
         plain.masked(u), plain.masked(y), longest_delay=int(problem.longest_delay)
     )
     fits: list[Fit] = []
-    for name in sorted(structures, key=lambda name: STRUCTURES[name].order):
+    asked = tuple(name for name in structures if name in PLAIN) or PLAIN  # no more is seen of it
+    for name in sorted(asked, key=lambda name: STRUCTURES[name].order):
         structure = STRUCTURES[name]
         if structure.order > 1 and fits and not _hopeful(problem, fits):
             continue
         starts = starting_values(rough, structure, earliest=-2, count=2, thorough=True)
         if name == "second_order":
             starts += [nested(fit) for fit in fits if fit.structure.name == "first_order"]
-            starts += _resonances(rough, fits[0].delay)
+            starts += _resonances(rough, fits[0].delay if fits else float(rough.lag))
         tried = [fit_structure(problem, structure, s, iterations=_TASTE) for s in starts]
         best = min(tried, key=lambda fit: fit.objective)
         if not best.converged:
