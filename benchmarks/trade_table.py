@@ -51,7 +51,7 @@ def given_rows() -> list[str]:
         ("exponential sweep", "exponential", 8.0),
         ("Schroeder multisine", "schroeder", 9.0),
         ("repeated sweeps of 0.6 s", "repeated", 9.0),
-        ("repeated sweeps of 0.6 s", "repeated", 1.8),
+        ("three sweeps of 0.6 s", "repeated", 1.8),
     ):
         stimulus = design(band=BAND, duration=length, fs=FS, limits=PAPERS_PEAKS, kind=kind)
         if stimulus.extinction is not None:

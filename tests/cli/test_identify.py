@@ -93,8 +93,8 @@ def test_a_good_record_is_printed_and_written(good, tmp_path):
     assert "u → y" in done.stdout
     result = Identification.from_dict(json.loads(saved.read_text()))
     pair = result["y", "u"]
-    assert pair.delay.value == pytest.approx(0.1, abs=5 * pair.delay.std)
-    assert pair.scale_factor.value == pytest.approx(2.0, abs=5 * pair.scale_factor.std)
+    assert pair.delay.value == pytest.approx(0.1, abs=5 * pair.delay.spread)
+    assert pair.scale_factor.value == pytest.approx(2.0, abs=5 * pair.scale_factor.spread)
     assert f"{pair.bias.value:.3f}" in done.stdout
     assert page.read_text().startswith("<!DOCTYPE html>")
 

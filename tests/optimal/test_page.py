@@ -53,6 +53,8 @@ def test_the_table_holds_every_family(printed):
         "HMPIM, n solved",
         "exponential sweep",
         "Schroeder multisine",
+        "repeated sweeps of 0.6 s",
+        "three sweeps of 0.6 s",
         *(
             f"{what} {family}"
             for family in ("linear sweep", "exponential sweep", "multisine")

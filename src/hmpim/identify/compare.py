@@ -74,7 +74,7 @@ def compare(new: Identification, old: Identification) -> tuple[Change, ...]:
     >>> def found(delay, rng):
     ...     sensor = hmpim.Sensor(delay=delay, noise_std=0.1)
     ...     return identify(hmpim.run(sensor, stimulus, rng=rng))
-    >>> [c.name for c in compare(found(0.101, 1), found(0.1, 2)) if c.changed][:1]
+    >>> [c.name for c in compare(found(0.101, 3), found(0.1, 4)) if c.changed][:1]
     ['delay']
     """
     both: list[tuple[str, str, str, Estimate, Estimate]] = []

@@ -7,10 +7,12 @@ confidence sets: R. L. Berger and D. D. Boos, JASA 89, 1994). So it is with one 
 likely but for its price, or that is slow and would not show.
 """
 
+from collections.abc import Iterable
 from dataclasses import fields, replace
 
 import numpy as np
 
+from hmpim.identify.fitting.fit import Fit
 from hmpim.identify.fitting.growth import as_if_hidden
 from hmpim.identify.fitting.trial import CLEARLY, JointFit, Trial
 from hmpim.identify.groups import PHASE_SPLIT
@@ -67,25 +69,40 @@ def spanned(parameters: Parameters, joint: JointFit, *, fs: float, highest: floa
     fs, highest : float
         Rate, and frequency beyond which no bandwidth is read off, in Hz.
     """
-    fits = [trial.fit for trial in (*rivals_of(joint), *joint.rivals)]
-    found = [figures_of(fit, fs=fs, highest=highest) for fit in fits]
+
+    def figures(fits: Iterable[Fit]) -> list[dict[str, float | None]]:
+        return [figures_of(fit, fs=fs, highest=highest) for fit in fits]
+
+    between = figures(trial.fit for trial in rivals_of(joint))
+    richer = figures(trial.fit for trial in joint.rivals)
     hidden, fit = joint.hidden, joint.best.fit
     if hidden is not None and (joint.rivals or hidden.may_hide(fit.structure)):
-        longest = figures_of(as_if_hidden(fit, hidden), fs=fs, highest=highest)
-        found.append({name: longest[name] for name in PHASE_SPLIT})
+        (longest,) = figures([as_if_hidden(fit, hidden)])
+        richer.append({name: longest[name] for name in PHASE_SPLIT})
     moved = {}
     for name in (field.name for field in fields(parameters)):
         own = getattr(parameters, name)
-        values = [other[name] for other in found if other.get(name) is not None]
-        if own is not None and values:
-            moved[name] = _hull(own, [float(value) for value in values if value is not None])
+        if own is None:
+            continue
+        whole, tail = _hull(own, _given(between, name)), _hull(own, _given(richer, name))
+        if tail is not own and whole is own:  # a tail of one model, not a choice between several
+            whole = replace(tail, std=tail.spread)
+        elif tail is not own:
+            lows, highs = zip(*(e.ci95 for e in (tail, whole) if e.ci95), strict=True)
+            whole = replace(whole, ci95=(min(lows), max(highs)))
+        moved[name] = whole
     return replace(parameters, **moved)
+
+
+def _given(found: list[dict[str, float | None]], name: str) -> list[float]:
+    """What each fit says of one figure."""
+    return [float(value) for other in found if (value := other.get(name)) is not None]
 
 
 def _hull(own: Estimate, values: list[float]) -> Estimate:
     """An interval that holds those around all values; the deviation only where none widens it."""
     low, high = own.ci95 or (None, None)
-    if low is None or high is None:
+    if low is None or high is None or not values:
         return own
     below, above = min([own.value, *values]) - own.value, max([own.value, *values]) - own.value
     if max(above, -below) <= _MOVES * (high - low) / 2:

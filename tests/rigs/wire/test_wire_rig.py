@@ -44,7 +44,7 @@ def test_the_delay_found_is_the_rigs_and_not_the_networks(network):
     pair = identify(record)["roll.position", "roll.command"]
     for name, truth in (("delay", LATE / 500.0), ("time_constant", TIME_CONSTANT)):
         found = getattr(pair.parameters, name)
-        assert abs(found.value - truth) < max(4 * found.std, 2e-5)
+        assert abs(found.value - truth) < max(4 * found.spread, 2e-5)
     (clocks,) = [f for f in record.findings if f.code == "clocks"]
     ppm = 1e6 * network["drift"]
     assert float(clocks.message.split("gains ")[1].split(" ppm")[0]) == pytest.approx(ppm, abs=0.5)
@@ -96,7 +96,7 @@ def test_lost_late_doubled_and_swapped_are_counted_and_put_right():
     pair = identify(record)["roll.position", "roll.command"]
     for name, truth in (("delay", LATE / 500.0), ("time_constant", TIME_CONSTANT)):
         found = getattr(pair.parameters, name)
-        assert abs(found.value - truth) < max(4 * found.std, 5e-5)
+        assert abs(found.value - truth) < max(4 * found.spread, 5e-5)
     assert position.values.size == command.values.size
 
 

@@ -17,7 +17,7 @@ from typing import Generic, Protocol, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from hmpim.identify.fitting.fit import Fit, Problem, jacobian
+from hmpim.identify.fitting.fit import Fit, Problem, jacobian, within_reach
 from hmpim.identify.fitting.sampled_rows import part_of
 from hmpim.identify.uncertainty import covariance
 from hmpim.identify.whiteness import is_white
@@ -55,6 +55,9 @@ _PROBE = 0.3
 
 _FARTHEST = 1.0
 """Logarithm by which a time constant moves at most beside a pole that would not show."""
+
+_ANY = 10_000_000
+"""Samples that bound no time constant, of a fit to statistics."""
 
 _MOST = 7
 """Poles up to which one more is asked for."""
@@ -261,6 +264,8 @@ def as_if_hidden(fit: Fit, hidden: HiddenPole) -> Fit:
     moved = lag**2 * hidden.shift
     moved[1 : fit.theta.size] = np.clip(moved[1 : fit.theta.size], -_FARTHEST, _FARTHEST)
     theta, linear = np.split(np.concatenate([fit.theta, fit.linear]) + moved, [fit.theta.size])
+    samples = max(fit.prediction.size, _ANY)
+    theta = within_reach(fit.structure, theta, delays=(-np.inf, np.inf), samples=samples)
     return replace(
         fit,
         structure=one_more_pole(fit.structure),

@@ -60,8 +60,8 @@ def wide_span(evidence: Evidence) -> tuple[Finding, ...]:
         return ()
     wide: dict[str, tuple[float, float]] = {}
     for name in _SIZES:
-        estimate = getattr(evidence.spanned, name)
-        if estimate is None or estimate.std is not None or estimate.ci95 is None:
+        estimate, own = getattr(evidence.spanned, name), getattr(evidence.readings.parameters, name)
+        if estimate is None or own is None or estimate.ci95 is None or estimate.ci95 == own.ci95:
             continue
         low, high = estimate.ci95
         if high - low > 2 * _WIDE * abs(estimate.value):
