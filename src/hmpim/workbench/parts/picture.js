@@ -58,8 +58,13 @@ export default {
       }
       this.fixed = (layout.shapes ?? []).length;
       layout.shapes = [...(layout.shapes ?? []), ...(this.cursors ?? []).map(this.shape)];
-      const config = { displaylogo: false, responsive: true, scrollZoom: false };
+      // shapes are dragged at once with this alone; "editable" only makes them ask for a click first
+      const edits = { shapePosition: (this.cursors ?? []).length > 0 };
+      const config = { displaylogo: false, responsive: true, scrollZoom: false, edits };
       await this.Plotly.react(this.$el, data, layout, config);
+      for (const path of this.$el.querySelectorAll(".shapelayer path[data-index]")) {
+        if (Number(path.dataset.index) < this.fixed) path.style.pointerEvents = "none";
+      }
       if (!this.drawn) this.$el.on("plotly_relayout", this.moved);
       this.drawn += 1;
       this.$el.dataset.drawn = this.drawn;
@@ -69,7 +74,7 @@ export default {
       const along = { [across ? "y0" : "x0"]: c.at, [across ? "y1" : "x1"]: c.at };
       const ends = across ? { x0: 0, x1: 1 } : { y0: 0, y1: 1 };
       return {
-        type: "line", ...along, ...ends, editable: true, name: c.name,
+        type: "line", ...along, ...ends, name: c.name,
         xref: across ? `x${c.panel} domain` : `x${c.panel}`,
         yref: across ? `y${c.panel}` : `y${c.panel} domain`,
         line: { color: c.colour ?? "#b0417f", width: 4, dash: "solid" },
