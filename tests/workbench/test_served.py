@@ -280,7 +280,8 @@ def test_two_runs_are_compared_and_held_against_a_specification(page, served):
         save(recorded(delay, rng=k), served.runs / f"unit{k}" / "run.h5")
     go(page, served, "runs")
     for k in (1, 2):
-        page.get_by_label(f"Choose unit{k}/run.h5").check()
+        page.get_by_label(f"Choose unit{k}/run.h5").click()
+        page.wait_for_selector(f"[aria-label='Choose unit{k}/run.h5'][aria-checked=true]")
     page.get_by_role("button", name="Compare those chosen").click()
     page.get_by_text("Bode plots over each other").wait_for()
     cells = page.get_by_role("row", name=re.compile("^Delay, pure")).get_by_role("cell")

@@ -37,7 +37,10 @@ export default {
     this.update();
     this.sizes = new ResizeObserver(() => this.drawn && Plotly.Plots.resize(this.$el));
     this.sizes.observe(this.$el);
-    this.theme = new MutationObserver(() => this.update());
+    this.theme = new MutationObserver(() => {
+      const dark = document.body.classList.contains("body--dark");
+      if (dark !== this.dark) this.update(); // other classes come and go while one scrolls or types
+    });
     this.theme.observe(document.body, { attributes: true, attributeFilter: ["class"] });
   },
   unmounted() {
@@ -48,7 +51,7 @@ export default {
   methods: {
     async update() {
       if (!this.Plotly || !this.figure) return;
-      const dark = document.body.classList.contains("body--dark");
+      const dark = (this.dark = document.body.classList.contains("body--dark"));
       const plain = { data: unpacked(this.figure.data), layout: unpacked(this.figure.layout) };
       const { data, layout } = dark ? recoloured(plain) : plain;
       layout.font = { ...(layout.font ?? {}), color: dark ? "#e6edf3" : "#1f2328" };
