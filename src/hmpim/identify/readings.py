@@ -128,7 +128,7 @@ def read_parameters(
     weighed = joint.weighed
     freedom = max(weighed.counted - vector.size, 1)
     residual = weighed.innovations(fit.prediction, fit.residual)
-    white = is_white(residual if weighed.counts is None else residual[weighed.counts])
+    white = is_white(weighed.counting(residual))
     tested = joint.hidden
     rows = tested.rows if tested is not None and tested.fit is fit else jacobian(weighed, fit)
     cov = known_covariance

@@ -76,7 +76,7 @@ def spanned(parameters: Parameters, joint: JointFit, *, fs: float, highest: floa
     between = figures(trial.fit for trial in rivals_of(joint))
     richer = figures(trial.fit for trial in joint.rivals)
     hidden, fit = joint.hidden, joint.best.fit
-    if hidden is not None and (joint.rivals or hidden.may_hide(fit.structure)):
+    if hidden is not None and (joint.rivals or hidden.may_hide):
         (longest,) = figures([as_if_hidden(fit, hidden)])
         richer.append({name: longest[name] for name in PHASE_SPLIT})
     moved = {}

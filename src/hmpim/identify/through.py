@@ -154,7 +154,7 @@ def fit_through(joint: JointFit, instrument: Instrument) -> tuple[JointFit, Real
     rows, told = jacobian(problem, fit), jacobian(asked, fit)
     left = problem.innovations(fit.prediction, fit.residual)
     freedom = max(problem.counted - rows.shape[0], 1)
-    white = is_white(left if problem.counts is None else left[problem.counts])
+    white = is_white(problem.counting(left))
     # (told rowsᵀ)⁻¹ told R toldᵀ (…)⁻ᵀ: the bound for the instrument, turned to the input.
     turn = np.linalg.lstsq(told @ rows.T, told @ told.T, rcond=1e-14)[0]
     cov = turn @ covariance(told, left, freedom=freedom, white=white) @ turn.T

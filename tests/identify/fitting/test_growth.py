@@ -126,7 +126,7 @@ def test_intervals_cover_most_of_what_the_record_half_sees(u):
 
 def test_a_pole_that_would_not_show_takes_its_time_from_the_delay(u):
     joint = fitted(u, noisy(answer(u, (6.0,)), 1.0, 3), "first_order")
-    assert joint.hidden.may_hide(joint.best.fit.structure)
+    assert joint.hidden.may_hide
     longest = as_if_hidden(joint.best.fit, joint.hidden)
     assert longest.structure.name == "second_order"
     assert longest.delay < joint.best.fit.delay - 0.5 * joint.hidden.limit

@@ -67,14 +67,14 @@ def begins_of(problem: Problem, fit: Fit, *, lag: int) -> int | None:
         return None
     free = part_of(replace(problem, begins=begins), fit.structure, fit.theta).free
     late = np.arange(problem.y.size) >= begins
-    valid = late if problem.counts is None else problem.counts & late
+    told = _counts(problem)
+    valid = told & late
     innovations = problem.innovations(fit.prediction, fit.residual)
     residual = innovations * late
     count = int(np.count_nonzero(valid))
     power = float(residual @ residual)
     share = effective_share(residual[valid])
-    told = np.ones(problem.y.size, dtype=bool) if problem.counts is None else problem.counts
-    if _stands_out(innovations, told & ~late, told & late):
+    if _stands_out(innovations, told & ~late, valid):
         return begins
     if not free.shape[0] or power <= 0.0:
         return None
@@ -105,7 +105,7 @@ def look_again(problem: Problem, trial: Trial, seen: Seen, *, lag: int) -> Seen 
         As for `begins_of`.
     """
     count = problem.y.size
-    told = np.ones(count, dtype=bool) if problem.counts is None else problem.counts
+    told = _counts(problem)
     innovations = problem.innovations(trial.fit.prediction, trial.fit.residual)
     if trial.intersample == "bandlimited":
         late = np.arange(count) - trial.fit.delay
@@ -119,6 +119,11 @@ def look_again(problem: Problem, trial: Trial, seen: Seen, *, lag: int) -> Seen 
         return None
     after = np.arange(count) >= begins
     return Seen(valid=after if seen.valid is None else seen.valid & after, begins=begins)
+
+
+def _counts(problem: Problem) -> NDArray[np.bool_]:
+    """Which samples count."""
+    return np.ones(problem.y.size, dtype=bool) if problem.counts is None else problem.counts
 
 
 def _stands_out(

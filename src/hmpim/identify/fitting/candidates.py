@@ -29,6 +29,7 @@ __all__ = [
     "fit_under_each_assumption",
     "is_worth_explaining",
     "nested",
+    "refit_between",
 ]
 
 _MATERIAL = 0.01
@@ -221,7 +222,7 @@ def nested(first_order: Fit) -> NDArray[np.float64]:
     return np.concatenate([first_order.theta, [0.1875]])  # (1 + 3/4 Ts)(1 + 1/4 Ts)
 
 
-def _moved(problem: Problem, fit: Fit, origin: Intersample, mode: Intersample) -> Fit:
+def refit_between(problem: Problem, fit: Fit, origin: Intersample, mode: Intersample) -> Fit:
     """Fit the same structure under another assumption, from where the first one ended."""
     return fit_structure(problem, fit.structure, shifted(fit.theta, origin, mode))
 
@@ -247,7 +248,7 @@ def fit_under_each_assumption(
 
     def moved(some: list[Fit]) -> list[tuple[Intersample, Fit]]:
         return [
-            (mode, _moved(data.problem(mode, seen), fit, natural, mode))
+            (mode, refit_between(data.problem(mode, seen), fit, natural, mode))
             for mode in others
             for fit in some
         ]

@@ -17,7 +17,7 @@ from typing import Generic, Protocol, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from hmpim.identify.fitting.fit import Fit, Problem, jacobian, within_reach
+from hmpim.identify.fitting.fit import Fit, Problem, jacobian, solved, within_reach
 from hmpim.identify.fitting.sampled_rows import part_of
 from hmpim.identify.uncertainty import covariance
 from hmpim.identify.whiteness import is_white
@@ -57,7 +57,7 @@ _FARTHEST = 1.0
 """Logarithm by which a time constant moves at most beside a pole that would not show."""
 
 _ANY = 10_000_000
-"""Samples that bound no time constant, of a fit to statistics."""
+"""Samples that bound no time constant."""
 
 _MOST = 7
 """Poles up to which one more is asked for."""
@@ -77,9 +77,6 @@ class HiddenPole:
     squared, std : float
         q = T² as a score test finds it, and its standard deviation. Below 0 it stands for what
         one more pole cannot be: a zero, or a pair of poles.
-    scale : float
-        Time in samples that the fit itself has: the time constant, or the poles' geometric mean;
-        of a fit without a pole, its delay.
     shift : ndarray, shape (p,)
         Change of the fit's vector with q.
     fit : Fit
@@ -90,10 +87,14 @@ class HiddenPole:
 
     squared: float
     std: float
-    scale: float
     shift: Real
     fit: Fit
     rows: Real
+
+    @property
+    def scale(self) -> float:
+        """Time in samples that the fit has: its poles' geometric mean, or without one its delay."""
+        return scale_of(self.fit)
 
     @property
     def limit(self) -> float:
@@ -105,9 +106,10 @@ class HiddenPole:
         """Whether the record asks for a pole by more than chance, and one that matters."""
         return self.squared > _BY_CHANCE * self.std and self.squared > (_MATTERS * self.scale) ** 2
 
-    def may_hide(self, structure: Structure) -> bool:
+    @property
+    def may_hide(self) -> bool:
         """Whether a pole that moves the delay by much would not show, beside none or one."""
-        return structure.order <= 1 and self.limit > _HIDES * self.scale
+        return self.fit.structure.order <= 1 and self.limit > _HIDES * self.scale
 
 
 class Fitted(Protocol):
@@ -204,18 +206,15 @@ def hidden_pole(problem: Problem, fit: Fit) -> HiddenPole:
     every = jacobian(problem, fit, response_to_square(problem, fit))
     freedom = max(problem.counted - every.shape[0], 1)
     left = problem.innovations(fit.prediction, fit.residual)
-    white = is_white(left if problem.counts is None else left[problem.counts])
-    variance = covariance(every, left, freedom=freedom, white=white)[-1, -1]
     rows, row = every[:-1], every[-1]
-    size = np.sqrt(np.maximum(np.sum(rows**2, axis=1), np.finfo(float).tiny))
-    basis = (rows / size[:, None]).T
-    shift = -np.linalg.lstsq(basis, row, rcond=1e-10)[0] / size
+    shift = -solved(rows @ rows.T, rows @ row)
     own = row + shift @ rows  # what no other parameter can do
     power = max(float(own @ own), np.finfo(float).tiny)
+    white = is_white(problem.counting(left))
+    variance = covariance(own[None], left, freedom=freedom, white=white)[0, 0]
     return HiddenPole(
         squared=float(own @ left) / power,
         std=float(np.sqrt(variance)),
-        scale=scale_of(fit),
         shift=shift,
         fit=fit,
         rows=rows,
@@ -264,8 +263,7 @@ def as_if_hidden(fit: Fit, hidden: HiddenPole) -> Fit:
     moved = lag**2 * hidden.shift
     moved[1 : fit.theta.size] = np.clip(moved[1 : fit.theta.size], -_FARTHEST, _FARTHEST)
     theta, linear = np.split(np.concatenate([fit.theta, fit.linear]) + moved, [fit.theta.size])
-    samples = max(fit.prediction.size, _ANY)
-    theta = within_reach(fit.structure, theta, delays=(-np.inf, np.inf), samples=samples)
+    theta = within_reach(fit.structure, theta, delays=(-np.inf, np.inf), samples=_ANY)
     return replace(
         fit,
         structure=one_more_pole(fit.structure),

@@ -22,6 +22,7 @@ from hmpim.identify.fitting.candidates import (
     fit_rich,
     fit_under_each_assumption,
     is_worth_explaining,
+    refit_between,
 )
 from hmpim.identify.fitting.data import (
     FINAL_PRECISION,
@@ -31,7 +32,6 @@ from hmpim.identify.fitting.data import (
     band_of,
     follows,
     refit,
-    shifted,
 )
 from hmpim.identify.fitting.enrich import (
     INTEGRATING,
@@ -150,20 +150,7 @@ def joint_fit(
         fitted = fit_under_each_assumption(
             data, natural, kept, counted, alone=intersample is not None
         )
-    data, trials, best, share = _weighed(data, natural, fitted, counted)
-    for _ in range(_LOOKS):
-        again = look_again(
-            data.problem(best.intersample, counted), best, counted, lag=data.rough.lag
-        )
-        if again is None:
-            break
-        counted, data = again, replace(data, noise=None)
-        fitted = [
-            (mode, refit(data.problem(mode, counted), fit))
-            for mode, fit in fitted
-            if fit.objective < HOPELESS**2 * best.fit.objective or fit.structure.name in PLAIN
-        ]
-        data, trials, best, share = _weighed(data, natural, fitted, counted)
+    data, counted, trials, best, share = _looked_again(data, natural, fitted, counted)
     weighed = data.problem(best.intersample, counted)
     joint = JointFit(
         problem=replace(weighed, noise=None, told=None),
@@ -176,6 +163,25 @@ def joint_fit(
     )
     modes = [mode for mode in BETWEEN if intersample is None and mode != best.intersample]
     return _grown(joint, data, counted, structures, modes)
+
+
+def _looked_again(
+    data: Data, natural: Intersample, fitted: list[tuple[Intersample, Fit]], seen: Seen
+) -> tuple[Data, Seen, list[Trial], Trial, float]:
+    """Weigh all fits, and again where the best of them shows that other samples count."""
+    data, trials, best, share = _weighed(data, natural, fitted, seen)
+    for _ in range(_LOOKS):
+        again = look_again(data.problem(best.intersample, seen), best, seen, lag=data.rough.lag)
+        if again is None:
+            break
+        seen, data = again, replace(data, noise=None)
+        fitted = [
+            (mode, refit(data.problem(mode, seen), fit))
+            for mode, fit in fitted
+            if fit.objective < HOPELESS**2 * best.fit.objective or fit.structure.name in PLAIN
+        ]
+        data, trials, best, share = _weighed(data, natural, fitted, seen)
+    return data, seen, trials, best, share
 
 
 def _grown(
@@ -208,11 +214,7 @@ def _grown(
     moved = [
         trial_of(
             mode,
-            fit_structure(
-                data.problem(mode, seen),
-                polished.structure,
-                shifted(polished.theta, best.intersample, mode),
-            ),
+            refit_between(data.problem(mode, seen), polished, best.intersample, mode),
             count,
         )
         for mode in others

@@ -71,6 +71,10 @@ class Problem:
         """Samples whose residual, whitened where noise is, counts; None when all do."""
         return self.valid if self.told is None else self.told
 
+    def counting(self, values: Real) -> Real:
+        """Return the samples of `values`, (n,), that count."""
+        return values if self.counts is None else np.asarray(values[self.counts])
+
     def masked(self, rows: Real) -> Real:
         """Return `rows`, (k, n) or (n,), samples that do not count set to 0, noise whitened."""
         if self.noise is not None and self.told is not None and rows.size:

@@ -49,7 +49,7 @@ def missed_pole(evidence: Evidence) -> tuple[Finding, ...]:
             f"{moved / fs:.2g} s off. Lower the noise, or sweep higher, until a richer structure "
             "can be told."
         )
-    elif hidden.may_hide(evidence.joint.best.fit.structure):
+    elif hidden.may_hide:
         message = (
             f"A further pole with a time constant of up to {hidden.limit / fs:.3g} s would not "
             "show in this record, and would shorten the delay by as much; the intervals cover it. "

@@ -398,7 +398,7 @@ def _decided(
     best = search.again(chosen, precision=_FINAL_PRECISION)
     polished = trial_of(best.intersample, best.fit, count)
     if growth.grown:
-        moved = [] if alone else _moved(search, best.intersample, [best], alone=False)
+        moved = _moved(search, best.intersample, [best], alone=alone)
         trials += [trial_of(f.intersample, f.fit, count) for f in (*growth.grown[:-1], *moved)]
         trials.append(polished)
     else:

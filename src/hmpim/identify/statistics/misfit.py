@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.special import chdtrc
 
 from hmpim.identify.fitting.fit import solved
-from hmpim.identify.fitting.growth import HiddenPole, response_to_square, scale_of
+from hmpim.identify.fitting.growth import HiddenPole, response_to_square
 from hmpim.identify.fitting.rows import Problem
 from hmpim.identify.statistics.fit import Fitted
 from hmpim.identify.statistics.products import Products
@@ -80,7 +80,6 @@ def hidden_pole_of(fitted: Fitted, problem: Problem) -> HiddenPole:
     return HiddenPole(
         squared=float(gain[0]) / size,
         std=float(np.sqrt(fitted.variance / size)),
-        scale=scale_of(fit),
         shift=np.append(shift, 0.0),  # the bias is solved apart
         fit=fit,
         rows=fitted.rows,
