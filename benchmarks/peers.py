@@ -259,7 +259,7 @@ def _child(name: str, records: list, line) -> None:
                 spent.append(time.process_time() - begin)
             after = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
         line.send((found, spent, max(after - before, 0) / 1024))
-    except Exception as error:
+    except Exception as error:  # code of others: what it raises is its row
         line.send(f"{type(error).__name__}: {error}")
 
 

@@ -3,18 +3,15 @@
 Run on an idle machine: python benchmarks/workbench.py. It needs Chromium and Playwright.
 """
 
-import os
-import re
 import statistics
-import subprocess
-import sys
 import tempfile
 import time
 import urllib.request
 from pathlib import Path
 
 import numpy as np
-from playwright.sync_api import Page, sync_playwright
+from playwright.sync_api import Page
+from served import workbench_in
 
 import hmpim
 from hmpim.experiment.readiness import LIGHTS
@@ -118,31 +115,16 @@ def million(page: Page, url: str, desks: Desks, runs: Path) -> None:
 
 def main() -> None:
     """Serve a workbench, and measure it."""
-    with tempfile.TemporaryDirectory() as place, sync_playwright() as playwright:
+    with tempfile.TemporaryDirectory() as place:
         folder = Path(place)
         (folder / "hmpim.toml").write_text(RIGS, encoding="utf-8")
-        served = subprocess.Popen(
-            [sys.executable, "-m", "hmpim.cli.main", "workbench", "--no-browser", "--runs", "runs"],
-            cwd=folder, stdout=subprocess.PIPE, text=True,
-            env={**os.environ, "PYTHONUNBUFFERED": "1"},
-        )  # fmt: skip
-        assert served.stdout is not None
-        found = re.search(r"http://\S+", served.stdout.readline())
-        assert found is not None
-        browser = playwright.chromium.launch(
-            executable_path="/usr/bin/chromium", args=["--no-sandbox"]
-        )
-        page = browser.new_page(viewport={"width": 1280, "height": 800})
-        page.set_default_timeout(300_000)
-        desks = Desks(folder / "runs" / ".workbench")
-        try:
-            slider(page, found.group(), desks)
-            million(page, found.group(), desks, folder / "runs")
-            strip(page, found.group(), desks)
-        finally:
-            browser.close()
-            served.terminate()
-            served.wait()
+        with workbench_in(folder) as (url, browser):
+            page = browser.new_page(viewport={"width": 1280, "height": 800})
+            page.set_default_timeout(300_000)
+            desks = Desks(folder / "runs" / ".workbench")
+            slider(page, url, desks)
+            million(page, url, desks, folder / "runs")
+            strip(page, url, desks)
 
 
 if __name__ == "__main__":

@@ -5,9 +5,7 @@ folder, every page is drawn there in three sizes, light and dark, to be looked a
 """
 
 import io
-import os
 import re
-import subprocess
 import sys
 import tempfile
 from collections.abc import Callable
@@ -15,7 +13,8 @@ from dataclasses import replace
 from pathlib import Path
 
 from PIL import Image
-from playwright.sync_api import Browser, Page, sync_playwright
+from playwright.sync_api import Browser, Page
+from served import workbench_in
 
 import hmpim
 from hmpim.experiment.readiness import LIGHTS
@@ -128,29 +127,14 @@ def main() -> None:
     if given is not None:
         given.mkdir(parents=True, exist_ok=True)
         wanted = [(n, size, dark) for n in READY for size in SIZES for dark in (False, True)]
-    with tempfile.TemporaryDirectory() as place, sync_playwright() as playwright:
+    with tempfile.TemporaryDirectory() as place:
         furnish(Path(place) / "runs")
-        served = subprocess.Popen(
-            [sys.executable, "-m", "hmpim.cli.main", "workbench", "--no-browser", "--runs", "runs"],
-            cwd=place, stdout=subprocess.PIPE, text=True,
-            env={**os.environ, "PYTHONUNBUFFERED": "1"},
-        )  # fmt: skip
-        assert served.stdout is not None
-        found = re.search(r"http://\S+", served.stdout.readline())
-        assert found is not None
-        browser = playwright.chromium.launch(
-            executable_path="/usr/bin/chromium", args=["--no-sandbox"]
-        )
-        try:
+        with workbench_in(Path(place)) as (url, browser):
             for name, size, dark in wanted:
                 kind = f"-{size}" if given is not None or size != "laptop" else ""
                 mode = "-dark" if given is not None and dark else ""
                 path = (given or IMAGES) / f"workbench-{name}{kind}{mode}.png"
-                shoot(browser, found.group(), name, size, dark=dark, path=path)
-        finally:
-            browser.close()
-            served.terminate()
-            served.wait()
+                shoot(browser, url, name, size, dark=dark, path=path)
 
 
 if __name__ == "__main__":

@@ -16,7 +16,7 @@ from typing import Any
 from hmpim.batch.addresses import Address, addresses_of, find_files
 from hmpim.batch.metadata import Beside, read_metadata
 from hmpim.batch.pool import Pool
-from hmpim.batch.reading import read_records, reason_of
+from hmpim.batch.reading import Read, read_records, reason_of
 from hmpim.batch.request import Request
 from hmpim.batch.rows import group_rows
 from hmpim.errors import ArgumentError
@@ -107,15 +107,20 @@ class _Compress:
     def do(self) -> Sums:
         total = Sums(groups={})
         for read in read_records(self.addresses, self.request):
+            total = total + self._one(read)
+        return total
+
+    def _one(self, read: Read) -> Sums:
+        """The sum of one record, or why there is none."""
+        reason = read.reason
+        if read.record is not None:
             told = {**read.metadata, **self.beside.of(read.address)}
             try:
-                if read.record is None:
-                    raise ArgumentError(read.reason)
                 one = (1, compress(read.record, lags=self.lags))
-                total = total + Sums(groups={_group_of(told, self.by): one})
-            except Exception as error:  # it is said, and the others go on
-                total = total + Sums(groups={}, reasons=((read.address.name, reason_of(error)),))
-        return total
+                return Sums(groups={_group_of(told, self.by): one})
+            except Exception as error:  # bad data, or a defect that one record meets: others go on
+                reason = reason_of(error)
+        return Sums(groups={}, reasons=((read.address.name, reason),))
 
 
 def _group_of(told: Mapping[str, str], by: str) -> str:
@@ -186,7 +191,7 @@ def identify_groups(
         begin = time.thread_time()
         try:
             result = identify(statistics)
-        except Exception as error:  # it is said, and the others go on
+        except Exception as error:  # a defect that one group meets: the others go on
             reasons.append((name, reason_of(error)))
             continue
         seconds = time.thread_time() - begin

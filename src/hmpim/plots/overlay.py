@@ -61,15 +61,8 @@ def overlaid_bode(
         phase_items.append(replace(look, y=curve.phase))
     for i, bandwidth in enumerate(bandwidths):
         if bandwidth is not None:
-            value, reach = bandwidth[0], 1.96 * bandwidth[1]
-            mark = Rule(
-                at=value,
-                low=value - reach,
-                high=value + reach,
-                colour=_COLOURS[i % len(_COLOURS)],
-                dashes=":",
-            )
-            phase_items.append(mark)
+            mark = _interval(*bandwidth)
+            phase_items.append(replace(mark, colour=_COLOURS[i % len(_COLOURS)], dashes=":"))
     if phase_level is not None:
         phase_items.append(Rule(at=phase_level, axis="y", colour="muted", dashes=":", width=0.8))
     x = Axis(scale="log", numbered=False)
@@ -132,7 +125,7 @@ def beside_bode(
                 items.append(Rule(at=-90.0, axis="y", colour="muted", dashes=":", width=0.8))
                 items += [] if bandwidth is None else [_marked(*bandwidth)]
             elif bandwidth is not None:
-                items.append(replace(_marked(*bandwidth), words=""))
+                items.append(_interval(*bandwidth))
             panels.append(
                 replace(
                     panel,
@@ -151,11 +144,14 @@ def beside_bode(
     )
 
 
+def _interval(value: float, std: float) -> Rule:
+    """A frequency with its 95 % interval."""
+    return Rule(at=value, low=value - 1.96 * std, high=value + 1.96 * std)
+
+
 def _marked(value: float, std: float) -> Rule:
-    return Rule(
-        at=value,
-        low=value - 1.96 * std,
-        high=value + 1.96 * std,
+    return replace(
+        _interval(value, std),
         words=f"−90° at {plus_minus(value, std)} Hz",
         words_at=0.2,
         side="left",
