@@ -1,17 +1,23 @@
 """Whether the input answers the noise: a loop around the unit."""
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.special import chdtrc
 
-from hmpim.identify.fitting.fit import without
+from hmpim.identify.fitting.fit import solved
 from hmpim.identify.groups import MODELLED
 from hmpim.identify.judgement.evidence import Evidence
 from hmpim.record import Finding
 
 __all__ = ["feedback"]
 
+Real = NDArray[np.float64]
+
 _AHEAD = 12
 """Samples of the input's future, and of its past, that are looked at."""
+
+_AT_ONCE = 20_000
+"""Samples whose lags are held at once."""
 
 _CHANCE = 1e-6
 """Chance below which what is left over is said to move the input."""
@@ -32,17 +38,16 @@ def feedback(evidence: Evidence) -> tuple[Finding, ...]:
     inside = inside if counts is None else inside[counts[inside]]
     if inside.size < 10 * _AHEAD:
         return ()
-    level = u - u.mean()
-    lags = level[inside + np.arange(-_AHEAD, _AHEAD + 1)[:, None]]
-    past, future = lags[: _AHEAD + 1], lags[_AHEAD + 1 :]
-    rows = without(future, np.vstack([past, np.ones(inside.size)]))
-    size, direction = np.linalg.eigh(rows @ rows.T)
-    seen = size > 1e-9 * float(np.trace(lags @ lags.T))
+    gram, cross = _products(u - u.mean(), left, inside)
+    past, future = slice(0, _AHEAD + 2), slice(_AHEAD + 2, None)  # the past, and a constant
+    # Of the future what the past does not tell (a Schur complement).
+    told = np.column_stack([solved(gram[past, past], column) for column in gram[past, future].T])
+    size, direction = np.linalg.eigh(gram[future, future] - gram[future, past] @ told)
+    seen = size > 1e-9 * float(np.trace(gram) - gram[0, 0])
     if not seen.any():
         return ()
-    residual = left[inside]
-    along = direction[:, seen].T @ (rows @ residual)
-    gained = float(np.sum(along**2 / size[seen])) / float(residual.var())
+    along = direction[:, seen].T @ (cross[future] - told.T @ cross[past])
+    gained = float(np.sum(along**2 / size[seen])) / float(left[inside].var())
     if chdtrc(int(seen.sum()), gained) > _CHANCE:
         return ()
     coloured = not evidence.readings.white
@@ -57,3 +62,15 @@ def feedback(evidence: Evidence) -> tuple[Finding, ...]:
             parameters=MODELLED,
         ),
     )
+
+
+def _products(u: Real, left: Real, inside: NDArray[np.intp]) -> tuple[Real, Real]:
+    """Products of a constant and an input's lags, past first, with each other and what is left."""
+    lags = np.arange(-_AHEAD, _AHEAD + 1)
+    gram, cross = np.zeros((lags.size + 1, lags.size + 1)), np.zeros(lags.size + 1)
+    for begin in range(0, inside.size, _AT_ONCE):
+        some = inside[begin : begin + _AT_ONCE]
+        rows = np.vstack([np.ones(some.size), u[some + lags[:, None]]])
+        gram += rows @ rows.T
+        cross += rows @ left[some]
+    return gram, cross
