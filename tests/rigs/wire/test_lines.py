@@ -3,6 +3,7 @@
 import os
 import select
 import threading
+import time
 from contextlib import ExitStack, contextmanager
 
 import pytest
@@ -12,7 +13,7 @@ from hmpim.experiment import run
 from hmpim.identify import identify
 from hmpim.rigs import SystemClock
 from hmpim.rigs.catalogue import describe, find_rig
-from hmpim.rigs.wire import CanServer, FarEnd, SerialServer, WireRig, serve
+from hmpim.rigs.wire import CanServer, FarEnd, SerialServer, UdpClient, UdpServer, WireRig, serve
 from hmpim.stimulus import Limits, design
 from wire_support import Lag, hello
 
@@ -109,3 +110,19 @@ def test_what_is_not_there_is_said():
             ).rig,
             SWEEP,
         )
+
+
+def test_wait_for_a_datagram_is_not_rounded_to_milliseconds():
+    def shortest(timeout):
+        waits = []
+        for _ in range(30):
+            begun = time.perf_counter()
+            assert client.receive(timeout) is None
+            waits.append(time.perf_counter() - begun)
+        return min(waits)
+
+    with UdpServer("127.0.0.1", 0) as silent:
+        client = UdpClient(*silent.address)
+        client.open()
+        assert shortest(1e-4) < 0.5 * shortest(1e-3)
+        client.close()

@@ -151,6 +151,7 @@ class UdpClient:
             self._socket = socket.socket(_family(self._address[0]), socket.SOCK_DGRAM)
             self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, _BUFFER)
             self._socket.connect(self._address)
+            self._socket.setblocking(False)
         except OSError as error:
             self.close()
             raise RigError(f"{self.name} cannot be reached: {error}") from error
@@ -172,16 +173,17 @@ class UdpClient:
     def receive(self, timeout: float) -> bytes | None:
         """Return the next datagram, None if none comes within `timeout` (s)."""
         assert self._socket is not None
-        return _receive(self._socket, timeout)
+        received = _receive(self._socket, timeout)
+        return None if received is None else received[0]
 
 
-def _receive(one: socket.socket, timeout: float) -> bytes | None:
-    one.settimeout(max(timeout, 0.0))
+def _receive(one: socket.socket, timeout: float) -> tuple[bytes, object] | None:
+    """Take one datagram; the socket's own timeout would be rounded up to whole milliseconds."""
     try:
-        return one.recv(_LARGEST)
-    except (BlockingIOError, TimeoutError):
-        return None
-    except OSError:  # "nobody listens there" of an earlier send
+        if timeout > 0.0 and not select.select([one], [], [], timeout)[0]:
+            return None
+        return one.recvfrom(_LARGEST)
+    except OSError:  # nothing there, or "nobody listens there" of an earlier send
         return None
 
 
@@ -225,13 +227,7 @@ class UdpServer:
 
     def receive(self, timeout: float) -> tuple[bytes, object] | None:
         """Return the next datagram and who sent it, None if none comes within `timeout` (s)."""
-        try:
-            if timeout > 0.0 and not select.select([self._socket], [], [], timeout)[0]:
-                return None
-            data, sender = self._socket.recvfrom(_LARGEST)
-        except OSError:
-            return None
-        return data, sender
+        return _receive(self._socket, timeout)
 
     def send(self, data: bytes, to: object) -> None:
         """Send one datagram; that the other end is gone does not matter here."""
