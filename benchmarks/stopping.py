@@ -7,6 +7,9 @@ line of JSON to FILE. ``stopping.py table FILE`` makes the table of docs/live.md
 repeated    sweeps of 0.6 s up and down, as `hmpim.run(until=...)` ends them
 beyond      the same with a mode of 35 Hz
 slow        one sweep of 10 s, ended at the first look at which the bars look small
+wire        as repeated, played in real time over UDP to a process that serves the system
+
+Seeds that FILE holds are not played again.
 
 ``stopping.py exact DRAWS`` asks what ending itself does to intervals, without the estimator: the
 model is linear in its parameters about the truth, and its errors are those of least squares.
@@ -16,8 +19,13 @@ from __future__ import annotations
 
 import argparse
 import json
+import re
+import subprocess
+import sys
+import tempfile
 from collections.abc import Iterator
-from functools import cache
+from contextlib import ExitStack, contextmanager
+from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
@@ -26,8 +34,10 @@ import numpy as np
 import hmpim
 from hmpim.experiment.collect import Played
 from hmpim.experiment.sure import Sure
+from hmpim.record import uniform
 from hmpim.rigs import ChannelSpec, Layout, Samples
 from hmpim.rigs.stimuli import commands_of
+from hmpim.rigs.wire import UdpClient, WireRig
 
 TRUTH = {
     "delay": 0.15,
@@ -109,6 +119,55 @@ def slow(seed: int) -> dict[str, Any]:
                 "z": errors(look.parameters),
             }
     return {"seed": seed, "time": None, "looks": None, "rest": None, "z": None}
+
+
+RIG_FILE = """rig = "sensor"
+[limits]
+position = 3
+velocity = 130
+acceleration = 17000
+[options]
+"""
+
+
+@contextmanager
+def served(*, seed: int) -> Iterator[tuple[str, int]]:
+    """The system in a process of its own, in real time; yields its address."""
+    with tempfile.NamedTemporaryFile("w", suffix=".toml") as unit:
+        options = {**TRUTH, "noise_std": NOISE}
+        unit.write(RIG_FILE + "".join(f"{name} = {v}\n" for name, v in options.items()))
+        unit.flush()
+        words = f"table --udp 127.0.0.1:0 --rate {FS:g} --sensor {unit.name} --seed {seed}".split()
+        command = [sys.executable, "-m", "hmpim.cli.main", *words]
+        with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
+            try:
+                assert process.stdout is not None
+                found = re.search(r"udp://([\d.]+):(\d+)", process.stdout.readline())
+                assert found is not None
+                yield found[1], int(found[2])
+            finally:
+                process.terminate()
+
+
+def wired(address: tuple[str, int], seed: int) -> dict[str, Any]:
+    """One run in real time, ended by the same rule, and the live estimate where it was left."""
+    stimulus, until = repeated(duration=4.8), hmpim.Until(**TARGETS)
+    record = hmpim.run(WireRig(transport=UdpClient(*address)), stimulus, until=until)
+    said = {finding.code: finding.message for finding in record.findings}
+    row = {"seed": seed, "time": None, "looks": None, "rest": None, "z": None,
+           "said": said.get("datagrams", "")}  # fmt: skip
+    if record.stopping is None:
+        return row
+    even, live = uniform(record), hmpim.LiveEstimator(stimulus)
+    known = slice(round(record.stopping.time * FS))
+    live.read(even.inputs[0].values[known], even.outputs[0].values[known])
+    look = live.look()
+    assert look is not None
+    short = record.inputs[0].values
+    row |= {"time": record.stopping.time, "looks": record.stopping.looks,
+            "rest": float(np.abs(short[known.stop :]).max()),
+            "z": errors(look.parameters)}  # fmt: skip
+    return row
 
 
 def errors(parameters: Any) -> dict[str, float]:
@@ -209,7 +268,7 @@ def played(rule: str, seed: int) -> dict[str, Any]:
 def main() -> None:
     """Play seeds, or print a table."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("rule", choices=("repeated", "beyond", "slow", "exact", "table"))
+    parser.add_argument("rule", choices=("repeated", "beyond", "slow", "wire", "exact", "table"))
     parser.add_argument("seeds", nargs="*", help="FIRST LAST, or the file to make a table of")
     parser.add_argument("--out", type=Path)
     given = parser.parse_args()
@@ -221,13 +280,21 @@ def main() -> None:
         print("\n".join(exact(int(given.seeds[0]))))
         return
     first, last = map(int, given.seeds)
-    for seed in range(first, last):
-        line = json.dumps(played(given.rule, seed))
-        if given.out is None:
-            print(line, flush=True)
-        else:
-            with given.out.open("a") as out:
-                out.write(line + "\n")
+    known = set()
+    if given.out is not None and given.out.exists():
+        known = {json.loads(line)["seed"] for line in given.out.read_text().splitlines()}
+    seeds = [seed for seed in range(first, last) if seed not in known]
+    with ExitStack() as stack:
+        play = partial(played, given.rule)
+        if given.rule == "wire":
+            play = partial(wired, stack.enter_context(served(seed=first)))
+        for seed in seeds:
+            line = json.dumps(play(seed))
+            if given.out is None:
+                print(line, flush=True)
+            else:
+                with given.out.open("a") as out:
+                    out.write(line + "\n")
 
 
 if __name__ == "__main__":

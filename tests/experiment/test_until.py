@@ -1,17 +1,19 @@
 """A run ends as soon as enough is known, never before, smoothly, and its intervals hold."""
 
 import math
+import threading
 from functools import lru_cache
 
 import numpy as np
 import pytest
 from scipy.signal import lfilter
-from stopping import TRUTH, errors, sensor
+from stopping import LAYOUT, TRUTH, blocks, errors, sensor
 
 import hmpim
 from hmpim import Until
 from hmpim.errors import ArgumentError
 from hmpim.experiment import ManualClock, RunOptions, until_of
+from hmpim.experiment.sure import Sure
 from hmpim.identify import Estimate
 from hmpim.identify.result import Parameters
 from hmpim.record import Stopping
@@ -146,6 +148,22 @@ def test_beside_a_run_in_real_time_nobody_waits_for_a_look():
     record, unit, _ = followed(until=rule, clock=False)
     assert record.stopping is not None
     ends_at_rest_inside(unit, record.stopping)
+
+
+def test_a_look_that_is_still_going_on_is_waited_for_at_the_end_of_the_process():
+    """A daemon thread that is broken off within compiled code aborts the process."""
+    go_on, threads = threading.Event(), []
+
+    class Slow(Sure):
+        def _looked(self, waiting):
+            threads.append(threading.current_thread())
+            go_on.wait(10.0)
+
+    looking = Slow(RULE, {"": sweeps()}, {"": LIMITS}, LAYOUT, ahead=0.2)
+    looking(next(blocks(sweeps(), sensor(), 0)))
+    go_on.set()
+    looking._busy.join()
+    assert [thread.daemon for thread in threads] == [False]
 
 
 @pytest.mark.parametrize("after", [3, 60, 137, 300, 555])

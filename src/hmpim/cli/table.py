@@ -4,13 +4,16 @@ import signal
 from contextlib import nullcontext
 from pathlib import Path
 from types import FrameType
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from hmpim.cli.files import check_files
 from hmpim.cli.terminal import say
 from hmpim.errors import ArgumentError
+
+if TYPE_CHECKING:
+    from hmpim.rigs.wire import Hello, Plant
 
 __all__ = ["table"]
 
@@ -35,6 +38,15 @@ def table(
         str,
         typer.Option("--load", metavar="NAME", help="What it carries: acceptance, bracket, ..."),
     ] = "acceptance",
+    sensor: Annotated[
+        Path | None,
+        typer.Option(
+            "--sensor",
+            metavar="FILE",
+            help="Serve no table but the sensor that this rig file describes, on one axis that "
+            "follows exactly.",
+        ),
+    ] = None,
     watchdog: Annotated[
         float,
         typer.Option(
@@ -57,28 +69,26 @@ def table(
         typer.Option("--clock-drift", metavar="PPM", help="Let its clock gain so many µs in 1 s."),
     ] = 0.0,
 ) -> None:
-    """Serve the simulated five-axis table until Ctrl-C; whoever runs hmpim run moves it.
+    """Serve the simulated five-axis table until Ctrl-C, or a sensor; hmpim run moves it.
 
     It checks every command against Fig. 4's limits, brakes after the watchdog's silence, and
     comes to rest inside its limits.
     """
-    import numpy as np
-
     from hmpim.experiment.priority import undelayed
-    from hmpim.rigs import MotionTable, SkewedClock, SystemClock
-    from hmpim.rigs.table import both_loads
-    from hmpim.rigs.table.served import TablePlant, table_hello
+    from hmpim.rigs import SkewedClock, SystemClock
     from hmpim.rigs.wire import FarEnd, Trace, UdpServer, parse_address, serve
 
     if mode not in ("P", "PV", "PVA"):
         raise ArgumentError(f"--mode {mode!r} is not known; use P, PV or PVA")
     if not 0.0 < watchdog <= 0.1:
         raise ArgumentError(f"--watchdog {watchdog:g} s must be more than 0 and at most 0.1")
-    check_files(writes={"--trace": trace})
-    uut, target = both_loads(load)
-    moved = MotionTable(mode=mode, uut_load=uut, target_load=target)  # type: ignore[arg-type]
-    hello = table_hello(moved, rate=rate, watchdog=watchdog)
-    plant = TablePlant(moved, rate=rate, rng=np.random.default_rng(seed))
+    check_files(reads={"--sensor": sensor}, writes={"--trace": trace})
+    if sensor is None:
+        hello, plant = _table(mode, load, rate=rate, watchdog=watchdog, seed=seed)
+        what = f"Table at udp://{{}}:{{}}, {rate:g} Hz, {mode}, {load}"
+    else:
+        hello, plant = _sensor(sensor, rate=rate, watchdog=watchdog, seed=seed)
+        what = f"Sensor {hello.name!r} at udp://{{}}:{{}}, {rate:g} Hz"
     farend = FarEnd(hello)
     host, port = parse_address(udp)
     ended: list[int] = []
@@ -90,11 +100,47 @@ def table(
         for number in (signal.SIGINT, signal.SIGTERM):
             signal.signal(number, end)
         at = server.address
-        say(f"Table at udp://{at[0]}:{at[1]}, {rate:g} Hz, {mode}, {load}; Ctrl-C ends it")
+        say(f"{what.format(at[0], at[1])}; Ctrl-C ends it")
         clock = SkewedClock(SystemClock(), offset=clock_offset, drift=1e-6 * clock_drift)
         every = max(1, round(0.1 * rate))
         writing = None if trace is None else Trace(trace, hello.axes, every=every)
         with undelayed(realtime=True) as scheduling, writing or nullcontext():
             say(f"It has {scheduling}")
             serve(server, farend, plant, clock=clock, until=lambda: bool(ended), trace=writing)
-    say("Table at rest")
+    say("Table at rest" if sensor is None else "At rest")
+
+
+def _table(
+    mode: str, load: str, *, rate: float, watchdog: float, seed: int | None
+) -> "tuple[Hello, Plant]":
+    """The five-axis table."""
+    import numpy as np
+
+    from hmpim.rigs import MotionTable
+    from hmpim.rigs.table import both_loads
+    from hmpim.rigs.table.served import TablePlant, table_hello
+
+    uut, target = both_loads(load)
+    moved = MotionTable(mode=mode, uut_load=uut, target_load=target)  # type: ignore[arg-type]
+    hello = table_hello(moved, rate=rate, watchdog=watchdog)
+    return hello, TablePlant(moved, rate=rate, rng=np.random.default_rng(seed))
+
+
+def _sensor(path: Path, *, rate: float, watchdog: float, seed: int | None) -> "tuple[Hello, Plant]":
+    """The sensor of a rig file, on an axis of its own."""
+    import numpy as np
+
+    from hmpim.rigs import Sensor
+    from hmpim.rigs.catalogue import find_rig, read_description
+    from hmpim.rigs.wire import SensorPlant, sensor_hello
+    from hmpim.stimulus import Limits
+
+    found = find_rig("", description=read_description(path))
+    if not isinstance(found.rig, Sensor):
+        raise ArgumentError(
+            f"--sensor {str(path)!r} describes {found.description.rig!r}, and a sensor is needed: "
+            'rig = "sensor"'
+        )
+    limits = found.limits if isinstance(found.limits, Limits) else Limits()
+    hello = sensor_hello(found.rig, rate=rate, watchdog=watchdog, limits=limits)
+    return hello, SensorPlant(found.rig, rate=rate, rng=np.random.default_rng(seed))

@@ -229,7 +229,8 @@ class Sure:
         waiting, self._waiting = self._waiting, []
         if self._ahead == 0.0:
             return self._looked(waiting)
-        self._busy = threading.Thread(target=self._beside, args=(waiting,), daemon=True)
+        # Not a daemon: a look that is broken off within compiled code takes the process with it.
+        self._busy = threading.Thread(target=self._beside, args=(waiting,), name="look")
         self._busy.start()
         return None
 

@@ -15,7 +15,7 @@ from scipy.signal import lfilter
 from hmpim.errors import ArgumentError
 from hmpim.rigs.between import ContinuousInput
 
-__all__ = ["Poles", "first_order", "respond", "second_order"]
+__all__ = ["Poles", "first_order", "respond", "second_order", "state_after_impulse"]
 
 FloatArray = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
@@ -116,7 +116,7 @@ def respond(
         first = _one_pole(poles.slow, step, added[0])
     else:
         second = _one_pole(poles.fast, step, added[1])
-        carry = _kernel(poles, np.array([step]))[0, 0]
+        carry = state_after_impulse(poles, np.array([step]))[0, 0]
         first = _one_pole(poles.slow, step, added[0] + carry * second[:-1])
     return np.asarray(u.rest + poles.gain * first.real)
 
@@ -127,8 +127,26 @@ def _one_pole(pole: complex, step: float, added: ComplexArray) -> ComplexArray:
     return np.asarray(lfilter([1.0], [1.0, -np.exp(pole * step)], fed))
 
 
-def _kernel(poles: Poles, lag: FloatArray) -> ComplexArray:
-    """State at `lag` (any shape) seconds after a unit impulse; shape (order, ...)."""
+def state_after_impulse(poles: Poles, lag: FloatArray) -> ComplexArray:
+    """State at times after a unit impulse.
+
+    Parameters
+    ----------
+    poles : Poles
+        The dynamics; times their gain the first row is the output.
+    lag : ndarray, any shape
+        Times in s.
+
+    Returns
+    -------
+    ndarray, shape (order, ...)
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> state_after_impulse(first_order(0.5), np.array([0.0, 0.5])).real.round(3).tolist()
+    [[1.0, 0.368]]
+    """
     slow = np.exp(poles.slow * lag)
     if poles.fast is None:
         return np.asarray(slow[np.newaxis])
@@ -162,9 +180,9 @@ def _added_by_input(
         moved = u.at(at.ravel()).reshape(at.shape) - u.rest
         largest = max(largest, float(np.abs(moved).max()))
         if np.ptp(a) == 0.0 and np.ptp(b) == 0.0:  # as most are: one kernel serves all
-            kernel = _kernel(poles, step - offset[0])
+            kernel = state_after_impulse(poles, step - offset[0])
             return np.asarray((kernel * weights) @ moved.T * (b - a))
-        kernel = _kernel(poles, step - offset)
+        kernel = state_after_impulse(poles, step - offset)
         return np.asarray(np.einsum("spq,pq,q->sp", kernel, moved, weights) * (b - a))
 
     for block in range(0, interval.size, _BLOCK):

@@ -9,6 +9,7 @@ from hmpim.rigs.wire.rig import WireRig, expected_hello
 from hmpim.rigs.wire.sequence import Counts, Sequence
 from hmpim.rigs.wire.serial import SerialClient, SerialServer
 from hmpim.rigs.wire.serve import Plant, Trace, serve
+from hmpim.rigs.wire.served_sensor import SensorPlant, sensor_hello
 from hmpim.rigs.wire.transport import Transport, UdpClient, UdpServer, parse_address
 
 __all__ = [
@@ -24,6 +25,7 @@ __all__ = [
     "Order",
     "Plant",
     "Response",
+    "SensorPlant",
     "Sequence",
     "SerialClient",
     "SerialServer",
@@ -38,6 +40,7 @@ __all__ = [
     "fit_clocks",
     "pack",
     "parse_address",
+    "sensor_hello",
     "serve",
     "unpack",
 ]
