@@ -13,8 +13,9 @@ import numpy as np
 import pytest
 
 import hmpim
-from hmpim.identify import HarmonicCurve, Identification, Nonlinearity
+from hmpim.identify import HarmonicCurve, Identification, InputSet, Nonlinearity, Parameters
 from hmpim.identify.identify import identify
+from hmpim.identify.result.inputs import OutputCoherence
 from hmpim.plots import Figure
 from hmpim.record import Finding, Record
 from hmpim.report import About, render, report, sheet, write_figures
@@ -193,6 +194,36 @@ def test_several_pairs_each_have_their_section_and_a_dead_one_its_reason(found):
     assert {"pair-1", "pair-2"} <= set(page.ids)
     assert "1 of 2 pairs can be trusted" in text
     assert "is constant at 3" in text
+
+
+def test_pairs_that_are_not_coupled_are_folded_and_do_not_lead(found):
+    pair = found.pairs[0]
+    unrelated = replace(doubt("unrelated"), message="Does not follow.")
+    apart = replace(
+        pair,
+        input="v",
+        verdict="not_identifiable",
+        parameters=Parameters(),
+        warnings=(unrelated,),
+    )
+    warned = replace(pair, warnings=(doubt("drift"),))
+    line = np.array([1.0, 2.0])
+    inputs = InputSet(
+        names=("u", "v"), bands=((0.1, 20.0),) * 2, frequency=line, condition=line,
+        coherence=(OutputCoherence(output="y", frequency=line, multiple=line / 2),),
+    )  # fmt: skip
+    text = render(replace(found, pairs=(warned, apart), inputs=inputs, data=None))
+    check_sound(text)
+    above = text[text.index('<ol class="findings">') : text.index("</ol>")]
+    assert re.findall(r"About (\w+)\.|Does not", above) == ["drift"]
+    folded = text.index("1 pair is not coupled")
+    assert text.index('id="pair-1" class="on-paper" open') < folded < text.index('id="pair-2"')
+
+
+def test_a_finding_of_one_pair_of_several_names_it(found):
+    pair = found.pairs[0]
+    both = (replace(pair, warnings=(doubt("drift"),)), replace(pair, input="v", warnings=()))
+    assert "<strong>u → y:</strong> About drift." in render(replace(found, pairs=both, data=None))
 
 
 def test_units_of_a_gain_are_on_the_bode_plot(field_record):

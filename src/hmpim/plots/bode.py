@@ -232,7 +232,7 @@ def pair_bode(
 
     The measured response with its 95 % band, the fitted model over it, the model's phase
     without its delay, and marks with their 95 % intervals at the -90° and -3 dB bandwidths and
-    the natural frequency.
+    the natural frequency. One whose interval reaches down to zero is not marked.
 
     Parameters
     ----------
@@ -364,6 +364,8 @@ def _marks(pair: "PairIdentification") -> list[Mark]:
         if estimate is None:
             continue
         low, high = estimate.ci95 or (None, None)
+        if low is not None and low <= 0.0:  # it may lie anywhere: a mark would say otherwise
+            continue
         marks.append(
             Mark(
                 frequency=estimate.value,

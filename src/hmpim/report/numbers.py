@@ -5,6 +5,9 @@ from hmpim.identify.result.digits import aside, interval, plus_minus
 
 __all__ = ["format_estimate", "format_interval", "format_number", "format_value", "plus_minus"]
 
+_ROUNDING = 1e-12
+"""Error over value that is arithmetic's and not the record's."""
+
 
 def format_value(estimate: Estimate) -> str:
     """Write an estimate without its unit: ``value ± std``, or how far it may lie to either side.
@@ -15,7 +18,11 @@ def format_value(estimate: Estimate) -> str:
     '9.987 ± 0.030'
     >>> format_value(Estimate(value=0.15, std=None, ci95=(0.1474, 0.1502), unit="s"))
     '0.15000 −0.00260 +0.00020'
+    >>> format_value(Estimate(value=0.003, std=7e-19, ci95=(0.003, 0.003), unit="deg"))
+    '0.003 ± 0'
     """
+    if _exact(estimate):
+        return f"{estimate.value:.10g} ± 0"
     if estimate.std is not None:
         return plus_minus(estimate.value, estimate.std)
     low, high = estimate.ci95 or (None, None)
@@ -33,6 +40,11 @@ def format_estimate(estimate: Estimate) -> str:
     return f"{format_value(estimate)} {estimate.unit}".rstrip()
 
 
+def _exact(estimate: Estimate) -> bool:
+    """Whether nothing but rounding is left of the error."""
+    return estimate.std is not None and estimate.std <= _ROUNDING * abs(estimate.value)
+
+
 def format_interval(estimate: Estimate) -> str:
     """Write the 95 % interval with as many places as the value has.
 
@@ -43,6 +55,8 @@ def format_interval(estimate: Estimate) -> str:
     >>> format_interval(Estimate(value=0.15, std=None, ci95=(0.1474, None), unit="s"))
     '0.1474 or more'
     """
+    if _exact(estimate):
+        return "–"
     low, high = estimate.ci95 or (None, None)
     return interval(low, high, value=estimate.value, std=estimate.std)
 

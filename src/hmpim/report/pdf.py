@@ -119,7 +119,11 @@ def _data(view: dict[str, Any], drawn: Any, *, sheet: bool) -> dict[str, Any]:
         "verdict": view["verdict"],
         "notes": [_clean(note) for note in view["notes"]],
         "findings": [
-            {"message": _clean(f["message"]), "advice": f["advice"].replace("`", "")}
+            {
+                "where": _clean(f["where"]),
+                "message": _clean(f["message"]),
+                "advice": f["advice"].replace("`", ""),
+            }
             for f in view["findings"]
         ],
         "summary": view["summary"],

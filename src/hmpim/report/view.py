@@ -7,6 +7,7 @@ from typing import Any
 
 from hmpim.identify import Identification, PairIdentification
 from hmpim.plots.candidates import INTERSAMPLE_WORDS
+from hmpim.record import Finding
 from hmpim.report.about import About
 from hmpim.report.advice import advice, leading_findings
 from hmpim.report.figures import Picture, pair_pictures, stimulus_picture
@@ -67,9 +68,9 @@ def report_view(
     'Nothing was identified.'
     """
     about = about or About()
-    every = [finding for pair in result.pairs for finding in pair.warnings]
-    leading = leading_findings(every)
     main = list(result.counted) or list(result.pairs)
+    leading = leading_findings([finding for pair in main for finding in pair.warnings])
+    remarks = sum(len(pair.warnings) for pair in result.pairs)
     return {
         "title": about.title or _title(result),
         "about": _about(about, result),
@@ -77,13 +78,26 @@ def report_view(
         "verdict": result.verdict if result.pairs else "not_identifiable",
         "notes": list(notes),
         "findings": [
-            {"message": f.message, "code": f.code, "severity": f.severity, "advice": advice(f)}
+            {
+                "message": f.message,
+                "code": f.code,
+                "severity": f.severity,
+                "advice": advice(f),
+                "where": _where(f, main),
+            }
             for f in leading
         ],
-        "remarks": len(every),
+        "remarks": remarks,
         "summary": _summary(main) if len(result.pairs) > 1 else None,
         "facts": _facts(result),
-        "pairs": [_pair_view(result, pair, truth or {}) for pair in result.pairs],
+        "pairs": [
+            {
+                **_pair_view(result, pair, truth or {}),
+                "id": f"pair-{number}",
+                "counted": any(pair is one for one in main),
+            }
+            for number, pair in enumerate(result.pairs, start=1)
+        ],
         "inputs": inputs_view(result),
         "stimulus": None if stimulus is None else stimulus_picture(stimulus),
         "pictures": list(pictures),
@@ -109,6 +123,24 @@ def _about(about: About, result: Identification) -> list[tuple[str, str]]:
         ("Operator", about.operator),
         ("Date", about.date or datetime.now(UTC).strftime("%Y-%m-%d")),
     ]
+
+
+def _where(finding: Finding, pairs: Sequence[PairIdentification]) -> str:
+    """Name the pairs that remark the same, where there are several; nothing if all do."""
+    with_it = [
+        f"{pair.input} → {pair.output}"
+        for pair in pairs
+        if any(other.code == finding.code for other in pair.warnings)
+    ]
+    if len(with_it) == len(pairs):
+        return ""
+    first = next(
+        f"{pair.input} → {pair.output}"
+        for pair in pairs
+        if any(other is finding for other in pair.warnings)
+    )
+    more = len(with_it) - 1
+    return f"{first} (and {more} more)" if more else first
 
 
 def _summary(pairs: Sequence[PairIdentification]) -> dict[str, Any]:
@@ -183,7 +215,6 @@ def _pair_view(
             for c in sorted(pair.candidates, key=lambda c: c.criterion)
         ],
         "nonlinear": nonlinear_facts(pair),
-        "counted": pair in result.counted,
         "first": [picture for picture in drawn if picture.key in _FIRST],
         "rest": [p for p in drawn if p.key not in (*_FIRST, "candidates", "harmonics")],
         "named": {p.key: p for p in drawn if p.key in ("candidates", "harmonics")},

@@ -391,4 +391,5 @@ def off_by(estimate: Estimate, truth: float) -> str:
     """
     if not 0.0 < estimate.spread < math.inf:
         return format_number(estimate.value - truth)
-    return f"{(estimate.value - truth) / estimate.spread:+.1f} std"
+    steps = round((estimate.value - truth) / estimate.spread, 1) + 0.0  # no negative zero
+    return f"{steps:+.1f} std" if steps else "0.0 std"

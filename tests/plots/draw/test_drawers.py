@@ -1,6 +1,7 @@
 """Every way of drawing shows the same: the data, the ends, the ticks, the words."""
 
 import json
+from dataclasses import replace
 from itertools import combinations, pairwise
 
 import numpy as np
@@ -8,7 +9,9 @@ import pytest
 
 from hmpim import plots
 from hmpim.plots import Axis, Band, Curve, Figure, Image, Panel, Points, Rule, Span, Words
+from hmpim.plots.bode import pair_bode
 from hmpim.plots.draw.frames import frames, ticks
+from hmpim.plots.draw.layout import SIZE, places, text_width
 from hmpim.plots.style import COLOURS
 
 F = np.geomspace(0.1, 100.0, 30)
@@ -107,6 +110,27 @@ def test_panels_of_a_column_share_their_horizontal_ends():
     assert shared[0].x == shared[1].x == (-1.0, 9.0)
     apart = frames(Figure(panels=panels, alt="", heights=(1.0, 1.0), share_x=False))
     assert apart[0].x == pytest.approx((-0.05, 5.05))
+
+
+@pytest.mark.parametrize("reach", [0.05, 0.4, 0.6, 1.2, 60.0, 400.0])
+@pytest.mark.parametrize("height", [1.2, 1.7, 2.9])
+def test_numbers_of_an_axis_leave_room_for_its_label(reach, height):
+    curve = Curve(x=F, y=np.linspace(-reach, reach, F.size))
+    panel = Panel(x=Axis(), y=Axis(label="Magnitude (dB)", low=-reach, high=reach), items=(curve,))
+    figure = Figure(panels=(panel,), alt="", heights=(height,))
+    (place,), _ = places(figure, frames(figure), width=700.0)
+    widest = max(text_width(words) for _, words in place.y_ticks)
+    assert place.left - 7.0 - widest > place.edge + SIZE
+    assert text_width("−") > text_width("-")  # a true minus is as wide as a plus
+
+
+def test_a_mark_that_may_lie_anywhere_is_not_drawn(identified):
+    pair = identified["y", "u"]
+    sure = pair.parameters.bandwidth_phase90
+    wide = replace(sure, std=sure.value, ci95=(-sure.value, 3 * sure.value))
+    unsure = replace(pair, parameters=replace(pair.parameters, bandwidth_phase90=wide))
+    said = [rule.words for panel in pair_bode(unsure).panels for rule in panel.of(Rule)]
+    assert not any(words.startswith("−90° at") and "without" not in words for words in said)
 
 
 def test_a_result_is_drawn_with_its_marks_in_their_intervals(identified):

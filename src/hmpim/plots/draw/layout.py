@@ -35,7 +35,7 @@ def text_width(text: str) -> float:
     >>> 25.0 < text_width("Time") < 35.0
     True
     """
-    narrow = sum(c in "iljtfI.,:;'|!()[] −-1" for c in text)
+    narrow = sum(c in "iljtfI.,:;'|!()[] -1" for c in text)
     return SIZE * (0.64 * (len(text) - narrow) + 0.42 * narrow)
 
 
@@ -88,7 +88,7 @@ def places(figure: Figure, shown: list[Frame], *, width: float) -> tuple[list[Pl
     rows = _rows(figure, columns)
     lefts = [0.0] * columns
     for panel, frame in panels:
-        labels = [words for height in (80.0, 200.0) for _, words in _y_ticks(panel, frame, height)]
+        labels = _possible_labels(panel, frame, _PER_INCH * figure.heights[panel.row])
         room = max((text_width(words) for words in labels if panel.y.numbered), default=0.0)
         column = 0 if columns == 1 else panel.column
         lefts[column] = max(lefts[column], room + 12.0 + LINE * bool(panel.y.label))
@@ -152,5 +152,20 @@ def _tick_room(axis: Axis, frame: Frame) -> float:
     return max(longest + 14.0, 34.0)
 
 
+def _possible_labels(panel: Panel, frame: Frame, height: float) -> list[str]:
+    """Words of all ticks that a panel may have whose row is so high, title and legend included."""
+    least = _most_ticks(height - 6 * LINE)
+    most = _most_ticks(height - 8.0)
+    return [
+        words
+        for count in range(least, most + 1)
+        for _, words in ticks(panel.y, frame.y, most=count)
+    ]
+
+
+def _most_ticks(height: float) -> int:
+    return max(int(height / 26.0), 3)
+
+
 def _y_ticks(panel: Panel, frame: Frame, height: float) -> list[tuple[float, str]]:
-    return ticks(panel.y, frame.y, most=max(int(height / 26.0), 3))
+    return ticks(panel.y, frame.y, most=_most_ticks(height))
