@@ -60,8 +60,16 @@ def test_a_file_that_breaks_in_the_middle_gives_each_record_once(rows_file, monk
 
 
 def test_rows_of_one_file_are_records(rows_file, tmp_path, gain_alone):
-    """Row groups end in the middle of records."""
-    table = hmpim.batch(rows_file, out=tmp_path / "out", fs=FS, cluster=HERE)
+    """Row groups end in the middle of records; how many there are is reckoned from the first."""
+    totals = []
+    table = hmpim.batch(
+        rows_file,
+        out=tmp_path / "out",
+        fs=FS,
+        cluster=HERE,
+        progress=lambda state: totals.append(state.total),
+    )
+    assert (totals[0], totals[-1]) == (9, 8)  # the first 250 of 800 rows hold three
     assert gains(table) == {f"{rows_file}#unit{k}": float(k) for k in range(1, 9)}
     frame = table.to_pandas(["record", "meta_bench"])
     assert frame["meta_bench"].tolist().count("left") == 4
@@ -75,8 +83,15 @@ def test_groups_of_one_file_are_records(tmp_path, gain_alone):
             group = file.create_group(f"runs/unit{k}")
             group["u"], group["y"] = (c.values for c in record.channels)
             group.attrs["fs"], group.attrs["serial"] = FS, f"S{k}"
-    request = Request(group="/runs")
-    table = hmpim.batch(path, out=tmp_path / "out", request=request, cluster=HERE)
+    one, totals = Cluster(workers=0, per_task=1), []
+    table = hmpim.batch(
+        path,
+        out=tmp_path / "out",
+        request=Request(group="/runs"),
+        cluster=one,
+        progress=lambda state: totals.append(state.total),
+    )
+    assert set(totals) == {2}
     assert gains(table) == {f"{path}#/runs/unit{k}": float(k) for k in (1, 2)}
     assert sorted(table.to_pandas(["meta_serial"])["meta_serial"]) == ["S1", "S2"]
 
@@ -93,8 +108,15 @@ def test_lists_in_cells_are_records(tmp_path, gain_alone):
         "fs": [FS] * 3,
     }
     parquet.write_table(pa.table(cells), path)
-    table = hmpim.batch(path, out=tmp_path / "out", cluster=HERE)
+    one, totals = Cluster(workers=0, per_task=1), []
+    table = hmpim.batch(
+        path,
+        out=tmp_path / "out",
+        cluster=one,
+        progress=lambda state: totals.append(state.total),
+    )
     assert gains(table) == {f"{path}#{k}": float(k + 1) for k in range(3)}
+    assert set(totals) == {3}
 
 
 def test_a_record_that_fails_is_a_row_with_its_reason(folder_of_records, tmp_path):

@@ -73,7 +73,7 @@ class Scheduler:
             if promise.status == "pending":
                 promise.ends("cancelled")
 
-    def close(self, timeout):
+    def close(self, timeout=None):
         self.status = "closed"
 
 
@@ -134,6 +134,30 @@ def test_patience_ends(monkeypatch):
     crew._client.goes()
     with pytest.raises(hmpim.HmpimError, match="no Dask scheduler at 'tcp://away:1'"):
         crew.next()
+
+
+def test_workers_are_seen_to_while_others_bring_results(monkeypatch):
+    """One that died does not wait until the others are idle."""
+    scheduler, seen = Scheduler(), []
+    crew = pool._Dask(lambda: scheduler, lambda: seen.append(len(seen)), 60.0, lambda text: None)
+    monkeypatch.setattr(pool, "_LOOK", 0.0)
+    for k in range(3):
+        crew.submit(Numbered(str(k)))
+        scheduler.does(k)
+    assert [crew.next().done for _ in range(3)] == ["0", "1", "2"]
+    assert seen == [0, 1, 2]
+
+
+def test_workers_without_hmpim_are_named():
+    """Asked before a task is given: each would die of it."""
+
+    class Bare(Scheduler):
+        def run(self, call, name, on_error):
+            assert call(name).do_task is not None  # what they are to import is there
+            return {"tcp://a": None, "tcp://b": ModuleNotFoundError("No module named 'hmpim'")}
+
+    with pytest.raises(hmpim.HmpimError, match=r"worker tcp://b cannot import .*extra 'batch'"):
+        pool._check_workers(Bare())
 
 
 def started(*words: str) -> subprocess.Popen:

@@ -6,7 +6,7 @@ for the record: it is known without reading a sample.
 """
 
 import hashlib
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 from typing import Any, Literal
@@ -175,19 +175,35 @@ def opened(file: File) -> Any:
     return system.open(place, "rb")
 
 
-def addresses_of(file: File, request: Request) -> Iterator[Address]:
+Expect = Callable[[int], None]
+"""Told how many records a file holds, as soon as that is known or can be reckoned."""
+
+
+def addresses_of(
+    file: File, request: Request, expect: Expect = lambda count: None
+) -> Iterator[Address]:
     """Say which records a file holds; one, unless it is made for many.
 
     A Parquet file holds many if it has the request's column of records, or lists in the input's
     column; an HDF5 file, if each group below the request's group holds data.
+
+    Parameters
+    ----------
+    file : File
+        Where to look.
+    request : Request
+        What separates the records of a file.
+    expect : callable, optional
+        Told how many records it holds, before they are all listed: exactly for lists and groups,
+        and by the rows read so far where each record has rows of its own.
     """
     suffix = PurePosixPath(file.url).suffix.lower()
     try:
         if suffix in _PARQUET:
-            yield from _in_parquet(file, request)
+            yield from _in_parquet(file, request, expect)
             return
         if suffix in _HDF5:
-            yield from _in_hdf5(file, request)
+            yield from _in_hdf5(file, request, expect)
             return
     except Exception:  # damaged: what is wrong is said in the record's row when it is read
         yield Address(file=file, form="broken")
@@ -195,12 +211,13 @@ def addresses_of(file: File, request: Request) -> Iterator[Address]:
     yield Address(file=file)
 
 
-def _in_parquet(file: File, request: Request) -> Iterator[Address]:
+def _in_parquet(file: File, request: Request, expect: Expect) -> Iterator[Address]:
     parquet = need("pyarrow.parquet", extra="batch", what="a Parquet file")
     with opened(file) as handle:
         whole = parquet.ParquetFile(handle)
         names = whole.schema_arrow.names
         if any("list" in str(field.type) for field in whole.schema_arrow):
+            expect(whole.metadata.num_rows)
             labels = request.record_column in names
             start = 0
             for k in range(whole.num_row_groups):
@@ -215,12 +232,12 @@ def _in_parquet(file: File, request: Request) -> Iterator[Address]:
                     )
                 start += count
         elif request.record_column in names:
-            yield from _runs_of(file, whole, request.record_column)
+            yield from _runs_of(file, whole, request.record_column, expect)
         else:
             yield Address(file=file)
 
 
-def _runs_of(file: File, whole: Any, column: str) -> Iterator[Address]:
+def _runs_of(file: File, whole: Any, column: str, expect: Expect) -> Iterator[Address]:
     """Rows that follow one another and belong to one record, through all row groups."""
     label, begin, start = None, 0, 0
     seen: set[object] = set()
@@ -230,6 +247,9 @@ def _runs_of(file: File, whole: Any, column: str) -> Iterator[Address]:
         index = np.asarray(codes.indices.fill_null(-1))
         names = codes.dictionary.to_pylist()
         edges = np.flatnonzero(np.diff(index)) + 1
+        if index.size:
+            found = len(seen) + edges.size + 1
+            expect(found * whole.metadata.num_rows // (start + index.size))
         for first in (0, *edges.tolist()) if index.size else ():
             here = names[index[first]] if index[first] >= 0 else ""
             if label is None:
@@ -248,7 +268,7 @@ def _rows(file: File, label: object, start: int, stop: int, seen: set[object]) -
     return Address(file=file, form=form, place=str(label), start=start, stop=stop)
 
 
-def _in_hdf5(file: File, request: Request) -> Iterator[Address]:
+def _in_hdf5(file: File, request: Request, expect: Expect) -> Iterator[Address]:
     import h5py
 
     with opened(file) as handle:
@@ -260,6 +280,7 @@ def _in_hdf5(file: File, request: Request) -> Iterator[Address]:
         with h5py.File(handle, "r") as whole:
             place = whole[request.group]
             groups = [name for name in place if isinstance(place.get(name), h5py.Group)]
+            expect(len(groups))
             for name in groups:
                 path = f"{request.group.rstrip('/')}/{name}"
                 yield Address(file=file, form="group", place=path)

@@ -14,6 +14,7 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from importlib import import_module
 from typing import Any, Protocol
 
 from hmpim.errors import ArgumentError, HmpimError
@@ -115,7 +116,7 @@ class _Dask:
         self._client = connect()
         self._under_way: dict[str, tuple[Job, Any]] = {}
         self._back: queue.SimpleQueue[tuple[str, Any]] = queue.SimpleQueue()
-        self._threads, self._looked = 1, 0.0
+        self._threads, self._looked, self._tended = 1, 0.0, time.monotonic()
         self._turn = 0
 
     @property
@@ -136,12 +137,10 @@ class _Dask:
 
     def next(self) -> Finished:
         while True:
+            self._look()
             try:
                 key, future = self._back.get(timeout=_LOOK)
             except queue.Empty:
-                self._tend()
-                if self._client.status not in ("running", "connecting"):
-                    self._again()
                 continue
             if key not in self._under_way:
                 continue  # of a scheduler that is gone
@@ -150,6 +149,15 @@ class _Dask:
                 continue
             task, _ = self._under_way.pop(key)
             return _finished(task, future)
+
+    def _look(self) -> None:
+        """See to the workers and the scheduler now and then, however quickly tasks come back."""
+        if time.monotonic() - self._tended < _LOOK:
+            return
+        self._tend()
+        if self._client.status not in ("running", "connecting"):
+            self._again()
+        self._tended = time.monotonic()
 
     def _again(self) -> None:
         """Connect anew, and give all that is under way again."""
@@ -225,10 +233,11 @@ def dask_pool(
     Raises
     ------
     ArgumentError
-        If there is no such scheduler, or it has no workers.
+        If there is no such scheduler, it has no workers, or they have no hmpim.
     """
     distributed = need("distributed", extra="batch", what="a batch of records")
-    logging.getLogger("distributed").setLevel(logging.CRITICAL)
+    for name in ("distributed", "distributed.client"):  # Dask gives the second a level of its own
+        logging.getLogger(name).setLevel(logging.CRITICAL)
     with contextlib.ExitStack() as stack:
         tend = _nothing
         if scheduler is None:
@@ -247,7 +256,10 @@ def dask_pool(
         where = scheduler
 
         def connect() -> Any:
-            return _client(distributed, where, tend, patience)
+            client = _client(distributed, where, tend, patience)
+            if tend is _nothing:
+                _check_workers(client)
+            return client
 
         pool = _Dask(connect, tend, patience, say)
         stack.callback(pool.close)
@@ -273,6 +285,18 @@ def _client(distributed: Any, scheduler: str, tend: Callable[[], None], patience
             )
         time.sleep(0.05)
     return client
+
+
+def _check_workers(client: Any) -> None:
+    """Have each worker import what it needs: one that cannot would die of its first task."""
+    told = client.run(import_module, "hmpim.batch.work", on_error="return")
+    for address, found in told.items():
+        if isinstance(found, Exception):
+            client.close()
+            raise ArgumentError(
+                f"the worker {address} cannot import hmpim ({found}); give it this version with "
+                "the extra 'batch'"
+            )
 
 
 class _Crew:

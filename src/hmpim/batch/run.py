@@ -70,7 +70,7 @@ class State:
     Parameters
     ----------
     records, total : int
-        Done, earlier runs included, and known of so far.
+        Done, earlier runs included, and known of so far, or reckoned from the rows read so far.
     repeated : int
         How many of those done were done by earlier runs.
     failures : int
@@ -313,10 +313,17 @@ class _Run:
         )
 
     def _counted(self, file: File) -> Iterator[Address]:
-        """Records of a file; what is known of in all grows with those beyond the first."""
-        for k, address in enumerate(addresses_of(file, self._request)):
-            self._known += k > 0
+        """Records of a file, which counts as one until more is known of it."""
+        others, listed = self._known - 1, 0
+
+        def expect(count: int) -> None:
+            self._known = others + max(count, listed)
+
+        for address in addresses_of(file, self._request, expect):
+            listed += 1
+            self._known = max(self._known, others + listed)
             yield address
+        self._known = others + listed
 
     def _columns(self, first: Address) -> tuple[str, ...]:
         """Columns of metadata: those of the table beside, and those of the first record."""
