@@ -9,7 +9,7 @@ DEV    := $(VENV)/.dev-installed
 # they share is made once. Byte code is kept: the suite starts the command line many times.
 PYTEST := PYTHONDONTWRITEBYTECODE= OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n auto --dist loadscope
 
-.PHONY: help install demo test check studies bench accuracy docs clean
+.PHONY: help install demo test browser check studies bench accuracy docs clean
 help:  ## show this list
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
 
@@ -33,6 +33,10 @@ demo: $(RUN)  ## a sensor and then five axes at once: parameters found, pages to
 
 test: $(DEV)  ## the test suite: a few minutes on two cores
 	$(PYTEST)
+
+# One process: there is one workbench and one browser, which are busy themselves.
+browser: $(DEV)  ## the workbench in a browser (Chromium), what `make test` leaves out
+	$(PYTEST) -n 0 -m browser tests/workbench
 
 studies: $(DEV)  ## the long form: HMPIM_SEEDS seeds (200), HMPIM_EXAMPLES times the examples (50)
 	HMPIM_EXAMPLES=$${HMPIM_EXAMPLES:-50} $(PYTEST) -m "study or hypothesis"

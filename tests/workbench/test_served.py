@@ -135,6 +135,7 @@ def test_a_design_follows_its_sliders_and_stays_inside_its_limits(page, served):
     assert page.get_by_label("To (Hz)").input_value() == "15"
 
 
+@pytest.mark.browser
 def test_five_axes_run_once_every_light_is_green(page, served):
     rows = tuple(replace(row, low=0.5, amplitude=1.0) for row in five_axes())
     wish = Wish(rows=rows, duration=4.0, fs=500.0, model=Model(noise_std=0.01))
@@ -156,7 +157,7 @@ def test_five_axes_run_once_every_light_is_green(page, served):
     page.get_by_role("button", name="Disarm").click()
 
 
-@pytest.mark.study
+@pytest.mark.browser
 def test_a_second_window_looks_on_cannot_start_and_may_stop(page, served, window):
     folder = start(page, served, checked(ROLL, "bench"))
     other = window()
@@ -184,6 +185,7 @@ def test_the_stop_button_ends_a_run_at_once_and_keeps_the_record(page, served):
     page.get_by_role("button", name="Disarm").click()
 
 
+@pytest.mark.browser
 def test_a_lost_window_ends_its_run_and_the_record_is_kept(page, served, window):
     lost = window()
     folder = start(lost, served, checked(ROLL, "bench"))
@@ -191,7 +193,7 @@ def test_a_lost_window_ends_its_run_and_the_record_is_kept(page, served, window)
     lost.wait_for_selector(".hm-strip[data-end]")
     lost.context.close()
     go(page, served, "run")
-    page.get_by_text("the window that armed the rig is gone").first.wait_for()
+    page.get_by_text("Ended early: the window that armed the rig is gone").wait_for()
     record = hmpim.load(folder / "run.h5")
     assert record.duration < 300.0
     assert any("is gone" in f.message for f in record.findings)
@@ -211,7 +213,7 @@ DRAG = """(factor) => {
 }"""
 
 
-@pytest.mark.study
+@pytest.mark.browser
 def test_a_foreign_file_is_dropped_identified_read_by_eye_and_reported(page, served, tmp_path):
     record = recorded()
     u, y = record.inputs[0].values, record.outputs[0].values
@@ -293,7 +295,7 @@ def test_two_runs_are_compared_and_held_against_a_specification(page, served):
     assert page.get_by_role("row", name=re.compile("unit2.* ok ok ")).count() == 1
 
 
-@pytest.mark.study
+@pytest.mark.browser
 def test_a_campaign_names_no_code_is_stopped_and_resumed(page, served):
     code = PLAN.replace('kind = "sensor"', 'kind = "python"\nentry = "os:system"')
     code = "\n".join(line for line in code.splitlines() if not line.startswith("sensor ="))
