@@ -16,20 +16,22 @@ from hmpim.units import rate_label
 if TYPE_CHECKING:
     from hmpim.identify import Identification, PairIdentification
     from hmpim.record import Record
-    from hmpim.stimulus import Stimulus
+    from hmpim.stimulus import Limits, Stimulus
 
 __all__ = ["input_output", "model_over_measurement", "residuals", "time_histories"]
 
 MOST_LAGS = 100  # of the residual's autocorrelation; more cannot be told apart on a page
 
 
-def time_histories(stimulus: "Stimulus") -> Figure:
+def time_histories(stimulus: "Stimulus", *, limits: "Limits | None" = None) -> Figure:
     """Describe a stimulus's position, velocity and acceleration, each with its limit (Fig. 3).
 
     Parameters
     ----------
     stimulus : hmpim.stimulus.Stimulus
         What is sent to the unit under test.
+    limits : hmpim.stimulus.Limits, optional
+        Others to draw than its own, in its unit: what the unit under test allows, say.
 
     Examples
     --------
@@ -39,7 +41,7 @@ def time_histories(stimulus: "Stimulus") -> Figure:
     >>> [panel.y.label for panel in figure.panels]
     ['Position (deg)', 'Velocity (deg/s)', 'Acceleration (deg/s²)']
     """
-    limits = stimulus.limits
+    limits = stimulus.limits if limits is None else limits
     parts = (
         ("Position", stimulus.position, None if limits is None else limits.position),
         ("Velocity", stimulus.velocity, None if limits is None else limits.velocity),

@@ -1,12 +1,15 @@
 """The page that designs: what is wished, sliders, and all that follows from them."""
 
+import asyncio
+import time
 from dataclasses import replace
 from typing import Any
 
-from nicegui import ui
+from nicegui import background_tasks, ui
 
 from hmpim.errors import HmpimError
 from hmpim.plots import Figure
+from hmpim.plots.stimulus import stimulus_spectrogram
 from hmpim.workbench.bench import Window
 from hmpim.workbench.desks import AxisRow, Wish
 from hmpim.workbench.pages.frame import Command, Later, card, failures_said
@@ -16,13 +19,17 @@ from hmpim.workbench.work.design import stimulus_part
 from hmpim.workbench.work.designed import (
     Designed,
     designed,
+    error_cells,
     five_axes,
     save_design,
-    spectrogram,
+    spectrum,
 )
 from hmpim.workbench.workers import Latest
 
 __all__ = ["design"]
+
+_SPECTRUM_EVERY = 0.3  # s between two spectra while a slider moves faster than all can follow
+_REST = 0.15  # s without a change after which tables and spectrogram follow
 
 
 def design(window: Window) -> Later:
@@ -44,7 +51,13 @@ class DesignPage:
         self.latest = Latest()
         self.pictures: dict[str, Picture] = {}
         self.sliders: dict[str, tuple[ui.slider, ui.label]] = {}
-        self.drawn: tuple[Wish, int] | None = None  # whose spectrogram is shown
+        # what is shown: the design, and of which wishes motion, spectrum and spectrogram are
+        self.found: Designed | None = None
+        self.moved: tuple[Wish, int] | None = None
+        self.windowed: tuple[Wish, int, float] | None = None
+        self.spectrogram_of: tuple[Wish, int] | None = None
+        self.spectrum_at = 0.0
+        self.resting: asyncio.Task[None] | None = None
         with ui.element("div").classes("hm-side"):
             with card("Sliders"):
                 self._sliders()
@@ -85,7 +98,10 @@ class DesignPage:
     def _set(self, **changes: Any) -> Any:
         if any(value is None for name, value in changes.items() if name in _NEEDED):
             return None
-        self.window.change(wish=replace(self.wish, **changes))
+        wish = replace(self.wish, **changes)
+        if wish == self.wish:
+            return None  # a key on a slider tells its value twice
+        self.window.change(wish=wish)
         return self.draw()
 
     async def _solve(self) -> None:
@@ -212,43 +228,74 @@ class DesignPage:
         await self.draw()
 
     async def _draw(self) -> None:
+        """Show what follows from the wish: what has changed, and first what moves the plots."""
         wish, axis, soon = self.wish, int(self.axis.value or 0), self.window.workbench.workers.soon
-        if wish.gentlest:
+        if self.resting is not None:
+            self.resting.cancel()
+        moved = (stimulus_part(wish), axis)
+        if wish.gentlest and moved != self.moved:
             self.said.set_text("Searching for the gentlest …")
             self.said.classes(replace="hm-verdict hm-soft")
         try:
-            found = await soon(designed, wish, axis)
-            if self.said.is_deleted:  # the page was left meanwhile
-                return
-            self._show(found)
-            shown = (stimulus_part(wish), axis)
-            if shown == self.drawn or self.latest.newer:
-                return
-            figure = await soon(spectrogram, wish, axis)
-            if not self.said.is_deleted:
-                self.drawn = shown
-                self._picture("spectrogram", figure)
+            if moved != self.moved:
+                self.moved, self.windowed = None, None
+                self.found = await soon(designed, wish, axis)
+                if self.said.is_deleted:  # the page was left meanwhile
+                    return
+                self._picture("motion", self.found.motion)
+                self._say(self.found)
+                self.moved = moved
+            windowed = (*moved, wish.alpha)
+            late = time.monotonic() - self.spectrum_at > _SPECTRUM_EVERY
+            if windowed != self.windowed and (late or not self.latest.newer):
+                figure = await soon(spectrum, wish, axis)
+                if self.said.is_deleted:
+                    return
+                self._picture("spectrum", figure)
+                self.windowed, self.spectrum_at = windowed, time.monotonic()
+            if not self.latest.newer:
+                self.resting = background_tasks.create(self._rest(wish, moved))
         except HmpimError as error:
-            if not self.said.is_deleted:
-                self.said.set_text(" ".join(str(error).split()))
-                self.said.classes(replace="hm-verdict hm-bad")
+            self.moved = None
+            self._refuse(error)
 
-    def _show(self, found: Designed) -> None:
+    def _refuse(self, error: HmpimError) -> None:
+        if not self.said.is_deleted:
+            self.said.set_text(" ".join(str(error).split()))
+            self.said.classes(replace="hm-verdict hm-bad")
+
+    async def _rest(self, wish: Wish, moved: tuple[Wish, int]) -> None:
+        """Show, once the sliders rest, what no hand on a slider waits for."""
+        await asyncio.sleep(_REST)
+        workers, found = self.window.workbench.workers, self.found
+        if found is None or self.said.is_deleted:
+            return
+        try:
+            errors = await workers.soon(error_cells, wish)
+            if self.tables.is_deleted:
+                return
+            self._tabulate(found, errors)
+            if moved != self.spectrogram_of:
+                figure = await workers.do(stimulus_spectrogram, found.shown)
+                if not self.said.is_deleted:
+                    self.spectrogram_of = moved
+                    self._picture("spectrogram", figure)
+        except HmpimError as error:
+            self._refuse(error)
+
+    def _tabulate(self, found: Designed, errors: tuple[tuple[str, ...], ...]) -> None:
+        self.tables.clear()
+        with self.tables:
+            heads = ("Axis", "Quantity", "Peak", "Limit", "")
+            plain_table(heads, found.peaks, title="Peaks and limits")
+            plain_table(("Axis", "Parameter", "Predicted ± (95 %)"), errors, title="Error bars")
+
+    def _say(self, found: Designed) -> None:
         for name, value in found.solved.items():
             self.sliders[name][1].set_text(f"solved: {value:.3g}")
         self.said.set_text(found.words)
         self.said.classes(replace="hm-verdict hm-ok" if found.inside else "hm-verdict hm-bad")
         self.command.show(found.command)
-        self.tables.clear()
-        with self.tables:
-            plain_table(
-                ("Axis", "Quantity", "Peak", "Limit", ""), found.peaks, title="Peaks and limits"
-            )
-            plain_table(
-                ("Axis", "Parameter", "Predicted ± (95 %)"), found.errors, title="Error bars"
-            )
-        for name, figure in found.figures.items():
-            self._picture(name, figure)
 
     def _picture(self, name: str, figure: Figure) -> None:
         if name in self.pictures:

@@ -27,14 +27,29 @@ function recoloured(value) {
   return Object.fromEntries(Object.entries(value).map(([k, v]) => [k, recoloured(v)]));
 }
 
+// What two drawings must have in common for one to take the other's curves: all but the curves'
+// points and the ends of the axes.
+function likeness(data, layout) {
+  if (data.some((t) => t.type !== "scatter" || t.error_y)) return "";
+  const axes = /^[xy]axis\d*$/;
+  const bare = Object.entries(layout).map(([k, v]) => [k, axes.test(k) ? { ...v, range: 0 } : v]);
+  return JSON.stringify([bare, data.map((t) => ({ ...t, x: 0, y: 0 }))]);
+}
+
+function ends(layout) {
+  const axes = Object.entries(layout).filter(([k]) => /^[xy]axis\d*$/.test(k));
+  return Object.fromEntries(axes.map(([k, v]) => [k, v.range]));
+}
+
 export default {
   template: '<div class="hm-picture" role="figure" :aria-label="alt"></div>',
   props: { figure: Object, cursors: Array, alt: String },
   async mounted() {
+    this.current ??= { figure: this.figure, cursors: this.cursors };
+    this.drawn = 0;
     const { Plotly } = await import("nicegui-plotly");
     this.Plotly = Plotly;
-    this.drawn = 0;
-    this.update();
+    await this.update();
     this.sizes = new ResizeObserver(() => this.drawn && Plotly.Plots.resize(this.$el));
     this.sizes.observe(this.$el);
     this.theme = new MutationObserver(() => {
@@ -49,10 +64,20 @@ export default {
     this.Plotly?.purge(this.$el);
   },
   methods: {
+    // Draws another figure. Of several that come while one is drawn only the last counts.
+    show(figure, alt, cursors) {
+      this.current = { figure, cursors };
+      this.$el.setAttribute("aria-label", alt);
+      if (!this.drawn || this.waiting) return; // it is drawn with all else that comes first
+      this.waiting = setTimeout(() => this.update(), 0);
+    },
     async update() {
-      if (!this.Plotly || !this.figure) return;
+      clearTimeout(this.waiting);
+      this.waiting = 0;
+      if (!this.Plotly) return;
       const dark = (this.dark = document.body.classList.contains("body--dark"));
-      const plain = { data: unpacked(this.figure.data), layout: unpacked(this.figure.layout) };
+      const { figure, cursors } = this.current;
+      const plain = { data: unpacked(figure.data), layout: unpacked(figure.layout) };
       const { data, layout } = dark ? recoloured(plain) : plain;
       layout.font = { ...(layout.font ?? {}), color: dark ? "#e6edf3" : "#1f2328" };
       if (this.$el.clientWidth < 600) {
@@ -60,17 +85,36 @@ export default {
         layout.legend = { ...layout.legend, font: { size: 10 } };
       }
       this.fixed = (layout.shapes ?? []).length;
-      layout.shapes = [...(layout.shapes ?? []), ...(this.cursors ?? []).map(this.shape)];
+      layout.shapes = [...(layout.shapes ?? []), ...(cursors ?? []).map(this.shape)];
+      const like = likeness(data, layout);
+      if (this.drawn && like && like === this.like) await this.move(data, layout);
+      else await this.redraw(data, layout, cursors);
+      this.like = like;
+      this.ends = ends(layout);
+      this.drawn += 1;
+      this.$el.dataset.drawn = this.drawn;
+    },
+    async redraw(data, layout, cursors) {
       // shapes are dragged at once with this alone; "editable" only makes them ask for a click first
-      const edits = { shapePosition: (this.cursors ?? []).length > 0 };
+      const edits = { shapePosition: (cursors ?? []).length > 0 };
       const config = { displaylogo: false, responsive: true, scrollZoom: false, edits };
       await this.Plotly.react(this.$el, data, layout, config);
       for (const path of this.$el.querySelectorAll(".shapelayer path[data-index]")) {
         if (Number(path.dataset.index) < this.fixed) path.style.pointerEvents = "none";
       }
       if (!this.drawn) this.$el.on("plotly_relayout", this.moved);
-      this.drawn += 1;
-      this.$el.dataset.drawn = this.drawn;
+    },
+    // Moves curves, and ends of axes that nobody has zoomed; nothing else is drawn anew.
+    async move(data, layout) {
+      const near = (a, b) => a.every((v, k) => Math.abs(v - b[k]) < 1e-9 * (Math.abs(v) + 1e-9));
+      const frame = { data: data.map(({ x, y }) => ({ x, y })), traces: [...data.keys()], layout: {} };
+      for (const [axis, range] of Object.entries(ends(layout))) {
+        const shown = this.$el.layout[axis].range;
+        if (near(shown, this.ends[axis]) && !near(shown, range)) frame.layout[axis] = { range };
+      }
+      await this.Plotly.animate(this.$el, frame, {
+        mode: "immediate", transition: { duration: 0 }, frame: { duration: 0, redraw: false },
+      });
     },
     shape(c) {
       const across = c.axis === "y";
@@ -89,7 +133,7 @@ export default {
       for (const [key, value] of Object.entries(event)) {
         const dragged = key.match(/^shapes\[(\d+)\]\.(x0|y0)$/);
         if (dragged && Number(dragged[1]) >= this.fixed) {
-          const cursor = this.cursors[Number(dragged[1]) - this.fixed];
+          const cursor = this.current.cursors[Number(dragged[1]) - this.fixed];
           const own = cursor.axis === "y" ? "y0" : "x0";
           if (own === dragged[2]) this.$emit("cursor", { name: cursor.name, at: Number(value) });
         }
@@ -103,6 +147,10 @@ export default {
     },
     refill(curves) {
       if (!this.drawn) return;
+      const { figure } = this.current;
+      const data = figure.data.map((t) => ({ ...t }));
+      for (const { index, x, y } of curves) Object.assign(data[index], { x, y });
+      this.current = { ...this.current, figure: { ...figure, data } };
       const numbers = curves.map((c) => c.index);
       const x = curves.map((c) => unpacked(c.x));
       const y = curves.map((c) => unpacked(c.y));

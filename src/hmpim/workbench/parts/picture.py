@@ -66,6 +66,7 @@ class Picture(Element, component="picture.js"):
     ) -> None:
         super().__init__()
         self._described = figure
+        self._seen: tuple[int, float, float] | None = None  # panel and ends that are zoomed
         self._set(figure, cursors)
         self.on("zoom", self._zoom)
         if on_cursor is not None:
@@ -79,14 +80,18 @@ class Picture(Element, component="picture.js"):
             self.on("cursor", dropped)
 
     def show(self, figure: Figure, *, cursors: Sequence[Cursor] = ()) -> None:
-        """Draw another figure in its place; what is zoomed stays so."""
+        """Draw another figure in its place; what is zoomed stays so.
+
+        The figure goes to this picture alone: the page around it is not drawn anew.
+        """
         self._described = figure
         self._set(figure, cursors)
-        self.update()
-        self.run_method("update")
+        self.run_method("show", *(self._props[name] for name in ("figure", "alt", "cursors")))
 
     def _set(self, figure: Figure, cursors: Sequence[Cursor]) -> None:
         drawn = figure.to_plotly(most_points=MOST)
+        if self._seen is not None:
+            drawn["data"] = zoomed(figure, *self._seen).to_plotly(most_points=MOST)["data"]
         drawn["layout"]["uirevision"] = "kept"
         self._props["figure"] = packed(drawn)
         self._props["alt"] = figure.alt
@@ -105,6 +110,7 @@ class Picture(Element, component="picture.js"):
     def _zoom(self, event: events.GenericEventArguments) -> None:
         panel = int(event.args["panel"] or 1) - 1
         low, high = event.args["low"], event.args["high"]
+        self._seen = None if low is None or high is None else (panel, low, high)
         figure = zoomed(self._described, panel, low, high)
         drawn = figure.to_plotly(most_points=MOST)["data"]
         curves = [

@@ -1,14 +1,12 @@
 """A design as its page shows it: figures, tables, the command that does the same."""
 
 import shlex
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 from hmpim.formats.stimulus_files import save_stimulus
 from hmpim.plots import Figure, time_histories
-from hmpim.plots.stimulus import stimulus_spectrogram, stimulus_spectrum
+from hmpim.plots.stimulus import stimulus_spectrum
 from hmpim.stimulus import Stimulus, section_v
 from hmpim.stimulus.lead import RestToRest
 from hmpim.stimulus.section_v import FIG_4
@@ -16,24 +14,25 @@ from hmpim.workbench.desks import AxisRow, Wish
 from hmpim.workbench.names import free_place
 from hmpim.workbench.work.design import error_rows, limits_of, peak_rows, stimuli_of
 
-__all__ = ["Designed", "designed", "five_axes", "save_design", "spectrogram"]
+__all__ = ["Designed", "designed", "error_cells", "five_axes", "save_design", "spectrum"]
 
 _UNITS = {"delay": "s", "natural_frequency": "Hz"}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Designed:
-    """What follows from a wish: words, cells of tables, figures of one axis, the command.
+    """What follows from a wish at once: words, cells of a table, one axis's motion, the command.
 
-    `solved` holds what was solved of the sliders: extinction, and lead in s.
+    `solved` holds what was solved of the sliders: extinction, and lead in s. `shown` is the
+    stimulus that is drawn.
     """
 
     words: str
     solved: dict[str, float]
     inside: bool
     peaks: tuple[tuple[str, ...], ...]
-    errors: tuple[tuple[str, ...], ...]
-    figures: dict[str, Figure]
+    shown: Stimulus
+    motion: Figure
     command: str
 
 
@@ -55,6 +54,9 @@ def designed(wish: Wish, axis: int = 0) -> Designed:
     stimuli = stimuli_of(wish)
     peaks = peak_rows(wish, stimuli)
     inside = all(row.peak <= row.limit for row in peaks)
+    drawn = min(axis, len(stimuli) - 1)
+    row = wish.rows[drawn]
+    own = limits_of(replace(row, amplitude=row.position), wish.unit)  # whatever amplitude is used
     return Designed(
         words=_words(stimuli, inside),
         solved=_solved(wish, stimuli[0]),
@@ -62,29 +64,33 @@ def designed(wish: Wish, axis: int = 0) -> Designed:
         peaks=tuple(
             (r.axis or "–", r.quantity, f"{r.peak:.5g}", f"{r.limit:g}", r.unit) for r in peaks
         ),
-        errors=tuple(
-            (s.axis or "–", name.replace("_", " "), f"{value:.3g} {_UNITS.get(name, '')}".strip())
-            for s in stimuli
-            for name, value in error_rows(wish, s)
-        ),
-        figures=_figures(_shown(wish, axis), wish),
+        shown=stimuli[drawn],
+        motion=time_histories(stimuli[drawn], limits=own),
         command=_command(wish),
     )
 
 
-def spectrogram(wish: Wish, axis: int = 0) -> Figure:
-    """Describe how the spectrum of an axis goes with time; it takes longer than all the rest."""
-    figure = stimulus_spectrogram(_shown(wish, axis))
-    assert isinstance(figure, Figure)
-    return figure
-
-
-def _shown(wish: Wish, axis: int) -> Stimulus:
-    """The stimulus of an axis with the axis's own limits, whatever amplitude is used."""
+def spectrum(wish: Wish, axis: int = 0) -> Figure:
+    """Describe the spectrum of an axis, with and without the window."""
     stimuli = stimuli_of(wish)
-    shown = min(axis, len(stimuli) - 1)
-    own = limits_of(replace(wish.rows[shown], amplitude=wish.rows[shown].position), wish.unit)
-    return replace(stimuli[shown], limits=own)
+    return stimulus_spectrum(stimuli[min(axis, len(stimuli) - 1)], alpha=wish.alpha)
+
+
+def error_cells(wish: Wish) -> tuple[tuple[str, ...], ...]:
+    """Return the predicted error bars (95 %) of every axis as cells of a table."""
+    return tuple(
+        (s.axis or "–", name.replace("_", " "), f"{value:.3g} {_UNITS.get(name, '')}".strip())
+        for s in stimuli_of(wish)
+        for name, value in error_rows(wish, s)
+    )
+
+
+def _words(stimuli: tuple[Stimulus, ...], inside: bool) -> str:
+    first = stimuli[0]
+    words = f"{first.duration:.4g} s, {first.samples} samples at {first.fs:g} Hz"
+    if len(stimuli) == 1 and first.gain is not None and first.extinction is not None:
+        words += f", gain {first.gain:.4g} {first.unit}, n = {first.extinction:.3g}"
+    return f"{words}: {'inside all limits' if inside else 'beyond a limit'}."
 
 
 def _solved(wish: Wish, stimulus: Stimulus) -> dict[str, float]:
@@ -96,23 +102,6 @@ def _solved(wish: Wish, stimulus: Stimulus) -> dict[str, float]:
     if wish.lead is None and isinstance(waveform, RestToRest):
         found["lead"] = waveform.lead_in.end - waveform.lead_in.start
     return found
-
-
-def _words(stimuli: tuple[Stimulus, ...], inside: bool) -> str:
-    first = stimuli[0]
-    words = f"{first.duration:.4g} s, {first.samples} samples at {first.fs:g} Hz"
-    if len(stimuli) == 1 and first.gain is not None and first.extinction is not None:
-        words += f", gain {first.gain:.4g} {first.unit}, n = {first.extinction:.3g}"
-    return f"{words}: {'inside all limits' if inside else 'beyond a limit'}."
-
-
-def _figures(stimulus: Stimulus, wish: Wish) -> dict[str, Figure]:
-    made: dict[str, Callable[[], Any]] = {
-        "motion": lambda: time_histories(stimulus),
-        "spectrum": lambda: stimulus_spectrum(stimulus, alpha=wish.alpha),
-    }
-    figures = {name: make() for name, make in made.items()}
-    return {name: figure for name, figure in figures.items() if isinstance(figure, Figure)}
 
 
 def _command(wish: Wish) -> str:
