@@ -172,7 +172,6 @@ class DesignPage:
             self.sliders[name] = (slider, shown)
 
     def _slid(self, name: str, value: float) -> Any:
-        self.sliders[name][1].set_text(f"{value:g}")
         if name == "alpha":
             return self._set(alpha=value)
         if name == "amplitude":
@@ -243,7 +242,6 @@ class DesignPage:
                 if self.said.is_deleted:  # the page was left meanwhile
                     return
                 self._picture("motion", self.found.motion)
-                self._say(self.found)
                 self.moved = moved
             windowed = (*moved, wish.alpha)
             late = time.monotonic() - self.spectrum_at > _SPECTRUM_EVERY
@@ -253,6 +251,8 @@ class DesignPage:
                     return
                 self._picture("spectrum", figure)
                 self.windowed, self.spectrum_at = windowed, time.monotonic()
+            if self.found is not None:
+                self._say(self.found)
             if not self.latest.newer:
                 self.resting = background_tasks.create(self._rest(wish, moved))
         except HmpimError as error:
@@ -291,8 +291,9 @@ class DesignPage:
             plain_table(("Axis", "Parameter", "Predicted ± (95 %)"), errors, title="Error bars")
 
     def _say(self, found: Designed) -> None:
-        for name, value in found.solved.items():
-            self.sliders[name][1].set_text(f"solved: {value:.3g}")
+        for name, (slider, shown) in self.sliders.items():
+            solved = found.solved.get(name)
+            shown.set_text(f"{slider.value:g}" if solved is None else f"solved: {solved:.3g}")
         self.said.set_text(found.words)
         self.said.classes(replace="hm-verdict hm-ok" if found.inside else "hm-verdict hm-bad")
         self.command.show(found.command)

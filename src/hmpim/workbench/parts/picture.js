@@ -32,7 +32,8 @@ function recoloured(value) {
 function likeness(data, layout) {
   if (data.some((t) => t.type !== "scatter" || t.error_y)) return "";
   const axes = /^[xy]axis\d*$/;
-  const bare = Object.entries(layout).map(([k, v]) => [k, axes.test(k) ? { ...v, range: 0 } : v]);
+  const bare = Object.entries({ ...layout, meta: 0 })
+    .map(([k, v]) => [k, axes.test(k) ? { ...v, range: 0 } : v]);
   return JSON.stringify([bare, data.map((t) => ({ ...t, x: 0, y: 0 }))]);
 }
 

@@ -85,7 +85,8 @@ class Picture(Element, component="picture.js"):
         The figure goes to this picture alone: the page around it is not drawn anew.
         """
         self._described = figure
-        self._set(figure, cursors)
+        with self._props.suspend_updates():  # else it went twice
+            self._set(figure, cursors)
         self.run_method("show", *(self._props[name] for name in ("figure", "alt", "cursors")))
 
     def _set(self, figure: Figure, cursors: Sequence[Cursor]) -> None:
