@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 
 from hmpim.errors import ArgumentError
+from hmpim.plots.stimulus import stimulus_spectrogram
 from hmpim.workbench.desks import AxisRow, Model, Wish
 from hmpim.workbench.parts.picture import MOST, packed
 from hmpim.workbench.work.design import error_rows, stimuli_of
-from hmpim.workbench.work.designed import designed, five_axes, spectrogram
+from hmpim.workbench.work.designed import designed, five_axes, spectrum
 
 WISH = Wish(rows=(AxisRow(name="roll"),), duration=5.0, fs=200.0, model=Model(wanted=2.0))
 
@@ -29,6 +30,15 @@ def test_what_is_solved_is_what_the_stimulus_has():
     assert designed(replace(WISH, extinction=1.5, lead=0.4)).solved == {}
 
 
+def test_limits_are_drawn_as_they_are_and_not_as_the_amplitude_uses_them():
+    from hmpim.plots import Rule
+
+    half = replace(WISH, rows=(replace(WISH.rows[0], amplitude=5.0),))
+    panel = designed(half).motion.panels[0]
+    assert sorted(rule.at for rule in panel.of(Rule)) == [-10.0, 10.0]
+    assert designed(half).shown.peaks.position <= 5.0
+
+
 def test_the_gentlest_tells_as_much_as_is_wanted_at_less_acceleration(monkeypatch):
     monkeypatch.setattr("hmpim.workbench.work.design.FAMILIES", ("multisine",))  # one of three
     gentle = replace(WISH, gentlest=True)
@@ -43,7 +53,8 @@ def test_the_gentlest_tells_as_much_as_is_wanted_at_less_acceleration(monkeypatc
 
 
 def test_pictures_go_to_a_page_as_bytes_and_never_as_lists():
-    figures = [*designed(replace(WISH, fs=5000.0)).figures.values(), spectrogram(WISH)]
+    fast = replace(WISH, fs=5000.0)
+    figures = [designed(fast).motion, spectrum(fast), stimulus_spectrogram(designed(WISH).shown)]
     for figure in figures:
         drawn = packed(figure.to_plotly(most_points=MOST))
         for trace in drawn["data"]:

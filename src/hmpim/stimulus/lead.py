@@ -25,7 +25,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import minimize_scalar
 
 from hmpim.errors import ArgumentError, LimitsError
 from hmpim.stimulus.limits import QUANTITIES, Limits, three_digits
@@ -38,7 +37,10 @@ from hmpim.stimulus.sweep import Sweep
 
 __all__ = ["RestToRest", "join_time", "rest_to_rest", "starts_and_ends_at_rest"]
 
-_CHOICES = 64  # durations tried for one lead
+_CHOICES = 64  # durations tried for one lead at first
+_FINER = 33  # and in each round about the best: odd, so that the best is among them
+_CLOSE = 1e-9  # of itself: a duration is known well enough
+_ALIKE = 1e-12  # of itself: two are equally harsh but for rounding
 _STEPS = 16  # instants tried for joining or leaving
 _BEYOND = 1e12  # harsher than any lead inside the limits
 
@@ -425,16 +427,20 @@ def gentlest_between(
     low = math.log(0.3 * min(scales))
     high = min(math.log(20.0 * max(scales)), math.log(longest))
     grid = np.linspace(min(low, high - 1e-3), high, _CHOICES)
-    found = harshness(grid)
-    best = int(np.argmin(found))
-    if found[best] >= _BEYOND:
+    best, least = _shortest(harshness(grid))
+    if least >= _BEYOND:
         return None
-    around = (float(grid[max(best - 1, 0)]), float(grid[min(best + 1, grid.size - 1)]))
-    finer = minimize_scalar(
-        lambda at: float(harshness(np.array([at]))[0]),
-        bounds=around,
-        method="bounded",
-        options={"xatol": 1e-9},
-    )
-    log_duration = float(finer.x) if finer.fun <= found[best] else float(grid[best])
+    log_duration = float(grid[best])
+    # many at once: a call for one takes nearly as long as a call for all
+    while grid[-1] - grid[0] > _CLOSE:
+        grid = np.linspace(grid[max(best - 1, 0)], grid[min(best + 1, grid.size - 1)], _FINER)
+        best, found = _shortest(harshness(grid))
+        if found <= least * (1.0 + _ALIKE):
+            least, log_duration = min(found, least), float(grid[best])
     return between(first, last, start=0.0, duration=math.exp(log_duration))
+
+
+def _shortest(harshness: FloatArray) -> tuple[int, float]:
+    """Where the first of those stands that are as small as the smallest, and how small that is."""
+    least = float(harshness.min())
+    return int(np.argmax(harshness <= least * (1.0 + _ALIKE))), least
