@@ -40,7 +40,8 @@ class Workers:
 
     def stop(self) -> None:
         """End them; what is under way is not awaited."""
-        for pool in (self._pool, self._quick):
+        pools, self._pool, self._quick = (self._pool, self._quick), None, None
+        for pool in pools:
             if pool is not None:
                 for process in list((pool._processes or {}).values()):
                     process.kill()
@@ -72,8 +73,9 @@ class Workers:
         try:
             return await asyncio.wrap_future(pool.submit(work, *arguments, **named))
         except BrokenProcessPool as error:
-            self.stop()
-            self.start()
+            if pool in (self._pool, self._quick):  # else they were begun anew, or are stopped
+                self.stop()
+                self.start()
             raise HmpimError(
                 "the process that worked on it ended, perhaps for want of memory; try again"
             ) from error
