@@ -8,6 +8,9 @@ from hmpim.identify.fleet import fit_fleet, learn_fleet
 from hmpim.identify.surface import Surface, places_in
 
 FS, SAMPLES, LEARNT = 100.0, 600, 6
+NOISE = 0.1
+"""At which no record tells what the input does between its samples."""
+
 NAMES = ("delay", "scale_factor", "bias", "noise_std", "natural_frequency", "damping_ratio",
          "bandwidth_phase90", "bandwidth_3db", "peak_gain_db", "delay_low_frequency")  # fmt: skip
 
@@ -25,7 +28,7 @@ def output(seed: int, delay: float = 0.03, natural: float = 6.0) -> np.ndarray:
         delay=delay, scale_factor=2.0, denominator=(omega**-2, 0.8 / omega, 1.0), bias=0.3
     )
     y = hmpim.simulate(model, sweep(), fs=FS, intersample="bandlimited")
-    return y + 0.02 * rng.standard_normal(SAMPLES)
+    return y + NOISE * rng.standard_normal(SAMPLES)
 
 
 def alone(y: np.ndarray):
@@ -42,24 +45,30 @@ def fleet():
 
 
 def test_together_is_as_alone(fleet):
-    """To a hundredth of a standard deviation, and the standard deviations to a thousandth."""
+    """Values and intervals to a hundredth of their half width, also where they cover several
+    assumptions; what is left out, `identify` found to ask for one more pole."""
     outputs = np.stack([output(seed) for seed in range(20, 32)])
     fit = fit_fleet(fleet, outputs)
-    assert np.count_nonzero(fit.sound) >= 11
-    for y, parameters in zip(outputs[:4], fit.parameters[:4], strict=True):
-        pair = alone(y)
+    assert len(fleet.members) == 3
+    assert np.count_nonzero(fit.sound) >= 10
+    assert fit.undetermined.all()
+    for k in np.flatnonzero(fit.sound)[:4]:
+        pair, together = alone(outputs[k]), fit.parameters[k]
+        assert pair.intersample == fit.intersample[k]
         for name in NAMES:
-            one, other = getattr(pair, name), getattr(parameters, name)
-            assert other.value == pytest.approx(one.value, abs=0.01 * one.std), name
-            assert other.std == pytest.approx(one.std, rel=1e-3), name
-            assert other.ci95 == pytest.approx(one.ci95, abs=0.02 * one.std), name
+            one, other = getattr(pair, name), getattr(together, name)
+            half = (one.ci95[1] - one.ci95[0]) / 2
+            assert other.value == pytest.approx(one.value, abs=0.01 * half), name
+            assert other.ci95 == pytest.approx(one.ci95, abs=0.02 * half), name
+            assert (other.std is None) == (one.std is None), name
+    assert together.delay.std is None  # it covers all three
 
 
 def test_what_is_not_of_the_kind_is_left_to_itself(fleet):
     far, faster = output(40, delay=0.06), output(41, natural=12.0)
     clipped = np.minimum(output(42), 1.2)
     stray = output(43)
-    stray[300:] += 0.4  # a step of its own
+    stray[300:] += 1.0  # a step of its own
     fit = fit_fleet(fleet, np.stack([far, faster, clipped, stray, output(44)]))
     assert fit.sound.tolist() == [False, False, False, False, True]
     assert fit.parameters[:4] == (None,) * 4

@@ -194,9 +194,10 @@ def fleet_rows(
     seconds : float
         Processor time for each.
     """
-    for read, parameters, percent in zip(reads, fit.parameters, fit.fit_percent, strict=True):
+    for i, (read, parameters) in enumerate(zip(reads, fit.parameters, strict=True)):
         if parameters is None or read.record is None:
             continue
+        codes = [finding.code for finding in read.record.findings]
         source, output = read.record.inputs[0], read.record.outputs[0]
         yield {
             **_common(read.address, read.metadata),
@@ -206,13 +207,13 @@ def fleet_rows(
             "input_unit": source.unit,
             "output_unit": output.unit,
             "structure": fleet.structure.name,
-            "intersample": fleet.intersample,
+            "intersample": fit.intersample[i],
             "verdict": "ok",
             "fs": fleet.fs,
             "samples": read.record.samples,
-            "fit_percent": float(percent),
+            "fit_percent": float(fit.fit_percent[i]),
             "seconds": seconds,
-            "warnings": [finding.code for finding in read.record.findings],
+            "warnings": codes + ["intersample"] * bool(fit.undetermined[i]),
             **_figures(parameters),
         }
 

@@ -24,7 +24,14 @@ from hmpim.model.response import (
     response,
 )
 
-__all__ = ["Readings", "figures_of", "read_figures", "read_parameters", "system_of"]
+__all__ = [
+    "Readings",
+    "figures_at",
+    "figures_of",
+    "read_figures",
+    "read_parameters",
+    "system_of",
+]
 
 _Vector = NDArray[np.float64]
 
@@ -317,8 +324,14 @@ def figures_of(fit: Fit, *, fs: float, highest: float) -> dict[str, float | None
     fs, highest : float
         As for `read_parameters`.
     """
-    structure = fit.structure
     vector = np.concatenate([fit.theta, fit.linear])
+    return figures_at(fit.structure, vector, fs=fs, highest=highest)
+
+
+def figures_at(
+    structure: Structure, vector: _Vector, *, fs: float, highest: float
+) -> dict[str, float | None]:
+    """The same at any parameters, `vector` as `Readings` has it."""
     system = system_of(structure, vector, fs)
     marks, peak = _marks_of(structure, system, highest=highest)
     mode = _lowest_mode(structure, vector)
@@ -327,8 +340,9 @@ def figures_of(fit: Fit, *, fs: float, highest: float) -> dict[str, float | None
     return {
         "delay": system.delay,
         "delay_low_frequency": _slope_at_dc(system) if steady else system.delay,
-        "scale_factor": fs ** (structure.integrators - structure.dc_zeros) * float(fit.linear[0]),
-        "bias": float(fit.linear[-1]),
+        "scale_factor": fs ** (structure.integrators - structure.dc_zeros)
+        * float(vector[1 + structure.order]),
+        "bias": float(vector[-1]),
         "natural_frequency": natural,
         "damping_ratio": damping,
         "time_constant": dominant_time_constant(system),

@@ -19,7 +19,7 @@ from hmpim.identify.groups import PHASE_SPLIT
 from hmpim.identify.readings import figures_of
 from hmpim.identify.result import Estimate, Parameters
 
-__all__ = ["rivals_of", "spanned"]
+__all__ = ["MOVES", "rivals_of", "spanned"]
 
 _AS_LIKELY = 6.0
 """Difference of the criterion within which another filter is about as likely (odds of 20)."""
@@ -27,7 +27,7 @@ _AS_LIKELY = 6.0
 _SEEN = 3.84
 """Twice the log-likelihood that a coefficient must add to be seen (chance of 5 %)."""
 
-_MOVES = 0.05
+MOVES = 0.05
 """Share of an interval's half width from which another assumption widens it."""
 
 
@@ -105,6 +105,6 @@ def _hull(own: Estimate, values: list[float]) -> Estimate:
     if low is None or high is None or not values:
         return own
     below, above = min([own.value, *values]) - own.value, max([own.value, *values]) - own.value
-    if max(above, -below) <= _MOVES * (high - low) / 2:
+    if max(above, -below) <= MOVES * (high - low) / 2:
         return own
     return replace(own, std=None, ci95=(low + below, high + above))

@@ -24,6 +24,7 @@ from hmpim.identify.whiteness import is_white
 from hmpim.model.dynamics import STRUCTURES, Structure, StructureName, coefficients_of, theta_of
 
 __all__ = [
+    "BY_CHANCE",
     "Growth",
     "HiddenPole",
     "as_if_hidden",
@@ -35,13 +36,13 @@ __all__ = [
     "with_pole",
 ]
 
-_BY_CHANCE = 1.645
+BY_CHANCE = 1.645
 """Standard deviations of q that chance exceeds in 5 % of records without one more pole."""
 
 _CLEAR = 4.0
 """Standard deviations of q from which it is looked for elsewhere too."""
 
-_SEEN = _BY_CHANCE**2
+_SEEN = BY_CHANCE**2
 """Twice the log-likelihood that a fit of one more pole must gain, for the same chance."""
 
 _MATTERS = 0.01
@@ -104,7 +105,7 @@ class HiddenPole:
     @property
     def is_asked_for(self) -> bool:
         """Whether the record asks for a pole by more than chance, and one that matters."""
-        return self.squared > _BY_CHANCE * self.std and self.squared > (_MATTERS * self.scale) ** 2
+        return self.squared > BY_CHANCE * self.std and self.squared > (_MATTERS * self.scale) ** 2
 
     @property
     def may_hide(self) -> bool:

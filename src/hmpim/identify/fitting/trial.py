@@ -8,12 +8,12 @@ from hmpim.identify.fitting.fit import Fit, Problem
 from hmpim.identify.fitting.growth import HiddenPole
 from hmpim.record import Intersample
 
-__all__ = ["CLEARLY", "JointFit", "Trial", "likeliest_of", "trial_of"]
+__all__ = ["CLEARLY", "LIKELIER", "JointFit", "Trial", "likeliest_of", "trial_of"]
 
 CLEARLY = 6.0
 """Difference in log-likelihood that excludes an assumption (odds of 400)."""
 
-_LIKELIER = 3.0
+LIKELIER = 3.0
 """Difference in log-likelihood from which another assumption is taken than the natural one (odds
 of 20): either's figures then lie inside the intervals."""
 
@@ -92,4 +92,4 @@ def likeliest_of(trials: list[Trial], natural: Intersample) -> Trial:
     if not rivals or best in rivals:
         return best
     rival = min(rivals, key=lambda trial: trial.criterion)
-    return best if rival.criterion - best.criterion > 2 * _LIKELIER else rival
+    return best if rival.criterion - best.criterion > 2 * LIKELIER else rival

@@ -5,15 +5,15 @@ from hmpim.identify.judgement.evidence import Evidence, structure_in_words
 from hmpim.identify.spanned import rivals_of
 from hmpim.record import Finding
 
-__all__ = ["other_intersample", "wide_span"]
+__all__ = ["SHIFT", "SIZES", "WIDE", "other_intersample", "wide_span"]
 
-_SHIFT = 0.05
+SHIFT = 0.05
 """Difference of the delay, in samples, from which another assumption is worth a word."""
 
-_WIDE = 0.1
+WIDE = 0.1
 """Half width of an interval over its figure, from which what it covers is no figure any more."""
 
-_SIZES = (
+SIZES = (
     "scale_factor",
     "natural_frequency",
     "damping_ratio",
@@ -37,7 +37,7 @@ def other_intersample(evidence: Evidence) -> tuple[Finding, ...]:
     for trial in rivals_of(evidence.joint):
         apart = trial.fit.delay - best.fit.delay
         other = trial.fit.structure.name != best.fit.structure.name
-        if other or abs(apart) > _SHIFT:
+        if other or abs(apart) > SHIFT:
             model = f" with a {structure_in_words(trial.fit.structure.name)} model" if other else ""
             moves.append(f"{_WORDS[trial.intersample]}{model} by {apart:+.2f} samples")
     if not moves:
@@ -59,12 +59,12 @@ def wide_span(evidence: Evidence) -> tuple[Finding, ...]:
     if evidence.spanned is None:
         return ()
     wide: dict[str, tuple[float, float]] = {}
-    for name in _SIZES:
+    for name in SIZES:
         estimate, own = getattr(evidence.spanned, name), getattr(evidence.readings.parameters, name)
         if estimate is None or own is None or estimate.ci95 is None or estimate.ci95 == own.ci95:
             continue
         low, high = estimate.ci95
-        if high - low > 2 * _WIDE * abs(estimate.value):
+        if high - low > 2 * WIDE * abs(estimate.value):
             wide[name] = (low, high)
     if not wide:
         return ()

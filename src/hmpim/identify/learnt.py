@@ -1,0 +1,269 @@
+"""What records of one stimulus and of second order share, learnt from the first of them.
+
+What a model of one structure can make of one stimulus is a surface of few dimensions in the space
+of records. Over the box in which the units of a fleet lie it is sampled once: an orthonormal basis
+of some ten to sixty rows holds it, and a polynomial says where on it a model lies. There is one
+such surface for each assumption on what the stimulus does between its samples, unless that is
+stated, and beside each the surface of what one more pole would add.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hmpim.identify.fitting.data import shifted
+from hmpim.identify.fitting.growth import one_more_pole, with_pole
+from hmpim.identify.fitting.rows import Part, Problem
+from hmpim.identify.readings import figures_at
+from hmpim.identify.result import PairIdentification
+from hmpim.identify.surface import Surface, places_in
+from hmpim.model.dynamics import STRUCTURES, Structure
+from hmpim.model.sampled import prepare_input
+from hmpim.record import BETWEEN, Intersample
+
+__all__ = ["Fleet", "Member", "learn_fleet"]
+
+Real = NDArray[np.float64]
+
+_DEGREE = 9
+_UNSEEN = 1e-9
+"""Share of the greatest singular value below which a direction of the surface is left out."""
+
+_MOST = 150
+"""Directions that are looked for at most; a surface that has more is not held by them."""
+
+_CLEAR = 100.0
+"""By how much the criterion must prefer the structure, so that no other widens its bars."""
+
+_WIDE = 4.5
+"""Half a side of the box, in deviations of the units that it is learnt from."""
+
+_APART = (0.1, 0.02, 0.02)
+"""What another assumption moves beside half a sample: samples, and shares of ω and ζ."""
+
+_PROBE = 0.3
+"""Time constant, over the unit's own, at which one more pole is tried."""
+
+_FEWEST = 5
+_LIKELY = 1.96
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Member:
+    """The surface under one assumption.
+
+    Parameters
+    ----------
+    intersample : {'zoh', 'foh', 'bandlimited'}
+        What the stimulus does between its samples.
+    basis : ndarray, shape (r, n)
+        Orthonormal, each row without mean.
+    surface : Surface
+        Places in the basis, and the mean in the last column, of the unit-gain response; a function
+        of the delay in samples and of the logarithms of ω and ζ.
+    grown : Surface
+        Places in the basis of what one more pole adds, over the square of its time constant.
+    lost : float
+        Largest root of the sum of squares of what the basis and the surface leave out.
+    """
+
+    intersample: Intersample
+    basis: Real
+    surface: Surface
+    grown: Surface
+    lost: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Fleet:
+    """What records of one stimulus share.
+
+    Parameters
+    ----------
+    u : ndarray, shape (n,)
+        The stimulus.
+    fs : float
+        Rate in Hz.
+    band : (float, float)
+        Excited band in Hz.
+    structure : Structure
+        Of every unit.
+    natural : {'zoh', 'foh', 'bandlimited'}
+        Assumption that stands unless another is likelier at odds of 20.
+    members : tuple of Member
+        One for each assumption that is open.
+    figures : Surface
+        What is read off a model of unit gain, in the order of `names`.
+    names : tuple of str
+        Fields of `Parameters`.
+    """
+
+    u: Real
+    fs: float
+    band: tuple[float, float]
+    structure: Structure
+    natural: Intersample
+    members: tuple[Member, ...]
+    figures: Surface
+    names: tuple[str, ...]
+
+
+def learn_fleet(
+    u: Real, pairs: Sequence[PairIdentification], *, fs: float, band: tuple[float, float]
+) -> Fleet | None:
+    """Learn from some units what a fleet shares; None where they are not of one kind.
+
+    Parameters
+    ----------
+    u : ndarray, shape (n,)
+        The stimulus, common to all.
+    pairs : sequence of PairIdentification
+        What `identify` said of five or more units.
+    fs : float
+        Rate in Hz.
+    band : (float, float)
+        Excited band in Hz.
+    """
+    if len(pairs) < _FEWEST or not all(_is_plain(pair, pairs[0]) for pair in pairs):
+        return None
+    structure, found = STRUCTURES["second_order"], pairs[0].intersample
+    if found not in BETWEEN:
+        return None
+    tried = {c.intersample for c in pairs[0].candidates if c.structure == structure.name}
+    open_ = tuple(mode for mode in BETWEEN if mode in tried)
+    own = _box(pairs, fs)
+    boxes = {mode: _moved(own, found, mode) for mode in open_}
+    low = np.min([box[0] for box in boxes.values()], axis=0)
+    high = np.max([box[1] for box in boxes.values()], axis=0)
+    places = places_in(low, high, _DEGREE)
+    read = [_figures_at(_theta(place), structure, fs) for place in places]
+    names = tuple(read[0])
+    if any(tuple(r) != names for r in read):
+        return None  # a figure that some units of the box have and others do not
+    values = np.array([list(r.values()) for r in read])
+    return Fleet(
+        u=u,
+        fs=fs,
+        band=band,
+        structure=structure,
+        natural="bandlimited" if len(open_) > 1 else found,
+        members=tuple(_member(u, structure, mode, *boxes[mode]) for mode in open_),
+        figures=Surface.fitted(low, high, places, values, degree=_DEGREE),
+        names=names,
+    )
+
+
+def _is_plain(pair: PairIdentification, first: PairIdentification) -> bool:
+    """Whether nothing but its structure, clearly, is said of a unit, and the same as of another."""
+    if pair.structure != "second_order":  # of a simpler one, a second pole is never clearly absent
+        return False
+    rivals = [c.criterion for c in pair.candidates if c.structure != pair.structure]
+    chosen = next((c.criterion for c in pair.candidates if c.chosen), np.inf)
+    return (
+        (pair.structure, pair.intersample) == (first.structure, first.intersample)
+        and pair.verdict == "ok"
+        and all(w.severity == "info" for w in pair.warnings)
+        and min(rivals, default=np.inf) - chosen > _CLEAR
+        and pair.parameters.hold_period is None
+        and pair.parameters.saturation_low is None
+        and pair.parameters.saturation_high is None
+        and pair.parameters.quantization_step is None
+    )
+
+
+def _box(pairs: Sequence[PairIdentification], fs: float) -> tuple[Real, Real]:
+    """Where units of the fleet lie, under the assumption under which they were found."""
+    places = np.array([_place(pair, fs) for pair in pairs])
+    middle = np.median(places, axis=0)
+    spread = 1.4826 * np.median(np.abs(places - middle), axis=0)
+    own = fs * max(_own_error(pair) for pair in pairs)
+    least = np.array([max(3 * own, 0.02), 0.005, 0.005])
+    farthest = np.abs(places - middle).max(axis=0)
+    reach = np.maximum(_WIDE * np.maximum(spread, least), 1.3 * farthest)
+    return middle - reach, middle + reach
+
+
+def _moved(box: tuple[Real, Real], found: Intersample, mode: Intersample) -> tuple[Real, Real]:
+    """Where they lie under another assumption."""
+    apart = np.array(_APART) * (mode != found)
+    away = shifted(np.zeros(3), found, mode)
+    return box[0] + away - apart, box[1] + away + apart
+
+
+def _own_error(pair: PairIdentification) -> float:
+    """Deviation of a delay in s; of an interval that covers several models, of its shorter side."""
+    delay = pair.delay
+    if delay is None or delay.ci95 is None or None in delay.ci95:
+        return np.inf
+    if delay.std is not None:
+        return delay.std
+    low, high = (abs(float(end or 0.0) - delay.value) for end in delay.ci95)
+    return min(low, high) / _LIKELY
+
+
+def _place(pair: PairIdentification, fs: float) -> Real:
+    """Where a unit lies: delay in samples, logarithms of ω and ζ."""
+    assert pair.delay is not None
+    second, first, unit = pair.denominator
+    omega = float(np.sqrt(unit / second))
+    zeta = first / unit * omega / 2
+    return np.array([pair.delay.value * fs, np.log(omega / fs), np.log(zeta)])
+
+
+def _theta(place: Real) -> Real:
+    """Parameters of a fit at a place.
+
+    ω and ζ move more independently of each other than the fit's own, so that a box is smaller.
+    """
+    omega, zeta = np.exp(place[1:])
+    return np.array([place[0], np.log(2 * zeta / omega), 0.25 / zeta**2])
+
+
+def _member(u: Real, structure: Structure, mode: Intersample, low: Real, high: Real) -> Member:
+    places = places_in(low, high, _DEGREE)
+    problem = Problem(
+        source=prepare_input(u, mode), y=np.zeros(u.size), valid=None, longest_delay=float(u.size)
+    )
+    rows, grown = np.empty((places.shape[0], u.size)), np.empty((places.shape[0], u.size))
+    richer = one_more_pole(structure)
+    for k, place in enumerate(places):
+        theta = _theta(place)
+        lag = _PROBE * float(np.exp(-place[1]))  # over 1/ω, the unit's own
+        rows[k] = Part(problem, structure, theta).rows[0]
+        there = Part(problem, richer, with_pole(structure, theta, lag)).rows[0]
+        grown[k] = (there - rows[k]) / lag**2
+    means = rows.mean(axis=1, keepdims=True)
+    rows -= means
+    grown -= grown.mean(axis=1, keepdims=True)
+    basis = _basis_of(np.concatenate([rows, grown]))
+    inside = rows @ basis.T
+    left = np.linalg.norm(rows - inside @ basis, axis=1).max()
+    surface = Surface.fitted(low, high, places, np.hstack([inside, means]), degree=_DEGREE)
+    return Member(
+        intersample=mode,
+        basis=basis,
+        surface=surface,
+        grown=Surface.fitted(low, high, places, grown @ basis.T, degree=_DEGREE),
+        lost=float(left + np.linalg.norm(surface.error)),
+    )
+
+
+def _basis_of(rows: Real) -> Real:
+    """An orthonormal basis of all rows, (r, n), found from random sums of them.
+
+    N. Halko, P. G. Martinsson, J. A. Tropp, SIAM Review 53, 2011: so many sums span the rows as
+    well as all of them do, once they are more than the rows have dimensions.
+    """
+    sums = np.random.default_rng(0).standard_normal((min(_MOST, *rows.shape), rows.shape[0]))
+    _, sizes, basis = np.linalg.svd(sums @ rows, full_matrices=False)
+    return np.asarray(basis[sizes > _UNSEEN * sizes[0]])
+
+
+def _figures_at(theta: Real, structure: Structure, fs: float) -> dict[str, float]:
+    """What is read off the model of unit gain at a place, up to half the rate."""
+    vector = np.concatenate([theta, [1.0, 0.0]])
+    found = figures_at(structure, vector, fs=fs, highest=fs / 2)
+    own = ("scale_factor", "bias")
+    return {name: v for name, v in found.items() if v is not None and name not in own}
