@@ -10,27 +10,19 @@ import threading
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
-
 from hmpim.errors import ArgumentError, HmpimError, LimitsError
 from hmpim.experiment.collect import Played
+from hmpim.experiment.paired import Paired
 from hmpim.experiment.priority import ordinary
 from hmpim.experiment.until import Until
 from hmpim.identify import LiveEstimator
 from hmpim.identify.statistics import Look
-from hmpim.record import Channel, Record, uniform
 from hmpim.rigs import ChannelSpec, Layout, Samples
 from hmpim.stimulus import Limits, Stimulus, left_early, passes_band_at
 
 __all__ = ["Leave", "Sure", "pair_of"]
 
-Real = NDArray[np.float64]
-
-_BACK = 8  # samples held back where channels must be interpolated: the next ones change them
-_HOLE = 10  # samples missing in a row after which nothing is claimed any more
 _FARTHEST = 2.0  # s of commands that are played at most while a look is taken
-_EVEN = 0.1  # of an interval by which stamps of one clock may be uneven
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -95,60 +87,6 @@ def pair_of(until: Until, layout: Layout) -> tuple[ChannelSpec, ChannelSpec]:
     return by_name[source], by_name[output]
 
 
-class _Pair:
-    """Samples of an input and an output, put on one uniform clock as they come."""
-
-    def __init__(self, names: tuple[str, str], *, fs: float) -> None:
-        self._names, self._fs = names, fs
-        self._parts: dict[str, list[Samples]] = {name: [] for name in names}
-        self._given = 0
-        self.whole = True
-        """Whether no more than a few samples are missing."""
-
-    def add(self, samples: Mapping[str, Samples]) -> None:
-        """Take what has come."""
-        for name in self._names:
-            part = samples.get(name)
-            if part is None or not part.time.size:
-                continue
-            self._parts[name].append(part)
-
-    def fresh(self) -> tuple[Real, Real]:
-        """Samples of both that were not given before."""
-        whole = [Samples.joined(self._parts[name]) for name in self._names if self._parts[name]]
-        if len(whole) < 2 or min(part.time.size for part in whole) < 4 * _BACK:
-            return np.empty(0), np.empty(0)
-        u, y = whole
-        if u.time.size == y.time.size and np.array_equal(u.time, y.time) and self._even(u.time):
-            values, known = (u.values, y.values), u.time.size
-        else:
-            aligned = uniform(self._record(u, y))
-            one, other = aligned.inputs[0], aligned.outputs[0]
-            self._look_for_holes(one.valid & other.valid)
-            values, known = (one.values, other.values), aligned.samples - _BACK
-        fresh = slice(self._given, max(known, self._given))
-        self._given = fresh.stop
-        return values[0][fresh], values[1][fresh]
-
-    def _even(self, time: Real) -> bool:
-        return bool(np.abs(np.diff(time) * self._fs - 1.0).max() < _EVEN)
-
-    def _record(self, u: Samples, y: Samples) -> Record:
-        """Both; a clock of its own that is far from the run's begins with its first sample."""
-        late = float(y.time[0] - u.time[0])
-        shift = late if abs(late) > 1.0 else 0.0
-        source, answer = (
-            Channel(name=name, time=part.time - by, values=part.values)
-            for name, part, by in zip(("u", "y"), (u, y), (0.0, shift), strict=True)
-        )
-        return Record(inputs=(source,), outputs=(answer,), fs=self._fs)
-
-    def _look_for_holes(self, valid: NDArray[np.bool_]) -> None:
-        edges = np.flatnonzero(np.diff(np.concatenate(([True], valid, [True])).astype(np.int8)))
-        if edges.size and int(np.diff(edges.reshape(-1, 2), axis=1).max()) > _HOLE:
-            self.whole = False
-
-
 class Sure:
     """Looks on while a run is played, and says how to leave it as soon as enough is known.
 
@@ -188,7 +126,7 @@ class Sure:
                 "the stimulus has no band, so that nobody knows when it has passed it; take one "
                 "that has, design(kind='repeated') for instance"
             )
-        self._pair = _Pair((source.name, output.name), fs=self._stimulus.fs)
+        self._pair = Paired((source.name, output.name), fs=self._stimulus.fs)
         mode = layout.intersample if source.role == "input" else None  # a measured one is smooth
         self._live = LiveEstimator(
             self._stimulus, intersample="bandlimited" if mode in (None, "sampled") else mode

@@ -86,6 +86,7 @@ class Live:
     def __init__(self) -> None:
         self.channels: dict[str, Channel] = {}
         self.limits: dict[str, float] = {}
+        self.intersample: str | None = None
         self.end = 0.0
         self.seconds = 0.0
         self.blocks = 0
@@ -96,7 +97,7 @@ class Live:
             name: Channel(name=name, role=role, axis=axis, unit=unit)
             for name, role, axis, unit in begun.channels
         }
-        self.limits = begun.limits
+        self.limits, self.intersample = begun.limits, begun.intersample
         self.end, self.seconds, self.blocks = 0.0, begun.seconds, 0
 
     def take(self, block: Block) -> None:

@@ -14,6 +14,7 @@ from hmpim.experiment.readiness import Light
 from hmpim.rigs.catalogue import Description, describe, named_rigs, read_description
 from hmpim.stimulus import Stimulus
 from hmpim.workbench.live import Live
+from hmpim.workbench.looks import Looks, begun_looks
 from hmpim.workbench.names import harmless_name
 from hmpim.workbench.processes import process_context
 from hmpim.workbench.settings import Settings
@@ -100,7 +101,8 @@ class RigBench:
         self.folder: Path | None = None
         self.ended: Ended | None = None
         self.lights: dict[str, Light] = {}
-        self.looks: dict[str, list[tuple[float, float]]] = {}  # time, ± % of the natural frequency
+        self.stimuli: tuple[Stimulus, ...] = ()
+        self._looks: dict[str, Looks | None] = {}
         self.checking = False
         self.count = 0
         self._running = False
@@ -134,6 +136,13 @@ class RigBench:
             described_rig(self._settings, rig)
             self.owner, self.rig = desk, rig
             self._seen = time.monotonic()
+
+    def looks(self, axis: str) -> Looks | None:
+        """What looks on at an axis of the run; None where no estimate so far can be made of it."""
+        if axis not in self._looks:
+            played = [s for s in self.stimuli if s.axis == axis or len(self.stimuli) == 1]
+            self._looks[axis] = begun_looks(played[0], self.live.intersample) if played else None
+        return self._looks[axis]
 
     def disarm(self, desk: str) -> None:
         """Give the rig back."""
@@ -176,7 +185,8 @@ class RigBench:
             self._spare = None
             here.send(order)
             self.live, self.ended, self.folder = Live(), None, folder
-            self.lights, self.looks = {}, {}
+            self.stimuli = stimuli
+            self.lights, self._looks = {}, {}
             self.checking = questions is not None
             self._pipe, self._process, self._running = here, process, True
             self.count += 1

@@ -1,22 +1,24 @@
 """The page that runs: arm a rig, start, watch, stop."""
 
 import asyncio
+from contextlib import suppress
 
 from nicegui import events, ui
 
 from hmpim.errors import HmpimError, RigError
-from hmpim.identify import PairIdentification
+from hmpim.identify import Look
 from hmpim.plots import Figure
 from hmpim.plots.closing import closing_bars
+from hmpim.report.words import structure_words
 from hmpim.workbench.bench import Window
 from hmpim.workbench.desks import Analysis
 from hmpim.workbench.pages.frame import Command, card, failures_said
 from hmpim.workbench.parts.picture import Picture
 from hmpim.workbench.parts.strip import Strip
-from hmpim.workbench.parts.table import parameter_cells, plain_table
+from hmpim.workbench.parts.table import look_cells, plain_table
 from hmpim.workbench.rig import known_rigs
 from hmpim.workbench.work.design import digest, stimuli_of
-from hmpim.workbench.work.record import so_far
+from hmpim.workbench.work.record import response_so_far
 
 __all__ = ["ready_to_run", "run"]
 
@@ -56,9 +58,10 @@ class RunPage:
         self.window, self.bench = window, window.workbench.rig
         self.strips: dict[str, Strip] = {}
         self.shown = -1
-        self.estimating = False
         self.pictures: dict[str, Picture] = {}
-        self.estimated = -1  # samples of the last estimate
+        self.measuring = False
+        self.measured: tuple[str, int] = ("", -1)  # axis and samples of the last response
+        self.looked: tuple[str, float] = ("", -1.0)  # axis and time of the last look
         with ui.element("div").classes("hm-side"):
             with card("Rig"):
                 self.choice = rig_choice(window)
@@ -78,7 +81,8 @@ class RunPage:
                 ui.label("The Escape key stops too.").classes("hm-soft")
             with card("Estimate so far"):
                 self.axis = ui.select([], label="Axis").props("dense")
-                self.estimates = ui.element("div").props('aria-live="polite"')
+                self.told = ui.label().classes("hm-soft")
+                self.estimates = ui.element("div")
             with card("Log"):
                 self.log = ui.label().classes("hm-pre").props("tabindex=0")
         with ui.element("div").classes("hm-body"):
@@ -93,7 +97,8 @@ class RunPage:
         self.command = Command(_command(window))
         ui.keyboard(on_key=self._key, ignore=[])
         ui.timer(_EVERY, self._tick)
-        ui.timer(2.0, self._estimate)
+        ui.timer(0.5, self._look)
+        ui.timer(2.0, self._measure)
         ui.timer(0.5, lambda: self.log.set_text("\n".join(self.bench.lines)))
         self._tick()
 
@@ -146,7 +151,8 @@ class RunPage:
         live, bench = self.bench.live, self.bench
         if bench.count != self.shown or (live.channels and not self.strips):
             self.shown = bench.count
-            self.estimated = -1
+            self.measured, self.looked = ("", -1), ("", -1.0)
+            self.told.set_text("")
             self.strips = {}
             self.chart.clear()
             self.after.clear()
@@ -186,54 +192,64 @@ class RunPage:
 
                 ui.button("Analyse it", on_click=analyse).style("align-self: flex-start")
 
-    async def _estimate(self) -> None:
-        """Estimate from what has come in; the next begins when this one is done."""
-        live = self.bench.live
-        channels = live.of(self.axis.value or "") if self.axis.value is not None else {}
-        if self.estimating or self.bench.checking or len(channels) < 2:
+    async def _look(self) -> None:
+        """Look at the estimate so far, with all that has come in."""
+        live, axis = self.bench.live, self.axis.value
+        if axis is None or self.bench.checking or len(live.of(axis)) < 2:
+            return
+        looks, count = self.bench.looks(axis), self.bench.count
+        if looks is None:
+            self.told.set_text("The stimulus has no band: nothing is estimated until it is played.")
+            return
+        with suppress(HmpimError):  # the samples cannot be put on one clock yet
+            await looks.follow(live, axis, self.window.workbench.workers.do)
+        look = looks.look
+        if look is None or self.estimates.is_deleted or self.bench.count != count:
+            return
+        if (axis, look.time) == self.looked:
+            return
+        self.looked = (axis, look.time)
+        self.told.set_text(_of_look(look, "" if looks.passed else f"{looks.passed_at:.1f} s"))
+        self.estimates.clear()
+        with self.estimates:
+            plain_table(*look_cells(look, passed=looks.passed), title="Estimate so far")
+        if looks.closing:
+            figure = closing_bars(
+                [time for time, _ in looks.closing],
+                [error for _, error in looks.closing],
+                wanted=self.window.desk.wish.model.wanted,
+                name="Natural frequency",
+            )
+            self._show("bars", self.bars, figure)
+
+    async def _measure(self) -> None:
+        """Draw the response measured so far; the next begins when this one is done."""
+        live, axis = self.bench.live, self.axis.value
+        channels = live.of(axis) if axis is not None else {}
+        if self.measuring or self.bench.checking or len(channels) < 2:
             return
         command, response = channels["input"], channels["output"]
         size = min(command.size, response.size)
-        if size < _FEWEST or size == self.estimated:
+        if size < _FEWEST or (axis, size) == self.measured:
             return
-        self.estimated, axis, count = size, str(self.axis.value), self.bench.count
-        self.estimating = True
+        self.measured, count = (axis, size), self.bench.count
+        self.measuring = True
         try:
-            pair, figure = await self.window.workbench.workers.do(
-                so_far,
+            looks = self.bench.looks(axis)
+            figure = await self.window.workbench.workers.do(
+                response_so_far,
                 (command.time.copy(), command.values.copy()),
                 (response.time.copy(), response.values.copy()),
                 (command.name, response.name),
                 (command.unit, response.unit),
+                None if looks is None else looks.estimator.statistics.band,
             )
-            if self.estimates.is_deleted or self.bench.count != count:
-                return
-            self._show("bode", self.plot, figure)
-            self._closing(axis, live.end, pair)
-            self.estimates.clear()
-            with self.estimates:
-                columns, rows = parameter_cells(pair, {})
-                plain_table(columns[:4], [row[:4] for row in rows], title="Estimate so far")
+            if not self.plot.is_deleted and self.bench.count == count:
+                self._show("bode", self.plot, figure)
         except HmpimError:
             await asyncio.sleep(0.3)  # too little yet
         finally:
-            self.estimating = False
-
-    def _closing(self, axis: str, time: float, pair: PairIdentification) -> None:
-        """Note how wide the bar is now, for every window, and show how it went so far."""
-        looks = self.bench.looks.setdefault(axis, [])
-        found = pair.parameters.natural_frequency
-        if found is not None and found.ci95 is not None and None not in found.ci95:
-            low, high = found.ci95
-            if high is not None and low is not None and (not looks or time > looks[-1][0]):
-                looks.append((time, 50.0 * (high - low) / found.value))
-        figure = closing_bars(
-            [t for t, _ in looks],
-            [error for _, error in looks],
-            wanted=self.window.desk.wish.model.wanted,
-            name="Natural frequency",
-        )
-        self._show("bars", self.bars, figure)
+            self.measuring = False
 
     def _show(self, name: str, place: ui.element, figure: Figure) -> None:
         if name in self.pictures:
@@ -241,6 +257,18 @@ class RunPage:
         else:
             with place:
                 self.pictures[name] = Picture(figure)
+
+
+def _of_look(look: Look, passed_at: str) -> str:
+    words = f"{look.time:.1f} s read, fitted as {structure_words(look.structure)}."
+    if passed_at:
+        words += f" The whole band is played at {passed_at}."
+    if look.parameters.delay is not None and look.parameters.delay.verdict != "ok":
+        words += (
+            " Doubtful: what the fit leaves over still follows the input, or what it says lies "
+            "outside of what was played."
+        )
+    return words
 
 
 def rig_choice(window: Window) -> ui.select:

@@ -4,11 +4,11 @@ from collections.abc import Mapping, Sequence
 
 from nicegui import ui
 
-from hmpim.identify import PairIdentification
+from hmpim.identify import Look, PairIdentification
 from hmpim.report import format_number, format_value
 from hmpim.report.words import GLOSSARY, paper_value
 
-__all__ = ["parameter_cells", "plain_table"]
+__all__ = ["look_cells", "parameter_cells", "plain_table"]
 
 _VERDICTS = {"ok": "ok", "doubtful": "doubtful"}
 _CLASSES = {"ok": "hm-ok", "doubtful": "hm-doubt", "not identifiable": "hm-bad", "fail": "hm-bad"}
@@ -81,6 +81,33 @@ def parameter_cells(
         cells.append("" if paper is None else format_number(paper))
         rows.append(tuple(cells))
     return columns, rows
+
+
+def look_cells(look: Look, *, passed: bool) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
+    """Return headings and rows of the estimate so far.
+
+    Parameters
+    ----------
+    look : Look
+        What is known so far.
+    passed : bool
+        Whether the whole band has been played: before that, nothing is called ok.
+    """
+    rows: list[tuple[str, ...]] = []
+    for words in GLOSSARY:
+        estimate = getattr(look.parameters, words.name)
+        if estimate is not None:
+            verdict = _VERDICTS[estimate.verdict]
+            early = verdict == "ok" and not passed
+            rows.append(
+                (
+                    words.label,
+                    format_value(estimate),
+                    estimate.unit,
+                    "too early" if early else verdict,
+                )
+            )
+    return ("Parameter", "So far", "Unit", "Verdict"), rows
 
 
 def _unit(name: str) -> str:

@@ -67,11 +67,15 @@ class Questions:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Begun:
-    """A run has begun: channels as (name, role, axis, unit), largest positions by axis, length."""
+    """A run has begun: channels as (name, role, axis, unit), largest positions by axis, length.
+
+    `intersample` is what the inputs do between their samples; None where the rig does not say.
+    """
 
     channels: tuple[tuple[str, str, str, str], ...]
     limits: dict[str, float]
     seconds: float
+    intersample: str | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -219,7 +223,13 @@ class _Teller:
         if played.block.start == 0:
             channels = tuple((c.name, c.role, c.axis or "", c.unit) for c in played.layout.channels)
             limits = dict(self._limits({axis for _, role, axis, _ in channels if role == "input"}))
-            _tell(self._pipe, Begun(channels=channels, limits=limits, seconds=played.seconds))
+            begun = Begun(
+                channels=channels,
+                limits=limits,
+                seconds=played.seconds,
+                intersample=played.layout.intersample,
+            )
+            _tell(self._pipe, begun)
         samples = {name: (s.time, s.values) for name, s in played.samples.items()}
         _tell(self._pipe, Block(end=float(played.block.time[-1]), samples=samples))
 

@@ -30,7 +30,7 @@ __all__ = [
     "found",
     "look",
     "read_record",
-    "so_far",
+    "response_so_far",
     "windowed",
     "write_report",
 ]
@@ -186,10 +186,14 @@ def write_report(
     return notes
 
 
-def so_far(
-    command: Samples, response: Samples, names: tuple[str, str], units: tuple[str, str]
-) -> tuple[PairIdentification, Figure]:
-    """Identify what has come in of one axis so far, and describe its Bode plot.
+def response_so_far(
+    command: Samples,
+    response: Samples,
+    names: tuple[str, str],
+    units: tuple[str, str],
+    band: tuple[float, float] | None,
+) -> Figure:
+    """Identify what has come in of one axis so far, and describe the response that it shows.
 
     Parameters
     ----------
@@ -197,6 +201,8 @@ def so_far(
         Times in s and values.
     names, units : (str, str)
         Of the two.
+    band : tuple of float or None
+        What will be played, in Hz: the plot is as wide from the beginning, and fills.
     """
     (t, u), (s, y) = command, response
     record = Record(
@@ -205,6 +211,8 @@ def so_far(
         fs=fit_clock(t).fs,
     )
     pair = identify(record).pairs[0]
-    fs = record.fs
-    slim = replace(pair, time=None, prediction=None, residual=None)
-    return slim, pair_bode(pair, input_unit=units[0], output_unit=units[1], fs=fs)
+    figure = pair_bode(pair, input_unit=units[0], output_unit=units[1], fs=record.fs)
+    if band is None:
+        return figure
+    panels = (replace(p, x=replace(p.x, low=band[0], high=band[1])) for p in figure.panels)
+    return replace(figure, panels=tuple(panels))
