@@ -2,9 +2,9 @@
 
 `python benchmarks/peers.py` beside what requirements-peers.txt lists; one that is not installed is
 left out, and said so. Each peer works in a process of its own, forked after the imports, so that
-the peak of memory is its own. The record is that of FIELD: second order 10 Hz, damping ratio 0.4,
-delay 150 ms, bias 0.6, noise 0.1, chirp 0.1 to 20 Hz, 10 s at 200 Hz. `--growth` adds the growth
-with length.
+the peak of memory is its own. The record is that of docs/field.md: second order 10 Hz, damping
+ratio 0.4, delay 150 ms, bias 0.6, noise 0.1, chirp 0.1 to 20 Hz, 10 s at 200 Hz. `--growth` adds
+the growth with length.
 """
 
 from __future__ import annotations

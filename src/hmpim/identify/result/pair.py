@@ -85,7 +85,7 @@ class PairIdentification(ByValue):
         )
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the pair as plain JSON values (DESIGN.md, Result JSON)."""
+        """Return the pair as plain JSON values (docs/architecture.md, Result JSON)."""
         return {
             "input": self.input,
             "output": self.output,
