@@ -12,14 +12,15 @@ import hmpim
 DOCS = Path(__file__).parents[2] / "docs"
 
 
-def test_the_table_of_contents_leads_somewhere():
-    """That no page is left out is what the build warns of; see the study below."""
+def test_the_table_of_contents_has_every_page_once():
     placed = []
     for block in re.findall(r"```{toctree}\n(.*?)```", (DOCS / "index.md").read_text(), re.DOTALL):
         placed += [line for line in block.splitlines() if line and not line.startswith(":")]
     assert len(placed) > 30
     assert len(set(placed)) == len(placed)
-    assert not [name for name in placed if not (DOCS / f"{name}.md").is_file()]
+    there = [*DOCS.glob("*.md"), *DOCS.glob("howto/*.md"), DOCS / "decisions" / "index.md"]
+    pages = {page.relative_to(DOCS).with_suffix("").as_posix() for page in there} - {"index"}
+    assert set(placed) == pages
 
 
 def test_every_public_name_has_its_entry():
