@@ -20,6 +20,7 @@ from hmpim.plots import Figure
 from hmpim.record import Finding, Record
 from hmpim.report import About, render, report, sheet, write_figures
 from hmpim.report.advice import advice
+from hmpim.report.study import StudyPage, render_study
 from hmpim.stimulus import Limits, design
 
 VOID = {"meta", "link", "br", "hr", "img", "input"}
@@ -311,6 +312,16 @@ def test_at_most_three_findings_are_above_the_fold_causes_first(found):
     assert re.findall(r"About (\w+)\.", above) == ["gaps", "saturation", "structure"]
     assert above.count('class="todo"') == 3
     assert "Everything remarked (5)" in text
+
+
+def test_a_study_that_rests_on_doubt_does_not_look_as_if_all_were_well():
+    page = StudyPage(
+        title="T", description="", headline="All met.", met=True, grids=(), sections=(), facts=()
+    )
+    assert 'class="verdict ok"' in render_study(page)
+    assert 'class="verdict doubtful"' in render_study(replace(page, doubtful=True))
+    failed = render_study(replace(page, met=False, doubtful=True))
+    assert 'class="verdict not_identifiable"' in failed
 
 
 def test_every_doubt_that_can_be_raised_has_something_to_do():

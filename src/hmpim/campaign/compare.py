@@ -34,9 +34,11 @@ def bandwidth(row: Row) -> Reading | None:
 def samples_reading(row: Row) -> Reading | None:
     """The -90° of samples over samples, off the response: friction fits no linear structure.
 
-    Where the response tells nothing, the bandwidth of the fitted model.
+    Its error is that of the reading it starts from, the surer of the model's and the response's;
+    where the response tells nothing, that is the answer.
     """
-    start = bandwidth(row) or row.measured_bandwidth
+    known = [row.parameters.get("bandwidth_phase90"), row.measured_bandwidth]
+    start = min((r for r in known if r is not None), key=lambda r: r.std, default=None)
     if start is None:
         return None
     found = samples_bandwidth(row.pair["frequency_response"], near=start.value)
@@ -198,11 +200,11 @@ def _modes(axis: str, rows: list[Row]) -> str:
             reading = samples_reading(row)
             found = None if reading is None else reading.value
             known = row.pair["known"].get("exact_samples_bandwidth")
-            seen.append(f"{row.mode} {'–' if found is None else f'{found:.1f}'}")
+            seen.append(f"{row.mode} {'unknown' if found is None else f'{found:.1f} Hz'}")
             exact += [] if known is None else [f"{known:.1f}"]
         if len(seen) > 1:
-            free = f" (without friction {', '.join(exact)})" if len(exact) == len(seen) else ""
-            said.append(f"at {rate:g} Hz {', '.join(seen)} Hz{free}")
+            free = f" (without friction {', '.join(exact)} Hz)" if len(exact) == len(seen) else ""
+            said.append(f"at {rate:g} Hz {', '.join(seen)}{free}")
     if not said:
         return ""
     return f"{axis}, −90° of samples over samples: " + "; ".join(said) + "."

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from hmpim.campaign.compare import HEARD, case_label
+from hmpim.campaign.compare import HEARD, bandwidth, case_label, samples_reading
 from hmpim.campaign.plan import Compare, FigurePlan
 from hmpim.campaign.study import Row
 from hmpim.identify import PairIdentification
@@ -19,6 +19,7 @@ from hmpim.report.figures import Picture
 __all__ = ["pair_of", "section_pictures"]
 
 _BESIDE: tuple[Compare, ...] = ("rates", "loads", "excitation")
+_MODES = ("P", "PV", "PVA")
 _MOST_BESIDE = 3  # columns that a page has room for
 _CLEAR = 0.3  # share of the response: what is less sure is left out
 
@@ -60,14 +61,21 @@ def _overlaid(rows: Sequence[Row], every: Sequence[Row], compare: Compare) -> De
     seen = [(row, curve) for row in rows if (curve := _curve(row)) is not None]
     if not seen:
         return None
+    if compare == "modes":
+        seen.sort(key=lambda item: (_MODES.index(item[0].mode), item[0].rate))
+        return beside_bode(
+            [(f"{row.axis}, {row.mode}", curve) for row, curve in seen],
+            bandwidths=[_bandwidth(row, compare) for row, _ in seen],
+            within=[f"{row.rate:g} Hz" for row, _ in seen],
+        )
     if compare in _BESIDE and len(seen) <= _MOST_BESIDE:
         return beside_bode(
             [(case_label(row, compare, every), curve) for row, curve in seen],
-            bandwidths=[_bandwidth(row) for row, _ in seen],
+            bandwidths=[_bandwidth(row, compare) for row, _ in seen],
         )
     return overlaid_bode(
         [(case_label(row, compare, every), curve) for row, curve in seen],
-        bandwidths=[_bandwidth(row) for row, _ in seen],
+        bandwidths=[_bandwidth(row, compare) for row, _ in seen],
         pairs=compare != "axes",
     )
 
@@ -154,7 +162,9 @@ def _curve(row: Row) -> BodeCurve | None:
     return measured_curve(pair.frequency_response, near=model_curve(pair, seen, fs=row.rate))
 
 
-def _bandwidth(row: Row) -> tuple[float, float] | None:
-    """-90° of a row and its standard deviation, where both are known."""
-    found = row.parameters.get("bandwidth_phase90") or row.measured_bandwidth
-    return None if found is None or not math.isfinite(found.std) else (found.value, found.std)
+def _bandwidth(row: Row, compare: Compare) -> tuple[float, float] | None:
+    """-90° of a row and its standard deviation, as the section's sentences give it."""
+    found = samples_reading(row) if compare in ("levels", "modes") else bandwidth(row)
+    if found is None or not found.std < found.value:  # it may lie anywhere
+        return None
+    return found.value, found.std

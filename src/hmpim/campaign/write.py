@@ -89,9 +89,7 @@ def headline(study: Study) -> str:
     """Whether the specification is met, and what is doubtful all the same."""
     count = len(study.checks)
     unsure = [row for row in study.rows if row.verdict != "ok"]
-    resting = sum(
-        check.reading is not None and check.reading.verdict != "ok" for check in study.checks
-    )
+    resting = _resting(study)
     if study.met is None:
         said = f"{len(study.rows)} identifications; nothing was specified."
     elif study.met and count == 1:
@@ -108,6 +106,13 @@ def headline(study: Study) -> str:
         said += f" {len(unsure)} of {len(study.rows)} rows hold doubtful figures"
         said += f": {names}." if names else "."
     return said
+
+
+def _resting(study: Study) -> int:
+    """How many checks rest on a doubtful figure."""
+    return sum(
+        check.reading is not None and check.reading.verdict != "ok" for check in study.checks
+    )
 
 
 def study_page(study: Study) -> StudyPage:
@@ -128,6 +133,7 @@ def study_page(study: Study) -> StudyPage:
         description=study.plan.description,
         headline=headline(study),
         met=study.met,
+        doubtful=_resting(study) > 0,
         grids=tuple(grids),
         sections=tuple(_section(study, figure) for figure in study.plan.figures),
         facts=(

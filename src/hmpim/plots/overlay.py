@@ -96,16 +96,19 @@ def beside_bode(
     curves: Sequence[tuple[str, BodeCurve]],
     *,
     bandwidths: Sequence[tuple[float, float] | None],
+    within: Sequence[str] = (),
 ) -> Figure:
-    """Describe two or three responses side by side, on the same axes (Figs 19 to 21, 24, 25).
+    """Describe responses side by side, on the same axes (Figs 19 to 21, 24, 25).
 
     Parameters
     ----------
     curves : sequence of (label, BodeCurve)
-        A column for each.
+        A column for each label.
     bandwidths : sequence of (float, float) or None
         -90° frequency of each curve and its standard deviation, in Hz: marked with its 95 %
         interval, and said in words.
+    within : sequence of str
+        What tells each curve from the others of its column; nothing where each has its own.
 
     Examples
     --------
@@ -116,16 +119,22 @@ def beside_bode(
     (['500 Hz', '1000 Hz'], '−90° at 1.670 ± 0.010 Hz')
     """
     together = overlaid_bode(curves)  # for its axes, which are the same for all
+    labels = list(dict.fromkeys(label for label, _ in curves))
     panels = []
-    for column, ((label, _), bandwidth) in enumerate(zip(curves, bandwidths, strict=True)):
+    for column, label in enumerate(labels):
+        inside = [i for i, (name, _) in enumerate(curves) if name == label]
         for panel in together.panels:
-            line = replace(panel.of(Curve)[column], label="", colour="input", dashes="-", width=1.2)
-            items: list[Item] = [line]
+            items: list[Item] = []
             if panel.row:
                 items.append(Rule(at=-90.0, axis="y", colour="muted", dashes=":", width=0.8))
-                items += [] if bandwidth is None else [_marked(*bandwidth)]
-            elif bandwidth is not None:
-                items.append(_interval(*bandwidth))
+            for place, i in enumerate(inside):
+                line = replace(panel.of(Curve)[i], label=within[i] if within else "", width=1.2)
+                colour, dashes = _COLOURS[place], _DASHES[place % len(_DASHES)]
+                items.append(replace(line, colour=colour, dashes=dashes))
+                found = bandwidths[i]
+                if found is not None:
+                    mark = _marked(*found, place=place) if panel.row else _interval(*found)
+                    items.append(replace(mark, colour=colour, dashes=dashes) if within else mark)
             panels.append(
                 replace(
                     panel,
@@ -133,14 +142,14 @@ def beside_bode(
                     title="" if panel.row else label,
                     y=panel.y if column == 0 else replace(panel.y, label="", numbered=False),
                     column=column,
-                    legend=False,
+                    legend=bool(within) and not panel.row,
                 )
             )
     return Figure(
         panels=tuple(panels),
-        alt="Bode plots side by side: " + ", ".join(label for label, _ in curves) + ".",
+        alt="Bode plots side by side: " + ", ".join(labels) + ".",
         heights=together.heights,
-        columns=len(curves),
+        columns=len(labels),
     )
 
 
@@ -149,11 +158,11 @@ def _interval(value: float, std: float) -> Rule:
     return Rule(at=value, low=value - 1.96 * std, high=value + 1.96 * std)
 
 
-def _marked(value: float, std: float) -> Rule:
+def _marked(value: float, std: float, *, place: int) -> Rule:
     return replace(
         _interval(value, std),
         words=f"−90° at {plus_minus(value, std)} Hz",
-        words_at=0.2,
+        words_at=0.2 - 0.12 * place,
         side="left",
     )
 

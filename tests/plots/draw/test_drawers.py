@@ -10,8 +10,10 @@ import pytest
 from hmpim import plots
 from hmpim.plots import Axis, Band, Curve, Figure, Image, Panel, Points, Rule, Span, Words
 from hmpim.plots.bode import pair_bode
+from hmpim.plots.curves import BodeCurve
 from hmpim.plots.draw.frames import frames, ticks
 from hmpim.plots.draw.layout import SIZE, places, text_width
+from hmpim.plots.overlay import beside_bode
 from hmpim.plots.style import COLOURS
 
 F = np.geomspace(0.1, 100.0, 30)
@@ -122,6 +124,27 @@ def test_numbers_of_an_axis_leave_room_for_its_label(reach, height):
     widest = max(text_width(words) for _, words in place.y_ticks)
     assert place.left - 7.0 - widest > place.edge + SIZE
     assert text_width("−") > text_width("-")  # a true minus is as wide as a plus
+
+
+def test_columns_share_their_axes_and_each_curve_has_its_mark():
+    names = ["P", "P", "PV", "PV"]
+    curves = [
+        (name, BodeCurve(frequency=F, magnitude_db=-k * F, phase=-(k + 1) * F))
+        for k, name in enumerate(names)
+    ]
+    figure = beside_bode(
+        curves,
+        bandwidths=[(30.0, 0.1), (29.0, 0.1), None, (20.0, 0.1)],
+        within=["500 Hz", "1000 Hz"] * 2,
+    )
+    assert figure.columns == 2
+    assert len({(panel.x.low, panel.x.high) for panel in figure.panels}) == 1
+    upright = [
+        [rule.at for rule in panel.of(Rule) if rule.axis == "x"] for panel in figure.panels[1::2]
+    ]
+    assert upright == [[30.0, 29.0], [20.0]]
+    assert [line.label for line in figure.panels[2].of(Curve)] == ["500 Hz", "1000 Hz"]
+    assert figure.panels[3].of(Rule)[-1].colour == figure.panels[3].of(Curve)[-1].colour
 
 
 def test_a_mark_that_may_lie_anywhere_is_not_drawn(identified):

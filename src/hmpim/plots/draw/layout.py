@@ -1,11 +1,11 @@
 """Where the panels of a page's picture stand, in pixels, with room for all that is written."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from hmpim.plots.description import Axis, Figure, Image, Panel
 from hmpim.plots.draw.frames import Frame, legend_items, ticks
 
-__all__ = ["LINE", "SIZE", "Place", "legend_lines", "places", "text_width"]
+__all__ = ["LINE", "SIZE", "Place", "legend_lines", "places", "stacked", "text_width"]
 
 SIZE = 12.0  # of the letters, px
 LINE = 17.0  # from one line of words to the next
@@ -83,8 +83,7 @@ def places(figure: Figure, shown: list[Frame], *, width: float) -> tuple[list[Pl
     True
     """
     panels = list(zip(figure.panels, shown, strict=True))
-    narrow = width < 0.75 * _PER_INCH * figure.width
-    columns = 1 if narrow else figure.columns
+    columns = 1 if _narrow(figure, width) else figure.columns
     rows = _rows(figure, columns)
     lefts = [0.0] * columns
     for panel, frame in panels:
@@ -133,6 +132,38 @@ def places(figure: Figure, shown: list[Frame], *, width: float) -> tuple[list[Pl
             )
         )
     return out, at + 2.0
+
+
+def stacked(figure: Figure, *, width: float) -> Figure:
+    """Return the figure as a narrow page shows it: columns one under the other, all numbered.
+
+    Examples
+    --------
+    >>> left = Panel(x=Axis(), y=Axis(label="y (V)"))
+    >>> right = Panel(x=Axis(), y=Axis(numbered=False), column=1)
+    >>> figure = Figure(panels=(left, right), alt="", columns=2)
+    >>> [panel.y.label for panel in stacked(figure, width=300.0).panels]
+    ['y (V)', 'y (V)']
+    >>> stacked(figure, width=700.0) is figure
+    True
+    """
+    if figure.columns == 1 or not _narrow(figure, width):
+        return figure
+    named = {panel.row: panel.y.label for panel in figure.panels if panel.y.label}
+    panels = [
+        panel
+        if panel.bare or panel.y.numbered
+        else replace(
+            panel,
+            y=replace(panel.y, numbered=True, label=panel.y.label or named.get(panel.row, "")),
+        )
+        for panel in figure.panels
+    ]
+    return replace(figure, panels=tuple(panels))
+
+
+def _narrow(figure: Figure, width: float) -> bool:
+    return width < 0.75 * _PER_INCH * figure.width
 
 
 def _fits(panel: Panel, labels: list[str], width: float) -> bool:

@@ -28,7 +28,7 @@ from hmpim.plots.description import (
     Words,
 )
 from hmpim.plots.draw.frames import Frame, frames, legend_items, placed, ticks
-from hmpim.plots.draw.layout import LINE, SIZE, Place, legend_lines, places, text_width
+from hmpim.plots.draw.layout import LINE, SIZE, Place, legend_lines, places, stacked, text_width
 from hmpim.plots.draw.raster import picture_of
 from hmpim.plots.envelope import envelope
 from hmpim.plots.style import COLOURS, Colour
@@ -80,6 +80,7 @@ def draw(
     (True, False)
     """
     across = _PER_INCH * figure.width if width is None else width
+    figure = stacked(figure, width=across)
     shown = frames(figure)
     where, height = places(figure, shown, width=across)
     pen = _Pen(key, themed)

@@ -39,7 +39,8 @@ class Section:
 class StudyPage:
     """Everything that the page shows, its first table above all.
 
-    `met` is None where nothing was specified; `sheets` are names and addresses of pages beside it.
+    `met` is None where nothing was specified; `doubtful` says that some of what is met rests on
+    doubtful figures; `sheets` are names and addresses of pages beside it.
     """
 
     title: str
@@ -50,6 +51,7 @@ class StudyPage:
     sections: tuple[Section, ...]
     facts: tuple[tuple[str, str], ...]
     sheets: tuple[tuple[str, str], ...] = ()
+    doubtful: bool = False
 
 
 def render_study(page: StudyPage) -> str:
@@ -65,6 +67,12 @@ def render_study(page: StudyPage) -> str:
     text = (
         page_environment("hmpim.report.study")
         .get_template("study.html.j2")
-        .render(page=page, verdict={True: "ok", False: "not_identifiable", None: ""}[page.met])
+        .render(page=page, verdict=_verdict(page))
     )
     return "\n".join(printable(line) for line in text.splitlines()) + "\n"
+
+
+def _verdict(page: StudyPage) -> str:
+    if page.met and page.doubtful:
+        return "doubtful"
+    return {True: "ok", False: "not_identifiable", None: ""}[page.met]
