@@ -152,6 +152,7 @@ class Cable:
         self.process.kill()
         self.process.wait()
         self.process.stdout.close()
+        self.process.stdin.close()  # of one that was not pulled
 
 
 RAISING = """
