@@ -102,6 +102,28 @@ def test_a_loop_without_its_reference_is_noticed_and_an_open_one_is_not():
     }
 
 
+def test_a_stiffening_spring_under_a_multisine_is_no_loop():
+    # Its third harmonic is the input's future where the input rises in frequency.
+    lines = np.arange(3, 150) / 10.0
+    phases = -np.pi * np.arange(lines.size) ** 2 / lines.size
+    u = np.cos(2 * np.pi * TIME[:, None] * lines + phases).sum(axis=1)
+    fine = 8
+    command = np.interp(np.arange(N * fine) / fine, np.arange(N), u / np.abs(u).max())
+    stiffness, h = (2 * np.pi * 6.0) ** 2, 1.0 / (fine * FS)
+    x = v = 0.0
+    y = np.zeros(command.size)
+    for k, force in enumerate(command):
+        v += h * (stiffness * (force - x - 0.1 * x**3) - 2 * 0.2 * 2 * np.pi * 6.0 * v)
+        x += h * v
+        y[k] = x
+    y = y[::fine] + 0.003 * np.random.default_rng(1).standard_normal(N)
+    record = hmpim.Record.from_arrays({"u": u / np.abs(u).max()}, {"y": y}, fs=FS)
+    pair = hmpim.identify(record, structures=["second_order"])["y", "u"]
+    codes = {w.code for w in pair.warnings}
+    assert "feedback" not in codes
+    assert pair.verdict == "doubtful"
+
+
 def test_the_measured_response_is_the_plants():
     found = hmpim.identify(looped(2), reference="r", structures=["first_order"])["y", "u"]
     response = found.frequency_response

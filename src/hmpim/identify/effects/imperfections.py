@@ -38,6 +38,9 @@ _MOST_CLIPPED = 0.85
 _MUCH_CLIPPED = 0.4
 """Share beyond which what is found is doubtful: a rectifier clips half."""
 
+_MANY_SPIKES = 0.05
+"""Share of spikes beyond which those that do not stand out count as well."""
+
 _FEWEST_LEVELS = 8
 """Levels that an output must take, unless its input takes as few."""
 
@@ -328,15 +331,15 @@ def _lost_findings(found: Imperfections) -> list[Finding]:
             )
         )
     if found.spikes is not None:
-        count = int(np.count_nonzero(found.spikes))
+        count, share = int(np.count_nonzero(found.spikes)), float(np.mean(found.spikes))
+        many = share > _MANY_SPIKES
         findings.append(
             Finding(
                 code="spikes",
-                message=f"{count} samples ({100 * float(np.mean(found.spikes)):.2g} %) stand far "
-                "out of those around them and are left out. Look for loose contacts, lost bits "
-                "or impacts.",
-                severity="doubt",
-                parameters=MODELLED,
+                message=f"{count} samples ({100 * share:.2g} %) stand far out of those around them "
+                "and are left out. Look for loose contacts, lost bits or impacts.",
+                severity="doubt" if many else "info",
+                parameters=MODELLED if many else (),
             )
         )
     if found.frozen is not None:

@@ -31,8 +31,8 @@ def feedback(evidence: Evidence) -> tuple[Finding, ...]:
     all the same (L. Ljung, System Identification, 2nd ed., ch. 13.4).
     """
     left, u = evidence.readings.innovations, evidence.u
-    if evidence.through or left.size != u.size or u.size < 20 * _AHEAD:
-        return ()
+    if evidence.through or evidence.nonlinear or left.size != u.size or u.size < 20 * _AHEAD:
+        return ()  # a sweep's harmonics are its future
     inside = np.arange(_AHEAD, u.size - _AHEAD)
     counts = evidence.joint.weighed.counts
     inside = inside if counts is None else inside[counts[inside]]
