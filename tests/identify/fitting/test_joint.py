@@ -231,3 +231,22 @@ def test_intervals_hold_under_coloured_noise(field_record, seeds, colour):
         p = read(joint_fit(u, y + noise))
         inside.append([holds(getattr(p, name), truth) for name, truth in TRUTH.items()])
     assert_share(inside, at_least=0.92, at_most=0.98)
+
+
+@pytest.mark.parametrize("seed", [2, *in_studies(3, 4, 5, 6, 7, 9, 10)])
+def test_a_free_response_of_two_modes_is_no_coloured_noise(seed):
+    """A record out of the midst of a random motion: its lines answered one by one."""
+    rng = np.random.default_rng(seed)
+    lines = np.fft.rfft(rng.standard_normal(4000))
+    lines[np.fft.rfftfreq(4000) > 0.4] = 0.0
+    s = 2j * np.pi * np.fft.rfftfreq(4000, 1.0 / FS)
+    answer = np.exp(-0.02 * s) * sum(
+        gain / (1.0 + 2 * damping * s / w + (s / w) ** 2)
+        for gain, damping, w in ((1.0, 0.06, 2 * np.pi * 4.0), (0.5, 0.05, 2 * np.pi * 9.0))
+    )
+    u, y = (np.fft.irfft(x, 4000)[1000:2500] for x in (lines, lines * answer))
+    noise = 0.03 * float(y.std())
+    joint = joint_fit(u, y + noise * rng.standard_normal(y.size), intersample="bandlimited")
+    assert joint.best.fit.structure.name == "two_modes"
+    assert joint.forgotten > 0
+    assert np.sqrt(joint.best.fit.cost / y.size) == pytest.approx(noise, rel=0.08)

@@ -88,13 +88,13 @@ def test_an_integrating_output_has_no_bandwidth_to_miss(field_record, evidence_o
 
 
 def test_a_record_that_ends_before_the_system_settles_casts_doubt(clean):
-    """Five time constants of 1.2 s and the delay are 6.15 s of 10."""
-    system = replace(clean.readings.system, denominator=np.array([1.0, 1.2]))
+    """Five time constants of 2 s and the delay are 10.15 s of 10."""
+    system = replace(clean.readings.system, denominator=np.array([1.0, 2.0]))
     slow = replace(clean, readings=replace(clean.readings, system=system))
     (found,) = short_record(slow)
     assert (found.code, found.severity, found.parameters) == ("short_record", "doubt", MODELLED)
-    assert "settling time of 6.15 s" in found.message
-    quick = replace(system, denominator=np.array([1.0, 0.9]))
+    assert "settling time of 10.15 s" in found.message
+    quick = replace(system, denominator=np.array([1.0, 1.9]))
     assert short_record(replace(clean, readings=replace(clean.readings, system=quick))) == ()
 
 

@@ -115,6 +115,9 @@ def look_again(problem: Problem, trial: Trial, seen: Seen, *, lag: int) -> Seen 
     if seen.begins is not None:
         return None
     begins = begins_of(problem, trial.fit, lag=lag)
+    if begins is None and problem.noise is not None:
+        # Noise of the colour of a mode explains its free response, and more of it than there is.
+        begins = begins_of(replace(problem, noise=None, told=None), trial.fit, lag=lag)
     if begins is None:
         return None
     after = np.arange(count) >= begins

@@ -128,7 +128,11 @@ def fit_rich(
             found.append(_best_of(problem, structure, starts, [*fits, *found]))
         if is_white(min(found, key=lambda fit: fit.objective).residual):
             return found
-    proposed = proposals(data.rough, members(structures, RICH), best, all_of_them=all_of_them)
+    rich = members(structures, RICH)
+    proposed = proposals(data.rough, rich, best, all_of_them=all_of_them)
+    if not proposed and _is_poor(problem, best):
+        # A rough response that takes a free response for an answer proposes nothing.
+        proposed = proposals(data.rough, rich, best, all_of_them=True)
     for start in range(0, len(proposed), _AT_ONCE):
         some = proposed[start : start + _AT_ONCE]
         for p in some:
@@ -180,6 +184,12 @@ def is_worth_explaining(problem: Problem, fit: Fit, data: Data) -> bool:
     owed = float(np.sqrt(left.share * fit.cost / spread)) if spread else 0.0
     if left.probability < FOLLOWS and (owed > _MATERIAL or _misses_part(problem, fit, data, band)):
         return True
+    return _is_poor(problem, fit)
+
+
+def _is_poor(problem: Problem, fit: Fit) -> bool:
+    """Whether much of the output is left over, and it is no white noise."""
+    spread = float(np.sum((problem.masked(problem.y - problem.y.mean())) ** 2))
     return fit.cost > POOR * spread and not is_white(fit.residual)
 
 

@@ -175,11 +175,12 @@ def _looked_again(
         if again is None:
             break
         seen, data = again, replace(data, noise=None)
-        fitted = [
-            (mode, refit(data.problem(mode, seen), fit))
+        hopeful = [(best.intersample, best.fit)] + [
+            (mode, fit)
             for mode, fit in fitted
-            if fit.objective < HOPELESS**2 * best.fit.objective or fit.structure.name in PLAIN
+            if fit.cost < HOPELESS**2 * best.fit.cost or fit.structure.name in PLAIN
         ]
+        fitted = [(mode, refit(data.problem(mode, seen), fit)) for mode, fit in hopeful]
         data, trials, best, share = _weighed(data, natural, fitted, seen)
     return data, seen, trials, best, share
 

@@ -29,9 +29,6 @@ _OUTSIDE = 2.0
 _PAST = 1.2
 """Natural frequency, over the end of the excited band, up to which the band still tells it."""
 
-_LONG = 0.5
-"""Settling time over the record's length, beyond which it is too short."""
-
 _FEET = 1e-5
 """Power of an input over its greatest, below which it excites nothing."""
 
@@ -154,7 +151,7 @@ def short_record(evidence: Evidence) -> tuple[Finding, ...]:
     system = evidence.readings.system
     settle = max(system.delay, 0.0) + 5.0 * slowest_time_constant(system.denominator)
     length = evidence.joint.problem.y.size / evidence.fs
-    if settle <= _LONG * length:
+    if settle <= length:
         return ()
     return (
         Finding(
