@@ -5,8 +5,8 @@ BIN    := $(VENV)/bin
 RUN    := $(VENV)/.run-installed
 DEV    := $(VENV)/.dev-installed
 
-# One process for each core, each with one thread; a file's tests go to one process, so that what
-# they share is made once. Byte code is kept: the suite starts the command line many times.
+# Three processes for two cores (tests/conftest.py), as tests wait for other programs and for clocks;
+# each has one thread. A file's tests go to one process, so that what they share is made once. Byte code is kept: the suite starts the command line many times.
 PYTEST := PYTHONDONTWRITEBYTECODE= OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n auto --dist loadscope
 
 .PHONY: help install demo test browser check studies bench accuracy docs clean

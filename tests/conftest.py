@@ -26,6 +26,14 @@ settings.load_profile("hmpim")
 if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_auto_num_workers():
+    """Three processes for two cores: a fifth of the time, tests wait for a process or a clock."""
+    cores = os.cpu_count() or 1
+    return cores + cores // 2
+
+
 DATA = Path(__file__).parents[2] / "shared" / "data"
 
 

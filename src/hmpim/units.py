@@ -100,8 +100,11 @@ def conversion_factor(unit: str, *, to: str) -> float:
     >>> round(conversion_factor("rad", to="deg"), 4)
     57.2958
     """
-    if unit == to:
-        return 1.0
+    return 1.0 if unit == to else _factor(unit, to)
+
+
+@cache
+def _factor(unit: str, to: str) -> float:
     try:
         return float(_registry().Quantity(1.0, _parsed(unit)).to(_parsed(to)).magnitude)
     except _mismatch() as error:

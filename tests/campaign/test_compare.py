@@ -12,6 +12,8 @@ from hmpim.campaign.crossing import samples_bandwidth
 from hmpim.campaign.grids import PARAMETERS
 from hmpim.campaign.study import make_study
 from hmpim.campaign.write import study_page, write_study
+from hmpim.rigs.table import AXES
+from tests_support import in_studies
 
 F = np.arange(1.0, 60.0, 0.1)
 
@@ -84,16 +86,23 @@ def test_demo_finds_all_five_axes_and_shows_them(demo):
     assert "<svg" in page
 
 
-def test_all_in_one_fit_have_the_bandwidths_of_each_alone(demo):
+@pytest.mark.parametrize("axes", [("elevation",), *in_studies((tuple(AXES),))])
+def test_all_in_one_fit_have_the_bandwidths_of_each_alone(demo, axes):
     """The rows come of one axis at a time; here all inputs of the raw record are fitted at once."""
     study, folder = demo
     (path,) = (folder / "records").glob("*.h5")
     plain = ["static", "first_order", "second_order", "third_order"]
-    found = hmpim.identify(hmpim.load(path), structures=plain)
+    record = hmpim.load(path)
+    record = record.with_roles(
+        inputs=[c.name for c in record.inputs], outputs=[f"{axis}.position" for axis in axes]
+    )
+    found = hmpim.identify(record, structures=plain)
+    assert len(found.pairs) == 5 * len(axes)
     for row in study.rows:
-        pair = found[f"{row.axis}.position", f"{row.axis}.command"]
-        single = row.parameters["bandwidth_phase90"].value
-        assert pair.bandwidth_phase90.value == pytest.approx(single, rel=0.02)
+        if row.axis in axes:
+            pair = found[f"{row.axis}.position", f"{row.axis}.command"]
+            single = row.parameters["bandwidth_phase90"].value
+            assert pair.bandwidth_phase90.value == pytest.approx(single, rel=0.02)
     for pair in found.pairs:
         if pair.input.split(".")[0] != pair.output.split(".")[0]:
             assert pair.parameters.scale_factor is None  # inertia couples nothing at rest

@@ -93,6 +93,7 @@ def half_as_long(*names):
     )
 
 
+@pytest.mark.study  # small: tests/rigs/table/test_table.py, of the same name
 def test_friction_lowers_the_bandwidth_of_small_motions(tmp_path):
     plan = half_as_long("levels")
     check_levels(make_study(plan, run_campaign(plan, tmp_path)))

@@ -1,6 +1,5 @@
 """What Tab offers: commands, options, and the rigs that a person described."""
 
-import os
 import subprocess
 import sys
 
@@ -44,31 +43,30 @@ def test_a_broken_file_of_rigs_says_nothing_to_the_shell(tmp_path, monkeypatch, 
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="bash is not there")
-def test_completion_installs_itself_for_bash(tmp_path):
+def test_completion_installs_itself_for_bash(tmp_path, monkeypatch, capsys):
     """In a home of its own: the script lies there, .bashrc reads it, and bash completes by it."""
-    home = {
-        **os.environ,
+    monkeypatch.setattr(sys, "argv", ["hmpim", "--install-completion", "bash"])
+    for name, value in {
         "HOME": str(tmp_path),
         "SHELL": "/bin/bash",
         "_TYPER_COMPLETE_TEST_DISABLE_SHELL_DETECTION": "1",
-    }
-    main = "import sys; sys.argv[0] = 'hmpim'; from hmpim.cli.main import main; main()"
-    installed = subprocess.run(
-        [sys.executable, "-c", main, "--install-completion", "bash"],
-        env=home, capture_output=True, text=True, check=True, cwd=tmp_path,
-    )  # fmt: skip
-    assert "bash completion installed" in installed.stdout
+    }.items():
+        monkeypatch.setenv(name, value)
+    with pytest.raises(SystemExit) as ended:
+        app(prog_name="hmpim")
+    assert ended.value.code in (0, None)
+    assert "bash completion installed" in capsys.readouterr().out
     script = tmp_path / ".bash_completions" / "hmpim.sh"
     assert str(script) in (tmp_path / ".bashrc").read_text()
     (tmp_path / "hmpim.toml").write_text(RIGS)
     hmpim = tmp_path / "hmpim"
-    hmpim.write_text(f"#!{sys.executable}\n{main}\n")
+    hmpim.write_text(f"#!{sys.executable}\nfrom hmpim.cli.main import main; main()\n")
     hmpim.chmod(0o755)
     pressed = (
         f"source '{script}'; COMP_WORDS=(hmpim run s.csv --rig bench9); COMP_CWORD=4; "
         f'_hmpim_completion {hmpim}; echo "${{COMPREPLY[@]}}"'
     )
     done = subprocess.run(
-        ["bash", "-c", pressed], env=home, capture_output=True, text=True, check=True, cwd=tmp_path
+        ["bash", "-c", pressed], capture_output=True, text=True, check=True, cwd=tmp_path
     )
     assert done.stdout.split() == ["bench9"]

@@ -118,6 +118,7 @@ HIGHEST = """([low, high]) => {
 }"""
 
 
+@pytest.mark.browser
 def test_a_design_follows_its_sliders_and_stays_inside_its_limits(page, served):
     go(page, served, "design")
     page.get_by_text("inside all limits").wait_for()
@@ -285,6 +286,7 @@ def test_a_file_too_large_is_refused_and_a_hostile_name_stays_inside(page, serve
     assert not any("<" in p.name or p.name == "big.csv" for p in new)
 
 
+@pytest.mark.browser
 def test_two_runs_are_compared_and_held_against_a_specification(page, served):
     for k, delay in enumerate((0.15, 0.12), start=1):
         (served.runs / f"unit{k}").mkdir()
@@ -335,6 +337,7 @@ def desk_text(served, name):
     return Desks(served.runs / ".workbench").get(name).campaign.plan
 
 
+@pytest.mark.browser
 def test_nothing_is_lost_by_a_reload_and_a_second_window_gets_a_desk_of_its_own(
     page, served, window
 ):

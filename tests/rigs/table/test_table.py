@@ -166,7 +166,8 @@ def all_at_once():
     return table, stimuli, run(table, stimuli, rng=2)
 
 
-@pytest.mark.parametrize("axis", ["roll", *in_studies(*(a for a in AXES if a != "roll"))])
+@pytest.mark.study  # small: the demo of tests/campaign/test_compare.py, which moves all axes
+@pytest.mark.parametrize("axis", AXES)
 def test_all_axes_at_once_give_the_bandwidths_of_each_alone(all_at_once, axis):
     """Fig. 24: there the automatic roll bandwidth came out a third too low."""
     table, stimuli, together = all_at_once
@@ -182,7 +183,7 @@ def test_friction_lowers_the_apparent_bandwidth_of_small_motions(levels):
     found = []
     for acceleration in levels:
         limits = Limits(position=2.0, velocity=200.0, acceleration=acceleration, unit="deg")
-        stimulus = design(band=(0.1, 40), duration=10, fs=1000, limits=limits, axis="pitch")
+        stimulus = design(band=(0.1, 40), duration=5, fs=1000, limits=limits, axis="pitch")
         record = run(MotionTable(), stimulus, rng=1)
         # What is read is the measured response: which structure fits best does not matter.
         found.append(crossing(identified(record, "pitch", structures=["second_order"])))
