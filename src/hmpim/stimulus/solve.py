@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from typing import TypeVar
 
 import numpy as np
-from scipy.optimize import minimize_scalar
+from scipy.optimize import brentq, minimize_scalar
 
 from hmpim.errors import LimitsError
 from hmpim.stimulus.exponential import ExponentialSweep
@@ -157,14 +157,13 @@ def smallest_extinction(
 
 def _first_root(search: _Search, low: float, high: float) -> float:
     """Smallest n that fits between `low`, which does not, and `high`, which does."""
-    while high - low > 0.01 * STEP:
-        middle = 0.5 * (low + high)
-        low, high = (low, middle) if search.excess(middle) <= 0.0 else (middle, high)
-    for rounded in (math.floor(high / STEP), math.ceil(high / STEP)):
+    near = 0.01 * STEP
+    root = min(float(brentq(search.excess, low, high, xtol=near)) + near, high)
+    for rounded in (math.floor(root / STEP), math.ceil(root / STEP)):
         n = round(rounded * STEP, 9)
         if search.excess(n) <= 0.0:
             return n
-    return high  # a dip narrower than the step
+    return root if search.excess(root) <= 0.0 else high  # a dip narrower than the step
 
 
 def _what_would_do(search: _Search, n: float) -> str:
