@@ -19,7 +19,7 @@ from hmpim.identify import Identification, Parameters
 from hmpim.record import Record
 from hmpim.units import conversion_factor
 
-__all__ = ["Folder", "Run", "filter_runs", "find_runs"]
+__all__ = ["Folder", "Run", "asked_of", "filter_runs", "find_runs"]
 
 _SCHEMA = "hmpim/identification/"
 _HDF5 = b"\x89HDF\r\n\x1a\n"
@@ -177,6 +177,50 @@ source, rig, input, output, verdict, created, fs, duration, samples, delay, ...
     return tuple(run for run in runs if all(test(run) for test in tests))
 
 
+def asked_of(name: str, conditions: Sequence[str], *, unit: str) -> tuple[tuple[str, float], ...]:
+    """Return what conditions ask of one figure: words, and the value in a unit.
+
+    Parameters
+    ----------
+    name : str
+        Of the figure, such as ``delay``.
+    conditions : sequence of str
+        As for `filter_runs`.
+    unit : str
+        Of the values that are returned.
+
+    Raises
+    ------
+    ArgumentError
+        If a condition cannot be read.
+
+    Examples
+    --------
+    >>> asked_of("delay", ["delay < 3ms", "verdict = ok"], unit="s")
+    (('< 3ms', 0.003),)
+    """
+    asked = []
+    for text in conditions:
+        _condition(text)
+        match = _CONDITION.match(text)
+        if match is not None and match["name"] == name and name in _FIGURES:
+            number, own = _quantity(match["value"], text)
+            value = number * (conversion_factor(own, to=unit) if own else 1.0)
+            asked.append((f"{match['sign']} {match['value']}", value))
+    return tuple(asked)
+
+
+def _quantity(value: str, text: str) -> tuple[float, str]:
+    """Number and unit of a condition's value."""
+    match = _QUANTITY.match(value)
+    try:
+        if match is None:
+            raise ValueError(value)
+        return float(match["number"]), match["unit"]
+    except ValueError:
+        raise ArgumentError(f"{text!r}: {value!r} is no number; write it as 3ms or 0.003") from None
+
+
 def _kind(path: Path) -> str:
     """What a file is of ours, told by its content: '' for anything else."""
     try:
@@ -285,13 +329,7 @@ def _of_words(name: str, sign: str, value: str, text: str) -> Callable[[Run], bo
 
 
 def _of_figures(name: str, sign: str, value: str, text: str) -> Callable[[Run], bool]:
-    match = _QUANTITY.match(value)
-    try:
-        if match is None:
-            raise ValueError(value)
-        number, unit = float(match["number"]), match["unit"]
-    except ValueError:
-        raise ArgumentError(f"{text!r}: {value!r} is no number; write it as 3ms or 0.003") from None
+    number, unit = _quantity(value, text)
 
     def test(run: Run) -> bool:
         return any(

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hmpim.plots.description import Axis, Figure, Panel, Points
+from hmpim.plots.description import Axis, Figure, Panel, Points, Rule
 from hmpim.plots.style import axis_label, plain
 
 if TYPE_CHECKING:
@@ -16,7 +16,11 @@ __all__ = ["trend"]
 
 
 def trend(
-    labels: Sequence[str], estimates: Sequence["Estimate | None"], *, name: str = "value"
+    labels: Sequence[str],
+    estimates: Sequence["Estimate | None"],
+    *,
+    name: str = "value",
+    specified: Sequence[tuple[str, float]] = (),
 ) -> Figure:
     """Describe how a parameter went from run to run.
 
@@ -28,6 +32,8 @@ def trend(
         As many; None leaves a gap.
     name : str
         Of the parameter, for the axis.
+    specified : sequence of (str, float)
+        What it should be: words such as '> 9.12 Hz', and where the line stands.
 
     Examples
     --------
@@ -50,15 +56,22 @@ def trend(
         label="value and 95 % interval",
         size=5.0,
     )
+    rules = [
+        Rule(at=at, axis="y", words=f"specified {words}", label="" if k else "specification")
+        for k, (words, at) in enumerate(specified)
+    ]
     ticks = tuple((float(k), plain(label)) for k, label in enumerate(labels))
     return Figure(
         panels=(
             Panel(
                 x=Axis(low=-0.5, high=len(labels) - 0.5, ticks=ticks),
                 y=Axis(label=axis_label(name, unit)),
-                items=(points,),
+                items=(points, *rules),
             ),
         ),
-        alt=f"{name} in {len(told)} runs: " + ", ".join(f"{e.value:.4g}" for _, e in told) + ".",
+        alt=f"{name} in {len(told)} runs: "
+        + ", ".join(f"{e.value:.4g}" for _, e in told)
+        + "".join(f"; specified {words}" for words, _ in specified)
+        + ".",
         heights=(2.4,),
     )

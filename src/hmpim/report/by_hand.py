@@ -5,9 +5,9 @@ from collections.abc import Mapping
 from hmpim.errors import ArgumentError
 from hmpim.identify import PairIdentification, gain_and_phase
 from hmpim.report.numbers import format_estimate
-from hmpim.report.words import GLOSSARY
+from hmpim.report.words import GLOSSARY, structure_words
 
-__all__ = ["hand_notes", "reading_at"]
+__all__ = ["fit_note", "hand_notes", "reading_at"]
 
 _FREQUENCIES = (
     "natural_frequency",
@@ -65,6 +65,27 @@ def hand_notes(
             note = f"{note} {reading_at(pair, value, fs=fs)}".rstrip()
         notes.append(note)
     return tuple(notes)
+
+
+def fit_note(automatic: PairIdentification, *, set_by_hand: str) -> str:
+    """Say what was found before structure or interval were set by hand.
+
+    Parameters
+    ----------
+    automatic : PairIdentification
+        What was found of the whole record, any structure allowed.
+    set_by_hand : str
+        What was set, such as 'second order, 1 to 8 s'.
+    """
+    found = [
+        f"{words.inline} {format_estimate(estimate)}"
+        for words in GLOSSARY
+        if (estimate := getattr(automatic.parameters, words.name)) is not None
+    ]
+    return (
+        f"{automatic.output} from {automatic.input}, by hand: {set_by_hand}; automatic: "
+        f"{structure_words(automatic.structure)}, whole record: {', '.join(found)}."
+    )
 
 
 def reading_at(pair: PairIdentification, frequency: float, *, fs: float) -> str:

@@ -8,6 +8,7 @@ from typing import Any
 from nicegui import events, ui
 
 from hmpim.errors import ArgumentError
+from hmpim.identify import Identification
 from hmpim.model.dynamics import STRUCTURES
 from hmpim.report.words import structure_words
 from hmpim.workbench.bench import Window
@@ -15,7 +16,7 @@ from hmpim.workbench.desks import Analysis
 from hmpim.workbench.names import free_place
 from hmpim.workbench.pages.frame import Command, Later, card, failures_said
 from hmpim.workbench.pages.result import ResultView
-from hmpim.workbench.work.record import Looked, Question, View, found, look
+from hmpim.workbench.work.record import Found, Looked, Question, View, automatic, found, look
 
 __all__ = ["analyse"]
 
@@ -39,6 +40,7 @@ class AnalysePage:
         self.workers = window.workbench.workers
         self.looked: Looked | None = None
         self.result: ResultView | None = None
+        self.automatic: tuple[tuple[Question, int], Identification] | None = None
         with ui.element("div").classes("hm-side"):
             with card("Record"):
                 self._uploader()
@@ -197,6 +199,7 @@ class AnalysePage:
                 ui.label("Identifying …")
             try:
                 made = await self.workers.do(found, self.question, View(pair=wish.pair))
+                beside = await self._automatic(made)
             finally:
                 if not self.shown.is_deleted:  # else the page was left meanwhile
                     self.shown.clear()
@@ -204,9 +207,23 @@ class AnalysePage:
             if self.shown.is_deleted:
                 return
             with self.shown:
-                self.result = ResultView(self, made)
+                self.result = ResultView(self, made, beside)
             if (wish.window, wish.alpha) != ("gaussian", 1.5):
                 await self.result.see_through()
+
+    async def _automatic(self, made: Found) -> Identification | None:
+        """What is found with nothing set by hand, to stand beside; None where nothing is set.
+
+        It is kept as long as file and channels are the same.
+        """
+        question = self.question
+        asked = (question.automatic, made.stamp)
+        if not question.set_by_hand:
+            self.automatic = (asked, made.result)
+            return None
+        if self.automatic is None or self.automatic[0] != asked:
+            self.automatic = (asked, await self.workers.do(automatic, question))
+        return self.automatic[1]
 
     @property
     def question(self) -> Question:

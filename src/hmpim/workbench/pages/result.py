@@ -5,13 +5,13 @@ from typing import TYPE_CHECKING, Any, Protocol, get_args
 
 from nicegui import ui
 
-from hmpim.identify import PairIdentification
+from hmpim.identify import Identification, PairIdentification
 from hmpim.identify.windows import WindowName
 from hmpim.plots import Curve, Figure
 from hmpim.plots.by_hand import with_hand_values
 from hmpim.report.by_hand import reading_at
 from hmpim.report.figures import Picture as Described
-from hmpim.report.words import by_weight, headline
+from hmpim.report.words import by_weight, headline, structure_words
 from hmpim.workbench.bench import Window
 from hmpim.workbench.desks import Analysis
 from hmpim.workbench.pages.frame import card, failures_said
@@ -66,13 +66,18 @@ class ResultView:
         The page.
     found : Found
         The result and its pictures.
+    automatic : Identification or None
+        What was found before structure or interval were set by hand; None where neither is.
     """
 
-    def __init__(self, owner: Owner, found: Found) -> None:
-        self.owner, self.found = owner, found
+    def __init__(self, owner: Owner, found: Found, automatic: Identification | None) -> None:
+        self.owner, self.found, self.automatic = owner, found, automatic
         self.pair: PairIdentification = found.result.pairs[
             min(owner.wish.pair, len(found.result.pairs) - 1)
         ]
+        self.beside: PairIdentification | None = None
+        if automatic is not None:
+            self.beside = automatic.pairs[min(owner.wish.pair, len(automatic.pairs) - 1)]
         self.described = {picture.key: picture for picture in found.pictures}
         self.pictures: dict[str, Picture] = {}
         self.fields: dict[str, ui.number] = {}
@@ -89,6 +94,12 @@ class ResultView:
         with card("Verdict"):
             classes = _CLASSES.get(str(result.verdict), "hm-bad")
             ui.label(headline(result)).classes(f"hm-verdict {classes}")
+            if self.automatic is not None and self.beside is not None:
+                ui.label(
+                    f"✎ By hand: {self.owner.question.set_by_hand}. Automatic: "
+                    f"{structure_words(self.beside.structure)}, whole record: "
+                    f"{headline(self.automatic)}"
+                )
             for finding in by_weight(self.pair.warnings)[:3]:
                 mark = "hm-doubt" if finding.severity == "doubt" else "hm-soft"
                 ui.label(finding.message).classes(mark)
@@ -192,7 +203,11 @@ class ResultView:
 
     def _table(self) -> None:
         self.table.clear()
-        columns, rows = parameter_cells(self.pair, self.owner.wish.hand)
+        hand, fitted = self.owner.wish.hand, None if self.beside is None else self.pair
+        columns, rows = parameter_cells(
+            self.beside or self.pair, hand, fitted=fitted,
+            set_by_hand=self.owner.question.set_by_hand,
+        )  # fmt: skip
         with self.table:
             plain_table(columns, rows, title="Parameters")
 
@@ -224,6 +239,6 @@ class ResultView:
             page = self.owner.path.with_name(f"{self.owner.path.stem}.report.html")
             wish = self.owner.wish
             await self.owner.window.workbench.workers.do(
-                write_report, self.owner.question, str(page), wish.pair, wish.hand
+                write_report, self.owner.question, str(page), wish.pair, wish.hand, self.beside
             )
             ui.download.file(page)

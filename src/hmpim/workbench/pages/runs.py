@@ -115,6 +115,7 @@ class RunsPage:
                     self.window.desk.chosen_runs,
                     str(self.parameter.value),
                     self.pair.value or "",
+                    self.wanted.value or "",
                 )
             finally:
                 self.button.enable()

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 
 from nicegui import ui
 
-from hmpim.identify import Look, PairIdentification
+from hmpim.identify import Estimate, Look, PairIdentification
 from hmpim.report import format_number, format_value
 from hmpim.report.words import GLOSSARY, paper_value
 
@@ -44,43 +44,62 @@ def plain_table(columns: Sequence[str], rows: Sequence[Sequence[str]], *, title:
 
 
 def parameter_cells(
-    pair: PairIdentification, hand: Mapping[str, float]
+    pair: PairIdentification,
+    hand: Mapping[str, float],
+    *,
+    fitted: PairIdentification | None = None,
+    set_by_hand: str = "",
 ) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
-    """Return headings and rows of a pair's parameters, values set by hand beside the automatic.
+    """Return headings and rows of a pair's parameters, what was set by hand beside the automatic.
 
     Parameters
     ----------
     pair : PairIdentification
-        What was found.
+        What was found automatically.
     hand : mapping of str to float
         Values set by hand, by parameter.
+    fitted : PairIdentification, optional
+        What was found with structure or interval set by hand.
+    set_by_hand : str
+        Which, in words.
 
     Returns
     -------
     tuple
         Headings, and a row for each parameter that has any value.
     """
+    shown = pair if fitted is None else fitted
     columns: tuple[str, ...] = ("Parameter", "Automatic", "Unit", "Verdict", "Paper's steps")
     if hand:
         columns = (*columns[:3], "By hand", *columns[3:])
+    if fitted is not None:
+        columns = (*columns[:3], f"✎ {set_by_hand}, by hand", *columns[3:])
     rows = []
     for words in GLOSSARY:
         estimate = getattr(pair.parameters, words.name)
-        paper = paper_value(pair, words.name)
+        other = getattr(shown.parameters, words.name)
+        paper = paper_value(shown, words.name)
         by_hand = hand.get(words.name)
-        if estimate is None and paper is None and by_hand is None:
+        if estimate is None and other is None and paper is None and by_hand is None:
             continue
+        known = other if estimate is None else estimate
         cells = [
             words.label,
             "–" if estimate is None else format_value(estimate),
-            _unit(words.name) if estimate is None else estimate.unit,
+            _unit(words.name) if known is None else known.unit,
         ]
+        if fitted is not None:
+            cells.append("–" if other is None else _marked(other))
         if hand:
             cells.append("" if by_hand is None else f"✎ {by_hand:.5g}, by hand")
         cells.append("" if estimate is None else _VERDICTS[estimate.verdict])
         cells.append("" if paper is None else format_number(paper))
         rows.append(tuple(cells))
     return columns, rows
+
+
+def _marked(estimate: Estimate) -> str:
+    return f"✎ {format_value(estimate)}" + ("" if estimate.verdict == "ok" else ", doubtful")
 
 
 def look_cells(look: Look, *, passed: bool) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:

@@ -18,8 +18,9 @@ from hmpim.plots import Figure, pair_bode, spectra
 from hmpim.record import Channel, Record, uniform
 from hmpim.record.clock import fit_clock
 from hmpim.report import report
-from hmpim.report.by_hand import hand_notes
+from hmpim.report.by_hand import fit_note, hand_notes
 from hmpim.report.figures import Picture, pair_pictures
+from hmpim.report.words import structure_words
 
 __all__ = [
     "Found",
@@ -27,6 +28,7 @@ __all__ = [
     "Question",
     "View",
     "Windowed",
+    "automatic",
     "found",
     "look",
     "read_record",
@@ -64,6 +66,21 @@ class Question:
     stop: float | None = None
     structure: str | None = None
 
+    @property
+    def automatic(self) -> "Question":
+        """The same of the whole record, any structure allowed."""
+        return replace(self, start=None, stop=None, structure=None)
+
+    @property
+    def set_by_hand(self) -> str:
+        """What is set by hand, in words; '' for nothing."""
+        words = [] if self.structure is None else [structure_words(self.structure)]
+        if self.start is not None or self.stop is not None:
+            first = "the beginning" if self.start is None else f"{self.start:g}"
+            last = "the end" if self.stop is None else f"{self.stop:g} s"
+            words.append(f"{first} to {last}")
+        return ", ".join(words)
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class View:
@@ -76,9 +93,13 @@ class View:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Found:
-    """A result without its samples, and the pictures of one pair, as the report has them."""
+    """A result without its samples, and the pictures of one pair, as the report has them.
+
+    `stamp` tells the file as it was then.
+    """
 
     result: Identification
+    stamp: int
     pictures: tuple[Picture, ...]
 
 
@@ -134,12 +155,23 @@ def found(question: Question, view: View) -> Found:
     view : View
         How it is looked at.
     """
+    stamp = Path(question.file).stat().st_mtime_ns
     result = _identified(question)
-    pairs = tuple(replace(p, time=None, prediction=None, residual=None) for p in result.pairs)
     return Found(
-        result=replace(result, pairs=pairs, data=None),
-        pictures=tuple(pair_pictures(result, result.pairs[min(view.pair, len(pairs) - 1)])),
+        result=_slim(result),
+        stamp=stamp,
+        pictures=tuple(pair_pictures(result, result.pairs[min(view.pair, len(result.pairs) - 1)])),
     )
+
+
+def automatic(question: Question) -> Identification:
+    """Identify the whole record, any structure allowed; return it without its samples."""
+    return _slim(_identified(question.automatic))
+
+
+def _slim(result: Identification) -> Identification:
+    pairs = tuple(replace(p, time=None, prediction=None, residual=None) for p in result.pairs)
+    return replace(result, pairs=pairs, data=None)
 
 
 def _identified(question: Question) -> Identification:
@@ -176,11 +208,22 @@ def windowed(question: Question, view: View, pair: PairIdentification) -> Window
 
 
 def write_report(
-    question: Question, path: str, pair: int, hand: Mapping[str, float]
+    question: Question,
+    path: str,
+    pair: int,
+    hand: Mapping[str, float],
+    automatic: PairIdentification | None = None,
 ) -> tuple[str, ...]:
-    """Identify once more, and write the page and the result beside it; return the notes."""
+    """Identify once more, and write the page and the result beside it; return the notes.
+
+    `automatic` is what was found before structure or interval were set by hand.
+    """
     result = _identified(question)
-    notes = hand_notes(result.pairs[min(pair, len(result.pairs) - 1)], hand, fs=result.record.fs)
+    shown = result.pairs[min(pair, len(result.pairs) - 1)]
+    told = shown if automatic is None else automatic
+    notes = hand_notes(told, hand, fs=result.record.fs)
+    if automatic is not None:
+        notes = (fit_note(automatic, set_by_hand=question.set_by_hand), *notes)
     report(result, path, notes=notes)
     save(result, Path(path).with_suffix(".json"))
     return notes

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from hmpim.errors import ArgumentError
 from hmpim.formats.files import read
-from hmpim.formats.runs import Run, filter_runs, find_runs
+from hmpim.formats.runs import Run, asked_of, filter_runs, find_runs
 from hmpim.formats.saving import load, save
 from hmpim.identify import Estimate, Identification, PairIdentification, identify
 from hmpim.plots import Figure
@@ -88,7 +88,9 @@ def _row(run: Run, wanted: Sequence[str], good: set[str]) -> Row:
     )
 
 
-def compared(folder: str, names: Sequence[str], parameter: str, pair: str) -> Compared:
+def compared(
+    folder: str, names: Sequence[str], parameter: str, pair: str, specification: str = ""
+) -> Compared:
     """Hold runs against each other; one that was not identified yet is, and its result kept.
 
     Parameters
@@ -101,6 +103,8 @@ def compared(folder: str, names: Sequence[str], parameter: str, pair: str) -> Co
         Which one is drawn from run to run.
     pair : str
         "output from input" of the pair; the first of each run where it has no such pair.
+    specification : str
+        Conditions, parted by commas; what they ask of the parameter is drawn.
 
     Raises
     ------
@@ -130,12 +134,20 @@ def compared(folder: str, names: Sequence[str], parameter: str, pair: str) -> Co
         for w in GLOSSARY
         if any(getattr(one.parameters, w.name) is not None for _, one in pairs)
     )
+    unit = next((value.unit for value in values if value is not None), None)
     labels = [Path(name).parent.name or name for name, _ in pairs]
     return Compared(
         columns=("Parameter", *labels),
         cells=cells,
         bode=overlaid_bode(curves),
-        trend=trend(labels, values, name=words),
+        trend=trend(
+            labels,
+            values,
+            name=words,
+            specified=()
+            if unit is None
+            else asked_of(parameter, _conditions(specification), unit=unit),
+        ),
     )
 
 
