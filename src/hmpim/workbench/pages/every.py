@@ -42,6 +42,8 @@ def add_pages(workbench: Workbench, app: FastAPI) -> None:
         Into which NiceGUI is mounted; what is added here is asked first.
     """
     ui.add_css((_STATIC / "workbench.css").read_text(encoding="utf-8"), shared=True)
+    named = (_STATIC / "named.js").read_text(encoding="utf-8")
+    ui.add_head_html(f"<script>{named}</script>", shared=True)
     add_front(workbench)
     for name, build in _PAGES.items():
         add_page(workbench, name, build)

@@ -163,7 +163,8 @@ class Command:
         with ui.element("details").classes("hm-command hm-wide"):
             with ui.element("summary"):
                 ui.label("The same from Python or the command line")
-            self._text = ui.label(words).classes("hm-pre").props("tabindex=0")
+            self._text = ui.label(words).classes("hm-pre")
+            self._text.props('tabindex=0 role="region" aria-label="The command"')
 
     def show(self, words: str) -> None:
         """Show this."""

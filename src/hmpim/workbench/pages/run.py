@@ -84,7 +84,8 @@ class RunPage:
                 self.told = ui.label().classes("hm-soft")
                 self.estimates = ui.element("div")
             with card("Log"):
-                self.log = ui.label().classes("hm-pre").props("tabindex=0")
+                self.log = ui.label().classes("hm-pre")
+                self.log.props('tabindex=0 role="log" aria-label="The last lines of the log"')
         with ui.element("div").classes("hm-body"):
             with card("Command and response"):
                 self.progress = ui.label("Nothing is running.").classes("hm-soft")

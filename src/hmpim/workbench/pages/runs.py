@@ -72,7 +72,9 @@ class RunsPage:
             if not found.rows:
                 ui.label("There are no runs yet.").classes("hm-soft")
                 return
-            with ui.element("div").classes("hm-table").props("tabindex=0"), ui.element("table"):
+            whole = ui.element("div").classes("hm-table")
+            whole.props('tabindex=0 role="region" aria-label="Runs of the folder"')
+            with whole, ui.element("table"):
                 with ui.element("thead"), ui.element("tr"):
                     for head in _HEADS:
                         with ui.element("th").props('scope="col"'):

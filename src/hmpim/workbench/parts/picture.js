@@ -98,10 +98,17 @@ export default {
     async redraw(data, layout, cursors) {
       // shapes are dragged at once with this alone; "editable" only makes them ask for a click first
       const edits = { shapePosition: (cursors ?? []).length > 0 };
-      const config = { displaylogo: false, responsive: true, scrollZoom: false, edits };
+      const config = {
+        displaylogo: false, responsive: true, scrollZoom: false, edits,
+        modeBarButtonsToRemove: ["select2d", "lasso2d", "autoScale2d"],
+      };
       await this.Plotly.react(this.$el, data, layout, config);
       for (const path of this.$el.querySelectorAll(".shapelayer path[data-index]")) {
         if (Number(path.dataset.index) < this.fixed) path.style.pointerEvents = "none";
+      }
+      // what is done by dragging is no use to keys, and a page of plots has many
+      for (const drag of this.$el.querySelectorAll(".modebar-btn[data-attr=dragmode]")) {
+        drag.tabIndex = -1;
       }
       if (!this.drawn) this.$el.on("plotly_relayout", this.moved);
     },

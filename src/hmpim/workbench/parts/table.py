@@ -26,7 +26,8 @@ def plain_table(columns: Sequence[str], rows: Sequence[Sequence[str]], *, title:
     title : str
         For those who hear it.
     """
-    whole = ui.element("div").classes("hm-table").props("tabindex=0")
+    whole = ui.element("div").classes("hm-table").props('tabindex=0 role="region"')
+    whole.props["aria-label"] = title
     with whole, ui.element("table"):
         with ui.element("caption").style("position:absolute;left:-100vw"):
             ui.label(title)
