@@ -28,7 +28,7 @@ DRAWN = "(n) => document.querySelectorAll('.hm-picture[data-drawn]').length >= n
 CLOCKED = """([label, shows, key]) => {
     const plots = [...document.querySelectorAll(".hm-picture[data-drawn]")];
     const plot = plots.find((one) => one.getAttribute("aria-label").startsWith(shows));
-    const slider = document.querySelector(`[role=slider][aria-label="${label}"] [tabindex]`);
+    const slider = document.querySelector(`.q-slider[aria-label="${label}"] [tabindex]`);
     return new Promise((done) => {
         const begun = performance.now();
         new MutationObserver((_, observer) => {

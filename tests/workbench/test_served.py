@@ -122,7 +122,7 @@ HIGHEST = """([low, high]) => {
 def test_a_design_follows_its_sliders_and_stays_inside_its_limits(page, served):
     go(page, served, "design")
     page.get_by_text("inside all limits").wait_for()
-    slider = page.get_by_role("slider", name="Amplitude")
+    slider = page.locator(".q-slider[aria-label=Amplitude]")
     slider.click(position={"x": 1, "y": 10})
     page.get_by_role("cell", name="0.1", exact=True).wait_for()
     slider.locator("[tabindex='0']").press("ArrowRight")
@@ -354,3 +354,51 @@ def test_nothing_is_lost_by_a_reload_and_a_second_window_gets_a_desk_of_its_own(
     page.reload()
     page.wait_for_function("() => document.querySelector('[aria-label=\"To (s)\"]')?.value === '8'")
     assert desk.name in page.url
+
+
+# Keys and names.
+
+STOPS = """() => [...document.querySelectorAll(
+        "a[href], button, input, textarea, summary, [tabindex]")]
+    .filter((e) => e.tabIndex >= 0 && !e.disabled && e.type !== "file" && e.checkVisibility())
+    .map((e, k) => { e.dataset.stop = k; return e.outerHTML.slice(0, 200); })"""
+
+
+def heard(line):
+    """Role and name of what has the focus, as a screen reader is told them, and its number."""
+    line.send("DOM.getDocument", {"depth": 0})
+    here = line.send("Runtime.evaluate", {"expression": "document.activeElement"})["result"]
+    asked = {"objectId": here["objectId"], "fetchRelatives": False}
+    node = line.send("Accessibility.getPartialAXTree", asked)["nodes"][0]
+    stop = line.send("Runtime.evaluate", {"expression": "document.activeElement.dataset.stop"})
+    return (
+        node["role"]["value"],
+        node.get("name", {}).get("value", ""),
+        stop["result"].get("value"),
+    )
+
+
+@pytest.mark.browser
+def test_every_control_is_reached_by_tab_in_its_order_and_has_a_name(page, served):
+    save(recorded(), served.runs / "heard.csv")
+    analysis = Analysis(file="heard.csv", inputs=("u",), outputs=("y",))
+    desk = desk_of(served, Desk(name=secrets.token_hex(8), analysis=analysis))
+    ready = {"design": "Error bars", "analyse": "Delay by hand (s)", "runs": "Choose heard.csv"}
+    line = page.context.new_cdp_session(page)
+    for name in ("design", "check", "run", "analyse", "runs", "campaign"):
+        go(page, served, name, desk)
+        if name in ready:
+            page.get_by_label(ready[name]).first.wait_for()
+        page.wait_for_timeout(500)
+        wanted = page.evaluate(STOPS)
+        reached = []
+        for _ in wanted:
+            page.keyboard.press("Tab")
+            role, words, stop = heard(line)
+            assert words, f"{name}: {role} without a name at {wanted[int(stop or 0)]}"
+            reached.append(int(stop))
+        assert reached == list(range(len(wanted))), name
+        assert len(wanted) > 10
+    go(page, served, "design")
+    page.get_by_role("slider", name="Amplitude").press("ArrowLeft")
+    page.get_by_text("0.99", exact=True).wait_for()
