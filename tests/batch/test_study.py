@@ -1,5 +1,8 @@
 """The page of a batch, and what each record is held against."""
 
+from datetime import UTC, datetime, timedelta
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -7,7 +10,7 @@ import hmpim
 from batch_support import FS, write_rows
 from hmpim.batch.expect import held_against, read_bound
 from hmpim.batch.run import Cluster
-from hmpim.batch.study import outliers, write_study
+from hmpim.batch.study import _order, outliers, write_study
 from hmpim.batch.summary import summary_of
 
 
@@ -51,3 +54,22 @@ def test_equal_units_seldom_stand_out(seeds):
         away, limit = outliers(np.random.default_rng(seed).standard_normal(500))
         alarms += bool((away > limit).any())
     assert alarms <= 0.01 * seeds + 4 * np.sqrt(0.01 * seeds)
+
+
+@pytest.mark.parametrize(
+    ("step", "said", "last"),
+    [(86_400.0, "Days since the first (created)", 3.0), (40.0, "Minutes since", 2.0),
+     (0.01, "Record, by name", 3.0)],
+)  # fmt: skip
+def test_records_stand_in_the_order_of_their_making_where_the_stamps_tell_it(step, said, last):
+    import pyarrow as pa
+
+    begin = datetime(2026, 1, 1, tzinfo=UTC)
+    stamps = [(begin + timedelta(seconds=step * k)).isoformat() for k in range(4)]
+    columns = {"meta_created": stamps, "record": ["a", "b", "c", "d"]}
+    table = SimpleNamespace(
+        metadata=("created",), to_arrow=lambda names: pa.table({n: columns[n] for n in names})
+    )
+    places, along = _order(table, np.arange(4))
+    assert along.startswith(said)
+    assert places.tolist() == pytest.approx([0.0, last / 3, 2 * last / 3, last])

@@ -8,13 +8,30 @@ from numpy.typing import NDArray
 from hmpim.plots import Axis, Band, Curve, Figure, Panel, Points, Rule
 from hmpim.plots.description import Item
 from hmpim.plots.style import axis_label, plain
+from hmpim.report.words import GLOSSARY
 
-__all__ = ["distribution", "groups", "sequence"]
+__all__ = ["FOR_A_MEDIAN", "distribution", "groups", "label_of", "sequence"]
 
 Real = NDArray[np.float64]
 
 _MOST_POINTS = 1500
+_FEW_POINTS = 200
+FOR_A_MEDIAN = 60
+"""Records from which on a running median is drawn: three blocks of twenty."""
+
+_LABELS = {words.name: words.label for words in GLOSSARY}
 _MOST_GROUPS = 24
+
+
+def label_of(name: str) -> str:
+    """Return what a report calls a parameter.
+
+    Examples
+    --------
+    >>> label_of("bandwidth_phase90"), label_of("fit_percent")
+    ('Bandwidth, −90°', 'Fit percent')
+    """
+    return _LABELS.get(name, name.replace("_", " ").capitalize())
 
 
 def distribution(values: Real, *, name: str, unit: str, bounds: tuple[float, ...] = ()) -> Figure:
@@ -33,7 +50,7 @@ def distribution(values: Real, *, name: str, unit: str, bounds: tuple[float, ...
     --------
     >>> figure = distribution(np.arange(10.0), name="delay", unit="s")
     >>> figure.panels[0].x.label
-    'delay (s)'
+    'Delay, pure (s)'
     """
     tail = 0.01 if values.size > 50 else 0.0
     low, high = (float(end) for end in np.quantile(values, (tail, 1.0 - tail)))
@@ -52,7 +69,7 @@ def distribution(values: Real, *, name: str, unit: str, bounds: tuple[float, ...
     return Figure(
         panels=(
             Panel(
-                x=Axis(label=axis_label(name.replace("_", " "), unit)),
+                x=Axis(label=axis_label(label_of(name), unit)),
                 y=Axis(label="Records", low=0.0),
                 items=items,
             ),
@@ -80,11 +97,12 @@ def sequence(
     every = np.unique(np.linspace(0, values.size - 1, _MOST_POINTS).astype(int))
     far = np.argsort(np.abs(values - np.median(values)))[-50:]
     shown = np.union1d(every, far)
+    size = 2.0 if values.size > _FEW_POINTS else 4.5
     items: list[Points | Curve | Rule] = [
-        Points(x=places[shown], y=values[shown], size=2.0, colour="input")
+        Points(x=places[shown], y=values[shown], size=size, colour="input")
     ]
-    blocks = np.array_split(np.arange(values.size), int(np.clip(values.size // 20, 1, 60)))
-    if len(blocks) > 2:
+    if values.size >= FOR_A_MEDIAN:
+        blocks = np.array_split(np.arange(values.size), min(values.size // 20, 60))
         middle = np.array([np.median(places[b]) for b in blocks])
         median = np.array([np.median(values[b]) for b in blocks])
         items.append(Curve(x=middle, y=median, label="running median", colour="output", width=1.8))
@@ -93,7 +111,7 @@ def sequence(
         panels=(
             Panel(
                 x=Axis(label=along),
-                y=Axis(label=axis_label(name.replace("_", " "), unit)),
+                y=Axis(label=axis_label(label_of(name), unit)),
                 items=tuple(items),
             ),
         ),
@@ -119,7 +137,7 @@ def groups(some: Mapping[str, Real], *, name: str, unit: str, by: str) -> Figure
         panels=(
             Panel(
                 x=Axis(label=by, ticks=words, low=-0.5, high=len(shown) - 0.5, grid=False),
-                y=Axis(label=axis_label(name.replace("_", " "), unit)),
+                y=Axis(label=axis_label(label_of(name), unit)),
                 items=(Points(x=at, y=median, low=low, high=high, size=5.0, colour="output"),),
             ),
         ),

@@ -11,7 +11,7 @@ from scipy.special import ndtri
 
 from hmpim.batch.between import between_units
 from hmpim.batch.expect import Bound, Outcome, held_against
-from hmpim.batch.pictures import distribution, groups, sequence
+from hmpim.batch.pictures import FOR_A_MEDIAN, distribution, groups, label_of, sequence
 from hmpim.batch.summary import ParameterSummary, Summary, column, summary_of
 from hmpim.batch.table import BatchTable
 from hmpim.formats.atomic import write_text
@@ -23,6 +23,9 @@ __all__ = ["outliers", "study_page", "write_study"]
 
 _TIMES = ("created", "recorded", "date", "time", "datetime", "timestamp")
 """Columns of metadata that may say when a record was made."""
+
+_BY_NAME = "Record, by name"
+_SPANS = (("Days", 86_400.0), ("Hours", 3600.0), ("Minutes", 60.0), ("Seconds", 1.0))
 
 _FALSE_ALARM = 0.01
 """Chance that any of a fleet of equal units, normally distributed, stands out."""
@@ -135,7 +138,7 @@ def _figures(found: Summary) -> Grid:
         columns=("Parameter", "Records", "Median", "5 %", "95 %", "Doubtful"),
         rows=tuple(
             (
-                row.name.replace("_", " ") + (f" ({row.unit})" if row.unit else ""),
+                label_of(row.name) + (f" ({row.unit})" if row.unit else ""),
                 str(row.count),
                 *(f"{value:.5g}" for value in (row.median, row.low, row.high)),
                 str(row.doubtful),
@@ -157,7 +160,7 @@ def _between(table: BatchTable, found: Summary) -> tuple[Grid, ...]:
         low, high = told.spread_ci95
         rows.append(
             (
-                row.name.replace("_", " ") + (f" ({row.unit})" if row.unit else ""),
+                label_of(row.name) + (f" ({row.unit})" if row.unit else ""),
                 str(told.units),
                 f"{told.mean:.6g} ± {told.mean_std:.2g}",
                 f"{told.spread:.3g}",
@@ -230,7 +233,7 @@ def _section(
         if o.bound.name == row.name
     )
     some = values[there]
-    title = row.name.replace("_", " ").capitalize()
+    title = label_of(row.name)
     pictures = [
         Picture(
             key=f"{row.name}-distribution",
@@ -246,7 +249,10 @@ def _section(
         Picture(
             key=f"{row.name}-trend",
             title=f"{title}: one after the other",
-            caption=f"Each record, along {along.lower()}, with the running median.",
+            caption=(
+                "Each record, by name" if along == _BY_NAME else f"Each record: {along.lower()}"
+            )
+            + (", with the running median." if some.size >= FOR_A_MEDIAN else "."),
             description=f"{row.name} along {along.lower()}.",
             figure=sequence(
                 places[order], some[order], name=row.name, unit=row.unit, along=along, bounds=bounds
@@ -289,23 +295,31 @@ def _standing_out(
             for name, k, std in zip(names, worst, own, strict=True)
         ),
     )
-    return (f"{far.size} records lie beyond {limit:.1f} robust deviations.",), (grid,)
+    count = "1 record lies" if far.size == 1 else f"{far.size} records lie"
+    return (f"{count} beyond {limit:.1f} robust deviations.",), (grid,)
 
 
 def _order(table: BatchTable, there: NDArray[np.int64]) -> tuple[Real, str]:
-    """When each record was made, in days; without that, its place in the alphabet."""
+    """When each record was made; without that, its place in the alphabet.
+
+    Stamps closer than a second on average are when files were written, not when tests were made.
+    """
     for name in _TIMES:
         if name not in table.metadata:
             continue
         words = table.to_arrow([f"meta_{name}"]).column(0).take(there).to_pylist()
         stamps = [_stamp(word) for word in words]
         if all(stamp is not None for stamp in stamps):
-            days = np.array(stamps, dtype=np.float64) / 86_400.0
-            return days - days.min(), f"Days since the first ({name})"
+            seconds = np.array(stamps, dtype=np.float64)
+            seconds -= seconds.min()
+            if seconds.max() < seconds.size:
+                continue
+            unit, length = next(u for u in _SPANS if seconds.max() >= 2.0 * u[1] or u[1] == 1.0)
+            return seconds / length, f"{unit} since the first ({name})"
     names = np.array(table.to_arrow(["record"]).column(0).take(there).to_pylist())
     places = np.empty(names.size)
     places[np.argsort(names, kind="stable")] = np.arange(names.size)
-    return places, "Record, by name"
+    return places, _BY_NAME
 
 
 def _stamp(word: str | None) -> float | None:
