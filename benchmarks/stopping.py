@@ -216,7 +216,7 @@ def exact(draws: int) -> list[str]:
              "| --- " * (4 + len(TRUTH)) + "|"]  # fmt: skip
     for step in (4, 10, 20):
         for needed in (1, 3):
-            ends, z = _ends(slopes, noise, step=step, needed=needed)
+            ends, z = linear_ends(slopes, noise, step=step, needed=needed)
             held = [100.0 * float(np.mean(np.abs(row) < 1.96)) for row in z.T]
             cells = [needed, f"{step / FS:g}", f"{np.median(ends):.3g}"]
             cells += [f"{share:.1f}" for share in (*held, np.mean(held))]
@@ -236,7 +236,7 @@ def _slopes(stimulus: hmpim.Stimulus) -> Any:
     return np.column_stack(columns)
 
 
-def _ends(slopes: Any, noise: Any, *, step: int, needed: int) -> tuple[Any, Any]:
+def linear_ends(slopes: Any, noise: Any, *, step: int, needed: int) -> tuple[Any, Any]:
     """Time of each end, and errors there in standard deviations."""
     targets = np.array([TARGETS.get(name, np.inf) for name in TRUTH])
     ends, z = np.full(len(noise), np.nan), np.full((len(noise), len(TRUTH)), np.nan)

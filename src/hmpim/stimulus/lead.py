@@ -252,8 +252,8 @@ def rest_to_rest(
         forward = rest_to_rest(core.waveform, limits=limits, fs=fs, longest=longest)
         return _mirrored(forward, fs)
     earliest, first, last = _spans(core, jerk=math.isfinite(limits.jerk))
-    start_peaks = true_peaks(core, start=earliest, stop=first)
-    end_peaks = true_peaks(core, start=last, stop=core.duration)
+    start_peaks = true_peaks(core, start=earliest, stop=first, jerk=False)
+    end_peaks = true_peaks(core, start=last, stop=core.duration, jerk=False)
     rest = np.zeros(3)
     entry = exit_ = None
     for join in _handovers(core, earliest, first, 0):

@@ -170,9 +170,9 @@ def largest(coefficients: FloatArray, durations: FloatArray) -> FloatArray:
 
     Notes
     -----
-    A derivative is largest at an end or at a root of the next; the roots are the eigenvalues
-    of the companion matrices (L. N. Trefethen and D. Bau, Numerical Linear Algebra, 1997,
-    lecture 25), all in one call.
+    A derivative is largest at an end or at a root of the next; beyond the second degree the roots
+    are the eigenvalues of the companion matrices (L. N. Trefethen and D. Bau, Numerical Linear
+    Algebra, 1997, lecture 25), all in one call.
 
     Examples
     --------
@@ -183,8 +183,9 @@ def largest(coefficients: FloatArray, durations: FloatArray) -> FloatArray:
     for order in range(4):
         slope = p[:, 1:] * np.arange(1.0, p.shape[1])
         # a double root may come out as a pair just off the axis: its real part will do
-        inner = np.clip(_roots(slope).real, 0.0, 1.0)
-        at = np.concatenate((np.zeros((len(p), 1)), np.ones((len(p), 1)), inner), axis=1)
+        at = np.zeros((len(p), slope.shape[1] + 1))
+        at[:, 1] = 1.0
+        at[:, 2:] = np.clip(_real_roots(slope), 0.0, 1.0)
         value = np.zeros(at.shape)
         for column in p.T[::-1]:
             value = value * at + column[:, None]
@@ -193,14 +194,28 @@ def largest(coefficients: FloatArray, durations: FloatArray) -> FloatArray:
     return np.stack(found)
 
 
-def _roots(polynomials: FloatArray) -> NDArray[np.complex128]:
-    """Roots of polynomials with rising powers, shape (k, m + 1) to (k, m)."""
+def _real_roots(polynomials: FloatArray) -> FloatArray:
+    """Real parts of the roots of polynomials with rising powers, shape (k, m + 1) to (k, m)."""
     degree = polynomials.shape[1] - 1
     lead = polynomials[:, -1]
     # of a lower degree than its row is long: the roots that it lacks are sent far away
     least = _NO_LEAD * np.abs(polynomials).max(axis=1)
     lead = np.where(np.abs(lead) > least, lead, np.where(least > 0.0, least, 1.0))
+    rest = polynomials[:, :-1] / lead[:, None]
+    if degree == 1:
+        return np.asarray(-rest)
+    if degree == 2:
+        return _of_squares(rest)
     companion = np.zeros((len(polynomials), degree, degree))
     companion[:, np.arange(1, degree), np.arange(degree - 1)] = 1.0
-    companion[:, :, -1] = -polynomials[:, :-1] / lead[:, None]
-    return np.asarray(np.linalg.eigvals(companion[:, ::-1, ::-1]), dtype=np.complex128)
+    companion[:, :, -1] = -rest
+    return np.asarray(np.linalg.eigvals(companion[:, ::-1, ::-1]).real)
+
+
+def _of_squares(rest: FloatArray) -> FloatArray:
+    """Real parts of the roots of s² + b s + c, shape (k, 2) of (c, b); nothing cancels."""
+    middle = -0.5 * rest[:, 1]
+    inside = middle**2 - rest[:, 0]
+    far = middle + np.copysign(np.sqrt(np.maximum(inside, 0.0)), middle)
+    near = np.where(far == 0.0, 0.0, rest[:, 0] / np.where(far == 0.0, 1.0, far))
+    return np.stack((far, np.where(inside < 0.0, far, near)), axis=1)
