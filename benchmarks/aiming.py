@@ -24,7 +24,7 @@ from hmpim.optimal import RoughModel
 from hmpim.optimal.fisher import responses, sensitivities
 
 MODEL = RoughModel(delay=0.15, natural_frequency=10.0, damping_ratio=0.4)
-PEAKS = (math.inf, 12000.0, 8000.0, 5657.0, 4000.0)
+PEAKS = (math.inf, 12000.0, 8000.0, 4000.0)
 LENGTH, LEAD, SWEEP = 6.0, 0.08, 0.6  # s: of the record, before the first sweep, of a sweep
 BEGINS = ((0.68, 0.68), (0.93, 0.73))  # s: aimed from, by what was known; in real time 0.2 s ahead
 SHAPES = (  # shares of the natural frequency between which it goes; s of a dwell, of a glide

@@ -149,10 +149,11 @@ def test_what_is_not_asked_for_is_told_all_the_same():
 @pytest.mark.usefixtures("effort")
 def test_a_jerk_limit_is_kept_too():
     free = search(duration=4.0)
-    limits = Limits(position=10, jerk=0.9 * free.stimulus.peaks.jerk, unit="deg")
+    limits = Limits(position=10, jerk=0.6 * free.stimulus.peaks.jerk, unit="deg")
     found = search(limits, duration=4.0)
     assert found.stimulus.peaks.jerk <= limits.jerk
-    assert found.value < 1.5 * free.value
+    assert found.value < 2.0 * free.value  # 1.63: the end of the band is held up, too
+    assert excited_band(found.stimulus.position, FS)[1] >= found.wish.reach
 
 
 @pytest.mark.parametrize("which", BOTH)

@@ -12,9 +12,22 @@ from hmpim.optimal.wish import PARAMETERS, Family, Gentle, Wish
 from hmpim.stimulus import Stimulus, Waveform
 from hmpim.stimulus.motion import Scalable
 
-__all__ = ["COVERED", "Candidate", "cost_of", "gentleness", "needed_gain", "shortfall", "try_out"]
+__all__ = [
+    "COVERED",
+    "FULL",
+    "Candidate",
+    "cost_of",
+    "gentleness",
+    "gentler",
+    "needed_gain",
+    "shortfall",
+    "try_out",
+]
 
 FloatArray = NDArray[np.float64]
+
+FULL = 1.0 + 1e-9
+"""Share of the limits up to which they are kept."""
 
 COVERED = 1.005
 """Shortfall up to which a band counts as reached: its end is seen in bins."""
@@ -135,6 +148,25 @@ def gentleness(stimulus: Stimulus, gentle: Gentle) -> float:
     if gentle == "travel":
         return float(np.abs(stimulus.velocity).sum() / stimulus.fs)
     return stimulus.samples / stimulus.fs
+
+
+def gentler(one: Candidate | None, other: Candidate | None) -> Candidate | None:
+    """Return the gentler one inside the limits, else the one that is less beyond them.
+
+    Parameters
+    ----------
+    one, other : Candidate or None
+        None for none.
+
+    Examples
+    --------
+    >>> gentler(None, None) is None
+    True
+    """
+    both = [c for c in (one, other) if c is not None]
+    if not both:
+        return None
+    return min(both, key=lambda c: (c.use > FULL, c.value if c.use <= FULL else c.use))
 
 
 def try_out(

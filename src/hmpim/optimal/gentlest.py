@@ -10,7 +10,7 @@ import numpy as np
 
 from hmpim.arguments import checked
 from hmpim.errors import ArgumentError, LimitsError
-from hmpim.optimal.candidate import Candidate, gentleness
+from hmpim.optimal.candidate import FULL, Candidate, gentleness, gentler
 from hmpim.optimal.fisher import Errors, predict_errors
 from hmpim.optimal.multisine import best_multisine
 from hmpim.optimal.sweeps import best_sweep
@@ -28,9 +28,9 @@ FAMILIES: tuple[Family, ...] = get_args(Family)
 _LENGTH = 10.0  # s; the paper's longer one
 _LONGEST = 60.0  # s, where the duration is to be short and no longest one is stated
 _TRIALS = 100  # of one search, roughly: for the progress that is told
+_MORE = 8  # starts, before it is said that limits do not allow an accuracy
 _ROUNDS = 8  # of the search for the shortest record
 _CLOSE = 0.01  # of the duration, to which the shortest is found
-_FULL = 1.0 + 1e-9
 _FREE = 0.98  # of a limit: what is below it is not shaped by it
 _ROOM = 1.05  # on what would do: another search may end in another, slightly worse minimum
 
@@ -180,8 +180,8 @@ def gentlest(
         best = _best(family, wish, step=_steps(progress, family, k, len(chosen)))
         if best is not None:
             found.append(best)
-    found.sort(key=lambda c: (c.use > _FULL, c.value if c.use <= _FULL else c.use))
-    if not found or found[0].use > _FULL:
+    found.sort(key=lambda c: (c.use > FULL, c.value if c.use <= FULL else c.use))
+    if not found or found[0].use > FULL:
         raise LimitsError(_what_would_do(wish, found[0] if found else None))
     _tell(progress, 1.0, "done")
     first = found[0]
@@ -234,7 +234,7 @@ def trade(
         best = _rescaled(shape, factor, found.wish, wish) or _best(
             found.family, wish, near=shape, step=step
         )
-        inside = best is not None and best.use <= _FULL
+        inside = best is not None and best.use <= FULL
         points.append(TradePoint(factor=factor, value=best.value if best and inside else None))
     _tell(progress, 1.0, "done")
     return tuple(points)
@@ -290,20 +290,23 @@ def _best(
     if wish.gentle == "duration":
         return _shortest(family, wish, step)
     best = None if near is None else _at(family, wish, wish.duration, near, step)
-    if best is None or best.use > _FULL:
+    if best is None or best.use > FULL:
         best = _at(family, wish, wish.duration, None, step)
-    if best is not None and best.use <= _FULL:
+    if best is not None and best.use <= FULL:
         return best
     if wish.unlimited:
         return best
     # limits come first: the least share of them, and on from there if that is inside
-    inside = _at(family, replace(wish, gentle="duration"), wish.duration, None, step)
+    least = replace(wish, gentle="duration")
+    inside = _at(family, least, wish.duration, None, step)
+    if family == "multisine" and (inside is None or inside.use > FULL):
+        inside = gentler(inside, best_multisine(least, wish.duration, starts=_MORE, step=step))
     if inside is None:
         return best
     inside = replace(inside, value=gentleness(inside.stimulus, wish.gentle))
-    if inside.use > _FULL:
+    if inside.use > FULL:
         return inside  # for limits in proportion, in proportion: what would do relies on it
-    return _better(inside, _at(family, wish, wish.duration, inside, step))
+    return gentler(inside, _at(family, wish, wish.duration, inside, step))
 
 
 def _at(
@@ -314,14 +317,6 @@ def _at(
         return best_multisine(wish, total, start=start, step=step)
     trials = 40 if near is None else 15
     return best_sweep(wish, total, family=family, start=start, trials=trials, step=step)
-
-
-def _better(one: Candidate | None, other: Candidate | None) -> Candidate | None:
-    """Return the gentler one inside the limits, else the one that is less beyond them."""
-    both = [c for c in (one, other) if c is not None]
-    if not both:
-        return None
-    return min(both, key=lambda c: (c.use > _FULL, c.value if c.use <= _FULL else c.use))
 
 
 def _shortest(family: Family, wish: Wish, step: Step) -> Candidate | None:
@@ -339,17 +334,17 @@ def _shortest(family: Family, wish: Wish, step: Step) -> Candidate | None:
     for _ in range(_ROUNDS):
         total = math.ceil(total * wish.fs - 1e-6) / wish.fs
         best = _at(family, wish, total, near, step)
-        if near is not None and family == "multisine" and (best is None or best.use > _FULL):
-            best = _better(best, _at(family, wish, total, None, step))  # a second look costs little
+        if near is not None and family == "multisine" and (best is None or best.use > FULL):
+            best = gentler(best, _at(family, wish, total, None, step))  # a second look costs little
         near = best or near
         tried = near if near is not None and _lasts(near, total, wish) else None
-        if tried is not None and tried.use <= _FULL:
+        if tried is not None and tried.use <= FULL:
             enough, enough_at = tried, total
         else:
             short_at = max(short_at, total)
             short_use = math.inf if tried is None else tried.use
         if short_at >= wish.duration - 0.5 / wish.fs:
-            return _better(enough, tried)
+            return gentler(enough, tried)
         if enough is not None and enough_at - max(short_at, wish.shortest) <= max(
             _CLOSE * enough_at, 1.0 / wish.fs
         ):

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import linprog
 
-from hmpim.optimal.candidate import Candidate, try_out
+from hmpim.optimal.candidate import Candidate, gentler, try_out
 from hmpim.optimal.fisher import sensitivities
 from hmpim.optimal.wish import PARAMETERS, Step, Wish
 from hmpim.stimulus import RestToRest, SumOfSines
@@ -38,7 +38,7 @@ _PATIENCE = 5  # good steps
 _LITTLE = 2e-3  # of the cost: less gained in so many steps ends a descent
 _FIRST_ROWS = 4  # per unknown, that a linear programme is begun with
 _BROKEN = 1e-9  # of a bound: what a solution may exceed it by
-_END = 0.3  # of the greatest velocity of a line, which one past the reach must have
+_END = 0.36  # of the greatest velocity of a line, which one past the reach must have
 _FEWEST = 4  # lines that leave freedom beside the three conditions of rest
 
 
@@ -266,24 +266,25 @@ def best_multisine(
     best, plain = None, begins[0]
     # as it comes; then with the end of the band held up; then without its lowest lines
     for first, edge in ((1, False), (1, True), (2, False), (3, False), (4, False), (5, False)):
-        if lines - first < _FEWEST or (best is not None and best.use <= 1.0):
+        if lines - first < _FEWEST or (first > 1 and best is not None and best.use <= 1.0):
             break
         numbers = np.arange(first, lines + 1)
         programme = replace(_programme(wish, moving, total, repeats, numbers), edge=edge)
         descended = [_descend(programme, _without(b, first), steps, step) for b in begins]
-        found = [z for z in descended if z is not None]
+        found = sorted((z for z in descended if z is not None), key=programme.cost)
         if not found:
             break
-        z = min(found, key=programme.cost)
-        waveform = _waveform(z, repeats * numbers, moving, wish.fs)
-        whole = _with(z, first)
-        tried = try_out(waveform, wish, family="multisine", total=total, shape=whole, finer=3)
-        if tried is not None and not edge and first == 1:
+        for z in found:  # the lines alone cannot promise what samples show
+            waveform = _waveform(z, repeats * numbers, moving, wish.fs)
+            whole = _with(z, first)
+            tried = try_out(waveform, wish, family="multisine", total=total, shape=whole, finer=3)
+            if tried is not None:
+                break
+        if tried is not None and z is found[0] and not edge and first == 1:
             return tried
-        if tried is not None and (best is None or tried.use < best.use):
-            best = tried
+        best = gentler(best, tried)
         if not edge:
-            plain = whole  # what was found without holding the band: on from there, a line less
+            plain = _with(found[0], first)  # without holding the band: on from there, a line less
         if edge or first > 1:
             begins = [plain]
     return best
