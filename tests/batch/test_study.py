@@ -8,6 +8,7 @@ import pytest
 
 import hmpim
 from batch_support import FS, write_rows
+from hmpim.batch import study
 from hmpim.batch.expect import held_against, read_bound
 from hmpim.batch.run import Cluster
 from hmpim.batch.study import _order, outliers, write_study
@@ -33,7 +34,37 @@ def test_bounds_are_held_against_intervals(table, tmp_path):
     page = (tmp_path / "study.html").read_text(encoding="utf-8")
     assert "3 outside the specification" in page
     assert "Scale factor by bench" in page
+    assert ">nan" not in page
     assert summary_of(table).verdicts["ok"] + summary_of(table).verdicts.get("doubtful", 0) == 8
+
+
+class Told:
+    """A table of a few columns."""
+
+    def __init__(self, **columns):
+        self._columns = columns
+        self.metadata = tuple(n.removeprefix("meta_") for n in columns if n.startswith("meta_"))
+
+    def to_arrow(self, names):
+        import pyarrow as pa
+
+        return pa.table({name: self._columns[name] for name in names})
+
+
+def test_a_date_that_somebody_gave_goes_before_the_file_s_own():
+    made = [f"2026-03-0{k}T10:00:00" for k in (1, 2, 5)]
+    files = ["2026-11-22T10:00:00"] * 3
+    every = np.arange(3)
+    places, along = study._order(Told(meta_created=files, meta_date=made), every)
+    assert (places.tolist(), along) == ([0.0, 1.0, 4.0], "Days since the first (date)")
+    files = [f"2026-11-22T10:0{k}:00" for k in (0, 1, 9)]
+    places, along = study._order(Told(meta_created=files), every)
+    assert (places.tolist(), along) == ([0.0, 1.0, 9.0], "Minutes since the first (created)")
+
+
+def test_an_interval_over_several_models_has_the_error_bar_of_the_likeliest():
+    table = Told(d=[5.0, 5.0], d_std=[0.1, None], d_low=[4.8, 2.0], d_high=[5.2, 5.196])
+    assert study._own_errors(table, "d") == pytest.approx([0.1, 0.1])
 
 
 def test_units_of_bounds(table):

@@ -21,7 +21,8 @@ from hmpim.units import conversion_factor
 
 __all__ = ["outliers", "study_page", "write_study"]
 
-_TIMES = ("created", "recorded", "date", "time", "datetime", "timestamp")
+_HALF = 1.96
+_TIMES = ("recorded", "date", "time", "datetime", "timestamp", "created")
 """Columns of metadata that may say when a record was made."""
 
 _BY_NAME = "Record, by name"
@@ -152,7 +153,7 @@ def _between(table: BatchTable, found: Summary) -> tuple[Grid, ...]:
     """Mean of all records, and how much they differ beyond their error bars."""
     rows = []
     for row in found.parameters:
-        values, errors = column(table, row.name), column(table, f"{row.name}_std")
+        values, errors = column(table, row.name), _own_errors(table, row.name)
         kept = np.isfinite(values) & np.isfinite(errors) & (errors > 0)
         if np.count_nonzero(kept) < _FEWEST_IN_GROUP:
             continue
@@ -176,7 +177,9 @@ def _between(table: BatchTable, found: Summary) -> tuple[Grid, ...]:
         rows=tuple(rows),
         note=(
             "Spread: standard deviation between records beyond their error bars (random effects, "
-            "restricted maximum likelihood). Share: of the variance that is between records."
+            "restricted maximum likelihood). Share: of the variance that is between records. Where "
+            "intervals cover several models, the error bars are those of the likeliest one: "
+            "another moves all records alike."
         ),
     )
     return (grid,)
@@ -286,17 +289,34 @@ def _standing_out(
         return (f"No record stands out (none beyond {limit:.1f} robust deviations).",), ()
     worst = far[np.argsort(-away[far], kind="stable")][:_MOST_ROWS]
     names = table.to_arrow(["record"]).column(0).take(there[worst]).to_pylist()
-    own = column(table, f"{row.name}_std")[there[worst]]
+    ends = [column(table, f"{row.name}_{end}")[there[worst]] for end in ("low", "high")]
     grid = Grid(
         caption="Records that stand out",
-        columns=("Record", "Value", "± (standard deviation)", "Robust deviations"),
+        columns=("Record", "Value", "95 % interval", "Robust deviations"),
         rows=tuple(
-            (name, f"{some[k]:.6g}", f"{std:.2g}", f"{min(away[k], 1e6):.1f}")
-            for name, k, std in zip(names, worst, own, strict=True)
+            (name, f"{some[k]:.6g}", _interval(low, high), f"{min(away[k], 1e6):.1f}")
+            for name, k, low, high in zip(names, worst, *ends, strict=True)
         ),
     )
     count = "1 record lies" if far.size == 1 else f"{far.size} records lie"
     return (f"{count} beyond {limit:.1f} robust deviations.",), (grid,)
+
+
+def _own_errors(table: BatchTable, name: str) -> Real:
+    """Standard deviation of each record's figure by its own noise, shape (n,).
+
+    Of an interval that covers several models it is the shorter side over 1.96: the other reaches
+    to what they say.
+    """
+    low, high = (column(table, f"{name}_{end}") for end in ("low", "high"))
+    value, std = column(table, name), column(table, f"{name}_std")
+    return np.where(np.isfinite(std), std, np.minimum(value - low, high - value) / _HALF)
+
+
+def _interval(low: float, high: float) -> str:
+    """An interval in words; an end that is open or withheld is a dash."""
+    told = [f"{end:.6g}" if np.isfinite(end) else "–" for end in (low, high)]
+    return " to ".join(told) if told != ["–", "–"] else "–"
 
 
 def _order(table: BatchTable, there: NDArray[np.int64]) -> tuple[Real, str]:
