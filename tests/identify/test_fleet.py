@@ -78,7 +78,7 @@ def test_units_of_two_kinds_teach_nothing():
     pairs = [alone(output(seed)) for seed in range(LEARNT - 1)]
     other = alone(sweep() + 0.02 * np.random.default_rng(0).standard_normal(SAMPLES))
     assert other.structure == "static"
-    assert learn_fleet(sweep(), [*pairs, other], fs=FS, band=(0.2, 20.0)) is None
+    assert learn_fleet(sweep(), [*pairs, other, other], fs=FS, band=(0.2, 20.0)) is None
     assert learn_fleet(sweep(), pairs[:3], fs=FS, band=(0.2, 20.0)) is None
 
 

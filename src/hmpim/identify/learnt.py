@@ -47,6 +47,9 @@ _PROBE = 0.3
 """Time constant, over the unit's own, at which one more pole is tried."""
 
 _FEWEST = 5
+_MOSTLY = 0.75
+"""Share of the units that must be plain: of twenty, chance lets one ask for one more pole."""
+
 _LIKELY = 1.96
 
 
@@ -113,7 +116,7 @@ class Fleet:
 def learn_fleet(
     u: Real, pairs: Sequence[PairIdentification], *, fs: float, band: tuple[float, float]
 ) -> Fleet | None:
-    """Learn from some units what a fleet shares; None where they are not of one kind.
+    """Learn from some units what a fleet shares; None where most are not of one kind.
 
     Parameters
     ----------
@@ -126,14 +129,16 @@ def learn_fleet(
     band : (float, float)
         Excited band in Hz.
     """
-    if len(pairs) < _FEWEST or not all(_is_plain(pair, pairs[0]) for pair in pairs):
+    structure = STRUCTURES["second_order"]
+    plain = [pair for pair in pairs if _is_plain(pair)]
+    modes = [pair.intersample for pair in plain]
+    found = max(BETWEEN, key=modes.count)
+    alike = [pair for pair in plain if pair.intersample == found]
+    if len(alike) < max(_FEWEST, _MOSTLY * len(pairs)):
         return None
-    structure, found = STRUCTURES["second_order"], pairs[0].intersample
-    if found not in BETWEEN:
-        return None
-    tried = {c.intersample for c in pairs[0].candidates if c.structure == structure.name}
+    tried = {c.intersample for c in alike[0].candidates if c.structure == structure.name}
     open_ = tuple(mode for mode in BETWEEN if mode in tried)
-    own = _box(pairs, fs)
+    own = _box(alike, fs)
     boxes = {mode: _moved(own, found, mode) for mode in open_}
     low = np.min([box[0] for box in boxes.values()], axis=0)
     high = np.max([box[1] for box in boxes.values()], axis=0)
@@ -155,15 +160,14 @@ def learn_fleet(
     )
 
 
-def _is_plain(pair: PairIdentification, first: PairIdentification) -> bool:
-    """Whether nothing but its structure, clearly, is said of a unit, and the same as of another."""
+def _is_plain(pair: PairIdentification) -> bool:
+    """Whether nothing but its structure, clearly, is said of a unit."""
     if pair.structure != "second_order":  # of a simpler one, a second pole is never clearly absent
         return False
     rivals = [c.criterion for c in pair.candidates if c.structure != pair.structure]
     chosen = next((c.criterion for c in pair.candidates if c.chosen), np.inf)
     return (
-        (pair.structure, pair.intersample) == (first.structure, first.intersample)
-        and pair.verdict == "ok"
+        pair.verdict == "ok"
         and all(w.severity == "info" for w in pair.warnings)
         and min(rivals, default=np.inf) - chosen > _CLEAR
         and pair.parameters.hold_period is None
