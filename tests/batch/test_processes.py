@@ -7,11 +7,12 @@ import subprocess
 import sys
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 import hmpim
-from batch_support import FS, rounded
-from hmpim.batch import pool
+from batch_support import FS, gain_record, rounded
+from hmpim.batch import Request, pool
 from hmpim.batch.parts import parts_in
 from hmpim.batch.run import Cluster
 
@@ -117,3 +118,44 @@ def test_a_disk_that_is_full_and_then_is_not(rows_file, tmp_path):
     assert (again, silent, len(after)) == (0, "", 8)
     assert before.items() <= after.items()  # kept, and not written again
     assert (names, failures) == ([f"{rows_file}#unit{k}" for k in range(1, 9)], 0)
+
+
+@pytest.mark.study
+def test_damage_among_thousands(tmp_path):
+    """Two thousand records; one with a gap, a file cut short, one of nonsense; a worker killed."""
+    import pyarrow as pa
+    from pyarrow import parquet
+
+    rng, place = np.random.default_rng(0), tmp_path / "records"
+    place.mkdir()
+    u, y = (channel.values for channel in gain_record(1).channels)
+    many = [y * (1 + 0.01 * rng.standard_normal()) for _ in range(2000)]
+    many = [values + 0.01 * rng.standard_normal(values.size) for values in many]
+    many[777][50] = np.nan
+    cells = {"u": [u.tolist()] * 2000, "y": [values.tolist() for values in many]}
+    parquet.write_table(pa.table(cells), place / "fleet.parquet", row_group_size=100)
+    whole = (place / "fleet.parquet").read_bytes()
+    (place / "short.parquet").write_bytes(whole[: len(whole) // 2])
+    (place / "nonsense.csv").write_text("time,u,y\n0,1,2\n1,nonsense,\n")
+    crews, killed = [], []
+
+    def kill(state):
+        if state.records > 600 and not killed:
+            crews[0]._processes[0].kill()
+            killed.append(state.records)
+
+    with pytest.MonkeyPatch.context() as patch:
+        _keep_crews(patch, crews)
+        table = hmpim.batch(
+            place,
+            out=tmp_path / "out",
+            fs=FS,
+            request=Request(keep="parameters"),
+            cluster=Cluster(workers=2),
+            progress=kill,
+        )
+    assert killed
+    frame = table.to_pandas(["record", "reason"])
+    assert len(frame) == frame["record"].nunique() == 2002
+    failed = frame[frame["reason"].notna()]["record"]
+    assert {name.rpartition("/")[2] for name in failed} == {"short.parquet", "nonsense.csv"}
