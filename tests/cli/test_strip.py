@@ -1,8 +1,11 @@
 """The strip chart: what is drawn is what was commanded and measured."""
 
 import io
+import os
+import re
 
 import numpy as np
+import pytest
 
 from hmpim.cli.strip import Strip, drawn
 from hmpim.experiment import run
@@ -59,3 +62,18 @@ def test_the_run_is_seen_and_left_in_the_terminal():
     agree = np.mean(command[:, 40:-late] == response[:, 40 + late :])
     assert agree > 0.9 > np.mean(command[:, 40:-late] == response[:, 40:-late])
     assert f"{record.outputs[0].values[-1]:+10.3f}" in screens[-1]
+
+
+@pytest.mark.parametrize(("columns", "rows"), [(60, 24), (30, 24), (80, 4), (0, 0)])
+def test_no_line_is_wrapped_and_none_leaves_the_screen(monkeypatch, columns, rows):
+    """What is drawn over must stand where it was drawn: a terminal that says 0 is a usual one."""
+    size = os.terminal_size((columns, rows))
+    monkeypatch.setattr(os, "get_terminal_size", lambda _: size)
+    out = io.StringIO()
+    monkeypatch.setattr(out, "fileno", lambda: 2)
+    sensor = Sensor(delay=0.01, input_name="elevation.command", output_name="elevation.position")
+    run(sensor, SWEEP, subscribers=[Strip(out)])
+    lines = re.sub(r"\x1b\[\d*[AK]|\r", "", out.getvalue()).splitlines()
+    assert max(map(len, lines)) < (columns or 80)
+    assert max(int(up) for up in re.findall(r"\x1b\[(\d+)A", out.getvalue())) < (rows or 24)
+    assert any(line.startswith("elevat") and max(map(ord, line)) > 0x2800 for line in lines)

@@ -173,7 +173,7 @@ def run(
         )
     say(
         f"{record.samples} samples of {', '.join(c.name for c in record.outputs)} in "
-        f"{record.duration:g} s from {record.source}"
+        f"{record.duration:g} s from {record.source or found.rig.name}"
     )
     if record.stopping is not None:
         stopped = record.stopping

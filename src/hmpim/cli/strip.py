@@ -1,5 +1,6 @@
 """A strip chart in the terminal: command and response of each axis while a run goes on."""
 
+import os
 import time
 from collections import deque
 from collections.abc import Callable
@@ -16,7 +17,10 @@ __all__ = ["Strip", "drawn"]
 FloatArray = NDArray[np.float64]
 
 _SPAN = 3.0  # s of the run that are seen
-_WIDTH = 64  # characters, two columns of dots each
+_WIDTH = 64  # characters at most, two columns of dots each
+_LEAST = 8  # characters at least: names are cut rather
+_NUMBER = 10  # characters of the value beside it
+_USUAL = (80, 24)  # columns and lines of a terminal that does not say
 _EVERY = 0.2  # s between two drawings: the run has better things to do
 _HEIGHT = 8  # lines for all channels together, one each at least
 _DOTS = np.array([[0x01, 0x08], [0x02, 0x10], [0x04, 0x20], [0x40, 0x80]])
@@ -104,22 +108,34 @@ class Strip:
             self._draw(shown, end=end, seconds=played.seconds)
 
     def _draw(self, shown: list[str], *, end: float, seconds: float) -> None:
-        height = max(1, _HEIGHT // len(shown))
-        wide = max(map(len, shown))
+        columns, rows = _room(self._to)
+        shown = shown[: max(rows - 2, 1)]
+        height = max(1, min(_HEIGHT, rows - 2) // len(shown))
+        wide = min(max(map(len, shown)), max(columns - 2 - _NUMBER - _LEAST, 1))
+        across = max(min(_WIDTH, columns - 2 - _NUMBER - wide), 1)
         lines = []
         for name in shown:
             parts = self._kept[name] or [Samples(time=np.empty(0), values=np.empty(0))]
             all_of_it = Samples.joined(list(parts))
-            strip = drawn(all_of_it, end=end, span=_SPAN, size=(_WIDTH, height))
-            now = f"{all_of_it.values[-1]:+10.3f}" if all_of_it.values.size else ""
-            margins = [f"{name:<{wide}} "] + [" " * (wide + 1)] * (height - 1)
+            strip = drawn(all_of_it, end=end, span=_SPAN, size=(across, height))
+            now = f"{all_of_it.values[-1]:+{_NUMBER}.3f}" if all_of_it.values.size else ""
+            margins = [f"{name[:wide]:<{wide}} "] + [" " * (wide + 1)] * (height - 1)
             ends = [now] + [""] * (height - 1)
             lines += [a + b + c for a, b, c in zip(margins, strip, ends, strict=True)]
-        lines.append(f"{'':<{wide}} {end:.1f} of {seconds:.1f} s")
+        lines.append(f"{'':<{wide}} {end:.1f} of {seconds:.1f} s"[: columns - 1])
         up = f"\x1b[{self._lines}A" if self._lines else ""
         self._to.write(up + "".join(f"\r\x1b[K{line}\n" for line in lines))
         self._to.flush()
         self._lines = len(lines)
+
+
+def _room(to: TextIO) -> tuple[int, int]:
+    """Columns and lines of a terminal: a line that is wrapped could not be drawn over."""
+    try:
+        size = os.get_terminal_size(to.fileno())
+    except (OSError, ValueError):  # no terminal
+        return _USUAL
+    return size.columns or _USUAL[0], size.lines or _USUAL[1]
 
 
 def _shown(layout: Layout) -> list[str]:
