@@ -1,4 +1,6 @@
+import errno
 import os
+from pathlib import Path
 
 import pytest
 
@@ -98,3 +100,13 @@ def test_what_cannot_be_written_is_refused_up_front(tmp_path, monkeypatch):
         check_writable("/proc/run.h5")
     with pytest.raises(ArgumentError, match="cannot be written"):
         check_writable(tmp_path / ("x" * 300))
+
+
+def test_a_disk_that_is_read_only_is_said_of_the_file_that_was_named(tmp_path, monkeypatch):
+    def refused(*_, **__):
+        raise OSError(errno.EROFS, os.strerror(errno.EROFS), "probe")
+
+    monkeypatch.setattr(os, "open", refused)
+    monkeypatch.setattr(Path, "unlink", refused)
+    with pytest.raises(ArgumentError, match=r"run\.h5' cannot be written: Read-only file system"):
+        check_writable(tmp_path / "run.h5")

@@ -8,7 +8,7 @@ disk that is full, never leaves half a file; what a power cut leaves is up to th
 import os
 import secrets
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from hmpim.errors import ArgumentError
@@ -127,7 +127,8 @@ def check_writable(path: str | os.PathLike[str], *, size: int = 0) -> None:
     except OSError as error:
         raise ArgumentError(f"{os.fspath(path)!r} cannot be written: {_reason(error)}") from error
     finally:
-        probe.unlink(missing_ok=True)
+        with suppress(OSError):  # a disk that is read only refuses this, too
+            probe.unlink(missing_ok=True)
     if free < 1.05 * size:
         raise ArgumentError(
             f"{os.fspath(path)!r} is going to take {_megabytes(size)} and its disk has "
