@@ -9,6 +9,7 @@ from typer.testing import CliRunner
 
 from hmpim.cli.main import app
 from hmpim.formats import load
+from hmpim.formats.recording import read_recording
 from hmpim.formats.stimulus_files import save_stimulus
 from hmpim.stimulus import Limits, design
 from tests_support import designed_once
@@ -158,3 +159,17 @@ def test_the_axis_is_that_of_the_stimulus_or_asked_for_or_the_only_one_described
     save_stimulus(design(band=(0.5, 10), duration=1, fs=500, limits=slow, axis="roll"), "s.csv")
     out = run("run", "--rig", "table", "--axis", "pitch", "s.csv", "-o", "r.h5")
     assert "--axis pitch: the stimulus is for roll already; leave it out" in out.stderr
+
+
+def test_ctrl_c_says_what_there_is_of_the_run(folder, monkeypatch):
+    """A subscriber stands for the person who has seen enough."""
+
+    def enough(played):
+        if played.block.start > 100:
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr("hmpim.cli.run._watching", lambda live: [enough])
+    out = run("run", "--rig", "eye", "s.csv", "-o", "r.h5")
+    assert out.exit_code == 130
+    assert "what was recorded until then is in r.h5" in out.stderr
+    assert not read_recording(folder / "r.h5").complete

@@ -1,7 +1,8 @@
 """``hmpim run``: a stimulus played on a rig, its record in a file, and if wanted the page."""
 
 import sys
-from contextlib import nullcontext
+from collections.abc import Iterator
+from contextlib import contextmanager, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -10,11 +11,12 @@ import typer
 from hmpim.cli.complete import complete_rig
 from hmpim.cli.files import check_files
 from hmpim.cli.stages import Stages
-from hmpim.cli.terminal import output_console, say, working
+from hmpim.cli.terminal import output_console, say, warn, working
 from hmpim.errors import ArgumentError
 
 if TYPE_CHECKING:
     from hmpim.cli.strip import Strip
+    from hmpim.experiment import RunLog
     from hmpim.report.figures import Picture
     from hmpim.rigs import Rig
     from hmpim.rigs.catalogue import Description
@@ -159,7 +161,7 @@ def run(
     )
     unit = found.rig if watchdog else _driven(found.rig, rig, described)
     stages = Stages()
-    with clock or nullcontext(), RunLog(log) as events, stages.stage("run"):
+    with clock or nullcontext(), RunLog(log) as events, _kept_is_said(events), stages.stage("run"):
         record = play(
             unit,
             stimuli,
@@ -236,6 +238,18 @@ def _again(text: str, description: "Description | None") -> "Rig":
     from hmpim.rigs.catalogue import find_rig
 
     return find_rig(text, description=description).rig
+
+
+@contextmanager
+def _kept_is_said(log: "RunLog") -> Iterator[None]:
+    """Say after Ctrl-C what there is of the run."""
+    try:
+        yield
+    except KeyboardInterrupt:
+        for event in log.events:
+            if event.message.startswith("what was recorded until then"):
+                warn(event.message)
+        raise
 
 
 def _watching(*, live: bool) -> list["Strip"]:
