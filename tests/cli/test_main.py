@@ -32,6 +32,14 @@ def test_every_command_explains_itself_with_an_example(command):
 
 
 @pytest.mark.parametrize(
+    ("command", "words"), [("rigs", "under [rigs.NAME] in"), ("channels", '"NAME [ms]"')]
+)
+def test_help_shows_what_stands_in_brackets(command, words):
+    done = RUNNER.invoke(app, [command, "--help"], env={"COLUMNS": "160"})
+    assert words in done.stdout
+
+
+@pytest.mark.parametrize(
     ("arguments", "reason"),
     [
         (["indentify"], "No such command 'indentify'. Did you mean 'identify'?; see hmpim --help"),

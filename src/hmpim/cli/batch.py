@@ -35,7 +35,7 @@ def batch(
         typer.Argument(
             metavar="PATHS...",
             help="Folders, globs and files with records, local or any address of fsspec. A Parquet "
-            "file with a column of records, or an HDF5 file with a group a record, holds many.",
+            "file with a column of records, or an HDF5 file with one group per record, holds many.",
         ),
     ],
     out: Annotated[
@@ -52,11 +52,14 @@ def batch(
     ] = Between.AUTO,
     keep: Annotated[
         Kept,
-        typer.Option("--keep", help="All that identify says, or the parameters alone: quicker."),
+        typer.Option(
+            "--keep",
+            help="Keep everything that identify finds, or only the parameters, which is faster.",
+        ),
     ] = Kept.RESULTS,
     metadata: Annotated[
         Path | None,
-        typer.Option("--metadata", metavar="FILE", help="CSV or Parquet with one row a record."),
+        typer.Option("--metadata", metavar="FILE", help="CSV or Parquet with one row per record."),
     ] = None,
     record_column: Annotated[
         str,
@@ -80,20 +83,23 @@ def batch(
             "--lags",
             metavar="N",
             help="With --pool-by: window in samples, into which delay and settling time fit; a "
-            "fifth of the first record without.",
+            "fifth of the first record by default.",
         ),
     ] = None,
     scheduler: Scheduler = None,
     workers: Workers = None,
     per_task: Annotated[
-        int, typer.Option("--per-task", metavar="N", help="Records a task, and a part.")
+        int,
+        typer.Option(
+            "--per-task", metavar="N", help="Records per task, and per part of the table."
+        ),
     ] = 100,
     expect: Annotated[
         list[str] | None,
         typer.Option(
             "--expect",
             metavar="BOUND",
-            help="Hold each record against it: 'delay < 5ms'; may be repeated.",
+            help="Check each record against this bound: 'delay < 5ms'; may be repeated.",
         ),
     ] = None,
     by: Annotated[
@@ -102,7 +108,9 @@ def batch(
     ] = None,
     report: Annotated[
         Path | None,
-        typer.Option("--report", metavar="FILE", help="The page; DIR/study.html without."),
+        typer.Option(
+            "--report", metavar="FILE", help="Where the page goes; DIR/study.html by default."
+        ),
     ] = None,
     resume: Annotated[
         bool,

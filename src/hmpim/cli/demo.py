@@ -31,7 +31,7 @@ def demo(
     out: Annotated[
         Path, typer.Option("--out", metavar="DIR", help="Folder for the page and the JSON file.")
     ] = Path("out/demo"),
-    seed: Annotated[int, typer.Option("--seed", min=0, help="Of the sensor's noise.")] = 7,
+    seed: Annotated[int, typer.Option("--seed", min=0, help="Seed of the sensor's noise.")] = 7,
 ) -> None:
     """Design a stimulus inside limits, apply it to a simulated sensor, find its parameters.
 

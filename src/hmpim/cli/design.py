@@ -69,7 +69,7 @@ def design(
         str,
         typer.Option(
             metavar="auto|0|S",
-            help="Seconds for coming from rest and going back; 0: the printed waveform.",
+            help="Seconds to leave rest and to return to it; 0: the paper's waveform.",
         ),
     ] = "auto",
     tail: Annotated[
@@ -79,7 +79,7 @@ def design(
         str,
         typer.Option(
             metavar="auto|none",
-            help="auto: a slow motion to and fro under the waveform, against stiction.",
+            help="auto: add a slow back-and-forth motion to the waveform, against stiction.",
         ),
     ] = "none",
     unit: Annotated[str, typer.Option(help="Unit of the position, such as deg.")] = "",
@@ -94,7 +94,7 @@ def design(
         float | None,
         typer.Option(help="Standard deviation of the noise in each sample, in the unit."),
     ] = None,
-    seed: Annotated[int, typer.Option(help="Of random phases.")] = 0,
+    seed: Annotated[int, typer.Option(help="Seed of the random phases.")] = 0,
     output: Annotated[
         Path | None,
         typer.Option(

@@ -65,12 +65,14 @@ def export(
     ] = None,
     fs: Annotated[
         float | None,
-        typer.Option("--fs", metavar="HZ", help="Rate of stepped programs; else the record's."),
+        typer.Option(
+            "--fs", metavar="HZ", help="Rate of stepped programs; by default the record's."
+        ),
     ] = None,
     intersample: Annotated[
         Between | None,
         typer.Option(
-            "--intersample", help="What their input does between samples; else as identified."
+            "--intersample", help="What their input does between samples; by default as identified."
         ),
     ] = None,
     timestep: Annotated[
@@ -80,7 +82,8 @@ def export(
         ),
     ] = None,
     fmi: Annotated[
-        int | None, typer.Option("--fmi", metavar="2|3", help="Version of FMI, for fmu; else 2.")
+        int | None,
+        typer.Option("--fmi", metavar="2|3", help="Version of FMI, for fmu; 2 by default."),
     ] = None,
     pade: Annotated[
         int | None,

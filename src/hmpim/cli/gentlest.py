@@ -66,10 +66,13 @@ def gentlest(
     ] = _INFINITE,
     max_jerk: Annotated[float, typer.Option(help="Jerk limit, unit per second cubed.")] = _INFINITE,
     unit: Annotated[str, typer.Option(help="Unit of the position, such as deg.")] = "",
-    gentle: Annotated[What, typer.Option(help="What is to be small.")] = What.PEAK_ACCELERATION,
+    gentle: Annotated[What, typer.Option(help="What to keep small.")] = What.PEAK_ACCELERATION,
     duration: Annotated[
         float | None,
-        typer.Option(help="Length of the record, seconds: 10; the longest, where it is small: 60."),
+        typer.Option(
+            help="Length of the record, seconds; 10 by default. With --gentle duration: the "
+            "longest, 60."
+        ),
     ] = None,
     family: Annotated[
         list[str] | None,
@@ -87,7 +90,7 @@ def gentlest(
 ) -> None:
     """Find the gentlest stimulus that buys a wanted accuracy inside limits.
 
-    Exit code 1 if no stimulus does; what would do is said.
+    Exit code 1 if no stimulus does; the message says what would.
 
     Example:
 

@@ -118,7 +118,7 @@ def identify(
         typer.Option(
             "--at",
             metavar="HZ",
-            help="Say gain and phase at this frequency, measured and modelled; may be repeated.",
+            help="Report gain and phase at this frequency, measured and modelled; may be repeated.",
         ),
     ] = None,
     structure: Annotated[
@@ -132,7 +132,7 @@ def identify(
         typer.Option(
             "--hand",
             metavar="NAME=VALUE",
-            help="A value read by eye, such as bandwidth_phase90=33: said beside the automatic "
+            help="A value read by eye, such as bandwidth_phase90=33: shown beside the automatic "
             "one; may be repeated.",
         ),
     ] = None,
@@ -155,7 +155,7 @@ def identify(
 ) -> None:
     """Find every parameter of a measured record, each with its error bar.
 
-    Of several records: averages, repeatability, and whether stated errors and scatter agree.
+    Several records of one test are averaged, and their scatter is compared with the stated errors.
     """
     check_files(
         reads={"the record": [*records, *(beside or [])]},

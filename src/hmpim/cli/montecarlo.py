@@ -29,7 +29,8 @@ def montecarlo(
         Path, typer.Option("--out", metavar="DIR", help="Folder for the draws and the page.")
     ] = Path("out/montecarlo"),
     draws: Annotated[
-        int | None, typer.Option("--draws", metavar="N", help="So many, whatever the plan says.")
+        int | None,
+        typer.Option("--draws", metavar="N", help="Number of draws, in place of the plan's."),
     ] = None,
     scheduler: Scheduler = None,
     workers: Workers = None,
@@ -38,7 +39,7 @@ def montecarlo(
     ] = None,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No progress, no table.")] = False,
 ) -> None:
-    """Draw systems, stimuli and noise; identify each; hold what is found against the truth.
+    """Draw systems, stimuli and noise; identify each; compare what is found with the truth.
 
     The same seed gives the same figures, whatever the number of workers. Stopped at any time, the
     same command goes on where it was.

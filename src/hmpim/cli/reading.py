@@ -57,7 +57,7 @@ Output = Annotated[
 Auxiliary = Annotated[
     list[str] | None,
     typer.Option(
-        "--auxiliary", metavar="NAME", help="Channel to keep and not to fit; may be repeated."
+        "--auxiliary", metavar="NAME", help="Channel to keep without fitting it; may be repeated."
     ),
 ]
 Rate = Annotated[
@@ -67,7 +67,7 @@ Rate = Annotated[
 Time = Annotated[
     str | None,
     typer.Option(
-        "--time", metavar="NAME", help='Channel of the time; with its unit as "NAME [ms]".'
+        "--time", metavar="NAME", help='Channel of the time; with its unit as "NAME \\[ms]".'
     ),
 ]
 Unit = Annotated[
@@ -80,11 +80,11 @@ Unit = Annotated[
 ]
 From = Annotated[
     float | None,
-    typer.Option("--from", metavar="S", help="Leave out what is before, in s of the file."),
+    typer.Option("--from", metavar="S", help="Ignore everything before this time of the file, s."),
 ]
 To = Annotated[
     float | None,
-    typer.Option("--to", metavar="S", help="Leave out what is after, in s of the file."),
+    typer.Option("--to", metavar="S", help="Ignore everything after this time of the file, s."),
 ]
 Sweep = Annotated[
     str | None,
@@ -99,7 +99,7 @@ Offset = Annotated[
     typer.Option(
         "--offset",
         metavar="NAME=TIME|?",
-        help="By how much the clock of a channel or of a file beside is late, such as y=3.2ms; "
+        help="How late the clock of a channel, or of a --beside file, is, such as y=3.2ms; "
         "? if it is not known. May be repeated.",
     ),
 ]
@@ -114,7 +114,7 @@ Common = Annotated[
     typer.Option(
         "--common",
         metavar="NAME",
-        help="Channel that all files hold, by which their clocks are held together.",
+        help="Channel that all files contain; it aligns their clocks.",
     ),
 ]
 StampChoice = Annotated[

@@ -19,9 +19,9 @@ def rigs(
         Path | None, typer.Option("--json", metavar="FILE", help="Write the list as JSON.")
     ] = None,
 ) -> None:
-    """List the rigs that hmpim run takes; what is broken is named with its fault.
+    r"""List the rigs that hmpim run accepts; a broken one is listed with its fault.
 
-    A rig is described under [rigs.NAME] in hmpim.toml, here or in a folder above, or in the
+    A rig is described under \[rigs.NAME] in hmpim.toml, here or in a folder above, or in the
     user's configuration folder. Other packages add kinds by the entry point hmpim.rigs.
     """
     from rich.table import Table

@@ -92,16 +92,16 @@ def run(
         bool,
         typer.Option(
             "--watchdog/--no-watchdog",
-            help="Refuse a rig that nothing stops if this process is killed; without, it is "
-            "driven by a process of its own that lives on to stop it.",
+            help="Refuse a rig that nothing would stop if this process were killed. Without: a "
+            "separate process drives the rig, and outlives this one to stop it.",
         ),
     ] = True,
     feel: Annotated[
         bool | None,
         typer.Option(
             "--feel/--no-feel",
-            help="Move it a little first, then more in steps. On for a rig that states no limits "
-            "of its own.",
+            help="Begin with a small motion, and raise the level in steps. On for a rig that "
+            "states no limits of its own.",
         ),
     ] = None,
     live: Annotated[
@@ -120,7 +120,7 @@ def run(
     ] = 1000.0,
     seed: Annotated[
         int | None,
-        typer.Option("--seed", min=0, help="Of what is random in a simulated rig."),
+        typer.Option("--seed", min=0, help="Seed of everything random in a simulated rig."),
     ] = None,
     json: Annotated[
         Path | None,

@@ -18,19 +18,19 @@ def runs(
         typer.Option(
             "--where",
             metavar="CONDITION",
-            help="Keep what meets it: 'delay > 3ms', 'verdict = ok', 'name = *roll*', "
+            help="Keep only what meets it: 'delay > 3ms', 'verdict = ok', 'name = *roll*', "
             "'created >= 2026-11-20'; may be repeated.",
         ),
     ] = None,
     compare: Annotated[
-        bool, typer.Option("--compare", help="Hold each result against the first.")
+        bool, typer.Option("--compare", help="Compare each result with the first.")
     ] = False,
     json: Annotated[
         Path | None, typer.Option("--json", metavar="FILE", help="Write the runs as JSON.")
     ] = None,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print no table.")] = False,
 ) -> None:
-    """List the records and results in a folder; filter them, hold them against the first."""
+    """List the records and results in a folder; filter them, compare them with the first."""
     check_files(writes={"--json": json})
 
     from json import dumps

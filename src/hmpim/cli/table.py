@@ -53,9 +53,9 @@ def table(
             "--watchdog", metavar="S", help="Silence after which it brakes, at most 0.1 s."
         ),
     ] = 0.08,
-    seed: Annotated[int | None, typer.Option("--seed", min=0, help="Of the encoders' noise.")] = (
-        None
-    ),
+    seed: Annotated[
+        int | None, typer.Option("--seed", min=0, help="Seed of the encoders' noise.")
+    ] = (None),
     trace: Annotated[
         Path | None,
         typer.Option("--trace", metavar="FILE", help="Write every tick as CSV: what it truly did."),
@@ -69,7 +69,7 @@ def table(
         typer.Option("--clock-drift", metavar="PPM", help="Let its clock gain so many µs in 1 s."),
     ] = 0.0,
 ) -> None:
-    """Serve the simulated five-axis table until Ctrl-C, or a sensor; hmpim run moves it.
+    """Serve the simulated five-axis table, or a sensor, over UDP until Ctrl-C.
 
     It checks every command against Fig. 4's limits, brakes after the watchdog's silence, and
     comes to rest inside its limits.

@@ -32,15 +32,22 @@ def validate(
         typer.Option("--against", metavar="OLD", help="An older result to compare with."),
     ] = None,
     fit: Annotated[
-        float | None, typer.Option("--fit", metavar="PERCENT", help="Least fit of the prediction.")
+        float | None,
+        typer.Option("--fit", metavar="PERCENT", help="Lowest fit of the prediction that passes."),
     ] = None,
     noise_ratio: Annotated[
         float,
-        typer.Option("--noise-ratio", metavar="R", help="Greatest residual, over what was said."),
+        typer.Option(
+            "--noise-ratio",
+            metavar="R",
+            help="Largest residual that passes, relative to the stated one.",
+        ),
     ] = 1.2,
     chance: Annotated[
         float,
-        typer.Option("--chance", metavar="P", help="Least probability of the residual's tests."),
+        typer.Option(
+            "--chance", metavar="P", help="Lowest probability of the residual's tests that passes."
+        ),
     ] = 1e-3,
     fs: Annotated[
         float | None,
@@ -50,9 +57,9 @@ def validate(
         Path | None, typer.Option("--json", metavar="FILE", help="Write the figures as JSON.")
     ] = None,
 ) -> None:
-    """Does a result predict another record, within what it said? Exit code 1 where not.
+    """Check that a result predicts another record as well as it claims. Exit code 1 if not.
 
-    With --against: has anything changed since an older result, beyond both error bars?
+    With --against: check what has changed since an older result, beyond both error bars.
     """
     from hmpim.identify import Bounds, compare
     from hmpim.identify import validate as check

@@ -17,7 +17,7 @@ def workbench(
     runs: Annotated[
         Path,
         typer.Option(
-            "--runs", metavar="DIR", help="Folder of the runs; all that is written goes there."
+            "--runs", metavar="DIR", help="Folder of the runs; everything is written there."
         ),
     ] = Path("runs"),
     port: Annotated[
@@ -47,7 +47,7 @@ def workbench(
         typer.Option(
             "--grace",
             metavar="S",
-            help="A run ends when the window that armed its rig is gone for so long.",
+            help="Seconds after which a run ends once the window that armed its rig is gone.",
         ),
     ] = 5.0,
 ) -> None:
