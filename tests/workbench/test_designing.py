@@ -1,5 +1,6 @@
 """Designs behind the page: what is kept, what is solved, what the gentlest saves."""
 
+import base64
 from dataclasses import replace
 
 import numpy as np
@@ -8,7 +9,7 @@ import pytest
 from hmpim.errors import ArgumentError
 from hmpim.plots.stimulus import stimulus_spectrogram
 from hmpim.workbench.desks import AxisRow, Model, Wish
-from hmpim.workbench.parts.picture import MOST, packed
+from hmpim.workbench.drawn import MOST, packed, refilled
 from hmpim.workbench.work.design import error_rows, stimuli_of
 from hmpim.workbench.work.designed import designed, five_axes, spectrum
 
@@ -66,7 +67,6 @@ def test_pictures_go_to_a_page_as_bytes_and_never_as_lists():
 
 def test_a_million_samples_go_thinned_with_their_peaks_and_are_thinned_again_on_zoom():
     from hmpim.plots import Axis, Curve, Figure, Panel
-    from hmpim.workbench.parts.picture import zoomed
 
     y = np.sin(np.linspace(0.0, 40.0, 1_000_000))
     y[123_456], y[123_460] = 7.0, 3.0
@@ -77,6 +77,13 @@ def test_a_million_samples_go_thinned_with_their_peaks_and_are_thinned_again_on_
     drawn = whole.to_plotly(most_points=MOST)["data"][0]
     assert drawn["y"].size <= MOST
     assert drawn["y"].max() == 7.0
-    near = zoomed(whole, 0, 123.4, 123.5).to_plotly(most_points=MOST)["data"][0]
-    assert near["y"].size == 103  # every sample of a tenth of a second, and one beyond each end
-    assert {7.0, 3.0} <= set(near["y"])
+    (near,) = refilled(whole, 0, 123.4, 123.5)
+    seen = np.frombuffer(base64.b64decode(near["y"]["bdata"]))
+    assert seen.size == 103  # every sample of a tenth of a second, and one beyond each end
+    assert {7.0, 3.0} <= set(seen)
+    (half,) = refilled(whole, 0, 100.0, 600.0)
+    seen = np.frombuffer(base64.b64decode(half["y"]["bdata"]))
+    assert seen.size <= MOST
+    assert seen.max() == 7.0
+    (again,) = refilled(whole, 0, None, None)
+    assert again["y"] == sent["y"]

@@ -1,5 +1,6 @@
 """The page that analyses a file: dropped, channels chosen, identified, read by eye."""
 
+import asyncio
 import shlex
 from dataclasses import replace
 from pathlib import Path
@@ -16,7 +17,7 @@ from hmpim.workbench.desks import Analysis
 from hmpim.workbench.names import free_place
 from hmpim.workbench.pages.frame import Command, Later, card, failures_said
 from hmpim.workbench.pages.result import ResultView
-from hmpim.workbench.work.record import Found, Looked, Question, View, automatic, found, look
+from hmpim.workbench.work.record import Looked, Question, View, automatic, found, look
 
 __all__ = ["analyse"]
 
@@ -192,35 +193,37 @@ class AnalysePage:
         with failures_said():
             if not wish.inputs or not wish.outputs:
                 raise ArgumentError("choose at least one input and one output")
+            question = self.question
             self.button.disable()
             self.shown.clear()
             with self.shown, ui.row().classes("hm-row"):
                 ui.spinner()
                 ui.label("Identifying …")
             try:
-                made = await self.workers.do(found, self.question, View(pair=wish.pair))
-                beside = await self._automatic(made)
+                made, beside = await asyncio.gather(
+                    self.workers.do(found, question, View(pair=wish.pair)), self._beside(question)
+                )
             finally:
                 if not self.shown.is_deleted:  # else the page was left meanwhile
                     self.shown.clear()
                     self.button.enable()
             if self.shown.is_deleted:
                 return
+            if beside is None:
+                self.automatic = ((question.automatic, made.stamp), made.result)
             with self.shown:
                 self.result = ResultView(self, made, beside)
             if (wish.window, wish.alpha) != ("gaussian", 1.5):
                 await self.result.see_through()
 
-    async def _automatic(self, made: Found) -> Identification | None:
+    async def _beside(self, question: Question) -> Identification | None:
         """What is found with nothing set by hand, to stand beside; None where nothing is set.
 
         It is kept as long as file and channels are the same.
         """
-        question = self.question
-        asked = (question.automatic, made.stamp)
         if not question.set_by_hand:
-            self.automatic = (asked, made.result)
             return None
+        asked = (question.automatic, self.path.stat().st_mtime_ns)
         if self.automatic is None or self.automatic[0] != asked:
             self.automatic = (asked, await self.workers.do(automatic, question))
         return self.automatic[1]

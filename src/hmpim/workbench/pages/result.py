@@ -141,15 +141,19 @@ class ResultView:
             self.reading = ui.label().props('role="status"')
 
     def _picture(self, picture: Described) -> None:
+        figure = self._figure(picture.key)
         with card(picture.title):
             self.pictures[picture.key] = Picture(
-                self._figure(picture.key), cursors=self._cursors(picture.key), on_cursor=self._drop
+                figure,
+                cursors=self._cursors(picture.key),
+                on_cursor=self._drop,
+                ready=self.found.drawn[picture.key] if figure is picture.figure else None,
             )
             ui.label(picture.caption).classes("hm-soft")
 
     def _figure(self, key: str) -> Figure:
         figure = self.described[key].figure
-        if key == "bode":
+        if key == "bode" and self.owner.wish.hand:
             return with_hand_values(figure, self.pair, self.owner.wish.hand)
         return figure
 

@@ -27,6 +27,15 @@ function recoloured(value) {
   return Object.fromEntries(Object.entries(value).map(([k, v]) => [k, recoloured(v)]));
 }
 
+// Pictures of a page are drawn one after the other, and the page answers between two of them.
+let turn = Promise.resolve();
+
+function inTurn(draw) {
+  const drawn = turn.then(() => new Promise((done) => setTimeout(done, 0))).then(draw);
+  turn = drawn.catch(() => {}); // one that fails is said on the page, and the next is drawn
+  return drawn;
+}
+
 // What two drawings must have in common for one to take the other's curves: all but the curves'
 // points and the ends of the axes.
 function likeness(data, layout) {
@@ -50,7 +59,8 @@ export default {
     this.drawn = 0;
     const { Plotly } = await import("nicegui-plotly");
     this.Plotly = Plotly;
-    await this.update();
+    await inTurn(() => this.$el.isConnected && this.update());
+    if (!this.drawn) return; // it was taken away meanwhile
     this.sizes = new ResizeObserver(() => this.drawn && Plotly.Plots.resize(this.$el));
     this.sizes.observe(this.$el);
     this.theme = new MutationObserver(() => {

@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +22,7 @@ from hmpim.report import report
 from hmpim.report.by_hand import fit_note, hand_notes
 from hmpim.report.figures import Picture, pair_pictures
 from hmpim.report.words import structure_words
+from hmpim.workbench.drawn import drawn
 
 __all__ = [
     "Found",
@@ -95,12 +97,14 @@ class View:
 class Found:
     """A result without its samples, and the pictures of one pair, as the report has them.
 
-    `stamp` tells the file as it was then.
+    `stamp` tells the file as it was then; `drawn` holds each picture as a page takes it, so that
+    no page waits until a million samples are thinned.
     """
 
     result: Identification
     stamp: int
     pictures: tuple[Picture, ...]
+    drawn: Mapping[str, Any]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -157,10 +161,13 @@ def found(question: Question, view: View) -> Found:
     """
     stamp = Path(question.file).stat().st_mtime_ns
     result = _identified(question)
+    pair = result.pairs[min(view.pair, len(result.pairs) - 1)]
+    pictures = tuple(pair_pictures(result, pair))
     return Found(
         result=_slim(result),
         stamp=stamp,
-        pictures=tuple(pair_pictures(result, result.pairs[min(view.pair, len(result.pairs) - 1)])),
+        pictures=pictures,
+        drawn={picture.key: drawn(picture.figure) for picture in pictures},
     )
 
 
