@@ -255,6 +255,10 @@ def _kept(fine: NDArray[Any], source: SampledInput, first: int) -> NDArray[Any]:
     return fine[first : first + factor * (source.samples - 1) + 1 : factor]
 
 
+_NOWHERE = complex("nan")
+"""Distance of poles that are the same: no expansion."""
+
+
 def partial_fractions(
     numerator: Real, poles: Complex, leading: float, doubled: NDArray[np.bool_] | None = None
 ) -> tuple[Complex, Complex, float]:
@@ -285,20 +289,24 @@ def partial_fractions(
     >>> simple.real.tolist(), constant  # s²/((s + 1)(s + 2)) = 1 + 1/(s + 1) - 4/(s + 2)
     ([1.0, -4.0], 1.0)
     """
-    twice = np.zeros(poles.size, dtype=bool) if doubled is None else doubled
-    apart = poles[:, None] - poles[None, :]
-    np.fill_diagonal(apart, 1.0)
-    times = np.where(twice, 2, 1)
-    below = leading * np.prod(apart ** times[None, :], axis=1)
-    above = np.zeros(poles.size, dtype=np.complex128)
-    rate = np.zeros(poles.size, dtype=np.complex128)
-    for b in numerator[::-1]:
-        rate = above + poles * rate
-        above = b + poles * above
-    value = above / below
-    inverse = times[None, :] / apart
-    np.fill_diagonal(inverse, 0.0)
-    slope = (rate - above * inverse.sum(axis=1)) / below
-    order = int(times.sum())
+    # A handful of numbers: Python is done before NumPy has looked at its arguments.
+    places, coefficients = poles.tolist(), numerator[::-1].tolist()
+    twice = [False] * len(places) if doubled is None else doubled.tolist()
+    simple, double = [], []
+    for k, p in enumerate(places):
+        below, inverse = leading + 0.0j, 0.0j
+        for j, q in enumerate(places):
+            if j != k:
+                apart, times = p - q or _NOWHERE, 1 + twice[j]
+                below *= apart**times
+                inverse += times / apart
+        above = rate = 0.0j
+        for b in coefficients:
+            rate = above + p * rate
+            above = b + p * above
+        value = above / below
+        simple.append((rate - above * inverse) / below if twice[k] else value)
+        double.append(value if twice[k] else 0.0j)
+    order = len(places) + sum(twice)
     constant = float(numerator[order] / leading) if numerator.size > order else 0.0
-    return np.where(twice, slope, value), np.where(twice, value, 0.0), constant
+    return np.array(simple, dtype=complex), np.array(double, dtype=complex), constant

@@ -5,6 +5,8 @@ Coefficients here are in seconds: numerator and denominator by rising powers of 
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import lru_cache
+from math import atan, pi
 
 import numpy as np
 from numpy.typing import NDArray
@@ -78,7 +80,7 @@ def _polynomial(
 
 def _roots(coefficients: NDArray[np.float64]) -> NDArray[np.complex128]:
     """Roots of a polynomial by rising powers."""
-    trimmed = np.trim_zeros(coefficients, "b")
+    trimmed = coefficients if coefficients[-1] else np.trim_zeros(coefficients, "b")
     if trimmed.size == 3:  # in closed form, without loss where one root is much the greater
         c, b, a = trimmed
         away = np.sqrt(complex(b * b - 4 * a * c))
@@ -145,8 +147,11 @@ def _first_crossing(frequency: NDArray[np.float64], values: NDArray[np.float64])
     return int(below[0]) if below.size else None
 
 
+@lru_cache(maxsize=8)
 def _grid(highest: float) -> NDArray[np.float64]:
-    return np.concatenate([[0.0], np.geomspace(highest * 1e-4, highest, 150)])
+    grid = np.concatenate([[0.0], np.geomspace(highest * 1e-4, highest, 150)])
+    grid.flags.writeable = False
+    return grid
 
 
 def bandwidth_phase(
@@ -163,7 +168,43 @@ def bandwidth_phase(
     i = _first_crossing(grid, margin(grid))
     if i is None:
         return None
+    if system.step is None:
+        single = _single_phase(system, late=system.delay if delay else 0.0)
+        return float(brentq(lambda f: single(f) + lag, grid[i], grid[i + 1]))
     return float(brentq(lambda f: float(margin(np.array([f]))[0]), grid[i], grid[i + 1]))
+
+
+def _single_phase(system: RationalDelay, *, late: float) -> Callable[[float], float]:
+    """`phase` at one frequency after the other: NumPy takes longer to begin than this to end."""
+    parts = []
+    for sign, roots in ((1.0, _roots(system.numerator)), (-1.0, _roots(system.denominator))):
+        for root in roots.tolist():
+            away = -root.real or float(np.finfo(float).tiny)
+            parts.append((sign, root.imag, away, atan(-root.imag / away)))
+
+    def at(frequency: float) -> float:
+        omega = 2 * pi * frequency
+        turned = sum(sign * (atan((omega - x) / away) - start) for sign, x, away, start in parts)
+        return turned - omega * late
+
+    return at
+
+
+def _single_gain(system: RationalDelay) -> Callable[[float], float]:
+    """Square of the gain over that at DC, at one frequency after the other."""
+    above = (system.numerator / system.numerator[0])[::-1].tolist()
+    below = system.denominator[::-1].tolist()
+
+    def at(frequency: float) -> float:
+        s = 2j * pi * frequency
+        top = bottom = 0.0j
+        for coefficient in above:
+            top = coefficient + s * top
+        for coefficient in below:
+            bottom = coefficient + s * bottom
+        return float(abs(top / bottom) ** 2)
+
+    return at
 
 
 def bandwidth_3db(system: RationalDelay, *, highest: float) -> float | None:
@@ -178,6 +219,9 @@ def bandwidth_3db(system: RationalDelay, *, highest: float) -> float | None:
     i = _first_crossing(grid, margin(grid))
     if i is None:
         return None
+    if system.step is None:
+        single = _single_gain(system)
+        return float(brentq(lambda f: single(f) - 0.5, grid[i], grid[i + 1]))
     return float(brentq(lambda f: float(margin(np.array([f]))[0]), grid[i], grid[i + 1]))
 
 

@@ -14,6 +14,7 @@ from typing import Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg.lapack import dsyevd
 
 from hmpim.identify.fitting.rows import Part, Problem
 from hmpim.identify.fitting.sampled_rows import SampledPart, part_of
@@ -208,10 +209,12 @@ def solved_exactly(rows: Real, target: Real) -> tuple[Real, float]:
 
 def solved(gram: Real, moment: Real, damping: float = 0.0) -> Real:
     """Solve normal equations, scaled to unit diagonal; directions without content stay 0."""
-    diagonal = np.diag(gram)
+    diagonal = gram.diagonal()
     scale = np.sqrt(np.where(diagonal > 1e-200 * diagonal.max(), diagonal, 1.0))
-    scaled = gram / np.outer(scale, scale)
-    values, vectors = np.linalg.eigh(scaled)
+    scaled = gram / (scale[:, None] * scale)
+    values, vectors, info = dsyevd(scaled, lower=1)  # eigh's routine, which takes as long to check
+    if info:
+        raise np.linalg.LinAlgError("eigenvalues of the normal equations did not converge")
     keep = values > _UNSEEN * values[-1]
     projected = (vectors.T @ (moment / scale))[keep] / (values[keep] + damping)
     return np.asarray(vectors[:, keep] @ projected / scale)
