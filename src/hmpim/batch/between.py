@@ -9,9 +9,8 @@ interval by the Q-profile (W. Viechtbauer, Journal of Educational and Behavioral
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.optimize import brentq
-from scipy.special import chdtri
 
 from hmpim.errors import ArgumentError
 
@@ -112,7 +111,7 @@ def _restricted(x: Real, variance: Real) -> float:
 
 def _profiled(x: Real, variance: Real, level: float) -> float:
     """τ² at which the generalised Q is the quantile of chi-squared that the level asks for."""
-    wanted = float(chdtri(x.size - 1, level))
+    wanted = float(scipy.special.chdtri(x.size - 1, level))
 
     def off(between: float) -> float:
         w = 1.0 / (variance + between)
@@ -124,7 +123,7 @@ def _profiled(x: Real, variance: Real, level: float) -> float:
     top = 1.0
     while off(top) > 0.0:
         top *= 4.0
-    return float(brentq(off, 0.0, top))
+    return float(scipy.optimize.brentq(off, 0.0, top))
 
 
 def _typical(variance: Real) -> float:

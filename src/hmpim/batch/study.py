@@ -6,8 +6,8 @@ from importlib.metadata import version
 from os import PathLike
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.special import ndtri
 
 from hmpim.batch.between import between_units
 from hmpim.batch.expect import Bound, Outcome, held_against
@@ -127,7 +127,7 @@ def outliers(values: Real) -> tuple[Real, float]:
     """
     middle = np.median(values)
     spread = 1.4826 * float(np.median(np.abs(values - middle)))
-    limit = float(-ndtri(_FALSE_ALARM / 2 / max(values.size, 1)))
+    limit = float(-scipy.special.ndtri(_FALSE_ALARM / 2 / max(values.size, 1)))
     if spread == 0.0:
         return np.where(values == middle, 0.0, np.inf), limit
     return np.abs(values - middle) / spread, limit

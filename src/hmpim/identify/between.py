@@ -16,8 +16,8 @@ identified again, and once more if the correction still moves.
 from dataclasses import dataclass, replace
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.optimize import least_squares
 
 from hmpim.errors import ArgumentError
 from hmpim.identify.result import Identification, PairIdentification
@@ -197,7 +197,9 @@ def _refined(
         scale[cut] = max(abs(model.delay), 1.0 / waveforms[0].fs)
         scale[cut + part.size - len(_moved_coefficients(model)) : cut + part.size] = 1.0
     small = np.full(begun.size, _APART)
-    done = least_squares(left, begun, x_scale=scale, diff_step=small, max_nfev=_STEPS)
+    done = scipy.optimize.least_squares(
+        left, begun, x_scale=scale, diff_step=small, max_nfev=_STEPS
+    )
     return made(np.asarray(done.x))
 
 

@@ -3,7 +3,7 @@
 import math
 from dataclasses import dataclass, fields
 
-from scipy.special import ndtri
+import scipy
 
 from hmpim.arguments import checked
 from hmpim.errors import RecordError
@@ -93,7 +93,7 @@ def compare(new: Identification, old: Identification) -> tuple[Change, ...]:
             "the two results have no parameter in common; are they of the same unit, with the "
             "same channel names?"
         )
-    limit = float(-ndtri(_CHANCE / (2 * len(both))))
+    limit = float(-scipy.special.ndtri(_CHANCE / (2 * len(both))))
     return tuple(
         Change(
             output=output,

@@ -4,8 +4,8 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike, NDArray
-from scipy import signal
 
 from hmpim.errors import ArgumentError, RecordError
 from hmpim.identify.signals import as_pair, as_signal, check_rate
@@ -85,7 +85,7 @@ def cross_correlation(x: ArrayLike, y: ArrayLike) -> Correlation:
     """
     first, second = as_pair(x, y)
     n = first.size
-    value = np.asarray(signal.correlate(first, second, mode="full", method="fft")) / n
+    value = np.asarray(scipy.signal.correlate(first, second, mode="full", method="fft")) / n
     return Correlation(lag=np.arange(1 - n, n), value=value)
 
 

@@ -16,8 +16,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.special import stdtrit
 
 from hmpim.identify.fitting.growth import BY_CHANCE
 from hmpim.identify.fitting.trial import CLEARLY, LIKELIER
@@ -199,7 +199,7 @@ def _told(
     highest = min(fleet.band[1], fleet.fs / 2)
     if "natural_frequency" in fleet.names:  # beyond the band no peak is told
         sound &= fit.figures["natural_frequency"][some] < highest
-    half = float(stdtrit(errors.freedom, 0.975))
+    half = float(scipy.special.stdtrit(errors.freedom, 0.975))
     columns = {}
     for name, deviation in errors.deviations.items():
         value = fit.figures[name][some]

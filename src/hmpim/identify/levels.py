@@ -9,7 +9,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, fields
 
 import numpy as np
-from scipy.stats import chi2
+import scipy
 
 from hmpim.arguments import checked
 from hmpim.errors import ArgumentError
@@ -316,7 +316,7 @@ def _trend(levels: list[Level], name: str) -> Trend | None:
         amplitudes=tuple(a for a, _ in known),
         values=tuple(float(v) for v in values),
         stds=tuple(float(s) for s in stds),
-        probability=float(chi2.sf(statistic, len(known) - 1)),
+        probability=float(scipy.stats.chi2.sf(statistic, len(known) - 1)),
         change=float((values[-1] - values[0]) / abs(values[0])) if values[0] != 0 else 0.0,
     )
 

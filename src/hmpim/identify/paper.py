@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike, NDArray
-from scipy import fft
 
 from hmpim.arguments import checked
 from hmpim.errors import ArgumentError, RecordError
@@ -190,9 +190,9 @@ def paper_analysis(
     plain = np.stack((stimulus, measured))
     if remove_mean:
         plain -= plain.mean(axis=1, keepdims=True)
-    value = np.asarray(fft.rfft(np.concatenate((plain, plain * taper)), length, axis=-1))
+    value = np.asarray(scipy.fft.rfft(np.concatenate((plain, plain * taper)), length, axis=-1))
     level = decibel(value)
-    frequency = np.asarray(fft.rfftfreq(length, 1 / fs), dtype=np.float64)
+    frequency = np.asarray(scipy.fft.rfftfreq(length, 1 / fs), dtype=np.float64)
     steps = _frequency_steps(value[2], value[3], fs / length, span, time, fs)
     inner = autocorrelation(time.error)
     return PaperAnalysis(
@@ -270,9 +270,9 @@ def paper_estimates(
     length = n + padding(n)
     both = np.stack((stimulus, measured))
     both -= both.mean(axis=1, keepdims=True)
-    value = np.asarray(fft.rfft(both * window_samples("gaussian", n), length, axis=-1))
+    value = np.asarray(scipy.fft.rfft(both * window_samples("gaussian", n), length, axis=-1))
     steps = _frequency_steps(value[0], value[1], fs / length, span, time, fs)
-    frequency = np.asarray(fft.rfftfreq(length, 1 / fs), dtype=np.float64)[steps.inside]
+    frequency = np.asarray(scipy.fft.rfftfreq(length, 1 / fs), dtype=np.float64)[steps.inside]
     return _estimates(time, steps, frequency, fs)
 
 

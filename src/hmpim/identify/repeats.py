@@ -10,9 +10,8 @@ from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.stats import chi2
-from scipy.stats import f as fisher
 
 from hmpim.arguments import checked
 from hmpim.errors import RecordError
@@ -328,7 +327,7 @@ def _parameter(name: str, found: tuple[PairIdentification, ...]) -> RepeatedPara
     mean = float(weights @ values / weights.sum())
     statistic = float(weights @ (values - mean) ** 2)
     freedom = values.size - 1
-    probability = float(chi2.sf(statistic, freedom))
+    probability = float(scipy.stats.chi2.sf(statistic, freedom))
     widened = max(1.0, statistic / freedom) if probability < _DOUBT else 1.0
     return RepeatedParameter(
         name=name,
@@ -427,5 +426,5 @@ def _split(
     power = float(np.mean(mean**2))
     probability = 1.0
     if remains > 0:
-        probability = float(fisher.sf(power / remains, length * share, freedom * share))
+        probability = float(scipy.stats.f.sf(power / remains, length * share, freedom * share))
     return noise, float(np.sqrt(max(power - remains, 0.0))), probability

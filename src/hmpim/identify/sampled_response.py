@@ -5,8 +5,8 @@ of a first-order lag amount to a percent of the response well below a quarter of
 """
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.linalg import expm
 
 from hmpim.model import RationalDelay, response
 from hmpim.record import Intersample
@@ -104,4 +104,4 @@ def _stepped(rows: NDArray[np.float64], span: float) -> NDArray[np.float64]:
     wide = np.zeros((order + 1, order + 1))
     wide[:order, :order] = rows
     wide[order - 1, order] = 1.0
-    return np.asarray(expm(wide * span))
+    return np.asarray(scipy.linalg.expm(wide * span))

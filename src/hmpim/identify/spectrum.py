@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike, NDArray
-from scipy import fft
 
 from hmpim.errors import ArgumentError, RecordError
 from hmpim.identify.signals import as_pair, as_signal, check_rate
@@ -76,7 +76,9 @@ def padding(samples: int) -> int:
     >>> padding(2000)
     6000
     """
-    return int(fft.next_fast_len((4 if samples < _LONG else 2) * samples, real=True)) - samples
+    return (
+        int(scipy.fft.next_fast_len((4 if samples < _LONG else 2) * samples, real=True)) - samples
+    )
 
 
 def spectrum(
@@ -133,8 +135,8 @@ def spectrum(
     length = array.size + zeros
     tapered = array * window_samples(window, array.size, alpha=alpha)
     return Spectrum(
-        frequency=np.asarray(fft.rfftfreq(length, 1 / fs), dtype=np.float64),
-        value=np.asarray(fft.rfft(tapered, length)),
+        frequency=np.asarray(scipy.fft.rfftfreq(length, 1 / fs), dtype=np.float64),
+        value=np.asarray(scipy.fft.rfft(tapered, length)),
     )
 
 
@@ -294,8 +296,8 @@ def excited_band(u: ArrayLike, fs: float) -> tuple[float, float]:
     if not np.any(np.abs(centred) > 1e-12 * np.max(np.abs(array))):
         raise RecordError(f"u is constant at {array[0]:g}; a stimulus must move")
     n = array.size
-    length = int(fft.next_fast_len(n, real=True))
-    power = np.abs(fft.rfft(centred, length)) ** 2
+    length = int(scipy.fft.next_fast_len(n, real=True))
+    power = np.abs(scipy.fft.rfft(centred, length)) ** 2
     power[0] = 0.0
     # A running sum of the power, so that lines of a multisine and ripples do not matter.
     running = np.concatenate(([0.0], np.cumsum(np.concatenate(([0, 0], power, [0, 0])))))

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.stats import qmc
 
 __all__ = ["Surface", "places_in"]
 
@@ -39,7 +39,7 @@ def places_in(low: Real, high: Real, degree: int) -> Real:
         Always the same; the last 40 are for the error.
     """
     count = int(_OVER * len(_powers(low.size, degree))) + _CHECKS
-    points = qmc.Halton(d=low.size, scramble=False).random(count + 1)[1:]
+    points = scipy.stats.qmc.Halton(d=low.size, scramble=False).random(count + 1)[1:]
     return np.asarray((low + high) / 2 - (high - low) / 2 * np.cos(np.pi * points))
 
 

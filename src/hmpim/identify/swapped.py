@@ -11,9 +11,8 @@ changes its sign when the columns are swapped; nothing else about the record nee
 """
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import fft
-from scipy.signal import csd
 
 from hmpim.identify.groups import EVERY
 from hmpim.record import Finding
@@ -121,8 +120,8 @@ def _is_ahead(u: NDArray[np.float64], y: NDArray[np.float64]) -> bool:
     A sine, an integral or a derivative resembles as much on the other side, with the other sign:
     then it is not told which is ahead.
     """
-    size = fft.next_fast_len(2 * u.size, real=True)
-    likeness = fft.irfft(np.conj(fft.rfft(u, size)) * fft.rfft(y, size), size)
+    size = scipy.fft.next_fast_len(2 * u.size, real=True)
+    likeness = scipy.fft.irfft(np.conj(scipy.fft.rfft(u, size)) * scipy.fft.rfft(y, size), size)
     behind, ahead = likeness[: u.size], likeness[size - u.size + 1 :]
     peak = float(ahead[np.argmax(np.abs(ahead))])
     opposite = float((-np.sign(peak) * behind).max())
@@ -134,7 +133,7 @@ def _thinned(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.bool_]]:
     """Means over blocks that are still short beside what the two have in common."""
     size = min(u.size, max(64, u.size // 8))
-    frequency, shared = csd(u, y, nperseg=size, detrend="constant")
+    frequency, shared = scipy.signal.csd(u, y, nperseg=size, detrend="constant")
     total = np.cumsum(np.abs(shared))
     highest = float(frequency[np.searchsorted(total, 0.95 * total[-1])])
     block = int(_BAND / highest) if highest > 0.0 else u.size

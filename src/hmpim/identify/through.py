@@ -12,8 +12,8 @@ Hof, Automatica 41, 2005). An instrument that is not exact widens the error bars
 from dataclasses import dataclass, replace
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.linalg import toeplitz
 
 from hmpim.errors import RecordError
 from hmpim.identify.fitting.fit import Fit, Problem, jacobian, within_reach
@@ -101,7 +101,7 @@ def instrument_of(name: str, reference: Real, u: Real) -> Instrument:
     best, least = np.zeros(u.size), np.inf
     lags = 8
     while lags <= min(_LONGEST, max(8, u.size // _SHARE)):
-        rows = np.column_stack([toeplitz(since, np.zeros(lags)), np.ones(u.size)])
+        rows = np.column_stack([scipy.linalg.toeplitz(since, np.zeros(lags)), np.ones(u.size)])
         found = rows @ np.linalg.lstsq(rows, level, rcond=None)[0]
         left = float(np.sum((level - found) ** 2))
         criterion = u.size * np.log(max(left, np.finfo(float).tiny)) + 2 * lags

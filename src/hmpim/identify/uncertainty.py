@@ -10,9 +10,8 @@ first-order propagation, implicit where it is the root of an equation.
 from collections.abc import Callable
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.fft import next_fast_len, rfft
-from scipy.special import chdtri, stdtrit
 
 from hmpim.identify.result import Estimate
 from hmpim.identify.whiteness import autoregressive_spectrum
@@ -55,8 +54,8 @@ def covariance(
     if white:
         inner = np.eye(scale.size) * float(residual @ residual) / freedom
     else:
-        length = next_fast_len(2 * residual.size, real=True)
-        spectra = rfft(q.T, length)
+        length = scipy.fft.next_fast_len(2 * residual.size, real=True)
+        spectra = scipy.fft.rfft(q.T, length)
         omega = 2 * np.pi * np.arange(spectra.shape[1]) / length
         power = autoregressive_spectrum(residual, omega) * residual.size / freedom
         power[1 : (length + 1) // 2] *= 2.0  # both signs of frequency
@@ -87,7 +86,7 @@ def estimate(value: float, variance: float, *, freedom: float, unit: str = "") -
     1.196
     """
     std = float(np.sqrt(max(variance, 0.0)))
-    half = float(stdtrit(max(freedom, 1.0), 0.975)) * std
+    half = float(scipy.special.stdtrit(max(freedom, 1.0), 0.975)) * std
     return Estimate(
         value=float(value), std=std, ci95=(float(value - half), float(value + half)), unit=unit
     )
@@ -111,7 +110,10 @@ def noise_estimate(
     """
     sigma = float(np.sqrt(sum_of_squares / freedom))
     effective = max(freedom * share, 1.0)
-    low, high = float(chdtri(effective, 0.025)), float(chdtri(effective, 0.975))
+    low, high = (
+        float(scipy.special.chdtri(effective, 0.025)),
+        float(scipy.special.chdtri(effective, 0.975)),
+    )
     return Estimate(
         value=sigma,
         std=sigma / float(np.sqrt(2 * effective)),

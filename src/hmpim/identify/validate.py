@@ -4,9 +4,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.fft import rfft
-from scipy.special import chdtrc, chdtri, ndtr
 
 from hmpim.arguments import checked
 from hmpim.errors import ArgumentError, RecordError
@@ -347,8 +346,8 @@ def _size(
     if bounds.noise_ratio is not None:
         # Few samples scatter: the standard deviation of a share, and of a level.
         count = max(residual.size * effective_share(residual), 4.0)
-        low = 2.0 * float(ndtr(1.96 / bounds.noise_ratio)) - 1.0
-        high = 2.0 * float(ndtr(1.96 * bounds.noise_ratio)) - 1.0
+        low = 2.0 * float(scipy.special.ndtr(1.96 / bounds.noise_ratio)) - 1.0
+        high = 2.0 * float(scipy.special.ndtr(1.96 * bounds.noise_ratio)) - 1.0
         scatter = 3.0 * float(np.sqrt(0.95 * 0.05 / count))
         low, high = max(low - scatter, 0.0), min(high + scatter, 1.0)
     of_model = float(np.sqrt(np.mean(model_std**2)))
@@ -382,7 +381,7 @@ def _tests(
 ) -> tuple[Check, ...]:
     """Whether the residual follows an input, and is white where the noise was."""
     checks = []
-    worst = float(chdtri(1, bounds.chance or _CHANCE))
+    worst = float(scipy.special.chdtri(1, bounds.chance or _CHANCE))
     for pair, model in zip(pairs, models, strict=True):
         u = aligned.signal(pair.input).values
         band = excited_band(u, aligned.fs)
@@ -436,7 +435,7 @@ def _tests(
 def _power_in(residual: NDArray[np.float64], band: tuple[float, float], fs: float) -> float:
     """Mean square of what lies in a band, in Hz."""
     n = residual.size
-    spectrum = np.abs(rfft(residual)) ** 2
+    spectrum = np.abs(scipy.fft.rfft(residual)) ** 2
     f = np.arange(spectrum.size) * fs / n
     return float(2.0 * spectrum[(f >= band[0]) & (f <= band[1])].sum() / n**2)
 
@@ -449,4 +448,4 @@ def _whiteness(residual: NDArray[np.float64]) -> float:
         return 1.0
     rho = r[1:] / r[0]
     statistic = n * (n + 2) * float(np.sum(rho**2 / (n - np.arange(1, lags + 1))))
-    return float(chdtrc(lags, statistic))
+    return float(scipy.special.chdtrc(lags, statistic))

@@ -3,10 +3,8 @@
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.fft import irfft, next_fast_len, rfft
-from scipy.linalg import solve_toeplitz
-from scipy.special import chdtrc
 
 __all__ = [
     "Misfit",
@@ -37,8 +35,10 @@ def autocovariance(residual: NDArray[np.float64], lags: int) -> NDArray[np.float
     if lags <= 60 and n < 1_000_000:
         full = [float(residual[: n - k] @ residual[k:]) for k in range(lags + 1)]
         return np.array(full) / n
-    length = next_fast_len(n + lags + 1, real=True)
-    return np.asarray(irfft(np.abs(rfft(residual, length)) ** 2, length)[: lags + 1] / n)
+    length = scipy.fft.next_fast_len(n + lags + 1, real=True)
+    return np.asarray(
+        scipy.fft.irfft(np.abs(scipy.fft.rfft(residual, length)) ** 2, length)[: lags + 1] / n
+    )
 
 
 def is_white(residual: NDArray[np.float64], *, level: float = 1e-3) -> bool:
@@ -58,7 +58,7 @@ def is_white(residual: NDArray[np.float64], *, level: float = 1e-3) -> bool:
     rho = r[1:] / r[0]
     n = residual.size
     statistic = n * (n + 2) * np.sum(rho**2 / (n - np.arange(1, lags + 1)))
-    return bool(chdtrc(lags, statistic) > level)
+    return bool(scipy.special.chdtrc(lags, statistic) > level)
 
 
 def effective_share(residual: NDArray[np.float64]) -> float:
@@ -140,7 +140,7 @@ def autoregressive_spectrum(
     r = autocovariance(residual, longest)
     best = (n * np.log(r[0]), r[0], np.zeros(0))
     for order in range(1, longest + 1):
-        coefficients = solve_toeplitz(r[:order], r[1 : order + 1])
+        coefficients = scipy.linalg.solve_toeplitz(r[:order], r[1 : order + 1])
         variance = float(r[0] - coefficients @ r[1 : order + 1])
         if variance <= 0:
             break
@@ -165,7 +165,7 @@ def _flicker(residual: NDArray[np.float64], omega: NDArray[np.float64]) -> NDArr
     bins = np.arange(1, min(_FLICKER_BINS, n // 8) + 1)
     if bins.size < 8:
         return np.zeros_like(omega)
-    wave = rfft(residual)[bins]
+    wave = scipy.fft.rfft(residual)[bins]
     level = np.log(np.maximum(np.abs(wave) ** 2 / n, np.finfo(float).tiny)) + 0.5772
     steps = np.log(bins) - np.mean(np.log(bins))
     slope = float(steps @ level / (steps @ steps))
@@ -220,7 +220,7 @@ def misfit(
         How many groups to cut the band into, at most.
     """
     n = u.size
-    spectrum_u, spectrum_e = rfft(u - u.mean()), rfft(residual)
+    spectrum_u, spectrum_e = scipy.fft.rfft(u - u.mean()), scipy.fft.rfft(residual)
     first = max(int(np.ceil(band[0] * n)), 1)
     last = min(int(band[1] * n), spectrum_u.size - 1)
     bins = np.arange(first, last + 1)
@@ -243,4 +243,6 @@ def misfit(
     tail = (1.0 + taken / noise / (width - 1)) ** (-(width - 1.0))
     statistic = -2.0 * np.sum(np.log(np.maximum(tail, 1e-300)))
     beyond = float(np.sum(taken - noise) / np.sum(total))
-    return Misfit(share=max(beyond, 0.0), probability=float(chdtrc(2 * groups, statistic)))
+    return Misfit(
+        share=max(beyond, 0.0), probability=float(scipy.special.chdtrc(2 * groups, statistic))
+    )

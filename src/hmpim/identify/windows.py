@@ -3,8 +3,8 @@
 from typing import Literal, get_args
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.signal import windows
 
 from hmpim.errors import ArgumentError
 
@@ -101,7 +101,9 @@ def window_samples(name: WindowName, samples: int, *, alpha: float = 1.5) -> NDA
     if name == "rectangular":
         return np.ones(samples)
     # A window that must be zero at its ends comes out at -1e-17 there in some of them.
-    return np.asarray(windows.get_window(name, samples, fftbins=False), dtype=np.float64)
+    return np.asarray(
+        scipy.signal.windows.get_window(name, samples, fftbins=False), dtype=np.float64
+    )
 
 
 def _check_samples(samples: int) -> None:

@@ -7,9 +7,8 @@ export give the same numbers.
 from dataclasses import dataclass, replace
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.linalg import schur
-from scipy.signal import lfilter
 
 from hmpim.errors import ArgumentError
 from hmpim.model.causal import causal_filter
@@ -184,7 +183,7 @@ class _Played:
 
 def _play(step: Discrete, u: _Real) -> _Played:
     """Run the linear part from rest, over deviations from rest, shape (n,)."""
-    filtered = np.asarray(lfilter(step.prefilter, [1.0], u))
+    filtered = np.asarray(scipy.signal.lfilter(step.prefilter, [1.0], u))
     reach = step.delay + TAPS
     padded = np.concatenate([np.zeros(reach), filtered])
     taps = np.stack([padded[TAPS - i : TAPS - i + u.size] for i in range(TAPS)])
@@ -201,13 +200,13 @@ def _recursion(transition: _Real, driven: _Real) -> _Real:
     """
     if not transition.size:
         return np.zeros_like(driven)
-    triangle, basis = schur(transition, output="complex")
+    triangle, basis = scipy.linalg.schur(transition, output="complex")
     incoming = basis.conj().T @ driven
     turned = np.zeros_like(incoming)
     for i in range(transition.shape[0] - 1, -1, -1):
         drive = incoming[i].copy()
         drive[1:] += triangle[i, i + 1 :] @ turned[i + 1 :, :-1]
-        turned[i] = lfilter([1.0], [1.0, -triangle[i, i]], drive)
+        turned[i] = scipy.signal.lfilter([1.0], [1.0, -triangle[i, i]], drive)
     return np.asarray((basis @ turned).real)
 
 

@@ -13,9 +13,8 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.linalg import expm, matrix_balance
-from scipy.signal import tf2ss
 
 from hmpim.errors import ArgumentError
 from hmpim.model.causal import causal_filter
@@ -279,8 +278,8 @@ def _realised(system: RationalDelay, fs: float) -> tuple[_Real, _Real, _Real, fl
     b = system.numerator * fs ** np.arange(system.numerator.size)
     if a.size == 1:
         return np.zeros((0, 0)), np.zeros(0), np.zeros(0), float(b[0] / a[0])
-    A, B, C, D = tf2ss(b[::-1], a[::-1])
-    balanced, (scale, _) = matrix_balance(A, permute=False, separate=True)
+    A, B, C, D = scipy.signal.tf2ss(b[::-1], a[::-1])
+    balanced, (scale, _) = scipy.linalg.matrix_balance(A, permute=False, separate=True)
     entry, output = B[:, 0] / scale, C[0] * scale
     size = np.abs(entry).max()  # the state counts in units of what comes in
     return np.asarray(balanced), np.asarray(entry / size), np.asarray(output * size), float(D[0, 0])
@@ -293,7 +292,7 @@ def _advance(generator: _Real, entry: _Real, span: float) -> tuple[_Real, _Real,
     wide[:n, :n] = generator
     wide[:n, n] = entry
     wide[n, n + 1] = 1.0
-    moved = expm(wide * span)
+    moved = scipy.linalg.expm(wide * span)
     return moved[:n, :n], moved[:n, n], moved[:n, n + 1]
 
 

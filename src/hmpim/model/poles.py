@@ -20,8 +20,8 @@ from math import factorial, floor
 from typing import Any
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.signal import lfilter
 
 from hmpim.model.sampled import MARGIN, SampledInput, spline_at, spline_signs
 
@@ -185,9 +185,9 @@ class PoleResponses:
         """Each row over 1 - q^factor/z, in which z is one sample of the record."""
         for k, q in enumerate(self._powers[:, -1]):
             if self._real[k]:
-                driven[k].real = lfilter([1.0], [1.0, -q.real], driven[k].real)
+                driven[k].real = scipy.signal.lfilter([1.0], [1.0, -q.real], driven[k].real)
             else:
-                driven[k] = lfilter([1.0], [1.0, -q], driven[k])
+                driven[k] = scipy.signal.lfilter([1.0], [1.0, -q], driven[k])
         return driven
 
     def _kept(self, answers: Complex) -> Complex:
@@ -231,11 +231,11 @@ def input_responses(source: SampledInput, delay: float, *, slopes: bool) -> Real
     begin, lag = placed(source, delay)
     c, first = _reaching(source, begin)
     rows = np.zeros((2 if slopes else 1, source.samples))
-    rows[0] = _kept(lfilter(spline_at(lag, source.degree), [1.0], c), source, first)
+    rows[0] = _kept(scipy.signal.lfilter(spline_at(lag, source.degree), [1.0], c), source, first)
     if slopes and source.degree > 0:
         lower = spline_at(lag, source.degree - 1)
         taps = np.append(lower, 0.0) - np.concatenate([[0.0], lower])
-        rows[1] = source.oversampling * _kept(lfilter(taps, [1.0], c), source, first)
+        rows[1] = source.oversampling * _kept(scipy.signal.lfilter(taps, [1.0], c), source, first)
     return rows
 
 

@@ -9,8 +9,8 @@ from functools import lru_cache
 from math import atan, pi
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.optimize import brentq
 
 from hmpim.model.filters import delta_of
 
@@ -170,8 +170,10 @@ def bandwidth_phase(
         return None
     if system.step is None:
         single = _single_phase(system, late=system.delay if delay else 0.0)
-        return float(brentq(lambda f: single(f) + lag, grid[i], grid[i + 1]))
-    return float(brentq(lambda f: float(margin(np.array([f]))[0]), grid[i], grid[i + 1]))
+        return float(scipy.optimize.brentq(lambda f: single(f) + lag, grid[i], grid[i + 1]))
+    return float(
+        scipy.optimize.brentq(lambda f: float(margin(np.array([f]))[0]), grid[i], grid[i + 1])
+    )
 
 
 def _single_phase(system: RationalDelay, *, late: float) -> Callable[[float], float]:
@@ -221,8 +223,10 @@ def bandwidth_3db(system: RationalDelay, *, highest: float) -> float | None:
         return None
     if system.step is None:
         single = _single_gain(system)
-        return float(brentq(lambda f: single(f) - 0.5, grid[i], grid[i + 1]))
-    return float(brentq(lambda f: float(margin(np.array([f]))[0]), grid[i], grid[i + 1]))
+        return float(scipy.optimize.brentq(lambda f: single(f) - 0.5, grid[i], grid[i + 1]))
+    return float(
+        scipy.optimize.brentq(lambda f: float(margin(np.array([f]))[0]), grid[i], grid[i + 1])
+    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

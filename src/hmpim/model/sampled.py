@@ -20,11 +20,8 @@ from functools import cache, lru_cache
 from math import comb, factorial, floor
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.fft import rfft
-from scipy.linalg import expm
-from scipy.ndimage import spline_filter1d
-from scipy.signal import firwin, lfilter, oaconvolve
 
 from hmpim.record import Intersample
 
@@ -106,7 +103,7 @@ def prepare_input(u: NDArray[np.float64], intersample: Intersample) -> SampledIn
         oversampling = _oversampling(deviation)
         if oversampling > 1:
             extended = _interpolated(extended, oversampling)
-        extended = spline_filter1d(extended, order=5, mode="mirror")
+        extended = scipy.ndimage.spline_filter1d(extended, order=5, mode="mirror")
     return SampledInput(
         coefficients=extended,
         first=float(u[0]),
@@ -119,7 +116,7 @@ def prepare_input(u: NDArray[np.float64], intersample: Intersample) -> SampledIn
 def _oversampling(deviation: NDArray[np.float64]) -> int:
     """Factor that brings the content of the input below the spline's good band."""
     taper = np.hanning(deviation.size + 2)[1:-1]  # the ends' jump is not content
-    power = np.abs(rfft(deviation * taper)) ** 2
+    power = np.abs(scipy.fft.rfft(deviation * taper)) ** 2
     total = power.sum()
     if total == 0:
         return 1
@@ -133,7 +130,9 @@ def _oversampling(deviation: NDArray[np.float64]) -> int:
 @cache
 def _interpolator(factor: int) -> NDArray[np.float64]:
     half = 20 * factor
-    return factor * np.asarray(firwin(2 * half + 1, 1.0 / factor, window=("kaiser", 8.0)))
+    return factor * np.asarray(
+        scipy.signal.firwin(2 * half + 1, 1.0 / factor, window=("kaiser", 8.0))
+    )
 
 
 def _interpolated(extended: NDArray[np.float64], factor: int) -> NDArray[np.float64]:
@@ -141,7 +140,7 @@ def _interpolated(extended: NDArray[np.float64], factor: int) -> NDArray[np.floa
     kernel = _interpolator(factor)
     stuffed = np.zeros(extended.size * factor)
     stuffed[::factor] = extended
-    return np.asarray(oaconvolve(stuffed, kernel, mode="same"), dtype=np.float64)
+    return np.asarray(scipy.signal.oaconvolve(stuffed, kernel, mode="same"), dtype=np.float64)
 
 
 @cache
@@ -170,7 +169,7 @@ def _spline_taps(
     matrix[n - 1, n] = 1.0 / denominator[-1]
     start = np.zeros(size)
     start[-1] = 1.0
-    step, part = expm(np.stack([matrix, matrix * (1.0 - lag)]))
+    step, part = scipy.linalg.expm(np.stack([matrix, matrix * (1.0 - lag)]))
     truncated = np.zeros((taps, n))  # answers to t_+^p / p! at i - lag
     state = part @ start
     for i in range(1, taps):
@@ -270,7 +269,7 @@ def delayed_response(
     def filtered(
         numerator: NDArray[np.float64], recursion: NDArray[np.float64]
     ) -> NDArray[np.float64]:
-        y = lfilter(numerator, recursion, c)
+        y = scipy.signal.lfilter(numerator, recursion, c)
         if begin < 0:
             y = np.concatenate([np.zeros(min(-begin, factor * source.samples)), y])
         return np.asarray(y[max(begin, 0) :: factor][: source.samples])

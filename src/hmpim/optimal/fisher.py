@@ -16,8 +16,8 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.fft import irfft, next_fast_len, rfft, rfftfreq
 
 from hmpim.errors import ArgumentError
 from hmpim.model import delayed_response, prepare_input, second_order_coefficients
@@ -133,13 +133,13 @@ def sensitivities(
     if route == "time":
         return _by_filters(position, model, fs)
     pad = math.ceil((model.delay + _FORGOTTEN * model.settling) * fs)
-    length = next_fast_len(n + pad, real=True)
-    s = np.asarray(2j * np.pi * rfftfreq(length, 1.0 / fs), dtype=np.complex128)
-    spectrum = rfft(position, length)
+    length = scipy.fft.next_fast_len(n + pad, real=True)
+    s = np.asarray(2j * np.pi * scipy.fft.rfftfreq(length, 1.0 / fs), dtype=np.complex128)
+    spectrum = scipy.fft.rfft(position, length)
     factors = responses(model, s)
     if position.ndim == 2:
         factors = factors[:, None, :]
-    return np.asarray(irfft(factors * spectrum, length)[..., :n])
+    return np.asarray(scipy.fft.irfft(factors * spectrum, length)[..., :n])
 
 
 def _by_filters(position: FloatArray, model: RoughModel, fs: float) -> FloatArray:

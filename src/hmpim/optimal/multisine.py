@@ -17,8 +17,8 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.optimize import linprog
 
 from hmpim.optimal.candidate import Candidate, gentler, try_out
 from hmpim.optimal.fisher import sensitivities
@@ -186,7 +186,7 @@ def _solved(
     held = np.zeros(len(right), dtype=bool)
     held[np.argsort(right - rows @ middle)[: _FIRST_ROWS * objective.size]] = True
     while True:
-        solved = linprog(
+        solved = scipy.optimize.linprog(
             objective,
             A_ub=rows[held],
             b_ub=right[held],

@@ -8,8 +8,8 @@ leads cost is never left out. The gain of each trial is solved exactly.
 import math
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.optimize import minimize
 
 from hmpim.errors import HmpimError
 from hmpim.optimal.candidate import Candidate, cost_of, try_out
@@ -75,7 +75,7 @@ def best_sweep(
 def _descended(search: "_Search", begin: FloatArray, trials: int) -> tuple[float, FloatArray]:
     """Lowest cost and its shape, by a simplex that begins at a shape."""
     simplex = begin + np.array([[0.0, 0.0, 0.0], [0.3, 0.0, 0.0], [0.0, 0.2, 0.0], [0.0, 0.0, 0.3]])
-    ended = minimize(
+    ended = scipy.optimize.minimize(
         search.cost,
         begin,
         method="Nelder-Mead",

@@ -3,8 +3,8 @@
 from typing import TYPE_CHECKING
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.signal import ShortTimeFFT
 
 from hmpim.identify.spectrum import decibel, spectrum
 from hmpim.plots.description import Axis, Curve, Dashes, Figure, Image, Panel
@@ -74,7 +74,7 @@ def stimulus_spectrogram(stimulus: "Stimulus") -> Figure:
     seconds = 2.0 * np.sqrt(stimulus.sweep_duration / (band[1] - band[0] or 1.0))
     length = int(np.clip(seconds * fs, 16, max(n // 4, 16)))
     window = np.hanning(length + 2)[1:-1]
-    transform = ShortTimeFFT(
+    transform = scipy.signal.ShortTimeFFT(
         window, hop=max(n // _COLUMNS, 1), fs=fs, mfft=max(4 * length, 256), fft_mode="onesided"
     )
     lines = np.abs(transform.stft(stimulus.position))

@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.interpolate import CubicSpline
 
 from hmpim.errors import RecordError
 from hmpim.record.clock import fit_clock
@@ -156,9 +156,9 @@ def _refined(
     other, nor, at its own samples, in its own values. With the other's slope the noise would
     draw the offset towards whole samples.
     """
-    curve = CubicSpline(t2, x2)
+    curve = scipy.interpolate.CubicSpline(t2, x2)
     slope = curve.derivative()
-    own = CubicSpline(t1, x1)(t1, 1)
+    own = scipy.interpolate.CubicSpline(t1, x1)(t1, 1)
     drift, middle = 0.0, float(t1.mean())
     covariance, correlation = np.zeros((2, 2)), 0.0
     for _ in range(20):

@@ -4,8 +4,8 @@ from collections.abc import Callable
 from itertools import pairwise
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.interpolate import CubicSpline
 
 from hmpim.record.clock import Clock
 from hmpim.record.record import Channel, Intersample
@@ -204,7 +204,7 @@ def _curve(
         values = np.bincount(bunch, values) / count
     if time.size < 2:
         return lambda at: np.full(at.size, values[0])
-    return CubicSpline(time, values)
+    return scipy.interpolate.CubicSpline(time, values)
 
 
 def _sharpen(

@@ -5,9 +5,8 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.signal import fftconvolve
-from scipy.stats import spearmanr
 
 from hmpim.record.clock import fit_clock
 from hmpim.record.mend import check_span
@@ -187,7 +186,7 @@ def _swept(
     y0, y1 = away[cross - 1], away[cross]
     crossing = cross - 1 + np.clip(y0 / np.where(y0 == y1, 1.0, y0 - y1), 0.0, 1.0)
     frequency = fs / (crossing[2:] - crossing[:-2])
-    order = float(spearmanr(np.arange(frequency.size), frequency).statistic)
+    order = float(scipy.stats.spearmanr(np.arange(frequency.size), frequency).statistic)
     low, high = float(frequency.min()), float(frequency.max())
     if not abs(order) >= _STEADY or high < 1.5 * low:
         return None, None, None
@@ -267,7 +266,7 @@ def _shift(
     if part.size < pattern.size:
         return near, 0.0
     centred = pattern - pattern.mean()
-    cross = fftconvolve(part, centred[::-1], mode="valid")
+    cross = scipy.signal.fftconvolve(part, centred[::-1], mode="valid")
     total = np.concatenate(([0.0], np.cumsum(part)))
     square = np.concatenate(([0.0], np.cumsum(part**2)))
     n = pattern.size

@@ -4,8 +4,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.interpolate import make_interp_spline
 
 from hmpim.record import Intersample
 
@@ -72,7 +72,9 @@ def between_samples(values: FloatArray, fs: float, intersample: Intersample) -> 
 
     else:
         breaks = time[[0, -1]]
-        spline = make_interp_spline(time, values, k=min(7, 2 * ((values.size - 2) // 2) + 1))
+        spline = scipy.interpolate.make_interp_spline(
+            time, values, k=min(7, 2 * ((values.size - 2) // 2) + 1)
+        )
 
         def at(t: FloatArray) -> FloatArray:
             return np.asarray(spline(np.clip(t, 0.0, time[-1])))

@@ -9,8 +9,8 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.signal import lfilter
 
 from hmpim.errors import ArgumentError
 from hmpim.rigs.between import ContinuousInput
@@ -124,7 +124,7 @@ def respond(
 def _one_pole(pole: complex, step: float, added: ComplexArray) -> ComplexArray:
     """x[k+1] = exp(pole step) x[k] + added[k], from x[0] = 0."""
     fed = np.concatenate((np.zeros(1, dtype=np.complex128), added))
-    return np.asarray(lfilter([1.0], [1.0, -np.exp(pole * step)], fed))
+    return np.asarray(scipy.signal.lfilter([1.0], [1.0, -np.exp(pole * step)], fed))
 
 
 def state_after_impulse(poles: Poles, lag: FloatArray) -> ComplexArray:

@@ -16,8 +16,8 @@ from dataclasses import dataclass, field
 from typing import Literal, get_args
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike, NDArray
-from scipy.signal import lfilter
 
 from hmpim.arguments import checked, generator
 from hmpim.errors import ArgumentError
@@ -321,7 +321,7 @@ class Sensor(Simulated):
             return self.noise_std * white
         fed = math.sqrt(1.0 - c * c) * white
         fed[0] = white[0]  # starts in its steady state
-        return np.asarray(self.noise_std * lfilter([1.0], [1.0, -c], fed))
+        return np.asarray(self.noise_std * scipy.signal.lfilter([1.0], [1.0, -c], fed))
 
 
 def _check(

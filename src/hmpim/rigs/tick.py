@@ -12,8 +12,8 @@ from types import TracebackType
 from typing import Self
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.stats import linregress
 
 from hmpim.errors import ArgumentError, RigError
 from hmpim.record import Finding
@@ -41,7 +41,7 @@ def _gain(stamps: NDArray[np.float64], came: NDArray[np.float64]) -> tuple[float
     """
     late = came - stamps
     least = [part[np.argmin(late[part])] for part in np.array_split(np.arange(late.size), _SPANS)]
-    line = linregress(stamps[least], late[least])
+    line = scipy.stats.linregress(stamps[least], late[least])
     return float(line.slope), float(line.stderr)
 
 

@@ -9,7 +9,7 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.signal import max_len_seq
+import scipy
 
 from hmpim.errors import ArgumentError
 from hmpim.stimulus.limits import Limits
@@ -168,7 +168,7 @@ class Prbs:
     @property
     def levels(self) -> FloatArray:
         """Positions from the rest before to the rest after, shape (bits + 2,)."""
-        sequence, _ = max_len_seq(self.order, length=min(self.bits, 2**self.order - 1))
+        sequence, _ = scipy.signal.max_len_seq(self.order, length=min(self.bits, 2**self.order - 1))
         played = np.resize(2.0 * sequence.astype(np.float64) - 1.0, self.bits)
         return self.amplitude * np.concatenate(([0.0], played, [0.0]))
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from typing import TypeVar
 
 import numpy as np
-from scipy.optimize import brentq, minimize_scalar
+import scipy
 
 from hmpim.errors import LimitsError
 from hmpim.stimulus.exponential import ExponentialSweep
@@ -144,7 +144,7 @@ def smallest_extinction(
             return 0.0 if k == 0 else _first_root(search, float(grid[k - 1]), float(n))
         # a dip between grid points, too short to be seen on them
         if k >= 2 and values[k - 1] < min(values[k - 2], values[k]):
-            dip = minimize_scalar(
+            dip = scipy.optimize.minimize_scalar(
                 search.excess,
                 bounds=(float(grid[k - 2]), float(n)),
                 method="bounded",
@@ -158,7 +158,7 @@ def smallest_extinction(
 def _first_root(search: _Search, low: float, high: float) -> float:
     """Smallest n that fits between `low`, which does not, and `high`, which does."""
     near = 0.01 * STEP
-    root = min(float(brentq(search.excess, low, high, xtol=near)) + near, high)
+    root = min(float(scipy.optimize.brentq(search.excess, low, high, xtol=near)) + near, high)
     for rounded in (math.floor(root / STEP), math.ceil(root / STEP)):
         n = round(rounded * STEP, 9)
         if search.excess(n) <= 0.0:

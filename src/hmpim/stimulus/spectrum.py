@@ -14,7 +14,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.signal import welch
+import scipy
 
 from hmpim.errors import ArgumentError, LimitsError
 from hmpim.stimulus.limits import QUANTITIES, Limits, three_digits
@@ -156,7 +156,9 @@ def measured_noise(samples: FloatArray | Sequence[float], fs: float) -> OverFreq
             f"noise of shape {x.shape} must be one row of at least 64 finite samples"
         )
     part = x.size // _PARTS
-    frequency, density = welch(x - x.mean(), fs=check_positive("fs", fs, "Hz"), nperseg=part)
+    frequency, density = scipy.signal.welch(
+        x - x.mean(), fs=check_positive("fs", fs, "Hz"), nperseg=part
+    )
     return OverFrequency(frequency=tuple(frequency[1:].tolist()), value=tuple(density[1:].tolist()))
 
 

@@ -3,8 +3,8 @@
 from typing import Any
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.signal import lfilter
 
 from hmpim.batch.montecarlo.plan import Plan, drawn
 from hmpim.batch.rows import PARAMETERS
@@ -126,7 +126,7 @@ def _noise(size: int, correlation: float, rng: np.random.Generator) -> NDArray[n
         return rng.standard_normal(size)
     settle = 2000
     white = np.sqrt(1 - correlation**2) * rng.standard_normal(size + settle)
-    return np.asarray(lfilter([1.0], [1.0, -correlation], white)[settle:])
+    return np.asarray(scipy.signal.lfilter([1.0], [1.0, -correlation], white)[settle:])
 
 
 def _bounds(u: NDArray[Any], clean: NDArray[Any], truth: dict[str, Any]) -> Parameters:

@@ -5,8 +5,8 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.special import ndtri
 
 from hmpim.batch.montecarlo.plan import Plan
 from hmpim.batch.rows import PARAMETERS
@@ -221,7 +221,7 @@ def _share(flags: NDArray[np.bool_]) -> Share:
     count = int(flags.size)
     if not count:
         return Share(share=float("nan"), low=0.0, high=1.0, count=0)
-    z, p = float(-ndtri(0.025)), float(flags.mean())
+    z, p = float(-scipy.special.ndtri(0.025)), float(flags.mean())
     middle = (p + z * z / (2 * count)) / (1 + z * z / count)
     half = z / (1 + z * z / count) * np.sqrt(p * (1 - p) / count + z * z / (4 * count**2))
     return Share(share=p, low=float(middle - half), high=float(middle + half), count=count)

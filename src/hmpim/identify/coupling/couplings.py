@@ -11,8 +11,8 @@ keeps a pole that is half told and with it the wider error bars.
 from dataclasses import replace
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.fft import rfft
 
 from hmpim.identify.fitting.candidates import nested
 from hmpim.identify.fitting.enrich import PLAIN
@@ -75,7 +75,7 @@ def whitening_of(residual: Real) -> Real | None:
     """
     if is_white(residual):
         return None
-    power = np.abs(rfft(residual - residual.mean())) ** 2 / residual.size
+    power = np.abs(scipy.fft.rfft(residual - residual.mean())) ** 2 / residual.size
     power[0] = power[1]
     bins = np.arange(power.size)
     reach = np.maximum((_SMOOTHED * bins).astype(np.int64), _NARROWEST)

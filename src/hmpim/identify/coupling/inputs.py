@@ -10,8 +10,8 @@ from collections.abc import Sequence
 from itertools import groupby
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import fft
 
 from hmpim.identify.frf.neighbours import centres_in_band, mirrored, windows_around
 from hmpim.identify.result.inputs import BOUND, Alike, InputSet
@@ -59,7 +59,7 @@ def own_band(u: Real, fs: float, stated: tuple[float, float] | None) -> tuple[fl
     low, high = excited_band(u, fs)
     if stated is None:
         return low, high
-    power = np.abs(fft.rfft(u - u.mean())) ** 2
+    power = np.abs(scipy.fft.rfft(u - u.mean())) ** 2
     level = np.sqrt(np.convolve(power, np.ones(5) / 5, mode="same"))
     reached = np.flatnonzero(level >= _DEEP * level.max())
     high = max(high, float(reached[-1]) * fs / u.size)
@@ -97,7 +97,7 @@ def input_set(
     bands = tuple(own_band(u, fs, stated) for u in inputs)
     size = inputs[0].size
     step = fs / size
-    spectra = [np.array(fft.rfft(u - u.mean()))[: (size - 1) // 2 + 1] for u in inputs]
+    spectra = [np.array(scipy.fft.rfft(u - u.mean()))[: (size - 1) // 2 + 1] for u in inputs]
     low = max(round(min(b[0] for b in bands) / step), 1)
     high = min(round(max(b[1] for b in bands) / step), spectra[0].size - 1)
     centre = centres_in_band(low, max(high, low + 1), _POINTS)

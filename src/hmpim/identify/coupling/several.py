@@ -10,8 +10,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.fft import irfft, next_fast_len, rfft
 
 from hmpim.identify.coupling.couplings import FOLLOWS, coupling_fit, whitening_of
 from hmpim.identify.coupling.jointly import gained_by, joint_covariance
@@ -195,8 +195,10 @@ def _strongest(
 def _follows_at_all(u: Real, y: Real) -> float:
     """Amplitude (r.m.s.) of the output that correlates with the input at the best lag."""
     first, second = u - u.mean(), y - y.mean()
-    length = next_fast_len(2 * u.size, real=True)
-    crossed = irfft(np.conj(rfft(first, length)) * rfft(second, length), length)[: u.size // 2]
+    length = scipy.fft.next_fast_len(2 * u.size, real=True)
+    crossed = scipy.fft.irfft(
+        np.conj(scipy.fft.rfft(first, length)) * scipy.fft.rfft(second, length), length
+    )[: u.size // 2]
     size = float(np.linalg.norm(first))
     return float(np.max(np.abs(crossed))) / max(size, 1e-300) / float(np.sqrt(u.size))
 

@@ -13,9 +13,8 @@ normal tail are A. C. Cohen's, Technometrics 1, 1959.
 from dataclasses import dataclass, replace
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.fft import next_fast_len, rfft
-from scipy.stats import norm
 
 from hmpim.errors import RecordError
 from hmpim.identify.effects.held import held_prediction, rows_at_updates
@@ -345,8 +344,8 @@ def _evaluated(data: _Data, fit: Fit, log_sigma: float) -> _State | None:
             if not where.any():
                 continue
             a = sign * (edge[where] - prediction[where]) / sigma
-            tail = norm.logsf(a)
-            hazard = np.exp(norm.logpdf(a) - tail)
+            tail = scipy.stats.norm.logsf(a)
+            hazard = np.exp(scipy.stats.norm.logpdf(a) - tail)
             value[where] = tail + 0.5 * np.log(2 * np.pi)
             slope[where] = sign * hazard / sigma
             bend[where] = hazard * (hazard - a) / sigma**2
@@ -437,8 +436,8 @@ def _coloured_scores(state: _State) -> tuple[NDArray[np.float64], float]:
     Also by how much fewer samples tell the noise: 1 + 2 Σ ρ² (M. S. Bartlett, 1946).
     """
     weighted = state.rows * np.sqrt(np.maximum(state.bend, 0.0))
-    length = next_fast_len(2 * state.slope.size, real=True)
-    spectra = rfft(weighted, length)
+    length = scipy.fft.next_fast_len(2 * state.slope.size, real=True)
+    spectra = scipy.fft.rfft(weighted, length)
     omega = 2 * np.pi * np.arange(spectra.shape[1]) / length
     power = masked_spectrum(state.slope, state.inside, omega)
     fewer = float(np.mean(np.concatenate([power, power[1:-1]]) ** 2))

@@ -7,10 +7,8 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike, NDArray
-from scipy.fft import rfft
-from scipy.optimize import minimize_scalar
-from scipy.stats import t as student
 
 from hmpim.errors import RecordError
 from hmpim.identify.signals import as_signal, check_rate
@@ -199,7 +197,7 @@ def bias_drift(residual: ArrayLike, time: ArrayLike) -> Drift:
     return Drift(
         slope=slope,
         std=std,
-        probability=float(2 * student.sf(abs(slope) / std, freedom)),
+        probability=float(2 * scipy.stats.t.sf(abs(slope) / std, freedom)),
         total=slope * length,
     )
 
@@ -219,10 +217,10 @@ def _wandering_variance(ramp: NDArray[np.float64], e: NDArray[np.float64]) -> fl
     omega = 2 * np.pi * np.arange(n + 1) / (2 * n)
     omega[0] = omega[1]
     inside = slice(2, n - 1, 2)
-    power = np.abs(rfft(e)[1 : (n - 1) // 2]) ** 2 / n
+    power = np.abs(scipy.fft.rfft(e)[1 : (n - 1) // 2]) ** 2 / n
     shape = omega**-exponent
     level = float(np.mean(power / shape[inside][: power.size]))
-    weights = np.abs(rfft(ramp / (ramp @ ramp), 2 * n)) ** 2
+    weights = np.abs(scipy.fft.rfft(ramp / (ramp @ ramp), 2 * n)) ** 2
     return float(level * (weights[1:] @ shape[1:]) / n)
 
 
@@ -231,7 +229,7 @@ def _line(e: NDArray[np.float64], fs: float) -> float | None:
     n = e.size
     if n < 8 * _NEIGHBOURS:
         return None
-    power = np.abs(rfft(e * np.hanning(n))) ** 2
+    power = np.abs(scipy.fft.rfft(e * np.hanning(n))) ** 2
     inner = np.arange(_NEIGHBOURS, power.size - _NEIGHBOURS)
     summed = np.concatenate([[0.0], np.cumsum(power)])
     wide = summed[inner + _NEIGHBOURS + 1] - summed[inner - _NEIGHBOURS]
@@ -268,7 +266,7 @@ def _amplitude(e: NDArray[np.float64], frequency: float) -> float:
 def _likelier(e: NDArray[np.float64]) -> tuple[Colour, float]:
     """AR(1) or a power law, by Whittle's likelihood, and the power law's exponent."""
     n = e.size
-    power = np.abs(rfft(e)[1 : (n - 1) // 2]) ** 2 / n
+    power = np.abs(scipy.fft.rfft(e)[1 : (n - 1) // 2]) ** 2 / n
     power = np.maximum(power, 1e-12 * power.mean())
     omega = 2 * np.pi * np.arange(1, power.size + 1) / n
 
@@ -281,7 +279,9 @@ def _likelier(e: NDArray[np.float64]) -> tuple[Colour, float]:
     def law(exponent: float) -> float:
         return cost(omega**-exponent)
 
-    first = minimize_scalar(autoregressive, bounds=(-0.999, 0.9999), method="bounded")
-    second = minimize_scalar(law, bounds=(-2.0, 4.0), method="bounded")
+    first = scipy.optimize.minimize_scalar(
+        autoregressive, bounds=(-0.999, 0.9999), method="bounded"
+    )
+    second = scipy.optimize.minimize_scalar(law, bounds=(-2.0, 4.0), method="bounded")
     kind: Colour = "autoregressive" if first.fun <= second.fun else "power_law"
     return kind, float(second.x)

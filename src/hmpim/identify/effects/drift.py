@@ -9,9 +9,9 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
+import scipy
 from numpy.polynomial.legendre import legvander
 from numpy.typing import NDArray
-from scipy.fft import rfft
 
 from hmpim.identify.effects.colour import bias_drift
 from hmpim.identify.fitting.enrich import PLAIN
@@ -146,7 +146,9 @@ def _steepness(residual: NDArray[np.float64]) -> float:
     columns = _polynomials(residual.size, _DEGREES[-1])
     columns = columns / np.linalg.norm(columns, axis=1)[:, None]
     weights = columns @ (residual - residual.mean())
-    power = np.abs(rfft(residual - residual.mean() - weights @ columns)) ** 2 / residual.size
+    power = (
+        np.abs(scipy.fft.rfft(residual - residual.mean() - weights @ columns)) ** 2 / residual.size
+    )
     level = float(np.mean(power[8:41]))
     return float(np.mean(weights[:4] ** 2)) / max(level, np.finfo(float).tiny)
 

@@ -7,9 +7,8 @@ too, and every gain comes out smaller by the share of the noise in the input's p
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike, NDArray
-from scipy.fft import rfft
-from scipy.signal.windows import blackmanharris
 
 from hmpim.identify.signals import as_signal, check_band, check_rate
 
@@ -89,8 +88,12 @@ def input_noise(u: ArrayLike, fs: float, *, band: tuple[float, float]) -> InputN
     samples = as_signal("u", u)
     if np.ptp(samples) == 0:
         return None
-    window = np.asarray(blackmanharris(samples.size, sym=False), dtype=np.float64)
-    power = np.abs(rfft(window * (samples - samples.mean()))) ** 2 / float(window @ window)
+    window = np.asarray(
+        scipy.signal.windows.blackmanharris(samples.size, sym=False), dtype=np.float64
+    )
+    power = np.abs(scipy.fft.rfft(window * (samples - samples.mean()))) ** 2 / float(
+        window @ window
+    )
     band = (band[0], min(band[1], _end(power) * fs / samples.size))
     if _ABOVE * band[1] > _ROOM * fs / 2 or band[1] <= band[0]:
         return None

@@ -1,8 +1,8 @@
 """Colour of a noise that is known at some samples only, as between clipped ones."""
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.linalg import solve_toeplitz
 
 from hmpim.identify.whiteness import autocovariance
 
@@ -49,7 +49,7 @@ def masked_spectrum(
         return np.ones_like(omega)
     best = (count * float(np.log(r[0])), float(r[0]), np.zeros(0))
     for order in range(1, longest + 1):
-        coefficients = solve_toeplitz(r[:order], r[1 : order + 1])
+        coefficients = scipy.linalg.solve_toeplitz(r[:order], r[1 : order + 1])
         variance = float(r[0] - coefficients @ r[1 : order + 1])
         roots = np.roots(np.concatenate([[1.0], -coefficients]))
         # Averaged over different pairs, the covariances need not belong to any noise.

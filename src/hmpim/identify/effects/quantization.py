@@ -10,8 +10,8 @@ rounded signal repeats: B. Widrow and I. Kollár, Quantization Noise, 2008, ch. 
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike, NDArray
-from scipy.fft import rfft
 
 from hmpim.identify.signals import as_signal
 
@@ -184,7 +184,7 @@ def _by_clusters(samples: NDArray[np.float64], span: float) -> Quantization | No
     # A plateau counts as much as its neighbours: it must not ring at all frequencies.
     counts = np.minimum(counts, max(3, int(3 * samples.size / _CELLS)))
     total = float(counts.sum())
-    spectrum = rfft(counts.astype(np.float32), 4 * _CELLS)  # padded: four points per peak
+    spectrum = scipy.fft.rfft(counts.astype(np.float32), 4 * _CELLS)  # padded: four points per peak
     first, last = 4 * (_FEWEST_LEVELS + 1), _CELLS
     power = np.abs(spectrum[:last]) ** 2 / total
     if last - first < 100:

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike, NDArray
-from scipy.stats import poisson
 
 from hmpim.errors import RecordError
 from hmpim.identify.effects.smeared import smeared_plateaus
@@ -296,7 +296,9 @@ def _is_crowded(count: int, below: NDArray[np.float64], resolution: float) -> bo
     room = max(float(distances[nearest - 1]), 2.0 * resolution) - resolution
     found = np.count_nonzero(distances < room + resolution) + 1
     expected = found * resolution / room
-    return bool(count > _CROWDED * expected and poisson.sf(count - 1, 2.5 * expected) < 1e-6)
+    return bool(
+        count > _CROWDED * expected and scipy.stats.poisson.sf(count - 1, 2.5 * expected) < 1e-6
+    )
 
 
 def _is_even(below: NDArray[np.float64], resolution: float, reach: float) -> bool:

@@ -3,8 +3,8 @@
 from dataclasses import replace
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.special import chdtri
 
 from hmpim.identify.fitting.data import Data, Seen
 from hmpim.identify.fitting.fit import Fit, Problem, jacobian, solved
@@ -82,7 +82,7 @@ def begins_of(problem: Problem, fit: Fit, *, lag: int) -> int | None:
     gained = float((rows @ residual) @ solved(rows @ rows.T, rows @ residual))
     left = max(power - gained, np.finfo(float).tiny)
     statistic = share * count * float(np.log(power / left))
-    return begins if statistic > chdtri(free.shape[0], _REST) else None
+    return begins if statistic > scipy.special.chdtri(free.shape[0], _REST) else None
 
 
 def look_again(problem: Problem, trial: Trial, seen: Seen, *, lag: int) -> Seen | None:
@@ -136,7 +136,7 @@ def _stands_out(
     if not some.any() or not others.any():
         return False
     level = float(np.median(innovations[others] ** 2)) / 0.455  # of a squared Gaussian
-    limit = _TWICE * level * float(chdtri(int(np.count_nonzero(some)), _REST))
+    limit = _TWICE * level * float(scipy.special.chdtri(int(np.count_nonzero(some)), _REST))
     return float(np.sum(innovations[some] ** 2)) > limit
 
 

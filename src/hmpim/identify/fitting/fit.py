@@ -13,8 +13,8 @@ from dataclasses import dataclass
 from typing import Protocol, TypeVar
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.linalg.lapack import dsyevd
 
 from hmpim.identify.fitting.rows import Part, Problem
 from hmpim.identify.fitting.sampled_rows import SampledPart, part_of
@@ -212,7 +212,9 @@ def solved(gram: Real, moment: Real, damping: float = 0.0) -> Real:
     diagonal = gram.diagonal()
     scale = np.sqrt(np.where(diagonal > 1e-200 * diagonal.max(), diagonal, 1.0))
     scaled = gram / (scale[:, None] * scale)
-    values, vectors, info = dsyevd(scaled, lower=1)  # eigh's routine, which takes as long to check
+    values, vectors, info = scipy.linalg.lapack.dsyevd(
+        scaled, lower=1
+    )  # eigh's routine, which takes as long to check
     if info:
         raise np.linalg.LinAlgError("eigenvalues of the normal equations did not converge")
     keep = values > _UNSEEN * values[-1]

@@ -10,8 +10,8 @@ coupling show here.
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.special import chdtrc
 
 __all__ = ["Halves", "compare_halves"]
 
@@ -77,4 +77,6 @@ def compare_halves(
     if variance == 0.0:
         return Halves(probability=1.0, owed=0.0)
     free = max(degrees - rows.shape[0], 1)
-    return Halves(probability=float(chdtrc(free, share * statistic / variance)), owed=owed)
+    return Halves(
+        probability=float(scipy.special.chdtrc(free, share * statistic / variance)), owed=owed
+    )

@@ -8,9 +8,8 @@ begin at rest, the free response of the state it begins with.
 from dataclasses import dataclass, replace
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.fft import irfft, rfft
-from scipy.signal import lfilter
 
 from hmpim.identify.fitting.sections import Expansion, Poles, poles_of
 from hmpim.model.dynamics import Structure
@@ -78,11 +77,11 @@ class Problem:
     def masked(self, rows: Real) -> Real:
         """Return `rows`, (k, n) or (n,), samples that do not count set to 0, noise whitened."""
         if self.noise is not None and self.told is not None and rows.size:
-            return np.asarray(lfilter(self.noise, np.ones(1), rows) * self.told)
+            return np.asarray(scipy.signal.lfilter(self.noise, np.ones(1), rows) * self.told)
         counted = rows if self.valid is None else rows * self.valid
         if self.whitening is None:
             return counted
-        return np.asarray(irfft(rfft(counted) * self.whitening, rows.shape[-1]))
+        return np.asarray(scipy.fft.irfft(scipy.fft.rfft(counted) * self.whitening, rows.shape[-1]))
 
     def innovations(self, prediction: Real, residual: Real) -> Real:
         """What of the output no past residual foresees; the residual itself of white noise."""

@@ -1,8 +1,8 @@
 """The rows of software under test: what a filter in z makes of the samples, and the derivatives."""
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.signal import lfilter
 
 from hmpim.identify.fitting.rows import Part, Problem
 from hmpim.model.dynamics import Structure, coefficients_of
@@ -36,7 +36,9 @@ class SampledPart:
         deviation = source.coefficients[MARGIN : MARGIN + n]
         moved = np.concatenate([np.zeros(late), deviation])[:n]
         self._below = _below(structure, theta[1:])
-        rows = [lfilter(self._below.sum() * nyquist_taps(structure), self._below, moved)]
+        rows = [
+            scipy.signal.lfilter(self._below.sum() * nyquist_taps(structure), self._below, moved)
+        ]
         for _ in range(structure.zeros):
             rows.append(np.diff(rows[-1], prepend=0.0))
         self._moving = np.stack(rows)
@@ -49,7 +51,7 @@ class SampledPart:
             blows = np.zeros((structure.order, n))
             for k in range(min(structure.order, n - problem.begins)):
                 blows[k, problem.begins + k] = 1.0
-            self.free = np.asarray(lfilter(np.ones(1), self._below, blows))
+            self.free = np.asarray(scipy.signal.lfilter(np.ones(1), self._below, blows))
 
     def slopes(self, numerator: Real, initial: Real) -> Real:
         """Derivatives by theta, shape (1 + order, n); a whole number of samples has none."""
@@ -59,7 +61,7 @@ class SampledPart:
             return out
         forced = numerator @ self._moving
         free = initial @ self.free if initial.size else np.zeros(forced.size)
-        turned = -lfilter(np.ones(1), self._below, forced + free)
+        turned = -scipy.signal.lfilter(np.ones(1), self._below, forced + free)
         by_coefficient = np.stack(
             [
                 forced / self._below.sum()

@@ -11,8 +11,8 @@ samples serves every structure and every delay.
 from dataclasses import dataclass, replace
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.signal import lfilter
 
 from hmpim.identify.fitting.beginning import begins_of
 from hmpim.identify.fitting.fit import Fit, Problem, fit_structure, solved_exactly
@@ -229,9 +229,9 @@ def _refined(problem: Problem, u: Real, structure: Structure, delay: int, below:
     for _ in range(_REFINED):
         if np.max(np.abs(np.roots(below))) >= 1.0:
             break
-        x = lfilter(weights, below, moved)
-        z = lfilter([1.0], below, y - y[0])
-        level = lfilter([1.0], below, np.ones(n))
+        x = scipy.signal.lfilter(weights, below, moved)
+        z = scipy.signal.lfilter([1.0], below, y - y[0])
+        level = scipy.signal.lfilter([1.0], below, np.ones(n))
         rows = [np.concatenate([np.zeros(k), z[: n - k]]) for k in range(1, structure.order + 1)]
         rows += [np.concatenate([np.zeros(k), x[: n - k]]) for k in range(structure.zeros + 1)]
         told = slice(None) if problem.valid is None else problem.valid

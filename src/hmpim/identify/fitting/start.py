@@ -15,8 +15,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.fft import irfft, next_fast_len, rfft
 
 from hmpim.model.dynamics import Structure, theta_of
 
@@ -83,9 +83,9 @@ def _tapered(x: NDArray[np.float64]) -> NDArray[np.float64]:
 
 def coarse_lag(u: NDArray[np.float64], y: NDArray[np.float64], longest: int) -> int:
     """Lag in samples, 0..longest, of the greatest magnitude of the cross-correlation."""
-    length = next_fast_len(u.size + longest + 1, real=True)
-    spectrum = np.conj(rfft(u - u.mean(), length)) * rfft(y - y.mean(), length)
-    correlation = irfft(spectrum, length)[: longest + 1]
+    length = scipy.fft.next_fast_len(u.size + longest + 1, real=True)
+    spectrum = np.conj(scipy.fft.rfft(u - u.mean(), length)) * scipy.fft.rfft(y - y.mean(), length)
+    correlation = scipy.fft.irfft(spectrum, length)[: longest + 1]
     return int(np.argmax(np.abs(correlation)))
 
 
@@ -104,9 +104,9 @@ def rough_response(
     lag = coarse_lag(u, y, longest_delay)
     overlap = u.size - lag
     group = max(min(u.size // (_TURNS * (lag + _LATE)), u.size // _ENOUGH), 1)
-    length = next_fast_len(-(-u.size // group), real=True)
-    spectrum_u = rfft(_tapered(u[:overlap]), group * length)
-    spectrum_y = rfft(_tapered(y[lag:]), group * length)
+    length = scipy.fft.next_fast_len(-(-u.size // group), real=True)
+    spectrum_u = scipy.fft.rfft(_tapered(u[:overlap]), group * length)
+    spectrum_y = scipy.fft.rfft(_tapered(y[lag:]), group * length)
     power = _grouped(spectrum_u.real**2 + spectrum_u.imag**2, group)
     cross = _grouped(np.conj(spectrum_u) * spectrum_y, group)
     power[0] = 0.0
@@ -221,7 +221,7 @@ def _levy(
     spectrum = np.zeros((order + 1, length // 2 + 1), dtype=complex)
     spectrum[:, rough.bins] = weighted
     # irfft adds each bin's mirror and divides by the length.
-    cross = irfft(spectrum, length, axis=1)[:, shifts % length] * length / 2
+    cross = scipy.fft.irfft(spectrum, length, axis=1)[:, shifts % length] * length / 2
     total = weight.sum()
     # Eliminate the constant K = sum_j a_j cross_j / total, a_0 = 1.
     reduced = gram[None, :, :] - cross.T[:, :, None] * cross.T[:, None, :] / total

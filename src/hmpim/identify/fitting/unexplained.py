@@ -5,8 +5,8 @@ response at the high end and still explain 99 % of the output's power.
 """
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.fft import rfft
 
 __all__ = ["unexplained_response"]
 
@@ -58,13 +58,15 @@ def unexplained_response(
         return 0.0
     bins = bins[: groups * width]
     shape = (groups, width)
-    moved = (rfft(u - u.mean())[bins] * np.exp(-2j * np.pi * bins * delay / n)).reshape(shape)
+    moved = (scipy.fft.rfft(u - u.mean())[bins] * np.exp(-2j * np.pi * bins * delay / n)).reshape(
+        shape
+    )
     power = np.sum(np.abs(moved) ** 2, axis=1)
     seen = power > 0.0
 
     def followed(x: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Power of a signal that one gain of each group explains, and of all of it."""
-        wave = rfft(x - x.mean())[bins].reshape(shape)
+        wave = scipy.fft.rfft(x - x.mean())[bins].reshape(shape)
         taken = np.abs(np.sum(moved.conj() * wave, axis=1)) ** 2 / np.where(seen, power, 1.0)
         return taken, np.sum(np.abs(wave) ** 2, axis=1)
 

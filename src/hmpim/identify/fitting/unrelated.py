@@ -1,8 +1,8 @@
 """Whether an output follows its input at all."""
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.signal import lfilter
 
 from hmpim.identify.fitting.autoregression import autoregression
 from hmpim.identify.fitting.fit import Fit, Problem, solved
@@ -48,7 +48,7 @@ def says_nothing(
         return False
     y = problem.y - problem.masked(problem.y).sum() / problem.counted
     noise = autoregression(problem.masked(y), problem.valid)
-    heard, seen = (lfilter(noise, np.ones(1), x - x.mean()) for x in (u, y))
+    heard, seen = (scipy.signal.lfilter(noise, np.ones(1), x - x.mean()) for x in (u, y))
     if problem.valid is not None:
         seen = seen * problem.coloured(noise).told
     seen[: noise.size] = 0.0

@@ -3,9 +3,8 @@
 from dataclasses import replace
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.signal import lfilter
-from scipy.special import chdtri
 
 from hmpim.identify.fitting.autoregression import autoregression
 from hmpim.identify.fitting.data import (
@@ -48,7 +47,7 @@ def prewhitened_of(data: Data, mode: Intersample, fits: list[Fit], seen: Seen) -
     left = whitened.innovations(fit.prediction, fit.residual)
     if float(left @ left) > _HIDES * fit.cost:
         return None
-    u, y = (lfilter(noise, np.ones(1), x - x.mean()) for x in (data.u, data.y))
+    u, y = (scipy.signal.lfilter(noise, np.ones(1), x - x.mean()) for x in (data.u, data.y))
     y = y if seen.valid is None else y * whitened.told
     rough = rough_response(u[noise.size :], y[noise.size :], longest_delay=data.u.size // 2)
     return replace(data, noise=noise, rough=rough)
@@ -92,4 +91,4 @@ def is_contradicted(data: Data, best: Trial, seen: Seen) -> bool:
     cov = covariance(rows, plain.residual, freedom=freedom, white=False)[:unknown, :unknown]
     apart = plain.theta - best.fit.theta
     statistic = float(apart @ np.linalg.pinv(cov, rcond=1e-12, hermitian=True) @ apart)
-    return not statistic < chdtri(unknown, FOLLOWS)
+    return not statistic < scipy.special.chdtri(unknown, FOLLOWS)

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from typing import Literal, get_args
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike, NDArray
-from scipy import fft
 
 from hmpim.errors import ArgumentError, RecordError
 from hmpim.identify.result import FrequencyResponse
@@ -291,5 +291,5 @@ def _spectra(
 ) -> NDArray[np.complex128]:
     """Transforms of all segments of all repeats, shape (repeats · segments, bins)."""
     views = np.lib.stride_tricks.sliding_window_view(x, taper.size, axis=1)[:, ::step]
-    spectra = fft.rfft(views * taper, axis=2)
+    spectra = scipy.fft.rfft(views * taper, axis=2)
     return np.asarray(spectra.reshape(-1, spectra.shape[2]))

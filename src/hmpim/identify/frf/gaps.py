@@ -1,8 +1,8 @@
 """Gaps in the outputs of several inputs, filled before anything is transformed."""
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike, NDArray
-from scipy.interpolate import PchipInterpolator
 
 from hmpim.errors import ArgumentError, RecordError
 
@@ -66,7 +66,7 @@ def filled(
             )
         gaps = np.flatnonzero(~told)
         if gaps.size and given is None:
-            row[gaps] = PchipInterpolator(np.flatnonzero(told), row[told])(gaps)
+            row[gaps] = scipy.interpolate.PchipInterpolator(np.flatnonzero(told), row[told])(gaps)
         elif given is not None:
             row[gaps] = given[i, gaps]
     return out, np.asarray(mask.mean(axis=1))

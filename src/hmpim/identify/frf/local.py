@@ -6,8 +6,8 @@ predicts a bin from its neighbours alone.
 """
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike, NDArray
-from scipy.interpolate import PchipInterpolator
 
 from hmpim.errors import ArgumentError, RecordError
 from hmpim.identify.frf.choice import choose
@@ -113,7 +113,9 @@ def local_response(
     if fill is None:
         inside = np.flatnonzero(~mask)
         joined = second.copy()
-        joined[inside] = PchipInterpolator(np.flatnonzero(mask), second[mask])(inside)
+        joined[inside] = scipy.interpolate.PchipInterpolator(np.flatnonzero(mask), second[mask])(
+            inside
+        )
         return _single(first, joined, fs, delay=delay, band=band, points=points)
     guess = as_signal("fill", fill)
     if guess.size != second.size:

@@ -12,8 +12,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike, NDArray
-from scipy import fft
 
 from hmpim.errors import ArgumentError, RecordError
 from hmpim.identify.frf.choice import choose
@@ -267,7 +267,7 @@ def _checked_delays(delays: ArrayLike, p: int, m: int, length: float) -> Real:
 
 def _refuse_identical(u: Real, low: int, high: int, labels: tuple[str, ...]) -> None:
     """Name the inputs that are one and the same over the band, or sums of others."""
-    spectra = fft.rfft(u, axis=1)[:, low : high + 1]
+    spectra = scipy.fft.rfft(u, axis=1)[:, low : high + 1]
     size = np.sqrt(np.mean(np.abs(spectra) ** 2, axis=1))
     if np.any(size == 0):
         raise RecordError(
@@ -316,14 +316,14 @@ def _moved(u: Real, late: Real, fs: float, base: int) -> Complex:
         rest[j] = late[j] * fs - (lag + base)
     count = (length - 1) // 2 + 1
     turn = np.exp(-2j * np.pi * np.outer(rest, np.arange(count)) / length)
-    spectra: Complex = np.asarray(fft.rfft(moved, axis=1))[:, :count] * turn
+    spectra: Complex = np.asarray(scipy.fft.rfft(moved, axis=1))[:, :count] * turn
     spectra[:, 0] = 0.0
     return spectra
 
 
 def _chosen(u: Complex, y: Real, base: int, centre: Integer) -> _Joint:
     """Fit one output at every width, and choose at each centre."""
-    spectrum = np.array(fft.rfft(y[base:]))[: u.shape[1]]
+    spectrum = np.array(scipy.fft.rfft(y[base:]))[: u.shape[1]]
     spectrum[0] = 0.0
     polynomials = [
         fit

@@ -9,9 +9,9 @@ no correlation into E|error|², so least squares and its variances hold as they 
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
-from scipy import fft
 
 __all__ = [
     "LocalFit",
@@ -165,11 +165,11 @@ def transform(u: Real, y: Real, fs: float, delay: float) -> Spectra:
     lag = min(int(np.floor(delay * fs + 1e-9)), u.size // 2)
     length = u.size - lag
     if length > _LONG:
-        length = int(fft.prev_fast_len(length, real=True))
+        length = int(scipy.fft.prev_fast_len(length, real=True))
     count = (length - 1) // 2 + 1  # without the bin at fs/2, which is real
     frequency = np.asarray(np.arange(count) * (fs / length), dtype=np.float64)
-    spectrum_u = np.array(fft.rfft(u[:length])[:count])
-    spectrum_y = fft.rfft(y[lag : lag + length])[:count]
+    spectrum_u = np.array(scipy.fft.rfft(u[:length])[:count])
+    spectrum_y = scipy.fft.rfft(y[lag : lag + length])[:count]
     spectrum_y = spectrum_y * np.exp(2j * np.pi * frequency * (delay - lag / fs))
     spectrum_u[0] = spectrum_y[0] = 0.0
     return Spectra(frequency=frequency, u=spectrum_u, y=spectrum_y)

@@ -1,8 +1,8 @@
 """Whether the input answers the noise: a loop around the unit."""
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.special import chdtrc
 
 from hmpim.identify.fitting.fit import solved
 from hmpim.identify.groups import MODELLED
@@ -48,7 +48,7 @@ def feedback(evidence: Evidence) -> tuple[Finding, ...]:
         return ()
     along = direction[:, seen].T @ (cross[future] - told.T @ cross[past])
     gained = float(np.sum(along**2 / size[seen])) / float(left[inside].var())
-    if chdtrc(int(seen.sum()), gained) > _CHANCE:
+    if scipy.special.chdtrc(int(seen.sum()), gained) > _CHANCE:
         return ()
     coloured = not evidence.readings.white
     return (

@@ -1,9 +1,8 @@
 """What lies outside the band, before the record's start or beyond its end."""
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.fft import rfft
-from scipy.signal.windows import blackmanharris
 
 from hmpim.identify.fitting.enrich import PLAIN
 from hmpim.identify.groups import MODELLED, PHASE_SPLIT, TIMING
@@ -195,8 +194,8 @@ def _at_the_line(evidence: Evidence) -> str:
 
 def _windowed_power(u: NDArray[np.float64]) -> NDArray[np.float64]:
     """Power behind a Blackman-Harris window, without what a constant has there."""
-    window = blackmanharris(u.size, sym=False)
-    return np.asarray(np.abs(rfft((u - window @ u / window.sum()) * window)) ** 2)
+    window = scipy.signal.windows.blackmanharris(u.size, sym=False)
+    return np.asarray(np.abs(scipy.fft.rfft((u - window @ u / window.sum()) * window)) ** 2)
 
 
 def count_lines(u: NDArray[np.float64]) -> int:

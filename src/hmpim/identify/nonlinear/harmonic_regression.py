@@ -10,9 +10,8 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.linalg import solve_toeplitz
-from scipy.signal import lfilter
 
 from hmpim.identify.nonlinear.sweep_phase import SweepPhase
 from hmpim.identify.whiteness import autocovariance
@@ -192,7 +191,7 @@ class HarmonicFit:
 
     def weights_of(self, traces: NDArray[np.float64]) -> NDArray[np.float64]:
         """Weights that traces, shape (k, n), would have by themselves, shape (k, p c)."""
-        white = lfilter(self.whitening, [1.0], traces[:, self.view.index], axis=1)
+        white = scipy.signal.lfilter(self.whitening, [1.0], traces[:, self.view.index], axis=1)
         moments = _moments(white, self.white, self.view)
         return np.asarray(moments @ self.covariance / self.variance)
 
@@ -218,8 +217,8 @@ def fit_harmonics(
     weights, _, _ = _solved(_gram(columns, view), _moments(e[None], columns, view)[0])
     count = columns.shape[0]
     whitening = whitener(e - _expanded(columns, weights.reshape(-1, count), view))
-    white_e = lfilter(whitening, [1.0], e)
-    white = lfilter(whitening, [1.0], columns, axis=1)
+    white_e = scipy.signal.lfilter(whitening, [1.0], e)
+    white = scipy.signal.lfilter(whitening, [1.0], columns, axis=1)
     weights, covariance, used = _solved(_gram(white, view), _moments(white_e[None], white, view)[0])
     left = white_e - _expanded(white, weights.reshape(-1, count), view)
     freedom = max(e.size - int(np.count_nonzero(used)) - whitening.size + 1, 1)
@@ -306,7 +305,7 @@ def whitener(
         return np.ones(1)
     best, chosen = e.size * np.log(r[0]), np.zeros(0)
     for order in range(1, longest + 1):
-        coefficients = solve_toeplitz(r[:order], r[1 : order + 1])
+        coefficients = scipy.linalg.solve_toeplitz(r[:order], r[1 : order + 1])
         variance = float(r[0] - coefficients @ r[1 : order + 1])
         if variance <= 1e-12 * r[0]:
             break

@@ -13,8 +13,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike
-from scipy.special import chdtrc, fdtrc
 
 from hmpim.errors import RecordError
 from hmpim.identify.nonlinear.harmonic_regression import (
@@ -198,7 +198,7 @@ def any_harmonic(residual: ArrayLike, sweep: SweepPhase, fs: float, *, delay: fl
         count = np.add.reduceat(seen.astype(np.float64), starts)
         used = count > 0
         statistic = float(np.sum(2.0 * np.abs(taken[used]) ** 2 / count[used])) / power
-        chances.append(float(chdtrc(2 * np.count_nonzero(used), statistic)))
+        chances.append(float(scipy.special.chdtrc(2 * np.count_nonzero(used), statistic)))
     return min(1.0, len(chances) * min(chances))
 
 
@@ -221,7 +221,9 @@ def _tested(fit: HarmonicFit, fs: float) -> Harmonics:
             Harmonic(
                 order=k,
                 rms=float(np.sqrt(power)),
-                probability=float(fdtrc(group.size, fit.freedom, statistic / group.size)),
+                probability=float(
+                    scipy.special.fdtrc(group.size, fit.freedom, statistic / group.size)
+                ),
                 frequency=tuple(frequency[told].tolist()),
                 amplitude=tuple(np.hypot(fit.weights[at], fit.weights[at + 1])[told].tolist()),
                 std=tuple(np.sqrt(spread[told]).tolist()),

@@ -10,9 +10,8 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike, NDArray
-from scipy.fft import irfft, next_fast_len, rfft
-from scipy.stats import f as fisher
 
 from hmpim.errors import ArgumentError
 from hmpim.identify.signals import as_pair, as_signal
@@ -111,8 +110,8 @@ def find_period(u: ArrayLike) -> int | None:
     power = np.concatenate([[0.0], np.cumsum(x**2)])
     if power[-1] == 0:
         return None
-    length = next_fast_len(2 * n, real=True)
-    product = irfft(np.abs(rfft(x, length)) ** 2, length)[: n // 2 + 1]
+    length = scipy.fft.next_fast_len(2 * n, real=True)
+    product = scipy.fft.irfft(np.abs(scipy.fft.rfft(x, length)) ** 2, length)[: n // 2 + 1]
     lag = np.arange(n // 2 + 1)
     both = power[n - lag] + (power[n] - power[lag])
     different = (both - 2 * product) / np.maximum(both, np.finfo(float).tiny)
@@ -168,8 +167,8 @@ def detection_lines(u: ArrayLike, y: ArrayLike, *, period: int) -> Lines | None:
             f"{source.size}; noise is told from distortion by two periods at least"
         )
     start = source.size - periods * int(period)
-    U = rfft(source[start:].reshape(periods, -1), axis=1) * 2.0 / period
-    Y = rfft(output[start:].reshape(periods, -1), axis=1) * 2.0 / period
+    U = scipy.fft.rfft(source[start:].reshape(periods, -1), axis=1) * 2.0 / period
+    Y = scipy.fft.rfft(output[start:].reshape(periods, -1), axis=1) * 2.0 / period
     mean_u, mean_y = np.abs(U.mean(axis=0)), Y.mean(axis=0)
     scatter = np.sum(np.abs(Y - mean_y) ** 2, axis=0) / (periods - 1) / periods
     mean_u[0] = 0.0
@@ -210,7 +209,7 @@ def _level(
     power = float(np.mean(np.abs(line) ** 2))
     chance = 1.0 if power == 0 else 0.0
     if noise > 0:
-        chance = float(fisher.sf(power / noise, 2 * count, 2 * count * (periods - 1)))
+        chance = float(scipy.stats.f.sf(power / noise, 2 * count, 2 * count * (periods - 1)))
     rms = float(np.sqrt(max(power - noise, 0.0)))
     return LineLevel(
         parity=parity,

@@ -23,8 +23,8 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.signal import lfilter
 
 from hmpim.identify.fitting.fit import Fit, Problem, jacobian
 from hmpim.identify.nonlinear.harmonic_regression import whitener
@@ -314,8 +314,8 @@ def _fitted(
     left = e - (background @ e) @ background - weight * alone
     colour = whitener(left[counted], longest=_LONGEST_AUTOREGRESSION)
     # Samples that do not count are passed over: what is left keeps its linear relation.
-    rows = lfilter(colour, [1.0], np.vstack([background, h])[:, counted], axis=1)
-    white = lfilter(colour, [1.0], e[counted])
+    rows = scipy.signal.lfilter(colour, [1.0], np.vstack([background, h])[:, counted], axis=1)
+    white = scipy.signal.lfilter(colour, [1.0], e[counted])
     q, r = np.linalg.qr(rows.T)  # the trace last
     if abs(r[-1, -1]) < 1e-9 * float(np.linalg.norm(rows[-1])):
         return None

@@ -8,9 +8,8 @@ a sweep may go up to four fifths of the Nyquist frequency.
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike, NDArray
-from scipy.interpolate import CubicSpline
-from scipy.signal import resample_poly
 
 from hmpim.identify.signals import as_signal, check_rate
 
@@ -150,7 +149,9 @@ def _finer(x: NDArray[np.float64]) -> NDArray[np.float64]:
     margin = min(32, x.size - 1)
     before = 2 * x[0] - x[margin:0:-1]
     after = 2 * x[-1] - x[-2 : -2 - margin : -1]
-    extended = resample_poly(np.concatenate([before, x, after]), _FINER, 1, window=("kaiser", 8.0))
+    extended = scipy.signal.resample_poly(
+        np.concatenate([before, x, after]), _FINER, 1, window=("kaiser", 8.0)
+    )
     start = margin * _FINER
     return np.asarray(extended[start : start + (x.size - 1) * _FINER + 1], dtype=np.float64)
 
@@ -200,7 +201,7 @@ def _through(
     """Phase by a smooth curve through the half turns, going on at the last rate beyond them."""
     turns = first + np.pi * np.arange(crossings.size)
     apart = np.diff(crossings, prepend=-np.inf) > 0.0  # rounding may put two at one instant
-    curve = CubicSpline(crossings[apart], turns[apart])
+    curve = scipy.interpolate.CubicSpline(crossings[apart], turns[apart])
     inside = np.clip(sample, crossings[0], crossings[-1])
     beyond = sample - inside
     return np.asarray(curve(inside) + beyond * curve(inside, 1))

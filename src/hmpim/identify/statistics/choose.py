@@ -7,9 +7,8 @@ whiten, choose.
 from dataclasses import dataclass, replace
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.signal import lfilter
-from scipy.special import chdtrc, chdtri
 
 from hmpim.errors import RecordError
 from hmpim.identify.fitting.autoregression import whitening_filter
@@ -287,15 +286,15 @@ def _rests(search: _Search, fits: list[Fitted]) -> bool:
     free = Part(problem, best.fit.structure, best.fit.theta).free[:, :lags]
     head = best.residual(search.products).head(0, lags)
     every = np.vstack([head, free])
-    head, *free_rows = lfilter(left.noise, np.ones(1), every)[:, left.noise.size :]
-    if float(head @ head) > 2.0 * left.innovation * chdtri(head.size, _REST):
+    head, *free_rows = scipy.signal.lfilter(left.noise, np.ones(1), every)[:, left.noise.size :]
+    if float(head @ head) > 2.0 * left.innovation * scipy.special.chdtri(head.size, _REST):
         return False
     if not free_rows or begins >= lags:
         return True
     free = np.array(free_rows)
     moment = free @ head
     told = float(moment @ solved(free @ free.T, moment))
-    return told < left.innovation * float(chdtri(free.shape[0], _REST))
+    return told < left.innovation * float(scipy.special.chdtri(free.shape[0], _REST))
 
 
 def _memory(fitted: Fitted) -> int:
@@ -358,7 +357,7 @@ def left_over(search: "_Search", fitted: Fitted) -> LeftOver:
     rho = gram[0, 1 : max(min(gram.shape[0], count // 4), 1)] / power
     lags = np.arange(1, rho.size + 1)
     box = count * (count + 2.0) * float(np.sum(rho**2 / (count - lags)))
-    white = rho.size == 0 or chdtrc(rho.size, box) > _WHITE
+    white = rho.size == 0 or scipy.special.chdtrc(rho.size, box) > _WHITE
     if white and not products.order:
         power, count = fitted.fit.objective, products.counted
     clear = rho[np.abs(rho) > 3.0 / np.sqrt(count)]

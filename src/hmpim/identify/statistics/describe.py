@@ -3,8 +3,8 @@
 import hashlib
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.special import chdtri
 
 from hmpim.errors import RecordError
 from hmpim.identify.fitting.nested import FAR, stretched
@@ -326,7 +326,7 @@ def _unrelated(statistics: Statistics, chosen: Chosen) -> PairIdentification | N
     spread = products.moments(best.rows, best.steady).energy
     share = 1.0 if products.order else chosen.left.share
     gained = products.counted * share * float(np.log(max(spread / best.fit.objective, 1.0)))
-    if gained > chdtri(best.fit.structure.parameters, _UNRELATED):
+    if gained > scipy.special.chdtri(best.fit.structure.parameters, _UNRELATED):
         return None
     mean = best.moments.bias
     variance = spread / max(products.counted - 1, 1)

@@ -6,8 +6,8 @@ excited band, are asked for beside all parameters of the model (C. R. Rao, Proc.
 """
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.special import chdtrc
 
 from hmpim.identify.fitting.fit import solved
 from hmpim.identify.fitting.growth import HiddenPole, response_to_square
@@ -57,7 +57,9 @@ def misfit_of(fitted: Fitted, products: Products, band: tuple[float, float]) -> 
     power = float(np.sum(projected**2 / values[kept]))
     freedom = int(kept.sum())
     beyond = (power - freedom * variance) / cost
-    return Misfit(share=max(beyond, 0.0), probability=float(chdtrc(freedom, power / variance)))
+    return Misfit(
+        share=max(beyond, 0.0), probability=float(scipy.special.chdtrc(freedom, power / variance))
+    )
 
 
 def hidden_pole_of(fitted: Fitted, problem: Problem) -> HiddenPole:

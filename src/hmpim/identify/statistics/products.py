@@ -9,8 +9,8 @@ The bias is solved for each run, or for all, and taken off too.
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.fft import irfft, next_fast_len, rfft
 
 from hmpim.identify.fitting.autoregression import LONGEST
 from hmpim.identify.statistics.reach import AHEAD
@@ -78,13 +78,13 @@ class Products:
         self.order = self.noise.size - 1
         self.first = self.order + skipped
         """Sample of a run from which on its whitened outputs count."""
-        self._length = int(next_fast_len(2 * reach.span + 1, real=True))
+        self._length = int(scipy.fft.next_fast_len(2 * reach.span + 1, real=True))
         self._runs = runs = tuple(closed(run, reach) for run in statistics.runs)
         self._power = self._spectrum(sum((run.uu for run in runs), np.zeros(reach.span + 1)))
-        self._white = rfft(self.noise, self._length)
+        self._white = scipy.fft.rfft(self.noise, self._length)
         self._cross = np.stack([self._lagged(run) for run in runs])
         ends = [end for run in runs for end in self._ends_of(run)]
-        self._inputs = rfft(np.stack([end[0] for end in ends]), self._length)
+        self._inputs = scipy.fft.rfft(np.stack([end[0] for end in ends]), self._length)
         self._apart = np.stack([end[1] for end in ends])
         self._around = np.stack([end[2] for end in ends])
         self._out = self._around * self._apart[:, None]
@@ -103,7 +103,7 @@ class Products:
         around = np.zeros(self._length)
         around[: autocorrelation.size] = autocorrelation
         around[-autocorrelation.size + 1 :] += autocorrelation[:0:-1]
-        return np.asarray(rfft(around).real)
+        return np.asarray(scipy.fft.rfft(around).real)
 
     def _lagged(self, run: Run) -> Real:
         """Products of whitened outputs and the whitened input at each tap, (rows + 1, taps)."""
@@ -163,8 +163,8 @@ class Products:
             What each makes of a constant input of 1.
         """
         runs, count = self._runs, rows.shape[0]
-        spectra = rfft(rows, self._length) * self._white
-        ends = irfft(spectra[:, None] * self._inputs, self._length) * self._apart
+        spectra = scipy.fft.rfft(rows, self._length) * self._white
+        ends = scipy.fft.irfft(spectra[:, None] * self._inputs, self._length) * self._apart
         flat = ends.reshape(count, -1)
         gram = _products(spectra, self._power, self._length) - flat @ flat.T
         lost = np.einsum("qet,ect->eqc", ends, self._out).reshape(len(runs), 2, count, -1).sum(1)
@@ -184,8 +184,10 @@ class Products:
         runs = self._runs
         weights = np.hstack([-bias, np.ones((len(runs), 1))])
         reach, longest = self.statistics.reach, LONGEST
-        spectrum = rfft(response, self._length)
-        made = irfft(spectrum * spectrum.conj() * self._power, self._length)[: longest + 1]
+        spectrum = scipy.fft.rfft(response, self._length)
+        made = scipy.fft.irfft(spectrum * spectrum.conj() * self._power, self._length)[
+            : longest + 1
+        ]
         whole = np.zeros(longest + 1)
         for run, c in zip(runs, weights, strict=True):
             follows = c @ run.vu
@@ -195,7 +197,7 @@ class Products:
                 behind = follows[start - k : start - k + reach.taps]
                 whole[k] += c @ run.vv[:, :, k] @ c - response @ (ahead + behind)
         doubled = np.repeat(weights, 2, axis=0)
-        ends = np.einsum("ec,ect->et", doubled, self._around) - irfft(
+        ends = np.einsum("ec,ect->et", doubled, self._around) - scipy.fft.irfft(
             spectrum * self._inputs, self._length
         )
         return Residual(

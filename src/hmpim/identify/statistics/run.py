@@ -7,8 +7,8 @@ not want, the samples at either end tell. So a run is read once, block by block.
 from dataclasses import dataclass, replace
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.fft import irfft, next_fast_len, rfft
 
 from hmpim.equality import ByValue
 from hmpim.identify.fitting.autoregression import LONGEST
@@ -113,13 +113,13 @@ def _added(run: Run, reach: Reach, u: Real, v: Real) -> Run:
     before_u, before_v = run.tail_u, _before(run, reach)
     whole_u = np.concatenate([before_u, u])
     whole_v = np.hstack([before_v, v])
-    length = next_fast_len(u.size + reach.span, real=True)
+    length = scipy.fft.next_fast_len(u.size + reach.span, real=True)
     new_u, new_v = _late(u, reach.span, length), _late(v, reach.span, length)
-    all_u, all_v = rfft(whole_u, length), _late(whole_v, reach.span - reach.forth, length)
-    uu = irfft(new_u * all_u.conj(), length)[: reach.span + 1]
-    after = irfft(new_v * all_u.conj(), length)[:, : reach.back + 1]
-    ahead = irfft(new_u * all_v.conj(), length)[:, 1 : reach.forth + 1]
-    vv = irfft(new_v[:, None] * all_v.conj()[None], length)[:, :, : LONGEST + 1]
+    all_u, all_v = scipy.fft.rfft(whole_u, length), _late(whole_v, reach.span - reach.forth, length)
+    uu = scipy.fft.irfft(new_u * all_u.conj(), length)[: reach.span + 1]
+    after = scipy.fft.irfft(new_v * all_u.conj(), length)[:, : reach.back + 1]
+    ahead = scipy.fft.irfft(new_u * all_v.conj(), length)[:, 1 : reach.forth + 1]
+    vv = scipy.fft.irfft(new_v[:, None] * all_v.conj()[None], length)[:, :, : LONGEST + 1]
     room_u, room_y = reach.span - run.samples, reach.back - run.samples
     return replace(
         run,
@@ -144,7 +144,7 @@ def _late(x: Real, by: int, length: int) -> NDArray[np.complex128]:
     """Transform of what begins `by` samples late."""
     shifted = np.zeros((*x.shape[:-1], length))
     shifted[..., by : by + x.shape[-1]] = x
-    return np.asarray(rfft(shifted, length))
+    return np.asarray(scipy.fft.rfft(shifted, length))
 
 
 def _filled(head: Real, count: int, more: Real) -> Real:

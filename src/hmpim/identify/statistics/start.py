@@ -6,9 +6,8 @@ where nothing is excited. From its transform the starts of the joint fit are fou
 """
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.fft import irfft, next_fast_len, rfft
-from scipy.signal.windows import blackman
 
 from hmpim.identify.fitting.start import RoughResponse
 from hmpim.identify.spectrum import band_of_levels
@@ -59,18 +58,18 @@ def _without(total: float, samples: Real) -> Real:
 def power_of(statistics: Statistics, length: int) -> Real:
     """Power spectrum of the input at length // 2 + 1 frequencies, smoothed by its lag window."""
     uu, _ = correlations(statistics)
-    windowed = uu * blackman(2 * uu.size - 1)[uu.size - 1 :]
+    windowed = uu * scipy.signal.windows.blackman(2 * uu.size - 1)[uu.size - 1 :]
     around = np.zeros(length)
     around[: uu.size] = windowed
     around[length - uu.size + 1 :] += windowed[:0:-1]
-    return np.asarray(np.maximum(rfft(around).real, 0.0))
+    return np.asarray(np.maximum(scipy.fft.rfft(around).real, 0.0))
 
 
 def excited(statistics: Statistics) -> tuple[float, float]:
     """Excited band in Hz: as stated, or where the input's power is not negligible."""
     if statistics.band is not None:
         return statistics.band
-    length = next_fast_len(4 * statistics.reach.span, real=True)
+    length = scipy.fft.next_fast_len(4 * statistics.reach.span, real=True)
     level = np.sqrt(power_of(statistics, length))
     level[0] = 0.0
     return band_of_levels(level, statistics.fs / length)
@@ -81,15 +80,17 @@ def rough_of(statistics: Statistics) -> RoughResponse:
     reach = statistics.reach
     uu, yu = correlations(statistics)
     cross = yu[reach.forth - AHEAD :][: reach.taps]
-    length = int(next_fast_len(2 * reach.span + 1, real=True))
+    length = int(scipy.fft.next_fast_len(2 * reach.span + 1, real=True))
     around = np.zeros(length)
     around[: uu.size] = uu
     around[length - uu.size + 1 :] += uu[:0:-1]
-    spectrum = rfft(around).real
+    spectrum = scipy.fft.rfft(around).real
     power = power_of(statistics, length)
     ridge = _RIDGE * float(power.max())
     answer = _solved(spectrum, ridge, cross, length)
-    moved = rfft(answer, length) * np.exp(2j * np.pi * np.arange(power.size) * AHEAD / length)
+    moved = scipy.fft.rfft(answer, length) * np.exp(
+        2j * np.pi * np.arange(power.size) * AHEAD / length
+    )
     power[0] = 0.0
     bins = np.flatnonzero(power > _FLOOR * power.max())
     omega = 2 * np.pi * bins / length
@@ -110,7 +111,9 @@ def _solved(spectrum: Real, ridge: float, right: Real, length: int) -> Real:
     """Conjugate gradients on a Toeplitz matrix and a ridge."""
 
     def times(x: Real) -> Real:
-        return np.asarray(irfft(rfft(x, length) * spectrum, length)[: x.size] + ridge * x)
+        return np.asarray(
+            scipy.fft.irfft(scipy.fft.rfft(x, length) * spectrum, length)[: x.size] + ridge * x
+        )
 
     x, left = np.zeros_like(right), right.copy()
     way, size = left.copy(), float(left @ left)

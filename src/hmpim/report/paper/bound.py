@@ -8,8 +8,8 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.optimize import brentq
 
 from hmpim.errors import ArgumentError
 from hmpim.experiment import run
@@ -60,7 +60,7 @@ def phase90(delay: float, natural_frequency: float, damping_ratio: float) -> flo
         return 0.5 * math.pi - 2.0 * math.pi * f * delay - lag
 
     # the quadratic lag alone reaches 90° at its natural frequency
-    return float(brentq(margin, 0.0, natural_frequency, xtol=1e-12))
+    return float(scipy.optimize.brentq(margin, 0.0, natural_frequency, xtol=1e-12))
 
 
 def resonance_db(damping_ratio: float) -> float:

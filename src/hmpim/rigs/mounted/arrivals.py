@@ -13,8 +13,8 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.spatial import ConvexHull, QhullError
 
 from hmpim.record import Finding
 from hmpim.rigs.block import RunReport
@@ -91,8 +91,8 @@ def _lowest(x: FloatArray, y: FloatArray) -> tuple[float, float]:
         return 0.0, float(y.min())
     scaled = np.column_stack((x / np.ptp(x), y / np.ptp(y)))
     try:
-        hull = ConvexHull(scaled)
-    except QhullError:  # all on one line
+        hull = scipy.spatial.ConvexHull(scaled)
+    except scipy.spatial.QhullError:  # all on one line
         slope = float(np.polyfit(x, y, 1)[0])
         return slope, float((y - slope * x).min())
     for simplex, (_, up, _) in zip(hull.simplices, hull.equations, strict=True):

@@ -5,9 +5,8 @@ from types import TracebackType
 from typing import Self
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.interpolate import make_interp_spline
-from scipy.signal import cont2discrete, lfilter
 
 from hmpim.errors import ArgumentError, RigError
 from hmpim.rigs.block import ChannelSpec, RunReport, Samples
@@ -173,7 +172,7 @@ class CarriedSensor:
         if last <= self._done:
             return
         at: FloatArray = self._start + np.arange(self._done, last, dtype=np.float64) * self._step
-        spline = make_interp_spline(time, values, k=5)
+        spline = scipy.interpolate.make_interp_spline(time, values, k=5)
         u = np.asarray(spline(np.maximum(at - self._sensor.delay, self._start)))
         self._readings(at, self._moved(u))
         self._done = last
@@ -187,7 +186,9 @@ class CarriedSensor:
             return np.ones(1), np.ones(1), np.empty(0)
         roots = [poles.slow] if poles.fast is None else [poles.slow, poles.fast]
         denominator = np.real(np.poly(roots))
-        b, a, _ = cont2discrete(([denominator[-1]], denominator), self._step, method="foh")
+        b, a, _ = scipy.signal.cont2discrete(
+            ([denominator[-1]], denominator), self._step, method="foh"
+        )
         b = np.asarray(b).ravel()
         # The state in which a constant input gives a constant output.
         state = np.zeros(a.size - 1)
@@ -200,7 +201,7 @@ class CarriedSensor:
         b, a, state = self._filter
         if state.size == 0:
             return u
-        y, state = lfilter(b, a, u, zi=state)
+        y, state = scipy.signal.lfilter(b, a, u, zi=state)
         self._filter = (b, a, state)
         return np.asarray(y)
 
@@ -218,7 +219,10 @@ class CarriedSensor:
         taken = self._start + np.arange(self._next, last) / fs
         self._next = last
         sensor = self._sensor
-        read = sensor.scale_factor * make_interp_spline(times, whole, k=3)(taken) + sensor.bias
+        read = (
+            sensor.scale_factor * scipy.interpolate.make_interp_spline(times, whole, k=3)(taken)
+            + sensor.bias
+        )
         read = read + sensor.noise_std * self._rng.standard_normal(taken.size)
         if sensor.saturation_low is not None or sensor.saturation_high is not None:
             read = np.clip(read, sensor.saturation_low, sensor.saturation_high)

@@ -5,7 +5,7 @@ from collections import deque
 from dataclasses import dataclass, field
 
 import numpy as np
-from scipy.optimize import brentq
+import scipy
 
 __all__ = ["Seeker"]
 
@@ -90,4 +90,4 @@ class Seeker:
             seen = self.track_gain * np.exp(-s * self.delay)
             return float((seen / (s + seen / (1.0 + s * self.lag))).real)
 
-        return float(brentq(real_part, 0.1, 5.0))
+        return float(scipy.optimize.brentq(real_part, 0.1, 5.0))

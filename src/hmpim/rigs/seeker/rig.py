@@ -6,8 +6,8 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.interpolate import CubicSpline
 
 from hmpim.errors import ArgumentError
 from hmpim.rigs.block import Block, ChannelSpec, Layout, RunReport
@@ -150,7 +150,10 @@ class SeekerRig(Simulated):
         sight, body = moved.of("azimuth"), moved.of("yaw")
         sight, body = sight - sight[0], body - body[0]
         answers = self._followed(
-            CubicSpline(moved.time, sight), CubicSpline(moved.time, body), moved.time[-1], rng
+            scipy.interpolate.CubicSpline(moved.time, sight),
+            scipy.interpolate.CubicSpline(moved.time, body),
+            moved.time[-1],
+            rng,
         )
         newest = self.camera.newest(moved.time)
         rates = {
@@ -177,7 +180,11 @@ class SeekerRig(Simulated):
         return {name: row[block.start : block.stop] for name, row in values.items()}
 
     def _followed(
-        self, sight: CubicSpline, body: CubicSpline, end: float, rng: np.random.Generator
+        self,
+        sight: scipy.interpolate.CubicSpline,
+        body: scipy.interpolate.CubicSpline,
+        end: float,
+        rng: np.random.Generator,
     ) -> FloatArray:
         """Rate command that each frame leads to, deg/s."""
         camera, scene = self.camera, self.scene

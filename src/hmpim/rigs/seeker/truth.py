@@ -3,8 +3,8 @@
 from typing import Literal
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike, NDArray
-from scipy.optimize import brentq
 
 from hmpim.errors import ArgumentError
 
@@ -119,4 +119,4 @@ def seeker_bandwidth(
 
     first = int(past[0])
     low = grid[first - 1] if first else 1e-3 * frame_rate
-    return float(brentq(behind, low, grid[first], xtol=1e-9))
+    return float(scipy.optimize.brentq(behind, low, grid[first], xtol=1e-9))

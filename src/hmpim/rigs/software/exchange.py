@@ -11,9 +11,8 @@ from functools import partial
 from typing import Any
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.integrate import DOP853
-from scipy.optimize import brentq
 
 from hmpim.errors import RigError
 
@@ -158,7 +157,7 @@ class _Equations:
             return self._indicators.array.copy()
 
         watched = self._indicators.array.size > 0
-        solver = DOP853(
+        solver = scipy.integrate.DOP853(
             slopes, start, self._states.array.copy(), end, rtol=tolerance,
             atol=1e-3 * tolerance, first_step=end - start,
         )  # fmt: skip
@@ -191,7 +190,7 @@ def _crossing(function: Callable[[float], float], low: float, high: float) -> fl
     """First instant behind the change of sign, to a millionth of a millionth of the step."""
     if function(low) == 0.0 or (function(low) > 0) == (function(high) > 0):
         return high
-    at = float(brentq(function, low, high, xtol=1e-12 * (high - low) + 1e-15))
+    at = float(scipy.optimize.brentq(function, low, high, xtol=1e-12 * (high - low) + 1e-15))
     past = min(high, at + 1e-9 * (high - low))
     return past if (function(past) > 0) == (function(high) > 0) else high
 

@@ -4,7 +4,7 @@ import math
 from functools import lru_cache
 
 import numpy as np
-from scipy.optimize import brentq
+import scipy
 
 from hmpim.errors import ArgumentError
 from hmpim.rigs.table.axes import AxisSpec
@@ -91,7 +91,7 @@ def tune(axes: tuple[AxisSpec, ...], *, base: Base, tick: float, hold: int, late
                     f"actuator lag of {axis.actuator_lag * 1e3:g} ms and commands "
                     f"{late * tick * 1e3:g} ms late; ask for less, or a faster actuator"
                 )
-            ratio[i] = brentq(in_phase, *_SPAN, xtol=1e-10)
+            ratio[i] = scipy.optimize.brentq(in_phase, *_SPAN, xtol=1e-10)
     found = gains(ratio)
     decay = close_loop(step, found, mode="P", tick=tick).slowest_decay
     if decay >= 1.0:

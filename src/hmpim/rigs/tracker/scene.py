@@ -4,9 +4,8 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.ndimage import gaussian_filter
-from scipy.special import erf
 
 from hmpim.errors import ArgumentError
 
@@ -91,7 +90,7 @@ class Scene:
     def backdrop(self, rng: np.random.Generator) -> "Backdrop":
         """Draw the clutter of one run."""
         rough = rng.standard_normal((self.height, self.width))
-        smooth = gaussian_filter(rough, self.clutter_size, mode="wrap")
+        smooth = scipy.ndimage.gaussian_filter(rough, self.clutter_size, mode="wrap")
         spread = smooth.std()
         clutter = self.clutter_std * smooth / spread if spread > 0 else 0.0 * smooth
         return Backdrop(scene=self, grey=self.level + clutter)
@@ -136,4 +135,4 @@ def _integral(x: FloatArray, blur: float) -> FloatArray:
     """Antiderivative of the Gaussian's cumulative distribution."""
     z = x / blur
     density = np.exp(-0.5 * z * z) / math.sqrt(2.0 * math.pi)
-    return np.asarray(blur * (z * 0.5 * (1.0 + erf(z / math.sqrt(2.0))) + density))
+    return np.asarray(blur * (z * 0.5 * (1.0 + scipy.special.erf(z / math.sqrt(2.0))) + density))

@@ -16,8 +16,8 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike, NDArray
-from scipy.optimize import linprog
 
 from hmpim.errors import ArgumentError
 
@@ -117,7 +117,7 @@ def fit_clocks(
             np.column_stack((np.zeros_like(x_back), np.ones_like(x_back), -x_back)),
         )
     )
-    solved = linprog(
+    solved = scipy.optimize.linprog(
         -rows.sum(axis=0),
         A_ub=rows,
         b_ub=np.concatenate((y_there, y_back)),
