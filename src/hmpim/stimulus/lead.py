@@ -422,7 +422,7 @@ def gentlest_between(
         peaks = largest(np.stack(np.broadcast_arrays(*found), axis=1), durations)
         use = (peaks / bounds[:, None]).max(axis=0)
         shares = peaks[:3] / neighbour[:, None]
-        return np.asarray(np.where(use > 1.0 + 1e-12, _BEYOND * use, (shares**2).sum(axis=0)))
+        return np.asarray(np.where(use > 1.0, _BEYOND * use, (shares**2).sum(axis=0)))
 
     low = math.log(0.3 * min(scales))
     high = min(math.log(20.0 * max(scales)), math.log(longest))
