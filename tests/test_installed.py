@@ -128,3 +128,12 @@ def test_no_module_needs_what_windows_has_not():
     )
     assert done.returncode == 0, done.stderr
     assert int(done.stdout.split()[-1]) > 200
+
+
+def test_importing_loads_no_room_of_scipy_and_no_drawing():
+    program = "import hmpim, hmpim.cli.main, sys; print(*sys.modules)"
+    said = subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, check=True, timeout=900
+    )
+    slow = {"matplotlib", "pandas", "plotly", "scipy.optimize", "scipy.signal", "scipy.stats"}
+    assert not slow & set(said.stdout.split())
