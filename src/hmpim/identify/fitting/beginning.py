@@ -13,13 +13,19 @@ from hmpim.identify.fitting.trial import Trial
 from hmpim.identify.whiteness import effective_share
 from hmpim.record import Intersample
 
-__all__ = ["begins_of", "count_in", "look_again"]
+__all__ = ["begins_of", "count_in", "in_motion", "look_again"]
 
 _REACH = 4
 """Samples by which what lies between the samples reaches back: half of a spline's support."""
 
 _RINGS = 8
 """Samples about a corner over which a spline through it rings."""
+
+_FIRST = 8
+"""Samples that show whether an input is in motion from the first."""
+
+_MOVES = 0.1
+"""Share of its mean square step from which it is."""
 
 _REST = 1e-4
 """Chance of taking a record at rest for one in mid-motion."""
@@ -29,6 +35,12 @@ _SPARED = 0.1
 
 _TWICE = 2.0
 """Factor on what the beginning may hold, for noise that is not white or not Gaussian."""
+
+
+def in_motion(u: NDArray[np.float64]) -> bool:
+    """Whether an input, (n,), moves from its first sample on, and so may have moved before."""
+    steps = np.diff(u) ** 2
+    return float(steps[:_FIRST].mean()) > _MOVES * float(steps.mean())
 
 
 def count_in(

@@ -3,6 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from hmpim.identify.fitting.beginning import in_motion
 from hmpim.identify.fitting.data import FOLLOWS, HOPELESS, POOR, Data, Seen, band_of, shifted
 from hmpim.identify.fitting.enrich import (
     INTEGRATING,
@@ -130,7 +131,7 @@ def fit_rich(
             return found
     rich = members(structures, RICH)
     proposed = proposals(data.rough, rich, best, all_of_them=all_of_them)
-    if not proposed and _is_poor(problem, best):
+    if not proposed and _is_poor(problem, best) and in_motion(data.u):
         # A rough response that takes a free response for an answer proposes nothing.
         proposed = proposals(data.rough, rich, best, all_of_them=True)
     for start in range(0, len(proposed), _AT_ONCE):
