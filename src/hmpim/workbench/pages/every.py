@@ -42,8 +42,9 @@ def add_pages(workbench: Workbench, app: FastAPI) -> None:
         Into which NiceGUI is mounted; what is added here is asked first.
     """
     ui.add_css((_STATIC / "workbench.css").read_text(encoding="utf-8"), shared=True)
-    named = (_STATIC / "named.js").read_text(encoding="utf-8")
-    ui.add_head_html(f"<script>{named}</script>", shared=True)
+    for script in ("early.js", "named.js"):
+        text = (_STATIC / script).read_text(encoding="utf-8")
+        ui.add_head_html(f"<script>{text}</script>", shared=True)
     add_front(workbench)
     for name, build in _PAGES.items():
         add_page(workbench, name, build)
