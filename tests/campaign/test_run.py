@@ -393,3 +393,23 @@ def test_killed_outright_it_goes_on_and_repeats_nothing(tmp_path):
     for path in (out / "cases" / f"{name}.json", out / "records" / f"{name}.h5"):
         path.unlink()
     assert run_campaign(read_plan(plan), out) == finished
+
+
+def test_two_plans_of_one_process_may_name_their_rigs_alike(tmp_path):
+    """Each gets the module beside it, and what that imports; a library's name is lent for as long."""
+    data = shipped_plan("example").read_text(encoding="utf-8")
+    assert 'kind = "sensor"' in data
+    data = data.replace('kind = "sensor"', 'kind = "python"\nentry = "bench:play"')
+    data = re.sub(r"^sensor = .*$", "", data, flags=re.MULTILINE)
+    said = []
+    for place in ("one", "two", "one"):
+        folder = tmp_path / place
+        folder.mkdir(exist_ok=True)
+        (folder / "plan.toml").write_text(data, encoding="utf-8")
+        (folder / "tomllib.py").write_text(f"name = {place!r}\n")  # as one of Python's own
+        (folder / "bench.py").write_text("import tomllib\ndef play(*_):\n    return tomllib.name\n")
+        rig = make_rig(read_plan(folder / "plan.toml"))
+        said.append(rig.player(None, (), None))
+    assert said == ["one", "two", "one"]
+    assert sys.modules["tomllib"] is tomllib
+    assert str(tmp_path / "two") not in sys.path

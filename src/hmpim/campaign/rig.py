@@ -2,8 +2,10 @@
 
 import importlib
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Protocol, cast
 
 import numpy as np
@@ -107,21 +109,44 @@ def make_rig(plan: Plan, *, player: Player | None = None) -> CampaignRig:
 def _imported(entry: str, folder: str) -> Player:
     """Import a function by its name, from the plan's own folder too."""
     module, _, name = entry.partition(":")
-    beside = [folder] if folder and folder not in sys.path else []
-    sys.path[:0] = beside
     try:
-        found = getattr(importlib.import_module(module), name)
+        with _beside(folder):
+            found = getattr(importlib.import_module(module), name)
     except Exception as error:  # a module of one's own may raise anything
         raise RigError(
             f"rig.entry = {entry!r} cannot be imported: {type(error).__name__}: {error}; it must "
             "name a function that Python finds from here or beside the plan"
         ) from error
-    finally:
-        for path in beside:
-            sys.path.remove(path)
     if not callable(found):
         raise RigError(f"rig.entry = {entry!r} is {found!r}; it must name a function")
     return cast(Player, found)
+
+
+@contextmanager
+def _beside(folder: str) -> Iterator[None]:
+    """Have the modules of a folder found first, whatever others of their names are loaded."""
+    if not folder:
+        yield
+        return
+    place = Path(folder).resolve()
+    own = {p.stem for p in place.glob("*.py")} | {p.parent.name for p in place.glob("*/__init__.py")}
+    others = {name for name in own if _is_elsewhere(name, place)}
+    aside = {n: m for n, m in sys.modules.items() if n.partition(".")[0] in others}
+    for name in aside:
+        del sys.modules[name]
+    sys.path.insert(0, str(place))
+    try:
+        yield
+    finally:
+        sys.path.remove(str(place))
+        for name in [n for n in sys.modules if n.partition(".")[0] in others]:
+            del sys.modules[name]
+        sys.modules.update(aside)
+
+
+def _is_elsewhere(name: str, place: Path) -> bool:
+    file = getattr(sys.modules.get(name), "__file__", None)
+    return file is not None and place not in Path(file).resolve().parents
 
 
 def _wished(limits: Limits, wish: AxisWish) -> Limits:
