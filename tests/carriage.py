@@ -53,7 +53,7 @@ class Carriage:
             self.moved, self.now = True, float(block.time[k])
             read.append(self.lagged + 0.02 * self.rng.standard_normal())
             self.lagged += (1 - np.exp(-1 / FS / 0.05)) * (self.at - self.lagged)
-            self.file.write(f"{self.now:.4f} {self.at:.6f} {self.rate:.6f}\n")
+            self.file.write(f"{self.now:.6f} {self.at:.6f} {self.rate:.6f}\n")
         return {
             "u": Samples(time=block.time, values=block.position[:, 0]),
             "y": Samples(time=block.time, values=np.array(read)),
@@ -67,7 +67,7 @@ class Carriage:
         begun = time.perf_counter()
         while self.moved and (since := time.perf_counter() - begun) < brake.duration + 0.01:
             at, rate, _ = brake.at(since)
-            self.file.write(f"{self.now + since:.4f} {at[0]:.6f} {rate[0]:.6f}\n")
+            self.file.write(f"{self.now + since:.6f} {at[0]:.6f} {rate[0]:.6f}\n")
             time.sleep(0.005)
         self.moved = False
         self.file.write("rest\n")

@@ -150,9 +150,9 @@ def test_a_scaled_stimulus_keeps_everything_but_its_size():
 
 
 def test_a_rig_is_unknown_if_the_person_alone_states_its_limits():
-    options = RunOptions(feel="unknown")
     rig = Arm(lambda y: 0.5 * y)
-    assert not [f for f in run(rig, SWEEP, options=options).findings if f.code == "felt"]
+    assert not [f for f in run(rig, SWEEP).findings if f.code == "felt"]
     rig.limits = None
-    record = run(rig, SWEEP, options=options, limits=LIMITS)
-    assert [f for f in record.findings if f.code == "felt"]
+    assert [f for f in run(rig, SWEEP, limits=LIMITS).findings if f.code == "felt"]
+    at_once = run(rig, SWEEP, limits=LIMITS, options=RunOptions(feel=None))
+    assert not [f for f in at_once.findings if f.code == "felt"]

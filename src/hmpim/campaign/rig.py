@@ -129,7 +129,9 @@ def _beside(folder: str) -> Iterator[None]:
         yield
         return
     place = Path(folder).resolve()
-    own = {p.stem for p in place.glob("*.py")} | {p.parent.name for p in place.glob("*/__init__.py")}
+    own = {p.stem for p in place.glob("*.py")} | {
+        p.parent.name for p in place.glob("*/__init__.py")
+    }
     others = {name for name in own if _is_elsewhere(name, place)}
     aside = {n: m for n, m in sys.modules.items() if n.partition(".")[0] in others}
     for name in aside:

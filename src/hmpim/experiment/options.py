@@ -27,7 +27,7 @@ class RunOptions:
         stops it. Where False, the log says so; see `OutlivingRig`.
     feel : Feel, 'unknown' or None
         How to move a rig a little first; 'unknown' does so if it moves and states no limits of
-        its own; None plays at full amplitude at once.
+        its own; None plays at the full amplitude at once, whatever the rig.
 
     Examples
     --------
@@ -39,4 +39,4 @@ class RunOptions:
     watch: Watch = field(default_factory=Watch)
     realtime: bool = True
     watchdog: bool = False
-    feel: Feel | Literal["unknown"] | None = None
+    feel: Feel | Literal["unknown"] | None = "unknown"
