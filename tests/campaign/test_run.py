@@ -396,7 +396,7 @@ def test_killed_outright_it_goes_on_and_repeats_nothing(tmp_path):
 
 
 def test_two_plans_of_one_process_may_name_their_rigs_alike(tmp_path):
-    """Each gets the module beside it, and what that imports; a library's name is lent for as long."""
+    """Each gets the module beside it and what that imports; a library's name is only lent."""
     data = shipped_plan("example").read_text(encoding="utf-8")
     assert 'kind = "sensor"' in data
     data = data.replace('kind = "sensor"', 'kind = "python"\nentry = "bench:play"')
