@@ -28,6 +28,14 @@ def _keep_crews(patch, crews):
     patch.setattr(pool._Crew, "__init__", kept)
 
 
+def listening(pid: int) -> set[str]:
+    """Addresses at which a process is there for others."""
+    import psutil
+
+    found = psutil.Process(pid).net_connections(kind="inet")
+    return {one.laddr.ip for one in found if one.status == psutil.CONN_LISTEN}
+
+
 def test_a_worker_that_is_killed_loses_nothing(rows_file, tmp_path, monkeypatch):
     """It is killed once it has work; the one in its place does the rest.
 
@@ -37,12 +45,13 @@ def test_a_worker_that_is_killed_loses_nothing(rows_file, tmp_path, monkeypatch)
     out, script = tmp_path / "out", tmp_path / "script.py"
     script.write_text("raise SystemExit('imported')\n")
     monkeypatch.setitem(sys.modules, "__main__", SimpleNamespace(__file__=str(script)))
-    crews, killed = [], []
+    crews, killed, heard = [], [], set()
     _keep_crews(monkeypatch, crews)
 
     def kill(state):
         if 0 < state.records < 8 and not killed:
             victim = crews[0]._processes[0]
+            heard.update(listening(victim.pid), listening(os.getpid()))
             os.kill(victim.pid, signal.SIGKILL)
             killed.append(victim.pid)
 
@@ -50,6 +59,7 @@ def test_a_worker_that_is_killed_loses_nothing(rows_file, tmp_path, monkeypatch)
         rows_file, out=out, fs=FS, cluster=Cluster(workers=1, per_task=1), progress=kill
     )
     assert killed
+    assert heard == {"127.0.0.1"}  # Dask's own HTTP servers among them
     assert crews[0]._processes[0].pid != killed[0]
     assert rounded(table, "scale_factor") == {f"{rows_file}#unit{k}": float(k) for k in range(1, 9)}
     assert len(table) == len(parts_in(out)) == 8

@@ -246,6 +246,8 @@ def dask_pool(
                     n_workers=0,
                     host="127.0.0.1",
                     dashboard_address=None,
+                    # Without its dashboard Dask still serves HTTP, at one port for all.
+                    scheduler_kwargs={"dashboard_address": "127.0.0.1:0"},
                     silence_logs=logging.CRITICAL,
                 )
             )
@@ -326,6 +328,7 @@ class _Crew:
             "--host": "127.0.0.1",
             "--death-timeout": "20",
             "--preload": "hmpim.batch.work",
+            "--dashboard-address": "127.0.0.1:0",  # else its HTTP server is there for everybody
         }
         single = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
         logs = {"DASK_LOGGING__DISTRIBUTED": "critical"}
