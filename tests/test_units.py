@@ -69,3 +69,10 @@ def test_derivatives_are_written_the_usual_way_and_understood():
         for order in (1, 2, 3):
             assert check_unit(rate_unit(unit, order))
     assert conversion_factor(rate_unit("deg", 2), to="rad/s**2") == pytest.approx(math.pi / 180)
+
+
+@pytest.mark.parametrize(("unit", "to"), [("deg", "rad"), ("rad", "deg")])
+def test_what_is_known_without_the_registry_is_what_the_registry_says(unit, to):
+    pint = pytest.importorskip("pint")
+    there = pint.UnitRegistry().Quantity(1.0, unit).to(to).magnitude
+    assert conversion_factor(unit, to=to) == there

@@ -3,6 +3,7 @@
 The empty string means "no unit stated" and is taken as dimensionless.
 """
 
+import math
 import re
 from functools import cache
 from typing import TYPE_CHECKING
@@ -103,8 +104,13 @@ def conversion_factor(unit: str, *, to: str) -> float:
     return 1.0 if unit == to else _factor(unit, to)
 
 
+_ANGLES = {("deg", "rad"): math.pi / 180.0, ("rad", "deg"): 180.0 / math.pi}
+
+
 @cache
 def _factor(unit: str, to: str) -> float:
+    if (unit, to) in _ANGLES:  # asked for by every table; the registry takes half a second
+        return _ANGLES[unit, to]
     try:
         return float(_registry().Quantity(1.0, _parsed(unit)).to(_parsed(to)).magnitude)
     except _mismatch() as error:

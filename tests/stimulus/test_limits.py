@@ -9,6 +9,8 @@ from hypothesis import strategies as st
 
 from hmpim.errors import ArgumentError, UnitError
 from hmpim.stimulus import Limits, Peaks
+from hmpim.stimulus.peaks import ROUGHLY, true_peaks
+from hmpim.stimulus.sweep import Sweep
 
 sizes = st.floats(1e-3, 1e6)
 
@@ -50,3 +52,13 @@ def test_what_is_no_number_is_refused(name, value):
 def test_units_must_go_together():
     with pytest.raises(UnitError, match="'deg' cannot be turned into 'm'"):
         Limits(position=1.0, unit="deg").to("m")
+
+
+@pytest.mark.parametrize("extinction", [0.0, 0.4, 0.9, 1.3, 2.0])
+def test_rough_peaks_are_too_small_by_what_they_say_at_most(extinction):
+    sweep = Sweep(band=(0.3, 17.0), duration=4.0, extinction=extinction)
+    exact = true_peaks(sweep, start=0.05)
+    rough = true_peaks(sweep, start=0.05, exact=False)
+    for name in ("position", "velocity", "acceleration", "jerk"):
+        share = getattr(rough, name) / getattr(exact, name)
+        assert 1.0 - ROUGHLY <= share <= 1.0 + 1e-12

@@ -13,13 +13,14 @@ from hmpim.stimulus.exponential import ExponentialSweep
 from hmpim.stimulus.lead import join_time
 from hmpim.stimulus.limits import QUANTITIES, Limits, three_digits
 from hmpim.stimulus.motion import Peaks
-from hmpim.stimulus.peaks import true_peaks
+from hmpim.stimulus.peaks import ROUGHLY, true_peaks
 from hmpim.stimulus.scale import KEEP
 from hmpim.stimulus.sweep import Sweep
 from hmpim.units import rate_label
 
 __all__ = ["largest_gain", "smallest_extinction", "sweep_peaks"]
 
+_UNSURE = 3.0 * ROUGHLY  # of an excess: two rough peaks' logs, and what they leave out
 STEP = 0.001  # extinction is solved to this
 # from here on the acceleration (or the jerk) falls along the sweep, so more n buys nothing
 LARGEST = 2.0
@@ -29,7 +30,9 @@ AnySweep = Sweep | ExponentialSweep
 S = TypeVar("S", Sweep, ExponentialSweep)
 
 
-def sweep_peaks(sweep: AnySweep, *, start: float | None, jerk: bool = True) -> Peaks:
+def sweep_peaks(
+    sweep: AnySweep, *, start: float | None, jerk: bool = True, exact: bool = True
+) -> Peaks:
     """True peaks of a sweep, its singular instant left out.
 
     Parameters
@@ -42,6 +45,8 @@ def sweep_peaks(sweep: AnySweep, *, start: float | None, jerk: bool = True) -> P
     jerk : bool
         Whether the jerk is wanted. That of the printed waveform, which starts with a velocity
         step, is infinite in any case.
+    exact : bool
+        As in `true_peaks`.
 
     Examples
     --------
@@ -51,10 +56,10 @@ def sweep_peaks(sweep: AnySweep, *, start: float | None, jerk: bool = True) -> P
     """
     if start is None:
         joined = join_time(sweep, jerk=jerk) if isinstance(sweep, Sweep) else 0.0
-        return true_peaks(sweep, start=joined, jerk=jerk)
+        return true_peaks(sweep, start=joined, jerk=jerk, exact=exact)
     if isinstance(sweep, ExponentialSweep) or not 0.0 < sweep.extinction < 1.0:
-        return replace(true_peaks(sweep, jerk=False), jerk=math.inf)
-    peaks = true_peaks(sweep, start=start, jerk=False)
+        return replace(true_peaks(sweep, jerk=False, exact=exact), jerk=math.inf)
+    peaks = true_peaks(sweep, start=start, jerk=False, exact=exact)
     at = sweep.motion(np.zeros(1))
     return Peaks(
         position=peaks.position,
@@ -71,13 +76,14 @@ class _Search:
     limits: Limits
     start: float | None
 
-    def peaks(self, n: float) -> Peaks:
+    def peaks(self, n: float, *, exact: bool = True) -> Peaks:
         """Peaks at gain 1."""
-        return sweep_peaks(self.make(n), start=self.start, jerk=math.isfinite(self.limits.jerk))
+        jerk = math.isfinite(self.limits.jerk)
+        return sweep_peaks(self.make(n), start=self.start, jerk=jerk, exact=exact)
 
-    def excess(self, n: float) -> float:
+    def excess(self, n: float, *, exact: bool = True) -> float:
         """Log of the largest share of a derivative's limit, the amplitude being at its limit."""
-        peaks = self.peaks(n)
+        peaks = self.peaks(n, exact=exact)
         gain = KEEP * self.limits.position / peaks.position
         share = gain * replace(self.limits, position=math.inf).use(peaks)
         return math.log(share) if share > 0.0 else -math.inf
@@ -137,13 +143,18 @@ def smallest_extinction(
     search = _Search(make=make, limits=limits, start=start)
     largest = LARGEST if math.isinf(limits.jerk) else LARGEST_WITH_JERK
     grid = np.linspace(0.0, largest, round(20 * largest) + 1)
-    values: list[float] = []
+    values: list[float] = []  # rough ones, made exact where they decide
     for k, n in enumerate(grid):
-        values.append(search.excess(float(n)))
+        values.append(search.excess(float(n), exact=False))
+        if values[k] <= _UNSURE:
+            values[k] = search.excess(float(n))
         if values[k] <= 0.0:
             return 0.0 if k == 0 else _first_root(search, float(grid[k - 1]), float(n))
         # a dip between grid points, too short to be seen on them
-        if k >= 2 and values[k - 1] < min(values[k - 2], values[k]):
+        if k >= 2 and values[k - 1] < min(values[k - 2], values[k]) + _UNSURE:
+            values[k - 2 :] = [search.excess(float(at)) for at in grid[k - 2 : k + 1]]
+            if values[k - 1] >= min(values[k - 2], values[k]):
+                continue
             dip = scipy.optimize.minimize_scalar(
                 search.excess,
                 bounds=(float(grid[k - 2]), float(n)),
@@ -152,7 +163,8 @@ def smallest_extinction(
             )
             if dip.fun <= 0.0:
                 return _first_root(search, float(grid[k - 2]), float(dip.x))
-    raise LimitsError(_what_would_do(search, float(grid[int(np.argmin(values))])))
+    near = [float(at) for at in grid[np.array(values) <= min(values) + _UNSURE]]
+    raise LimitsError(_what_would_do(search, min(near, key=search.excess)))
 
 
 def _first_root(search: _Search, low: float, high: float) -> float:
