@@ -57,7 +57,14 @@ def trend(
         size=5.0,
     )
     rules = [
-        Rule(at=at, axis="y", words=f"specified {words}", label="" if k else "specification")
+        Rule(
+            at=at,
+            axis="y",
+            words=f"specified {words}",
+            words_at=0.02,
+            label="" if k else "specification",
+            width=1.6,
+        )
         for k, (words, at) in enumerate(specified)
     ]
     ticks = tuple((float(k), plain(label)) for k, label in enumerate(labels))

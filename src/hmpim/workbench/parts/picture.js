@@ -27,6 +27,11 @@ function recoloured(value) {
   return Object.fromEntries(Object.entries(value).map(([k, v]) => [k, recoloured(v)]));
 }
 
+// How much larger than at a desk letters are on this screen: plots grow with the page.
+function size() {
+  return Math.max(1, parseFloat(getComputedStyle(document.documentElement).fontSize) / 16);
+}
+
 // Pictures of a page are drawn one after the other, and the page answers between two of them.
 let turn = Promise.resolve();
 
@@ -90,7 +95,14 @@ export default {
       const { figure, cursors } = this.current;
       const plain = { data: unpacked(figure.data), layout: unpacked(figure.layout) };
       const { data, layout } = dark ? recoloured(plain) : plain;
-      layout.font = { ...(layout.font ?? {}), color: dark ? "#e6edf3" : "#1f2328" };
+      const grown = (this.grown = size());
+      layout.font = {
+        ...(layout.font ?? {}), color: dark ? "#e6edf3" : "#1f2328", size: 12 * grown,
+      };
+      layout.height *= grown;
+      layout.margin = Object.fromEntries(
+        Object.entries(layout.margin ?? {}).map(([side, room]) => [side, room * grown]),
+      );
       if (this.$el.clientWidth < 600) {
         layout.margin = { ...layout.margin, l: 8, r: 6 };
         layout.legend = { ...layout.legend, font: { size: 10 } };
@@ -143,7 +155,7 @@ export default {
         xref: across ? `x${c.panel} domain` : `x${c.panel}`,
         yref: across ? `y${c.panel}` : `y${c.panel} domain`,
         line: { color: c.colour ?? "#b0417f", width: 4, dash: "solid" },
-        label: { text: c.label, textposition: "start", font: { size: 12 }, textangle: 0 },
+        label: { text: c.label, textposition: "start", font: { size: 12 * this.grown }, textangle: 0 },
       };
     },
     moved(event) {

@@ -36,11 +36,16 @@ export default {
   },
   methods: {
     size() {
-      return { width: Math.max(this.$el.clientWidth, 100), height: 150 };
+      return { width: Math.max(this.$el.clientWidth, 100), height: 150 * this.grown() };
+    },
+    grown() {
+      return Math.max(1, parseFloat(getComputedStyle(document.documentElement).fontSize) / 16);
     },
     build() {
       const ink = () => getComputedStyle(this.$el).color;
-      const axis = { stroke: ink, grid: { stroke: "rgba(128,128,128,0.25)", width: 1 } };
+      const grown = this.grown();
+      const font = `${12 * grown}px system-ui, sans-serif`;
+      const axis = { stroke: ink, font, labelFont: `bold ${font}`, size: 50 * grown, grid: { stroke: "rgba(128,128,128,0.25)", width: 1 } };
       const line = (label, stroke, dash) => ({ label, stroke, dash, width: 1.5, spanGaps: true });
       const limits = this.limit
         ? [line("limit", "#b0417f", [6, 4]), line("−limit", "#b0417f", [6, 4])]
@@ -49,7 +54,7 @@ export default {
         {
           ...this.size(), title: "", legend: { live: false }, cursor: { show: false },
           scales: { x: { time: false } },
-          axes: [axis, { ...axis, size: 64, label: this.unit, labelSize: 16 }],
+          axes: [axis, { ...axis, size: 64 * grown, label: this.unit, labelSize: 16 * grown }],
           series: [{}, line(this.names[0], "#0072b2"), line(this.names[1], "#d55e00"), ...limits],
         },
         [[0], [null], [null], ...limits.map(() => [null])],
