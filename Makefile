@@ -50,6 +50,7 @@ check: $(DEV)  ## ruff, mypy strict, import-linter
 bench: $(DEV)  ## speed, against a hand-written fit in the same run
 	$(BIN)/python benchmarks/identification_speed.py
 	$(BIN)/python benchmarks/peers.py --growth 1e6
+	$(BIN)/python benchmarks/fleet.py --records 1000
 	$(BIN)/python benchmarks/response_accuracy.py
 	$(BIN)/python benchmarks/live.py
 	$(BIN)/python benchmarks/workbench.py
