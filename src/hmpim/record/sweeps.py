@@ -209,8 +209,8 @@ def _is_linear(frequency: NDArray[np.float64]) -> bool:
     """Whether the square of the frequency grows evenly from half cycle to half cycle."""
     square = frequency[: max(8, round(0.9 * frequency.size))] ** 2  # the fast end may fade away
     count = np.arange(square.size)
-    line = np.polynomial.Polynomial.fit(count, square, 1)
-    return float(np.std(square - line(count))) < _EVEN * float(np.ptp(square))
+    off = square - np.polyval(np.polyfit(count, square, 1), count)
+    return float(np.std(off)) < _EVEN * float(np.ptp(square))
 
 
 def _slowest(crossing: NDArray[np.float64], otherwise: float) -> float:
@@ -219,10 +219,9 @@ def _slowest(crossing: NDArray[np.float64], otherwise: float) -> float:
     Half cycles are counted from the first crossing by a parabola. The sweep begins half a cycle
     before that crossing or, where a lead swings to the other side, there.
     """
-    curve = np.polynomial.Polynomial.fit(crossing[:_FIRST], np.arange(crossing[:_FIRST].size), 2)
-    level, slope, bend = curve.convert().coef
-    square = slope**2 - 4.0 * bend * (level + 1.0)  # of the slope where the count is -1
-    at = float(curve.deriv()(crossing[0]))
+    since = crossing[:_FIRST] - crossing[0]
+    bend, at, level = (float(c) for c in np.polyfit(since, np.arange(since.size), 2))
+    square = at**2 - 4.0 * bend * (level + 1.0)  # of the slope where the count is -1
     # Noise makes the square of next to nothing negative; a lead makes it so by more than it is.
     found = float(np.sqrt(abs(square))) if square > -0.5 * at**2 else at
     return 0.5 * found if found > 0.0 else otherwise
