@@ -201,13 +201,14 @@ def _swept(
         return None, None, None
     if _is_linear(frequency if order > 0 else frequency[::-1]):
         slow_first = crossing if order > 0 else crossing[-1] - crossing[::-1]
-        low = min(low, _slowest(slow_first / fs, low))
+        low = min(low, fs * _slowest(slow_first, low / fs))  # in samples: stamps may be any size
     return order > 0, low, high
 
 
 def _is_linear(frequency: NDArray[np.float64]) -> bool:
     """Whether the square of the frequency grows evenly from half cycle to half cycle."""
-    square = frequency[: max(8, round(0.9 * frequency.size))] ** 2  # the fast end may fade away
+    kept = frequency[: max(8, round(0.9 * frequency.size))]  # the fast end may fade away
+    square = (kept / kept.max()) ** 2
     count = np.arange(square.size)
     off = square - np.polyval(np.polyfit(count, square, 1), count)
     return float(np.std(off)) < _EVEN * float(np.ptp(square))
