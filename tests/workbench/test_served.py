@@ -364,6 +364,15 @@ STOPS = """() => [...document.querySelectorAll(
     .map((e, k) => { e.dataset.stop = k; return e.outerHTML.slice(0, 200); })"""
 
 
+SETTLED = """(most) => {
+    const pictures = [...document.querySelectorAll(".hm-picture")];
+    const count = document.querySelectorAll("main *").length;
+    const same = count === window.counted;
+    window.counted = count;
+    return same && pictures.length >= most && pictures.every((one) => one.dataset.drawn);
+}"""
+
+
 def heard(line):
     """Role and name of what has the focus, as a screen reader is told them, and its number."""
     line.send("DOM.getDocument", {"depth": 0})
@@ -389,7 +398,7 @@ def test_every_control_is_reached_by_tab_in_its_order_and_has_a_name(page, serve
         go(page, served, name, desk)
         if name in ready:
             page.get_by_label(ready[name]).first.wait_for()
-        page.wait_for_timeout(500)
+        page.wait_for_function(SETTLED, arg=3 if name == "design" else 0, polling=1000)
         wanted = page.evaluate(STOPS)
         reached = []
         for _ in wanted:
