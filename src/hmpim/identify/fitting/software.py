@@ -125,7 +125,7 @@ def is_exact(u: Real, y: Real) -> bool:
     Examples
     --------
     >>> u = np.sin(np.arange(400) ** 2 / 2000)
-    >>> y = lfilter([0.2], [1.0, -0.8], np.concatenate([np.zeros(6), u[:-6]]))
+    >>> y = scipy.signal.lfilter([0.2], [1.0, -0.8], np.concatenate([np.zeros(6), u[:-6]]))
     >>> is_exact(u, y), is_exact(u, y + 1e-6 * np.cos(np.arange(400) ** 2))
     (True, False)
     """
