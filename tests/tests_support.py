@@ -6,9 +6,11 @@ package that keeps its promise: one in ten thousand for each bound, one in a hun
 suite that holds a hundred of them. Nothing else decides a bound.
 """
 
+import asyncio
 import os
 import shutil
 import subprocess
+from concurrent.futures import ThreadPoolExecutor
 from functools import cache
 from pathlib import Path
 from typing import NoReturn
@@ -23,6 +25,12 @@ import hmpim
 from hmpim import Estimate
 
 FALSE_ALARM = 1e-4
+
+
+def finished(work):
+    """What a coroutine returns; in a thread of its own, since a browser's driver keeps a loop."""
+    with ThreadPoolExecutor(1) as thread:
+        return thread.submit(asyncio.run, work).result()
 
 
 def study_size(usual: int) -> int:

@@ -1,10 +1,9 @@
 """The lock: who may not pass, and what may not come in."""
 
-import asyncio
-
 import pytest
 
 from hmpim.workbench.lock import Lock
+from tests_support import finished
 
 TOKEN = "aT0ken_of-the-tests"
 HOST = (b"host", b"127.0.0.1:8080")
@@ -43,7 +42,7 @@ def answered(lock, scope, bodies=(b"",)):
     async def send(message):
         sent.append(message)
 
-    asyncio.run(lock(scope, receive, send))
+    finished(lock(scope, receive, send))
     body = b"".join(m.get("body", b"") for m in sent)
     return sent[0].get("status", sent[0].get("code")), dict(sent[0].get("headers", ())), body, read
 

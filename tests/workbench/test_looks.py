@@ -1,7 +1,5 @@
 """The estimate so far on the page of the run: what `hmpim.LiveEstimator` says, and nothing else."""
 
-import asyncio
-
 import numpy as np
 import pytest
 
@@ -11,6 +9,7 @@ from hmpim.workbench.live import Live
 from hmpim.workbench.looks import begun_looks
 from hmpim.workbench.parts.table import look_cells
 from hmpim.workbench.work.driving import Begun, Block
+from tests_support import finished
 
 STIMULUS = Stimulus(waveform=Chirp(band=(0.5, 20.0), duration=3.0), fs=200.0, axis="roll")
 CHANNELS = (("c", "input", "roll", "deg"), ("r", "output", "roll", "deg"))
@@ -38,8 +37,8 @@ def test_the_estimate_so_far_is_the_live_estimators(played):
     for part in np.split(np.arange(u.size), 6):
         samples = {"c": (t[part], u[part]), "r": (t[part], y[part])}
         live.take(Block(end=float(t[part][-1]), samples=samples))
-        asyncio.run(looks.follow(live, "roll", here))
-        asyncio.run(looks.follow(live, "roll", here))  # another window: nothing is read twice
+        finished(looks.follow(live, "roll", here))
+        finished(looks.follow(live, "roll", here))  # another window: nothing is read twice
         said = own.update(u[part], y[part])
         assert looks.look == said
         rows = look_cells(looks.look, passed=looks.passed)[1]
