@@ -280,6 +280,21 @@ class Sensor(Simulated):
             return second_order(self.natural_frequency, self.damping_ratio)
         return None
 
+    def digitised(self, reading: FloatArray) -> FloatArray:
+        """What its converter makes of readings: clipped, then rounded.
+
+        Examples
+        --------
+        >>> sensor = Sensor(saturation_high=1.0, quantization_step=0.5)
+        >>> sensor.digitised(np.array([0.2, 0.3, 7.0])).tolist()
+        [0.0, 0.5, 1.0]
+        """
+        if self.saturation_low is not None or self.saturation_high is not None:
+            reading = np.clip(reading, self.saturation_low, self.saturation_high)
+        if self.quantization_step is not None:
+            reading = self.quantization_step * np.rint(reading / self.quantization_step)
+        return np.asarray(reading)
+
     def _read(
         self, u: ContinuousInput, *, fs: float, count: int, rng: np.random.Generator
     ) -> FloatArray:
@@ -304,14 +319,11 @@ class Sensor(Simulated):
         reading = self.scale_factor * moved + self.bias
         if self.noise_std > 0.0:
             reading = reading + self._noise(readings, rng)
-        if self.saturation_low is not None or self.saturation_high is not None:
-            reading = np.clip(reading, self.saturation_low, self.saturation_high)
+        reading = self.digitised(reading)
         if self.hold_period is not None:
             index = np.floor((np.arange(count) / fs - start) / step + _GRACE).astype(np.int64)
             reading = reading[index]
-        if self.quantization_step is not None:
-            reading = self.quantization_step * np.rint(reading / self.quantization_step)
-        return np.asarray(reading)
+        return reading
 
     def _noise(self, count: int, rng: np.random.Generator) -> FloatArray:
         """Stationary AR(1) noise of standard deviation `noise_std`, shape (count,)."""

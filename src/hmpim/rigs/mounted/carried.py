@@ -219,15 +219,9 @@ class CarriedSensor:
         taken = self._start + np.arange(self._next, last) / fs
         self._next = last
         sensor = self._sensor
-        read = (
-            sensor.scale_factor * scipy.interpolate.make_interp_spline(times, whole, k=3)(taken)
-            + sensor.bias
-        )
-        read = read + sensor.noise_std * self._rng.standard_normal(taken.size)
-        if sensor.saturation_low is not None or sensor.saturation_high is not None:
-            read = np.clip(read, sensor.saturation_low, sensor.saturation_high)
-        if sensor.quantization_step is not None:
-            read = sensor.quantization_step * np.rint(read / sensor.quantization_step)
+        moved = scipy.interpolate.make_interp_spline(times, whole, k=3)(taken)
+        read = sensor.scale_factor * moved + sensor.bias
+        read = sensor.digitised(read + sensor.noise_std * self._rng.standard_normal(taken.size))
         arrives = taken + self._on_the_way + self._jitter * self._rng.random(taken.size)
         sent = np.concatenate((self._sent, np.stack((taken, read, arrives))), axis=1)
         sent[2] = np.maximum.accumulate(sent[2])  # none overtakes another

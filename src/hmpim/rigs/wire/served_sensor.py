@@ -12,6 +12,7 @@ from hmpim.rigs.sensor import Sensor
 from hmpim.rigs.wire.farend import Order
 from hmpim.rigs.wire.hello import Hello
 from hmpim.stimulus import Limits
+from hmpim.stimulus.quintic import coefficients_between
 
 __all__ = ["SensorPlant", "sensor_hello"]
 
@@ -84,11 +85,7 @@ class SensorPlant:
         sensor = self._sensor
         read = sensor.scale_factor * self._gain * self._state[0].real + sensor.bias
         read += sensor.noise_std * float(self._rng.standard_normal())
-        if sensor.saturation_low is not None or sensor.saturation_high is not None:
-            read = float(np.clip(read, sensor.saturation_low, sensor.saturation_high))
-        if sensor.quantization_step is not None:
-            read = sensor.quantization_step * round(read / sensor.quantization_step)
-        return np.array([read])
+        return sensor.digitised(np.array([read]))
 
     def truth(self) -> FloatArray:
         """Where the axis truly is."""
@@ -171,14 +168,6 @@ def _pieces(sensor: Sensor, rate: float, part: float) -> tuple[ComplexArray, Com
 
 def _quintic(s: FloatArray) -> FloatArray:
     """Share of position, velocity and acceleration at either end, shape (6, n); time in ticks."""
-    s3, s4, s5 = s**3, s**4, s**5
-    return np.array(
-        [
-            1.0 - 10.0 * s3 + 15.0 * s4 - 6.0 * s5,
-            s - 6.0 * s3 + 8.0 * s4 - 3.0 * s5,
-            0.5 * (s * s - 3.0 * s3 + 3.0 * s4 - s5),
-            10.0 * s3 - 15.0 * s4 + 6.0 * s5,
-            -4.0 * s3 + 7.0 * s4 - 3.0 * s5,
-            0.5 * (s3 - 2.0 * s4 + s5),
-        ]
-    )
+    ends = np.eye(6)
+    powers = np.stack(coefficients_between(ends[:3], ends[3:], duration=1.0))
+    return np.asarray(np.polynomial.polynomial.polyval(s, powers))
