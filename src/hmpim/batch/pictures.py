@@ -8,9 +8,9 @@ from numpy.typing import NDArray
 from hmpim.plots import Axis, Band, Curve, Figure, Panel, Points, Rule
 from hmpim.plots.description import Item
 from hmpim.plots.style import axis_label, plain
-from hmpim.report.words import GLOSSARY
+from hmpim.report.words import label_of
 
-__all__ = ["FOR_A_MEDIAN", "distribution", "groups", "label_of", "sequence"]
+__all__ = ["FOR_A_MEDIAN", "distribution", "groups", "sequence"]
 
 Real = NDArray[np.float64]
 
@@ -19,19 +19,7 @@ _FEW_POINTS = 200
 FOR_A_MEDIAN = 60
 """Records from which on a running median is drawn: three blocks of twenty."""
 
-_LABELS = {words.name: words.label for words in GLOSSARY}
 _MOST_GROUPS = 24
-
-
-def label_of(name: str) -> str:
-    """Return what a report calls a parameter.
-
-    Examples
-    --------
-    >>> label_of("bandwidth_phase90"), label_of("fit_percent")
-    ('Bandwidth, −90°', 'Fit percent')
-    """
-    return _LABELS.get(name, name.replace("_", " ").capitalize())
 
 
 def distribution(values: Real, *, name: str, unit: str, bounds: tuple[float, ...] = ()) -> Figure:

@@ -11,12 +11,13 @@ from numpy.typing import NDArray
 
 from hmpim.batch.between import between_units
 from hmpim.batch.expect import Bound, Outcome, held_against
-from hmpim.batch.pictures import FOR_A_MEDIAN, distribution, groups, label_of, sequence
+from hmpim.batch.pictures import FOR_A_MEDIAN, distribution, groups, sequence
 from hmpim.batch.summary import ParameterSummary, Summary, column, summary_of
 from hmpim.batch.table import BatchTable
 from hmpim.formats.atomic import write_text
 from hmpim.report.figures import Picture
 from hmpim.report.study import Grid, Section, StudyPage, render_study
+from hmpim.report.words import label_of
 from hmpim.units import conversion_factor
 
 __all__ = ["outliers", "study_page", "write_study"]

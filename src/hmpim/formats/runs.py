@@ -202,11 +202,12 @@ def asked_of(name: str, conditions: Sequence[str], *, unit: str) -> tuple[tuple[
     asked = []
     for text in conditions:
         _condition(text)
-        match = _CONDITION.match(text)
-        if match is not None and match["name"] == name and name in _FIGURES:
-            number, own = _quantity(match["value"], text)
-            value = number * (conversion_factor(own, to=unit) if own else 1.0)
-            asked.append((f"{match['sign']} {match['value']}", value))
+        about, sign, value = _parts(text)
+        if about == name and name in _FIGURES:
+            number, own = _quantity(value, text)
+            asked.append(
+                (f"{sign} {value}", number * (conversion_factor(own, to=unit) if own else 1.0))
+            )
     return tuple(asked)
 
 
@@ -298,11 +299,16 @@ def _changed(path: Path) -> str:
     return datetime.fromtimestamp(path.stat().st_mtime, tz=UTC).strftime("%Y-%m-%dT%H:%M:%S+0000")
 
 
-def _condition(text: str) -> Callable[[Run], bool]:
+def _parts(text: str) -> tuple[str, str, str]:
+    """Name, sign and value of a condition."""
     match = _CONDITION.match(text)
     if match is None:
         raise ArgumentError(f"{text!r} is no condition; write it as 'delay > 3ms'")
-    name, sign, value = match["name"], match["sign"], match["value"]
+    return match["name"], match["sign"], match["value"]
+
+
+def _condition(text: str) -> Callable[[Run], bool]:
+    name, sign, value = _parts(text)
     if name in _WORDS:
         return _of_words(name, sign, value, text)
     if name in _FIGURES:

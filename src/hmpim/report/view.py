@@ -110,7 +110,7 @@ def report_view(
 def _title(result: Identification) -> str:
     if len(result.pairs) == 1:
         pair = result.pairs[0]
-        return f"{pair.input} → {pair.output}"
+        return _named(pair)
     return f"{len(result.pairs)} pairs of channels"
 
 
@@ -125,21 +125,17 @@ def _about(about: About, result: Identification) -> list[tuple[str, str]]:
     ]
 
 
+def _named(pair: PairIdentification) -> str:
+    return f"{pair.input} → {pair.output}"
+
+
 def _where(finding: Finding, pairs: Sequence[PairIdentification]) -> str:
     """Name the pairs that remark the same, where there are several; nothing if all do."""
-    with_it = [
-        f"{pair.input} → {pair.output}"
-        for pair in pairs
-        if any(other.code == finding.code for other in pair.warnings)
-    ]
-    if len(with_it) == len(pairs):
+    alike = sum(any(other.code == finding.code for other in pair.warnings) for pair in pairs)
+    if alike == len(pairs):
         return ""
-    first = next(
-        f"{pair.input} → {pair.output}"
-        for pair in pairs
-        if any(other is finding for other in pair.warnings)
-    )
-    more = len(with_it) - 1
+    own = next(pair for pair in pairs if any(other is finding for other in pair.warnings))
+    first, more = _named(own), alike - 1
     return f"{first} (and {more} more)" if more else first
 
 
@@ -151,7 +147,7 @@ def _summary(pairs: Sequence[PairIdentification]) -> dict[str, Any]:
         "columns": [labels[name] for name in names],
         "rows": [
             {
-                "name": f"{pair.input} → {pair.output}",
+                "name": _named(pair),
                 "cells": [_told(pair, name) for name in names],
                 "verdict": pair.verdict,
                 "verdict_words": VERDICTS[pair.verdict],
@@ -194,7 +190,7 @@ def _pair_view(
     lowest = min((c.criterion for c in pair.candidates), default=0.0)
     drawn = pair_pictures(result, pair)
     return {
-        "name": f"{pair.input} → {pair.output}",
+        "name": _named(pair),
         "verdict": pair.verdict,
         "verdict_words": VERDICTS[pair.verdict],
         "sentence": pair_sentence(pair),

@@ -15,6 +15,7 @@ __all__ = [
     "ParameterWords",
     "by_weight",
     "headline",
+    "label_of",
     "leading",
     "nonlinear_facts",
     "paper_value",
@@ -158,6 +159,20 @@ GLOSSARY: tuple[ParameterWords, ...] = (
         meaning="Smallest step of the output.",
     ),
 )
+
+_LABELS = {words.name: words.label for words in GLOSSARY}
+
+
+def label_of(name: str) -> str:
+    """Return what a report calls a parameter.
+
+    Examples
+    --------
+    >>> label_of("bandwidth_phase90"), label_of("fit_percent")
+    ('Bandwidth, −90°', 'Fit percent')
+    """
+    return _LABELS.get(name, name.replace("_", " ").capitalize())
+
 
 VERDICTS: dict[Verdict, str] = {
     "ok": "The record tells the model",

@@ -15,7 +15,7 @@ from hmpim.plots.overlay import overlaid_bode
 from hmpim.plots.trend import trend
 from hmpim.record import Record
 from hmpim.report import format_estimate
-from hmpim.report.words import GLOSSARY
+from hmpim.report.words import GLOSSARY, label_of
 
 __all__ = ["Compared", "Listed", "Row", "compared", "listed"]
 
@@ -127,7 +127,6 @@ def compared(
         frequency = response.frequency[response.frequency > 0]
         if frequency.size:
             curves.append((name, measured_curve(response, near=model_curve(one, frequency))))
-    words = next((w.label for w in GLOSSARY if w.name == parameter), parameter)
     values: list[Estimate | None] = [getattr(one.parameters, parameter) for _, one in pairs]
     cells = tuple(
         (w.label, *(_cell(getattr(one.parameters, w.name)) for _, one in pairs))
@@ -143,7 +142,7 @@ def compared(
         trend=trend(
             labels,
             values,
-            name=words,
+            name=label_of(parameter),
             specified=()
             if unit is None
             else asked_of(parameter, _conditions(specification), unit=unit),
