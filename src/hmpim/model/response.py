@@ -158,22 +158,30 @@ def bandwidth_phase(
     system: RationalDelay, *, highest: float, lag: float = np.pi / 2, delay: bool = True
 ) -> float | None:
     """Lowest frequency in Hz at which the phase lags by `lag` rad; None beyond `highest` Hz."""
-    grid = _grid(highest)
-
     turned = _phase_of(system, delay=delay)
 
-    def margin(f: NDArray[np.float64]) -> NDArray[np.float64]:
-        return turned(f) + lag
+    def single() -> Callable[[float], float]:
+        phase = _single_phase(system, late=system.delay if delay else 0.0)
+        return lambda f: phase(f) + lag
 
+    return _lowest(
+        lambda f: turned(f) + lag, single if system.step is None else None, highest=highest
+    )
+
+
+def _lowest(
+    margin: Callable[[NDArray[np.float64]], NDArray[np.float64]],
+    single: Callable[[], Callable[[float], float]] | None,
+    *,
+    highest: float,
+) -> float | None:
+    """Lowest frequency in Hz at which a margin falls to 0; `single` makes it for one at a time."""
+    grid = _grid(highest)
     i = _first_crossing(grid, margin(grid))
     if i is None:
         return None
-    if system.step is None:
-        single = _single_phase(system, late=system.delay if delay else 0.0)
-        return float(scipy.optimize.brentq(lambda f: single(f) + lag, grid[i], grid[i + 1]))
-    return float(
-        scipy.optimize.brentq(lambda f: float(margin(np.array([f]))[0]), grid[i], grid[i + 1])
-    )
+    at = (lambda f: float(margin(np.array([f]))[0])) if single is None else single()
+    return float(scipy.optimize.brentq(at, grid[i], grid[i + 1]))
 
 
 def _single_phase(system: RationalDelay, *, late: float) -> Callable[[float], float]:
@@ -213,20 +221,15 @@ def bandwidth_3db(system: RationalDelay, *, highest: float) -> float | None:
     """Lowest frequency in Hz at which the gain is 1/√2 of that at DC; None beyond `highest` Hz."""
     if system.numerator[0] == 0:
         return None
-    grid = _grid(highest)
 
     def margin(f: NDArray[np.float64]) -> NDArray[np.float64]:
         return np.asarray(np.abs(response(system, f) / system.numerator[0]) ** 2 - 0.5)
 
-    i = _first_crossing(grid, margin(grid))
-    if i is None:
-        return None
-    if system.step is None:
-        single = _single_gain(system)
-        return float(scipy.optimize.brentq(lambda f: single(f) - 0.5, grid[i], grid[i + 1]))
-    return float(
-        scipy.optimize.brentq(lambda f: float(margin(np.array([f]))[0]), grid[i], grid[i + 1])
-    )
+    def single() -> Callable[[float], float]:
+        power = _single_gain(system)
+        return lambda f: power(f) - 0.5
+
+    return _lowest(margin, single if system.step is None else None, highest=highest)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -131,7 +131,7 @@ def fit_rich(
             return found
     rich = members(structures, RICH)
     proposed = proposals(data.rough, rich, best, all_of_them=all_of_them)
-    if not proposed and _is_poor(problem, best) and in_motion(data.u):
+    if not proposed and in_motion(data.u) and _is_poor(best, _spread(problem)):
         # A rough response that takes a free response for an answer proposes nothing.
         proposed = proposals(data.rough, rich, best, all_of_them=True)
     for start in range(0, len(proposed), _AT_ONCE):
@@ -181,16 +181,20 @@ def is_worth_explaining(problem: Problem, fit: Fit, data: Data) -> bool:
     """Whether the residual follows the input by more than a small share of output or response."""
     band = band_of(data)
     left = misfit(data.u, fit.residual, delay=fit.delay, band=band)
-    spread = float(np.sum((problem.masked(problem.y - problem.y.mean())) ** 2))
+    spread = _spread(problem)
     owed = float(np.sqrt(left.share * fit.cost / spread)) if spread else 0.0
     if left.probability < FOLLOWS and (owed > _MATERIAL or _misses_part(problem, fit, data, band)):
         return True
-    return _is_poor(problem, fit)
+    return _is_poor(fit, spread)
 
 
-def _is_poor(problem: Problem, fit: Fit) -> bool:
+def _spread(problem: Problem) -> float:
+    """Sum of squares of the output about its mean."""
+    return float(np.sum((problem.masked(problem.y - problem.y.mean())) ** 2))
+
+
+def _is_poor(fit: Fit, spread: float) -> bool:
     """Whether much of the output is left over, and it is no white noise."""
-    spread = float(np.sum((problem.masked(problem.y - problem.y.mean())) ** 2))
     return fit.cost > POOR * spread and not is_white(fit.residual)
 
 

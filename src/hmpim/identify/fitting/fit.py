@@ -212,9 +212,8 @@ def solved(gram: Real, moment: Real, damping: float = 0.0) -> Real:
     diagonal = gram.diagonal()
     scale = np.sqrt(np.where(diagonal > 1e-200 * diagonal.max(), diagonal, 1.0))
     scaled = gram / (scale[:, None] * scale)
-    values, vectors, info = scipy.linalg.lapack.dsyevd(
-        scaled, lower=1
-    )  # eigh's routine, which takes as long to check
+    # The routine of eigh, which takes as long to check its arguments.
+    values, vectors, info = scipy.linalg.lapack.dsyevd(scaled, lower=1)
     if info:
         raise np.linalg.LinAlgError("eigenvalues of the normal equations did not converge")
     keep = values > _UNSEEN * values[-1]

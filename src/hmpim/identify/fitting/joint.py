@@ -175,10 +175,12 @@ def _looked_again(
         if again is None:
             break
         seen, data = again, replace(data, noise=None)
+        chosen = (best.intersample, best.fit.structure)
         hopeful = [(best.intersample, best.fit)] + [
             (mode, fit)
             for mode, fit in fitted
-            if fit.cost < HOPELESS**2 * best.fit.cost or fit.structure.name in PLAIN
+            if (mode, fit.structure) != chosen
+            and (fit.cost < HOPELESS**2 * best.fit.cost or fit.structure.name in PLAIN)
         ]
         fitted = [(mode, refit(data.problem(mode, seen), fit)) for mode, fit in hopeful]
         data, trials, best, share = _weighed(data, natural, fitted, seen)
