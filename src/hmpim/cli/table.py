@@ -4,7 +4,7 @@ import signal
 from contextlib import nullcontext
 from pathlib import Path
 from types import FrameType
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, cast
 
 import typer
 
@@ -13,6 +13,7 @@ from hmpim.cli.terminal import say
 from hmpim.errors import ArgumentError
 
 if TYPE_CHECKING:
+    from hmpim.rigs.table import CommandMode
     from hmpim.rigs.wire import Hello, Plant
 
 __all__ = ["table"]
@@ -121,7 +122,7 @@ def _table(
     from hmpim.rigs.table.served import TablePlant, table_hello
 
     uut, target = both_loads(load)
-    moved = MotionTable(mode=mode, uut_load=uut, target_load=target)  # type: ignore[arg-type]
+    moved = MotionTable(mode=cast("CommandMode", mode), uut_load=uut, target_load=target)
     hello = table_hello(moved, rate=rate, watchdog=watchdog)
     return hello, TablePlant(moved, rate=rate, rng=np.random.default_rng(seed))
 

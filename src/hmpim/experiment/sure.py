@@ -17,10 +17,11 @@ from hmpim.experiment.priority import ordinary
 from hmpim.experiment.until import Until
 from hmpim.identify import LiveEstimator
 from hmpim.identify.statistics import Look
+from hmpim.record import Intersample
 from hmpim.rigs import ChannelSpec, Layout, Samples
 from hmpim.stimulus import Limits, Stimulus, left_early, passes_band_at
 
-__all__ = ["Leave", "Sure", "pair_of"]
+__all__ = ["Leave", "Sure", "begun_estimate", "pair_of"]
 
 _FARTHEST = 2.0  # s of commands that are played at most while a look is taken
 
@@ -87,6 +88,21 @@ def pair_of(until: Until, layout: Layout) -> tuple[ChannelSpec, ChannelSpec]:
     return by_name[source], by_name[output]
 
 
+def begun_estimate(stimulus: Stimulus, intersample: Intersample | None) -> LiveEstimator:
+    """Return the estimate of a run that begins.
+
+    Parameters
+    ----------
+    stimulus : Stimulus
+        What is played.
+    intersample : {'zoh', 'foh', 'bandlimited', 'sampled'} or None
+        What the input does between its samples; None where it is measured, and so smooth.
+    """
+    return LiveEstimator(
+        stimulus, intersample="bandlimited" if intersample in (None, "sampled") else intersample
+    )
+
+
 class Sure:
     """Looks on while a run is played, and says how to leave it as soon as enough is known.
 
@@ -128,9 +144,7 @@ class Sure:
             )
         self._pair = Paired((source.name, output.name), fs=self._stimulus.fs)
         mode = layout.intersample if source.role == "input" else None  # a measured one is smooth
-        self._live = LiveEstimator(
-            self._stimulus, intersample="bandlimited" if mode in (None, "sampled") else mode
-        )
+        self._live = begun_estimate(self._stimulus, mode)
         self._passed = passes_band_at(self._stimulus)
         self._ahead = ahead
         self._next = 0.0

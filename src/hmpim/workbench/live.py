@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from hmpim.record import Intersample
 from hmpim.workbench.work.driving import Begun, Block
 
 __all__ = ["Channel", "Live", "thinned"]
@@ -86,7 +87,7 @@ class Live:
     def __init__(self) -> None:
         self.channels: dict[str, Channel] = {}
         self.limits: dict[str, float] = {}
-        self.intersample: str | None = None
+        self.intersample: Intersample | None = None
         self.end = 0.0
         self.seconds = 0.0
         self.blocks = 0

@@ -9,7 +9,9 @@ from numpy.typing import NDArray
 
 from hmpim.errors import HmpimError
 from hmpim.experiment.paired import Paired
+from hmpim.experiment.sure import begun_estimate
 from hmpim.identify import LiveEstimator, Look
+from hmpim.record import Intersample
 from hmpim.rigs import Samples
 from hmpim.stimulus import Stimulus, passes_band_at
 from hmpim.workbench.live import Live
@@ -26,13 +28,12 @@ class Looks:
     ----------
     stimulus : Stimulus
         What is played; it has a band.
-    intersample : str or None
+    intersample : {'zoh', 'foh', 'bandlimited', 'sampled'} or None
         What the input does between its samples; None where it is measured.
     """
 
-    def __init__(self, stimulus: Stimulus, intersample: str | None) -> None:
-        mode = "bandlimited" if intersample in (None, "sampled") else intersample
-        self.estimator = LiveEstimator(stimulus, intersample=mode)  # type: ignore[arg-type]
+    def __init__(self, stimulus: Stimulus, intersample: Intersample | None) -> None:
+        self.estimator = begun_estimate(stimulus, intersample)
         self.passed_at = passes_band_at(stimulus)  # s
         self.look: Look | None = None
         self.closing: list[tuple[float, float]] = []
@@ -93,7 +94,7 @@ class Looks:
             self.closing.append((look.time, 50.0 * (high - low) / found.value))
 
 
-def begun_looks(stimulus: Stimulus, intersample: str | None) -> Looks | None:
+def begun_looks(stimulus: Stimulus, intersample: Intersample | None) -> Looks | None:
     """Return what looks on while a stimulus is played; None where no estimate so far can be made.
 
     Parameters

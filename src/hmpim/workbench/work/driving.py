@@ -29,7 +29,7 @@ from hmpim.experiment.readiness import (
     limits_light,
 )
 from hmpim.optimal import RoughModel
-from hmpim.record import Record
+from hmpim.record import Intersample, Record
 from hmpim.rigs import LimitsOfAxes, Rig
 from hmpim.rigs.catalogue import Description, FoundRig, find_rig
 from hmpim.stimulus import Limits, Stimulus
@@ -75,7 +75,7 @@ class Begun:
     channels: tuple[tuple[str, str, str, str], ...]
     limits: dict[str, float]
     seconds: float
-    intersample: str | None = None
+    intersample: Intersample | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
