@@ -9,19 +9,17 @@ with two cores, and print the tables of docs/performance.md. Run by `make bench`
 from __future__ import annotations
 
 import argparse
-import contextlib
 import json
 import os
 import re
-import signal
 import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
+from far_end import far_end
 
 import hmpim
 from hmpim.formats.recording import read_recording
@@ -34,25 +32,6 @@ HMPIM = [sys.executable, "-m", "hmpim.cli.main"]
 RATE = 1000.0
 BANDS = {"roll": 90.0, "yaw": 60.0, "pitch": 50.0, "azimuth": 24.0, "elevation": 18.0}
 TRAVEL = {"roll": 5.0, "yaw": 5.0, "pitch": 5.0, "azimuth": 3.0, "elevation": 3.0}
-
-
-@contextlib.contextmanager
-def served(folder: Path) -> Iterator[int]:
-    """Serve the table; yields its port."""
-    said = folder / "table.txt"
-    with said.open("w") as out:
-        process = subprocess.Popen(
-            [*HMPIM, "table", "--udp", "127.0.0.1:0", "--rate", f"{RATE:g}"],
-            stdout=out,
-            env=os.environ | {"PYTHONUNBUFFERED": "1"},
-        )
-    try:
-        while "udp://" not in said.read_text():
-            time.sleep(0.05)
-        yield int(said.read_text().split("udp://127.0.0.1:")[1].split(",")[0])
-    finally:
-        process.send_signal(signal.SIGINT)
-        process.wait()
 
 
 def processor_time() -> float:
@@ -68,7 +47,7 @@ def timing() -> list[str]:
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         save_stimulus(sweep, folder / "s.csv")
-        with served(folder) as port:
+        with far_end("--rate", f"{RATE:g}") as (_, port):
             subprocess.run(
                 [*HMPIM, "run", "--rig", f"udp://127.0.0.1:{port}", "s.csv", "-o", "r.h5",
                  "--log", "run.log", "--quiet"],
@@ -139,7 +118,7 @@ def five() -> list[str]:
         folder = Path(name)
         save_stimulus(stimuli, folder / "s.csv")
         before = processor_time()
-        with served(folder) as port:
+        with far_end("--rate", f"{RATE:g}") as (_, port):
             begun, spent = time.perf_counter(), processor_time()
             done = subprocess.run(
                 [*HMPIM, "run", "--rig", f"udp://127.0.0.1:{port}", "s.csv", "-o", "r.h5",

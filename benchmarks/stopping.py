@@ -19,9 +19,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import re
-import subprocess
-import sys
 import tempfile
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
@@ -30,6 +27,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from far_end import far_end
 
 import hmpim
 from hmpim.experiment.collect import Played
@@ -134,19 +132,12 @@ acceleration = 17000
 def served(*, seed: int) -> Iterator[tuple[str, int]]:
     """The system in a process of its own, in real time; yields its address."""
     with tempfile.NamedTemporaryFile("w", suffix=".toml") as unit:
-        options = {**TRUTH, "noise_std": NOISE}
-        unit.write(RIG_FILE + "".join(f"{name} = {v}\n" for name, v in options.items()))
+        values = {**TRUTH, "noise_std": NOISE}
+        unit.write(RIG_FILE + "".join(f"{name} = {v}\n" for name, v in values.items()))
         unit.flush()
-        words = f"table --udp 127.0.0.1:0 --rate {FS:g} --sensor {unit.name} --seed {seed}".split()
-        command = [sys.executable, "-m", "hmpim.cli.main", *words]
-        with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
-            try:
-                assert process.stdout is not None
-                found = re.search(r"udp://([\d.]+):(\d+)", process.stdout.readline())
-                assert found is not None
-                yield found[1], int(found[2])
-            finally:
-                process.terminate()
+        options = f"--rate {FS:g} --sensor {unit.name} --seed {seed}".split()
+        with far_end(*options) as address:
+            yield address
 
 
 def wired(address: tuple[str, int], seed: int) -> dict[str, Any]:
