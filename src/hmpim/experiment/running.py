@@ -52,7 +52,7 @@ Subscriber = Callable[[Played], object]
 EndsWhen = Callable[[Played], str | None]
 """Called with each block as it was played; a string ends the run, and is the reason."""
 
-_AHEAD = 0.2  # s of commands between a decision beside the run and what follows from it
+_AHEAD = 0.1  # s of commands between a decision beside the run and what follows from it
 _SWITCH = 5e-4  # s that whoever looks at the estimate may keep the commands waiting
 _BLOCK = 0.02  # s: commands handed to a rig at once, and how often anybody watching is told
 
