@@ -1,5 +1,6 @@
 """What several rooms' tests share: the measured records, the paper's system, closed forms."""
 
+import gc
 import os
 import signal
 from contextlib import contextmanager
@@ -9,7 +10,7 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, settings
 
-from hmpim.identify.judgement import failed as attempts
+import collecting
 from tests_support import field_chirp, second_order_lag, study_size
 
 # A busy machine is slow; that is no failure of what is tested. In `make test` the examples are
@@ -25,6 +26,12 @@ settings.load_profile("hmpim")
 # A shell that starts a job in the background has it ignore Ctrl-C, and all that it starts with it.
 if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
+
+gc.disable()  # until tests are collected: nothing of what is imported is garbage
+
+
+def pytest_configure(config):
+    config.pluginmanager.register(collecting)
 
 
 @pytest.hookimpl(optionalhook=True)
@@ -73,6 +80,8 @@ def field_record():
 @pytest.fixture(autouse=True)
 def breaking_checks(monkeypatch):
     """A check that raises fails the test; within ``with breaking_checks():`` it is only said."""
+    from hmpim.identify.judgement import failed as attempts
+
     said = attempts.failed
 
     def raised(name, error):

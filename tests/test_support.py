@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from scipy.stats import binom
 
 from tests_support import (
     FALSE_ALARM,
@@ -19,6 +18,8 @@ from tests_support import (
 @pytest.mark.parametrize("trials", [5, 40, 100, 1000])
 @pytest.mark.parametrize("chance", [0.01, 0.05, 0.5, 0.92, 0.95])
 def test_counts_beyond_the_bounds_have_the_stated_chance(trials, chance):
+    from scipy.stats import binom
+
     low, high = fewest(trials, chance), most(trials, chance)
     assert binom.cdf(low - 1, trials, chance) <= FALSE_ALARM < binom.cdf(low, trials, chance)
     assert binom.sf(high, trials, chance) <= FALSE_ALARM

@@ -19,7 +19,7 @@ import numpy as np
 import pytest
 from hypothesis import settings
 from numpy.typing import NDArray
-from scipy.stats import binom, chi2, norm
+from scipy import special
 
 import hmpim
 from hmpim import Estimate
@@ -86,12 +86,12 @@ def run_octave(folder: Path) -> str:
 
 def fewest(trials: int, chance: float) -> int:
     """Smallest count of `trials` that an event of this chance falls below with FALSE_ALARM."""
-    return int(binom.ppf(FALSE_ALARM, trials, chance))
+    return int(np.argmax(special.bdtr(np.arange(trials + 1), trials, chance) >= FALSE_ALARM))
 
 
 def most(trials: int, chance: float) -> int:
     """Largest count of `trials` that an event of this chance exceeds with FALSE_ALARM."""
-    return int(binom.isf(FALSE_ALARM, trials, chance))
+    return int(np.argmax(special.bdtrc(np.arange(trials + 1), trials, chance) <= FALSE_ALARM))
 
 
 def excluded(trials: int) -> float:
@@ -140,13 +140,13 @@ def independent(rows: NDArray[np.bool_]) -> int:
 
 def room(trials: int, std: float = 1.0) -> float:
     """How far the mean of `trials` values of this standard deviation may be from theirs."""
-    return float(norm.isf(FALSE_ALARM / 2)) * std / np.sqrt(trials)
+    return -float(special.ndtri(FALSE_ALARM / 2)) * std / np.sqrt(trials)
 
 
 def rms_between(trials: int) -> tuple[float, float]:
     """Between what the r.m.s. of `trials` standard normal values lies."""
-    tails = [FALSE_ALARM / 2, 1.0 - FALSE_ALARM / 2]
-    low, high = np.sqrt(chi2.ppf(tails, trials) / trials)
+    tails = np.array([FALSE_ALARM / 2, 1.0 - FALSE_ALARM / 2])
+    low, high = np.sqrt(2.0 * special.gammaincinv(trials / 2, tails) / trials)
     return float(low), float(high)
 
 

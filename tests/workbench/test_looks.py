@@ -7,7 +7,6 @@ import hmpim
 from hmpim.stimulus import Chirp, Step, Stimulus
 from hmpim.workbench.live import Live
 from hmpim.workbench.looks import begun_looks
-from hmpim.workbench.parts.table import look_cells
 from hmpim.workbench.work.driving import Begun, Block
 from tests_support import finished
 
@@ -28,6 +27,8 @@ def played():
 
 
 def test_the_estimate_so_far_is_the_live_estimators(played):
+    from hmpim.workbench.parts.table import look_cells
+
     u, y = played
     t = np.arange(u.size) / 200.0
     live, own = Live(), hmpim.LiveEstimator(STIMULUS, intersample="zoh")

@@ -7,7 +7,6 @@ import pytest
 import hmpim
 from hmpim.formats import save
 from hmpim.plots import Rule
-from hmpim.workbench.parts.table import parameter_cells
 from hmpim.workbench.work.record import Question, View, automatic, found, write_report
 from hmpim.workbench.work.runs import compared
 from workbench_support import recorded
@@ -24,6 +23,8 @@ def folder(tmp_path_factory):
 
 
 def test_structure_and_interval_by_hand_stand_beside_the_automatic(folder):
+    from hmpim.workbench.parts.table import parameter_cells
+
     path = folder / "unit1" / "run.h5"
     asked = Question(file=str(path), inputs=("u",), outputs=("y",))
     hand = replace(asked, structure="first_order", stop=8.0)

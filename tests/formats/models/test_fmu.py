@@ -17,7 +17,6 @@ from tests_support import c_compiler
 from .conftest import FS, result_of
 
 fmpy = pytest.importorskip("fmpy")
-lief = pytest.importorskip("lief")
 pytest.importorskip("ziglang")
 
 T = np.arange(300) / FS
@@ -87,6 +86,7 @@ SYSTEM = {
 
 def assert_importers_can_load(library: bytes, folder: str, version: int) -> None:
     """Read the symbols: those of the standard are exported, and every machine has what is used."""
+    lief = pytest.importorskip("lief")
     binary = lief.parse(library)
     kind, machine = binary.format.name, binary.abstract.header.architecture.name
     assert (kind, machine) == BUILT_FOR[folder]
