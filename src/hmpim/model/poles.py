@@ -61,6 +61,13 @@ def _phi(z: Complex, order: int) -> tuple[Complex, Complex]:
     return np.asarray(low), np.asarray(slope)
 
 
+@cache
+def _differences(degree: int) -> Real:
+    """The difference of order d + 1 of a row of d + 3 samples, as a matrix to its right."""
+    size, signs = degree + 3, enumerate(spline_signs(degree))
+    return np.asarray(sum(sign * np.eye(size, k=j) for j, sign in signs))
+
+
 def pole_taps(poles: Complex, lag: float, degree: int) -> tuple[Complex, Complex]:
     """Answer of 1/(s - p) to one B-spline, and its derivative by p, as numerators over 1 - e^p/z.
 
@@ -90,11 +97,8 @@ def pole_taps(poles: Complex, lag: float, degree: int) -> tuple[Complex, Complex
     phi, rate = _phi(z, degree + 1)
     powers = t ** (degree + 1)
     value, slope = powers * phi, powers * t * rate
-    signs = spline_signs(degree)
-    answer, turned = np.zeros_like(value), np.zeros_like(slope)
-    for j, sign in enumerate(signs):
-        answer[:, j:] += sign * value[:, : value.shape[1] - j]
-        turned[:, j:] += sign * slope[:, : slope.shape[1] - j]
+    differences = _differences(degree)
+    answer, turned = value @ differences, slope @ differences
     decay = np.exp(poles)[:, None]
     taps, slopes = answer.copy(), turned.copy()
     taps[:, 1:] -= decay * answer[:, :-1]
@@ -231,11 +235,11 @@ def input_responses(source: SampledInput, delay: float, *, slopes: bool) -> Real
     begin, lag = placed(source, delay)
     c, first = _reaching(source, begin)
     rows = np.zeros((2 if slopes else 1, source.samples))
-    rows[0] = _kept(scipy.signal.lfilter(spline_at(lag, source.degree), [1.0], c), source, first)
+    rows[0] = _kept(np.convolve(c, spline_at(lag, source.degree)), source, first)
     if slopes and source.degree > 0:
         lower = spline_at(lag, source.degree - 1)
         taps = np.append(lower, 0.0) - np.concatenate([[0.0], lower])
-        rows[1] = source.oversampling * _kept(scipy.signal.lfilter(taps, [1.0], c), source, first)
+        rows[1] = source.oversampling * _kept(np.convolve(c, taps), source, first)
     return rows
 
 
@@ -255,58 +259,48 @@ def _kept(fine: NDArray[Any], source: SampledInput, first: int) -> NDArray[Any]:
     return fine[first : first + factor * (source.samples - 1) + 1 : factor]
 
 
-_NOWHERE = complex("nan")
-"""Distance of poles that are the same: no expansion."""
-
-
 def partial_fractions(
-    numerator: Real, poles: Complex, leading: float, doubled: NDArray[np.bool_] | None = None
-) -> tuple[Complex, Complex, float]:
-    """Expand B(s) / (a Π(s - pₖ) Π_doubled(s - pₖ)) into poles, double poles and a constant.
+    numerators: Real, poles: Complex, leading: float
+) -> tuple[Complex, Real, Complex]:
+    """Expand each B(s) / (a Π(s - pₖ)) into its poles and a constant.
 
     Parameters
     ----------
-    numerator : ndarray, shape (m + 1,)
-        B by rising powers of s, m at most the number of poles with their multiplicity.
+    numerators : ndarray, shape (rows, m + 1)
+        B by rising powers of s, m at most the number of poles.
     poles : complex ndarray, shape (k,)
-        All different.
+        All different; an expansion about two that are the same is not a number.
     leading : float
         a, the factor of the highest power below.
-    doubled : ndarray of bool, shape (k,), optional
-        Which poles count twice; none by default.
 
     Returns
     -------
-    simple, double : complex ndarray, shape (k,)
-        Factors of 1/(s - pₖ) and of 1/(s - pₖ)².
-    constant : float
+    residues : complex ndarray, shape (rows, k)
+        Factors of 1/(s - pₖ).
+    constants : ndarray, shape (rows,)
         What is fed through: 0 unless m equals the number of poles.
+    apart : complex ndarray, shape (k, k)
+        1/(pⱼ - pₖ), 0 on the diagonal.
 
     Examples
     --------
     >>> poles = np.array([-1.0, -2.0], dtype=complex)
-    >>> simple, _, constant = partial_fractions(np.array([0.0, 0.0, 1.0]), poles, 1.0)
-    >>> simple.real.tolist(), constant  # s²/((s + 1)(s + 2)) = 1 + 1/(s + 1) - 4/(s + 2)
-    ([1.0, -4.0], 1.0)
+    >>> square = np.array([[0.0, 0.0, 1.0]])  # s²/((s + 1)(s + 2)) = 1 + 1/(s + 1) - 4/(s + 2)
+    >>> residues, constants, _ = partial_fractions(square, poles, 1.0)
+    >>> residues[0].real.tolist(), constants.tolist()
+    ([1.0, -4.0], [1.0])
     """
-    # A handful of numbers: Python is done before NumPy has looked at its arguments.
-    places, coefficients = poles.tolist(), numerator[::-1].tolist()
-    twice = [False] * len(places) if doubled is None else doubled.tolist()
-    simple, double = [], []
-    for k, p in enumerate(places):
-        below, inverse = leading + 0.0j, 0.0j
-        for j, q in enumerate(places):
-            if j != k:
-                apart, times = p - q or _NOWHERE, 1 + twice[j]
-                below *= apart**times
-                inverse += times / apart
-        above = rate = 0.0j
-        for b in coefficients:
-            rate = above + p * rate
-            above = b + p * above
-        value = above / below
-        simple.append((rate - above * inverse) / below if twice[k] else value)
-        double.append(value if twice[k] else 0.0j)
-    order = len(places) + sum(twice)
-    constant = float(numerator[order] / leading) if numerator.size > order else 0.0
-    return np.array(simple, dtype=complex), np.array(double, dtype=complex), constant
+    count = poles.size
+    differences = poles[:, None] - poles
+    differences[differences == 0.0] = _NOWHERE
+    differences.flat[:: count + 1] = 1.0
+    apart = 1.0 / differences
+    apart.flat[:: count + 1] = 0.0
+    above = numerators @ poles ** np.arange(numerators.shape[1])[:, None]
+    fed = numerators.shape[1] > count
+    constants = numerators[:, count] / leading if fed else np.zeros(len(numerators))
+    return above / (leading * differences.prod(axis=1)), constants, apart
+
+
+_NOWHERE = complex("nan")
+"""Distance of poles that are the same: no expansion."""

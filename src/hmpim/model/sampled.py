@@ -210,12 +210,9 @@ def _characteristic(step: NDArray[np.float64]) -> NDArray[np.float64]:
 def spline_at(lag: float, degree: int) -> NDArray[np.float64]:
     """One B-spline itself, sampled at i - lag: the answer of a system without dynamics."""
     i = np.arange(degree + 2)
-    answer = np.zeros(degree + 2)
-    for j, sign in enumerate(spline_signs(degree)):
-        t = i - lag - j
-        power = np.where(t >= 0, 1.0, 0.0) if degree == 0 else np.maximum(t, 0.0) ** degree
-        answer += sign * power / factorial(degree)
-    return answer
+    t = i - lag - i[:, None]  # one row for each of the powers that it is the difference of
+    powers = np.where(t >= 0.0, 1.0, 0.0) if degree == 0 else np.maximum(t, 0.0) ** degree
+    return np.asarray(spline_signs(degree) @ powers / factorial(degree))
 
 
 def delayed_response(

@@ -124,7 +124,7 @@ class Part:
         self._fed: Real | None = None
         self._numerators = _powers(structure)
         expanded = self._poles.expand(self._numerators)
-        self.rows = self._added(expanded, 1)
+        self.rows = self._added(expanded)
         """Responses that the numerator's coefficients multiply, shape (m, n)."""
         level = self._source.first
         if level and structure.dc_zeros == 0:
@@ -155,31 +155,34 @@ class Part:
         full: Real = numerator @ self._numerators
         turned = self._answers.slopes() if self._answers is not None and structure.order else None
         out = np.empty((self.theta.size, self._source.samples))
-        out[:1] = self._added(self._poles.by_delay(full), 2)
+        by_delay, by_sections = self._poles.slopes(full)
+        out[:1] = self._added(by_delay)
         if structure.integrators and self._source.first:
             out[0] -= full[0] * self._source.first * (self._since() > 0.0)
         if structure.order:
-            by_sections = self._poles.by_sections(full)
-            out[1:] = self._added(by_sections, 1)
+            out[1:] = self._added(by_sections)
             out[1:] += _real(by_sections.double, turned)
             if initial.size and self._since_start is not None:
                 state = np.concatenate([np.zeros(structure.integrators), initial])
-                free = self._poles.by_sections(state)
+                _, free = self._poles.slopes(state)
                 out[1:] += _real(free.simple, self._since_start)
                 out[1:] += _real(free.double, self._late * self._since_start)
         return out
 
-    def _added(self, expansion: Expansion, inputs: int) -> Real:
+    def _added(self, expansion: Expansion) -> Real:
         """Sum of single poles, the input itself and its rate."""
-        out = np.zeros((expansion.direct.size, self._source.samples))
-        if self._answers is not None:
-            out += _real(expansion.simple, self._answers.values)
-        if expansion.direct.any() or expansion.rate.any():
-            if self._fed is None or self._fed.shape[0] < inputs:
-                self._fed = input_responses(self._source, self._delay, slopes=inputs > 1)
+        if self._answers is None:
+            out = np.zeros((expansion.direct.size, self._source.samples))
+        else:
+            out = _real(expansion.simple, self._answers.values)
+        rate = expansion.rate
+        rated = rate is not None and bool(rate.any())
+        if rated or expansion.direct.any():
+            if self._fed is None or self._fed.shape[0] < 1 + rated:
+                self._fed = input_responses(self._source, self._delay, slopes=rated)
             out += np.outer(expansion.direct, self._fed[0])
-            if expansion.rate.any():
-                out += np.outer(expansion.rate, self._fed[1])
+            if rate is not None and rated:
+                out += np.outer(rate, self._fed[1])
         return out
 
     def _since(self) -> Real:
@@ -191,10 +194,11 @@ def _powers(structure: Structure) -> Real:
     return np.asarray(np.eye(structure.zeros + 1)[structure.dc_zeros :])
 
 
-def _real(weights: Complex, waves: Complex | None) -> Real:
+def _real(weights: Complex | None, waves: Complex | None) -> Real:
     """Real part of a sum over poles."""
-    if waves is None:
-        return np.zeros((weights.shape[0], 1))
-    if not waves.imag.any():
-        return np.asarray(weights.real @ waves.real)
-    return np.asarray(weights.real @ waves.real - weights.imag @ waves.imag)
+    if weights is None or waves is None:
+        return np.zeros((1, 1))
+    out = weights.real @ waves.real
+    if waves.imag.any():
+        out -= weights.imag @ waves.imag
+    return np.asarray(out)

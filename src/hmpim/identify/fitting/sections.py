@@ -32,15 +32,15 @@ class Expansion:
     ----------
     simple, double : complex ndarray, shape (rows, k)
         Of the responses of 1/(s - p) and 1/(s - p)², one of each conjugate pair: the rows are the
-        real parts.
+        real parts. `double` is None where there is none.
     direct, rate : ndarray, shape (rows,)
-        Of the input itself and of its rate.
+        Of the input itself and of its rate. `rate` is None where that has no part.
     """
 
     simple: Complex
-    double: Complex
+    double: Complex | None
     direct: Real
-    rate: Real
+    rate: Real | None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -69,51 +69,74 @@ class Poles:
         """One of each conjugate pair."""
         return self.every[self.kept]
 
-    @property
-    def leading(self) -> float:
-        """Factor of the highest power of A(s)."""
-        return float(np.prod([c[-1] for c in self.coefficients]))
-
     def expand(self, numerators: Real) -> Expansion:
         """Rows of B(s)/A(s), one for each row of `numerators`, by rising powers of s."""
-        expanded = [partial_fractions(b, self.every, self.leading) for b in numerators]
-        simple = self._halved(np.array([e[0] for e in expanded]))
-        return Expansion(
-            simple=simple,
-            double=np.zeros_like(simple),
-            direct=np.array([e[2] for e in expanded]),
-            rate=np.zeros(len(expanded)),
-        )
+        residues, constants, _ = self._fractions(numerators)
+        return self._expansion(residues, constants)
 
-    def by_delay(self, numerator: Real) -> Expansion:
-        """The row of -s B(s)/A(s)."""
-        simple, _, constant = partial_fractions(numerator, self.every, self.leading)
-        return Expansion(
-            simple=self._halved(-(simple * self.every)[None, :]),
-            double=np.zeros((1, int(self.kept.sum())), dtype=np.complex128),
-            direct=np.array([-float(simple.sum().real)]),
+    def slopes(self, numerator: Real) -> tuple[Expansion, Expansion]:
+        """Rows of the derivatives of B(s)/A(s): by the delay, and by the sections' parameters.
+
+        The derivative by the delay is -s B/A. That by a coefficient of a section Aₖ is B/A times
+        -s^m/Aₖ, each a sum over poles; in the product of the two
+
+            1/((s - p)(s - q)) = (1/(s - p) - 1/(s - q)) / (p - q).
+        """
+        (residues,), (constant,), apart = self._fractions(numerator[None, :])
+        by_delay = self._expansion(
+            -(residues * self.every)[None, :],
+            np.array([-residues.sum().real]),
             rate=np.array([-constant]),
         )
+        factors, fed = self._by_parameters()
+        simple = residues * (factors @ apart.T) + factors * (apart @ residues)
+        simple += fed[:, None] * residues + constant * factors
+        by_sections = self._expansion(-simple, -constant * fed, double=-residues * factors)
+        return by_delay, by_sections
 
-    def by_sections(self, numerator: Real) -> Expansion:
-        """Rows of the derivatives of B(s)/A(s) by the parameters of each section in turn."""
-        simple, double, direct = [], [], []
-        for k, c in enumerate(self.coefficients):
-            doubled = self.section == k
-            by_c = []
-            for power in range(1, c.size + 1):
-                above = np.concatenate([np.zeros(power), -numerator])
-                by_c.append(partial_fractions(above, self.every, self.leading * c[-1], doubled))
-            weights = [[c[0], 2.0 * c[1]], [0.0, c[0] ** 2]] if c.size == 2 else [[c[0]]]
-            for row in weights:
-                simple.append(sum(w * e[0] for w, e in zip(row, by_c, strict=True)))
-                double.append(sum(w * e[1] for w, e in zip(row, by_c, strict=True)))
-                direct.append(sum(w * e[2] for w, e in zip(row, by_c, strict=True)))
+    def _by_parameters(self) -> tuple[Complex, Real]:
+        """1/Aₖ times the derivative of Aₖ by each parameter: residues, and what is fed through."""
+        rows = sum(c.size for c in self.coefficients)
+        factors = np.zeros((rows, self.every.size), dtype=np.complex128)
+        fed = np.ones(rows)
+        row = 0
+        at = int(np.count_nonzero(self.section < 0))
+        for c in self.coefficients:
+            p = complex(self.every[at])
+            if c.size == 1:
+                factors[row, at] = p
+            else:
+                q = complex(self.every[at + 1])
+                c1, c2 = float(c[0]), float(c[1])
+                steep = c2 * (p - q)
+                factors[row, at] = (c1 + 2.0 * c2 * p) * p / steep
+                factors[row, at + 1] = -(c1 + 2.0 * c2 * q) * q / steep
+                factors[row + 1, at] = c1 * c1 * p * p / steep
+                factors[row + 1, at + 1] = -c1 * c1 * q * q / steep
+                fed[row], fed[row + 1] = 2.0, c1 * c1 / c2
+            row += c.size
+            at += c.size
+        return factors, fed
+
+    def _fractions(self, numerators: Real) -> tuple[Complex, Real, Complex]:
+        leading = 1.0
+        for c in self.coefficients:
+            leading *= float(c[-1])
+        return partial_fractions(numerators, self.every, leading)
+
+    def _expansion(
+        self,
+        simple: Complex,
+        direct: Real,
+        *,
+        double: Complex | None = None,
+        rate: Real | None = None,
+    ) -> Expansion:
         return Expansion(
-            simple=self._halved(np.array(simple)),
-            double=self._halved(np.array(double)),
-            direct=np.array(direct),
-            rate=np.zeros(len(direct)),
+            simple=self._halved(simple),
+            double=None if double is None else self._halved(double),
+            direct=direct,
+            rate=rate,
         )
 
     def _halved(self, rows: Complex) -> Complex:
