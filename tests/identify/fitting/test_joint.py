@@ -233,7 +233,7 @@ def test_intervals_hold_under_coloured_noise(field_record, seeds, colour):
     assert_share(inside, at_least=0.92, at_most=0.98)
 
 
-@pytest.mark.parametrize("seed", [2, *in_studies(3, 4, 5, 6, 7, 9, 10)])
+@pytest.mark.parametrize("seed", [2, *in_studies(*range(3, 12))])
 def test_a_free_response_of_two_modes_is_no_coloured_noise(seed):
     """A record out of the midst of a random motion: its lines answered one by one."""
     rng = np.random.default_rng(seed)

@@ -110,7 +110,9 @@ def fit_together(
         Rows beside the bias that enter linearly, such as a drift's.
     """
 
-    def fitted(u: Real, rest: Real, names: tuple[StructureName, ...]) -> JointFit:
+    def fitted(
+        u: Real, rest: Real, names: tuple[StructureName, ...], *, growing: bool = True
+    ) -> JointFit:
         return joint_fit(
             u,
             rest,
@@ -119,6 +121,7 @@ def fit_together(
             intersample=intersample,
             structures=names,
             nuisance=nuisance,
+            growing=growing,
         )
 
     if len(inputs) == 1:
@@ -131,18 +134,24 @@ def fit_together(
             lags=(None,),
         )
     plain = tuple(name for name in structures if name in PLAIN) or structures
-    fits = _strongest(inputs, y, valid, lambda u, rest: fitted(u, rest, plain))
+
+    def plainly(u: Real, rest: Real) -> JointFit:
+        return fitted(u, rest, plain, growing=False)
+
+    fits = _strongest(inputs, y, valid, plainly)
     strong = tuple(fits)
-    related = dict.fromkeys(strong, True)
-    whitening: Real | None = None
-    found = None
-    for names in (plain, structures):  # then again, the couplings known
+    related = {i: fit.related for i, fit in fits.items()}
+    if len(strong) > 1:  # each was fitted with the later ones unknown
         for i in strong:
-            fits[i] = fitted(inputs[i], y - _others(fits, related, i), names)
+            fits[i] = plainly(inputs[i], y - _others(fits, related, i))
             related[i] = fits[i].related
-        before, found = found, tuple(fits[i].best.fit.structure.name for i in strong)
-        if found != before:
-            whitening = _fit_couplings(inputs, y, fits, related, strong, plain, alike)
+    _fit_couplings(inputs, y, fits, related, strong, plain, alike)
+    before = [fits[i].best.fit.structure for i in strong]
+    for i in strong:  # the couplings known
+        fits[i] = fitted(inputs[i], y - _others(fits, related, i), structures)
+        related[i] = fits[i].related
+    if [fits[i].best.fit.structure for i in strong] != before:
+        _fit_couplings(inputs, y, fits, related, strong, plain, alike)
     _refine(y, fits, [j for j in fits if related[j]], None)
     # What was not white may have been no noise but what one of them had not given back yet.
     whitening = _whitening(y, fits, related, strong)
@@ -211,11 +220,13 @@ def _fit_couplings(
     strong: tuple[int, ...],
     structures: tuple[StructureName, ...],
     alike: Sequence[tuple[frozenset[int], NDArray[np.bool_]]],
-) -> Real | None:
-    """Fit, in place, all that is weak, the strongest first; return how the noise was whitened."""
+) -> None:
+    """Fit, in place, all that is weak, the strongest first."""
     best = fits[strong[0]]
     mode, counts = best.best.intersample, best.problem.valid
     weak = [j for j in range(len(inputs)) if j not in strong]
+    if not weak:
+        return
 
     def left() -> Real:
         rest = y - _others(fits, related, None) - best.best.fit.linear[-1]
@@ -225,7 +236,8 @@ def _fit_couplings(
     whitening = whitening_of(left())
     sources = {j: prepare_input(inputs[j], mode) for j in weak}
     roughly = tuple(name for name in structures if name == "first_order") or structures
-    for names in (roughly, structures) if weak else ():  # what they leave over whitened anew
+    known = all(j in fits for j in weak)
+    for names in (structures,) if known else (roughly, structures):  # each whitened anew
         for j in sorted(weak, key=lambda j: -_follows_at_all(inputs[j], left())):
             problem = Problem(
                 source=sources[j],
@@ -240,7 +252,6 @@ def _fit_couplings(
         while _together(y, fits, related, strong, whitening, alike, drop=names is structures):
             pass
         whitening = whitening_of(left())
-    return whitening
 
 
 def _together(

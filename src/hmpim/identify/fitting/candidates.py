@@ -130,10 +130,9 @@ def fit_rich(
         if is_white(min(found, key=lambda fit: fit.objective).residual):
             return found
     rich = members(structures, RICH)
-    proposed = proposals(data.rough, rich, best, all_of_them=all_of_them)
-    if not proposed and in_motion(data.u) and _is_poor(best, _spread(problem)):
-        # A rough response that takes a free response for an answer proposes nothing.
-        proposed = proposals(data.rough, rich, best, all_of_them=True)
+    # A rough response that takes a free response for an answer proposes nothing that is of use.
+    misled = in_motion(data.u) and _is_poor(best, _spread(problem))
+    proposed = proposals(data.rough, rich, best, all_of_them=all_of_them or misled)
     for start in range(0, len(proposed), _AT_ONCE):
         some = proposed[start : start + _AT_ONCE]
         for p in some:

@@ -50,8 +50,17 @@ _FORGETS = 5.0
 _UNSEEN = 1e-13
 """Share of the greatest eigenvalue below which the record does not see a direction."""
 
+_DAMPING = 1e-4
+"""Share of each diagonal element that the first steps add to it."""
+
+_STEEPEST = 1e6
+"""The same, from which on no smaller step is tried."""
+
+_POORLY, _WELL = 0.25, 0.75
+"""Share of the gain hoped for below which the damping grows, and above which it falls."""
+
 _EXACTLY = 1e-14
-"""The same share where no normal equations are made."""
+"""The share that is not seen where no normal equations are made."""
 
 Real = NDArray[np.float64]
 
@@ -424,6 +433,9 @@ def climb(
 ) -> tuple[E, bool]:
     """Levenberg and Marquardt's way to the least cost.
 
+    The damping follows how well the quadratic model foretells each step (J. Nocedal and S. J.
+    Wright, Numerical Optimization, 2nd ed., 2006, section 4.1); parameters at a bound are held.
+
     Parameters
     ----------
     evaluated : callable
@@ -446,33 +458,58 @@ def climb(
     bool
         Whether the last step was negligible.
     """
-    sizes = [theta.size for theta in thetas]
-    edges = np.cumsum(sizes)[:-1]
+    edges = np.cumsum([theta.size for theta in thetas])[:-1]
     best = evaluated(thetas)
-    damping = 1e-4
-    freedom = max(counted - sum(sizes) - best.linear.size, 1)
+    damping = _DAMPING
     for _ in range(iterations):
-        normal, moment = best.normal()
-        negligible = precision * best.cost / freedom
-        # Newton's decrement: what a full step would still gain
-        if float(solved(normal, moment) @ moment) < negligible:
+        here = np.concatenate(best.thetas)
+        free, normal, moment, decrement = _free_directions(best, edges, bounded)
+        negligible = precision * best.cost / max(counted - here.size - best.linear.size, 1)
+        if decrement < negligible:
             return best, True
+        refused = 0
         while True:
-            steps = np.split(solved(normal, moment, damping), edges)
-            here = best.thetas
-            share = min(_limited(s, t, d) for s, t, d in zip(structures, here, steps, strict=True))
-            moved = bounded([t + share * d for t, d in zip(here, steps, strict=True)])
+            step = np.zeros(here.size)
+            step[free] = solved(normal, moment, damping)
+            steps = np.split(step, edges)
+            share = min(
+                _limited(s, t, d) for s, t, d in zip(structures, best.thetas, steps, strict=True)
+            )
+            moved = bounded(np.split(here + share * step, edges))
             trial = evaluated(moved)
+            taken = (np.concatenate(moved) - here)[free]
+            hoped = float(taken @ (2.0 * moment - normal @ taken))
             if trial.cost < best.cost:
-                damping = max(damping / 10, 1e-9)
                 break
-            if damping > 1e6:  # no way down: a kink, a bound, or the arithmetic's own floor
-                return best, True
-            damping *= 10
+            if damping > _STEEPEST or abs(hoped) < negligible:
+                return best, True  # no way down: a kink, or the arithmetic's own floor
+            damping *= 10.0
+            refused += 1
         fell, best = best.cost - trial.cost, trial
         if fell < negligible and damping < 1e-3:
             return best, True
+        if fell < _POORLY * hoped:
+            damping *= 2.0
+        elif fell > _WELL * hoped and not refused:
+            damping = max(damping / 10.0, 1e-9)
     return best, False
+
+
+def _free_directions(
+    best: Evaluated, edges: NDArray[np.intp], bounded: Callable[[Sequence[Real]], list[Real]]
+) -> tuple[NDArray[np.bool_], Real, Real, float]:
+    """Parameters that no bound holds, their normal equations, and Newton's decrement.
+
+    The decrement is what a full step would still gain. A parameter is held where that step leads
+    it out of its bounds; the others then move as if it were known.
+    """
+    normal, moment = best.normal()
+    here, toward = np.concatenate(best.thetas), solved(normal, moment)
+    free = np.concatenate(bounded(np.split(here + toward, edges))) != here
+    if not free.all():
+        normal, moment = normal[np.ix_(free, free)], moment[free]
+        toward = solved(normal, moment) if free.any() else moment
+    return free, normal, moment, float(toward @ moment)
 
 
 def _projected(rows: Real, linear: Real) -> Real:

@@ -73,6 +73,7 @@ def joint_fit(
     intersample: Intersample | None = None,
     structures: tuple[StructureName, ...] = (*PLAIN, *RICH, *INTEGRATING),
     nuisance: NDArray[np.float64] | None = None,
+    growing: bool = True,
 ) -> JointFit:
     """Fit every structure and keep the one that the record supports.
 
@@ -92,6 +93,8 @@ def joint_fit(
         Which to try.
     nuisance : ndarray, shape (k, n), optional
         Rows beside the bias that enter linearly, such as a drift's.
+    growing : bool
+        Whether it is asked for one more pole at the end, and what that leaves open.
 
     Returns
     -------
@@ -161,6 +164,8 @@ def joint_fit(
         effective_share=share,
         related=not is_unrelated(replace(weighed, noise=None, told=None), best.fit, share),
     )
+    if not growing:
+        return joint
     modes = [mode for mode in BETWEEN if intersample is None and mode != best.intersample]
     return _grown(joint, data, counted, structures, modes)
 
