@@ -70,4 +70,6 @@ def test_one_stimulus_is_shared(tmp_path, monkeypatch):
         assert (quick[name].isna() == whole[name].isna()).all(), name
         assert (off.dropna() <= 0.01 * error[off.notna()] + 1e-12).all(), name
     assert quick["verdict"].tolist() == pytest.approx(whole["verdict"].tolist())
+    assert quick["sha256"].tolist() == whole["sha256"].tolist()
+    assert [list(w) for w in quick["warnings"]] == [list(w) for w in whole["warnings"]]
     assert quick["result"].isna().all()

@@ -47,13 +47,13 @@ def test_a_file_that_breaks_in_the_middle_gives_each_record_once(rows_file, monk
     request = Request(fs=FS)
     (file,) = find_files([str(rows_file)])
     addresses = list(addresses_of(file, request))
-    whole = reading._from_parquet
+    whole = reading.read_samples
 
     def breaking(some, request):
         yield from islice(whole(some, request), 3)
         raise OSError("the line is cut")
 
-    monkeypatch.setattr(reading, "_from_parquet", breaking)
+    monkeypatch.setattr(reading, "read_samples", breaking)
     told = list(reading.read_records(addresses, request))
     assert [read.address for read in told] == addresses
     assert [read.reason for read in told] == [""] * 3 + ["OSError: the line is cut"] * 5

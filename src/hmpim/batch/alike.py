@@ -2,102 +2,237 @@
 
 The first records of a stimulus are identified one by one; what they share is learnt from them
 (`hmpim.identify.fleet`) and kept in the process for the tasks that follow. A record for which that
-does not hold, for whatever reason, is identified one by one as well.
+does not hold, for whatever reason, is identified one by one as well. Of records that one file holds
+the first alone is made a `Record`: the others are compared with it, sample by sample.
 """
 
 import hashlib
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from hmpim.batch.reading import Read
+from hmpim.batch.reading import Read, recorded
 from hmpim.batch.request import Request
-from hmpim.batch.rows import Row, fleet_rows
+from hmpim.batch.rows import Row, fleet_table
+from hmpim.batch.samples import Samples
 from hmpim.identify import PairIdentification, excited_band
 from hmpim.identify.fleet import Fleet, fit_fleet, learn_fleet
 from hmpim.identify.threads import one_thread
 from hmpim.record import Record
 
-__all__ = ["identified_together"]
+__all__ = ["Together", "identified_together"]
 
 _LEARNT_FROM = 16
 _WORTH = 48
-"""Records of one stimulus in a task from which it pays to learn what they share."""
+"""Records of one stimulus that a process has met from which it pays to learn what they share."""
 
 _KEPT = 8
 _CLOCK = 1e-6
 """Share of a sample by which a stamp may be off a uniform clock."""
 
 _FLEETS: dict[str, Fleet | None] = {}
+_FIRST: dict[str, list[PairIdentification | None]] = {}
+"""What `identify` said of the first records of a stimulus, by its digest."""
 
 One = Callable[[Read], tuple[Sequence[Row], PairIdentification | None]]
+Told = Callable[[Read | Samples], Mapping[str, str]]
 
 
-def identified_together(reads: Sequence[Read], request: Request, one: One) -> Iterator[Row]:
-    """Rows of the records of a task, those of one stimulus done together.
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Together:
+    """What became of the records of a task.
 
     Parameters
     ----------
-    reads : sequence of Read
+    rows : sequence of mapping
+        Of the records that were identified one by one.
+    tables : sequence of pyarrow.Table
+        Of those that were done together.
+    """
+
+    rows: Sequence[Row]
+    tables: Sequence[Any]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Group:
+    """Records of one stimulus."""
+
+    key: str
+    record: Record
+    like: Samples | None
+    """The first of them, as others may be; None where it had to be mended."""
+    items: list[Read | Samples] = field(default_factory=list)
+    outputs: list[NDArray[np.float64]] = field(default_factory=list)
+
+    def takes(self, samples: Samples) -> bool:
+        """Whether samples are as the first but for the output, and that is whole."""
+        like, output = self.like, self.record.outputs[0]
+        if like is None or like.fs != samples.fs or like.units != samples.units:
+            return False
+        if like.arrays.keys() != samples.arrays.keys():
+            return False
+        values = samples.arrays[output.name]
+        return (
+            all(
+                name == output.name or np.array_equal(one, samples.arrays[name])
+                for name, one in like.arrays.items()
+            )
+            and values.size == output.values.size
+            and bool(np.isfinite(values).all())
+        )
+
+    def add(self, item: Read | Samples, values: NDArray[np.float64]) -> None:
+        self.items.append(item)
+        self.outputs.append(values)
+
+
+def identified_together(
+    items: Sequence[Read | Samples],
+    request: Request,
+    one: One,
+    *,
+    told: Told,
+    metadata: Sequence[str] = (),
+) -> Together:
+    """Identify the records of a task, those of one stimulus together.
+
+    Parameters
+    ----------
+    items : sequence of Read or Samples
         What was read.
     request : Request
         What is asked.
     one : callable
         Identifies a record by itself; gives its rows, and its pair if it has one.
+    told : callable
+        Metadata of a record.
+    metadata : sequence of str
+        Columns of metadata.
     """
-    groups: dict[str, list[Read]] = {}
-    for read in reads:
-        groups.setdefault(_stimulus(read, request), []).append(read)
-    for key, some in groups.items():
-        left = some
-        if key and key not in _FLEETS and len(some) >= _WORTH:
-            rows: list[Row] = []
-            pairs: list[PairIdentification] = []
-            for read in some[:_LEARNT_FROM]:
-                found, pair = one(read)
-                rows += found
-                pairs += [pair] if pair is not None else []
-            yield from rows
-            _keep(key, _learnt(some[0].record, pairs))
-            left = some[_LEARNT_FROM:]
-        fleet = _FLEETS.get(key)
+    groups, single = _grouped(items, request)
+    rows = [row for read in single for row in one(read)[0]]
+    tables: list[Any] = []
+    for group in groups:
+        left = list(range(len(group.items)))
+        if group.key not in _FLEETS:
+            left = _learn_from(group, request, one, rows)
+        fleet = _FLEETS.get(group.key)
         if fleet is not None and left:
-            yield from _by_fleet(fleet, left, one)
-        else:
-            for read in left:
-                yield from one(read)[0]
+            table, left = _by_fleet(fleet, group, left, request, told=told, metadata=metadata)
+            tables.append(table)
+        for i in left:
+            rows += one(_read(group.items[i], request))[0]
+    return Together(rows=rows, tables=tables)
 
 
-def _by_fleet(fleet: Fleet, reads: Sequence[Read], one: One) -> Iterator[Row]:
+def _grouped(items: Sequence[Read | Samples], request: Request) -> tuple[list[_Group], list[Read]]:
+    """Records by their stimulus, and those that share nothing."""
+    groups: dict[str, _Group] = {}
+    single: list[Read] = []
+    for item in items:
+        if isinstance(item, Samples):
+            known = next((g for g in groups.values() if g.takes(item)), None)
+            if known is not None:
+                known.add(item, item.arrays[known.record.outputs[0].name])
+                continue
+        read = _read(item, request)
+        key = _stimulus(read, request)
+        if not key or read.record is None:
+            single.append(read)
+            continue
+        if key not in groups:
+            plain = not read.record.findings and len(groups) < _KEPT
+            like = item if plain and isinstance(item, Samples) else None
+            groups[key] = _Group(key=key, record=read.record, like=like)
+        groups[key].add(read, read.record.outputs[0].values)
+    return list(groups.values()), single
+
+
+def _read(item: Read | Samples, request: Request) -> Read:
+    return item if isinstance(item, Read) else recorded(item, request)
+
+
+def _learn_from(group: _Group, request: Request, one: One, rows: list[Row]) -> list[int]:
+    """Identify the first records of a stimulus, learn from them, and return which are left."""
+    first = _FIRST.pop(group.key, [])
+    count = len(group.items)
+    worth = len(first) + count >= _WORTH
+    needed = max(_LEARNT_FROM - len(first), 0) if worth else count
+    for item in group.items[:needed]:
+        found, pair = one(_read(item, request))
+        rows += found
+        first.append(pair)
+    if worth and len(first) >= _LEARNT_FROM:
+        pairs = [pair for pair in first[:_LEARNT_FROM] if pair is not None]
+        _keep(_FLEETS, group.key, _learnt(group.record, pairs))
+    else:
+        _keep(_FIRST, group.key, first)
+    return list(range(min(needed, count), count))
+
+
+def _by_fleet(
+    fleet: Fleet,
+    group: _Group,
+    some: list[int],
+    request: Request,
+    *,
+    told: Told,
+    metadata: Sequence[str],
+) -> tuple[Any, list[int]]:
+    """The table of the records that can be done together, and those that cannot."""
     begin = time.thread_time()
-    records = [read.record for read in reads if read.record is not None]
-    channels = (records[0].inputs[0], records[0].outputs[0])
+    record, items = group.record, [group.items[i] for i in some]
+    outputs = np.stack([group.outputs[i] for i in some])
+    units = (record.inputs[0].unit, record.outputs[0].unit)
     with one_thread():
-        fit = fit_fleet(
-            fleet,
-            np.stack([record.outputs[0].values for record in records]),
-            units=(channels[0].unit, channels[1].unit),
-        )
-    each = (time.thread_time() - begin) / len(records)
-    yield from fleet_rows(reads, fleet, fit, seconds=each)
-    for read, sound in zip(reads, fit.sound, strict=True):
-        if not sound:
-            yield from one(read)[0]
+        fit = fit_fleet(fleet, outputs, units=units)
+    digests = _digests(record, items, outputs, request)
+    table = fleet_table(
+        [item.address for item in items],
+        [told(item) for item in items],
+        record,
+        fleet,
+        fit,
+        digests=digests,
+        metadata=metadata,
+        seconds=(time.thread_time() - begin) / len(items),
+    )
+    return table, [i for i, sound in zip(some, fit.sound.tolist(), strict=True) if not sound]
 
 
-def _learnt(record: Record | None, pairs: Sequence[PairIdentification]) -> Fleet | None:
-    assert record is not None
+def _digests(
+    record: Record,
+    items: Sequence[Read | Samples],
+    outputs: NDArray[np.float64],
+    request: Request,
+) -> list[str]:
+    """Digest of each record; of those that differ in the output's values alone, all at once."""
+    at_once = len(record.channels) == 2
+    told = record.sha256_with(outputs) if at_once else [""] * len(items)
+    for i, item in enumerate(items):
+        if not at_once or isinstance(item, Read):
+            own = _read(item, request).record
+            assert own is not None
+            told[i] = own.sha256
+    return told
+
+
+def _learnt(record: Record, pairs: Sequence[PairIdentification]) -> Fleet | None:
     u = record.inputs[0].values
     band = record.band or excited_band(u, record.fs)
     with one_thread():
         return learn_fleet(u, pairs, fs=record.fs, band=band)
 
 
-def _keep(key: str, fleet: Fleet | None) -> None:
-    while len(_FLEETS) >= _KEPT:
-        del _FLEETS[next(iter(_FLEETS))]
-    _FLEETS[key] = fleet
+def _keep(known: dict[str, Any], key: str, value: Any) -> None:
+    while len(known) >= _KEPT:
+        del known[next(iter(known))]
+    known[key] = value
 
 
 def _stimulus(read: Read, request: Request) -> str:
@@ -114,7 +249,7 @@ def _stimulus(read: Read, request: Request) -> str:
     if np.abs(source.time - uniform).max() * record.fs > _CLOCK:
         return ""
     digest = hashlib.sha256(request.digest.encode())
-    told = (record.fs, record.band, record.intersample, source.name, source.unit, output.unit)
-    digest.update(repr(told).encode())
+    names = (source.name, source.unit, output.name, output.unit)
+    digest.update(repr((record.fs, record.band, record.intersample, names)).encode())
     digest.update(source.values.tobytes())
     return digest.hexdigest()

@@ -2,21 +2,24 @@
 
 import hashlib
 import json
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import fields
 from functools import cache
 from typing import Any
+
+import numpy as np
 
 from hmpim.batch.addresses import Address
 from hmpim.batch.reading import Read
 from hmpim.identify import Estimate, Identification, Parameters
 from hmpim.identify.fleet import Fleet, FleetFit
+from hmpim.record import Record
 
 __all__ = [
     "PARAMETERS",
     "Row",
     "failed",
-    "fleet_rows",
+    "fleet_table",
     "group_rows",
     "left_out",
     "rows_of",
@@ -178,44 +181,76 @@ def _key(name: str) -> str:
     return hashlib.sha256(name.encode()).hexdigest()[:32]
 
 
-def fleet_rows(
-    reads: Sequence[Read], fleet: Fleet, fit: FleetFit, *, seconds: float
-) -> Iterator[dict[str, Any]]:
-    """Rows of the records that a fit of all together tells of; those it does not are left out.
+def fleet_table(
+    addresses: Sequence[Address],
+    told: Sequence[Mapping[str, str]],
+    record: Record,
+    fleet: Fleet,
+    fit: FleetFit,
+    *,
+    digests: Sequence[str],
+    metadata: Sequence[str],
+    seconds: float,
+) -> Any:
+    """An Arrow table of the records that a fit of all together tells of; the others are left out.
 
     Parameters
     ----------
-    reads : sequence of Read
-        The records, in the order of the fit.
+    addresses : sequence of Address
+        Where the records are, in the order of the fit.
+    told : sequence of mapping of str to str
+        Metadata of each.
+    record : Record
+        One of them: the others differ in the output's values alone.
     fleet : Fleet
         What they share.
     fit : FleetFit
         Their parameters.
+    digests : sequence of str
+        `Record.sha256` of each.
+    metadata : sequence of str
+        Columns of metadata.
     seconds : float
         Processor time for each.
     """
-    for i, (read, parameters) in enumerate(zip(reads, fit.parameters, strict=True)):
-        if parameters is None or read.record is None:
-            continue
-        codes = [finding.code for finding in read.record.findings]
-        source, output = read.record.inputs[0], read.record.outputs[0]
-        yield {
-            **_common(read.address, read.metadata),
-            "sha256": read.record.sha256,
-            "input": source.name,
-            "output": output.name,
-            "input_unit": source.unit,
-            "output_unit": output.unit,
-            "structure": fleet.structure.name,
-            "intersample": fit.intersample[i],
-            "verdict": "ok",
-            "fs": fleet.fs,
-            "samples": read.record.samples,
-            "fit_percent": float(fit.fit_percent[i]),
-            "seconds": seconds,
-            "warnings": codes + ["intersample"] * bool(fit.undetermined[i]),
-            **_figures(parameters),
-        }
+    import pyarrow as pa
+
+    keep = np.flatnonzero(fit.sound)
+    some, count = keep.tolist(), int(keep.size)
+    source, output = record.inputs[0], record.outputs[0]
+    codes = [finding.code for finding in record.findings]
+    columns: dict[str, Any] = {
+        "key": [addresses[i].digest for i in some],
+        "record": [addresses[i].name for i in some],
+        "sha256": [digests[i] for i in some],
+        "intersample": [fit.intersample[i] for i in some],
+        "fit_percent": fit.fit_percent[keep],
+        "warnings": [[*codes, *fit.codes[i]] for i in some],
+        **{f"meta_{name}": [told[i].get(name) for i in some] for name in metadata},
+    }
+    common = {
+        "input": source.name, "output": output.name, "input_unit": source.unit,
+        "output_unit": output.unit, "structure": fleet.structure.name, "verdict": "ok",
+        "fs": fleet.fs, "samples": record.samples, "seconds": seconds,
+    }  # fmt: skip
+    columns |= {name: [value] * count for name, value in common.items()}
+    for name, column in fit.columns.items():
+        absent = np.isnan(column.value[keep])
+        for end in ("value", "std", "low", "high"):
+            values = getattr(column, end)[keep]
+            label = name if end == "value" else f"{name}_{end}"
+            columns[label] = pa.array(values, mask=~np.isfinite(values))
+        columns[f"{name}_doubtful"] = pa.array(np.zeros(count, dtype=bool), mask=absent)
+    whole = schema(tuple(metadata))
+    return pa.table(
+        [
+            pa.array(columns[field.name], type=field.type)
+            if field.name in columns
+            else pa.nulls(count, field.type)
+            for field in whole
+        ],
+        schema=whole,
+    )
 
 
 def _figures(parameters: Parameters) -> dict[str, Any]:

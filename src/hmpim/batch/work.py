@@ -2,15 +2,17 @@
 
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 from hmpim.batch.addresses import Address
-from hmpim.batch.alike import identified_together
+from hmpim.batch.alike import Together, identified_together
 from hmpim.batch.parts import PARTS, part_name, write_part
-from hmpim.batch.reading import Read, read_records, reason_of
+from hmpim.batch.reading import Read, read_items, recorded
 from hmpim.batch.request import Request
 from hmpim.batch.rows import Row, failed, rows_of, table_of
+from hmpim.batch.samples import Samples, reason_of
 from hmpim.identify import PairIdentification, identify
 
 __all__ = ["Done", "Task", "do_task", "give_up"]
@@ -85,19 +87,14 @@ def do_task(task: Task) -> Done:
     if task.path.exists():
         return Done(records=len(task.addresses))
     begin = time.perf_counter()
-    reads = [_with_metadata(read, task) for read in read_records(task.addresses, task.request)]
+    items = list(read_items(task.addresses, task.request))
     read_by = time.perf_counter()
-    if task.request.keep == "parameters":
-        rows = list(
-            identified_together(reads, task.request, lambda read: _identified(read, task.request))
-        )
-    else:
-        rows = [row for read in reads for row in _identified(read, task.request)[0]]
+    found = _found(task, items)
     done_by = time.perf_counter()
-    write_part(table_of(rows, task.metadata), task.path)
+    write_part(_table(found, task), task.path)
     return Done(
         records=len(task.addresses),
-        failures=sum(row.get("reason") is not None for row in rows),
+        failures=sum(row.get("reason") is not None for row in found.rows),
         reading=read_by - begin,
         identifying=done_by - read_by,
         writing=time.perf_counter() - done_by,
@@ -112,10 +109,29 @@ def give_up(task: Task, reason: str) -> Done:
     return Done(records=len(task.addresses), failures=len(task.addresses))
 
 
-def _with_metadata(read: Read, task: Task) -> Read:
-    told = {**read.metadata, **_joined(read.address, task)}
-    kept = {name: told[name] for name in task.metadata if name in told}
-    return Read(address=read.address, record=read.record, reason=read.reason, metadata=kept)
+def _found(task: Task, items: Sequence[Read | Samples]) -> Together:
+    """What is said of each record, together where that is asked for and pays."""
+
+    def told(item: Read | Samples) -> Mapping[str, str]:
+        own = {**item.metadata, **_joined(item.address, task)}
+        return {name: own[name] for name in task.metadata if name in own}
+
+    def one(read: Read) -> tuple[Sequence[Row], PairIdentification | None]:
+        return _identified(replace(read, metadata=told(read)), task.request)
+
+    if task.request.keep == "parameters":
+        return identified_together(items, task.request, one, told=told, metadata=task.metadata)
+    reads = (item if isinstance(item, Read) else recorded(item, task.request) for item in items)
+    return Together(rows=[row for read in reads for row in one(read)[0]], tables=())
+
+
+def _table(found: Together, task: Task) -> Any:
+    """One table of all."""
+    import pyarrow as pa
+
+    if not found.rows:
+        return pa.concat_tables(found.tables)
+    return pa.concat_tables([table_of(found.rows, task.metadata), *found.tables])
 
 
 def _joined(address: Address, task: Task) -> Mapping[str, str]:

@@ -4,16 +4,18 @@
 fitted at once by the same least squares as `hmpim.identify`, in a few numbers instead of thousands.
 The basis is the stimulus' transforms and Gram matrix, made once for all. Every assumption on what
 the stimulus does between its samples is tried, and what the record does not exclude widens the
-intervals, as `hmpim.identify.spanned` does it.
+intervals, as `hmpim.identify.spanned` does it. The one record in twenty that asks for one more pole
+by chance is fitted with it, as `identify` does.
 
 The parameters and their errors are those of a fit to the record itself, as long as what the basis
 and the polynomials are off is small beside a standard deviation: `FleetFit.sound` says where it is,
 where the unit lies inside the box, where the residual is white and does not follow the input, and
-where nothing asks for one more pole. All other records are for `identify`.
+where no pole is to be added. All other records are for `identify`.
 """
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 import scipy
@@ -21,15 +23,17 @@ from numpy.typing import NDArray
 
 from hmpim.identify.fitting.growth import BY_CHANCE
 from hmpim.identify.fitting.trial import CLEARLY, LIKELIER
+from hmpim.identify.fleet_fits import Errors, Fits, errors_of, fitted_all
+from hmpim.identify.fleet_pole import with_tails
 from hmpim.identify.judgement.between_samples import SHIFT, SIZES, WIDE
 from hmpim.identify.learnt import Fleet, Member, learn_fleet
 from hmpim.identify.result import Estimate, Parameters
 from hmpim.identify.spanned import MOVES
 from hmpim.identify.uncertainty import noise_estimate
-from hmpim.identify.whiteness import is_white, misfit
+from hmpim.identify.whiteness import are_white, misfits
 from hmpim.record import Intersample
 
-__all__ = ["Fleet", "FleetFit", "fit_fleet", "learn_fleet"]
+__all__ = ["Column", "Fleet", "FleetFit", "fit_fleet", "learn_fleet"]
 
 Real = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -46,7 +50,52 @@ A held input's response bends where the delay passes a whole sample, which no po
 _CHANCE = 1e-3
 """Chance at which a record is taken as one whose residual follows the input."""
 
-_STEPS = 12
+_ASKS = 0.98 * BY_CHANCE
+"""Standard deviations from which one more pole is asked for: a little early, as the basis is not
+exact; the fit to the record itself then decides."""
+
+_OTHERWISE = -3.9
+"""Standard deviations below which a record asks for what no pole can be."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Column:
+    """One parameter of many records, each array of shape (N,); NaN where there is none.
+
+    Parameters
+    ----------
+    value, std, low, high : ndarray, shape (N,)
+        As `Estimate` has them; `std` is NaN where an interval covers several models.
+    unit : str
+        Of all of them.
+    """
+
+    value: Real
+    std: Real
+    low: Real
+    high: Real
+    unit: str
+
+    @classmethod
+    def empty(cls, count: int, unit: str) -> "Column":
+        """So many records without a figure."""
+        return cls(**{k: np.full(count, np.nan) for k in _ENDS}, unit=unit)
+
+    def estimate(self, i: int) -> Estimate | None:
+        """Of one record."""
+        value, std, low, high = (float(getattr(self, end)[i]) for end in _ENDS)
+        if np.isnan(value):
+            return None
+        std_ = None if np.isnan(std) else std
+        return Estimate(value=value, std=std_, ci95=(low, high), unit=self.unit)
+
+    def put(self, some: NDArray[np.intp], other: "Column", kept: Flags) -> None:
+        """Take those records of another that are kept."""
+        for end in _ENDS:
+            getattr(self, end)[some[kept]] = getattr(other, end)[kept]
+
+
+_ENDS = ("value", "std", "low", "high")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -55,37 +104,30 @@ class FleetFit:
 
     Parameters
     ----------
-    parameters : tuple of Parameters
-        Of each record; without the paper's delay. Those of a record that is not sound are None.
+    columns : mapping of str to Column
+        Parameters by name, without the paper's delay; NaN in those of a record that is not sound.
     sound : ndarray of bool, shape (N,)
         Whether they are what `identify` would say.
     intersample : tuple of {'zoh', 'foh', 'bandlimited'}
         The likeliest assumption for each.
-    undetermined : ndarray of bool, shape (N,)
-        Whether another one would move the delay and is not excluded.
+    codes : tuple of tuple of str
+        Codes of what `identify` would say beside it: 'intersample' where another assumption
+        would move the delay and is not excluded, 'structure' where one more pole is as likely.
     fit_percent : ndarray, shape (N,)
         100 (1 - ||y - ŷ|| / ||y - mean y||).
     """
 
-    parameters: tuple[Parameters | None, ...]
+    columns: Mapping[str, Column]
     sound: Flags
     intersample: tuple[Intersample, ...]
-    undetermined: Flags
+    codes: tuple[tuple[str, ...], ...]
     fit_percent: Real
 
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class _Fits:
-    """All records fitted under one assumption; first axis: the record."""
-
-    member: Member
-    theta: Real
-    gain: Real
-    bias: Real
-    cost: Real
-    left: Real
-    """What the fit leaves inside the basis."""
-    figures: Mapping[str, Real]
+    def parameters(self, i: int) -> Parameters | None:
+        """Return those of one record; None if it is not sound."""
+        if not self.sound[i]:
+            return None
+        return Parameters(**{name: column.estimate(i) for name, column in self.columns.items()})
 
 
 def fit_fleet(fleet: Fleet, outputs: Real, *, units: tuple[str, str] = ("", "")) -> FleetFit:
@@ -108,10 +150,12 @@ def fit_fleet(fleet: Fleet, outputs: Real, *, units: tuple[str, str] = ("", ""))
     means = outputs.mean(axis=1)
     centred = outputs - means[:, None]
     power = np.einsum("ij,ij->i", centred, centred)
-    fits = [_fitted(fleet, member, centred, means, power) for member in fleet.members]
+    fits = fitted_all(fleet, centred, means, power)
     behind, chosen = _weighed(fleet, fits, n)
-    found: list[Parameters | None] = [None] * count
-    sound, undetermined = np.zeros(count, dtype=bool), np.zeros(count, dtype=bool)
+    names = (*fleet.names, "scale_factor", "bias", "noise_std")
+    columns = {name: Column.empty(count, _unit(name, units)) for name in names}
+    sound = np.zeros(count, dtype=bool)
+    codes: list[tuple[str, ...]] = [()] * count
     for k, fit in enumerate(fits):
         some = np.flatnonzero(chosen == k)
         if some.size == 0:
@@ -121,46 +165,22 @@ def fit_fleet(fleet: Fleet, outputs: Real, *, units: tuple[str, str] = ("", ""))
             for j, rival in enumerate(fits)
             if j != k
         ]
-        told, sound[some], undetermined[some] = _told(fleet, fit, some, open_, centred[some], units)
-        for i, parameters in zip(some.tolist(), told, strict=True):
-            found[i] = parameters
+        told, sound[some], said = _told(fleet, fit, some, open_, outputs[some], units)
+        for name, column in told.items():
+            columns[name].put(some, column, sound[some])
+        for i, own in zip(some.tolist(), said, strict=True):
+            codes[i] = own
     cost = np.choose(chosen, [fit.cost for fit in fits])
     return FleetFit(
-        parameters=tuple(found),
+        columns=columns,
         sound=sound,
         intersample=tuple(fleet.members[k].intersample for k in chosen.tolist()),
-        undetermined=undetermined,
+        codes=tuple(codes),
         fit_percent=100.0 * (1.0 - np.sqrt(cost / np.maximum(power, np.finfo(float).tiny))),
     )
 
 
-def _fitted(fleet: Fleet, member: Member, centred: Real, means: Real, power: Real) -> _Fits:
-    """Fit all records under one assumption."""
-    z = centred @ member.basis.T
-    outside = np.maximum(power - np.einsum("ij,ij->i", z, z), 0.0)
-    theta = _descended(fleet, member, z, outside)
-    value, _ = member.surface.at(theta)
-    g = value[:, :-1]
-    gain = np.einsum("ij,ij->i", z, g) / np.einsum("ij,ij->i", g, g)
-    left = z - gain[:, None] * g
-    bias = means - gain * value[:, -1]
-    values, _ = fleet.figures.at(theta)
-    return _Fits(
-        member=member,
-        theta=theta,
-        gain=gain,
-        bias=bias,
-        cost=outside + np.einsum("ij,ij->i", left, left),
-        left=left,
-        figures={
-            **dict(zip(fleet.names, values.T, strict=True)),
-            "scale_factor": gain,
-            "bias": bias,
-        },
-    )
-
-
-def _weighed(fleet: Fleet, fits: list[_Fits], n: int) -> tuple[Real, NDArray[np.intp]]:
+def _weighed(fleet: Fleet, fits: list[Fits], n: int) -> tuple[Real, NDArray[np.intp]]:
     """Criterion of each record under each assumption, and which is taken."""
     tiny = np.finfo(float).tiny
     criterion = np.stack([n * np.log(np.maximum(fit.cost, tiny)) for fit in fits])
@@ -175,20 +195,19 @@ def _weighed(fleet: Fleet, fits: list[_Fits], n: int) -> tuple[Real, NDArray[np.
 
 def _told(
     fleet: Fleet,
-    fit: _Fits,
+    fit: Fits,
     some: NDArray[np.intp],
-    others: list[tuple[_Fits, Flags]],
-    centred: Real,
+    others: list[tuple[Fits, Flags]],
+    outputs: Real,
     units: tuple[str, str],
-) -> tuple[list[Parameters | None], Flags, Flags]:
-    """Parameters of some records under the assumption that is taken; which are sound; which open.
+) -> tuple[dict[str, Column], Flags, list[tuple[str, ...]]]:
+    """Parameters of some records under the assumption that is taken; which are sound; what is said.
 
     The records are `some` of those fitted; `others` tells which other assumptions stay possible.
     """
-    member, theta, cost = fit.member, fit.theta[some], fit.cost[some]
-    errors = _errors(fleet, fit, some)
-    sound = _is_plain(member, theta, fit.gain[some], errors.variance) & errors.exact
-    sound &= ~_asks_for_a_pole(fit, some, errors)
+    theta = fit.theta[some]
+    errors = errors_of(fleet, fit, some)
+    sound = _is_plain(fit.member, theta, fit.gain[some], errors.variance) & errors.exact
     apart = np.zeros(some.size, dtype=bool)
     for rival, stays in others:
         there = rival.theta[some]
@@ -199,115 +218,98 @@ def _told(
     highest = min(fleet.band[1], fleet.fs / 2)
     if "natural_frequency" in fleet.names:  # beyond the band no peak is told
         sound &= fit.figures["natural_frequency"][some] < highest
+    asked = _asks_for_a_pole(fit, some, errors)
+    sound &= asked > _OTHERWISE
+    model = fit.gain[some, None] * fit.member.surface.values(theta)[:, :-1] @ fit.member.basis
+    residual = outputs - outputs.mean(axis=1, keepdims=True) - model
+    sound[sound] = _leaves_noise(fleet, theta[sound], residual[sound])
+    alone, spanned = _columns(fleet, fit, some, others, errors, units)
+    codes = [("intersample",) * moved for moved in apart.tolist()]
+    for i in np.flatnonzero(sound & (asked > _ASKS)).tolist():
+        own = Parameters(**{name: column.estimate(i) for name, column in alone.items()})
+        tails = with_tails(fleet, fit.member, theta[i], outputs[i], own, highest=highest)
+        sound[i] = tails is not None
+        if tails is not None and tails.open:
+            codes[i] = ("structure", *codes[i])
+            _widen(spanned, i, own, tails.parameters)
+    for name in SIZES:
+        if name in spanned:
+            sound &= ~_is_wide(spanned[name])
+    for name in spanned:
+        if name.startswith("bandwidth"):
+            beyond = spanned[name].value > highest
+            for end in _ENDS:
+                getattr(spanned[name], end)[beyond] = np.nan
+    return spanned, sound, codes
+
+
+def _columns(
+    fleet: Fleet,
+    fit: Fits,
+    some: NDArray[np.intp],
+    others: list[tuple[Fits, Flags]],
+    errors: Errors,
+    units: tuple[str, str],
+) -> tuple[dict[str, Column], dict[str, Column]]:
+    """What some fits tell alone, and with intervals that cover the other assumptions."""
     half = float(scipy.special.stdtrit(errors.freedom, 0.975))
-    columns = {}
-    for name, deviation in errors.deviations.items():
-        value = fit.figures[name][some]
+    alone, spanned = {}, {}
+    for name, std in errors.deviations.items():
+        value, unit = fit.figures[name][some], _unit(name, units)
+        column = partial(Column, value=value, unit=unit)
         moved = [np.where(stays, rival.figures[name][some] - value, 0.0) for rival, stays in others]
-        columns[name] = _column(value, deviation, half, np.array([*moved, 0.0 * value]))
-        if name in SIZES:
-            sound &= ~_is_wide(columns[name])
-    residual = centred - (fit.gain[some] * member.surface.at(theta)[0][:, :-1].T).T @ member.basis
-    sound &= _leaves_noise(fleet, theta, residual, sound)
-    found: list[Parameters | None] = [None] * some.size
-    for i in np.flatnonzero(sound).tolist():
-        told = {
-            name: column.estimate(i, _unit(name, units))
-            for name, column in columns.items()
-            if not name.startswith("bandwidth") or column.value[i] <= highest
-        }
-        noise = noise_estimate(float(cost[i]), freedom=errors.freedom, share=1.0, unit=units[1])
-        found[i] = Parameters(**told, noise_std=noise)
-    return found, sound, apart
+        every = np.array([0.0 * value, *moved])
+        below, above = every.min(axis=0), every.max(axis=0)
+        widened = np.maximum(above, -below) > MOVES * half * std
+        low, high = value - half * std, value + half * std
+        alone[name] = column(std=std, low=low, high=high)
+        spanned[name] = column(
+            std=np.where(widened, np.nan, std),
+            low=np.where(widened, low + below, low),
+            high=np.where(widened, high + above, high),
+        )
+    size = np.sqrt(fit.cost[some])
+    single = noise_estimate(1.0, freedom=errors.freedom, share=1.0)
+    ends = single.ci95 or (None, None)
+    noise = Column(
+        value=size * single.value,
+        std=size * (single.std or np.nan),
+        low=size * (ends[0] or np.nan),
+        high=size * (ends[1] or np.nan),
+        unit=_unit("noise_std", units),
+    )
+    return {**alone, "noise_std": noise}, {**spanned, "noise_std": noise}
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class _Errors:
-    """What the fits of some records leave uncertain; first axis of an array: the record."""
+def _widen(columns: dict[str, Column], i: int, own: Parameters, tails: Parameters) -> None:
+    """Let the intervals of one record cover one more pole, beside the other assumptions."""
+    for name, column in columns.items():
+        tail = getattr(tails, name)
+        if tail is None or tail.ci95 is None or tail is getattr(own, name):
+            continue
+        low, high = tail.ci95
+        if np.isnan(column.std[i]):  # it covers other assumptions as well
+            low, high = min(low, column.low[i]), max(high, column.high[i])
+        else:
+            column.std[i] = tail.spread
+        column.low[i], column.high[i] = low, high
 
-    rows: Real
-    """Derivatives by place and gain, in the basis."""
-    inner: Real
-    """Inverse of their Gram matrix."""
-    variance: Real
-    freedom: int
-    deviations: Mapping[str, Real]
-    exact: Flags
-    """Whether the polynomials of what is read off are exact enough."""
 
-
-def _errors(fleet: Fleet, fit: _Fits, some: NDArray[np.intp]) -> _Errors:
-    """Standard deviations of all that is told, to first order."""
-    n, theta, gain = fleet.u.size, fit.theta[some], fit.gain[some]
-    value, slope = fit.member.surface.at(theta)
-    size = theta.shape[1]
-    freedom = n - size - 2
-    variance = fit.cost[some] / freedom
-    rows = np.concatenate([gain[:, None, None] * slope[:, :, :-1], value[:, None, :-1]], axis=1)
-    inner = np.linalg.pinv(np.einsum("iaj,ibj->iab", rows, rows), rcond=1e-13, hermitian=True)
-    covariance = variance[:, None, None] * inner
-    _, steep = fleet.figures.at(theta)
-    spread = np.einsum("iak,iab,ibk->ik", steep, covariance[:, :size, :size], steep)
-    deviations = np.sqrt(np.maximum(spread, 0.0))
-    # The bias is the mean less what the model makes of it; the mean's own error is apart.
-    by_mean = -np.concatenate([gain[:, None] * slope[:, :, -1], value[:, -1:]], axis=1)
-    of_bias = np.einsum("ia,iab,ib->i", by_mean, covariance, by_mean) + variance / n
-    return _Errors(
-        rows=rows,
-        inner=inner,
-        variance=variance,
-        freedom=freedom,
-        deviations={
-            **dict(zip(fleet.names, deviations.T, strict=True)),
-            "scale_factor": np.sqrt(covariance[:, size, size]),
-            "bias": np.sqrt(of_bias),
-        },
-        exact=(fleet.figures.error <= _OFF * deviations + 1e-12).all(axis=1),
+def _is_wide(column: Column) -> Flags:
+    """Whether what several models allow is no figure any more."""
+    return np.asarray(
+        np.isnan(column.std) & (column.high - column.low > 2 * WIDE * np.abs(column.value))
     )
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class _Column:
-    """One parameter of many records, each array of shape (N,)."""
-
-    value: Real
-    std: Real
-    low: Real
-    high: Real
-    widened: Flags
-
-    def estimate(self, i: int, unit: str) -> Estimate:
-        """Of one record; an interval that covers several models has no deviation."""
-        return Estimate(
-            value=float(self.value[i]),
-            std=None if self.widened[i] else float(self.std[i]),
-            ci95=(float(self.low[i]), float(self.high[i])),
-            unit=unit,
-        )
-
-
-def _column(value: Real, std: Real, half: float, moved: Real) -> _Column:
-    """Intervals that cover what other assumptions, (k, N), move, as `spanned` widens them."""
-    below, above = np.minimum(moved.min(axis=0), 0.0), np.maximum(moved.max(axis=0), 0.0)
-    widened = np.maximum(above, -below) > MOVES * half * std
-    low = value - half * std + np.where(widened, below, 0.0)
-    high = value + half * std + np.where(widened, above, 0.0)
-    return _Column(value=value, std=std, low=low, high=high, widened=widened)
-
-
-def _is_wide(column: _Column) -> Flags:
-    """Whether what several models allow is no figure any more."""
-    return np.asarray(column.widened & (column.high - column.low > 2 * WIDE * np.abs(column.value)))
-
-
-def _asks_for_a_pole(fit: _Fits, some: NDArray[np.intp], errors: _Errors) -> Flags:
-    """Whether a record asks for one more pole by more than chance, as the score test has it."""
-    row = fit.gain[some, None] * fit.member.grown.at(fit.theta[some])[0]
-    along = np.einsum("iab,ibj,ij->ia", errors.inner, errors.rows, row)
+def _asks_for_a_pole(fit: Fits, some: NDArray[np.intp], errors: Errors) -> Real:
+    """By how many standard deviations records ask for one more pole, as the score test has it."""
+    row = fit.gain[some, None] * fit.member.grown.values(fit.theta[some])
+    along = (errors.inner @ (errors.rows @ row[:, :, None]))[:, :, 0]
     own = row - np.einsum("ia,iaj->ij", along, errors.rows)  # what no other parameter can do
     score = np.einsum("ij,ij->i", own, fit.left[some])
     power = np.einsum("ij,ij->i", own, own) * fit.cost[some] / (errors.freedom - 1)
-    return np.asarray(score > BY_CHANCE * np.sqrt(power))
+    return np.asarray(score / np.sqrt(np.maximum(power, np.finfo(float).tiny)))
 
 
 _UNITS = {
@@ -319,43 +321,11 @@ _UNITS = {
 
 def _unit(name: str, units: tuple[str, str]) -> str:
     given, got = units
-    if name == "bias":
+    if name in ("bias", "noise_std"):
         return got
     if name == "scale_factor":
         return "" if given == got else f"{got or '1'}/{given}" if given else got
     return _UNITS.get(name, "")
-
-
-def _descended(fleet: Fleet, member: Member, z: Real, outside: Real) -> Real:
-    """Gauss-Newton for all records at once, the gain solved exactly at each step."""
-    low, high = member.surface.low, member.surface.high
-    theta = np.tile((low + high) / 2, (z.shape[0], 1))
-    step = np.zeros_like(theta)
-    share = np.ones(z.shape[0])
-    before, best = np.full(z.shape[0], np.inf), theta.copy()
-    for _ in range(_STEPS):
-        value, slope = member.surface.at(theta)
-        g, dg = value[:, :-1], slope[:, :, :-1]
-        square = np.einsum("ij,ij->i", g, g)
-        gain = np.einsum("ij,ij->i", z, g) / square
-        left = z - gain[:, None] * g
-        cost = outside + np.einsum("ij,ij->i", left, left)
-        better = cost < before
-        best[better], before = theta[better], np.minimum(cost, before)
-        rows = gain[:, None, None] * dg
-        along = np.einsum("iaj,ij->ia", rows, g) / square[:, None]
-        rows = rows - along[:, :, None] * g[:, None, :]
-        moment = np.einsum("iaj,ij->ia", rows, left)
-        gram = np.einsum("iaj,ibj->iab", rows, rows)
-        gram += 1e-9 * np.einsum("iaa->ia", gram)[:, :, None] * np.eye(gram.shape[1])
-        fresh = np.linalg.solve(gram, moment[:, :, None])[:, :, 0]
-        step = np.where(better[:, None], fresh, step)
-        share = np.where(better, 1.0, share / 4)
-        gained = np.einsum("ia,ia->i", fresh, moment)
-        if (gained < 1e-6 * cost / fleet.u.size).all():
-            break
-        theta = np.clip(best + share[:, None] * step, low, high)
-    return best
 
 
 def _is_plain(
@@ -366,14 +336,16 @@ def _is_plain(
     return np.asarray(inside & (np.abs(gain) * member.lost <= off * np.sqrt(variance)))
 
 
-def _leaves_noise(fleet: Fleet, theta: Real, residual: Real, asked: Flags) -> Flags:
-    """Which records that are asked for leave white noise that does not follow the stimulus."""
-    plain = asked.copy()
-    band = (fleet.band[0] / fleet.fs, fleet.band[1] / fleet.fs)
-    for i in np.flatnonzero(asked).tolist():
-        left = residual[i]
-        plain[i] = (
-            is_white(left)
-            and misfit(fleet.u, left, delay=float(theta[i, 0]), band=band).probability > _CHANCE
-        )
-    return plain
+def _leaves_noise(fleet: Fleet, theta: Real, residual: Real) -> Flags:
+    """Which residuals are white noise that does not follow the stimulus."""
+    if residual.shape[0] == 0:
+        return np.zeros(0, dtype=bool)
+    spectra = scipy.fft.rfft(residual)
+    _, probability = misfits(
+        scipy.fft.rfft(fleet.u - fleet.u.mean()),
+        spectra,
+        samples=fleet.u.size,
+        delays=theta[:, 0],
+        band=(fleet.band[0] / fleet.fs, fleet.band[1] / fleet.fs),
+    )
+    return np.asarray(are_white(residual, spectra) & (probability > _CHANCE))

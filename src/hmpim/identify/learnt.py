@@ -20,10 +20,10 @@ from hmpim.identify.readings import figures_at
 from hmpim.identify.result import PairIdentification
 from hmpim.identify.surface import Surface, places_in
 from hmpim.model.dynamics import STRUCTURES, Structure
-from hmpim.model.sampled import prepare_input
+from hmpim.model.sampled import SampledInput, prepare_input
 from hmpim.record import BETWEEN, Intersample
 
-__all__ = ["Fleet", "Member", "learn_fleet"]
+__all__ = ["Fleet", "Member", "learn_fleet", "theta_at"]
 
 Real = NDArray[np.float64]
 
@@ -70,6 +70,8 @@ class Member:
         Places in the basis of what one more pole adds, over the square of its time constant.
     lost : float
         Largest root of the sum of squares of what the basis and the surface leave out.
+    source : SampledInput
+        The stimulus, prepared.
     """
 
     intersample: Intersample
@@ -77,6 +79,7 @@ class Member:
     surface: Surface
     grown: Surface
     lost: float
+    source: SampledInput
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -143,7 +146,7 @@ def learn_fleet(
     low = np.min([box[0] for box in boxes.values()], axis=0)
     high = np.max([box[1] for box in boxes.values()], axis=0)
     places = places_in(low, high, _DEGREE)
-    read = [_figures_at(_theta(place), structure, fs) for place in places]
+    read = [_figures_at(theta_at(place), structure, fs) for place in places]
     names = tuple(read[0])
     if any(tuple(r) != names for r in read):
         return None  # a figure that some units of the box have and others do not
@@ -216,8 +219,8 @@ def _place(pair: PairIdentification, fs: float) -> Real:
     return np.array([pair.delay.value * fs, np.log(omega / fs), np.log(zeta)])
 
 
-def _theta(place: Real) -> Real:
-    """Parameters of a fit at a place.
+def theta_at(place: Real) -> Real:
+    """Return the parameters of a fit at a place of a surface.
 
     ω and ζ move more independently of each other than the fit's own, so that a box is smaller.
     """
@@ -227,13 +230,12 @@ def _theta(place: Real) -> Real:
 
 def _member(u: Real, structure: Structure, mode: Intersample, low: Real, high: Real) -> Member:
     places = places_in(low, high, _DEGREE)
-    problem = Problem(
-        source=prepare_input(u, mode), y=np.zeros(u.size), valid=None, longest_delay=float(u.size)
-    )
+    source = prepare_input(u, mode)
+    problem = Problem(source=source, y=np.zeros(u.size), valid=None, longest_delay=float(u.size))
     rows, grown = np.empty((places.shape[0], u.size)), np.empty((places.shape[0], u.size))
     richer = one_more_pole(structure)
     for k, place in enumerate(places):
-        theta = _theta(place)
+        theta = theta_at(place)
         lag = _PROBE * float(np.exp(-place[1]))  # over 1/ω, the unit's own
         rows[k] = Part(problem, structure, theta).rows[0]
         there = Part(problem, richer, with_pole(structure, theta, lag)).rows[0]
@@ -251,6 +253,7 @@ def _member(u: Real, structure: Structure, mode: Intersample, low: Real, high: R
         surface=surface,
         grown=Surface.fitted(low, high, places, grown @ basis.T, degree=_DEGREE),
         lost=float(left + np.linalg.norm(surface.error)),
+        source=source,
     )
 
 

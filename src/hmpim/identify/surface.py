@@ -102,6 +102,11 @@ class Surface:
         rate = 2.0 / (self.high - self.low)
         return rows @ self.weights, (slopes @ self.weights) * rate[None, :, None]
 
+    def values(self, places: Real) -> Real:
+        """Values alone, shape (n, k), at places of shape (n, p)."""
+        first, _ = _polynomials(_scaled(places, self.low, self.high), int(self.powers.max()))
+        return np.asarray(_multiplied(first, self.powers) @ self.weights)
+
     def holds(self, places: Real) -> NDArray[np.bool_]:
         """Which places are inside the box, shape (n,)."""
         return np.asarray(((places > self.low) & (places < self.high)).all(axis=1))
@@ -118,21 +123,30 @@ def _scaled(places: Real, low: Real, high: Real) -> Real:
 
 def _products(x: Real, powers: NDArray[np.int64]) -> tuple[Real, Real]:
     """Products of Chebyshev polynomials, (n, c), and their slopes, (n, p, c), at (n, p)."""
-    degree = int(powers.max(initial=0))
-    first = np.ones((degree + 1, *x.shape))
+    first, rate = _polynomials(x, int(powers.max(initial=0)))
+    slopes = np.empty((x.shape[0], x.shape[1], powers.shape[0]))
+    for j in range(x.shape[1]):
+        turned = first.copy()
+        turned[:, j] = rate[:, j]
+        slopes[:, j] = _multiplied(turned, powers)
+    return _multiplied(first, powers), slopes
+
+
+def _multiplied(each: Real, powers: NDArray[np.int64]) -> Real:
+    """Products, (n, c), of what each variable has at each degree, (n, p, degrees)."""
+    out = each[:, 0, powers[:, 0]]
+    for j in range(1, powers.shape[1]):
+        out *= each[:, j, powers[:, j]]
+    return np.asarray(out)
+
+
+def _polynomials(x: Real, degree: int) -> tuple[Real, Real]:
+    """Chebyshev polynomials up to a degree, and their slopes, (n, p, degree + 1), at (n, p)."""
+    first = np.ones((*x.shape, degree + 1))
     rate = np.zeros_like(first)
     if degree:
-        first[1], rate[1] = x, 1.0
+        first[..., 1], rate[..., 1] = x, 1.0
     for k in range(2, degree + 1):
-        first[k] = 2 * x * first[k - 1] - first[k - 2]
-        rate[k] = 2 * first[k - 1] + 2 * x * rate[k - 1] - rate[k - 2]
-    size = x.shape[1]
-    each = [first[powers[:, j], :, j].T for j in range(size)]
-    turned = [rate[powers[:, j], :, j].T for j in range(size)]
-    rows = np.prod(each, axis=0)
-    slopes = np.stack(
-        [np.prod([turned[i] if i == j else each[i] for i in range(size)], axis=0)
-         for j in range(size)],
-        axis=1,
-    )  # fmt: skip
-    return rows, slopes
+        first[..., k] = 2 * x * first[..., k - 1] - first[..., k - 2]
+        rate[..., k] = 2 * first[..., k - 1] + 2 * x * rate[..., k - 1] - rate[..., k - 2]
+    return first, rate

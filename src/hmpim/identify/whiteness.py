@@ -8,12 +8,14 @@ from numpy.typing import NDArray
 
 __all__ = [
     "Misfit",
+    "are_white",
     "autocovariance",
     "autoregressive_spectrum",
     "effective_share",
     "innovation_gain",
     "is_white",
     "misfit",
+    "misfits",
 ]
 
 _LAGS = 25
@@ -219,30 +221,104 @@ def misfit(
     groups : int
         How many groups to cut the band into, at most.
     """
-    n = u.size
-    spectrum_u, spectrum_e = scipy.fft.rfft(u - u.mean()), scipy.fft.rfft(residual)
+    share, probability = misfits(
+        scipy.fft.rfft(u - u.mean()),
+        scipy.fft.rfft(residual)[None],
+        samples=u.size,
+        delays=np.array([delay]),
+        band=band,
+        groups=groups,
+    )
+    return Misfit(share=float(share[0]), probability=float(probability[0]))
+
+
+def misfits(
+    stimulus: NDArray[np.complex128],
+    residuals: NDArray[np.complex128],
+    *,
+    samples: int,
+    delays: NDArray[np.float64],
+    band: tuple[float, float],
+    groups: int = 24,
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Test many residuals of one input as `misfit` does one; shares and probabilities.
+
+    Parameters
+    ----------
+    stimulus : complex ndarray, shape (m,)
+        Transform of the input less its mean.
+    residuals : complex ndarray, shape (k, m)
+        Transforms of the residuals.
+    samples : int
+        Length of each record.
+    delays : ndarray, shape (k,)
+        In samples.
+    band, groups
+        As for `misfit`.
+    """
+    count, n = residuals.shape[0], samples
     first = max(int(np.ceil(band[0] * n)), 1)
-    last = min(int(band[1] * n), spectrum_u.size - 1)
-    bins = np.arange(first, last + 1)
-    width = max(bins.size // groups, 4)
-    groups = bins.size // width
+    last = min(int(band[1] * n), stimulus.size - 1)
+    width = max((last + 1 - first) // groups, 4)
+    groups = max(last + 1 - first, 0) // width
     if groups == 0:
-        return Misfit(share=0.0, probability=1.0)
-    bins = bins[: groups * width]
-    shifted = spectrum_u[bins] * np.exp(-2j * np.pi * bins * delay / n)
-    U = shifted.reshape(groups, width)
-    E = spectrum_e[bins].reshape(groups, width)
+        return np.zeros(count), np.ones(count)
+    bins = np.arange(first, first + groups * width)
+    U = stimulus[bins].reshape(groups, width)
+    E = (residuals[:, bins] * np.exp((2j * np.pi / n) * np.outer(delays, bins))).reshape(
+        count, groups, width
+    )
     power = np.sum(np.abs(U) ** 2, axis=1)
     power = np.where(power > 0, power, 1.0)
-    taken = np.abs(np.sum(U.conj() * E, axis=1) / np.sqrt(power)) ** 2  # of any unit
-    total = np.sum(np.abs(E) ** 2, axis=1)
+    along = np.sum(U.conj() * E, axis=2) / np.sqrt(power)
+    taken = along.real**2 + along.imag**2  # of any unit
+    total = np.sum(E.real**2 + E.imag**2, axis=2)
     noise = (total - taken) / (width - 1)
-    if not np.all(noise > 0):
-        return Misfit(share=0.0, probability=1.0)
+    told = np.all(noise > 0, axis=1)
+    noise, total = np.where(told[:, None], noise, 1.0), np.where(told[:, None], total, 1.0)
     # Fisher's sum over groups: each ratio is F(2, 2 width - 2), whose tail is closed.
     tail = (1.0 + taken / noise / (width - 1)) ** (-(width - 1.0))
-    statistic = -2.0 * np.sum(np.log(np.maximum(tail, 1e-300)))
-    beyond = float(np.sum(taken - noise) / np.sum(total))
-    return Misfit(
-        share=max(beyond, 0.0), probability=float(scipy.special.chdtrc(2 * groups, statistic))
+    statistic = -2.0 * np.sum(np.log(np.maximum(tail, 1e-300)), axis=1)
+    beyond = np.sum(taken - noise, axis=1) / np.sum(total, axis=1)
+    return (
+        np.where(told, np.maximum(beyond, 0.0), 0.0),
+        np.where(told, scipy.special.chdtrc(2 * groups, statistic), 1.0),
     )
+
+
+def are_white(
+    residuals: NDArray[np.float64],
+    spectra: NDArray[np.complex128],
+    *,
+    level: float = 1e-3,
+) -> NDArray[np.bool_]:
+    """Test many residuals of one length as `is_white` does one.
+
+    Parameters
+    ----------
+    residuals : ndarray, shape (k, n)
+        The residuals.
+    spectra : complex ndarray, shape (k, m)
+        Their transforms, which give the correlation of each with itself shifted in a circle.
+    level : float
+        As for `is_white`.
+
+    Examples
+    --------
+    >>> rng = np.random.default_rng(0)
+    >>> noise = rng.standard_normal((2, 1000))
+    >>> noise[1] = np.cumsum(noise[1])
+    >>> are_white(noise, scipy.fft.rfft(noise)).tolist(), is_white(noise[1])
+    ([True, False], False)
+    """
+    n = residuals.shape[1]
+    lags = min(_LAGS, n // 4)
+    if lags == 0:
+        return np.ones(residuals.shape[0], dtype=bool)
+    r = scipy.fft.irfft(spectra.real**2 + spectra.imag**2, n)[:, : lags + 1]
+    for k in range(1, lags + 1):  # less what the end meets at the beginning
+        r[:, k] -= np.einsum("ij,ij->i", residuals[:, :k], residuals[:, n - k :])
+    power = np.where(r[:, :1] > 0, r[:, :1], 1.0)
+    statistic = n * (n + 2) * np.sum((r[:, 1:] / power) ** 2 / (n - np.arange(1, lags + 1)), axis=1)
+    white = scipy.special.chdtrc(lags, statistic) > level
+    return np.asarray(white | (r[:, 0] <= 0))

@@ -32,6 +32,13 @@ Role = Literal["input", "output", "reference", "auxiliary"]
 ROLES: tuple[Role, ...] = ("input", "output", "reference", "auxiliary")
 
 
+def _add(digest: Any, role: Role, channel: "Channel", values: NDArray[np.float64]) -> None:
+    """Take a channel with these values into a digest."""
+    digest.update(f"{role}\0{channel.name}\0{channel.unit}\0".encode())
+    digest.update(np.ascontiguousarray(channel.time, dtype="<f8").tobytes())
+    digest.update(np.ascontiguousarray(values, dtype="<f8").tobytes())
+
+
 def _frozen(name: str, values: ArrayLike) -> NDArray[np.float64]:
     if np.iscomplexobj(values):
         raise RecordError(
@@ -318,10 +325,37 @@ class Record(ByValue):
         digest = hashlib.sha256()
         for role in ROLES:
             for c in self.of(role):
-                digest.update(f"{role}\0{c.name}\0{c.unit}\0".encode())
-                digest.update(np.ascontiguousarray(c.time, dtype="<f8").tobytes())
-                digest.update(np.ascontiguousarray(c.values, dtype="<f8").tobytes())
+                _add(digest, role, c, c.values)
         return digest.hexdigest()
+
+    def sha256_with(self, outputs: NDArray[np.float64]) -> list[str]:
+        """Digests of records of one input and one output that differ in the output's values alone.
+
+        Parameters
+        ----------
+        outputs : ndarray, shape (k, n)
+            The values in each.
+
+        Examples
+        --------
+        >>> both = ([1, 2], [3, 4])
+        >>> one, other = (Record.from_arrays({"u": [0, 1]}, {"y": y}, fs=2.0) for y in both)
+        >>> one.sha256_with(np.array([[3.0, 4.0]])) == [other.sha256]
+        True
+        """
+        if len(self.channels) != 2:
+            raise RecordError(
+                f"a record of {len(self.channels)} channels; what others share with it is known "
+                "for one input and one output alone"
+            )
+        (source, output), head, found = self.channels, hashlib.sha256(), []
+        _add(head, "input", source, source.values)
+        _add(head, "output", output, output.values[:0])
+        for values in outputs:
+            digest = head.copy()
+            digest.update(np.ascontiguousarray(values, dtype="<f8").tobytes())
+            found.append(digest.hexdigest())
+        return found
 
     @property
     def channels(self) -> tuple[Channel, ...]:

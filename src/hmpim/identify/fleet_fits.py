@@ -1,0 +1,182 @@
+"""Many outputs of one stimulus fitted at once under one assumption, and what that leaves uncertain.
+
+Each output is a few numbers in the basis that `hmpim.identify.learnt` found. Gauss and Newton's
+steps are taken for all at once; delay and poles move, the gain is solved exactly.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hmpim.identify.fitting.data import shifted
+from hmpim.identify.learnt import Fleet, Member
+
+__all__ = ["Errors", "Fits", "errors_of", "fitted_all"]
+
+Real = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+_OFF = 0.05
+"""Error of the figures' surface, in standard deviations of each, that is let pass."""
+
+_STEPS = 12
+
+_NEGLIGIBLE = 1e-6
+"""Share of the noise's variance below which a step need not be made."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Fits:
+    """All records fitted under one assumption; first axis: the record."""
+
+    member: Member
+    theta: Real
+    gain: Real
+    bias: Real
+    cost: Real
+    left: Real
+    """What the fit leaves inside the basis."""
+    figures: Mapping[str, Real]
+
+
+def fitted_all(fleet: Fleet, centred: Real, means: Real, power: Real) -> list[Fits]:
+    """Fit all records under each assumption of the fleet, in the order of its members.
+
+    Parameters
+    ----------
+    fleet : Fleet
+        What the records share.
+    centred : ndarray, shape (N, n)
+        Outputs less their means.
+    means, power : ndarray, shape (N,)
+        Those means, and the sums of squares of `centred`.
+    """
+    sizes = np.cumsum([member.basis.shape[0] for member in fleet.members])
+    inside = centred @ np.concatenate([member.basis for member in fleet.members]).T
+    found: list[Fits] = []
+    for member, z in zip(fleet.members, np.split(inside, sizes[:-1], axis=1), strict=True):
+        low, high = member.surface.low, member.surface.high
+        start = np.tile((low + high) / 2, (means.size, 1))
+        if found:  # the same units, moved by what another assumption moves
+            first = found[0].member
+            away = shifted(np.zeros(low.size), first.intersample, member.intersample)
+            plain = first.surface.holds(found[0].theta)[:, None]
+            start = np.where(plain, found[0].theta + away, start)
+        found.append(_fitted(fleet, member, z, means, power, np.clip(start, low, high)))
+    return found
+
+
+def _fitted(fleet: Fleet, member: Member, z: Real, means: Real, power: Real, start: Real) -> Fits:
+    """Fit all records under one assumption."""
+    outside = np.maximum(power - _dots(z, z), 0.0)
+    theta = _descended(fleet, member, z, outside, start)
+    value = member.surface.values(theta)
+    g = value[:, :-1]
+    gain = _dots(z, g) / _dots(g, g)
+    left = z - gain[:, None] * g
+    values = fleet.figures.values(theta)
+    return Fits(
+        member=member,
+        theta=theta,
+        gain=gain,
+        bias=means - gain * value[:, -1],
+        cost=outside + _dots(left, left),
+        left=left,
+        figures={
+            **dict(zip(fleet.names, values.T, strict=True)),
+            "scale_factor": gain,
+            "bias": means - gain * value[:, -1],
+        },
+    )
+
+
+def _dots(a: Real, b: Real) -> Real:
+    """Product of each row of one with the row of the other."""
+    return np.asarray(np.einsum("ij,ij->i", a, b))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Errors:
+    """What the fits of some records leave uncertain; first axis of an array: the record."""
+
+    rows: Real
+    """Derivatives by place and gain, in the basis."""
+    inner: Real
+    """Inverse of their Gram matrix."""
+    variance: Real
+    freedom: int
+    deviations: Mapping[str, Real]
+    exact: Flags
+    """Whether the polynomials of what is read off are exact enough."""
+
+
+def errors_of(fleet: Fleet, fit: Fits, some: NDArray[np.intp]) -> Errors:
+    """Standard deviations of all that is told, to first order."""
+    n, theta, gain = fleet.u.size, fit.theta[some], fit.gain[some]
+    value, slope = fit.member.surface.at(theta)
+    size = theta.shape[1]
+    freedom = n - size - 2
+    variance = fit.cost[some] / freedom
+    rows = np.concatenate([gain[:, None, None] * slope[:, :, :-1], value[:, None, :-1]], axis=1)
+    inner = np.linalg.pinv(rows @ rows.transpose(0, 2, 1), rcond=1e-13, hermitian=True)
+    covariance = variance[:, None, None] * inner
+    _, steep = fleet.figures.at(theta)
+    spread = np.sum(steep * (covariance[:, :size, :size] @ steep), axis=1)
+    deviations = np.sqrt(np.maximum(spread, 0.0))
+    # The bias is the mean less what the model makes of it; the mean's own error is apart.
+    by_mean = -np.concatenate([gain[:, None] * slope[:, :, -1], value[:, -1:]], axis=1)
+    of_bias = _dots(by_mean, (covariance @ by_mean[:, :, None])[:, :, 0]) + variance / n
+    return Errors(
+        rows=rows,
+        inner=inner,
+        variance=variance,
+        freedom=freedom,
+        deviations={
+            **dict(zip(fleet.names, deviations.T, strict=True)),
+            "scale_factor": np.sqrt(covariance[:, size, size]),
+            "bias": np.sqrt(of_bias),
+        },
+        exact=(fleet.figures.error <= _OFF * deviations + 1e-12).all(axis=1),
+    )
+
+
+def _descended(fleet: Fleet, member: Member, z: Real, outside: Real, start: Real) -> Real:
+    """Gauss-Newton for all records at once, the gain solved exactly at each step.
+
+    A record that has arrived is left out of what follows.
+    """
+    low, high = member.surface.low, member.surface.high
+    best, least = start.copy(), np.full(z.shape[0], np.inf)
+    theta, step, share = start.copy(), np.zeros_like(start), np.ones(z.shape[0])
+    on = np.arange(z.shape[0])
+    for _ in range(_STEPS):
+        cost, fresh, gained = _step(member, theta, z[on], outside[on])
+        better = cost < least[on]
+        best[on[better]], least[on[better]] = theta[better], cost[better]
+        step = np.where(better[:, None], fresh, step)
+        share = np.where(better, 1.0, share / 4)
+        stay = gained >= _NEGLIGIBLE * cost / fleet.u.size
+        on, step, share = on[stay], step[stay], share[stay]
+        if on.size == 0:
+            break
+        theta = np.clip(best[on] + share[:, None] * step, low, high)
+    return best
+
+
+def _step(member: Member, theta: Real, z: Real, outside: Real) -> tuple[Real, Real, Real]:
+    """Cost of each record, the step from there, and by how much it lowers the cost."""
+    value, slope = member.surface.at(theta)
+    g, dg = value[:, :-1], slope[:, :, :-1]
+    square = _dots(g, g)
+    gain = _dots(z, g) / square
+    left = z - gain[:, None] * g
+    # The slopes less what the gain does; that has no part in what is left.
+    moment = gain[:, None] * (dg @ left[:, :, None])[:, :, 0]
+    along = (dg @ g[:, :, None])[:, :, 0]
+    gram = dg @ dg.transpose(0, 2, 1) - along[:, :, None] * (along / square[:, None])[:, None, :]
+    gram *= (gain**2)[:, None, None]
+    gram += 1e-9 * np.einsum("iaa->ia", gram)[:, :, None] * np.eye(gram.shape[1])
+    fresh = np.asarray(np.linalg.solve(gram, moment[:, :, None])[:, :, 0], dtype=np.float64)
+    return outside + _dots(left, left), fresh, _dots(fresh, moment)

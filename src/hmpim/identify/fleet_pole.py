@@ -1,0 +1,92 @@
+"""One more pole for one record of a fleet: the few that ask for it, most of them by chance.
+
+The record itself is fitted here, from where the fit of all ended, and grown as
+`hmpim.identify.fitting.joint` grows a fit.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hmpim.identify.fitting.data import FINAL_PRECISION
+from hmpim.identify.fitting.fit import fit_structure
+from hmpim.identify.fitting.growth import grow, hidden_pole
+from hmpim.identify.fitting.rows import Problem
+from hmpim.identify.fitting.trial import JointFit, Trial, trial_of
+from hmpim.identify.learnt import Fleet, Member, theta_at
+from hmpim.identify.result import Parameters
+from hmpim.identify.spanned import spanned
+from hmpim.identify.whiteness import is_white
+from hmpim.model.dynamics import STRUCTURES, Structure
+
+__all__ = ["Tails", "with_tails"]
+
+Real = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Tails:
+    """What one more pole leaves open.
+
+    Parameters
+    ----------
+    parameters : Parameters
+        With intervals that cover it.
+    open : bool
+        Whether it is as likely, but for its price; if not, they are what they were.
+    """
+
+    parameters: Parameters
+    open: bool
+
+
+def with_tails(
+    fleet: Fleet, member: Member, place: Real, y: Real, own: Parameters, *, highest: float
+) -> Tails | None:
+    """Fit one more pole to a record; None if the likelihood pays for it.
+
+    Parameters
+    ----------
+    fleet, member : Fleet, Member
+        What the record shares with others, and the assumption that is taken.
+    place : ndarray, shape (3,)
+        Where it lies on the member's surface.
+    y : ndarray, shape (n,)
+        Its output.
+    own : Parameters
+        What the fit without the pole says.
+    highest : float
+        Frequency in Hz beyond which no bandwidth is read off.
+    """
+    problem = Problem(source=member.source, y=y, valid=None, longest_delay=y.size // 2 + 2.0)
+
+    def refit(structure: Structure, theta: Real, precision: float = 1e-2) -> Trial:
+        fit = fit_structure(problem, structure, theta, precision=precision)
+        return trial_of(member.intersample, fit, y.size)
+
+    best = refit(fleet.structure, theta_at(place), FINAL_PRECISION)
+    growth = grow(
+        best,
+        hidden=lambda trial: hidden_pole(problem, trial.fit),
+        refit=refit,
+        count=y.size,
+        names=tuple(STRUCTURES),
+        white=lambda trial: is_white(trial.fit.residual),
+    )
+    if growth.grown:
+        return None
+    if not growth.rivals:
+        return Tails(parameters=own, open=False)
+    joint = JointFit(
+        problem=problem,
+        weighed=problem,
+        best=best,
+        trials=(best,),
+        forgotten=0,
+        effective_share=1.0,
+        related=True,
+        rivals=growth.rivals,
+        hidden=growth.hidden,
+    )
+    return Tails(parameters=spanned(own, joint, fs=fleet.fs, highest=highest), open=True)
