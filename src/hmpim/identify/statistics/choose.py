@@ -166,7 +166,7 @@ class _Search:
 
     def follows(self, fitted: Fitted) -> Misfit:
         """Whether what is left over follows the input, whatever its own colour."""
-        noise = left_over(self, fitted).noise
+        noise = left_over(self.products, fitted).noise
         if noise.size == 1 or self.products.order:
             return misfit_of(fitted, self.products, self.band)
         return misfit_of(fitted, self.whitened(noise), self.band)
@@ -217,7 +217,7 @@ def choose(
     fits = _enriched(search, natural, rough, fits, members(names, RICH))
     fits = [f for f in fits if f.fit.structure.name in names] or fits
     fits += _moved(search, natural, fits, alone=alone)
-    left = left_over(search, _least(fits))
+    left = left_over(search.products, _least(fits))
     if left.noise.size > 1 and search.follows(_least(fits)).probability >= FOLLOWS:
         search.products = search.whitened(left.noise)
         least = _least(fits).fit.objective
@@ -280,7 +280,7 @@ def _rests(search: _Search, fits: list[Fitted]) -> bool:
     Its power is chi-squared, and so is what a free response of the state explains of it.
     """
     best, lags = _least(fits), search.statistics.reach.lags
-    left = left_over(search, best)
+    left = left_over(search.products, best)
     begins = int(np.ceil(max(best.fit.delay, 0.0))) + 4
     problem = replace(search.problem(best.intersample), begins=begins)
     free = Part(problem, best.fit.structure, best.fit.theta).free[:, :lags]
@@ -346,12 +346,11 @@ def _moved(
     return out
 
 
-def left_over(search: "_Search", fitted: Fitted) -> LeftOver:
+def left_over(products: Products, fitted: Fitted) -> LeftOver:
     """Power, colour and autoregression of what a fit leaves over."""
-    products = search.products
     plain = products
     if products.order:
-        plain = Products(search.statistics, skipped=products.skipped)
+        plain = Products(products.statistics, skipped=products.skipped)
     gram, count = fitted.residual(plain).gram(products.skipped)
     power = max(float(gram[0, 0]), np.finfo(float).tiny)
     rho = gram[0, 1 : max(min(gram.shape[0], count // 4), 1)] / power
@@ -381,7 +380,7 @@ def _decided(
     alone: bool,
 ) -> Chosen:
     """Weigh all fits alike, add poles that the likelihood pays for, and polish the chosen one."""
-    left = left_over(search, _least(fits))
+    left = left_over(search.products, _least(fits))
     count = search.products.counted * (1.0 if search.products.order else left.share)
     trials = [trial_of(f.intersample, f.fit, count) for f in fits]
     likeliest = likeliest_of(trials, natural)
@@ -391,7 +390,7 @@ def _decided(
         refit=lambda structure, theta: search.fit(likeliest.intersample, structure, theta),
         count=count,
         names=names,
-        white=lambda f: left_over(search, f).noise.size == 1,
+        white=lambda f: left_over(search.products, f).noise.size == 1,
     )
     chosen = growth.grown[-1] if growth.grown else fits[trials.index(likeliest)]
     best = search.again(chosen, precision=_FINAL_PRECISION)
@@ -410,7 +409,7 @@ def _decided(
     return Chosen(
         best=best,
         trials=tuple(trials),
-        left=left_over(search, best),
+        left=left_over(search.products, best),
         misfit=search.follows(best),
         band=band,
         problem=search.problem(best.intersample),

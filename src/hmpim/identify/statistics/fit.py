@@ -7,6 +7,7 @@ joint fit's rows.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -61,21 +62,25 @@ class _Evaluation:
         """Derivatives of the impulse response, shape (1 + order, taps)."""
         return self.part.slopes(self.linear, np.empty(0))
 
+    @cached_property
     def all_rows(self) -> tuple[Real, Real]:
         """Derivatives by theta, then the rows; and what each makes of a constant 1."""
         steady = np.concatenate([np.zeros(self.part.theta.size), self.steady])
         return np.vstack([self.slopes, self.part.rows]), steady
 
+    @cached_property
     def all_moments(self) -> Moments:
         """Products of derivatives by theta, then of the rows."""
-        return self.products.moments(*self.all_rows())
+        return self.products.moments(*self.all_rows)
 
     def normal(self) -> tuple[Real, Real]:
         """Normal equations of delay and denominator: matrix, and derivative of the cost."""
-        moments, unknown = self.all_moments(), self.part.theta.size
+        moments, unknown = self.all_moments, self.part.theta.size
         turned, mixed = moments.gram[:unknown, :unknown], moments.gram[:unknown, unknown:]
         inner = moments.gram[unknown:, unknown:]
         left = moments.cross[:unknown] - mixed @ self.linear
+        if inner.size == 1 and inner[0, 0] > 0.0:
+            return turned - mixed @ mixed.T / inner[0, 0], left
         return turned - mixed @ np.linalg.lstsq(inner, mixed.T, rcond=None)[0], left
 
 
@@ -195,8 +200,8 @@ def fit_products(
         iterations=iterations,
         precision=precision,
     )
-    rows, steady = best.all_rows()
-    moments, unknown = products.moments(rows, steady), best.part.theta.size
+    rows, steady = best.all_rows
+    moments, unknown = best.all_moments, best.part.theta.size
     bias = moments.bias - float(moments.bias_rows[unknown:] @ best.linear)
     nothing = np.empty(0)
     fit = Fit(

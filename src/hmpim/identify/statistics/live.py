@@ -8,14 +8,13 @@ from numpy.typing import ArrayLike, NDArray
 from hmpim.arguments import check_argument, numbers_of
 from hmpim.errors import ArgumentError
 from hmpim.identify.fitting.data import FOLLOWS
-from hmpim.identify.fitting.enrich import PLAIN
 from hmpim.identify.fitting.rows import Problem
 from hmpim.identify.judgement import all_doubted
 from hmpim.identify.result import Estimate, Identification, Parameters
-from hmpim.identify.statistics.choose import choose
+from hmpim.identify.statistics.begin import begin
 from hmpim.identify.statistics.describe import identify_statistics
 from hmpim.identify.statistics.fit import Fitted, fit_products, pulse
-from hmpim.identify.statistics.misfit import misfit_of
+from hmpim.identify.statistics.misfit import Asked, asked_of, misfit_of
 from hmpim.identify.statistics.products import Products
 from hmpim.identify.statistics.reach import Reach
 from hmpim.identify.statistics.statistics import Statistics
@@ -39,6 +38,9 @@ _STEPS = 3
 
 _BETWEEN = 1.05
 """Growth of the record before it is asked again whether the residual follows the input."""
+
+_MOVED = 0.5
+"""Samples that the delay may move before what is asked for is made anew about it."""
 
 _PAST = 1.2
 """Natural frequency, over the end of the band, up to which the band still tells it."""
@@ -125,6 +127,7 @@ class LiveEstimator:
         self._fitted: Fitted | None = None
         self._tried = self._asked = 0
         self._follows = True
+        self._asks: Asked | None = None
         self._look: Look | None = None
 
     @property
@@ -168,12 +171,13 @@ class LiveEstimator:
         moves = bool(statistics.runs[0].uu[0] and statistics.runs[0].vv[-1, -1, 0])
         if statistics.samples < _FEWEST or not moves:
             return None
-        fitted = self._again()
+        products = Products(statistics, skipped=0)
+        fitted = self._again(products)
         if statistics.samples >= _BETWEEN * self._asked:
             self._asked = statistics.samples
             self._follows = self._lacks(fitted)
             if self._follows and statistics.samples >= _PAUSE * self._tried:
-                fitted = self._begin()
+                fitted = self._begin(products)
                 self._follows = self._lacks(fitted)
         self._fitted = fitted
         self._look = self._read(fitted)
@@ -181,35 +185,32 @@ class LiveEstimator:
 
     def _lacks(self, fitted: Fitted) -> bool:
         """Whether what is left over follows the input."""
-        low, high = self._excited()
+        products, delay = fitted.products, fitted.fit.delay
         fs = self._statistics.fs
-        return misfit_of(fitted, fitted.products, (low / fs, high / fs)).probability < FOLLOWS
+        low, high = self._excited()
+        band = low / fs, high / fs
+        if self._asks is None or abs(self._asks.delay - delay) > _MOVED:
+            self._asks = asked_of(delay, band, products)
+        return misfit_of(fitted, products, band, asked=self._asks).probability < FOLLOWS
 
     def identification(self) -> Identification:
         """The whole identification of what was read, with every structure and every check."""
         return identify_statistics(self._statistics, intersample=self._mode)
 
-    def _again(self) -> Fitted:
+    def _again(self, products: Products) -> Fitted:
         """The same structure, a few steps from where it was."""
         before = self._fitted
         if before is None:
-            return self._begin()
+            return self._begin(products)
+        fit = before.fit
         return fit_products(
-            Products(self._statistics, skipped=0),
-            self._problem,
-            self._mode,
-            before.fit.structure,
-            before.fit.theta,
-            iterations=_STEPS,
+            products, self._problem, self._mode, fit.structure, fit.theta, iterations=_STEPS
         )
 
-    def _begin(self) -> Fitted:
+    def _begin(self, products: Products) -> Fitted:
         """A new start: every plain structure from the data alone."""
         self._tried = self._statistics.samples
-        chosen = choose(self._statistics, intersample=self._mode, structures=PLAIN)
-        fit = chosen.best.fit
-        products = Products(self._statistics, skipped=0)
-        return fit_products(products, self._problem, self._mode, fit.structure, fit.theta)
+        return begin(products, self._problem, self._mode)
 
     def _excited(self) -> tuple[float, float]:
         statistics = self._statistics

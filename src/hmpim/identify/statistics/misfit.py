@@ -5,6 +5,8 @@ excited band, are asked for beside all parameters of the model (C. R. Rao, Proc.
 44, 1948). Under a right model what they gain is chi-squared.
 """
 
+from dataclasses import dataclass
+
 import numpy as np
 import scipy
 from numpy.typing import NDArray
@@ -17,7 +19,7 @@ from hmpim.identify.statistics.products import Products
 from hmpim.identify.statistics.reach import AHEAD
 from hmpim.identify.whiteness import Misfit
 
-__all__ = ["hidden_pole_of", "integrated_share", "misfit_of"]
+__all__ = ["Asked", "asked_of", "hidden_pole_of", "integrated_share", "misfit_of"]
 
 _GROUPS = 12
 """Frequencies that are asked for."""
@@ -32,9 +34,41 @@ _CLEAR = 50.0
 """Squared standard deviations from which a step is seen, by whatever chance."""
 
 Real = NDArray[np.float64]
+Complex = NDArray[np.complex128]
 
 
-def misfit_of(fitted: Fitted, products: Products, band: tuple[float, float]) -> Misfit:
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Asked:
+    """Responses that are asked for, made once for several looks at a run.
+
+    Parameters
+    ----------
+    delay : float
+        About which, in samples.
+    rows : ndarray, shape (2 groups, taps)
+        The responses.
+    transforms : complex ndarray
+        Theirs, for products without a noise model.
+    """
+
+    delay: float
+    rows: Real
+    transforms: Complex
+
+
+def asked_of(delay: float, band: tuple[float, float], products: Products) -> Asked:
+    """Responses that are asked for about a delay, in samples; `band` as for `misfit_of`."""
+    rows = _responses(delay, band, products.statistics.reach.taps)
+    return Asked(delay=delay, rows=rows, transforms=products.transform(rows))
+
+
+def misfit_of(
+    fitted: Fitted,
+    products: Products,
+    band: tuple[float, float],
+    *,
+    asked: Asked | None = None,
+) -> Misfit:
     """Test whether the residual of a fit is still coherent with the input.
 
     Parameters
@@ -45,9 +79,12 @@ def misfit_of(fitted: Fitted, products: Products, band: tuple[float, float]) -> 
         With what the fit leaves over whitened, so that its colour does no harm.
     band : (float, float)
         Excited band, in cycles per sample.
+    asked : Asked, optional
+        What is asked for, where it is known already: about the fit's own delay by default.
     """
-    asked = _responses(fitted.fit.delay, band, fitted.response.size)
-    gain, left, cost = _beside(fitted, products, asked)
+    if asked is None:
+        asked = asked_of(fitted.fit.delay, band, products)
+    gain, left, cost = _beside(fitted, products, asked.rows, asked.transforms)
     variance = cost / max(products.counted - fitted.rows.shape[0] - 1, 1)
     power_left = np.diag(left)
     size = np.sqrt(np.where(power_left > 1e-200 * power_left.max(), power_left, 1.0))
@@ -116,12 +153,14 @@ def integrated_share(fitted: Fitted) -> float:
     return float(np.max(np.where(clear, power, 0.0)) / cost) if cost > 0.0 else 0.0
 
 
-def _beside(fitted: Fitted, products: Products, asked: Real) -> tuple[Real, Real, float]:
+def _beside(
+    fitted: Fitted, products: Products, asked: Real, known: Complex | None = None
+) -> tuple[Real, Real, float]:
     """Products of the residual and more responses, of these without the model's own, its power."""
     count = asked.shape[0]
     own = fitted.rows
     steady = np.concatenate([asked.sum(axis=1), fitted.steady])
-    moments = products.moments(np.vstack([asked, own]), steady)
+    moments = products.moments(np.vstack([asked, own]), steady, known=known)
     linear = np.concatenate([np.zeros(fitted.fit.theta.size), fitted.fit.linear[:-1]])
     mixed, inner = moments.gram[:count, count:], moments.gram[count:, count:]
     own_size = np.diag(inner)

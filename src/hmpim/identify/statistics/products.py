@@ -20,6 +20,9 @@ from hmpim.identify.statistics.statistics import Statistics
 
 __all__ = ["Moments", "Products"]
 
+_FEW = 64
+"""Samples at the beginning up to which a convolution is sooner a product with a matrix."""
+
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
@@ -78,20 +81,28 @@ class Products:
         self.order = self.noise.size - 1
         self.first = self.order + skipped
         """Sample of a run from which on its whitened outputs count."""
+        self._levels = np.array([run.level for run in statistics.runs])
         self._length = int(scipy.fft.next_fast_len(2 * reach.span + 1, real=True))
         self._runs = runs = tuple(closed(run, reach) for run in statistics.runs)
+        self._average = self._averages()
         self._power = self._spectrum(sum((run.uu for run in runs), np.zeros(reach.span + 1)))
         self._white = scipy.fft.rfft(self.noise, self._length)
         self._cross = np.stack([self._lagged(run) for run in runs])
         ends = [end for run in runs for end in self._ends_of(run)]
         self._inputs = scipy.fft.rfft(np.stack([end[0] for end in ends]), self._length)
-        self._apart = np.stack([end[1] for end in ends])
-        self._around = np.stack([end[2] for end in ends])
-        self._out = self._around * self._apart[:, None]
-        self._inner = np.stack([self._outputs(run) for run in runs]) - np.einsum(
-            "rect,redt->rcd",
-            *2 * [self._out.reshape(len(runs), 2, reach.rows + 1, -1)],
+        self._around = np.stack([end[1] for end in ends])
+        self._apart = (
+            slice(0, self.first + AHEAD),
+            slice(reach.span, reach.span + reach.taps + self.order),
         )
+        """Samples of a full convolution with the head that do not count; with the tail."""
+        heads = [run.head_u[: self.first + AHEAD] for run in runs]
+        few = self._apart[0].stop <= _FEW
+        self._begun = np.stack([_moved(head) for head in heads]) if few else None
+        parts = [self._around[i::2, :, apart] for i, apart in enumerate(self._apart)]
+        self._out = np.concatenate(parts, axis=2)
+        self._inner = np.stack([self._outputs(run) for run in runs])
+        self._inner -= self._out @ self._out.transpose(0, 2, 1)
 
     @property
     def counted(self) -> int:
@@ -124,13 +135,12 @@ class Products:
         later = run.vv[:, :, 1 : weight.size] @ weight[1:]
         return np.asarray(weight[0] * run.vv[:, :, 0] + later + later.T)
 
-    def _ends_of(self, run: Run) -> list[tuple[Real, Real, Real]]:
-        """Input, which samples of its full convolution do not count, and outputs there."""
+    def _ends_of(self, run: Run) -> list[tuple[Real, Real]]:
+        """Input at either end, and whitened outputs there."""
         reach = self.statistics.reach
         n, span, count = run.samples, reach.span, reach.rows + 1
         # Sample c of a convolution with the head is sample c - AHEAD of the run, and of one with
         # the tail n - span - AHEAD + c.
-        index = np.arange(self._length)
         head, tail = (np.zeros((count, self._length)) for _ in range(2))
         size = min(reach.back, n)
         early = np.vstack([reach.fixed(0, size), run.head_y[:size]])
@@ -140,19 +150,20 @@ class Products:
         late[:, reach.forth - AHEAD :] = 0.0  # of a closed run
         tail[:, span + AHEAD - reach.forth : span + AHEAD] = late
         out = []
-        for u, v, apart in (
-            (run.head_u, head, index < self.first + AHEAD),
-            (run.tail_u, tail, index >= span),
-        ):
+        for u, v in ((run.head_u, head), (run.tail_u, tail)):
             white = np.zeros_like(v)
             for i, a in enumerate(self.noise):
                 white[:, i:] += a * v[:, : v.shape[1] - i]
             padded = np.zeros(self._length)
             padded[:span] = u
-            out.append((padded, apart.astype(np.float64), white))
+            out.append((padded, white))
         return out
 
-    def moments(self, rows: Real, steady: Real) -> Moments:
+    def transform(self, rows: Real) -> Complex:
+        """Transforms of impulse responses, (q, taps), whitened: those that `moments` asks for."""
+        return np.asarray(scipy.fft.rfft(rows, self._length) * self._white)
+
+    def moments(self, rows: Real, steady: Real, *, known: Complex | None = None) -> Moments:
         """Products of what impulse responses make of the input.
 
         Parameters
@@ -161,15 +172,33 @@ class Products:
             Impulse responses, from `AHEAD` samples before the input on.
         steady : ndarray, shape (q,)
             What each makes of a constant input of 1.
+        known : complex ndarray, optional
+            Transforms of the first rows, from `transform`.
         """
-        runs, count = self._runs, rows.shape[0]
-        spectra = scipy.fft.rfft(rows, self._length) * self._white
-        ends = scipy.fft.irfft(spectra[:, None] * self._inputs, self._length) * self._apart
-        flat = ends.reshape(count, -1)
+        if known is None:
+            spectra = self.transform(rows)
+        else:
+            spectra = np.vstack([known, self.transform(rows[known.shape[0] :])])
+        apart = self._not_counted(rows, spectra)
+        flat = apart.reshape(rows.shape[0], -1)
         gram = _products(spectra, self._power, self._length) - flat @ flat.T
-        lost = np.einsum("qet,ect->eqc", ends, self._out).reshape(len(runs), 2, count, -1).sum(1)
-        mixed = np.einsum("rct,qt->rqc", self._cross, rows) - lost
+        lost = apart.transpose(1, 0, 2) @ self._out.transpose(0, 2, 1)
+        mixed = rows @ self._cross.transpose(0, 2, 1) - lost
         return self._without_bias(gram, mixed, steady)
+
+    def _not_counted(self, rows: Real, spectra: Complex) -> Real:
+        """Samples at the ends of each run that do not count, (q, runs, samples)."""
+        head, tail = self._apart
+        heads, tails = self._inputs[0::2], self._inputs[1::2]
+        late = scipy.fft.irfft(spectra[:, None] * tails, self._length)[..., tail]
+        if self._begun is None:
+            early = scipy.fft.irfft(spectra[:, None] * heads, self._length)[..., head]
+        else:
+            first = rows[:, head]
+            if self.order:
+                first = scipy.signal.lfilter(self.noise, np.ones(1), first)
+            early = (first @ self._begun).transpose(1, 0, 2)
+        return np.concatenate([early, late], axis=2)
 
     def residual(self, response: Real, bias: Real) -> Residual:
         """What a model leaves over; of products without a noise model only.
@@ -214,7 +243,7 @@ class Products:
         energy = float(self._inner[:, -1, -1].sum())
         beside, cross = mixed[:, :, :-1], mixed[:, :, -1].sum(axis=0)
         if statistics.bias == "common":
-            u, y = np.array([run.level for run in statistics.runs]).T
+            u, y = self._levels.T
             weight, with_y, with_rows = inner[:, 0, 0], outer[:, 0], beside[:, :, 0]
             first = np.outer(steady, u @ with_rows)
             gram = gram + first + first.T + u**2 @ weight * np.outer(steady, steady)
@@ -227,31 +256,31 @@ class Products:
             solved = np.divide(1.0, inner, out=np.zeros_like(inner), where=inner > 0.0)
         else:
             solved = np.linalg.pinv(inner, hermitian=True)
-        told = np.einsum("rjk,rqk->rjq", solved, beside)
-        fixed = np.einsum("rjk,rk->rj", solved, outer)
-        average = self._average()
-        levels = np.array([run.level for run in statistics.runs])
-        bias = np.einsum("rj,rj->r", average, fixed)
-        taken = np.einsum("rj,rjq->rq", average, told)
+        beside = beside.transpose(0, 2, 1)  # (runs, rows of the bias, q)
+        told = solved @ beside
+        fixed = (solved @ outer[:, :, None])[:, :, 0]
+        average, levels = self._average[:, None], self._levels
+        bias = (average @ fixed[:, :, None])[:, 0, 0]
+        taken = (average @ told)[:, 0]
         if statistics.bias == "common":
             each = fixed[0] - levels[:, 1:]
-            each_rows = (told[0] - np.outer(levels[:, 0], steady))[:, None]
+            each_rows = (told[0] - levels[:, :1] * steady)[:, None]
         else:
             each, each_rows = fixed, told
-            bias, taken = bias + levels[:, 1], taken + np.outer(levels[:, 0], steady)
+            bias, taken = bias + levels[:, 1], taken + levels[:, :1] * steady
+        count = bias.size
         return Moments(
-            gram=gram - np.einsum("rjq,rpj->qp", told, beside),
-            cross=cross - np.einsum("rj,rqj->q", fixed, beside),
-            energy=energy - float(np.einsum("rj,rj->", fixed, outer)),
+            gram=gram - (told.transpose(0, 2, 1) @ beside).sum(axis=0),
+            cross=cross - (fixed[:, None] @ beside)[:, 0].sum(axis=0),
+            energy=energy - float((fixed * outer).sum()),
             fixed=each,
             fixed_rows=each_rows,
-            bias=float(bias.mean()),
-            bias_rows=taken.mean(axis=0),
-            bias_variance=float(np.einsum("rj,rjk,rk->", average, solved, average))
-            / average.shape[0] ** 2,
+            bias=float(bias.sum()) / count,
+            bias_rows=taken.sum(axis=0) / count,
+            bias_variance=float((average @ solved @ average.transpose(0, 2, 1)).sum()) / count**2,
         )
 
-    def _average(self) -> Real:
+    def _averages(self) -> Real:
         """Mean over its run of each row of the bias, shape (biases, rows)."""
         statistics = self.statistics
         if statistics.reach.rows == 1:
@@ -266,4 +295,11 @@ def _products(spectra: Complex, power: Real, length: int) -> Real:
     twice[0] = 1.0
     if length % 2 == 0:
         twice[-1] = 1.0
-    return np.asarray((spectra * (power * twice / length)) @ spectra.conj().T).real
+    weighed = spectra * (power * twice / length)
+    # Real parts of a product are those of real and imaginary parts, side by side.
+    return np.asarray(weighed.view(np.float64) @ spectra.view(np.float64).T)
+
+
+def _moved(head: Real) -> Real:
+    """Matrix that turns an impulse response's first samples into those of its convolution."""
+    return np.asarray(scipy.linalg.toeplitz(head, np.zeros(head.size)).T)

@@ -19,6 +19,9 @@ __all__ = ["Run", "begun", "closed", "continued"]
 _PIECE = 16_384
 """Samples that are read at once, at least."""
 
+_FEW = 64
+"""New samples up to which their products are sooner made one by one than by transforms."""
+
 Real = NDArray[np.float64]
 
 
@@ -113,13 +116,8 @@ def _added(run: Run, reach: Reach, u: Real, v: Real) -> Run:
     before_u, before_v = run.tail_u, _before(run, reach)
     whole_u = np.concatenate([before_u, u])
     whole_v = np.hstack([before_v, v])
-    length = scipy.fft.next_fast_len(u.size + reach.span, real=True)
-    new_u, new_v = _late(u, reach.span, length), _late(v, reach.span, length)
-    all_u, all_v = scipy.fft.rfft(whole_u, length), _late(whole_v, reach.span - reach.forth, length)
-    uu = scipy.fft.irfft(new_u * all_u.conj(), length)[: reach.span + 1]
-    after = scipy.fft.irfft(new_v * all_u.conj(), length)[:, : reach.back + 1]
-    ahead = scipy.fft.irfft(new_u * all_v.conj(), length)[:, 1 : reach.forth + 1]
-    vv = scipy.fft.irfft(new_v[:, None] * all_v.conj()[None], length)[:, :, : LONGEST + 1]
+    products = _one_by_one if u.size <= _FEW else _transformed
+    uu, after, ahead, vv = products(reach, (u, v), (whole_u, whole_v))
     room_u, room_y = reach.span - run.samples, reach.back - run.samples
     return replace(
         run,
@@ -132,6 +130,43 @@ def _added(run: Run, reach: Reach, u: Real, v: Real) -> Run:
         head_y=_filled(run.head_y, run.samples, v[-1, : max(room_y, 0)]),
         tail_y=whole_v[-1, -reach.forth :],
     )
+
+
+def _transformed(
+    reach: Reach, new: tuple[Real, Real], whole: tuple[Real, Real]
+) -> tuple[Real, Real, Real, Real]:
+    """Products of new inputs and outputs and those `span` and `forth` samples before, by FFT.
+
+    Returns
+    -------
+    uu : ndarray, shape (span + 1,)
+        Σ u(t) u(t-k).
+    after, ahead : ndarray, shape (rows + 1, back + 1) and (rows + 1, forth)
+        Σ v(t) u(t-k), k from 0 on; Σ u(t) v(t-k), k from 1 on.
+    vv : ndarray, shape (rows + 1, rows + 1, LONGEST + 1)
+        Σ v_i(t) v_j(t-k).
+    """
+    length = scipy.fft.next_fast_len(new[0].size + reach.span, real=True)
+    new_u, new_v = (_late(x, reach.span, length) for x in new)
+    all_u = scipy.fft.rfft(whole[0], length)
+    all_v = _late(whole[1], reach.span - reach.forth, length)
+    uu = scipy.fft.irfft(new_u * all_u.conj(), length)[: reach.span + 1]
+    after = scipy.fft.irfft(new_v * all_u.conj(), length)[:, : reach.back + 1]
+    ahead = scipy.fft.irfft(new_u * all_v.conj(), length)[:, 1 : reach.forth + 1]
+    vv = scipy.fft.irfft(new_v[:, None] * all_v.conj()[None], length)[:, :, : LONGEST + 1]
+    return uu, after, ahead, vv
+
+
+def _one_by_one(
+    reach: Reach, new: tuple[Real, Real], whole: tuple[Real, Real]
+) -> tuple[Real, Real, Real, Real]:
+    """The same of a few new samples, without transforms."""
+    (u, v), (whole_u, whole_v) = new, whole
+    near = whole_v[:, reach.forth - LONGEST :]
+    uu, *after = (np.correlate(whole_u, x, "valid")[::-1] for x in (u, *v))
+    ahead = [np.correlate(x, u, "valid")[-2::-1] for x in whole_v]
+    vv = [[np.correlate(x, row, "valid")[::-1] for x in near] for row in v]
+    return uu, np.array(after)[:, : reach.back + 1], np.array(ahead), np.array(vv)
 
 
 def _before(run: Run, reach: Reach) -> Real:
