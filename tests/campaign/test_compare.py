@@ -60,11 +60,23 @@ def test_what_is_not_clear_has_no_crossing():
     assert samples_bandwidth(response(), near=500.0) is None
 
 
-@pytest.fixture(scope="module")
-def demo(tmp_path_factory):
+def demo_plan(name):
+    """The demonstration as it is shipped, or in half the time at half the rate."""
+    if name == "shipped":
+        return read_plan(shipped_plan("demo"))
+    data = tomllib.loads(shipped_plan("demo").read_text(encoding="utf-8"))
+    data["stimulus"]["duration"] = 5.0
+    data["test"][0]["rates"] = [500.0]
+    for axis in data["axes"].values():
+        axis["travel"] = 2.0  # in 5 s the limits leave no more
+    return parse_plan(data)
+
+
+@pytest.fixture(scope="module", params=["short", *in_studies("shipped")])
+def demo(request, tmp_path_factory):
     pytest.importorskip("mujoco", reason="the table needs the extra 'table'")
     folder = tmp_path_factory.mktemp("demo")
-    plan = read_plan(shipped_plan("demo"))
+    plan = demo_plan(request.param)
     study = make_study(plan, run_campaign(plan, folder))
     write_study(study, folder)
     return study, folder
@@ -158,7 +170,7 @@ def test_a_doubtful_figure_is_marked_and_the_others_of_its_row_are_not(demo):
     assert 0 < marked < len(study.rows) * len(PARAMETERS)
 
 
-def test_an_earlier_study_of_the_first_schema_is_compared_with(demo, tmp_path):
+def test_an_earlier_study_of_the_first_schema_is_compared_with(demo, request, tmp_path):
     """It has no verdict for each figure; its values and errors are as they were."""
     _, folder = demo
     data = json.loads((folder / "study.json").read_text(encoding="utf-8"))
@@ -168,7 +180,7 @@ def test_an_earlier_study_of_the_first_schema_is_compared_with(demo, tmp_path):
             del reading["verdict"]
     before = tmp_path / "study.json"
     before.write_text(json.dumps(data | {"schema": "hmpim/study/1"}), encoding="utf-8")
-    plan = read_plan(shipped_plan("demo"))
+    plan = demo_plan(request.node.callspec.params["demo"])
     cases = [json.loads(p.read_text(encoding="utf-8")) for p in (folder / "cases").glob("*.json")]
     changes = make_study(plan, cases, earlier=before).changes
     assert len(changes) > 30
