@@ -27,7 +27,7 @@ from hmpim.rigs import Sensor
 def plan_of(**changes):
     data = tomllib.loads(shipped_plan("example").read_text(encoding="utf-8"))
     data["stimulus"]["duration"] = 3.0
-    data["test"][0]["rates"] = [500.0]
+    data["test"][0]["rates"] = [250.0]
     data.update(changes)
     return parse_plan(data)
 

@@ -128,7 +128,7 @@ SPOILT = {
 
 
 LONG = {
-    *("resonant noise", "random walk", "sine", "the input reversed", "the input squared", "a ramp"),
+    *("resonant noise", "random walk", "sine without noise", "the input reversed", "the input squared", "a ramp"),
     *("a delay of four fifths", "stuck after half, noisy", "full-wave rectifier", "gain rises"),
     *("clocks part by 0.1 %", "freezes", "two thirds clipped", "relay", "wraps around"),
     "another input as well",
@@ -141,6 +141,8 @@ LONG = {
         "held for 0.2 s",
         "clocks part by 0.2 %",
         "slow sine",
+        "polarity flips",
+        "slack",
     ),
 }
 """Long to identify, or like another one that is not here: in `make studies` only."""

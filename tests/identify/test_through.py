@@ -7,6 +7,7 @@ from scipy.signal import lfilter
 import hmpim
 from hmpim.errors import ArgumentError, RecordError
 from hmpim.identify.through import instrument_of
+from tests_support import assert_share, holds
 
 FS, N = 200.0, 2000
 POLE, GAIN, LATE = (
@@ -39,29 +40,14 @@ TRUTH = {
 }
 
 
-def held(seeds, **options):
-    """Share of intervals that hold the truth."""
+@pytest.mark.few(12)
+def test_intervals_through_the_reference_hold(seeds):
     told = []
-    for seed in seeds:
-        pair = hmpim.identify(looped(seed), structures=["first_order"], **options)["y", "u"]
-        for name, value in TRUTH.items():
-            low, high = getattr(pair.parameters, name).ci95
-            told.append(low <= value <= high)
-    return np.mean(told)
-
-
-def test_intervals_through_the_reference_hold():
-    share = held(range(30), reference="r")
-    assert share > 0.95 - 3 * np.sqrt(
-        0.95 * 0.05 / 30
-    )  # the three figures of a record err together
-
-
-@pytest.mark.study
-def test_intervals_through_the_reference_hold_over_many_seeds(study_seeds):
-    count = len(study_seeds)
-    bound = 3 * np.sqrt(0.95 * 0.05 / count)
-    assert abs(held(study_seeds, reference="r") - 0.95) < bound + 0.01
+    for seed in range(seeds):
+        record = looped(seed)
+        pair = hmpim.identify(record, reference="r", structures=["first_order"])["y", "u"]
+        told.append([holds(getattr(pair.parameters, name), TRUTH[name]) for name in TRUTH])
+    assert_share(told, at_least=0.94, at_most=0.96)
 
 
 def test_an_instrument_of_the_wrong_shape_moves_nothing():

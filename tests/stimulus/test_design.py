@@ -144,7 +144,7 @@ def check_inside(stimulus, t):
         assert peak <= getattr(stimulus.peaks, name) * (1 + 1e-9)
 
 
-@examples(6)
+@examples(3)
 @given(wish=wishes())
 def test_led_stimulus_is_at_rest_at_both_ends_and_inside_its_limits(wish):
     stimulus = designed(wish)
@@ -168,7 +168,7 @@ def test_stated_extinction_is_taken_and_one_limit_is_reached(wish, n):
     assert stimulus.limits.use(of_sweep(stimulus, "auto")) == pytest.approx(1.0, abs=1e-7)
 
 
-@examples(6)
+@examples(4)
 @given(wish=wishes(), lead=st.sampled_from(["auto", 0]))
 def test_extinction_is_the_smallest_and_gain_the_largest(wish, lead):
     stimulus = designed(wish, lead=lead)

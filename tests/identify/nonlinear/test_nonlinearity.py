@@ -73,12 +73,11 @@ def inspected(drive, y):
     [
         ("spring", 0.1, "hardening"),
         ("spring", -0.1, "softening"),
-        ("friction", 0.01, "friction"),
         ("friction", 0.04, "friction"),
         ("backlash", 0.02, "backlash"),
-        ("backlash", 0.1, "backlash"),
         ("rate", 25.0, "rate_limit"),
         ("clip", 0.7, "saturation"),
+        *in_studies(("friction", 0.01, "friction"), ("backlash", 0.1, "backlash")),
     ],
 )
 def test_each_kind_is_named(kind, size, code):
@@ -216,12 +215,11 @@ def test_the_size_of_a_nonlinearity_scales_with_the_units():
 
 
 @pytest.mark.real_data
-@pytest.mark.parametrize("every", [2, *in_studies(1)])
-def test_the_silverbox_hardens(measured, every):
+@pytest.mark.study  # small: one record and all levels, in test_nonlinear_end_to_end.py
+def test_the_silverbox_hardens(measured):
     data = np.load(measured / "silverbox" / "snls80mv.npz")
     u, y, fs = data["input"], data["output"], 610.3515625
     spans = [(2000, 8000), (8000, 14000), (14000, 20000), (20000, 26000), (32000, 38000)]
-    spans = spans[::every]
     pairs, peaks = [], []
     for start, stop in spans:
         record = Record.from_arrays(
