@@ -59,12 +59,13 @@ def test_beyond_the_band_only_the_model_answers_and_a_file_keeps_it(field_record
 
 def test_refusals(field_record):
     _, u, y = field_record
-    record = hmpim.Record.from_arrays({"u": u}, {"y": y}, fs=200.0)
+    noise = np.random.default_rng(0).standard_normal(y.size)
+    record = hmpim.Record.from_arrays({"u": u}, {"y": y + 0.1 * noise}, fs=200.0)
     pair = hmpim.identify(record, structures=["second_order"])["y", "u"]
     with pytest.raises(hmpim.HmpimError, match="-1 Hz is not positive"):
         gain_and_phase(pair, [2.0, -1.0], fs=200.0)
-    noise = np.random.default_rng(0).standard_normal(y.size)
-    lost = hmpim.identify(hmpim.Record.from_arrays({"u": u}, {"y": noise}, fs=200.0))["y", "u"]
+    unrelated = hmpim.Record.from_arrays({"u": u}, {"y": noise}, fs=200.0)
+    lost = hmpim.identify(unrelated, structures=["static", "first_order"])["y", "u"]
     with pytest.raises(hmpim.HmpimError, match="not identifiable"):
         gain_and_phase(lost, 2.0, fs=200.0)
 

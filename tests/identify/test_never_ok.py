@@ -128,7 +128,14 @@ SPOILT = {
 
 
 LONG = {
-    *("resonant noise", "random walk", "sine without noise", "the input reversed", "the input squared", "a ramp"),
+    *(
+        "resonant noise",
+        "random walk",
+        "sine without noise",
+        "the input reversed",
+        "the input squared",
+        "a ramp",
+    ),
     *("a delay of four fifths", "stuck after half, noisy", "full-wave rectifier", "gain rises"),
     *("clocks part by 0.1 %", "freezes", "two thirds clipped", "relay", "wraps around"),
     "another input as well",

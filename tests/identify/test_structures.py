@@ -9,7 +9,7 @@ from hmpim.identify.fitting.joint import joint_fit
 from hmpim.model import STRUCTURES, coefficients_of, denominator_of, theta_of
 from tests_support import in_studies
 
-FS, DURATION, FINE = 500.0, 10.0, 8
+FS, DURATION, FINE = 500.0, 6.0, 8
 OMEGA = 2 * np.pi
 
 

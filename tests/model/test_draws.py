@@ -27,11 +27,11 @@ MODEL = Model(
 
 
 def test_draws_have_the_mean_and_covariance_they_are_drawn_from():
-    drawn = draw_models(MODEL, 4000, rng=1)
+    drawn = draw_models(MODEL, 2000, rng=1)
     vectors = np.array([coefficient_vector(m) for m in drawn])
     scale = np.sqrt(np.diag(COVARIANCE))
     away = (vectors - coefficient_vector(MODEL)) / scale
-    assert np.abs(away.mean(axis=0)).max() < 4 / np.sqrt(4000)
+    assert np.abs(away.mean(axis=0)).max() < 4 / np.sqrt(2000)
     assert np.cov(away.T) == pytest.approx(COVARIANCE / np.outer(scale, scale), abs=0.08)
     assert np.std([m.bias for m in drawn]) == pytest.approx(0.02, rel=0.06)
     assert np.std([m.noise_std for m in drawn]) == pytest.approx(0.005, rel=0.06)

@@ -135,7 +135,7 @@ PEAK_BESIDE_A_BREAK = {
 }
 
 
-@examples(8)
+@examples(5)
 @given(wish=wishes())
 @example(wish=PEAK_BESIDE_A_BREAK)
 def test_any_wish_of_any_kind(wish):

@@ -114,7 +114,7 @@ def test_stated_intervals_hold_with_a_drift(kind):
     assert_share(inside, at_least=0.92, at_most=0.98)
 
 
-@pytest.mark.few(10)
+@pytest.mark.few(6)
 @pytest.mark.parametrize("colour", [0.0, 0.9])
 def test_noise_is_not_taken_for_a_drift(seeds, colour):
     plain = {"structures": ["second_order"], "noise_colour": colour}

@@ -218,7 +218,7 @@ def test_scaling_the_output_scales_gain_bias_and_noise_only(field_record):
         assert getattr(other, name).std == pytest.approx(getattr(one, name).std, rel=1e-3)
 
 
-@pytest.mark.few(10)
+@pytest.mark.few(6)
 @pytest.mark.parametrize("colour", [0.9, *in_studies(-0.6)])
 def test_intervals_hold_under_coloured_noise(field_record, seeds, colour):
     from scipy.signal import lfilter

@@ -98,8 +98,9 @@ EACH = [("roll", "PVA"), ("yaw", "P"), ("azimuth", "P"), ("elevation", "P")]
 OTHERS = [case for case in product(AXES, MODES) if case not in EACH]
 
 
+@pytest.mark.parametrize("seconds", [4.0, *in_studies(10.0)])
 @pytest.mark.parametrize(("axis", "mode"), [*EACH, *in_studies(*OTHERS)])
-def test_identified_and_exact_bandwidths_agree(axis, mode):
+def test_identified_and_exact_bandwidths_agree(axis, mode, seconds):
     """Nothing is told to the fit; what is exact is what the record's own statement means."""
     table = MotionTable(friction=False, mode=mode)
     truth = exact_bandwidth(table, axis=axis)
@@ -107,7 +108,7 @@ def test_identified_and_exact_bandwidths_agree(axis, mode):
     weak = mode == "PVA" and axis in ("azimuth", "elevation")
     stimulus = design(
         band=(1.0 if weak else 0.1, 1.5 * truth),
-        duration=30.0 if weak else 10.0,
+        duration=30.0 if weak else seconds,
         fs=1000.0,
         limits=table.limits_of(axis, travel=0.2 if weak else 1.5, share=0.95),
         axis=axis,
