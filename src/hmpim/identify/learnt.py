@@ -28,6 +28,9 @@ __all__ = ["Fleet", "Member", "learn_fleet", "theta_at"]
 Real = NDArray[np.float64]
 
 _DEGREE = 9
+_SMOOTHER = 7
+"""Degree for what is read off a model, which is off by a millionth of its error bar then."""
+
 _UNSEEN = 1e-9
 """Share of the greatest singular value below which a direction of the surface is left out."""
 
@@ -145,7 +148,7 @@ def learn_fleet(
     boxes = {mode: _moved(own, found, mode) for mode in open_}
     low = np.min([box[0] for box in boxes.values()], axis=0)
     high = np.max([box[1] for box in boxes.values()], axis=0)
-    places = places_in(low, high, _DEGREE)
+    places = places_in(low, high, _SMOOTHER)
     read = [_figures_at(theta_at(place), structure, fs) for place in places]
     names = tuple(read[0])
     if any(tuple(r) != names for r in read):
@@ -158,7 +161,7 @@ def learn_fleet(
         structure=structure,
         natural="bandlimited" if len(open_) > 1 else found,
         members=tuple(_member(u, structure, mode, *boxes[mode]) for mode in open_),
-        figures=Surface.fitted(low, high, places, values, degree=_DEGREE),
+        figures=Surface.fitted(low, high, places, values, degree=_SMOOTHER),
         names=names,
     )
 

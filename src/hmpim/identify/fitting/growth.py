@@ -12,6 +12,7 @@ but for the price of its pole, is a rival that the intervals cover.
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cache
 from typing import Generic, Protocol, TypeVar
 
 import numpy as np
@@ -143,6 +144,7 @@ class Growth(Generic[F]):
     hidden: HiddenPole
 
 
+@cache
 def one_more_pole(structure: Structure) -> Structure:
     """Return a structure with one more pole; a real pole that is alone gets it as partner.
 
