@@ -1,5 +1,6 @@
 """Run a batch: tasks given out a few at a time, each part kept as soon as it is done."""
 
+import os
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager
@@ -22,7 +23,13 @@ from hmpim.batch.work import Done, Task, give_up
 from hmpim.errors import ArgumentError
 from hmpim.formats.readers.protocol import need
 
-__all__ = ["Cluster", "Progress", "State", "batch"]
+__all__ = ["Cluster", "Progress", "State", "batch", "portion"]
+
+_SHARES = 4
+"""Tasks that each worker has at least, so that none is idle while another ends."""
+
+_FEWEST = 3
+"""Records to a task at least: one takes as long as a task costs to give out and to write."""
 
 
 @checked
@@ -39,7 +46,7 @@ class Cluster:
         Processes on this computer; one for each core if None, and 0 for this process itself,
         without Dask.
     per_task : int
-        Records that a worker does at once and that make one part.
+        Records that a worker does at once and that make one part; fewer where there are few in all.
     patience : float
         Seconds to wait for a scheduler that went away.
 
@@ -217,15 +224,16 @@ class _Run:
         columns = self._columns(first)
         with open_folder(self._folder, self._request, columns, fresh=fresh) as metadata:
             done = Known(self._folder)
-            tasks = self._tasks(chain([first], addresses), done, metadata)
-            ready = next(tasks, None)
-            if ready is None:
+            left = self._left(chain([first], addresses), done)
+            enough = self._cluster.per_task * max(_SHARES * self._crew, 1)
+            ahead = list(islice(left, enough))
+            if not ahead:
                 self._tell()
                 return
             with self._pool() as pool:
                 self._begun = time.monotonic()
                 self._tell()
-                self._drive(pool, chain([ready], tasks))
+                self._drive(pool, self._tasks(chain(ahead, left), len(ahead), done, metadata))
 
     def pooled(self, paths: Sequence[str], *, fresh: bool) -> None:
         """Identify the records of each group as one; a group is a row."""
@@ -331,22 +339,57 @@ class _Run:
         own = () if read is None else tuple(read.metadata)
         return tuple(dict.fromkeys((*self._beside.columns, *own)))
 
+    @property
+    def _crew(self) -> int:
+        """Processes at work, as far as that is known before they are there; 0 for this one."""
+        if self._cluster.workers is not None:
+            return self._cluster.workers
+        return os.cpu_count() or 1
+
+    def _left(self, addresses: Iterator[Address], done: Known) -> Iterator[Address]:
+        """Those that have no rows yet; the others are counted."""
+        for address in addresses:
+            if address in done:
+                self._repeated += 1
+                self._records += 1
+            else:
+                yield address
+
     def _tasks(
-        self, addresses: Iterator[Address], done: Known, metadata: tuple[str, ...]
+        self, left: Iterator[Address], ahead: int, done: Known, metadata: tuple[str, ...]
     ) -> Iterator[Task]:
-        while some := tuple(islice(addresses, self._cluster.per_task)):
-            left = tuple(a for a in some if a not in done)
-            self._repeated += len(some) - len(left)
-            self._records += len(some) - len(left)
-            if left:
-                done.drop(left)
-                yield Task(
-                    addresses=left,
-                    request=self._request,
-                    folder=str(self._folder),
-                    metadata=metadata,
-                    joined=_joined(self._beside, left),
-                )
+        size = portion(ahead, per_task=self._cluster.per_task, workers=self._crew)
+        while some := tuple(islice(left, size)):
+            done.drop(some)
+            yield Task(
+                addresses=some,
+                request=self._request,
+                folder=str(self._folder),
+                metadata=metadata,
+                joined=_joined(self._beside, some),
+            )
+
+
+def portion(known: int, *, per_task: int, workers: int) -> int:
+    """Records to a task: fewer than asked for where that leaves workers without one.
+
+    Parameters
+    ----------
+    known : int
+        Records that are left, counted up to what is enough for all workers.
+    per_task : int
+        Records to a task where there are many.
+    workers : int
+        Processes at work; 0 for this one alone.
+
+    Examples
+    --------
+    >>> [portion(n, per_task=100, workers=2) for n in (1, 8, 100, 500, 800)]
+    [3, 3, 13, 63, 100]
+    """
+    if workers == 0:
+        return per_task
+    return max(min(per_task, _FEWEST), min(per_task, -(-known // (_SHARES * workers))))
 
 
 def _joined(beside: Beside, addresses: Sequence[Address]) -> dict[str, dict[str, str]]:
