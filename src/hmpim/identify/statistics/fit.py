@@ -40,6 +40,10 @@ def pulse(reach: Reach, intersample: Intersample) -> Problem:
     )
 
 
+class _SpentError(Exception):
+    """All evaluations that there may be were made."""
+
+
 class _Evaluation:
     """A structure at given parameters: what is linear solved, and the way down."""
 
@@ -165,6 +169,7 @@ def fit_products(
     *,
     iterations: int = 40,
     precision: float = 1e-2,
+    evaluations: int | None = None,
 ) -> Fitted:
     """Fit one structure from one start.
 
@@ -182,24 +187,34 @@ def fit_products(
         Start: delay in samples, parameters of the denominator's sections.
     iterations, precision
         As for `hmpim.identify.fitting.fit.fit_structure`.
+    evaluations : int, optional
+        How often the structure is evaluated at most, steps that lead nowhere included; as often as
+        the steps ask for by default.
     """
+    seen: list[_Evaluation] = []
 
     def bounded(moved: Sequence[Real]) -> list[Real]:
         delays = (_SHORTEST_DELAY, problem.longest_delay)
         return [within_reach(structure, t, delays=delays, samples=problem.y.size) for t in moved]
 
     def evaluated(thetas: Sequence[Real]) -> _Evaluation:
-        return _Evaluation(products, problem, answers_of(problem, structure, thetas[0]))
+        if len(seen) == evaluations:
+            raise _SpentError
+        seen.append(_Evaluation(products, problem, answers_of(problem, structure, thetas[0])))
+        return seen[-1]
 
-    best, converged = climb(
-        evaluated,
-        bounded([theta]),
-        structures=[structure],
-        bounded=bounded,
-        counted=products.counted,
-        iterations=iterations,
-        precision=precision,
-    )
+    try:
+        best, converged = climb(
+            evaluated,
+            bounded([theta]),
+            structures=[structure],
+            bounded=bounded,
+            counted=products.counted,
+            iterations=iterations,
+            precision=precision,
+        )
+    except _SpentError:
+        best, converged = min(seen, key=lambda one: one.cost), False
     rows, steady = best.all_rows
     moments, unknown = best.all_moments, best.part.theta.size
     bias = moments.bias - float(moments.bias_rows[unknown:] @ best.linear)

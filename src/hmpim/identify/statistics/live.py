@@ -8,6 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 from hmpim.arguments import check_argument, numbers_of
 from hmpim.errors import ArgumentError
 from hmpim.identify.fitting.data import FOLLOWS
+from hmpim.identify.fitting.fit import Fit
 from hmpim.identify.fitting.rows import Problem
 from hmpim.identify.judgement import all_doubted
 from hmpim.identify.result import Estimate, Identification, Parameters
@@ -33,8 +34,8 @@ _FEWEST = 60
 _PAUSE = 1.1
 """Growth of the record before another new start is tried."""
 
-_STEPS = 3
-"""Of the fit, at each look."""
+_EVALUATIONS, _FEWER = 4, 2
+"""Of the fit, at each look; at one that asks whether the residual follows the input."""
 
 _BETWEEN = 1.05
 """Growth of the record before it is asked again whether the residual follows the input."""
@@ -127,6 +128,7 @@ class LiveEstimator:
         self._fitted: Fitted | None = None
         self._tried = self._asked = 0
         self._follows = True
+        self._asked_last = False
         self._asks: Asked | None = None
         self._look: Look | None = None
 
@@ -172,8 +174,11 @@ class LiveEstimator:
         if statistics.samples < _FEWEST or not moves:
             return None
         products = Products(statistics, skipped=0)
-        fitted = self._again(products)
-        if statistics.samples >= _BETWEEN * self._asked:
+        # Not at two looks in a row, since each takes long enough.
+        asks = statistics.samples >= _BETWEEN * self._asked and not self._asked_last
+        fitted = self._again(products, _FEWER if asks else _EVALUATIONS)
+        self._asked_last = asks
+        if asks:
             self._asked = statistics.samples
             self._follows = self._lacks(fitted)
             if self._follows and statistics.samples >= _PAUSE * self._tried:
@@ -197,20 +202,22 @@ class LiveEstimator:
         """The whole identification of what was read, with every structure and every check."""
         return identify_statistics(self._statistics, intersample=self._mode)
 
-    def _again(self, products: Products) -> Fitted:
+    def _again(self, products: Products, evaluations: int) -> Fitted:
         """The same structure, a few steps from where it was."""
-        before = self._fitted
-        if before is None:
+        if self._fitted is None:
             return self._begin(products)
-        fit = before.fit
-        return fit_products(
-            products, self._problem, self._mode, fit.structure, fit.theta, iterations=_STEPS
-        )
+        return self._onward(products, self._fitted.fit, evaluations)
 
     def _begin(self, products: Products) -> Fitted:
         """A new start: every plain structure from the data alone."""
         self._tried = self._statistics.samples
-        return begin(products, self._problem, self._mode)
+        return self._onward(products, begin(self._statistics, self._mode), _EVALUATIONS)
+
+    def _onward(self, products: Products, fit: Fit, evaluations: int) -> Fitted:
+        """A structure fitted a few steps farther."""
+        return fit_products(
+            products, self._problem, self._mode, fit.structure, fit.theta, evaluations=evaluations
+        )
 
     def _excited(self) -> tuple[float, float]:
         statistics = self._statistics

@@ -14,7 +14,7 @@ from hmpim.equality import ByValue
 from hmpim.identify.fitting.autoregression import LONGEST
 from hmpim.identify.statistics.reach import AHEAD, Reach
 
-__all__ = ["Run", "begun", "closed", "continued"]
+__all__ = ["Run", "begun", "closed", "continued", "shortened"]
 
 _PIECE = 16_384
 """Samples that are read at once, at least."""
@@ -110,6 +110,18 @@ def closed(run: Run, reach: Reach) -> Run:
     after = 2.0 * last - run.tail_u[-2 : -2 - known : -1]
     after = np.concatenate([after, np.full(AHEAD - known, after[-1] if known else last)])
     return _added(run, reach, after, np.zeros((reach.rows + 1, AHEAD)))
+
+
+def shortened(run: Run, reach: Reach) -> Run:
+    """The same run, of which no more is kept than a shorter reach asks for."""
+    return replace(
+        run,
+        uu=run.uu[: reach.span + 1],
+        vu=run.vu[:, : reach.forth + reach.back + 1],
+        head_u=run.head_u[: reach.span],
+        tail_u=run.tail_u[-reach.span :],
+        head_y=run.head_y[: reach.back],
+    )
 
 
 def _added(run: Run, reach: Reach, u: Real, v: Real) -> Run:
