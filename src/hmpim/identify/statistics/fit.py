@@ -21,9 +21,13 @@ from hmpim.model.dynamics import Structure
 from hmpim.model.sampled import prepare_input
 from hmpim.record import Intersample
 
-__all__ = ["Fitted", "answers_of", "fit_products", "pulse"]
+__all__ = ["Fitted", "fit_products", "follow", "pulse"]
 
 _SHORTEST_DELAY = -4.0
+
+_NEAR = 0.25
+"""What a step may gain, in units of σ², so that where it leads need not be evaluated: a parameter
+then moves by half a standard deviation at most, and the error of that is of the square."""
 
 Real = NDArray[np.float64]
 
@@ -47,8 +51,11 @@ class _SpentError(Exception):
 class _Evaluation:
     """A structure at given parameters: what is linear solved, and the way down."""
 
-    def __init__(self, products: Products, problem: Problem, part: Part) -> None:
-        self.products, self.problem, self.part = products, problem, part
+    def __init__(
+        self, products: Products, problem: Problem, structure: Structure, theta: Real
+    ) -> None:
+        self.products, self.problem = products, problem
+        self.part = part = Part(problem, structure, theta)
         self.steady = np.zeros(part.rows.shape[0])
         self.steady[0] = 1.0 if part.structure.dc_zeros == 0 else 0.0
         self.moments = products.moments(part.rows, self.steady)
@@ -100,6 +107,8 @@ class Fitted:
         What was assumed.
     response : ndarray, shape (taps,)
         Impulse response.
+    weights : ndarray, shape (q,)
+        What multiplies `rows` in it: the last step, 0 where it was evaluated; the numerator.
     rows, steady : ndarray, shape (q, taps) and (q,)
         Derivatives of it by theta, then by the numerator; what each makes of a constant 1.
     moments : Moments
@@ -111,6 +120,7 @@ class Fitted:
     fit: Fit
     intersample: Intersample
     response: Real
+    weights: Real
     rows: Real
     steady: Real
     moments: Moments
@@ -141,8 +151,7 @@ class Fitted:
 
     def residual(self, plain: Products) -> Residual:
         """What is left over, by products without a noise model."""
-        unknown = self.fit.theta.size
-        fixed = self.moments.fixed - self.moments.fixed_rows[..., unknown:] @ self.fit.linear[:-1]
+        fixed = self.moments.fixed - self.moments.fixed_rows @ self.weights
         return plain.residual(self.response, fixed)
 
 
@@ -153,11 +162,6 @@ def _inverse(gram: Real) -> Real:
     values, vectors = np.linalg.eigh(gram / np.outer(scale, scale))
     values = np.maximum(values, 1e-14 * values[-1])
     return np.asarray((vectors / values) @ vectors.T / np.outer(scale, scale))
-
-
-def answers_of(problem: Problem, structure: Structure, theta: Real) -> Part:
-    """Impulse responses of a structure."""
-    return Part(problem, structure, theta)
 
 
 def fit_products(
@@ -191,22 +195,68 @@ def fit_products(
         How often the structure is evaluated at most, steps that lead nowhere included; as often as
         the steps ask for by default.
     """
+    here = _Evaluation(products, problem, structure, _within(problem, structure, theta))
+    return _climbed(
+        here, intersample, iterations=iterations, precision=precision, evaluations=evaluations
+    )
+
+
+def follow(
+    products: Products,
+    problem: Problem,
+    intersample: Intersample,
+    fit: Fit,
+    *,
+    evaluations: int,
+) -> Fitted:
+    """Take a fit along to more samples of the same run.
+
+    Where these move it by a fraction of its error bars, that is one step of Gauss and Newton. Where
+    it leads is foretold by the derivatives and not evaluated: it costs half of what it would.
+
+    Parameters
+    ----------
+    products, problem, intersample, evaluations
+        As for `fit_products`.
+    fit : Fit
+        Of the samples before.
+    """
+    here = _Evaluation(products, problem, fit.structure, fit.theta)
+    normal, moment = here.normal()
+    step = solved(normal, moment)
+    gained, theta = float(step @ moment), fit.theta + step
+    freedom = max(products.counted - step.size - here.linear.size, 1)
+    held = (_within(problem, fit.structure, theta) != theta).any()
+    if fit.converged and gained * freedom < _NEAR * here.cost and not held:
+        return _ended(here, intersample, step, left=here.cost - gained, converged=True)
+    return _climbed(here, intersample, evaluations=evaluations)
+
+
+def _climbed(
+    here: _Evaluation,
+    intersample: Intersample,
+    *,
+    iterations: int = 40,
+    precision: float = 1e-2,
+    evaluations: int | None,
+) -> Fitted:
+    """The way down from the first evaluation, which counts as one."""
+    products, problem, structure = here.products, here.problem, here.part.structure
     seen: list[_Evaluation] = []
 
     def bounded(moved: Sequence[Real]) -> list[Real]:
-        delays = (_SHORTEST_DELAY, problem.longest_delay)
-        return [within_reach(structure, t, delays=delays, samples=problem.y.size) for t in moved]
+        return [_within(problem, structure, t) for t in moved]
 
     def evaluated(thetas: Sequence[Real]) -> _Evaluation:
         if len(seen) == evaluations:
             raise _SpentError
-        seen.append(_Evaluation(products, problem, answers_of(problem, structure, thetas[0])))
+        seen.append(_Evaluation(products, problem, structure, thetas[0]) if seen else here)
         return seen[-1]
 
     try:
         best, converged = climb(
             evaluated,
-            bounded([theta]),
+            here.thetas,
             structures=[structure],
             bounded=bounded,
             counted=products.counted,
@@ -215,18 +265,36 @@ def fit_products(
         )
     except _SpentError:
         best, converged = min(seen, key=lambda one: one.cost), False
-    rows, steady = best.all_rows
-    moments, unknown = best.all_moments, best.part.theta.size
-    bias = moments.bias - float(moments.bias_rows[unknown:] @ best.linear)
+    still = np.zeros(best.part.theta.size)
+    return _ended(best, intersample, still, left=best.cost, converged=converged)
+
+
+def _within(problem: Problem, structure: Structure, theta: Real) -> Real:
+    """Keep parameters where they can be told."""
+    delays = (_SHORTEST_DELAY, problem.longest_delay)
+    return within_reach(structure, theta, delays=delays, samples=problem.y.size)
+
+
+def _ended(
+    last: _Evaluation, intersample: Intersample, step: Real, *, left: float, converged: bool
+) -> Fitted:
+    """Where a fit ended: a step away from the last evaluation, as the derivatives foretell it."""
+    (rows, steady), moments, unknown = last.all_rows, last.all_moments, step.size
+    linear = last.linear
+    if step.any():
+        inner, mixed = moments.gram[unknown:, unknown:], moments.gram[unknown:, :unknown]
+        linear = linear - solved(inner, mixed @ step)
+    weights = np.concatenate([step, linear])
+    bias = moments.bias - float(moments.bias_rows @ weights)
     nothing = np.empty(0)
     fit = Fit(
-        structure=structure,
-        theta=best.part.theta,
-        linear=np.append(best.linear, bias),
+        structure=last.part.structure,
+        theta=last.part.theta + step,
+        linear=np.append(linear, bias),
         prediction=nothing,
         residual=nothing,
-        cost=best.cost,
-        objective=best.cost,
+        cost=left,
+        objective=left,
         converged=converged,
         nuisance=nothing,
         initial=nothing,
@@ -234,9 +302,10 @@ def fit_products(
     return Fitted(
         fit=fit,
         intersample=intersample,
-        response=best.linear @ best.part.rows,
+        response=weights @ rows,
+        weights=weights,
         rows=rows,
         steady=steady,
         moments=moments,
-        products=products,
+        products=last.products,
     )

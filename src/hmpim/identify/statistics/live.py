@@ -8,13 +8,12 @@ from numpy.typing import ArrayLike, NDArray
 from hmpim.arguments import check_argument, numbers_of
 from hmpim.errors import ArgumentError
 from hmpim.identify.fitting.data import FOLLOWS
-from hmpim.identify.fitting.fit import Fit
 from hmpim.identify.fitting.rows import Problem
 from hmpim.identify.judgement import all_doubted
 from hmpim.identify.result import Estimate, Identification, Parameters
 from hmpim.identify.statistics.begin import begin
 from hmpim.identify.statistics.describe import identify_statistics
-from hmpim.identify.statistics.fit import Fitted, fit_products, pulse
+from hmpim.identify.statistics.fit import Fitted, follow, pulse
 from hmpim.identify.statistics.misfit import Asked, asked_of, misfit_of
 from hmpim.identify.statistics.products import Products
 from hmpim.identify.statistics.reach import Reach
@@ -203,21 +202,18 @@ class LiveEstimator:
         return identify_statistics(self._statistics, intersample=self._mode)
 
     def _again(self, products: Products, evaluations: int) -> Fitted:
-        """The same structure, a few steps from where it was."""
+        """The same structure, a step or a few from where it was."""
         if self._fitted is None:
             return self._begin(products)
-        return self._onward(products, self._fitted.fit, evaluations)
+        return follow(
+            products, self._problem, self._mode, self._fitted.fit, evaluations=evaluations
+        )
 
     def _begin(self, products: Products) -> Fitted:
         """A new start: every plain structure from the data alone."""
         self._tried = self._statistics.samples
-        return self._onward(products, begin(self._statistics, self._mode), _EVALUATIONS)
-
-    def _onward(self, products: Products, fit: Fit, evaluations: int) -> Fitted:
-        """A structure fitted a few steps farther."""
-        return fit_products(
-            products, self._problem, self._mode, fit.structure, fit.theta, evaluations=evaluations
-        )
+        fit = begin(self._statistics, self._mode)
+        return follow(products, self._problem, self._mode, fit, evaluations=_EVALUATIONS)
 
     def _excited(self) -> tuple[float, float]:
         statistics = self._statistics

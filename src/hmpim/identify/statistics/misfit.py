@@ -161,7 +161,7 @@ def _beside(
     own = fitted.rows
     steady = np.concatenate([asked.sum(axis=1), fitted.steady])
     moments = products.moments(np.vstack([asked, own]), steady, known=known)
-    linear = np.concatenate([np.zeros(fitted.fit.theta.size), fitted.fit.linear[:-1]])
+    linear = fitted.weights
     mixed, inner = moments.gram[:count, count:], moments.gram[count:, count:]
     own_size = np.diag(inner)
     size = np.sqrt(np.where(own_size > 1e-200 * own_size.max(), own_size, 1.0))
