@@ -1,9 +1,10 @@
-"""A run in real time over a wire: its regularity, and five axes at once from the run to the page.
+"""Runs in real time: regularity over a wire, five axes from run to page, the estimate so far.
 
 ``live.py timing`` sends 1000 commands a second over loopback for 10 s and says how regularly they
 went. ``live.py five`` plays five axes at once on the served table, writes the page, says what each
-stage took, and holds the bandwidths against those of the local table. Both want an idle machine
-with two cores, and print the tables of docs/performance.md. Run by `make bench`.
+stage took, and holds the bandwidths against those of the local table. ``live.py updates`` feeds
+`hmpim.LiveEstimator` block by block and says what each update takes. All want an idle machine with
+two cores, and print the tables of docs/performance.md. Run by `make bench`.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ import sys
 import tempfile
 import time
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from far_end import far_end
@@ -27,6 +29,8 @@ from hmpim.formats.stimulus_files import save_stimulus
 from hmpim.rigs import MotionTable
 from hmpim.rigs.table import exact_bandwidth
 from hmpim.stimulus.axes import AxisPlan
+
+Real = np.ndarray[Any, np.dtype[np.float64]]
 
 HMPIM = [sys.executable, "-m", "hmpim.cli.main"]
 RATE = 1000.0
@@ -151,6 +155,65 @@ def five() -> list[str]:
     ]
 
 
+def updates() -> list[str]:
+    """What an update of the live estimate takes, at two rates, a block every 0.05 s."""
+    runs = [updated(fs, seconds) for fs in (200.0, 1000.0) for seconds in (4.8, 19.2)]
+    slowest = max(float(np.quantile(run[1], 0.99)) for run in runs)
+    return [
+        "| ms | "
+        + " | ".join(f"{fs:g} Hz, {seconds:g} s" for (fs, seconds), *_ in runs)
+        + " | asked for |",
+        "| --- |" + " --- |" * (len(runs) + 1),
+        _row("ordinary update: median", [np.median(run[1]) for run in runs]),
+        _row("99 %", [np.quantile(run[1], 0.99) for run in runs], f"{verdict(slowest <= 5)}: 5"),
+        _row("longest", [run[1].max() for run in runs]),
+        _row("median of the first quarter", [np.median(_part(run[1], 0)) for run in runs]),
+        _row("median of the last quarter", [np.median(_part(run[1], 3)) for run in runs]),
+        _row("new start: longest", [run[2].max() for run in runs]),
+        _row("new starts", [run[2].size for run in runs], shape="d"),
+        _row("kept of the run, kB", [run[3] / 1e3 for run in runs], shape=".0f"),
+    ]
+
+
+def updated(fs: float, seconds: float) -> tuple[tuple[float, float], Real, Real, int]:
+    """Milliseconds of ordinary updates and of new starts, and bytes kept, of one run."""
+    limits = hmpim.Limits(position=1.0)
+    plan = {"band": (0.1, 20.0), "fs": fs, "limits": limits, "kind": "repeated", "sweep": 0.6}
+    stimulus = hmpim.design(duration=seconds, **plan)
+    sensor = hmpim.Sensor(
+        delay=0.15, natural_frequency=10.0, damping_ratio=0.4, bias=0.6, noise_std=0.1
+    )
+    record = hmpim.run(sensor, stimulus, rng=0)
+    u, y = record.inputs[0].values, record.outputs[0].values
+    size = round(0.05 * fs)
+    fed(stimulus, u[: 30 * size], y[: 30 * size], size)  # what is loaded at first use, is loaded
+    ordinary, anew, kept = fed(stimulus, u, y, size)
+    return (fs, seconds), ordinary, anew, kept
+
+
+def fed(stimulus: hmpim.Stimulus, u: Real, y: Real, size: int) -> tuple[Real, Real, int]:
+    """Feed a run, block by block; milliseconds of each update, those that start anew apart."""
+    live = hmpim.LiveEstimator(stimulus)
+    ordinary, anew = [], []
+    for first in range(0, u.size, size):
+        block, starts = slice(first, first + size), live.starts
+        begun = time.perf_counter()
+        look = live.update(u[block], y[block])
+        took = 1e3 * (time.perf_counter() - begun)
+        if look is not None:
+            (ordinary if live.starts == starts else anew).append(took)
+    return np.array(ordinary), np.array(anew), live.statistics.nbytes
+
+
+def _part(times: Real, quarter: int) -> Real:
+    """One quarter of a run's updates."""
+    return np.array_split(times, 4)[quarter]
+
+
+def _row(name: str, values: list[Any], asked: str = "", *, shape: str = ".1f") -> str:
+    return f"| {name} | " + " | ".join(f"{value:{shape}}" for value in values) + f" | {asked} |"
+
+
 def bandwidths(path: Path) -> dict[str, tuple[float, float]]:
     """Of each axis's own pair, value and standard deviation."""
     pairs = json.loads(path.read_text())["pairs"]
@@ -180,10 +243,11 @@ def stages(text: str, *, wall: float, spent: float, serving: float) -> list[str]
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("what", nargs="?", choices=("timing", "five", "both"), default="both")
+    made = {"timing": timing, "five": five, "updates": updates}
+    parser.add_argument("what", nargs="?", choices=(*made, "all"), default="all")
     what = parser.parse_args().what
-    for wanted, make in (("timing", timing), ("five", five)):
-        if what in (wanted, "both"):
+    for wanted, make in made.items():
+        if what in (wanted, "all"):
             print(f"## {wanted}\n")
             print("\n".join(make()), flush=True)
             print()

@@ -22,7 +22,7 @@ from hmpim.identify.statistics.statistics import Statistics
 from hmpim.model.dynamics import STRUCTURES
 from hmpim.record import Intersample
 
-__all__ = ["begin"]
+__all__ = ["begin", "only_told"]
 
 _TASTE = 4
 """Evaluations from each start before the best one is followed."""
@@ -41,7 +41,7 @@ def begin(statistics: Statistics, intersample: Intersample) -> Fit:
     intersample : {'zoh', 'foh', 'bandlimited'}
         What the input does between its samples.
     """
-    short = _only_told(statistics)
+    short = only_told(statistics)
     products = Products(short, skipped=0)
     fitted = partial(fit_products, products, pulse(short.reach, intersample), intersample)
     rough = rough_of(short)
@@ -63,7 +63,7 @@ def begin(statistics: Statistics, intersample: Intersample) -> Fit:
     )
 
 
-def _only_told(statistics: Statistics) -> Statistics:
+def only_told(statistics: Statistics) -> Statistics:
     """The same, without lags that are longer than the run: it tells nothing about them."""
     reach = replace(statistics.reach, lags=min(statistics.lags, statistics.samples))
     runs = tuple(shortened(run, reach) for run in statistics.runs)

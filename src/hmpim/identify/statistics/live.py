@@ -125,11 +125,16 @@ class LiveEstimator:
         self._mode: Intersample = intersample
         self._problem: Problem = pulse(self._statistics.reach, intersample)
         self._fitted: Fitted | None = None
-        self._tried = self._asked = 0
+        self._tried = self._asked = self._starts = 0
         self._follows = True
         self._asked_last = False
         self._asks: Asked | None = None
         self._look: Look | None = None
+
+    @property
+    def starts(self) -> int:
+        """How often a new start was made; it takes longer than other updates do."""
+        return self._starts
 
     @property
     def statistics(self) -> Statistics:
@@ -212,6 +217,7 @@ class LiveEstimator:
     def _begin(self, products: Products) -> Fitted:
         """A new start: every plain structure from the data alone."""
         self._tried = self._statistics.samples
+        self._starts += 1
         fit = begin(self._statistics, self._mode)
         return follow(products, self._problem, self._mode, fit, evaluations=_EVALUATIONS)
 
