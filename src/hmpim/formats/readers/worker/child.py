@@ -73,6 +73,7 @@ def _serve(requests: int, answers: int, memory: int) -> None:
     _forbid()
     pipe, reply = os.fdopen(requests, "rb"), os.fdopen(answers, "wb")
     gc.freeze()  # what is imported stays: no collection need look at it again
+    imported = len(sys.modules)
     while (request := receive(pipe, limit=0)) is not None:
         with open(os.devnull, "w") as silent:
             # A thread that needs nothing of Python, so it also ends what never lets Python in.
@@ -87,6 +88,9 @@ def _serve(requests: int, answers: int, memory: int) -> None:
             os._exit(1)  # what a library keeps would be lost for the next file
         del message, arrays
         gc.collect()
+        if len(sys.modules) > imported:  # a library that this file needed
+            gc.freeze()
+            imported = len(sys.modules)
 
 
 def _die_with_parent() -> None:
