@@ -149,6 +149,7 @@ LONG = {
         "clocks part by 0.2 %",
         "slow sine",
         "polarity flips",
+        "delay changes",  # fitting/test_halves.py has it
         "slack",
     ),
 }

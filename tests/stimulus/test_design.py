@@ -112,8 +112,8 @@ def wishes(draw):
         "fs": band[1] * draw(st.floats(2.05, 20.0)),
         "limits": Limits(
             position=position,
-            velocity=position * omega * 10 ** draw(st.floats(-1.2, 0.3)),
-            acceleration=position * omega**2 * 10 ** draw(st.floats(-2.0, 0.3)),
+            velocity=position * omega * 10 ** draw(st.floats(-0.9, 0.3)),
+            acceleration=position * omega**2 * 10 ** draw(st.floats(-1.5, 0.3)),
         ),
     }
 

@@ -12,6 +12,7 @@ from hmpim.errors import ArgumentError, RecordError
 from hmpim.formats.models import export
 from hmpim.identify import Identification, Parameters
 from hmpim.model import Model, frequency_response
+from tests_support import in_studies
 
 from .conftest import FS, compiled_c, result_of
 
@@ -59,7 +60,7 @@ def walk(seed: int) -> np.ndarray:
 
 
 @pytest.mark.usefixtures("needs_cc")
-@pytest.mark.parametrize("intersample", ["zoh", "foh", "bandlimited"])
+@pytest.mark.parametrize("intersample", ["zoh", "bandlimited", *in_studies("foh")])
 @pytest.mark.parametrize("name", sorted(MODELS))
 def test_programs_give_what_the_model_gives(name, intersample, tmp_path):
     model = replace(MODELS[name], intersample=intersample, band=20.0)
