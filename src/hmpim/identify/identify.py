@@ -36,7 +36,7 @@ from hmpim.identify.result import (
 )
 from hmpim.identify.statistics.describe import identify_statistics
 from hmpim.identify.statistics.statistics import Statistics
-from hmpim.identify.swapped import is_swapped, swapped_finding
+from hmpim.identify.swapped import is_swapped, lags_behind, swapped_finding
 from hmpim.identify.threads import one_thread
 from hmpim.identify.through import Instrument, fit_through, instrument_of
 from hmpim.identify.whiteness import is_white
@@ -288,8 +288,6 @@ def _identify_output(
         )
         return [untold(aligned, source, output, record, dead) for source in aligned.inputs], None
     backwards = _backwards(aligned, output) if instrument is None else ()
-    if backwards:
-        structures = tuple(name for name in structures if name in PLAIN) or structures
     if intersample is None and len(aligned.inputs) == 1 and not backwards and instrument is None:
         (source,) = aligned.inputs
         if bool(source.valid.all() and output.valid.all()) and _is_software(
@@ -299,11 +297,15 @@ def _identify_output(
             structures = cast(tuple[StructureName, ...], tuple(FILTERS))
     richest = max(count_levels(source.values) for source in aligned.inputs)
     found = find_imperfections(output.values, aligned.fs, richest=richest)
-    joined, drifting = (
-        (_joined(aligned, output, found, intersample, structures, inputs), None)
-        if backwards
-        else _drifted(aligned, output, found, intersample, structures, inputs)
-    )
+    if backwards:
+        plain = tuple(name for name in structures if name in PLAIN) or structures
+        joined, drifting = _joined(aligned, output, found, intersample, plain, inputs), None
+        if lags_behind(joined.fits[0]):  # it was the clock
+            backwards = ()
+        else:
+            structures = plain
+    if not backwards:
+        joined, drifting = _drifted(aligned, output, found, intersample, structures, inputs)
     if drifting is not None and found.saturation is None:
         clipped = _clipped(aligned, output, found, drifting, intersample, structures)
         if clipped is not None:

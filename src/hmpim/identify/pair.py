@@ -183,7 +183,7 @@ def _measured(
 
     Where an integrating output ends is not where it began, and that step leaks into every bin.
     """
-    delay = max(fit.delay, 0.0) / fs
+    delay = fit.delay / fs
     if not fit.structure.integrators:
         return local_response(u, y, fs, delay=delay, band=band)
     steps = local_response(u, np.diff(y, prepend=y[0]), fs, delay=delay, band=band)

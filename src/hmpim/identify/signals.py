@@ -1,4 +1,4 @@
-"""What may be analysed: finite real samples, as many in as out, at a positive rate."""
+"""What may be analysed: finite real samples, as many in as out, at a positive rate; how late."""
 
 import math
 
@@ -7,9 +7,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from hmpim.errors import ArgumentError, RecordError
 
-__all__ = ["as_pair", "as_signal", "check_band", "check_rate"]
+__all__ = ["as_pair", "as_signal", "check_band", "check_rate", "longest_lag", "whole_lag"]
 
 _FEWEST_SAMPLES = 4
+
+_FARTHEST = 0.85
+"""Longest lag that is looked for, over the record's length; what is left must show an answer."""
 
 
 def as_signal(name: str, values: ArrayLike) -> NDArray[np.float64]:
@@ -103,3 +106,28 @@ def check_band(band: tuple[float, float], fs: float) -> None:
         raise ArgumentError(
             f"band is ({low}, {high}) Hz; give 0 <= low < high <= fs/2 = {fs / 2:g} Hz"
         )
+
+
+def longest_lag(samples: int) -> int:
+    """Longest lag, in samples, that is looked for in so many.
+
+    Examples
+    --------
+    >>> longest_lag(1000)
+    850
+    """
+    return int(_FARTHEST * samples)
+
+
+def whole_lag(delay: float, fs: float, samples: int) -> int:
+    """Whole samples by which an output is moved back, below 0 forward; the phase takes the rest.
+
+    A delay beyond most of the record leaves too little.
+
+    Examples
+    --------
+    >>> whole_lag(0.026, 100.0, 1000), whole_lag(-0.026, 100.0, 1000), whole_lag(12.0, 100.0, 1000)
+    (2, -3, 850)
+    """
+    most = longest_lag(samples)
+    return int(np.clip(np.floor(delay * fs + 1e-9), -most, most))

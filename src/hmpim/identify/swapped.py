@@ -14,10 +14,14 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from hmpim.identify.fitting.fit import jacobian
+from hmpim.identify.fitting.trial import JointFit
 from hmpim.identify.groups import EVERY
+from hmpim.identify.uncertainty import covariance
+from hmpim.identify.whiteness import is_white
 from hmpim.record import Finding
 
-__all__ = ["is_swapped", "swapped_finding"]
+__all__ = ["is_swapped", "lags_behind", "swapped_finding"]
 
 _WEIGHTS = 20
 """Weights on each side; twice as many for the past alone."""
@@ -39,6 +43,9 @@ _ROWS = 20_000
 
 _FEWEST = 200
 """Samples that are looked at, at least."""
+
+_TOLD = 0.1
+"""Standard deviation of a time constant, over it, from which the record tells that there is one."""
 
 _FLOOR = 0.01
 """Share (r.m.s.) of a channel below which what is left over is not told apart."""
@@ -112,6 +119,23 @@ def swapped_finding(source: str, output: str) -> Finding:
         severity="doubt",
         parameters=EVERY,
     )
+
+
+def lags_behind(joint: JointFit) -> bool:
+    """Whether an output that is ahead lags all the same, as the inverse of a unit cannot.
+
+    Its clock then is late, and the columns are right: behind a negative delay there are poles that
+    the record tells, and they leave white noise.
+    """
+    fit = joint.best.fit
+    if not fit.structure.order or not is_white(joint.problem.counting(fit.residual)):
+        return False
+    rows = jacobian(joint.problem, fit)
+    variance = covariance(
+        rows, fit.residual, freedom=max(joint.problem.counted - len(rows), 1), white=True
+    )
+    # The logarithm of the first section's time constant comes after the delay.
+    return bool(variance[1, 1] < _TOLD**2)
 
 
 def _is_ahead(u: NDArray[np.float64], y: NDArray[np.float64]) -> bool:

@@ -55,7 +55,7 @@ def test_starting_values_are_near_the_truth(field_record):
     _, u, y = field_record
     noisy = y + 0.1 * np.random.default_rng(3).standard_normal(y.size)
     start = starting_values(
-        rough_response(u, noisy, longest_delay=1000), STRUCTURES["second_order"], earliest=-2
+        rough_response(u, noisy, longest_delay=1000), STRUCTURES["second_order"]
     )[0]
     assert start[0] == pytest.approx(30.0, abs=2.0)
     np.testing.assert_allclose(start[1:], true_theta()[1:], atol=0.4)
@@ -250,3 +250,31 @@ def test_a_free_response_of_two_modes_is_no_coloured_noise(seed):
     assert joint.best.fit.structure.name == "two_modes"
     assert joint.forgotten > 0
     assert np.sqrt(joint.best.fit.cost / y.size) == pytest.approx(noise, rel=0.08)
+
+
+@pytest.mark.parametrize("ahead", [0.05, 0.4])
+def test_an_output_may_be_ahead_of_its_input(field_record, ahead):
+    """The same answer, its stamps too early by more than delay and dynamics are late."""
+    _, u, y = field_record
+    moved = round((0.15 + ahead) * FS)
+    noisy = y + 0.02 * np.random.default_rng(3).standard_normal(y.size)
+    joint = joint_fit(u[:-moved], noisy[moved:], intersample="bandlimited")
+    assert joint.best.fit.structure.name == "second_order"
+    rest = joint_fit(u, noisy, intersample="bandlimited").best.fit
+    assert joint.best.fit.delay == pytest.approx(rest.delay - moved, abs=0.05)
+    assert joint.best.fit.denominator == pytest.approx(rest.denominator, rel=0.02)
+
+
+def test_a_delay_beyond_half_of_a_record_in_motion():
+    """What answers the input before the record does not count, be it most of the record."""
+    rng = np.random.default_rng(4)
+    lines = np.fft.rfft(rng.standard_normal(4000))
+    lines[np.fft.rfftfreq(4000) > 0.1] = 0.0
+    s = 2j * np.pi * np.fft.rfftfreq(4000, 1.0 / FS)
+    answer = np.exp(-6.0 * s) / (1.0 + 0.8 * s / 60.0 + (s / 60.0) ** 2)
+    u, y = (np.fft.irfft(x, 4000)[:2000] for x in (lines, lines * answer))
+    noise = 0.02 * float(y.std())
+    joint = joint_fit(u, y + noise * rng.standard_normal(y.size), intersample="bandlimited")
+    assert joint.best.fit.structure.name == "second_order"
+    assert joint.best.fit.delay == pytest.approx(6.0 * FS, abs=0.1)
+    assert joint.forgotten > 6.0 * FS

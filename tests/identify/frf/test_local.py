@@ -220,7 +220,7 @@ def test_where_nothing_is_excited_the_error_says_so() -> None:
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"delay": -0.1}, "delay is -0.1 s"),
+        ({"delay": float("inf")}, "delay is inf s"),
         ({"delay": float("nan")}, "delay is nan s"),
         ({"order": 7}, "order is 7"),
         ({"order": -1}, "order is -1"),

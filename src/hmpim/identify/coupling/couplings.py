@@ -125,7 +125,7 @@ def coupling_fit(
         structure = STRUCTURES[name]
         if structure.order > 1 and fits and not _hopeful(problem, fits):
             continue
-        starts = starting_values(rough, structure, earliest=-2, count=2, thorough=True)
+        starts = starting_values(rough, structure, count=2, thorough=True)
         if name == "second_order":
             starts += [nested(fit) for fit in fits if fit.structure.name == "first_order"]
             starts += _resonances(rough, fits[0].delay if fits else float(rough.lag))

@@ -391,7 +391,7 @@ def _moved(data: _Data, state: _State, step: NDArray[np.float64]) -> _State | No
     denominator = moved.denominator
     if not (np.all(np.isfinite(denominator)) and np.all(denominator >= 0)):
         return None
-    if not -4.0 <= moved.delay <= data.problem.longest_delay:
+    if not data.problem.shortest_delay <= moved.delay <= data.problem.longest_delay:
         return None
     floor = np.log(_LEAST_NOISE * max(float(np.std(data.y)), np.finfo(float).tiny))
     return _evaluated(data, moved, max(state.log_sigma + float(step[-1]), float(floor)))

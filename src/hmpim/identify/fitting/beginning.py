@@ -10,6 +10,7 @@ from hmpim.identify.fitting.data import Data, Seen
 from hmpim.identify.fitting.fit import Fit, Problem, jacobian, solved
 from hmpim.identify.fitting.sampled_rows import part_of
 from hmpim.identify.fitting.trial import Trial
+from hmpim.identify.signals import longest_lag
 from hmpim.identify.whiteness import effective_share
 from hmpim.record import Intersample
 
@@ -32,6 +33,9 @@ _REST = 1e-4
 
 _SPARED = 0.1
 """Share of the record that may be left out at the beginning for a delay not known yet."""
+
+_LEFT = 4
+"""Samples for each parameter that must be left."""
 
 _TWICE = 2.0
 """Factor on what the beginning may hold, for noise that is not white or not Gaussian."""
@@ -73,9 +77,9 @@ def begins_of(problem: Problem, fit: Fit, *, lag: int) -> int | None:
     input before the record. A fit from rest may have any delay where it was not at rest; that of
     the cross-correlation, `lag`, is the later one, and costs a few samples.
     """
-    latest = max(fit.delay, float(lag) if lag <= problem.y.size * _SPARED else 0.0)
+    latest = max(fit.delay, float(lag) if lag <= problem.y.size * _SPARED else 0.0, 0.0)
     begins = int(np.ceil(latest)) + _REACH
-    if begins > problem.y.size // 2 or fit.objective <= 0.0:
+    if begins > longest_lag(problem.y.size) or fit.objective <= 0.0:
         return None
     free = part_of(replace(problem, begins=begins), fit.structure, fit.theta).free
     late = np.arange(problem.y.size) >= begins
@@ -84,6 +88,8 @@ def begins_of(problem: Problem, fit: Fit, *, lag: int) -> int | None:
     innovations = problem.innovations(fit.prediction, fit.residual)
     residual = innovations * late
     count = int(np.count_nonzero(valid))
+    if count < _LEFT * fit.structure.parameters:
+        return None
     power = float(residual @ residual)
     share = effective_share(residual[valid])
     if _stands_out(innovations, told & ~late, valid):

@@ -15,11 +15,16 @@ from hmpim.identify.fitting.enrich import (
 )
 from hmpim.identify.fitting.fit import Fit, Problem, fit_structure
 from hmpim.identify.fitting.growth import one_more_pole, scale_of, with_pole
-from hmpim.identify.fitting.start import RoughResponse, rough_response, starting_values
+from hmpim.identify.fitting.start import (
+    RoughResponse,
+    rough_response,
+    starting_values,
+)
 from hmpim.identify.fitting.trial import CLEARLY
 from hmpim.identify.fitting.unexplained import unexplained_response
+from hmpim.identify.signals import longest_lag
 from hmpim.identify.whiteness import effective_share, is_white, misfit
-from hmpim.model.dynamics import STRUCTURES, Structure, StructureName
+from hmpim.model.dynamics import STRUCTURES, Structure, StructureName, coefficients_of
 from hmpim.model.response import slowest_time_constant
 from hmpim.record import BETWEEN, Intersample
 
@@ -30,6 +35,7 @@ __all__ = [
     "fit_under_each_assumption",
     "is_worth_explaining",
     "nested",
+    "reduced",
     "refit_between",
 ]
 
@@ -79,7 +85,7 @@ def fit_plain(
         if settled and name == "first_order":
             starts = [_without_second_pole(fits[0])]
         else:
-            starts = starting_values(rough, structure, earliest=-2, thorough=False)
+            starts = starting_values(rough, structure, thorough=False)
         steps = 2 if settled else _TASTE
         fit = fit_structure(problem, structure, starts[0], iterations=steps)
         hopeful = min((f.objective for f in fits), default=np.inf) * HOPELESS
@@ -87,7 +93,7 @@ def fit_plain(
         if not white and fit.objective < _FALLING * hopeful:
             rivals = starts[1:]
             if not settled:
-                rivals += starting_values(rough, structure, earliest=-2)
+                rivals += starting_values(rough, structure)
             for theta in rivals:
                 rival = fit_structure(problem, structure, theta, iterations=_TASTE)
                 fit = min(fit, rival, key=lambda f: f.objective)
@@ -121,7 +127,7 @@ def fit_rich(
     found: list[Fit] = []
     if integrating:
         added = np.cumsum(data.u - data.u[0])
-        rough = rough_response(added, data.y, longest_delay=data.y.size // 2)
+        rough = rough_response(added, data.y, longest_delay=longest_lag(data.y.size))
         for structure in integrating:
             if found and is_white(min(found, key=lambda fit: fit.objective).residual):
                 return found
@@ -145,6 +151,39 @@ def fit_rich(
         # Poles without end follow what no linear model describes: friction, rounding.
         found = [fit for fit in found if fit.structure.order <= _SURE]
     return found
+
+
+def reduced(problem: Problem, fits: list[Fit], richer: list[Fit]) -> list[Fit]:
+    """Fits of plain structures, also tried from what the best of the richer ones has found.
+
+    One section of it is kept; what the others add at low frequencies is delay.
+    """
+    best = min(richer, key=lambda f: f.objective)
+    sections = _sections(best)
+    late = best.delay + sum(float(c[0]) for _, c in sections)
+    if best.structure.zeros and best.linear.size > 2 and best.linear[0]:
+        late -= float(best.linear[1] / best.linear[0])
+    out = []
+    for fit in fits:
+        starts = [
+            np.concatenate([[late - c[0]], theta])
+            for theta, c in sections
+            if fit.structure.sections == (c.size,)
+        ]
+        if fit.objective <= HOPELESS * best.objective:
+            starts = []
+        tried = [fit_structure(problem, fit.structure, theta) for theta in starts]
+        out.append(min([fit, *tried], key=lambda f: f.objective))
+    return out
+
+
+def _sections(fit: Fit) -> list[tuple[NDArray[np.float64], NDArray[np.float64]]]:
+    """Parameters and coefficients of each section of a denominator."""
+    if not fit.structure.sections:
+        return []
+    edges = np.cumsum(fit.structure.sections)[:-1]
+    flat = coefficients_of(fit.structure, fit.theta[1:])
+    return list(zip(np.split(fit.theta[1:], edges), np.split(flat, edges), strict=True))
 
 
 def _grown(structure: Structure, fits: list[Fit]) -> list[NDArray[np.float64]]:

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from hmpim.identify.fitting.fit import Fit, Problem, fit_structure
 from hmpim.identify.fitting.start import RoughResponse
+from hmpim.identify.signals import longest_lag
 from hmpim.identify.whiteness import misfit
 from hmpim.model.sampled import SampledInput, prepare_input
 from hmpim.record import Intersample
@@ -23,6 +24,9 @@ __all__ = [
     "refit",
     "shifted",
 ]
+
+_STAMPED_LATE = -4.0
+"""Delay in samples that is tried where the output follows its input."""
 
 FOLLOWS = 1e-4
 """Chance below which what is left over follows the input."""
@@ -65,7 +69,8 @@ class Data:
             source=self.sources[mode],
             y=self.y,
             valid=seen.valid,
-            longest_delay=self.y.size // 2 + 2.0,
+            longest_delay=longest_lag(self.y.size) + 2.0,
+            shortest_delay=min(self.rough.earliest, _STAMPED_LATE),
             nuisance=self.nuisance,
             begins=seen.begins,
         )

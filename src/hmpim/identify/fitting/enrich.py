@@ -61,7 +61,7 @@ def integrator_starts(rough: RoughResponse, structure: Structure) -> list[NDArra
         An integrator, alone or with a lag.
     """
     rest = STRUCTURES[PLAIN[structure.order]]  # the plain one of each order
-    return starting_values(rough, rest, earliest=-2)
+    return starting_values(rough, rest)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -53,6 +53,9 @@ _UNSEEN = 1e-13
 _DAMPING = 1e-4
 """Share of each diagonal element that the first steps add to it."""
 
+_NUDGE = 1e-7
+"""Change of a parameter that shows whether a bound is in its way."""
+
 _STEEPEST = 1e6
 """The same, from which on no smaller step is tried."""
 
@@ -269,9 +272,9 @@ def without(rows: Real, others: Real) -> Real:
     return np.asarray(rows - (rows @ q) @ q.T)
 
 
-def _bounded(problem: Problem, structure: Structure, theta: Real, shortest_delay: float) -> Real:
+def _bounded(problem: Problem, structure: Structure, theta: Real) -> Real:
     """Keep delay and time constants where the record can tell them."""
-    delays = (shortest_delay, problem.longest_delay)
+    delays = (problem.shortest_delay, problem.longest_delay)
     return within_reach(structure, theta, delays=delays, samples=problem.y.size)
 
 
@@ -318,7 +321,6 @@ def fit_structure(
     *,
     iterations: int = 40,
     precision: float = 1e-2,
-    shortest_delay: float = -4.0,
 ) -> Fit:
     """Fit one structure from one start.
 
@@ -335,8 +337,6 @@ def fit_structure(
     precision : float
         Stop when a step lowers the sum of squares by less than this, in units of σ²; a
         parameter then is within about the root of it, in standard deviations.
-    shortest_delay : float
-        Least delay to try, in samples; below 0 an input column stamped late shows.
 
     Returns
     -------
@@ -349,7 +349,6 @@ def fit_structure(
         [theta],
         iterations=iterations,
         precision=precision,
-        shortest_delay=shortest_delay,
     )
     return fit
 
@@ -361,7 +360,6 @@ def fit_together(
     *,
     iterations: int = 40,
     precision: float = 1e-2,
-    shortest_delay: float = -4.0,
 ) -> list[Fit]:
     """Fit one output to several inputs at once, each with a structure of its own.
 
@@ -369,7 +367,7 @@ def fit_together(
     ----------
     problems : sequence of Problem
         One for each input; output, mask, whitening, nuisance and beginning are the first one's.
-    structures, thetas, iterations, precision, shortest_delay
+    structures, thetas, iterations, precision
         As for `fit_structure`, one structure and start for each input.
 
     Returns
@@ -379,10 +377,7 @@ def fit_together(
     """
 
     def bounded(moved: Sequence[Real]) -> list[Real]:
-        return [
-            _bounded(p, s, t, shortest_delay)
-            for p, s, t in zip(problems, structures, moved, strict=True)
-        ]
+        return [_bounded(p, s, t) for p, s, t in zip(problems, structures, moved, strict=True)]
 
     def evaluated(moved: Sequence[Real]) -> _Evaluation:
         return _evaluated(problems, structures, moved)
@@ -500,15 +495,17 @@ def _free_directions(
 ) -> tuple[NDArray[np.bool_], Real, Real, float]:
     """Parameters that no bound holds, their normal equations, and Newton's decrement.
 
-    The decrement is what a full step would still gain. A parameter is held where that step leads
-    it out of its bounds; the others then move as if it were known.
+    The decrement is what a full step would still gain. A parameter is held where the way down
+    leads it out of its bounds (D. P. Bertsekas, SIAM J. Control Optim. 20, 1982); the others then
+    move as if it were known.
     """
     normal, moment = best.normal()
-    here, toward = np.concatenate(best.thetas), solved(normal, moment)
-    free = np.concatenate(bounded(np.split(here + toward, edges))) != here
+    here = np.concatenate(best.thetas)
+    down = here + _NUDGE * np.sign(moment)
+    free = np.concatenate(bounded(np.split(down, edges))) == down
     if not free.all():
         normal, moment = normal[np.ix_(free, free)], moment[free]
-        toward = solved(normal, moment) if free.any() else moment
+    toward = solved(normal, moment) if free.any() else moment
     return free, normal, moment, float(toward @ moment)
 
 

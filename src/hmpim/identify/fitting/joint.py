@@ -22,6 +22,7 @@ from hmpim.identify.fitting.candidates import (
     fit_rich,
     fit_under_each_assumption,
     is_worth_explaining,
+    reduced,
     refit_between,
 )
 from hmpim.identify.fitting.data import (
@@ -41,7 +42,7 @@ from hmpim.identify.fitting.enrich import (
 from hmpim.identify.fitting.fit import Fit, fit_structure, solved
 from hmpim.identify.fitting.growth import grow, hidden_pole
 from hmpim.identify.fitting.software import software_fit
-from hmpim.identify.fitting.start import rough_response
+from hmpim.identify.fitting.start import lag_ahead, rough_response
 from hmpim.identify.fitting.trial import JointFit, Trial, likeliest_of, trial_of
 from hmpim.identify.fitting.unrelated import is_unrelated, says_nothing
 from hmpim.identify.fitting.whitening import (
@@ -50,6 +51,7 @@ from hmpim.identify.fitting.whitening import (
     prewhitened_of,
     refit_whitened,
 )
+from hmpim.identify.signals import longest_lag
 from hmpim.identify.whiteness import effective_share, is_white
 from hmpim.model.dynamics import FILTERS, Structure, StructureName
 from hmpim.model.sampled import prepare_input
@@ -59,6 +61,9 @@ __all__ = ["joint_fit"]
 
 _LOOKS = 2
 """How often the samples that count are looked at again, once there is a structure."""
+
+_SPARE = 0.1
+"""Share of the record that an output ahead of its input must leave."""
 
 _JUMP = 0.05
 """Share of its range by which a held input jumps at least once."""
@@ -110,18 +115,18 @@ def joint_fit(
         intersample = "zoh"  # an input that stands still and jumps does nothing else
     natural: Intersample = "bandlimited" if intersample is None else intersample
     level = y if nuisance is None else y - _regressed(nuisance, y, valid)
+    level = level if valid is None else _bridged(level, valid)
     data = Data(
         u=u,
         y=y,
         sources={natural: prepare_input(u, natural)},
-        rough=rough_response(
-            u, level if valid is None else _bridged(level, valid), longest_delay=u.size // 2
-        ),
+        rough=rough_response(u, level, longest_delay=longest_lag(u.size)),
         nuisance=nuisance,
     )
     plain = tuple(name for name in structures if name in PLAIN)
     seen = Seen(valid=valid, begins=None)
     fits = fit_plain(data.problem(natural, seen), data.rough, plain or PLAIN)
+    data, seen, fits = _or_ahead(data, natural, seen, fits, level, plain or PLAIN)
     prewhitened = prewhitened_of(data, natural, fits, seen)
     if prewhitened is not None:
         free = fit_plain(prewhitened.problem(natural, seen), prewhitened.rough, plain or PLAIN)
@@ -129,7 +134,12 @@ def joint_fit(
             data, fits = prewhitened, free
     counted = count_in(data, natural, fits, seen, known)
     if counted.begins is not None:  # from rest those fits ended anywhere
-        fits = fit_plain(data.problem(natural, counted), data.rough, plain or PLAIN)
+        problem = data.problem(natural, counted)
+        before = {fit.structure.name: fit for fit in fits}
+        fits = [
+            min(fit, refit(problem, before[fit.structure.name]), key=lambda f: f.objective)
+            for fit in fit_plain(problem, data.rough, plain or PLAIN)
+        ]
         later = count_in(data, natural, fits, seen, known)
         counted = counted if later.begins is None else later
     if counted is not seen:
@@ -144,11 +154,15 @@ def joint_fit(
         problem = data.problem(natural, counted)
         richer = fit_rich(data, problem, fits, others, all_of_them=not plain)
         if richer and counted.begins is not None:
-            resting = count_in(data, natural, richer, seen, known)
+            leading = min(richer, key=lambda f: f.objective)
+            from_rest = refit(data.problem(natural, seen), leading)
+            resting = count_in(data, natural, [from_rest], seen, known)
             if resting.begins is None:  # it was the structure that was wrong, not the beginning
                 counted = resting
                 fits = [refit(data.problem(natural, counted), f) for f in fits]
                 richer = [refit(data.problem(natural, counted), f) for f in richer]
+        if richer:
+            fits = reduced(data.problem(natural, counted), fits, richer)
         kept = [*fits, *richer] if plain else richer or fits
         fitted = fit_under_each_assumption(
             data, natural, kept, counted, alone=intersample is not None
@@ -303,6 +317,35 @@ def _regressed(
     every = np.vstack([rows, np.ones(y.size)])[:, counts]
     weights = solved(every @ every.T, every @ y[counts])[:-1]
     return np.asarray(weights @ rows)
+
+
+def _or_ahead(
+    data: Data,
+    natural: Intersample,
+    seen: Seen,
+    fits: list[Fit],
+    level: NDArray[np.float64],
+    plain: tuple[StructureName, ...],
+) -> tuple[Data, Seen, list[Fit]]:
+    """The same with an output that is ahead of its input, where that leaves clearly less."""
+    best = min(fits, key=lambda f: f.objective)
+    longest = longest_lag(level.size)
+    lag = None if is_white(best.residual) else lag_ahead(data.u, level, longest)
+    if lag is None:
+        return data, seen, fits
+    rough = rough_response(data.u, level, longest_delay=longest, lag=lag)
+    ahead = replace(data, rough=rough)
+    counted = np.ones(level.size, dtype=bool) if seen.valid is None else seen.valid.copy()
+    counted[rough.earliest :] = False  # they answer what comes after the record
+    shorter = replace(seen, valid=counted)
+    count = np.count_nonzero(counted)
+    if count < _SPARE * level.size:
+        return data, seen, fits
+    found = fit_plain(ahead.problem(natural, shorter), rough, plain)
+    least = min(f.objective for f in found) / count
+    if HOPELESS * least > best.objective / data.problem(natural, seen).counted:
+        return data, seen, fits
+    return ahead, shorter, found
 
 
 def _bridged(y: NDArray[np.float64], valid: NDArray[np.bool_]) -> NDArray[np.float64]:

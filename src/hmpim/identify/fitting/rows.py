@@ -36,6 +36,8 @@ class Problem:
         Samples that count; None when all do.
     longest_delay : float
         Greatest delay to try, in samples.
+    shortest_delay : float
+        Least delay to try, in samples; below 0 the output is ahead, or its stamps are late.
     whitening : ndarray, shape (n // 2 + 1,), or None
         Gain at each bin of the transform after which the noise is white; residuals and
         derivatives then are those of the whitened output. None for noise that is white.
@@ -54,6 +56,7 @@ class Problem:
     y: Real
     valid: NDArray[np.bool_] | None
     longest_delay: float
+    shortest_delay: float = -4.0
     whitening: Real | None = None
     noise: Real | None = None
     told: NDArray[np.bool_] | None = None

@@ -20,7 +20,13 @@ from numpy.typing import NDArray
 
 from hmpim.model.dynamics import Structure, theta_of
 
-__all__ = ["RoughResponse", "coarse_lag", "rough_response", "starting_values"]
+__all__ = ["RoughResponse", "coarse_lag", "lag_ahead", "rough_response", "starting_values"]
+
+_STAMPED_LATE = -2
+"""Least delay in samples that is looked for where the output follows the input."""
+
+_DYNAMICS = 24
+"""Samples at least that dynamics add to the delay of an output that is ahead."""
 
 _TAPER = 0.1
 """Share of the record tapered at either end."""
@@ -50,7 +56,7 @@ class RoughResponse:
     Parameters
     ----------
     lag : int
-        Samples by which the output was moved back.
+        Samples by which the output was moved back; below 0 where it is ahead of the input.
     length : int
         Length of the transform whose bins these are.
     bins : ndarray of int, shape (m,)
@@ -70,6 +76,13 @@ class RoughResponse:
     response: NDArray[np.complex128]
     weight: NDArray[np.float64]
 
+    @property
+    def earliest(self) -> int:
+        """Least pure delay to look at, in samples."""
+        if self.lag >= _STAMPED_LATE:
+            return _STAMPED_LATE
+        return self.lag - max(-self.lag // 4, _DYNAMICS)
+
 
 def _tapered(x: NDArray[np.float64]) -> NDArray[np.float64]:
     n = x.size
@@ -83,14 +96,25 @@ def _tapered(x: NDArray[np.float64]) -> NDArray[np.float64]:
 
 def coarse_lag(u: NDArray[np.float64], y: NDArray[np.float64], longest: int) -> int:
     """Lag in samples, 0..longest, of the greatest magnitude of the cross-correlation."""
+    return int(np.argmax(_likeness(u, y, longest)[: longest + 1]))
+
+
+def lag_ahead(u: NDArray[np.float64], y: NDArray[np.float64], longest: int) -> int | None:
+    """Lag below 0 at which an output resembles its input most; None if it does so behind it."""
+    likeness = _likeness(u, y, longest)
+    late, ahead = likeness[: longest + 1], likeness[: -longest - 1 : -1]
+    return -1 - int(np.argmax(ahead)) if ahead.max() > late.max() else None
+
+
+def _likeness(u: NDArray[np.float64], y: NDArray[np.float64], longest: int) -> NDArray[np.float64]:
+    """Magnitude of the cross-correlation by lag, those below 0 at the end."""
     length = scipy.fft.next_fast_len(u.size + longest + 1, real=True)
     spectrum = np.conj(scipy.fft.rfft(u - u.mean(), length)) * scipy.fft.rfft(y - y.mean(), length)
-    correlation = scipy.fft.irfft(spectrum, length)[: longest + 1]
-    return int(np.argmax(np.abs(correlation)))
+    return np.abs(scipy.fft.irfft(spectrum, length))
 
 
 def rough_response(
-    u: NDArray[np.float64], y: NDArray[np.float64], *, longest_delay: int
+    u: NDArray[np.float64], y: NDArray[np.float64], *, longest_delay: int, lag: int | None = None
 ) -> RoughResponse:
     """Divide tapered spectra, the output first moved back by the coarse delay.
 
@@ -100,13 +124,15 @@ def rough_response(
         Uniform samples.
     longest_delay : int
         Greatest lag to look at, in samples.
+    lag : int, optional
+        Coarse delay in samples; that of the cross-correlation, 0 or more, if None.
     """
-    lag = coarse_lag(u, y, longest_delay)
-    overlap = u.size - lag
-    group = max(min(u.size // (_TURNS * (lag + _LATE)), u.size // _ENOUGH), 1)
+    lag = coarse_lag(u, y, longest_delay) if lag is None else lag
+    overlap = u.size - abs(lag)
+    group = max(min(u.size // (_TURNS * (abs(lag) + _LATE)), u.size // _ENOUGH), 1)
     length = scipy.fft.next_fast_len(-(-u.size // group), real=True)
-    spectrum_u = scipy.fft.rfft(_tapered(u[:overlap]), group * length)
-    spectrum_y = scipy.fft.rfft(_tapered(y[lag:]), group * length)
+    spectrum_u = scipy.fft.rfft(_tapered(u[max(-lag, 0) :][:overlap]), group * length)
+    spectrum_y = scipy.fft.rfft(_tapered(y[max(lag, 0) :][:overlap]), group * length)
     power = _grouped(spectrum_u.real**2 + spectrum_u.imag**2, group)
     cross = _grouped(np.conj(spectrum_u) * spectrum_y, group)
     power[0] = 0.0
@@ -135,7 +161,6 @@ def starting_values(
     rough: RoughResponse,
     structure: Structure,
     *,
-    earliest: int,
     count: int = 3,
     thorough: bool = True,
 ) -> list[NDArray[np.float64]]:
@@ -147,8 +172,6 @@ def starting_values(
         From `rough_response`.
     structure : Structure
         What will be fitted.
-    earliest : int
-        Least pure delay to look at, in samples.
     count : int
         At most so many.
     thorough : bool
@@ -160,7 +183,7 @@ def starting_values(
         Delay in samples, parameters of the denominator's sections.
     """
     finer = int(np.clip(np.ceil(rough.omega[-1] / _PHASE_STEP), 1, 8))
-    shifts = np.arange(min(earliest - rough.lag, 0) * finer, 2 * finer + 1)
+    shifts = np.arange(min(rough.earliest - rough.lag, 0) * finer, 2 * finer + 1)
     order = structure.order
     scale = float(np.sqrt(rough.weight @ rough.omega**2 / rough.weight.sum()))
     # Multiplied by A's coefficients and e^(jω shift), these should sum to a constant.

@@ -19,6 +19,7 @@ from hmpim.identify.fitting.data import (
 from hmpim.identify.fitting.fit import Fit, Problem, fit_structure, jacobian
 from hmpim.identify.fitting.start import rough_response
 from hmpim.identify.fitting.trial import Trial
+from hmpim.identify.signals import longest_lag
 from hmpim.identify.uncertainty import covariance
 from hmpim.record import Intersample
 
@@ -49,7 +50,7 @@ def prewhitened_of(data: Data, mode: Intersample, fits: list[Fit], seen: Seen) -
         return None
     u, y = (scipy.signal.lfilter(noise, np.ones(1), x - x.mean()) for x in (data.u, data.y))
     y = y if seen.valid is None else y * whitened.told
-    rough = rough_response(u[noise.size :], y[noise.size :], longest_delay=data.u.size // 2)
+    rough = rough_response(u[noise.size :], y[noise.size :], longest_delay=longest_lag(data.u.size))
     return replace(data, noise=noise, rough=rough)
 
 

@@ -15,7 +15,7 @@ from hmpim.identify.frf.neighbours import LocalFit, Spectra, centres_in_band, tr
 from hmpim.identify.frf.polynomial import polynomial_fits
 from hmpim.identify.frf.rational import rational_fits
 from hmpim.identify.result import FrequencyResponse
-from hmpim.identify.signals import as_pair, as_signal, check_band, check_rate
+from hmpim.identify.signals import as_pair, as_signal, check_band, check_rate, whole_lag
 
 __all__ = ["local_polynomial_response", "local_response"]
 
@@ -69,7 +69,7 @@ def local_response(
     band : tuple of float
         Excited band, Hz.
     delay : float
-        Pure delay in s, not negative, as well as it is known; it need not be exact.
+        Pure delay in s, as well as it is known; it need not be exact.
     valid : array_like of bool, shape (n,), optional
         False where `y` is missing; all of it valid by default.
     fill : array_like, shape (n,), optional
@@ -157,7 +157,7 @@ def local_polynomial_response(
     band : tuple of float
         Excited band, Hz.
     delay : float
-        Pure delay in s, not negative, as well as it is known; it need not be exact.
+        Pure delay in s, as well as it is known; it need not be exact.
     order : int
         Order R of the polynomials of G and T, 0 to 6; less where the record is too short.
     widths : tuple of int or None
@@ -212,8 +212,8 @@ def _checked(
     check_band(band, fs)
     if first.size < _FEWEST_SAMPLES:
         raise RecordError(f"the record has {first.size} samples; give at least {_FEWEST_SAMPLES}")
-    if not (np.isfinite(delay) and delay >= 0):
-        raise ArgumentError(f"delay is {delay} s; give a finite number, 0 or more")
+    if not np.isfinite(delay):
+        raise ArgumentError(f"delay is {delay} s; give a finite number")
     if points < 1:
         raise ArgumentError(f"points is {points}; give at least 1")
     if np.ptp(first) == 0:
@@ -341,9 +341,10 @@ def _masked(
     points: int,
 ) -> FrequencyResponse:
     """Estimate with the input zero wherever its response, a delay later, is missing."""
-    lag = min(int(np.floor(delay * fs + 1e-9)), u.size // 2)
+    lag = whole_lag(delay, fs, u.size)
+    length = u.size - abs(lag)
     answered = np.ones(u.size, dtype=np.bool_)
-    answered[: u.size - lag] = mask[lag:]
+    answered[max(-lag, 0) :][:length] = mask[max(lag, 0) :][:length]
     return _single(
         np.where(answered, u, 0.0),
         np.where(mask, y, 0.0),

@@ -13,6 +13,8 @@ import scipy
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
+from hmpim.identify.signals import whole_lag
+
 __all__ = [
     "LocalFit",
     "Spectra",
@@ -161,15 +163,14 @@ def transform(u: Real, y: Real, fs: float, delay: float) -> Spectra:
     >>> bool(np.allclose(s.u, s.y))
     True
     """
-    # A delay beyond half the record leaves too little; the phase then takes the rest.
-    lag = min(int(np.floor(delay * fs + 1e-9)), u.size // 2)
-    length = u.size - lag
+    lag = whole_lag(delay, fs, u.size)
+    length = u.size - abs(lag)
     if length > _LONG:
         length = int(scipy.fft.prev_fast_len(length, real=True))
     count = (length - 1) // 2 + 1  # without the bin at fs/2, which is real
     frequency = np.asarray(np.arange(count) * (fs / length), dtype=np.float64)
-    spectrum_u = np.array(scipy.fft.rfft(u[:length])[:count])
-    spectrum_y = scipy.fft.rfft(y[lag : lag + length])[:count]
+    spectrum_u = np.array(scipy.fft.rfft(u[max(-lag, 0) :][:length])[:count])
+    spectrum_y = scipy.fft.rfft(y[max(lag, 0) :][:length])[:count]
     spectrum_y = spectrum_y * np.exp(2j * np.pi * frequency * (delay - lag / fs))
     spectrum_u[0] = spectrum_y[0] = 0.0
     return Spectra(frequency=frequency, u=spectrum_u, y=spectrum_y)

@@ -5,6 +5,7 @@ import scipy
 from numpy.typing import NDArray
 
 from hmpim.identify.fitting.enrich import PLAIN
+from hmpim.identify.fitting.growth import scale_of
 from hmpim.identify.groups import MODELLED, PHASE_SPLIT, TIMING
 from hmpim.identify.judgement.evidence import Evidence, structure_in_words
 from hmpim.model import response, slowest_time_constant
@@ -36,6 +37,9 @@ _LINE, _APART = 7, 4
 
 _SPARE = 2
 """What lines must tell beyond the figures, for a wrong structure to show."""
+
+_LEADS, _STAMPED_LATE = 2.0, 5.0
+"""Time constants, and samples, by which a missing lead or a stamp may have an output ahead."""
 
 _BANDWIDTHS = ("bandwidth_phase90", "bandwidth_phase90_without_delay", "bandwidth_3db")
 
@@ -164,17 +168,23 @@ def short_record(evidence: Evidence) -> tuple[Finding, ...]:
 
 
 def negative_delay(evidence: Evidence) -> tuple[Finding, ...]:
-    """Doubt an output that moves before its input."""
+    """Doubt an output that moves before its input.
+
+    By as much as its time constants a lead that no structure has may move it. Further ahead it is
+    the clock, and the figures are those of the record.
+    """
     delay = evidence.readings.parameters.delay
     latest = None if delay is None or delay.ci95 is None else delay.ci95[1]
     if delay is None or latest is None or latest >= 0:
         return ()
+    fit = evidence.joint.best.fit
+    by_a_lead = -fit.delay < max(_LEADS * scale_of(fit), _STAMPED_LATE)
     return (
         Finding(
             code="negative_delay",
             message=f"The delay is negative ({delay.value:.4g} s): the output moves before the "
             "input. Check that the input column is not stamped late, and which column is which.",
-            severity="doubt",
+            severity="doubt" if by_a_lead else "info",
             parameters=TIMING,
         ),
     )

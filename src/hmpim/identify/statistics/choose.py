@@ -263,7 +263,7 @@ def _plain(
     """Each plain structure from its own starts, then the richer ones from the simpler."""
     fits: list[Fitted] = []
     for name in sorted(names, key=lambda name: -STRUCTURES[name].order):
-        starts = starting_values(rough, STRUCTURES[name], earliest=-2)
+        starts = starting_values(rough, STRUCTURES[name])
         fits.append(search.best_of(mode, STRUCTURES[name], starts, _TASTE))
     by_name = {f.fit.structure.name: f for f in fits}
     if {"first_order", "second_order"} <= by_name.keys():
