@@ -48,7 +48,7 @@ def begin(statistics: Statistics, intersample: Intersample) -> Fit:
     fits: list[Fitted] = []
     for name in PLAIN:
         structure = STRUCTURES[name]
-        starts = starting_values(rough, structure, earliest=-2)
+        starts = starting_values(rough, structure)
         if structure.order == 2:  # it is a first-order one too
             starts.append(nested(fits[-1].fit))
         tried = [fitted(structure, theta, evaluations=_TASTE) for theta in starts]
