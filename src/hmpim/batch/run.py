@@ -2,6 +2,7 @@
 
 import os
 import time
+from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, replace
@@ -225,15 +226,14 @@ class _Run:
         with open_folder(self._folder, self._request, columns, fresh=fresh) as metadata:
             done = Known(self._folder)
             left = self._left(chain([first], addresses), done)
-            enough = self._cluster.per_task * max(_SHARES * self._crew, 1)
-            ahead = list(islice(left, enough))
+            ahead = deque(islice(left, self._enough))
             if not ahead:
                 self._tell()
                 return
             with self._pool() as pool:
                 self._begun = time.monotonic()
                 self._tell()
-                self._drive(pool, self._tasks(chain(ahead, left), len(ahead), done, metadata))
+                self._drive(pool, self._tasks(ahead, left, done, metadata))
 
     def pooled(self, paths: Sequence[str], *, fresh: bool) -> None:
         """Identify the records of each group as one; a group is a row."""
@@ -355,11 +355,24 @@ class _Run:
             else:
                 yield address
 
+    @property
+    def _enough(self) -> int:
+        """Records from which on all workers have whole tasks to do."""
+        return self._cluster.per_task * max(_SHARES * self._crew, 1)
+
     def _tasks(
-        self, left: Iterator[Address], ahead: int, done: Known, metadata: tuple[str, ...]
+        self,
+        ahead: deque[Address],
+        left: Iterator[Address],
+        done: Known,
+        metadata: tuple[str, ...],
     ) -> Iterator[Task]:
-        size = portion(ahead, per_task=self._cluster.per_task, workers=self._crew)
-        while some := tuple(islice(left, size)):
+        """Tasks that become smaller towards the end, so that all workers end at once."""
+        while ahead:
+            per_task = self._cluster.per_task
+            size = portion(len(ahead), per_task=per_task, workers=self._crew)
+            some = tuple(ahead.popleft() for _ in range(min(size, len(ahead))))
+            ahead.extend(islice(left, self._enough - len(ahead)))
             done.drop(some)
             yield Task(
                 addresses=some,
