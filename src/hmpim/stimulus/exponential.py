@@ -13,9 +13,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from hmpim.errors import ArgumentError
 from hmpim.stimulus.motion import FloatArray, Motion, at_rest_outside
-from hmpim.stimulus.sweep import LARGEST_EXTINCTION, check_band, check_positive
+from hmpim.stimulus.sweep import check_band, check_extinction, check_positive
 
 __all__ = ["ExponentialSweep"]
 
@@ -58,15 +57,7 @@ class ExponentialSweep:
         object.__setattr__(self, "band", check_band(self.band))
         object.__setattr__(self, "duration", check_positive("duration", self.duration, "s"))
         object.__setattr__(self, "gain", check_positive("gain", self.gain, ""))
-        if (
-            isinstance(self.extinction, (str, bool))
-            or not 0 <= self.extinction <= LARGEST_EXTINCTION
-        ):
-            raise ArgumentError(
-                f"extinction = {self.extinction!r} must lie between 0 (none) and "
-                f"{LARGEST_EXTINCTION:g}; 2 already holds the acceleration level"
-            )
-        object.__setattr__(self, "extinction", float(self.extinction))
+        object.__setattr__(self, "extinction", check_extinction(self.extinction))
 
     @property
     def growth(self) -> float:

@@ -18,7 +18,7 @@ from hmpim.arguments import checked
 from hmpim.errors import ArgumentError
 from hmpim.stimulus.motion import FloatArray, Motion, at_rest_outside
 
-__all__ = ["Sweep", "check_band", "check_positive"]
+__all__ = ["Sweep", "check_band", "check_extinction", "check_positive"]
 
 LARGEST_EXTINCTION = 10.0
 _INSTANT = 1e-30  # seconds; earlier is time 0, and t^(n-2) cannot overflow
@@ -80,6 +80,27 @@ def check_band(band: tuple[float, float]) -> tuple[float, float]:
     return low, high
 
 
+def check_extinction(extinction: float) -> float:
+    """Return the extinction of a sweep, linear or exponential, as a float.
+
+    Raises
+    ------
+    ArgumentError
+        If it does not lie between 0 and 10.
+
+    Examples
+    --------
+    >>> check_extinction(1)
+    1.0
+    """
+    if isinstance(extinction, (str, bool)) or not 0 <= extinction <= LARGEST_EXTINCTION:
+        raise ArgumentError(
+            f"extinction = {extinction!r} must lie between 0 (none) and "
+            f"{LARGEST_EXTINCTION:g}; 2 already holds the acceleration level"
+        )
+    return float(extinction)
+
+
 @checked
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Sweep:
@@ -124,15 +145,7 @@ class Sweep:
         object.__setattr__(self, "band", check_band(self.band))
         object.__setattr__(self, "duration", check_positive("duration", self.duration, "s"))
         object.__setattr__(self, "gain", check_positive("gain", self.gain, ""))
-        if (
-            isinstance(self.extinction, (str, bool))
-            or not 0 <= self.extinction <= LARGEST_EXTINCTION
-        ):
-            raise ArgumentError(
-                f"extinction = {self.extinction!r} must lie between 0 (none) and "
-                f"{LARGEST_EXTINCTION:g}; 2 already holds the acceleration level"
-            )
-        object.__setattr__(self, "extinction", float(self.extinction))
+        object.__setattr__(self, "extinction", check_extinction(self.extinction))
 
     @property
     def sweep_rate(self) -> float:

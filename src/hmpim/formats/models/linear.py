@@ -7,10 +7,9 @@ import numpy as np
 from hmpim.errors import ArgumentError
 from hmpim.formats.atomic import write_text
 from hmpim.formats.models.refined import (
-    REFINE,
     pade_error,
     pade_order,
-    refined_words,
+    refined_values,
 )
 from hmpim.formats.models.render import literal, rendered
 from hmpim.formats.models.source import Source
@@ -38,10 +37,8 @@ def write_scipy(source: Source, path: Path) -> tuple[Path, ...]:
 
 def _write(source: Source, path: Path, *, control: bool, pade: int | None) -> tuple[Path, ...]:
     model, pair = source.causal(), source.pair
-    system, seen = model.system, pair.frequency_response
     order = pade_order(source) if pade is None else pade
     band = model.band or 0.2 * source.fs
-    integrates = bool(system.denominator[0] == 0.0)
     spread = model.spread
     text = rendered(
         "linear.py.jinja",
@@ -49,32 +46,14 @@ def _write(source: Source, path: Path, *, control: bool, pade: int | None) -> tu
         name=source.name,
         title=f"{pair.output} from {pair.input}, for {'python-control' if control else 'scipy'}.",
         lines=[line.replace("\\", "/").replace('"""', "'''") for line in source.lines()],
-        said=refined_words(source),
         pade=order,
         pade_error=pade_error(order, 2 * np.pi * band * model.delay),
         band=band,
         input=pair.input,
         output=pair.output,
-        delay=model.delay,
-        numerator=system.numerator[::-1],
-        denominator=system.denominator[::-1],
-        level=0.0 if integrates else float(system.numerator[0] / system.denominator[0]),
-        integrates=integrates,
-        bias=model.bias,
-        noise_std=model.noise_std,
-        low=model.saturation_low,
-        high=model.saturation_high,
-        hold_period=model.hold_period,
-        quantum=model.quantization_step,
-        intersample=source.intersample,
-        fs=source.fs,
-        refine=REFINE,
         parameters=literal({k: e.to_dict() for k, e in source.estimates()}),
         covariance=literal(None if spread is None else [list(r) for r in spread.covariance]),
-        frequency=seen.frequency,
-        real=seen.response.real,
-        imag=seen.response.imag,
-        std=seen.std,
+        **refined_values(source),
     )
     write_text(path, text)
     return (path,)

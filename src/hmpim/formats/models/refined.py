@@ -5,12 +5,20 @@ the input by the exact delay, interpolate it on a grid `REFINE` times finer, and
 """
 
 from math import factorial
+from typing import Any
 
 import numpy as np
 
 from hmpim.formats.models.source import Source
 
-__all__ = ["REFINE", "pade_error", "pade_order", "refined_error", "refined_words"]
+__all__ = [
+    "REFINE",
+    "pade_error",
+    "pade_order",
+    "refined_error",
+    "refined_values",
+    "refined_words",
+]
 
 REFINE = 20
 """Steps of the finer grid for each sample."""
@@ -49,6 +57,40 @@ def refined_words(source: Source) -> str:
         f"simulate: for a {kind} input, the delay is right to 1/{2 * REFINE} of a sample; "
         "response itself is exact."
     )
+
+
+def refined_values(source: Source) -> dict[str, Any]:
+    """Return what the scripts of all such tools say of a model, by its name in their templates.
+
+    Raises
+    ------
+    ArgumentError
+        If the output is ahead of the input.
+    """
+    model, seen = source.causal(), source.pair.frequency_response
+    top, below = model.system.numerator, model.system.denominator
+    integrates = bool(below[0] == 0.0)
+    return {
+        "said": refined_words(source),
+        "delay": model.delay,
+        "numerator": top[::-1],
+        "denominator": below[::-1],
+        "level": 0.0 if integrates else float(top[0] / below[0]),
+        "integrates": integrates,
+        "bias": model.bias,
+        "noise_std": model.noise_std,
+        "low": model.saturation_low,
+        "high": model.saturation_high,
+        "hold_period": model.hold_period,
+        "quantum": model.quantization_step,
+        "intersample": source.intersample,
+        "fs": source.fs,
+        "refine": REFINE,
+        "frequency": seen.frequency,
+        "real": seen.response.real,
+        "imag": seen.response.imag,
+        "std": seen.std,
+    }
 
 
 def pade_error(order: int, turn: float) -> float:

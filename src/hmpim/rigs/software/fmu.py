@@ -14,9 +14,9 @@ from hmpim.record import Intersample
 from hmpim.rigs.block import Block, Layout, Quantity
 from hmpim.rigs.protocol import Stimuli
 from hmpim.rigs.simulated import Playing, Simulated
-from hmpim.rigs.stimuli import feed_of
+from hmpim.rigs.stimuli import check_feed, feed_of
 from hmpim.stimulus import Limits
-from hmpim.units import check_unit, conversion_factor, read_unit
+from hmpim.units import conversion_factor, read_unit
 
 __all__ = ["FmuRig", "Interface"]
 
@@ -87,15 +87,13 @@ class FmuRig(Simulated):
     _playing: Playing = field(default_factory=Playing, init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
-        for name, known in (("interface", Interface), ("measures", Quantity)):
-            if getattr(self, name) not in get_args(known):
-                raise ArgumentError(
-                    f"{name} = {getattr(self, name)!r} is not known; use one of {get_args(known)}"
-                )
+        if self.interface not in get_args(Interface):
+            raise ArgumentError(
+                f"interface = {self.interface!r} is not known; use one of {get_args(Interface)}"
+            )
         if not 0.0 < self.tolerance < 1.0:
             raise ArgumentError(f"tolerance = {self.tolerance!r} must be between 0 and 1")
-        if self.output_unit is not None:
-            check_unit(self.output_unit)
+        check_feed(measures=self.measures, output_unit=self.output_unit)
 
     @property
     def axes(self) -> tuple[str, ...]:

@@ -23,7 +23,7 @@ import threading
 from collections import deque
 from contextlib import suppress
 from dataclasses import dataclass, field
-from typing import IO, get_args
+from typing import IO
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,7 +33,7 @@ from hmpim.record import Intersample
 from hmpim.rigs.block import Block, Layout, Quantity
 from hmpim.rigs.protocol import Stimuli
 from hmpim.rigs.simulated import Playing, Simulated
-from hmpim.rigs.stimuli import feed_of
+from hmpim.rigs.stimuli import check_feed, feed_of
 from hmpim.stimulus import Limits
 from hmpim.units import check_unit
 
@@ -106,12 +106,7 @@ class ProcessRig(Simulated):
             value = getattr(self, name)
             if not (isinstance(value, (int, float)) and 0 < value < math.inf):
                 raise ArgumentError(f"{name} = {value!r} s must be a positive number of seconds")
-        if self.measures not in get_args(Quantity):
-            raise ArgumentError(
-                f"measures = {self.measures!r} is not known; use one of {get_args(Quantity)}"
-            )
-        if self.output_unit is not None:
-            check_unit(self.output_unit)
+        check_feed(measures=self.measures, output_unit=self.output_unit)
 
     @property
     def axes(self) -> tuple[str, ...]:
