@@ -25,19 +25,19 @@ MILLION = 1_000_000
 RIGS = '[rigs.bench]\nrig = "table"\n[rigs.bench.options]\nrealtime = true\n'
 
 DRAWN = "(n) => document.querySelectorAll('.hm-picture[data-drawn]').length >= n"
-CLOCKED = """([label, shows, key]) => {
+CLOCKED = """([label, shows, up]) => {
     const plots = [...document.querySelectorAll(".hm-picture[data-drawn]")];
     const plot = plots.find((one) => one.getAttribute("aria-label").startsWith(shows));
-    const slider = document.querySelector(`.q-slider[aria-label="${label}"] [tabindex]`);
+    const slider = document.querySelector(`input[type=range][aria-label="${label}"]`);
     return new Promise((done) => {
         const begun = performance.now();
         new MutationObserver((_, observer) => {
             observer.disconnect();
             done(performance.now() - begun);
         }).observe(plot, { attributes: true, attributeFilter: ["data-drawn"] });
-        for (const type of ["keydown", "keyup"]) {
-            slider.dispatchEvent(new KeyboardEvent(type, { keyCode: key, bubbles: true }));
-        }
+        if (up) slider.stepUp();
+        else slider.stepDown();
+        slider.dispatchEvent(new Event("input"));
     });
 }"""
 
@@ -71,7 +71,7 @@ def slider(page: Page, url: str, desks: Desks) -> None:
         page.wait_for_function(DRAWN, arg=3)
         times = []
         for k in range(SLIDES):
-            times.append(page.evaluate(CLOCKED, [label, shows, 39 if k % 2 else 37]))
+            times.append(page.evaluate(CLOCKED, [label, shows, k % 2 == 1]))
             time.sleep(0.2)
         middle, worst = statistics.median(times), max(times)
         print(f"slider, {label.split(',')[0]}: median {middle:.0f} ms, worst {worst:.0f} ms")

@@ -9,7 +9,7 @@ import pytest
 from hmpim.errors import ArgumentError
 from hmpim.plots.stimulus import stimulus_spectrogram
 from hmpim.workbench.desks import AxisRow, Model, Wish
-from hmpim.workbench.drawn import MOST, packed, refilled
+from hmpim.workbench.drawn import MOST, changes, drawn, packed, refilled
 from hmpim.workbench.work.design import error_rows, stimuli_of
 from hmpim.workbench.work.designed import designed, five_axes, spectrum
 
@@ -87,3 +87,19 @@ def test_a_million_samples_go_thinned_with_their_peaks_and_are_thinned_again_on_
     assert seen.max() == 7.0
     (again,) = refilled(whole, 0, None, None)
     assert again["y"] == sent["y"]
+
+
+def test_what_a_page_has_already_is_not_sent_again_and_makes_the_same_picture():
+    wish = Wish(duration=2.0, extinction=0.5)
+    before, now = (drawn(spectrum(replace(wish, alpha=alpha))) for alpha in (1.5, 1.6))
+    sent = changes(now, before)
+    assert sent["layout"] is None or sent["layout"] == now["layout"]
+    plain, windowed = (trace["kept"] for trace in sent["data"])
+    assert plain == ["x", "y"]
+    assert "y" not in windowed
+    again = [
+        {**trace, **{key: old[key] for key in trace["kept"]}}
+        for trace, old in zip(sent["data"], before["data"], strict=True)
+    ]
+    assert [{k: v for k, v in trace.items() if k != "kept"} for trace in again] == now["data"]
+    assert changes(now, None)["data"][0]["kept"] == []

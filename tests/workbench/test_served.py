@@ -122,10 +122,10 @@ HIGHEST = """([low, high]) => {
 def test_a_design_follows_its_sliders_and_stays_inside_its_limits(page, served):
     go(page, served, "design")
     page.get_by_text("inside all limits").wait_for()
-    slider = page.locator(".q-slider[aria-label=Amplitude]")
+    slider = page.get_by_role("slider", name="Amplitude")
     slider.click(position={"x": 1, "y": 10})
     page.get_by_role("cell", name="0.1", exact=True).wait_for()
-    slider.locator("[tabindex='0']").press("ArrowRight")
+    slider.press("ArrowRight")
     page.get_by_role("cell", name="0.2", exact=True).wait_for()
     # the curve was moved, not the picture drawn anew: it is the one that the table speaks of
     page.wait_for_function(HIGHEST, arg=[0.199, 0.2])

@@ -9,10 +9,11 @@ from numpy.typing import NDArray
 
 from hmpim.plots.description import Curve, Figure, Panel
 
-__all__ = ["MOST", "drawn", "packed", "refilled", "zoomed"]
+__all__ = ["MOST", "changes", "drawn", "packed", "refilled", "zoomed"]
 
 MOST = 2000
 """Points of a curve that are sent: more than a page has columns."""
+_POINTS = ("x", "y", "z")  # of a trace: what may be long
 
 
 def drawn(figure: Figure, *, seen: tuple[int, float, float] | None = None) -> dict[str, Any]:
@@ -31,6 +32,37 @@ def drawn(figure: Figure, *, seen: tuple[int, float, float] | None = None) -> di
     whole["layout"]["uirevision"] = "kept"
     plain: dict[str, Any] = packed(whole)
     return plain
+
+
+def changes(now: dict[str, Any], before: dict[str, Any] | None) -> dict[str, Any]:
+    """Return a drawn figure without what a page has already.
+
+    Parameters
+    ----------
+    now, before : dict
+        As `drawn` returns them; None before anything was sent.
+
+    Returns
+    -------
+    dict
+        ``layout`` is None where it is as it was, and each trace names in ``kept`` the points that
+        are left out.
+
+    Examples
+    --------
+    >>> before = {"data": [{"x": [1, 2], "y": [3, 4]}], "layout": {"height": 300}}
+    >>> now = {"data": [{"x": [1, 2], "y": [5, 6]}], "layout": {"height": 300}}
+    >>> changes(now, before)
+    {'data': [{'y': [5, 6], 'kept': ['x']}], 'layout': None}
+    """
+    old = {"data": [], "layout": None} if before is None else before
+    had = [*old["data"], *[{}] * len(now["data"])]
+    sent = []
+    for trace, other in zip(now["data"], had, strict=False):
+        kept = [key for key in _POINTS if key in trace and trace[key] == other.get(key)]
+        rest = {key: value for key, value in trace.items() if key not in kept}
+        sent.append({**rest, "kept": kept})
+    return {"data": sent, "layout": None if now["layout"] == old["layout"] else now["layout"]}
 
 
 def refilled(

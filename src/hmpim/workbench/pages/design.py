@@ -14,6 +14,7 @@ from hmpim.workbench.bench import Window
 from hmpim.workbench.desks import AxisRow, Wish
 from hmpim.workbench.pages.frame import Command, Later, card, failures_said
 from hmpim.workbench.parts.picture import Picture
+from hmpim.workbench.parts.slider import Slider, Words
 from hmpim.workbench.parts.table import plain_table
 from hmpim.workbench.work.design import stimulus_part
 from hmpim.workbench.work.designed import (
@@ -29,7 +30,7 @@ from hmpim.workbench.workers import Latest
 __all__ = ["design"]
 
 _SPECTRUM_EVERY = 0.3  # s between two spectra while a slider moves faster than all can follow
-_REST = 0.15  # s without a change after which tables and spectrogram follow
+_REST = 0.3  # s without a change after which tables and spectrogram follow
 
 
 def design(window: Window) -> Later:
@@ -50,7 +51,7 @@ class DesignPage:
         self.window = window
         self.latest = Latest()
         self.pictures: dict[str, Picture] = {}
-        self.sliders: dict[str, tuple[ui.slider, ui.label]] = {}
+        self.sliders: dict[str, Slider] = {}
         # what is shown: the design, and of which wishes motion, spectrum and spectrogram are
         self.found: Designed | None = None
         self.moved: tuple[Wish, int] | None = None
@@ -61,6 +62,7 @@ class DesignPage:
         with ui.element("div").classes("hm-side"):
             with card("Sliders"):
                 self._sliders()
+                ui.label(_RESTING).classes("hm-soft")
                 with ui.element("div").classes("hm-row"):
                     ui.button("Solve", on_click=self._solve).tooltip(
                         "The largest motion and the smallest extinction inside the limits"
@@ -76,7 +78,7 @@ class DesignPage:
                 self._numbers(self.wish.model, self._model, _MODEL)
         with ui.element("div").classes("hm-body"):
             with card("Design"):
-                self.said = ui.label().classes("hm-verdict").props('role="status"')
+                self.said = Words()
                 self.tables = ui.element("div").classes("hm-body")
                 with ui.element("div").classes("hm-row"):
                     ui.button("Save and download", icon="download", on_click=self._save)
@@ -121,9 +123,8 @@ class DesignPage:
         row = self.wish.rows[0]
         values = {"amplitude": row.amplitude / row.position, "extinction": 0.0, "lead": 0.0}
         for name, value in values.items():
-            slider, shown = self.sliders[name]
-            slider.set_value(round(value, 2))
-            shown.set_text(f"{value:g}")
+            self.sliders[name].stand(round(value, 2))
+            self.sliders[name].say(f"{value:g}")
         self._axes()
         await self.draw()
 
@@ -159,17 +160,10 @@ class DesignPage:
         self._slider("alpha", "Window α", (0.1, 5.0), self.wish.alpha)
 
     def _slider(self, name: str, words: str, ends: tuple[float, float], value: float) -> None:
-        with ui.element("div"):
-            with ui.element("div").classes("hm-row"):
-                ui.label(words)
-                shown = ui.label(f"{value:g}").classes("hm-soft")
-            slider = ui.slider(min=ends[0], max=ends[1], step=0.01, value=round(value, 2))
-            slider.props(f'aria-label="{words}" label')
-            # only a hand on the slider changes the wish; set from here, the slider shows it
-            slider.on(
-                "update:model-value", lambda e: self._slid(name, float(e.args)), throttle=0.03
-            )
-            self.sliders[name] = (slider, shown)
+        self.sliders[name] = Slider(
+            words, ends=ends, step=0.01, value=round(value, 2),
+            on_slide=lambda value: self._slid(name, value),
+        )  # fmt: skip
 
     def _slid(self, name: str, value: float) -> Any:
         if name == "alpha":
@@ -233,8 +227,7 @@ class DesignPage:
             self.resting.cancel()
         moved = (stimulus_part(wish), axis)
         if wish.gentlest and moved != self.moved:
-            self.said.set_text("Searching for the gentlest …")
-            self.said.classes(replace="hm-verdict hm-soft")
+            self.said.say("Searching for the gentlest …", "soft")
         try:
             if moved != self.moved:
                 self.moved, self.windowed = None, None
@@ -261,8 +254,7 @@ class DesignPage:
 
     def _refuse(self, error: HmpimError) -> None:
         if not self.said.is_deleted:
-            self.said.set_text(" ".join(str(error).split()))
-            self.said.classes(replace="hm-verdict hm-bad")
+            self.said.say(" ".join(str(error).split()), "bad")
 
     async def _rest(self, wish: Wish, moved: tuple[Wish, int]) -> None:
         """Show, once the sliders rest, what no hand on a slider waits for."""
@@ -275,6 +267,7 @@ class DesignPage:
             if self.tables.is_deleted:
                 return
             self._tabulate(found, errors)
+            self.command.show(found.command)
             if moved != self.spectrogram_of:
                 figure = await workers.do(stimulus_spectrogram, found.shown)
                 if not self.said.is_deleted:
@@ -291,12 +284,10 @@ class DesignPage:
             plain_table(("Axis", "Parameter", "Predicted ± (95 %)"), errors, title="Error bars")
 
     def _say(self, found: Designed) -> None:
-        for name, (slider, shown) in self.sliders.items():
+        for name, slider in self.sliders.items():
             solved = found.solved.get(name)
-            shown.set_text(f"{slider.value:g}" if solved is None else f"solved: {solved:.3g}")
-        self.said.set_text(found.words)
-        self.said.classes(replace="hm-verdict hm-ok" if found.inside else "hm-verdict hm-bad")
-        self.command.show(found.command)
+            slider.say(f"{slider.value:g}" if solved is None else f"solved: {solved:.3g}")
+        self.said.say(found.words, "ok" if found.inside else "bad")
 
     def _picture(self, name: str, figure: Figure) -> None:
         if name in self.pictures:
@@ -313,6 +304,7 @@ class DesignPage:
             ui.notify(f"Saved as {path}")
 
 
+_RESTING = "Curves follow a slider at once; tables, error bars and spectrogram once it rests."
 _TEST = {"duration": "Duration (s)", "fs": "Rate (Hz)"}
 _MODEL = {
     "delay": "Delay (s)",

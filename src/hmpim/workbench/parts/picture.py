@@ -9,7 +9,7 @@ from nicegui import events
 from nicegui.element import Element
 
 from hmpim.plots.description import Figure
-from hmpim.workbench.drawn import drawn, refilled
+from hmpim.workbench.drawn import changes, drawn, refilled
 
 __all__ = ["Cursor", "Picture"]
 
@@ -66,6 +66,7 @@ class Picture(Element, component="picture.js"):
         super().__init__()
         self._described = figure
         self._seen: tuple[int, float, float] | None = None  # panel and ends that are zoomed
+        self._kept = True  # whether the page holds the points that were sent last
         self._set(figure, cursors, ready)
         self.on("zoom", self._zoom)
         if on_cursor is not None:
@@ -81,12 +82,14 @@ class Picture(Element, component="picture.js"):
     def show(self, figure: Figure, *, cursors: Sequence[Cursor] = ()) -> None:
         """Draw another figure in its place; what is zoomed stays so.
 
-        The figure goes to this picture alone: the page around it is not drawn anew.
+        What of it is new goes to this picture alone: the page around it is not drawn anew.
         """
+        before, self._kept = self._props["figure"] if self._kept else None, True
         self._described = figure
         with self._props.suspend_updates():  # else it went twice
             self._set(figure, cursors)
-        self.run_method("show", *(self._props[name] for name in ("figure", "alt", "cursors")))
+        new = changes(self._props["figure"], before)
+        self.run_method("show", new, self._props["alt"], self._props["cursors"])
 
     def _set(
         self, figure: Figure, cursors: Sequence[Cursor], ready: dict[str, Any] | None = None
@@ -109,6 +112,9 @@ class Picture(Element, component="picture.js"):
         panel = int(event.args["panel"] or 1) - 1
         low, high = event.args["low"], event.args["high"]
         self._seen = None if low is None or high is None else (panel, low, high)
-        curves = await asyncio.to_thread(refilled, self._described, panel, low, high)
-        if not self.is_deleted:
+        self._kept = False
+        described = self._described
+        curves = await asyncio.to_thread(refilled, described, panel, low, high)
+        if not self.is_deleted and self._described is described:  # else it was drawn meanwhile
             self.run_method("refill", curves)
+            self._kept = False
