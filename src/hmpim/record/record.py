@@ -23,8 +23,7 @@ Intersample = Literal["zoh", "foh", "bandlimited", "sampled"]
 """Held, linear or band-limited between its samples; or software, which sees the samples alone."""
 
 BETWEEN: tuple[Intersample, ...] = ("zoh", "foh", "bandlimited")
-"""What a signal in continuous time may do between its samples."""
-"""What an input does between its samples: held, linear, or band-limited."""
+"""What a signal in continuous time may do between its samples: held, linear or band-limited."""
 
 Role = Literal["input", "output", "reference", "auxiliary"]
 """What a channel is in its record: what went in, what came out, what was asked, what is kept."""
