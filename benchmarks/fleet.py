@@ -1,25 +1,30 @@
 """Many records: rate, growth with workers, memory, and the gain of doing one stimulus together.
 
 One Parquet file of records of 10 s at 200 Hz, second order, every unit its own parameters; those
-of `shared` have one stimulus, those of `unrelated` a chirp each. Before each kind one `identify`
+of `shared` have one stimulus (5 000 units, measured again with new noise), those of `unrelated` a
+chirp each. Before each kind one `identify`
 after the other is timed in this process, so that a rate stands beside workers ÷ that time; times of
-one are processor times, rates are by the clock. The memory of the process that gives out the work,
-and of its workers, is sampled twice a second throughout. `--table FILE` writes all as
-docs/performance.md has it, `--plot FILE` draws rate and memory over the number of records. With
+one are processor times, rates are by the clock. Beside unrelated records stands what as many plain
+processes do in the same turn, each of which only calls `identify` in a loop: what two of them do
+over one is all that the computer has to give. Memory of the process that gives out the work and of
+its workers, and the workers' processor time, are sampled twice a second throughout. `--table FILE`
+writes all as a table, `--plot FILE` draws rate and memory over the number of records. With
 `--folder DIR` records and results stay: the same command goes on where it was stopped. Progress
 goes to the terminal. On an idle machine of two cores, with the time that each takes there:
 
-    python benchmarks/fleet.py --records 2000 --turns 3                                   # 6 min
-    python benchmarks/fleet.py --records 20000 --only unrelated --workers 2               # 4 min
-    python benchmarks/fleet.py --records 100000 --only shared-parameters --workers 2      # 3 min
-    python benchmarks/fleet.py --records 100000 --only unrelated --workers 2 --folder DIR # 18 min
-    python benchmarks/fleet.py --growth 1,10,100,1000,10000 --only shared-parameters
+    python benchmarks/fleet.py --records 600 --turns 3 --only unrelated                    # 6 min
+    python benchmarks/fleet.py --records 100000 --only shared-parameters --workers 2       # 5 min
+    python benchmarks/fleet.py --records 20000 --turns 3 --only shared-parameters          # 5 min
+    python benchmarks/fleet.py --records 100000 --only unrelated --workers 2 --folder DIR  # 75 min
+    python benchmarks/fleet.py --growth 1,10,100,1000,10000 --only shared-parameters \\
+        --plot docs/images/fleet.svg --table FILE                                          # 2 min
 """
 
 from __future__ import annotations
 
 import argparse
 import json
+import multiprocessing
 import os
 import shutil
 import sys
@@ -35,11 +40,25 @@ from hmpim.batch import Request
 from hmpim.batch.run import Cluster
 
 FS, SAMPLES, ROWS = 200.0, 2000, 100
+UNITS = 5000
+"""Units of a shared stimulus at most; beyond, each is measured again with noise of its own."""
 
 
 def chirp(last: float) -> np.ndarray:
     at = np.arange(SAMPLES) / FS
     return np.sin(2 * np.pi * (0.1 * at + (last - 0.1) / 20 * at**2))
+
+
+def answer(u: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+    """What a unit of its own makes of a stimulus."""
+    omega = 2 * np.pi * 10 * (1 + 0.05 * rng.standard_normal())
+    model = hmpim.Model(
+        delay=0.02 * (1 + 0.05 * rng.standard_normal()),
+        scale_factor=1.0,
+        denominator=(omega**-2, 0.8 / omega, 1.0),
+        bias=0.6,
+    )
+    return hmpim.simulate(model, u, fs=FS, intersample="bandlimited")
 
 
 def write_fleet(path: Path, count: int, *, shared: bool) -> None:
@@ -50,25 +69,22 @@ def write_fleet(path: Path, count: int, *, shared: bool) -> None:
     common = chirp(20.0)
     cells = pa.list_(pa.float64())
     schema = pa.schema([("u", cells), ("y", cells), ("fs", pa.float64())])
+    units = [answer(common, rng) for _ in range(min(count, UNITS) if shared else 0)]
     half = path.with_suffix(".half")
     with parquet.ParquetWriter(half, schema) as writer:
         for start in range(0, count, ROWS):
             some = range(start, min(start + ROWS, count))
-            inputs, outputs = [], []
-            for _ in some:
-                omega = 2 * np.pi * 10 * (1 + 0.05 * rng.standard_normal())
-                model = hmpim.Model(
-                    delay=0.02 * (1 + 0.05 * rng.standard_normal()),
-                    scale_factor=1.0,
-                    denominator=(omega**-2, 0.8 / omega, 1.0),
-                    bias=0.6,
-                )
-                u = common if shared else chirp(rng.uniform(15.0, 20.0))
-                y = hmpim.simulate(model, u, fs=FS, intersample="bandlimited")
-                inputs.append(u)
-                outputs.append(y + 0.1 * rng.standard_normal(SAMPLES))
-            table = {"u": inputs, "y": outputs, "fs": [FS] * len(some)}
-            writer.write_table(pa.table(table, schema=schema))
+            if shared:
+                inputs, outputs = [common for _ in some], [units[k % UNITS] for k in some]
+            else:
+                inputs = [chirp(rng.uniform(15.0, 20.0)) for _ in some]
+                outputs = [answer(u, rng) for u in inputs]
+            measured = np.stack(outputs) + 0.1 * rng.standard_normal((len(some), SAMPLES))
+            edges = np.arange(len(some) + 1, dtype=np.int32) * SAMPLES
+            columns = [
+                pa.ListArray.from_arrays(edges, np.ravel(values)) for values in (inputs, measured)
+            ]
+            writer.write_table(pa.table([*columns, [FS] * len(some)], schema=schema))
     half.rename(path)
 
 
@@ -87,13 +103,49 @@ def one_identify(path: Path, count: int = 40) -> float:
     return 1e3 * float(np.median(spent))
 
 
+def plain_loop(path: str, seconds: float, ready, begin, back) -> None:
+    """Identify the first records of a file over and over, for so long."""
+    from pyarrow import parquet
+
+    some = parquet.ParquetFile(path).read_row_group(0).slice(0, 40)
+    records = []
+    for k in range(some.num_rows):
+        u, y = (some.column(name)[k].values.to_numpy() for name in ("u", "y"))
+        records.append(hmpim.Record.from_arrays({"u": u}, {"y": y}, fs=FS))
+    hmpim.identify(records[0])
+    ready.put(None)
+    begin.wait()
+    count, start = 0, time.perf_counter()
+    while time.perf_counter() - start < seconds:
+        hmpim.identify(records[count % len(records)])
+        count += 1
+    back.put(count / (time.perf_counter() - start))
+
+
+def plain_rate(path: Path, processes: int, seconds: float = 8.0) -> float:
+    """Records a second of so many processes that do nothing but identify."""
+    spawn = multiprocessing.get_context("spawn")
+    ready, back, begin = spawn.Queue(), spawn.Queue(), spawn.Event()
+    told = (str(path), seconds, ready, begin, back)
+    crew = [spawn.Process(target=plain_loop, args=told) for _ in range(processes)]
+    for process in crew:
+        process.start()
+    for _ in crew:
+        ready.get(timeout=120)
+    begin.set()
+    rate = sum(back.get(timeout=120) for _ in crew)
+    for process in crew:
+        process.join()
+    return rate
+
+
 class Watch:
-    """Resident memory of this process and of its workers, in MB, sampled while they work."""
+    """Processor time of the workers, and resident memory of all in MB, sampled while they work."""
 
     def __init__(self) -> None:
         self._done = threading.Event()
         self._thread = threading.Thread(target=self._sample, daemon=True)
-        self.samples: list[tuple[float, float, float]] = []
+        self.samples: list[tuple[float, float, float, float]] = []
 
     def __enter__(self) -> Watch:
         self._thread.start()
@@ -105,15 +157,26 @@ class Watch:
 
     def _sample(self) -> None:
         while not self._done.wait(0.5):
-            workers = [resident(pid) for pid in children(os.getpid())]
-            here = resident(os.getpid())
-            self.samples.append((time.perf_counter(), here, max(workers, default=0.0)))
+            workers = children(os.getpid())
+            largest = max((resident(pid) for pid in workers), default=0.0)
+            spent = sum(processor(pid) for pid in workers)
+            self.samples.append((time.perf_counter(), resident(os.getpid()), largest, spent))
 
     def quarter(self, k: int) -> tuple[float, float]:
         """Largest memory here, and of any worker, in the k-th quarter of the time."""
         n = len(self.samples)
         some = self.samples[k * n // 4 : (k + 1) * n // 4] or self.samples
         return max((s[1] for s in some), default=0.0), max((s[2] for s in some), default=0.0)
+
+    def spent(self, marks: list[tuple[float, int]]) -> tuple[float, float]:
+        """Processor time of the workers for each record in ms, and their share of the time."""
+        inside = [s for s in self.samples if marks[0][0] <= s[0] <= marks[-1][0] and s[3] > 0]
+        if len(inside) < 2:
+            return float("nan"), float("nan")
+        first, last = inside[0], inside[-1]
+        seconds, span = last[3] - first[3], last[0] - first[0]
+        done = np.interp([first[0], last[0]], *zip(*marks, strict=True))
+        return 1e3 * seconds / max(float(np.diff(done)[0]), 1e-9), seconds / span
 
 
 def resident(pid: int) -> float:
@@ -122,6 +185,15 @@ def resident(pid: int) -> float:
     except (OSError, IndexError):
         return 0.0
     return pages * os.sysconf("SC_PAGE_SIZE") / 2**20
+
+
+def processor(pid: int) -> float:
+    """Processor time of a process since it began, in s."""
+    try:
+        words = Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()
+    except (OSError, IndexError):
+        return 0.0
+    return (int(words[11]) + int(words[12])) / os.sysconf("SC_CLK_TCK")
 
 
 def children(pid: int) -> list[int]:
@@ -171,7 +243,8 @@ def run(path: Path, out: Path, *, keep: str, workers: int, one_ms: float) -> dic
         )
     end, own = time.perf_counter(), time.process_time() - own
     seconds = table.to_arrow(["seconds"]).column(0).to_numpy()
-    second, fourth = watch.quarter(1), watch.quarter(3)
+    first, second, fourth = (watch.quarter(k) for k in (0, 1, 3))
+    spent, busy = watch.spent(told.marks)
     rate, bound = told.rate(), 1e3 * workers / one_ms
     return {
         "workers": workers,
@@ -184,6 +257,10 @@ def run(path: Path, out: Path, *, keep: str, workers: int, one_ms: float) -> dic
         "percent_of_bound": 100 * rate / bound,
         "processor_ms": 1e3 * float(np.nanmean(seconds)),
         "giving_out_ms": 1e3 * own / len(table),
+        "worker_ms": spent,
+        "workers_busy": busy / workers,
+        "here_at_the_start_mb": first[0],
+        "worker_at_the_start_mb": first[1],
         "here_mb": second[0],
         "here_at_the_end_mb": fourth[0],
         "worker_mb": second[1],
@@ -195,9 +272,9 @@ def run(path: Path, out: Path, *, keep: str, workers: int, one_ms: float) -> dic
 def table_of(rows: list[dict]) -> str:
     """Medians over the turns, as a table of docs/performance.md."""
     head = ("records", "workers", "a second", "workers ÷ one `identify`", "whole, s",
-            "a record, ms of processor", "giving out, MB: second quarter, last",
-            "worker, MB: second quarter, last")  # fmt: skip
-    lines = [f"| | {' | '.join(head)} |", f"| {' | '.join(['---'] * 9)} |"]
+            "as many plain loops", "processor a record, ms", "a worker's share of a core",
+            "giving out, MB: quarters 1, 2, 4", "worker, MB: quarters 1, 2, 4")  # fmt: skip
+    lines = [f"| | {' | '.join(head)} |", f"| {' | '.join(['---'] * (len(head) + 1))} |"]
     for key in dict.fromkeys((r["kind"], r["records"], r["workers"]) for r in rows):
         some = [r for r in rows if (r["kind"], r["records"], r["workers"]) == key]
 
@@ -207,11 +284,17 @@ def table_of(rows: list[dict]) -> str:
         lines.append(
             f"| {key[0]} | {key[1]} | {key[2]} | {middle('rate'):.3g} | {middle('bound'):.3g} | "
             f"{middle('whole_s'):.1f} | "
-            f"{middle('processor_ms'):.2f} | "
-            f"{middle('here_mb'):.0f}, {middle('here_at_the_end_mb'):.0f} | "
-            f"{middle('worker_mb'):.0f}, {middle('worker_at_the_end_mb'):.0f} |"
+            f"{told(middle('plain'))} | {middle('worker_ms'):.2f} | {middle('workers_busy'):.2f} | "
+            f"{middle('here_at_the_start_mb'):.0f}, {middle('here_mb'):.0f}, "
+            f"{middle('here_at_the_end_mb'):.0f} | "
+            f"{middle('worker_at_the_start_mb'):.0f}, {middle('worker_mb'):.0f}, "
+            f"{middle('worker_at_the_end_mb'):.0f} |"
         )
     return "\n".join(lines + gains_of(rows)) + "\n"
+
+
+def told(number: float) -> str:
+    return f"{number:.3g}" if np.isfinite(number) else "–"
 
 
 def gains_of(rows: list[dict]) -> list[str]:
@@ -220,18 +303,23 @@ def gains_of(rows: list[dict]) -> list[str]:
     for kind, records, workers in dict.fromkeys(
         (r["kind"], r["records"], r["workers"]) for r in rows if r["workers"] > 1
     ):
-        ratios = [
-            r["rate"] / one["rate"]
+        pairs = [
+            (r, one)
             for r in rows
             for one in rows
             if (r["kind"], r["records"], r["workers"]) == (kind, records, workers)
             and (one["kind"], one["records"], one["workers"], one["turn"])
             == (kind, records, 1, r["turn"])
         ]
+        ratios = [r["rate"] / one["rate"] for r, one in pairs]
+        plain = [r["plain"] / one["plain"] for r, one in pairs]
         if ratios:
             times = ", ".join(f"{ratio:.2f}" for ratio in ratios)
-            lines += ["", f"{kind}, {records} records: {workers} workers do "
-                      f"{np.median(ratios):.2f} times what one does ({times})."]  # fmt: skip
+            beside = (
+                f"; plain loops {np.median(plain):.2f} times" if np.isfinite(plain).all() else ""
+            )
+            gain = f"{np.median(ratios):.2f} times what one does ({times})"
+            lines += ["", f"{kind}, {records} records: {workers} workers do {gain}{beside}."]
     return lines
 
 
@@ -311,8 +399,9 @@ def turns_of(
             out = folder / f"{path.stem}-{turn}-{workers}"
             kept = out.with_suffix(".json")
             if not kept.exists():
+                plain = plain_rate(path, workers) if kind == "unrelated" else float("nan")
                 found = run(path, out, keep=keep, workers=workers, one_ms=one_ms)
-                told = {"kind": kind, "turn": turn, **found}
+                told = {"kind": kind, "turn": turn, "plain": plain, **found}
                 kept.write_text(json.dumps(told) + "\n")
                 shutil.rmtree(out)
             rows.append(json.loads(kept.read_text()))

@@ -5,6 +5,7 @@ import pytest
 
 import hmpim
 from hmpim.batch import Request, alike
+from hmpim.batch.rows import PARAMETERS
 from hmpim.batch.run import Cluster
 
 FS, SAMPLES, UNITS = 100.0, 300, 12
@@ -73,3 +74,69 @@ def test_one_stimulus_is_shared(tmp_path, monkeypatch):
     assert quick["sha256"].tolist() == whole["sha256"].tolist()
     assert [list(w) for w in quick["warnings"]] == [list(w) for w in whole["warnings"]]
     assert quick["result"].isna().all()
+
+
+KINDS = {
+    "static": lambda omega: (1.0,),
+    "first_order": lambda omega: (1 / omega, 1.0),
+    "second_order": lambda omega: (omega**-2, 0.9 / omega, 1.0),
+}
+
+
+def write_many(path, kind: str, count: int) -> None:
+    """Units of one kind, and among them those of which something else is to be said."""
+    import pyarrow as pa
+    from pyarrow import parquet
+
+    time = np.arange(600) / FS
+    u = np.sin(2 * np.pi * (0.3 * time + 19.7 / 12 * time**2))
+    rng = np.random.default_rng(8)
+    outputs = []
+    for _ in range(count):
+        omega = 2 * np.pi * 6 * (1 + 0.03 * rng.standard_normal())
+        delay = 0.03 * (1 + 0.03 * rng.standard_normal())
+        model = hmpim.Model(delay=delay, scale_factor=2.0, denominator=KINDS[kind](omega), bias=0.3)
+        y = hmpim.simulate(model, u, fs=FS, intersample="bandlimited")
+        outputs.append(y + 0.1 * rng.standard_normal(600))
+    outputs[20] = np.minimum(outputs[20], 1.5)
+    outputs[25] = outputs[25] + np.linspace(0, 3, 600)
+    outputs[30] = outputs[30] + 0.2 * outputs[30] ** 2
+    outputs[35] = np.round(outputs[35], 0)
+    outputs[40][100:110] = np.nan
+    outputs[45] = rng.standard_normal(600)
+    cells = {"u": [u.tolist()] * count, "y": [y.tolist() for y in outputs]}
+    parquet.write_table(pa.table(cells), path)
+
+
+@pytest.mark.study
+@pytest.mark.parametrize("kind", KINDS)
+def test_every_record_says_what_it_says_alone(tmp_path, monkeypatch, kind):
+    """Values to a hundredth of an interval, intervals to a twentieth, all verdicts and findings."""
+    monkeypatch.setattr(alike, "_FLEETS", {})
+    path = tmp_path / "many.parquet"
+    write_many(path, kind, 70)
+    quick, whole = (
+        hmpim.batch(
+            path,
+            out=tmp_path / keep,
+            fs=FS,
+            request=Request(keep=keep),
+            cluster=Cluster(workers=0),
+        )
+        .to_pandas()
+        .set_index("record")
+        .sort_index()
+        for keep in ("parameters", "results")
+    )
+    assert (alike._FLEETS.popitem()[1] is not None) == (kind == "second_order")
+    assert [list(w) for w in quick["warnings"]] == [list(w) for w in whole["warnings"]]
+    for name in ("verdict", "structure", "intersample", "sha256", "fs", "samples"):
+        assert quick[name].tolist() == whole[name].tolist(), name
+    for name in PARAMETERS:
+        if name == "delay_correlation":
+            continue
+        assert (quick[name].isna() == whole[name].isna()).all(), name
+        half = (whole[f"{name}_high"] - whole[f"{name}_low"]) / 2
+        for end, share in (("", 0.01), ("_low", 0.05), ("_high", 0.05)):
+            off = (quick[name + end] - whole[name + end]).abs() / half
+            assert not (off > share).any(), (name + end, off.max())
