@@ -295,7 +295,8 @@ def test_a_linear_programme_solved_by_cuts_is_solved(rows):
 @pytest.mark.usefixtures("effort")
 def test_what_cannot_be_met_is_refused_with_what_would_do():
     tight = {"position": 0.2, "acceleration": 300.0}
-    with pytest.raises(LimitsError, match=r"in 10 s.* needs (\S+) times the limits") as refused:
+    met = r"in 10 s.* needs (\S+) times the limits, and none"
+    with pytest.raises(LimitsError, match=met) as refused:
         search(Limits(**tight, unit="deg"))
     factor = float(str(refused.value).split(" times the limits")[0].split()[-1])
     wider = Limits(**{k: factor * v for k, v in tight.items()}, unit="deg")
