@@ -249,6 +249,18 @@ def test_a_failing_stop_is_told():
         run(Spy(fault=OSError("cable"), fails_in="stop"), SINE)
 
 
+def test_a_stop_that_fails_with_what_came_before_says_the_cause_first():
+    class Pulled(Spy):
+        def stop(self):
+            raise OSError("no answer to the stop")
+
+    pulled = Pulled(fault=RigError("nothing came for 0.5 s"), fails_in="play")
+    said = "failed: nothing came for 0.5 s; then it could not be told to stop: OSError: no answer"
+    with pytest.raises(RigError, match=said) as failure:
+        run(pulled, SINE)
+    assert isinstance(failure.value.__cause__, RigError)
+
+
 def test_ctrl_c_during_a_stop_waits_until_the_rig_stands():
     class Slow(Spy):
         def stop(self):

@@ -247,7 +247,7 @@ def _kept_is_said(log: "RunLog") -> Iterator[None]:
         yield
     except KeyboardInterrupt:
         for event in log.events:
-            if event.message.startswith("what was recorded until then"):
+            if event.kind == "kept":
                 warn(event.message)
         raise
 

@@ -12,7 +12,7 @@ from hmpim.errors import ArgumentError
 
 __all__ = ["Event", "EventKind", "RunLog"]
 
-EventKind = Literal["check", "arm", "start", "done", "stop", "fault", "note"]
+EventKind = Literal["check", "arm", "start", "done", "stop", "kept", "fault", "note"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -23,8 +23,8 @@ class Event:
     ----------
     seconds : float
         After the log was begun.
-    kind : {'check', 'arm', 'start', 'done', 'stop', 'fault', 'note'}
-        What it was.
+    kind : {'check', 'arm', 'start', 'done', 'stop', 'kept', 'fault', 'note'}
+        What it was; 'kept' says where what was recorded before a failure is.
     message : str
         In words.
 

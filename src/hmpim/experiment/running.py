@@ -156,7 +156,7 @@ class Running:
             with undisturbed():
                 kept = recorder.fail(_words(error))
             if kept:
-                self.log.add("note", f"what was recorded until then is in {self.path}")
+                self.log.add("kept", f"what was recorded until then is in {self.path}")
             raise
         recorder.finish(record)
         return record
@@ -171,8 +171,10 @@ class Running:
                     self.log.add("note", scheduling)
                 with quick_to_switch(_SWITCH if isinstance(self.until, Until) else None):
                     layout, collected = self._play(ready, findings, recorder)
-        finally:
-            self._stop()
+        except BaseException as cause:
+            self._stop_after(cause)
+            raise
+        self._stop()
         with self._faults_logged():
             report = self.rig.report() if isinstance(self.rig, Reporting) else RunReport()
             clock = self.options.clock
@@ -276,6 +278,17 @@ class Running:
                 self.log.add("fault", f"stop failed: {type(error).__name__}: {error}")
                 raise
             self.log.add("stop", f"{self.rig.name} was told to stop")
+
+    def _stop_after(self, cause: BaseException) -> None:
+        """Stop the rig after a failure; where that fails, too, the cause is said first."""
+        try:
+            self._stop()
+        except Exception as error:
+            why = str(cause) if isinstance(cause, HmpimError) else _words(cause)
+            more = "" if str(error) in why else f": {_words(error)}"
+            raise RigError(
+                f"rig {self.rig.name!r} failed: {why}; then it could not be told to stop{more}"
+            ) from cause
 
     @contextmanager
     def _faults_logged(self) -> Iterator[None]:
