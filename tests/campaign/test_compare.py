@@ -8,7 +8,7 @@ import pytest
 
 import hmpim
 from hmpim.campaign import parse_plan, read_plan, run_campaign, shipped_plan
-from hmpim.campaign.crossing import samples_bandwidth
+from hmpim.campaign.crossing import first_crossing, samples_bandwidth
 from hmpim.campaign.grids import PARAMETERS
 from hmpim.campaign.study import make_study
 from hmpim.campaign.write import study_page, write_study
@@ -38,6 +38,16 @@ def truth():
 @pytest.mark.parametrize("near", [0.8, 1.0, 1.3])
 def test_crossing_is_found_from_where_it_is_looked_for(near):
     assert samples_bandwidth(response(), near=near * truth()) == pytest.approx(truth(), rel=1e-3)
+
+
+def test_where_nothing_tells_where_to_look_the_response_does():
+    assert first_crossing(response()) == pytest.approx(truth(), abs=0.1)
+    near = first_crossing(response(seed=1, std=0.02))
+    found = samples_bandwidth(response(seed=1, std=0.02), near=near)
+    assert found == pytest.approx(truth(), rel=0.02)
+    assert first_crossing(response(std=2.0)) is None  # nowhere clear
+    low = {name: values[:50] for name, values in response().items()}  # to 6 Hz: not so late yet
+    assert first_crossing(low) is None
 
 
 def test_noise_in_the_phase_does_not_pull_the_crossing_down():

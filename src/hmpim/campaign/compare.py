@@ -5,7 +5,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any
 
-from hmpim.campaign.crossing import samples_bandwidth
+from hmpim.campaign.crossing import first_crossing, samples_bandwidth
 from hmpim.campaign.plan import Compare
 from hmpim.campaign.study import Reading, Row
 
@@ -197,10 +197,8 @@ def _modes(axis: str, rows: list[Row]) -> str:
     for rate in sorted({row.rate for row in rows}):
         seen, exact = [], []
         for row in (row for row in rows if row.rate == rate):
-            reading = samples_reading(row)
-            found = None if reading is None else reading.value
             known = row.pair["known"].get("exact_samples_bandwidth")
-            seen.append(f"{row.mode} {'unknown' if found is None else f'{found:.1f} Hz'}")
+            seen.append(f"{row.mode} {_samples_in_words(row)}")
             exact += [] if known is None else [f"{known:.1f}"]
         if len(seen) > 1:
             free = f" (without friction {', '.join(exact)} Hz)" if len(exact) == len(seen) else ""
@@ -208,6 +206,19 @@ def _modes(axis: str, rows: list[Row]) -> str:
     if not said:
         return ""
     return f"{axis}, −90° of samples over samples: " + "; ".join(said) + "."
+
+
+def _samples_in_words(row: Row) -> str:
+    """The -90° of samples over samples; where no model reaches it, off the response alone."""
+    reading = samples_reading(row)
+    if reading is not None:
+        return f"{reading.value:.1f} Hz"
+    response = row.pair["frequency_response"]
+    near = first_crossing(response)
+    found = None if near is None else samples_bandwidth(response, near=near)
+    if found is None:
+        return "unknown: the response is not clear up to there"
+    return f"{found:.1f} Hz off the response alone, for the model does not reach −90°"
 
 
 def _lifted(row: Row) -> bool:

@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-__all__ = ["samples_bandwidth"]
+__all__ = ["first_crossing", "samples_bandwidth"]
 
 _CLEAR = 0.3  # share of the response: what is less sure does not count
 _FEWEST = 6
@@ -57,3 +57,36 @@ def samples_bandwidth(response: dict[str, Any], *, near: float) -> float | None:
             return None
         found *= 1.0 + float(inside[np.argmin(np.abs(inside))])
     return found
+
+
+def first_crossing(response: dict[str, Any]) -> float | None:
+    """First frequency at which the clear part of a measured response lies beyond -90°.
+
+    Where no model and no reading tells where to look for `samples_bandwidth`, this does.
+
+    Parameters
+    ----------
+    response : dict
+        As `samples_bandwidth` takes it.
+
+    Returns
+    -------
+    float or None
+        In Hz; None where the response is clear nowhere, or does not come so far.
+
+    Examples
+    --------
+    >>> f = np.linspace(1.0, 20.0, 200)
+    >>> late = np.exp(-2j * np.pi * f * 0.025)  # -90° at 10 Hz
+    >>> found = first_crossing(
+    ...     {"frequency": f, "real": late.real, "imag": late.imag, "std": 0.01 + 0 * f}
+    ... )
+    >>> round(found, 1)
+    10.1
+    """
+    f = np.asarray(response["frequency"], dtype=np.float64)
+    z = np.asarray(response["real"]) + 1j * np.asarray(response["imag"])
+    std = np.array([np.inf if s is None else s for s in response["std"]], dtype=np.float64)
+    clear = (std < _CLEAR * np.abs(z)) & (f > 0.0)
+    beyond = np.unwrap(np.angle(z[clear])) <= -0.5 * np.pi
+    return float(f[clear][np.argmax(beyond)]) if beyond.any() else None
