@@ -23,7 +23,7 @@ def format_value(estimate: Estimate) -> str:
     """
     if _exact(estimate):
         return f"{estimate.value:.10g} ± 0"
-    if estimate.std is not None:
+    if estimate.std is not None and estimate.ci95 is not None:
         return plus_minus(estimate.value, estimate.std)
     low, high = estimate.ci95 or (None, None)
     return aside(estimate.value, low, high)
@@ -42,7 +42,8 @@ def format_estimate(estimate: Estimate) -> str:
 
 def _exact(estimate: Estimate) -> bool:
     """Whether nothing but rounding is left of the error."""
-    return estimate.std is not None and estimate.std <= _ROUNDING * abs(estimate.value)
+    known = estimate.std is not None and estimate.ci95 is not None
+    return known and estimate.spread <= _ROUNDING * abs(estimate.value)
 
 
 def format_interval(estimate: Estimate) -> str:
@@ -55,7 +56,7 @@ def format_interval(estimate: Estimate) -> str:
     >>> format_interval(Estimate(value=0.15, std=None, ci95=(0.1474, None), unit="s"))
     '0.1474 or more'
     """
-    if _exact(estimate):
+    if _exact(estimate) or estimate.ci95 is None:
         return "–"
     low, high = estimate.ci95 or (None, None)
     return interval(low, high, value=estimate.value, std=estimate.std)

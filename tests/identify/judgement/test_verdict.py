@@ -46,6 +46,19 @@ def test_a_doubt_touches_what_it_names_and_nothing_else(pair, group):
     assert found.verdict == "doubtful"
 
 
+@pytest.mark.parametrize("code", ["nonlinear", "halves_disagree", "feedback"])
+def test_a_model_that_the_record_contradicts_has_no_interval(pair, code):
+    found = judged(replace(pair, warnings=(finding("delay", code=code),))).parameters.delay
+    assert found.ci95 is None
+    assert found.std == pair.parameters.delay.std  # what noise alone does
+    assert "± ?" in str(found)
+
+
+def test_where_too_few_lines_tell_it_not_even_the_noise_is_known(pair):
+    found = judged(replace(pair, warnings=(finding("delay", code="few_lines"),)))
+    assert (found.parameters.delay.ci95, found.parameters.delay.std) == (None, None)
+
+
 def test_information_touches_nothing(pair):
     found = judged(replace(pair, warnings=(finding(*EVERY, severity="info"),)))
     assert found.verdict == "ok"

@@ -26,8 +26,14 @@ _OF_THE_RECORD = frozenset(
 )
 """Codes of doubts that the measured response shares; the others are about the model."""
 
-_WITHHELD = frozenset({"few_lines"})
-"""Codes of doubts under which a figure's error is not known: its interval is withheld."""
+_WITHHELD = frozenset({"few_lines", "feedback", "halves_disagree", "nonlinear"})
+"""Codes of doubts under which a figure's error is not known: its interval is withheld.
+
+Under the last three the record contradicts the model itself, and an interval made with it held in
+about half of the study of families; what noise alone does to the figure is known all the same."""
+
+_UNTOLD = frozenset({"few_lines"})
+"""Those under which that is not known either."""
 
 
 def judged(pair: PairIdentification) -> PairIdentification:
@@ -43,7 +49,8 @@ def judged(pair: PairIdentification) -> PairIdentification:
     """
     names = doubted(pair.warnings)
     unknown = doubted(w for w in pair.warnings if w.code in _WITHHELD)
-    parameters = _all_weighed(_withheld(pair.parameters, unknown), names)
+    untold = doubted(w for w in pair.warnings if w.code in _UNTOLD)
+    parameters = _all_weighed(_withheld(pair.parameters, unknown, untold), names)
     shared = doubted(w for w in pair.warnings if w.code in _OF_THE_RECORD)
     return replace(
         pair,
@@ -105,12 +112,16 @@ def _all_weighed(holder: H, names: frozenset[str]) -> H:
     )
 
 
-def _withheld(parameters: Parameters, names: frozenset[str]) -> Parameters:
-    """Take the intervals away whose figures are named."""
+def _withheld(parameters: Parameters, names: frozenset[str], untold: frozenset[str]) -> Parameters:
+    """Take the intervals away whose figures are named, and the deviations of those untold."""
     given = {name: getattr(parameters, name) for name in names}
     known = {name: estimate for name, estimate in given.items() if estimate is not None}
     return replace(
-        parameters, **{name: replace(e, std=None, ci95=None) for name, e in known.items()}
+        parameters,
+        **{
+            name: replace(e, std=None if name in untold else e.spread, ci95=None)
+            for name, e in known.items()
+        },
     )
 
 

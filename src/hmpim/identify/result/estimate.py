@@ -32,7 +32,8 @@ class Estimate:
         The figure; ``float(estimate)`` gives it.
     std : float or None
         Standard deviation; None where the interval does not come from a normal error. What is
-        no finite number counts as None.
+        no finite number counts as None. Where the interval is withheld it is what noise alone does
+        to the figure, not how far the figure may be off.
     ci95 : (float or None, float or None), or None
         95 % interval. It may be asymmetric; an end that is open, or infinite, is None; None for
         an interval that is withheld.
@@ -82,7 +83,7 @@ class Estimate:
     def text(self) -> str:
         """Value and error with their unit: '0.15000 ± 0.00009 s'."""
         low, high = self.ci95 or (None, None)
-        if self.std is None:
+        if self.std is None or self.ci95 is None:
             number = aside(self.value, low, high)
         else:
             number = plus_minus(self.value, self.std, short=True)
