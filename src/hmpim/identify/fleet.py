@@ -21,6 +21,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from hmpim.identify.effects.imperfections import find_imperfections
 from hmpim.identify.fitting.growth import BY_CHANCE
 from hmpim.identify.fitting.trial import CLEARLY, LIKELIER
 from hmpim.identify.fleet_fits import Errors, Fits, errors_of, fitted_all
@@ -223,6 +224,7 @@ def _told(
     model = fit.gain[some, None] * fit.member.surface.values(theta)[:, :-1] @ fit.member.basis
     residual = outputs - outputs.mean(axis=1, keepdims=True) - model
     sound[sound] = _leaves_noise(fleet, theta[sound], residual[sound])
+    sound[sound] = _is_continuous(outputs[sound], fleet.fs)
     alone, spanned = _columns(fleet, fit, some, others, errors, units)
     codes = [("intersample",) * moved for moved in apart.tolist()]
     for i in np.flatnonzero(sound & (asked > _ASKS)).tolist():
@@ -349,3 +351,14 @@ def _leaves_noise(fleet: Fleet, theta: Real, residual: Real) -> Flags:
         band=(fleet.band[0] / fleet.fs, fleet.band[1] / fleet.fs),
     )
     return np.asarray(are_white(residual, spectra) & (probability > _CHANCE))
+
+
+def _is_continuous(outputs: Real, fs: float) -> Flags:
+    """Which outputs show no rounding, hold, level or repetition: most take no value twice."""
+    ordered = np.sort(outputs, axis=1)
+    plain = (ordered[:, 1:] != ordered[:, :-1]).all(axis=1)
+    for i in np.flatnonzero(~plain).tolist():
+        found = find_imperfections(outputs[i], fs)
+        seen = (found.saturation, found.hold, found.quantization, found.repeated, found.levels)
+        plain[i] = all(what is None for what in seen)
+    return np.asarray(plain)
