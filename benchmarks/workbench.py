@@ -64,7 +64,7 @@ def slider(page: Page, url: str, desks: Desks) -> None:
     for label, shows in (
         ("Window α", "Spectra"),
         ("Extinction n (0: as small as fits)", "Position"),
-        ("Amplitude", "Position"),
+        ("Amplitude, share of the limit", "Position"),
     ):
         desk = desks.put(Desk(name="5110e25110e25110", wish=Wish(extinction=0.5)))
         page.goto(f"{url}design?desk={desk.name}")

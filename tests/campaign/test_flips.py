@@ -83,24 +83,40 @@ def test_no_seed_turns_a_verdict_of_the_demonstration(seeds):
     assert max(seen.spread.values()) < 1.2  # 1.06 over 60 seeds
 
 
-@pytest.mark.study  # small: the demonstration's, above
-def test_no_seed_turns_a_pair_of_the_table(tmp_path):
-    """The reduced plan in half the time: single parameters do flip, the pairs do not."""
-    pytest.importorskip("mujoco", reason="the table needs the extra 'table'")
-    plan = read_plan(shipped_plan("section_v_reduced"))
-    plan = replace(
+def shortened(name, tests):
+    """A plan that ships, in 5 s, which leaves less travel."""
+    plan = read_plan(shipped_plan(name))
+    return replace(
         plan,
         duration=5.0,
         axes=tuple(replace(axis, travel=2.0) for axis in plan.axes),
-        tests=tuple(test for test in plan.tests if test.name in ("acceptance", "levels")),
+        tests=tuple(
+            replace(t, rates=(500.0,)) if t.together else t for t in plan.tests if t.name in tests
+        ),
         figures=(),
         specifications=(),
     )
+
+
+@pytest.mark.study  # small: the demonstration's, above
+@pytest.mark.parametrize(
+    ("name", "tests", "most"),
+    [
+        ("section_v_reduced", ("acceptance", "levels"), 0),
+        ("demo", ("together",), 1),  # azimuth's structure is doubted by 1 of 6 seeds
+    ],
+)
+def test_how_many_seeds_turn_a_pair_of_the_table(name, tests, most, tmp_path):
+    """Single figures flip more often: the table of docs/doubtful.md."""
+    pytest.importorskip("mujoco", reason="the table needs the extra 'table'")
+    plan = shortened(name, tests)
     cases = defaultdict(Seen)
     for seed in range(SEEDS):
         for case in run_campaign(replace(plan, seed=seed), tmp_path / str(seed)):
-            cases[case["id"]].take(case["pairs"][0])
-    for name, seen in cases.items():
+            for pair in case["pairs"]:
+                cases[f"{case['id']} {pair['output']}"].take(pair)
+    assert cases
+    for which, seen in cases.items():
         widest = max(seen.spread.items(), key=lambda item: item[1], default=("", 1.0))
-        print(f"{name}: pair {flips(seen.pair)}, {seen.flips}, widest {widest}")
-        assert flips(seen.pair) == 0, name
+        print(f"{which}: pair {flips(seen.pair)}, {seen.flips}, widest {widest}")
+        assert flips(seen.pair) <= most, which

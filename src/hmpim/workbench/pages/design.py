@@ -151,7 +151,9 @@ class DesignPage:
 
     def _sliders(self) -> None:
         row = self.wish.rows[0]
-        self._slider("amplitude", "Amplitude", (0.01, 1.0), row.amplitude / row.position)
+        self._slider(
+            "amplitude", "Amplitude, share of the limit", (0.01, 1.0), row.amplitude / row.position
+        )
         self._slider(
             "extinction", "Extinction n (0: as small as fits)", (0.0, 3.0),
             self.wish.extinction or 0.0,

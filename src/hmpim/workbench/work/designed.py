@@ -16,7 +16,7 @@ from hmpim.workbench.work.design import error_rows, limits_of, peak_rows, stimul
 
 __all__ = ["Designed", "designed", "error_cells", "five_axes", "save_design", "spectrum"]
 
-_UNITS = {"delay": "s", "natural_frequency": "Hz"}
+_UNITS = {"delay": (1e3, "ms"), "natural_frequency": (1.0, "Hz")}  # as they are read aloud
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -78,8 +78,13 @@ def spectrum(wish: Wish, axis: int = 0) -> Figure:
 
 def error_cells(wish: Wish) -> tuple[tuple[str, ...], ...]:
     """Return the predicted error bars (95 %) of every axis as cells of a table."""
+
+    def shown(name: str, value: float) -> str:
+        times, unit = _UNITS.get(name, (1.0, ""))
+        return f"{times * value:.3g} {unit}".strip()
+
     return tuple(
-        (s.axis or "–", name.replace("_", " "), f"{value:.3g} {_UNITS.get(name, '')}".strip())
+        (s.axis or "–", name.replace("_", " "), shown(name, value))
         for s in stimuli_of(wish)
         for name, value in error_rows(wish, s)
     )
