@@ -123,3 +123,15 @@ def test_five_plain_sweeps_at_once():
     assert told
     for name, gain in told.items():
         assert abs(gain.value - truth[name]) < 5 * gain.std
+
+
+def test_small_spikes_show_once_the_large_ones_are_out(field_record):
+    """Spikes of fifty times the range move the first fit so far that those of half of it hide."""
+    _, u, y = (x[:600] for x in field_record)
+    rng = np.random.default_rng(1)
+    noisy = y + 0.01 * rng.standard_normal(y.size)
+    at = rng.choice(np.arange(60, 580), 8, replace=False)
+    noisy[at] += [50.0, -50.0, 50.0, -50.0, 0.6, -0.8, 0.7, -1.0]
+    pair = hmpim.identify(hmpim.Record.from_arrays({"u": u}, {"y": noisy}, fs=200.0))["y", "u"]
+    assert "8 samples" in next(w.message for w in pair.warnings if w.code == "spikes")
+    assert pair.parameters.noise_std.value == pytest.approx(0.01, rel=0.15)

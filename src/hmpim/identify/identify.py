@@ -53,6 +53,9 @@ _LARGEST = 1e75
 _EXACT = 1e-9
 """Share of the output (r.m.s.) up to which a model explains a record to rounding."""
 
+_LOOKS = 2
+"""How often an output is looked at again with its model in hand."""
+
 _ROUNDS = 3
 """Times that what folds between two clocks is taken out and all is identified again, at most."""
 
@@ -310,26 +313,14 @@ def _identify_output(
         clipped = _clipped(aligned, output, found, drifting, intersample, structures)
         if clipped is not None:
             found, joined, drifting = clipped[0], clipped[1], None
-    seen = found.saturation is not None or found.hold is not None
-    residual = joined.fits[0].best.fit.residual
-    if seen or not is_white(residual) or stands_out(residual):
-        # Now that there is a model, a plateau can be told from a crest.
-        predicted = joined.prediction
-        if drifting is not None:
-            predicted = predicted + drifting.trend
-        again = find_imperfections(output.values, aligned.fs, prediction=predicted, richest=richest)
-        plateau = again.saturation
-        if plateau is None and found.saturation is not None and found.saturation.noise == "after":
-            again = replace(again, saturation=found.saturation)
-        if drifting is not None and plateau is not None and plateau.noise == "after":
-            again = replace(again, saturation=None)  # a wander bends the output as a level does
-        if (
-            (again.saturation is None) != (found.saturation is None)
-            or (again.hold is None) != (found.hold is None)
-            or again.lost is not None
-        ):
-            joined, drifting = _drifted(aligned, output, again, intersample, structures, inputs)
-        found = again
+    for _ in range(_LOOKS):
+        again = _looked_again(output, aligned.fs, found, joined, drifting, richest)
+        if again is None:
+            break
+        changed, found = again.counts_otherwise_than(found), again
+        if not changed:
+            break
+        joined, drifting = _drifted(aligned, output, found, intersample, structures, inputs)
     if inputs is not None:
         return _each_input(aligned, output, record, joined, found, inputs)
     (source,) = aligned.inputs
@@ -350,6 +341,32 @@ def _identify_output(
     )
     (said,) = backwards or (unfollowed,)
     return [untold(aligned, source, output, record, said)], None
+
+
+def _looked_again(
+    output: Signal,
+    fs: float,
+    found: Imperfections,
+    joined: Joined,
+    drifting: Drifting | None,
+    richest: int,
+) -> Imperfections | None:
+    """What is wrong with an output, now that there is a model; None where nothing asks for it."""
+    residual = joined.fits[0].best.fit.residual
+    seen = found.saturation is not None or found.hold is not None
+    if not seen and is_white(residual) and not stands_out(residual):
+        return None
+    # A plateau can now be told from a crest.
+    predicted = joined.prediction
+    if drifting is not None:
+        predicted = predicted + drifting.trend
+    again = find_imperfections(output.values, fs, prediction=predicted, richest=richest)
+    plateau = again.saturation
+    if plateau is None and found.saturation is not None and found.saturation.noise == "after":
+        again = replace(again, saturation=found.saturation)
+    if drifting is not None and plateau is not None and plateau.noise == "after":
+        again = replace(again, saturation=None)  # a wander bends the output as a level does
+    return again
 
 
 def _is_software(u: NDArray[np.float64], y: NDArray[np.float64]) -> bool:

@@ -57,6 +57,17 @@ class Imperfections:
     repeated: NDArray[np.bool_] | None
     levels: int | None
 
+    def counts_otherwise_than(self, before: "Imperfections") -> bool:
+        """Whether it is clipped or held and was not, or the other way, or lost more samples."""
+        if (self.saturation is None) != (before.saturation is None):
+            return True
+        if (self.hold is None) != (before.hold is None):
+            return True
+        lost = self.lost
+        return lost is not None and bool(
+            np.any(lost if before.lost is None else lost & ~before.lost)
+        )
+
     @property
     def lost(self) -> NDArray[np.bool_] | None:
         """Samples that say nothing at all: spikes, copies, and where the output stood still."""
