@@ -226,7 +226,6 @@ def _points(item: Points, x: Any, y: Any) -> dict[str, Any]:
 def _rule(item: Rule, panel: Panel, frame: Frame) -> _Parts:
     line: dict[str, Any] = {
         **_box(item.axis, item.at, item.at, item.colour, 0.0), "type": "line",
-        "layer": "between",  # over the grid, which would hide it, and under the curves
         "line": {"color": COLOURS[item.colour], "width": item.width, "dash": _DASHES[item.dashes]},
     }  # fmt: skip
     shapes = [line]
