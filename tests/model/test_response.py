@@ -97,3 +97,13 @@ def test_unstable_or_improper_models_are_refused():
         Model(delay=0.0, scale_factor=1.0, numerator=(1.0, 1.0, 1.0), denominator=(1.0, 1.0))
     with pytest.raises(ArgumentError, match="integrates more than once"):
         Model(delay=0.0, scale_factor=1.0, denominator=(1.0, 0.0, 0.0))
+
+
+def test_poles_lost_to_rounding_have_no_time_constant():
+    lost = RationalDelay(
+        delay=0.005,
+        numerator=np.array([1.0, 1.2, -0.98, 0.25]),
+        denominator=np.array([1.0, 2.15238724, 0.917807189, 1.11872473e-99]),
+        step=0.005,
+    )
+    assert dominant_time_constant(lost) is None

@@ -299,6 +299,7 @@ def dominant_time_constant(system: RationalDelay) -> float | None:
     if not poles.size:
         return None
     slowest = poles[np.argmax(poles.real)]
-    if abs(slowest.imag) > 1e-9 * abs(slowest):
+    # beside a coefficient of next to nothing the other poles are lost to rounding
+    if slowest.real == 0.0 or abs(slowest.imag) > 1e-9 * abs(slowest):
         return None
     return float(-1.0 / slowest.real)
