@@ -6,6 +6,8 @@ __all__ = ["aside", "interval", "plus_minus"]
 
 _MOST_PLACES = 7
 _LARGEST_PLAIN = 1e7
+_SMALLEST_LONG = 0.01
+"""Value from which on plain digits read better than a power of ten, however many there are."""
 
 _ROUNDING = 1e-10
 """Error over value below which the value's digits are no longer written out to it."""
@@ -32,6 +34,8 @@ def plus_minus(value: float, std: float, *, short: bool = False) -> str:
     ('0.150001 ± 0.000095', '0.15000 ± 0.00009')
     >>> plus_minus(12345.6, 340.0)
     '12350 ± 340'
+    >>> plus_minus(0.31247002, 2.1e-7)
+    '0.31247002 ± 0.00000021'
     >>> plus_minus(1.5e-9, 2e-11)
     '(1.500 ± 0.020)e-09'
     >>> plus_minus(3.0, math.inf)
@@ -109,7 +113,8 @@ def _places(std: float, *, short: bool = False) -> int | None:
 def _exponent(value: float, std: float, places: int) -> int:
     """Power of ten to take out, 0 where plain digits read well."""
     largest = max(abs(value), std)
-    if places <= _MOST_PLACES and largest < _LARGEST_PLAIN:
+    few = places <= _MOST_PLACES or largest >= _SMALLEST_LONG
+    if few and largest < _LARGEST_PLAIN:
         return 0
     return math.floor(math.log10(largest)) if math.isfinite(largest) else 0
 
