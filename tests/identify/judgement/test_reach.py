@@ -52,7 +52,7 @@ def test_a_resonance_beyond_the_band_casts_doubt_on_what_splits_the_phase(eviden
     far = evidence_of(field_chirp(TIME), y + WHITE, structures=("second_order",))
     (found,) = natural_frequency_beyond(far)
     assert (found.code, found.severity, found.parameters) == ("extrapolated", "doubt", PHASE_SPLIT)
-    assert re.search(r"ends at 20 Hz\. Sweep to at least 4[45]\.?\d* Hz", found.message)
+    assert re.search(r"ends at 20 Hz\. To see it, sweep to 4[45]\.?\d* Hz\.", found.message)
     (missing,) = beyond_band(far)
     assert missing.severity == "info"
     assert missing.parameters == ("bandwidth_phase90_without_delay", "bandwidth_3db")
@@ -73,6 +73,7 @@ def test_a_mode_far_beyond_the_band_casts_doubt_only_in_a_richer_structure(clean
     evidence = replace(clean, readings=readings)
     assert fast_mode(evidence) == ()
     (found,) = fast_mode(replace(evidence, joint=replace(clean.joint, best=third)))
+    assert "sweep to 150 Hz, sampled at 380 Hz or faster" in found.message
     assert (found.code, found.severity, found.parameters) == ("extrapolated", "doubt", PHASE_SPLIT)
     assert "third-order model needs a mode at 100 Hz" in found.message
 

@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 
 from hmpim.identify.effects.colour import bias_drift
 from hmpim.identify.fitting.enrich import PLAIN
-from hmpim.identify.fitting.fit import jacobian, solved, without
+from hmpim.identify.fitting.fit import jacobian
+from hmpim.identify.fitting.least_squares import solved, without
 from hmpim.identify.fitting.trial import JointFit, Trial
 from hmpim.identify.uncertainty import covariance
 from hmpim.identify.whiteness import innovation_gain, is_white

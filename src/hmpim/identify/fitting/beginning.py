@@ -7,7 +7,8 @@ import scipy
 from numpy.typing import NDArray
 
 from hmpim.identify.fitting.data import Data, Seen
-from hmpim.identify.fitting.fit import Fit, Problem, jacobian, solved
+from hmpim.identify.fitting.fit import Fit, Problem, jacobian
+from hmpim.identify.fitting.least_squares import solved
 from hmpim.identify.fitting.sampled_rows import part_of
 from hmpim.identify.fitting.trial import Trial
 from hmpim.identify.signals import longest_lag

@@ -18,7 +18,8 @@ from typing import Generic, Protocol, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from hmpim.identify.fitting.fit import Fit, Problem, jacobian, solved, within_reach
+from hmpim.identify.fitting.fit import Fit, Problem, jacobian, within_reach
+from hmpim.identify.fitting.least_squares import solved
 from hmpim.identify.fitting.sampled_rows import part_of
 from hmpim.identify.uncertainty import covariance
 from hmpim.identify.whiteness import is_white

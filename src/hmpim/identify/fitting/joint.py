@@ -39,8 +39,9 @@ from hmpim.identify.fitting.enrich import (
     PLAIN,
     RICH,
 )
-from hmpim.identify.fitting.fit import Fit, fit_structure, solved
+from hmpim.identify.fitting.fit import Fit, fit_structure
 from hmpim.identify.fitting.growth import grow, hidden_pole
+from hmpim.identify.fitting.least_squares import solved
 from hmpim.identify.fitting.software import software_fit
 from hmpim.identify.fitting.start import lag_ahead, rough_response
 from hmpim.identify.fitting.trial import JointFit, Trial, likeliest_of, trial_of

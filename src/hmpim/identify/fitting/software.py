@@ -15,7 +15,8 @@ import scipy
 from numpy.typing import NDArray
 
 from hmpim.identify.fitting.beginning import begins_of
-from hmpim.identify.fitting.fit import Fit, Problem, fit_structure, solved_exactly
+from hmpim.identify.fitting.fit import Fit, Problem, fit_structure
+from hmpim.identify.fitting.least_squares import solved_exactly
 from hmpim.identify.fitting.start import coarse_lag
 from hmpim.identify.fitting.trial import JointFit, trial_of
 from hmpim.identify.fitting.unrelated import is_unrelated

@@ -5,7 +5,8 @@ import scipy
 from numpy.typing import NDArray
 
 from hmpim.identify.fitting.autoregression import autoregression
-from hmpim.identify.fitting.fit import Fit, Problem, solved
+from hmpim.identify.fitting.fit import Fit, Problem
+from hmpim.identify.fitting.least_squares import solved
 from hmpim.identify.fitting.sampled_rows import part_of
 from hmpim.identify.whiteness import effective_share, innovation_gain, misfit
 

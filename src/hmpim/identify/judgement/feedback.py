@@ -4,7 +4,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from hmpim.identify.fitting.fit import solved
+from hmpim.identify.fitting.least_squares import solved
 from hmpim.identify.groups import MODELLED
 from hmpim.identify.judgement.evidence import Evidence
 from hmpim.record import Finding

@@ -1,5 +1,7 @@
 """What lies outside the band, before the record's start or beyond its end."""
 
+import math
+
 import numpy as np
 import scipy
 from numpy.typing import NDArray
@@ -38,6 +40,9 @@ _LINE, _APART = 7, 4
 _SPARE = 2
 """What lines must tell beyond the figures, for a wrong structure to show."""
 
+_OF_RATE = 0.4
+"""Share of the rate that a sweep may end at."""
+
 _LEADS, _STAMPED_LATE = 2.0, 5.0
 """Time constants, and samples, by which a missing lead or a stamp may have an output ahead."""
 
@@ -73,8 +78,8 @@ def fast_mode(evidence: Evidence) -> tuple[Finding, ...]:
             code="extrapolated",
             message=f"A {structure_in_words(name)} model needs a mode at {fastest:.4g} Hz, beyond "
             f"the excited band, which ends at {evidence.band[1]:.4g} Hz: the delay may not be "
-            "constant, or the clocks may part. Check the time stamps, or sweep to "
-            f"{1.5 * fastest:.3g} Hz.",
+            "constant, or the clocks may part. Check the time stamps, or "
+            f"{_sweep_to(fastest, evidence)}.",
             severity="doubt",
             parameters=PHASE_SPLIT,
         ),
@@ -90,12 +95,24 @@ def natural_frequency_beyond(evidence: Evidence) -> tuple[Finding, ...]:
         Finding(
             code="extrapolated",
             message=f"The natural frequency of {natural.value:.4g} Hz lies beyond the excited "
-            f"band, which ends at {evidence.band[1]:.4g} Hz. Sweep to at least "
-            f"{1.5 * natural.value:.3g} Hz.",
+            f"band, which ends at {evidence.band[1]:.4g} Hz. To see it, "
+            f"{_sweep_to(natural.value, evidence)}.",
             severity="doubt",
             parameters=PHASE_SPLIT,
         ),
     )
+
+
+def _sweep_to(mode: float, evidence: Evidence) -> str:
+    """What shows a mode, in words.
+
+    Half as far again is far enough; of the rate, a sweep may use four tenths.
+    """
+    top = round(1.5 * mode, 2 - math.floor(math.log10(1.5 * mode)))
+    if top <= _OF_RATE * evidence.fs:
+        return f"sweep to {top:.7g} Hz"
+    rate = round(top / _OF_RATE, 1 - math.floor(math.log10(top / _OF_RATE)))
+    return f"sweep to {top:.7g} Hz, sampled at {rate:.7g} Hz or faster"
 
 
 def integrator(evidence: Evidence) -> tuple[Finding, ...]:

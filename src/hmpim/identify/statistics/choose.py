@@ -15,8 +15,8 @@ from hmpim.identify.fitting.autoregression import whitening_filter
 from hmpim.identify.fitting.candidates import nested
 from hmpim.identify.fitting.data import FOLLOWS, HOPELESS, shifted
 from hmpim.identify.fitting.enrich import INTEGRATING, PLAIN, RICH, members, proposals
-from hmpim.identify.fitting.fit import solved
 from hmpim.identify.fitting.growth import HiddenPole, grow
+from hmpim.identify.fitting.least_squares import solved
 from hmpim.identify.fitting.rows import Part, Problem
 from hmpim.identify.fitting.start import RoughResponse, starting_values
 from hmpim.identify.fitting.trial import Trial, likeliest_of, trial_of

@@ -12,7 +12,9 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from hmpim.identify.fitting.fit import Fit, climb, solved, within_reach
+from hmpim.identify.fitting.climb import climb
+from hmpim.identify.fitting.fit import Fit, within_reach
+from hmpim.identify.fitting.least_squares import solved
 from hmpim.identify.fitting.rows import Part, Problem
 from hmpim.identify.statistics.products import Moments, Products
 from hmpim.identify.statistics.reach import AHEAD, Reach

@@ -11,8 +11,8 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from hmpim.identify.fitting.fit import solved
 from hmpim.identify.fitting.growth import HiddenPole, response_to_square
+from hmpim.identify.fitting.least_squares import solved
 from hmpim.identify.fitting.rows import Problem
 from hmpim.identify.statistics.fit import Fitted
 from hmpim.identify.statistics.products import Products

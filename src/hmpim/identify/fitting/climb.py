@@ -1,0 +1,153 @@
+"""Levenberg and Marquardt's way down, for anything that is linear but for a few parameters."""
+
+from collections.abc import Callable, Sequence
+from typing import Protocol, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hmpim.identify.fitting.least_squares import solved
+from hmpim.model.dynamics import Structure
+
+__all__ = ["Evaluated", "climb"]
+
+_DAMPING = 1e-4
+"""Share of each diagonal element that the first steps add to it."""
+
+_NUDGE = 1e-7
+"""Change of a parameter that shows whether a bound is in its way."""
+
+_STEEPEST = 1e6
+"""The same, from which on no smaller step is tried."""
+
+_POORLY, _WELL = 0.25, 0.75
+"""Share of the gain hoped for below which the damping grows, and above which it falls."""
+
+Real = NDArray[np.float64]
+
+
+class Evaluated(Protocol):
+    """A model at given parameters: what all that is linear leaves over, and the way down."""
+
+    @property
+    def thetas(self) -> list[Real]:
+        """Parameters that are not linear, of each input."""
+
+    @property
+    def linear(self) -> Real:
+        """Parameters that are."""
+
+    @property
+    def cost(self) -> float:
+        """Sum of squares of what is left over."""
+
+    def normal(self) -> tuple[Real, Real]:
+        """Normal equations of the nonlinear parameters: matrix, and derivative of the cost."""
+
+
+E = TypeVar("E", bound=Evaluated)
+
+
+def climb(
+    evaluated: Callable[[Sequence[Real]], E],
+    thetas: Sequence[Real],
+    *,
+    structures: Sequence[Structure],
+    bounded: Callable[[Sequence[Real]], list[Real]],
+    counted: int,
+    iterations: int,
+    precision: float,
+) -> tuple[E, bool]:
+    """Levenberg and Marquardt's way to the least cost.
+
+    The damping follows how well the quadratic model foretells each step (J. Nocedal and S. J.
+    Wright, Numerical Optimization, 2nd ed., 2006, section 4.1); parameters at a bound are held.
+
+    Parameters
+    ----------
+    evaluated : callable
+        From the nonlinear parameters of each input to an `Evaluated`.
+    thetas : sequence of ndarray
+        Where to begin, inside the bounds.
+    structures : sequence of Structure
+        One for each input.
+    bounded : callable
+        Keeps parameters where they can be told.
+    counted : int
+        Samples that count.
+    iterations, precision
+        As for `fit_structure`.
+
+    Returns
+    -------
+    Evaluated
+        Where it ended.
+    bool
+        Whether the last step was negligible.
+    """
+    edges = np.cumsum([theta.size for theta in thetas])[:-1]
+    best = evaluated(thetas)
+    damping = _DAMPING
+    for _ in range(iterations):
+        here = np.concatenate(best.thetas)
+        free, normal, moment, decrement = _free_directions(best, edges, bounded)
+        negligible = precision * best.cost / max(counted - here.size - best.linear.size, 1)
+        if decrement < negligible:
+            return best, True
+        refused = 0
+        while True:
+            step = np.zeros(here.size)
+            step[free] = solved(normal, moment, damping)
+            steps = np.split(step, edges)
+            share = min(
+                _limited(s, t, d) for s, t, d in zip(structures, best.thetas, steps, strict=True)
+            )
+            moved = bounded(np.split(here + share * step, edges))
+            trial = evaluated(moved)
+            taken = (np.concatenate(moved) - here)[free]
+            hoped = float(taken @ (2.0 * moment - normal @ taken))
+            if trial.cost < best.cost:
+                break
+            if damping > _STEEPEST or abs(hoped) < negligible:
+                return best, True  # no way down: a kink, or the arithmetic's own floor
+            damping *= 10.0
+            refused += 1
+        fell, best = best.cost - trial.cost, trial
+        if fell < negligible and damping < 1e-3:
+            return best, True
+        if fell < _POORLY * hoped:
+            damping *= 2.0
+        elif fell > _WELL * hoped and not refused:
+            damping = max(damping / 10.0, 1e-9)
+    return best, False
+
+
+def _free_directions(
+    best: Evaluated, edges: NDArray[np.intp], bounded: Callable[[Sequence[Real]], list[Real]]
+) -> tuple[NDArray[np.bool_], Real, Real, float]:
+    """Parameters that no bound holds, their normal equations, and Newton's decrement.
+
+    The decrement is what a full step would still gain. A parameter is held where the way down
+    leads it out of its bounds (D. P. Bertsekas, SIAM J. Control Optim. 20, 1982); the others then
+    move as if it were known.
+    """
+    normal, moment = best.normal()
+    here = np.concatenate(best.thetas)
+    down = here + _NUDGE * np.sign(moment)
+    free = np.concatenate(bounded(np.split(down, edges))) == down
+    if not free.all():
+        normal, moment = normal[np.ix_(free, free)], moment[free]
+    toward = solved(normal, moment) if free.any() else moment
+    return free, normal, moment, float(toward @ moment)
+
+
+def _limited(structure: Structure, theta: Real, step: Real) -> float:
+    """Share of a step to take so that no coefficient changes beyond recognition."""
+    share, start = 1.0, 1
+    for order in structure.sections:
+        share = min(share, 1.0 / max(abs(step[start]), 1e-300))
+        if order == 2:
+            room = max(1.0, theta[start + 1])
+            share = min(share, room / max(abs(step[start + 1]), 1e-300))
+        start += order
+    return share

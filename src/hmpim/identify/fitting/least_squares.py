@@ -1,0 +1,56 @@
+"""Least squares, where columns may differ by powers of ten and some say nothing."""
+
+import numpy as np
+import scipy
+from numpy.typing import NDArray
+
+__all__ = ["solved", "solved_exactly", "without"]
+
+_UNSEEN = 1e-13
+"""Share of the greatest eigenvalue below which the record does not see a direction."""
+
+_EXACTLY = 1e-14
+"""The share that is not seen where no normal equations are made."""
+
+Real = NDArray[np.float64]
+
+
+def solved_exactly(rows: Real, target: Real) -> tuple[Real, float]:
+    """Least squares without normal equations, whose rounding is the square root of this one's.
+
+    Returns
+    -------
+    weights : ndarray, shape (k,)
+        Of `rows`, (k, n).
+    left : float
+        Sum of squares that they leave of `target`, (n,).
+    """
+    scale = np.sqrt(np.maximum(np.sum(rows**2, axis=1), np.finfo(float).tiny))
+    found = np.linalg.lstsq((rows / scale[:, None]).T, target, rcond=_EXACTLY)[0] / scale
+    residual = target - found @ rows
+    return np.asarray(found), float(residual @ residual)
+
+
+def solved(gram: Real, moment: Real, damping: float = 0.0) -> Real:
+    """Solve normal equations, scaled to unit diagonal; directions without content stay 0."""
+    diagonal = gram.diagonal()
+    scale = np.sqrt(np.where(diagonal > 1e-200 * diagonal.max(), diagonal, 1.0))
+    scaled = gram / (scale[:, None] * scale)
+    # The routine of eigh, which takes as long to check its arguments.
+    values, vectors, info = scipy.linalg.lapack.dsyevd(scaled, lower=1)
+    if info:
+        raise np.linalg.LinAlgError("eigenvalues of the normal equations did not converge")
+    keep = values > _UNSEEN * values[-1]
+    projected = (vectors.T @ (moment / scale))[keep] / (values[keep] + damping)
+    return np.asarray(vectors[:, keep] @ projected / scale)
+
+
+def without(rows: Real, others: Real) -> Real:
+    """Project `others`, (k, n), out of `rows`, (p, n)."""
+    if not others.shape[0]:
+        return rows
+    scale = np.sqrt(np.maximum(np.sum(others**2, axis=1), np.finfo(float).tiny))
+    q, r = np.linalg.qr((others / scale[:, None]).T)
+    told = np.abs(np.diag(r)) > np.sqrt(_UNSEEN)
+    q = q[:, told]
+    return np.asarray(rows - (rows @ q) @ q.T)
