@@ -34,6 +34,7 @@ Real = np.ndarray[Any, np.dtype[np.float64]]
 
 HMPIM = [sys.executable, "-m", "hmpim.cli.main"]
 RATE = 1000.0
+PLAYS = 7
 BANDS = {"roll": 90.0, "yaw": 60.0, "pitch": 50.0, "azimuth": 24.0, "elevation": 18.0}
 TRAVEL = {"roll": 5.0, "yaw": 5.0, "pitch": 5.0, "azimuth": 3.0, "elevation": 3.0}
 
@@ -176,7 +177,10 @@ def updates() -> list[str]:
 
 
 def updated(fs: float, seconds: float) -> tuple[tuple[float, float], Real, Real, int]:
-    """Milliseconds of ordinary updates and of new starts, and bytes kept, of one run."""
+    """Milliseconds of ordinary updates and of new starts, and bytes kept, of one run.
+
+    Each the least of several plays of the same samples.
+    """
     limits = hmpim.Limits(position=1.0)
     plan = {"band": (0.1, 20.0), "fs": fs, "limits": limits, "kind": "repeated", "sweep": 0.6}
     stimulus = hmpim.design(duration=seconds, **plan)
@@ -187,8 +191,10 @@ def updated(fs: float, seconds: float) -> tuple[tuple[float, float], Real, Real,
     u, y = record.inputs[0].values, record.outputs[0].values
     size = round(0.05 * fs)
     fed(stimulus, u[: 30 * size], y[: 30 * size], size)  # what is loaded at first use, is loaded
-    ordinary, anew, kept = fed(stimulus, u, y, size)
-    return (fs, seconds), ordinary, anew, kept
+    # Every play does the same; of each update the least time is its own, the rest the computer's.
+    plays = [fed(stimulus, u, y, size) for _ in range(PLAYS)]
+    ordinary, anew = (np.min([play[i] for play in plays], axis=0) for i in (0, 1))
+    return (fs, seconds), ordinary, anew, plays[0][2]
 
 
 def fed(stimulus: hmpim.Stimulus, u: Real, y: Real, size: int) -> tuple[Real, Real, int]:

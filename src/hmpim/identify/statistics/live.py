@@ -33,8 +33,9 @@ _FEWEST = 60
 _PAUSE = 1.1
 """Growth of the record before another new start is tried."""
 
-_EVALUATIONS, _FEWER = 4, 2
-"""Of the fit, at each look; at one that asks whether the residual follows the input."""
+_EVALUATIONS, _FEWER = 2, 1
+"""Of the fit, at each look: where it is and a step from there. While the residual follows the input
+a look that asks whether it does so still takes a step only where its end need not be evaluated."""
 
 _BETWEEN = 1.05
 """Growth of the record before it is asked again whether the residual follows the input."""
@@ -180,7 +181,7 @@ class LiveEstimator:
         products = Products(statistics, skipped=0)
         # Not at two looks in a row, since each takes long enough.
         asks = statistics.samples >= _BETWEEN * self._asked and not self._asked_last
-        fitted = self._again(products, _FEWER if asks else _EVALUATIONS)
+        fitted = self._again(products, _FEWER if asks and self._follows else _EVALUATIONS)
         self._asked_last = asks
         if asks:
             self._asked = statistics.samples
@@ -207,7 +208,7 @@ class LiveEstimator:
         return identify_statistics(self._statistics, intersample=self._mode)
 
     def _again(self, products: Products, evaluations: int) -> Fitted:
-        """The same structure, a step or a few from where it was."""
+        """The same structure, a step from where it was."""
         if self._fitted is None:
             return self._begin(products)
         return follow(
