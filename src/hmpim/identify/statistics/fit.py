@@ -31,6 +31,9 @@ _NEAR = 0.25
 """What a step may gain, in units of σ², so that where it leads need not be evaluated: a parameter
 then moves by half a standard deviation at most, and the error of that is of the square."""
 
+_CLOSE = 4.0
+"""The same where no other evaluation is to be made: two standard deviations."""
+
 Real = NDArray[np.float64]
 
 
@@ -229,8 +232,10 @@ def follow(
     gained, theta = float(step @ moment), fit.theta + step
     freedom = max(products.counted - step.size - here.linear.size, 1)
     held = (_within(problem, fit.structure, theta) != theta).any()
-    if fit.converged and gained * freedom < _NEAR * here.cost and not held:
-        return _ended(here, intersample, step, left=here.cost - gained, converged=True)
+    near = fit.converged and gained * freedom < _NEAR * here.cost
+    close = evaluations == 1 and gained * freedom < _CLOSE * here.cost
+    if (near or close) and not held:
+        return _ended(here, intersample, step, left=here.cost - gained, converged=near)
     return _climbed(here, intersample, evaluations=evaluations)
 
 

@@ -34,14 +34,15 @@ _PAUSE = 1.1
 """Growth of the record before another new start is tried."""
 
 _EVALUATIONS, _FEWER = 2, 1
-"""Of the fit, at each look: where it is and a step from there. While the residual follows the input
-a look that asks whether it does so still takes a step only where its end need not be evaluated."""
+"""Of the fit, at each look: where it is and a step from there; at a look that asks whether the
+residual follows the input, where it is alone."""
 
 _BETWEEN = 1.05
 """Growth of the record before it is asked again whether the residual follows the input."""
 
-_MOVED = 0.5
-"""Samples that the delay may move before what is asked for is made anew about it."""
+_TURN = 0.05
+"""Cycles of the highest frequency by which the delay may move before what is asked for is made
+anew about it."""
 
 _PAST = 1.2
 """Natural frequency, over the end of the band, up to which the band still tells it."""
@@ -128,7 +129,7 @@ class LiveEstimator:
         self._fitted: Fitted | None = None
         self._tried = self._asked = self._starts = 0
         self._follows = True
-        self._asked_last = False
+        self._asked_last = self._made = False
         self._asks: Asked | None = None
         self._look: Look | None = None
 
@@ -179,29 +180,44 @@ class LiveEstimator:
         if statistics.samples < _FEWEST or not moves:
             return None
         products = Products(statistics, skipped=0)
-        # Not at two looks in a row, since each takes long enough.
-        asks = statistics.samples >= _BETWEEN * self._asked and not self._asked_last
-        fitted = self._again(products, _FEWER if asks and self._follows else _EVALUATIONS)
-        self._asked_last = asks
-        if asks:
+        due = statistics.samples >= _BETWEEN * self._asked and not self._asked_last
+        made = due and self._is_elsewhere(self._fitted)
+        asks = due and not made
+        fitted = self._again(products, _FEWER if due else _EVALUATIONS)
+        if made:  # and asked at the next look, since each takes long enough
+            self._asks = self._asked_about(fitted)
+        if asks or self._fitted is None:
             self._asked = statistics.samples
             self._follows = self._lacks(fitted)
             if self._follows and statistics.samples >= _PAUSE * self._tried:
                 fitted = self._begin(products)
+                self._asks = self._asked_about(fitted)
                 self._follows = self._lacks(fitted)
+        self._asked_last, self._made = asks, made
         self._fitted = fitted
         self._look = self._read(fitted)
         return self._look
 
+    def _is_elsewhere(self, fitted: Fitted | None) -> bool:
+        """Whether a fit's delay has moved away from what is asked for, made before this look."""
+        if fitted is None or self._asks is None or self._made:
+            return False
+        return abs(self._asks.delay - fitted.fit.delay) * self._band()[1] > _TURN
+
+    def _asked_about(self, fitted: Fitted) -> Asked:
+        return asked_of(fitted.fit.delay, self._band(), fitted.products)
+
+    def _band(self) -> tuple[float, float]:
+        """Cycles a sample that are excited."""
+        low, high = self._excited()
+        return low / self._statistics.fs, high / self._statistics.fs
+
     def _lacks(self, fitted: Fitted) -> bool:
         """Whether what is left over follows the input."""
-        products, delay = fitted.products, fitted.fit.delay
-        fs = self._statistics.fs
-        low, high = self._excited()
-        band = low / fs, high / fs
-        if self._asks is None or abs(self._asks.delay - delay) > _MOVED:
-            self._asks = asked_of(delay, band, products)
-        return misfit_of(fitted, products, band, asked=self._asks).probability < FOLLOWS
+        if self._asks is None:
+            self._asks = self._asked_about(fitted)
+        misfit = misfit_of(fitted, fitted.products, self._band(), asked=self._asks)
+        return misfit.probability < FOLLOWS
 
     def identification(self) -> Identification:
         """The whole identification of what was read, with every structure and every check."""
