@@ -119,7 +119,7 @@ class ResultView:
         wish = self.owner.wish
         with card("By hand"):
             ui.label(
-                "Drag the lines in the plots, or type; the automatic values stay beside."
+                "Drag the lines in the plots, or type; the automatic values stay in the table."
             ).classes("hm-soft")
             with ui.element("div").classes("hm-row"):
                 for name, words in _BY_HAND.items():

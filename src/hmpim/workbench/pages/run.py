@@ -22,7 +22,7 @@ from hmpim.workbench.work.record import response_so_far
 
 __all__ = ["ready_to_run", "run"]
 
-NO_WATCHDOG = "Rig without a watchdog: drive it by a further process"
+NO_WATCHDOG = "Rig without a watchdog: drive it from a separate process"
 _EVERY = 0.1  # s between two looks at what has come in
 _FEWEST = 200  # samples before the first estimate
 
