@@ -32,6 +32,23 @@ def write_fleet(path) -> None:
     parquet.write_table(pa.table(cells), path)
 
 
+def done_both_ways(path, folder):
+    """Tables of the parameters alone, done together, and of everything, done one by one."""
+    return [
+        hmpim.batch(
+            path,
+            out=folder / keep,
+            fs=FS,
+            request=Request(keep=keep),
+            cluster=Cluster(workers=0),
+        )
+        .to_pandas()
+        .set_index("record")
+        .sort_index()
+        for keep in ("parameters", "results")
+    ]
+
+
 def test_one_stimulus_is_shared(tmp_path, monkeypatch):
     path = tmp_path / "fleet.parquet"
     write_fleet(path)
@@ -47,19 +64,7 @@ def test_one_stimulus_is_shared(tmp_path, monkeypatch):
         return found
 
     monkeypatch.setattr(alike, "fit_fleet", counted)
-    tables = [
-        hmpim.batch(
-            path,
-            out=tmp_path / keep,
-            fs=FS,
-            request=Request(keep=keep),
-            cluster=Cluster(workers=0),
-        )
-        .to_pandas()
-        .set_index("record")
-        for keep in ("parameters", "results")
-    ]
-    quick, whole = (table.sort_index() for table in tables)
+    quick, whole = done_both_ways(path, tmp_path)
     assert len(together) == 1
     assert len(together[0]) == UNITS - 7  # all but those learnt from and the one with a gap
     assert together[0].count(False) >= 1  # the clipped one, at least
@@ -115,19 +120,7 @@ def test_every_record_says_what_it_says_alone(tmp_path, monkeypatch, kind):
     monkeypatch.setattr(alike, "_FLEETS", {})
     path = tmp_path / "many.parquet"
     write_many(path, kind, 70)
-    quick, whole = (
-        hmpim.batch(
-            path,
-            out=tmp_path / keep,
-            fs=FS,
-            request=Request(keep=keep),
-            cluster=Cluster(workers=0),
-        )
-        .to_pandas()
-        .set_index("record")
-        .sort_index()
-        for keep in ("parameters", "results")
-    )
+    quick, whole = done_both_ways(path, tmp_path)
     assert (alike._FLEETS.popitem()[1] is not None) == (kind == "second_order")
     assert [list(w) for w in quick["warnings"]] == [list(w) for w in whole["warnings"]]
     for name in ("verdict", "structure", "intersample", "sha256", "fs", "samples"):

@@ -3,11 +3,15 @@
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 __all__ = ["first_crossing", "samples_bandwidth"]
 
 _CLEAR = 0.3  # share of the response: what is less sure does not count
 _FEWEST = 6
+
+FloatArray = NDArray[np.float64]
+ComplexArray = NDArray[np.complex128]
 
 
 def samples_bandwidth(response: dict[str, Any], *, near: float) -> float | None:
@@ -38,13 +42,10 @@ def samples_bandwidth(response: dict[str, Any], *, near: float) -> float | None:
     >>> round(found, 6)
     10.0
     """
-    f = np.asarray(response["frequency"], dtype=np.float64)
-    z = np.asarray(response["real"]) + 1j * np.asarray(response["imag"])
-    std = np.array([np.inf if s is None else s for s in response["std"]], dtype=np.float64)
-    clear = (std < _CLEAR * np.abs(z)) & (f > 0.0)
+    f, z, std = _clear_part(response)
     found = near
     for low, high in ((0.6, 1.4), (0.8, 1.2), (0.85, 1.15)):
-        seen = clear & (f > low * found) & (f < high * found)
+        seen = (f > low * found) & (f < high * found)
         if np.count_nonzero(seen) < _FEWEST:
             return None
         x = f[seen] / found - 1.0
@@ -84,9 +85,15 @@ def first_crossing(response: dict[str, Any]) -> float | None:
     >>> round(found, 1)
     10.1
     """
+    f, z, _ = _clear_part(response)
+    beyond = np.unwrap(np.angle(z)) <= -0.5 * np.pi
+    return float(f[np.argmax(beyond)]) if beyond.any() else None
+
+
+def _clear_part(response: dict[str, Any]) -> tuple[FloatArray, ComplexArray, FloatArray]:
+    """Frequency, response and its deviation where it is clear."""
     f = np.asarray(response["frequency"], dtype=np.float64)
     z = np.asarray(response["real"]) + 1j * np.asarray(response["imag"])
     std = np.array([np.inf if s is None else s for s in response["std"]], dtype=np.float64)
     clear = (std < _CLEAR * np.abs(z)) & (f > 0.0)
-    beyond = np.unwrap(np.angle(z[clear])) <= -0.5 * np.pi
-    return float(f[clear][np.argmax(beyond)]) if beyond.any() else None
+    return f[clear], z[clear], std[clear]

@@ -16,6 +16,7 @@ from hmpim.identify.fitting.rows import Problem
 from hmpim.identify.fitting.trial import JointFit, Trial, trial_of
 from hmpim.identify.learnt import Fleet, Member, theta_at
 from hmpim.identify.result import Parameters
+from hmpim.identify.signals import longest_lag
 from hmpim.identify.spanned import spanned
 from hmpim.identify.whiteness import is_white
 from hmpim.model.dynamics import STRUCTURES, Structure
@@ -59,7 +60,8 @@ def with_tails(
     highest : float
         Frequency in Hz beyond which no bandwidth is read off.
     """
-    problem = Problem(source=member.source, y=y, valid=None, longest_delay=y.size // 2 + 2.0)
+    longest = longest_lag(y.size) + 2.0  # as of every record
+    problem = Problem(source=member.source, y=y, valid=None, longest_delay=longest)
 
     def refit(structure: Structure, theta: Real, precision: float = 1e-2) -> Trial:
         fit = fit_structure(problem, structure, theta, precision=precision)

@@ -41,9 +41,6 @@ _STEPS = 40
 _NEGLIGIBLE = 1e-4
 """Standard deviations by which the last step moves any parameter."""
 
-_LEADS = 4.0
-"""Samples by which an output may lead, as for every fit."""
-
 Real = NDArray[np.float64]
 
 
@@ -169,7 +166,7 @@ def _moved(problem: Problem, fit: Fit, step: Real) -> Fit:
     theta = within_reach(
         fit.structure,
         fit.theta + step[:unknown],
-        delays=(-_LEADS, problem.longest_delay),
+        delays=(problem.shortest_delay, problem.longest_delay),
         samples=problem.y.size,
     )
     linear = fit.linear + step[unknown:]

@@ -1,6 +1,7 @@
 """Records: time-stamped channels, each with its unit, and the quality of the data."""
 
 from hmpim.record.align import Aligned, Signal, uniform
+from hmpim.record.channel import BETWEEN, Channel, Intersample
 from hmpim.record.clock import Clock, fit_clock
 from hmpim.record.describe import Description, describe
 from hmpim.record.finding import Finding, Severity
@@ -9,7 +10,7 @@ from hmpim.record.offset import ClockOffset, clock_offset
 from hmpim.record.onto import on_grid
 from hmpim.record.propose import Proposal, propose
 from hmpim.record.quality import inspect_record, inspect_timing, inspect_values
-from hmpim.record.record import BETWEEN, ROLES, Channel, Intersample, Record, Role
+from hmpim.record.record import ROLES, Record, Role
 from hmpim.record.series import Series
 from hmpim.record.stopping import Stopping
 from hmpim.record.sweeps import Motion, find_motions

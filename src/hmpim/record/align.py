@@ -8,12 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hmpim.errors import RecordError
+from hmpim.record.channel import Channel, Intersample
 from hmpim.record.clock import Clock, fit_clock
 from hmpim.record.finding import Finding
 from hmpim.record.held import Waveform, switches_beside, waveform_of
 from hmpim.record.onto import is_reduced, on_grid
 from hmpim.record.quality import clock_findings
-from hmpim.record.record import Channel, Intersample, Record
+from hmpim.record.record import Record
 from hmpim.record.resample import share_above
 
 __all__ = ["Aligned", "Signal", "uniform"]

@@ -6,9 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hmpim.errors import RecordError
+from hmpim.record.channel import Channel
 from hmpim.record.clock import fit_clock
 from hmpim.record.mend import mend, restarts
-from hmpim.record.record import Channel
 from hmpim.record.series import Series
 from hmpim.units import check_unit
 

@@ -15,8 +15,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from hmpim.record.channel import Channel, Intersample
 from hmpim.record.clock import Clock
-from hmpim.record.record import Channel, Intersample
 from hmpim.record.resample import band_limited
 
 __all__ = ["Waveform", "switches_beside", "waveform_of"]

@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hmpim.errors import RecordError
+from hmpim.record.channel import Channel
 from hmpim.record.finding import Finding
-from hmpim.record.record import Channel
 from hmpim.record.series import Series
 
 __all__ = ["Mended", "check_span", "mend", "restarts"]

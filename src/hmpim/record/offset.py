@@ -7,9 +7,9 @@ import scipy
 from numpy.typing import NDArray
 
 from hmpim.errors import RecordError
+from hmpim.record.channel import Channel
 from hmpim.record.clock import fit_clock
 from hmpim.record.onto import on_grid
-from hmpim.record.record import Channel
 
 __all__ = ["ClockOffset", "clock_offset"]
 

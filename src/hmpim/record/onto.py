@@ -7,8 +7,8 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from hmpim.record.channel import Channel, Intersample
 from hmpim.record.clock import Clock
-from hmpim.record.record import Channel, Intersample
 from hmpim.record.resample import CROSSINGS, PASSED, band_limited, share_above
 
 __all__ = ["is_reduced", "on_grid"]

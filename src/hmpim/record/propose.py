@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from hmpim.record.channel import Channel
 from hmpim.record.clock import fit_clock
 from hmpim.record.onto import on_grid
-from hmpim.record.record import Channel
 
 __all__ = ["Proposal", "propose"]
 

@@ -3,9 +3,10 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from hmpim.record.channel import Channel
 from hmpim.record.clock import Clock, fit_clock
 from hmpim.record.finding import Finding
-from hmpim.record.record import Channel, Record
+from hmpim.record.record import Record
 
 __all__ = ["clock_findings", "inspect_record", "inspect_timing", "inspect_values"]
 

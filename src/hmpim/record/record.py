@@ -11,19 +11,13 @@ from numpy.typing import ArrayLike, NDArray
 from hmpim.arguments import checked, shown
 from hmpim.equality import ByValue
 from hmpim.errors import ArgumentError, RecordError
+from hmpim.record.channel import Channel, Intersample, frozen_samples
 from hmpim.record.clock import fit_clock
 from hmpim.record.finding import Finding
 from hmpim.record.stopping import Stopping
 from hmpim.tables import html_table, shortened
-from hmpim.units import check_unit
 
-__all__ = ["ROLES", "Channel", "Intersample", "Record", "Role"]
-
-Intersample = Literal["zoh", "foh", "bandlimited", "sampled"]
-"""Held, linear or band-limited between its samples; or software, which sees the samples alone."""
-
-BETWEEN: tuple[Intersample, ...] = ("zoh", "foh", "bandlimited")
-"""What a signal in continuous time may do between its samples: held, linear or band-limited."""
+__all__ = ["ROLES", "Record", "Role"]
 
 Role = Literal["input", "output", "reference", "auxiliary"]
 """What a channel is in its record: what went in, what came out, what was asked, what is kept."""
@@ -36,93 +30,6 @@ def _add(digest: Any, role: Role, channel: "Channel", values: NDArray[np.float64
     digest.update(f"{role}\0{channel.name}\0{channel.unit}\0".encode())
     digest.update(np.ascontiguousarray(channel.time, dtype="<f8").tobytes())
     digest.update(np.ascontiguousarray(values, dtype="<f8").tobytes())
-
-
-def _frozen(name: str, values: ArrayLike) -> NDArray[np.float64]:
-    if np.iscomplexobj(values):
-        raise RecordError(
-            f"channel {name!r} is complex; give real numbers: the real part, or two channels"
-        )
-    try:
-        array = np.array(values, dtype=np.float64)
-    except (TypeError, ValueError) as error:
-        raise RecordError(f"channel {name!r} is not numeric ({error}); give real numbers") from None
-    if array.ndim != 1:
-        raise RecordError(
-            f"channel {name!r} has shape {array.shape}; give one dimension of samples, shape (n,)"
-        )
-    array.setflags(write=False)
-    return array
-
-
-@checked
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Channel(ByValue):
-    """One measured signal on its own clock.
-
-    Samples that a masked array hides are left out: a gap in this channel alone.
-
-    Parameters
-    ----------
-    name : str
-        Name of the channel, unique in its record.
-    time : ndarray, shape (n,)
-        Time stamps in seconds, strictly increasing.
-    values : ndarray, shape (n,)
-        Samples, in `unit`.
-    unit : str
-        Unit of the values; empty for none.
-
-    Raises
-    ------
-    RecordError
-        For NaN or infinite values, unequal lengths, or time that does not increase.
-    """
-
-    name: str
-    time: NDArray[np.float64]
-    values: NDArray[np.float64]
-    unit: str = ""
-
-    def __post_init__(self) -> None:
-        check_unit(self.unit)
-        hidden = _hidden(self.time), _hidden(self.values)
-        time = _frozen(f"{self.name} (time)", self.time)
-        values = _frozen(self.name, self.values)
-        if time.size != values.size:
-            raise RecordError(
-                f"channel {self.name!r} has {values.size} samples and {time.size} time stamps; "
-                "they must be as many"
-            )
-        if any(mask is not None for mask in hidden):
-            seen = ~np.logical_or.reduce([mask for mask in hidden if mask is not None])
-            time, values = _frozen(self.name, time[seen]), _frozen(self.name, values[seen])
-        object.__setattr__(self, "time", time)
-        object.__setattr__(self, "values", values)
-        if values.size < 2:
-            raise RecordError(f"channel {self.name!r} has {values.size} samples; at least 2 needed")
-        for label, array in ((self.name, values), (f"{self.name} (time)", time)):
-            bad = np.flatnonzero(~np.isfinite(array))
-            if bad.size:
-                raise RecordError(
-                    f"channel {label!r} holds {array[bad[0]]} at sample {bad[0]} "
-                    f"({bad.size} such in all); cut them out or fill them before identifying"
-                )
-        with np.errstate(over="ignore", invalid="ignore"):
-            step = np.diff(time - time[0])  # stamps of a damaged file may lie too far apart to tell
-        onward = (step > 0) & (step < np.inf)
-        if not onward.all():
-            k = int(np.argmin(onward))
-            raise RecordError(
-                f"time of channel {self.name!r} does not increase at sample {k + 1}: "
-                f"{time[k]:.9g} s is followed by {time[k + 1]:.9g} s; sort the record, "
-                "or cut it there"
-            )
-
-    def __repr__(self) -> str:
-        unit = f" {self.unit}" if self.unit else ""
-        span = f"{self.time[0]:.6g} to {self.time[-1]:.6g} s"
-        return f"Channel({shortened([self.name])}{unit}, {self.values.size} samples, {span})"
 
 
 @checked
@@ -268,7 +175,7 @@ class Record(ByValue):
         given = (_by_name("u", inputs), _by_name("y", outputs), references or {}, auxiliary or {})
         _check_unique([name for part in given for name in part])
         named = {name: values for part in given for name, values in part.items()}
-        lengths = {name: _frozen(name, values).size for name, values in named.items()}
+        lengths = {name: frozen_samples(name, values).size for name, values in named.items()}
         if len(set(lengths.values())) > 1:
             raise RecordError(
                 "channels have unequal lengths ("
@@ -282,7 +189,7 @@ class Record(ByValue):
             assert fs is not None
             stamps: NDArray[Any] = np.arange(n) / fs
         else:
-            _frozen("time", time)
+            frozen_samples("time", time)
             stamps = np.asanyarray(time)
         units = units or {}
         unknown = sorted(set(units) - set(named))
@@ -459,13 +366,6 @@ def _spans(channel: Channel) -> tuple[str, str]:
     """From when to when, and from what to what."""
     time, values = channel.time, channel.values
     return f"{time[0]:.6g} to {time[-1]:.6g}", f"{values.min():.6g} to {values.max():.6g}"
-
-
-def _hidden(values: ArrayLike) -> NDArray[np.bool_] | None:
-    """What a masked array hides, shape (n,); None if nothing."""
-    if not isinstance(values, np.ma.MaskedArray) or not np.ma.is_masked(values):
-        return None
-    return np.ma.getmaskarray(values)
 
 
 def _by_name(name: str, given: Mapping[str, ArrayLike] | ArrayLike) -> Mapping[str, ArrayLike]:

@@ -8,9 +8,9 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from hmpim.record.channel import Channel
 from hmpim.record.clock import fit_clock
 from hmpim.record.mend import check_span
-from hmpim.record.record import Channel
 
 __all__ = ["Motion", "cut_alike", "find_motions"]
 

@@ -15,11 +15,7 @@ from hmpim.identify.fitting.enrich import (
 )
 from hmpim.identify.fitting.fit import Fit, Problem, fit_structure
 from hmpim.identify.fitting.growth import one_more_pole, scale_of, with_pole
-from hmpim.identify.fitting.start import (
-    RoughResponse,
-    rough_response,
-    starting_values,
-)
+from hmpim.identify.fitting.start import RoughResponse, rough_response, starting_values
 from hmpim.identify.fitting.trial import CLEARLY
 from hmpim.identify.fitting.unexplained import unexplained_response
 from hmpim.identify.signals import longest_lag
@@ -163,18 +159,18 @@ def reduced(problem: Problem, fits: list[Fit], richer: list[Fit]) -> list[Fit]:
     late = best.delay + sum(float(c[0]) for _, c in sections)
     if best.structure.zeros and best.linear.size > 2 and best.linear[0]:
         late -= float(best.linear[1] / best.linear[0])
-    out = []
-    for fit in fits:
-        starts = [
-            np.concatenate([[late - c[0]], theta])
+
+    def better(fit: Fit) -> Fit:
+        if fit.objective <= HOPELESS * best.objective:
+            return fit
+        tried = [
+            fit_structure(problem, fit.structure, np.concatenate([[late - c[0]], theta]))
             for theta, c in sections
             if fit.structure.sections == (c.size,)
         ]
-        if fit.objective <= HOPELESS * best.objective:
-            starts = []
-        tried = [fit_structure(problem, fit.structure, theta) for theta in starts]
-        out.append(min([fit, *tried], key=lambda f: f.objective))
-    return out
+        return min([fit, *tried], key=lambda f: f.objective)
+
+    return [better(fit) for fit in fits]
 
 
 def _sections(fit: Fit) -> list[tuple[NDArray[np.float64], NDArray[np.float64]]]:

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hmpim.identify.fitting.fit import Fit, Problem, fit_structure
+from hmpim.identify.fitting.rows import STAMPED_LATE
 from hmpim.identify.fitting.start import RoughResponse
 from hmpim.identify.signals import longest_lag
 from hmpim.identify.whiteness import misfit
@@ -24,9 +25,6 @@ __all__ = [
     "refit",
     "shifted",
 ]
-
-_STAMPED_LATE = -4.0
-"""Delay in samples that is tried where the output follows its input."""
 
 FOLLOWS = 1e-4
 """Chance below which what is left over follows the input."""
@@ -70,7 +68,7 @@ class Data:
             y=self.y,
             valid=seen.valid,
             longest_delay=longest_lag(self.y.size) + 2.0,
-            shortest_delay=min(self.rough.earliest, _STAMPED_LATE),
+            shortest_delay=min(self.rough.earliest, STAMPED_LATE),
             nuisance=self.nuisance,
             begins=seen.begins,
         )

@@ -16,7 +16,10 @@ from hmpim.model.dynamics import Structure
 from hmpim.model.poles import PoleResponses, input_responses
 from hmpim.model.sampled import SampledInput
 
-__all__ = ["Part", "Problem"]
+__all__ = ["STAMPED_LATE", "Part", "Problem"]
+
+STAMPED_LATE = -4.0
+"""Least delay in samples that is tried where an output follows its input: stamps may be late."""
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -56,7 +59,7 @@ class Problem:
     y: Real
     valid: NDArray[np.bool_] | None
     longest_delay: float
-    shortest_delay: float = -4.0
+    shortest_delay: float = STAMPED_LATE
     whitening: Real | None = None
     noise: Real | None = None
     told: NDArray[np.bool_] | None = None

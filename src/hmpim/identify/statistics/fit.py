@@ -25,8 +25,6 @@ from hmpim.record import Intersample
 
 __all__ = ["Fitted", "fit_products", "follow", "pulse"]
 
-_SHORTEST_DELAY = -4.0
-
 _NEAR = 0.25
 """What a step may gain, in units of σ², so that where it leads need not be evaluated: a parameter
 then moves by half a standard deviation at most, and the error of that is of the square."""
@@ -278,7 +276,7 @@ def _climbed(
 
 def _within(problem: Problem, structure: Structure, theta: Real) -> Real:
     """Keep parameters where they can be told."""
-    delays = (_SHORTEST_DELAY, problem.longest_delay)
+    delays = (problem.shortest_delay, problem.longest_delay)
     return within_reach(structure, theta, delays=delays, samples=problem.y.size)
 
 
