@@ -1,12 +1,14 @@
 """docs/method.md: its tables of warnings and of groups are what the code says."""
 
 import ast
+import inspect
 import re
 from functools import cache
 from pathlib import Path
 from typing import NamedTuple
 
 from hmpim.identify import groups
+from hmpim.identify.identify import identify_output
 from hmpim.identify.nonlinear.words import KIND_WORDS
 
 ROOT = Path(__file__).parents[2]
@@ -119,3 +121,19 @@ def test_the_groups_are_those_of_the_code():
     seen = set(groups.EVERY) - set(groups.MODELLED)
     assert members(table["all of the model"]) <= seen
     assert {name for name in seen if "saturation" not in name} == members(table["all of the model"])
+
+
+def test_the_algorithm_stands_line_for_line_as_in_the_code():
+    block = re.search(r"## The algorithm\n.*?```python\n(.*?)```\n(.*?)\n## ", TEXT, re.S)
+    source = ast.parse(inspect.getsource(identify_output)).body[0]
+    assert isinstance(source, ast.FunctionDef)
+    code = source.body[1:]  # without the docstring
+    assert ast.dump(ast.parse(block[1])) == ast.dump(ast.Module(body=code, type_ignores=[]))
+    assert len(block[1].splitlines()) <= 15
+    called = {
+        node.func.id
+        for node in ast.walk(source)
+        if isinstance(node, ast.Call) and isinstance(node.func, ast.Name)
+    }
+    steps = set(re.findall(r"^\| `(\w+)` \|", block[2], re.M))
+    assert steps == called - {"range", "describe_dead"}

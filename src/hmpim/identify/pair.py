@@ -1,26 +1,31 @@
 """All that is said of one output and one input, once the joint fit is made."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from hmpim.identify.asked.question import Question
+from hmpim.identify.asked.reference import response_through
 from hmpim.identify.bandwidth import response_bandwidths
-from hmpim.identify.coupling.coupled import Responses
+from hmpim.identify.coupling.coupled import Responses, responses_of, settled, unrelated
 from hmpim.identify.coupling.several import Joined
-from hmpim.identify.effects.drift import Drifting, drift_finding
+from hmpim.identify.effects.censored import CensoredFit
+from hmpim.identify.effects.drift import drift_finding
 from hmpim.identify.effects.imperfections import Imperfections, refine, with_imperfections
 from hmpim.identify.fitting.fit import Fit
 from hmpim.identify.fitting.plainer import plainer, taking
 from hmpim.identify.fitting.trial import JointFit
 from hmpim.identify.frf.local import local_response
+from hmpim.identify.groups import EVERY
 from hmpim.identify.judgement import ROUNDING, Evidence, attempt, judge
-from hmpim.identify.nonlinear.nonlinearity import inspect_nonlinearity
+from hmpim.identify.nonlinear.nonlinearity import Inspection, inspect_nonlinearity
 from hmpim.identify.paper import paper_estimates
 from hmpim.identify.readings import Readings, read_parameters
 from hmpim.identify.result import (
     Candidate,
     FrequencyResponse,
+    OutputCoherence,
     PairIdentification,
     PaperEstimates,
     Parameters,
@@ -28,80 +33,98 @@ from hmpim.identify.result import (
 )
 from hmpim.identify.spanned import spanned
 from hmpim.identify.spectrum import excited_band
-from hmpim.identify.through import Instrument, response_through
 from hmpim.identify.uncertainty import estimate, noise_estimate, response_std
 from hmpim.identify.whiteness import Misfit, misfit
 from hmpim.model.filters import in_z
 from hmpim.model.response import RationalDelay
-from hmpim.record import Aligned, Finding, Record, Signal
+from hmpim.record import Finding
 
-__all__ = ["described", "untold"]
+__all__ = ["Described", "describe", "describe_dead"]
 
 
-def described(
-    aligned: Aligned,
-    source: Signal,
-    output: Signal,
-    record: Record,
-    joined: Joined,
-    i: int,
-    matrix: Responses | None,
-    found: Imperfections,
-    drifting: Drifting | None = None,
-    instrument: Instrument | None = None,
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Described:
+    """All that is said of one output: a pair for each input, and how much all explain together."""
+
+    pairs: tuple[PairIdentification, ...]
+    coherence: OutputCoherence | None = None
+
+
+def describe(question: Question, seen: Imperfections, fitted: Joined) -> Described:
+    """Say all that is known of an output, against each input in that one's own band."""
+    aligned, output, inputs = question.aligned, question.output, question.inputs
+    if inputs is None:
+        (source,) = aligned.inputs
+        if fitted.related[0]:
+            pair = _pair(question, seen, fitted, 0, None)
+            if question.swapped is not None:
+                pair = replace(pair, warnings=(question.swapped, *pair.warnings))
+            return Described(pairs=(pair,))
+        unfollowed = Finding(
+            code="unrelated",
+            message=f"Output {output.name!r} does not follow input {source.name!r}: a constant "
+            "explains it as well. Check the channels, or excite more.",
+            severity="doubt",
+            parameters=EVERY,
+        )
+        return Described(pairs=(_untold(question, 0, question.swapped or unfollowed),))
+    responses = responses_of(aligned, output, fitted, inputs)
+    pairs = []
+    for i, source in enumerate(aligned.inputs):
+        if fitted.related[i]:
+            pair = _pair(question, seen, fitted, i, responses)
+            pairs.append(settled(pair, fitted, i, inputs, aligned.fs))
+        else:
+            finding = unrelated(output.name, source.name, responses.columns[i])
+            pairs.append(_untold(question, i, finding, responses.columns[i]))
+    return Described(pairs=tuple(pairs), coherence=responses.coherence)
+
+
+def describe_dead(question: Question) -> Described:
+    """Say of an output that is constant that it is."""
+    output = question.output
+    finding = Finding(
+        code="dead_channel",
+        message=f"Output {output.name!r} is constant at {output.values[output.valid][0]:g}. "
+        "The sensor is describe_dead, stuck or not connected.",
+        severity="doubt",
+        parameters=EVERY,
+    )
+    every = range(len(question.aligned.inputs))
+    return Described(pairs=tuple(_untold(question, i, finding) for i in every))
+
+
+def _pair(
+    question: Question, found: Imperfections, joined: Joined, i: int, matrix: Responses | None
 ) -> PairIdentification:
     """Say all that is known of an output that follows an input."""
-    fs, joint = aligned.fs, joined.fits[i]
-    covariance = joined.covariances[i] if joined.covariances else None
-    software = joint.best.fit.structure.sampled  # it holds what it said at a sample
-    alone = matrix is None and instrument is None
-    refined = refine(joint, found, fs, drifting) if alone and not software else None
-    censored = None
-    if refined is not None:
-        joint, censored = refined
-        covariance = censored.covariance
+    aligned, output, instrument = question.aligned, question.output, question.instrument
+    fs, source, drifting = aligned.fs, aligned.inputs[i], joined.drifting
+    joint, censored, covariance = _refined(question, found, joined, i)
     inspection, unseen = attempt(
-        "nonlinearity",
-        lambda: (
-            None
-            if instrument is not None
-            else inspect_nonlinearity(
-                source.values,
-                joint.problem,
-                joint.best.fit,
-                fs=fs,
-                plain=plainer(joint) if matrix is None and covariance is None else None,
-                others=[other.values for other in aligned.inputs if other is not source],
-                floor=max(found.rounding, ROUNDING * float(np.std(output.values))),
-                unit=output.unit,
-            )
-        ),
-        None,
+        "nonlinearity", lambda: _inspected(question, found, joint, i, covariance), None
     )
     joint = joint if inspection is None else taking(joint, inspection.fit)
     fit = joint.best.fit
     u, y = source.values, joint.problem.y  # without the drift, and what other inputs move
-    band = record.band or excited_band(u, fs)
+    band = _band(question, i)
+    highest = min(band[1], fs / 2)
     paper = paper_estimates(u, output.values if matrix is None else y, fs, band=band)
     readings = read_parameters(
         joint,
         fs=fs,
-        highest=min(band[1], fs / 2),
+        highest=highest,
         delay_correlation=paper.delay,
         known_covariance=covariance,
         input_unit=source.unit,
         output_unit=output.unit,
     )
-    if instrument is not None:
-        response = response_through(instrument, y, fs, band=band)
-    elif matrix is None:
-        told = found.telling(y.size, fs)
-        whole = y if told is None else np.where(told, y, _expected(fit, censored is not None))
-        response = _measured(u, whole, fit, fs, band)
-        if told is not None:
-            response = _with_error_of(response, readings)
-    else:
+    if matrix is not None:
         response = matrix.columns[i]
+    elif instrument is not None:
+        response = response_through(instrument, y, fs, band=band)
+    else:
+        response = _measured(u, joint, readings, found.telling(y.size, fs), fs, band)
     from_response, unread = attempt(
         "response_bandwidths",
         lambda: response_bandwidths(
@@ -118,7 +141,7 @@ def described(
         lambda: misfit(u, fit.residual, delay=fit.delay, band=(band[0] / fs, band[1] / fs)),
         Misfit(share=0.0, probability=1.0),
     )
-    spread = spanned(readings.parameters, joint, fs=fs, highest=min(band[1], fs / 2))
+    spread = spanned(readings.parameters, joint, fs=fs, highest=highest)
     evidence = Evidence(
         joint=joint,
         readings=readings,
@@ -136,18 +159,13 @@ def described(
     )
     parameters, seen = with_imperfections(spread, found, censored, output.unit)
     known = {finding.code for finding in seen}
-    bent = () if inspection is None else inspection.findings
-    drifts = () if drifting is None else (drift_finding(drifting, fs, output.unit),)
-    through = () if instrument is None else (instrument.finding(),)
     findings = (
-        *through,
+        *(() if instrument is None else (instrument.finding(),)),
         *judge(evidence),
         *seen,
-        *(finding for finding in bent if finding.code not in known),
-        *drifts,
-        *unseen,
-        *unread,
-        *untested,
+        *(f for f in (inspection.findings if inspection else ()) if f.code not in known),
+        *(() if drifting is None else (drift_finding(drifting, fs, output.unit),)),
+        *(*unseen, *unread, *untested),
     )
     numerator, denominator = _coefficients(readings.system)
     return PairIdentification(
@@ -172,7 +190,78 @@ def described(
     )
 
 
+def _band(question: Question, i: int) -> tuple[float, float]:
+    """Band in Hz that an input excites."""
+    if question.inputs is not None:
+        return question.inputs.bands[i]
+    source, aligned = question.aligned.inputs[i], question.aligned
+    return question.record.band or excited_band(source.values, aligned.fs)
+
+
+def _refined(
+    question: Question, found: Imperfections, joined: Joined, i: int
+) -> tuple[JointFit, CensoredFit | None, NDArray[np.float64] | None]:
+    """The fit with clipped and held samples counted as what they are, and a covariance known."""
+    joint = joined.fits[i]
+    covariance = joined.covariances[i] if joined.covariances else None
+    software = joint.best.fit.structure.sampled  # it holds what it said at a sample
+    if question.inputs is not None or question.instrument is not None or software:
+        return joint, None, covariance
+    refined = refine(joint, found, question.aligned.fs, joined.drifting)
+    if refined is None:
+        return joint, None, covariance
+    return *refined, refined[1].covariance
+
+
+def _inspected(
+    question: Question,
+    found: Imperfections,
+    joint: JointFit,
+    i: int,
+    covariance: NDArray[np.float64] | None,
+) -> Inspection | None:
+    """What of the residual is nonlinear; not asked of a loop."""
+    if question.instrument is not None:
+        return None
+    aligned, output = question.aligned, question.output
+    source = aligned.inputs[i]
+    return inspect_nonlinearity(
+        source.values,
+        joint.problem,
+        joint.best.fit,
+        fs=aligned.fs,
+        plain=plainer(joint) if question.inputs is None and covariance is None else None,
+        others=[other.values for other in aligned.inputs if other is not source],
+        floor=max(found.rounding, ROUNDING * float(np.std(output.values))),
+        unit=output.unit,
+    )
+
+
 def _measured(
+    u: NDArray[np.float64],
+    joint: JointFit,
+    readings: Readings,
+    told: NDArray[np.bool_] | None,
+    fs: float,
+    band: tuple[float, float],
+) -> FrequencyResponse:
+    """Local response; where samples do not tell, the model fills in, and its error is added.
+
+    Noise decides which samples near a level are clipped, so those that are left are not a fair
+    choice; the model alone in place of the others would pull the response towards the level.
+    """
+    fit, y = joint.best.fit, joint.problem.y
+    if told is None:
+        return _local(u, y, fit, fs, band)
+    response = _local(u, np.where(told, y, fit.prediction + fit.residual), fit, fs, band)
+    covariance = _finite(readings.coefficient_covariance)
+    if covariance is None:
+        return response
+    own = response_std(readings.system, covariance, response.frequency)
+    return replace(response, std=np.hypot(response.std, own))
+
+
+def _local(
     u: NDArray[np.float64],
     y: NDArray[np.float64],
     fit: Fit,
@@ -189,24 +278,6 @@ def _measured(
     steps = local_response(u, np.diff(y, prepend=y[0]), fs, delay=delay, band=band)
     difference = 1.0 - np.exp(-2j * np.pi * steps.frequency / fs)
     return replace(steps, response=steps.response / difference, std=steps.std / np.abs(difference))
-
-
-def _expected(fit: Fit, refined: bool) -> NDArray[np.float64]:
-    """Say what the output was where it was clipped or held, for spectra.
-
-    Noise decides which samples near a level are clipped, so those that are left are not a fair
-    choice; the model alone in place of the others would pull the response towards the level.
-    """
-    return fit.prediction + fit.residual if refined else fit.prediction
-
-
-def _with_error_of(response: FrequencyResponse, readings: Readings) -> FrequencyResponse:
-    """Add the model's error, where samples were put in by it."""
-    covariance = _finite(readings.coefficient_covariance)
-    if covariance is None:
-        return response
-    own = response_std(readings.system, covariance, response.frequency)
-    return replace(response, std=np.hypot(response.std, own))
 
 
 def _finite(covariance: NDArray[np.float64]) -> NDArray[np.float64] | None:
@@ -271,16 +342,12 @@ def _candidates(joint: JointFit) -> tuple[Candidate, ...]:
     )
 
 
-def untold(
-    aligned: Aligned,
-    source: Signal,
-    output: Signal,
-    record: Record,
-    finding: Finding,
-    response: FrequencyResponse | None = None,
+def _untold(
+    question: Question, i: int, finding: Finding, response: FrequencyResponse | None = None
 ) -> PairIdentification:
     """Say what little can be said of an output that does not follow the input."""
-    band = record.band or excited_band(source.values, aligned.fs)
+    aligned, output = question.aligned, question.output
+    source, band = aligned.inputs[i], _band(question, i)
     counted = output.values[output.valid]
     mean, variance = float(counted.mean()), float(counted.var(ddof=1))
     return PairIdentification(

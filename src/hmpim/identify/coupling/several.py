@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from hmpim.identify.coupling.couplings import FOLLOWS, coupling_fit, whitening_of
 from hmpim.identify.coupling.jointly import gained_by, joint_covariance
 from hmpim.identify.coupling.lag import Lag, lag_of
+from hmpim.identify.effects.drift import Drifting
 from hmpim.identify.fitting.enrich import PLAIN
 from hmpim.identify.fitting.fit import Fit, Problem, jacobian
 from hmpim.identify.fitting.fit import fit_together as fit_all
@@ -63,6 +64,8 @@ class Joined:
         Whether the input's contribution is large beside the output, not a coupling.
     lags : tuple of Lag or None
         Delay and lag of couplings of no more than first order.
+    drifting : Drifting or None
+        The bias's drift, of an output to one input; the fit's output is without it.
     """
 
     fits: tuple[JointFit, ...]
@@ -70,16 +73,17 @@ class Joined:
     covariances: tuple[Real, ...]
     strong: tuple[bool, ...]
     lags: tuple[Lag | None, ...]
+    drifting: Drifting | None = None
 
     @property
     def prediction(self) -> Real:
-        """What all inputs together predict of the output, bias included, shape (n,)."""
+        """What all inputs together predict of the output, bias and drift included, shape (n,)."""
         first = self.fits[0].best.fit
         total: Real = np.full(first.prediction.size, first.linear[-1])
         for fit, told in zip(self.fits, self.related, strict=True):
             if told:
                 total = total + _part(fit)
-        return total
+        return total if self.drifting is None else total + self.drifting.trend
 
 
 def fit_together(

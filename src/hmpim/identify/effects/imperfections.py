@@ -119,7 +119,7 @@ def find_imperfections(
         What a first model says; with it a plateau is told from a crest, and spikes and
         standstill are looked for.
     richest : int
-        Levels that the inputs take.
+        Levels that the inputs take; 0 where those of the output are not asked for.
     """
     rounding = detect_quantization(y)
     step = 0.0 if rounding is None else rounding.step
@@ -141,7 +141,7 @@ def find_imperfections(
         spikes=spikes,
         frozen=frozen,
         repeated=find_repeated(y) if rounding is None and hold is None else None,
-        levels=_few_levels(y, clipping, richest),
+        levels=_few_levels(y, richest),
     )
 
 
@@ -156,8 +156,10 @@ def count_levels(x: NDArray[np.float64]) -> int:
     return int(np.unique(x).size)
 
 
-def _few_levels(y: NDArray[np.float64], clipping: Saturation | None, richest: int) -> int | None:
+def _few_levels(y: NDArray[np.float64], richest: int) -> int | None:
     """How many values the output takes, if they are few beside those of the inputs."""
+    if not richest:
+        return None
     levels = count_levels(y)
     return levels if levels < _FEWEST_LEVELS and richest > 2 * levels else None
 

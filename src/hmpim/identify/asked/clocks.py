@@ -13,6 +13,7 @@ pole, which the grid's input hardly tells apart, are told by the corners themsel
 identified again, and once more if the correction still moves.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -24,7 +25,7 @@ from hmpim.identify.result import Identification, PairIdentification
 from hmpim.model import Model, simulate
 from hmpim.record import Aligned, Channel, Finding, Record, Signal, Waveform, fit_clock, on_grid
 
-__all__ = ["Unfolded", "moved_by", "unfolded"]
+__all__ = ["settled_between"]
 
 Real = NDArray[np.float64]
 
@@ -38,8 +39,41 @@ _HOPELESS = 1e3
 """Times the output's range that stands for a model that cannot be simulated."""
 
 
+_ROUNDS = 3
+"""Times that what folds between two clocks is taken out and all is identified again, at most."""
+
+_STILL = 0.003
+"""Samples by which the delay may still move with it: less than a third of one hundredth."""
+
+
+def settled_between(
+    record: Record, aligned: Aligned, identified: Callable[[Aligned, bool], Identification]
+) -> Identification:
+    """Identify, what folds between the clocks taken out by the models found, until it stays.
+
+    Parameters
+    ----------
+    record : Record
+        With the outputs at their own stamps.
+    aligned : Aligned
+        As `uniform` gives it, with waveforms.
+    identified : callable
+        Identifies an aligned record; by plain structures only if the second argument is true.
+    """
+    names = ", ".join(repr(signal.name) for signal in aligned.inputs)
+    said = _settled_finding(names, _STILL / aligned.fs)
+    told = tuple(f for f in aligned.findings if f.code != said.code)
+    taken = _unfolded(record, aligned, identified(aligned, True))
+    for _ in range(_ROUNDS):
+        found = identified(replace(taken.aligned, findings=(*told, said)), False)
+        before, taken = taken, _unfolded(record, aligned, found)
+        if _moved_by(before, taken) < _STILL:
+            return found
+    return identified(before.aligned, False)  # with the doubt
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Unfolded:
+class _Unfolded:
     """A record on the common clock, as if its inputs had nothing above half the rate.
 
     Parameters
@@ -54,29 +88,19 @@ class Unfolded:
     slopes: tuple[Real, ...]
 
 
-def unfolded(record: Record, aligned: Aligned, found: Identification) -> Unfolded:
-    """Take out of each output what folds in it, by the models found so far.
-
-    Parameters
-    ----------
-    record : Record
-        With the outputs at their own stamps.
-    aligned : Aligned
-        As `uniform` gives it, with waveforms.
-    found : Identification
-        Its models.
-    """
+def _unfolded(record: Record, aligned: Aligned, found: Identification) -> _Unfolded:
+    """Take out of each output what folds in it, by the models found so far."""
     outputs = tuple(
         _one(channel, signal, record, aligned, found)
         for channel, signal in zip(record.outputs, aligned.outputs, strict=True)
     )
-    return Unfolded(
+    return _Unfolded(
         aligned=replace(aligned, outputs=outputs),
         slopes=tuple(np.gradient(signal.values) for signal in outputs),
     )
 
 
-def moved_by(before: Unfolded, after: Unfolded) -> float:
+def _moved_by(before: _Unfolded, after: _Unfolded) -> float:
     """Return the delay, in samples, by which two corrections differ, the most of all outputs."""
     most = 0.0
     pairs = zip(before.aligned.outputs, after.aligned.outputs, after.slopes, strict=True)
@@ -87,7 +111,7 @@ def moved_by(before: Unfolded, after: Unfolded) -> float:
     return most
 
 
-def settled_finding(names: str, seconds: float) -> Finding:
+def _settled_finding(names: str, seconds: float) -> Finding:
     """Say that it was done."""
     return Finding(
         code="held_between",

@@ -52,7 +52,7 @@ _FLOOR = 0.01
 
 _SEEN = 0.2
 """Evidence (logarithm of a ratio) that accuses. The study of records in their right order
-(`tests/identify/test_swapped.py`) stays below it, with noise on both channels."""
+(`tests/identify/asked/test_swapped.py`) stays below it, with noise on both channels."""
 
 _AGAINST = -0.05
 """Evidence at another step that acquits."""

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import hmpim
-from hmpim.identify.swapped import is_swapped
+from hmpim.identify.asked.swapped import is_swapped
 from tests_support import assert_share, in_studies
 
 FS = 200.0
@@ -108,7 +108,7 @@ def test_it_is_said_first_and_nothing_is_ok(field_record):
 
 def test_swapped_columns_cost_no_richer_fits(field_record, monkeypatch):
     """Said at once: only the plain structures are tried, and no drift."""
-    module = import_module("hmpim.identify.identify")
+    module = import_module("hmpim.identify.steps")
     asked = []
     fit = module.fit_together
 

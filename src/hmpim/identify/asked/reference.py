@@ -15,7 +15,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from hmpim.errors import RecordError
+from hmpim.errors import ArgumentError, RecordError
 from hmpim.identify.fitting.fit import Fit, Problem, jacobian, within_reach
 from hmpim.identify.fitting.sampled_rows import part_of
 from hmpim.identify.fitting.trial import JointFit
@@ -24,9 +24,15 @@ from hmpim.identify.result import FrequencyResponse
 from hmpim.identify.uncertainty import covariance
 from hmpim.identify.whiteness import is_white
 from hmpim.model.sampled import prepare_input
-from hmpim.record import Finding
+from hmpim.record import Aligned, Finding, Record, uniform
 
-__all__ = ["Instrument", "fit_through", "instrument_of", "response_through"]
+__all__ = [
+    "Instrument",
+    "aligned_with_reference",
+    "fit_through",
+    "instrument_of",
+    "response_through",
+]
 
 _LONGEST = 256
 """Samples over which the input is taken to answer the reference, at most."""
@@ -72,6 +78,36 @@ class Instrument:
             severity="info",
             parameters=(),
         )
+
+
+def aligned_with_reference(record: Record, reference: str) -> tuple[Aligned, Instrument]:
+    """All channels on one clock, and in place of the input what the reference moves of it.
+
+    Raises
+    ------
+    ArgumentError
+        If the record has several inputs or is software's, or no channel has that name.
+    """
+    if len(record.inputs) > 1:
+        raise ArgumentError(
+            f"reference={reference!r} takes a record of one input; this one has "
+            f"{len(record.inputs)}: leave the others out"
+        )
+    if record.intersample == "sampled":
+        raise ArgumentError(
+            f"reference={reference!r} takes a plant, not software (intersample='sampled'); leave "
+            "one of the two out"
+        )
+    driver = next((c for c in record.channels if c.name == reference), None)
+    if driver is None or driver in record.outputs or driver in record.inputs:
+        known = ", ".join(c.name for c in (*record.references, *record.auxiliary)) or "none"
+        raise ArgumentError(
+            f"reference {reference!r} is no channel beside inputs and outputs; there are: {known}"
+        )
+    aligned = uniform(replace(record, inputs=(*record.inputs, driver), references=(), auxiliary=()))
+    source, moves = aligned.inputs
+    instrument = instrument_of(reference, moves.values, source.values)
+    return replace(aligned, inputs=(replace(source, values=instrument.moved),)), instrument
 
 
 def instrument_of(name: str, reference: Real, u: Real) -> Instrument:

@@ -1,0 +1,100 @@
+"""Arguments and records that cannot be answered, each refused in one sentence."""
+
+from collections.abc import Sequence
+from typing import cast, get_args
+
+import numpy as np
+
+from hmpim.errors import ArgumentError, RecordError
+from hmpim.model.dynamics import FILTERS, STRUCTURES, StructureName
+from hmpim.record import Aligned, Intersample, Record
+
+__all__ = [
+    "check_moves",
+    "check_samples",
+    "check_statistics",
+    "checked_intersample",
+    "checked_structures",
+]
+
+_FEWEST_SAMPLES = 50
+
+_LARGEST = 1e75
+"""Size of a sample, and one over the least: fourth powers stay in the range of doubles."""
+
+
+def checked_intersample(intersample: str, stated: Intersample | None) -> Intersample | None:
+    """Return what the input does between its samples; None where it is to be found."""
+    if intersample == "auto":
+        return stated
+    for known in get_args(Intersample):
+        if intersample == known:
+            return cast(Intersample, known)
+    raise ArgumentError(
+        f"intersample {intersample!r} is not known; choose of auto, zoh, foh, bandlimited, sampled"
+    )
+
+
+def checked_structures(
+    structures: Sequence[str] | None, intersample: Intersample | None
+) -> tuple[StructureName, ...]:
+    """Return the structures that are to be tried: of software, filters."""
+    known = list(FILTERS) if intersample == "sampled" else list(STRUCTURES)
+    asked = tuple(structures) if structures is not None else tuple(known)
+    for name in asked:
+        if name not in known:
+            raise ArgumentError(f"structure {name!r} is not known; choose of {known}")
+    return cast(tuple[StructureName, ...], asked)
+
+
+def check_statistics(intersample: Intersample | None, reference: str | None) -> None:
+    """Refuse what statistics cannot tell."""
+    if intersample == "sampled":
+        raise ArgumentError(
+            "statistics do not know software (intersample='sampled'); identify the record"
+        )
+    if reference is not None:
+        raise ArgumentError(
+            f"statistics keep no reference, and reference={reference!r} is asked for; identify "
+            "the record"
+        )
+
+
+def check_samples(record: Record) -> None:
+    """Refuse too few samples, and numbers whose products would leave the range of doubles."""
+    channels = (*record.inputs, *record.outputs)
+    for channel in channels:
+        if channel.values.size < _FEWEST_SAMPLES:
+            raise RecordError(
+                f"channel {channel.name!r} has {channel.values.size} samples; at least "
+                f"{_FEWEST_SAMPLES} are needed to tell dynamics from noise, so record longer"
+            )
+    for channel in channels:
+        largest, span = float(np.abs(channel.values).max()), float(np.ptp(channel.values / 2))
+        if largest > _LARGEST or 0.0 < span < 1 / _LARGEST:
+            raise RecordError(
+                f"channel {channel.name!r} reaches {largest:.3g}, out of the range from "
+                f"{1 / _LARGEST:g} to {_LARGEST:g} that can be calculated with; give it in another "
+                "unit, or look for damaged samples"
+            )
+    if not 1 / _LARGEST < record.fs < _LARGEST:
+        raise RecordError(
+            f"the record runs at {record.fs:.3g} Hz; check the unit of its time stamps, which are "
+            "seconds"
+        )
+
+
+def check_moves(aligned: Aligned) -> None:
+    """Refuse an input that is constant, and outputs of which none moves."""
+    for signal in aligned.inputs:
+        if np.ptp(signal.values) == 0:
+            raise RecordError(
+                f"input {signal.name!r} is constant at {signal.values[0]:g}; nothing can be "
+                "identified from an input that does not move"
+            )
+    dead = [s for s in aligned.outputs if np.ptp(s.values[s.valid]) == 0]
+    if len(dead) == len(aligned.outputs):
+        raise RecordError(
+            f"output {dead[0].name!r} is constant at {dead[0].values[0]:g}; the sensor is dead, "
+            "stuck or not connected, or the wrong column is taken as output"
+        )

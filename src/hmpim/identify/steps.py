@@ -1,0 +1,134 @@
+"""The steps of the algorithm in `hmpim.identify.identify`, in their order."""
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hmpim.identify.asked.question import Question
+from hmpim.identify.asked.reference import fit_through
+from hmpim.identify.asked.swapped import is_swapped, lags_behind, swapped_finding
+from hmpim.identify.coupling.several import Joined, fit_together
+from hmpim.identify.effects.drift import with_drift
+from hmpim.identify.effects.imperfections import (
+    Imperfections,
+    count_levels,
+    find_imperfections,
+    refine,
+)
+from hmpim.identify.effects.lost import stands_out
+from hmpim.identify.fitting.trial import JointFit
+from hmpim.identify.whiteness import is_white
+from hmpim.model.dynamics import StructureName
+
+__all__ = ["drift_or_levels", "fit", "look", "look_again", "mark_swapped", "through_reference"]
+
+_BETTER = 0.7
+"""Share of the noise's power under a drift below which a clipped level is taken instead."""
+
+
+def look(question: Question) -> Imperfections:
+    """Find clipped, held, rounded, stuck and lost samples of the output."""
+    richest = max(count_levels(source.values) for source in question.aligned.inputs)
+    return find_imperfections(question.output.values, question.aligned.fs, richest=richest)
+
+
+def mark_swapped(question: Question, seen: Imperfections) -> Question:
+    """Say if the one input there is follows the output; a late clock alone may do it."""
+    output = question.output
+    if len(question.aligned.inputs) > 1 or question.instrument is not None:
+        return question
+    (source,) = question.aligned.inputs
+    if not is_swapped(source.values, output.values, source.valid & output.valid):
+        return question
+    if lags_behind(_fit_once(question, seen, question.plain).fits[0]):  # it was the clock
+        return question
+    finding = swapped_finding(source.name, output.name)
+    return replace(question, structures=question.plain, swapped=finding)
+
+
+def fit(question: Question, seen: Imperfections) -> Joined:
+    """Fit every structure, with a bias that drifts where what is left over asks for it."""
+    fitted = _fit_once(question, seen, question.structures)
+    if len(fitted.fits) > 1 or fitted.fits[0].silent or question.swapped:
+        return fitted
+
+    def with_rows(rows: NDArray[np.float64], plainly: bool) -> JointFit:
+        names = question.plain if plainly else question.structures
+        return _fit_once(question, seen, names, rows).fits[0]
+
+    drifting = with_drift(fitted.fits[0], with_rows, clipped=seen.saturation is not None)
+    if drifting is None:
+        return fitted
+    joint = drifting.joint
+    return replace(fitted, fits=(joint,), related=(joint.related,), drifting=drifting)
+
+
+def drift_or_levels(
+    question: Question, seen: Imperfections, fitted: Joined
+) -> tuple[Imperfections, Joined]:
+    """Take levels behind the noise, where they explain better what was taken for a drift."""
+    if fitted.drifting is None or seen.saturation is not None:
+        return seen, fitted
+    y, fs = question.output.values, question.aligned.fs
+    steady = _fit_once(question, seen, question.structures)
+    plateau = find_imperfections(y, fs, prediction=steady.prediction).saturation
+    if plateau is None or plateau.noise != "after":
+        return seen, fitted
+    clipped = replace(seen, saturation=plateau)
+    levelled = _fit_once(question, clipped, question.structures)
+    refined = refine(levelled.fits[0], clipped, fs)
+    (drifted,) = fitted.fits
+    left = drifted.best.fit.cost / drifted.problem.counted
+    if refined is None or refined[1].noise_std ** 2 > _BETTER * left:
+        return seen, fitted
+    return clipped, levelled
+
+
+def look_again(question: Question, seen: Imperfections, fitted: Joined) -> Imperfections:
+    """Look with the model in hand: a plateau can now be told from a crest."""
+    residual = fitted.fits[0].best.fit.residual
+    asked = seen.saturation is not None or seen.hold is not None
+    if not asked and is_white(residual) and not stands_out(residual):
+        return seen
+    y, fs = question.output.values, question.aligned.fs
+    again = find_imperfections(y, fs, prediction=fitted.prediction)
+    again = replace(again, levels=seen.levels)
+    plateau = again.saturation
+    if plateau is None and seen.saturation is not None and seen.saturation.noise == "after":
+        return replace(again, saturation=seen.saturation)
+    if fitted.drifting is not None and plateau is not None and plateau.noise == "after":
+        return replace(again, saturation=None)  # a wander bends the output as a level does
+    return again
+
+
+def through_reference(question: Question, fitted: Joined) -> Joined:
+    """Move a fit to the reference's part of the input to where the input's own residual is."""
+    if question.instrument is None or not fitted.related[0]:
+        return fitted
+    joint, own = fit_through(fitted.fits[0], question.instrument)
+    return replace(fitted, fits=(joint,), covariances=(own,))
+
+
+def _fit_once(
+    question: Question,
+    seen: Imperfections,
+    structures: tuple[StructureName, ...],
+    rows: NDArray[np.float64] | None = None,
+) -> Joined:
+    """Fit an output to all inputs, with `rows` beside the bias, on the samples that tell."""
+    aligned, output, inputs = question.aligned, question.output, question.inputs
+    valid = None if bool(output.valid.all()) else np.asarray(output.valid)
+    told = seen.telling(output.values.size, aligned.fs)
+    if told is not None:
+        valid = told if valid is None else valid & told
+    return fit_together(
+        [source.values for source in aligned.inputs],
+        output.values,
+        valid=valid,
+        known=question.measured,
+        intersample=question.intersample,
+        structures=structures,
+        alike=() if inputs is None else inputs.alike_bins(aligned.samples, aligned.fs),
+        nuisance=rows,
+    )
