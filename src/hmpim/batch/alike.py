@@ -21,10 +21,11 @@ from hmpim.batch.rows import Row, fleet_table
 from hmpim.batch.samples import Samples
 from hmpim.identify import PairIdentification, excited_band
 from hmpim.identify.fleet import Fleet, fit_fleet, learn_fleet
+from hmpim.identify.kept import keeping
 from hmpim.identify.threads import one_thread
 from hmpim.record import Record
 
-__all__ = ["Together", "identified_together"]
+__all__ = ["One", "Together", "identified_together"]
 
 _LEARNT_FROM = 16
 _WORTH = 48
@@ -119,14 +120,15 @@ def identified_together(
     tables: list[Any] = []
     for group in groups:
         left = list(range(len(group.items)))
-        if group.key not in _FLEETS:
-            left = _learn_from(group, request, one, rows)
-        fleet = _FLEETS.get(group.key)
-        if fleet is not None and left:
-            table, left = _by_fleet(fleet, group, left, request, told=told, metadata=metadata)
-            tables.append(table)
-        for i in left:
-            rows += one(_read(group.items[i], request))[0]
+        with keeping():
+            if group.key not in _FLEETS:
+                left = _learn_from(group, request, one, rows)
+            fleet = _FLEETS.get(group.key)
+            if fleet is not None and left:
+                table, left = _by_fleet(fleet, group, left, request, told=told, metadata=metadata)
+                tables.append(table)
+            for i in left:
+                rows += one(_read(group.items[i], request))[0]
     return Together(rows=rows, tables=tables)
 
 

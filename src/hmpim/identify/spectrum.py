@@ -7,6 +7,7 @@ import scipy
 from numpy.typing import ArrayLike, NDArray
 
 from hmpim.errors import ArgumentError, RecordError
+from hmpim.identify.kept import kept
 from hmpim.identify.signals import as_pair, as_signal, check_rate
 from hmpim.identify.windows import WindowName, window_samples
 
@@ -251,6 +252,7 @@ def well_excited(u: NDArray[np.complex128]) -> NDArray[np.bool_]:
     return np.asarray((power > 0) & (power >= _NOTCH_DEPTH * mean), dtype=np.bool_)
 
 
+@kept
 def excited_band(u: ArrayLike, fs: float) -> tuple[float, float]:
     """Return the band that a stimulus excites, found from its spectrum.
 

@@ -18,10 +18,13 @@ from hmpim.identify.effects.imperfections import (
 )
 from hmpim.identify.effects.lost import stands_out
 from hmpim.identify.fitting.trial import JointFit
+from hmpim.identify.kept import kept
 from hmpim.identify.whiteness import is_white
 from hmpim.model.dynamics import StructureName
 
 __all__ = ["drift_or_levels", "fit", "look", "look_again", "mark_swapped", "through_reference"]
+
+_levels = kept(count_levels)
 
 _BETTER = 0.7
 """Share of the noise's power under a drift below which a clipped level is taken instead."""
@@ -29,7 +32,7 @@ _BETTER = 0.7
 
 def look(question: Question) -> Imperfections:
     """Find clipped, held, rounded, stuck and lost samples of the output."""
-    richest = max(count_levels(source.values) for source in question.aligned.inputs)
+    richest = max(_levels(source.values) for source in question.aligned.inputs)
     return find_imperfections(question.output.values, question.aligned.fs, richest=richest)
 
 

@@ -6,6 +6,8 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from hmpim.identify.kept import kept
+
 __all__ = [
     "Misfit",
     "are_white",
@@ -222,7 +224,7 @@ def misfit(
         How many groups to cut the band into, at most.
     """
     share, probability = misfits(
-        scipy.fft.rfft(u - u.mean()),
+        _transform(u),
         scipy.fft.rfft(residual)[None],
         samples=u.size,
         delays=np.array([delay]),
@@ -230,6 +232,12 @@ def misfit(
         groups=groups,
     )
     return Misfit(share=float(share[0]), probability=float(probability[0]))
+
+
+@kept
+def _transform(u: NDArray[np.float64]) -> NDArray[np.complex128]:
+    """Of an input less its mean."""
+    return np.asarray(scipy.fft.rfft(u - u.mean()), dtype=np.complex128)
 
 
 def misfits(

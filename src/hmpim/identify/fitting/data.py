@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from hmpim.identify.fitting.fit import Fit, Problem, fit_structure
 from hmpim.identify.fitting.rows import STAMPED_LATE
 from hmpim.identify.fitting.start import RoughResponse
+from hmpim.identify.kept import kept
 from hmpim.identify.signals import longest_lag
 from hmpim.identify.whiteness import misfit
 from hmpim.model.sampled import SampledInput, prepare_input
@@ -22,6 +23,7 @@ __all__ = [
     "Seen",
     "band_of",
     "follows",
+    "prepared",
     "refit",
     "shifted",
 ]
@@ -38,6 +40,10 @@ POOR = 0.2
 
 FINAL_PRECISION = 1e-6
 """Precision of the chosen fit, see `fit_structure`."""
+
+
+prepared = kept(prepare_input)
+"""An input prepared under an assumption, as `hmpim.model.sampled.prepare_input` does it."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -62,7 +68,7 @@ class Data:
     def problem(self, mode: Intersample, seen: Seen) -> Problem:
         """The data under one assumption, with the samples that count."""
         if mode not in self.sources:
-            self.sources[mode] = prepare_input(self.u, mode)
+            self.sources[mode] = prepared(self.u, mode)
         problem = Problem(
             source=self.sources[mode],
             y=self.y,

@@ -32,6 +32,7 @@ from hmpim.identify.fitting.data import (
     Seen,
     band_of,
     follows,
+    prepared,
     refit,
 )
 from hmpim.identify.fitting.enrich import (
@@ -55,7 +56,6 @@ from hmpim.identify.fitting.whitening import (
 from hmpim.identify.signals import longest_lag
 from hmpim.identify.whiteness import effective_share, is_white
 from hmpim.model.dynamics import FILTERS, Structure, StructureName
-from hmpim.model.sampled import prepare_input
 from hmpim.record import BETWEEN, Intersample
 
 __all__ = ["joint_fit"]
@@ -120,7 +120,7 @@ def joint_fit(
     data = Data(
         u=u,
         y=y,
-        sources={natural: prepare_input(u, natural)},
+        sources={natural: prepared(u, natural)},
         rough=rough_response(u, level, longest_delay=longest_lag(u.size)),
         nuisance=nuisance,
     )

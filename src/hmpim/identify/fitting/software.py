@@ -35,8 +35,8 @@ _ORDER = 4
 _TAPS = 16
 """Input samples that it may take."""
 
-_ROWS, _GLANCE = 20_000, 1000
-"""Equations, evenly over the record, for starts, and to see whether they hold at all."""
+_ROWS, _GLANCES = 20_000, (160, 1000)
+"""Equations, evenly over the record, for starts, and to see whether they hold at all: few first."""
 
 _EARLIER = 40
 """Samples by which the delay may be below the lag of the greatest cross-correlation."""
@@ -130,9 +130,13 @@ def is_exact(u: Real, y: Real) -> bool:
     >>> is_exact(u, y), is_exact(u, y + 1e-6 * np.cos(np.arange(400) ** 2))
     (True, False)
     """
-    equations = _equations(u, y, None, most=_GLANCE)
-    _, left = solved_exactly(equations.factor[:, :-1].T, equations.factor[:, -1])
-    return bool(left < _EXACT**2 * float(y.var()) * equations.rows)
+    allowed = _EXACT**2 * float(y.var()) * min(u.size - _ORDER, _GLANCES[-1])
+    for most in _GLANCES:
+        equations = _equations(u, y, None, most=most)
+        _, left = solved_exactly(equations.factor[:, :-1].T, equations.factor[:, -1])
+        if not left < allowed:
+            return False
+    return True
 
 
 def software_fit(

@@ -18,6 +18,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from hmpim.identify.kept import kept
 from hmpim.model.dynamics import Structure, theta_of
 
 __all__ = ["RoughResponse", "coarse_lag", "lag_ahead", "rough_response", "starting_values"]
@@ -109,8 +110,20 @@ def lag_ahead(u: NDArray[np.float64], y: NDArray[np.float64], longest: int) -> i
 def _likeness(u: NDArray[np.float64], y: NDArray[np.float64], longest: int) -> NDArray[np.float64]:
     """Magnitude of the cross-correlation by lag, those below 0 at the end."""
     length = scipy.fft.next_fast_len(u.size + longest + 1, real=True)
-    spectrum = np.conj(scipy.fft.rfft(u - u.mean(), length)) * scipy.fft.rfft(y - y.mean(), length)
+    spectrum = np.conj(_transform(u, length)) * scipy.fft.rfft(y - y.mean(), length)
     return np.abs(scipy.fft.irfft(spectrum, length))
+
+
+@kept
+def _transform(u: NDArray[np.float64], length: int) -> NDArray[np.complex128]:
+    """Of an input less its mean, padded to a length."""
+    return np.asarray(scipy.fft.rfft(u - u.mean(), length), dtype=np.complex128)
+
+
+@kept
+def _tapered_transform(u: NDArray[np.float64], length: int) -> NDArray[np.complex128]:
+    """Of an input, its ends tapered, padded to a length."""
+    return np.asarray(scipy.fft.rfft(_tapered(u), length), dtype=np.complex128)
 
 
 def rough_response(
@@ -131,7 +144,7 @@ def rough_response(
     overlap = u.size - abs(lag)
     group = max(min(u.size // (_TURNS * (abs(lag) + _LATE)), u.size // _ENOUGH), 1)
     length = scipy.fft.next_fast_len(-(-u.size // group), real=True)
-    spectrum_u = scipy.fft.rfft(_tapered(u[max(-lag, 0) :][:overlap]), group * length)
+    spectrum_u = _tapered_transform(u[max(-lag, 0) :][:overlap], group * length)
     spectrum_y = scipy.fft.rfft(_tapered(y[max(lag, 0) :][:overlap]), group * length)
     power = _grouped(spectrum_u.real**2 + spectrum_u.imag**2, group)
     cross = _grouped(np.conj(spectrum_u) * spectrum_y, group)

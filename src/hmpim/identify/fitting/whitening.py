@@ -39,10 +39,12 @@ def prewhitened_of(data: Data, mode: Intersample, fits: list[Fit], seen: Seen) -
     wander or a line leaves free.
     """
     fit = min(fits, key=lambda f: f.objective)
-    noise = autoregression(fit.residual, seen.valid)
     problem = data.problem(mode, seen)
     spread = problem.masked(problem.y - problem.y.mean())
-    if noise.size == 1 or fit.cost < POOR * float(spread @ spread):
+    if fit.cost < POOR * float(spread @ spread):
+        return None
+    noise = autoregression(fit.residual, seen.valid)
+    if noise.size == 1:
         return None
     whitened = problem.coloured(noise)
     left = whitened.innovations(fit.prediction, fit.residual)

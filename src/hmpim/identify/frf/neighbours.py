@@ -13,6 +13,7 @@ import scipy
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
+from hmpim.identify.kept import kept
 from hmpim.identify.signals import whole_lag
 
 __all__ = [
@@ -169,11 +170,19 @@ def transform(u: Real, y: Real, fs: float, delay: float) -> Spectra:
         length = int(scipy.fft.prev_fast_len(length, real=True))
     count = (length - 1) // 2 + 1  # without the bin at fs/2, which is real
     frequency = np.asarray(np.arange(count) * (fs / length), dtype=np.float64)
-    spectrum_u = np.array(scipy.fft.rfft(u[max(-lag, 0) :][:length])[:count])
+    spectrum_u = _transform(u[max(-lag, 0) :][:length], count)
     spectrum_y = scipy.fft.rfft(y[max(lag, 0) :][:length])[:count]
     spectrum_y = spectrum_y * np.exp(2j * np.pi * frequency * (delay - lag / fs))
-    spectrum_u[0] = spectrum_y[0] = 0.0
+    spectrum_y[0] = 0.0
     return Spectra(frequency=frequency, u=spectrum_u, y=spectrum_y)
+
+
+@kept
+def _transform(u: Real, count: int) -> Complex:
+    """First bins of an input's transform, 0 at DC."""
+    spectrum = np.array(scipy.fft.rfft(u)[:count], dtype=np.complex128)
+    spectrum[0] = 0.0
+    return spectrum
 
 
 def centres_in_band(low: int, high: int, points: int) -> Integer:

@@ -11,6 +11,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from hmpim.identify.frf.neighbours import LocalFit, Spectra, Windows, mirrored, windows_around
+from hmpim.identify.kept import kept
 
 __all__ = ["polynomial_fits"]
 
@@ -20,14 +21,43 @@ _NOTHING = 1e-24
 # Products of bins held at once, about 80 MB.
 _CHUNK = 1_000_000
 
+_Way = tuple[NDArray[np.complex128], NDArray[np.float64], NDArray[np.float64]]
+
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class _Normal:
-    """Normal equations of each window: first the columns of G, then those of T."""
+class _Solver:
+    """What the input says of one window width: first the columns of G, then those of T.
 
-    gram: NDArray[np.complex128]
-    right: NDArray[np.complex128]
+    Parameters
+    ----------
+    windows : Windows
+        Of this width.
+    powers : ndarray, shape (s, order + 1)
+        x^p on a window's bins.
+    here : ndarray, shape (c, order + 1)
+        x^p at each centre.
+    size : ndarray, shape (w,)
+        By what G's columns are scaled.
+    row : complex ndarray, shape (c, q)
+        Columns at each centre.
+    ways : tuple of (inverse, spread, leverage)
+        With T, and without: inverse of the normal equations, (w, q, q), variance of G where the
+        noise of a bin is 1, and what a centre's own bin weighs in its fit, both (c,).
+    """
+
+    windows: Windows
+    powers: NDArray[np.float64]
+    here: NDArray[np.float64]
     size: NDArray[np.float64]
+    row: NDArray[np.complex128]
+    ways: tuple[_Way, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Right:
+    """What the output says of each window: the right sides, (w, q), and its power, (w,)."""
+
+    right: NDArray[np.complex128]
     power: NDArray[np.float64]
 
 
@@ -37,7 +67,8 @@ def polynomial_fits(
     """Fit G and T, and G alone, over windows of each width.
 
     The normal equations are made of moments Σ A x^p over a window, x = -1 … 1, of five
-    products A; so all windows share one matrix of powers.
+    products A; so all windows share one matrix of powers. Their left sides, all that is told of
+    the input alone, are made once for records of one stimulus.
 
     Parameters
     ----------
@@ -63,80 +94,106 @@ def polynomial_fits(
     >>> [abs(fit.response[0] - 3).round(6).item() for fit in fits]
     [0.0, 0.0]
     """
-    reach = min(max(widths), spectra.u.size - 1)
-    u, y = mirrored(spectra.u, reach), mirrored(spectra.y, reach)
-    products = np.stack((np.abs(u) ** 2 + 0j, np.conj(u), np.conj(u) * y, y, np.abs(y) ** 2 + 0j))
     fits: list[LocalFit] = []
     for width in widths:
-        windows = windows_around(centre, spectra.u.size, width)
-        problem = _normal(products, windows, reach, order)
-        terms = order + 1
-        here = windows.x[windows.place][:, None] ** np.arange(terms)
-        row = np.concatenate(
-            (here * (spectra.u[centre] / problem.size[windows.near])[:, None], here + 0j), axis=1
-        )
-        fits.extend(
-            _solve(problem, windows, here, row[:, :columns], spectra.y[centre], columns)
-            for columns in (2 * terms, terms)
-        )
+        solver = _solver(spectra.u, centre, width, order)
+        right = _right_of(spectra, solver, width)
+        fits.extend(_solve(solver, way, right, spectra.y[centre]) for way in solver.ways)
     return fits
 
 
-def _normal(products: NDArray[np.complex128], windows: Windows, reach: int, order: int) -> _Normal:
-    size, terms = windows.size, order + 1
+@kept
+def _solver(
+    u: NDArray[np.complex128], centre: NDArray[np.int64], width: int, order: int
+) -> _Solver:
+    windows, terms = windows_around(centre, u.size, width), order + 1
+    reach, size = min(width, u.size - 1), windows.size
     powers = windows.powers(2 * order)
-    views = sliding_window_view(products, size, axis=1)
-    start = windows.start + reach
-    chunk = max(_CHUNK // size, 1)
-    moments = np.concatenate(
-        [views[:, start[k : k + chunk]] @ powers for k in range(0, start.size, chunk)], axis=1
+    folded = mirrored(u, reach)
+    squares, own = _moments(
+        np.stack((np.abs(folded) ** 2 + 0j, np.conj(folded))), windows, reach, powers
     )
     pair = np.add.outer(np.arange(terms), np.arange(terms))
-    ones = np.repeat(powers.sum(axis=0)[None], start.size, axis=0)
+    ones = np.repeat(powers.sum(axis=0)[None], windows.start.size, axis=0)
     crosses = windows.counted < size
     ones[crosses] -= powers[-windows.start[crosses]]
     # G's columns are scaled to the size of T's, whatever the unit of U; where there is no U at
     # all, G comes out as zero with a huge error.
-    floor = _NOTHING * float(products[0].real.max())
-    scale = np.sqrt(np.maximum(moments[0, :, 0].real / windows.counted, floor))
-    gram = np.empty((start.size, 2 * terms, 2 * terms), dtype=np.complex128)
-    gram[:, :terms, :terms] = moments[0][:, pair] / (scale**2)[:, None, None]
-    cross = moments[1][:, pair] / scale[:, None, None]
+    floor = _NOTHING * float(np.max(np.abs(folded) ** 2))
+    scale = np.sqrt(np.maximum(squares[:, 0].real / windows.counted, floor))
+    gram = np.empty((windows.start.size, 2 * terms, 2 * terms), dtype=np.complex128)
+    gram[:, :terms, :terms] = squares[:, pair] / (scale**2)[:, None, None]
+    cross = own[:, pair] / scale[:, None, None]
     gram[:, :terms, terms:] = cross
     gram[:, terms:, :terms] = np.conj(cross.swapaxes(1, 2))
     gram[:, terms:, terms:] = ones[:, pair]
     gram[:, np.arange(2 * terms), np.arange(2 * terms)] += _RIDGE * size
-    right = np.concatenate((moments[2][:, :terms] / scale[:, None], moments[3][:, :terms]), axis=1)
-    return _Normal(gram=gram, right=right, size=scale, power=moments[4, :, 0].real)
+    here = windows.x[windows.place][:, None] ** np.arange(terms)
+    row = np.concatenate((here * (u[centre] / scale[windows.near])[:, None], here + 0j), axis=1)
+    return _Solver(
+        windows=windows,
+        powers=np.ascontiguousarray(powers[:, :terms]),
+        here=here,
+        size=scale,
+        row=row,
+        ways=tuple(_way(windows, gram, here, row, columns) for columns in (2 * terms, terms)),
+    )
 
 
-def _solve(
-    problem: _Normal,
+def _way(
     windows: Windows,
+    gram: NDArray[np.complex128],
     here: NDArray[np.float64],
     row: NDArray[np.complex128],
-    y: NDArray[np.complex128],
     columns: int,
-) -> LocalFit:
-    """Solve the normal equations of the first `columns` columns, and read off each centre."""
-    near, terms = windows.near, here.shape[1]
-    right = problem.right[:, :columns]
-    inverse = np.asarray(np.linalg.inv(problem.gram[:, :columns, :columns]), dtype=np.complex128)
-    theta = (inverse @ right[:, :, None])[:, :, 0]
-    left = problem.power - np.sum(np.conj(right) * theta, axis=1).real
-    # The difference of two nearly equal sums is never less than its rounding.
-    left = np.maximum(left, 1e-15 * problem.power)
-    noise = left / np.maximum(windows.counted - columns, 1)
-    theta, size = theta[near], problem.size[near]
-    pair = np.zeros((near.size, 2, columns), dtype=np.complex128)
-    pair[:, 0, :terms] = here
-    pair[:, 1] = row
+) -> _Way:
+    """Inverse, spread and leverage with the first `columns` columns."""
+    inverse = np.asarray(np.linalg.inv(gram[:, :columns, :columns]), dtype=np.complex128)
+    pair = np.zeros((windows.near.size, 2, columns), dtype=np.complex128)
+    pair[:, 0, : here.shape[1]] = here
+    pair[:, 1] = row[:, :columns]
     forms = windows.forms(pair, inverse)
-    spread, leverage = forms[:, 0], forms[:, 1]
-    missed = y - np.sum(row * theta, axis=1)
+    return inverse, np.maximum(forms[:, 0], 0.0), forms[:, 1]
+
+
+def _moments(
+    products: NDArray[np.complex128], windows: Windows, reach: int, powers: NDArray[np.float64]
+) -> NDArray[np.complex128]:
+    """Σ A x^p over each window, shape (k, w, p), of products A, (k, b), that `mirrored` made."""
+    views = sliding_window_view(products, windows.size, axis=1)
+    start = windows.start + reach
+    chunk = max(_CHUNK // windows.size, 1)
+    some = [views[:, start[k : k + chunk]] @ powers for k in range(0, start.size, chunk)]
+    return np.concatenate(some, axis=1)
+
+
+def _right_of(spectra: Spectra, solver: _Solver, width: int) -> _Right:
+    reach = min(width, spectra.u.size - 1)
+    products = np.stack((np.conj(spectra.u) * spectra.y, spectra.y, np.abs(spectra.y) ** 2 + 0j))
+    folded = np.concatenate((np.conj(products[:, reach:0:-1]), products), axis=1)
+    both, alone, power = _moments(folded, solver.windows, reach, solver.powers)
+    return _Right(
+        right=np.concatenate((both / solver.size[:, None], alone), axis=1),
+        power=power[:, 0].real,
+    )
+
+
+def _solve(solver: _Solver, way: _Way, of_output: _Right, y: NDArray[np.complex128]) -> LocalFit:
+    """Solve the normal equations of one way, and read off each centre."""
+    inverse, spread, leverage = way
+    columns, terms = inverse.shape[1], solver.here.shape[1]
+    windows, near, row = solver.windows, solver.windows.near, solver.row
+    right = of_output.right[:, :columns]
+    theta = (inverse @ right[:, :, None])[:, :, 0]
+    left = of_output.power - np.sum(np.conj(right) * theta, axis=1).real
+    # The difference of two nearly equal sums is never less than its rounding.
+    left = np.maximum(left, 1e-15 * of_output.power)
+    noise = left / np.maximum(windows.counted - columns, 1)
+    theta, size = theta[near], solver.size[near]
+    missed = y - np.sum(row[:, :columns] * theta, axis=1)
     return LocalFit(
-        response=np.sum(here * theta[:, :terms], axis=1) / size,
-        spread=np.maximum(spread, 0.0) / size**2,
+        response=np.sum(solver.here * theta[:, :terms], axis=1) / size,
+        spread=spread / size**2,
         noise=noise[near],
         power=size**2,
         prediction_error=np.abs(missed / np.maximum(1.0 - leverage, 1e-6)) ** 2,

@@ -11,6 +11,7 @@ import numpy as np
 import scipy
 from numpy.typing import ArrayLike, NDArray
 
+from hmpim.identify.kept import kept
 from hmpim.identify.signals import as_signal, check_rate
 
 __all__ = ["SweepPhase", "sweep_phase"]
@@ -64,6 +65,7 @@ class SweepPhase:
     inside: NDArray[np.bool_]
 
 
+@kept
 def sweep_phase(u: ArrayLike, fs: float) -> SweepPhase | None:
     """Find the phase of `u` if it is one sinusoid of varying frequency and amplitude.
 

@@ -1,0 +1,65 @@
+"""What follows from the input alone is made once, and what is said of a record stays the same."""
+
+import numpy as np
+
+import hmpim
+from hmpim.identify import kept as room
+from hmpim.identify.kept import keeping, kept
+
+FS, SAMPLES = 100.0, 500
+
+
+def record(seed: int, *, last: float = 20.0, fault: str = "") -> hmpim.Record:
+    time = np.arange(SAMPLES) / FS
+    u = np.sin(2 * np.pi * (0.3 * time + (last - 0.3) / 10 * time**2))
+    model = hmpim.Model(delay=0.02 + 0.011 * seed, scale_factor=2.0, denominator=(1e-3, 0.03, 1.0))
+    y = hmpim.simulate(model, u, fs=FS, intersample="bandlimited")
+    y += 0.05 * np.random.default_rng([7, seed]).standard_normal(SAMPLES)
+    if fault == "clipped":
+        y = np.minimum(y, 1.2)
+    if fault == "unrelated":
+        y = np.random.default_rng(8).standard_normal(SAMPLES)
+    return hmpim.Record.from_arrays({"u": u}, {"y": y}, fs=FS)
+
+
+def test_a_result_is_the_same_to_the_last_digit():
+    """Of records of one input and of another in between, with delays of several samples."""
+    records = [
+        record(0), record(1, fault="clipped"), record(1, last=15.0), record(2),
+        record(3, fault="unrelated"),
+    ]  # fmt: skip
+    alone = [hmpim.identify(r).to_dict() for r in records]
+    with keeping():
+        beside = [hmpim.identify(r).to_dict() for r in records]
+        assert room._KEPT.get()
+    assert beside == alone
+    assert room._KEPT.get() is None
+
+
+def test_what_is_kept_is_bounded_and_found_by_the_samples():
+    made = []
+
+    @kept
+    def doubled(u: np.ndarray, factor: float = 2.0) -> np.ndarray:
+        made.append(factor)
+        return factor * u
+
+    u = np.arange(4.0)
+    with keeping():
+        first = doubled(u)
+        assert doubled(u.copy()) is first
+        assert not first.flags.writeable
+        assert doubled(u, 3.0)[1] == 3.0
+        u[1] = 5.0  # the array was changed: it is another input
+        assert doubled(u)[1] == 10.0
+        doubled(np.zeros(100_000))
+        doubled(np.zeros(100_000))
+        for k in range(100):
+            doubled(u, float(k))
+        assert len(room._KEPT.get()) == room._MOST
+        with keeping():  # within another it belongs to that
+            before = len(made)
+            doubled(u, 99.0)
+    assert len(made) == before
+    doubled(u, 99.0)
+    assert len(made) == before + 1
