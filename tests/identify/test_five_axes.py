@@ -206,6 +206,6 @@ def test_every_coupling_stands_in_one_table(result):
 
 def test_the_page_shows_the_inputs(result):
     text = render(replace(result, pairs=result.pairs[:0], data=None))
-    assert "Inputs driven at once" in text
+    assert "Inputs driven together" in text
     assert "Multiple coherence" in text or "multiple coherence" in text
     assert "roll.command" in text

@@ -36,9 +36,7 @@ def test_two_figures_agree_within_two_standard_deviations_and_else_say_why(paper
 
 def test_the_headline_is_the_verdict_of_the_worst_pair(found):
     pair = found.pairs[0]
-    assert headline(found).startswith(
-        "The record tells the model: second-order dynamics and a delay"
-    )
+    assert headline(found).startswith("Model identified: second-order dynamics and a delay")
     reason = Finding(
         code="unrelated",
         message="Output 'y' does not follow input 'u'.",
@@ -47,9 +45,9 @@ def test_the_headline_is_the_verdict_of_the_worst_pair(found):
     )
     lost = replace(pair, verdict="not_identifiable", warnings=(reason,))
     assert headline(replace(found, pairs=(lost,))) == (
-        "This record cannot tell: output 'y' does not follow input 'u'."
+        "Not identifiable: output 'y' does not follow input 'u'."
     )
-    assert "1 of 2 pairs can be trusted" in headline(replace(found, pairs=(pair, lost)))
+    assert "1 of 2 pairs can be used" in headline(replace(found, pairs=(pair, lost)))
 
 
 def doubting(pair, *doubts):
@@ -65,26 +63,32 @@ def test_a_doubtful_pair_is_said_by_what_is_doubtful_and_why(found):
     vague = (("delay", "damping_ratio"), "A second pole may hide.")
     pair = found.pairs[0]
     assert headline(replace(found, pairs=(doubting(pair, late),))).endswith(
-        "of the output. Delay is doubtful, the other figures are good. The delay may be 2 ms off."
+        "of the output. Delay is doubtful; the other figures are reliable. The delay may be "
+        "2 ms off."
     )
     assert headline(replace(found, pairs=(doubting(pair, late, vague),))).endswith(
-        "of the output. Delay and damping ratio are doubtful, the other figures are good. A second "
-        "pole may hide."
+        "of the output. Delay and damping ratio are doubtful; the other figures are reliable. A "
+        "second pole may hide."
     )
+
+
+def test_a_unit_in_a_name_keeps_its_capitals_where_a_sentence_begins_with_it(found):
+    doubted = doubting(found.pairs[0], (("bandwidth_3db",), "It slips."))
+    assert "−3 dB bandwidth is doubtful;" in headline(replace(found, pairs=(doubted,)))
 
 
 def test_where_most_is_doubtful_what_is_good_is_named(found):
     names = tuple(n for n in EVERY if n not in ("bias", "scale_factor"))
     text = headline(replace(found, pairs=(doubting(found.pairs[0], (names, "It slips.")),)))
-    assert text.endswith("Only scale factor and bias are good. It slips.")
+    assert text.endswith("Only scale factor and bias are reliable. It slips.")
     text = headline(replace(found, pairs=(doubting(found.pairs[0], (EVERY, "It slips.")),)))
-    assert text.endswith("No figure of the model can be relied on. It slips.")
+    assert text.endswith("No figure of the model is reliable. It slips.")
 
 
 def test_a_unit_without_dynamics_is_not_said_to_have_any(found):
     still = replace(found.pairs[0], structure="static", parameters=Parameters(), fit_percent=97.0)
     assert headline(replace(found, pairs=(still,))).startswith(
-        "The record tells the model: a scale factor explains 97.0 % of the output"
+        "Model identified: a scale factor explains 97.0 % of the output"
     )
 
 

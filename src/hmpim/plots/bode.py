@@ -369,13 +369,20 @@ def _marks(pair: "PairIdentification") -> list[Mark]:
         marks.append(
             Mark(
                 frequency=estimate.value,
-                label=f"{before}{estimate.text}{after}",
+                label=f"{before}{_in_words(estimate)}{after}",
                 axes=axes,
                 low=low,
                 high=high,
             )
         )
     return marks
+
+
+def _in_words(estimate: "Estimate") -> str:
+    """An estimate with its error; one whose error is withheld with four digits."""
+    if estimate.ci95 is not None:
+        return estimate.text
+    return f"{estimate.value:.4g} {estimate.unit}, doubtful"
 
 
 def _whole_band(curves: Sequence[BodeCurve]) -> tuple[float, float] | None:

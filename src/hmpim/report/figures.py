@@ -50,7 +50,7 @@ def stimulus_picture(stimulus: "Stimulus") -> Picture:
     return Picture(
         key="stimulus",
         title="Stimulus and its limits",
-        caption=f"What is sent to the unit under test, with its derivatives. {reached}",
+        caption=f"Command sent to the unit under test, with its derivatives. {reached}",
         description=f"Position, velocity and acceleration over {stimulus.duration:g} s. {reached}",
         figure=plots.time_histories(stimulus),
     )
@@ -110,7 +110,7 @@ def _signal_pictures(record: Record, pair: PairIdentification) -> list[Picture]:
     signals = Picture(
         key="signals",
         title="Stimulus and response",
-        caption="What went in and what came out.",
+        caption="Measured input and output.",
         description=(
             f"Input {pair.input} between {u.values.min():.4g} and {u.values.max():.4g} {u.unit}, "
             f"output {pair.output} between {y.values.min():.4g} and {y.values.max():.4g} "
@@ -146,7 +146,7 @@ def _paper_pictures(
         Picture(
             key="correlation",
             title="Cross-correlation",
-            caption="Equation (8). Its peak is the paper's delay: the pure delay and what the "
+            caption="Equation (8). The peak is the paper's delay: the pure delay plus what the "
             "dynamics add.",
             description=f"Cross-correlation of {pair.input} and {pair.output} over the lag, "
             f"peak at {format_number(peak)} s.",
@@ -161,8 +161,8 @@ def _paper_pictures(
         Picture(
             key="error",
             title="Autocorrelation of the error",
-            caption="Equations (9) and (10): the error that is left when the delay of (8) is "
-            "taken out. The root of its middle is the paper's bias (11).",
+            caption="Equations (9) and (10): autocorrelation of the error that remains after the "
+            "delay of (8) is removed. The root of its value at lag 0 is the paper's bias (11).",
             description=f"Autocorrelation of the time-corrected error, whose root mean square "
             f"is {root_mean_square:.4g} {y.unit}.",
             figure=plots.error_autocorrelation(
@@ -176,8 +176,9 @@ def _paper_pictures(
         Picture(
             key="spectra",
             title="Spectra",
-            caption=f"Equation (17), without and with the {analysis.window} window, which "
-            "lessens leakage and costs level at both ends of the sweep.",
+            caption="Equation (17), without and with the "
+            f"{analysis.window.capitalize()} window, which reduces leakage and lowers the level at "
+            "both ends of the sweep.",
             description=f"Spectra of {pair.input} and {pair.output} in dB, without and with "
             f"window; the excited band is {low:.4g} to {high:.4g} Hz.",
             figure=plots.spectra(
@@ -209,15 +210,15 @@ def _response_pictures(
     between = ""
     if found.scale_factor is not None and pair.intersample in _BETWEEN:
         between = (
-            f" The model is seen as the samples see it, its input {_BETWEEN[pair.intersample]} "
-            "them; the marks are of the system itself."
+            f" The model is drawn from sample to sample, its input {_BETWEEN[pair.intersample]} "
+            "samples; the marks are those of the system itself."
         )
     pictures = [
         Picture(
             key="bode",
             title="Bode plot",
-            caption="Frequency response as measured, with the band that holds it with 95 % at "
-            f"each frequency, and the fitted model over it.{between}",
+            caption="Measured frequency response with its 95 % band at each frequency, and the "
+            f"fitted model.{between}",
             description=f"Magnitude and phase of {pair.output} over {pair.input} from {span}: "
             f"{', '.join(marks) or 'no marks'}.",
             figure=plots.pair_bode(pair, input_unit=units[0], output_unit=units[1], fs=fs),
@@ -227,9 +228,9 @@ def _response_pictures(
         pictures.append(
             Picture(
                 key="deviation",
-                title="Measured response against the model",
-                caption="The same, divided by the model: where the model is right, the band "
-                "holds the dashed line at 19 frequencies of 20.",
+                title="Measured response over model",
+                caption="Measured response divided by the model. If the model is right, the band "
+                "contains the dashed line at 19 frequencies of 20.",
                 description=f"Magnitude and phase of the measured response over the model's, "
                 f"from {span}, with the 95 % band around them.",
                 figure=plots.pair_deviation(pair, fs=fs),
@@ -247,9 +248,9 @@ def _model_pictures(pair: PairIdentification, unit: str) -> list[Picture]:
         Picture(
             key="model",
             title="Model over measurement",
-            caption="The model's output over the measured one; the fit is "
+            caption="Output of the model and measured output; the fit is "
             f"{pair.fit_percent:.2f} %.",
-            description=f"Measured and modelled {pair.output} lie over each other; the fit is "
+            description=f"Measured and modelled {pair.output} over time; the fit is "
             f"{pair.fit_percent:.2f} %.",
             figure=plots.model_over_measurement(
                 pair.time, measured, pair.prediction, output_name=pair.output, unit=unit
@@ -258,8 +259,8 @@ def _model_pictures(pair: PairIdentification, unit: str) -> list[Picture]:
         Picture(
             key="residual",
             title="Residual",
-            caption="What the model leaves over, and its autocorrelation. White noise stays "
-            "inside the dashed lines 19 times of 20; what does not has been left unexplained.",
+            caption="Residual of the model, and its autocorrelation. White noise stays inside the "
+            "dashed lines at 19 lags of 20; more outside means that the model misses something.",
             description=f"Residual of {pair.output} with standard deviation {spread:.4g} {unit}, "
             "and its autocorrelation.",
             figure=plots.residuals(pair.time, pair.residual, output_name=pair.output, unit=unit),
@@ -272,9 +273,9 @@ def _harmonics_picture(pair: PairIdentification, found: Nonlinearity) -> Picture
     return Picture(
         key="harmonics",
         title="Harmonics",
-        caption="Harmonics of the sweep in what the linear model leaves over, against the "
-        "sweep's frequency, as far as they stand out of the noise. Even orders come from what is "
-        "asymmetric, odd ones from what is alike either way.",
+        caption="Harmonics of the sweep in the residual of the linear model, over the frequency "
+        "of the sweep, where they exceed the noise. Asymmetry causes even orders; what acts alike "
+        "in both directions causes odd ones.",
         description=f"Amplitude of harmonics {', '.join(str(k) for k in orders)} of {pair.output}, "
         "in per cent of its own amplitude at the frequency of the sweep.",
         figure=plots.harmonics(found.harmonics),
@@ -285,8 +286,8 @@ def _candidates_picture(pair: PairIdentification) -> Picture:
     return Picture(
         key="candidates",
         title="Structures tried",
-        caption="How far each structure stands behind the best, by the Bayesian information "
-        "criterion; ten or more is decisive.",
+        caption="Bayesian information criterion of each structure, relative to the best; ten or "
+        "more is decisive.",
         description=f"{len(pair.candidates)} structures; "
         f"{pair.structure.replace('_', ' ')} was chosen.",
         figure=plots.candidates(pair.candidates),

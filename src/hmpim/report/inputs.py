@@ -63,11 +63,11 @@ def inputs_view(result: Identification) -> InputsView | None:
         gains=gain_rows(result),
         picture=Picture(
             key="inputs",
-            title="Told apart, and explained",
-            caption="Above: condition number of the errors that the inputs' own spectra leave to "
-            "the responses; up to 10 they count as told apart. Below: share of each output that "
-            "all inputs together explain (multiple coherence).",
-            description=f"The inputs are told apart at {told:.0f} % of the frequencies.",
+            title="Separation of the inputs, and coherence",
+            caption="Above: condition number of the inputs' spectra; up to 10, the inputs count as "
+            "separable. Below: share of each output that all inputs together explain (multiple "
+            "coherence).",
+            description=f"The inputs are separable at {told:.0f} % of the frequencies.",
             figure=plots.inputs_plot(inputs),
         ),
     )
@@ -91,13 +91,13 @@ def gain_rows(result: Identification) -> tuple[dict[str, Any], ...]:
 
 
 def _apart(inputs: InputSet, name: str) -> str:
-    """Which inputs one is not told from, and where."""
+    """Which inputs one cannot be separated from, and where."""
     found = [
         f"{', '.join(other for other in group.names if other != name)} at {group.where}"
         for group in inputs.alike
         if name in group.names
     ]
-    return "; ".join(found) or "told from all others"
+    return "; ".join(found) or "separable from all others"
 
 
 def _gain(pair: PairIdentification) -> str:

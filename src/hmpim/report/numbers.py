@@ -20,13 +20,19 @@ def format_value(estimate: Estimate) -> str:
     '0.15000 −0.00260 +0.00020'
     >>> format_value(Estimate(value=0.003, std=7e-19, ci95=(0.003, 0.003), unit="deg"))
     '0.003 ± 0'
+
+    Without an error, four digits are enough:
+
+    >>> format_value(Estimate(value=35.7572, std=0.2, ci95=None, unit="Hz", verdict="doubtful"))
+    '35.76 ± ?'
     """
+    if estimate.ci95 is None:
+        return f"{format_number(estimate.value)} ± ?"
     if _exact(estimate):
         return f"{estimate.value:.10g} ± 0"
-    if estimate.std is not None and estimate.ci95 is not None:
+    if estimate.std is not None:
         return plus_minus(estimate.value, estimate.std)
-    low, high = estimate.ci95 or (None, None)
-    return aside(estimate.value, low, high)
+    return aside(estimate.value, *estimate.ci95)
 
 
 def format_estimate(estimate: Estimate) -> str:

@@ -140,7 +140,7 @@ def print_result(
                 console.print(finding_line(warning))
         missing = untold(pair)
         if missing and not several:
-            console.print(Text(f"No figure for: {missing}.", style="dim"))
+            console.print(Text(f"Not determined: {missing}.", style="dim"))
 
 
 def finding_line(finding: Finding) -> "Text":

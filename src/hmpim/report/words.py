@@ -1,6 +1,7 @@
 """The words of a report: what each parameter is, what each verdict means, why figures differ."""
 
 import math
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -50,8 +51,8 @@ GLOSSARY: tuple[ParameterWords, ...] = (
         name="delay",
         label="Delay, pure",
         short="delay",
-        meaning="Time by which everything comes later, whatever its frequency: transport, "
-        "processing, waiting for the next sample. The lag of the dynamics is not in it.",
+        meaning="Time by which the output lags at every frequency alike: transport, processing, "
+        "waiting for the next sample. The lag of the dynamics is not part of it.",
         differs="the peak of the cross-correlation (8) is the delay plus what the dynamics add, "
         "and falls on a whole sample",
     ),
@@ -59,41 +60,41 @@ GLOSSARY: tuple[ParameterWords, ...] = (
         name="delay_correlation",
         label="Delay, by correlation",
         short="delay by correlation",
-        meaning="Where the cross-correlation of input and output has its peak, equation (8): the "
+        meaning="Lag at which the cross-correlation of input and output peaks, equation (8): the "
         "pure delay plus what the dynamics add for this input.",
     ),
     ParameterWords(
         name="delay_low_frequency",
-        label="Delay, of slow motion",
-        short="delay of slow motion",
-        meaning="Slope of the phase towards zero frequency: by how much a slow movement is late, "
+        label="Delay, low frequency",
+        short="low-frequency delay",
+        meaning="Slope of the phase towards zero frequency: how late a slow movement arrives, "
         "dynamics included.",
     ),
     ParameterWords(
         name="scale_factor",
         label="Scale factor",
-        meaning="Output per input when both stand still, bias left aside.",
-        differs="equation (13) divides samples of the slow beginning, and takes the bias of (11), "
-        "which is too large, off first",
+        meaning="Output over input when both stand still, without the bias.",
+        differs="equation (13) divides samples of the slow beginning, after subtracting the bias "
+        "of (11), which is too large",
     ),
     ParameterWords(
         name="bias",
         label="Bias",
-        meaning="What the output shows when the input is zero.",
-        differs="equation (11) is the r.m.s. error: noise, and all that the dynamics leave over, "
-        "are in it",
+        meaning="Output when the input is zero.",
+        differs="equation (11) is the r.m.s. error, which also contains noise and the error that "
+        "the dynamics cause",
     ),
     ParameterWords(
         name="noise_std",
         label="Noise",
-        meaning="Standard deviation of what the model cannot predict.",
-        differs="equation (14) counts what scale factor and dynamics leave over as noise",
+        meaning="Standard deviation of the part of the output that the model cannot predict.",
+        differs="equation (14) counts the error that scale factor and dynamics cause as noise",
     ),
     ParameterWords(
         name="natural_frequency",
         label="Natural frequency",
-        meaning="Undamped natural frequency of second-order dynamics, where they alone turn the "
-        "phase by 90°.",
+        meaning="Undamped natural frequency of second-order dynamics: the frequency at which they "
+        "alone turn the phase by 90°.",
         differs="it is read off a noisy phase from which (25) takes the delay of (8), which is "
         "too long",
     ),
@@ -101,8 +102,8 @@ GLOSSARY: tuple[ParameterWords, ...] = (
         name="damping_ratio",
         label="Damping ratio",
         meaning="Damping of second-order dynamics over critical damping: below 0.7 the magnitude "
-        "has a hump, above 1 nothing swings.",
-        differs="it is read off the hump of a noisy, windowed magnitude",
+        "has a peak, above 1 the step response does not overshoot.",
+        differs="it is read off the peak of a noisy, windowed magnitude",
     ),
     ParameterWords(
         name="time_constant",
@@ -113,7 +114,7 @@ GLOSSARY: tuple[ParameterWords, ...] = (
         name="bandwidth_phase90",
         label="Bandwidth, −90°",
         short="−90° bandwidth",
-        meaning="Frequency at which the output is 90° late in all, delay included: the paper's "
+        meaning="Frequency at which the output lags by 90° in all, delay included: the paper's "
         "measure of merit.",
         differs="it is read off one noisy, windowed ratio of spectra",
     ),
@@ -127,14 +128,14 @@ GLOSSARY: tuple[ParameterWords, ...] = (
         name="bandwidth_3db",
         label="Bandwidth, −3 dB",
         short="−3 dB bandwidth",
-        meaning="Frequency at which the magnitude has fallen 3 dB below that at standstill.",
+        meaning="Frequency at which the magnitude has fallen 3 dB below that at zero frequency.",
         differs="it is read off one noisy, windowed ratio of spectra",
     ),
     ParameterWords(
         name="peak_gain_db",
         label="Peak gain",
-        meaning="Height of the magnitude's hump over its value at standstill.",
-        differs="noise and window change the height of a hump",
+        meaning="Height of the magnitude's peak above its value at zero frequency.",
+        differs="noise and window change the height of a peak",
     ),
     ParameterWords(
         name="hold_period",
@@ -145,13 +146,13 @@ GLOSSARY: tuple[ParameterWords, ...] = (
         name="saturation_low",
         label="Saturation, low",
         short="low saturation",
-        meaning="Value below which the output does not go.",
+        meaning="Lowest value that the output reaches: its stop.",
     ),
     ParameterWords(
         name="saturation_high",
         label="Saturation, high",
         short="high saturation",
-        meaning="Value above which the output does not go.",
+        meaning="Highest value that the output reaches: its stop.",
     ),
     ParameterWords(
         name="quantization_step",
@@ -175,9 +176,9 @@ def label_of(name: str) -> str:
 
 
 VERDICTS: dict[Verdict, str] = {
-    "ok": "The record tells the model",
+    "ok": "Model identified",
     "doubtful": "Use with care",
-    "not_identifiable": "This record cannot tell",
+    "not_identifiable": "Not identifiable",
 }
 
 _STRUCTURES = {
@@ -197,10 +198,17 @@ _STRUCTURES = {
 
 _PARTS = {
     "static": "a scale factor",
-    "first_order": "first-order dynamics",
-    "second_order": "second-order dynamics",
-    "second_order_zero": "second-order dynamics with a zero",
+    "two_modes": "two modes",
+    "three_modes": "three modes",
+    "four_modes": "four modes",
+    "washout": "a washout",
+    "band_pass": "a band-pass",
+    "integrator": "an integrator",
+    "integrator_first_order": "an integrator with a first-order lag",
+    "integrator_second_order": "an integrator with a second-order lag",
 }
+_ORDERED = re.compile(r"(?P<order>[a-z]+)_order(?P<zeros>|_zero|_zeros)")
+_ZEROS = {"": "", "_zero": " with a zero", "_zeros": " with two zeros"}
 
 _COUNTS = {1: "one pole", 2: "two poles", 3: "three poles", 4: "four poles"}
 
@@ -244,10 +252,11 @@ def headline(result: Identification) -> str:
         return f"{VERDICTS[result.verdict]}: {pair_sentence(result.pairs[0])}"
     trusted = sum(pair.verdict == "ok" for pair in result.counted)
     apart = pairs - len(result.counted)
-    rest = f" {apart} more are not coupled." if apart else ""
+    others = "The other pair is" if apart == 1 else f"The other {apart} pairs are"
+    rest = f" {others} not coupled." if apart else ""
     return (
-        f"{VERDICTS[result.verdict]}: {trusted} of {len(result.counted)} pairs can be trusted as "
-        f"they stand.{rest}"
+        f"{VERDICTS[result.verdict]}: {trusted} of {len(result.counted)} pairs can be used without "
+        f"reservation.{rest}"
     )
 
 
@@ -299,17 +308,31 @@ def pair_sentence(pair: PairIdentification) -> str:
         return "no model describes the output." if cause is None else _uncapped(cause.message)
     if cause is not None and pair.parameters.scale_factor is None:
         return _uncapped(cause.message)
-    model = [_PARTS.get(pair.structure, f"{structure_words(pair.structure)} dynamics")]
+    model = [_dynamics(pair.structure)]
     if pair.parameters.delay is not None:
         model.append("a delay")
-    verb = "explain" if len(model) > 1 or pair.structure not in _PARTS else "explains"
+    verb = "explains" if len(model) == 1 and model[0].startswith(("a ", "an ")) else "explain"
     text = f"{' and '.join(model)} {verb} {pair.fit_percent:.1f} % of the output"
     if cause is not None:
         return f"{text}. {_trust(pair)}. {cause.message}"
     if pair.intersample == "sampled":
-        return f"{text}, sample over sample, as software does."
+        return f"{text}, from sample to sample, as in software."
     between = INTERSAMPLE_WORDS[pair.intersample]
-    return f"{text}, the input taken as {between} between its samples."
+    return f"{text}; the input is taken as {between} between its samples."
+
+
+def _dynamics(structure: str) -> str:
+    """Name what a structure is made of, within a sentence.
+
+    Examples
+    --------
+    >>> _dynamics("third_order_zeros"), _dynamics("two_modes")
+    ('third-order dynamics with two zeros', 'two modes')
+    """
+    ordered = _ORDERED.fullmatch(structure)
+    if ordered is not None:
+        return f"{ordered['order']}-order dynamics{_ZEROS[ordered['zeros']]}"
+    return _PARTS.get(structure, f"{structure_words(structure)} dynamics")
 
 
 def leading(pair: PairIdentification) -> Finding | None:
@@ -334,13 +357,14 @@ def _trust(pair: PairIdentification) -> str:
     bad = [w.inline for w in given if getattr(pair.parameters, w.name).verdict == "doubtful"]
     good = [w.inline for w in given if getattr(pair.parameters, w.name).verdict == "ok"]
     if not bad:
-        return "Every figure stands as it is"
+        return "Every figure is reliable"
     if not good:
-        return "No figure of the model can be relied on"
+        return "No figure of the model is reliable"
     if len(good) < len(bad):
-        return f"Only {_listed(good)} {'is' if len(good) == 1 else 'are'} good"
+        return f"Only {_listed(good)} {'is' if len(good) == 1 else 'are'} reliable"
     verb = "is" if len(bad) == 1 else "are"
-    return f"{_listed(bad).capitalize()} {verb} doubtful, the other figures are good"
+    doubtful = _listed(bad)
+    return f"{doubtful[:1].upper()}{doubtful[1:]} {verb} doubtful; the other figures are reliable"
 
 
 def _listed(names: Sequence[str]) -> str:
