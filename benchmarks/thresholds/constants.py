@@ -1,0 +1,104 @@
+"""The numbers with a name of a package, read from its source."""
+
+from __future__ import annotations
+
+import ast
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+__all__ = ["ROOT", "Constant", "constants", "imported", "module_name"]
+
+ROOT = Path(__file__).parents[2] / "src" / "hmpim" / "identify"
+_NAME = re.compile(r"_?[A-Z][A-Z0-9_]*")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Constant:
+    """One module constant that holds a number: `file` under identify/, its text, what it says."""
+
+    file: str
+    name: str
+    text: str
+    says: str
+
+    @property
+    def key(self) -> str:
+        return f"{self.file}:{self.name}"
+
+    @property
+    def module(self) -> str:
+        return module_name(ROOT / self.file)
+
+
+def module_name(path: Path) -> str:
+    """`hmpim.identify.fitting.fit` for its file."""
+    parts = path.relative_to(ROOT.parents[1]).with_suffix("").parts
+    return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
+
+
+def _assigned(statement: ast.stmt) -> tuple[str, ast.expr] | None:
+    if isinstance(statement, ast.Assign) and len(statement.targets) == 1:
+        target, value = statement.targets[0], statement.value
+    elif isinstance(statement, ast.AnnAssign) and statement.value is not None:
+        target, value = statement.target, statement.value
+    else:
+        return None
+    if not isinstance(target, ast.Name) or not _NAME.fullmatch(target.id):
+        return None
+    return target.id, value
+
+
+def _is_number(value: ast.expr, known: set[str]) -> bool:
+    """Whether it is made of numbers, by arithmetic or by functions of numpy."""
+    nodes = list(ast.walk(value))
+    if any(isinstance(n, ast.Constant) and isinstance(n.value, str) for n in nodes):
+        return False
+    if any(isinstance(n, ast.Lambda | ast.comprehension | ast.Dict) for n in nodes):
+        return False
+    return any(
+        (isinstance(n, ast.Constant) and isinstance(n.value, int | float))
+        or (isinstance(n, ast.Name) and n.id in known)
+        for n in nodes
+    )
+
+
+def _words(follows: ast.stmt | None) -> str:
+    if isinstance(follows, ast.Expr) and isinstance(follows.value, ast.Constant):
+        return " ".join(str(follows.value.value).split())
+    return ""
+
+
+def _of_file(path: Path) -> Iterator[Constant]:
+    body = ast.parse(path.read_text()).body
+    known: set[str] = set()
+    for statement, follows in zip(body, [*body[1:], None], strict=True):
+        found = _assigned(statement)
+        if isinstance(statement, ast.ImportFrom):
+            known |= {a.asname or a.name for a in statement.names if _NAME.fullmatch(a.name)}
+        if found is None or not _is_number(found[1], known):
+            continue
+        known.add(found[0])
+        yield Constant(
+            file=path.relative_to(ROOT).as_posix(),
+            name=found[0],
+            text=ast.unparse(found[1]),
+            says=_words(follows),
+        )
+
+
+def constants() -> list[Constant]:
+    """All of them, by file and place."""
+    return [one for path in sorted(ROOT.rglob("*.py")) for one in _of_file(path)]
+
+
+def imported(path: Path) -> dict[str, tuple[str, str]]:
+    """Names of constants that a module takes from others: what it calls them, whose they are."""
+    out = {}
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.ImportFrom) and node.module and "hmpim" in node.module:
+            for alias in node.names:
+                if _NAME.fullmatch(alias.name):
+                    out[alias.asname or alias.name] = (node.module, alias.name)
+    return out
