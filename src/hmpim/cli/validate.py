@@ -48,7 +48,7 @@ def validate(
         typer.Option(
             "--chance", metavar="P", help="Lowest probability of the residual's tests that passes."
         ),
-    ] = 1e-3,
+    ] = 1e-4,
     fs: Annotated[
         float | None,
         typer.Option("--fs", metavar="HZ", help="Sampling rate, if the record has no time."),

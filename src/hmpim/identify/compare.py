@@ -3,16 +3,12 @@
 import math
 from dataclasses import dataclass, fields
 
-import scipy
-
 from hmpim.arguments import checked
 from hmpim.errors import RecordError
+from hmpim.identify.chance import deviations
 from hmpim.identify.result import Estimate, Identification, Parameters
 
 __all__ = ["Change", "compare"]
-
-_CHANCE = 0.01
-"""Chance of calling anything changed in a unit that has not, over all its parameters."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -57,7 +53,7 @@ def compare(new: Identification, old: Identification) -> tuple[Change, ...]:
     Returns
     -------
     tuple of Change
-        One for each parameter. The limit leaves a chance of 1 % that anything is called changed
+        One for each parameter. The limit leaves a chance of 0.01 % that anything is called changed
         in a unit that has not, however many parameters there are.
 
     Raises
@@ -93,7 +89,7 @@ def compare(new: Identification, old: Identification) -> tuple[Change, ...]:
             "the two results have no parameter in common; are they of the same unit, with the "
             "same channel names?"
         )
-    limit = float(-scipy.special.ndtri(_CHANCE / (2 * len(both))))
+    limit = deviations(len(both))
     return tuple(
         Change(
             output=output,

@@ -21,9 +21,8 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from hmpim.identify.chance import CLEARLY, DEVIATIONS, FALSE_ALARM, LIKELIER, ONE_SIDED
 from hmpim.identify.effects.imperfections import find_imperfections
-from hmpim.identify.fitting.growth import BY_CHANCE
-from hmpim.identify.fitting.trial import CLEARLY, LIKELIER
 from hmpim.identify.fleet_fits import Errors, Fits, errors_of, fitted_all
 from hmpim.identify.fleet_pole import with_tails
 from hmpim.identify.judgement.between_samples import SHIFT, SIZES, WIDE
@@ -48,15 +47,9 @@ _ROUGH = 0.2
 A held input's response bends where the delay passes a whole sample, which no polynomial follows.
 """
 
-_CHANCE = 1e-3
-"""Chance at which a record is taken as one whose residual follows the input."""
-
-_ASKS = 0.98 * BY_CHANCE
+_ASKS = 0.98 * ONE_SIDED
 """Standard deviations from which one more pole is asked for: a little early, as the basis is not
 exact; the fit to the record itself then decides."""
-
-_OTHERWISE = -3.9
-"""Standard deviations below which a record asks for what no pole can be."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -220,7 +213,7 @@ def _told(
     if "natural_frequency" in fleet.names:  # beyond the band no peak is told
         sound &= fit.figures["natural_frequency"][some] < highest
     asked = _asks_for_a_pole(fit, some, errors)
-    sound &= asked > _OTHERWISE
+    sound &= asked > -DEVIATIONS
     model = fit.gain[some, None] * fit.member.surface.values(theta)[:, :-1] @ fit.member.basis
     residual = outputs - outputs.mean(axis=1, keepdims=True) - model
     sound[sound] = _leaves_noise(fleet, theta[sound], residual[sound])
@@ -350,7 +343,7 @@ def _leaves_noise(fleet: Fleet, theta: Real, residual: Real) -> Flags:
         delays=theta[:, 0],
         band=(fleet.band[0] / fleet.fs, fleet.band[1] / fleet.fs),
     )
-    return np.asarray(are_white(residual, spectra) & (probability > _CHANCE))
+    return np.asarray(are_white(residual, spectra) & (probability > FALSE_ALARM))
 
 
 def _is_continuous(outputs: Real, fs: float) -> Flags:

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from hmpim.identify.chance import HALF
 from hmpim.identify.fitting.data import shifted
 from hmpim.identify.fitting.growth import one_more_pole, with_pole
 from hmpim.identify.fitting.rows import Part, Problem
@@ -52,8 +53,6 @@ _PROBE = 0.3
 _FEWEST = 5
 _MOSTLY = 0.75
 """Share of the units that must be plain: of twenty, chance lets one ask for one more pole."""
-
-_LIKELY = 1.96
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -210,7 +209,7 @@ def _own_error(pair: PairIdentification) -> float:
     if delay.std is not None:
         return delay.std
     low, high = (abs(float(end or 0.0) - delay.value) for end in delay.ci95)
-    return min(low, high) / _LIKELY
+    return min(low, high) / HALF
 
 
 def _place(pair: PairIdentification, fs: float) -> Real:

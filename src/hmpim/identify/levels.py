@@ -14,6 +14,7 @@ import scipy
 from hmpim.arguments import checked
 from hmpim.errors import ArgumentError
 from hmpim.identify.alike import check_channels
+from hmpim.identify.chance import FALSE_ALARM
 from hmpim.identify.identify import identify
 from hmpim.identify.result import Estimate, Identification, PairIdentification, Parameters
 from hmpim.model.dynamics import FILTERS, STRUCTURES
@@ -39,9 +40,6 @@ _COMPARED = (
     "delay",
 )
 """Parameters that a linear system keeps, the most telling first."""
-
-_CHANCE = 1e-3
-"""Chance of such scatter below which a parameter counts as changed, all looked at together."""
 
 _WORTH = 0.002
 """Least relative change that is reported: below it error bars alone are in question."""
@@ -248,7 +246,7 @@ def compare_levels(
     levels = _levels(results, amplitudes)
     trends = tuple(t for t in (_trend(levels, name) for name in _COMPARED) if t is not None)
     changed = [
-        t for t in trends if t.probability * len(trends) < _CHANCE and abs(t.change) > _WORTH
+        t for t in trends if t.probability * len(trends) < FALSE_ALARM and abs(t.change) > _WORTH
     ]
     reach = _linear_up_to(levels, trends)
     findings = []

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from hmpim.arguments import checked
 from hmpim.errors import RecordError
 from hmpim.identify.alike import check_alike, check_apart
+from hmpim.identify.chance import FALSE_ALARM
 from hmpim.identify.groups import EVERY, MODELLED, PHASE_SPLIT
 from hmpim.identify.identify import identify
 from hmpim.identify.judgement import judged_together
@@ -36,7 +37,6 @@ __all__ = ["RepeatedPair", "RepeatedParameter", "Repeats", "identify_repeats"]
 SCHEMA = "hmpim/repeats/1"
 
 # Chance of doubting right error bars, on either side.
-_DOUBT = 0.005
 # A whole number of samples, which may well be the same every time.
 _COUNTED = "delay_correlation"
 
@@ -281,7 +281,7 @@ def _pair(found: tuple[PairIdentification, ...]) -> RepeatedPair:
         _doubt(parameter, found[0].output) for parameter in parameters if not parameter.agree
     )
     noise, unmodelled, probability = _split(told)
-    if probability is not None and unmodelled and probability < _DOUBT:
+    if probability is not None and unmodelled and probability < FALSE_ALARM:
         findings.append(
             Finding(
                 code="unmodelled",
@@ -328,7 +328,7 @@ def _parameter(name: str, found: tuple[PairIdentification, ...]) -> RepeatedPara
     statistic = float(weights @ (values - mean) ** 2)
     freedom = values.size - 1
     probability = float(scipy.stats.chi2.sf(statistic, freedom))
-    widened = max(1.0, statistic / freedom) if probability < _DOUBT else 1.0
+    widened = max(1.0, statistic / freedom) if probability < FALSE_ALARM else 1.0
     return RepeatedParameter(
         name=name,
         # Where the scatter is what counts, so are its few degrees of freedom.
@@ -343,14 +343,14 @@ def _parameter(name: str, found: tuple[PairIdentification, ...]) -> RepeatedPara
         chi_squared=statistic,
         freedom=freedom,
         probability=probability,
-        agree=probability >= _DOUBT and (name == _COUNTED or probability <= 1 - _DOUBT),
+        agree=probability >= FALSE_ALARM and (name == _COUNTED or probability <= 1 - FALSE_ALARM),
     )
 
 
 def _doubt(parameter: RepeatedParameter, output: str) -> Finding:
     ratio = float(np.sqrt(parameter.chi_squared / parameter.freedom))
     words = parameter.name.replace("_", " ")
-    if parameter.probability < _DOUBT:
+    if parameter.probability < FALSE_ALARM:
         return Finding(
             code="scatter",
             message=f"The {words} of {output!r} scatters from repeat to repeat {ratio:.3g} times "

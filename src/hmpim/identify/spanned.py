@@ -12,20 +12,15 @@ from dataclasses import fields, replace
 
 import numpy as np
 
+from hmpim.identify.chance import CLEARLY, LIKELIER, SEEN
 from hmpim.identify.fitting.fit import Fit
 from hmpim.identify.fitting.growth import as_if_hidden
-from hmpim.identify.fitting.trial import CLEARLY, JointFit, Trial
+from hmpim.identify.fitting.trial import JointFit, Trial
 from hmpim.identify.groups import PHASE_SPLIT
 from hmpim.identify.readings import figures_of
 from hmpim.identify.result import Estimate, Parameters
 
 __all__ = ["MOVES", "rivals_of", "spanned"]
-
-_AS_LIKELY = 6.0
-"""Difference of the criterion within which another filter is about as likely (odds of 20)."""
-
-_SEEN = 3.84
-"""Twice the log-likelihood that a coefficient must add to be seen (chance of 5 %)."""
 
 MOVES = 0.05
 """Share of an interval's half width from which another assumption widens it."""
@@ -51,7 +46,7 @@ def _is_as_likely(trial: Trial, joint: JointFit) -> bool:
     behind = trial.criterion - joint.best.criterion
     extra = trial.fit.structure.parameters - joint.best.fit.structure.parameters
     price = float(np.log(joint.problem.counted * joint.effective_share))
-    return behind < _AS_LIKELY and (extra <= 0 or extra * price - behind > _SEEN * extra)
+    return behind < 2 * LIKELIER and (extra <= 0 or extra * price - behind > SEEN * extra)
 
 
 def spanned(parameters: Parameters, joint: JointFit, *, fs: float, highest: float) -> Parameters:

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from hmpim.arguments import checked
 from hmpim.errors import ArgumentError, RecordError
+from hmpim.identify.chance import FALSE_ALARM, HALF
 from hmpim.identify.effects.hold import Hold, detect_hold, updates
 from hmpim.identify.predict import to_model
 from hmpim.identify.result import Identification, PairIdentification
@@ -21,9 +22,6 @@ __all__ = ["Bounds", "Check", "OutputValidation", "Validation", "validate"]
 
 _DRAWS = 32
 """Models drawn for the prediction band; its width is then known to an eighth."""
-
-_CHANCE = 1e-3
-"""Chance of failing a model that is right, for each test of the residual."""
 
 _LAGS = 25
 
@@ -52,7 +50,7 @@ class Bounds:
 
     fit_percent: float | None = None
     noise_ratio: float | None = 1.2
-    chance: float | None = _CHANCE
+    chance: float | None = FALSE_ALARM
 
     def __post_init__(self) -> None:
         if self.fit_percent is not None and not self.fit_percent < 100.0:
@@ -341,13 +339,13 @@ def _size(
     """Size of the residual, and how often it is inside the band."""
     expected = float(np.sqrt(np.mean(std**2))) or np.finfo(float).tiny
     ratio = float(np.sqrt(np.mean(residual**2))) / expected
-    share = float(np.mean(np.abs(residual) <= 1.96 * std))
+    share = float(np.mean(np.abs(residual) <= HALF * std))
     low = high = None
     if bounds.noise_ratio is not None:
         # Few samples scatter: the standard deviation of a share, and of a level.
         count = max(residual.size * effective_share(residual), 4.0)
-        low = 2.0 * float(scipy.special.ndtr(1.96 / bounds.noise_ratio)) - 1.0
-        high = 2.0 * float(scipy.special.ndtr(1.96 * bounds.noise_ratio)) - 1.0
+        low = 2.0 * float(scipy.special.ndtr(HALF / bounds.noise_ratio)) - 1.0
+        high = 2.0 * float(scipy.special.ndtr(HALF * bounds.noise_ratio)) - 1.0
         scatter = 3.0 * float(np.sqrt(0.95 * 0.05 / count))
         low, high = max(low - scatter, 0.0), min(high + scatter, 1.0)
     of_model = float(np.sqrt(np.mean(model_std**2)))
@@ -381,7 +379,7 @@ def _tests(
 ) -> tuple[Check, ...]:
     """Whether the residual follows an input, and is white where the noise was."""
     checks = []
-    worst = float(scipy.special.chdtri(1, bounds.chance or _CHANCE))
+    worst = float(scipy.special.chdtri(1, bounds.chance or FALSE_ALARM))
     for pair, model in zip(pairs, models, strict=True):
         u = aligned.signal(pair.input).values
         band = excited_band(u, aligned.fs)
@@ -397,7 +395,7 @@ def _tests(
         name = f"follows_{pair.input}" if len(pairs) > 1 else "follows_input"
         told = (
             f"The residual follows {pair.input!r} no more than chance would have it"
-            if left.probability >= _CHANCE
+            if left.probability >= FALSE_ALARM
             else f"{100 * left.share:.2g} % of the residual follows {pair.input!r}"
             + (", which the error bars admit" if admitted else "")
         )
@@ -424,8 +422,8 @@ def _tests(
             low=bounds.chance if quiet and not coloured else None,
             high=None,
             message="The residual is "
-            + ("white" if white >= _CHANCE else "coloured")
-            + (", as the noise was" if coloured and white < _CHANCE else "")
+            + ("white" if white >= FALSE_ALARM else "coloured")
+            + (", as the noise was" if coloured and white < FALSE_ALARM else "")
             + f" (probability {white:.2g}).",
         )
     )

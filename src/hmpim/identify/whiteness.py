@@ -6,6 +6,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from hmpim.identify.chance import FALSE_ALARM
 from hmpim.identify.kept import kept
 
 __all__ = [
@@ -45,7 +46,7 @@ def autocovariance(residual: NDArray[np.float64], lags: int) -> NDArray[np.float
     )
 
 
-def is_white(residual: NDArray[np.float64], *, level: float = 1e-3) -> bool:
+def is_white(residual: NDArray[np.float64], *, level: float = FALSE_ALARM) -> bool:
     """Ljung-Box test (Biometrika 65, 1978) over 25 lags.
 
     Parameters
@@ -298,7 +299,7 @@ def are_white(
     residuals: NDArray[np.float64],
     spectra: NDArray[np.complex128],
     *,
-    level: float = 1e-3,
+    level: float = FALSE_ALARM,
 ) -> NDArray[np.bool_]:
     """Test many residuals of one length as `is_white` does one.
 

@@ -13,6 +13,7 @@ import scipy
 from numpy.polynomial.legendre import legvander
 from numpy.typing import NDArray
 
+from hmpim.identify.chance import FALSE_ALARM
 from hmpim.identify.effects.colour import bias_drift
 from hmpim.identify.fitting.enrich import PLAIN
 from hmpim.identify.fitting.fit import jacobian
@@ -27,9 +28,6 @@ __all__ = ["Drifting", "drift_finding", "with_drift"]
 
 _DEGREES = (1, 2, 3, 4, 6, 8, 12, 16)
 """Degrees of the polynomial that are weighed against each other."""
-
-_CERTAIN = 1e-5
-"""Chance below which a slope is not chance."""
 
 _STEEP = 80.0
 """Power of the slowest motion over that a little faster: 1/f noise has about 20."""
@@ -139,7 +137,7 @@ def _asked_for(joint: JointFit) -> bool:
     steep = _STEEP if fit.structure.name in PLAIN else _STEEP / 5  # a rich model hides some
     if _steepness(residual) > steep:
         return True
-    return bias_drift(residual, counted.astype(np.float64)).probability < _CERTAIN
+    return bias_drift(residual, counted.astype(np.float64)).probability < FALSE_ALARM
 
 
 def _steepness(residual: NDArray[np.float64]) -> float:

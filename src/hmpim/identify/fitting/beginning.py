@@ -6,6 +6,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from hmpim.identify.chance import FALSE_ALARM
 from hmpim.identify.fitting.data import Data, Seen
 from hmpim.identify.fitting.fit import Fit, Problem, jacobian
 from hmpim.identify.fitting.least_squares import solved
@@ -28,9 +29,6 @@ _FIRST = 8
 
 _MOVES = 0.1
 """Share of its mean square step from which it is."""
-
-_REST = 1e-4
-"""Chance of taking a record at rest for one in mid-motion."""
 
 _SPARED = 0.1
 """Share of the record that may be left out at the beginning for a delay not known yet."""
@@ -101,7 +99,7 @@ def begins_of(problem: Problem, fit: Fit, *, lag: int) -> int | None:
     gained = float((rows @ residual) @ solved(rows @ rows.T, rows @ residual))
     left = max(power - gained, np.finfo(float).tiny)
     statistic = share * count * float(np.log(power / left))
-    return begins if statistic > scipy.special.chdtri(free.shape[0], _REST) else None
+    return begins if statistic > scipy.special.chdtri(free.shape[0], FALSE_ALARM) else None
 
 
 def look_again(problem: Problem, trial: Trial, seen: Seen, *, lag: int) -> Seen | None:
@@ -155,7 +153,7 @@ def _stands_out(
     if not some.any() or not others.any():
         return False
     level = float(np.median(innovations[others] ** 2)) / 0.455  # of a squared Gaussian
-    limit = _TWICE * level * float(scipy.special.chdtri(int(np.count_nonzero(some)), _REST))
+    limit = _TWICE * level * float(scipy.special.chdtri(int(np.count_nonzero(some)), FALSE_ALARM))
     return float(np.sum(innovations[some] ** 2)) > limit
 
 

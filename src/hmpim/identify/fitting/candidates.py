@@ -3,8 +3,9 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from hmpim.identify.chance import CLEARLY, FALSE_ALARM
 from hmpim.identify.fitting.beginning import in_motion
-from hmpim.identify.fitting.data import FOLLOWS, HOPELESS, POOR, Data, Seen, band_of, shifted
+from hmpim.identify.fitting.data import HOPELESS, POOR, Data, Seen, band_of, shifted
 from hmpim.identify.fitting.enrich import (
     INTEGRATING,
     PLAIN,
@@ -16,7 +17,6 @@ from hmpim.identify.fitting.enrich import (
 from hmpim.identify.fitting.fit import Fit, Problem, fit_structure
 from hmpim.identify.fitting.growth import one_more_pole, scale_of, with_pole
 from hmpim.identify.fitting.start import RoughResponse, rough_response, starting_values
-from hmpim.identify.fitting.trial import CLEARLY
 from hmpim.identify.fitting.unexplained import unexplained_response
 from hmpim.identify.signals import longest_lag
 from hmpim.identify.whiteness import effective_share, is_white, misfit
@@ -217,7 +217,9 @@ def is_worth_explaining(problem: Problem, fit: Fit, data: Data) -> bool:
     left = misfit(data.u, fit.residual, delay=fit.delay, band=band)
     spread = _spread(problem)
     owed = float(np.sqrt(left.share * fit.cost / spread)) if spread else 0.0
-    if left.probability < FOLLOWS and (owed > _MATERIAL or _misses_part(problem, fit, data, band)):
+    if left.probability < FALSE_ALARM and (
+        owed > _MATERIAL or _misses_part(problem, fit, data, band)
+    ):
         return True
     return _is_poor(fit, spread)
 

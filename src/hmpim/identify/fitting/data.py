@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from hmpim.identify.chance import FALSE_ALARM
 from hmpim.identify.fitting.fit import Fit, Problem, fit_structure
 from hmpim.identify.fitting.rows import STAMPED_LATE
 from hmpim.identify.fitting.start import RoughResponse
@@ -16,7 +17,6 @@ from hmpim.record import Intersample
 
 __all__ = [
     "FINAL_PRECISION",
-    "FOLLOWS",
     "HOPELESS",
     "POOR",
     "Data",
@@ -27,9 +27,6 @@ __all__ = [
     "refit",
     "shifted",
 ]
-
-FOLLOWS = 1e-4
-"""Chance below which what is left over follows the input."""
 
 HOPELESS = 2.0
 """A structure whose sum of squares is this many times the least is not tried again at once
@@ -90,7 +87,7 @@ def band_of(data: Data) -> tuple[float, float]:
 def follows(data: Data, fit: Fit) -> bool:
     """Whether what a fit leaves over still follows the input."""
     left = misfit(data.u, fit.residual, delay=fit.delay, band=band_of(data))
-    return left.probability < FOLLOWS
+    return left.probability < FALSE_ALARM
 
 
 def shifted(

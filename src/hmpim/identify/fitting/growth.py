@@ -18,6 +18,7 @@ from typing import Generic, Protocol, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from hmpim.identify.chance import DEVIATIONS, HALF, ONE_SIDED
 from hmpim.identify.fitting.fit import Fit, Problem, jacobian, within_reach
 from hmpim.identify.fitting.least_squares import solved
 from hmpim.identify.fitting.sampled_rows import part_of
@@ -26,7 +27,6 @@ from hmpim.identify.whiteness import is_white
 from hmpim.model.dynamics import STRUCTURES, Structure, StructureName, coefficients_of, theta_of
 
 __all__ = [
-    "BY_CHANCE",
     "Growth",
     "HiddenPole",
     "as_if_hidden",
@@ -37,15 +37,6 @@ __all__ = [
     "scale_of",
     "with_pole",
 ]
-
-BY_CHANCE = 1.645
-"""Standard deviations of q that chance exceeds in 5 % of records without one more pole."""
-
-_CLEAR = 4.0
-"""Standard deviations of q from which it is looked for elsewhere too."""
-
-_SEEN = BY_CHANCE**2
-"""Twice the log-likelihood that a fit of one more pole must gain, for the same chance."""
 
 _MATTERS = 0.01
 """Time constant, over the fit's own, below which one more pole moves nothing."""
@@ -102,12 +93,12 @@ class HiddenPole:
     @property
     def limit(self) -> float:
         """Longest time constant, in samples, that the record does not exclude."""
-        return float(np.sqrt(max(self.squared, 0.0) + 2.0 * self.std))
+        return float(np.sqrt(max(self.squared, 0.0) + HALF * self.std))
 
     @property
     def is_asked_for(self) -> bool:
         """Whether the record asks for a pole by more than chance, and one that matters."""
-        return self.squared > BY_CHANCE * self.std and self.squared > (_MATTERS * self.scale) ** 2
+        return self.squared > ONE_SIDED * self.std and self.squared > (_MATTERS * self.scale) ** 2
 
     @property
     def may_hide(self) -> bool:
@@ -310,12 +301,12 @@ def grow(
             return Growth(grown=tuple(grown), rivals=(), hidden=test)
         richer = one_more_pole(structure)
         starts = [float(np.sqrt(test.squared))]
-        if test.squared > _CLEAR * test.std:  # so far away the test's own figure may be far off
+        if test.squared > DEVIATIONS * test.std:  # so far away the test's own figure may be far off
             starts.append(_PROBE * test.scale)
         tried = [refit(richer, with_pole(structure, best.fit.theta, lag)) for lag in starts]
         found = min(tried, key=lambda f: f.fit.objective)
         gain = count * float(np.log(best.fit.objective / found.fit.objective))
-        if gain < _SEEN:
+        if gain < ONE_SIDED**2:
             return Growth(grown=tuple(grown), rivals=(), hidden=test)
         may_be_chosen = richer.name != structure.name and richer.name in names
         sure = richer.order <= _SURE or white(found)

@@ -4,18 +4,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from hmpim.identify.chance import LIKELIER
 from hmpim.identify.fitting.fit import Fit, Problem
 from hmpim.identify.fitting.growth import HiddenPole
 from hmpim.record import Intersample
 
-__all__ = ["CLEARLY", "LIKELIER", "JointFit", "Trial", "likeliest_of", "trial_of"]
-
-CLEARLY = 6.0
-"""Difference in log-likelihood that excludes an assumption (odds of 400)."""
-
-LIKELIER = 3.0
-"""Difference in log-likelihood from which another assumption is taken than the natural one (odds
-of 20): either's figures then lie inside the intervals."""
+__all__ = ["JointFit", "Trial", "likeliest_of", "trial_of"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -4,6 +4,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from hmpim.identify.chance import FALSE_ALARM
 from hmpim.identify.fitting.autoregression import autoregression
 from hmpim.identify.fitting.fit import Fit, Problem
 from hmpim.identify.fitting.least_squares import solved
@@ -19,10 +20,6 @@ of delays and dynamics, pure noise reaches about 15."""
 _INNOVATES = 60.0
 """And by which it must beat "the output is noise of some colour", where the residual is so
 coloured that few of its samples are independent; another sweep reaches about 40."""
-
-
-_SILENT = 1e-4
-"""Chance of an unrelated output that seems to answer, whatever its model."""
 
 
 def says_nothing(
@@ -55,7 +52,7 @@ def says_nothing(
     seen[: noise.size] = 0.0
     answer = misfit(heard, seen, delay=fit.delay, band=band)
     reachable = -0.5 * problem.counted * float(np.log1p(-min(answer.share, 0.999)))
-    return answer.probability > _SILENT or reachable < _RELATED
+    return answer.probability > FALSE_ALARM or reachable < _RELATED
 
 
 def is_unrelated(problem: Problem, fit: Fit, share: float) -> bool:

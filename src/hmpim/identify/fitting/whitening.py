@@ -6,16 +6,9 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from hmpim.identify.chance import FALSE_ALARM
 from hmpim.identify.fitting.autoregression import autoregression
-from hmpim.identify.fitting.data import (
-    FINAL_PRECISION,
-    FOLLOWS,
-    HOPELESS,
-    POOR,
-    Data,
-    Seen,
-    follows,
-)
+from hmpim.identify.fitting.data import FINAL_PRECISION, HOPELESS, POOR, Data, Seen, follows
 from hmpim.identify.fitting.fit import Fit, Problem, fit_structure, jacobian
 from hmpim.identify.fitting.start import rough_response
 from hmpim.identify.fitting.trial import Trial
@@ -94,4 +87,4 @@ def is_contradicted(data: Data, best: Trial, seen: Seen) -> bool:
     cov = covariance(rows, plain.residual, freedom=freedom, white=False)[:unknown, :unknown]
     apart = plain.theta - best.fit.theta
     statistic = float(apart @ np.linalg.pinv(cov, rcond=1e-12, hermitian=True) @ apart)
-    return not statistic < scipy.special.chdtri(unknown, FOLLOWS)
+    return not statistic < scipy.special.chdtri(unknown, FALSE_ALARM)

@@ -4,6 +4,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from hmpim.identify.chance import FALSE_ALARM
 from hmpim.identify.fitting.least_squares import solved
 from hmpim.identify.groups import MODELLED
 from hmpim.identify.judgement.evidence import Evidence
@@ -18,9 +19,6 @@ _AHEAD = 12
 
 _AT_ONCE = 20_000
 """Samples whose lags are held at once."""
-
-_CHANCE = 1e-6
-"""Chance below which what is left over is said to move the input."""
 
 
 def feedback(evidence: Evidence) -> tuple[Finding, ...]:
@@ -48,7 +46,7 @@ def feedback(evidence: Evidence) -> tuple[Finding, ...]:
         return ()
     along = direction[:, seen].T @ (cross[future] - told.T @ cross[past])
     gained = float(np.sum(along**2 / size[seen])) / float(left[inside].var())
-    if scipy.special.chdtrc(int(seen.sum()), gained) > _CHANCE:
+    if scipy.special.chdtrc(int(seen.sum()), gained) > FALSE_ALARM:
         return ()
     coloured = not evidence.readings.white
     return (

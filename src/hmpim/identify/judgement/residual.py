@@ -3,6 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from hmpim.identify.chance import DEVIATIONS, FALSE_ALARM
 from hmpim.identify.effects.colour import noise_colour
 from hmpim.identify.effects.input_noise import input_noise
 from hmpim.identify.fitting.halves import compare_halves
@@ -19,9 +20,6 @@ __all__ = [
     "uneven_noise",
 ]
 
-_CHANCE = 1e-4
-"""Chance of the residual following the input as it does, below which it is said to."""
-
 _TOLERATED_MISFIT = 0.03
 """Misfit, over the output's own r.m.s., beyond which a result is doubtful."""
 
@@ -31,14 +29,8 @@ _OF_THE_NOISE = 0.1
 _MOSTLY_NOISE = 0.5
 """R.m.s. of the residual over that of the output beyond which its colour matters too."""
 
-_PARTED = 1e-6
-"""Chance of halves so far apart, below which they are said to disagree."""
-
 _FAST = 9
 """Samples over which the size of what is fast in the input is taken."""
-
-_GROWS = 5.0
-"""Standard deviations of a correlation from which the noise is said to grow with it."""
 
 _ATTENUATES = 0.002
 """Share by which noise on the input must lower the gain to be worth a word."""
@@ -49,7 +41,7 @@ _SPOILS = 0.01
 
 def lack_of_fit(evidence: Evidence) -> tuple[Finding, ...]:
     """Say that the residual still follows the input; a doubt from 3 % of the output on."""
-    if evidence.misfit.probability >= _CHANCE:
+    if evidence.misfit.probability >= FALSE_ALARM:
         return ()
     owed = float(np.sqrt(evidence.misfit.share)) * evidence.unexplained
     name = structure_in_words(evidence.joint.best.fit.structure.name)
@@ -80,7 +72,7 @@ def coloured_noise(evidence: Evidence) -> tuple[Finding, ...]:
     """Say that the residual is not white; a doubt where it is most of the output and follows u."""
     if evidence.readings.white:
         return ()
-    follows = evidence.misfit.probability < _CHANCE
+    follows = evidence.misfit.probability < FALSE_ALARM
     return (
         Finding(
             code="coloured_noise",
@@ -110,7 +102,7 @@ def uneven_noise(evidence: Evidence) -> tuple[Finding, ...]:
     related = float(np.corrcoef(power, fast)[0, 1])
     slope = related * float(power.std() / fast.std())
     share = slope * float(fast.mean() / power.mean())
-    if related * np.sqrt(power.size) <= _GROWS or share <= _OF_THE_NOISE:
+    if related * np.sqrt(power.size) <= DEVIATIONS or share <= _OF_THE_NOISE:
         return ()
     return (
         Finding(
@@ -133,7 +125,7 @@ def halves_disagree(evidence: Evidence) -> tuple[Finding, ...]:
         joint.problem.y,
         share=joint.weighed_share,
     )
-    if halves.probability >= _PARTED or halves.owed <= _TOLERATED_MISFIT:
+    if halves.probability >= FALSE_ALARM or halves.owed <= _TOLERATED_MISFIT:
         return ()
     return (
         Finding(

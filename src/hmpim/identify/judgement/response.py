@@ -2,14 +2,12 @@
 
 import numpy as np
 
+from hmpim.identify.chance import DEVIATIONS
 from hmpim.identify.groups import PHASE_SPLIT
 from hmpim.identify.judgement.evidence import Evidence
 from hmpim.record import Finding
 
 __all__ = ["bandwidth_disagrees"]
-
-_APART = 4.0
-"""Standard deviations by which response and model may part."""
 
 _MATTERS = 0.03
 """Share of a bandwidth below which a disagreement is not worth a word."""
@@ -37,7 +35,9 @@ def bandwidth_disagrees(evidence: Evidence) -> tuple[Finding, ...]:
         if one is None or other is None:
             continue
         apart = abs(one.value - other.value)
-        if apart <= max(_APART * float(np.hypot(one.spread, other.spread)), _MATTERS * other.value):
+        if apart <= max(
+            DEVIATIONS * float(np.hypot(one.spread, other.spread)), _MATTERS * other.value
+        ):
             continue
         touched += [name, *shaped_by]
         message = message or (  # one sentence is enough

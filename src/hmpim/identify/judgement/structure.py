@@ -2,14 +2,12 @@
 
 import numpy as np
 
+from hmpim.identify.chance import DEVIATIONS
 from hmpim.identify.groups import PHASE_SPLIT
 from hmpim.identify.judgement.evidence import Evidence, structure_in_words
 from hmpim.record import Finding
 
 __all__ = ["missed_pole", "other_order"]
-
-_ASKED = 4.0
-"""Standard deviations of the score test from which other dynamics are asked for."""
 
 _MATTERS = 0.03
 """Share of the fit's own time from which they matter."""
@@ -42,7 +40,7 @@ def missed_pole(evidence: Evidence) -> tuple[Finding, ...]:
         return ()
     order, fs = evidence.joint.best.fit.structure.order, evidence.fs
     moved = float(np.sqrt(abs(hidden.squared)))
-    if abs(hidden.squared) > _ASKED * hidden.std and moved > _MATTERS * hidden.scale:
+    if abs(hidden.squared) > DEVIATIONS * hidden.std and moved > _MATTERS * hidden.scale:
         message = (
             f"The record asks for other dynamics than {order} pole{'s' * (order != 1)} "
             f"({abs(hidden.squared) / hidden.std:.0f} standard deviations), and the delay may be "

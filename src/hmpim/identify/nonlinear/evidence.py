@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from hmpim.identify.chance import FALSE_ALARM
 from hmpim.identify.fitting.fit import Fit, Problem, jacobian
 from hmpim.identify.nonlinear.harmonic_kinds import compare_harmonics
 from hmpim.identify.nonlinear.harmonics import Harmonics, any_harmonic, sweep_harmonics
@@ -18,13 +19,7 @@ from hmpim.identify.nonlinear.mechanisms import Mechanism, compare_mechanisms
 from hmpim.identify.nonlinear.sweep_phase import SweepPhase, sweep_phase
 from hmpim.identify.whiteness import is_white
 
-__all__ = ["CHANCE", "Look", "Seen", "look_at", "plainer_of", "thinned"]
-
-CHANCE = 1e-5
-"""Chance of a harmonic or a line from noise alone below which it counts."""
-
-_WORTH_A_LOOK = 1e-3
-"""Chance in the quick look at a white residual below which it is looked at in full."""
+__all__ = ["Look", "Seen", "look_at", "plainer_of", "thinned"]
 
 _GAIN = 12.0
 """Log-likelihood that a trace must bring; in linear systems the best of all reaches 7."""
@@ -124,7 +119,7 @@ def _by_harmonics(look: Look, sweep: SweepPhase, fit: Fit, white: bool) -> Seen:
     rate, delay = look.fs / look.block, fit.delay / look.fs
     if (
         white
-        and any_harmonic(residual, sweep, rate, delay=delay) > _WORTH_A_LOOK
+        and any_harmonic(residual, sweep, rate, delay=delay) > FALSE_ALARM
         and not _curved(fit, look.problem)
     ):
         return Seen(fit=fit)
@@ -140,7 +135,7 @@ def _by_harmonics(look: Look, sweep: SweepPhase, fit: Fit, white: bool) -> Seen:
     if harmonics is None:
         return Seen(fit=fit)
     harmonics = _within(harmonics, float(np.sqrt(np.mean(residual**2))))
-    parts = [harmonics.rms(p) for p in (0, 1) if harmonics.probability(p) < CHANCE]
+    parts = [harmonics.rms(p) for p in (0, 1) if harmonics.probability(p) < FALSE_ALARM]
     kinds: tuple[Mechanism, ...] = ()
     told = bool(parts) or harmonics.regression.evidence > _HINT
     if told and not look.others and np.ptp(fit.prediction) > 0:
@@ -172,7 +167,7 @@ def _within(harmonics: Harmonics, most: float) -> Harmonics:
 def _by_traces(look: Look, fit: Fit, white: bool) -> Seen:
     """Ask lines left out, if the input repeats, and whether any kind explains the residual."""
     lines = _lines(look.u, look.problem)
-    levels = [] if lines is None else [v for v in lines.levels if v.probability < CHANCE]
+    levels = [] if lines is None else [v for v in lines.levels if v.probability < FALSE_ALARM]
     if white and not levels and not _curved(fit, look.problem):
         return Seen(fit=fit, lines=lines)
     power = fit.cost / max(look.problem.counted, 1)
@@ -260,7 +255,7 @@ def _curved(fit: Fit, problem: Problem) -> bool:
     left = 1.0 - np.einsum("ij,ij->j", mixed, gram[:3, 3:])
     taken = (moment[3:] - mixed.T @ moment[:3]) ** 2
     told = left > 1e-6
-    needed = 2 * np.log(1 / _WORTH_A_LOOK) * float(e @ e) / e.size
+    needed = 2 * np.log(1 / FALSE_ALARM) * float(e @ e) / e.size
     return bool(np.any(taken[told] > needed * left[told]))
 
 

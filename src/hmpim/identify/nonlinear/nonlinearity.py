@@ -13,8 +13,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from hmpim.errors import RecordError
+from hmpim.identify.chance import FALSE_ALARM, HALF
 from hmpim.identify.fitting.fit import Fit, Problem
-from hmpim.identify.nonlinear.evidence import CHANCE, Look, Seen, look_at, plainer_of, thinned
+from hmpim.identify.nonlinear.evidence import Look, Seen, look_at, plainer_of, thinned
 from hmpim.identify.nonlinear.harmonic_regression import SweepView
 from hmpim.identify.nonlinear.harmonics import Harmonics
 from hmpim.identify.nonlinear.lines import Lines
@@ -224,7 +225,7 @@ def _where(seen: Seen, output: float) -> list[str]:
         where = [
             f"{100 * seen.harmonics.rms(parity) / output:.2g} % in {name} harmonics of the sweep"
             for name, parity in (("odd", 1), ("even", 0))
-            if seen.harmonics.probability(parity) < CHANCE
+            if seen.harmonics.probability(parity) < FALSE_ALARM
         ]
     elif seen.mechanisms:
         even = seen.mechanisms[0].kind == "asymmetry"
@@ -233,7 +234,7 @@ def _where(seen: Seen, output: float) -> list[str]:
         where += [
             f"{100 * level.share:.2g} % at {level.parity} lines left out"
             for level in seen.lines.levels
-            if level.probability < CHANCE
+            if level.probability < FALSE_ALARM
         ]
     return where
 
@@ -278,7 +279,7 @@ def _summary(
         size = Estimate(
             value=value,
             std=std,
-            ci95=(value - 1.96 * std, value + 1.96 * std),
+            ci95=(value - HALF * std, value + HALF * std),
             unit=measures.get(named[0].kind, ""),
         )
     return Nonlinearity(

@@ -5,6 +5,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from typing import Any, Literal
 
+from hmpim.identify.chance import HALF
 from hmpim.identify.result.digits import aside, plus_minus
 
 __all__ = [
@@ -17,9 +18,6 @@ __all__ = [
 
 ParameterVerdict = Literal["ok", "doubtful"]
 Verdict = Literal["ok", "doubtful", "not_identifiable"]
-
-_HALF = 1.959963984540054
-"""Standard deviations of a normal error on either side of 95 %."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
@@ -77,7 +75,7 @@ class Estimate:
         low, high = self.ci95 or (None, None)
         if low is None or high is None:
             return math.inf
-        return max(self.value - low, high - self.value) / _HALF
+        return max(self.value - low, high - self.value) / HALF
 
     @property
     def text(self) -> str:

@@ -11,9 +11,10 @@ import scipy
 from numpy.typing import NDArray
 
 from hmpim.errors import RecordError
+from hmpim.identify.chance import FALSE_ALARM
 from hmpim.identify.fitting.autoregression import whitening_filter
 from hmpim.identify.fitting.candidates import nested
-from hmpim.identify.fitting.data import FOLLOWS, HOPELESS, shifted
+from hmpim.identify.fitting.data import HOPELESS, shifted
 from hmpim.identify.fitting.enrich import INTEGRATING, PLAIN, RICH, members, proposals
 from hmpim.identify.fitting.growth import HiddenPole, grow
 from hmpim.identify.fitting.least_squares import solved
@@ -45,14 +46,8 @@ _MATERIAL = 0.01
 _FINAL_PRECISION = 1e-10
 """Of the chosen fit: 1e-5 standard deviations."""
 
-_REST = 1e-4
-"""Chance of taking a run at rest for one in mid-motion."""
-
 _FORGOTTEN = 1e-4
 """Of an impulse response's peak, below which it is over."""
-
-_WHITE = 1e-3
-"""Chance of calling white noise coloured (Ljung and Box)."""
 
 Real = NDArray[np.float64]
 
@@ -218,7 +213,7 @@ def choose(
     fits = [f for f in fits if f.fit.structure.name in names] or fits
     fits += _moved(search, natural, fits, alone=alone)
     left = left_over(search.products, _least(fits))
-    if left.noise.size > 1 and search.follows(_least(fits)).probability >= FOLLOWS:
+    if left.noise.size > 1 and search.follows(_least(fits)).probability >= FALSE_ALARM:
         search.products = search.whitened(left.noise)
         least = _least(fits).fit.objective
         fits = [search.again(f) for f in fits if f.fit.objective < HOPELESS**2 * least]
@@ -287,14 +282,14 @@ def _rests(search: _Search, fits: list[Fitted]) -> bool:
     head = best.residual(search.products).head(0, lags)
     every = np.vstack([head, free])
     head, *free_rows = scipy.signal.lfilter(left.noise, np.ones(1), every)[:, left.noise.size :]
-    if float(head @ head) > 2.0 * left.innovation * scipy.special.chdtri(head.size, _REST):
+    if float(head @ head) > 2.0 * left.innovation * scipy.special.chdtri(head.size, FALSE_ALARM):
         return False
     if not free_rows or begins >= lags:
         return True
     free = np.array(free_rows)
     moment = free @ head
     told = float(moment @ solved(free @ free.T, moment))
-    return told < left.innovation * float(scipy.special.chdtri(free.shape[0], _REST))
+    return told < left.innovation * float(scipy.special.chdtri(free.shape[0], FALSE_ALARM))
 
 
 def _memory(fitted: Fitted) -> int:
@@ -327,7 +322,7 @@ def _owes(search: _Search, fitted: Fitted) -> bool:
     left = search.follows(fitted)
     spread = search.products.moments(fitted.rows[:1], fitted.steady[:1]).energy
     owed = left.share * fitted.fit.objective > _MATERIAL**2 * spread
-    return left.probability < FOLLOWS and bool(owed)
+    return left.probability < FALSE_ALARM and bool(owed)
 
 
 def _moved(
@@ -356,7 +351,7 @@ def left_over(products: Products, fitted: Fitted) -> LeftOver:
     rho = gram[0, 1 : max(min(gram.shape[0], count // 4), 1)] / power
     lags = np.arange(1, rho.size + 1)
     box = count * (count + 2.0) * float(np.sum(rho**2 / (count - lags)))
-    white = rho.size == 0 or scipy.special.chdtrc(rho.size, box) > _WHITE
+    white = rho.size == 0 or scipy.special.chdtrc(rho.size, box) > FALSE_ALARM
     if white and not products.order:
         power, count = fitted.fit.objective, products.counted
     clear = rho[np.abs(rho) > 3.0 / np.sqrt(count)]

@@ -7,6 +7,7 @@ import scipy
 from numpy.typing import NDArray
 
 from hmpim.errors import RecordError
+from hmpim.identify.chance import FALSE_ALARM
 from hmpim.identify.fitting.nested import FAR, stretched
 from hmpim.identify.fitting.rows import Problem
 from hmpim.identify.fitting.trial import JointFit
@@ -72,9 +73,6 @@ _OVER = 1e-3
 
 _SETTLES = 7.0
 """Time constants after which less than that is left."""
-
-_UNRELATED = 1e-6
-"""Chance of an unrelated output being taken for one that follows."""
 
 _INTEGRATES = 0.1
 """Share of what is left over that steps in the response may explain."""
@@ -326,7 +324,7 @@ def _unrelated(statistics: Statistics, chosen: Chosen) -> PairIdentification | N
     spread = products.moments(best.rows, best.steady).energy
     share = 1.0 if products.order else chosen.left.share
     gained = products.counted * share * float(np.log(max(spread / best.fit.objective, 1.0)))
-    if gained > scipy.special.chdtri(best.fit.structure.parameters, _UNRELATED):
+    if gained > scipy.special.chdtri(best.fit.structure.parameters, FALSE_ALARM):
         return None
     mean = best.moments.bias
     variance = spread / max(products.counted - 1, 1)

@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from hmpim.arguments import check_argument, numbers_of
 from hmpim.errors import ArgumentError
-from hmpim.identify.fitting.data import FOLLOWS
+from hmpim.identify.chance import FALSE_ALARM
 from hmpim.identify.fitting.rows import Problem
 from hmpim.identify.judgement import all_doubted
 from hmpim.identify.result import Estimate, Identification, Parameters
@@ -217,7 +217,7 @@ class LiveEstimator:
         if self._asks is None:
             self._asks = self._asked_about(fitted)
         misfit = misfit_of(fitted, fitted.products, self._band(), asked=self._asks)
-        return misfit.probability < FOLLOWS
+        return misfit.probability < FALSE_ALARM
 
     def identification(self) -> Identification:
         """The whole identification of what was read, with every structure and every check."""
