@@ -27,10 +27,11 @@ from hmpim.identify.fleet_fits import Errors, Fits, errors_of, fitted_all
 from hmpim.identify.fleet_pole import with_tails
 from hmpim.identify.judgement.between_samples import SHIFT, SIZES, WIDE
 from hmpim.identify.learnt import Fleet, Member, learn_fleet
+from hmpim.identify.noise.misfit import misfits
+from hmpim.identify.noise.whiteness import are_white
 from hmpim.identify.result import Estimate, Parameters
 from hmpim.identify.spanned import MOVES
 from hmpim.identify.uncertainty import noise_estimate
-from hmpim.identify.whiteness import are_white, misfits
 from hmpim.record import Intersample
 
 __all__ = ["Column", "Fleet", "FleetFit", "fit_fleet", "learn_fleet"]

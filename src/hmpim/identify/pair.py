@@ -19,6 +19,7 @@ from hmpim.identify.fitting.trial import JointFit
 from hmpim.identify.frf.local import local_response
 from hmpim.identify.groups import EVERY
 from hmpim.identify.judgement import ROUNDING, Evidence, attempt, judge
+from hmpim.identify.noise.misfit import Misfit, misfit
 from hmpim.identify.nonlinear.nonlinearity import Inspection, inspect_nonlinearity
 from hmpim.identify.paper import paper_estimates
 from hmpim.identify.readings import Readings, read_parameters
@@ -34,7 +35,6 @@ from hmpim.identify.result import (
 from hmpim.identify.spanned import spanned
 from hmpim.identify.spectrum import excited_band
 from hmpim.identify.uncertainty import estimate, noise_estimate, response_std
-from hmpim.identify.whiteness import Misfit, misfit
 from hmpim.model.filters import in_z
 from hmpim.model.response import RationalDelay
 from hmpim.record import Finding
@@ -86,7 +86,7 @@ def describe_dead(question: Question) -> Described:
     finding = Finding(
         code="dead_channel",
         message=f"Output {output.name!r} is constant at {output.values[output.valid][0]:g}. "
-        "The sensor is describe_dead, stuck or not connected.",
+        "The sensor is dead, stuck or not connected.",
         severity="doubt",
         parameters=EVERY,
     )

@@ -15,7 +15,7 @@ from hmpim.identify.correlation import (
     correlation_peak,
     cross_correlation,
 )
-from hmpim.identify.noise import noise_by_autocorrelation
+from hmpim.identify.noise_by_autocorrelation import noise_by_autocorrelation
 from hmpim.identify.result import PaperEstimates
 from hmpim.identify.signals import as_pair, check_band, check_rate
 from hmpim.identify.spectrum import decibel, excited_band, padding, ratio, well_excited

@@ -9,9 +9,11 @@ from numpy.typing import NDArray
 from hmpim.identify.fitting.fit import Fit, jacobian
 from hmpim.identify.fitting.nested import widened
 from hmpim.identify.fitting.trial import JointFit
+from hmpim.identify.noise.autoregression import autoregressive_spectrum
+from hmpim.identify.noise.covariance import covariance
+from hmpim.identify.noise.whiteness import is_white
 from hmpim.identify.result import Estimate, Parameters
-from hmpim.identify.uncertainty import covariance, estimate, gradient, noise_estimate
-from hmpim.identify.whiteness import autoregressive_spectrum, is_white
+from hmpim.identify.uncertainty import estimate, gradient, noise_estimate
 from hmpim.model.dynamics import Structure, coefficients_of, denominator_of
 from hmpim.model.filters import in_delta
 from hmpim.model.response import (

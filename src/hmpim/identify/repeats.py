@@ -20,6 +20,7 @@ from hmpim.identify.chance import FALSE_ALARM
 from hmpim.identify.groups import EVERY, MODELLED, PHASE_SPLIT
 from hmpim.identify.identify import identify
 from hmpim.identify.judgement import judged_together
+from hmpim.identify.noise.whiteness import effective_share
 from hmpim.identify.result import (
     Estimate,
     FrequencyResponse,
@@ -29,7 +30,6 @@ from hmpim.identify.result import (
 )
 from hmpim.identify.result.lookup import find_pair
 from hmpim.identify.uncertainty import estimate, noise_estimate
-from hmpim.identify.whiteness import effective_share
 from hmpim.record import Finding, Intersample, Record
 
 __all__ = ["RepeatedPair", "RepeatedParameter", "Repeats", "identify_repeats"]

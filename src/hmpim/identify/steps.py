@@ -19,7 +19,7 @@ from hmpim.identify.effects.imperfections import (
 from hmpim.identify.effects.lost import stands_out
 from hmpim.identify.fitting.trial import JointFit
 from hmpim.identify.kept import kept
-from hmpim.identify.whiteness import is_white
+from hmpim.identify.noise.whiteness import is_white
 from hmpim.model.dynamics import StructureName
 
 __all__ = ["drift_or_levels", "fit", "look", "look_again", "mark_swapped", "through_reference"]

@@ -11,10 +11,11 @@ from hmpim.arguments import checked
 from hmpim.errors import ArgumentError, RecordError
 from hmpim.identify.chance import FALSE_ALARM, HALF
 from hmpim.identify.effects.hold import Hold, detect_hold, updates
+from hmpim.identify.noise.misfit import misfit
+from hmpim.identify.noise.whiteness import autocovariance, effective_share
 from hmpim.identify.predict import to_model
 from hmpim.identify.result import Identification, PairIdentification
 from hmpim.identify.spectrum import excited_band
-from hmpim.identify.whiteness import autocovariance, effective_share, misfit
 from hmpim.model import Model, draw_models, simulate, slowest_time_constant
 from hmpim.record import Aligned, Record, uniform
 

@@ -8,7 +8,7 @@ import pytest
 from hmpim.identify.fitting.fit import jacobian
 from hmpim.identify.fitting.joint import joint_fit
 from hmpim.identify.fitting.nested import widened
-from hmpim.identify.uncertainty import covariance
+from hmpim.identify.noise.covariance import covariance
 from hmpim.model.sampled import delayed_response, prepare_input
 
 FS, N, DELAY = 200.0, 2000, 14.56

@@ -7,8 +7,8 @@ from hmpim.identify.bandwidth import response_bandwidths
 from hmpim.identify.fitting.joint import joint_fit
 from hmpim.identify.frf.local import local_response
 from hmpim.identify.judgement import Evidence
+from hmpim.identify.noise.misfit import misfit
 from hmpim.identify.readings import read_parameters
-from hmpim.identify.whiteness import misfit
 
 FS, BAND = 200.0, (0.1, 20.0)
 

@@ -14,7 +14,7 @@ from hmpim.identify.judgement.residual import (
     noise_on_the_input,
     uneven_noise,
 )
-from hmpim.identify.whiteness import Misfit
+from hmpim.identify.noise.misfit import Misfit
 
 WHITE = 0.1 * np.random.default_rng(3).standard_normal(2000)
 

@@ -20,9 +20,9 @@ from hmpim.identify.fitting.fit import Fit, Problem, jacobian, within_reach
 from hmpim.identify.fitting.sampled_rows import part_of
 from hmpim.identify.fitting.trial import JointFit
 from hmpim.identify.frf.local import local_response
+from hmpim.identify.noise.covariance import covariance
+from hmpim.identify.noise.whiteness import is_white
 from hmpim.identify.result import FrequencyResponse
-from hmpim.identify.uncertainty import covariance
-from hmpim.identify.whiteness import is_white
 from hmpim.model.sampled import prepare_input
 from hmpim.record import Aligned, Finding, Record, uniform
 

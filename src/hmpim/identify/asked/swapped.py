@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 from hmpim.identify.fitting.fit import jacobian
 from hmpim.identify.fitting.trial import JointFit
 from hmpim.identify.groups import EVERY
-from hmpim.identify.uncertainty import covariance
-from hmpim.identify.whiteness import is_white
+from hmpim.identify.noise.covariance import covariance
+from hmpim.identify.noise.whiteness import is_white
 from hmpim.record import Finding
 
 __all__ = ["is_swapped", "lags_behind", "swapped_finding"]

@@ -19,7 +19,7 @@ from hmpim.identify.fitting.enrich import PLAIN
 from hmpim.identify.fitting.fit import Fit, Problem, fit_structure
 from hmpim.identify.fitting.start import RoughResponse, rough_response, starting_values
 from hmpim.identify.fitting.trial import JointFit, Trial
-from hmpim.identify.whiteness import effective_share, is_white
+from hmpim.identify.noise.whiteness import effective_share, is_white
 from hmpim.model.dynamics import STRUCTURES, StructureName
 from hmpim.record import Intersample
 

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hmpim.identify.fitting.fit import Fit, Problem, jacobian
-from hmpim.identify.uncertainty import covariance
+from hmpim.identify.noise.covariance import covariance
 
 __all__ = ["gained_by", "joint_covariance"]
 

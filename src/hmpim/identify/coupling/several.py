@@ -22,7 +22,7 @@ from hmpim.identify.fitting.fit import Fit, Problem, jacobian
 from hmpim.identify.fitting.fit import fit_together as fit_all
 from hmpim.identify.fitting.joint import joint_fit
 from hmpim.identify.fitting.trial import JointFit
-from hmpim.identify.whiteness import effective_share, is_white
+from hmpim.identify.noise.whiteness import effective_share, is_white
 from hmpim.model.dynamics import StructureName
 from hmpim.model.response import slowest_time_constant
 from hmpim.model.sampled import prepare_input

@@ -7,6 +7,4 @@ censored        the fit that counts clipped and held samples as what they are
 quantization    the rounding step
 lost            spikes and standstills
 drift           a bias that drifts, fitted with the model
-colour          the colour of the noise
-input_noise     a stimulus that was measured with noise
 """

@@ -22,7 +22,7 @@ from hmpim.identify.effects.hold import Updates
 from hmpim.identify.effects.masked import masked_spectrum
 from hmpim.identify.effects.saturation import Saturation
 from hmpim.identify.fitting.fit import Fit, Problem, fit_structure
-from hmpim.identify.whiteness import is_white
+from hmpim.identify.noise.whiteness import is_white
 
 __all__ = ["CensoredFit", "censored_covariance", "fit_censored", "fit_held"]
 

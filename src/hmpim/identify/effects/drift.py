@@ -14,13 +14,14 @@ from numpy.polynomial.legendre import legvander
 from numpy.typing import NDArray
 
 from hmpim.identify.chance import FALSE_ALARM
-from hmpim.identify.effects.colour import bias_drift
 from hmpim.identify.fitting.enrich import PLAIN
 from hmpim.identify.fitting.fit import jacobian
 from hmpim.identify.fitting.least_squares import solved, without
 from hmpim.identify.fitting.trial import JointFit, Trial
-from hmpim.identify.uncertainty import covariance
-from hmpim.identify.whiteness import innovation_gain, is_white
+from hmpim.identify.noise.autoregression import innovation_gain
+from hmpim.identify.noise.colour import bias_drift
+from hmpim.identify.noise.covariance import covariance
+from hmpim.identify.noise.whiteness import is_white
 from hmpim.model import slowest_time_constant
 from hmpim.record import Finding
 

@@ -4,7 +4,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from hmpim.identify.whiteness import autocovariance
+from hmpim.identify.noise.whiteness import autocovariance
 
 __all__ = ["masked_spectrum"]
 

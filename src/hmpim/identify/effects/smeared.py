@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from hmpim.identify.whiteness import effective_share
+from hmpim.identify.noise.whiteness import effective_share
 
 __all__ = ["Plateaus", "smeared_plateaus"]
 

@@ -9,7 +9,6 @@ candidates      fits of every structure, under each assumption
 enrich          which richer structures to try, and where from
 beginning       which samples count, and whether the record begins at rest
 whitening       the noise of all trials, and whether whitening may be trusted
-autoregression  the noise as an autoregression
 trial           what was tried, and what is chosen of it
 unexplained     what of the response a fit leaves over
 plainer         a plain structure beside a rich one

@@ -12,8 +12,8 @@ from hmpim.identify.fitting.fit import Fit, Problem, jacobian
 from hmpim.identify.fitting.least_squares import solved
 from hmpim.identify.fitting.sampled_rows import part_of
 from hmpim.identify.fitting.trial import Trial
+from hmpim.identify.noise.whiteness import effective_share
 from hmpim.identify.signals import longest_lag
-from hmpim.identify.whiteness import effective_share
 from hmpim.record import Intersample
 
 __all__ = ["begins_of", "count_in", "in_motion", "look_again"]

@@ -10,8 +10,8 @@ from hmpim.identify.fitting.fit import Fit, Problem, fit_structure
 from hmpim.identify.fitting.rows import STAMPED_LATE
 from hmpim.identify.fitting.start import RoughResponse
 from hmpim.identify.kept import kept
+from hmpim.identify.noise.misfit import misfit
 from hmpim.identify.signals import longest_lag
-from hmpim.identify.whiteness import misfit
 from hmpim.model.sampled import SampledInput, prepare_input
 from hmpim.record import Intersample
 

@@ -22,8 +22,8 @@ from hmpim.identify.chance import DEVIATIONS, HALF, ONE_SIDED
 from hmpim.identify.fitting.fit import Fit, Problem, jacobian, within_reach
 from hmpim.identify.fitting.least_squares import solved
 from hmpim.identify.fitting.sampled_rows import part_of
-from hmpim.identify.uncertainty import covariance
-from hmpim.identify.whiteness import is_white
+from hmpim.identify.noise.covariance import covariance
+from hmpim.identify.noise.whiteness import is_white
 from hmpim.model.dynamics import STRUCTURES, Structure, StructureName, coefficients_of, theta_of
 
 __all__ = [

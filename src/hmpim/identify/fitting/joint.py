@@ -44,7 +44,7 @@ from hmpim.identify.fitting.fit import Fit, fit_structure
 from hmpim.identify.fitting.growth import grow, hidden_pole
 from hmpim.identify.fitting.least_squares import solved
 from hmpim.identify.fitting.software import software_fit
-from hmpim.identify.fitting.start import lag_ahead, rough_response
+from hmpim.identify.fitting.start import rough_response
 from hmpim.identify.fitting.trial import JointFit, Trial, likeliest_of, trial_of
 from hmpim.identify.fitting.unrelated import is_unrelated, says_nothing
 from hmpim.identify.fitting.whitening import (
@@ -53,8 +53,8 @@ from hmpim.identify.fitting.whitening import (
     prewhitened_of,
     refit_whitened,
 )
+from hmpim.identify.noise.whiteness import effective_share, is_white
 from hmpim.identify.signals import longest_lag
-from hmpim.identify.whiteness import effective_share, is_white
 from hmpim.model.dynamics import FILTERS, Structure, StructureName
 from hmpim.record import BETWEEN, Intersample
 
@@ -331,8 +331,8 @@ def _or_ahead(
     """The same with an output that is ahead of its input, where that leaves clearly less."""
     best = min(fits, key=lambda f: f.objective)
     longest = longest_lag(level.size)
-    lag = None if is_white(best.residual) else lag_ahead(data.u, level, longest)
-    if lag is None:
+    lag = data.rough.ahead
+    if lag is None or is_white(best.residual):
         return data, seen, fits
     rough = rough_response(data.u, level, longest_delay=longest, lag=lag)
     ahead = replace(data, rough=rough)

@@ -7,7 +7,7 @@ import numpy as np
 from hmpim.identify.fitting.enrich import PLAIN
 from hmpim.identify.fitting.fit import Fit, fit_structure
 from hmpim.identify.fitting.trial import JointFit, Trial
-from hmpim.identify.whiteness import effective_share
+from hmpim.identify.noise.whiteness import effective_share
 
 __all__ = ["plainer", "taking"]
 

@@ -20,7 +20,7 @@ from hmpim.identify.fitting.least_squares import solved_exactly
 from hmpim.identify.fitting.start import coarse_lag
 from hmpim.identify.fitting.trial import JointFit, trial_of
 from hmpim.identify.fitting.unrelated import is_unrelated
-from hmpim.identify.whiteness import effective_share
+from hmpim.identify.noise.whiteness import effective_share
 from hmpim.model.dynamics import FILTERS, Structure
 from hmpim.model.filters import nyquist_taps, section_parameters
 from hmpim.model.sampled import prepare_input

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from hmpim.identify.kept import kept
 from hmpim.model.dynamics import Structure, theta_of
 
-__all__ = ["RoughResponse", "coarse_lag", "lag_ahead", "rough_response", "starting_values"]
+__all__ = ["RoughResponse", "coarse_lag", "rough_response", "starting_values"]
 
 _STAMPED_LATE = -2
 """Least delay in samples that is looked for where the output follows the input."""
@@ -68,6 +68,8 @@ class RoughResponse:
         Output over input.
     weight : ndarray, shape (m,)
         Power of the input, largest 1.
+    ahead : int or None
+        Lag below 0 at which the output resembles the input most; None if it does so behind it.
     """
 
     lag: int
@@ -76,6 +78,7 @@ class RoughResponse:
     omega: NDArray[np.float64]
     response: NDArray[np.complex128]
     weight: NDArray[np.float64]
+    ahead: int | None = None
 
     @property
     def earliest(self) -> int:
@@ -97,21 +100,17 @@ def _tapered(x: NDArray[np.float64]) -> NDArray[np.float64]:
 
 def coarse_lag(u: NDArray[np.float64], y: NDArray[np.float64], longest: int) -> int:
     """Lag in samples, 0..longest, of the greatest magnitude of the cross-correlation."""
-    return int(np.argmax(_likeness(u, y, longest)[: longest + 1]))
+    return _lags(u, y, longest)[0]
 
 
-def lag_ahead(u: NDArray[np.float64], y: NDArray[np.float64], longest: int) -> int | None:
-    """Lag below 0 at which an output resembles its input most; None if it does so behind it."""
-    likeness = _likeness(u, y, longest)
-    late, ahead = likeness[: longest + 1], likeness[: -longest - 1 : -1]
-    return -1 - int(np.argmax(ahead)) if ahead.max() > late.max() else None
-
-
-def _likeness(u: NDArray[np.float64], y: NDArray[np.float64], longest: int) -> NDArray[np.float64]:
-    """Magnitude of the cross-correlation by lag, those below 0 at the end."""
+def _lags(u: NDArray[np.float64], y: NDArray[np.float64], longest: int) -> tuple[int, int | None]:
+    """Lags of greatest likeness: from 0 on, and below 0 if it is greater there."""
     length = scipy.fft.next_fast_len(u.size + longest + 1, real=True)
     spectrum = np.conj(_transform(u, length)) * scipy.fft.rfft(y - y.mean(), length)
-    return np.abs(scipy.fft.irfft(spectrum, length))
+    likeness = np.abs(scipy.fft.irfft(spectrum, length))
+    late, ahead = likeness[: longest + 1], likeness[: -longest - 1 : -1]
+    behind = int(np.argmax(late))
+    return behind, -1 - int(np.argmax(ahead)) if ahead.max() > late.max() else None
 
 
 @kept
@@ -140,7 +139,9 @@ def rough_response(
     lag : int, optional
         Coarse delay in samples; that of the cross-correlation, 0 or more, if None.
     """
-    lag = coarse_lag(u, y, longest_delay) if lag is None else lag
+    ahead = None
+    if lag is None:
+        lag, ahead = _lags(u, y, longest_delay)
     overlap = u.size - abs(lag)
     group = max(min(u.size // (_TURNS * (abs(lag) + _LATE)), u.size // _ENOUGH), 1)
     length = scipy.fft.next_fast_len(-(-u.size // group), real=True)
@@ -158,6 +159,7 @@ def rough_response(
         omega=2 * np.pi * bins / length,
         response=cross[bins] / power[bins],
         weight=weight,
+        ahead=ahead,
     )
 
 

@@ -5,11 +5,12 @@ import scipy
 from numpy.typing import NDArray
 
 from hmpim.identify.chance import FALSE_ALARM
-from hmpim.identify.fitting.autoregression import autoregression
 from hmpim.identify.fitting.fit import Fit, Problem
 from hmpim.identify.fitting.least_squares import solved
 from hmpim.identify.fitting.sampled_rows import part_of
-from hmpim.identify.whiteness import effective_share, innovation_gain, misfit
+from hmpim.identify.noise.autoregression import autoregression, innovation_gain
+from hmpim.identify.noise.misfit import misfit
+from hmpim.identify.noise.whiteness import effective_share
 
 __all__ = ["is_unrelated", "says_nothing"]
 

@@ -7,13 +7,20 @@ import scipy
 from numpy.typing import NDArray
 
 from hmpim.identify.chance import FALSE_ALARM
-from hmpim.identify.fitting.autoregression import autoregression
-from hmpim.identify.fitting.data import FINAL_PRECISION, HOPELESS, POOR, Data, Seen, follows
+from hmpim.identify.fitting.data import (
+    FINAL_PRECISION,
+    HOPELESS,
+    POOR,
+    Data,
+    Seen,
+    follows,
+)
 from hmpim.identify.fitting.fit import Fit, Problem, fit_structure, jacobian
 from hmpim.identify.fitting.start import rough_response
 from hmpim.identify.fitting.trial import Trial
+from hmpim.identify.noise.autoregression import autoregression
+from hmpim.identify.noise.covariance import covariance
 from hmpim.identify.signals import longest_lag
-from hmpim.identify.uncertainty import covariance
 from hmpim.record import Intersample
 
 __all__ = ["is_contradicted", "noise_of", "prewhitened_of", "refit_whitened"]

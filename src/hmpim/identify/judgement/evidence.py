@@ -6,9 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hmpim.identify.fitting.trial import JointFit
+from hmpim.identify.noise.misfit import Misfit
 from hmpim.identify.readings import Readings
 from hmpim.identify.result import Parameters, ResponseBandwidths
-from hmpim.identify.whiteness import Misfit
 
 __all__ = ["Evidence", "structure_in_words"]
 

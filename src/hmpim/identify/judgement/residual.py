@@ -4,11 +4,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hmpim.identify.chance import DEVIATIONS, FALSE_ALARM
-from hmpim.identify.effects.colour import noise_colour
-from hmpim.identify.effects.input_noise import input_noise
 from hmpim.identify.fitting.halves import compare_halves
 from hmpim.identify.groups import GAIN, MODELLED
 from hmpim.identify.judgement.evidence import Evidence, structure_in_words
+from hmpim.identify.noise.colour import noise_colour
+from hmpim.identify.noise.input_noise import input_noise
 from hmpim.record import Finding
 
 __all__ = [

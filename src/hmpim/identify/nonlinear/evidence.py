@@ -12,12 +12,12 @@ from numpy.typing import NDArray
 
 from hmpim.identify.chance import FALSE_ALARM
 from hmpim.identify.fitting.fit import Fit, Problem, jacobian
+from hmpim.identify.noise.whiteness import is_white
 from hmpim.identify.nonlinear.harmonic_kinds import compare_harmonics
 from hmpim.identify.nonlinear.harmonics import Harmonics, any_harmonic, sweep_harmonics
 from hmpim.identify.nonlinear.lines import Lines, detection_lines, find_period
 from hmpim.identify.nonlinear.mechanisms import Mechanism, compare_mechanisms
 from hmpim.identify.nonlinear.sweep_phase import SweepPhase, sweep_phase
-from hmpim.identify.whiteness import is_white
 
 __all__ = ["Look", "Seen", "look_at", "plainer_of", "thinned"]
 

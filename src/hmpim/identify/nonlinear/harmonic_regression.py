@@ -13,8 +13,8 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from hmpim.identify.noise.whiteness import autocovariance
 from hmpim.identify.nonlinear.sweep_phase import SweepPhase
-from hmpim.identify.whiteness import autocovariance
 
 __all__ = ["HIGHEST", "HarmonicFit", "SweepView", "fit_harmonics", "view_of", "whitener"]
 

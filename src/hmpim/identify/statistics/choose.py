@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 
 from hmpim.errors import RecordError
 from hmpim.identify.chance import FALSE_ALARM
-from hmpim.identify.fitting.autoregression import whitening_filter
 from hmpim.identify.fitting.candidates import nested
 from hmpim.identify.fitting.data import HOPELESS, shifted
 from hmpim.identify.fitting.enrich import INTEGRATING, PLAIN, RICH, members, proposals
@@ -21,13 +20,14 @@ from hmpim.identify.fitting.least_squares import solved
 from hmpim.identify.fitting.rows import Part, Problem
 from hmpim.identify.fitting.start import RoughResponse, starting_values
 from hmpim.identify.fitting.trial import Trial, likeliest_of, trial_of
+from hmpim.identify.noise.autoregression import whitening_filter
+from hmpim.identify.noise.misfit import Misfit
 from hmpim.identify.statistics.fit import Fitted, fit_products, pulse
 from hmpim.identify.statistics.misfit import hidden_pole_of, misfit_of
 from hmpim.identify.statistics.products import Products
 from hmpim.identify.statistics.reach import AHEAD
 from hmpim.identify.statistics.start import excited, rough_of
 from hmpim.identify.statistics.statistics import Statistics
-from hmpim.identify.whiteness import Misfit
 from hmpim.model.dynamics import STRUCTURES, Structure, StructureName
 from hmpim.record import BETWEEN, Intersample
 

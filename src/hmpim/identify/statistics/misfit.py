@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 from hmpim.identify.fitting.growth import HiddenPole, response_to_square
 from hmpim.identify.fitting.least_squares import solved
 from hmpim.identify.fitting.rows import Problem
+from hmpim.identify.noise.misfit import Misfit
 from hmpim.identify.statistics.fit import Fitted
 from hmpim.identify.statistics.products import Products
 from hmpim.identify.statistics.reach import AHEAD
-from hmpim.identify.whiteness import Misfit
 
 __all__ = ["Asked", "asked_of", "hidden_pole_of", "integrated_share", "misfit_of"]
 

@@ -12,7 +12,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from hmpim.identify.fitting.autoregression import LONGEST
+from hmpim.identify.noise.autoregression import LONGEST
 from hmpim.identify.statistics.reach import AHEAD
 from hmpim.identify.statistics.residual import Residual
 from hmpim.identify.statistics.run import Run, closed

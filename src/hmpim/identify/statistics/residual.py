@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from hmpim.identify.fitting.autoregression import LONGEST
+from hmpim.identify.noise.autoregression import LONGEST
 from hmpim.identify.statistics.reach import AHEAD
 
 __all__ = ["Residual"]

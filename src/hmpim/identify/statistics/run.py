@@ -11,7 +11,7 @@ import scipy
 from numpy.typing import NDArray
 
 from hmpim.equality import ByValue
-from hmpim.identify.fitting.autoregression import LONGEST
+from hmpim.identify.noise.autoregression import LONGEST
 from hmpim.identify.statistics.reach import AHEAD, Reach
 
 __all__ = ["Run", "begun", "closed", "continued", "shortened"]

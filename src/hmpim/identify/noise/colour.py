@@ -11,9 +11,9 @@ import scipy
 from numpy.typing import ArrayLike, NDArray
 
 from hmpim.errors import RecordError
+from hmpim.identify.noise.covariance import covariance
+from hmpim.identify.noise.whiteness import autocovariance, effective_share, is_white
 from hmpim.identify.signals import as_signal, check_rate
-from hmpim.identify.uncertainty import covariance
-from hmpim.identify.whiteness import autocovariance, effective_share, is_white
 
 __all__ = ["Colour", "Drift", "NoiseColour", "bias_drift", "noise_colour"]
 
@@ -190,9 +190,7 @@ def bias_drift(residual: ArrayLike, time: ArrayLike) -> Drift:
     if not np.any(left):
         return Drift(slope=slope, std=0.0, probability=float(slope == 0.0), total=slope * length)
     variance = covariance(rows, left, freedom=t.size - 2, white=is_white(left))[1, 1]
-    if _wanders(left):
-        variance = max(variance, _wandering_variance(rows[1], left))
-    std = float(np.sqrt(variance))
+    std = float(np.sqrt(max(variance, _wandering_variance(rows[1], left))))
     freedom = max((t.size - 2) * effective_share(left), 1.0)
     return Drift(
         slope=slope,
@@ -202,18 +200,18 @@ def bias_drift(residual: ArrayLike, time: ArrayLike) -> Drift:
     )
 
 
-def _wanders(e: NDArray[np.float64]) -> bool:
-    """Whether the noise is so slow that no autoregression reaches its lowest frequencies."""
-    if is_white(e):
-        return False
-    r = autocovariance(e, 1)
-    return bool(_likelier(e)[0] == "power_law" or r[1] > _WANDERS * r[0])
-
-
 def _wandering_variance(ramp: NDArray[np.float64], e: NDArray[np.float64]) -> float:
-    """Variance of the slope under noise whose power goes as f^-α down to the record's length."""
+    """Variance of the slope under noise whose power goes as f^-α down to the record's length.
+
+    0 unless the noise is so slow that no autoregression reaches its lowest frequencies.
+    """
+    if is_white(e):
+        return 0.0
+    r = autocovariance(e, 1)
+    kind, exponent = _likelier(e)
+    if kind != "power_law" and r[1] <= _WANDERS * r[0]:
+        return 0.0
     n = e.size
-    exponent = _likelier(e)[1]
     omega = 2 * np.pi * np.arange(n + 1) / (2 * n)
     omega[0] = omega[1]
     inside = slice(2, n - 1, 2)

@@ -5,8 +5,8 @@ import pytest
 from scipy.signal import lfilter
 
 from hmpim.errors import RecordError
-from hmpim.identify.effects.colour import bias_drift, noise_colour
-from hmpim.identify.effects.input_noise import input_noise
+from hmpim.identify.noise.colour import bias_drift, noise_colour
+from hmpim.identify.noise.input_noise import input_noise
 from tests_support import assert_share
 
 FS = 200.0

@@ -1,0 +1,100 @@
+"""Whether noise is white, and how many of its samples are independent."""
+
+import numpy as np
+import scipy
+from numpy.typing import NDArray
+
+from hmpim.identify.chance import FALSE_ALARM
+
+__all__ = ["are_white", "autocovariance", "effective_share", "is_white"]
+
+_LAGS = 25
+
+
+def autocovariance(
+    residual: NDArray[np.float64], lags: int, spectra: NDArray[np.complex128] | None = None
+) -> NDArray[np.float64]:
+    """Biased autocovariance at lags 0..lags, shape (..., lags + 1), the unit of residual squared.
+
+    Parameters
+    ----------
+    residual : ndarray, shape (..., n)
+        One residual, or several of one length.
+    lags : int
+        Longest lag.
+    spectra : complex ndarray, shape (..., n // 2 + 1), optional
+        Their transforms, where they are known.
+
+    Examples
+    --------
+    >>> autocovariance(np.array([1.0, -1.0, 1.0, -1.0]), 1).round(6).tolist()
+    [1.0, -0.75]
+    """
+    n = residual.shape[-1]
+    if spectra is not None:
+        r = scipy.fft.irfft(spectra.real**2 + spectra.imag**2, n)[..., : lags + 1]
+        for k in range(1, lags + 1):  # less what the end meets at the beginning
+            r[..., k] -= np.vecdot(residual[..., :k], residual[..., n - k :])
+        return np.asarray(r / n)
+    if lags <= 60 and n < 1_000_000:
+        full = [np.vecdot(residual[..., : n - k], residual[..., k:]) for k in range(lags + 1)]
+        return np.asarray(np.stack(full, axis=-1) / n)
+    length = scipy.fft.next_fast_len(n + lags + 1, real=True)
+    power = np.abs(scipy.fft.rfft(residual, length)) ** 2
+    return np.asarray(scipy.fft.irfft(power, length)[..., : lags + 1] / n)
+
+
+def is_white(residual: NDArray[np.float64]) -> bool:
+    """Whether one residual, shape (n,), is white by the test of `are_white`."""
+    return bool(are_white(residual))
+
+
+def are_white(
+    residuals: NDArray[np.float64], spectra: NDArray[np.complex128] | None = None
+) -> NDArray[np.bool_]:
+    """Ljung-Box test (Biometrika 65, 1978) over 25 lags.
+
+    Parameters
+    ----------
+    residuals : ndarray, shape (..., n)
+        With samples that do not count left out or 0.
+    spectra : complex ndarray, shape (..., n // 2 + 1), optional
+        Their transforms, where they are known.
+
+    Returns
+    -------
+    ndarray of bool, shape (...)
+        White noise is called coloured at the rate `FALSE_ALARM`.
+
+    Examples
+    --------
+    >>> rng = np.random.default_rng(0)
+    >>> noise = rng.standard_normal((2, 1000))
+    >>> noise[1] = np.cumsum(noise[1])
+    >>> are_white(noise).tolist(), are_white(noise, scipy.fft.rfft(noise)).tolist()
+    ([True, False], [True, False])
+    """
+    n = residuals.shape[-1]
+    lags = min(_LAGS, n // 4)
+    if lags == 0:
+        return np.ones(residuals.shape[:-1], dtype=bool)
+    r = autocovariance(residuals, lags, spectra)
+    power = np.where(r[..., :1] > 0, r[..., :1], 1.0)
+    rho = r[..., 1:] / power
+    statistic = n * (n + 2) * np.sum(rho**2 / (n - np.arange(1, lags + 1)), axis=-1)
+    return np.asarray((scipy.special.chdtrc(lags, statistic) > FALSE_ALARM) | (r[..., 0] <= 0))
+
+
+def effective_share(residual: NDArray[np.float64]) -> float:
+    """Independent samples per sample: 1 for white noise, less for coloured.
+
+    1 / (1 + 2 Σ ρ²), the share that holds for estimates of power (Bartlett, 1946), over
+    the lags at which the correlation stands out of its own scatter.
+    """
+    lags = min(200, residual.size // 4)
+    if is_white(residual) or lags < 1:
+        return 1.0
+    r = autocovariance(residual, lags)
+    rho = r[1:] / r[0]
+    rho = rho[np.abs(rho) > 3.0 / np.sqrt(residual.size)]
+    return float(1.0 / (1.0 + 2.0 * np.sum(rho**2)))
