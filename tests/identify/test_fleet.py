@@ -5,6 +5,7 @@ import pytest
 
 import hmpim
 from hmpim.identify.fleet import fit_fleet, learn_fleet
+from hmpim.identify.learnt import box_around
 from hmpim.identify.surface import Surface, places_in
 
 FS, SAMPLES, LEARNT = 100.0, 600, 6
@@ -96,3 +97,14 @@ def test_a_surface_knows_its_error():
     value, slope = smooth.at(at)
     assert value[0, 0] == pytest.approx(np.exp(0.37), abs=1e-5)
     assert slope[0, 0, 0] == pytest.approx(np.exp(0.37), abs=1e-4)
+
+
+def test_a_box_learnt_from_sixteen_units_holds_the_others():
+    """A unit outside costs as much as fifty inside: less than one in a thousand may be."""
+    rng = np.random.default_rng(4)
+    outside = 0
+    for _ in range(200):
+        low, high = box_around(rng.standard_normal((16, 3)), np.zeros(3))
+        others = rng.standard_normal((500, 3))
+        outside += np.count_nonzero(((others < low) | (others > high)).any(axis=1))
+    assert outside < 1e-3 * 200 * 500

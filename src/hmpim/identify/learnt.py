@@ -24,7 +24,7 @@ from hmpim.model.dynamics import STRUCTURES, Structure
 from hmpim.model.sampled import SampledInput, prepare_input
 from hmpim.record import BETWEEN, Intersample
 
-__all__ = ["Fleet", "Member", "learn_fleet", "theta_at"]
+__all__ = ["Fleet", "Member", "box_around", "learn_fleet", "theta_at"]
 
 Real = NDArray[np.float64]
 
@@ -41,8 +41,9 @@ _MOST = 150
 _CLEAR = 100.0
 """By how much the criterion must prefer the structure, so that no other widens its bars."""
 
-_WIDE = 4.5
-"""Half a side of the box, in deviations of the units that it is learnt from."""
+_WIDE = 5.0
+"""Half a side of the box, in deviations of the units that it is learnt from: of sixteen, what one
+more unit exceeds once in 5000 (Student)."""
 
 _APART = (0.1, 0.02, 0.02)
 """What another assumption moves beside half a sample: samples, and shares of ω and ζ."""
@@ -184,11 +185,32 @@ def _is_plain(pair: PairIdentification) -> bool:
 
 def _box(pairs: Sequence[PairIdentification], fs: float) -> tuple[Real, Real]:
     """Where units of the fleet lie, under the assumption under which they were found."""
-    places = np.array([_place(pair, fs) for pair in pairs])
-    middle = np.median(places, axis=0)
-    spread = 1.4826 * np.median(np.abs(places - middle), axis=0)
     own = fs * max(_own_error(pair) for pair in pairs)
     least = np.array([max(3 * own, 0.02), 0.005, 0.005])
+    return box_around(np.array([_place(pair, fs) for pair in pairs]), least)
+
+
+def box_around(places: Real, least: Real) -> tuple[Real, Real]:
+    """Return the corners of a box that holds units like these, all but one in a thousand.
+
+    Parameters
+    ----------
+    places : ndarray, shape (k, d)
+        Where some units lie.
+    least : ndarray, shape (d,)
+        Deviations between units that are allowed for anyway.
+
+    Examples
+    --------
+    >>> low, high = box_around(np.array([[-1.0], [0.0], [1.0]]), np.array([0.1]))
+    >>> low.round(2).tolist(), high.round(2).tolist()
+    ([-7.41], [7.41])
+    """
+    middle = np.median(places, axis=0)
+    # Of so few the median deviation alone may come out half as large as it is.
+    spread = np.maximum(
+        1.4826 * np.median(np.abs(places - middle), axis=0), np.std(places, axis=0, ddof=1)
+    )
     farthest = np.abs(places - middle).max(axis=0)
     reach = np.maximum(_WIDE * np.maximum(spread, least), 1.3 * farthest)
     return middle - reach, middle + reach
