@@ -9,7 +9,7 @@ from hmpim.campaign.cases import prepare
 from hmpim.campaign.compare import linear_from, samples_reading
 from hmpim.campaign.rig import make_rig
 from hmpim.campaign.study import make_study
-from hmpim.identify.spectrum import decibel, spectrum
+from hmpim.identify.section_iv.spectrum import decibel, spectrum
 
 pytest.importorskip("mujoco", reason="the table needs the extra 'table'")
 

@@ -7,9 +7,9 @@ from functools import cache
 from pathlib import Path
 from typing import NamedTuple
 
-from hmpim.identify import groups
 from hmpim.identify.identify import identify_output
 from hmpim.identify.nonlinear.words import KIND_WORDS
+from hmpim.identify.result import groups
 
 ROOT = Path(__file__).parents[2]
 TEXT = (ROOT / "docs" / "method.md").read_text(encoding="utf-8")

@@ -11,7 +11,7 @@ from scipy.optimize import linprog
 from hmpim.errors import ArgumentError, LimitsError
 from hmpim.experiment import run
 from hmpim.identify import identify
-from hmpim.identify.spectrum import excited_band
+from hmpim.identify.section_iv.spectrum import excited_band
 from hmpim.optimal import (
     PARAMETERS,
     Accuracy,

@@ -3,8 +3,8 @@ from dataclasses import fields, replace
 import pytest
 
 from hmpim.identify import Estimate, PaperEstimates, Parameters
-from hmpim.identify.groups import EVERY
 from hmpim.identify.judgement import judged
+from hmpim.identify.result.groups import EVERY
 from hmpim.record import Finding
 from hmpim.report.words import GLOSSARY, headline, remark, untold
 

@@ -19,7 +19,7 @@ from hmpim.formats.atomic import write_text
 from hmpim.formats.recording import save_recording
 from hmpim.identify import identify
 from hmpim.identify.frf.multivariable import response_matrix
-from hmpim.identify.spectrum import decibel, spectrum
+from hmpim.identify.section_iv.spectrum import decibel, spectrum
 from hmpim.record import Record
 from hmpim.stimulus import Stimulus
 

@@ -1,13 +1,11 @@
 """Identification: from a record to every parameter, each with its error bar (paper, section IV)."""
 
-from hmpim.identify.alike import same_at_levels
-from hmpim.identify.compare import Change, compare
 from hmpim.identify.frf.averaged import Averaged, averaged_response, coherence_significance
 from hmpim.identify.frf.local import local_polynomial_response, local_response
 from hmpim.identify.frf.multivariable import ResponseMatrix, response_matrix
-from hmpim.identify.gain_phase import GainPhase, gain_and_phase, measurable
 from hmpim.identify.identify import identify
-from hmpim.identify.levels import (
+from hmpim.identify.records.alike import same_at_levels
+from hmpim.identify.records.levels import (
     Level,
     LevelComparison,
     Levels,
@@ -15,9 +13,7 @@ from hmpim.identify.levels import (
     compare_levels,
     identify_levels,
 )
-from hmpim.identify.paper import PaperAnalysis, paper_analysis
-from hmpim.identify.predict import Prediction, predict, to_model
-from hmpim.identify.repeats import (
+from hmpim.identify.records.repeats import (
     RepeatedPair,
     RepeatedParameter,
     Repeats,
@@ -41,9 +37,13 @@ from hmpim.identify.result import (
     ResponseBandwidths,
     Verdict,
 )
-from hmpim.identify.spectrum import excited_band
+from hmpim.identify.section_iv.paper import PaperAnalysis, paper_analysis
+from hmpim.identify.section_iv.spectrum import excited_band
 from hmpim.identify.statistics import LiveEstimator, Look, Statistics, compress
-from hmpim.identify.validate import Bounds, Check, OutputValidation, Validation, validate
+from hmpim.identify.uses.compare import Change, compare
+from hmpim.identify.uses.gain_phase import GainPhase, gain_and_phase, measurable
+from hmpim.identify.uses.predict import Prediction, predict, to_model
+from hmpim.identify.uses.validate import Bounds, Check, OutputValidation, Validation, validate
 
 __all__ = [
     "Alike",

@@ -4,8 +4,8 @@
 fitted at once by the same least squares as `hmpim.identify`, in a few numbers instead of thousands.
 The basis is the stimulus' transforms and Gram matrix, made once for all. Every assumption on what
 the stimulus does between its samples is tried, and what the record does not exclude widens the
-intervals, as `hmpim.identify.spanned` does it. The one record in twenty that asks for one more pole
-by chance is fitted with it, as `identify` does.
+intervals, as `hmpim.identify.reading.spanned` does it. The one record in twenty that asks for one
+more pole by chance is fitted with it, as `identify` does.
 
 The parameters and their errors are those of a fit to the record itself, as long as what the basis
 and the polynomials are off is small beside a standard deviation: `FleetFit.sound` says where it is,
@@ -29,9 +29,9 @@ from hmpim.identify.judgement.between_samples import SHIFT, SIZES, WIDE
 from hmpim.identify.learnt import Fleet, Member, learn_fleet
 from hmpim.identify.noise.misfit import misfits
 from hmpim.identify.noise.whiteness import are_white
+from hmpim.identify.reading.spanned import MOVES
 from hmpim.identify.result import Estimate, Parameters
-from hmpim.identify.spanned import MOVES
-from hmpim.identify.uncertainty import noise_estimate
+from hmpim.identify.result.error_bars import noise_estimate
 from hmpim.record import Intersample
 
 __all__ = ["Column", "Fleet", "FleetFit", "fit_fleet", "learn_fleet"]

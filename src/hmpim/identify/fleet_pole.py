@@ -16,9 +16,9 @@ from hmpim.identify.fitting.rows import Problem
 from hmpim.identify.fitting.trial import JointFit, Trial, trial_of
 from hmpim.identify.learnt import Fleet, Member, theta_at
 from hmpim.identify.noise.whiteness import is_white
+from hmpim.identify.reading.spanned import spanned
 from hmpim.identify.result import Parameters
 from hmpim.identify.signals import longest_lag
-from hmpim.identify.spanned import spanned
 from hmpim.model.dynamics import STRUCTURES, Structure
 
 __all__ = ["Tails", "with_tails"]

@@ -18,7 +18,7 @@ from hmpim.identify.asked.refusals import (
     checked_structures,
 )
 from hmpim.identify.asked.software import recognise_software
-from hmpim.identify.coupling.coupled import inputs_of
+from hmpim.identify.coupling.responses import inputs_of
 from hmpim.identify.judgement import judged
 from hmpim.identify.pair import Described, describe, describe_dead
 from hmpim.identify.result import Identification, RecordSummary

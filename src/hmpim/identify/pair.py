@@ -7,9 +7,8 @@ from numpy.typing import NDArray
 
 from hmpim.identify.asked.question import Question
 from hmpim.identify.asked.reference import response_through
-from hmpim.identify.bandwidth import response_bandwidths
-from hmpim.identify.coupling.coupled import Responses, responses_of, settled, unrelated
-from hmpim.identify.coupling.several import Joined
+from hmpim.identify.coupling.output_fit import OutputFit
+from hmpim.identify.coupling.responses import Responses, responses_of, settled, unrelated
 from hmpim.identify.effects.censored import CensoredFit
 from hmpim.identify.effects.drift import drift_finding
 from hmpim.identify.effects.imperfections import Imperfections, refine, with_imperfections
@@ -17,12 +16,13 @@ from hmpim.identify.fitting.fit import Fit
 from hmpim.identify.fitting.plainer import plainer, taking
 from hmpim.identify.fitting.trial import JointFit
 from hmpim.identify.frf.local import local_response
-from hmpim.identify.groups import EVERY
 from hmpim.identify.judgement import ROUNDING, Evidence, attempt, judge
 from hmpim.identify.noise.misfit import Misfit, misfit
 from hmpim.identify.nonlinear.nonlinearity import Inspection, inspect_nonlinearity
-from hmpim.identify.paper import paper_estimates
-from hmpim.identify.readings import Readings, read_parameters
+from hmpim.identify.reading.bandwidth import response_bandwidths
+from hmpim.identify.reading.propagation import response_std
+from hmpim.identify.reading.readings import Readings, read_parameters
+from hmpim.identify.reading.spanned import spanned
 from hmpim.identify.result import (
     Candidate,
     FrequencyResponse,
@@ -32,9 +32,10 @@ from hmpim.identify.result import (
     Parameters,
     ResponseBandwidths,
 )
-from hmpim.identify.spanned import spanned
-from hmpim.identify.spectrum import excited_band
-from hmpim.identify.uncertainty import estimate, noise_estimate, response_std
+from hmpim.identify.result.error_bars import estimate, noise_estimate
+from hmpim.identify.result.groups import EVERY
+from hmpim.identify.section_iv.paper import paper_estimates
+from hmpim.identify.section_iv.spectrum import excited_band
 from hmpim.model.filters import in_z
 from hmpim.model.response import RationalDelay
 from hmpim.record import Finding
@@ -50,7 +51,7 @@ class Described:
     coherence: OutputCoherence | None = None
 
 
-def describe(question: Question, seen: Imperfections, fitted: Joined) -> Described:
+def describe(question: Question, seen: Imperfections, fitted: OutputFit) -> Described:
     """Say all that is known of an output, against each input in that one's own band."""
     aligned, output, inputs = question.aligned, question.output, question.inputs
     if inputs is None:
@@ -95,7 +96,7 @@ def describe_dead(question: Question) -> Described:
 
 
 def _pair(
-    question: Question, found: Imperfections, joined: Joined, i: int, matrix: Responses | None
+    question: Question, found: Imperfections, joined: OutputFit, i: int, matrix: Responses | None
 ) -> PairIdentification:
     """Say all that is known of an output that follows an input."""
     aligned, output, instrument = question.aligned, question.output, question.instrument
@@ -199,7 +200,7 @@ def _band(question: Question, i: int) -> tuple[float, float]:
 
 
 def _refined(
-    question: Question, found: Imperfections, joined: Joined, i: int
+    question: Question, found: Imperfections, joined: OutputFit, i: int
 ) -> tuple[JointFit, CensoredFit | None, NDArray[np.float64] | None]:
     """The fit with clipped and held samples counted as what they are, and a covariance known."""
     joint = joined.fits[i]

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from hmpim.identify.asked.question import Question
 from hmpim.identify.asked.reference import fit_through
 from hmpim.identify.asked.swapped import is_swapped, lags_behind, swapped_finding
-from hmpim.identify.coupling.several import Joined, fit_together
+from hmpim.identify.coupling.output_fit import OutputFit, fit_together
 from hmpim.identify.effects.drift import with_drift
 from hmpim.identify.effects.imperfections import (
     Imperfections,
@@ -50,7 +50,7 @@ def mark_swapped(question: Question, seen: Imperfections) -> Question:
     return replace(question, structures=question.plain, swapped=finding)
 
 
-def fit(question: Question, seen: Imperfections) -> Joined:
+def fit(question: Question, seen: Imperfections) -> OutputFit:
     """Fit every structure, with a bias that drifts where what is left over asks for it."""
     fitted = _fit_once(question, seen, question.structures)
     if len(fitted.fits) > 1 or fitted.fits[0].silent or question.swapped:
@@ -68,8 +68,8 @@ def fit(question: Question, seen: Imperfections) -> Joined:
 
 
 def drift_or_levels(
-    question: Question, seen: Imperfections, fitted: Joined
-) -> tuple[Imperfections, Joined]:
+    question: Question, seen: Imperfections, fitted: OutputFit
+) -> tuple[Imperfections, OutputFit]:
     """Take levels behind the noise, where they explain better what was taken for a drift."""
     if fitted.drifting is None or seen.saturation is not None:
         return seen, fitted
@@ -88,7 +88,7 @@ def drift_or_levels(
     return clipped, levelled
 
 
-def look_again(question: Question, seen: Imperfections, fitted: Joined) -> Imperfections:
+def look_again(question: Question, seen: Imperfections, fitted: OutputFit) -> Imperfections:
     """Look with the model in hand: a plateau can now be told from a crest."""
     residual = fitted.fits[0].best.fit.residual
     asked = seen.saturation is not None or seen.hold is not None
@@ -105,7 +105,7 @@ def look_again(question: Question, seen: Imperfections, fitted: Joined) -> Imper
     return again
 
 
-def through_reference(question: Question, fitted: Joined) -> Joined:
+def through_reference(question: Question, fitted: OutputFit) -> OutputFit:
     """Move a fit to the reference's part of the input to where the input's own residual is."""
     if question.instrument is None or not fitted.related[0]:
         return fitted
@@ -118,7 +118,7 @@ def _fit_once(
     seen: Imperfections,
     structures: tuple[StructureName, ...],
     rows: NDArray[np.float64] | None = None,
-) -> Joined:
+) -> OutputFit:
     """Fit an output to all inputs, with `rows` beside the bias, on the samples that tell."""
     aligned, output, inputs = question.aligned, question.output, question.inputs
     valid = None if bool(output.valid.all()) else np.asarray(output.valid)

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from hmpim.identify.spectrum import excited_band
+from hmpim.identify.section_iv.spectrum import excited_band
 from hmpim.optimal.fisher import fisher_information, standard_deviations
 from hmpim.optimal.wish import PARAMETERS, Family, Gentle, Wish
 from hmpim.stimulus import Stimulus, Waveform

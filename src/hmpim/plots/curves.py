@@ -98,7 +98,7 @@ def model_curve(
     above, below = np.array(pair.numerator[::-1]), np.array(pair.denominator[::-1])
     rate = None
     if pair.intersample == "sampled":
-        from hmpim.identify.predict import rate_of
+        from hmpim.identify.uses.predict import rate_of
 
         rate = rate_of(pair) or fs
         if rate is None:

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hmpim.errors import ArgumentError
-from hmpim.identify.correlation import autocorrelation
+from hmpim.identify.section_iv.correlation import autocorrelation
 from hmpim.plots.description import Axis, Curve, Figure, Item, Panel, Rule
 from hmpim.plots.results import model_of, residual_of, signals_of
 from hmpim.plots.style import axis_label, plain

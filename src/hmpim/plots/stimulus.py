@@ -6,7 +6,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from hmpim.identify.spectrum import decibel, spectrum
+from hmpim.identify.section_iv.spectrum import decibel, spectrum
 from hmpim.plots.description import Axis, Curve, Dashes, Figure, Image, Panel
 from hmpim.plots.spectra import spectra
 from hmpim.plots.style import Colour

@@ -7,7 +7,7 @@ import numpy as np
 
 from hmpim import plots
 from hmpim.identify import Identification, Nonlinearity, PairIdentification
-from hmpim.identify.paper import PaperAnalysis, paper_analysis
+from hmpim.identify.section_iv.paper import PaperAnalysis, paper_analysis
 from hmpim.record import Intersample, Record, Signal, uniform
 from hmpim.report.numbers import format_number
 

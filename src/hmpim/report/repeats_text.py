@@ -3,8 +3,8 @@
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from hmpim.identify.levels import Levels, Trend
-from hmpim.identify.repeats import RepeatedPair, Repeats
+from hmpim.identify.records.levels import Levels, Trend
+from hmpim.identify.records.repeats import RepeatedPair, Repeats
 from hmpim.plots.style import printable
 from hmpim.record import Finding
 from hmpim.report.numbers import format_estimate, format_number, format_value, plus_minus
@@ -25,7 +25,7 @@ def repeats_table(pair: RepeatedPair) -> "Table":
     --------
     >>> import numpy as np
     >>> from hmpim.identify import Estimate, FrequencyResponse
-    >>> from hmpim.identify.repeats import RepeatedParameter
+    >>> from hmpim.identify.records.repeats import RepeatedParameter
     >>> none = np.empty(0)
     >>> mean = Estimate(value=0.15, std=0.0001, ci95=(0.1498, 0.1502), unit="s")
     >>> delay = RepeatedParameter(

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 from hmpim.errors import ArgumentError
 from hmpim.formats.runs import Folder, Run
-from hmpim.identify.compare import Change, compare
+from hmpim.identify.uses.compare import Change, compare
 from hmpim.plots.style import printable
 
 if TYPE_CHECKING:

@@ -5,8 +5,8 @@ import pytest
 
 from hmpim.identify.fitting.growth import as_if_hidden, hidden_pole, one_more_pole, with_pole
 from hmpim.identify.fitting.joint import joint_fit
-from hmpim.identify.readings import read_parameters
-from hmpim.identify.spanned import spanned
+from hmpim.identify.reading.readings import read_parameters
+from hmpim.identify.reading.spanned import spanned
 from hmpim.model.dynamics import STRUCTURES, coefficients_of, denominator_of, theta_of
 from hmpim.model.sampled import delayed_response, prepare_input
 from tests_support import fewest, rms_between, room

@@ -6,7 +6,7 @@ import pytest
 from hmpim.identify.fitting.fit import Problem, fit_structure, jacobian
 from hmpim.identify.fitting.joint import joint_fit
 from hmpim.identify.fitting.start import rough_response, starting_values
-from hmpim.identify.readings import read_parameters
+from hmpim.identify.reading.readings import read_parameters
 from hmpim.model import (
     STRUCTURES,
     Model,

@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from hmpim.identify.bandwidth import response_bandwidths
 from hmpim.identify.fitting.joint import joint_fit
 from hmpim.identify.frf.local import local_response
 from hmpim.identify.judgement import Evidence
 from hmpim.identify.noise.misfit import misfit
-from hmpim.identify.readings import read_parameters
+from hmpim.identify.reading.bandwidth import response_bandwidths
+from hmpim.identify.reading.readings import read_parameters
 
 FS, BAND = 200.0, (0.1, 20.0)
 

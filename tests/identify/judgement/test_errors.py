@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hmpim.identify.groups import MODELLED
 from hmpim.identify.judgement.errors import not_converged, weak_delay, weak_excitation
+from hmpim.identify.result.groups import MODELLED
 
 
 @pytest.mark.parametrize("check", [not_converged, weak_delay, weak_excitation])

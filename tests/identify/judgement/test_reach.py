@@ -6,7 +6,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hmpim.identify.groups import MODELLED, PHASE_SPLIT, TIMING
 from hmpim.identify.judgement.reach import (
     beyond_band,
     fast_mode,
@@ -18,6 +17,7 @@ from hmpim.identify.judgement.reach import (
     short_record,
 )
 from hmpim.identify.result import Estimate
+from hmpim.identify.result.groups import MODELLED, PHASE_SPLIT, TIMING
 from hmpim.model.dynamics import STRUCTURES
 from tests_support import field_chirp, second_order_lag
 

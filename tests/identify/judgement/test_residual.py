@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hmpim.identify.groups import GAIN, MODELLED
 from hmpim.identify.judgement.residual import (
     coloured_noise,
     halves_disagree,
@@ -15,6 +14,7 @@ from hmpim.identify.judgement.residual import (
     uneven_noise,
 )
 from hmpim.identify.noise.misfit import Misfit
+from hmpim.identify.result.groups import GAIN, MODELLED
 
 WHITE = 0.1 * np.random.default_rng(3).standard_normal(2000)
 

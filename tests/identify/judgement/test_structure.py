@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from hmpim.identify.fitting.trial import Trial
-from hmpim.identify.groups import PHASE_SPLIT
 from hmpim.identify.judgement.between_samples import other_intersample, wide_span
 from hmpim.identify.judgement.structure import missed_pole, other_order
+from hmpim.identify.result.groups import PHASE_SPLIT
 from hmpim.model.dynamics import STRUCTURES
 
 TIME = np.arange(2000) / 200.0

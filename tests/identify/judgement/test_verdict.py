@@ -11,8 +11,8 @@ import pytest
 import hmpim
 from hmpim.errors import ArgumentError
 from hmpim.identify import Parameters
-from hmpim.identify.groups import EVERY, GAIN, MODELLED, PHASE_SPLIT, TIMING
 from hmpim.identify.judgement import CHECKS, attempt, judge, judged, judged_together
+from hmpim.identify.result.groups import EVERY, GAIN, MODELLED, PHASE_SPLIT, TIMING
 from hmpim.record import Finding
 
 

@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 
 from hmpim.identify.fitting.fit import jacobian
 from hmpim.identify.fitting.trial import JointFit
-from hmpim.identify.groups import EVERY
 from hmpim.identify.noise.covariance import covariance
 from hmpim.identify.noise.whiteness import is_white
+from hmpim.identify.result.groups import EVERY
 from hmpim.record import Finding
 
 __all__ = ["is_swapped", "lags_behind", "swapped_finding"]

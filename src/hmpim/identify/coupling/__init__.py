@@ -1,9 +1,9 @@
-"""Several inputs and outputs: direct terms, couplings, and what cannot be told apart.
+"""Several inputs at once: direct terms, couplings, and what cannot be told apart.
 
 inputs      the inputs themselves: bands, condition, copies, coherence
-several     one output fitted to all inputs
-couplings   the weak ones, one by one
-jointly     all of them moved together
+output_fit  one output fitted to all inputs
+weak        couplings beside what is strong, one by one
+together    all of them moved at once, and their common covariance
 lag         where delay and lag are not told apart
-coupled     the matrix of responses, refusals and warnings
+responses   the measured response to each input, and what is said of weak ones
 """

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from hmpim.identify.frf.neighbours import centres_in_band, mirrored, windows_around
 from hmpim.identify.result.inputs import BOUND, Alike, InputSet
-from hmpim.identify.spectrum import excited_band
+from hmpim.identify.section_iv.spectrum import excited_band
 
 __all__ = ["input_set", "own_band"]
 

@@ -19,9 +19,9 @@ from hmpim.identify.effects.quantization import Quantization, detect_quantizatio
 from hmpim.identify.effects.saturation import Saturation, detect_saturation
 from hmpim.identify.fitting.enrich import PLAIN
 from hmpim.identify.fitting.trial import JointFit, Trial
-from hmpim.identify.groups import EVERY, MODELLED
 from hmpim.identify.result import Parameters
-from hmpim.identify.uncertainty import estimate
+from hmpim.identify.result.error_bars import estimate
+from hmpim.identify.result.groups import EVERY, MODELLED
 from hmpim.record import Finding
 
 __all__ = ["Imperfections", "count_levels", "find_imperfections", "refine", "with_imperfections"]

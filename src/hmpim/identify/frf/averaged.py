@@ -14,8 +14,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from hmpim.errors import ArgumentError, RecordError
 from hmpim.identify.result import FrequencyResponse
+from hmpim.identify.section_iv.windows import WindowName, window_samples
 from hmpim.identify.signals import check_band, check_rate
-from hmpim.identify.windows import WindowName, window_samples
 
 __all__ = [
     "Averaged",

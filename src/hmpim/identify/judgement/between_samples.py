@@ -1,8 +1,8 @@
 """Other assumptions on what the input does between its samples, and what they would move."""
 
-from hmpim.identify.groups import PHASE_SPLIT
 from hmpim.identify.judgement.evidence import Evidence, structure_in_words
-from hmpim.identify.spanned import rivals_of
+from hmpim.identify.reading.spanned import rivals_of
+from hmpim.identify.result.groups import PHASE_SPLIT
 from hmpim.record import Finding
 
 __all__ = ["SHIFT", "SIZES", "WIDE", "other_intersample", "wide_span"]

@@ -1,8 +1,8 @@
 """Error bars that are too wide for the figure, and a fit that did not end."""
 
-from hmpim.identify.groups import MODELLED
 from hmpim.identify.judgement.evidence import Evidence
 from hmpim.identify.result import Estimate
+from hmpim.identify.result.groups import MODELLED
 from hmpim.record import Finding
 
 __all__ = ["not_converged", "weak_delay", "weak_excitation"]

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from hmpim.identify.fitting.trial import JointFit
 from hmpim.identify.noise.misfit import Misfit
-from hmpim.identify.readings import Readings
+from hmpim.identify.reading.readings import Readings
 from hmpim.identify.result import Parameters, ResponseBandwidths
 
 __all__ = ["Evidence", "structure_in_words"]

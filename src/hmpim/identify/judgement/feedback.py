@@ -6,8 +6,8 @@ from numpy.typing import NDArray
 
 from hmpim.identify.chance import FALSE_ALARM
 from hmpim.identify.fitting.least_squares import solved
-from hmpim.identify.groups import MODELLED
 from hmpim.identify.judgement.evidence import Evidence
+from hmpim.identify.result.groups import MODELLED
 from hmpim.record import Finding
 
 __all__ = ["feedback"]

@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 
 from hmpim.identify.fitting.enrich import PLAIN
 from hmpim.identify.fitting.growth import scale_of
-from hmpim.identify.groups import MODELLED, PHASE_SPLIT, TIMING
 from hmpim.identify.judgement.evidence import Evidence, structure_in_words
+from hmpim.identify.result.groups import MODELLED, PHASE_SPLIT, TIMING
 from hmpim.model import response, slowest_time_constant
 from hmpim.record import Finding
 

@@ -5,10 +5,10 @@ from numpy.typing import NDArray
 
 from hmpim.identify.chance import DEVIATIONS, FALSE_ALARM
 from hmpim.identify.fitting.halves import compare_halves
-from hmpim.identify.groups import GAIN, MODELLED
 from hmpim.identify.judgement.evidence import Evidence, structure_in_words
 from hmpim.identify.noise.colour import noise_colour
 from hmpim.identify.noise.input_noise import input_noise
+from hmpim.identify.result.groups import GAIN, MODELLED
 from hmpim.record import Finding
 
 __all__ = [

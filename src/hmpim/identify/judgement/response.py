@@ -3,8 +3,8 @@
 import numpy as np
 
 from hmpim.identify.chance import DEVIATIONS
-from hmpim.identify.groups import PHASE_SPLIT
 from hmpim.identify.judgement.evidence import Evidence
+from hmpim.identify.result.groups import PHASE_SPLIT
 from hmpim.record import Finding
 
 __all__ = ["bandwidth_disagrees"]

@@ -3,8 +3,8 @@
 import numpy as np
 
 from hmpim.identify.chance import DEVIATIONS
-from hmpim.identify.groups import PHASE_SPLIT
 from hmpim.identify.judgement.evidence import Evidence, structure_in_words
+from hmpim.identify.result.groups import PHASE_SPLIT
 from hmpim.record import Finding
 
 __all__ = ["missed_pole", "other_order"]

@@ -3,7 +3,7 @@
 A sweep answers the first question by its harmonics, a multisine by the lines it leaves out,
 any other input by how much better a nonlinear trace explains the residual. Which way is for
 `hmpim.identify.nonlinear.mechanisms`, asked only where there is something to explain. Dependence on
-the amplitude takes several records: `hmpim.identify.levels`.
+the amplitude takes several records: `hmpim.identify.records.levels`.
 """
 
 from collections.abc import Sequence

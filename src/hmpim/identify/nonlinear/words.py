@@ -2,8 +2,8 @@
 
 from collections.abc import Sequence
 
-from hmpim.identify.groups import MODELLED
 from hmpim.identify.nonlinear.mechanisms import Kind, Mechanism
+from hmpim.identify.result.groups import MODELLED
 from hmpim.record import Finding
 
 __all__ = ["KIND_WORDS", "general", "particular"]

@@ -11,7 +11,6 @@ from hmpim.identify.chance import FALSE_ALARM
 from hmpim.identify.fitting.nested import FAR, stretched
 from hmpim.identify.fitting.rows import Problem
 from hmpim.identify.fitting.trial import JointFit
-from hmpim.identify.groups import EVERY
 from hmpim.identify.judgement import Evidence, judge, judged
 from hmpim.identify.judgement.between_samples import other_intersample, wide_span
 from hmpim.identify.judgement.checks import Check
@@ -26,7 +25,9 @@ from hmpim.identify.judgement.reach import (
 )
 from hmpim.identify.judgement.residual import lack_of_fit
 from hmpim.identify.judgement.structure import missed_pole, other_order
-from hmpim.identify.readings import Readings, read_figures
+from hmpim.identify.reading.propagation import response_std
+from hmpim.identify.reading.readings import Readings, read_figures
+from hmpim.identify.reading.spanned import spanned
 from hmpim.identify.result import (
     Candidate,
     FrequencyResponse,
@@ -37,13 +38,13 @@ from hmpim.identify.result import (
     RecordSummary,
     ResponseBandwidths,
 )
-from hmpim.identify.spanned import spanned
+from hmpim.identify.result.error_bars import estimate, noise_estimate
+from hmpim.identify.result.groups import EVERY
 from hmpim.identify.statistics.choose import Chosen, choose
 from hmpim.identify.statistics.misfit import integrated_share
 from hmpim.identify.statistics.run import Run
 from hmpim.identify.statistics.start import correlations
 from hmpim.identify.statistics.statistics import Statistics
-from hmpim.identify.uncertainty import estimate, noise_estimate, response_std
 from hmpim.model.dynamics import StructureName
 from hmpim.model.response import response, slowest_time_constant
 from hmpim.record import Finding, Intersample

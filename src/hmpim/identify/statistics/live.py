@@ -11,6 +11,7 @@ from hmpim.identify.chance import FALSE_ALARM
 from hmpim.identify.fitting.rows import Problem
 from hmpim.identify.judgement import all_doubted
 from hmpim.identify.result import Estimate, Identification, Parameters
+from hmpim.identify.result.error_bars import estimate, noise_estimate
 from hmpim.identify.statistics.begin import begin
 from hmpim.identify.statistics.describe import identify_statistics
 from hmpim.identify.statistics.fit import Fitted, follow, pulse
@@ -18,7 +19,6 @@ from hmpim.identify.statistics.misfit import Asked, asked_of, misfit_of
 from hmpim.identify.statistics.products import Products
 from hmpim.identify.statistics.reach import Reach
 from hmpim.identify.statistics.statistics import Statistics
-from hmpim.identify.uncertainty import estimate, noise_estimate
 from hmpim.record import Intersample
 from hmpim.stimulus import Stimulus
 

@@ -10,7 +10,7 @@ import scipy
 from numpy.typing import NDArray
 
 from hmpim.identify.fitting.start import RoughResponse
-from hmpim.identify.spectrum import band_of_levels
+from hmpim.identify.section_iv.spectrum import band_of_levels
 from hmpim.identify.statistics.reach import AHEAD
 from hmpim.identify.statistics.statistics import Statistics
 

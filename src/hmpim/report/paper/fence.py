@@ -6,8 +6,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hmpim.experiment import run
-from hmpim.identify.response import phase
-from hmpim.identify.spectrum import TransferFunction, decibel, spectrum, transfer_function
+from hmpim.identify.section_iv.response import phase
+from hmpim.identify.section_iv.spectrum import (
+    TransferFunction,
+    decibel,
+    spectrum,
+    transfer_function,
+)
 from hmpim.plots.description import Axis, Curve, Figure, Item, Panel
 from hmpim.report.figures import Picture
 from hmpim.report.paper.bound import resonance_db

@@ -6,8 +6,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from hmpim.identify.spectrum import decibel, spectrum
-from hmpim.identify.windows import WindowName, window_samples
+from hmpim.identify.section_iv.spectrum import decibel, spectrum
+from hmpim.identify.section_iv.windows import WindowName, window_samples
 from hmpim.plots import Axis, Curve, Figure, Panel, Rule, spectrum_curve
 from hmpim.plots.description import Dashes, Item
 from hmpim.plots.style import Colour, axis_label

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from hmpim.experiment import run
 from hmpim.identify import PaperAnalysis, paper_analysis
-from hmpim.identify.response import natural_frequency, phase_without_delay
-from hmpim.identify.windows import WindowName
+from hmpim.identify.section_iv.response import natural_frequency, phase_without_delay
+from hmpim.identify.section_iv.windows import WindowName
 from hmpim.rigs import Sensor
 from hmpim.stimulus import Stimulus
 

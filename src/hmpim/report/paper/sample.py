@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from hmpim.experiment import run
 from hmpim.identify import PairIdentification, identify, paper_analysis
-from hmpim.identify.response import delay_phase
+from hmpim.identify.section_iv.response import delay_phase
 from hmpim.plots import Axis, Curve, Figure, Panel, Rule, model_curve, spectrum_curve
 from hmpim.plots.description import Item
 from hmpim.report.figures import Picture

@@ -7,7 +7,7 @@ import numpy as np
 
 from hmpim.experiment import run
 from hmpim.identify import Estimate, PairIdentification, PaperAnalysis
-from hmpim.identify.response import natural_frequency, phase_without_delay
+from hmpim.identify.section_iv.response import natural_frequency, phase_without_delay
 from hmpim.record import Record
 from hmpim.report.paper.bound import Bound, phase90, resonance_db
 from hmpim.report.paper.odds import Readings

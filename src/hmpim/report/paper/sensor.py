@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from hmpim.experiment import run
 from hmpim.identify import PaperAnalysis, paper_analysis
-from hmpim.identify.static import initial_period
+from hmpim.identify.section_iv.static import initial_period
 from hmpim.plots import cross_correlation, error_autocorrelation, input_output
 from hmpim.plots.description import Axis, Curve, Figure, Item, Panel, Points, Rule
 from hmpim.record import Record

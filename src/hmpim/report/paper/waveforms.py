@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from hmpim.identify.spectrum import decibel, spectrum
+from hmpim.identify.section_iv.spectrum import decibel, spectrum
 from hmpim.plots import Axis, Curve, Figure, Panel, spectrum_curve, time_histories
 from hmpim.report.figures import Picture
 from hmpim.report.paper.chapter import Chapter

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, Protocol, get_args
 from nicegui import ui
 
 from hmpim.identify import Identification, PairIdentification
-from hmpim.identify.windows import WindowName
+from hmpim.identify.section_iv.windows import WindowName
 from hmpim.plots import Curve, Figure
 from hmpim.plots.by_hand import with_hand_values
 from hmpim.report.by_hand import reading_at

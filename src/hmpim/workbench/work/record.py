@@ -13,7 +13,7 @@ from hmpim.formats.options import ReadOptions
 from hmpim.formats.saving import save
 from hmpim.formats.survey import survey
 from hmpim.identify import Identification, PairIdentification, PaperEstimates, identify
-from hmpim.identify.paper import paper_analysis
+from hmpim.identify.section_iv.paper import paper_analysis
 from hmpim.model.dynamics import StructureName
 from hmpim.plots import Figure, pair_bode, spectra
 from hmpim.record import Channel, Record, uniform

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from scipy import signal
 
 from hmpim.errors import ArgumentError
-from hmpim.identify.windows import WindowName, gaussian_window, window_samples
+from hmpim.identify.section_iv.windows import WindowName, gaussian_window, window_samples
 
 
 @given(st.integers(1, 300), st.floats(0.1, 5.0))

@@ -4,8 +4,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from hmpim.errors import ArgumentError
-from hmpim.identify.correlation import autocorrelation
-from hmpim.identify.noise_by_autocorrelation import noise_by_autocorrelation
+from hmpim.identify.section_iv.correlation import autocorrelation
+from hmpim.identify.section_iv.noise_by_autocorrelation import noise_by_autocorrelation
 
 
 @given(st.floats(-5, 5), st.floats(0.01, 2), st.integers(0, 2**32 - 1))

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from hmpim.errors import RecordError
-from hmpim.identify.repeats import Repeats, identify_repeats
+from hmpim.identify.records.repeats import Repeats, identify_repeats
 from hmpim.record import Record
 from tests_support import assert_share, room
 

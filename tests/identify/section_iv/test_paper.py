@@ -8,11 +8,11 @@ from hypothesis import strategies as st
 from scipy import signal
 
 from hmpim.errors import ArgumentError, RecordError
-from hmpim.identify.correlation import autocorrelation, cross_correlation
-from hmpim.identify.paper import PaperAnalysis, paper_analysis, paper_estimates
-from hmpim.identify.response import delay_phase, natural_frequency
 from hmpim.identify.result import PaperEstimates
-from hmpim.identify.spectrum import decibel, spectrum, transfer_function
+from hmpim.identify.section_iv.correlation import autocorrelation, cross_correlation
+from hmpim.identify.section_iv.paper import PaperAnalysis, paper_analysis, paper_estimates
+from hmpim.identify.section_iv.response import delay_phase, natural_frequency
+from hmpim.identify.section_iv.spectrum import decibel, spectrum, transfer_function
 
 FS, DURATION, BAND = 200.0, 10.0, (0.1, 20.0)
 Waveform = Callable[[np.ndarray], np.ndarray]

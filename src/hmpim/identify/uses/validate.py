@@ -13,9 +13,9 @@ from hmpim.identify.chance import FALSE_ALARM, HALF
 from hmpim.identify.effects.hold import Hold, detect_hold, updates
 from hmpim.identify.noise.misfit import misfit
 from hmpim.identify.noise.whiteness import autocovariance, effective_share
-from hmpim.identify.predict import to_model
 from hmpim.identify.result import Identification, PairIdentification
-from hmpim.identify.spectrum import excited_band
+from hmpim.identify.section_iv.spectrum import excited_band
+from hmpim.identify.uses.predict import to_model
 from hmpim.model import Model, draw_models, simulate, slowest_time_constant
 from hmpim.record import Aligned, Record, uniform
 

@@ -8,10 +8,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from hmpim.arguments import numbers_of
 from hmpim.errors import ArgumentError
-from hmpim.identify.bandwidth import ratio_at
-from hmpim.identify.predict import to_model
+from hmpim.identify.reading.bandwidth import ratio_at
 from hmpim.identify.result import Estimate, PairIdentification
-from hmpim.identify.uncertainty import estimate
+from hmpim.identify.result.error_bars import estimate
+from hmpim.identify.uses.predict import to_model
 from hmpim.model import RationalDelay, phase, response
 
 __all__ = ["GainPhase", "gain_and_phase", "measurable"]
@@ -73,7 +73,7 @@ def gain_and_phase(
     Notes
     -----
     The measurement is divided by the model first, whose phase says how often it has turned
-    (`hmpim.identify.bandwidth`). The model's error is carried over to first order from the
+    (`hmpim.identify.reading.bandwidth`). The model's error is carried over to first order from the
     covariance of its coefficients.
 
     Examples

@@ -5,7 +5,7 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as npst
 
 from hmpim.errors import ArgumentError, RecordError
-from hmpim.identify.spectrum import (
+from hmpim.identify.section_iv.spectrum import (
     decibel,
     excited_band,
     padding,
@@ -14,7 +14,7 @@ from hmpim.identify.spectrum import (
     transfer_function,
     well_excited,
 )
-from hmpim.identify.windows import gaussian_window
+from hmpim.identify.section_iv.windows import gaussian_window
 
 
 def hmpim_waveform(

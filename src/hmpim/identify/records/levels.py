@@ -13,9 +13,9 @@ import scipy
 
 from hmpim.arguments import checked
 from hmpim.errors import ArgumentError
-from hmpim.identify.alike import check_channels
 from hmpim.identify.chance import FALSE_ALARM
 from hmpim.identify.identify import identify
+from hmpim.identify.records.alike import check_channels
 from hmpim.identify.result import Estimate, Identification, PairIdentification, Parameters
 from hmpim.model.dynamics import FILTERS, STRUCTURES
 from hmpim.record import Finding, Intersample, Record

@@ -5,8 +5,8 @@ import pytest
 
 import hmpim
 from hmpim.identify.fitting.joint import joint_fit
-from hmpim.identify.readings import figures_of, read_parameters
-from hmpim.identify.spanned import rivals_of
+from hmpim.identify.reading.readings import figures_of, read_parameters
+from hmpim.identify.reading.spanned import rivals_of
 from tests_support import assert_share
 
 FS = 200.0

@@ -8,23 +8,23 @@ from numpy.typing import ArrayLike, NDArray
 
 from hmpim.arguments import checked
 from hmpim.errors import ArgumentError, RecordError
-from hmpim.identify import response as reading
-from hmpim.identify.correlation import (
+from hmpim.identify.result import PaperEstimates
+from hmpim.identify.section_iv import response as reading
+from hmpim.identify.section_iv.correlation import (
     Correlation,
     autocorrelation,
     correlation_peak,
     cross_correlation,
 )
-from hmpim.identify.noise_by_autocorrelation import noise_by_autocorrelation
-from hmpim.identify.result import PaperEstimates
-from hmpim.identify.signals import as_pair, check_band, check_rate
-from hmpim.identify.spectrum import decibel, excited_band, padding, ratio, well_excited
-from hmpim.identify.static import (
+from hmpim.identify.section_iv.noise_by_autocorrelation import noise_by_autocorrelation
+from hmpim.identify.section_iv.spectrum import decibel, excited_band, padding, ratio, well_excited
+from hmpim.identify.section_iv.static import (
     bias_by_autocorrelation,
     scale_factor_near_dc,
     time_corrected_error,
 )
-from hmpim.identify.windows import WindowName, window_samples
+from hmpim.identify.section_iv.windows import WindowName, window_samples
+from hmpim.identify.signals import as_pair, check_band, check_rate
 
 __all__ = ["PaperAnalysis", "paper_analysis", "paper_estimates"]
 

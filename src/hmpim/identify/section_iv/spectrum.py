@@ -8,8 +8,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from hmpim.errors import ArgumentError, RecordError
 from hmpim.identify.kept import kept
+from hmpim.identify.section_iv.windows import WindowName, window_samples
 from hmpim.identify.signals import as_pair, as_signal, check_rate
-from hmpim.identify.windows import WindowName, window_samples
 
 __all__ = [
     "Spectrum",

@@ -4,8 +4,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from hmpim.errors import ArgumentError
-from hmpim.identify.correlation import autocorrelation
-from hmpim.identify.static import (
+from hmpim.identify.section_iv.correlation import autocorrelation
+from hmpim.identify.section_iv.static import (
     bias_by_autocorrelation,
     initial_period,
     scale_factor_near_dc,

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import hmpim
-from hmpim.identify.bandwidth import response_bandwidths
+from hmpim.identify.reading.bandwidth import response_bandwidths
 from hmpim.identify.result import Estimate, FrequencyResponse, Parameters
 from hmpim.model import RationalDelay, bandwidth_phase, phase, response, second_order_coefficients
 

@@ -4,7 +4,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from hmpim.errors import ArgumentError
-from hmpim.identify.response import (
+from hmpim.identify.section_iv.response import (
     bandwidth_3db,
     bandwidth_phase90,
     damping_from_hump,

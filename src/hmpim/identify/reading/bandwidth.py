@@ -8,9 +8,9 @@ far measurement and model part there, and where the measurement crosses.
 
 import numpy as np
 
+from hmpim.identify.reading.sampled_response import sampled_response
 from hmpim.identify.result import Estimate, FrequencyResponse, Parameters, ResponseBandwidths
-from hmpim.identify.sampled_response import sampled_response
-from hmpim.identify.uncertainty import estimate
+from hmpim.identify.result.error_bars import estimate
 from hmpim.model import RationalDelay, phase, response
 from hmpim.record import Intersample
 

@@ -7,11 +7,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hmpim.errors import RecordError
-from hmpim.identify.coupling.couplings import unsettled
 from hmpim.identify.coupling.inputs import input_set
-from hmpim.identify.coupling.several import Joined
+from hmpim.identify.coupling.output_fit import OutputFit
+from hmpim.identify.coupling.weak import unsettled
 from hmpim.identify.frf.multivariable import ResponseMatrix, response_matrix
-from hmpim.identify.groups import EVERY, MODELLED
 from hmpim.identify.result import (
     Alike,
     Estimate,
@@ -21,7 +20,8 @@ from hmpim.identify.result import (
     PairIdentification,
     Parameters,
 )
-from hmpim.identify.uncertainty import estimate
+from hmpim.identify.result.error_bars import estimate
+from hmpim.identify.result.groups import EVERY, MODELLED
 from hmpim.record import Aligned, Finding, Record, Signal
 
 __all__ = ["Responses", "inputs_of", "responses_of", "settled", "unrelated"]
@@ -98,7 +98,9 @@ def inputs_of(aligned: Aligned, record: Record) -> InputSet:
     return found
 
 
-def responses_of(aligned: Aligned, output: Signal, joined: Joined, inputs: InputSet) -> Responses:
+def responses_of(
+    aligned: Aligned, output: Signal, joined: OutputFit, inputs: InputSet
+) -> Responses:
     """Response of one output to all inputs, each in its own band.
 
     The band is cut where an input's own begins or ends; what an input beyond its band still
@@ -209,7 +211,7 @@ def _bound(response: FrequencyResponse) -> tuple[float, float, float] | None:
 
 
 def settled(
-    pair: PairIdentification, joined: Joined, i: int, inputs: InputSet, fs: float
+    pair: PairIdentification, joined: OutputFit, i: int, inputs: InputSet, fs: float
 ) -> PairIdentification:
     """Say only what the record tells: of weak couplings, and of inputs that are alike."""
     parameters = pair.parameters

@@ -1,7 +1,7 @@
 """One output, several inputs at once: each pair's fit with the others taken out.
 
 The inputs that move the output most are fitted as if alone, each to what the others leave over;
-what is weak beside them (`hmpim.identify.coupling.couplings`) follows, with the noise whitened.
+what is weak beside them (`hmpim.identify.coupling.weak`) follows, with the noise whitened.
 Then all pairs are moved at once. The error bars come from all pairs' derivatives together, so that
 inputs that resemble each other widen them.
 """
@@ -13,9 +13,9 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from hmpim.identify.coupling.couplings import FOLLOWS, coupling_fit, whitening_of
-from hmpim.identify.coupling.jointly import gained_by, joint_covariance
 from hmpim.identify.coupling.lag import Lag, lag_of
+from hmpim.identify.coupling.together import gained_by, joint_covariance
+from hmpim.identify.coupling.weak import FOLLOWS, coupling_fit, whitening_of
 from hmpim.identify.effects.drift import Drifting
 from hmpim.identify.fitting.enrich import PLAIN
 from hmpim.identify.fitting.fit import Fit, Problem, jacobian
@@ -28,7 +28,7 @@ from hmpim.model.response import slowest_time_constant
 from hmpim.model.sampled import prepare_input
 from hmpim.record import Intersample
 
-__all__ = ["Joined", "fit_together"]
+__all__ = ["OutputFit", "fit_together"]
 
 _LATEST = 0.1
 """Delay of a coupling, as a share of the record, up to which it is looked for."""
@@ -49,7 +49,7 @@ Real = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Joined:
+class OutputFit:
     """Fits of one output to each input.
 
     Parameters
@@ -96,7 +96,7 @@ def fit_together(
     structures: tuple[StructureName, ...],
     alike: Sequence[tuple[frozenset[int], NDArray[np.bool_]]] = (),
     nuisance: Real | None = None,
-) -> Joined:
+) -> OutputFit:
     """Fit one output to several inputs.
 
     Parameters
@@ -130,7 +130,7 @@ def fit_together(
 
     if len(inputs) == 1:
         fit = fitted(inputs[0], y, structures)
-        return Joined(
+        return OutputFit(
             fits=(fit,),
             related=(fit.related,),
             covariances=(),
@@ -167,7 +167,7 @@ def fit_together(
     told = dict(zip(kept, _covariances(pairs, whitening), strict=True))
     weak = [j for j in kept if j not in strong]
     everyone = range(len(inputs))
-    return Joined(
+    return OutputFit(
         fits=tuple(fits[j] for j in everyone),
         related=tuple(related[j] for j in everyone),
         covariances=tuple(told.get(j, np.zeros((0, 0))) for j in everyone),

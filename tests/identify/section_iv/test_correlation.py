@@ -5,7 +5,7 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as npst
 
 from hmpim.errors import ArgumentError, RecordError
-from hmpim.identify.correlation import (
+from hmpim.identify.section_iv.correlation import (
     Correlation,
     autocorrelation,
     correlation_peak,

@@ -15,12 +15,11 @@ from numpy.typing import NDArray
 
 from hmpim.arguments import checked
 from hmpim.errors import RecordError
-from hmpim.identify.alike import check_alike, check_apart
 from hmpim.identify.chance import FALSE_ALARM
-from hmpim.identify.groups import EVERY, MODELLED, PHASE_SPLIT
 from hmpim.identify.identify import identify
 from hmpim.identify.judgement import judged_together
 from hmpim.identify.noise.whiteness import effective_share
+from hmpim.identify.records.alike import check_alike, check_apart
 from hmpim.identify.result import (
     Estimate,
     FrequencyResponse,
@@ -28,8 +27,9 @@ from hmpim.identify.result import (
     PairIdentification,
     Parameters,
 )
+from hmpim.identify.result.error_bars import estimate, noise_estimate
+from hmpim.identify.result.groups import EVERY, MODELLED, PHASE_SPLIT
 from hmpim.identify.result.lookup import find_pair
-from hmpim.identify.uncertainty import estimate, noise_estimate
 from hmpim.record import Finding, Intersample, Record
 
 __all__ = ["RepeatedPair", "RepeatedParameter", "Repeats", "identify_repeats"]

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hmpim.errors import ArgumentError
-from hmpim.identify.correlation import autocorrelation
+from hmpim.identify.section_iv.correlation import autocorrelation
 from hmpim.identify.signals import as_signal
 
 __all__ = ["Infinity", "noise_by_autocorrelation"]

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from hmpim.errors import ArgumentError
-from hmpim.identify.levels import compare_levels
+from hmpim.identify.records.levels import compare_levels
 from hmpim.identify.result import Estimate, Parameters
 
 

@@ -12,8 +12,9 @@ from hmpim.identify.fitting.trial import JointFit
 from hmpim.identify.noise.autoregression import autoregressive_spectrum
 from hmpim.identify.noise.covariance import covariance
 from hmpim.identify.noise.whiteness import is_white
+from hmpim.identify.reading.propagation import gradient
 from hmpim.identify.result import Estimate, Parameters
-from hmpim.identify.uncertainty import estimate, gradient, noise_estimate
+from hmpim.identify.result.error_bars import estimate, noise_estimate
 from hmpim.model.dynamics import Structure, coefficients_of, denominator_of
 from hmpim.model.filters import in_delta
 from hmpim.model.response import (

@@ -1,0 +1,53 @@
+"""A value with its error bar: Student's t around an estimate, chi-squared around a noise."""
+
+import numpy as np
+import scipy
+
+from hmpim.identify.result.estimate import Estimate
+
+__all__ = ["estimate", "noise_estimate"]
+
+
+def estimate(value: float, variance: float, *, freedom: float, unit: str = "") -> Estimate:
+    """Value with its standard deviation and 95 % interval (Student's t).
+
+    Examples
+    --------
+    >>> estimate(1.0, 0.01, freedom=1e9).ci95[1].__round__(3)
+    1.196
+    """
+    std = float(np.sqrt(max(variance, 0.0)))
+    half = float(scipy.special.stdtrit(max(freedom, 1.0), 0.975)) * std
+    return Estimate(
+        value=float(value), std=std, ci95=(float(value - half), float(value + half)), unit=unit
+    )
+
+
+def noise_estimate(
+    sum_of_squares: float, *, freedom: int, share: float, unit: str = ""
+) -> Estimate:
+    """Standard deviation of the noise, its own error, and its interval (chi-squared).
+
+    Parameters
+    ----------
+    sum_of_squares : float
+        Of the residual.
+    freedom : int
+        Samples that counted less parameters.
+    share : float
+        Independent samples per sample, 1 for white noise.
+    unit : str
+        Of the output.
+    """
+    sigma = float(np.sqrt(sum_of_squares / freedom))
+    effective = max(freedom * share, 1.0)
+    low, high = (
+        float(scipy.special.chdtri(effective, 0.025)),
+        float(scipy.special.chdtri(effective, 0.975)),
+    )
+    return Estimate(
+        value=sigma,
+        std=sigma / float(np.sqrt(2 * effective)),
+        ci95=(sigma * (effective / low) ** 0.5, sigma * (effective / high) ** 0.5),
+        unit=unit,
+    )
