@@ -88,6 +88,7 @@ def identify(
 
     Examples
     --------
+    >>> import numpy as np
     >>> rng = np.random.default_rng(1)
     >>> t = np.arange(1000) / 100
     >>> u = np.sin(2 * np.pi * (0.1 * t + 1.0 * t**2))

@@ -78,12 +78,13 @@ def gain_and_phase(
 
     Examples
     --------
-    >>> import hmpim
+    >>> from hmpim.identify import identify
+    >>> from hmpim.record import Record
     >>> rng = np.random.default_rng(1)
     >>> t = np.arange(2000) / 200
     >>> u = np.sin(2 * np.pi * (0.1 * t + t**2))
     >>> y = 2.0 * np.interp(t - 0.05, t, u, left=0) + 0.01 * rng.standard_normal(2000)
-    >>> result = hmpim.identify(hmpim.Record.from_arrays({"u": u}, {"y": y}, fs=200.0))
+    >>> result = identify(Record.from_arrays({"u": u}, {"y": y}, fs=200.0))
     >>> at = gain_and_phase(result["y", "u"], 5.0, fs=200.0)[0]
     >>> round(at.phase.value), round(at.model_phase.value), round(at.model_gain_db.value, 1)
     (-90, -90, 6.0)
