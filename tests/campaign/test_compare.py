@@ -149,7 +149,7 @@ def test_page_says_how_to_read_it_and_why_a_verdict_is_not_ok(demo):
     assert "Noise (deg)" in cases.columns
     assert "Load" not in cases.columns  # the usual one in every row
     verdicts = [row[cases.columns.index("Verdict")] for row in cases.rows]
-    (remarks,) = [grid for grid in page.grids if grid.caption.startswith("What the identif")]
+    (remarks,) = [grid for grid in page.grids if grid.caption.startswith("Findings of the identif")]
     assert f"{sum(v != 'ok' for v in verdicts)} of 5 verdicts" in remarks.caption
     told = {row[0]: int(row[1]) for row in remarks.rows}
     codes = [{w["code"] for w in row.pair["warnings"]} for row in study.rows]

@@ -5,7 +5,7 @@ import os
 import pytest
 from typer.testing import CliRunner
 
-from hmpim.cli.files import check_files
+from hmpim.cli.files import check_files, plan_file
 from hmpim.cli.main import app
 from hmpim.errors import ArgumentError
 
@@ -163,3 +163,14 @@ def test_a_folder_without_write_permission(tmp_path):
     with pytest.raises(ArgumentError, match="may not be written to"):
         check_files(folders={"--out": tmp_path / "new"})
     tmp_path.chmod(0o700)
+
+
+def test_a_folder_does_not_hide_a_plan_that_ships_and_a_file_does(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    ships = tmp_path / "inside.toml"
+    (tmp_path / "demo").mkdir()
+    assert plan_file("demo", ("demo",), lambda _: ships) == ships
+    (tmp_path / "example").write_text(PLAN)
+    assert plan_file("example", ("example",), lambda _: ships).read_text() == PLAN
+    with pytest.raises(ArgumentError, match="there is no plan sub"):
+        plan_file("sub", ("demo",), lambda _: ships)

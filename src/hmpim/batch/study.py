@@ -102,7 +102,7 @@ def study_page(
         facts=(
             ("Folder", str(table.folder)),
             ("Parts", str(len(table.paths))),
-            ("Asked", f"{table.request.keep}; inputs {table.request.inputs or 'as stated'}; "
+            ("Settings", f"{table.request.keep}; inputs {table.request.inputs or 'as stated'}; "
              f"outputs {table.request.outputs or 'as stated'}"),
             ("Made by", f"hmpim {version('hmpim')}, {datetime.now(UTC):%Y-%m-%d %H:%M UTC}"),
         ),
@@ -136,7 +136,7 @@ def outliers(values: Real) -> tuple[Real, float]:
 
 def _figures(found: Summary) -> Grid:
     return Grid(
-        caption="What was found",
+        caption="Results",
         columns=("Parameter", "Records", "Median", "5 %", "95 %", "Doubtful"),
         rows=tuple(
             (
@@ -178,9 +178,9 @@ def _between(table: BatchTable, found: Summary) -> tuple[Grid, ...]:
         rows=tuple(rows),
         note=(
             "Spread: standard deviation between records beyond their error bars (random effects, "
-            "restricted maximum likelihood). Share: of the variance that is between records. Where "
-            "intervals cover several models, the error bars are those of the likeliest one: "
-            "another moves all records alike."
+            "restricted maximum likelihood). Share: part of the variance that is between records. "
+            "Where intervals cover several models, the error bars are those of the likeliest one; "
+            "another model would shift all records alike."
         ),
     )
     return (grid,)
@@ -191,7 +191,7 @@ def _specified(outcomes: Sequence[Outcome]) -> tuple[Grid, ...]:
         return ()
     grid = Grid(
         caption="Specification",
-        columns=("Bound", "Met", "Not met", "Not sure", "Not told", "Outcome"),
+        columns=("Bound", "Met", "Not met", "Undecided", "No figure", "Outcome"),
         rows=tuple(
             (
                 o.bound.text,

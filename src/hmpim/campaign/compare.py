@@ -32,7 +32,7 @@ def bandwidth(row: Row) -> Reading | None:
 
 
 def samples_reading(row: Row) -> Reading | None:
-    """The -90° of samples over samples, off the response: friction fits no linear structure.
+    """The -90° of the sampled response, read off it: friction fits no linear structure.
 
     Its error is that of the reading it starts from, the surer of the model's and the response's;
     where the response tells nothing, that is the answer.
@@ -97,8 +97,8 @@ def findings(
             found.append(sentence)
     if compare == "modes" and any(_lifted(row) for row in rows):
         found.append(
-            "Friction counts as damping: beyond the servo's own frequency that turns the phase "
-            "forward, and with feedforward it raises the figure."
+            "Friction adds damping, which advances the phase beyond the servo's natural frequency: "
+            "with feedforward, friction raises the bandwidth."
         )
     if compare in ("excitation", "axes"):
         if couplings:
@@ -181,10 +181,10 @@ def _levels(axis: str, rows: list[Row]) -> str:
     text = (
         f"{axis}: {a.value:.2f} Hz at {low.peaks[2]:.0f} {unit}, {b.value:.2f} Hz at "
         f"{high.peaks[2]:.0f} {unit}. Linear to {100 * LINEAR:.0f} % from "
-        f"{start.peaks[2]:.0f} {unit} on (samples over samples, off the responses)."
+        f"{start.peaks[2]:.0f} {unit} on, read off the sampled responses."
     )
     if a.value < (1.0 - LINEAR) * b.value:
-        text += " The smaller the motion the lower the bandwidth, as dry friction makes it."
+        text += " Dry friction lowers the bandwidth of small motions."
     exact = high.pair["known"].get("exact_samples_bandwidth")
     if exact is not None:
         text += f" Without friction it is {exact:.2f} Hz at every level."
@@ -192,7 +192,7 @@ def _levels(axis: str, rows: list[Row]) -> str:
 
 
 def _modes(axis: str, rows: list[Row]) -> str:
-    """Samples over samples for every mode: behind the hold there is no figure for all three."""
+    """The sampled response for every mode: behind the hold there is no figure for all three."""
     said = []
     for rate in sorted({row.rate for row in rows}):
         seen, exact = [], []
@@ -205,11 +205,11 @@ def _modes(axis: str, rows: list[Row]) -> str:
             said.append(f"at {rate:g} Hz {', '.join(seen)}{free}")
     if not said:
         return ""
-    return f"{axis}, −90° of samples over samples: " + "; ".join(said) + "."
+    return f"{axis}, −90° of the sampled response: " + "; ".join(said) + "."
 
 
 def _samples_in_words(row: Row) -> str:
-    """The -90° of samples over samples; where no model reaches it, off the response alone."""
+    """The -90° of the sampled response, said to be read off it where no model reaches it."""
     reading = samples_reading(row)
     if reading is not None:
         return f"{reading.value:.1f} Hz"
@@ -217,8 +217,8 @@ def _samples_in_words(row: Row) -> str:
     near = first_crossing(response)
     found = None if near is None else samples_bandwidth(response, near=near)
     if found is None:
-        return "unknown: the response is not clear up to there"
-    return f"{found:.1f} Hz off the response alone, for the model does not reach −90°"
+        return "unknown (the response is too noisy there)"
+    return f"{found:.1f} Hz (read off the response; the model does not reach −90°)"
 
 
 def _lifted(row: Row) -> bool:
@@ -239,7 +239,7 @@ def _at_90(row: Row, varied: str) -> str:
     text = f"−90° at {found.value:.2f} ± {found.std:.2f} Hz{where}"
     if row.exact_bandwidth is not None:
         off = f"{_percent(found.value, row.exact_bandwidth):+.1f}".replace("-", "−")
-        text += f", {off} % from {row.exact_bandwidth:.2f} Hz, exact without friction"
+        text += f", {off} % from {row.exact_bandwidth:.2f} Hz, the exact value without friction"
     return text
 
 
@@ -275,13 +275,13 @@ def _strongest(couplings: Sequence[dict[str, Any]]) -> str:
     low, high = couplings[0]["band"]
     where = f"from {low:g} to {high:g} Hz"
     if not seen:
-        return f"No coupling {where} stands out of the noise."
+        return f"No coupling {where} exceeds its noise by three standard deviations."
     top = max(seen, key=lambda c: c["gain"])
     exact = top.get("exact")
     beside = "" if exact is None else f" (exact without friction: {100 * exact:.2f} %)"
     return (
-        f"{len(seen)} of {len(couplings)} couplings {where} stand out of the noise by three "
-        f"standard deviations; the strongest is {top['from']} to {top['to']}, "
+        f"{len(seen)} of {len(couplings)} couplings {where} exceed three standard "
+        f"deviations; the strongest is {top['from']} to {top['to']}, "
         f"{100 * top['gain']:.2f} ± {100 * top['std']:.2f} % of the command{beside}."
     )
 
@@ -330,10 +330,10 @@ def _fence(axis: str, rows: list[Row]) -> str:
         return ""
     return (
         f"{axis}: bins of the record are {bin_width:.3f} Hz apart at either rate. Over the upper "
-        f"half of the band the ratio of the spectra jumps from bin to bin by {' and '.join(jumps)} "
-        f"of itself (r.m.s.); the response estimated between the bins, locally, is sure to "
-        f"{' and '.join(parts)} (median). The faster commands bring twice the samples of the same "
-        "motion; and no peak falls through the fence."
+        f"half of the band the ratio of the spectra scatters from bin to bin by "
+        f"{' and '.join(jumps)} (r.m.s.); the local estimate of the response, which also holds "
+        f"between the bins, has a standard deviation of {' and '.join(parts)} (median). The faster "
+        "commands bring twice the samples of the same motion, and no peak is lost between bins."
     )
 
 

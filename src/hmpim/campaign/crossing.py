@@ -1,4 +1,4 @@
-"""Where a measured response crosses -90°, samples over samples: one reading for every mode."""
+"""Where a measured response crosses -90° from sample to sample: one reading for every mode."""
 
 from typing import Any
 

@@ -40,14 +40,14 @@ _INLINE = {words.name: words.inline for words in GLOSSARY}
 
 _READING = (
     "−90° is that of the fitted model: behind the hold where the record says that its input is "
-    "held (position commands alone, mode P), of samples over samples elsewhere; −90° of the "
+    "held (position commands alone, mode P), of the sampled response elsewhere; −90° of the "
     "response is the same, read off the measured response"
 )
-_DOUBTFUL = "a figure followed by ? is doubtful, and the others of its row are not"
+_DOUBTFUL = "? marks a doubtful figure; the others of its row are reliable"
 _EXACT = "exact is the linearised mechanics of the simulated table, without friction"
 _NEGATIVE = (
     "a negative delay belongs to the fit, not to the unit: where feedforward or friction shape "
-    "the response, dynamics and delay stand in for each other"
+    "the response, the fit can trade dynamics for delay"
 )
 
 
@@ -120,26 +120,29 @@ def axis_grid(study: Study) -> Grid:
         rows.append(
             (
                 axis,
-                row.test,
                 _cell(row, "bandwidth_phase90"),
-                "; ".join(wanted) or "–",
                 ("fail" if failed else "pass") if checks else "–",
-                f"{len(checks) - len(failed)} of {len(checks)}" if checks else "–",
                 row.verdict.replace("_", " "),
+                "; ".join(wanted) or "–",
+                f"{len(checks) - len(failed)} of {len(checks)}" if checks else "–",
                 doubtful_words([row]) or "–",
+                row.test,
             )
         )
     columns = (
         "Axis",
-        "Test",
         "−90° (Hz)",
-        "Specification",
         "Outcome",
-        "Checks met",
         "Verdict",
-        "Doubtful",
+        "Specification",
+        "Checks met",
+        "Doubtful figures",
+        "Test",
     )
-    return Grid(caption="Each axis: value ± standard deviation", columns=columns, rows=tuple(rows))
+    caption = "Each axis: value ± standard deviation"
+    if any(row[1].endswith("?") for row in rows):
+        caption += "; ? marks a doubtful value"
+    return Grid(caption=caption, columns=columns, rows=tuple(rows))
 
 
 def doubtful_words(rows: Sequence[Row], *, most: int = 4) -> str:
@@ -198,7 +201,7 @@ def _shown(reading: Reading | None) -> str:
 
 
 def check_grid(study: Study) -> Grid:
-    """Every limit of the specification, held against every case that it is for."""
+    """Every limit of the specification, checked in every case that it is for."""
     rows = []
     for check in study.checks:
         unit = "" if check.reading is None else check.reading.unit
@@ -212,7 +215,7 @@ def check_grid(study: Study) -> Grid:
                 check.outcome,
             )
         )
-    columns = ("Axis", "Case", "Quantity", "Wanted", "Found", "Outcome")
+    columns = ("Axis", "Case", "Quantity", "Required", "Found", "Outcome")
     failed = sum(check.outcome == "fail" for check in study.checks)
     return Grid(
         caption=f"Specification: {len(rows) - failed} of {len(rows)} checks met",
@@ -238,9 +241,9 @@ def bounds(low: float, high: float) -> str:
 
 
 def remark_grid(rows: Sequence[Row]) -> Grid | None:
-    """What the identifications remark: each kind once, with how many rows have it, and the first.
+    """Findings of the identifications: each kind once, with how many rows have it, and the first.
 
-    None where nothing is remarked.
+    None where there are none.
     """
     first: dict[str, str] = {}
     share: dict[str, list[bool]] = {}  # of the rows with this remark, whether it casts doubt
@@ -255,8 +258,8 @@ def remark_grid(rows: Sequence[Row]) -> Grid | None:
     unsure = sum(row.verdict != "ok" for row in rows)
     order = sorted(share, key=lambda code: -len(share[code]))
     return Grid(
-        caption=f"What the identifications remark; {unsure} of {len(rows)} verdicts are not ok",
-        columns=("Remark", "Rows", "Casts doubt", "For instance"),
+        caption=f"Findings of the identifications; {unsure} of {len(rows)} verdicts are not ok",
+        columns=("Finding", "Rows", "Casts doubt", "Example"),
         rows=tuple(
             (
                 code.replace("_", " "),
@@ -266,10 +269,10 @@ def remark_grid(rows: Sequence[Row]) -> Grid | None:
             )
             for code in order
         ),
-        note="A verdict that is not ok says that at least one figure of the row is doubtful: one "
-        "linear model of few poles is not all there is, because of friction, for instance, or the "
-        "record does not tell that parameter. The error bars say how well the best such model is "
-        "known.",
+        note="A verdict that is not ok means that at least one figure of the row is doubtful: "
+        "either a linear model of few poles does not describe the unit fully, because of friction, "
+        "for instance, or the record does not determine that parameter. The error bars state how "
+        "well the best such model is known.",
     )
 
 
@@ -279,8 +282,8 @@ def change_grid(study: Study) -> Grid:
     shared = len({(change.case_id, change.axis) for change in study.changes})
     whole = "" if shared == len(study.rows) else f"; {shared} of {len(study.rows)} rows are in both"
     return Grid(
-        caption=f"Against the earlier study: {len(moved)} of {len(study.changes)} figures differ "
-        f"by more than three standard deviations{whole}",
+        caption=f"Compared with the earlier study: {len(moved)} of {len(study.changes)} figures "
+        f"differ by more than three standard deviations{whole}",
         columns=("Axis", "Case", "Quantity", "Before", "Now"),
         rows=tuple(
             (
@@ -313,9 +316,9 @@ def coupling_grid(couplings: Sequence[dict[str, Any]]) -> Grid:
             "From → to",
             "Gain (% of the command)",
             *(("Exact (%)",) if exact else ()),
-            "Beyond three std",
+            "Above 3 std",
         ),
         rows=tuple(rows),
-        note="A gain that does not stand out by three standard deviations is mostly noise: it "
-        "tells how large the coupling may be, not how large it is.",
+        note="A gain of less than three standard deviations is mostly noise: it limits how large "
+        "the coupling may be, and does not measure it.",
     )

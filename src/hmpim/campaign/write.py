@@ -100,10 +100,10 @@ def headline(study: Study) -> str:
         failed = sum(check.outcome == "fail" for check in study.checks)
         said = f"{failed} of {count} checks are not met."
     if resting:
-        said += f" {resting} of them rest on a doubtful figure."
+        said += f" {resting} of them {'rests' if resting == 1 else 'rest'} on a doubtful figure."
     if unsure:
         names = doubtful_words(unsure)
-        said += f" {len(unsure)} of {len(study.rows)} rows hold doubtful figures"
+        said += f" {len(unsure)} of {len(study.rows)} rows have doubtful figures"
         said += f": {names}." if names else "."
     return said
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from hmpim.cli.files import check_files
+from hmpim.cli.files import check_files, plan_file
 from hmpim.cli.terminal import output_console, say, stopping
 from hmpim.errors import ArgumentError
 
@@ -63,12 +63,8 @@ def campaign(
         return
     if plan is None:
         raise ArgumentError("PLAN.toml is missing; 'hmpim campaign --example' prints one")
-    path = Path(plan)
-    if plan not in PLANS and not path.exists():
-        raise ArgumentError(
-            f"there is no plan {plan}; give a file, or one that ships: {', '.join(PLANS)}"
-        )
-    wanted = read_plan(shipped_plan(plan) if plan in PLANS and not path.exists() else path)
+    path = plan_file(plan, PLANS, shipped_plan)
+    wanted = read_plan(path)
 
     from hmpim.campaign.run import run_campaign
     from hmpim.campaign.study import check_earlier, make_study

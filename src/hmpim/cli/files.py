@@ -1,13 +1,13 @@
 """Files that a command reads and writes, checked before any work is done."""
 
 import os
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from itertools import combinations
 from pathlib import Path
 
 from hmpim.errors import ArgumentError
 
-__all__ = ["check_files"]
+__all__ = ["check_files", "plan_file"]
 
 Paths = Path | Sequence[Path] | None
 
@@ -124,3 +124,38 @@ def _same(one: Path, other: Path) -> bool:
 def _inside(path: Path, folder: Path) -> bool:
     path, folder = path.resolve(), folder.resolve()
     return path == folder or folder in path.parents
+
+
+def plan_file(plan: str, ships: Sequence[str], shipped: Callable[[str], Path]) -> Path:
+    """Return the file of a plan: the one of that name, or else the one that ships.
+
+    A folder is no plan, so that one named `demo` does not hide the plan `demo`.
+
+    Parameters
+    ----------
+    plan : str
+        A path, or the name of a plan that ships.
+    ships : sequence of str
+        Names of the plans that ship.
+    shipped : callable
+        Path of one of them.
+
+    Raises
+    ------
+    ArgumentError
+        If there is neither.
+
+    Examples
+    --------
+    >>> plan_file("nothing", ("demo",), Path)
+    Traceback (most recent call last):
+    hmpim.errors.ArgumentError: there is no plan nothing; give a file, or one that ships: demo
+    """
+    path = Path(plan)
+    if path.exists() and not path.is_dir():
+        return path
+    if plan in ships:
+        return shipped(plan)
+    raise ArgumentError(
+        f"there is no plan {plan}; give a file, or one that ships: {', '.join(ships)}"
+    )

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from hmpim.cli.crew import Scheduler, Workers
-from hmpim.cli.files import check_files
+from hmpim.cli.files import check_files, plan_file
 from hmpim.cli.terminal import output_console, say, warn
 from hmpim.errors import ArgumentError
 
@@ -62,12 +62,8 @@ def montecarlo(
     from hmpim.formats.atomic import write_text
     from hmpim.report.study import render_study
 
-    path = Path(plan)
-    if plan not in PLANS and not path.exists():
-        raise ArgumentError(
-            f"there is no plan {plan}; give a file, or one that ships: {', '.join(PLANS)}"
-        )
-    wanted = read_plan(shipped_plan(plan) if plan in PLANS and not path.exists() else path)
+    path = plan_file(plan, PLANS, shipped_plan)
+    wanted = read_plan(path)
     if draws is not None:
         if draws < 1:
             raise ArgumentError(f"--draws {draws}: give 1 or more")

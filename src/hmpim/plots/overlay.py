@@ -134,7 +134,10 @@ def beside_bode(
                 found = bandwidths[i]
                 if found is not None:
                     mark = _marked(*found, place=place) if panel.row else _interval(*found)
-                    items.append(replace(mark, colour=colour, dashes=dashes) if within else mark)
+                    if within:  # columns are narrow: the dotted line says what is marked
+                        mark = replace(mark, words=mark.words.removeprefix("−90° at "))
+                        mark = replace(mark, colour=colour, dashes=dashes)
+                    items.append(mark)
             panels.append(
                 replace(
                     panel,

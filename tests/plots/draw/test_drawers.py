@@ -195,3 +195,15 @@ def test_no_two_colours_of_curves_look_alike(sight):
     }
     for one, other in combinations(seen, 2):
         assert np.linalg.norm(seen[one] - seen[other]) > 0.1, (one, other)  # 25 of 255 steps
+
+
+def test_a_long_upright_label_has_room_beside_its_panel():
+    def beside(label):
+        panel = Panel(x=Axis(label="Time (s)"), y=Axis(label=label))
+        figure = Figure(panels=(panel,), alt="", heights=(1.5,))
+        (place,), _ = places(figure, frames(figure), width=350.0)
+        return place.height
+
+    label = "Bandwidth, −90° without delay (Hz)"
+    assert beside("y") < 150.0
+    assert beside(label) >= 0.8 * text_width(label)

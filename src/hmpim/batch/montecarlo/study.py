@@ -8,8 +8,10 @@ import numpy as np
 from hmpim.batch.montecarlo.plan import Plan
 from hmpim.batch.montecarlo.summary import FAR, MonteCarlo, Region, Share
 from hmpim.plots import Axis, Figure, Panel, Points, Rule
+from hmpim.plots.style import axis_label
 from hmpim.report.figures import Picture
 from hmpim.report.study import Grid, Section, StudyPage
+from hmpim.report.words import label_of
 
 __all__ = ["montecarlo_page"]
 
@@ -27,6 +29,14 @@ _SHORT = {
     "peak_gain_db": "peak",
 }
 """Names that fit below a picture."""
+
+_UNITS = {
+    **dict.fromkeys(("delay", "delay_low_frequency", "delay_correlation", "time_constant"), "s"),
+    **dict.fromkeys(("natural_frequency", "bandwidth_3db", "bandwidth_phase90"), "Hz"),
+    "bandwidth_phase90_without_delay": "Hz",
+    "peak_gain_db": "dB",
+    **dict.fromkeys(("damping_ratio", "scale_factor"), "–"),
+}
 
 
 def montecarlo_page(plan: Plan, found: MonteCarlo) -> StudyPage:
@@ -77,10 +87,16 @@ def _percent(share: Share) -> str:
 def _parameters(found: MonteCarlo) -> Grid:
     return Grid(
         caption="Parameters, of draws whose structure was found",
-        columns=("Parameter", "Draws", "R.m.s. error", "Over the bound", "95 % interval holds"),
+        columns=(
+            "Parameter",
+            "Draws",
+            "R.m.s. error",
+            "Over the bound",
+            "95 % interval contains truth",
+        ),
         rows=tuple(
             (
-                score.name.replace("_", " "),
+                axis_label(label_of(score.name), _UNITS.get(score.name, "output unit")),
                 str(score.coverage.count),
                 f"{score.rms:.4g}",
                 f"{score.over_bound:.3f}" if np.isfinite(score.over_bound) else "–",
@@ -88,7 +104,8 @@ def _parameters(found: MonteCarlo) -> Grid:
             )
             for score in found.parameters
         ),
-        note="The bound is Cramér and Rao's for white noise, each draw's own; 1 is the best.",
+        note="The bound is the Cramér-Rao bound of each draw, for white noise; 1 is the best "
+        "possible.",
     )
 
 
@@ -122,8 +139,8 @@ def _errors(found: MonteCarlo) -> Picture:
 def _coverage(found: MonteCarlo) -> Picture:
     return _picture(
         "coverage",
-        "How often the interval holds the truth",
-        "Share of draws whose 95 % interval holds the truth.",
+        "How often the interval contains the truth",
+        "Share of draws whose 95 % interval contains the truth.",
         [s.name for s in found.parameters],
         _shares([s.coverage for s in found.parameters]),
         (100 * _STATED, "stated"),
@@ -142,7 +159,7 @@ def _by_region(quantity: str, found: MonteCarlo) -> Section:
     grid = Grid(
         caption=f"Quarters of {quantity}",
         columns=(
-            "From … to", "Over the bound", "95 % interval holds", "Structure right", "ok",
+            "From … to", "Over the bound", "95 % interval contains truth", "Structure right", "ok",
             "ok and wrong",
         ),
         rows=tuple(
@@ -161,7 +178,7 @@ def _by_region(quantity: str, found: MonteCarlo) -> Section:
         _picture(
             f"{quantity}-coverage",
             f"Coverage by {quantity}",
-            "Share of all intervals that hold the truth, by quarter.",
+            "Share of all intervals that contain the truth, by quarter.",
             names,
             _shares([r.coverage for r in some]),
             (100 * _STATED, "stated"),

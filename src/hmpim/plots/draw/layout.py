@@ -11,6 +11,7 @@ SIZE = 12.0  # of the letters, px
 LINE = 17.0  # from one line of words to the next
 _PER_INCH = 96.0
 _HANDLE = 30.0  # of a legend's entry, gaps included
+_UPRIGHT = 0.85  # of `text_width`, which is generous: an upright label may end where its field does
 _BAR = 66.0  # of an image's colours
 
 
@@ -95,6 +96,7 @@ def places(figure: Figure, shown: list[Frame], *, width: float) -> tuple[list[Pl
     tops = dict.fromkeys(set(rows), 0.0)
     bottoms = dict(tops)
     heights = dict(tops)
+    inside = dict.fromkeys(tops, 70.0)  # of the field of data; its label stands beside it
     for (panel, _), row in zip(panels, rows, strict=True):
         inner = each * (1 if columns == 1 else panel.columns) - lefts[0] - 14.0
         legend = legend_lines(panel, inner)
@@ -103,13 +105,14 @@ def places(figure: Figure, shown: list[Frame], *, width: float) -> tuple[list[Pl
         tops[row] = max(tops[row], LINE * lines + 8.0)
         below = LINE * (panel.x.numbered + bool(panel.x.label)) + 8.0
         bottoms[row] = max(bottoms[row], below)
+        inside[row] = max(inside[row], _UPRIGHT * text_width(panel.y.label))
         heights[row] = max(heights[row], _PER_INCH * figure.heights[panel.row])
     out = []
     start = {}
     at = 0.0
     for row in sorted(heights):
         start[row] = at
-        at += max(heights[row], tops[row] + bottoms[row] + 70.0)
+        at += max(heights[row], tops[row] + bottoms[row] + inside[row])
     ends = [*sorted(start.values())[1:], at]
     row_ends = dict(zip(sorted(start), ends, strict=True))
     for (panel, frame), row in zip(panels, rows, strict=True):
