@@ -17,6 +17,7 @@ __all__ = [
     "CLEARLY",
     "COVERAGE",
     "DEVIATIONS",
+    "EXCLUDED",
     "FALSE_ALARM",
     "HALF",
     "LIKELIER",
@@ -55,6 +56,9 @@ def deviations(questions: int = 1) -> float:
 
 DEVIATIONS = deviations()
 """The same of a single question: 3.89."""
+
+EXCLUDED = DEVIATIONS**2
+"""Deviance at which the rate of false alarms excludes one parameter less: 15.1."""
 
 HALF = float(scipy.special.ndtri(0.5 + COVERAGE / 2))
 """Deviations of a normal error on either side that such an interval spans: 1.96."""

@@ -16,7 +16,7 @@ from hmpim.identify.fitting.fit import Fit
 from hmpim.identify.fitting.plainer import plainer, taking
 from hmpim.identify.fitting.trial import JointFit
 from hmpim.identify.frf.local import local_response
-from hmpim.identify.judgement import ROUNDING, Evidence, attempt, judge
+from hmpim.identify.judgement import Evidence, attempt, judge
 from hmpim.identify.noise.misfit import Misfit, misfit
 from hmpim.identify.nonlinear.nonlinearity import Inspection, inspect_nonlinearity
 from hmpim.identify.reading.bandwidth import response_bandwidths
@@ -36,6 +36,7 @@ from hmpim.identify.result.error_bars import estimate, noise_estimate
 from hmpim.identify.result.groups import EVERY
 from hmpim.identify.section_iv.paper import paper_estimates
 from hmpim.identify.section_iv.spectrum import excited_band
+from hmpim.identify.worth import ROUNDING
 from hmpim.model.filters import in_z
 from hmpim.model.response import RationalDelay
 from hmpim.record import Finding

@@ -9,12 +9,10 @@ from hmpim.identify.asked.question import Question
 from hmpim.identify.fitting.enrich import PLAIN
 from hmpim.identify.fitting.joint import joint_fit
 from hmpim.identify.fitting.software import is_exact, software_fit
+from hmpim.identify.worth import ROUNDING
 from hmpim.model.dynamics import FILTERS, StructureName
 
 __all__ = ["recognise_software"]
-
-_EXACT = 1e-9
-"""Share of the output (r.m.s.) up to which a model explains a record to rounding."""
 
 
 def recognise_software(question: Question) -> Question:
@@ -31,7 +29,7 @@ def recognise_software(question: Question) -> Question:
     if not is_exact(u, y):
         return question
     filters = software_fit(u, y).best.fit
-    enough = _EXACT**2 * float(np.sum((y - y.mean()) ** 2))
+    enough = ROUNDING**2 * float(np.sum((y - y.mean()) ** 2))
     plain = [trial.fit for trial in joint_fit(u, y, structures=PLAIN).trials]
     exact = [fit.structure.parameters for fit in plain if fit.cost <= enough]
     if filters.cost > enough or filters.structure.parameters > min(exact, default=np.inf):

@@ -22,6 +22,7 @@ from hmpim.identify.result import (
 )
 from hmpim.identify.result.error_bars import estimate
 from hmpim.identify.result.groups import EVERY, MODELLED
+from hmpim.identify.worth import LOOSE, PAST
 from hmpim.record import Aligned, Finding, Record, Signal
 
 __all__ = ["Responses", "inputs_of", "responses_of", "settled", "unrelated"]
@@ -34,12 +35,6 @@ _NEVER_APART = 0.05
 
 _MENTIONED, _DOUBTED = 0.1, 0.5
 """Shares of an input's band in which it is not told from others: for a word, for a doubt."""
-
-_KNOWN = 0.5
-"""Relative standard deviation beyond which a weak coupling's parameter is not told."""
-
-_KNOWN_LAG = 0.33
-"""Likewise for a time constant, which is never below 0: told only when large, it would be so."""
 
 _LARGEST_DB = 6.0
 """Standard deviation of a peak, in dB, beyond which it is not told."""
@@ -299,10 +294,10 @@ def _told(p: Parameters, band: tuple[float, float]) -> tuple[Parameters, list[st
     """Parameters that a weak coupling's record tells, and the names of the others."""
 
     def loose(e: Estimate) -> bool:
-        return not e.spread <= _KNOWN * abs(e.value)
+        return not e.spread <= LOOSE * abs(e.value)
 
     def beyond(e: Estimate) -> bool:
-        return loose(e) or not band[0] <= e.value <= 1.2 * band[1]
+        return loose(e) or not band[0] <= e.value <= PAST * band[1]
 
     def late(e: Estimate) -> bool:
         return not e.spread <= 0.5 / band[1]
@@ -310,7 +305,7 @@ def _told(p: Parameters, band: tuple[float, float]) -> tuple[Parameters, list[st
     gone: set[str] = set()
     for name, bad in (
         ("scale_factor", loose),
-        ("time_constant", lambda e: not e.spread <= _KNOWN_LAG * abs(e.value)),
+        ("time_constant", lambda e: not e.spread <= LOOSE * abs(e.value)),
         ("damping_ratio", loose),
         ("natural_frequency", beyond),
         ("bandwidth_phase90", beyond),

@@ -22,6 +22,7 @@ from hmpim.identify.noise.autoregression import innovation_gain
 from hmpim.identify.noise.colour import bias_drift
 from hmpim.identify.noise.covariance import covariance
 from hmpim.identify.noise.whiteness import is_white
+from hmpim.identify.worth import POOR
 from hmpim.model import slowest_time_constant
 from hmpim.record import Finding
 
@@ -35,9 +36,6 @@ _STEEP = 80.0
 
 _SLOW = 0.25
 """Time constant of the model, over the record's length, that may be a drift in disguise."""
-
-_POOR = 0.3
-"""Share of the output's power left over from which a drift is looked for in any case."""
 
 _BEHIND_LEVELS = 0.3
 """Gain per sample, in the criterion, that a drift of a clipped output must bring."""
@@ -129,7 +127,7 @@ def _asked_for(joint: JointFit) -> bool:
     if is_white(fit.residual):
         return False
     spread = problem.masked(problem.y - problem.y.mean())
-    if fit.cost > _POOR * float(spread @ spread):
+    if fit.cost > POOR * float(spread @ spread):
         return True
     counted = np.arange(problem.y.size) if problem.valid is None else np.flatnonzero(problem.valid)
     residual = fit.residual[counted]

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hmpim.identify.noise.whiteness import effective_share
+from hmpim.identify.worth import WORTH
 
 __all__ = ["Plateaus", "smeared_plateaus"]
 
@@ -32,9 +33,6 @@ _GAIN = 40.0
 
 _BEYOND = 0.3
 """Standard deviations of the noise by which the prediction must go beyond on average."""
-
-_WORTH = 0.003
-"""And share of the output's span."""
 
 _FLAT = 0.3
 """Slope of the output against the prediction on a plateau; 1 where nothing is clipped."""
@@ -108,7 +106,7 @@ def smeared_plateaus(
     bent = np.vstack([rows, prediction**2, prediction**3])
     if _cost(y, bent) - best.cost < 0.25 * _GAIN * variance:
         return None
-    least = max(_BEYOND * float(np.sqrt(best.cost / y.size)), step, _WORTH * float(np.ptp(y)))
+    least = max(_BEYOND * float(np.sqrt(best.cost / y.size)), step, WORTH * float(np.ptp(y)))
     excess = np.abs(best.unclipped - np.clip(best.unclipped, best.low, best.high))
     kept = tuple(
         bool(np.any(clipped) and np.mean(excess[clipped]) > least)

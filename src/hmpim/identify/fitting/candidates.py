@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 from hmpim.identify.chance import CLEARLY, FALSE_ALARM
 from hmpim.identify.fitting.beginning import in_motion
-from hmpim.identify.fitting.data import HOPELESS, POOR, Data, Seen, band_of, shifted
+from hmpim.identify.fitting.data import HOPELESS, Data, Seen, band_of, shifted
 from hmpim.identify.fitting.enrich import (
     INTEGRATING,
     PLAIN,
@@ -21,6 +21,7 @@ from hmpim.identify.fitting.unexplained import unexplained_response
 from hmpim.identify.noise.misfit import misfit
 from hmpim.identify.noise.whiteness import effective_share, is_white
 from hmpim.identify.signals import longest_lag
+from hmpim.identify.worth import MATERIAL, POOR
 from hmpim.model.dynamics import STRUCTURES, Structure, StructureName, coefficients_of
 from hmpim.model.response import slowest_time_constant
 from hmpim.record import BETWEEN, Intersample
@@ -35,9 +36,6 @@ __all__ = [
     "reduced",
     "refit_between",
 ]
-
-_MATERIAL = 0.01
-"""Share of the output (r.m.s.) below which a misfit is reported but not modelled."""
 
 _PARTLY = 0.08
 """Share of the response, evenly over the band, below which the same holds."""
@@ -219,7 +217,7 @@ def is_worth_explaining(problem: Problem, fit: Fit, data: Data) -> bool:
     spread = _spread(problem)
     owed = float(np.sqrt(left.share * fit.cost / spread)) if spread else 0.0
     if left.probability < FALSE_ALARM and (
-        owed > _MATERIAL or _misses_part(problem, fit, data, band)
+        owed > MATERIAL or _misses_part(problem, fit, data, band)
     ):
         return True
     return _is_poor(fit, spread)

@@ -18,7 +18,6 @@ from hmpim.record import Intersample
 __all__ = [
     "FINAL_PRECISION",
     "HOPELESS",
-    "POOR",
     "Data",
     "Seen",
     "band_of",
@@ -31,9 +30,6 @@ __all__ = [
 HOPELESS = 2.0
 """A structure whose sum of squares is this many times the least is not tried again at once
 under the other assumptions."""
-
-POOR = 0.2
-"""Share of the output's power left over, in colour, that asks for a richer structure anyway."""
 
 FINAL_PRECISION = 1e-6
 """Precision of the chosen fit, see `fit_structure`."""

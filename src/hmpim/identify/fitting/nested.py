@@ -8,14 +8,12 @@ a few of its own errors of 0.
 import numpy as np
 from numpy.typing import NDArray
 
+from hmpim.identify.chance import EXCLUDED
 from hmpim.identify.fitting.fit import Fit, fit_structure
 from hmpim.identify.fitting.trial import JointFit
 from hmpim.model.dynamics import STRUCTURES
 
-__all__ = ["FAR", "stretched", "widened"]
-
-FAR = 30.0
-"""Deviance beyond which the simpler structure is out of the question."""
+__all__ = ["stretched", "widened"]
 
 
 def widened(joint: JointFit, cov: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -48,11 +46,11 @@ def widened(joint: JointFit, cov: NDArray[np.float64]) -> NDArray[np.float64]:
     )
     if fit.structure.name != "second_order" or simple is None or not np.isfinite(cov).all():
         return cov
-    if _deviance(simple, joint) > 2 * FAR:
+    if _deviance(simple, joint) > 2 * EXCLUDED:
         return cov
     simple = fit_structure(problem, STRUCTURES["first_order"], simple.theta)
     deviance = _deviance(simple, joint)
-    if deviance > FAR:
+    if deviance > EXCLUDED:
         return cov
     return stretched(cov, simple, fit, deviance)
 

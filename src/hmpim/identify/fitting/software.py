@@ -21,6 +21,7 @@ from hmpim.identify.fitting.start import coarse_lag
 from hmpim.identify.fitting.trial import JointFit, trial_of
 from hmpim.identify.fitting.unrelated import is_unrelated
 from hmpim.identify.noise.whiteness import effective_share
+from hmpim.identify.worth import ROUNDING
 from hmpim.model.dynamics import FILTERS, Structure
 from hmpim.model.filters import nyquist_taps, section_parameters
 from hmpim.model.sampled import prepare_input
@@ -46,9 +47,6 @@ _NEAR = 3
 
 _ROUNDING = 1e-11
 """Share of the output (r.m.s.) down to which nothing is told from rounding."""
-
-_EXACT = 1e-9
-"""Share of the output (r.m.s.) up to which an equation holds exactly."""
 
 _REFINED = 4
 """Times that input and output are filtered by the poles found."""
@@ -130,7 +128,7 @@ def is_exact(u: Real, y: Real) -> bool:
     >>> is_exact(u, y), is_exact(u, y + 1e-6 * np.cos(np.arange(400) ** 2))
     (True, False)
     """
-    allowed = _EXACT**2 * float(y.var()) * min(u.size - _ORDER, _GLANCES[-1])
+    allowed = ROUNDING**2 * float(y.var()) * min(u.size - _ORDER, _GLANCES[-1])
     for most in _GLANCES:
         equations = _equations(u, y, None, most=most)
         _, left = solved_exactly(equations.factor[:, :-1].T, equations.factor[:, -1])

@@ -21,6 +21,7 @@ from hmpim.identify.fitting.trial import Trial
 from hmpim.identify.noise.autoregression import autoregression
 from hmpim.identify.noise.covariance import covariance
 from hmpim.identify.signals import longest_lag
+from hmpim.identify.worth import POOR
 from hmpim.record import Intersample
 
 __all__ = ["is_contradicted", "noise_of", "prewhitened_of", "refit_whitened"]

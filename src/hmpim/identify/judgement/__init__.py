@@ -12,14 +12,13 @@ failed           a check that raises costs itself, and nothing else
 verdict          from findings to a verdict for each parameter and for the pair
 """
 
-from hmpim.identify.judgement.checks import CHECKS, ROUNDING, Check, judge
+from hmpim.identify.judgement.checks import CHECKS, Check, judge
 from hmpim.identify.judgement.evidence import Evidence
 from hmpim.identify.judgement.failed import attempt
 from hmpim.identify.judgement.verdict import all_doubted, judged, judged_together
 
 __all__ = [
     "CHECKS",
-    "ROUNDING",
     "Check",
     "Evidence",
     "all_doubted",

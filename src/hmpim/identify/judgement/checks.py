@@ -28,12 +28,10 @@ from hmpim.identify.judgement.residual import (
 )
 from hmpim.identify.judgement.response import bandwidth_disagrees
 from hmpim.identify.judgement.structure import missed_pole, other_order
+from hmpim.identify.worth import ROUNDING
 from hmpim.record import Finding
 
 __all__ = ["CHECKS", "Check", "judge"]
-
-ROUNDING = 1e-9
-"""Share of the output (r.m.s.) below which what is left over is rounding, and says nothing."""
 
 Check = Callable[[Evidence], tuple[Finding, ...]]
 """Looks at the evidence and says what it finds, if anything."""

@@ -10,6 +10,7 @@ from hmpim.identify.fitting.enrich import PLAIN
 from hmpim.identify.fitting.growth import scale_of
 from hmpim.identify.judgement.evidence import Evidence, structure_in_words
 from hmpim.identify.result.groups import MODELLED, PHASE_SPLIT, TIMING
+from hmpim.identify.worth import PAST
 from hmpim.model import response, slowest_time_constant
 from hmpim.record import Finding
 
@@ -27,9 +28,6 @@ __all__ = [
 
 _OUTSIDE = 2.0
 """Mode of a richer structure, over the end of the excited band, that no record tells."""
-
-_PAST = 1.2
-"""Natural frequency, over the end of the excited band, up to which the band still tells it."""
 
 _FEET = 1e-5
 """Power of an input over its greatest, below which it excites nothing."""
@@ -89,7 +87,7 @@ def fast_mode(evidence: Evidence) -> tuple[Finding, ...]:
 def natural_frequency_beyond(evidence: Evidence) -> tuple[Finding, ...]:
     """Doubt a natural frequency that was not excited, and the delay that goes with it."""
     natural = evidence.readings.parameters.natural_frequency
-    if natural is None or natural.value <= _PAST * evidence.band[1]:
+    if natural is None or natural.value <= PAST * evidence.band[1]:
         return ()
     return (
         Finding(

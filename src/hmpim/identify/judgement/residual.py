@@ -9,6 +9,7 @@ from hmpim.identify.judgement.evidence import Evidence, structure_in_words
 from hmpim.identify.noise.colour import noise_colour
 from hmpim.identify.noise.input_noise import input_noise
 from hmpim.identify.result.groups import GAIN, MODELLED
+from hmpim.identify.worth import MATERIAL, TOLERATED, WORTH
 from hmpim.record import Finding
 
 __all__ = [
@@ -20,9 +21,6 @@ __all__ = [
     "uneven_noise",
 ]
 
-_TOLERATED_MISFIT = 0.03
-"""Misfit, over the output's own r.m.s., beyond which a result is doubtful."""
-
 _OF_THE_NOISE = 0.1
 """Share of the residual's power that follows the input, beyond which it is not the noise's."""
 
@@ -32,12 +30,6 @@ _MOSTLY_NOISE = 0.5
 _FAST = 9
 """Samples over which the size of what is fast in the input is taken."""
 
-_ATTENUATES = 0.002
-"""Share by which noise on the input must lower the gain to be worth a word."""
-
-_SPOILS = 0.01
-"""Share from which the size of the response is not to be relied on."""
-
 
 def lack_of_fit(evidence: Evidence) -> tuple[Finding, ...]:
     """Say that the residual still follows the input; a doubt from 3 % of the output on."""
@@ -45,7 +37,7 @@ def lack_of_fit(evidence: Evidence) -> tuple[Finding, ...]:
         return ()
     owed = float(np.sqrt(evidence.misfit.share)) * evidence.unexplained
     name = structure_in_words(evidence.joint.best.fit.structure.name)
-    if owed <= _TOLERATED_MISFIT and evidence.misfit.share > _OF_THE_NOISE:
+    if owed <= TOLERATED and evidence.misfit.share > _OF_THE_NOISE:
         return (
             Finding(
                 code="lack_of_fit",
@@ -62,7 +54,7 @@ def lack_of_fit(evidence: Evidence) -> tuple[Finding, ...]:
             message=f"The residual still follows the input: about {100 * owed:.2g} % of the output "
             f"(r.m.s.) is not described by the {name} model. "
             "Look at the Bode plot where model and measurement part.",
-            severity="doubt" if owed > _TOLERATED_MISFIT else "info",
+            severity="doubt" if owed > TOLERATED else "info",
             parameters=MODELLED,
         ),
     )
@@ -125,7 +117,7 @@ def halves_disagree(evidence: Evidence) -> tuple[Finding, ...]:
         joint.problem.y,
         share=joint.weighed_share,
     )
-    if halves.probability >= FALSE_ALARM or halves.owed <= _TOLERATED_MISFIT:
+    if halves.probability >= FALSE_ALARM or halves.owed <= TOLERATED:
         return ()
     return (
         Finding(
@@ -159,7 +151,7 @@ def noise_colour_of(evidence: Evidence) -> tuple[Finding, ...]:
 def noise_on_the_input(evidence: Evidence) -> tuple[Finding, ...]:
     """Say that the input is noisy; a doubt where gains come out too small by a hundredth."""
     noise = input_noise(evidence.u, evidence.fs, band=evidence.band)
-    if noise is None or noise.attenuation <= _ATTENUATES:
+    if noise is None or noise.attenuation <= WORTH:
         return ()
     return (
         Finding(
@@ -167,7 +159,7 @@ def noise_on_the_input(evidence: Evidence) -> tuple[Finding, ...]:
             message=f"The input carries noise of {noise.std:.3g} (standard deviation), which "
             f"lowers the gain found by about {100 * noise.attenuation:.2g} %. Use the "
             "command instead of its measurement, if you have it.",
-            severity="doubt" if noise.attenuation > _SPOILS else "info",
+            severity="doubt" if noise.attenuation > MATERIAL else "info",
             parameters=(*GAIN, "noise_std"),
         ),
     )

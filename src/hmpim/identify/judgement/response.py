@@ -5,12 +5,10 @@ import numpy as np
 from hmpim.identify.chance import DEVIATIONS
 from hmpim.identify.judgement.evidence import Evidence
 from hmpim.identify.result.groups import PHASE_SPLIT
+from hmpim.identify.worth import TOLERATED
 from hmpim.record import Finding
 
 __all__ = ["bandwidth_disagrees"]
-
-_MATTERS = 0.03
-"""Share of a bandwidth below which a disagreement is not worth a word."""
 
 _GAIN_SHAPE = ("natural_frequency", "damping_ratio", "time_constant", "peak_gain_db")
 """What shapes the gain about -3 dB."""
@@ -36,7 +34,7 @@ def bandwidth_disagrees(evidence: Evidence) -> tuple[Finding, ...]:
             continue
         apart = abs(one.value - other.value)
         if apart <= max(
-            DEVIATIONS * float(np.hypot(one.spread, other.spread)), _MATTERS * other.value
+            DEVIATIONS * float(np.hypot(one.spread, other.spread)), TOLERATED * other.value
         ):
             continue
         touched += [name, *shaped_by]

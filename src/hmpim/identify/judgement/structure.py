@@ -5,12 +5,10 @@ import numpy as np
 from hmpim.identify.chance import DEVIATIONS
 from hmpim.identify.judgement.evidence import Evidence, structure_in_words
 from hmpim.identify.result.groups import PHASE_SPLIT
+from hmpim.identify.worth import TOLERATED
 from hmpim.record import Finding
 
 __all__ = ["missed_pole", "other_order"]
-
-_MATTERS = 0.03
-"""Share of the fit's own time from which they matter."""
 
 
 def other_order(evidence: Evidence) -> tuple[Finding, ...]:
@@ -40,7 +38,7 @@ def missed_pole(evidence: Evidence) -> tuple[Finding, ...]:
         return ()
     order, fs = evidence.joint.best.fit.structure.order, evidence.fs
     moved = float(np.sqrt(abs(hidden.squared)))
-    if abs(hidden.squared) > DEVIATIONS * hidden.std and moved > _MATTERS * hidden.scale:
+    if abs(hidden.squared) > DEVIATIONS * hidden.std and moved > TOLERATED * hidden.scale:
         message = (
             f"The record asks for other dynamics than {order} pole{'s' * (order != 1)} "
             f"({abs(hidden.squared) / hidden.std:.0f} standard deviations), and the delay may be "

@@ -24,21 +24,10 @@ from hmpim.identify.nonlinear.sweep_phase import sweep_phase
 from hmpim.identify.nonlinear.words import general, particular
 from hmpim.identify.result import Estimate, HarmonicCurve, Nonlinearity
 from hmpim.identify.signals import as_signal
+from hmpim.identify.worth import MATERIAL, TOLERATED, WORTH
 from hmpim.record import Finding
 
 __all__ = ["Inspection", "Shares", "inspect_nonlinearity"]
-
-_SMALLEST = 0.003
-"""R.m.s. of the nonlinear part over that of the output from which it is worth a warning."""
-
-_DOUBTFUL = 0.005
-"""The same, from which parameters may depend on the amplitude by per cents."""
-
-_DOUBTFUL_UNSWEPT = 0.02
-"""The same without a sweep, where the traces see next to all of it."""
-
-_EFFECT = 0.01
-"""R.m.s. of all that a kind does, what passes for linear too, over that of the output, likewise."""
 
 _LONGEST = 32768
 """Samples of a sweep looked at one by one; longer records are averaged in blocks first."""
@@ -168,7 +157,7 @@ def inspect_nonlinearity(
     seen = look_at(look, fit)
     if plain is not None and seen.rms > 0:
         seen = plainer_of(look, seen, look_at(look, plain))
-    matters = seen.effect > _SMALLEST * output and seen.rms > floor
+    matters = seen.effect > WORTH * output and seen.rms > floor
     named = seen.named if matters else ()
     shares = _shares(seen, seen.fit.cost / max(problem.counted, 1))
     findings: list[Finding] = []
@@ -203,8 +192,8 @@ def inspect_nonlinearity(
 def _is_large(seen: Seen, output: float) -> bool:
     """Whether the linear parameters hold at this amplitude only."""
     if seen.harmonics is None:
-        return seen.rms > _DOUBTFUL_UNSWEPT * output
-    return seen.rms > _DOUBTFUL * output or seen.effect > _EFFECT * output
+        return seen.rms > TOLERATED * output
+    return seen.rms > MATERIAL * output or seen.effect > MATERIAL * output
 
 
 def _shares(seen: Seen, power: float) -> Shares:

@@ -17,6 +17,7 @@ from hmpim.identify.chance import FALSE_ALARM
 from hmpim.identify.identify import identify
 from hmpim.identify.records.alike import check_channels
 from hmpim.identify.result import Estimate, Identification, PairIdentification, Parameters
+from hmpim.identify.worth import TOLERATED, WORTH
 from hmpim.model.dynamics import FILTERS, STRUCTURES
 from hmpim.record import Finding, Intersample, Record
 
@@ -40,12 +41,6 @@ _COMPARED = (
     "delay",
 )
 """Parameters that a linear system keeps, the most telling first."""
-
-_WORTH = 0.002
-"""Least relative change that is reported: below it error bars alone are in question."""
-
-_LINEAR = 0.02
-"""Relative change from the smallest level up to which a level counts as in the linear range."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -246,7 +241,7 @@ def compare_levels(
     levels = _levels(results, amplitudes)
     trends = tuple(t for t in (_trend(levels, name) for name in _COMPARED) if t is not None)
     changed = [
-        t for t in trends if t.probability * len(trends) < FALSE_ALARM and abs(t.change) > _WORTH
+        t for t in trends if t.probability * len(trends) < FALSE_ALARM and abs(t.change) > WORTH
     ]
     reach = _linear_up_to(levels, trends)
     findings = []
@@ -325,7 +320,7 @@ def _linear_up_to(levels: list[Level], trends: tuple[Trend, ...]) -> float:
     for t in trends:
         for a, value, std in zip(t.amplitudes[1:], t.values[1:], t.stds[1:], strict=True):
             moved = abs(value - t.values[0])
-            if moved > _LINEAR * abs(t.values[0]) and moved > 3 * float(np.hypot(std, t.stds[0])):
+            if moved > TOLERATED * abs(t.values[0]) and moved > 3 * float(np.hypot(std, t.stds[0])):
                 before = [level.amplitude for level in levels if level.amplitude < a]
                 reach = min(reach, before[-1])
                 break

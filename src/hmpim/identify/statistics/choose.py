@@ -28,6 +28,7 @@ from hmpim.identify.statistics.products import Products
 from hmpim.identify.statistics.reach import AHEAD
 from hmpim.identify.statistics.start import excited, rough_of
 from hmpim.identify.statistics.statistics import Statistics
+from hmpim.identify.worth import MATERIAL
 from hmpim.model.dynamics import STRUCTURES, Structure, StructureName
 from hmpim.record import BETWEEN, Intersample
 
@@ -39,9 +40,6 @@ _FEWEST = 50
 _TASTE = 4
 _LONG_TASTE = 12
 """Steps from each start before the best one is followed to its end; of richer structures."""
-
-_MATERIAL = 0.01
-"""Share of the output (r.m.s.) below which a misfit is said but not modelled."""
 
 _FINAL_PRECISION = 1e-10
 """Of the chosen fit: 1e-5 standard deviations."""
@@ -321,7 +319,7 @@ def _owes(search: _Search, fitted: Fitted) -> bool:
     """Whether what is left over follows the input by more than a small share of the output."""
     left = search.follows(fitted)
     spread = search.products.moments(fitted.rows[:1], fitted.steady[:1]).energy
-    owed = left.share * fitted.fit.objective > _MATERIAL**2 * spread
+    owed = left.share * fitted.fit.objective > MATERIAL**2 * spread
     return left.probability < FALSE_ALARM and bool(owed)
 
 

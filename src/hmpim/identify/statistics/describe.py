@@ -7,8 +7,8 @@ import scipy
 from numpy.typing import NDArray
 
 from hmpim.errors import RecordError
-from hmpim.identify.chance import FALSE_ALARM
-from hmpim.identify.fitting.nested import FAR, stretched
+from hmpim.identify.chance import EXCLUDED, FALSE_ALARM
+from hmpim.identify.fitting.nested import stretched
 from hmpim.identify.fitting.rows import Problem
 from hmpim.identify.fitting.trial import JointFit
 from hmpim.identify.judgement import Evidence, judge, judged
@@ -249,7 +249,7 @@ def _covariance(chosen: Chosen) -> Real:
         return cov
     count = best.products.counted * (1.0 if best.products.order else chosen.left.share)
     deviance = float(count * np.log(max(simple.fit.objective / best.fit.objective, 1.0)))
-    return cov if deviance > FAR else stretched(cov, simple.fit, best.fit, deviance)
+    return cov if deviance > EXCLUDED else stretched(cov, simple.fit, best.fit, deviance)
 
 
 def _joint(statistics: Statistics, chosen: Chosen) -> JointFit:

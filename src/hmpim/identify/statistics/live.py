@@ -19,6 +19,7 @@ from hmpim.identify.statistics.misfit import Asked, asked_of, misfit_of
 from hmpim.identify.statistics.products import Products
 from hmpim.identify.statistics.reach import Reach
 from hmpim.identify.statistics.statistics import Statistics
+from hmpim.identify.worth import PAST
 from hmpim.record import Intersample
 from hmpim.stimulus import Stimulus
 
@@ -43,9 +44,6 @@ _BETWEEN = 1.05
 _TURN = 0.05
 """Cycles of the highest frequency by which the delay may move before what is asked for is made
 anew about it."""
-
-_PAST = 1.2
-"""Natural frequency, over the end of the band, up to which the band still tells it."""
 
 Real = NDArray[np.float64]
 
@@ -288,7 +286,7 @@ def _figures(fitted: Fitted, statistics: Statistics) -> Parameters:
 def _doubted(parameters: Parameters, time: float, highest: float, *, follows: bool) -> Parameters:
     """Nothing is claimed below 1/time, beyond the band, or while the residual follows the input."""
     natural = parameters.natural_frequency
-    outside = natural is not None and not 1.0 / time < natural.value < _PAST * highest
+    outside = natural is not None and not 1.0 / time < natural.value < PAST * highest
     if not (follows or outside):
         return parameters
     return all_doubted(parameters)
