@@ -26,9 +26,6 @@ __all__ = ["drift_or_levels", "fit", "look", "look_again", "mark_swapped", "thro
 
 _levels = kept(count_levels)
 
-_BETTER = 0.7
-"""Share of the noise's power under a drift below which a clipped level is taken instead."""
-
 
 def look(question: Question) -> Imperfections:
     """Find clipped, held, rounded, stuck and lost samples of the output."""
@@ -60,7 +57,7 @@ def fit(question: Question, seen: Imperfections) -> OutputFit:
         names = question.plain if plainly else question.structures
         return _fit_once(question, seen, names, rows).fits[0]
 
-    drifting = with_drift(fitted.fits[0], with_rows, clipped=seen.saturation is not None)
+    drifting = with_drift(fitted.fits[0], with_rows)
     if drifting is None:
         return fitted
     joint = drifting.joint
@@ -83,7 +80,7 @@ def drift_or_levels(
     refined = refine(levelled.fits[0], clipped, fs)
     (drifted,) = fitted.fits
     left = drifted.best.fit.cost / drifted.problem.counted
-    if refined is None or refined[1].noise_std ** 2 > _BETTER * left:
+    if refined is None or refined[1].noise_std ** 2 > left:
         return seen, fitted
     return clipped, levelled
 

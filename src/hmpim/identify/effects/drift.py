@@ -14,7 +14,7 @@ from numpy.polynomial.legendre import legvander
 from numpy.typing import NDArray
 
 from hmpim.identify.chance import FALSE_ALARM
-from hmpim.identify.fitting.enrich import PLAIN
+from hmpim.identify.fitting.candidates import almost_integrates
 from hmpim.identify.fitting.fit import jacobian
 from hmpim.identify.fitting.least_squares import solved, without
 from hmpim.identify.fitting.trial import JointFit, Trial
@@ -23,7 +23,6 @@ from hmpim.identify.noise.colour import bias_drift
 from hmpim.identify.noise.covariance import covariance
 from hmpim.identify.noise.whiteness import is_white
 from hmpim.identify.worth import POOR
-from hmpim.model import slowest_time_constant
 from hmpim.record import Finding
 
 __all__ = ["Drifting", "drift_finding", "with_drift"]
@@ -33,12 +32,6 @@ _DEGREES = (1, 2, 3, 4, 6, 8, 12, 16)
 
 _STEEP = 80.0
 """Power of the slowest motion over that a little faster: 1/f noise has about 20."""
-
-_SLOW = 0.25
-"""Time constant of the model, over the record's length, that may be a drift in disguise."""
-
-_BEHIND_LEVELS = 0.3
-"""Gain per sample, in the criterion, that a drift of a clipped output must bring."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -68,8 +61,6 @@ class Drifting:
 def with_drift(
     first: JointFit,
     fitted: Callable[[NDArray[np.float64], bool], JointFit],
-    *,
-    clipped: bool = False,
 ) -> Drifting | None:
     """Fit again with a drifting bias, where the first fit asks for it and gains by it.
 
@@ -80,9 +71,6 @@ def with_drift(
     fitted : callable
         Makes the joint fit with rows for the drift; of the plain structures only if the second
         argument is true.
-    clipped : bool
-        Whether samples beyond a level were left out: that alone makes the residual slow, so a
-        drift must then explain more.
 
     Returns
     -------
@@ -97,7 +85,7 @@ def with_drift(
     columns = columns[:degree]
     # The structure is chosen once more, now that the drift is known.
     joint = fitted(columns, is_white(joint.best.fit.residual))
-    if _gain(joint, degree, first, 0) < (_BEHIND_LEVELS * joint.problem.counted if clipped else 0):
+    if _gain(joint, degree, first, 0) < 0.0:
         return None
     return _described(joint, columns)
 
@@ -121,9 +109,8 @@ def drift_finding(drifting: Drifting, fs: float, unit: str) -> Finding:
 def _asked_for(joint: JointFit) -> bool:
     """Whether what a fit leaves over is slow, or its model is as slow as a drift."""
     fit, problem = joint.best.fit, joint.problem
-    slow = slowest_time_constant(fit.denominator) > _SLOW * problem.y.size
-    if slow and not fit.structure.integrators:  # the model may have taken the drift for its own
-        return True
+    if almost_integrates(fit) and not fit.structure.integrators:
+        return True  # the model may have taken the drift for its own
     if is_white(fit.residual):
         return False
     spread = problem.masked(problem.y - problem.y.mean())
@@ -133,8 +120,7 @@ def _asked_for(joint: JointFit) -> bool:
     residual = fit.residual[counted]
     if counted.size < 100:
         return False
-    steep = _STEEP if fit.structure.name in PLAIN else _STEEP / 5  # a rich model hides some
-    if _steepness(residual) > steep:
+    if _steepness(residual) > _STEEP:
         return True
     return bias_drift(residual, counted.astype(np.float64)).probability < FALSE_ALARM
 

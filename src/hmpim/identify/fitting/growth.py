@@ -24,6 +24,7 @@ from hmpim.identify.fitting.least_squares import solved
 from hmpim.identify.fitting.sampled_rows import part_of
 from hmpim.identify.noise.covariance import covariance
 from hmpim.identify.noise.whiteness import is_white
+from hmpim.identify.worth import MATERIAL
 from hmpim.model.dynamics import STRUCTURES, Structure, StructureName, coefficients_of, theta_of
 
 __all__ = [
@@ -37,9 +38,6 @@ __all__ = [
     "scale_of",
     "with_pole",
 ]
-
-_MATTERS = 0.01
-"""Time constant, over the fit's own, below which one more pole moves nothing."""
 
 _HIDES = 0.2
 """Time constant, over the fit's own, up to which one more pole may hide without a word."""
@@ -98,7 +96,7 @@ class HiddenPole:
     @property
     def is_asked_for(self) -> bool:
         """Whether the record asks for a pole by more than chance, and one that matters."""
-        return self.squared > ONE_SIDED * self.std and self.squared > (_MATTERS * self.scale) ** 2
+        return self.squared > ONE_SIDED * self.std and self.squared > (MATERIAL * self.scale) ** 2
 
     @property
     def may_hide(self) -> bool:

@@ -10,7 +10,6 @@ from hmpim.identify.chance import FALSE_ALARM
 from hmpim.identify.fitting.data import (
     FINAL_PRECISION,
     HOPELESS,
-    POOR,
     Data,
     Seen,
     follows,

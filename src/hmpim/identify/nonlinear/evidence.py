@@ -24,9 +24,6 @@ __all__ = ["Look", "Seen", "look_at", "plainer_of", "thinned"]
 _GAIN = 12.0
 """Log-likelihood that a trace must bring; in linear systems the best of all reaches 7."""
 
-_BESIDE = 0.2
-"""R.m.s. of a kind's harmonics over that of linear misfit, from which it counts by itself."""
-
 _UNSWEPT = 0.15
 """Share of a coloured residual's power that a kind must explain, without a sweep, to count."""
 
@@ -48,15 +45,6 @@ is exact."""
 
 _ALIKE_SHARE = 0.2
 """The same between friction and backlash: slow motion against a spring with friction is play."""
-
-_MOSTLY = 0.6
-"""Share of what the harmonics tell, explained by one kind, that vouches for a plain structure."""
-
-_TELLS_MORE = 1.3
-"""Times as much that a kind must gain beside the plain structure as beside the rich one."""
-
-_CLEARER = 0.05
-"""By how much that share must be above the one with a rich structure."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -81,13 +69,6 @@ class Seen:
     mechanisms: tuple[Mechanism, ...] = ()
     named: tuple[Mechanism, ...] = ()
     rms: float = 0.0
-
-    @property
-    def explained(self) -> float:
-        """Share of what the harmonics tell that the likeliest kind explains."""
-        if self.harmonics is None or not self.named:
-            return 0.0
-        return self.named[0].gain / max(self.harmonics.regression.evidence, _GAIN)
 
     @property
     def effect(self) -> float:
@@ -147,8 +128,7 @@ def _by_harmonics(look: Look, sweep: SweepPhase, fit: Fit, white: bool) -> Seen:
             fs=rate,
         )
     named = _likely(kinds, harmonics.regression.evidence)
-    # Without a harmonic of its own, a kind may be a sharp resonance that was left out.
-    if not parts and (not named or named[0].rms < _BESIDE * harmonics.fundamental_rms):
+    if not parts and not named:
         return Seen(fit=fit, harmonics=harmonics)
     rms = float(np.sqrt(np.sum(np.square(parts)))) if parts else named[0].rms
     return Seen(fit=fit, harmonics=harmonics, mechanisms=kinds, named=named, rms=rms)
@@ -208,17 +188,8 @@ def _likely(kinds: tuple[Mechanism, ...], evidence: float) -> tuple[Mechanism, .
 
 
 def plainer_of(look: Look, rich: Seen, plain: Seen) -> Seen:
-    """The plain fit if one kind beside it explains the harmonics clearly better, or all better."""
-    if plain.explained > max(_MOSTLY, rich.explained + _CLEARER):
-        return plain
-    if plain.explained > 0.5 * rich.explained and _gain(plain) > _TELLS_MORE * _gain(rich):
-        return plain
+    """The fit that explains more, with the likeliest kind beside it, by Schwarz's criterion."""
     return min(rich, plain, key=lambda one: _criterion(look, one))
-
-
-def _gain(seen: Seen) -> float:
-    """Log-likelihood that the harmonics of the likeliest kind bring."""
-    return seen.named[0].gain if seen.harmonics is not None and seen.named else 0.0
 
 
 def _criterion(look: Look, seen: Seen) -> float:

@@ -24,7 +24,7 @@ from hmpim.identify.nonlinear.sweep_phase import sweep_phase
 from hmpim.identify.nonlinear.words import general, particular
 from hmpim.identify.result import Estimate, HarmonicCurve, Nonlinearity
 from hmpim.identify.signals import as_signal
-from hmpim.identify.worth import MATERIAL, TOLERATED, WORTH
+from hmpim.identify.worth import MATERIAL, WORTH
 from hmpim.record import Finding
 
 __all__ = ["Inspection", "Shares", "inspect_nonlinearity"]
@@ -191,9 +191,7 @@ def inspect_nonlinearity(
 
 def _is_large(seen: Seen, output: float) -> bool:
     """Whether the linear parameters hold at this amplitude only."""
-    if seen.harmonics is None:
-        return seen.rms > TOLERATED * output
-    return seen.rms > MATERIAL * output or seen.effect > MATERIAL * output
+    return seen.effect > MATERIAL * output
 
 
 def _shares(seen: Seen, power: float) -> Shares:
