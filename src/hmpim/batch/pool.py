@@ -43,6 +43,9 @@ Its profiler alone, which looks at the stack every 10 ms, takes 5 to 8 % of the 
 `identify`.
 """
 
+_READY = "hmpim.batch.ready"
+"""What a worker imports before it is given anything."""
+
 _ALL_THERE = 10.0
 """Seconds to wait for the other workers of this computer once one is there."""
 
@@ -314,7 +317,7 @@ def _client(
 
 def _check_workers(client: Any) -> None:
     """Have each worker import what it needs: one that cannot would die of its first task."""
-    told = client.run(import_module, "hmpim.batch.work", on_error="return")
+    told = client.run(import_module, _READY, on_error="return")
     for address, found in told.items():
         if isinstance(found, Exception):
             client.close()
@@ -350,7 +353,7 @@ class _Crew:
             "--nthreads": "1",
             "--host": "127.0.0.1",
             "--death-timeout": "20",
-            "--preload": "hmpim.batch.work",
+            "--preload": _READY,
             "--dashboard-address": "127.0.0.1:0",  # else its HTTP server is there for everybody
         }
         single = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
