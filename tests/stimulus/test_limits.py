@@ -3,13 +3,16 @@
 import math
 import re
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from hmpim.errors import ArgumentError, UnitError
 from hmpim.stimulus import Limits, Peaks
+from hmpim.stimulus.exponential import ExponentialSweep
 from hmpim.stimulus.peaks import ROUGHLY, true_peaks
+from hmpim.stimulus.solve import _Search
 from hmpim.stimulus.sweep import Sweep
 
 sizes = st.floats(1e-3, 1e6)
@@ -62,3 +65,25 @@ def test_rough_peaks_are_too_small_by_what_they_say_at_most(extinction):
     for name in ("position", "velocity", "acceleration", "jerk"):
         share = getattr(rough, name) / getattr(exact, name)
         assert 1.0 - ROUGHLY <= share <= 1.0 + 1e-12
+
+
+@pytest.mark.parametrize("kind", [Sweep, ExponentialSweep])
+@pytest.mark.parametrize("limits", [{"acceleration": 50.0}, {"velocity": 9.0, "jerk": 1e4}])
+def test_a_few_instants_show_an_excess_no_larger_than_it_is(kind, limits):
+    def make(n):
+        return kind(band=(0.3, 17.0), duration=4.0, extinction=n)
+
+    search = _Search(make=make, limits=Limits(position=2.0, **limits), start=None)
+    for n in np.linspace(0.0, 2.0, 9):
+        assert search.at_least(n) <= search.excess(n)
+    assert search.at_least(0.0) > search.excess(0.0) - 0.5  # where most is spared
+
+
+@pytest.mark.parametrize("extinction", [0.0, 0.7, 1.0, 2.0])
+def test_a_motion_without_its_jerk_is_the_same_motion(extinction):
+    sweep = Sweep(band=(0.3, 17.0), duration=4.0, extinction=extinction)
+    time = np.linspace(-0.1, 4.1, 500)
+    whole, brief = sweep.motion(time), sweep.without_jerk(time)
+    assert brief.jerk is None
+    for name in ("position", "velocity", "acceleration"):
+        assert np.array_equal(getattr(whole, name), getattr(brief, name))

@@ -22,6 +22,7 @@ ends, as a binary sequence, needs no lead; time at rest is put around it.
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -186,11 +187,12 @@ def join_time(sweep: Sweep, *, jerk: bool = False) -> float:
     quarter = sweep.time_of_phase(0.5 * math.pi)
     around = np.linspace(quarter, sweep.time_of_phase(min(2.5 * math.pi, total)), 512)
     names = ("acceleration", "jerk") if jerk else ("acceleration",)
-    most = sweep.motion(around)
+    moved = sweep.motion if jerk else sweep.without_jerk
+    most = moved(around)
     levels = {name: float(np.abs(getattr(most, name)).max()) for name in names}
 
     def too_much(time: FloatArray) -> NDArray[np.bool_]:
-        at = sweep.motion(time)
+        at = moved(time)
         over: NDArray[np.bool_] = np.zeros(time.shape, dtype=np.bool_)
         for name, level in levels.items():
             over |= np.abs(getattr(at, name)) > level
@@ -204,10 +206,17 @@ def join_time(sweep: Sweep, *, jerk: bool = False) -> float:
         return earliest
     last = int(np.flatnonzero(beyond)[-1])
     low, high = float(early[last]), float(early[min(last + 1, early.size - 1)])
-    while high - low > 1e-9 * quarter:
-        middle = 0.5 * (low + high)
-        over = bool(too_much(np.array([middle]))[0])
-        low, high = (middle, high) if over else (low, middle)
+    near = 1e-9 * quarter
+    while high - low > near:  # halvings, four at a time: the instants that they may ask at once
+        at = [low, high]
+        for _ in range(4):
+            at = [*(t for a, b in pairwise(at) for t in (a, 0.5 * (a + b))), high]
+        over = too_much(np.array(at))
+        first, last = 0, len(at) - 1
+        while last - first > 1 and at[last] - at[first] > near:
+            middle = (first + last) // 2
+            first, last = (middle, last) if over[middle] else (first, middle)
+        low, high = at[first], at[last]
     return max(high, earliest)
 
 

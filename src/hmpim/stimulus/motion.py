@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 __all__ = [
+    "Brief",
     "FloatArray",
     "Motion",
     "Peaks",
@@ -87,6 +88,15 @@ class Piecewise(Protocol):
     @property
     def breaks(self) -> tuple[float, ...]:
         """Times in seconds at which one piece hands over to the next."""
+        ...
+
+
+@runtime_checkable
+class Brief(Protocol):
+    """A waveform that can leave out its jerk, which takes it longer than all the rest."""
+
+    def without_jerk(self, time: FloatArray) -> Motion:
+        """Position, velocity and acceleration at `time`, the very same numbers."""
         ...
 
 

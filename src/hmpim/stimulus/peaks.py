@@ -1,15 +1,18 @@
 """The true peaks of a waveform: every cycle is resolved, then each peak is closed in upon."""
 
 import math
+from collections.abc import Callable
 from itertools import pairwise
 
 import numpy as np
 
 from hmpim.arguments import MOST_SAMPLES
 from hmpim.errors import ArgumentError
-from hmpim.stimulus.motion import FloatArray, Motion, Peaks, Piecewise, Waveform
+from hmpim.stimulus.motion import Brief, FloatArray, Motion, Peaks, Piecewise, Waveform
 
 __all__ = ["ROUGHLY", "true_peaks"]
+
+Moved = Callable[[FloatArray], Motion]
 
 _POINTS_PER_CYCLE = 24
 ROUGHLY = 1.0 - math.cos(math.pi / _POINTS_PER_CYCLE)
@@ -65,13 +68,16 @@ def true_peaks(
     end = waveform.duration if stop is None else stop
     grid = _grid(waveform, start, end)
     known = jerk and waveform.motion(grid[:1]).jerk is not None
+    moved: Moved = waveform.motion
+    if not jerk and isinstance(waveform, Brief):
+        moved = waveform.without_jerk
     orders = 4 if known else 3
     brackets: list[list[FloatArray]] = [[] for _ in range(orders)]
     coarse = np.zeros(orders)
     # blocks overlap on each side, so that every interior point has its neighbours
     for first in range(0, grid.size, _BLOCK):
         block = grid[max(first - _WIDE, 0) : first + _BLOCK + _WIDE]
-        for k, size in enumerate(_magnitudes(waveform.motion(block))[:orders]):
+        for k, size in enumerate(_magnitudes(moved(block))[:orders]):
             coarse[k] = max(coarse[k], float(size.max()))
             near = size >= _NEAR * coarse[k]
             left = np.concatenate(([True], size[1:] >= size[:-1]))
@@ -81,7 +87,7 @@ def true_peaks(
             brackets[k].append(np.stack((size[at], block[low], block[at], block[high])))
     found = [float(top) for top in coarse]
     if exact:
-        found = _closed_in(waveform, [np.concatenate(b, axis=1) for b in brackets], coarse)
+        found = _closed_in(moved, [np.concatenate(b, axis=1) for b in brackets], coarse)
     jumping = _first_jump(waveform, found, start, end)
     found += [math.inf] * (4 - orders)
     found[jumping + 1 :] = [math.inf] * (3 - jumping)
@@ -89,7 +95,7 @@ def true_peaks(
     return Peaks(position=x, velocity=v, acceleration=a, jerk=j)
 
 
-def _closed_in(waveform: Waveform, brackets: list[FloatArray], coarse: FloatArray) -> list[float]:
+def _closed_in(moved: Moved, brackets: list[FloatArray], coarse: FloatArray) -> list[float]:
     """Largest value of each derivative within its brackets; one call of the waveform a round."""
     around = [b[1:, b[0] >= _NEAR * top] for b, top in zip(brackets, coarse, strict=True)]
     best = [float(top) for top in coarse]
@@ -103,7 +109,7 @@ def _closed_in(waveform: Waveform, brackets: list[FloatArray], coarse: FloatArra
             left = low[:, None] + (middle - low)[:, None] * share[:-1]
             right = middle[:, None] + (high - middle)[:, None] * share
             times.append(np.concatenate((left, right), axis=1))
-        motion = waveform.motion(np.concatenate([at.ravel() for at in times]))
+        motion = moved(np.concatenate([at.ravel() for at in times]))
         sizes = _magnitudes(motion)
         first = 0
         for k, at in zip(orders, times, strict=True):

@@ -200,7 +200,19 @@ class Sweep:
         """
         return at_rest_outside(time, self.duration, self._inside)
 
-    def _inside(self, t: FloatArray) -> Motion:
+    def without_jerk(self, time: FloatArray) -> Motion:
+        """As `motion`, to the last bit, but without the jerk, in about half the time.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> sweep = Sweep(band=(0.1, 10.0), duration=10.0, gain=1.0, extinction=1.0)
+        >>> sweep.without_jerk(np.array([0.0])).velocity.tolist()
+        [1.0]
+        """
+        return at_rest_outside(time, self.duration, lambda t: self._inside(t, jerk=False))
+
+    def _inside(self, t: FloatArray, *, jerk: bool = True) -> Motion:
         a, b, n, gain = self.sweep_rate, self.start_omega, self.extinction, self.gain
         omega = b + a * t
         phase = t * (b + 0.5 * a * t)
@@ -221,32 +233,36 @@ class Sweep:
             - curve * position
             + 2.0 * slope * slope * position / sigma
         ) / sigma
-        # 1/σ₂ and its derivatives against those of sin σ₁, by Leibniz
-        first = -slope / sigma
-        second = (2.0 * slope * slope / sigma - curve) / sigma
-        third = (
-            6.0 * slope * curve / sigma
-            - 6.0 * slope * slope * slope / sigma / sigma
-            - curve * (n - 2.0) / safe
-        ) / sigma
-        jerk = (
-            -omega * (3.0 * a * sine + omega * omega * cosine)
-            + 3.0 * (a * cosine - omega * omega * sine) * first
-            + 3.0 * omega * cosine * second
-            + sine * third
-        ) / sigma
-        if not np.all(started):
-            at_zero = b + (0.5 * a if n == 0.0 else 0.0)
+        at_zero = b + (0.5 * a if n == 0.0 else 0.0)
+        late = bool(np.all(started))
+        if not late:
             velocity = np.where(started, velocity, b / at_zero)
             acceleration = np.where(started, acceleration, 0.0 if n == 1.0 else a / at_zero)
-            first_0 = -0.5 * a / at_zero if n == 1.0 else 0.0
-            second_0 = 2.0 * first_0 * first_0 - (a / at_zero if n == 2.0 else 0.0)
-            jerk_0 = (-(b**3) + 3.0 * a * first_0 + 3.0 * b * second_0) / at_zero
-            jerk = np.where(started, jerk, jerk_0)
+        third_derivative = None
+        if jerk:
+            # 1/σ₂ and its derivatives against those of sin σ₁, by Leibniz
+            first = -slope / sigma
+            second = (2.0 * slope * slope / sigma - curve) / sigma
+            third = (
+                6.0 * slope * curve / sigma
+                - 6.0 * slope * slope * slope / sigma / sigma
+                - curve * (n - 2.0) / safe
+            ) / sigma
+            third_derivative = (
+                -omega * (3.0 * a * sine + omega * omega * cosine)
+                + 3.0 * (a * cosine - omega * omega * sine) * first
+                + 3.0 * omega * cosine * second
+                + sine * third
+            ) / sigma
+            if not late:
+                first_0 = -0.5 * a / at_zero if n == 1.0 else 0.0
+                second_0 = 2.0 * first_0 * first_0 - (a / at_zero if n == 2.0 else 0.0)
+                jerk_0 = (-(b**3) + 3.0 * a * first_0 + 3.0 * b * second_0) / at_zero
+                third_derivative = np.where(started, third_derivative, jerk_0)
         return Motion(
             time=t,
             position=gain * position,
             velocity=gain * velocity,
             acceleration=gain * acceleration,
-            jerk=gain * jerk,
+            jerk=None if third_derivative is None else gain * third_derivative,
         )
