@@ -7,6 +7,7 @@ joint           all structures, all assumptions between the samples, and the cho
 data            what all trials of a joint fit share
 candidates      fits of every structure, under each assumption
 enrich          which richer structures to try, and where from
+course          the way up to the choice: start, ahead, wander, beginning, enrichment
 beginning       which samples count, and whether the record begins at rest
 whitening       the noise of all trials, and whether whitening may be trusted
 trial           what was tried, and what is chosen of it

@@ -152,13 +152,14 @@ def software_fit(
     u, y, valid, nuisance
         As for `hmpim.identify.fitting.joint.joint_fit`.
     structures : tuple of str
-        Names in `FILTERS`.
+        Of which those in `FILTERS` are tried; all of them where there is none.
 
     Returns
     -------
     JointFit
         A trial for each structure and delay followed to its end.
     """
+    names = tuple(name for name in structures if name in FILTERS) or tuple(FILTERS)
     equations = _equations(u, y, valid)
     problem = Problem(
         source=prepare_input(u, "sampled"),
@@ -168,7 +169,7 @@ def software_fit(
         nuisance=nuisance,
     )
     floor = _ROUNDING**2 * float(np.sum(problem.masked(y - y.mean()) ** 2))
-    fits = _followed(problem, equations, u, structures, exact=floor)
+    fits = _followed(problem, equations, u, names, exact=floor)
     first = min(fits, key=lambda fit: fit.cost)
     begins = None if first.cost <= floor else begins_of(problem, first, lag=0)
     if begins is not None:

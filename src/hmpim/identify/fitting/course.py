@@ -1,0 +1,255 @@
+"""The way of the joint fit up to the choice: start, climb, begin, enrich."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hmpim.identify.fitting.beginning import count_in
+from hmpim.identify.fitting.candidates import (
+    almost_integrates,
+    fit_plain,
+    fit_rich,
+    fit_under_each_assumption,
+    is_worth_explaining,
+    reduced,
+)
+from hmpim.identify.fitting.data import HOPELESS, Data, Seen, band_of, follows, prepared, refit
+from hmpim.identify.fitting.enrich import PLAIN
+from hmpim.identify.fitting.fit import Fit, Problem
+from hmpim.identify.fitting.least_squares import solved
+from hmpim.identify.fitting.start import rough_response
+from hmpim.identify.fitting.unrelated import says_nothing
+from hmpim.identify.fitting.whitening import prewhitened_of
+from hmpim.identify.noise.whiteness import is_white
+from hmpim.identify.signals import longest_lag
+from hmpim.model.dynamics import StructureName
+from hmpim.record import Intersample
+
+__all__ = [
+    "Course",
+    "continue_between",
+    "enrich",
+    "find_beginning",
+    "free_from_wander",
+    "is_unanswered",
+    "start",
+    "turn_ahead",
+]
+
+_SPARE = 0.1
+"""Share of the record that an output ahead of its input must leave."""
+
+_JUMP = 0.05
+"""Share of its range by which a held input jumps at least once."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Course:
+    """Where the joint fit of a record stands.
+
+    Parameters
+    ----------
+    data : Data
+        What all trials share.
+    natural : {'zoh', 'foh', 'bandlimited'}
+        The assumption between the samples that all begin with.
+    alone : bool
+        Whether no other is tried.
+    known : ndarray of bool, shape (n,), or None
+        Input samples that were measured.
+    plain, others : tuple of str
+        Structures to try first, and the richer ones.
+    given, counted : Seen
+        Samples as they were given, and those that count.
+    fits : list of Fit
+        Of the plain structures.
+    """
+
+    data: Data
+    natural: Intersample
+    alone: bool
+    known: NDArray[np.bool_] | None
+    plain: tuple[StructureName, ...]
+    others: tuple[StructureName, ...]
+    given: Seen
+    counted: Seen
+    fits: list[Fit]
+
+    @property
+    def problem(self) -> Problem:
+        """The samples that count, under the natural assumption."""
+        return self.data.problem(self.natural, self.counted)
+
+    @property
+    def best(self) -> Fit:
+        """The fit that leaves least."""
+        return min(self.fits, key=lambda fit: fit.objective)
+
+
+def start(
+    u: NDArray[np.float64],
+    y: NDArray[np.float64],
+    valid: NDArray[np.bool_] | None,
+    known: NDArray[np.bool_] | None,
+    intersample: Intersample | None,
+    structures: tuple[StructureName, ...],
+    nuisance: NDArray[np.float64] | None,
+) -> Course:
+    """Start from the spectra, and climb with each plain structure."""
+    if intersample is None and _looks_held(u):
+        intersample = "zoh"  # an input that stands still and jumps does nothing else
+    natural: Intersample = "bandlimited" if intersample is None else intersample
+    data = Data(
+        u=u,
+        y=y,
+        sources={natural: prepared(u, natural)},
+        rough=rough_response(u, _level(y, nuisance, valid), longest_delay=longest_lag(u.size)),
+        nuisance=nuisance,
+    )
+    plain = tuple(name for name in structures if name in PLAIN)
+    seen = Seen(valid=valid, begins=None)
+    return Course(
+        data=data,
+        natural=natural,
+        alone=intersample is not None,
+        known=known,
+        plain=plain,
+        others=tuple(name for name in structures if name not in PLAIN),
+        given=seen,
+        counted=seen,
+        fits=fit_plain(data.problem(natural, seen), data.rough, plain or PLAIN),
+    )
+
+
+def turn_ahead(course: Course) -> Course:
+    """The same with an output that is ahead of its input, where that leaves clearly less."""
+    data, seen, best = course.data, course.given, course.best
+    lag = data.rough.ahead
+    if lag is None or is_white(best.residual):
+        return course
+    level = _level(data.y, data.nuisance, seen.valid)
+    rough = rough_response(data.u, level, longest_delay=longest_lag(level.size), lag=lag)
+    ahead = replace(data, rough=rough)
+    counted = np.ones(level.size, dtype=bool) if seen.valid is None else seen.valid.copy()
+    counted[rough.earliest :] = False  # they answer what comes after the record
+    shorter = replace(seen, valid=counted)
+    count = np.count_nonzero(counted)
+    if count < _SPARE * level.size:
+        return course
+    found = fit_plain(ahead.problem(course.natural, shorter), rough, course.plain or PLAIN)
+    least = min(f.objective for f in found) / count
+    if HOPELESS * least > best.objective / course.problem.counted:
+        return course
+    return replace(course, data=ahead, given=shorter, counted=shorter, fits=found)
+
+
+def free_from_wander(course: Course) -> Course:
+    """The same from starts with the noise whitened, where its colour hides the response."""
+    whitened = prewhitened_of(course.data, course.natural, course.fits, course.given)
+    if whitened is None:
+        return course
+    problem = whitened.problem(course.natural, course.given)
+    free = fit_plain(problem, whitened.rough, course.plain or PLAIN)
+    if follows(course.data, min(free, key=lambda f: f.objective)):
+        return course
+    return replace(course, data=whitened, fits=free)
+
+
+def find_beginning(course: Course) -> Course:
+    """The samples that count, and the fits to them: the record may not begin at rest."""
+    data, natural, seen, fits = course.data, course.natural, course.given, course.fits
+    counted = count_in(data, natural, fits, seen, course.known)
+    if counted.begins is not None:  # from rest those fits ended anywhere
+        problem = data.problem(natural, counted)
+        before = {fit.structure.name: fit for fit in fits}
+        fits = [
+            min(fit, refit(problem, before[fit.structure.name]), key=lambda f: f.objective)
+            for fit in fit_plain(problem, data.rough, course.plain or PLAIN)
+        ]
+        later = count_in(data, natural, fits, seen, course.known)
+        counted = counted if later.begins is None else later
+    if counted is not seen:
+        fits = [refit(data.problem(natural, counted), f) for f in fits]
+    return replace(course, counted=counted, fits=fits)
+
+
+def continue_between(course: Course) -> list[tuple[Intersample, Fit]]:
+    """The fits, and the leading ones under the other assumptions between the samples."""
+    return fit_under_each_assumption(
+        course.data, course.natural, course.fits, course.counted, alone=course.alone
+    )
+
+
+def is_unanswered(course: Course, fitted: list[tuple[Intersample, Fit]]) -> bool:
+    """Whether neither the likelihood nor a test without a model sees an answer."""
+    mode, best = min(fitted, key=lambda item: item[1].objective)
+    problem = course.data.problem(mode, course.counted)
+    return says_nothing(course.data.u, problem, best, band_of(course.data))
+
+
+def enrich(
+    course: Course, fitted: list[tuple[Intersample, Fit]]
+) -> tuple[Course, list[tuple[Intersample, Fit]]]:
+    """Richer structures while what is left over follows the input, then the plain ones again."""
+    data, plain = course.data, course.plain
+    mode, best = min(fitted, key=lambda item: item[1].objective)
+    asked = is_worth_explaining(data.problem(mode, course.counted), best, data)
+    if plain and not asked and not almost_integrates(best):
+        return course, fitted
+    fits = course.fits
+    richer = fit_rich(data, course.problem, fits, course.others, all_of_them=not plain)
+    if richer and course.counted.begins is not None:
+        leading = min(richer, key=lambda f: f.objective)
+        from_rest = refit(data.problem(course.natural, course.given), leading)
+        resting = count_in(data, course.natural, [from_rest], course.given, course.known)
+        if resting.begins is None:  # it was the structure that was wrong, not the beginning
+            course = replace(course, counted=resting)
+            fits = [refit(course.problem, f) for f in fits]
+            richer = [refit(course.problem, f) for f in richer]
+    if richer:
+        fits = reduced(course.problem, fits, richer)
+    course = replace(course, fits=[*fits, *richer] if plain else richer or fits)
+    return course, continue_between(course)
+
+
+def _level(
+    y: NDArray[np.float64],
+    nuisance: NDArray[np.float64] | None,
+    valid: NDArray[np.bool_] | None,
+) -> NDArray[np.float64]:
+    """An output for spectra: without what its rows explain, gaps filled."""
+    level = y if nuisance is None else y - _regressed(nuisance, y, valid)
+    return level if valid is None else _bridged(level, valid)
+
+
+def _regressed(
+    rows: NDArray[np.float64], y: NDArray[np.float64], valid: NDArray[np.bool_] | None
+) -> NDArray[np.float64]:
+    """What of an output the rows explain beside a constant, by least squares."""
+    counts = slice(None) if valid is None else valid
+    every = np.vstack([rows, np.ones(y.size)])[:, counts]
+    weights = solved(every @ every.T, every @ y[counts])[:-1]
+    return np.asarray(weights @ rows)
+
+
+def _bridged(y: NDArray[np.float64], valid: NDArray[np.bool_]) -> NDArray[np.float64]:
+    """Fill samples that do not count by straight lines, for spectra."""
+    index = np.arange(y.size)
+    return np.interp(index, index[valid], y[valid])
+
+
+def _looks_held(u: NDArray[np.float64]) -> bool:
+    """Whether an input stands still most of the time and then jumps, as a held one does.
+
+    What moves between two samples moves at one instant only if it stood before and stands after.
+    """
+    jumps = np.abs(np.diff(u))
+    moves = jumps > 0
+    count = int(np.count_nonzero(moves))
+    alone = moves & ~np.append(moves[1:], False) & ~np.append(False, moves[:-1])
+    return bool(
+        2 * count < moves.size
+        and jumps.max() > _JUMP * np.ptp(u)
+        and 2 * np.count_nonzero(alone) > count
+    )
