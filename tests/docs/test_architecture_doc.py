@@ -29,6 +29,12 @@ def test_each_room_of_the_walk_has_the_files_told_of():
     assert seen == {place.parent.name for place in SOURCE.glob("*/__init__.py")}
 
 
+def test_each_room_of_identification_is_told_of():
+    chapter = TEXT.partition("### The rooms of identification")[2].partition("```text")[0]
+    told = re.findall(r"^\| `(\w+)` \|", chapter, re.MULTILINE)
+    assert set(told) == {place.parent.name for place in (SOURCE / "identify").glob("*/__init__.py")}
+
+
 def test_the_ground_is_there():
     told = re.findall(r"`(\w+\.py)`", WALK.partition("On the ground")[2])
     assert {*told, "__init__.py"} == {place.name for place in SOURCE.glob("*.py")}

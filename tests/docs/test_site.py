@@ -29,13 +29,20 @@ def test_every_public_name_has_its_entry():
     assert sorted(re.findall(r"\.\. auto\w+:: (\w+)", first)) == sorted(hmpim.__all__)
 
 
-def test_the_layers_of_the_page_are_those_that_are_checked():
+@pytest.mark.parametrize(
+    ("name", "chapter"),
+    [
+        ("Layers of docs/architecture.md", "## Who may ask whom"),
+        ("Rooms of identification in docs/architecture.md", "### The rooms of identification"),
+    ],
+)
+def test_the_layers_of_the_page_are_those_that_are_checked(name, chapter):
     project = (DOCS.parent / "pyproject.toml").read_text(encoding="utf-8")
-    contract = project.partition("Layers of docs/architecture.md")[2]
-    contract = contract.partition("layers = [")[2].partition("]\n")[0]
+    contract = project.partition(name)[2].partition("layers = [")[2].partition("]\n")[0]
     checked = [re.findall(r"\((\w+)\)", line) for line in contract.splitlines() if "(" in line]
     page = (DOCS / "architecture.md").read_text(encoding="utf-8")
-    block = page.partition("## Who may ask whom")[2].partition("```text\n")[2].partition("```")[0]
+    block = page.partition(chapter)[2].partition("```text\n")[2].partition("```")[0]
+    assert checked
     assert [line.split(" | ") for line in block.splitlines()] == checked
 
 
