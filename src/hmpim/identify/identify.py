@@ -20,6 +20,7 @@ from hmpim.identify.asked.refusals import (
 from hmpim.identify.asked.software import recognise_software
 from hmpim.identify.coupling.responses import inputs_of
 from hmpim.identify.judgement import judged
+from hmpim.identify.kept import keeping
 from hmpim.identify.pair import Described, describe, describe_dead
 from hmpim.identify.result import Identification, RecordSummary
 from hmpim.identify.statistics.describe import identify_statistics
@@ -125,7 +126,7 @@ def identify(
         cleared = replace(question, aligned=one_clock, intersample="bandlimited", structures=tried)
         return _identify_outputs(cleared)
 
-    with one_thread():
+    with one_thread(), keeping():
         if aligned.waveforms and instrument is None:
             return settled_between(record, aligned, between_clocks)
         return _identify_outputs(question)

@@ -1,8 +1,9 @@
-"""What follows from the input alone, kept while records of one stimulus are identified.
+"""What follows from some samples alone, kept while records of one stimulus are identified.
 
 Half a dozen steps of `hmpim.identify` begin with the input: its transform, its splines, the phase
-of its sweep, the regressors of its windows. Inside `keeping()` each of these is made once for every
-input that is met, and found again by the samples themselves; outside nothing is kept.
+of its sweep, the regressors of its windows; half a dozen ask whether a residual is white. Inside
+`keeping()` each of these is made once for all samples that are met, and found again by the samples
+themselves; outside nothing is kept. `identify` keeps for itself, a batch for all its records.
 """
 
 from collections import OrderedDict
@@ -19,8 +20,8 @@ __all__ = ["keeping", "kept"]
 _MOST = 64
 """Results that are kept; that used longest ago goes first."""
 
-_LARGEST = 1 << 19
-"""Bytes of an input up to which anything is kept of it: 65 536 samples."""
+_LARGEST = 1 << 18
+"""Bytes of an array up to which anything is kept of it: 32 768 samples."""
 
 _KEPT: ContextVar[OrderedDict[Hashable, Any] | None] = ContextVar("kept", default=None)
 

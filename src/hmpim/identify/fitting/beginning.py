@@ -80,7 +80,6 @@ def begins_of(problem: Problem, fit: Fit, *, lag: int) -> int | None:
     begins = int(np.ceil(latest)) + _REACH
     if begins > longest_lag(problem.y.size) or fit.objective <= 0.0:
         return None
-    free = part_of(replace(problem, begins=begins), fit.structure, fit.theta).free
     late = np.arange(problem.y.size) >= begins
     told = _counts(problem)
     valid = told & late
@@ -93,9 +92,12 @@ def begins_of(problem: Problem, fit: Fit, *, lag: int) -> int | None:
     share = effective_share(residual[valid])
     if _stands_out(innovations, told & ~late, valid):
         return begins
-    if not free.shape[0] or power <= 0.0:
+    if not fit.structure.order or power <= 0.0:
         return None
-    rows = np.vstack([jacobian(problem, fit), problem.masked(free)]) * valid
+    part = part_of(replace(problem, begins=begins), fit.structure, fit.theta)
+    free = part.free
+    known = part if problem.begins is None else None
+    rows = np.vstack([jacobian(problem, fit, part=known), problem.masked(free)]) * valid
     gained = float((rows @ residual) @ solved(rows @ rows.T, rows @ residual))
     left = max(power - gained, np.finfo(float).tiny)
     statistic = share * count * float(np.log(power / left))

@@ -182,7 +182,9 @@ def _evaluated(
     return _Evaluation(problems, parts)
 
 
-def jacobian(problem: Problem, fit: Fit, *more: Real) -> Real:
+def jacobian(
+    problem: Problem, fit: Fit, *more: Real, part: Part | SampledPart | None = None
+) -> Real:
     """Derivatives of the prediction with respect to theta, then to `fit.linear`.
 
     Drift and initial state, where they are fitted, are projected out: the inverse of the rows'
@@ -196,17 +198,21 @@ def jacobian(problem: Problem, fit: Fit, *more: Real) -> Real:
         Where the derivatives are taken.
     *more : ndarray, shape (n,)
         Rows of other parameters, treated alike.
+    part : Part or SampledPart, optional
+        What the input does there, where it is known; a free response that it has and the problem
+        has not is left alone.
 
     Returns
     -------
     ndarray, shape (1 + order + m + 1 + len(more), n)
         Zero where a sample does not count.
     """
-    part = part_of(problem, fit.structure, fit.theta)
+    part = part_of(problem, fit.structure, fit.theta) if part is None else part
+    free = part.free[: 0 if problem.begins is None else None]
     bias = np.ones((1, problem.y.size))
     rows = np.vstack([part.slopes(fit.linear[:-1], fit.initial), part.rows, bias, *more])
     counted = problem.masked(rows)
-    others = [part.free] if problem.nuisance is None else [part.free, problem.nuisance]
+    others = [free] if problem.nuisance is None else [free, problem.nuisance]
     return without(counted, problem.masked(np.vstack(others)))
 
 

@@ -162,14 +162,26 @@ def solved(gram: Complex, right: Complex) -> tuple[Complex, Complex]:
     >>> x.real.round(9).tolist()
     [[0.5]]
     """
-    index = np.arange(gram.shape[1])
-    scale = 1.0 / np.sqrt(np.maximum(gram[:, index, index].real, 1e-300))
-    scaled = gram * scale[:, :, None] * scale[:, None, :]
-    scaled[:, index, index] += _RIDGE * gram.shape[1]
+    scaled, scale = _scaled(gram)
     inverse: Complex = np.asarray(
         np.linalg.inv(scaled) * scale[:, :, None] * scale[:, None, :], dtype=np.complex128
     )
     return inverse, (inverse @ right)[:, :, 0]
+
+
+def _solution(gram: Complex, right: Complex) -> Complex:
+    """Solution alone, in a third of the time."""
+    scaled, scale = _scaled(gram)
+    return np.asarray(np.linalg.solve(scaled, right * scale[:, :, None])[:, :, 0] * scale)
+
+
+def _scaled(gram: Complex) -> tuple[Complex, Real]:
+    """Normal equations of columns of size 1, and by what each was multiplied."""
+    index = np.arange(gram.shape[1])
+    scale = 1.0 / np.sqrt(np.maximum(gram[:, index, index].real, 1e-300))
+    scaled = gram * scale[:, :, None] * scale[:, None, :]
+    scaled[:, index, index] += _RIDGE * gram.shape[1]
+    return scaled, scale
 
 
 def linear_start(linear: Complex, slopes: Real, smooth: Complex) -> Complex:
@@ -184,7 +196,7 @@ def linear_start(linear: Complex, slopes: Real, smooth: Complex) -> Complex:
     """
     start = np.concatenate((linear, -smooth[:, :, None] * slopes), axis=2)
     left = np.conj(start.swapaxes(1, 2))
-    return solved(left @ start, left @ smooth[:, :, None])[1]
+    return _solution(left @ start, left @ smooth[:, :, None])
 
 
 def restricted(found: RationalSolution, kept: int) -> Complex:
@@ -232,10 +244,14 @@ def gauss_newton(
     [[2.0, 0.5]]
     """
     state = _state(linear, slopes, y, theta)
-    for _ in range(steps):
+    for k in range(steps):
         rows = _jacobian(linear, slopes, state)
         left = np.conj(rows.swapaxes(1, 2))
-        inverse, step = solved(left @ rows, left @ (y - state.fitted)[:, :, None])
+        gram, right = left @ rows, left @ (y - state.fitted)[:, :, None]
+        if k < steps - 1:
+            step = _solution(gram, right)
+        else:
+            inverse, step = solved(gram, right)
         state = _better(state, _state(linear, slopes, y, state.theta + step))
     # The last step was small, so the derivatives before it serve.
     return RationalSolution(state=state, rows=rows, inverse=inverse)

@@ -1,5 +1,8 @@
 """Whether the input answers the noise: a loop around the unit."""
 
+from collections.abc import Iterator
+from dataclasses import dataclass
+
 import numpy as np
 import scipy
 from numpy.typing import NDArray
@@ -7,6 +10,7 @@ from numpy.typing import NDArray
 from hmpim.identify.chance import FALSE_ALARM
 from hmpim.identify.fitting.least_squares import solved
 from hmpim.identify.judgement.evidence import Evidence
+from hmpim.identify.kept import kept
 from hmpim.identify.result.groups import MODELLED
 from hmpim.record import Finding
 
@@ -16,6 +20,9 @@ Real = NDArray[np.float64]
 
 _AHEAD = 12
 """Samples of the input's future, and of its past, that are looked at."""
+
+_PAST, _FUTURE = slice(0, _AHEAD + 2), slice(_AHEAD + 2, None)
+"""Of the lags behind a constant: it and the past, and the future."""
 
 _AT_ONCE = 20_000
 """Samples whose lags are held at once."""
@@ -36,17 +43,13 @@ def feedback(evidence: Evidence) -> tuple[Finding, ...]:
     inside = inside if counts is None else inside[counts[inside]]
     if inside.size < 10 * _AHEAD:
         return ()
-    gram, cross = _products(u - u.mean(), left, inside)
-    past, future = slice(0, _AHEAD + 2), slice(_AHEAD + 2, None)  # the past, and a constant
-    # Of the future what the past does not tell (a Schur complement).
-    told = np.column_stack([solved(gram[past, past], column) for column in gram[past, future].T])
-    size, direction = np.linalg.eigh(gram[future, future] - gram[future, past] @ told)
-    seen = size > 1e-9 * float(np.trace(gram) - gram[0, 0])
-    if not seen.any():
+    own = _future_of(u, inside)
+    if not own.size.size:
         return ()
-    along = direction[:, seen].T @ (cross[future] - told.T @ cross[past])
-    gained = float(np.sum(along**2 / size[seen])) / float(left[inside].var())
-    if scipy.special.chdtrc(int(seen.sum()), gained) > FALSE_ALARM:
+    cross = _products_with(u, left, inside)
+    along = own.direction.T @ (cross[_FUTURE] - own.told.T @ cross[_PAST])
+    gained = float(np.sum(along**2 / own.size)) / float(left[inside].var())
+    if scipy.special.chdtrc(own.size.size, gained) > FALSE_ALARM:
         return ()
     coloured = not evidence.readings.white
     return (
@@ -62,13 +65,38 @@ def feedback(evidence: Evidence) -> tuple[Finding, ...]:
     )
 
 
-def _products(u: Real, left: Real, inside: NDArray[np.intp]) -> tuple[Real, Real]:
-    """Products of a constant and an input's lags, past first, with each other and what is left."""
-    lags = np.arange(-_AHEAD, _AHEAD + 1)
-    gram, cross = np.zeros((lags.size + 1, lags.size + 1)), np.zeros(lags.size + 1)
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Future:
+    """What an input's future has beside its past: sizes and directions, and what the past tells."""
+
+    size: Real
+    direction: Real
+    told: Real
+
+
+@kept
+def _future_of(u: Real, inside: NDArray[np.intp]) -> _Future:
+    gram = np.zeros((2 * _AHEAD + 2, 2 * _AHEAD + 2))
+    for rows, _ in _lags_of(u, inside):
+        gram += rows @ rows.T
+    # Of the future what the past does not tell (a Schur complement).
+    told = np.column_stack([solved(gram[_PAST, _PAST], c) for c in gram[_PAST, _FUTURE].T])
+    size, direction = np.linalg.eigh(gram[_FUTURE, _FUTURE] - gram[_FUTURE, _PAST] @ told)
+    seen = size > 1e-9 * float(np.trace(gram) - gram[0, 0])
+    return _Future(size=size[seen], direction=direction[:, seen], told=told)
+
+
+def _products_with(u: Real, left: Real, inside: NDArray[np.intp]) -> Real:
+    """Products of a constant and an input's lags, past first, with what is left."""
+    cross = np.zeros(2 * _AHEAD + 2)
+    for rows, some in _lags_of(u, inside):
+        cross += rows @ left[some]
+    return cross
+
+
+def _lags_of(u: Real, inside: NDArray[np.intp]) -> Iterator[tuple[Real, NDArray[np.intp]]]:
+    """A constant and an input's lags, past first, as rows, so many samples at once; and those."""
+    u, lags = u - u.mean(), np.arange(-_AHEAD, _AHEAD + 1)
     for begin in range(0, inside.size, _AT_ONCE):
         some = inside[begin : begin + _AT_ONCE]
-        rows = np.vstack([np.ones(some.size), u[some + lags[:, None]]])
-        gram += rows @ rows.T
-        cross += rows @ left[some]
-    return gram, cross
+        yield np.vstack([np.ones(some.size), u[some + lags[:, None]]]), some

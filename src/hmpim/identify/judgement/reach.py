@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from hmpim.identify.fitting.enrich import PLAIN
 from hmpim.identify.fitting.growth import scale_of
 from hmpim.identify.judgement.evidence import Evidence, structure_in_words
+from hmpim.identify.kept import kept
 from hmpim.identify.result.groups import MODELLED, PHASE_SPLIT, TIMING
 from hmpim.identify.worth import PAST
 from hmpim.model import response, slowest_time_constant
@@ -223,6 +224,7 @@ def _windowed_power(u: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.asarray(np.abs(scipy.fft.rfft((u - window @ u / window.sum()) * window)) ** 2)
 
 
+@kept
 def count_lines(u: NDArray[np.float64]) -> int:
     """How many frequencies an input has that can be told apart.
 

@@ -10,6 +10,7 @@ import numpy as np
 import scipy
 from numpy.typing import ArrayLike, NDArray
 
+from hmpim.identify.kept import kept
 from hmpim.identify.signals import as_signal, check_band, check_rate
 
 __all__ = ["InputNoise", "input_noise"]
@@ -47,6 +48,7 @@ class InputNoise:
     attenuation: float
 
 
+@kept
 def input_noise(u: ArrayLike, fs: float, *, band: tuple[float, float]) -> InputNoise | None:
     """Estimate the noise on the input from its spectrum above the excited band.
 

@@ -5,6 +5,7 @@ import scipy
 from numpy.typing import NDArray
 
 from hmpim.identify.chance import FALSE_ALARM
+from hmpim.identify.kept import kept
 
 __all__ = ["are_white", "autocovariance", "effective_share", "is_white"]
 
@@ -44,6 +45,7 @@ def autocovariance(
     return np.asarray(scipy.fft.irfft(power, length)[..., : lags + 1] / n)
 
 
+@kept
 def is_white(residual: NDArray[np.float64]) -> bool:
     """Whether one residual, shape (n,), is white by the test of `are_white`."""
     return bool(are_white(residual))
@@ -85,6 +87,7 @@ def are_white(
     return np.asarray((scipy.special.chdtrc(lags, statistic) > FALSE_ALARM) | (r[..., 0] <= 0))
 
 
+@kept
 def effective_share(residual: NDArray[np.float64]) -> float:
     """Independent samples per sample: 1 for white noise, less for coloured.
 
