@@ -20,9 +20,9 @@ from hmpim.units import rate_label
 
 __all__ = ["largest_gain", "smallest_extinction", "sweep_peaks"]
 
-_FAR = 1.5
-"""An excess from which no n within 0.1 fits: n moves the log of a peak by |ln t| times its own
-change at most, and |ln t| stays below 7 between a millisecond and a quarter of an hour."""
+_FAR = 0.7
+"""An excess from which no n within a step of 0.05 fits: it moves the log of either peak by 0.05
+|ln t| at most, and |ln t| stays below 7 between a millisecond and a quarter of an hour."""
 _PER_CYCLE = 4  # instants that show an excess to be large
 
 _UNSURE = 3.0 * ROUGHLY  # of an excess: two rough peaks' logs, and what they leave out
