@@ -17,9 +17,11 @@ from hmpim.identify.fitting.plainer import plainer, taking
 from hmpim.identify.fitting.trial import JointFit
 from hmpim.identify.frf.local import local_response
 from hmpim.identify.judgement import Evidence, attempt, judge
+from hmpim.identify.judgement.unfollowed import unfollowed
 from hmpim.identify.noise.misfit import Misfit, misfit
 from hmpim.identify.nonlinear.nonlinearity import Inspection, inspect_nonlinearity
 from hmpim.identify.reading.bandwidth import response_bandwidths
+from hmpim.identify.reading.coefficients import coefficients_of, highest_first
 from hmpim.identify.reading.propagation import response_std
 from hmpim.identify.reading.readings import Readings, read_parameters
 from hmpim.identify.reading.spanned import spanned
@@ -37,8 +39,6 @@ from hmpim.identify.result.groups import EVERY
 from hmpim.identify.section_iv.paper import paper_estimates
 from hmpim.identify.section_iv.spectrum import excited_band
 from hmpim.identify.worth import ROUNDING
-from hmpim.model.filters import in_z
-from hmpim.model.response import RationalDelay
 from hmpim.record import Finding
 
 __all__ = ["Described", "describe", "describe_dead"]
@@ -62,14 +62,8 @@ def describe(question: Question, seen: Imperfections, fitted: OutputFit) -> Desc
             if question.swapped is not None:
                 pair = replace(pair, warnings=(question.swapped, *pair.warnings))
             return Described(pairs=(pair,))
-        unfollowed = Finding(
-            code="unrelated",
-            message=f"Output {output.name!r} does not follow input {source.name!r}: a constant "
-            "explains it as well. Check the channels, or excite more.",
-            severity="doubt",
-            parameters=EVERY,
-        )
-        return Described(pairs=(_untold(question, 0, question.swapped or unfollowed),))
+        said = question.swapped or unfollowed(output.name, source.name)
+        return Described(pairs=(_untold(question, 0, said),))
     responses = responses_of(aligned, output, fitted, inputs)
     pairs = []
     for i, source in enumerate(aligned.inputs):
@@ -100,33 +94,77 @@ def _pair(
     question: Question, found: Imperfections, joined: OutputFit, i: int, matrix: Responses | None
 ) -> PairIdentification:
     """Say all that is known of an output that follows an input."""
-    aligned, output, instrument = question.aligned, question.output, question.instrument
-    fs, source, drifting = aligned.fs, aligned.inputs[i], joined.drifting
+    aligned, output, drifting = question.aligned, question.output, joined.drifting
+    source, band = aligned.inputs[i], _band(question, i)
     joint, censored, covariance = _refined(question, found, joined, i)
     inspection, unseen = attempt(
         "nonlinearity", lambda: _inspected(question, found, joint, i, covariance), None
     )
     joint = joint if inspection is None else taking(joint, inspection.fit)
-    fit = joint.best.fit
-    u, y = source.values, joint.problem.y  # without the drift, and what other inputs move
-    band = _band(question, i)
-    highest = min(band[1], fs / 2)
-    paper = paper_estimates(u, output.values if matrix is None else y, fs, band=band)
+    y = output.values if matrix is None else joint.problem.y
+    paper = paper_estimates(source.values, y, aligned.fs, band=band)
     readings = read_parameters(
         joint,
-        fs=fs,
-        highest=highest,
+        fs=aligned.fs,
+        highest=min(band[1], aligned.fs / 2),
         delay_correlation=paper.delay,
         known_covariance=covariance,
         input_unit=source.unit,
         output_unit=output.unit,
     )
-    if matrix is not None:
-        response = matrix.columns[i]
-    elif instrument is not None:
-        response = response_through(instrument, y, fs, band=band)
-    else:
-        response = _measured(u, joint, readings, found.telling(y.size, fs), fs, band)
+    response = (
+        _measured(question, found, joint, readings, i) if matrix is None else matrix.columns[i]
+    )
+    bent = () if inspection is None else inspection.findings
+    evidence, unmade = _evidence(question, found, readings, joint, response, i, bool(bent))
+    parameters, seen = with_imperfections(
+        evidence.spanned or readings.parameters, found, censored, output.unit
+    )
+    known = {finding.code for finding in seen}
+    findings = (
+        *(() if question.instrument is None else (question.instrument.finding(),)),
+        *judge(evidence),
+        *seen,
+        *(finding for finding in bent if finding.code not in known),
+        *(() if drifting is None else (drift_finding(drifting, aligned.fs, output.unit),)),
+        *(*unseen, *unmade),
+    )
+    fit = joint.best.fit
+    numerator, denominator = coefficients_of(readings.system)
+    return PairIdentification(
+        input=source.name,
+        output=output.name,
+        structure=fit.structure.name,
+        intersample=joint.best.intersample,
+        fit_percent=evidence.fit_percent,
+        parameters=parameters,
+        paper=paper,
+        frequency_response=response,
+        numerator=numerator,
+        denominator=denominator,
+        candidates=_candidates(joint),
+        warnings=(*aligned.findings, *findings),
+        from_response=evidence.measured,
+        time=aligned.time,
+        prediction=fit.prediction if drifting is None else fit.prediction + drifting.trend,
+        residual=fit.residual,
+        covariance=highest_first(readings.coefficient_covariance, readings.system),
+        nonlinearity=None if inspection is None else inspection.summary,
+    )
+
+
+def _evidence(
+    question: Question,
+    found: Imperfections,
+    readings: Readings,
+    joint: JointFit,
+    response: FrequencyResponse,
+    i: int,
+    nonlinear: bool,
+) -> tuple[Evidence, tuple[Finding, ...]]:
+    """What the checks look at, and what of it could not be made."""
+    fs, band, fit = question.aligned.fs, _band(question, i), joint.best.fit
+    u = question.aligned.inputs[i].values
     from_response, unread = attempt(
         "response_bandwidths",
         lambda: response_bandwidths(
@@ -143,53 +181,22 @@ def _pair(
         lambda: misfit(u, fit.residual, delay=fit.delay, band=(band[0] / fs, band[1] / fs)),
         Misfit(share=0.0, probability=1.0),
     )
-    spread = spanned(readings.parameters, joint, fs=fs, highest=highest)
     evidence = Evidence(
         joint=joint,
         readings=readings,
-        spanned=spread,
+        spanned=spanned(readings.parameters, joint, fs=fs, highest=min(band[1], fs / 2)),
         misfit=left,
         u=u,
         fs=fs,
         band=band,
         fit_percent=_fit_percent(joint),
-        nonlinear=inspection is not None and bool(inspection.findings),
+        nonlinear=nonlinear,
         held=found.hold is not None,
         measured=from_response,
-        through=instrument is not None,
-        jittered=any(finding.code == "jitter" for finding in aligned.findings),
+        through=question.instrument is not None,
+        jittered=any(finding.code == "jitter" for finding in question.aligned.findings),
     )
-    parameters, seen = with_imperfections(spread, found, censored, output.unit)
-    known = {finding.code for finding in seen}
-    findings = (
-        *(() if instrument is None else (instrument.finding(),)),
-        *judge(evidence),
-        *seen,
-        *(f for f in (inspection.findings if inspection else ()) if f.code not in known),
-        *(() if drifting is None else (drift_finding(drifting, fs, output.unit),)),
-        *(*unseen, *unread, *untested),
-    )
-    numerator, denominator = _coefficients(readings.system)
-    return PairIdentification(
-        input=source.name,
-        output=output.name,
-        structure=fit.structure.name,
-        intersample=joint.best.intersample,
-        fit_percent=evidence.fit_percent,
-        parameters=parameters,
-        paper=paper,
-        frequency_response=response,
-        numerator=numerator,
-        denominator=denominator,
-        candidates=_candidates(joint),
-        warnings=(*aligned.findings, *findings),
-        from_response=from_response,
-        time=aligned.time,
-        prediction=fit.prediction if drifting is None else fit.prediction + drifting.trend,
-        residual=fit.residual,
-        covariance=_highest_first(readings),
-        nonlinearity=None if inspection is None else inspection.summary,
-    )
+    return evidence, (*unread, *untested)
 
 
 def _band(question: Question, i: int) -> tuple[float, float]:
@@ -240,24 +247,23 @@ def _inspected(
 
 
 def _measured(
-    u: NDArray[np.float64],
-    joint: JointFit,
-    readings: Readings,
-    told: NDArray[np.bool_] | None,
-    fs: float,
-    band: tuple[float, float],
+    question: Question, found: Imperfections, joint: JointFit, readings: Readings, i: int
 ) -> FrequencyResponse:
     """Local response; where samples do not tell, the model fills in, and its error is added.
 
     Noise decides which samples near a level are clipped, so those that are left are not a fair
     choice; the model alone in place of the others would pull the response towards the level.
     """
-    fit, y = joint.best.fit, joint.problem.y
+    u, fs, band = question.aligned.inputs[i].values, question.aligned.fs, _band(question, i)
+    fit, y = joint.best.fit, joint.problem.y  # without the drift
+    if question.instrument is not None:
+        return response_through(question.instrument, y, fs, band=band)
+    told = found.telling(y.size, fs)
     if told is None:
         return _local(u, y, fit, fs, band)
     response = _local(u, np.where(told, y, fit.prediction + fit.residual), fit, fs, band)
-    covariance = _finite(readings.coefficient_covariance)
-    if covariance is None:
+    covariance = readings.coefficient_covariance
+    if not np.isfinite(covariance).all():
         return response
     own = response_std(readings.system, covariance, response.frequency)
     return replace(response, std=np.hypot(response.std, own))
@@ -280,43 +286,6 @@ def _local(
     steps = local_response(u, np.diff(y, prepend=y[0]), fs, delay=delay, band=band)
     difference = 1.0 - np.exp(-2j * np.pi * steps.frequency / fs)
     return replace(steps, response=steps.response / difference, std=steps.std / np.abs(difference))
-
-
-def _finite(covariance: NDArray[np.float64]) -> NDArray[np.float64] | None:
-    """None where a direction is not seen by the record."""
-    return covariance if bool(np.isfinite(covariance).all()) else None
-
-
-def _highest_first(readings: Readings) -> NDArray[np.float64] | None:
-    """Covariance of delay, numerator and denominator, as results have it; None if not known."""
-    covariance = _finite(readings.coefficient_covariance)
-    if covariance is None:
-        return None
-    above = 1 + readings.system.numerator.size
-    order = [0, *range(1, above)[::-1], *range(above, covariance.shape[0])[::-1]]
-    return covariance[np.ix_(order, order)]
-
-
-def _coefficients(system: RationalDelay) -> tuple[tuple[float, ...], tuple[float, ...]]:
-    """Numerator and denominator of unit gain, highest power first: of s, or of software's z.
-
-    Below, the coefficient 1 is that of s⁰, or that of the highest power of z.
-    """
-    above, below = system.numerator / _leading(system.numerator), system.denominator
-    if system.step is None:
-        return _descending(above), _descending(below)
-    length = max(above.size, below.size)
-    above, below = (np.pad(in_z(c), (0, length - c.size)) for c in (above, below))
-    return tuple((above / below[0]).tolist()), tuple((below / below[0]).tolist())
-
-
-def _leading(numerator: NDArray[np.float64]) -> float:
-    """First coefficient that is not 0: the scale factor."""
-    return float(numerator[np.flatnonzero(numerator)[0]]) if numerator.any() else 1.0
-
-
-def _descending(coefficients: NDArray[np.float64]) -> tuple[float, ...]:
-    return tuple(float(c) for c in coefficients[::-1])
 
 
 def _spread(joint: JointFit) -> float:

@@ -9,6 +9,7 @@ structure        other numbers of poles that the record does not exclude
 between_samples  other assumptions on what the input does between its samples
 response         bandwidths that the measured response contradicts
 failed           a check that raises costs itself, and nothing else
+unfollowed       an output that a constant explains as well
 verdict          from findings to a verdict for each parameter and for the pair
 """
 

@@ -25,6 +25,8 @@ from hmpim.identify.judgement.reach import (
 )
 from hmpim.identify.judgement.residual import lack_of_fit
 from hmpim.identify.judgement.structure import missed_pole, other_order
+from hmpim.identify.judgement.unfollowed import unfollowed
+from hmpim.identify.reading.coefficients import coefficients_of, highest_first
 from hmpim.identify.reading.propagation import response_std
 from hmpim.identify.reading.readings import Readings, read_figures
 from hmpim.identify.reading.spanned import spanned
@@ -39,7 +41,6 @@ from hmpim.identify.result import (
     ResponseBandwidths,
 )
 from hmpim.identify.result.error_bars import estimate, noise_estimate
-from hmpim.identify.result.groups import EVERY
 from hmpim.identify.statistics.choose import Chosen, choose
 from hmpim.identify.statistics.misfit import integrated_share
 from hmpim.identify.statistics.run import Run
@@ -196,10 +197,7 @@ def _related(statistics: Statistics, chosen: Chosen) -> PairIdentification:
         measured=ResponseBandwidths(),
     )
     findings = judge(evidence, checks=_CHECKS)
-    finite = bool(np.isfinite(spread).all())
-    above = 1 + system.numerator.size
-    order = [0, *range(1, above)[::-1], *range(above, spread.shape[0])[::-1]]
-    leading = float(system.numerator[np.flatnonzero(system.numerator)[0]])
+    numerator, denominator = coefficients_of(system)
     frequency = np.geomspace(max(band[0], 1e-3 * band[1]), band[1], _FREQUENCIES)
     return PairIdentification(
         input=statistics.names[0],
@@ -213,14 +211,14 @@ def _related(statistics: Statistics, chosen: Chosen) -> PairIdentification:
             frequency=frequency,
             response=np.asarray(response(system, frequency)),
             std=response_std(system, spread, frequency)
-            if finite
+            if np.isfinite(spread).all()
             else np.full(frequency.size, np.inf),
         ),
-        numerator=tuple((system.numerator[::-1] / leading).tolist()),
-        denominator=tuple(system.denominator[::-1].tolist()),
+        numerator=numerator,
+        denominator=denominator,
         candidates=_candidates(statistics, chosen),
         warnings=(*findings, _no_samples(statistics)),
-        covariance=spread[np.ix_(order, order)] if finite else None,
+        covariance=highest_first(spread, system),
     )
 
 
@@ -355,13 +353,7 @@ def _unrelated(statistics: Statistics, chosen: Chosen) -> PairIdentification | N
         denominator=(1.0,),
         candidates=(),
         warnings=(
-            Finding(
-                code="unrelated",
-                message=f"Output {name!r} does not follow input {source!r}: a constant explains it "
-                "as well. Check the channels, or excite more.",
-                severity="doubt",
-                parameters=EVERY,
-            ),
+            unfollowed(name, source),
             _no_samples(statistics),
         ),
     )

@@ -1,0 +1,49 @@
+"""A system's coefficients as results have them: highest power first, of unit gain."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hmpim.model.filters import in_z
+from hmpim.model.response import RationalDelay
+
+__all__ = ["coefficients_of", "highest_first"]
+
+
+def coefficients_of(system: RationalDelay) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """Numerator and denominator of unit gain, highest power first: of s, or of software's z.
+
+    Below, the coefficient 1 is that of s⁰, or that of the highest power of z.
+
+    Examples
+    --------
+    >>> lag = RationalDelay(delay=0.1, numerator=2.0 * np.ones(1), denominator=np.array([1.0, 0.5]))
+    >>> coefficients_of(lag)
+    ((1.0,), (0.5, 1.0))
+    """
+    above, below = system.numerator, system.denominator
+    if above.any():  # the first that is not 0 is the scale factor
+        above = above / above[np.flatnonzero(above)[0]]
+    if system.step is not None:
+        length = max(above.size, below.size)
+        above, below = (np.pad(in_z(c), (0, length - c.size))[::-1] for c in (above, below))
+        above, below = above / below[-1], below / below[-1]
+    return tuple(above[::-1].tolist()), tuple(below[::-1].tolist())
+
+
+def highest_first(
+    covariance: NDArray[np.float64], system: RationalDelay
+) -> NDArray[np.float64] | None:
+    """Covariance of delay, numerator and denominator by falling powers; None if it is not known.
+
+    Parameters
+    ----------
+    covariance : ndarray, shape (q, q)
+        By rising powers; not finite where the record does not see a direction.
+    system : RationalDelay
+        Whose coefficients they are.
+    """
+    if not np.isfinite(covariance).all():
+        return None
+    above = 1 + system.numerator.size
+    order = [0, *range(1, above)[::-1], *range(above, covariance.shape[0])[::-1]]
+    return covariance[np.ix_(order, order)]
