@@ -52,14 +52,13 @@ def envelope(
         inner = np.geomspace(first, x[-1], slices + 1)[1:-1]
     else:
         inner = np.linspace(x[0], x[-1], slices + 1)[1:-1]
-    starts = np.unique(np.concatenate(([0], np.searchsorted(x, inner))))
+    starts = np.concatenate(([0], np.searchsorted(x, inner)))
+    starts = starts[np.diff(starts, prepend=-1) > 0]
     slice_of = np.repeat(np.arange(starts.size), np.diff(starts, append=x.size))
-    ends = []
+    shown = np.zeros(x.size, dtype=np.bool_)
     extreme = y[starts]
     for extreme in (np.fmin.reduceat(y, starts), np.fmax.reduceat(y, starts)):
         there = np.flatnonzero(y == extreme[slice_of])
-        _, first = np.unique(slice_of[there], return_index=True)
-        ends.append(there[first])
-    missing = starts[np.isnan(extreme)]  # a slice without any sample stays a gap
-    kept = np.unique(np.concatenate((*ends, missing)))
-    return x[kept], y[kept]
+        shown[there[np.diff(slice_of[there], prepend=-1) > 0]] = True  # the first of each slice
+    shown[starts[np.isnan(extreme)]] = True  # a slice without any sample stays a gap
+    return x[shown], y[shown]

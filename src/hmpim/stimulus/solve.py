@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cache
 from typing import TypeVar
 
 import numpy as np
@@ -208,12 +209,13 @@ def smallest_extinction(
 def _first_root(search: _Search, low: float, high: float) -> float:
     """Smallest n that fits between `low`, which does not, and `high`, which does."""
     near = 0.01 * STEP
-    root = min(float(scipy.optimize.brentq(search.excess, low, high, xtol=near)) + near, high)
+    excess = cache(search.excess)
+    root = min(float(scipy.optimize.brentq(excess, low, high, xtol=near)) + near, high)
     for rounded in (math.floor(root / STEP), math.ceil(root / STEP)):
         n = round(rounded * STEP, 9)
-        if search.excess(n) <= 0.0:
+        if excess(n) <= 0.0:
             return n
-    return root if search.excess(root) <= 0.0 else high  # a dip narrower than the step
+    return root if excess(root) <= 0.0 else high  # a dip narrower than the step
 
 
 def _what_would_do(search: _Search, n: float) -> str:

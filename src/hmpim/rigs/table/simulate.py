@@ -122,9 +122,12 @@ class Motion:
         self._inertia = gains.inertia[joint]
         self._with_velocity, self._with_acceleration = feedforward(mode)
         limits = [axis.limits.to("rad") for axis in axes]
-        self._rate_limit = RESERVE * np.array([x.velocity for x in limits])[joint]
-        self._acceleration_limit = RESERVE * np.array([x.acceleration for x in limits])[joint]
-        self._torque_limit = supply * np.array([x.torque_limit for x in axes])[joint]
+        rate = RESERVE * np.array([x.velocity for x in limits])[joint]
+        acceleration = RESERVE * np.array([x.acceleration for x in limits])[joint]
+        torque = supply * np.array([x.torque_limit for x in axes])[joint]
+        self._rate, self._acceleration, self._torque = (
+            (-limit, limit) for limit in (rate, acceleration, torque)
+        )
         self._overspeed = _OVERSPEED * np.array([x.velocity for x in limits])[joint]
         # Commands come late: those before the newest are needed, at rest the first of all.
         before = -(-timing.late // timing.hold)
@@ -194,19 +197,17 @@ class Motion:
 
     def _tick(self, rate: FloatArray, measured: FloatArray, push: FloatArray) -> None:
         """One tick of the controller: rate wanted to torque, and one step of the mechanics."""
-        limit = self._rate_limit
-        rate = np.minimum(np.maximum(rate, -limit, out=rate), limit, out=rate)
+        least, most = self._rate
+        rate = np.minimum(np.maximum(rate, least, out=rate), most, out=rate)
         rate -= measured
         rate *= self._damping
         rate += push
-        limit = self._acceleration_limit
-        demand = np.maximum(rate, -limit, out=rate)
-        demand = np.minimum(demand, limit, out=demand)
+        least, most = self._acceleration
+        demand = np.minimum(np.maximum(rate, least, out=rate), most, out=rate)
         demand *= self._inertia
         demand += self._trim
-        limit = self._torque_limit
-        np.maximum(demand, -limit, out=demand)
-        np.minimum(demand, limit, out=self._data.ctrl)
+        least, most = self._torque
+        np.minimum(np.maximum(demand, least, out=demand), most, out=self._data.ctrl)
         self._step(self._model, self._data)
 
 
