@@ -9,7 +9,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from hmpim.identify.fitting.data import FINAL_PRECISION
 from hmpim.identify.fitting.fit import fit_structure
 from hmpim.identify.fitting.growth import grow, hidden_pole
 from hmpim.identify.fitting.rows import Problem
@@ -22,6 +21,9 @@ from hmpim.identify.signals import longest_lag
 from hmpim.model.dynamics import STRUCTURES, Structure
 
 __all__ = ["Tails", "with_tails"]
+
+_THERE = 1e-4
+"""Precision of the fit without the pole, which begins where it ends but for the surface's error."""
 
 Real = NDArray[np.float64]
 
@@ -67,7 +69,7 @@ def with_tails(
         fit = fit_structure(problem, structure, theta, precision=precision)
         return trial_of(member.intersample, fit, y.size)
 
-    best = refit(fleet.structure, theta_at(place), FINAL_PRECISION)
+    best = refit(fleet.structure, theta_at(place), _THERE)
     growth = grow(
         best,
         hidden=lambda trial: hidden_pole(problem, trial.fit),

@@ -86,7 +86,15 @@ def _roots(coefficients: NDArray[np.float64]) -> NDArray[np.complex128]:
         away = np.sqrt(complex(b * b - 4 * a * c))
         q = -0.5 * (b + (away if (b * away.conjugate()).real >= 0 else -away))
         return np.array([q / a, c / q]) if q != 0 else np.zeros(2, dtype=complex)
-    return np.asarray(np.roots(trimmed[::-1]), dtype=np.complex128)
+    return _roots_of(tuple(trimmed.tolist()))
+
+
+@lru_cache(maxsize=8)  # each figure of a system begins with them
+def _roots_of(coefficients: tuple[float, ...]) -> NDArray[np.complex128]:
+    """Roots as eigenvalues."""
+    roots = np.asarray(np.roots(coefficients[::-1]), dtype=np.complex128)
+    roots.flags.writeable = False
+    return roots
 
 
 def _turn(roots: NDArray[np.complex128], omega: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -302,22 +302,27 @@ def read_figures(
 
 
 def _marks_of(
-    structure: Structure, system: RationalDelay, *, highest: float
+    structure: Structure, system: RationalDelay, *, highest: float, split_alone: bool = False
 ) -> tuple[tuple[float | None, float | None, float | None, float | None], PeakGain | None]:
     """-90° with the delay and without, -3 dB, the peak's frequency; and the peak."""
     steady = structure.integrators == 0 and structure.dc_zeros == 0
     dynamic = structure.order > 0 and steady
+    split = bandwidth_phase(system, highest=highest, delay=False) if dynamic else None
+    if split_alone:
+        return (None, split, None, None), None
     peak = peak_gain(system, highest=highest) if dynamic else None
     marks = (
         bandwidth_phase(system, highest=highest) if steady else None,
-        bandwidth_phase(system, highest=highest, delay=False) if dynamic else None,
+        split,
         bandwidth_3db(system, highest=highest) if dynamic else None,
         peak.frequency if peak is not None else None,
     )
     return marks, peak
 
 
-def figures_of(fit: Fit, *, fs: float, highest: float) -> dict[str, float | None]:
+def figures_of(
+    fit: Fit, *, fs: float, highest: float, split_alone: bool = False
+) -> dict[str, float | None]:
     """Values alone of what `read_parameters` gives with error bars, the noise apart.
 
     Parameters
@@ -326,17 +331,24 @@ def figures_of(fit: Fit, *, fs: float, highest: float) -> dict[str, float | None
         Any fit.
     fs, highest : float
         As for `read_parameters`.
+    split_alone : bool
+        Whether `PHASE_SPLIT` is all that is asked; what else is looked for along a curve is None.
     """
     vector = np.concatenate([fit.theta, fit.linear])
-    return figures_at(fit.structure, vector, fs=fs, highest=highest)
+    return figures_at(fit.structure, vector, fs=fs, highest=highest, split_alone=split_alone)
 
 
 def figures_at(
-    structure: Structure, vector: _Vector, *, fs: float, highest: float
+    structure: Structure,
+    vector: _Vector,
+    *,
+    fs: float,
+    highest: float,
+    split_alone: bool = False,
 ) -> dict[str, float | None]:
     """The same at any parameters, `vector` as `Readings` has it."""
     system = system_of(structure, vector, fs)
-    marks, peak = _marks_of(structure, system, highest=highest)
+    marks, peak = _marks_of(structure, system, highest=highest, split_alone=split_alone)
     mode = _lowest_mode(structure, vector)
     natural, damping = (None, None) if mode is None else _mode_at(vector, mode, fs)
     steady = structure.integrators == 0 and structure.dc_zeros == 0

@@ -72,7 +72,7 @@ def spanned(parameters: Parameters, joint: JointFit, *, fs: float, highest: floa
     richer = figures(trial.fit for trial in joint.rivals)
     hidden, fit = joint.hidden, joint.best.fit
     if hidden is not None and (joint.rivals or hidden.may_hide):
-        (longest,) = figures([as_if_hidden(fit, hidden)])
+        longest = figures_of(as_if_hidden(fit, hidden), fs=fs, highest=highest, split_alone=True)
         richer.append({name: longest[name] for name in PHASE_SPLIT})
     moved = {}
     for name in (field.name for field in fields(parameters)):
