@@ -20,6 +20,8 @@ INTERSAMPLE_WORDS: "dict[Intersample, str]" = {
 """What an input does between its samples, in words a reader knows."""
 
 MOST_BARS = 12
+_ROOM = 100.0
+"""End of the axis over the longest bar: the words behind it stay clear of it on a phone."""
 
 
 def candidates(tried: "Sequence[Candidate]") -> Figure:
@@ -50,7 +52,7 @@ def candidates(tried: "Sequence[Candidate]") -> Figure:
         colours=tuple("other" if c.chosen else "muted" for c in ranked),
     )
     words = [
-        Words(x=x, y=y, text=f"fit {c.fit_percent:.2f} %" + (", chosen" if c.chosen else ""))
+        Words(x=x, y=y, text=_fit(c, named=c.chosen or y == 0.0))
         for c, x, y in zip(ranked, lead, places, strict=True)
     ]
     return Figure(
@@ -60,7 +62,7 @@ def candidates(tried: "Sequence[Candidate]") -> Figure:
                     label="Criterion above the lowest (BIC, lower is better)",
                     scale="symlog",
                     low=0.0,
-                    high=max(max(lead) * 6.0, 10.0),
+                    high=max(max(lead) * _ROOM, 10.0),
                 ),
                 y=Axis(
                     low=len(ranked) - 0.5,
@@ -76,3 +78,9 @@ def candidates(tried: "Sequence[Candidate]") -> Figure:
         + ".",
         heights=(0.7 + 0.26 * len(ranked),),
     )
+
+
+def _fit(tried: "Candidate", *, named: bool) -> str:
+    """What stands behind a bar; short, but for those that say what the number is."""
+    percent = f"{tried.fit_percent:.2f} %"
+    return f"fit {percent}" + (", chosen" if tried.chosen else "") if named else percent

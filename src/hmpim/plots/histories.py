@@ -254,7 +254,7 @@ def residuals(
                 Rule(at=0.0, axis="y", colour="muted", dashes="-", width=0.8),
                 *(Rule(at=at, axis="y", label=words) for at in (-bound, bound)),
             ),
-            title="Residual against itself",
+            title="Autocorrelation of the residual",
             row=1,
         ),
     )

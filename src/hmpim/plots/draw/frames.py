@@ -171,6 +171,8 @@ def ticks(axis: Axis, ends: tuple[float, float], *, most: int = 7) -> list[tuple
     --------
     >>> [words for _, words in ticks(Axis(degrees=True), (-290.0, 20.0))]
     ['−270', '−180', '−90', '0']
+    >>> [words for _, words in ticks(Axis(scale="symlog"), (0.0, 5000.0), most=3)]
+    ['0', '100']
     >>> [words for _, words in ticks(Axis(scale="log"), (0.1, 20.0), most=8)]
     ['0.1', '0.2', '0.5', '1', '2', '5', '10', '20']
     """
@@ -181,7 +183,7 @@ def ticks(axis: Axis, ends: tuple[float, float], *, most: int = 7) -> list[tuple
         values = _log_ticks(low, high, most)
     elif axis.scale == "symlog":
         values = [0.0] * (low <= 0.0) + [10.0**k for k in range(1, 13) if low <= 10.0**k <= high]
-        values = values[:1] + values[1 :: -(-len(values) // most)]
+        values = values[:: -(-len(values) // most)]
     elif axis.degrees and high - low > _FEW_DEGREES:
         span = high - low
         steps = [s for s in _TURNS if span <= _MOST_TURNS * s]
