@@ -22,8 +22,10 @@ __all__ = [
     "HALF",
     "LIKELIER",
     "ONE_SIDED",
+    "SEARCHED",
     "SEEN",
     "deviations",
+    "searched",
 ]
 
 FALSE_ALARM = 1e-4
@@ -59,6 +61,26 @@ DEVIATIONS = deviations()
 
 EXCLUDED = DEVIATIONS**2
 """Deviance at which the rate of false alarms excludes one parameter less: 15.1."""
+
+
+def searched(alternatives: int) -> float:
+    """Log-likelihood that the likeliest of many alternatives gains as seldom by chance.
+
+    Parameters
+    ----------
+    alternatives : int
+        How many are looked at.
+
+    Examples
+    --------
+    >>> round(searched(1), 1), round(searched(36), 1)
+    (9.2, 12.8)
+    """
+    return math.log(alternatives / FALSE_ALARM)
+
+
+SEARCHED = searched(10_000_000)
+"""The same of a search over all delays, frequencies and dynamics: 25.3."""
 
 HALF = float(scipy.special.ndtri(0.5 + COVERAGE / 2))
 """Deviations of a normal error on either side that such an interval spans: 1.96."""

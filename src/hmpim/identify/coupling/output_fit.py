@@ -13,9 +13,10 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from hmpim.identify.chance import SEARCHED
 from hmpim.identify.coupling.lag import Lag, lag_of
 from hmpim.identify.coupling.together import gained_by, joint_covariance
-from hmpim.identify.coupling.weak import FOLLOWS, coupling_fit, whitening_of
+from hmpim.identify.coupling.weak import coupling_fit, whitening_of
 from hmpim.identify.effects.drift import Drifting
 from hmpim.identify.fitting.enrich import PLAIN
 from hmpim.identify.fitting.fit import Fit, Problem, jacobian
@@ -35,9 +36,6 @@ _LATEST = 0.1
 
 _PERIODS = 4.0
 """Periods of a coupling's corner frequency that the record must hold."""
-
-_COLOURED = 1.6
-"""Factor on the evidence asked of a coupling where the stronger ones leave no white noise."""
 
 _RIVAL = 0.75
 """Share of the best correlation from which an input is a rival for the strongest."""
@@ -289,7 +287,7 @@ def _together(
             0.0 if _too_slow(found[k], y.size) else gained_by(_apart(problems, shared), found, k)
         )
     least = int(np.argmin(gains))
-    if gains[least] > (FOLLOWS if whitening is None else _COLOURED * FOLLOWS):
+    if gains[least] > SEARCHED:
         return False
     related[weak[least]] = False
     return True

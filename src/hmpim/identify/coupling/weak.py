@@ -14,6 +14,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from hmpim.identify.chance import CLEARLY
 from hmpim.identify.fitting.candidates import nested
 from hmpim.identify.fitting.enrich import PLAIN
 from hmpim.identify.fitting.fit import Fit, Problem, fit_structure
@@ -23,17 +24,7 @@ from hmpim.identify.noise.whiteness import effective_share, is_white
 from hmpim.model.dynamics import STRUCTURES, StructureName
 from hmpim.record import Intersample
 
-__all__ = ["FOLLOWS", "coupling_fit", "unsettled", "whitening_of"]
-
-FOLLOWS = 25.0
-"""Log-likelihood by which a coupling must beat none, the noise whitened: looking at thousands
-of delays and dynamics, pure noise reaches about 15."""
-
-_SECOND = 6.0
-"""What a second pole must bring beyond Akaike's criterion: of its delay nothing is summed over."""
-
-_HOPEFUL = 6.0
-"""Log-likelihood that the simpler structures must gain for a second pole to be tried."""
+__all__ = ["coupling_fit", "unsettled", "whitening_of"]
 
 _SMOOTHED = 0.1
 """Reach of the average over the residual's periodogram, as a share of the frequency."""
@@ -153,7 +144,7 @@ def _hopeful(problem: Problem, fits: list[Fit]) -> bool:
     """Whether a simpler structure sees anything that a richer one might see better."""
     nothing = problem.masked(problem.y - fits[0].linear[-1])
     gain = np.log(float(nothing @ nothing) / max(min(fit.objective for fit in fits), 1e-300))
-    return bool(0.5 * problem.counted * gain > _HOPEFUL)
+    return bool(0.5 * problem.counted * gain > CLEARLY)
 
 
 def _resonances(rough: RoughResponse, lag: float) -> list[Real]:
@@ -181,7 +172,7 @@ def unsettled(fit: JointFit) -> tuple[float, float]:
         return 0.0, 0.0
     one = min(richer, key=lambda t: t.criterion)
     other = min(plainer, key=lambda t: t.criterion)
-    weight = 1.0 / (1.0 + np.exp(0.5 * np.clip(one.criterion - _SECOND - other.criterion, -99, 99)))
+    weight = 1.0 / (1.0 + np.exp(0.5 * np.clip(one.criterion - CLEARLY - other.criterion, -99, 99)))
     share = float(weight * (1.0 - weight))
     delay = one.fit.delay - other.fit.delay
     gain = float(one.fit.linear[0] - other.fit.linear[0])
@@ -191,5 +182,5 @@ def unsettled(fit: JointFit) -> tuple[float, float]:
 def _akaike(problem: Problem, fit: Fit) -> float:
     tiny = np.finfo(float).tiny
     count = problem.counted
-    owed = 2 * fit.structure.parameters + (_SECOND if fit.structure.order > 1 else 0.0)
+    owed = 2 * fit.structure.parameters + (CLEARLY if fit.structure.order > 1 else 0.0)
     return float(count * np.log(max(fit.objective, tiny) / count) + owed)

@@ -13,6 +13,7 @@ import numpy as np
 import scipy
 from numpy.typing import ArrayLike, NDArray
 
+from hmpim.identify.chance import SEARCHED
 from hmpim.identify.signals import as_signal
 
 __all__ = ["Quantization", "detect_quantization"]
@@ -31,9 +32,6 @@ _SAME_POWER = 0.9
 
 _CELLS = 1 << 15
 """Cells of the histogram whose transform is searched; steps down to 4 / _CELLS of the range."""
-
-_STANDS_OUT = 60.0
-"""Power of a peak over the median of its neighbourhood; the largest of 10^4 reaches 14."""
 
 _CLUSTERED = 0.25
 """Least magnitude of the peak: noise after the rounding of at most a quarter of a step."""
@@ -192,7 +190,7 @@ def _by_clusters(samples: NDArray[np.float64], span: float) -> Quantization | No
     best = first + int(np.argmax(power[first:]))
     near = slice(max(first, best // 2), min(2 * best, last))
     level = float(np.median(power[near]))
-    if power[best] < max(_STANDS_OUT * level, _CLUSTERED**2 * total):
+    if power[best] < max(SEARCHED / np.log(2) * level, _CLUSTERED**2 * total):
         return None
     return _sharpened(samples, 4 * _CELLS * width / best, span)
 

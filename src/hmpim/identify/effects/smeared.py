@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from hmpim.identify.chance import CLEARLY, SEARCHED
 from hmpim.identify.noise.whiteness import effective_share
 from hmpim.identify.worth import WORTH
 
@@ -27,9 +28,6 @@ _STARTS = (0.6, 0.75, 0.85, 0.92, 0.97)
 
 _BENDS = 6.0
 """Standard deviations by which the output must fall short at an extreme to be looked at."""
-
-_GAIN = 40.0
-"""Fall of the sum of squares in σ² that a level must bring; noise alone brings about 10."""
 
 _BEYOND = 0.3
 """Standard deviations of the noise by which the prediction must go beyond on average."""
@@ -104,7 +102,7 @@ def smeared_plateaus(
     model = np.clip(best.unclipped, best.low, best.high)
     variance = best.cost / y.size / effective_share(y - model)
     bent = np.vstack([rows, prediction**2, prediction**3])
-    if _cost(y, bent) - best.cost < 0.25 * _GAIN * variance:
+    if _cost(y, bent) - best.cost < 2 * CLEARLY * variance:
         return None
     least = max(_BEYOND * float(np.sqrt(best.cost / y.size)), step, WORTH * float(np.ptp(y)))
     excess = np.abs(best.unclipped - np.clip(best.unclipped, best.low, best.high))
@@ -220,4 +218,4 @@ def _holds(
         return False
     without = _best_split(y, rows, others) if any(others) else None
     cost = _cost(y, rows) if without is None else without.cost
-    return cost - best.cost > _GAIN * variance
+    return cost - best.cost > 2 * SEARCHED * variance

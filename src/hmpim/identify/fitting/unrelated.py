@@ -4,7 +4,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from hmpim.identify.chance import FALSE_ALARM
+from hmpim.identify.chance import FALSE_ALARM, SEARCHED
 from hmpim.identify.fitting.fit import Fit, Problem
 from hmpim.identify.fitting.least_squares import solved
 from hmpim.identify.fitting.sampled_rows import part_of
@@ -13,10 +13,6 @@ from hmpim.identify.noise.misfit import misfit
 from hmpim.identify.noise.whiteness import effective_share
 
 __all__ = ["is_unrelated", "says_nothing"]
-
-_RELATED = 40.0
-"""Log-likelihood by which a model must beat "the output is constant": looking at thousands
-of delays and dynamics, pure noise reaches about 15."""
 
 _INNOVATES = 60.0
 """And by which it must beat "the output is noise of some colour", where the residual is so
@@ -53,7 +49,7 @@ def says_nothing(
     seen[: noise.size] = 0.0
     answer = misfit(heard, seen, delay=fit.delay, band=band)
     reachable = -0.5 * problem.counted * float(np.log1p(-min(answer.share, 0.999)))
-    return answer.probability > FALSE_ALARM or reachable < _RELATED
+    return answer.probability > FALSE_ALARM or reachable < SEARCHED
 
 
 def is_unrelated(problem: Problem, fit: Fit, share: float) -> bool:
@@ -74,7 +70,7 @@ def is_unrelated(problem: Problem, fit: Fit, share: float) -> bool:
     if spread <= 0 or fit.cost <= 0:
         return spread <= 0
     gain = 0.5 * y.size * share * np.log(spread / fit.cost)
-    if gain >= _RELATED and problem.begins is None:
+    if gain >= SEARCHED and problem.begins is None:
         return False
     residual = fit.residual if problem.valid is None else fit.residual[problem.valid]
     # A free response may be any sine or exponential: the input must tell what they cannot.

@@ -11,6 +11,7 @@ import scipy
 from numpy.typing import ArrayLike, NDArray
 
 from hmpim.errors import RecordError
+from hmpim.identify.chance import SEARCHED
 from hmpim.identify.noise.covariance import covariance
 from hmpim.identify.noise.whiteness import autocovariance, effective_share, is_white
 from hmpim.identify.signals import as_signal, check_rate
@@ -19,9 +20,6 @@ __all__ = ["Colour", "Drift", "NoiseColour", "bias_drift", "noise_colour"]
 
 Colour = Literal["white", "autoregressive", "power_law"]
 """White; correlated over a few samples (AR(1)); or as a power of the frequency (1/f, wander)."""
-
-_LINE = 25.0
-"""Power of a spectral line over its neighbours' mean; noise alone exceeds it once in 10^11."""
 
 _WANDERS = 0.98
 """Correlation from sample to sample from which a noise counts as wander."""
@@ -235,7 +233,7 @@ def _line(e: NDArray[np.float64], fs: float) -> float | None:
     around = (wide - narrow) / (2 * _NEIGHBOURS - 4)
     ratio = power[inner] / np.maximum(around, np.finfo(float).tiny)
     best = int(np.argmax(ratio))
-    if ratio[best] < _LINE:
+    if ratio[best] < SEARCHED:
         return None
     k = int(inner[best])
     left, here, right = np.log(np.maximum(power[k - 1 : k + 2], np.finfo(float).tiny))

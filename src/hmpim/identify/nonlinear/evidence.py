@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from hmpim.identify.chance import FALSE_ALARM
+from hmpim.identify.chance import FALSE_ALARM, LIKELIER, searched
 from hmpim.identify.fitting.fit import Fit, Problem, jacobian
 from hmpim.identify.noise.whiteness import is_white
 from hmpim.identify.nonlinear.harmonic_kinds import compare_harmonics
@@ -21,7 +21,7 @@ from hmpim.identify.nonlinear.sweep_phase import SweepPhase, sweep_phase
 
 __all__ = ["Look", "Seen", "look_at", "plainer_of", "thinned"]
 
-_GAIN = 12.0
+_GAIN = searched(36)
 """Log-likelihood that a trace must bring; in linear systems the best of all reaches 7."""
 
 _UNSWEPT = 0.15
@@ -30,14 +30,8 @@ _UNSWEPT = 0.15
 _PERIODIC = 0.5
 """The same for an input that repeats."""
 
-_HINT = 4.0
-"""Log-likelihood of all harmonics, beyond what noise would gain, from which kinds are compared."""
-
 _NAMED = 0.3
 """Share of what the harmonics hold beyond noise that a kind must explain to be named."""
-
-_APART = 10.0
-"""Log-likelihood by which the next kind must be behind to be ruled out."""
 
 _APART_SHARE = 0.03
 """The same as a share of what the likeliest kind gains, more where that explains less: no trace
@@ -118,7 +112,7 @@ def _by_harmonics(look: Look, sweep: SweepPhase, fit: Fit, white: bool) -> Seen:
     harmonics = _within(harmonics, float(np.sqrt(np.mean(residual**2))))
     parts = [harmonics.rms(p) for p in (0, 1) if harmonics.probability(p) < FALSE_ALARM]
     kinds: tuple[Mechanism, ...] = ()
-    told = bool(parts) or harmonics.regression.evidence > _HINT
+    told = bool(parts) or harmonics.regression.evidence > LIKELIER
     if told and not look.others and np.ptp(fit.prediction) > 0:
         powers = np.arange(fit.denominator.size)
         kinds = compare_harmonics(
@@ -182,7 +176,7 @@ def _likely(kinds: tuple[Mechanism, ...], evidence: float) -> tuple[Mechanism, .
     def behind(other: Mechanism) -> float:
         alike = {first.kind, other.kind} == {"friction", "backlash"}
         share = (_ALIKE_SHARE if alike else _APART_SHARE) + 0.5 * unexplained
-        return max(_APART, share * first.gain)
+        return max(searched(1), share * first.gain)
 
     return tuple(m for m in kinds if m.likelihood > first.likelihood - behind(m))
 

@@ -11,6 +11,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from hmpim.identify.chance import SEARCHED
 from hmpim.identify.fitting.growth import HiddenPole, response_to_square
 from hmpim.identify.fitting.least_squares import solved
 from hmpim.identify.fitting.rows import Problem
@@ -29,9 +30,6 @@ _SEEN = 1e-6
 
 _STEPS = 48
 """Delays at which a step is looked for."""
-
-_CLEAR = 50.0
-"""Squared standard deviations from which a step is seen, by whatever chance."""
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -149,7 +147,7 @@ def integrated_share(fitted: Fitted) -> float:
     begins = np.linspace(AHEAD, taps.size // 2, _STEPS).astype(int)
     gain, left, cost = _beside(fitted, steps, (taps >= begins[:, None]).astype(np.float64))
     power = gain**2 / np.maximum(np.diag(left), np.finfo(float).tiny * np.diag(left).max())
-    clear = power > _CLEAR * cost / steps.counted
+    clear = power > 2 * SEARCHED * cost / steps.counted
     return float(np.max(np.where(clear, power, 0.0)) / cost) if cost > 0.0 else 0.0
 
 
