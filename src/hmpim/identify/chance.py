@@ -56,7 +56,7 @@ def deviations(questions: int = 1) -> float:
     return float(-scipy.special.ndtri(FALSE_ALARM / (2 * questions)))
 
 
-DEVIATIONS = deviations()
+DEVIATIONS = deviations(1)
 """The same of a single question: 3.89."""
 
 EXCLUDED = DEVIATIONS**2

@@ -20,6 +20,7 @@ from hmpim.identify.fitting.rows import Part, Problem
 from hmpim.identify.reading.readings import figures_at
 from hmpim.identify.result import PairIdentification
 from hmpim.identify.surface import Surface, places_in
+from hmpim.identify.worth import NEARLY
 from hmpim.model.dynamics import STRUCTURES, Structure
 from hmpim.model.sampled import SampledInput, prepare_input
 from hmpim.record import BETWEEN, Intersample
@@ -52,8 +53,6 @@ _PROBE = 0.3
 """Time constant, over the unit's own, at which one more pole is tried."""
 
 _FEWEST = 5
-_MOSTLY = 0.75
-"""Share of the units that must be plain: of twenty, chance lets one ask for one more pole."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -140,7 +139,7 @@ def learn_fleet(
     modes = [pair.intersample for pair in plain]
     found = max(BETWEEN, key=modes.count)
     alike = [pair for pair in plain if pair.intersample == found]
-    if len(alike) < max(_FEWEST, _MOSTLY * len(pairs)):
+    if len(alike) < max(_FEWEST, NEARLY * len(pairs)):
         return None
     tried = {c.intersample for c in alike[0].candidates if c.structure == structure.name}
     open_ = tuple(mode for mode in BETWEEN if mode in tried)

@@ -4,7 +4,7 @@ Many decisions share these numbers. Each is tuned: docs/thresholds.md tells what
 of it does to the records of the families study.
 """
 
-__all__ = ["LOOSE", "MATERIAL", "PAST", "POOR", "ROUNDING", "TOLERATED", "WORTH"]
+__all__ = ["FEW", "MATERIAL", "MUCH", "NEARLY", "PART", "PAST", "ROUNDING", "TOLERATED", "WORTH"]
 
 ROUNDING = 1e-9
 """Share of an output (r.m.s.) up to which a model explains it to rounding."""
@@ -18,11 +18,17 @@ MATERIAL = 0.01
 TOLERATED = 0.03
 """The same, up to which a model may be off where it is known to be."""
 
-POOR = 0.2
-"""Share of an output's power left over, in colour, that asks for another model anyway."""
+FEW = 0.05
+"""Share up to which what is seen is an exception, or what moves does not."""
 
-LOOSE = 0.3
-"""Relative standard deviation beyond which a figure is not known."""
+PART = 0.2
+"""Share from which a part is not to be neglected."""
+
+MUCH = 0.3
+"""Share from which it is too much for what it would otherwise pass for."""
+
+NEARLY = 0.85
+"""Share from which a part is all but the whole."""
 
 PAST = 1.2
 """Frequency, over the end of the excited band, up to which the band still tells it."""

@@ -19,15 +19,13 @@ from hmpim.identify.fitting.trial import JointFit
 from hmpim.identify.noise.covariance import covariance
 from hmpim.identify.noise.whiteness import is_white
 from hmpim.identify.result.groups import EVERY
+from hmpim.identify.worth import FEW, NEARLY, PART
 from hmpim.record import Finding
 
 __all__ = ["is_swapped", "lags_behind", "swapped_finding"]
 
 _WEIGHTS = 20
 """Weights on each side; twice as many for the past alone."""
-
-_OPPOSITE = 0.9
-"""Share of the correlation's peak that it may reach with the other sign on the other side."""
 
 _LEAD = 1
 """Samples of the future that the change of `y` may need: a central difference does."""
@@ -44,21 +42,11 @@ _ROWS = 20_000
 _FEWEST = 200
 """Samples that are looked at, at least."""
 
-_TOLD = 0.1
-"""Standard deviation of a time constant, over it, from which the record tells that there is one."""
-
 _FLOOR = 0.01
 """Share (r.m.s.) of a channel below which what is left over is not told apart."""
 
-_SEEN = 0.2
-"""Evidence (logarithm of a ratio) that accuses. The study of records in their right order
-(`tests/identify/asked/test_swapped.py`) stays below it, with noise on both channels."""
-
 _AGAINST = -0.05
 """Evidence at another step that acquits."""
-
-_OF_CHANGE = 0.05
-"""Evidence that the change of `y` must give as well: an integral's needs no future."""
 
 
 def is_swapped(u: NDArray[np.float64], y: NDArray[np.float64], valid: NDArray[np.bool_]) -> bool:
@@ -97,10 +85,10 @@ def is_swapped(u: NDArray[np.float64], y: NDArray[np.float64], valid: NDArray[np
         return False
     u, y, valid = _thinned(u, y, valid)
     evidence = [_evidence(u, y, valid, step) for step in _STEPS]
-    if max(evidence) <= _SEEN or min(evidence) <= _AGAINST:
+    if max(evidence) <= PART or min(evidence) <= _AGAINST:
         return False
     change, known = np.diff(y), valid[1:] & valid[:-1]
-    return any(_evidence(u[1:], change, known, step, lead=_LEAD) > _OF_CHANGE for step in _STEPS)
+    return any(_evidence(u[1:], change, known, step, lead=_LEAD) > FEW for step in _STEPS)
 
 
 def swapped_finding(source: str, output: str) -> Finding:
@@ -135,7 +123,7 @@ def lags_behind(joint: JointFit) -> bool:
         rows, fit.residual, freedom=max(joint.problem.counted - len(rows), 1), white=True
     )
     # The logarithm of the first section's time constant comes after the delay.
-    return bool(variance[1, 1] < _TOLD**2)
+    return bool(variance[1, 1] < PART**2)
 
 
 def _is_ahead(u: NDArray[np.float64], y: NDArray[np.float64]) -> bool:
@@ -149,7 +137,7 @@ def _is_ahead(u: NDArray[np.float64], y: NDArray[np.float64]) -> bool:
     behind, ahead = likeness[: u.size], likeness[size - u.size + 1 :]
     peak = float(ahead[np.argmax(np.abs(ahead))])
     opposite = float((-np.sign(peak) * behind).max())
-    return abs(peak) > float(np.abs(behind).max()) and opposite < _OPPOSITE * abs(peak)
+    return abs(peak) > float(np.abs(behind).max()) and opposite < NEARLY * abs(peak)
 
 
 def _thinned(

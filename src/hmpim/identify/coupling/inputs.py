@@ -16,14 +16,12 @@ from numpy.typing import NDArray
 from hmpim.identify.frf.neighbours import centres_in_band, mirrored, windows_around
 from hmpim.identify.result.inputs import BOUND, Alike, InputSet
 from hmpim.identify.section_iv.spectrum import excited_band
+from hmpim.identify.worth import MUCH
 
 __all__ = ["input_set", "own_band"]
 
 _POINTS = 240
 _TERMS = 3
-_INVOLVED = 0.3
-"""Share, of the greatest, from which an input has part in a direction that is not told."""
-
 _SINGULAR = 1e6
 """Condition beyond which it is rounding, and infinite."""
 
@@ -113,7 +111,7 @@ def input_set(
         condition[some], shares = _conditions([spectra[j] for j in which], centre[some])
         for k, share in zip(some, shares, strict=True):
             if condition[k] > BOUND:
-                involved[k] = tuple(names[j] for j in which[share > _INVOLVED * share.max()])
+                involved[k] = tuple(names[j] for j in which[share > MUCH * share.max()])
     return InputSet(
         names=tuple(names),
         bands=bands,

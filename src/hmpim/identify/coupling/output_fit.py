@@ -24,6 +24,7 @@ from hmpim.identify.fitting.fit import fit_together as fit_all
 from hmpim.identify.fitting.joint import joint_fit
 from hmpim.identify.fitting.trial import JointFit
 from hmpim.identify.noise.whiteness import effective_share, is_white
+from hmpim.identify.worth import NEARLY, PART
 from hmpim.model.dynamics import StructureName
 from hmpim.model.response import slowest_time_constant
 from hmpim.model.sampled import prepare_input
@@ -31,17 +32,8 @@ from hmpim.record import Intersample
 
 __all__ = ["OutputFit", "fit_together"]
 
-_LATEST = 0.1
-"""Delay of a coupling, as a share of the record, up to which it is looked for."""
-
 _PERIODS = 4.0
 """Periods of a coupling's corner frequency that the record must hold."""
-
-_RIVAL = 0.75
-"""Share of the best correlation from which an input is a rival for the strongest."""
-
-_STRONG = 0.15
-"""Share of the output's r.m.s. from which an input's contribution is fitted as if alone."""
 
 Real = NDArray[np.float64]
 
@@ -188,16 +180,16 @@ def _strongest(
     while waiting:
         share = {j: _follows_at_all(inputs[j], rest) / spread for j in waiting}
         most = max(share.values())
-        if fits and most < _STRONG:
+        if fits and most < PART:
             break
         # A delayed copy of an input correlates as well; which one it is the fit tells.
         left = y - sum((_part(f) for f in fits.values()), np.zeros(y.size))
-        tried = {j: fitted(inputs[j], left) for j in waiting if share[j] > _RIVAL * most}
+        tried = {j: fitted(inputs[j], left) for j in waiting if share[j] > NEARLY * most}
         i = min(tried, key=lambda j: tried[j].best.fit.cost)
         fit = tried[i]
         waiting.remove(i)
         part = _part(fit)
-        if not fits or (float(np.std(part)) > _STRONG * spread and fit.related):
+        if not fits or (float(np.std(part)) > PART * spread and fit.related):
             fits[i] = fit
             rest = rest - part
     return fits
@@ -234,7 +226,7 @@ def _fit_couplings(
         rest = y - _others(fits, related, None) - best.best.fit.linear[-1]
         return rest if counts is None else np.asarray(rest * counts)
 
-    latest = max(_LATEST * y.size, 4.0 * best.best.fit.delay) + 2.0
+    latest = max(PART * y.size, 4.0 * best.best.fit.delay) + 2.0
     whitening = whitening_of(left())
     sources = {j: prepare_input(inputs[j], mode) for j in weak}
     roughly = tuple(name for name in structures if name == "first_order") or structures

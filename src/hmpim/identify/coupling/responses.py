@@ -22,16 +22,10 @@ from hmpim.identify.result import (
 )
 from hmpim.identify.result.error_bars import estimate
 from hmpim.identify.result.groups import EVERY, MODELLED
-from hmpim.identify.worth import LOOSE, PAST
+from hmpim.identify.worth import FEW, MUCH, NEARLY, PAST
 from hmpim.record import Aligned, Finding, Record, Signal
 
 __all__ = ["Responses", "inputs_of", "responses_of", "settled", "unrelated"]
-
-_ONE = 0.9
-"""Share of the frequencies they excite at which inputs that are alike count as one."""
-
-_NEVER_APART = 0.05
-"""Share of all frequencies below which inputs count as one, whichever they are."""
 
 _MENTIONED, _DOUBTED = 0.1, 0.5
 """Shares of an input's band in which it is not told from others: for a word, for a doubt."""
@@ -83,7 +77,7 @@ def inputs_of(aligned: Aligned, record: Record) -> InputSet:
     )
     apart = float(np.mean(found.usable))
     for group in found.alike:
-        if group.share >= _ONE or (apart < _NEVER_APART and group is found.alike[0]):
+        if group.share >= NEARLY or (apart < FEW and group is found.alike[0]):
             raise RecordError(
                 f"inputs {', '.join(group.names)} cannot be told apart: over "
                 f"{100 * group.share:.0f} % of the frequencies they excite, one of them is a copy "
@@ -294,7 +288,7 @@ def _told(p: Parameters, band: tuple[float, float]) -> tuple[Parameters, list[st
     """Parameters that a weak coupling's record tells, and the names of the others."""
 
     def loose(e: Estimate) -> bool:
-        return not e.spread <= LOOSE * abs(e.value)
+        return not e.spread <= MUCH * abs(e.value)
 
     def beyond(e: Estimate) -> bool:
         return loose(e) or not band[0] <= e.value <= PAST * band[1]
@@ -305,7 +299,7 @@ def _told(p: Parameters, band: tuple[float, float]) -> tuple[Parameters, list[st
     gone: set[str] = set()
     for name, bad in (
         ("scale_factor", loose),
-        ("time_constant", lambda e: not e.spread <= LOOSE * abs(e.value)),
+        ("time_constant", lambda e: not e.spread <= MUCH * abs(e.value)),
         ("damping_ratio", loose),
         ("natural_frequency", beyond),
         ("bandwidth_phase90", beyond),

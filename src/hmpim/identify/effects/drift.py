@@ -22,7 +22,7 @@ from hmpim.identify.noise.autoregression import innovation_gain
 from hmpim.identify.noise.colour import bias_drift
 from hmpim.identify.noise.covariance import covariance
 from hmpim.identify.noise.whiteness import is_white
-from hmpim.identify.worth import POOR
+from hmpim.identify.worth import PART
 from hmpim.record import Finding
 
 __all__ = ["Drifting", "drift_finding", "with_drift"]
@@ -114,7 +114,7 @@ def _asked_for(joint: JointFit) -> bool:
     if is_white(fit.residual):
         return False
     spread = problem.masked(problem.y - problem.y.mean())
-    if fit.cost > POOR * float(spread @ spread):
+    if fit.cost > PART * float(spread @ spread):
         return True
     counted = np.arange(problem.y.size) if problem.valid is None else np.flatnonzero(problem.valid)
     residual = fit.residual[counted]

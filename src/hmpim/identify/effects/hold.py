@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from hmpim.errors import RecordError
 from hmpim.identify.signals import as_signal, check_rate
+from hmpim.identify.worth import FEW, NEARLY, PART
 
 __all__ = ["Hold", "Updates", "detect_hold", "updates"]
 
@@ -25,22 +26,8 @@ _RICHER = 1.5
 _FASTEST = 1.05
 """Samples between updates below which they cannot be told from one per sample."""
 
-_COMPLETE = 0.8
-"""Share of the updates that must show, if they come at less than every other sample: rounding
-and standing inputs leave the odd repeat too."""
-
-_CROWDED = 0.8
-"""Concentration of the changes on the circle, over that of all phases within one sample."""
-
-_VIOLATIONS = 0.02
-"""Share of changes that may be off the clock: gaps that were filled, a lost update."""
-
 _STILL = 6.0
 """Change over the usual one that counts as an update where noise was added after the hold."""
-
-_MOVES = 0.2
-"""Motion of the prediction while the output stands, over that from update to update in the
-same time, below which it is the input that is held."""
 
 _ROUNDING = 1e-6
 """Samples by which an update may miss the sample that shows it, by arithmetic alone."""
@@ -164,14 +151,14 @@ def detect_hold(y: ArrayLike, fs: float, prediction: ArrayLike | None = None) ->
     runs = np.diff(changed)
     if np.count_nonzero(runs > 1) < _FEWEST or not _is_rich(samples, change, changed):
         return None
-    shortest = int(np.quantile(runs, _VIOLATIONS, method="lower"))
+    shortest = int(np.quantile(runs, FEW, method="lower"))
     if prediction is not None and not _moves_within(samples, changed, prediction):
         return None
     period = _coarse_period(changed, runs, shortest)
     if period is None:
         return None
     if shortest == 1 and (
-        change.min() > 0 or changed.size * period < _COMPLETE * (changed[-1] - changed[0])
+        change.min() > 0 or changed.size * period < NEARLY * (changed[-1] - changed[0])
     ):
         return None
     return _bounded(changed.astype(np.float64), period, fs)
@@ -218,7 +205,7 @@ def _moves_within(
     standing = np.ones(motion.size, dtype=bool)
     standing[changed - 1] = False
     at_updates = float(np.mean(motion[~standing] ** 2))
-    return bool(np.mean(motion[standing] ** 2) > _MOVES**2 * at_updates)
+    return bool(np.mean(motion[standing] ** 2) > PART**2 * at_updates)
 
 
 def _coarse_period(
@@ -229,7 +216,7 @@ def _coarse_period(
     low, high = max(0.9 * shortest, _FASTEST), float(shortest + 1)
     if shortest == 1:  # 5/4 and 5/3 crowd alike; but nearly all updates show
         mean = float(np.mean(runs))
-        low, high = max(_COMPLETE * mean, _FASTEST), 1.01 * mean
+        low, high = max(NEARLY * mean, _FASTEST), 1.01 * mean
         if high <= low:
             return None
     count = min(200, changed.size)
@@ -242,7 +229,7 @@ def _coarse_period(
         power = np.array([np.abs(np.exp(2j * np.pi * c / t).mean()) for t in trial])
         best = float(trial[np.argmax(power)])
         expected = best / np.pi * np.sin(np.pi / best)
-        if best < _FASTEST or power.max() < _CROWDED * expected:
+        if best < _FASTEST or power.max() < NEARLY * expected:
             return None
         if count >= changed.size - stretch:
             if stretch == 0:
@@ -263,7 +250,7 @@ def _densest(changed: NDArray[np.intp], runs: NDArray[np.intp], count: int) -> i
 def _bounded(changed: NDArray[np.float64], period: float, fs: float) -> Hold | None:
     """Bounds of period and phase from all changes, and the middle between them."""
     k, changed, period = _numbered(changed, period)
-    allowed = int(_VIOLATIONS * changed.size)
+    allowed = int(FEW * changed.size)
     for _ in range(allowed + 1):
         interval = _feasible(k, changed, period)
         if interval is not None:

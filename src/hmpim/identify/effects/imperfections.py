@@ -22,6 +22,7 @@ from hmpim.identify.fitting.trial import JointFit, Trial
 from hmpim.identify.result import Parameters
 from hmpim.identify.result.error_bars import estimate
 from hmpim.identify.result.groups import EVERY, MODELLED
+from hmpim.identify.worth import FEW, NEARLY
 from hmpim.record import Finding
 
 __all__ = ["Imperfections", "count_levels", "find_imperfections", "refine", "with_imperfections"]
@@ -32,14 +33,8 @@ _MANY = 1e6
 _COARSE = 1.0
 """Steps of rounding, over the noise, from which quantisation is worth a warning."""
 
-_MOST_CLIPPED = 0.85
-"""Share of clipped samples beyond which too little is left to find the levels' effect."""
-
 _MUCH_CLIPPED = 0.4
-"""Share beyond which what is found is doubtful: a rectifier clips half."""
-
-_MANY_SPIKES = 0.05
-"""Share of spikes beyond which those that do not stand out count as well."""
+"""Share of clipped samples beyond which what is found is doubtful: a rectifier clips half."""
 
 _FEWEST_LEVELS = 8
 """Levels that an output must take, unless its input takes as few."""
@@ -125,7 +120,7 @@ def find_imperfections(
     step = 0.0 if rounding is None else rounding.step
     clipping: Saturation | None = detect_saturation(y, prediction, step=step)
     if clipping is not None and (
-        (clipping.low is None and clipping.high is None) or clipping.share > _MOST_CLIPPED
+        (clipping.low is None and clipping.high is None) or clipping.share > NEARLY
     ):
         clipping = None
     hold = detect_hold(y, fs, prediction)
@@ -345,7 +340,7 @@ def _lost_findings(found: Imperfections) -> list[Finding]:
         )
     if found.spikes is not None:
         count, share = int(np.count_nonzero(found.spikes)), float(np.mean(found.spikes))
-        many = share > _MANY_SPIKES
+        many = share > FEW
         findings.append(
             Finding(
                 code="spikes",

@@ -9,6 +9,8 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
+from hmpim.identify.worth import FEW, MUCH, PART
+
 __all__ = ["find_frozen", "find_repeated", "find_spikes", "stands_out"]
 
 _FAR = 8.0
@@ -18,26 +20,16 @@ _STEPS = 1.5
 """Motion of the model from sample to sample that a spike must exceed, at an edge above all."""
 
 _LONGEST_SPIKE = 3
-_MOST_SPIKES = 0.3
 _WINDOW = 51
 
 _FEWEST_EQUAL = 8
 """Equal samples in a row from which an output may stand still."""
-
-_MOVES = 0.05
-"""Motion of the model over a stretch, as a share of all its motion, that it must have."""
-
-_REPEATS = 0.3
-"""Share of repeats among the other samples beyond which standing still is the output's habit."""
 
 _LONGEST_COPY = 3
 """Samples in a row that may be copies of a frame before a lost one."""
 
 _FEWEST_COPIES = 0.002
 """Share of copies below which they are chance: at a crest two samples may be alike."""
-
-_MOST_COPIES = 0.2
-"""Share of copies beyond which they are the output's habit."""
 
 
 def stands_out(residual: NDArray[np.float64]) -> bool:
@@ -94,7 +86,7 @@ def find_spikes(
     for a, b in zip(first, last, strict=True):
         if b - a >= _LONGEST_SPIKE:
             away[a : b + 1] = False
-    return away if away.any() and np.mean(away) < _MOST_SPIKES else None
+    return away if away.any() and np.mean(away) < MUCH else None
 
 
 def find_frozen(
@@ -121,14 +113,14 @@ def find_frozen(
     repeats = np.concatenate([[False], np.diff(y) == 0.0])
     first, last = _runs(repeats)
     frozen = np.zeros(y.size, dtype=bool)
-    least = max(5.0 * step, _MOVES * float(np.ptp(prediction)))
+    least = max(5.0 * step, FEW * float(np.ptp(prediction)))
     for a, b in zip(first, last, strict=True):
         if b - a + 2 < _FEWEST_EQUAL or y[a] in (y.min(), y.max()):
             continue
         if float(np.ptp(prediction[a - 1 : b + 1])) > least:
             frozen[a : b + 1] = True
     others = repeats[~frozen]
-    if not frozen.any() or others.size == 0 or np.mean(others) > _REPEATS:
+    if not frozen.any() or others.size == 0 or np.mean(others) > MUCH:
         return None
     return frozen
 
@@ -155,7 +147,7 @@ def find_repeated(y: NDArray[np.float64]) -> NDArray[np.bool_] | None:
     [100, 200, 201]
     """
     copies = np.concatenate([[False], np.diff(y) == 0.0])
-    if not copies.any() or np.mean(copies) > _MOST_COPIES:
+    if not copies.any() or np.mean(copies) > PART:
         return None
     first, last = _runs(copies)
     for a, b in zip(first, last, strict=True):

@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from hmpim.identify.chance import SEARCHED
 from hmpim.identify.signals import as_signal
+from hmpim.identify.worth import FEW, NEARLY
 
 __all__ = ["Quantization", "detect_quantization"]
 
@@ -23,12 +24,6 @@ _FEWEST_LEVELS = 5
 
 _FINEST = 2.0**-22
 """Step over the greatest magnitude; below it lies the rounding of single-precision floats."""
-
-_ON_GRID = 0.05
-"""R.m.s. distance from the grid, in steps, that rounding in a file may leave; chance: 0.29."""
-
-_SAME_POWER = 0.9
-"""Share of values on a ten times coarser grid that betrays rounding to significant digits."""
 
 _CELLS = 1 << 15
 """Cells of the histogram whose transform is searched; steps down to 4 / _CELLS of the range."""
@@ -144,7 +139,7 @@ def _multiples(
             break
         count = min(2 * count, gaps.size)
     multiple = np.maximum(np.rint(gaps / step), 1.0)
-    if float(np.sqrt(np.mean((gaps / step - multiple) ** 2))) > _ON_GRID:
+    if float(np.sqrt(np.mean((gaps / step - multiple) ** 2))) > FEW:
         return None
     k = np.concatenate([[0.0], np.cumsum(multiple)])
     centred = k - k.mean()
@@ -153,7 +148,7 @@ def _multiples(
     offset = float(np.mean(levels - step * k))
     left = levels - offset - step * k
     error = float(np.sqrt(np.mean(left**2)))
-    if error > _ON_GRID * step or _significant_digits(levels, step):
+    if error > FEW * step or _significant_digits(levels, step):
         return None
     rounding = np.finfo(float).eps * float(np.max(np.abs(levels)))
     return Quantization(
@@ -171,7 +166,7 @@ def _significant_digits(levels: NDArray[np.float64], step: float) -> bool:
         return False
     phase = np.exp(2j * np.pi * levels / (10.0 * step))
     near = np.abs(np.angle(phase * np.conj(phase[np.argmax(np.abs(levels))]))) < 0.1
-    return bool(np.mean(near) > _SAME_POWER)
+    return bool(np.mean(near) > NEARLY)
 
 
 def _by_clusters(samples: NDArray[np.float64], span: float) -> Quantization | None:

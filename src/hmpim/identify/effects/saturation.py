@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from hmpim.errors import RecordError
 from hmpim.identify.effects.smeared import smeared_plateaus
 from hmpim.identify.signals import as_signal
+from hmpim.identify.worth import MUCH
 
 __all__ = ["NoiseAt", "Saturation", "detect_saturation"]
 
@@ -32,9 +33,6 @@ _FEWEST = 8
 
 _VISITS = 2
 """Stays at the level that must look alike, where no prediction helps."""
-
-_SHELL = 0.3
-"""Share of the signal's span below the level that is looked at."""
 
 _STEEPEST = 0.42
 """Exponent of the density against the distance: 0 if clipped, 1/2 at a crest, 1 if settling."""
@@ -275,7 +273,7 @@ def _is_clipped(
     if side.exact:
         resolution *= 2.0  # the level stands for half a step on either side
     distance = side.level - y[~side.at]
-    reach = resolution + _SHELL * span
+    reach = resolution + MUCH * span
     below = distance[(distance >= 0) & (distance < reach)]
     count = int(np.count_nonzero(side.at))
     if not _is_crowded(count, below, resolution):

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from hmpim.identify.chance import CLEARLY, SEARCHED
 from hmpim.identify.noise.whiteness import effective_share
-from hmpim.identify.worth import WORTH
+from hmpim.identify.worth import MUCH, WORTH
 
 __all__ = ["Plateaus", "smeared_plateaus"]
 
@@ -28,12 +28,6 @@ _STARTS = (0.6, 0.75, 0.85, 0.92, 0.97)
 
 _BENDS = 6.0
 """Standard deviations by which the output must fall short at an extreme to be looked at."""
-
-_BEYOND = 0.3
-"""Standard deviations of the noise by which the prediction must go beyond on average."""
-
-_FLAT = 0.3
-"""Slope of the output against the prediction on a plateau; 1 where nothing is clipped."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -104,7 +98,7 @@ def smeared_plateaus(
     bent = np.vstack([rows, prediction**2, prediction**3])
     if _cost(y, bent) - best.cost < 2 * CLEARLY * variance:
         return None
-    least = max(_BEYOND * float(np.sqrt(best.cost / y.size)), step, WORTH * float(np.ptp(y)))
+    least = max(MUCH * float(np.sqrt(best.cost / y.size)), step, WORTH * float(np.ptp(y)))
     excess = np.abs(best.unclipped - np.clip(best.unclipped, best.low, best.high))
     kept = tuple(
         bool(np.any(clipped) and np.mean(excess[clipped]) > least)
@@ -214,7 +208,7 @@ def _holds(
     centred = q - q.mean()
     slope = float(centred @ y[clipped]) / float(centred @ centred)
     error = float(np.sqrt(variance / (centred @ centred)))
-    if slope > _FLAT + 2 * error or error > 0.5:
+    if slope > MUCH + 2 * error or error > 0.5:
         return False
     without = _best_split(y, rows, others) if any(others) else None
     cost = _cost(y, rows) if without is None else without.cost

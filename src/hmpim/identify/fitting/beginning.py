@@ -14,6 +14,7 @@ from hmpim.identify.fitting.sampled_rows import part_of
 from hmpim.identify.fitting.trial import Trial
 from hmpim.identify.noise.whiteness import effective_share
 from hmpim.identify.signals import longest_lag
+from hmpim.identify.worth import PART
 from hmpim.record import Intersample
 
 __all__ = ["begins_of", "count_in", "in_motion", "look_again"]
@@ -27,12 +28,6 @@ _RINGS = 8
 _FIRST = 8
 """Samples that show whether an input is in motion from the first."""
 
-_MOVES = 0.1
-"""Share of its mean square step from which it is."""
-
-_SPARED = 0.1
-"""Share of the record that may be left out at the beginning for a delay not known yet."""
-
 _LEFT = 4
 """Samples for each parameter that must be left."""
 
@@ -43,7 +38,7 @@ _TWICE = 2.0
 def in_motion(u: NDArray[np.float64]) -> bool:
     """Whether an input, (n,), moves from its first sample on, and so may have moved before."""
     steps = np.diff(u) ** 2
-    return float(steps[:_FIRST].mean()) > _MOVES * float(steps.mean())
+    return float(steps[:_FIRST].mean()) > PART * float(steps.mean())
 
 
 def count_in(
@@ -76,7 +71,7 @@ def begins_of(problem: Problem, fit: Fit, *, lag: int) -> int | None:
     input before the record. A fit from rest may have any delay where it was not at rest; that of
     the cross-correlation, `lag`, is the later one, and costs a few samples.
     """
-    latest = max(fit.delay, float(lag) if lag <= problem.y.size * _SPARED else 0.0, 0.0)
+    latest = max(fit.delay, float(lag) if lag <= problem.y.size * PART else 0.0, 0.0)
     begins = int(np.ceil(latest)) + _REACH
     if begins > longest_lag(problem.y.size) or fit.objective <= 0.0:
         return None

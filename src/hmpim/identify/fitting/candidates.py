@@ -21,7 +21,7 @@ from hmpim.identify.fitting.unexplained import unexplained_response
 from hmpim.identify.noise.misfit import misfit
 from hmpim.identify.noise.whiteness import effective_share, is_white
 from hmpim.identify.signals import longest_lag
-from hmpim.identify.worth import MATERIAL, POOR
+from hmpim.identify.worth import FEW, MATERIAL, MUCH, PART
 from hmpim.model.dynamics import STRUCTURES, Structure, StructureName, coefficients_of
 from hmpim.model.response import slowest_time_constant
 from hmpim.record import BETWEEN, Intersample
@@ -37,17 +37,11 @@ __all__ = [
     "refit_between",
 ]
 
-_PARTLY = 0.08
-"""Share of the response, evenly over the band, below which the same holds."""
-
 _LONG_TASTE = 12
 """Steps from each start of a richer structure, whose valleys are longer."""
 
 _PARTNER = 0.3
 """Time constant of a pole that is added, over the fit's own."""
-
-_SLOW = 0.3
-"""Time constant, over the record's length, from which an integrator may explain it as well."""
 
 _SURE = 4
 """Poles up to which a structure may leave more than white noise."""
@@ -230,12 +224,12 @@ def _spread(problem: Problem) -> float:
 
 def _is_poor(fit: Fit, spread: float) -> bool:
     """Whether much of the output is left over, and it is no white noise."""
-    return fit.cost > POOR * spread and not is_white(fit.residual)
+    return fit.cost > PART * spread and not is_white(fit.residual)
 
 
 def almost_integrates(fit: Fit) -> bool:
     """Whether the slowest pole is as slow as the record is long."""
-    return slowest_time_constant(fit.denominator) > _SLOW * fit.residual.size
+    return slowest_time_constant(fit.denominator) > MUCH * fit.residual.size
 
 
 def _misses_part(problem: Problem, fit: Fit, data: Data, band: tuple[float, float]) -> bool:
@@ -249,7 +243,7 @@ def _misses_part(problem: Problem, fit: Fit, data: Data, band: tuple[float, floa
     missed = unexplained_response(
         data.u[span], data.y[span], fit.residual[span], delay=fit.delay, band=band
     )
-    return missed > _PARTLY
+    return missed > FEW
 
 
 def _nests(simple: Fit, rich: Fit) -> bool:

@@ -23,6 +23,7 @@ from hmpim.identify.fitting.unrelated import says_nothing
 from hmpim.identify.fitting.whitening import prewhitened_of
 from hmpim.identify.noise.whiteness import is_white
 from hmpim.identify.signals import longest_lag
+from hmpim.identify.worth import FEW, PART
 from hmpim.model.dynamics import StructureName
 from hmpim.record import Intersample
 
@@ -36,12 +37,6 @@ __all__ = [
     "start",
     "turn_ahead",
 ]
-
-_SPARE = 0.1
-"""Share of the record that an output ahead of its input must leave."""
-
-_JUMP = 0.05
-"""Share of its range by which a held input jumps at least once."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -135,7 +130,7 @@ def turn_ahead(course: Course) -> Course:
     counted[rough.earliest :] = False  # they answer what comes after the record
     shorter = replace(seen, valid=counted)
     count = np.count_nonzero(counted)
-    if count < _SPARE * level.size:
+    if count < PART * level.size:
         return course
     found = fit_plain(ahead.problem(course.natural, shorter), rough, course.plain or PLAIN)
     least = min(f.objective for f in found) / count
@@ -250,6 +245,6 @@ def _looks_held(u: NDArray[np.float64]) -> bool:
     alone = moves & ~np.append(moves[1:], False) & ~np.append(False, moves[:-1])
     return bool(
         2 * count < moves.size
-        and jumps.max() > _JUMP * np.ptp(u)
+        and jumps.max() > FEW * np.ptp(u)
         and 2 * np.count_nonzero(alone) > count
     )

@@ -24,7 +24,7 @@ from hmpim.identify.fitting.least_squares import solved
 from hmpim.identify.fitting.sampled_rows import part_of
 from hmpim.identify.noise.covariance import covariance
 from hmpim.identify.noise.whiteness import is_white
-from hmpim.identify.worth import MATERIAL
+from hmpim.identify.worth import MATERIAL, PART
 from hmpim.model.dynamics import STRUCTURES, Structure, StructureName, coefficients_of, theta_of
 
 __all__ = [
@@ -38,9 +38,6 @@ __all__ = [
     "scale_of",
     "with_pole",
 ]
-
-_HIDES = 0.2
-"""Time constant, over the fit's own, up to which one more pole may hide without a word."""
 
 _PROBE = 0.3
 """Time constant, over the fit's own, by which the derivative with respect to q is taken."""
@@ -101,7 +98,7 @@ class HiddenPole:
     @property
     def may_hide(self) -> bool:
         """Whether a pole that moves the delay by much would not show, beside none or one."""
-        return self.fit.structure.order <= 1 and self.limit > _HIDES * self.scale
+        return self.fit.structure.order <= 1 and self.limit > PART * self.scale
 
 
 class Fitted(Protocol):

@@ -20,13 +20,10 @@ from hmpim.identify.fitting.trial import Trial
 from hmpim.identify.noise.autoregression import autoregression
 from hmpim.identify.noise.covariance import covariance
 from hmpim.identify.signals import longest_lag
-from hmpim.identify.worth import POOR
+from hmpim.identify.worth import PART
 from hmpim.record import Intersample
 
 __all__ = ["is_contradicted", "noise_of", "prewhitened_of", "refit_whitened"]
-
-_HIDES = 0.1
-"""Share of a residual's power that is not foreseen, below which its colour may hide a response."""
 
 _RETURNS = 12
 """Steps that a fit is taken once more when only the noise model has changed."""
@@ -41,14 +38,14 @@ def prewhitened_of(data: Data, mode: Intersample, fits: list[Fit], seen: Seen) -
     fit = min(fits, key=lambda f: f.objective)
     problem = data.problem(mode, seen)
     spread = problem.masked(problem.y - problem.y.mean())
-    if fit.cost < POOR * float(spread @ spread):
+    if fit.cost < PART * float(spread @ spread):
         return None
     noise = autoregression(fit.residual, seen.valid)
     if noise.size == 1:
         return None
     whitened = problem.coloured(noise)
     left = whitened.innovations(fit.prediction, fit.residual)
-    if float(left @ left) > _HIDES * fit.cost:
+    if float(left @ left) > PART * fit.cost:
         return None
     u, y = (scipy.signal.lfilter(noise, np.ones(1), x - x.mean()) for x in (data.u, data.y))
     y = y if seen.valid is None else y * whitened.told

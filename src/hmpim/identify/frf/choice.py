@@ -6,13 +6,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hmpim.identify.frf.neighbours import LocalFit
+from hmpim.identify.worth import TOLERATED
 
 __all__ = ["choose"]
 
 # What is judged is averaged over this many frequencies on either side.
 _NEIGHBOURS = 30
 # Fits that predict within this of the best count as equally good.
-_TOLERANCE = 0.02
 # A fit is a reference for others if it predicts within this of the best.
 _CREDIBLE = 1.25
 # The next narrower window is taken unless the square of its error is this much greater.
@@ -68,7 +68,7 @@ def choose(
     # A window that came to nothing must not make nothing of those beyond its reach.
     mean = _averaged(np.minimum(missed, 1e6 * missed.min(axis=0)))
     least = mean.min(axis=0)
-    bent = np.maximum(mean - (1 + _TOLERANCE) * least, 0.0)[:, :, None] / power
+    bent = np.maximum(mean - (1 + TOLERATED) * least, 0.0)[:, :, None] / power
     credible = (mean <= _CREDIBLE * least)[:, :, None]
     variance = spread * least[:, None]
     # Fits come in pairs, with and without T: the same kind one width down stands two before.

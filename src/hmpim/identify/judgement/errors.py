@@ -3,7 +3,7 @@
 from hmpim.identify.judgement.evidence import Evidence
 from hmpim.identify.result import Estimate
 from hmpim.identify.result.groups import MODELLED
-from hmpim.identify.worth import LOOSE
+from hmpim.identify.worth import MUCH
 from hmpim.record import Finding
 
 __all__ = ["not_converged", "weak_delay", "weak_excitation"]
@@ -41,7 +41,7 @@ def weak_excitation(evidence: Evidence) -> tuple[Finding, ...]:
         if estimate is None:
             continue
         spread = estimate.spread / abs(estimate.value) if estimate.value else float("inf")
-        if spread <= LOOSE:
+        if spread <= MUCH:
             continue
         findings.append(
             Finding(
@@ -66,7 +66,7 @@ def weak_delay(evidence: Evidence) -> tuple[Finding, ...]:
             ("delay_low_frequency", p.delay_low_frequency),
         )
         if estimate is not None
-        and estimate.spread > max(_BLURRED / evidence.fs, LOOSE * abs(estimate.value))
+        and estimate.spread > max(_BLURRED / evidence.fs, MUCH * abs(estimate.value))
     )
     if p.delay is None or "delay" not in blurred:
         return ()

@@ -9,7 +9,7 @@ from hmpim.identify.judgement.evidence import Evidence, structure_in_words
 from hmpim.identify.noise.colour import noise_colour
 from hmpim.identify.noise.input_noise import input_noise
 from hmpim.identify.result.groups import GAIN, MODELLED
-from hmpim.identify.worth import MATERIAL, TOLERATED, WORTH
+from hmpim.identify.worth import MATERIAL, PART, TOLERATED, WORTH
 from hmpim.record import Finding
 
 __all__ = [
@@ -20,9 +20,6 @@ __all__ = [
     "noise_on_the_input",
     "uneven_noise",
 ]
-
-_OF_THE_NOISE = 0.1
-"""Share of the residual's power that follows the input, beyond which it is not the noise's."""
 
 _MOSTLY_NOISE = 0.5
 """R.m.s. of the residual over that of the output beyond which its colour matters too."""
@@ -37,7 +34,7 @@ def lack_of_fit(evidence: Evidence) -> tuple[Finding, ...]:
         return ()
     owed = float(np.sqrt(evidence.misfit.share)) * evidence.unexplained
     name = structure_in_words(evidence.joint.best.fit.structure.name)
-    if owed <= TOLERATED and evidence.misfit.share > _OF_THE_NOISE:
+    if owed <= TOLERATED and evidence.misfit.share > PART:
         return (
             Finding(
                 code="lack_of_fit",
@@ -94,7 +91,7 @@ def uneven_noise(evidence: Evidence) -> tuple[Finding, ...]:
     related = float(np.corrcoef(power, fast)[0, 1])
     slope = related * float(power.std() / fast.std())
     share = slope * float(fast.mean() / power.mean())
-    if related * np.sqrt(power.size) <= DEVIATIONS or share <= _OF_THE_NOISE:
+    if related * np.sqrt(power.size) <= DEVIATIONS or share <= PART:
         return ()
     return (
         Finding(

@@ -12,6 +12,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from hmpim.identify.noise.whiteness import autocovariance
+from hmpim.identify.worth import PART
 
 __all__ = [
     "LONGEST",
@@ -29,9 +30,6 @@ _LONGEST_AUTOREGRESSION = 30
 _FLICKER_BINS = 32
 _INNOVATION_ORDER = 12
 _MOST_INNOVATIONS = 100_000
-
-_MOST_LOST = 0.2
-"""Share of the samples that gaps may cost through the reach of an order."""
 
 Real = NDArray[np.float64]
 
@@ -99,7 +97,7 @@ def _reach(valid: NDArray[np.bool_] | None) -> int:
     if valid is None:
         return LONGEST
     ends = int(np.count_nonzero(valid[:-1] & ~valid[1:])) + 1
-    return int(_MOST_LOST * np.count_nonzero(valid) / ends)
+    return int(PART * np.count_nonzero(valid) / ends)
 
 
 def _moments(residual: Real, valid: NDArray[np.bool_] | None, longest: int) -> tuple[Real, int]:

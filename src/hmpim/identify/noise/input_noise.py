@@ -12,14 +12,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from hmpim.identify.kept import kept
 from hmpim.identify.signals import as_signal, check_band, check_rate
+from hmpim.identify.worth import NEARLY, PAST
 
 __all__ = ["InputNoise", "input_noise"]
-
-_ABOVE = 1.3
-"""Where, over the end of the excited band, the spectrum is looked at for the floor."""
-
-_ROOM = 0.85
-"""The excited band must end below this share of the Nyquist frequency, over `_ABOVE`."""
 
 _STANDS_OUT = 4.0
 """Mean power over the floor's from which a stretch of the spectrum counts as excited."""
@@ -97,9 +92,9 @@ def input_noise(u: ArrayLike, fs: float, *, band: tuple[float, float]) -> InputN
         window @ window
     )
     band = (band[0], min(band[1], _end(power) * fs / samples.size))
-    if _ABOVE * band[1] > _ROOM * fs / 2 or band[1] <= band[0]:
+    if PAST * band[1] > NEARLY * fs / 2 or band[1] <= band[0]:
         return None
-    first = int(np.ceil(_ABOVE * band[1] * samples.size / fs))
+    first = int(np.ceil(PAST * band[1] * samples.size / fs))
     floor = power[first:]
     if floor.size < 32:
         return None

@@ -18,27 +18,19 @@ from hmpim.identify.nonlinear.harmonics import Harmonics, any_harmonic, sweep_ha
 from hmpim.identify.nonlinear.lines import Lines, detection_lines, find_period
 from hmpim.identify.nonlinear.mechanisms import Mechanism, compare_mechanisms
 from hmpim.identify.nonlinear.sweep_phase import SweepPhase, sweep_phase
+from hmpim.identify.worth import MUCH, PART
 
 __all__ = ["Look", "Seen", "look_at", "plainer_of", "thinned"]
 
 _GAIN = searched(36)
 """Log-likelihood that a trace must bring; in linear systems the best of all reaches 7."""
 
-_UNSWEPT = 0.15
-"""Share of a coloured residual's power that a kind must explain, without a sweep, to count."""
-
 _PERIODIC = 0.5
 """The same for an input that repeats."""
-
-_NAMED = 0.3
-"""Share of what the harmonics hold beyond noise that a kind must explain to be named."""
 
 _APART_SHARE = 0.03
 """The same as a share of what the likeliest kind gains, more where that explains less: no trace
 is exact."""
-
-_ALIKE_SHARE = 0.2
-"""The same between friction and backlash: slow motion against a spring with friction is play."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -147,7 +139,7 @@ def _by_traces(look: Look, fit: Fit, white: bool) -> Seen:
     power = fit.cost / max(look.problem.counted, 1)
     least = 0.0
     if not white:  # dynamics left out resemble every kind a little, more so at few lines
-        least = power * (_UNSWEPT if find_period(look.u) is None else _PERIODIC)
+        least = power * (PART if find_period(look.u) is None else _PERIODIC)
     found = tuple(
         m
         for m in compare_mechanisms(look.problem, fit, fs=look.fs)
@@ -168,14 +160,14 @@ def _likely(kinds: tuple[Mechanism, ...], evidence: float) -> tuple[Mechanism, .
 
     `evidence` is the log-likelihood that all harmonics gain beyond what noise would.
     """
-    if not kinds or kinds[0].gain < max(_GAIN, _NAMED * evidence):
+    if not kinds or kinds[0].gain < max(_GAIN, MUCH * evidence):
         return ()
     first = kinds[0]
     unexplained = 1.0 - min(first.gain / max(evidence, first.gain), 1.0)
 
     def behind(other: Mechanism) -> float:
         alike = {first.kind, other.kind} == {"friction", "backlash"}
-        share = (_ALIKE_SHARE if alike else _APART_SHARE) + 0.5 * unexplained
+        share = (PART if alike else _APART_SHARE) + 0.5 * unexplained
         return max(searched(1), share * first.gain)
 
     return tuple(m for m in kinds if m.likelihood > first.likelihood - behind(m))

@@ -13,21 +13,16 @@ from numpy.typing import ArrayLike, NDArray
 
 from hmpim.identify.kept import kept
 from hmpim.identify.signals import as_signal, check_rate
+from hmpim.identify.worth import FEW, PART
 
 __all__ = ["SweepPhase", "sweep_phase"]
 
 _FEWEST_CROSSINGS = 8
 """Four turns at least."""
 
-_FLUKE = 0.15
-"""Peak between two crossings over its neighbours' below which noise made them."""
-
 _SINGLE = 0.99
 """Share of the power that one sinusoid of slow amplitude must explain: a triangle has 0.986,
 a square wave 0.81."""
-
-_LOCAL = 0.05
-"""Share of the power that may be left around any one half turn: leads and noisy ends are cut."""
 
 _ENOUGH = 0.5
 """Share of the samples that must belong to the sweep."""
@@ -112,7 +107,7 @@ def sweep_phase(u: ArrayLike, fs: float) -> SweepPhase | None:
     inside &= (sample >= crossings[0]) & (sample <= crossings[-1])
     level = x / np.maximum(envelope, _DEEPEST * envelope.max())
     error = np.where(inside, (level - np.cos(phase)) ** 2, 0.0)
-    inside &= _locally(error, level, crossings) < _LOCAL
+    inside &= _locally(error, level, crossings) < FEW
     power = float(level[inside] @ level[inside])
     if np.mean(inside) < _ENOUGH or float(np.sum(error[inside])) > (1.0 - _SINGLE) * power:
         return None
@@ -174,7 +169,7 @@ def _crossings(
         least = np.minimum(
             np.concatenate([[np.inf], ratio[:-1]]), np.concatenate([ratio[1:], [np.inf]])
         )
-        flukes = np.flatnonzero((ratio < _FLUKE) & (ratio < least))
+        flukes = np.flatnonzero((ratio < PART) & (ratio < least))
         if flukes.size == 0:
             break
         at = np.delete(at, np.concatenate([flukes, flukes + 1]))  # never two next to each other

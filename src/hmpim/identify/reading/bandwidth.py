@@ -11,13 +11,11 @@ import numpy as np
 from hmpim.identify.reading.sampled_response import sampled_response
 from hmpim.identify.result import Estimate, FrequencyResponse, Parameters, ResponseBandwidths
 from hmpim.identify.result.error_bars import estimate
+from hmpim.identify.worth import PART
 from hmpim.model import RationalDelay, phase, response
 from hmpim.record import Intersample
 
 __all__ = ["ratio_at", "response_bandwidths"]
-
-_REACH = 0.15
-"""Neighbours within this share of a frequency are looked at."""
 
 _FEWEST = 5
 
@@ -42,7 +40,7 @@ def ratio_at(
         return None
     if not measured.frequency[0] <= frequency <= measured.frequency[-1]:
         return None
-    near = apart <= max(_REACH * frequency, float(np.partition(apart, _FEWEST - 1)[_FEWEST - 1]))
+    near = apart <= max(PART * frequency, float(np.partition(apart, _FEWEST - 1)[_FEWEST - 1]))
     f = measured.frequency[near]
     modelled = sampled_response(system, f, fs=fs, intersample=intersample)
     ratio = measured.response[near] / modelled

@@ -5,12 +5,12 @@ from collections.abc import Sequence
 import numpy as np
 
 from hmpim.errors import RecordError
+from hmpim.identify.worth import FEW
 from hmpim.record import Record, uniform
 
 __all__ = ["check_alike", "check_apart", "check_channels", "same_at_levels"]
 
 # Inputs of two repeats are the same if their difference is at most this share of their size.
-_SAME = 0.05
 
 
 def same_at_levels(records: Sequence[Record]) -> bool:
@@ -44,9 +44,9 @@ def same_at_levels(records: Sequence[Record]) -> bool:
             power = float(first @ first)
             factor = float(first @ second) / power if power else 0.0
             rest = float(np.linalg.norm(second - factor * first))
-            if not factor > 0 or rest > _SAME * float(np.linalg.norm(second)):
+            if not factor > 0 or rest > FEW * float(np.linalg.norm(second)):
                 return False
-            changed = changed or abs(factor - 1) > _SAME
+            changed = changed or abs(factor - 1) > FEW
     return changed
 
 
@@ -75,7 +75,7 @@ def check_alike(records: tuple[Record, ...]) -> None:
             length = min(one.values.size, other.values.size)
             apart = float(np.std(one.values[:length] - other.values[:length]))
             size = float(np.std(one.values[:length]))
-            if apart > _SAME * size:
+            if apart > FEW * size:
                 raise RecordError(
                     f"input {one.name!r} of record {k} differs from that of record 0 by "
                     f"{100 * apart / size if size else np.inf:.3g} % (r.m.s.); repeats need one "

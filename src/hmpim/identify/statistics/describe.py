@@ -46,6 +46,7 @@ from hmpim.identify.statistics.misfit import integrated_share
 from hmpim.identify.statistics.run import Run
 from hmpim.identify.statistics.start import correlations
 from hmpim.identify.statistics.statistics import Statistics
+from hmpim.identify.worth import PART
 from hmpim.model.dynamics import StructureName
 from hmpim.model.response import response, slowest_time_constant
 from hmpim.record import Finding, Intersample
@@ -75,9 +76,6 @@ _OVER = 1e-3
 
 _SETTLES = 7.0
 """Time constants after which less than that is left."""
-
-_INTEGRATES = 0.1
-"""Share of what is left over that steps in the response may explain."""
 
 _FREQUENCIES = 200
 
@@ -115,7 +113,7 @@ def identify_statistics(
     nothing = _unrelated(statistics, chosen)
     if nothing is None:
         _check_window(statistics, chosen)
-    if integrated_share(chosen.best) > (0.0 if nothing else _INTEGRATES):
+    if integrated_share(chosen.best) > (0.0 if nothing else PART):
         raise RecordError(
             f"the output still moves at the end of the window of {statistics.lags} samples, as if "
             "it integrated the input; compress with more lags, or identify the record itself if it "
