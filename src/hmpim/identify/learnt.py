@@ -17,7 +17,7 @@ from hmpim.identify.chance import HALF
 from hmpim.identify.fitting.data import shifted
 from hmpim.identify.fitting.growth import one_more_pole, with_pole
 from hmpim.identify.fitting.rows import Part, Problem
-from hmpim.identify.reading.readings import figures_at
+from hmpim.identify.reading.figures import figures_at
 from hmpim.identify.result import PairIdentification
 from hmpim.identify.surface import Surface, places_in
 from hmpim.identify.worth import NEARLY

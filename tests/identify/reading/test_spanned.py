@@ -5,7 +5,8 @@ import pytest
 
 import hmpim
 from hmpim.identify.fitting.joint import joint_fit
-from hmpim.identify.reading.readings import figures_of, read_parameters
+from hmpim.identify.reading.figures import figures_of
+from hmpim.identify.reading.readings import read_parameters
 from hmpim.identify.reading.spanned import rivals_of
 from tests_support import assert_share
 

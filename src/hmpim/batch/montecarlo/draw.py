@@ -11,7 +11,7 @@ from hmpim.batch.rows import PARAMETERS
 from hmpim.experiment import run
 from hmpim.identify import Estimate, Parameters, identify
 from hmpim.identify.fitting.rows import Part, Problem
-from hmpim.identify.reading.readings import read_figures
+from hmpim.identify.reading.figures import read_figures
 from hmpim.identify.threads import one_thread
 from hmpim.model.dynamics import STRUCTURES, second_order_coefficients, theta_of
 from hmpim.model.sampled import prepare_input

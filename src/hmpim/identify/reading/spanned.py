@@ -16,7 +16,7 @@ from hmpim.identify.chance import CLEARLY, LIKELIER, SEEN
 from hmpim.identify.fitting.fit import Fit
 from hmpim.identify.fitting.growth import as_if_hidden
 from hmpim.identify.fitting.trial import JointFit, Trial
-from hmpim.identify.reading.readings import figures_of
+from hmpim.identify.reading.figures import figures_of
 from hmpim.identify.result import Estimate, Parameters
 from hmpim.identify.result.groups import PHASE_SPLIT
 

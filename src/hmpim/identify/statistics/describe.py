@@ -27,8 +27,9 @@ from hmpim.identify.judgement.residual import lack_of_fit
 from hmpim.identify.judgement.structure import missed_pole, other_order
 from hmpim.identify.judgement.unfollowed import unfollowed
 from hmpim.identify.reading.coefficients import coefficients_of, highest_first
+from hmpim.identify.reading.figures import read_figures
 from hmpim.identify.reading.propagation import response_std
-from hmpim.identify.reading.readings import Readings, read_figures
+from hmpim.identify.reading.readings import Readings
 from hmpim.identify.reading.spanned import spanned
 from hmpim.identify.result import (
     Candidate,

@@ -1,0 +1,330 @@
+"""Figures of a system, each with its error bar from the covariance of the fit."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hmpim.identify.fitting.fit import Fit
+from hmpim.identify.reading.propagation import gradient
+from hmpim.identify.result import Estimate, Parameters
+from hmpim.identify.result.error_bars import estimate
+from hmpim.model.dynamics import Structure, coefficients_of, denominator_of
+from hmpim.model.filters import in_delta
+from hmpim.model.response import (
+    PeakGain,
+    RationalDelay,
+    bandwidth_3db,
+    bandwidth_phase,
+    dominant_time_constant,
+    peak_gain,
+    response,
+)
+
+__all__ = ["figures_at", "figures_of", "read_figures", "system_of"]
+
+_Vector = NDArray[np.float64]
+_Marks = tuple[float | None, float | None, float | None, float | None]
+
+_UNITS = dict.fromkeys(["delay", "delay_low_frequency", "time_constant"], "s") | dict.fromkeys(
+    [
+        "natural_frequency",
+        "bandwidth_phase90",
+        "bandwidth_phase90_without_delay",
+        "bandwidth_3db",
+    ],
+    "Hz",
+)
+_UNITS |= {"damping_ratio": "", "peak_gain_db": "dB"}
+
+
+def system_of(structure: Structure, vector: _Vector, fs: float) -> RationalDelay:
+    """Build the system in seconds that a fit's vector stands for."""
+    order = structure.order
+    if structure.sampled:
+        above, below = in_delta(
+            structure, coefficients_of(structure, vector[1 : 1 + order]), vector[1 + order : -1]
+        )
+        return RationalDelay(
+            delay=float(vector[0]) / fs, numerator=above, denominator=below, step=1.0 / fs
+        )
+    denominator = denominator_of(structure, coefficients_of(structure, vector[1 : 1 + order]))
+    told = vector[1 + order : -1] * fs**structure.integrators
+    numerator = np.concatenate([np.zeros(structure.dc_zeros), told])
+    return RationalDelay(
+        delay=float(vector[0]) / fs,
+        numerator=numerator / fs ** np.arange(numerator.size),
+        denominator=denominator / fs ** (np.arange(denominator.size) - structure.integrators),
+    )
+
+
+def read_figures(
+    structure: Structure,
+    vector: _Vector,
+    cov: _Vector,
+    *,
+    fs: float,
+    highest: float,
+    effective: float,
+    noise: Estimate,
+    units: tuple[str, str],
+) -> tuple[Parameters, RationalDelay, _Vector]:
+    """Turn a fit's parameters and their covariance into estimates.
+
+    Parameters
+    ----------
+    structure : Structure
+        What was fitted.
+    vector : ndarray, shape (p,)
+        As `Readings` has it.
+    cov : ndarray, shape (p, p)
+        Of `vector`.
+    fs, highest : float
+        As for `read_parameters`.
+    effective : float
+        Independent samples less parameters.
+    noise : Estimate
+        Of the noise.
+    units : (str, str)
+        Of input and output.
+
+    Returns
+    -------
+    parameters : Parameters
+        Without the paper's delay.
+    system : RationalDelay
+        The system in seconds, the scale factor included.
+    spread : ndarray, shape (q, q)
+        Covariance of its delay and of the coefficients that may vary.
+    """
+    system = system_of(structure, vector, fs)
+    marks, peak = _marks_of(structure, system, highest=highest)
+    values = _values(structure, vector, system, marks, peak, fs)
+    if not structure.order:
+        values["delay_low_frequency"] = system.delay
+    sensitivity = _Sensitivity(structure, vector, fs, tuple(f for f in marks if f is not None))
+    slopes = _slopes(structure, vector, fs, values) | sensitivity.slopes(values, peak, system)
+    unit_of = _UNITS | {"scale_factor": _gain_unit(structure, *units), "bias": units[1]}
+    read: dict[str, Estimate | None] = {
+        name: None
+        if value is None
+        else estimate(
+            value,
+            float(slopes[name] @ cov @ slopes[name]),
+            freedom=effective,
+            unit=unit_of[name],
+        )
+        for name, value in values.items()
+    }
+    by_coefficient = sensitivity.coefficients
+    spread = by_coefficient.T @ cov @ by_coefficient
+    return Parameters(noise_std=noise, **read), system, spread
+
+
+def _slopes(
+    structure: Structure, vector: _Vector, fs: float, values: dict[str, float | None]
+) -> dict[str, _Vector]:
+    """Derivatives with respect to the fit's vector of what is no mark of the response."""
+    axis, order = np.eye(vector.size), structure.order
+    slopes = {
+        "delay": axis[0] / fs,
+        "delay_low_frequency": axis[0] / fs,
+        "scale_factor": _gain_rate(structure, fs) * axis[1 + order],
+        "bias": axis[-1],
+    }
+    if order and _is_steady(structure):
+        slopes["delay_low_frequency"] = gradient(
+            lambda v: _slope_at_dc(system_of(structure, v, fs)), vector
+        )
+    mode, natural = _lowest_mode(structure, vector), values["natural_frequency"]
+    if mode is not None and natural is not None:
+        stretch = axis[mode + 1] / (2 * vector[mode + 1])
+        slopes["natural_frequency"] = -natural * (axis[mode] + stretch)
+        slopes["damping_ratio"] = -(values["damping_ratio"] or 0.0) * stretch
+    if values["time_constant"] is not None:
+        slopes["time_constant"] = gradient(
+            lambda v: dominant_time_constant(system_of(structure, v, fs)) or float("nan"), vector
+        )
+    return slopes
+
+
+def _marks_of(
+    structure: Structure, system: RationalDelay, *, highest: float, split_alone: bool = False
+) -> tuple[_Marks, PeakGain | None]:
+    """-90° with the delay and without, -3 dB, the peak's frequency; and the peak."""
+    steady = _is_steady(structure)
+    dynamic = structure.order > 0 and steady
+    split = bandwidth_phase(system, highest=highest, delay=False) if dynamic else None
+    if split_alone:
+        return (None, split, None, None), None
+    peak = peak_gain(system, highest=highest) if dynamic else None
+    marks = (
+        bandwidth_phase(system, highest=highest) if steady else None,
+        split,
+        bandwidth_3db(system, highest=highest) if dynamic else None,
+        peak.frequency if peak is not None else None,
+    )
+    return marks, peak
+
+
+def figures_of(
+    fit: Fit, *, fs: float, highest: float, split_alone: bool = False
+) -> dict[str, float | None]:
+    """Values alone of what `read_parameters` gives with error bars, the noise apart.
+
+    Parameters
+    ----------
+    fit : Fit
+        Any fit.
+    fs, highest : float
+        As for `read_parameters`.
+    split_alone : bool
+        Whether `PHASE_SPLIT` is all that is asked; what else is looked for along a curve is None.
+    """
+    vector = np.concatenate([fit.theta, fit.linear])
+    return figures_at(fit.structure, vector, fs=fs, highest=highest, split_alone=split_alone)
+
+
+def figures_at(
+    structure: Structure,
+    vector: _Vector,
+    *,
+    fs: float,
+    highest: float,
+    split_alone: bool = False,
+) -> dict[str, float | None]:
+    """The same at any parameters, `vector` as `Readings` has it."""
+    system = system_of(structure, vector, fs)
+    marks, peak = _marks_of(structure, system, highest=highest, split_alone=split_alone)
+    return _values(structure, vector, system, marks, peak, fs)
+
+
+def _values(
+    structure: Structure,
+    vector: _Vector,
+    system: RationalDelay,
+    marks: _Marks,
+    peak: PeakGain | None,
+    fs: float,
+) -> dict[str, float | None]:
+    """Every figure of a system but the noise."""
+    mode = _lowest_mode(structure, vector)
+    natural, damping = (None, None) if mode is None else _mode_at(vector, mode, fs)
+    return {
+        "delay": system.delay,
+        "delay_low_frequency": _slope_at_dc(system) if _is_steady(structure) else system.delay,
+        "scale_factor": _gain_rate(structure, fs) * float(vector[1 + structure.order]),
+        "bias": float(vector[-1]),
+        "natural_frequency": natural,
+        "damping_ratio": damping,
+        "time_constant": dominant_time_constant(system),
+        "bandwidth_phase90": marks[0],
+        "bandwidth_phase90_without_delay": marks[1],
+        "bandwidth_3db": marks[2],
+        "peak_gain_db": None if peak is None else peak.gain_db,
+    }
+
+
+def _is_steady(structure: Structure) -> bool:
+    """Whether there is a gain at DC to compare with: an integrator and a washout have none."""
+    return structure.integrators == 0 and structure.dc_zeros == 0
+
+
+def _gain_rate(structure: Structure, fs: float) -> float:
+    """Scale factor in seconds over that in samples."""
+    return float(fs ** (structure.integrators - structure.dc_zeros))
+
+
+def _gain_unit(structure: Structure, input_unit: str, output_unit: str) -> str:
+    """Unit of the scale factor."""
+    unit = ""
+    if output_unit != input_unit:
+        unit = f"{output_unit or '1'}/{input_unit}" if input_unit else output_unit
+    if structure.integrators:
+        unit = f"{unit or '1'}/s"
+    if structure.dc_zeros:
+        unit = f"{unit}*s" if unit else "s"
+    return unit
+
+
+def _slope_at_dc(system: RationalDelay) -> float:
+    """Delay that the phase shows at low frequency, in s."""
+    first = 0.0 if system.denominator.size < 2 else float(system.denominator[1])
+    lead = system.numerator[1] / system.numerator[0] if system.numerator.size > 1 else 0.0
+    return float(system.delay + (first - lead) * (system.step or 1.0))
+
+
+def _mode_at(vector: _Vector, mode: int, fs: float) -> tuple[float, float]:
+    """Natural frequency in Hz and damping ratio of 1 + c1 s + c2 s²: c2^(-1/2), c1 ω / 2."""
+    damping = 0.5 / float(np.sqrt(vector[mode + 1]))  # it holds c2 / c1²
+    return 2 * damping * float(np.exp(-vector[mode])) * fs / (2 * np.pi), damping
+
+
+class _Sensitivity:
+    """Derivatives of ln(G / G(0)) with respect to the fit's vector, and to the frequency."""
+
+    def __init__(
+        self, structure: Structure, vector: _Vector, fs: float, frequencies: tuple[float, ...]
+    ) -> None:
+        self._places, self._fs = np.array(frequencies), fs
+
+        def curve(system: RationalDelay, f: _Vector) -> NDArray[np.complex128]:
+            told = system.numerator[structure.dc_zeros]
+            return np.asarray(response(system, f) / told)
+
+        def coefficients(system: RationalDelay) -> _Vector:
+            varied = system.denominator[structure.integrators + 1 :]
+            return np.concatenate([[system.delay], system.numerator, varied])
+
+        middle = system_of(structure, vector, fs)
+        here = curve(middle, self._places)
+        self._slopes = np.empty((vector.size, self._places.size), dtype=np.complex128)
+        by_coefficient = []
+        for i, value in enumerate(vector):
+            step = np.zeros(vector.size)
+            step[i] = 1e-6 * max(abs(value), 1e-3)
+            above, below = (system_of(structure, vector + sign * step, fs) for sign in (1.0, -1.0))
+            up, down = curve(above, self._places), curve(below, self._places)
+            self._slopes[i] = (up - down) / (2 * step[i] * here)
+            by_coefficient.append((coefficients(above) - coefficients(below)) / (2 * step[i]))
+        self.coefficients = np.stack(by_coefficient)
+        """Derivatives of the delay and the coefficients of B and A, in s, shape (p, q)."""
+        up, down = (curve(middle, self._places * (1 + sign * 1e-5)) for sign in (1.0, -1.0))
+        self._rates = (up - down) / (2e-5 * np.maximum(self._places, 1e-300) * here)
+
+    def slopes(
+        self, values: dict[str, float | None], peak: PeakGain | None, system: RationalDelay
+    ) -> dict[str, _Vector]:
+        """Derivatives of the marks with respect to the vector, each shape (p,).
+
+        A crossing's by the implicit function: the curve's own error over its slope.
+        """
+        told: dict[str, _Vector] = {}
+        for name, turn in (("bandwidth_phase90", 0.0), ("bandwidth_phase90_without_delay", 1.0)):
+            if (value := values[name]) is not None:
+                change, rate = self._at(value)
+                slope, steep = change.imag.copy(), rate.imag + 2 * np.pi * turn * system.delay
+                slope[0] += 2 * np.pi * turn * value / self._fs
+                told[name] = slope / steep
+        if (value := values["bandwidth_3db"]) is not None:
+            change, rate = self._at(value)
+            told["bandwidth_3db"] = change.real / rate.real
+        if peak is not None:
+            # At a maximum the frequency's own shift does not count; without a hump it is 0 dB.
+            change, _ = self._at(peak.frequency)
+            told["peak_gain_db"] = 20 / np.log(10) * change.real * (peak.frequency > 0)
+        return told
+
+    def _at(self, frequency: float) -> tuple[NDArray[np.complex128], complex]:
+        """Derivatives with respect to the vector, shape (p,), and to the frequency in Hz."""
+        i = int(np.flatnonzero(self._places == frequency)[0])
+        return self._slopes[:, i], complex(self._rates[i])
+
+
+def _lowest_mode(structure: Structure, vector: _Vector) -> int | None:
+    """Index in `vector` of the second-order section with the lowest natural frequency."""
+    found, start = [], 1
+    for order in structure.sections:
+        if order == 2:
+            omega = np.exp(-vector[start]) / np.sqrt(vector[start + 1])
+            found.append((float(omega), start))
+        start += order
+    return min(found)[1] if found else None
