@@ -11,7 +11,8 @@ from hmpim.identify.coupling.output_fit import OutputFit
 from hmpim.identify.coupling.responses import Responses, responses_of, settled, unrelated
 from hmpim.identify.effects.censored import CensoredFit
 from hmpim.identify.effects.drift import drift_finding
-from hmpim.identify.effects.imperfections import Imperfections, refine, with_imperfections
+from hmpim.identify.effects.imperfections import Imperfections, refine
+from hmpim.identify.effects.said import with_imperfections
 from hmpim.identify.fitting.fit import Fit
 from hmpim.identify.fitting.plainer import plainer, taking
 from hmpim.identify.fitting.trial import JointFit

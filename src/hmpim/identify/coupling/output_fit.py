@@ -121,11 +121,7 @@ def fit_together(
     if len(inputs) == 1:
         fit = fitted(inputs[0], y, structures)
         return OutputFit(
-            fits=(fit,),
-            related=(fit.related,),
-            covariances=(),
-            strong=(True,),
-            lags=(None,),
+            fits=(fit,), related=(fit.related,), covariances=(), strong=(True,), lags=(None,)
         )
     plain = tuple(name for name in structures if name in PLAIN) or structures
 
@@ -146,6 +142,17 @@ def fit_together(
         related[i] = fits[i].related
     if [fits[i].best.fit.structure for i in strong] != before:
         _fit_couplings(inputs, y, fits, related, strong, plain, alike)
+    return _moved_at_once(y, fits, related, strong, alike)
+
+
+def _moved_at_once(
+    y: Real,
+    fits: dict[int, JointFit],
+    related: dict[int, bool],
+    strong: tuple[int, ...],
+    alike: Sequence[tuple[frozenset[int], NDArray[np.bool_]]],
+) -> OutputFit:
+    """All pairs moved together until none is left out, with the errors of all."""
     _refine(y, fits, [j for j in fits if related[j]], None)
     # What was not white may have been no noise but what one of them had not given back yet.
     whitening = _whitening(y, fits, related, strong)
@@ -156,7 +163,7 @@ def fit_together(
     pairs = [fits[j] for j in kept]
     told = dict(zip(kept, _covariances(pairs, whitening), strict=True))
     weak = [j for j in kept if j not in strong]
-    everyone = range(len(inputs))
+    everyone = range(len(fits))
     return OutputFit(
         fits=tuple(fits[j] for j in everyone),
         related=tuple(related[j] for j in everyone),

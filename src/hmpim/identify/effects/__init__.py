@@ -1,6 +1,7 @@
 """The rest of Fig. 1: what a sensor does to its output besides dynamics.
 
 imperfections   all of them found, and the fit refined for them
+said            what is said of them, and the figures read off them
 saturation, smeared, masked   clipped levels, exact or behind noise
 hold, held      a data hold: period and phase, and the fit at its updates
 censored        the fit that counts clipped and held samples as what they are

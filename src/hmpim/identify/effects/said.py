@@ -1,0 +1,162 @@
+"""What is said of clipped, held, rounded and lost samples, and the figures read off them."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from hmpim.identify.effects.censored import CensoredFit
+from hmpim.identify.effects.hold import Hold
+from hmpim.identify.effects.imperfections import Imperfections
+from hmpim.identify.effects.saturation import Saturation
+from hmpim.identify.result import Estimate, Parameters
+from hmpim.identify.result.error_bars import estimate
+from hmpim.identify.result.groups import EVERY, MODELLED
+from hmpim.identify.worth import FEW
+from hmpim.record import Finding
+
+__all__ = ["with_imperfections"]
+
+_MANY = 1e6
+"""Degrees of freedom behind levels and periods, which are known all but exactly."""
+
+_COARSE = 1.0
+"""Steps of rounding, over the noise, from which quantisation is worth a warning."""
+
+_MUCH_CLIPPED = 0.4
+"""Share of clipped samples beyond which what is found is doubtful: a rectifier clips half."""
+
+
+def with_imperfections(
+    parameters: Parameters, found: Imperfections, censored: CensoredFit | None, unit: str
+) -> tuple[Parameters, tuple[Finding, ...]]:
+    """Add levels, hold period and step to the parameters, and say what they are."""
+    clipping, hold, rounding = found.saturation, found.hold, found.quantization
+    findings = (
+        *(() if clipping is None else (_of_clipping(clipping, unit),)),
+        *(() if hold is None else (_of_hold(hold),)),
+        *_of_rounding(found, parameters.noise_std, unit),
+        *_lost_findings(found),
+    )
+    figures = {}
+    if clipping is not None:
+        for name, level, std in (
+            ("saturation_low", clipping.low, clipping.low_std),
+            ("saturation_high", clipping.high, clipping.high_std),
+        ):
+            if level is not None:
+                figures[name] = estimate(level, (std or 0.0) ** 2, freedom=_MANY, unit=unit)
+    if hold is not None:
+        figures["hold_period"] = estimate(hold.period, hold.std**2, freedom=_MANY, unit="s")
+    if rounding is not None:
+        figures["quantization_step"] = estimate(
+            rounding.step, rounding.std**2, freedom=_MANY, unit=unit
+        )
+    if censored is not None and parameters.noise_std is not None:
+        figures["noise_std"] = estimate(
+            censored.noise_std,
+            censored.noise_std_std**2,
+            freedom=float(censored.index.size),
+            unit=unit,
+        )
+    return replace(parameters, **figures), findings
+
+
+def _of_clipping(clipping: Saturation, unit: str) -> Finding:
+    """Share and levels; much of it is a doubt."""
+    much = clipping.share > _MUCH_CLIPPED
+    levels = [
+        f"{name} {level:.6g} {unit}".rstrip()
+        for name, level in (("low", clipping.low), ("high", clipping.high))
+        if level is not None
+    ]
+    return Finding(
+        code="saturation",
+        message=f"{100 * clipping.share:.1f} % of the samples are clipped "
+        f"({', '.join(levels)}); they count as beyond the level. "
+        + (
+            "That is too much to rely on: lower the amplitude, or look for a rectifier."
+            if much
+            else "Lower the amplitude to keep the whole range."
+        ),
+        severity="doubt" if much else "info",
+        parameters=MODELLED if much else ("saturation_low", "saturation_high"),
+    )
+
+
+def _of_hold(hold: Hold) -> Finding:
+    """Period and phase of the updates."""
+    return Finding(
+        code="hold",
+        message=f"The output is updated every {1e3 * hold.period:.4g} ms only, first at "
+        f"{1e3 * hold.phase:.4g} ms into the record; the delay is that of the values, "
+        "without the time for which they are held.",
+        severity="info",
+        parameters=("hold_period", "delay"),
+    )
+
+
+def _of_rounding(found: Imperfections, noise: Estimate | None, unit: str) -> list[Finding]:
+    """Few levels, or steps that are coarse beside the noise."""
+    if found.levels is not None:
+        return [
+            Finding(
+                code="quantization",
+                message=f"The output takes only {found.levels} different values, too few to follow "
+                "the motion between them. Measure with a finer resolution, or a larger motion.",
+                severity="doubt",
+                parameters=EVERY,
+            )
+        ]
+    rounding = found.quantization
+    if rounding is None or noise is None or rounding.step <= _COARSE * noise.value:
+        return []
+    return [
+        Finding(
+            code="quantization",
+            message=f"The output is rounded to steps of {rounding.step:.4g} {unit}".rstrip()
+            + f", {rounding.step / max(noise.value, 1e-300):.2g} times the noise: errors "
+            "of rounding are not independent; error bars are only as good as that.",
+            severity="info",
+            parameters=MODELLED,
+        )
+    ]
+
+
+def _lost_findings(found: Imperfections) -> list[Finding]:
+    findings = []
+    if found.repeated is not None:
+        count = int(np.count_nonzero(found.repeated))
+        findings.append(
+            Finding(
+                code="repeated_frames",
+                message=f"{count} samples ({100 * float(np.mean(found.repeated)):.2g} %) repeat "
+                "the one before them to the last digit, as frames do that were lost on the way; "
+                "they are left out.",
+                severity="info",
+                parameters=(),
+            )
+        )
+    if found.spikes is not None:
+        count, share = int(np.count_nonzero(found.spikes)), float(np.mean(found.spikes))
+        many = share > FEW
+        findings.append(
+            Finding(
+                code="spikes",
+                message=f"{count} samples ({100 * share:.2g} %) stand far out of those around them "
+                "and are left out. Look for loose contacts, lost bits or impacts.",
+                severity="doubt" if many else "info",
+                parameters=MODELLED if many else (),
+            )
+        )
+    if found.frozen is not None:
+        findings.append(
+            Finding(
+                code="frozen",
+                message="The output stands still where the model moves, over "
+                f"{100 * float(np.mean(found.frozen)):.2g} % of the record, which is left out. "
+                "Look for lost updates, a stuck sensor, or friction.",
+                severity="doubt",
+                parameters=MODELLED,
+            )
+        )
+    return findings
