@@ -21,6 +21,7 @@ __all__ = ["pair_of", "section_pictures"]
 _BESIDE: tuple[Compare, ...] = ("rates", "loads", "excitation")
 _MODES = ("P", "PV", "PVA")
 _MOST_BESIDE = 3  # columns that a page has room for
+_MARKED = "Upright lines mark the −90° bandwidths."
 _CLEAR = 0.3  # share of the response: what is less sure is left out
 
 
@@ -44,7 +45,7 @@ def section_pictures(
         return [_picture("levels", figure.title, words, drawn)]
     if figure.compare == "axes":
         over = _overlaid(rows, rows, "axes")
-        return [] if over is None else [_picture("axes", figure.title, words, over)]
+        return [] if over is None else [_picture("axes", figure.title, words, over, more=_MARKED)]
     for axis in dict.fromkeys(row.axis for row in rows):
         if figure.compare == "fence":
             fence = _fence([row for row in rows if row.axis == axis])
@@ -52,7 +53,8 @@ def section_pictures(
             continue
         over = _overlaid([row for row in rows if row.axis == axis], rows, figure.compare)
         if over is not None:
-            pictures.append(_picture(axis, f"{figure.title}: {axis}", words, over))
+            title = f"{figure.title}: {axis}"
+            pictures.append(_picture(axis, title, words, over, more=_MARKED))
     return pictures
 
 
@@ -107,8 +109,9 @@ def _fence(rows: Sequence[Row]) -> Description:
     return picket_fence(records, band=(max(low, 0.55 * high), 0.75 * high))
 
 
-def _picture(key: str, title: str, words: str, drawn: Description) -> Picture:
-    return Picture(key=key, title=title, caption=title + ".", description=words, figure=drawn)
+def _picture(key: str, title: str, words: str, drawn: Description, *, more: str = "") -> Picture:
+    caption = f"{title}. {more}".rstrip()
+    return Picture(key=key, title=title, caption=caption, description=words, figure=drawn)
 
 
 def pair_of(row: Row, *, clear: bool = False) -> PairIdentification:

@@ -139,7 +139,7 @@ def study_page(study: Study) -> StudyPage:
         facts=(
             ("Rig", study.plan.rig.kind),
             ("Cases", str(len({row.case_id for row in study.rows}))),
-            ("Length of each test", f"{study.plan.duration:g} s, and coming to rest"),
+            ("Length of each test", f"{study.plan.duration:g} s, plus the return to rest"),
             ("Seed", str(study.plan.seed)),
             ("Plan", study.plan.digest[:12]),
             ("Made by", f"hmpim {version('hmpim')}"),

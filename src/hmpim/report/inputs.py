@@ -1,5 +1,6 @@
 """Several inputs on a page: which are told apart, and every coupling in one table."""
 
+import re
 from dataclasses import dataclass
 from typing import Any
 
@@ -93,11 +94,22 @@ def gain_rows(result: Identification) -> tuple[dict[str, Any], ...]:
 def _apart(inputs: InputSet, name: str) -> str:
     """Which inputs one cannot be separated from, and where."""
     found = [
-        f"{', '.join(other for other in group.names if other != name)} at {group.where}"
+        f"{', '.join(other for other in group.names if other != name)} at {_spans(group.where)}"
         for group in inputs.alike
         if name in group.names
     ]
     return "; ".join(found) or "separable from all others"
+
+
+def _spans(where: str) -> str:
+    """Bands in words, one of a single frequency as that.
+
+    Examples
+    --------
+    >>> _spans("0.2 to 0.4, 14.8 to 14.8 Hz")
+    '0.2 to 0.4, 14.8 Hz'
+    """
+    return re.sub(r"\b([\d.e+-]+) to \1(?=[, ])", r"\1", where)
 
 
 def _gain(pair: PairIdentification) -> str:
@@ -108,5 +120,5 @@ def _gain(pair: PairIdentification) -> str:
     response = pair.frequency_response
     if pair.verdict == "doubtful" and response.frequency.size:
         level = 20 * np.log10(max(float(np.max(np.abs(response.response))), 1e-300))
-        return f"no gain at rest; {level:.0f} dB at most"
+        return f"no static gain; {level:.0f} dB at most".replace("-", "−")
     return "–"

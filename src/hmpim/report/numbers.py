@@ -25,12 +25,18 @@ def format_value(estimate: Estimate) -> str:
 
     >>> format_value(Estimate(value=35.7572, std=0.2, ci95=None, unit="Hz", verdict="doubtful"))
     '35.76 ± ?'
+    >>> format_value(Estimate(value=21.3, std=7183.0, ci95=(-14000.0, 14500.0), unit="Hz"))
+    '21 ± 7200'
     """
     if estimate.ci95 is None:
         return f"{format_number(estimate.value)} ± ?"
     if _exact(estimate):
         return f"{estimate.value:.10g} ± 0"
     if estimate.std is not None:
+        if estimate.unit == "Hz" and estimate.std > abs(estimate.value):
+            # No frequency is 0, as rounding to the error would have it.
+            error = float(f"{estimate.std:.2g}")
+            return f"{estimate.value:.2g} ± {error:g}"
         return plus_minus(estimate.value, estimate.std)
     return aside(estimate.value, *estimate.ci95)
 

@@ -111,7 +111,9 @@ def _title(result: Identification) -> str:
     if len(result.pairs) == 1:
         pair = result.pairs[0]
         return _named(pair)
-    return f"{len(result.pairs)} pairs of channels"
+    inputs, outputs = ({getattr(p, role) for p in result.pairs} for role in ("input", "output"))
+    counts = ((len(inputs), "input"), (len(outputs), "output"))
+    return ", ".join(f"{count} {role}{'s' * (count != 1)}" for count, role in counts)
 
 
 def _about(about: About, result: Identification) -> list[tuple[str, str]]:
