@@ -38,16 +38,18 @@ def module_name(path: Path) -> str:
     return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
 
 
-def _assigned(statement: ast.stmt) -> tuple[str, ast.expr] | None:
+def _assigned(statement: ast.stmt) -> list[tuple[str, ast.expr]]:
+    """Names of constants that a statement gives values, and these."""
     if isinstance(statement, ast.Assign) and len(statement.targets) == 1:
         target, value = statement.targets[0], statement.value
     elif isinstance(statement, ast.AnnAssign) and statement.value is not None:
         target, value = statement.target, statement.value
     else:
-        return None
-    if not isinstance(target, ast.Name) or not _NAME.fullmatch(target.id):
-        return None
-    return target.id, value
+        return []
+    pairs = [(target, value)]
+    if isinstance(target, ast.Tuple) and isinstance(value, ast.Tuple):
+        pairs = list(zip(target.elts, value.elts, strict=True))
+    return [(t.id, v) for t, v in pairs if isinstance(t, ast.Name) and _NAME.fullmatch(t.id)]
 
 
 def _is_number(value: ast.expr, known: set[str]) -> bool:
@@ -74,18 +76,17 @@ def _of_file(path: Path) -> Iterator[Constant]:
     body = ast.parse(path.read_text()).body
     known: set[str] = set()
     for statement, follows in zip(body, [*body[1:], None], strict=True):
-        found = _assigned(statement)
         if isinstance(statement, ast.ImportFrom):
             known |= {a.asname or a.name for a in statement.names if _NAME.fullmatch(a.name)}
-        if found is None or not _is_number(found[1], known):
-            continue
-        known.add(found[0])
-        yield Constant(
-            file=path.relative_to(ROOT).as_posix(),
-            name=found[0],
-            text=ast.unparse(found[1]),
-            says=_words(follows),
-        )
+        for name, value in _assigned(statement):
+            if _is_number(value, known):
+                known.add(name)
+                yield Constant(
+                    file=path.relative_to(ROOT).as_posix(),
+                    name=name,
+                    text=ast.unparse(value),
+                    says=_words(follows),
+                )
 
 
 def constants() -> list[Constant]:
