@@ -1,7 +1,7 @@
 """Records of one stimulus done together, where the parameters alone are asked for.
 
 The first records of a stimulus are identified one by one; what they share is learnt from them
-(`hmpim.identify.fleet`) and kept in the process for the tasks that follow. A record for which that
+(`hmpim.identify.fleets`) and kept in the process for the tasks that follow. A record for which that
 does not hold, for whatever reason, is identified one by one as well. Of records that one file holds
 the first alone is made a `Record`: the others are compared with it, sample by sample.
 """
@@ -20,7 +20,7 @@ from hmpim.batch.request import Request
 from hmpim.batch.rows import Row, fleet_table
 from hmpim.batch.samples import Samples
 from hmpim.identify import PairIdentification, excited_band
-from hmpim.identify.fleet import Fleet, fit_fleet, learn_fleet
+from hmpim.identify.fleets.fleet import Fleet, fit_fleet, learn_fleet
 from hmpim.identify.kept import keeping
 from hmpim.identify.threads import one_thread
 from hmpim.record import Record

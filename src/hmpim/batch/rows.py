@@ -12,7 +12,7 @@ import numpy as np
 from hmpim.batch.addresses import Address
 from hmpim.batch.reading import Read
 from hmpim.identify import Estimate, Identification, Parameters
-from hmpim.identify.fleet import Fleet, FleetFit
+from hmpim.identify.fleets.fleet import Fleet, FleetFit
 from hmpim.record import Record
 
 __all__ = [

@@ -1,7 +1,7 @@
 """Many outputs of one stimulus fitted at once under one assumption, and what that leaves uncertain.
 
-Each output is a few numbers in the basis that `hmpim.identify.learnt` found. Gauss and Newton's
-steps are taken for all at once; delay and poles move, the gain is solved exactly.
+Each output is a few numbers in the basis that `learnt.py` found. Gauss and Newton's steps are taken
+for all at once; delay and poles move, the gain is solved exactly.
 """
 
 from collections.abc import Mapping
@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hmpim.identify.fitting.data import shifted
-from hmpim.identify.learnt import Fleet, Member
+from hmpim.identify.fleets.learnt import Fleet, Member
 
 __all__ = ["Errors", "Fits", "errors_of", "fitted_all"]
 

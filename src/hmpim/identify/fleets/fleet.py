@@ -1,7 +1,7 @@
 """Many records of one stimulus and of second order: fitted together, by what they share.
 
-`hmpim.identify.learnt` tells what that is. Each output is one product with the basis, and all are
-fitted at once by the same least squares as `hmpim.identify`, in a few numbers instead of thousands.
+`learnt.py` tells what that is. Each output is one product with the basis, and all are fitted at
+once by the same least squares as `hmpim.identify`, in a few numbers instead of thousands.
 The basis is the stimulus' transforms and Gram matrix, made once for all. Every assumption on what
 the stimulus does between its samples is tried, and what the record does not exclude widens the
 intervals, as `hmpim.identify.reading.spanned` does it. The one record in twenty that asks for one
@@ -23,10 +23,10 @@ from numpy.typing import NDArray
 
 from hmpim.identify.chance import CLEARLY, DEVIATIONS, FALSE_ALARM, LIKELIER, ONE_SIDED
 from hmpim.identify.effects.imperfections import find_imperfections
-from hmpim.identify.fleet_fits import Errors, Fits, errors_of, fitted_all
-from hmpim.identify.fleet_pole import with_tails
+from hmpim.identify.fleets.fits import Errors, Fits, errors_of, fitted_all
+from hmpim.identify.fleets.learnt import Fleet, Member, learn_fleet
+from hmpim.identify.fleets.pole import with_tails
 from hmpim.identify.judgement.between_samples import SHIFT, SIZES, WIDE
-from hmpim.identify.learnt import Fleet, Member, learn_fleet
 from hmpim.identify.noise.misfit import misfits
 from hmpim.identify.noise.whiteness import are_white
 from hmpim.identify.reading.spanned import MOVES

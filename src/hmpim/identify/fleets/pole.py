@@ -13,7 +13,7 @@ from hmpim.identify.fitting.fit import fit_structure
 from hmpim.identify.fitting.growth import grow, hidden_pole
 from hmpim.identify.fitting.rows import Problem
 from hmpim.identify.fitting.trial import JointFit, Trial, trial_of
-from hmpim.identify.learnt import Fleet, Member, theta_at
+from hmpim.identify.fleets.learnt import Fleet, Member, theta_at
 from hmpim.identify.noise.whiteness import is_white
 from hmpim.identify.reading.spanned import spanned
 from hmpim.identify.result import Parameters

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 import hmpim
-from hmpim.identify.fleet import fit_fleet, learn_fleet
-from hmpim.identify.learnt import box_around
-from hmpim.identify.surface import Surface, places_in
+from hmpim.identify.fleets.fleet import fit_fleet, learn_fleet
+from hmpim.identify.fleets.learnt import box_around
+from hmpim.identify.fleets.surface import Surface, places_in
 
 FS, SAMPLES, LEARNT = 100.0, 600, 6
 NOISE = 0.1

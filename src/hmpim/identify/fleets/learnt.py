@@ -17,9 +17,9 @@ from hmpim.identify.chance import HALF
 from hmpim.identify.fitting.data import shifted
 from hmpim.identify.fitting.growth import one_more_pole, with_pole
 from hmpim.identify.fitting.rows import Part, Problem
+from hmpim.identify.fleets.surface import Surface, places_in
 from hmpim.identify.reading.figures import figures_at
 from hmpim.identify.result import PairIdentification
-from hmpim.identify.surface import Surface, places_in
 from hmpim.identify.worth import NEARLY
 from hmpim.model.dynamics import STRUCTURES, Structure
 from hmpim.model.sampled import SampledInput, prepare_input
