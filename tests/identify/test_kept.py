@@ -9,31 +9,44 @@ from hmpim.identify.kept import keeping, kept
 FS, SAMPLES = 100.0, 500
 
 
+FAULTS = {
+    "": "intersample", "clipped": "saturation", "spikes": "spikes", "nonlinear": "nonlinear",
+    "gaps": "gaps", "unrelated": "unrelated",
+}  # fmt: skip
+"""With what is said of each."""
+
+
 def record(seed: int, *, last: float = 20.0, fault: str = "") -> hmpim.Record:
-    time = np.arange(SAMPLES) / FS
+    time, rng = np.arange(SAMPLES) / FS, np.random.default_rng([7, seed])
     u = np.sin(2 * np.pi * (0.3 * time + (last - 0.3) / 10 * time**2))
     model = hmpim.Model(delay=0.02 + 0.011 * seed, scale_factor=2.0, denominator=(1e-3, 0.03, 1.0))
     y = hmpim.simulate(model, u, fs=FS, intersample="bandlimited")
-    y += 0.05 * np.random.default_rng([7, seed]).standard_normal(SAMPLES)
+    if fault == "nonlinear":
+        y += 0.2 * y**2
+    y += 0.05 * rng.standard_normal(SAMPLES)
     if fault == "clipped":
         y = np.minimum(y, 1.2)
+    if fault == "spikes":
+        y[[90, 180, 333]] += 8.0
     if fault == "unrelated":
-        y = np.random.default_rng(8).standard_normal(SAMPLES)
-    return hmpim.Record.from_arrays({"u": u}, {"y": y}, fs=FS)
+        y = rng.standard_normal(SAMPLES)
+    there = (time < 2.0) | (time >= 2.2) if fault == "gaps" else time >= 0.0
+    return hmpim.Record.from_arrays({"u": u[there]}, {"y": y[there]}, time=time[there])
 
 
 def test_a_result_is_the_same_to_the_last_digit():
-    """Of records of one input and of another in between, with delays of several samples."""
-    records = [
-        record(0), record(1, fault="clipped"), record(1, last=15.0), record(2),
-        record(3, fault="unrelated"),
-    ]  # fmt: skip
+    """Of records of one input with and without faults and of another in between."""
+    records = [record(k % 4, fault=fault) for k, fault in enumerate(FAULTS)]
+    records.insert(3, record(1, last=15.0))
     alone = [hmpim.identify(r).to_dict() for r in records]
     with keeping():
         beside = [hmpim.identify(r).to_dict() for r in records]
         assert room._KEPT.get()
     assert beside == alone
     assert room._KEPT.get() is None
+    del alone[3]
+    for told, code in zip(alone, FAULTS.values(), strict=True):
+        assert code in [warning["code"] for warning in told["pairs"][0]["warnings"]]
 
 
 def test_what_is_kept_is_bounded_and_found_by_the_samples():
