@@ -3,8 +3,8 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hmpim.identify.arrays import Real
 from hmpim.identify.asked.question import Question
 from hmpim.identify.asked.reference import response_through
 from hmpim.identify.coupling.output_fit import OutputFit
@@ -210,7 +210,7 @@ def _band(question: Question, i: int) -> tuple[float, float]:
 
 def _refined(
     question: Question, found: Imperfections, joined: OutputFit, i: int
-) -> tuple[JointFit, CensoredFit | None, NDArray[np.float64] | None]:
+) -> tuple[JointFit, CensoredFit | None, Real | None]:
     """The fit with clipped and held samples counted as what they are, and a covariance known."""
     joint = joined.fits[i]
     covariance = joined.covariances[i] if joined.covariances else None
@@ -224,11 +224,7 @@ def _refined(
 
 
 def _inspected(
-    question: Question,
-    found: Imperfections,
-    joint: JointFit,
-    i: int,
-    covariance: NDArray[np.float64] | None,
+    question: Question, found: Imperfections, joint: JointFit, i: int, covariance: Real | None
 ) -> Inspection | None:
     """What of the residual is nonlinear; not asked of a loop."""
     if question.instrument is not None:
@@ -270,13 +266,7 @@ def _measured(
     return replace(response, std=np.hypot(response.std, own))
 
 
-def _local(
-    u: NDArray[np.float64],
-    y: NDArray[np.float64],
-    fit: Fit,
-    fs: float,
-    band: tuple[float, float],
-) -> FrequencyResponse:
+def _local(u: Real, y: Real, fit: Fit, fs: float, band: tuple[float, float]) -> FrequencyResponse:
     """Local response; of an integrator through the output's differences, which do not wander.
 
     Where an integrating output ends is not where it began, and that step leaks into every bin.

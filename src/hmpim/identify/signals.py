@@ -3,9 +3,10 @@
 import math
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from hmpim.errors import ArgumentError, RecordError
+from hmpim.identify.arrays import Real
 
 __all__ = ["as_pair", "as_signal", "check_band", "check_rate", "longest_lag", "whole_lag"]
 
@@ -15,7 +16,7 @@ _FARTHEST = 0.85
 """Longest lag that is looked for, over the record's length; what is left must show an answer."""
 
 
-def as_signal(name: str, values: ArrayLike) -> NDArray[np.float64]:
+def as_signal(name: str, values: ArrayLike) -> Real:
     """Return `values` as finite samples of shape (n,), n >= 4; no copy where none is needed.
 
     Raises
@@ -51,7 +52,7 @@ def as_signal(name: str, values: ArrayLike) -> NDArray[np.float64]:
     return array
 
 
-def as_pair(u: ArrayLike, y: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def as_pair(u: ArrayLike, y: ArrayLike) -> tuple[Real, Real]:
     """Return input and output as samples of the same shape (n,).
 
     Raises

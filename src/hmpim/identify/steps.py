@@ -3,8 +3,8 @@
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hmpim.identify.arrays import Real
 from hmpim.identify.asked.question import Question
 from hmpim.identify.asked.reference import fit_through
 from hmpim.identify.asked.swapped import is_swapped, lags_behind, swapped_finding
@@ -53,7 +53,7 @@ def fit(question: Question, seen: Imperfections) -> OutputFit:
     if len(fitted.fits) > 1 or fitted.fits[0].silent or question.swapped:
         return fitted
 
-    def with_rows(rows: NDArray[np.float64], plainly: bool) -> JointFit:
+    def with_rows(rows: Real, plainly: bool) -> JointFit:
         names = question.plain if plainly else question.structures
         return _fit_once(question, seen, names, rows).fits[0]
 
@@ -114,7 +114,7 @@ def _fit_once(
     question: Question,
     seen: Imperfections,
     structures: tuple[StructureName, ...],
-    rows: NDArray[np.float64] | None = None,
+    rows: Real | None = None,
 ) -> OutputFit:
     """Fit an output to all inputs, with `rows` beside the bias, on the samples that tell."""
     aligned, output, inputs = question.aligned, question.output, question.inputs

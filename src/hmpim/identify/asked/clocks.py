@@ -18,16 +18,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
 from hmpim.errors import ArgumentError
+from hmpim.identify.arrays import Mask, Real
 from hmpim.identify.result import Identification, PairIdentification
 from hmpim.model import Model, simulate
 from hmpim.record import Aligned, Channel, Finding, Record, Signal, Waveform, fit_clock, on_grid
 
 __all__ = ["settled_between"]
 
-Real = NDArray[np.float64]
 
 _STEPS = 15
 """Evaluations of all derivatives in which the models are moved."""
@@ -174,7 +173,7 @@ def _linear(pair: PairIdentification) -> Model | None:
     )
 
 
-def _counted(channel: Channel, aligned: Aligned) -> NDArray[np.bool_]:
+def _counted(channel: Channel, aligned: Aligned) -> Mask:
     """Samples of an output at which all inputs are known, shape (n,)."""
     known = np.logical_and.reduce([source.valid for source in aligned.inputs])
     nearest = np.rint((channel.time - aligned.start) * aligned.fs).astype(np.int64)
@@ -192,10 +191,7 @@ def _answers(models: list[Model], waveforms: list[Waveform], at: Real) -> Real:
 
 
 def _refined(
-    models: list[Model],
-    waveforms: list[Waveform],
-    channel: Channel,
-    counted: NDArray[np.bool_],
+    models: list[Model], waveforms: list[Waveform], channel: Channel, counted: Mask
 ) -> list[Model]:
     """The models moved to where they explain an output best, by the true waveforms."""
     if not np.all([c > 0.0 for model in models for c in _moved_coefficients(model)]):

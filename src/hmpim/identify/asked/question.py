@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hmpim.identify.arrays import Mask
 from hmpim.identify.asked.reference import Instrument
 from hmpim.identify.fitting.enrich import PLAIN
 from hmpim.identify.result import InputSet
@@ -56,7 +56,7 @@ class Question:
         return bool(np.ptp(self.output.values[self.output.valid]) > 0)
 
     @property
-    def measured(self) -> NDArray[np.bool_] | None:
+    def measured(self) -> Mask | None:
         """Samples at which every input was measured, shape (n,); None when all were."""
         told = np.logical_and.reduce([source.valid for source in self.aligned.inputs])
         return None if bool(told.all()) else np.asarray(told)

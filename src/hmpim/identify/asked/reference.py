@@ -13,9 +13,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
 from hmpim.errors import ArgumentError, RecordError
+from hmpim.identify.arrays import Real
 from hmpim.identify.fitting.fit import Fit, Problem, jacobian, within_reach
 from hmpim.identify.fitting.sampled_rows import part_of
 from hmpim.identify.fitting.trial import JointFit
@@ -46,8 +46,6 @@ _MOVES = 0.01
 _STEPS = 40
 _NEGLIGIBLE = 1e-4
 """Standard deviations by which the last step moves any parameter."""
-
-Real = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -14,6 +14,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from hmpim.identify.arrays import Mask, Real
 from hmpim.identify.fitting.fit import jacobian
 from hmpim.identify.fitting.trial import JointFit
 from hmpim.identify.noise.covariance import covariance
@@ -49,7 +50,7 @@ _AGAINST = -0.05
 """Evidence at another step that acquits."""
 
 
-def is_swapped(u: NDArray[np.float64], y: NDArray[np.float64], valid: NDArray[np.bool_]) -> bool:
+def is_swapped(u: Real, y: Real, valid: Mask) -> bool:
     """Whether `u` follows `y` rather than `y` follows `u`.
 
     Parameters
@@ -126,7 +127,7 @@ def lags_behind(joint: JointFit) -> bool:
     return bool(variance[1, 1] < PART**2)
 
 
-def _is_ahead(u: NDArray[np.float64], y: NDArray[np.float64]) -> bool:
+def _is_ahead(u: Real, y: Real) -> bool:
     """Whether `y` is ahead of `u` where they resemble each other most.
 
     A sine, an integral or a derivative resembles as much on the other side, with the other sign:
@@ -140,9 +141,7 @@ def _is_ahead(u: NDArray[np.float64], y: NDArray[np.float64]) -> bool:
     return abs(peak) > float(np.abs(behind).max()) and opposite < NEARLY * abs(peak)
 
 
-def _thinned(
-    u: NDArray[np.float64], y: NDArray[np.float64], valid: NDArray[np.bool_]
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.bool_]]:
+def _thinned(u: Real, y: Real, valid: Mask) -> tuple[Real, Real, Mask]:
     """Means over blocks that are still short beside what the two have in common."""
     size = min(u.size, max(64, u.size // 8))
     frequency, shared = scipy.signal.csd(u, y, nperseg=size, detrend="constant")
@@ -155,14 +154,7 @@ def _thinned(
     return u, y, np.asarray(valid[:whole].reshape(-1, block).all(axis=1))
 
 
-def _evidence(
-    u: NDArray[np.float64],
-    y: NDArray[np.float64],
-    valid: NDArray[np.bool_],
-    step: int,
-    *,
-    lead: int = 0,
-) -> float:
+def _evidence(u: Real, y: Real, valid: Mask, step: int, *, lead: int = 0) -> float:
     """Logarithm by which the past serves `u` better than `y`; 0 if there is too little to tell."""
     rows = _rows(valid, 2 * _WEIGHTS * step)
     if rows.size < _FEWEST:
@@ -170,7 +162,7 @@ def _evidence(
     return _future_needed(y, u, rows, step, lead) - _future_needed(u, y, rows, step, lead)
 
 
-def _rows(valid: NDArray[np.bool_], reach: int) -> NDArray[np.intp]:
+def _rows(valid: Mask, reach: int) -> NDArray[np.intp]:
     """Samples all of whose neighbours within reach were measured; evenly thinned."""
     lost = np.concatenate([[0], np.cumsum(~valid)])
     at = np.arange(reach, valid.size - reach)
@@ -179,11 +171,7 @@ def _rows(valid: NDArray[np.bool_], reach: int) -> NDArray[np.intp]:
 
 
 def _future_needed(
-    target: NDArray[np.float64],
-    source: NDArray[np.float64],
-    rows: NDArray[np.intp],
-    step: int,
-    lead: int,
+    target: Real, source: Real, rows: NDArray[np.intp], step: int, lead: int
 ) -> float:
     """Logarithm of what the past of `source` leaves over beside what past and future leave."""
     lags = step * np.arange(-_WEIGHTS, 2 * _WEIGHTS + 1)
@@ -200,7 +188,7 @@ def _future_needed(
     return 0.5 * float(np.log(alone / together))
 
 
-def _told(gram: NDArray[np.float64], product: NDArray[np.float64]) -> float:
+def _told(gram: Real, product: Real) -> float:
     """Power that the best weights tell; directions that the source hardly has are left out."""
     size, direction = np.linalg.eigh(gram)
     there = size > 1e-11 * size[-1]

@@ -13,6 +13,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from hmpim.identify.arrays import Complex, Mask, Real
 from hmpim.identify.frf.neighbours import centres_in_band, mirrored, windows_around
 from hmpim.identify.result.inputs import BOUND, Alike, InputSet
 from hmpim.identify.section_iv.spectrum import excited_band
@@ -27,8 +28,6 @@ _SINGULAR = 1e6
 
 _DEEP = 10 ** (-50 / 20)
 """Level, relative to the highest, down to which an input still tells something."""
-
-Real = NDArray[np.float64]
 
 
 def own_band(u: Real, fs: float, stated: tuple[float, float] | None) -> tuple[float, float]:
@@ -121,9 +120,7 @@ def input_set(
     )
 
 
-def _conditions(
-    spectra: Sequence[NDArray[np.complex128]], centre: NDArray[np.int64]
-) -> tuple[Real, Real]:
+def _conditions(spectra: Sequence[Complex], centre: NDArray[np.int64]) -> tuple[Real, Real]:
     """Condition at each centre, (c,), and each input's share of the worst direction, (c, m)."""
     m = len(spectra)
     reach = max(int(centre[-1] - centre[0] + 1) // 8, 4 * (m + 1))
@@ -157,10 +154,7 @@ def _conditions(
 
 
 def _alike(
-    involved: Sequence[tuple[str, ...]],
-    frequency: Real,
-    active: NDArray[np.bool_],
-    names: tuple[str, ...],
+    involved: Sequence[tuple[str, ...]], frequency: Real, active: Mask, names: tuple[str, ...]
 ) -> tuple[Alike, ...]:
     """Gather the frequencies at which the same inputs are not told apart."""
     found = []

@@ -10,8 +10,8 @@ Analysis, 2nd ed., Oxford 2006, ch. 3).
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hmpim.identify.arrays import Real
 from hmpim.identify.fitting.fit import Fit, Problem
 from hmpim.model.sampled import delayed_response
 
@@ -23,8 +23,6 @@ _EARLIEST = -1.0
 
 _CLOSE = 0.1
 """Least lag that is told from none, in samples."""
-
-Real = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -11,8 +11,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
+from hmpim.identify.arrays import Mask, Real
 from hmpim.identify.chance import SEARCHED
 from hmpim.identify.coupling.lag import Lag, lag_of
 from hmpim.identify.coupling.together import gained_by, joint_covariance
@@ -34,8 +34,6 @@ __all__ = ["OutputFit", "fit_together"]
 
 _PERIODS = 4.0
 """Periods of a coupling's corner frequency that the record must hold."""
-
-Real = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -80,11 +78,11 @@ def fit_together(
     inputs: list[Real],
     y: Real,
     *,
-    valid: NDArray[np.bool_] | None,
-    known: NDArray[np.bool_] | None,
+    valid: Mask | None,
+    known: Mask | None,
     intersample: Intersample | None,
     structures: tuple[StructureName, ...],
-    alike: Sequence[tuple[frozenset[int], NDArray[np.bool_]]] = (),
+    alike: Sequence[tuple[frozenset[int], Mask]] = (),
     nuisance: Real | None = None,
 ) -> OutputFit:
     """Fit one output to several inputs.
@@ -150,7 +148,7 @@ def _moved_at_once(
     fits: dict[int, JointFit],
     related: dict[int, bool],
     strong: tuple[int, ...],
-    alike: Sequence[tuple[frozenset[int], NDArray[np.bool_]]],
+    alike: Sequence[tuple[frozenset[int], Mask]],
 ) -> OutputFit:
     """All pairs moved together until none is left out, with the errors of all."""
     _refine(y, fits, [j for j in fits if related[j]], None)
@@ -174,10 +172,7 @@ def _moved_at_once(
 
 
 def _strongest(
-    inputs: list[Real],
-    y: Real,
-    valid: NDArray[np.bool_] | None,
-    fitted: Callable[[Real, Real], JointFit],
+    inputs: list[Real], y: Real, valid: Mask | None, fitted: Callable[[Real, Real], JointFit]
 ) -> dict[int, JointFit]:
     """Fit the inputs that move the output most, one after the other; at least one."""
     rest = y if valid is None else np.interp(np.arange(y.size), np.flatnonzero(valid), y[valid])
@@ -220,7 +215,7 @@ def _fit_couplings(
     related: dict[int, bool],
     strong: tuple[int, ...],
     structures: tuple[StructureName, ...],
-    alike: Sequence[tuple[frozenset[int], NDArray[np.bool_]]],
+    alike: Sequence[tuple[frozenset[int], Mask]],
 ) -> None:
     """Fit, in place, all that is weak, the strongest first."""
     best = fits[strong[0]]
@@ -261,7 +256,7 @@ def _together(
     related: dict[int, bool],
     strong: tuple[int, ...],
     whitening: Real | None,
-    alike: Sequence[tuple[frozenset[int], NDArray[np.bool_]]],
+    alike: Sequence[tuple[frozenset[int], Mask]],
     *,
     drop: bool = True,
 ) -> bool:
@@ -340,7 +335,7 @@ def _too_slow(fit: Fit, samples: int) -> bool:
     return bool(2 * np.pi * slowest * _PERIODS > samples)
 
 
-def _apart(problems: list[Problem], shared: list[NDArray[np.bool_]]) -> list[Problem]:
+def _apart(problems: list[Problem], shared: list[Mask]) -> list[Problem]:
     """The problems without the bins at which an input is not told from a stronger one."""
     if not shared:
         return problems

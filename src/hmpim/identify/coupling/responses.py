@@ -4,9 +4,9 @@ from dataclasses import dataclass, fields, replace
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hmpim.errors import RecordError
+from hmpim.identify.arrays import Real
 from hmpim.identify.coupling.inputs import input_set
 from hmpim.identify.coupling.output_fit import OutputFit
 from hmpim.identify.coupling.weak import unsettled
@@ -40,8 +40,6 @@ _SEEN, _SEEN_SHARE = 4.0, 0.2
 """Standard deviations, and share of the frequencies, at which a response shows a coupling."""
 
 _MANY = 1e6
-
-Real = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -9,8 +9,8 @@ to take over.
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hmpim.identify.arrays import Real
 from hmpim.identify.fitting.fit import Fit, Problem, jacobian
 from hmpim.identify.noise.covariance import covariance
 
@@ -18,8 +18,6 @@ __all__ = ["gained_by", "joint_covariance"]
 
 _UNSEEN = 1e-13
 """Share of the greatest eigenvalue below which the record does not see a direction."""
-
-Real = NDArray[np.float64]
 
 
 def gained_by(problems: Sequence[Problem], fits: Sequence[Fit], i: int) -> float:

@@ -12,8 +12,8 @@ from dataclasses import replace
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
+from hmpim.identify.arrays import Real
 from hmpim.identify.chance import CLEARLY
 from hmpim.identify.fitting.candidates import nested
 from hmpim.identify.fitting.enrich import PLAIN
@@ -37,8 +37,6 @@ _FLOOR = 1e-8
 
 _TASTE = 4
 _STEPS = 25
-
-Real = NDArray[np.float64]
 
 
 def whitening_of(residual: Real) -> Real | None:
@@ -77,11 +75,7 @@ def whitening_of(residual: Real) -> Real | None:
 
 
 def coupling_fit(
-    problem: Problem,
-    u: Real,
-    *,
-    intersample: Intersample,
-    structures: tuple[StructureName, ...],
+    problem: Problem, u: Real, *, intersample: Intersample, structures: tuple[StructureName, ...]
 ) -> JointFit:
     """Fit the plain structures to what the stronger inputs leave over.
 

@@ -17,6 +17,7 @@ import scipy
 from numpy.typing import NDArray
 
 from hmpim.errors import RecordError
+from hmpim.identify.arrays import Mask, Real
 from hmpim.identify.effects.held import held_prediction, rows_at_updates
 from hmpim.identify.effects.hold import Updates
 from hmpim.identify.effects.masked import masked_spectrum
@@ -64,7 +65,7 @@ class CensoredFit:
     fit: Fit
     noise_std: float
     noise_std_std: float
-    covariance: NDArray[np.float64]
+    covariance: Real
     log_likelihood: float
     index: NDArray[np.intp]
 
@@ -75,11 +76,11 @@ class _Data:
 
     problem: Problem
     arrivals: Updates
-    y: NDArray[np.float64]
-    low: NDArray[np.bool_]
-    high: NDArray[np.bool_]
-    low_edge: NDArray[np.float64]
-    high_edge: NDArray[np.float64]
+    y: Real
+    low: Mask
+    high: Mask
+    low_edge: Real
+    high_edge: Real
     noise_after: bool
 
 
@@ -94,14 +95,14 @@ class _State:
 
     fit: Fit
     log_sigma: float
-    prediction: NDArray[np.float64]
-    rows: NDArray[np.float64]
+    prediction: Real
+    rows: Real
     value: float
-    slope: NDArray[np.float64]
-    bend: NDArray[np.float64]
-    inside: NDArray[np.bool_]
-    score: NDArray[np.float64]
-    information: NDArray[np.float64]
+    slope: Real
+    bend: Real
+    inside: Mask
+    score: Real
+    information: Real
 
 
 def fit_censored(
@@ -110,7 +111,7 @@ def fit_censored(
     saturation: Saturation | None,
     *,
     arrivals: Updates | None = None,
-    drift: NDArray[np.float64] | None = None,
+    drift: Real | None = None,
     iterations: int = 50,
 ) -> CensoredFit:
     """Fit one structure to an output that was clipped.
@@ -227,7 +228,7 @@ def censored_covariance(
     *,
     arrivals: Updates | None = None,
     white: bool,
-) -> NDArray[np.float64]:
+) -> Real:
     """Covariance of `theta` and `linear` of a fit to a clipped or held output.
 
     The inverse of the observed information if the noise is white; else the sandwich, with
@@ -259,7 +260,7 @@ def _data(
     problem: Problem,
     saturation: Saturation | None,
     arrivals: Updates | None,
-    drift: NDArray[np.float64] | None = None,
+    drift: Real | None = None,
 ) -> _Data:
     n = problem.y.size
     counted = np.ones(n, dtype=bool) if problem.valid is None else problem.valid
@@ -370,7 +371,7 @@ def _evaluated(data: _Data, fit: Fit, log_sigma: float) -> _State | None:
     )
 
 
-def _step(state: _State, damping: float) -> NDArray[np.float64]:
+def _step(state: _State, damping: float) -> Real:
     """Newton's step, damped, on parameters scaled alike."""
     scale = np.sqrt(np.maximum(np.diag(state.information), np.finfo(float).tiny))
     scaled = state.information / np.outer(scale, scale)
@@ -380,7 +381,7 @@ def _step(state: _State, damping: float) -> NDArray[np.float64]:
     return np.asarray(vectors @ ((vectors.T @ (state.score / scale)) / values) / scale)
 
 
-def _moved(data: _Data, state: _State, step: NDArray[np.float64]) -> _State | None:
+def _moved(data: _Data, state: _State, step: Real) -> _State | None:
     """The state after a step, shortened where it would change the dynamics beyond recognition."""
     fit, unknown = state.fit, state.fit.theta.size
     room = _LARGEST_STEP * np.maximum(1.0, np.abs(fit.theta))
@@ -413,7 +414,7 @@ def _shrink(counted: int, fit: Fit) -> float:
     return float(np.sqrt(max(counted - fit.theta.size - fit.linear.size, 1) / counted))
 
 
-def _covariance(state: _State, *, white: bool) -> NDArray[np.float64]:
+def _covariance(state: _State, *, white: bool) -> Real:
     """Covariance of all parameters and ln σ."""
     diagonal = np.abs(np.diag(state.information))
     scale = np.sqrt(np.where(diagonal > 1e-200 * diagonal.max(), diagonal, 1.0))
@@ -430,7 +431,7 @@ def _covariance(state: _State, *, white: bool) -> NDArray[np.float64]:
     return np.asarray(inverse @ middle @ inverse)
 
 
-def _coloured_scores(state: _State) -> tuple[NDArray[np.float64], float]:
+def _coloured_scores(state: _State) -> tuple[Real, float]:
     """Covariance of the scores: their size as for white noise, their correlation as measured.
 
     Also by how much fewer samples tell the noise: 1 + 2 Σ ρ² (M. S. Bartlett, 1946).
@@ -445,7 +446,7 @@ def _coloured_scores(state: _State) -> tuple[NDArray[np.float64], float]:
     return np.asarray(((spectra * power) @ spectra.conj().T).real / length), fewer
 
 
-def _with_age(covariance: NDArray[np.float64], data: _Data) -> NDArray[np.float64]:
+def _with_age(covariance: Real, data: _Data) -> Real:
     """Add what is not known of the values' age to the variance of the delay."""
     widened = covariance.copy()
     widened[0, 0] += data.arrivals.age_std**2

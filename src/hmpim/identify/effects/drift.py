@@ -11,8 +11,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy
 from numpy.polynomial.legendre import legvander
-from numpy.typing import NDArray
 
+from hmpim.identify.arrays import Real
 from hmpim.identify.chance import FALSE_ALARM
 from hmpim.identify.fitting.candidates import almost_integrates
 from hmpim.identify.fitting.fit import jacobian
@@ -52,16 +52,13 @@ class Drifting:
     """
 
     joint: JointFit
-    trend: NDArray[np.float64]
+    trend: Real
     degree: int
     rate: float
     rate_std: float
 
 
-def with_drift(
-    first: JointFit,
-    fitted: Callable[[NDArray[np.float64], bool], JointFit],
-) -> Drifting | None:
+def with_drift(first: JointFit, fitted: Callable[[Real, bool], JointFit]) -> Drifting | None:
     """Fit again with a drifting bias, where the first fit asks for it and gains by it.
 
     Parameters
@@ -125,7 +122,7 @@ def _asked_for(joint: JointFit) -> bool:
     return bias_drift(residual, counted.astype(np.float64)).probability < FALSE_ALARM
 
 
-def _steepness(residual: NDArray[np.float64]) -> float:
+def _steepness(residual: Real) -> float:
     """Mean power of the four slowest polynomials over that of bins 8 to 40."""
     columns = _polynomials(residual.size, _DEGREES[-1])
     columns = columns / np.linalg.norm(columns, axis=1)[:, None]
@@ -137,14 +134,14 @@ def _steepness(residual: NDArray[np.float64]) -> float:
     return float(np.mean(weights[:4] ** 2)) / max(level, np.finfo(float).tiny)
 
 
-def _polynomials(size: int, degree: int) -> NDArray[np.float64]:
+def _polynomials(size: int, degree: int) -> Real:
     """Legendre polynomials 1 … degree over the record, zero on average, shape (degree, n)."""
     at = (2.0 * np.arange(size) + 1.0 - size) / size
     columns = legvander(at, degree).T[1:]
     return np.asarray(columns - columns.mean(axis=1, keepdims=True))
 
 
-def _degree(joint: JointFit, columns: NDArray[np.float64]) -> int:
+def _degree(joint: JointFit, columns: Real) -> int:
     """Least degree that serves, by Schwarz's criterion on model's residual and polynomial."""
     problem, fit = joint.problem, joint.best.fit
     counts = slice(None) if problem.valid is None else problem.valid
@@ -168,7 +165,7 @@ def _gain(one: JointFit, degree: int, other: JointFit, other_degree: int) -> flo
     return gained - unknown * float(np.log(one.problem.counted))
 
 
-def _described(joint: JointFit, columns: NDArray[np.float64]) -> Drifting:
+def _described(joint: JointFit, columns: Real) -> Drifting:
     """The fit with the drift taken off the output, its polynomials still free to move."""
     problem, weighed, fit = joint.problem, joint.weighed, joint.best.fit
     trend = fit.nuisance @ columns
@@ -198,7 +195,7 @@ def _described(joint: JointFit, columns: NDArray[np.float64]) -> Drifting:
     )
 
 
-def _without_drift(trial: Trial, columns: NDArray[np.float64]) -> Trial:
+def _without_drift(trial: Trial, columns: Real) -> Trial:
     """The same fit, of an output without the drift."""
     fit = trial.fit
     plain = replace(fit, prediction=fit.prediction - fit.nuisance @ columns)

@@ -9,8 +9,8 @@ period is a simple fraction of samples, as 20/3, only so many delays occur and a
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hmpim.identify.arrays import Real
 from hmpim.identify.effects.hold import Updates
 from hmpim.identify.fitting.fit import Fit, Problem, jacobian
 
@@ -26,7 +26,7 @@ _HELD_NODES = np.linspace(0.0, 1.0, 17)
 """Ages for a held or linear input, whose response bends between the samples; linear."""
 
 
-def _weights(age: NDArray[np.float64], *, smooth: bool) -> tuple[NDArray[np.float64], ...]:
+def _weights(age: Real, *, smooth: bool) -> tuple[Real, ...]:
     """Ages to compute at, shape (k,), and what each counts for each sample, shape (k, m)."""
     distinct, which = np.unique(np.round(age, 6), return_inverse=True)
     if distinct.size <= _EXACT:
@@ -43,7 +43,7 @@ def _weights(age: NDArray[np.float64], *, smooth: bool) -> tuple[NDArray[np.floa
     return nodes, share
 
 
-def rows_at_updates(problem: Problem, fit: Fit, arrivals: Updates) -> NDArray[np.float64]:
+def rows_at_updates(problem: Problem, fit: Fit, arrivals: Updates) -> Real:
     """Derivatives of the output at each update, with respect to `theta`, then `linear`.
 
     The last rows, from `theta.size` on, times `linear` are the output itself.
@@ -85,9 +85,7 @@ def rows_at_updates(problem: Problem, fit: Fit, arrivals: Updates) -> NDArray[np
     return rows
 
 
-def held_prediction(
-    values: NDArray[np.float64], arrivals: Updates, samples: int
-) -> NDArray[np.float64]:
+def held_prediction(values: Real, arrivals: Updates, samples: int) -> Real:
     """Repeat each update's value until the next, shape (samples,).
 
     Examples

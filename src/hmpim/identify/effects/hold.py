@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from hmpim.errors import RecordError
+from hmpim.identify.arrays import Real
 from hmpim.identify.signals import as_signal, check_rate
 from hmpim.identify.worth import FEW, NEARLY, PART
 
@@ -72,7 +73,7 @@ class Updates:
     """
 
     index: NDArray[np.intp]
-    age: NDArray[np.float64]
+    age: Real
     age_std: float = 0.0
 
 
@@ -164,7 +165,7 @@ def detect_hold(y: ArrayLike, fs: float, prediction: ArrayLike | None = None) ->
     return _bounded(changed.astype(np.float64), period, fs)
 
 
-def _changed(samples: NDArray[np.float64], change: NDArray[np.float64]) -> NDArray[np.intp]:
+def _changed(samples: Real, change: Real) -> NDArray[np.intp]:
     """Samples that differ from the one before by more than arithmetic, or than usual."""
     rounding = float(8 * np.finfo(float).eps * np.max(np.abs(samples)))
     least = rounding
@@ -173,9 +174,7 @@ def _changed(samples: NDArray[np.float64], change: NDArray[np.float64]) -> NDArr
     return np.flatnonzero(change > least) + 1
 
 
-def _is_rich(
-    samples: NDArray[np.float64], change: NDArray[np.float64], changed: NDArray[np.intp]
-) -> bool:
+def _is_rich(samples: Real, change: Real, changed: NDArray[np.intp]) -> bool:
     """Whether the output takes many values, by changes of many sizes."""
     jump = change[changed - 1]
     if np.mean(jump > _RICHER * np.quantile(jump, 0.01)) < 0.05:
@@ -187,15 +186,13 @@ def _is_rich(
     )
 
 
-def _spread_out(levels: NDArray[np.float64], apart: float) -> bool:
+def _spread_out(levels: Real, apart: float) -> bool:
     """Whether the values fill their range, rather than crowd at a few levels."""
     cells = np.histogram(levels, bins=50)[0]
     return bool(np.count_nonzero(cells) >= _FEWEST and np.ptp(levels) > 2 * _FEWEST * apart)
 
 
-def _moves_within(
-    samples: NDArray[np.float64], changed: NDArray[np.intp], prediction: ArrayLike
-) -> bool:
+def _moves_within(samples: Real, changed: NDArray[np.intp], prediction: ArrayLike) -> bool:
     model = as_signal("prediction", prediction)
     if model.size != samples.size:
         raise RecordError(
@@ -247,7 +244,7 @@ def _densest(changed: NDArray[np.intp], runs: NDArray[np.intp], count: int) -> i
     return int(np.argmin(length))
 
 
-def _bounded(changed: NDArray[np.float64], period: float, fs: float) -> Hold | None:
+def _bounded(changed: Real, period: float, fs: float) -> Hold | None:
     """Bounds of period and phase from all changes, and the middle between them."""
     k, changed, period = _numbered(changed, period)
     allowed = int(FEW * changed.size)
@@ -272,9 +269,7 @@ def _bounded(changed: NDArray[np.float64], period: float, fs: float) -> Hold | N
     return None
 
 
-def _numbered(
-    changed: NDArray[np.float64], period: float
-) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
+def _numbered(changed: Real, period: float) -> tuple[Real, Real, float]:
     """Which update each change is, and the period by least squares."""
     phase = np.angle(np.mean(np.exp(2j * np.pi * changed / period))) * period / (2 * np.pi)
     k = np.rint((changed - phase) / period)
@@ -288,17 +283,13 @@ def _numbered(
     return k, changed, period
 
 
-def _phase(
-    k: NDArray[np.float64], changed: NDArray[np.float64], period: float
-) -> tuple[float, float]:
+def _phase(k: Real, changed: Real, period: float) -> tuple[float, float]:
     """Bounds of the phase at one period: change - 1 < phase + k period <= change."""
     rest = changed - k * period
     return float(rest.max()) - 1.0, float(rest.min())
 
 
-def _feasible(
-    k: NDArray[np.float64], changed: NDArray[np.float64], period: float
-) -> tuple[float, float] | None:
+def _feasible(k: Real, changed: Real, period: float) -> tuple[float, float] | None:
     """Range of periods that leave a phase; the room for it is concave in the period."""
 
     def room(t: float) -> float:

@@ -8,9 +8,9 @@ held ones at the instants of their updates (`hmpim.identify.effects.censored`).
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hmpim.errors import RecordError
+from hmpim.identify.arrays import Mask, Real
 from hmpim.identify.effects.censored import CensoredFit, fit_censored
 from hmpim.identify.effects.drift import Drifting
 from hmpim.identify.effects.hold import Hold, Updates, detect_hold, updates
@@ -34,9 +34,9 @@ class Imperfections:
     saturation: Saturation | None
     hold: Hold | None
     quantization: Quantization | None
-    spikes: NDArray[np.bool_] | None
-    frozen: NDArray[np.bool_] | None
-    repeated: NDArray[np.bool_] | None
+    spikes: Mask | None
+    frozen: Mask | None
+    repeated: Mask | None
     levels: int | None
 
     def counts_otherwise_than(self, before: "Imperfections") -> bool:
@@ -51,7 +51,7 @@ class Imperfections:
         )
 
     @property
-    def lost(self) -> NDArray[np.bool_] | None:
+    def lost(self) -> Mask | None:
         """Samples that say nothing at all: spikes, copies, and where the output stood still."""
         seen = [s for s in (self.spikes, self.frozen, self.repeated) if s is not None]
         return np.logical_or.reduce(seen) if seen else None
@@ -65,7 +65,7 @@ class Imperfections:
         """Samples in which a held output is updated."""
         return None if self.hold is None else updates(self.hold, samples, fs)
 
-    def telling(self, samples: int, fs: float) -> NDArray[np.bool_] | None:
+    def telling(self, samples: int, fs: float) -> Mask | None:
         """Samples that say what the output was; None when all do."""
         lost = self.lost
         if self.saturation is None and self.hold is None and lost is None:
@@ -83,11 +83,7 @@ class Imperfections:
 
 
 def find_imperfections(
-    y: NDArray[np.float64],
-    fs: float,
-    *,
-    prediction: NDArray[np.float64] | None = None,
-    richest: int = 0,
+    y: Real, fs: float, *, prediction: Real | None = None, richest: int = 0
 ) -> Imperfections:
     """Look for saturation, hold, quantisation, spikes and standstill in an output.
 
@@ -127,7 +123,7 @@ def find_imperfections(
     )
 
 
-def count_levels(x: NDArray[np.float64]) -> int:
+def count_levels(x: Real) -> int:
     """Return how many different values `x` takes.
 
     Examples
@@ -138,7 +134,7 @@ def count_levels(x: NDArray[np.float64]) -> int:
     return int(np.unique(x).size)
 
 
-def _few_levels(y: NDArray[np.float64], richest: int) -> int | None:
+def _few_levels(y: Real, richest: int) -> int | None:
     """How many values the output takes, if they are few beside those of the inputs."""
     if not richest:
         return None
@@ -212,7 +208,7 @@ def _worth_refining(joint: JointFit, found: Imperfections) -> list[Trial]:
     return [best, *simpler]
 
 
-def _gaps_only(valid: NDArray[np.bool_], found: Imperfections, fs: float) -> NDArray[np.bool_]:
+def _gaps_only(valid: Mask, found: Imperfections, fs: float) -> Mask:
     """Samples that count, clipped and held ones among them again."""
     told, lost = found.telling(valid.size, fs), found.lost
     whole = valid if told is None else np.asarray(valid | ~told)

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
+from hmpim.identify.arrays import Mask, Real
 from hmpim.identify.worth import FEW, MUCH, PART
 
 __all__ = ["find_frozen", "find_repeated", "find_spikes", "stands_out"]
@@ -32,7 +33,7 @@ _FEWEST_COPIES = 0.002
 """Share of copies below which they are chance: at a crest two samples may be alike."""
 
 
-def stands_out(residual: NDArray[np.float64]) -> bool:
+def stands_out(residual: Real) -> bool:
     """Whether any sample is far beyond the bulk of a residual; quick, without a model.
 
     Examples
@@ -45,12 +46,7 @@ def stands_out(residual: NDArray[np.float64]) -> bool:
     return bool(away.max() > _FAR * 1.4826 * np.median(away) > 0.0)
 
 
-def find_spikes(
-    y: NDArray[np.float64],
-    prediction: NDArray[np.float64],
-    *,
-    clipped: NDArray[np.bool_] | None = None,
-) -> NDArray[np.bool_] | None:
+def find_spikes(y: Real, prediction: Real, *, clipped: Mask | None = None) -> Mask | None:
     """Return the samples that are spikes, or None.
 
     Parameters
@@ -89,9 +85,7 @@ def find_spikes(
     return away if away.any() and np.mean(away) < MUCH else None
 
 
-def find_frozen(
-    y: NDArray[np.float64], prediction: NDArray[np.float64], *, step: float = 0.0
-) -> NDArray[np.bool_] | None:
+def find_frozen(y: Real, prediction: Real, *, step: float = 0.0) -> Mask | None:
     """Return the samples at which the output stands still while the model moves, or None.
 
     Parameters
@@ -125,7 +119,7 @@ def find_frozen(
     return frozen
 
 
-def find_repeated(y: NDArray[np.float64]) -> NDArray[np.bool_] | None:
+def find_repeated(y: Real) -> Mask | None:
     """Return the samples that repeat the one before to the last digit, while all around moves.
 
     A frame that was lost is often filled by the one before it. An output that is rounded, held or
@@ -156,7 +150,7 @@ def find_repeated(y: NDArray[np.float64]) -> NDArray[np.bool_] | None:
     return copies if np.count_nonzero(copies) >= max(3.0, _FEWEST_COPIES * y.size) else None
 
 
-def _runs(flags: NDArray[np.bool_]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+def _runs(flags: Mask) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     """First and last sample of each run of true ones."""
     edges = np.diff(np.concatenate([[0], flags.astype(np.int8), [0]]))
     return np.flatnonzero(edges == 1), np.flatnonzero(edges == -1) - 1

@@ -2,8 +2,8 @@
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
+from hmpim.identify.arrays import Mask, Real
 from hmpim.identify.noise.whiteness import autocovariance
 
 __all__ = ["masked_spectrum"]
@@ -12,9 +12,7 @@ _LONGEST = 12
 """Order of the autoregression at most: with gaps, far lags are hardly known."""
 
 
-def masked_spectrum(
-    e: NDArray[np.float64], known: NDArray[np.bool_], omega: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def masked_spectrum(e: Real, known: Mask, omega: Real) -> Real:
     """Power spectrum for unit variance, from an autoregression fitted to known samples.
 
     Products of samples k apart are averaged over the pairs in which both are known

@@ -11,8 +11,9 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from hmpim.identify.arrays import Real
 from hmpim.identify.chance import SEARCHED
 from hmpim.identify.signals import as_signal
 from hmpim.identify.worth import FEW, NEARLY
@@ -102,14 +103,14 @@ def detect_quantization(y: ArrayLike) -> Quantization | None:
     return _by_distances(levels, largest) or _by_clusters(samples, span)
 
 
-def _distinct(samples: NDArray[np.float64], tolerance: float) -> NDArray[np.float64]:
+def _distinct(samples: Real, tolerance: float) -> Real:
     """Sorted values; those that differ by arithmetic alone count once."""
     values = np.unique(samples)
     starts = np.concatenate([[True], np.diff(values) > tolerance])
     return np.asarray(values[starts])
 
 
-def _by_distances(levels: NDArray[np.float64], largest: float) -> Quantization | None:
+def _by_distances(levels: Real, largest: float) -> Quantization | None:
     """Find the step of which all distances between neighbours are multiples."""
     gaps = np.diff(levels)
     smallest = float(gaps.min())
@@ -123,9 +124,7 @@ def _by_distances(levels: NDArray[np.float64], largest: float) -> Quantization |
     return None
 
 
-def _multiples(
-    levels: NDArray[np.float64], gaps: NDArray[np.float64], rough: float
-) -> Quantization | None:
+def _multiples(levels: Real, gaps: Real, rough: float) -> Quantization | None:
     # Small distances first: their multiple is sure even while the step is rough.
     order = np.argsort(gaps)
     ordered = gaps[order]
@@ -160,7 +159,7 @@ def _multiples(
     )
 
 
-def _significant_digits(levels: NDArray[np.float64], step: float) -> bool:
+def _significant_digits(levels: Real, step: float) -> bool:
     """Whether nearly all levels lie on a ten times coarser grid, so that few need this step."""
     if levels.size < 100:
         return False
@@ -169,7 +168,7 @@ def _significant_digits(levels: NDArray[np.float64], step: float) -> bool:
     return bool(np.mean(near) > NEARLY)
 
 
-def _by_clusters(samples: NDArray[np.float64], span: float) -> Quantization | None:
+def _by_clusters(samples: Real, span: float) -> Quantization | None:
     """Find the step at which the values' characteristic function stands out."""
     low = float(samples.min())
     width = span * (1.0 + 1e-9) / _CELLS
@@ -190,7 +189,7 @@ def _by_clusters(samples: NDArray[np.float64], span: float) -> Quantization | No
     return _sharpened(samples, 4 * _CELLS * width / best, span)
 
 
-def _sharpened(samples: NDArray[np.float64], step: float, span: float) -> Quantization | None:
+def _sharpened(samples: Real, step: float, span: float) -> Quantization | None:
     """Fit the grid to all values by least squares of their distance from it."""
     middle = float(np.median(samples))
     for _ in range(8):

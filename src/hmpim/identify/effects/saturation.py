@@ -15,6 +15,7 @@ import scipy
 from numpy.typing import ArrayLike, NDArray
 
 from hmpim.errors import RecordError
+from hmpim.identify.arrays import Mask, Real
 from hmpim.identify.effects.smeared import smeared_plateaus
 from hmpim.identify.signals import as_signal
 from hmpim.identify.worth import MUCH
@@ -81,13 +82,13 @@ class Saturation:
     high: float | None
     low_std: float | None
     high_std: float | None
-    clipped_low: NDArray[np.bool_]
-    clipped_high: NDArray[np.bool_]
+    clipped_low: Mask
+    clipped_high: Mask
     noise: NoiseAt
     tolerance: float
 
     @property
-    def clipped(self) -> NDArray[np.bool_]:
+    def clipped(self) -> Mask:
         """Samples at either level, shape (n,)."""
         return self.clipped_low | self.clipped_high
 
@@ -103,7 +104,7 @@ class _Side:
 
     level: float
     std: float
-    at: NDArray[np.bool_]
+    at: Mask
     exact: bool
 
 
@@ -170,7 +171,7 @@ def detect_saturation(
     )
 
 
-def _smeared(y: NDArray[np.float64], prediction: NDArray[np.float64], step: float) -> Saturation:
+def _smeared(y: Real, prediction: Real, step: float) -> Saturation:
     """Clipping that only the prediction shows."""
     found = smeared_plateaus(y, prediction, step=step)
     nothing = np.zeros(y.size, dtype=bool)
@@ -197,9 +198,7 @@ def _smeared(y: NDArray[np.float64], prediction: NDArray[np.float64], step: floa
     )
 
 
-def _upper(
-    y: NDArray[np.float64], prediction: NDArray[np.float64] | None, step: float
-) -> _Side | None:
+def _upper(y: Real, prediction: Real | None, step: float) -> _Side | None:
     """The upper level, by exact ties; without a prediction, by a plateau with scatter too."""
     span = float(np.ptp(y))
     if span == 0.0:
@@ -215,17 +214,17 @@ def _upper(
     return None
 
 
-def _spread(x: NDArray[np.float64]) -> float:
+def _spread(x: Real) -> float:
     """Standard deviation of the bulk, from the median of the magnitude."""
     return float(np.median(np.abs(x - np.median(x))) / 0.6745)
 
 
-def _scatter(y: NDArray[np.float64]) -> float:
+def _scatter(y: Real) -> float:
     """Standard deviation of what is not smooth from sample to sample: third differences."""
     return _spread(np.diff(y, 3)) / float(np.sqrt(20.0))
 
 
-def _exact(y: NDArray[np.float64], span: float, step: float) -> _Side | None:
+def _exact(y: Real, span: float, step: float) -> _Side | None:
     """Samples that share the greatest value, if it is not just any value that recurs."""
     rounding = max(1e-11 * span, 8 * np.finfo(float).eps * float(np.max(np.abs(y))))
     tolerance = max(rounding, 0.5 * step)
@@ -237,7 +236,7 @@ def _exact(y: NDArray[np.float64], span: float, step: float) -> _Side | None:
     return _Side(level=top, std=float(error), at=at, exact=True)
 
 
-def _scattered(y: NDArray[np.float64], sigma: float) -> _Side | None:
+def _scattered(y: Real, sigma: float) -> _Side | None:
     """A crowd of samples within a few `sigma` of the top."""
     top = float(y.max())
     upper = y[y > top - 20.0 * sigma]  # a level more than 6 below the top is none
@@ -262,13 +261,7 @@ def _scattered(y: NDArray[np.float64], sigma: float) -> _Side | None:
     )
 
 
-def _is_clipped(
-    y: NDArray[np.float64],
-    side: _Side,
-    prediction: NDArray[np.float64] | None,
-    step: float,
-    span: float,
-) -> bool:
+def _is_clipped(y: Real, side: _Side, prediction: Real | None, step: float, span: float) -> bool:
     resolution = max(float(side.level - y[side.at].min()), 0.5 * step, 1e-9 * span)
     if side.exact:
         resolution *= 2.0  # the level stands for half a step on either side
@@ -285,7 +278,7 @@ def _is_clipped(
     return _is_flat(y, side, resolution, reach)
 
 
-def _is_crowded(count: int, below: NDArray[np.float64], resolution: float) -> bool:
+def _is_crowded(count: int, below: Real, resolution: float) -> bool:
     """Whether the level holds more samples than a crest would, judged by what is just below."""
     if below.size == 0:
         return True
@@ -299,7 +292,7 @@ def _is_crowded(count: int, below: NDArray[np.float64], resolution: float) -> bo
     )
 
 
-def _is_even(below: NDArray[np.float64], resolution: float, reach: float) -> bool:
+def _is_even(below: Real, resolution: float, reach: float) -> bool:
     """Whether the values below the level do not crowd towards it."""
     floor = max(resolution, reach / 100.0)
     inside = np.maximum(below, floor) - floor + reach / 100.0
@@ -308,7 +301,7 @@ def _is_even(below: NDArray[np.float64], resolution: float, reach: float) -> boo
     return bool(exponent < _STEEPEST and not settled)
 
 
-def _visits(at: NDArray[np.bool_]) -> NDArray[np.intp]:
+def _visits(at: Mask) -> NDArray[np.intp]:
     """First and last sample of each stay at the level, shape (m, 2); short breaks do not count."""
     where = np.flatnonzero(at)
     breaks = np.flatnonzero(np.diff(where) > 3)
@@ -318,7 +311,7 @@ def _visits(at: NDArray[np.bool_]) -> NDArray[np.intp]:
     return np.stack([first[inside], last[inside]], axis=1)
 
 
-def _is_flat(y: NDArray[np.float64], side: _Side, resolution: float, reach: float) -> bool:
+def _is_flat(y: Real, side: _Side, resolution: float, reach: float) -> bool:
     """Whether the level is met and left at speed, the same either way, and is flat between."""
     visits = _visits(side.at)
     if visits.shape[0] < _VISITS:
@@ -344,9 +337,7 @@ def _is_flat(y: NDArray[np.float64], side: _Side, resolution: float, reach: floa
     return _neither_bends_nor_tilts(y, visits, resolution / 3.0)
 
 
-def _neither_bends_nor_tilts(
-    y: NDArray[np.float64], visits: NDArray[np.intp], sigma: float
-) -> bool:
+def _neither_bends_nor_tilts(y: Real, visits: NDArray[np.intp], sigma: float) -> bool:
     """Whether the values within the visits have no common slope or curvature."""
     place = np.concatenate([np.linspace(-1, 1, last - first + 1) for first, last in visits])
     value = np.concatenate([y[first : last + 1] for first, last in visits])
@@ -355,9 +346,7 @@ def _neither_bends_nor_tilts(
     return bool(abs(weights[1]) < _BENT * sigma and abs(weights[2]) < _BENT * sigma)
 
 
-def _goes_beyond(
-    y: NDArray[np.float64], side: _Side, prediction: NDArray[np.float64], resolution: float
-) -> bool:
+def _goes_beyond(y: Real, side: _Side, prediction: Real, resolution: float) -> bool:
     """Whether the prediction, set right on the other samples, exceeds the level at the level."""
     slope = np.gradient(prediction)
     rows = np.stack([np.ones(y.size), prediction, slope, np.gradient(slope)])

@@ -9,8 +9,8 @@ clipped and what q is are found in turn.
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hmpim.identify.arrays import Mask, Real
 from hmpim.identify.chance import CLEARLY, SEARCHED
 from hmpim.identify.noise.whiteness import effective_share
 from hmpim.identify.worth import MUCH, WORTH
@@ -41,8 +41,8 @@ class Plateaus:
     high: float | None
     low_std: float
     high_std: float
-    below: NDArray[np.bool_]
-    above: NDArray[np.bool_]
+    below: Mask
+    above: Mask
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -50,15 +50,13 @@ class _Split:
     cost: float
     low: float
     high: float
-    below: NDArray[np.bool_]
-    above: NDArray[np.bool_]
-    unclipped: NDArray[np.float64]
-    weights: NDArray[np.float64]
+    below: Mask
+    above: Mask
+    unclipped: Real
+    weights: Real
 
 
-def smeared_plateaus(
-    y: NDArray[np.float64], prediction: NDArray[np.float64], *, step: float = 0.0
-) -> Plateaus | None:
+def smeared_plateaus(y: Real, prediction: Real, *, step: float = 0.0) -> Plateaus | None:
     """Find levels at which `y` was clipped before noise was added.
 
     Parameters
@@ -124,12 +122,12 @@ def smeared_plateaus(
     )
 
 
-def _cost(y: NDArray[np.float64], rows: NDArray[np.float64]) -> float:
+def _cost(y: Real, rows: Real) -> float:
     weights = np.linalg.lstsq(rows.T, y, rcond=None)[0]
     return float(np.sum((y - weights @ rows) ** 2))
 
 
-def _falls_short(y: NDArray[np.float64], rows: NDArray[np.float64]) -> tuple[bool, bool]:
+def _falls_short(y: Real, rows: Real) -> tuple[bool, bool]:
     """Whether the output bends away from the prediction at its low and at its high end."""
     p = rows[1]
     ends = np.quantile(p, [0.1, 0.9])
@@ -148,9 +146,7 @@ def _falls_short(y: NDArray[np.float64], rows: NDArray[np.float64]) -> tuple[boo
     return found[0], found[1]
 
 
-def _best_split(
-    y: NDArray[np.float64], rows: NDArray[np.float64], sides: tuple[bool, bool]
-) -> _Split | None:
+def _best_split(y: Real, rows: Real, sides: tuple[bool, bool]) -> _Split | None:
     best = None
     for quantile in _STARTS:
         low, high = np.quantile(rows[1], [1.0 - quantile, quantile])
@@ -160,9 +156,7 @@ def _best_split(
     return best
 
 
-def _settled(
-    y: NDArray[np.float64], rows: NDArray[np.float64], low: float, high: float
-) -> _Split | None:
+def _settled(y: Real, rows: Real, low: float, high: float) -> _Split | None:
     """Levels and correction in turn, until the clipped samples stay the same."""
     q, weights = rows[1], np.zeros(rows.shape[0])
     below, above = q < low, q > high
@@ -194,12 +188,7 @@ def _settled(
 
 
 def _holds(
-    y: NDArray[np.float64],
-    rows: NDArray[np.float64],
-    best: _Split,
-    clipped: NDArray[np.bool_],
-    others: tuple[bool, bool],
-    variance: float,
+    y: Real, rows: Real, best: _Split, clipped: Mask, others: tuple[bool, bool], variance: float
 ) -> bool:
     """Whether one side's plateau is needed, and flat."""
     if np.count_nonzero(clipped) < _FEWEST:

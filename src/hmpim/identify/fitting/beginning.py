@@ -4,8 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
+from hmpim.identify.arrays import Mask, Real
 from hmpim.identify.chance import FALSE_ALARM
 from hmpim.identify.fitting.data import Data, Seen
 from hmpim.identify.fitting.fit import Fit, Problem, jacobian
@@ -35,18 +35,14 @@ _TWICE = 2.0
 """Factor on what the beginning may hold, for noise that is not white or not Gaussian."""
 
 
-def in_motion(u: NDArray[np.float64]) -> bool:
+def in_motion(u: Real) -> bool:
     """Whether an input, (n,), moves from its first sample on, and so may have moved before."""
     steps = np.diff(u) ** 2
     return float(steps[:_FIRST].mean()) > PART * float(steps.mean())
 
 
 def count_in(
-    data: Data,
-    mode: Intersample,
-    fits: list[Fit],
-    seen: Seen,
-    known: NDArray[np.bool_] | None,
+    data: Data, mode: Intersample, fits: list[Fit], seen: Seen, known: Mask | None
 ) -> Seen:
     """Samples that count once it is known how the system remembers, and where it begins."""
     fit = min(fits, key=lambda f: f.objective)
@@ -138,14 +134,12 @@ def look_again(problem: Problem, trial: Trial, seen: Seen, *, lag: int) -> Seen 
     return Seen(valid=after if seen.valid is None else seen.valid & after, begins=begins)
 
 
-def _counts(problem: Problem) -> NDArray[np.bool_]:
+def _counts(problem: Problem) -> Mask:
     """Which samples count."""
     return np.ones(problem.y.size, dtype=bool) if problem.counts is None else problem.counts
 
 
-def _stands_out(
-    innovations: NDArray[np.float64], some: NDArray[np.bool_], others: NDArray[np.bool_]
-) -> bool:
+def _stands_out(innovations: Real, some: Mask, others: Mask) -> bool:
     """Whether some samples hold more than the noise that the others show."""
     if not some.any() or not others.any():
         return False
@@ -166,7 +160,7 @@ def _ahead(fits: list[Fit]) -> int:
     return int(np.ceil(-delay)) + 3 if delay < 0 else 0
 
 
-def _unaffected(known: NDArray[np.bool_], memory: int) -> NDArray[np.bool_]:
+def _unaffected(known: Mask, memory: int) -> Mask:
     """Samples whose output depends on measured input alone."""
     unknown = np.concatenate([[0], np.cumsum(~known)])
     index = np.arange(known.size)

@@ -1,8 +1,8 @@
 """Fits of every structure: plain ones, richer ones where asked for, each between the samples."""
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hmpim.identify.arrays import Real
 from hmpim.identify.chance import CLEARLY, FALSE_ALARM
 from hmpim.identify.fitting.beginning import in_motion
 from hmpim.identify.fitting.data import HOPELESS, Data, Seen, band_of, shifted
@@ -166,7 +166,7 @@ def reduced(problem: Problem, fits: list[Fit], richer: list[Fit]) -> list[Fit]:
     return [better(fit) for fit in fits]
 
 
-def _sections(fit: Fit) -> list[tuple[NDArray[np.float64], NDArray[np.float64]]]:
+def _sections(fit: Fit) -> list[tuple[Real, Real]]:
     """Parameters and coefficients of each section of a denominator."""
     if not fit.structure.sections:
         return []
@@ -175,7 +175,7 @@ def _sections(fit: Fit) -> list[tuple[NDArray[np.float64], NDArray[np.float64]]]
     return list(zip(np.split(fit.theta[1:], edges), np.split(flat, edges), strict=True))
 
 
-def _grown(structure: Structure, fits: list[Fit]) -> list[NDArray[np.float64]]:
+def _grown(structure: Structure, fits: list[Fit]) -> list[Real]:
     """Starts from fits that have one pole less."""
     return [
         with_pole(fit.structure, fit.theta, _PARTNER * scale_of(fit))
@@ -184,9 +184,7 @@ def _grown(structure: Structure, fits: list[Fit]) -> list[NDArray[np.float64]]:
     ]
 
 
-def _best_of(
-    problem: Problem, structure: Structure, starts: list[NDArray[np.float64]], rivals: list[Fit]
-) -> Fit:
+def _best_of(problem: Problem, structure: Structure, starts: list[Real], rivals: list[Fit]) -> Fit:
     """The best of several starts, followed to its end if it may lead.
 
     What is left over in colour has few independent samples: a step that gains less than one of
@@ -255,13 +253,13 @@ def _nests(simple: Fit, rich: Fit) -> bool:
     )
 
 
-def _without_second_pole(second_order: Fit) -> NDArray[np.float64]:
+def _without_second_pole(second_order: Fit) -> Real:
     """First order from second: a fast second pole counts as delay."""
     delay, log_lag, shape = second_order.theta
     return np.array([delay + min(shape, 0.25) * np.exp(log_lag), log_lag])
 
 
-def nested(first_order: Fit) -> NDArray[np.float64]:
+def nested(first_order: Fit) -> Real:
     """First order as second: a quarter of its time constant moved into a second pole."""
     return np.concatenate([first_order.theta, [0.1875]])  # (1 + 3/4 Ts)(1 + 1/4 Ts)
 
@@ -272,12 +270,7 @@ def refit_between(problem: Problem, fit: Fit, origin: Intersample, mode: Intersa
 
 
 def fit_under_each_assumption(
-    data: Data,
-    natural: Intersample,
-    fits: list[Fit],
-    seen: Seen,
-    *,
-    alone: bool,
+    data: Data, natural: Intersample, fits: list[Fit], seen: Seen, *, alone: bool
 ) -> list[tuple[Intersample, Fit]]:
     """Add to fits under the natural assumption those under the others, unless it stands alone."""
     fitted = [(natural, fit) for fit in fits]

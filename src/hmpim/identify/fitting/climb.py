@@ -6,6 +6,7 @@ from typing import Protocol, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from hmpim.identify.arrays import Mask, Real
 from hmpim.identify.fitting.least_squares import solved
 from hmpim.model.dynamics import Structure
 
@@ -22,8 +23,6 @@ _STEEPEST = 1e6
 
 _POORLY, _WELL = 0.25, 0.75
 """Share of the gain hoped for below which the damping grows, and above which it falls."""
-
-Real = NDArray[np.float64]
 
 
 class Evaluated(Protocol):
@@ -124,7 +123,7 @@ def climb(
 
 def _free_directions(
     best: Evaluated, edges: NDArray[np.intp], bounded: Callable[[Sequence[Real]], list[Real]]
-) -> tuple[NDArray[np.bool_], Real, Real, float]:
+) -> tuple[Mask, Real, Real, float]:
     """Parameters that no bound holds, their normal equations, and Newton's decrement.
 
     The decrement is what a full step would still gain. A parameter is held where the way down

@@ -8,8 +8,8 @@ enough samples the smallest imperfection of real hardware is "significant".
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hmpim.identify.arrays import Complex, Real
 from hmpim.identify.fitting.fit import Fit
 from hmpim.identify.fitting.start import RoughResponse, starting_values
 from hmpim.model.dynamics import STRUCTURES, Structure, StructureName, theta_of
@@ -50,7 +50,7 @@ _BEATS = 0.95
 _REWEIGHTINGS = 6
 
 
-def integrator_starts(rough: RoughResponse, structure: Structure) -> list[NDArray[np.float64]]:
+def integrator_starts(rough: RoughResponse, structure: Structure) -> list[Real]:
     """Starts for an integrator: those of the rest of it, from the input's running sum.
 
     Parameters
@@ -79,7 +79,7 @@ class Proposal:
     """
 
     structure: Structure
-    starts: tuple[NDArray[np.float64], ...]
+    starts: tuple[Real, ...]
     error: float
 
 
@@ -118,7 +118,7 @@ def proposals(
     s = np.asarray(1j * rough.omega / scale, dtype=np.complex128)
     out = []
     for structure in structures:
-        found: list[tuple[float, NDArray[np.float64]]] = []
+        found: list[tuple[float, Real]] = []
         turns = [*near, *late] if structure.zeros >= structure.order else near
         for delay in np.maximum(fit.delay + reach * np.asarray(turns), -1.0):
             target = rough.response * np.exp(1j * rough.omega * (delay - rough.lag))
@@ -153,7 +153,7 @@ def _error(rough: RoughResponse, fit: Fit) -> float:
     return float(rough.weight @ np.abs(rough.response - response) ** 2)
 
 
-def _from_plain(rough: RoughResponse, structure: Structure, fit: Fit) -> NDArray[np.float64]:
+def _from_plain(rough: RoughResponse, structure: Structure, fit: Fit) -> Real:
     """The best plain fit with its missing sections added where they hardly matter; tried first."""
     theta = list(fit.theta)
     have = fit.structure.sections
@@ -170,11 +170,8 @@ def _from_plain(rough: RoughResponse, structure: Structure, fit: Fit) -> NDArray
 
 
 def _reweighted(
-    s: NDArray[np.complex128],
-    target: NDArray[np.complex128],
-    weight: NDArray[np.float64],
-    structure: Structure,
-) -> tuple[float, NDArray[np.float64]]:
+    s: Complex, target: Complex, weight: Real, structure: Structure
+) -> tuple[float, Real]:
     """Fit target A = B; return the output error and A by rising powers, A(0) = 1."""
     order, zeros = structure.order, structure.zeros
     below = s[:, None] ** np.arange(1, order + 1)
@@ -196,7 +193,7 @@ def _reweighted(
     return best
 
 
-def _sections(denominator: NDArray[np.float64], structure: Structure) -> NDArray[np.float64] | None:
+def _sections(denominator: Real, structure: Structure) -> Real | None:
     """Group the poles, mirrored into the left half plane, into the structure's sections."""
     poles = np.roots(denominator[::-1])
     if poles.size < structure.order or np.any(np.abs(poles) < 1e-9):

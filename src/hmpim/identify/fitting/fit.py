@@ -12,8 +12,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hmpim.identify.arrays import Real
 from hmpim.identify.fitting.climb import climb
 from hmpim.identify.fitting.least_squares import solved, solved_exactly, without
 from hmpim.identify.fitting.rows import Part, Problem
@@ -42,9 +42,6 @@ _SHAPES = (1e-4, 1e6)
 
 _FORGETS = 5.0
 """Time constants after which what came before is forgotten (0.7 % left)."""
-
-
-Real = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -16,8 +16,8 @@ from functools import cache
 from typing import Generic, Protocol, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hmpim.identify.arrays import Real
 from hmpim.identify.chance import DEVIATIONS, HALF, ONE_SIDED
 from hmpim.identify.fitting.fit import Fit, Problem, jacobian, within_reach
 from hmpim.identify.fitting.least_squares import solved
@@ -53,8 +53,6 @@ _MOST = 7
 
 _SURE = 4
 """Poles up to which a structure may leave more than white noise."""
-
-Real = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -11,7 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
+
+from hmpim.identify.arrays import Real
 
 __all__ = ["Halves", "compare_halves"]
 
@@ -33,13 +34,7 @@ class Halves:
     owed: float
 
 
-def compare_halves(
-    rows: NDArray[np.float64],
-    residual: NDArray[np.float64],
-    y: NDArray[np.float64],
-    *,
-    share: float,
-) -> Halves:
+def compare_halves(rows: Real, residual: Real, y: Real, *, share: float) -> Halves:
     """Compare the halves of a fit.
 
     Parameters

@@ -2,7 +2,8 @@
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
+
+from hmpim.identify.arrays import Real
 
 __all__ = ["solved", "solved_exactly", "without"]
 
@@ -11,8 +12,6 @@ _UNSEEN = 1e-13
 
 _EXACTLY = 1e-14
 """The share that is not seen where no normal equations are made."""
-
-Real = NDArray[np.float64]
 
 
 def solved_exactly(rows: Real, target: Real) -> tuple[Real, float]:

@@ -6,8 +6,8 @@ a few of its own errors of 0.
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hmpim.identify.arrays import Real
 from hmpim.identify.chance import EXCLUDED
 from hmpim.identify.fitting.fit import Fit, fit_structure
 from hmpim.identify.fitting.trial import JointFit
@@ -16,7 +16,7 @@ from hmpim.model.dynamics import STRUCTURES
 __all__ = ["stretched", "widened"]
 
 
-def widened(joint: JointFit, cov: NDArray[np.float64]) -> NDArray[np.float64]:
+def widened(joint: JointFit, cov: Real) -> Real:
     """Widen the covariance of a second-order fit until it admits the first-order one.
 
     By the likelihood ratio the best first-order model lies √Δ standard deviations away, Δ the
@@ -55,9 +55,7 @@ def widened(joint: JointFit, cov: NDArray[np.float64]) -> NDArray[np.float64]:
     return stretched(cov, simple, fit, deviance)
 
 
-def stretched(
-    cov: NDArray[np.float64], simple: Fit, fit: Fit, deviance: float
-) -> NDArray[np.float64]:
+def stretched(cov: Real, simple: Fit, fit: Fit, deviance: float) -> Real:
     """Widen the covariance of a second-order fit until a first-order one lies √deviance away.
 
     Parameters

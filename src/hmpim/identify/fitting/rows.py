@@ -9,8 +9,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
+from hmpim.identify.arrays import Complex, Mask, Real
 from hmpim.identify.fitting.sections import Expansion, Poles, poles_of
 from hmpim.model.dynamics import Structure
 from hmpim.model.poles import PoleResponses, input_responses
@@ -20,9 +20,6 @@ __all__ = ["STAMPED_LATE", "Part", "Problem"]
 
 STAMPED_LATE = -4.0
 """Least delay in samples that is tried where an output follows its input: stamps may be late."""
-
-Real = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -57,12 +54,12 @@ class Problem:
 
     source: SampledInput
     y: Real
-    valid: NDArray[np.bool_] | None
+    valid: Mask | None
     longest_delay: float
     shortest_delay: float = STAMPED_LATE
     whitening: Real | None = None
     noise: Real | None = None
-    told: NDArray[np.bool_] | None = None
+    told: Mask | None = None
     nuisance: Real | None = None
     begins: int | None = None
 
@@ -72,7 +69,7 @@ class Problem:
         return self.y.size if self.counts is None else int(np.count_nonzero(self.counts))
 
     @property
-    def counts(self) -> NDArray[np.bool_] | None:
+    def counts(self) -> Mask | None:
         """Samples whose residual, whitened where noise is, counts; None when all do."""
         return self.valid if self.told is None else self.told
 

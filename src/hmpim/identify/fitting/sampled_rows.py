@@ -2,8 +2,8 @@
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
+from hmpim.identify.arrays import Real
 from hmpim.identify.fitting.rows import Part, Problem
 from hmpim.model.dynamics import Structure, coefficients_of
 from hmpim.model.filters import nyquist_taps, poles_in_z
@@ -11,7 +11,6 @@ from hmpim.model.sampled import MARGIN, SAMPLES_ALONE
 
 __all__ = ["SampledPart", "part_of"]
 
-Real = NDArray[np.float64]
 
 _STEP = 1e-6
 

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from hmpim.identify.arrays import Complex, Mask, Real
 from hmpim.model.dynamics import Structure, coefficients_of
 from hmpim.model.poles import partial_fractions
 
@@ -19,9 +20,6 @@ __all__ = ["Expansion", "Poles", "poles_of"]
 _APART = 2e-4
 """Least distance of two poles, over their size: a double pole is taken as two that are as near,
 which changes no response by more than the square of this."""
-
-Real = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -60,7 +58,7 @@ class Poles:
     """
 
     every: Complex
-    kept: NDArray[np.bool_]
+    kept: Mask
     section: NDArray[np.intp]
     coefficients: tuple[Real, ...]
 

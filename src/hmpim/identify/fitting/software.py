@@ -12,8 +12,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
+from hmpim.identify.arrays import Mask, Real
 from hmpim.identify.fitting.beginning import begins_of
 from hmpim.identify.fitting.fit import Fit, Problem, fit_structure
 from hmpim.identify.fitting.least_squares import solved_exactly
@@ -28,7 +28,6 @@ from hmpim.model.sampled import prepare_input
 
 __all__ = ["is_exact", "software_fit"]
 
-Real = NDArray[np.float64]
 
 _ORDER = 4
 """Output samples that an equation reaches back to."""
@@ -90,9 +89,7 @@ class _Equations:
         return range(self.first, self.first + self.count - taken)
 
 
-def _equations(
-    u: Real, y: Real, valid: NDArray[np.bool_] | None, *, most: int = _ROWS
-) -> _Equations:
+def _equations(u: Real, y: Real, valid: Mask | None, *, most: int = _ROWS) -> _Equations:
     """Factor what one output sample may follow from; of masked samples, those told alone."""
     lag = coarse_lag(u, y, u.size // 2)
     first = max(lag - _EARLIER, 0)
@@ -141,7 +138,7 @@ def software_fit(
     u: Real,
     y: Real,
     *,
-    valid: NDArray[np.bool_] | None = None,
+    valid: Mask | None = None,
     structures: tuple[str, ...] = tuple(FILTERS),
     nuisance: Real | None = None,
 ) -> JointFit:

@@ -18,6 +18,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from hmpim.identify.arrays import Complex, Real
 from hmpim.identify.kept import kept
 from hmpim.model.dynamics import Structure, theta_of
 
@@ -75,9 +76,9 @@ class RoughResponse:
     lag: int
     length: int
     bins: NDArray[np.intp]
-    omega: NDArray[np.float64]
-    response: NDArray[np.complex128]
-    weight: NDArray[np.float64]
+    omega: Real
+    response: Complex
+    weight: Real
     ahead: int | None = None
 
     @property
@@ -88,7 +89,7 @@ class RoughResponse:
         return self.lag - max(-self.lag // 4, _DYNAMICS)
 
 
-def _tapered(x: NDArray[np.float64]) -> NDArray[np.float64]:
+def _tapered(x: Real) -> Real:
     n = x.size
     edge = max(int(_TAPER * n), 1)
     window = np.ones(n)
@@ -98,12 +99,12 @@ def _tapered(x: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.asarray(window * (x - window @ x / window.sum()))
 
 
-def coarse_lag(u: NDArray[np.float64], y: NDArray[np.float64], longest: int) -> int:
+def coarse_lag(u: Real, y: Real, longest: int) -> int:
     """Lag in samples, 0..longest, of the greatest magnitude of the cross-correlation."""
     return _lags(u, y, longest)[0]
 
 
-def _lags(u: NDArray[np.float64], y: NDArray[np.float64], longest: int) -> tuple[int, int | None]:
+def _lags(u: Real, y: Real, longest: int) -> tuple[int, int | None]:
     """Lags of greatest likeness: from 0 on, and below 0 if it is greater there."""
     length = scipy.fft.next_fast_len(u.size + longest + 1, real=True)
     spectrum = np.conj(_transform(u, length)) * scipy.fft.rfft(y - y.mean(), length)
@@ -114,19 +115,19 @@ def _lags(u: NDArray[np.float64], y: NDArray[np.float64], longest: int) -> tuple
 
 
 @kept
-def _transform(u: NDArray[np.float64], length: int) -> NDArray[np.complex128]:
+def _transform(u: Real, length: int) -> Complex:
     """Of an input less its mean, padded to a length."""
     return np.asarray(scipy.fft.rfft(u - u.mean(), length), dtype=np.complex128)
 
 
 @kept
-def _tapered_transform(u: NDArray[np.float64], length: int) -> NDArray[np.complex128]:
+def _tapered_transform(u: Real, length: int) -> Complex:
     """Of an input, its ends tapered, padded to a length."""
     return np.asarray(scipy.fft.rfft(_tapered(u), length), dtype=np.complex128)
 
 
 def rough_response(
-    u: NDArray[np.float64], y: NDArray[np.float64], *, longest_delay: int, lag: int | None = None
+    u: Real, y: Real, *, longest_delay: int, lag: int | None = None
 ) -> RoughResponse:
     """Divide tapered spectra, the output first moved back by the coarse delay.
 
@@ -173,12 +174,8 @@ def _grouped(values: NDArray[Any], group: int) -> NDArray[Any]:
 
 
 def starting_values(
-    rough: RoughResponse,
-    structure: Structure,
-    *,
-    count: int = 3,
-    thorough: bool = True,
-) -> list[NDArray[np.float64]]:
+    rough: RoughResponse, structure: Structure, *, count: int = 3, thorough: bool = True
+) -> list[Real]:
     """Starts for `hmpim.identify.fitting.fit.fit_structure`, the most promising first.
 
     Parameters
@@ -206,7 +203,7 @@ def starting_values(
     if order == 0:
         cost, _ = _levy(rough, terms, shifts, finer, rough.weight)
         return [np.array([rough.lag + shifts[int(np.argmin(cost))] / finer])]
-    found: list[tuple[float, NDArray[np.float64]]] = []
+    found: list[tuple[float, Real]] = []
     for corner in _CORNERS if thorough else _CORNERS[1:2]:
         roll_off = 1.0 + (rough.omega / (corner * rough.omega[-1])) ** 2
         first = rough.weight / roll_off ** min(order, 2)
@@ -229,14 +226,14 @@ def starting_values(
             )
             found.append((error, theta))
     found.sort(key=lambda item: item[0])
-    starts: list[NDArray[np.float64]] = []
+    starts: list[Real] = []
     for _, theta in found:
         if all(np.max(np.abs(theta - other)) > 0.3 for other in starts):
             starts.append(theta)
     return starts[:count]
 
 
-def _polynomial(a: NDArray[np.float64], x: NDArray[np.float64]) -> NDArray[np.complex128]:
+def _polynomial(a: Real, x: Real) -> Complex:
     """1 + a1 s + a2 s² + … at s = jx."""
     s, value = 1j * x, np.full(x.size, a[-1], dtype=complex)
     for coefficient in (*a[-2::-1], 1.0):
@@ -245,12 +242,8 @@ def _polynomial(a: NDArray[np.float64], x: NDArray[np.float64]) -> NDArray[np.co
 
 
 def _levy(
-    rough: RoughResponse,
-    terms: NDArray[np.complex128],
-    shifts: NDArray[np.intp],
-    finer: int,
-    weight: NDArray[np.float64],
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    rough: RoughResponse, terms: Complex, shifts: NDArray[np.intp], finer: int, weight: Real
+) -> tuple[Real, Real]:
     """Solve at each shift, in samples / finer; return costs, (k,), and coefficients, (k, order)."""
     order = terms.shape[0] - 1
     weighted = terms * weight
@@ -273,21 +266,19 @@ def _levy(
     return np.where(np.all(a > 0, axis=1), cost, cost + gram[0, 0]), a
 
 
-def _local_minima(cost: NDArray[np.float64], count: int) -> list[int]:
+def _local_minima(cost: Real, count: int) -> list[int]:
     inside = np.concatenate([[np.inf], cost, [np.inf]])
     low = np.flatnonzero((inside[1:-1] <= inside[:-2]) & (inside[1:-1] <= inside[2:]))
     return [int(i) for i in low[np.argsort(cost[low])][:count]]
 
 
-def _stable(a: NDArray[np.float64], order: int) -> NDArray[np.float64]:
+def _stable(a: Real, order: int) -> Real:
     """Nearest positive coefficients."""
     floor = 1e-2 ** np.arange(1, order + 1)
     return np.asarray(np.maximum(a, floor))
 
 
-def _output_error(
-    rough: RoughResponse, shift: float, a: NDArray[np.float64], scale: float
-) -> float:
+def _output_error(rough: RoughResponse, shift: float, a: Real, scale: float) -> float:
     """Weighted squared error of the response itself, gain solved."""
     target = rough.response * np.exp(1j * rough.omega * shift)
     model = 1.0 / _polynomial(a, rough.omega / scale)

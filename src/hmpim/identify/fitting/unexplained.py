@@ -6,19 +6,14 @@ response at the high end and still explain 99 % of the output's power.
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
+
+from hmpim.identify.arrays import Real
 
 __all__ = ["unexplained_response"]
 
 
 def unexplained_response(
-    u: NDArray[np.float64],
-    y: NDArray[np.float64],
-    residual: NDArray[np.float64],
-    *,
-    delay: float,
-    band: tuple[float, float],
-    groups: int = 24,
+    u: Real, y: Real, residual: Real, *, delay: float, band: tuple[float, float], groups: int = 24
 ) -> float:
     """Share of the response (r.m.s. over frequency) that the residual still holds.
 
@@ -64,7 +59,7 @@ def unexplained_response(
     power = np.sum(np.abs(moved) ** 2, axis=1)
     seen = power > 0.0
 
-    def followed(x: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def followed(x: Real) -> tuple[Real, Real]:
         """Power of a signal that one gain of each group explains, and of all of it."""
         wave = scipy.fft.rfft(x - x.mean())[bins].reshape(shape)
         taken = np.abs(np.sum(moved.conj() * wave, axis=1)) ** 2 / np.where(seen, power, 1.0)

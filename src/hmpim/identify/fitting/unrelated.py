@@ -2,8 +2,8 @@
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
+from hmpim.identify.arrays import Real
 from hmpim.identify.chance import FALSE_ALARM, SEARCHED
 from hmpim.identify.fitting.fit import Fit, Problem
 from hmpim.identify.fitting.least_squares import solved
@@ -19,9 +19,7 @@ _INNOVATES = 60.0
 coloured that few of its samples are independent; another sweep reaches about 40."""
 
 
-def says_nothing(
-    u: NDArray[np.float64], problem: Problem, fit: Fit, band: tuple[float, float]
-) -> bool:
+def says_nothing(u: Real, problem: Problem, fit: Fit, band: tuple[float, float]) -> bool:
     """Whether no model can be expected to explain an output that this fit does not.
 
     A test without a model: input and output pass the filter that leaves white noise of the
@@ -77,7 +75,7 @@ def is_unrelated(problem: Problem, fit: Fit, share: float) -> bool:
     return innovation_gain(y, residual) < _INNOVATES
 
 
-def _without_input(problem: Problem, fit: Fit) -> NDArray[np.float64]:
+def _without_input(problem: Problem, fit: Fit) -> Real:
     """The output less what free response alone makes of it: that needs no input."""
     if problem.begins is None:
         return problem.y

@@ -4,8 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
+from hmpim.identify.arrays import Real
 from hmpim.identify.chance import FALSE_ALARM
 from hmpim.identify.fitting.data import (
     FINAL_PRECISION,
@@ -53,7 +53,7 @@ def prewhitened_of(data: Data, mode: Intersample, fits: list[Fit], seen: Seen) -
     return replace(data, noise=noise, rough=rough)
 
 
-def noise_of(problem: Problem, fit: Fit, data: Data) -> NDArray[np.float64] | None:
+def noise_of(problem: Problem, fit: Fit, data: Data) -> Real | None:
     """Autoregression of what the best fit leaves over; None where that still follows the input.
 
     What follows the input is no noise, and whitening it would hide what a model lacks.

@@ -10,13 +10,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from hmpim.identify.arrays import Mask, Real
 from hmpim.identify.fitting.data import shifted
 from hmpim.identify.fleets.learnt import Fleet, Member
 
 __all__ = ["Errors", "Fits", "errors_of", "fitted_all"]
 
-Real = NDArray[np.float64]
-Flags = NDArray[np.bool_]
+Flags = Mask
 
 _OFF = 0.05
 """Error of the figures' surface, in standard deviations of each, that is let pass."""

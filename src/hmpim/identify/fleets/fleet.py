@@ -21,6 +21,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from hmpim.identify.arrays import Mask, Real
 from hmpim.identify.chance import CLEARLY, DEVIATIONS, FALSE_ALARM, LIKELIER, ONE_SIDED
 from hmpim.identify.effects.imperfections import find_imperfections
 from hmpim.identify.fleets.fits import Errors, Fits, errors_of, fitted_all
@@ -36,8 +37,7 @@ from hmpim.record import Intersample
 
 __all__ = ["Column", "Fleet", "FleetFit", "fit_fleet", "learn_fleet"]
 
-Real = NDArray[np.float64]
-Flags = NDArray[np.bool_]
+Flags = Mask
 
 _OFF = 0.05
 """Error of the surface, in standard deviations of a parameter, that is let pass."""

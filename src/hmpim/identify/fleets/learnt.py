@@ -11,8 +11,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hmpim.identify.arrays import Real
 from hmpim.identify.chance import HALF
 from hmpim.identify.fitting.data import shifted
 from hmpim.identify.fitting.growth import one_more_pole, with_pole
@@ -27,7 +27,6 @@ from hmpim.record import BETWEEN, Intersample
 
 __all__ = ["Fleet", "Member", "box_around", "learn_fleet", "theta_at"]
 
-Real = NDArray[np.float64]
 
 _DEGREE = 9
 _SMOOTHER = 7

@@ -6,9 +6,7 @@ The record itself is fitted here, from where the fit of all ended, and grown as
 
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
-
+from hmpim.identify.arrays import Real
 from hmpim.identify.fitting.fit import fit_structure
 from hmpim.identify.fitting.growth import grow, hidden_pole
 from hmpim.identify.fitting.rows import Problem
@@ -24,8 +22,6 @@ __all__ = ["Tails", "with_tails"]
 
 _THERE = 1e-4
 """Precision of the fit without the pole, which begins where it ends but for the surface's error."""
-
-Real = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

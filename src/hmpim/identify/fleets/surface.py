@@ -12,9 +12,10 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from hmpim.identify.arrays import Mask, Real
+
 __all__ = ["Surface", "places_in"]
 
-Real = NDArray[np.float64]
 
 _OVER = 2.5
 """Points of the fit for each coefficient."""
@@ -107,7 +108,7 @@ class Surface:
         first, _ = _polynomials(_scaled(places, self.low, self.high), int(self.powers.max()))
         return np.asarray(_multiplied(first, self.powers) @ self.weights)
 
-    def holds(self, places: Real) -> NDArray[np.bool_]:
+    def holds(self, places: Real) -> Mask:
         """Which places are inside the box, shape (n,)."""
         return np.asarray(((places > self.low) & (places < self.high)).all(axis=1))
 

@@ -10,9 +10,10 @@ from typing import Literal, get_args
 
 import numpy as np
 import scipy
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from hmpim.errors import ArgumentError, RecordError
+from hmpim.identify.arrays import Complex, Real
 from hmpim.identify.result import FrequencyResponse
 from hmpim.identify.section_iv.windows import WindowName, window_samples
 from hmpim.identify.signals import check_band, check_rate
@@ -57,8 +58,8 @@ class Averaged:
     estimator: Estimator
     segments: int
     averages: float
-    coherence_unbiased: NDArray[np.float64] | None
-    coherence_std: NDArray[np.float64] | None
+    coherence_unbiased: Real | None
+    coherence_std: Real | None
     significance: float | None
 
 
@@ -259,7 +260,7 @@ def effective_averages(window: ArrayLike, step: int, segments: int) -> float:
     return segments / (1 + 2 * doubt)
 
 
-def _repeats(u: ArrayLike, y: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _repeats(u: ArrayLike, y: ArrayLike) -> tuple[Real, Real]:
     """Return both as finite (repeats, n)."""
     first, second = (np.asarray(x, dtype=np.float64) for x in (u, y))
     if first.shape != second.shape or first.ndim not in (1, 2):
@@ -286,9 +287,7 @@ def _repeats(u: ArrayLike, y: ArrayLike) -> tuple[NDArray[np.float64], NDArray[n
     return first, second
 
 
-def _spectra(
-    x: NDArray[np.float64], taper: NDArray[np.float64], step: int
-) -> NDArray[np.complex128]:
+def _spectra(x: Real, taper: Real, step: int) -> Complex:
     """Transforms of all segments of all repeats, shape (repeats · segments, bins)."""
     views = np.lib.stride_tricks.sliding_window_view(x, taper.size, axis=1)[:, ::step]
     spectra = scipy.fft.rfft(views * taper, axis=2)

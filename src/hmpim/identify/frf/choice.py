@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from hmpim.identify.arrays import Mask, Real
 from hmpim.identify.frf.neighbours import LocalFit
 from hmpim.identify.worth import TOLERATED
 
@@ -17,8 +18,6 @@ _NEIGHBOURS = 30
 _CREDIBLE = 1.25
 # The next narrower window is taken unless the square of its error is this much greater.
 _DEAREST = 2.0
-
-Real = NDArray[np.float64]
 
 
 def choose(
@@ -60,7 +59,7 @@ def choose(
     shape = tried[0].response.shape
     position = np.arange(shape[0])
 
-    def stacked(name: str) -> NDArray[np.float64]:
+    def stacked(name: str) -> Real:
         return np.stack([getattr(fit, name) for fit in tried]).reshape(len(tried), shape[0], -1)
 
     response, spread, power = stacked("response"), stacked("spread"), stacked("power")
@@ -88,7 +87,7 @@ def choose(
     return chosen, bent[chosen, position].reshape(shape)
 
 
-def _beyond(apart: NDArray[np.float64], variance: Real, credible: NDArray[np.bool_]) -> Real:
+def _beyond(apart: Real, variance: Real, credible: Mask) -> Real:
     """Return |difference|² beyond the variance of a credible reference, over neighbours."""
     against = np.maximum(variance, 1e-150)  # a record without noise must not overflow
     excess = _averaged(np.where(credible, np.abs(apart) ** 2 / against - 1.0, 0.0))

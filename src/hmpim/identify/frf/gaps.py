@@ -2,15 +2,14 @@
 
 import numpy as np
 import scipy
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from hmpim.errors import ArgumentError, RecordError
+from hmpim.identify.arrays import Real
 
 __all__ = ["filled"]
 
 _FEWEST = 16
-
-Real = NDArray[np.float64]
 
 
 def filled(

@@ -10,6 +10,7 @@ import scipy
 from numpy.typing import ArrayLike, NDArray
 
 from hmpim.errors import ArgumentError, RecordError
+from hmpim.identify.arrays import Mask, Real
 from hmpim.identify.frf.choice import choose
 from hmpim.identify.frf.neighbours import LocalFit, Spectra, centres_in_band, transform
 from hmpim.identify.frf.polynomial import polynomial_fits
@@ -199,14 +200,8 @@ def local_polynomial_response(
 
 
 def _checked(
-    u: ArrayLike,
-    y: ArrayLike,
-    fs: float,
-    band: tuple[float, float],
-    *,
-    delay: float,
-    points: int,
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    u: ArrayLike, y: ArrayLike, fs: float, band: tuple[float, float], *, delay: float, points: int
+) -> tuple[Real, Real]:
     first, second = as_pair(u, y)
     check_rate(fs)
     check_band(band, fs)
@@ -221,7 +216,7 @@ def _checked(
     return first, second
 
 
-def _checked_mask(valid: ArrayLike | None, y: NDArray[np.float64]) -> NDArray[np.bool_] | None:
+def _checked_mask(valid: ArrayLike | None, y: Real) -> Mask | None:
     """Return the mask, None where nothing is missing."""
     if valid is None:
         return None
@@ -253,13 +248,7 @@ def _cut(spectra: Spectra, highest: int) -> Spectra:
 
 
 def _single(
-    u: NDArray[np.float64],
-    y: NDArray[np.float64],
-    fs: float,
-    *,
-    delay: float,
-    band: tuple[float, float],
-    points: int,
+    u: Real, y: Real, fs: float, *, delay: float, band: tuple[float, float], points: int
 ) -> FrequencyResponse:
     """Polynomials first; what they predict starts the rational functions; then choose of all."""
     spectra = transform(u, y, fs, delay)
@@ -332,13 +321,7 @@ def _answer(
 
 
 def _masked(
-    u: NDArray[np.float64],
-    y: NDArray[np.float64],
-    mask: NDArray[np.bool_],
-    fs: float,
-    delay: float,
-    band: tuple[float, float],
-    points: int,
+    u: Real, y: Real, mask: Mask, fs: float, delay: float, band: tuple[float, float], points: int
 ) -> FrequencyResponse:
     """Estimate with the input zero wherever its response, a delay later, is missing."""
     lag = whole_lag(delay, fs, u.size)

@@ -16,6 +16,7 @@ import scipy
 from numpy.typing import ArrayLike, NDArray
 
 from hmpim.errors import ArgumentError, RecordError
+from hmpim.identify.arrays import Complex, Mask, Real
 from hmpim.identify.frf.choice import choose
 from hmpim.identify.frf.gaps import filled
 from hmpim.identify.frf.neighbours import (
@@ -47,8 +48,6 @@ _STEPS = 3
 # Bins in all windows of one width, beyond which they cost too much.
 _AFFORDABLE = 60_000
 
-Complex = NDArray[np.complex128]
-Real = NDArray[np.float64]
 Integer = NDArray[np.int64]
 
 
@@ -84,7 +83,7 @@ class ResponseMatrix:
     response: Complex
     std: Real
     condition: Real
-    usable: NDArray[np.bool_]
+    usable: Mask
     multiple_coherence: Real
     partial_coherence: Real
     inputs: tuple[str, ...]
@@ -346,7 +345,7 @@ def _chosen(u: Complex, y: Real, base: int, centre: Integer) -> _Joint:
     tried = (*polynomials, *rationals)
     best, bent = choose([fit.local for fit in polynomials], [fit.local for fit in rationals])
 
-    def picked(values: list[NDArray[np.float64]]) -> NDArray[np.float64]:
+    def picked(values: list[Real]) -> Real:
         return np.asarray(np.stack(values)[best, rows])
 
     response: Complex = np.stack([fit.local.response for fit in tried])[best, rows]

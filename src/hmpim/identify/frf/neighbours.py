@@ -13,6 +13,7 @@ import scipy
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
+from hmpim.identify.arrays import Complex, Real
 from hmpim.identify.kept import kept
 from hmpim.identify.signals import whole_lag
 
@@ -29,8 +30,6 @@ __all__ = [
 # Samples from which the FFT's time at an awkward length is felt.
 _LONG = 100_000
 
-Real = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 Integer = NDArray[np.int64]
 
 

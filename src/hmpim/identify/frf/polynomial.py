@@ -10,6 +10,7 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
+from hmpim.identify.arrays import Complex, Real
 from hmpim.identify.frf.neighbours import LocalFit, Spectra, Windows, mirrored, windows_around
 from hmpim.identify.kept import kept
 
@@ -21,7 +22,7 @@ _NOTHING = 1e-24
 # Products of bins held at once, about 80 MB.
 _CHUNK = 1_000_000
 
-_Way = tuple[NDArray[np.complex128], NDArray[np.float64], NDArray[np.float64]]
+_Way = tuple[Complex, Real, Real]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -46,10 +47,10 @@ class _Solver:
     """
 
     windows: Windows
-    powers: NDArray[np.float64]
-    here: NDArray[np.float64]
-    size: NDArray[np.float64]
-    row: NDArray[np.complex128]
+    powers: Real
+    here: Real
+    size: Real
+    row: Complex
     ways: tuple[_Way, ...]
 
 
@@ -57,8 +58,8 @@ class _Solver:
 class _Right:
     """What the output says of each window: the right sides, (w, q), and its power, (w,)."""
 
-    right: NDArray[np.complex128]
-    power: NDArray[np.float64]
+    right: Complex
+    power: Real
 
 
 def polynomial_fits(
@@ -103,9 +104,7 @@ def polynomial_fits(
 
 
 @kept
-def _solver(
-    u: NDArray[np.complex128], centre: NDArray[np.int64], width: int, order: int
-) -> _Solver:
+def _solver(u: Complex, centre: NDArray[np.int64], width: int, order: int) -> _Solver:
     windows, terms = windows_around(centre, u.size, width), order + 1
     reach, size = min(width, u.size - 1), windows.size
     powers = windows.powers(2 * order)
@@ -140,13 +139,7 @@ def _solver(
     )
 
 
-def _way(
-    windows: Windows,
-    gram: NDArray[np.complex128],
-    here: NDArray[np.float64],
-    row: NDArray[np.complex128],
-    columns: int,
-) -> _Way:
+def _way(windows: Windows, gram: Complex, here: Real, row: Complex, columns: int) -> _Way:
     """Inverse, spread and leverage with the first `columns` columns."""
     inverse = np.asarray(np.linalg.inv(gram[:, :columns, :columns]), dtype=np.complex128)
     pair = np.zeros((windows.near.size, 2, columns), dtype=np.complex128)
@@ -156,9 +149,7 @@ def _way(
     return inverse, np.maximum(forms[:, 0], 0.0), forms[:, 1]
 
 
-def _moments(
-    products: NDArray[np.complex128], windows: Windows, reach: int, powers: NDArray[np.float64]
-) -> NDArray[np.complex128]:
+def _moments(products: Complex, windows: Windows, reach: int, powers: Real) -> Complex:
     """Σ A x^p over each window, shape (k, w, p), of products A, (k, b), that `mirrored` made."""
     views = sliding_window_view(products, windows.size, axis=1)
     start = windows.start + reach
@@ -178,7 +169,7 @@ def _right_of(spectra: Spectra, solver: _Solver, width: int) -> _Right:
     )
 
 
-def _solve(solver: _Solver, way: _Way, of_output: _Right, y: NDArray[np.complex128]) -> LocalFit:
+def _solve(solver: _Solver, way: _Way, of_output: _Right, y: Complex) -> LocalFit:
     """Solve the normal equations of one way, and read off each centre."""
     inverse, spread, leverage = way
     columns, terms = inverse.shape[1], solver.here.shape[1]

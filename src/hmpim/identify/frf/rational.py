@@ -18,6 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from hmpim.identify.arrays import Complex, Real
 from hmpim.identify.frf.neighbours import LocalFit, Spectra, Windows, mirrored, windows_around
 
 __all__ = [
@@ -41,9 +42,6 @@ DENOMINATOR_ORDER = 2
 
 _NOTHING = 1e-24
 _RIDGE = 1e-13
-
-Complex = NDArray[np.complex128]
-Real = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -86,10 +84,7 @@ class RationalSolution:
 
 
 def rational_fits(
-    spectra: Spectra,
-    centre: NDArray[np.int64],
-    widths: tuple[int, ...],
-    smooth: Complex,
+    spectra: Spectra, centre: NDArray[np.int64], widths: tuple[int, ...], smooth: Complex
 ) -> list[LocalFit]:
     """Fit rational functions of order 2 over 2, with T and without, over windows of each width.
 

@@ -2,9 +2,7 @@
 
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
-
+from hmpim.identify.arrays import Real
 from hmpim.identify.fitting.trial import JointFit
 from hmpim.identify.noise.misfit import Misfit
 from hmpim.identify.reading.readings import Readings
@@ -51,7 +49,7 @@ class Evidence:
     joint: JointFit
     readings: Readings
     misfit: Misfit
-    u: NDArray[np.float64]
+    u: Real
     fs: float
     band: tuple[float, float]
     fit_percent: float

@@ -7,6 +7,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from hmpim.identify.arrays import Real
 from hmpim.identify.chance import FALSE_ALARM
 from hmpim.identify.fitting.least_squares import solved
 from hmpim.identify.judgement.evidence import Evidence
@@ -16,7 +17,6 @@ from hmpim.record import Finding
 
 __all__ = ["feedback"]
 
-Real = NDArray[np.float64]
 
 _AHEAD = 12
 """Samples of the input's future, and of its past, that are looked at."""

@@ -4,8 +4,8 @@ import math
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
+from hmpim.identify.arrays import Real
 from hmpim.identify.fitting.enrich import PLAIN
 from hmpim.identify.fitting.growth import scale_of
 from hmpim.identify.judgement.evidence import Evidence, structure_in_words
@@ -218,14 +218,14 @@ def _at_the_line(evidence: Evidence) -> str:
     )
 
 
-def _windowed_power(u: NDArray[np.float64]) -> NDArray[np.float64]:
+def _windowed_power(u: Real) -> Real:
     """Power behind a Blackman-Harris window, without what a constant has there."""
     window = scipy.signal.windows.blackmanharris(u.size, sym=False)
     return np.asarray(np.abs(scipy.fft.rfft((u - window @ u / window.sum()) * window)) ** 2)
 
 
 @kept
-def count_lines(u: NDArray[np.float64]) -> int:
+def count_lines(u: Real) -> int:
     """How many frequencies an input has that can be told apart.
 
     Examples

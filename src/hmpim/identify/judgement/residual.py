@@ -1,8 +1,8 @@
 """What the model leaves over: lack of fit, colour, halves that disagree, noise on the input."""
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hmpim.identify.arrays import Real
 from hmpim.identify.chance import DEVIATIONS, FALSE_ALARM
 from hmpim.identify.fitting.halves import compare_halves
 from hmpim.identify.judgement.evidence import Evidence, structure_in_words
@@ -162,7 +162,7 @@ def noise_on_the_input(evidence: Evidence) -> tuple[Finding, ...]:
     )
 
 
-def _counted(evidence: Evidence) -> NDArray[np.float64]:
+def _counted(evidence: Evidence) -> Real:
     """Residual of the samples that counted."""
     residual, valid = evidence.joint.best.fit.residual, evidence.joint.problem.valid
     return residual if valid is None else residual[valid]

@@ -9,8 +9,8 @@ Trans. Autom. Control 19, 1974).
 import numpy as np
 import scipy
 from numpy.lib.stride_tricks import sliding_window_view
-from numpy.typing import NDArray
 
+from hmpim.identify.arrays import Mask, Real
 from hmpim.identify.noise.whiteness import autocovariance
 from hmpim.identify.worth import PART
 
@@ -31,10 +31,8 @@ _FLICKER_BINS = 32
 _INNOVATION_ORDER = 12
 _MOST_INNOVATIONS = 100_000
 
-Real = NDArray[np.float64]
 
-
-def autoregression(residual: Real, valid: NDArray[np.bool_] | None) -> Real:
+def autoregression(residual: Real, valid: Mask | None) -> Real:
     """Filter that leaves white noise of a residual, 1 first, shape (order + 1,).
 
     Parameters
@@ -92,7 +90,7 @@ def whitening_filter(gram: Real, count: int) -> Real:
     return np.concatenate([[1.0], -weights])
 
 
-def _reach(valid: NDArray[np.bool_] | None) -> int:
+def _reach(valid: Mask | None) -> int:
     """Greatest order that leaves enough samples between the gaps."""
     if valid is None:
         return LONGEST
@@ -100,7 +98,7 @@ def _reach(valid: NDArray[np.bool_] | None) -> int:
     return int(PART * np.count_nonzero(valid) / ends)
 
 
-def _moments(residual: Real, valid: NDArray[np.bool_] | None, longest: int) -> tuple[Real, int]:
+def _moments(residual: Real, valid: Mask | None, longest: int) -> tuple[Real, int]:
     """Sums of products of a sample and its past, (longest + 1)², the sample itself first."""
     gram, count = np.zeros((longest + 1, longest + 1)), 0
     for start in range(0, residual.size - longest, _BLOCK):
@@ -113,7 +111,7 @@ def _moments(residual: Real, valid: NDArray[np.bool_] | None, longest: int) -> t
     return gram, count
 
 
-def innovation_gain(y: NDArray[np.float64], residual: NDArray[np.float64]) -> float:
+def innovation_gain(y: Real, residual: Real) -> float:
     """Log-likelihood by which a residual is more likely than the output, both as coloured noise.
 
     Each is taken as an autoregression of its own (order 12, least squares, so that wander and
@@ -145,7 +143,7 @@ def innovation_gain(y: NDArray[np.float64], residual: NDArray[np.float64]) -> fl
     return float(0.5 * size * np.log(max(_innovation(y) / unforeseen, np.finfo(float).tiny)))
 
 
-def _innovation(x: NDArray[np.float64]) -> float:
+def _innovation(x: Real) -> float:
     """Mean square of what an autoregression with a constant does not foresee."""
     order = min(_INNOVATION_ORDER, x.size // 10)
     past = [x[order - k : x.size - k] for k in range(1, order + 1)]
@@ -154,9 +152,7 @@ def _innovation(x: NDArray[np.float64]) -> float:
     return float(np.mean((x[order:] - weights @ rows) ** 2))
 
 
-def autoregressive_spectrum(
-    residual: NDArray[np.float64], omega: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def autoregressive_spectrum(residual: Real, omega: Real) -> Real:
     """Power spectrum of the residual from an autoregression fitted to it (Yule-Walker).
 
     Parameters
@@ -192,7 +188,7 @@ def autoregressive_spectrum(
     return np.asarray(np.where(flicker > 0, flicker, power))
 
 
-def _flicker(residual: NDArray[np.float64], omega: NDArray[np.float64]) -> NDArray[np.float64]:
+def _flicker(residual: Real, omega: Real) -> Real:
     """Power that rises towards DC as f^-α, which a short autoregression levels off; 0 if none.
 
     A straight line through the logarithm of the first bins of the periodogram, whose scatter

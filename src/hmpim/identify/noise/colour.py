@@ -8,9 +8,10 @@ from typing import Literal
 
 import numpy as np
 import scipy
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from hmpim.errors import RecordError
+from hmpim.identify.arrays import Real
 from hmpim.identify.chance import SEARCHED
 from hmpim.identify.noise.covariance import covariance
 from hmpim.identify.noise.whiteness import autocovariance, effective_share, is_white
@@ -198,7 +199,7 @@ def bias_drift(residual: ArrayLike, time: ArrayLike) -> Drift:
     )
 
 
-def _wandering_variance(ramp: NDArray[np.float64], e: NDArray[np.float64]) -> float:
+def _wandering_variance(ramp: Real, e: Real) -> float:
     """Variance of the slope under noise whose power goes as f^-α down to the record's length.
 
     0 unless the noise is so slow that no autoregression reaches its lowest frequencies.
@@ -220,7 +221,7 @@ def _wandering_variance(ramp: NDArray[np.float64], e: NDArray[np.float64]) -> fl
     return float(level * (weights[1:] @ shape[1:]) / n)
 
 
-def _line(e: NDArray[np.float64], fs: float) -> float | None:
+def _line(e: Real, fs: float) -> float | None:
     """Frequency in Hz of the strongest narrow line, or None."""
     n = e.size
     if n < 8 * _NEIGHBOURS:
@@ -240,33 +241,33 @@ def _line(e: NDArray[np.float64], fs: float) -> float | None:
     return float((k + 0.5 * (left - right) / (left - 2 * here + right)) * fs / n)
 
 
-def _pair(size: int, frequency: float) -> NDArray[np.float64]:
+def _pair(size: int, frequency: float) -> Real:
     """Cosine and sine at `frequency` in cycles per sample, shape (2, n)."""
     phase = 2 * np.pi * frequency * np.arange(size)
     return np.stack([np.cos(phase), np.sin(phase)])
 
 
-def _weights(e: NDArray[np.float64], frequency: float) -> NDArray[np.float64]:
+def _weights(e: Real, frequency: float) -> Real:
     rows = _pair(e.size, frequency)
     return np.asarray(np.linalg.solve(rows @ rows.T, rows @ (e - e.mean())))
 
 
-def _tone(e: NDArray[np.float64], frequency: float) -> NDArray[np.float64]:
+def _tone(e: Real, frequency: float) -> Real:
     return np.asarray(_weights(e, frequency) @ _pair(e.size, frequency))
 
 
-def _amplitude(e: NDArray[np.float64], frequency: float) -> float:
+def _amplitude(e: Real, frequency: float) -> float:
     return float(np.hypot(*_weights(e, frequency)))
 
 
-def _likelier(e: NDArray[np.float64]) -> tuple[Colour, float]:
+def _likelier(e: Real) -> tuple[Colour, float]:
     """AR(1) or a power law, by Whittle's likelihood, and the power law's exponent."""
     n = e.size
     power = np.abs(scipy.fft.rfft(e)[1 : (n - 1) // 2]) ** 2 / n
     power = np.maximum(power, 1e-12 * power.mean())
     omega = 2 * np.pi * np.arange(1, power.size + 1) / n
 
-    def cost(shape: NDArray[np.float64]) -> float:
+    def cost(shape: Real) -> float:
         return float(np.log(np.mean(power / shape)) + np.mean(np.log(shape)))
 
     def autoregressive(rho: float) -> float:

@@ -8,16 +8,14 @@ autoregression fitted to the residual.
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
+from hmpim.identify.arrays import Real
 from hmpim.identify.noise.autoregression import autoregressive_spectrum
 
 __all__ = ["covariance"]
 
 
-def covariance(
-    rows: NDArray[np.float64], residual: NDArray[np.float64], *, freedom: int, white: bool
-) -> NDArray[np.float64]:
+def covariance(rows: Real, residual: Real, *, freedom: int, white: bool) -> Real:
     """Covariance of the parameters of a least-squares fit.
 
     Parameters

@@ -8,8 +8,9 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from hmpim.identify.arrays import Real
 from hmpim.identify.kept import kept
 from hmpim.identify.signals import as_signal, check_band, check_rate
 from hmpim.identify.worth import NEARLY, PAST
@@ -118,7 +119,7 @@ def input_noise(u: ArrayLike, fs: float, *, band: tuple[float, float]) -> InputN
     )
 
 
-def _end(power: NDArray[np.float64]) -> int:
+def _end(power: Real) -> int:
     """Last bin that stands out of what fills the top of the spectrum, which noise may be."""
     width = max(power.size // 50, 5)
     summed = np.cumsum(np.concatenate([[0.0], power]))
@@ -127,12 +128,12 @@ def _end(power: NDArray[np.float64]) -> int:
     return int(above[-1]) + width // 2 if above.size else power.size
 
 
-def _level(power: NDArray[np.float64]) -> float:
+def _level(power: Real) -> float:
     """Mean of exponentially distributed power, from its median: a line does no harm."""
     return float(np.median(power) / np.log(2.0))
 
 
-def _is_rough(samples: NDArray[np.float64], variance: float) -> bool:
+def _is_rough(samples: Real, variance: float) -> bool:
     """Whether noise shows between jumps as well; a clean square wave stands still there."""
     third = np.diff(samples, 3)
     usual = float(np.median(np.abs(third))) / 0.6745 / np.sqrt(20.0)

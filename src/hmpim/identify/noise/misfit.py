@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
+from hmpim.identify.arrays import Complex, Real
 from hmpim.identify.kept import kept
 
 __all__ = ["Misfit", "misfit", "misfits"]
@@ -29,12 +29,7 @@ class Misfit:
 
 
 def misfit(
-    u: NDArray[np.float64],
-    residual: NDArray[np.float64],
-    *,
-    delay: float,
-    band: tuple[float, float],
-    groups: int = 24,
+    u: Real, residual: Real, *, delay: float, band: tuple[float, float], groups: int = 24
 ) -> Misfit:
     """Test whether the residual is still coherent with the input.
 
@@ -65,20 +60,20 @@ def misfit(
 
 
 @kept
-def _transform(u: NDArray[np.float64]) -> NDArray[np.complex128]:
+def _transform(u: Real) -> Complex:
     """Of an input less its mean."""
     return np.asarray(scipy.fft.rfft(u - u.mean()), dtype=np.complex128)
 
 
 def misfits(
-    stimulus: NDArray[np.complex128],
-    residuals: NDArray[np.complex128],
+    stimulus: Complex,
+    residuals: Complex,
     *,
     samples: int,
-    delays: NDArray[np.float64],
+    delays: Real,
     band: tuple[float, float],
     groups: int = 24,
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+) -> tuple[Real, Real]:
     """Test many residuals of one input as `misfit` does one; shares and probabilities.
 
     Parameters

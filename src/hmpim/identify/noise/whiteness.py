@@ -2,8 +2,8 @@
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
+from hmpim.identify.arrays import Complex, Mask, Real
 from hmpim.identify.chance import FALSE_ALARM
 from hmpim.identify.kept import kept
 
@@ -12,9 +12,7 @@ __all__ = ["are_white", "autocovariance", "effective_share", "is_white"]
 _LAGS = 25
 
 
-def autocovariance(
-    residual: NDArray[np.float64], lags: int, spectra: NDArray[np.complex128] | None = None
-) -> NDArray[np.float64]:
+def autocovariance(residual: Real, lags: int, spectra: Complex | None = None) -> Real:
     """Biased autocovariance at lags 0..lags, shape (..., lags + 1), the unit of residual squared.
 
     Parameters
@@ -46,14 +44,12 @@ def autocovariance(
 
 
 @kept
-def is_white(residual: NDArray[np.float64]) -> bool:
+def is_white(residual: Real) -> bool:
     """Whether one residual, shape (n,), is white by the test of `are_white`."""
     return bool(are_white(residual))
 
 
-def are_white(
-    residuals: NDArray[np.float64], spectra: NDArray[np.complex128] | None = None
-) -> NDArray[np.bool_]:
+def are_white(residuals: Real, spectra: Complex | None = None) -> Mask:
     """Ljung-Box test (Biometrika 65, 1978) over 25 lags.
 
     Parameters
@@ -88,7 +84,7 @@ def are_white(
 
 
 @kept
-def effective_share(residual: NDArray[np.float64]) -> float:
+def effective_share(residual: Real) -> float:
     """Independent samples per sample: 1 for white noise, less for coloured.
 
     1 / (1 + 2 Σ ρ²), the share that holds for estimates of power (Bartlett, 1946), over

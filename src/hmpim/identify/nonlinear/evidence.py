@@ -8,8 +8,8 @@ with one kind beside it says more than a rich one alone.
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hmpim.identify.arrays import Real
 from hmpim.identify.chance import FALSE_ALARM, LIKELIER, searched
 from hmpim.identify.fitting.fit import Fit, Problem, jacobian
 from hmpim.identify.noise.whiteness import is_white
@@ -37,10 +37,10 @@ is exact."""
 class Look:
     """The record as it is looked at: in blocks of samples if it is long."""
 
-    u: NDArray[np.float64]
+    u: Real
     problem: Problem
     fs: float
-    others: tuple[NDArray[np.float64], ...]
+    others: tuple[Real, ...]
     sweep: SweepPhase | None
     block: int
 
@@ -64,7 +64,7 @@ class Seen:
         return max(self.rms, self.named[0].effect)
 
 
-def thinned(x: NDArray[np.float64], block: int) -> NDArray[np.float64]:
+def thinned(x: Real, block: int) -> Real:
     """Means over blocks of samples; an incomplete one at the end is left out."""
     if block == 1:
         return x
@@ -216,7 +216,7 @@ def _curved(fit: Fit, problem: Problem) -> bool:
     return bool(np.any(taken[told] > needed * left[told]))
 
 
-def _lines(u: NDArray[np.float64], problem: Problem) -> Lines | None:
+def _lines(u: Real, problem: Problem) -> Lines | None:
     """Distortion at lines left out, if the input repeats; the first period may be transient."""
     if problem.valid is not None:
         return None

@@ -8,8 +8,8 @@ fit took up does not lessen its size.
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hmpim.identify.arrays import Real
 from hmpim.identify.nonlinear.harmonic_regression import HarmonicFit
 from hmpim.identify.nonlinear.mechanisms import Hypothesis, Kind, Mechanism, hypotheses
 
@@ -17,7 +17,7 @@ __all__ = ["compare_harmonics"]
 
 
 def compare_harmonics(
-    fit: HarmonicFit, x: NDArray[np.float64], denominator: NDArray[np.float64], *, fs: float
+    fit: HarmonicFit, x: Real, denominator: Real, *, fs: float
 ) -> tuple[Mechanism, ...]:
     """Hold the harmonics of each kind against those seen, the likeliest first.
 
@@ -57,7 +57,7 @@ def compare_harmonics(
     seen = fit.weights[group] @ whiten
     traces = np.stack([one.trace for one in tried])
     weights = fit.weights_of(traces)
-    best: dict[Kind, tuple[float, float, Hypothesis, NDArray[np.float64]]] = {}
+    best: dict[Kind, tuple[float, float, Hypothesis, Real]] = {}
     for one, own in zip(tried, weights, strict=True):
         made = own[group] @ whiten
         power, along = float(made @ made), float(made @ seen)

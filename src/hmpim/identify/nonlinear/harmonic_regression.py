@@ -13,6 +13,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from hmpim.identify.arrays import Mask, Real
 from hmpim.identify.noise.whiteness import autocovariance
 from hmpim.identify.nonlinear.sweep_phase import SweepPhase
 
@@ -57,18 +58,18 @@ class SweepView:
     """
 
     index: NDArray[np.intp]
-    phase: NDArray[np.float64]
-    rate: NDArray[np.float64]
-    along: NDArray[np.float64]
+    phase: Real
+    rate: Real
+    along: Real
     places: int
     orders: tuple[int, ...]
 
 
-def _turned(sweep: SweepPhase, index: NDArray[np.intp], late: float) -> NDArray[np.float64]:
+def _turned(sweep: SweepPhase, index: NDArray[np.intp], late: float) -> Real:
     return np.asarray(np.interp(index - late, np.arange(sweep.phase.size), sweep.phase))
 
 
-def view_of(e: NDArray[np.float64], sweep: SweepPhase, fs: float, delay: float) -> SweepView | None:
+def view_of(e: Real, sweep: SweepPhase, fs: float, delay: float) -> SweepView | None:
     """The stretch that is looked at; None if it is too short, or no order lies below Nyquist."""
     late = delay * fs
     came = np.arange(e.size) - int(np.rint(late))  # to the sample is enough for what is inside
@@ -95,7 +96,7 @@ def view_of(e: NDArray[np.float64], sweep: SweepPhase, fs: float, delay: float) 
     )
 
 
-def _columns(view: SweepView, others: list[NDArray[np.float64]]) -> NDArray[np.float64]:
+def _columns(view: SweepView, others: list[Real]) -> Real:
     """Cosine and sine of order 1 and each of the others, the mean, then what other inputs do."""
     out = np.empty((3 + 2 * len(view.orders) + 2 * len(others), view.phase.size))
     turn = np.exp(1j * view.phase)
@@ -143,15 +144,15 @@ class HarmonicFit:
     """
 
     view: SweepView
-    columns: NDArray[np.float64]
-    whitening: NDArray[np.float64]
-    white: NDArray[np.float64]
-    weights: NDArray[np.float64]
-    covariance: NDArray[np.float64]
-    used: NDArray[np.bool_]
+    columns: Real
+    whitening: Real
+    white: Real
+    weights: Real
+    covariance: Real
+    used: Mask
     variance: float
     freedom: int
-    rest: NDArray[np.float64]
+    rest: Real
 
     @property
     def orders(self) -> tuple[int, ...]:
@@ -171,7 +172,7 @@ class HarmonicFit:
         place = np.arange(self.used.size) % self.columns.shape[0]
         return np.flatnonzero((place >= first) & (place < last) & self.used)
 
-    def part(self, i: int) -> NDArray[np.float64]:
+    def part(self, i: int) -> Real:
         """What the i-th order contributes, shape (m,)."""
         shaped = self.weights.reshape(-1, self.columns.shape[0])
         return _expanded(self.columns[2 * i : 2 * i + 2], shaped[:, 2 * i : 2 * i + 2], self.view)
@@ -184,12 +185,12 @@ class HarmonicFit:
         index = np.flatnonzero((place >= 2 * i) & (place < 2 * i + 2))
         return float(np.sum(own * self.covariance[np.ix_(index, index)]))
 
-    def power(self, weights: NDArray[np.float64], group: NDArray[np.intp]) -> float:
+    def power(self, weights: Real, group: NDArray[np.intp]) -> float:
         """Mean square of what weights, 0 outside of `group`, stand for."""
         own = _gram(self.columns, self.view)[np.ix_(group, group)]
         return float(weights[group] @ own @ weights[group]) / self.rest.size
 
-    def weights_of(self, traces: NDArray[np.float64]) -> NDArray[np.float64]:
+    def weights_of(self, traces: Real) -> Real:
         """Weights that traces, shape (k, n), would have by themselves, shape (k, p c)."""
         white = scipy.signal.lfilter(self.whitening, [1.0], traces[:, self.view.index], axis=1)
         moments = _moments(white, self.white, self.view)
@@ -197,7 +198,7 @@ class HarmonicFit:
 
 
 def fit_harmonics(
-    e: NDArray[np.float64], view: SweepView, others: Sequence[SweepPhase], late: float
+    e: Real, view: SweepView, others: Sequence[SweepPhase], late: float
 ) -> HarmonicFit:
     """Regress `e`, shape (n,), on harmonics of the sweep in `view`.
 
@@ -237,13 +238,13 @@ def fit_harmonics(
     )
 
 
-def _cells(view: SweepView) -> list[tuple[slice, NDArray[np.float64]]]:
+def _cells(view: SweepView) -> list[tuple[slice, Real]]:
     """For each stretch between two places: its samples, and how far along each lies."""
     starts = np.searchsorted(view.along, np.arange(view.places + 1))
     return [(slice(a, b), view.along[a:b] - i) for i, (a, b) in enumerate(pairwise(starts))]
 
 
-def _gram(columns: NDArray[np.float64], view: SweepView) -> NDArray[np.float64]:
+def _gram(columns: Real, view: SweepView) -> Real:
     """Products of all weighted columns, shape (p c, p c): only neighbours have any."""
     count, p = columns.shape[0], view.places + 1
     gram = np.zeros((p, count, p, count))
@@ -257,9 +258,7 @@ def _gram(columns: NDArray[np.float64], view: SweepView) -> NDArray[np.float64]:
     return gram.reshape(p * count, p * count)
 
 
-def _moments(
-    rows: NDArray[np.float64], columns: NDArray[np.float64], view: SweepView
-) -> NDArray[np.float64]:
+def _moments(rows: Real, columns: Real, view: SweepView) -> Real:
     """Products of rows, shape (k, m), with all weighted columns, shape (k, p c)."""
     count, p = columns.shape[0], view.places + 1
     out = np.zeros((rows.shape[0], p, count))
@@ -270,9 +269,7 @@ def _moments(
     return out.reshape(rows.shape[0], -1)
 
 
-def _solved(
-    gram: NDArray[np.float64], moment: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.bool_]]:
+def _solved(gram: Real, moment: Real) -> tuple[Real, Real, Mask]:
     """Weights, their covariance for unit noise, and which columns have any content."""
     scale = np.sqrt(np.maximum(np.diag(gram), 0.0))
     used = scale > 1e-6 * scale.max()
@@ -284,9 +281,7 @@ def _solved(
     return weights, covariance, used
 
 
-def _expanded(
-    columns: NDArray[np.float64], weights: NDArray[np.float64], view: SweepView
-) -> NDArray[np.float64]:
+def _expanded(columns: Real, weights: Real, view: SweepView) -> Real:
     """Sum of the columns, shape (c, m), by weights at each place, shape (p, c)."""
     grid = np.arange(weights.shape[0])
     out = np.zeros(columns.shape[1])
@@ -295,9 +290,7 @@ def _expanded(
     return out
 
 
-def whitener(
-    e: NDArray[np.float64], *, longest: int = _LONGEST_AUTOREGRESSION
-) -> NDArray[np.float64]:
+def whitener(e: Real, *, longest: int = _LONGEST_AUTOREGRESSION) -> Real:
     """Coefficients 1, -a1, … of the autoregression that Akaike's criterion chooses."""
     longest = min(longest, e.size // 20)
     r = autocovariance(e, longest)

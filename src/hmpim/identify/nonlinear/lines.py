@@ -11,9 +11,10 @@ from typing import Literal
 
 import numpy as np
 import scipy
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from hmpim.errors import ArgumentError
+from hmpim.identify.arrays import Complex, Real
 from hmpim.identify.signals import as_pair, as_signal
 
 __all__ = ["LineLevel", "Lines", "detection_lines", "find_period"]
@@ -196,13 +197,7 @@ def detection_lines(u: ArrayLike, y: ArrayLike, *, period: int) -> Lines | None:
     )
 
 
-def _level(
-    parity: Parity,
-    line: NDArray[np.complex128],
-    scatter: NDArray[np.float64],
-    periods: int,
-    signal: float,
-) -> LineLevel:
+def _level(parity: Parity, line: Complex, scatter: Real, periods: int, signal: float) -> LineLevel:
     """Compare what repeats with what does not."""
     count = line.size
     noise = float(np.mean(scatter))

@@ -24,8 +24,8 @@ from typing import Literal
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
+from hmpim.identify.arrays import Mask, Real
 from hmpim.identify.fitting.fit import Fit, Problem, jacobian
 from hmpim.identify.nonlinear.harmonic_regression import whitener
 from hmpim.model.sampled import delayed_response, prepare_input
@@ -107,10 +107,10 @@ class Mechanism:
     likelihood: float
     rms: float
     effect: float
-    trace: NDArray[np.float64]
+    trace: Real
 
 
-def play(x: NDArray[np.float64], half_gap: float) -> NDArray[np.float64]:
+def play(x: Real, half_gap: float) -> Real:
     """Output of backlash: follows `x` half a gap behind, and waits at each reversal.
 
     Parameters
@@ -134,7 +134,7 @@ def play(x: NDArray[np.float64], half_gap: float) -> NDArray[np.float64]:
     return np.array(out)
 
 
-def rate_limited(x: NDArray[np.float64], step: float) -> NDArray[np.float64]:
+def rate_limited(x: Real, step: float) -> Real:
     """Follow `x` by no more than `step` from sample to sample.
 
     Examples
@@ -167,7 +167,7 @@ class Hypothesis:
     """
 
     kind: Kind
-    trace: NDArray[np.float64]
+    trace: Real
     size: float | None = None
     spacing: float = 0.0
 
@@ -215,7 +215,7 @@ def compare_mechanisms(problem: Problem, fit: Fit, *, fs: float) -> tuple[Mechan
     return tuple(sorted(best.values(), key=lambda m: -m.likelihood))
 
 
-def _where(residual: NDArray[np.float64]) -> slice:
+def _where(residual: Real) -> slice:
     """The stretch that is looked at: all, or the part of a long record with most to explain."""
     n = residual.size
     if n <= _LONGEST:
@@ -226,7 +226,7 @@ def _where(residual: NDArray[np.float64]) -> slice:
     return slice(start, start + _LONGEST)
 
 
-def _background(problem: Problem, fit: Fit, here: slice) -> NDArray[np.float64]:
+def _background(problem: Problem, fit: Fit, here: slice) -> Real:
     """All that a linear change of the model could explain, orthonormal, shape (k, m)."""
     x = fit.prediction - fit.linear[-1]
     shifted = [problem.masked(_shifted(x, k))[here] for k in range(-_LAGS, _LAGS + 1, 2)]
@@ -238,14 +238,12 @@ def _background(problem: Problem, fit: Fit, here: slice) -> NDArray[np.float64]:
     return np.asarray((vectors[:, keep] / np.sqrt(values[keep])).T @ stacked)
 
 
-def _shifted(x: NDArray[np.float64], by: int) -> NDArray[np.float64]:
+def _shifted(x: Real, by: int) -> Real:
     index = np.clip(np.arange(x.size) - by, 0, x.size - 1)
     return x[index]
 
 
-def hypotheses(
-    x: NDArray[np.float64], denominator: NDArray[np.float64], fs: float
-) -> Iterator[Hypothesis]:
+def hypotheses(x: Real, denominator: Real, fs: float) -> Iterator[Hypothesis]:
     """Every kind with every value tried.
 
     Parameters
@@ -261,7 +259,7 @@ def hypotheses(
     step = np.gradient(x)
     fastest = float(np.max(np.abs(step)))
 
-    def through(force: NDArray[np.float64]) -> NDArray[np.float64]:
+    def through(force: Real) -> Real:
         """Answer of the dynamics, without delay, to a force given in the output's unit."""
         source = prepare_input(force, "foh")
         answer = delayed_response(source, delay=0.0, denominator=denominator)[0]
@@ -298,12 +296,7 @@ def hypotheses(
         )
 
 
-def _fitted(
-    hypothesis: Hypothesis,
-    e: NDArray[np.float64],
-    background: NDArray[np.float64],
-    counted: NDArray[np.bool_],
-) -> Mechanism | None:
+def _fitted(hypothesis: Hypothesis, e: Real, background: Real, counted: Mask) -> Mechanism | None:
     """Weight by generalised least squares, the noise's colour from what is then left."""
     h = hypothesis.trace * counted
     alone = h - (background @ h) @ background

@@ -10,9 +10,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from hmpim.errors import RecordError
+from hmpim.identify.arrays import Real
 from hmpim.identify.chance import FALSE_ALARM, HALF
 from hmpim.identify.fitting.fit import Fit, Problem
 from hmpim.identify.nonlinear.evidence import Look, Seen, look_at, plainer_of, thinned
@@ -96,7 +97,7 @@ def inspect_nonlinearity(
     *,
     fs: float,
     plain: Fit | None = None,
-    others: Sequence[NDArray[np.float64]] = (),
+    others: Sequence[Real] = (),
     floor: float = 0.0,
     unit: str = "",
 ) -> Inspection:
@@ -282,7 +283,7 @@ def _summary(
     )
 
 
-def _own_amplitude(view: SweepView, x: NDArray[np.float64], fs: float) -> HarmonicCurve:
+def _own_amplitude(view: SweepView, x: Real, fs: float) -> HarmonicCurve:
     """Amplitude of the linear model's output along the sweep, where the harmonics are told."""
     frequency, amplitude = [], []
     for place in range(view.places + 1):

@@ -9,8 +9,9 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from hmpim.identify.arrays import Mask, Real
 from hmpim.identify.kept import kept
 from hmpim.identify.signals import as_signal, check_rate
 from hmpim.identify.worth import FEW, PART
@@ -54,10 +55,10 @@ class SweepPhase:
         Samples during the sweep itself.
     """
 
-    phase: NDArray[np.float64]
-    frequency: NDArray[np.float64]
-    amplitude: NDArray[np.float64]
-    inside: NDArray[np.bool_]
+    phase: Real
+    frequency: Real
+    amplitude: Real
+    inside: Mask
 
 
 @kept
@@ -119,7 +120,7 @@ def sweep_phase(u: ArrayLike, fs: float) -> SweepPhase | None:
     )
 
 
-def _centre(x: NDArray[np.float64]) -> float:
+def _centre(x: Real) -> float:
     """Middle between neighbouring extremes, the median of all."""
     turns = np.flatnonzero(np.diff(np.sign(np.diff(x))) != 0) + 1
     if turns.size < 4:
@@ -127,9 +128,7 @@ def _centre(x: NDArray[np.float64]) -> float:
     return float(np.median(0.5 * (x[turns[1:]] + x[turns[:-1]])))
 
 
-def _locally(
-    error: NDArray[np.float64], level: NDArray[np.float64], crossings: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def _locally(error: Real, level: Real, crossings: Real) -> Real:
     """Share of the power left over three half turns around each sample."""
     starts = np.unique(np.clip(np.ceil(crossings).astype(np.intp), 0, error.size - 1))
     sums = np.add.reduceat(np.stack([error, level**2]), starts, axis=1)
@@ -141,7 +140,7 @@ def _locally(
     return np.asarray(share[np.maximum(which, 0)])
 
 
-def _finer(x: NDArray[np.float64]) -> NDArray[np.float64]:
+def _finer(x: Real) -> Real:
     """Samples at a multiple of the rate, shape ((n - 1) * finer + 1,); ends continued evenly."""
     margin = min(32, x.size - 1)
     before = 2 * x[0] - x[margin:0:-1]
@@ -153,9 +152,7 @@ def _finer(x: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.asarray(extended[start : start + (x.size - 1) * _FINER + 1], dtype=np.float64)
 
 
-def _crossings(
-    x: NDArray[np.float64],
-) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
+def _crossings(x: Real) -> tuple[Real, Real, float]:
     """Times of the zero crossings in samples, peaks between them, phase at the first one."""
     fine = _finer(x)
     sign = _signs(fine)
@@ -181,7 +178,7 @@ def _crossings(
     return np.asarray(times), np.asarray(peaks), first
 
 
-def _signs(fine: NDArray[np.float64]) -> NDArray[np.float64]:
+def _signs(fine: Real) -> Real:
     """Sign of each sample; at rest, and where zero is touched and not crossed, that before it.
 
     Between two crossings there is then a sample beyond the rest, so that no two coincide.
@@ -192,9 +189,7 @@ def _signs(fine: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.asarray(np.sign(fine[place]), dtype=np.float64)
 
 
-def _through(
-    crossings: NDArray[np.float64], first: float, sample: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def _through(crossings: Real, first: float, sample: Real) -> Real:
     """Phase by a smooth curve through the half turns, going on at the last rate beyond them."""
     turns = first + np.pi * np.arange(crossings.size)
     apart = np.diff(crossings, prepend=-np.inf) > 0.0  # rounding may put two at one instant

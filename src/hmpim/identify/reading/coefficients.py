@@ -1,8 +1,8 @@
 """A system's coefficients as results have them: highest power first, of unit gain."""
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hmpim.identify.arrays import Real
 from hmpim.model.filters import in_z
 from hmpim.model.response import RationalDelay
 
@@ -30,9 +30,7 @@ def coefficients_of(system: RationalDelay) -> tuple[tuple[float, ...], tuple[flo
     return tuple(above[::-1].tolist()), tuple(below[::-1].tolist())
 
 
-def highest_first(
-    covariance: NDArray[np.float64], system: RationalDelay
-) -> NDArray[np.float64] | None:
+def highest_first(covariance: Real, system: RationalDelay) -> Real | None:
     """Covariance of delay, numerator and denominator by falling powers; None if it is not known.
 
     Parameters

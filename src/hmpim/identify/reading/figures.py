@@ -1,8 +1,8 @@
 """Figures of a system, each with its error bar from the covariance of the fit."""
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hmpim.identify.arrays import Complex, Real
 from hmpim.identify.fitting.fit import Fit
 from hmpim.identify.reading.propagation import gradient
 from hmpim.identify.result import Estimate, Parameters
@@ -21,7 +21,6 @@ from hmpim.model.response import (
 
 __all__ = ["figures_at", "figures_of", "read_figures", "system_of"]
 
-_Vector = NDArray[np.float64]
 _Marks = tuple[float | None, float | None, float | None, float | None]
 
 _UNITS = dict.fromkeys(["delay", "delay_low_frequency", "time_constant"], "s") | dict.fromkeys(
@@ -36,7 +35,7 @@ _UNITS = dict.fromkeys(["delay", "delay_low_frequency", "time_constant"], "s") |
 _UNITS |= {"damping_ratio": "", "peak_gain_db": "dB"}
 
 
-def system_of(structure: Structure, vector: _Vector, fs: float) -> RationalDelay:
+def system_of(structure: Structure, vector: Real, fs: float) -> RationalDelay:
     """Build the system in seconds that a fit's vector stands for."""
     order = structure.order
     if structure.sampled:
@@ -58,15 +57,15 @@ def system_of(structure: Structure, vector: _Vector, fs: float) -> RationalDelay
 
 def read_figures(
     structure: Structure,
-    vector: _Vector,
-    cov: _Vector,
+    vector: Real,
+    cov: Real,
     *,
     fs: float,
     highest: float,
     effective: float,
     noise: Estimate,
     units: tuple[str, str],
-) -> tuple[Parameters, RationalDelay, _Vector]:
+) -> tuple[Parameters, RationalDelay, Real]:
     """Turn a fit's parameters and their covariance into estimates.
 
     Parameters
@@ -120,8 +119,8 @@ def read_figures(
 
 
 def _slopes(
-    structure: Structure, vector: _Vector, fs: float, values: dict[str, float | None]
-) -> dict[str, _Vector]:
+    structure: Structure, vector: Real, fs: float, values: dict[str, float | None]
+) -> dict[str, Real]:
     """Derivatives with respect to the fit's vector of what is no mark of the response."""
     axis, order = np.eye(vector.size), structure.order
     slopes = {
@@ -184,12 +183,7 @@ def figures_of(
 
 
 def figures_at(
-    structure: Structure,
-    vector: _Vector,
-    *,
-    fs: float,
-    highest: float,
-    split_alone: bool = False,
+    structure: Structure, vector: Real, *, fs: float, highest: float, split_alone: bool = False
 ) -> dict[str, float | None]:
     """The same at any parameters, `vector` as `Readings` has it."""
     system = system_of(structure, vector, fs)
@@ -199,7 +193,7 @@ def figures_at(
 
 def _values(
     structure: Structure,
-    vector: _Vector,
+    vector: Real,
     system: RationalDelay,
     marks: _Marks,
     peak: PeakGain | None,
@@ -252,7 +246,7 @@ def _slope_at_dc(system: RationalDelay) -> float:
     return float(system.delay + (first - lead) * (system.step or 1.0))
 
 
-def _mode_at(vector: _Vector, mode: int, fs: float) -> tuple[float, float]:
+def _mode_at(vector: Real, mode: int, fs: float) -> tuple[float, float]:
     """Natural frequency in Hz and damping ratio of 1 + c1 s + c2 s²: c2^(-1/2), c1 ω / 2."""
     damping = 0.5 / float(np.sqrt(vector[mode + 1]))  # it holds c2 / c1²
     return 2 * damping * float(np.exp(-vector[mode])) * fs / (2 * np.pi), damping
@@ -262,15 +256,15 @@ class _Sensitivity:
     """Derivatives of ln(G / G(0)) with respect to the fit's vector, and to the frequency."""
 
     def __init__(
-        self, structure: Structure, vector: _Vector, fs: float, frequencies: tuple[float, ...]
+        self, structure: Structure, vector: Real, fs: float, frequencies: tuple[float, ...]
     ) -> None:
         self._places, self._fs = np.array(frequencies), fs
 
-        def curve(system: RationalDelay, f: _Vector) -> NDArray[np.complex128]:
+        def curve(system: RationalDelay, f: Real) -> Complex:
             told = system.numerator[structure.dc_zeros]
             return np.asarray(response(system, f) / told)
 
-        def coefficients(system: RationalDelay) -> _Vector:
+        def coefficients(system: RationalDelay) -> Real:
             varied = system.denominator[structure.integrators + 1 :]
             return np.concatenate([[system.delay], system.numerator, varied])
 
@@ -292,12 +286,12 @@ class _Sensitivity:
 
     def slopes(
         self, values: dict[str, float | None], peak: PeakGain | None, system: RationalDelay
-    ) -> dict[str, _Vector]:
+    ) -> dict[str, Real]:
         """Derivatives of the marks with respect to the vector, each shape (p,).
 
         A crossing's by the implicit function: the curve's own error over its slope.
         """
-        told: dict[str, _Vector] = {}
+        told: dict[str, Real] = {}
         for name, turn in (("bandwidth_phase90", 0.0), ("bandwidth_phase90_without_delay", 1.0)):
             if (value := values[name]) is not None:
                 change, rate = self._at(value)
@@ -313,13 +307,13 @@ class _Sensitivity:
             told["peak_gain_db"] = 20 / np.log(10) * change.real * (peak.frequency > 0)
         return told
 
-    def _at(self, frequency: float) -> tuple[NDArray[np.complex128], complex]:
+    def _at(self, frequency: float) -> tuple[Complex, complex]:
         """Derivatives with respect to the vector, shape (p,), and to the frequency in Hz."""
         i = int(np.flatnonzero(self._places == frequency)[0])
         return self._slopes[:, i], complex(self._rates[i])
 
 
-def _lowest_mode(structure: Structure, vector: _Vector) -> int | None:
+def _lowest_mode(structure: Structure, vector: Real) -> int | None:
     """Index in `vector` of the second-order section with the lowest natural frequency."""
     found, start = [], 1
     for order in structure.sections:

@@ -7,16 +7,14 @@ the root of an equation.
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hmpim.identify.arrays import Real
 from hmpim.model import RationalDelay, response
 
 __all__ = ["gradient", "response_std"]
 
 
-def gradient(
-    function: Callable[[NDArray[np.float64]], float], at: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def gradient(function: Callable[[Real], float], at: Real) -> Real:
     """Derivative of a scalar function by central differences, shape (p,)."""
     out = np.empty(at.size)
     for i in range(at.size):
@@ -28,9 +26,7 @@ def gradient(
     return out
 
 
-def response_std(
-    system: RationalDelay, covariance: NDArray[np.float64], frequency: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def response_std(system: RationalDelay, covariance: Real, frequency: Real) -> Real:
     """Standard deviation of a model's response, sqrt(E|error|²), to first order.
 
     Parameters

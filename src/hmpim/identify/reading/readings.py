@@ -4,8 +4,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hmpim.identify.arrays import Real
 from hmpim.identify.fitting.fit import jacobian
 from hmpim.identify.fitting.nested import widened
 from hmpim.identify.fitting.trial import JointFit
@@ -22,7 +22,6 @@ from hmpim.model.response import (
 
 __all__ = ["Readings", "read_parameters"]
 
-_Vector = NDArray[np.float64]
 
 _ROUNDING = 1e-13
 """Share of the output (r.m.s.) by which rounding may move it, whatever the residual shows."""
@@ -57,15 +56,15 @@ class Readings:
 
     parameters: Parameters
     system: RationalDelay
-    vector: _Vector
-    covariance: _Vector
+    vector: Real
+    covariance: Real
     white: bool
-    rows: _Vector
-    innovations: _Vector
+    rows: Real
+    innovations: Real
     whitened: bool
-    coefficient_covariance: _Vector
+    coefficient_covariance: Real
 
-    def variance(self, function: Callable[[_Vector], float]) -> float:
+    def variance(self, function: Callable[[Real], float]) -> float:
         """Variance of a function of `vector`, to first order."""
         slope = gradient(function, self.vector)
         return float(slope @ self.covariance @ slope)
@@ -77,7 +76,7 @@ def read_parameters(
     fs: float,
     highest: float,
     delay_correlation: float | None,
-    known_covariance: _Vector | None = None,
+    known_covariance: Real | None = None,
     input_unit: str,
     output_unit: str,
 ) -> Readings:
@@ -140,9 +139,7 @@ def read_parameters(
     )
 
 
-def _covariance(
-    joint: JointFit, rows: _Vector, residual: _Vector, *, freedom: int, white: bool
-) -> _Vector:
+def _covariance(joint: JointFit, rows: Real, residual: Real, *, freedom: int, white: bool) -> Real:
     """Covariance of theta and linear; a held, static system moves in whole samples only."""
     fit = joint.best.fit
     if fit.structure.sampled:  # its delay is a whole number of samples
@@ -160,7 +157,7 @@ def _covariance(
     return covariance(rows, residual, freedom=freedom, white=white)
 
 
-def _wandering(cov: _Vector, residual: _Vector, counted: int) -> _Vector:
+def _wandering(cov: Real, residual: Real, counted: int) -> Real:
     """Widen the bias to what noise does that rises towards DC below what an autoregression tells.
 
     The variance of a mean is the noise's power at half a bin over the samples.

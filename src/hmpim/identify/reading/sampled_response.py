@@ -6,8 +6,8 @@ of a first-order lag amount to a percent of the response well below a quarter of
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
+from hmpim.identify.arrays import Complex, Real
 from hmpim.model import RationalDelay, response
 from hmpim.record import Intersample
 
@@ -15,12 +15,8 @@ __all__ = ["sampled_response"]
 
 
 def sampled_response(
-    system: RationalDelay,
-    frequency: NDArray[np.float64],
-    *,
-    fs: float,
-    intersample: Intersample,
-) -> NDArray[np.complex128]:
+    system: RationalDelay, frequency: Real, *, fs: float, intersample: Intersample
+) -> Complex:
     """Response from samples of the input to samples of the output.
 
     Parameters
@@ -66,9 +62,7 @@ def sampled_response(
     return response(system, frequency)
 
 
-def _held(
-    system: RationalDelay, frequency: NDArray[np.float64], fs: float
-) -> NDArray[np.complex128]:
+def _held(system: RationalDelay, frequency: Real, fs: float) -> Complex:
     """Answer a held input, time counted in samples.
 
     Within a sample the delayed input stands at an older sample for the fraction of the delay, and
@@ -98,7 +92,7 @@ def _held(
     return np.asarray((states @ output + direct * older) * z**-whole)
 
 
-def _stepped(rows: NDArray[np.float64], span: float) -> NDArray[np.float64]:
+def _stepped(rows: Real, span: float) -> Real:
     """Transition over a span of the states, with an input that stands still as last state."""
     order = rows.shape[0]
     wide = np.zeros((order + 1, order + 1))

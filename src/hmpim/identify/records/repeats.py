@@ -11,10 +11,10 @@ from typing import Any
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
 from hmpim.arguments import checked
 from hmpim.errors import RecordError
+from hmpim.identify.arrays import Real
 from hmpim.identify.chance import FALSE_ALARM
 from hmpim.identify.identify import identify
 from hmpim.identify.judgement import judged_together
@@ -409,7 +409,7 @@ def _split(
     if len(residuals) < 2:
         return None, None, None
     length = min(residual.size for residual in residuals)
-    left: NDArray[np.float64] = np.stack([residual[:length] for residual in residuals])
+    left: Real = np.stack([residual[:length] for residual in residuals])
     count = left.shape[0]
     mean = left.mean(axis=0)
     apart = left - mean

@@ -5,16 +5,14 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hmpim.equality import ByValue
+from hmpim.identify.arrays import Mask, Real
 
 __all__ = ["BOUND", "Alike", "InputSet", "OutputCoherence"]
 
 BOUND = 10.0
 """Condition number up to which inputs count as told apart."""
-
-Real = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -90,13 +88,11 @@ class InputSet(ByValue):
     coherence: tuple[OutputCoherence, ...] = ()
 
     @property
-    def usable(self) -> NDArray[np.bool_]:
+    def usable(self) -> Mask:
         """Where the inputs are told apart: condition at most 10, shape (f,)."""
         return np.asarray(self.condition <= BOUND)
 
-    def alike_bins(
-        self, samples: int, fs: float
-    ) -> tuple[tuple[frozenset[int], NDArray[np.bool_]], ...]:
+    def alike_bins(self, samples: int, fs: float) -> tuple[tuple[frozenset[int], Mask], ...]:
         """Inputs that are not told apart, and which bins of a transform of `samples` that is."""
         frequency = np.arange(samples // 2 + 1) * (fs / samples)
         found = []

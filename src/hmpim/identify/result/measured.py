@@ -5,9 +5,9 @@ from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hmpim.equality import ByValue
+from hmpim.identify.arrays import Complex, Real
 from hmpim.identify.result.estimate import Estimate, estimates_from_dict, estimates_to_dict
 
 __all__ = ["FrequencyResponse", "HarmonicCurve", "Nonlinearity", "ResponseBandwidths"]
@@ -29,10 +29,10 @@ class FrequencyResponse(ByValue):
         None where it means nothing, as with a single segment.
     """
 
-    frequency: NDArray[np.float64]
-    response: NDArray[np.complex128]
-    std: NDArray[np.float64]
-    coherence: NDArray[np.float64] | None = None
+    frequency: Real
+    response: Complex
+    std: Real
+    coherence: Real | None = None
 
     def to_dict(self) -> dict[str, Any]:
         """Return the response as plain JSON values."""

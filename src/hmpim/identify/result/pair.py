@@ -5,9 +5,9 @@ from dataclasses import dataclass, field, fields
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hmpim.equality import ByValue
+from hmpim.identify.arrays import Real
 from hmpim.identify.result.digits import interval
 from hmpim.identify.result.estimate import Estimate, Verdict
 from hmpim.identify.result.measured import FrequencyResponse, Nonlinearity, ResponseBandwidths
@@ -62,11 +62,11 @@ class PairIdentification(ByValue):
     warnings: tuple[Finding, ...]
     verdict: Verdict = "doubtful"
     from_response: ResponseBandwidths = field(default_factory=ResponseBandwidths)
-    time: NDArray[np.float64] | None = field(default=None, compare=False)
-    prediction: NDArray[np.float64] | None = field(default=None, compare=False)
-    residual: NDArray[np.float64] | None = field(default=None, compare=False)
+    time: Real | None = field(default=None, compare=False)
+    prediction: Real | None = field(default=None, compare=False)
+    residual: Real | None = field(default=None, compare=False)
     nonlinearity: Nonlinearity | None = None
-    covariance: NDArray[np.float64] | None = None
+    covariance: Real | None = None
     stopping: Stopping | None = None
 
     def __repr__(self) -> str:

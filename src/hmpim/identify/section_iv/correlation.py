@@ -8,6 +8,7 @@ import scipy
 from numpy.typing import ArrayLike, NDArray
 
 from hmpim.errors import ArgumentError, RecordError
+from hmpim.identify.arrays import Real
 from hmpim.identify.signals import as_pair, as_signal, check_rate
 
 __all__ = [
@@ -41,7 +42,7 @@ class Correlation:
     """
 
     lag: NDArray[np.int64]
-    value: NDArray[np.float64]
+    value: Real
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -4,10 +4,11 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from hmpim.arguments import checked
 from hmpim.errors import ArgumentError, RecordError
+from hmpim.identify.arrays import Complex, Mask, Real
 from hmpim.identify.result import PaperEstimates
 from hmpim.identify.section_iv import response as reading
 from hmpim.identify.section_iv.correlation import (
@@ -70,23 +71,23 @@ class PaperAnalysis:
     window: WindowName
     alpha: float
     inverted: bool
-    lag: NDArray[np.float64]
-    cross_correlation: NDArray[np.float64]
-    error_time: NDArray[np.float64]
-    error: NDArray[np.float64]
-    error_lag: NDArray[np.float64]
-    error_autocorrelation: NDArray[np.float64]
-    frequency: NDArray[np.float64]
-    input_db: NDArray[np.float64]
-    output_db: NDArray[np.float64]
-    input_windowed_db: NDArray[np.float64]
-    output_windowed_db: NDArray[np.float64]
-    band_frequency: NDArray[np.float64]
-    response: NDArray[np.complex128]
-    magnitude: NDArray[np.float64]
-    magnitude_db: NDArray[np.float64]
-    phase: NDArray[np.float64]
-    phase_without_delay: NDArray[np.float64]
+    lag: Real
+    cross_correlation: Real
+    error_time: Real
+    error: Real
+    error_lag: Real
+    error_autocorrelation: Real
+    frequency: Real
+    input_db: Real
+    output_db: Real
+    input_windowed_db: Real
+    output_windowed_db: Real
+    band_frequency: Real
+    response: Complex
+    magnitude: Real
+    magnitude_db: Real
+    phase: Real
+    phase_without_delay: Real
     estimates: PaperEstimates
 
 
@@ -97,7 +98,7 @@ class _TimeSteps:
     correlation: Correlation
     lag: int
     inverted: bool
-    error: NDArray[np.float64]
+    error: Real
     bias: float
     scale_factor: float | None
     noise_std: float
@@ -108,11 +109,11 @@ class _FrequencySteps:
     """What section IV.D gives inside the band; figures are read off the bins of `read`."""
 
     inside: slice
-    read: NDArray[np.bool_]
-    response: NDArray[np.complex128]
-    magnitude: NDArray[np.float64]
-    phase: NDArray[np.float64]
-    phase_without_delay: NDArray[np.float64]
+    read: Mask
+    response: Complex
+    magnitude: Real
+    phase: Real
+    phase_without_delay: Real
 
 
 @checked
@@ -223,10 +224,7 @@ def paper_analysis(
 
 
 def paper_estimates(
-    u: ArrayLike,
-    y: ArrayLike,
-    fs: float,
-    band: tuple[float, float] | None = None,
+    u: ArrayLike, y: ArrayLike, fs: float, band: tuple[float, float] | None = None
 ) -> PaperEstimates:
     """Return only the figures of `paper_analysis`, at the paper's own settings.
 
@@ -276,9 +274,7 @@ def paper_estimates(
     return _estimates(time, steps, frequency, fs)
 
 
-def _band(
-    u: NDArray[np.float64], fs: float, band: tuple[float, float] | None
-) -> tuple[float, float]:
+def _band(u: Real, fs: float, band: tuple[float, float] | None) -> tuple[float, float]:
     if band is None:
         return excited_band(u, fs)
     check_band(band, fs)
@@ -287,7 +283,7 @@ def _band(
     return band
 
 
-def _time_steps(u: NDArray[np.float64], y: NDArray[np.float64]) -> _TimeSteps:
+def _time_steps(u: Real, y: Real) -> _TimeSteps:
     """Sections IV.A to IV.C: equations (8) to (14)."""
     # The measurement first: a late measurement then peaks at a positive lag.
     correlation = cross_correlation(y, u)
@@ -306,12 +302,7 @@ def _time_steps(u: NDArray[np.float64], y: NDArray[np.float64]) -> _TimeSteps:
 
 
 def _frequency_steps(
-    u: NDArray[np.complex128],
-    y: NDArray[np.complex128],
-    step: float,
-    band: tuple[float, float],
-    time: _TimeSteps,
-    fs: float,
+    u: Complex, y: Complex, step: float, band: tuple[float, float], time: _TimeSteps, fs: float
 ) -> _FrequencySteps:
     """Section IV.D: equations (18) to (25) on the bins of two spectra inside the band."""
     # The bin at DC holds the bias and no stimulus.
@@ -340,7 +331,7 @@ def _frequency_steps(
 
 
 def _estimates(
-    time: _TimeSteps, steps: _FrequencySteps, frequency: NDArray[np.float64], fs: float
+    time: _TimeSteps, steps: _FrequencySteps, frequency: Real, fs: float
 ) -> PaperEstimates:
     frequency, magnitude = frequency[steps.read], steps.magnitude[steps.read]
     hump = reading.peak_gain(magnitude)

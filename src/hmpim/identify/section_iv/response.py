@@ -6,9 +6,10 @@ Phases are in degrees here, as in the paper's figures, and lag is negative.
 import math
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from hmpim.errors import ArgumentError
+from hmpim.identify.arrays import Real
 
 __all__ = [
     "bandwidth_3db",
@@ -28,7 +29,7 @@ __all__ = [
 _NEAR_DC = 0.05
 
 
-def magnitude(response: ArrayLike) -> NDArray[np.float64]:
+def magnitude(response: ArrayLike) -> Real:
     """Return |G| by equation (24), |G|² = R² + I², with R and I of equations (19)-(21).
 
     Parameters
@@ -50,7 +51,7 @@ def magnitude(response: ArrayLike) -> NDArray[np.float64]:
     return np.hypot(g.real, g.imag)
 
 
-def phase(response: ArrayLike, *, inverted: bool = False) -> NDArray[np.float64]:
+def phase(response: ArrayLike, *, inverted: bool = False) -> Real:
     """Return the phase φ of equation (23), tan φ = I/R, in degrees and without jumps.
 
     The arctangent takes the quadrant from the signs of R and I, and the phase is followed
@@ -98,7 +99,7 @@ def near_dc(bins: int) -> int:
     return max(math.ceil(_NEAR_DC * bins), 1)
 
 
-def delay_phase(frequency: ArrayLike, delay: float) -> NDArray[np.float64]:
+def delay_phase(frequency: ArrayLike, delay: float) -> Real:
     """Return the phase of a pure delay by equation (25): -ω δ, in degrees.
 
     Parameters
@@ -121,9 +122,7 @@ def delay_phase(frequency: ArrayLike, delay: float) -> NDArray[np.float64]:
     return -360.0 * np.asarray(frequency, dtype=np.float64) * delay
 
 
-def phase_without_delay(
-    frequency: ArrayLike, phase: ArrayLike, delay: float
-) -> NDArray[np.float64]:
+def phase_without_delay(frequency: ArrayLike, phase: ArrayLike, delay: float) -> Real:
     """Return the phase with the delay's part (25) taken out, as in Fig. 16.
 
     Parameters

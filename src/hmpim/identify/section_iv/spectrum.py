@@ -4,9 +4,10 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from hmpim.errors import ArgumentError, RecordError
+from hmpim.identify.arrays import Complex, Mask, Real
 from hmpim.identify.kept import kept
 from hmpim.identify.section_iv.windows import WindowName, window_samples
 from hmpim.identify.signals import as_pair, as_signal, check_rate
@@ -45,8 +46,8 @@ class Spectrum:
         X of equation (17), in the signal's unit, not divided by the number of samples.
     """
 
-    frequency: NDArray[np.float64]
-    value: NDArray[np.complex128]
+    frequency: Real
+    value: Complex
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -61,8 +62,8 @@ class TransferFunction:
         G(jω), output unit per input unit; NaN where the stimulus has nothing at all.
     """
 
-    frequency: NDArray[np.float64]
-    response: NDArray[np.complex128]
+    frequency: Real
+    response: Complex
 
 
 def padding(samples: int) -> int:
@@ -141,7 +142,7 @@ def spectrum(
     )
 
 
-def decibel(value: ArrayLike) -> NDArray[np.float64]:
+def decibel(value: ArrayLike) -> Real:
     """Return 20 log10 |value|; an exact zero becomes -6000 dB.
 
     Examples
@@ -204,7 +205,7 @@ def transfer_function(
     return TransferFunction(frequency=below.frequency, response=ratio(above.value, below.value))
 
 
-def ratio(y: NDArray[np.complex128], u: NDArray[np.complex128]) -> NDArray[np.complex128]:
+def ratio(y: Complex, u: Complex) -> Complex:
     """Return y / u, NaN where u is zero.
 
     Examples
@@ -218,7 +219,7 @@ def ratio(y: NDArray[np.complex128], u: NDArray[np.complex128]) -> NDArray[np.co
     return out
 
 
-def well_excited(u: NDArray[np.complex128]) -> NDArray[np.bool_]:
+def well_excited(u: Complex) -> Mask:
     """Return which bins of a stimulus's spectrum are no notch between better ones.
 
     Between the lines of a multisine, at the clock's multiples of a held sequence, and at
@@ -308,7 +309,7 @@ def excited_band(u: ArrayLike, fs: float) -> tuple[float, float]:
     return band_of_levels(level, fs / length)
 
 
-def band_of_levels(level: NDArray[np.float64], step: float) -> tuple[float, float]:
+def band_of_levels(level: Real, step: float) -> tuple[float, float]:
     """Excited band in Hz of an amplitude spectrum, by the rules of `excited_band`.
 
     Parameters

@@ -3,9 +3,10 @@
 import math
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from hmpim.errors import ArgumentError
+from hmpim.identify.arrays import Real
 from hmpim.identify.signals import as_pair, as_signal
 
 __all__ = [
@@ -21,7 +22,7 @@ _NONZERO = 0.5
 _HYSTERESIS = 0.05
 
 
-def time_corrected_error(u: ArrayLike, y: ArrayLike, lag: int) -> NDArray[np.float64]:
+def time_corrected_error(u: ArrayLike, y: ArrayLike, lag: int) -> Real:
     """Return the time-corrected measurement error of equation (9): truth minus measurement.
 
     ε_meas(n) = u(n) - y(n + lag), for the n at which both exist. The paper writes n - δ; the

@@ -4,9 +4,9 @@ from typing import Literal, get_args
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
 from hmpim.errors import ArgumentError
+from hmpim.identify.arrays import Real
 
 __all__ = ["WindowName", "gaussian_window", "window_samples"]
 
@@ -30,7 +30,7 @@ WindowName = Literal[
 _NARROWEST = 1e100  # of a window: its square is still a number
 
 
-def gaussian_window(samples: int, alpha: float = 1.5) -> NDArray[np.float64]:
+def gaussian_window(samples: int, alpha: float = 1.5) -> Real:
     """Return the Gaussian window of equations (15) and (16).
 
     w(n) = exp(-½ [α n / (N/2)]²) for -N/2 <= n <= N/2. That range holds N + 1 points, so a
@@ -66,7 +66,7 @@ def gaussian_window(samples: int, alpha: float = 1.5) -> NDArray[np.float64]:
     return np.asarray(np.exp(-0.5 * (alpha * n / half) ** 2), dtype=np.float64)
 
 
-def window_samples(name: WindowName, samples: int, *, alpha: float = 1.5) -> NDArray[np.float64]:
+def window_samples(name: WindowName, samples: int, *, alpha: float = 1.5) -> Real:
     """Return a window by its name, symmetric.
 
     Parameters

@@ -8,9 +8,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
 from hmpim.errors import RecordError
+from hmpim.identify.arrays import Real
 from hmpim.identify.chance import FALSE_ALARM
 from hmpim.identify.fitting.candidates import nested
 from hmpim.identify.fitting.data import HOPELESS, shifted
@@ -46,8 +46,6 @@ _FINAL_PRECISION = 1e-10
 
 _FORGOTTEN = 1e-4
 """Of an impulse response's peak, below which it is over."""
-
-Real = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -4,9 +4,9 @@ import hashlib
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
 from hmpim.errors import RecordError
+from hmpim.identify.arrays import Real
 from hmpim.identify.chance import EXCLUDED, FALSE_ALARM
 from hmpim.identify.fitting.nested import stretched
 from hmpim.identify.fitting.rows import Problem
@@ -79,8 +79,6 @@ _SETTLES = 7.0
 """Time constants after which less than that is left."""
 
 _FREQUENCIES = 200
-
-Real = NDArray[np.float64]
 
 
 def identify_statistics(

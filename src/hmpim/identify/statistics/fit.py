@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hmpim.identify.arrays import Real
 from hmpim.identify.fitting.climb import climb
 from hmpim.identify.fitting.fit import Fit, within_reach
 from hmpim.identify.fitting.least_squares import solved
@@ -31,8 +31,6 @@ then moves by half a standard deviation at most, and the error of that is of the
 
 _CLOSE = 4.0
 """The same where no other evaluation is to be made: two standard deviations."""
-
-Real = NDArray[np.float64]
 
 
 def pulse(reach: Reach, intersample: Intersample) -> Problem:
@@ -205,12 +203,7 @@ def fit_products(
 
 
 def follow(
-    products: Products,
-    problem: Problem,
-    intersample: Intersample,
-    fit: Fit,
-    *,
-    evaluations: int,
+    products: Products, problem: Problem, intersample: Intersample, fit: Fit, *, evaluations: int
 ) -> Fitted:
     """Take a fit along to more samples of the same run.
 

@@ -3,10 +3,11 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from hmpim.arguments import check_argument, numbers_of
 from hmpim.errors import ArgumentError
+from hmpim.identify.arrays import Real
 from hmpim.identify.chance import FALSE_ALARM
 from hmpim.identify.fitting.rows import Problem
 from hmpim.identify.judgement import all_doubted
@@ -44,8 +45,6 @@ _BETWEEN = 1.05
 _TURN = 0.05
 """Cycles of the highest frequency by which the delay may move before what is asked for is made
 anew about it."""
-
-Real = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

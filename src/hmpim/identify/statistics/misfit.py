@@ -9,8 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
+from hmpim.identify.arrays import Complex, Real
 from hmpim.identify.chance import SEARCHED
 from hmpim.identify.fitting.growth import HiddenPole, response_to_square
 from hmpim.identify.fitting.least_squares import solved
@@ -30,9 +30,6 @@ _SEEN = 1e-6
 
 _STEPS = 48
 """Delays at which a step is looked for."""
-
-Real = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -61,11 +58,7 @@ def asked_of(delay: float, band: tuple[float, float], products: Products) -> Ask
 
 
 def misfit_of(
-    fitted: Fitted,
-    products: Products,
-    band: tuple[float, float],
-    *,
-    asked: Asked | None = None,
+    fitted: Fitted, products: Products, band: tuple[float, float], *, asked: Asked | None = None
 ) -> Misfit:
     """Test whether the residual of a fit is still coherent with the input.
 

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
+from hmpim.identify.arrays import Complex, Real
 from hmpim.identify.noise.autoregression import LONGEST
 from hmpim.identify.statistics.reach import AHEAD
 from hmpim.identify.statistics.residual import Residual
@@ -22,9 +22,6 @@ __all__ = ["Moments", "Products"]
 
 _FEW = 64
 """Samples at the beginning up to which a convolution is sooner a product with a matrix."""
-
-Real = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

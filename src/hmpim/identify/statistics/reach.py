@@ -3,16 +3,14 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hmpim.identify.arrays import Real
 from hmpim.identify.noise.autoregression import LONGEST
 
 __all__ = ["AHEAD", "Reach"]
 
 AHEAD = 32
 """Samples by which an impulse response may begin before its input: a spline's reach, with room."""
-
-Real = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -8,9 +8,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
 from hmpim.equality import ByValue
+from hmpim.identify.arrays import Complex, Real
 from hmpim.identify.noise.autoregression import LONGEST
 from hmpim.identify.statistics.reach import AHEAD, Reach
 
@@ -21,8 +21,6 @@ _PIECE = 16_384
 
 _FEW = 64
 """New samples up to which their products are sooner made one by one than by transforms."""
-
-Real = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -187,7 +185,7 @@ def _before(run: Run, reach: Reach) -> Real:
     return np.vstack([fixed, run.tail_y])
 
 
-def _late(x: Real, by: int, length: int) -> NDArray[np.complex128]:
+def _late(x: Real, by: int, length: int) -> Complex:
     """Transform of what begins `by` samples late."""
     shifted = np.zeros((*x.shape[:-1], length))
     shifted[..., by : by + x.shape[-1]] = x

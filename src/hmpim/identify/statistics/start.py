@@ -7,8 +7,8 @@ where nothing is excited. From its transform the starts of the joint fit are fou
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
+from hmpim.identify.arrays import Real
 from hmpim.identify.fitting.start import RoughResponse
 from hmpim.identify.section_iv.spectrum import band_of_levels
 from hmpim.identify.statistics.reach import AHEAD
@@ -22,8 +22,6 @@ _RIDGE = 1e-5
 _STEPS = 200
 _FLOOR = 1e-5
 """Power of the input, over its greatest, below which a frequency is not excited."""
-
-Real = NDArray[np.float64]
 
 
 def correlations(statistics: Statistics) -> tuple[Real, Real]:

@@ -4,10 +4,11 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from hmpim.arguments import numbers_of
 from hmpim.errors import ArgumentError
+from hmpim.identify.arrays import Real
 from hmpim.identify.reading.bandwidth import ratio_at
 from hmpim.identify.result import Estimate, PairIdentification
 from hmpim.identify.result.error_bars import estimate
@@ -105,7 +106,7 @@ def gain_and_phase(
     numerator = p.scale_factor.value * above
     vector = np.concatenate([[p.delay.value], numerator, below[: below.size - 1 - integrators]])
 
-    def system(v: NDArray[np.float64]) -> RationalDelay:
+    def system(v: Real) -> RationalDelay:
         lowest = [0.0] * integrators + [1.0]
         return RationalDelay(
             delay=float(v[0]),
@@ -117,13 +118,13 @@ def gain_and_phase(
     return tuple(_at(pair, float(f), system, vector, pair.covariance, fs) for f in places)
 
 
-def _told(rising: NDArray[np.float64]) -> NDArray[np.float64]:
+def _told(rising: Real) -> Real:
     """Coefficients, the highest power first, without the powers that only z needs."""
     seen = np.flatnonzero(np.abs(rising) > 1e-12 * np.abs(rising).max())
     return rising[: seen[-1] + 1][::-1]
 
 
-def measurable(frequency: ArrayLike, fs: float) -> NDArray[np.float64]:
+def measurable(frequency: ArrayLike, fs: float) -> Real:
     """Return frequencies in Hz, shape (m,), if a record of rate `fs` can tell of them.
 
     Raises
@@ -152,9 +153,9 @@ def measurable(frequency: ArrayLike, fs: float) -> NDArray[np.float64]:
 def _at(
     pair: PairIdentification,
     f: float,
-    system: Callable[[NDArray[np.float64]], RationalDelay],
-    vector: NDArray[np.float64],
-    covariance: NDArray[np.float64],
+    system: Callable[[Real], RationalDelay],
+    vector: Real,
+    covariance: Real,
     fs: float,
 ) -> GainPhase:
     here, there = system(vector), np.array([f])

@@ -4,10 +4,10 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hmpim.arguments import checked
 from hmpim.errors import RecordError
+from hmpim.identify.arrays import Mask, Real
 from hmpim.identify.result import Estimate, PairIdentification
 from hmpim.model import Model, Spread, simulate, slowest_time_constant
 from hmpim.record import Record, uniform
@@ -29,10 +29,10 @@ class Prediction:
         100 (1 - ‖measured - predicted‖ / ‖measured - mean‖) over the scored samples.
     """
 
-    time: NDArray[np.float64]
-    measured: NDArray[np.float64]
-    predicted: NDArray[np.float64]
-    scored: NDArray[np.bool_]
+    time: Real
+    measured: Real
+    predicted: Real
+    scored: Mask
     fit_percent: float
 
 

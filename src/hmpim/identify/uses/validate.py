@@ -5,10 +5,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
 from hmpim.arguments import checked
 from hmpim.errors import ArgumentError, RecordError
+from hmpim.identify.arrays import Mask, Real
 from hmpim.identify.chance import FALSE_ALARM, HALF
 from hmpim.identify.effects.hold import Hold, detect_hold, updates
 from hmpim.identify.noise.misfit import misfit
@@ -113,11 +113,11 @@ class OutputValidation:
 
     output: str
     inputs: tuple[str, ...]
-    time: NDArray[np.float64]
-    measured: NDArray[np.float64]
-    predicted: NDArray[np.float64]
-    std: NDArray[np.float64]
-    scored: NDArray[np.bool_]
+    time: Real
+    measured: Real
+    predicted: Real
+    std: Real
+    scored: Mask
     checks: tuple[Check, ...]
 
     @property
@@ -274,14 +274,14 @@ def _validated(
     )
 
 
-def _held(models: Sequence[Model], y: NDArray[np.float64], fs: float) -> Hold | None:
+def _held(models: Sequence[Model], y: Real, fs: float) -> Hold | None:
     """Find the clock of a held output in this record, whose phase is its own."""
     if models[0].hold_period is None:
         return None
     return detect_hold(y, fs)
 
 
-def _settled(models: Sequence[Model], aligned: Aligned) -> NDArray[np.bool_]:
+def _settled(models: Sequence[Model], aligned: Aligned) -> Mask:
     wait = max(
         max(m.delay, 0.0) + 5.0 * slowest_time_constant(np.asarray(m.denominator[::-1]))
         for m in models
@@ -291,7 +291,7 @@ def _settled(models: Sequence[Model], aligned: Aligned) -> NDArray[np.bool_]:
 
 def _predicted(
     models: Sequence[Model], pairs: Sequence[PairIdentification], aligned: Aligned
-) -> NDArray[np.float64]:
+) -> Real:
     """Sum over the inputs, bias once; of a held output by its own clock."""
     total = np.full(aligned.samples, models[0].bias)
     clock = aligned.time - aligned.start
@@ -308,7 +308,7 @@ def _predicted(
 
 def _model_std(
     models: Sequence[Model], pairs: Sequence[PairIdentification], aligned: Aligned
-) -> NDArray[np.float64]:
+) -> Real:
     """Standard deviation of the prediction by what is open about the models."""
     if any(model.spread is None for model in models):
         return np.zeros(aligned.samples)
@@ -318,7 +318,7 @@ def _model_std(
     return np.asarray(np.std(predictions, axis=0))
 
 
-def _fit(y: NDArray[np.float64], residual: NDArray[np.float64], bounds: Bounds) -> Check:
+def _fit(y: Real, residual: Real, bounds: Bounds) -> Check:
     spread = float(np.linalg.norm(y - y.mean()))
     fit = 100.0 * (1.0 - float(np.linalg.norm(residual)) / spread) if spread else 0.0
     return Check(
@@ -331,11 +331,7 @@ def _fit(y: NDArray[np.float64], residual: NDArray[np.float64], bounds: Bounds) 
 
 
 def _size(
-    residual: NDArray[np.float64],
-    noise: float,
-    model_std: NDArray[np.float64],
-    std: NDArray[np.float64],
-    bounds: Bounds,
+    residual: Real, noise: float, model_std: Real, std: Real, bounds: Bounds
 ) -> tuple[Check, Check]:
     """Size of the residual, and how often it is inside the band."""
     expected = float(np.sqrt(np.mean(std**2))) or np.finfo(float).tiny
@@ -373,9 +369,9 @@ def _tests(
     aligned: Aligned,
     pairs: Sequence[PairIdentification],
     models: Sequence[Model],
-    residual: NDArray[np.float64],
-    scored: NDArray[np.bool_],
-    model_std: NDArray[np.float64],
+    residual: Real,
+    scored: Mask,
+    model_std: Real,
     bounds: Bounds,
 ) -> tuple[Check, ...]:
     """Whether the residual follows an input, and is white where the noise was."""
@@ -431,7 +427,7 @@ def _tests(
     return tuple(checks)
 
 
-def _power_in(residual: NDArray[np.float64], band: tuple[float, float], fs: float) -> float:
+def _power_in(residual: Real, band: tuple[float, float], fs: float) -> float:
     """Mean square of what lies in a band, in Hz."""
     n = residual.size
     spectrum = np.abs(scipy.fft.rfft(residual)) ** 2
@@ -439,7 +435,7 @@ def _power_in(residual: NDArray[np.float64], band: tuple[float, float], fs: floa
     return float(2.0 * spectrum[(f >= band[0]) & (f <= band[1])].sum() / n**2)
 
 
-def _whiteness(residual: NDArray[np.float64]) -> float:
+def _whiteness(residual: Real) -> float:
     """Probability of a Ljung-Box statistic as great, over 25 lags, were the residual white."""
     n, lags = residual.size, min(_LAGS, residual.size // 4)
     r = autocovariance(residual - residual.mean(), lags)
