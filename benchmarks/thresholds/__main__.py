@@ -14,7 +14,7 @@ from pathlib import Path
 
 
 def measure(count: int, jobs: int, seconds: float, trace: Path | None) -> None:
-    """Measure the tuned numbers, those that decide in the fewest draws first."""
+    """Measure the tuned numbers: those that decide in the fewest draws first."""
     from thresholds.effects import draws, perturbed, traced
     from thresholds.table import EFFECTS, origins
 
@@ -27,11 +27,7 @@ def measure(count: int, jobs: int, seconds: float, trace: Path | None) -> None:
     tuned = origins()[1]
     where = {key: [d for d, seen in base.items() if key in seen["moved"]] for key in tuned}
     cost = {key: sum(base[d]["seconds"] for d in where[key]) for key in tuned}
-    chosen, spent = [], 0.0
-    for key in sorted(tuned, key=lambda key: cost[key]):
-        spent += 2 * cost[key] / jobs
-        if spent <= seconds:
-            chosen.append(key)
+    order = sorted(tuned, key=lambda key: cost[key])
     cells = [seen["cell"] for seen in base.values()]
     run = {
         "draws": len(base),
@@ -40,18 +36,21 @@ def measure(count: int, jobs: int, seconds: float, trace: Path | None) -> None:
         "wrong_ok": cells.count("wrong_ok"),
     }
     numbers = {
-        key: {"moved": len(where[key]), "less": [0, 0, 0], "more": [0, 0, 0]} for key in chosen
+        key: {"moved": len(where[key]), "less": [0, 0, 0], "more": [0, 0, 0]} for key in order
     }
-    tasks = [(key, end, draw) for key in chosen for end in (0, 1) for draw in where[key]]
+    tasks = [(key, end, draw) for key in order for end in (0, 1) for draw in where[key]]
+    open_ = {key: 2 * len(where[key]) for key in order}
     begin = time.time()
-    for (key, end, draw), seen in perturbed(tasks, jobs=jobs):
+    for (key, end, draw), seen in perturbed(tasks, jobs=jobs, seconds=seconds):
         was, now = base[draw]["cell"], seen["cell"]
         effect = numbers[key]["more" if end else "less"]
         effect[0] += (now == "right_ok") - (was == "right_ok")
         effect[1] += (now == "wrong_ok") - (was == "wrong_ok")
         effect[2] += now != was
+        open_[key] -= 1
     print(f"{len(tasks)} draws again in {time.time() - begin:.0f} s", file=sys.stderr)
-    EFFECTS.write_text(json.dumps({"run": run, "numbers": numbers}, indent=1) + "\n")
+    whole = {key: numbers[key] for key in order if open_[key] == 0}
+    EFFECTS.write_text(json.dumps({"run": run, "numbers": whole}, indent=1) + "\n")
 
 
 def main() -> int:
@@ -63,7 +62,9 @@ def main() -> int:
     parser.add_argument("--measure", action="store_true", help="run the draws; else write the page")
     parser.add_argument("--draws", type=int, default=5, help="of each family (5: a tenth)")
     parser.add_argument("--jobs", type=int, default=2, help="processes (2)")
-    parser.add_argument("--seconds", type=float, default=1e9, help="to spend on changed numbers")
+    parser.add_argument(
+        "--seconds", type=float, default=1e9, help="to spend on changed numbers at most"
+    )
     parser.add_argument("--trace", type=Path, help="what was watched: read if there, else written")
     given = parser.parse_args()
     if given.measure:

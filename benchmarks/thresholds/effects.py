@@ -94,18 +94,24 @@ def _start(watch: bool) -> None:
         import_module(found.name)
 
 
-def _through(work: Any, tasks: Sequence[Any], *, jobs: int, watch: bool) -> Iterator[Any]:
+def _through(
+    work: Any, tasks: Sequence[Any], *, jobs: int, watch: bool, seconds: float = 1e9
+) -> Iterator[Any]:
+    """Each task with its result, in the order in which they end, until the time is over."""
     context = get_context("spawn")
+    begin = time.time()
     with ProcessPoolExecutor(jobs, mp_context=context, initializer=_start, initargs=(watch,)) as p:
         waiting = {p.submit(work, task): task for task in tasks}
-        begin = time.time()
         for count, done in enumerate(as_completed(waiting)):
-            if count % 100 == 99:
-                left = (time.time() - begin) / (count + 1) * (len(tasks) - count - 1)
-                print(
-                    f"{count + 1} of {len(tasks)}, {left:.0f} s left", file=sys.stderr, flush=True
-                )
             yield waiting[done], done.result()
+            spent = time.time() - begin
+            if count % 100 == 99:
+                left = spent / (count + 1) * (len(tasks) - count - 1)
+                said = f"{count + 1} of {len(tasks)}, {left:.0f} s left"
+                print(said, file=sys.stderr, flush=True)
+            if spent > seconds:
+                p.shutdown(wait=False, cancel_futures=True)
+                return
 
 
 def plain(some: Sequence[Draw], *, jobs: int) -> dict[Draw, dict[str, Any]]:
@@ -118,5 +124,8 @@ def traced(some: Sequence[Draw], *, jobs: int) -> dict[Draw, dict[str, Any]]:
     return dict(_through(watched, some, jobs=jobs, watch=True))
 
 
-def perturbed(tasks: Sequence[Task], *, jobs: int) -> Iterator[tuple[Task, dict[str, Any]]]:
-    return _through(changed, tasks, jobs=jobs, watch=False)
+def perturbed(
+    tasks: Sequence[Task], *, jobs: int, seconds: float
+) -> Iterator[tuple[Task, dict[str, Any]]]:
+    """Each draw with a constant changed, until the time is over."""
+    return _through(changed, tasks, jobs=jobs, watch=False, seconds=seconds)
