@@ -206,4 +206,4 @@ def test_a_long_upright_label_has_room_beside_its_panel():
 
     label = "Bandwidth, −90° without delay (Hz)"
     assert beside("y") < 150.0
-    assert beside(label) >= 0.8 * text_width(label)
+    assert beside(label) >= 0.9 * text_width(label)

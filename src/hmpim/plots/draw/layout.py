@@ -11,7 +11,7 @@ SIZE = 12.0  # of the letters, px
 LINE = 17.0  # from one line of words to the next
 _PER_INCH = 96.0
 _HANDLE = 30.0  # of a legend's entry, gaps included
-_UPRIGHT = 0.85  # of `text_width`, which is generous: an upright label may end where its field does
+_UPRIGHT = 0.95  # of `text_width`, which is generous: such a label ends where its field does
 _BAR = 66.0  # of an image's colours
 
 
