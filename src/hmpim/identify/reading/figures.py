@@ -97,8 +97,6 @@ def read_figures(
     system = system_of(structure, vector, fs)
     marks, peak = _marks_of(structure, system, highest=highest)
     values = _values(structure, vector, system, marks, peak, fs)
-    if not structure.order:
-        values["delay_low_frequency"] = system.delay
     sensitivity = _Sensitivity(structure, vector, fs, tuple(f for f in marks if f is not None))
     slopes = _slopes(structure, vector, fs, values) | sensitivity.slopes(values, peak, system)
     unit_of = _UNITS | {"scale_factor": _gain_unit(structure, *units), "bias": units[1]}
@@ -129,7 +127,7 @@ def _slopes(
         "scale_factor": _gain_rate(structure, fs) * axis[1 + order],
         "bias": axis[-1],
     }
-    if order and _is_steady(structure):
+    if (order or structure.zeros) and _is_steady(structure):
         slopes["delay_low_frequency"] = gradient(
             lambda v: _slope_at_dc(system_of(structure, v, fs)), vector
         )
