@@ -153,7 +153,7 @@ def test_workers_without_hmpim_are_named():
 
     class Bare(Scheduler):
         def run(self, call, name, on_error):
-            assert call(name).do_task is not None  # what they are to import is there
+            assert call(name).work.do_task is not None  # what they are to import is there
             return {"tcp://a": None, "tcp://b": ModuleNotFoundError("No module named 'hmpim'")}
 
     with pytest.raises(hmpim.HmpimError, match=r"worker tcp://b cannot import .*extra 'batch'"):
