@@ -102,7 +102,7 @@ def test_an_earlier_study_is_read_before_anything_moves_and_told_of_after(tmp_pa
     slower = ("natural_frequency = 14.0", "natural_frequency = 12.0")
     result = invoke(short_plan(tmp_path, c=compared, s=slower), "--out", second)
     assert result.exit_code == 0, result.output
-    (told,) = [line for line in result.stdout.splitlines() if line.startswith("Against")]
+    (told,) = [line for line in result.stdout.splitlines() if line.startswith("Compared with")]
     differ, of = (int(word) for word in told.split() if word.isdigit())
     assert 3 <= differ < of
     renamed = ('name = "rates"', 'name = "speeds"')
