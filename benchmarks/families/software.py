@@ -55,16 +55,21 @@ def figures_of(unit: Filter, fs: float) -> dict[str, float]:
     turned = np.unwrap(np.concatenate([[0.0], np.angle(value)]))[1:]
     without = turned + 2 * np.pi * grid * unit.late / fs
 
+    def phase(f: float, *, late: int) -> float:
+        exact = np.angle(own(np.array([f]))[0]) + 2 * np.pi * f * (unit.late - late) / fs
+        near = np.interp(f, grid, turned if late else without)
+        return exact + 2 * np.pi * np.round((near - exact) / (2 * np.pi))
+
     def crossing(values: np.ndarray, function) -> float | None:
         below = np.flatnonzero((values[:-1] > 0) & (values[1:] <= 0))
         return brentq(function, grid[below[0]], grid[below[0] + 1]) if below.size else None
 
     places = {
         "bandwidth_phase90": crossing(
-            turned + np.pi / 2, lambda f: np.interp(f, grid, turned) + np.pi / 2
+            turned + np.pi / 2, lambda f: phase(f, late=unit.late) + np.pi / 2
         ),
         "bandwidth_phase90_without_delay": crossing(
-            without + np.pi / 2, lambda f: np.interp(f, grid, without) + np.pi / 2
+            without + np.pi / 2, lambda f: phase(f, late=0) + np.pi / 2
         ),
         "bandwidth_3db": crossing(
             np.abs(value) ** 2 - 0.5, lambda f: abs(own(np.array([f]))[0]) ** 2 - 0.5

@@ -248,5 +248,6 @@ def _relative_to_dc(system: System, top: float) -> dict[str, float]:
             j = min(max(int(np.argmax(level)), 1), 99)
             grid = np.concatenate([fine[j - 1 : j + 2]])
             gain, i = level[j - 1 : j + 2], 1
-        found["peak_gain_db"] = float(20 * np.log10(gain[1]))
+        hump = float(20 * np.log10(gain[1]))
+        found["peak_gain_db"] = hump if hump > 1e-9 else 0.0  # less is rounding
     return found

@@ -6,6 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hmpim.model import delayed_response, prepare_input, second_order_coefficients
+from hmpim.model.sampled import interpolation_error
 
 
 def lag(time_constant: float) -> np.ndarray:
@@ -120,3 +121,31 @@ def test_without_dynamics_a_fraction_of_a_sample_is_exact():
     y = delayed_response(prepare_input(bump, "bandlimited"), delay=0.42, denominator=np.ones(1))[0]
     moved = np.exp(-(((k - 0.42 - 300) / 40) ** 2)) * np.sin(0.5 * (k - 0.42))
     np.testing.assert_allclose(y, moved, atol=2e-5)
+
+
+def test_an_input_in_motion_is_continued_without_a_corner():
+    n, frequency = 400, 0.05
+    u = np.cos(2 * np.pi * frequency * np.arange(n) + 0.6)
+    exact = np.cos(2 * np.pi * frequency * (np.arange(n) - 0.4) + 0.6) - u[0]
+
+    def missed(*, rest: bool) -> float:
+        shifted = delayed_response(
+            prepare_input(u, "bandlimited", rest=rest), delay=0.4, denominator=np.ones(1)
+        )
+        return float(np.abs(shifted[0] - exact)[1:12].max())
+
+    assert missed(rest=False) < 0.3 * missed(rest=True)
+
+
+@pytest.mark.parametrize("precision", [1e-3, 1e-5, 1e-6])
+def test_a_sweep_is_interpolated_as_closely_as_asked(precision):
+    index = np.arange(2000)
+    u = np.sin(np.pi * 0.2 / index.size * index**2) * np.hanning(index.size)
+    late = index - 0.5
+    exact = np.sin(np.pi * 0.2 / index.size * late**2) * (
+        0.5 - 0.5 * np.cos(2 * np.pi * late / (index.size - 1))
+    )
+    source = prepare_input(u, "bandlimited", precision=precision)
+    missed = (delayed_response(source, delay=0.5, denominator=np.ones(1))[0] - exact)[100:-100]
+    assert np.sqrt(np.mean(missed**2)) < precision * u.std()
+    assert interpolation_error(u, source.oversampling) < precision

@@ -27,9 +27,11 @@ from hmpim.record import Intersample
 
 __all__ = [
     "MARGIN",
+    "PRECISION",
     "SAMPLES_ALONE",
     "SampledInput",
     "delayed_response",
+    "interpolation_error",
     "prepare_input",
     "spline_at",
     "spline_signs",
@@ -38,11 +40,8 @@ __all__ = [
 MARGIN = 24
 """Samples by which the input is continued at either end: a spline's reach, with room."""
 
-_BAND_PER_RATE = 0.16
-"""Highest frequency, over the rate, at which a degree 5 spline is right within 1e-4."""
-
-_ENERGY_BEYOND = 1e-5
-"""Share of the input's amplitude spectrum (r.m.s.) that may lie beyond that frequency."""
+PRECISION = 3e-5
+"""Share of the input's deviation (r.m.s.) by which what lies between its samples may be missed."""
 
 SAMPLES_ALONE = -1
 """Degree that stands for an input of which nothing but its samples is seen."""
@@ -75,7 +74,13 @@ class SampledInput:
     samples: int
 
 
-def prepare_input(u: NDArray[np.float64], intersample: Intersample) -> SampledInput:
+def prepare_input(
+    u: NDArray[np.float64],
+    intersample: Intersample,
+    *,
+    rest: bool = True,
+    precision: float = PRECISION,
+) -> SampledInput:
     """Turn samples into spline coefficients, under an assumption on what lies between.
 
     Parameters
@@ -84,6 +89,12 @@ def prepare_input(u: NDArray[np.float64], intersample: Intersample) -> SampledIn
         Uniform samples.
     intersample : {'zoh', 'foh', 'bandlimited', 'sampled'}
         Held, linear, or band-limited; 'sampled' for software, which sees the samples alone.
+    rest : bool
+        Whether the input stood at its first sample before the record. Else it is continued there
+        as after the last sample, so that no corner rings; the free response of the state answers
+        for what it did.
+    precision : float
+        Share of the input's deviation (r.m.s.) by which a band-limited one may be missed.
 
     Examples
     --------
@@ -91,16 +102,15 @@ def prepare_input(u: NDArray[np.float64], intersample: Intersample) -> SampledIn
     1.0
     """
     deviation = u - u[0]
-    before = np.zeros(MARGIN)
-    reach = min(MARGIN, u.size - 1)
-    after = 2.0 * deviation[-1] - deviation[-2 : -2 - reach : -1]  # odd about the last sample
-    after = np.concatenate([after, np.full(MARGIN - reach, after[-1] if reach else 0.0)])
     if intersample in ("zoh", "sampled"):
-        after[:] = deviation[-1]
+        before, after = np.zeros(MARGIN), np.full(MARGIN, deviation[-1])
+    else:
+        after = _continued(deviation)
+        before = np.zeros(MARGIN) if rest else _continued(deviation[::-1])[::-1]
     extended = np.concatenate([before, deviation, after])
     oversampling = 1
     if intersample == "bandlimited":
-        oversampling = _oversampling(deviation)
+        oversampling = _oversampling(deviation, precision)
         if oversampling > 1:
             extended = _interpolated(extended, oversampling)
         extended = scipy.ndimage.spline_filter1d(extended, order=5, mode="mirror")
@@ -113,30 +123,43 @@ def prepare_input(u: NDArray[np.float64], intersample: Intersample) -> SampledIn
     )
 
 
-def _oversampling(deviation: NDArray[np.float64]) -> int:
+def _continued(deviation: NDArray[np.float64]) -> NDArray[np.float64]:
+    """What follows a last sample, odd about it: neither value nor slope jumps."""
+    reach = min(MARGIN, deviation.size - 1)
+    after = 2.0 * deviation[-1] - deviation[-2 : -2 - reach : -1]
+    return np.concatenate([after, np.full(MARGIN - reach, after[-1] if reach else 0.0)])
+
+
+def interpolation_error(u: NDArray[np.float64], oversampling: int) -> float:
+    """Share of an input's deviation, (n,), that its spline misses (r.m.s.), 2 (f / (F - f))^6."""
+    taper = np.hanning(u.size + 2)[1:-1]  # the ends' jump is not content
+    power = np.abs(scipy.fft.rfft((u - u[0]) * taper)) ** 2
+    total = float(power.sum())
+    if total == 0.0:
+        return 0.0
+    frequency = np.arange(power.size) / u.size
+    missed = 2.0 * (frequency / (oversampling - frequency)) ** 6
+    return float(np.sqrt(power @ missed**2 / total))
+
+
+def _oversampling(deviation: NDArray[np.float64], precision: float) -> int:
     """Factor that brings the content of the input below the spline's good band."""
-    taper = np.hanning(deviation.size + 2)[1:-1]  # the ends' jump is not content
-    power = np.abs(scipy.fft.rfft(deviation * taper)) ** 2
-    total = power.sum()
-    if total == 0:
-        return 1
-    frequency = np.arange(power.size) / deviation.size
     for factor in (1, 2):
-        if power[frequency > factor * _BAND_PER_RATE].sum() <= _ENERGY_BEYOND**2 * total:
+        if interpolation_error(deviation, factor) <= precision:
             return factor
     return 4
 
 
 @cache
 def _interpolator(factor: int) -> NDArray[np.float64]:
-    half = 20 * factor
+    half = MARGIN * factor
     return factor * np.asarray(
-        scipy.signal.firwin(2 * half + 1, 1.0 / factor, window=("kaiser", 8.0))
+        scipy.signal.firwin(2 * half + 1, 1.0 / factor, window=("kaiser", 12.0))
     )
 
 
 def _interpolated(extended: NDArray[np.float64], factor: int) -> NDArray[np.float64]:
-    """Band-limited interpolation by a Kaiser-windowed sinc that spans 20 samples either side."""
+    """Band-limited interpolation by a Kaiser-windowed sinc as long as the margins."""
     kernel = _interpolator(factor)
     stuffed = np.zeros(extended.size * factor)
     stuffed[::factor] = extended

@@ -14,7 +14,7 @@ from hmpim.identify.fitting.candidates import (
     is_worth_explaining,
     reduced,
 )
-from hmpim.identify.fitting.data import HOPELESS, Data, Seen, band_of, follows, prepared, refit
+from hmpim.identify.fitting.data import HOPELESS, Data, Seen, band_of, follows, refit
 from hmpim.identify.fitting.enrich import PLAIN
 from hmpim.identify.fitting.fit import Fit, Problem
 from hmpim.identify.fitting.least_squares import solved
@@ -25,6 +25,7 @@ from hmpim.identify.noise.whiteness import is_white
 from hmpim.identify.signals import longest_lag
 from hmpim.identify.worth import FEW, PART
 from hmpim.model.dynamics import StructureName
+from hmpim.model.sampled import interpolation_error
 from hmpim.record import Intersample
 
 __all__ = [
@@ -98,7 +99,7 @@ def start(
     data = Data(
         u=u,
         y=y,
-        sources={natural: prepared(u, natural)},
+        sources={},
         rough=rough_response(u, _level(y, nuisance, valid), longest_delay=longest_lag(u.size)),
         nuisance=nuisance,
     )
@@ -149,6 +150,24 @@ def free_from_wander(course: Course) -> Course:
     if follows(course.data, min(free, key=lambda f: f.objective)):
         return course
     return replace(course, data=whitened, fits=free)
+
+
+def interpolate_finely(course: Course) -> Course:
+    """The same with the input interpolated as closely as the noise lets it be seen.
+
+    What is missed between the samples biases an estimate by its share of the output; the noise
+    spreads it by its own share over the root of their number.
+    """
+    best, count = course.best, course.problem.counted
+    seen = np.sqrt(best.cost / count) / max(float(np.std(best.prediction)), np.finfo(float).tiny)
+    wanted = PART * float(seen / np.sqrt(count))
+    used = course.data.problem("bandlimited", course.counted).source.oversampling
+    if wanted >= course.data.precision or interpolation_error(course.data.u, used) <= wanted:
+        return course
+    finer = replace(course, data=replace(course.data, sources={}, precision=wanted))
+    if course.natural != "bandlimited":
+        return finer
+    return replace(finer, fits=[refit(finer.problem, fit) for fit in course.fits])
 
 
 def find_beginning(course: Course) -> Course:

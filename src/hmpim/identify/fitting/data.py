@@ -12,7 +12,7 @@ from hmpim.identify.fitting.start import RoughResponse
 from hmpim.identify.kept import kept
 from hmpim.identify.noise.misfit import misfit
 from hmpim.identify.signals import longest_lag
-from hmpim.model.sampled import SampledInput, prepare_input
+from hmpim.model.sampled import PRECISION, SampledInput, prepare_input
 from hmpim.record import Intersample
 
 __all__ = [
@@ -53,17 +53,19 @@ class Data:
 
     u: NDArray[np.float64]
     y: NDArray[np.float64]
-    sources: dict[Intersample, SampledInput]
+    sources: dict[tuple[Intersample, bool], SampledInput]
     rough: RoughResponse
     nuisance: NDArray[np.float64] | None
     noise: NDArray[np.float64] | None = None
+    precision: float = PRECISION
 
     def problem(self, mode: Intersample, seen: Seen) -> Problem:
         """The data under one assumption, with the samples that count."""
-        if mode not in self.sources:
-            self.sources[mode] = prepared(self.u, mode)
+        rest = seen.begins is None
+        if (mode, rest) not in self.sources:
+            self.sources[mode, rest] = prepared(self.u, mode, rest=rest, precision=self.precision)
         problem = Problem(
-            source=self.sources[mode],
+            source=self.sources[mode, rest],
             y=self.y,
             valid=seen.valid,
             longest_delay=longest_lag(self.y.size) + 2.0,

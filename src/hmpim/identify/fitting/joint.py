@@ -23,6 +23,7 @@ from hmpim.identify.fitting.course import (
     enrich,
     find_beginning,
     free_from_wander,
+    interpolate_finely,
     is_unanswered,
     start,
     turn_ahead,
@@ -86,6 +87,7 @@ def joint_fit(
     course = start(u, y, valid, known, intersample, structures, nuisance)
     course = turn_ahead(course)
     course = free_from_wander(course)
+    course = interpolate_finely(course)
     course = find_beginning(course)
     fitted = continue_between(course)
     if is_unanswered(course, fitted):

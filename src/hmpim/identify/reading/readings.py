@@ -100,6 +100,8 @@ def read_parameters(
     fit = joint.best.fit
     structure = fit.structure
     vector = np.concatenate([fit.theta, fit.linear])
+    if _in_whole_samples(joint):  # the middle of the sample in which the delay ends
+        vector[0] = np.ceil(np.round(vector[0], 6)) - 0.5
     weighed = joint.weighed
     freedom = max(weighed.counted - vector.size, 1)
     residual = weighed.innovations(fit.prediction, fit.residual)
@@ -148,13 +150,18 @@ def _covariance(joint: JointFit, rows: Real, residual: Real, *, freedom: int, wh
         full = np.zeros((rows.shape[0], rows.shape[0]))
         full[1:, 1:] = inner * (1.0 + rounding / max(fit.cost, 1e-3 * rounding))
         return full
-    if fit.structure.name == "static" and joint.best.intersample == "zoh":
+    if _in_whole_samples(joint):
         inner = covariance(rows[1:], residual, freedom=freedom, white=white)
         full = np.zeros((rows.shape[0], rows.shape[0]))
         full[1:, 1:] = inner
         full[0, 0] = 1.0 / 12.0  # uniform over the sample in which the delay ends
         return full
     return covariance(rows, residual, freedom=freedom, white=white)
+
+
+def _in_whole_samples(joint: JointFit) -> bool:
+    """Whether only the sample in which a delay ends can be seen: a held input, and no dynamics."""
+    return joint.best.fit.structure.name == "static" and joint.best.intersample == "zoh"
 
 
 def _wandering(cov: Real, residual: Real, counted: int) -> Real:
