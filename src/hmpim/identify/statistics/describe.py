@@ -146,8 +146,8 @@ def _check_moves(statistics: Statistics) -> None:
             )
 
 
-def _related(statistics: Statistics, chosen: Chosen) -> PairIdentification:
-    """Say all that is known of an output that follows its input."""
+def _read(statistics: Statistics, chosen: Chosen, joint: JointFit) -> Readings:
+    """Every figure of the chosen fit, and the covariance behind it."""
     best, fs, band = chosen.best, statistics.fs, chosen.band
     fit, left = best.fit, chosen.left
     vector = np.concatenate([fit.theta, fit.linear])
@@ -169,10 +169,8 @@ def _related(statistics: Statistics, chosen: Chosen) -> PairIdentification:
         ),
         units=statistics.units,
     )
-    joint = _joint(statistics, chosen)
-    parameters = spanned(parameters, joint, fs=fs, highest=min(band[1], fs / 2))
-    readings = Readings(
-        parameters=parameters,
+    return Readings(
+        parameters=spanned(parameters, joint, fs=fs, highest=min(band[1], fs / 2)),
         system=system,
         vector=vector,
         covariance=cov,
@@ -182,15 +180,23 @@ def _related(statistics: Statistics, chosen: Chosen) -> PairIdentification:
         whitened=True,
         coefficient_covariance=spread,
     )
+
+
+def _related(statistics: Statistics, chosen: Chosen) -> PairIdentification:
+    """Say all that is known of an output that follows its input."""
+    best, fs, band = chosen.best, statistics.fs, chosen.band
+    joint = _joint(statistics, chosen)
+    readings = _read(statistics, chosen, joint)
+    system, spread = readings.system, readings.coefficient_covariance
     evidence = Evidence(
         joint=joint,
         readings=readings,
-        spanned=parameters,
+        spanned=readings.parameters,
         misfit=chosen.misfit,
         u=np.empty(0),
         fs=fs,
         band=band,
-        fit_percent=_fit_percent(statistics, left.power),
+        fit_percent=_fit_percent(statistics, chosen.left.power),
         measured=ResponseBandwidths(),
     )
     findings = judge(evidence, checks=_CHECKS)
@@ -199,10 +205,10 @@ def _related(statistics: Statistics, chosen: Chosen) -> PairIdentification:
     return PairIdentification(
         input=statistics.names[0],
         output=statistics.names[1],
-        structure=fit.structure.name,
+        structure=best.fit.structure.name,
         intersample=best.intersample,
         fit_percent=evidence.fit_percent,
-        parameters=parameters,
+        parameters=readings.parameters,
         paper=_paper(statistics),
         frequency_response=FrequencyResponse(
             frequency=frequency,
