@@ -34,10 +34,9 @@ def measure(count: int, jobs: int, seconds: float, trace: Path | None) -> None:
         "each": count,
         "right_ok": cells.count("right_ok"),
         "wrong_ok": cells.count("wrong_ok"),
+        "moved": {key: len(where[key]) for key in order},
     }
-    numbers = {
-        key: {"moved": len(where[key]), "less": [0, 0, 0], "more": [0, 0, 0]} for key in order
-    }
+    numbers = {key: {"less": [0, 0, 0], "more": [0, 0, 0]} for key in order}
     tasks = [(key, end, draw) for key in order for end in (0, 1) for draw in where[key]]
     open_ = {key: 2 * len(where[key]) for key in order}
     begin = time.time()

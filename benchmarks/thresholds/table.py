@@ -80,8 +80,10 @@ def _records(run: Mapping[str, Any]) -> str:
 {run["each"]} of each family under seed 1; {run["right_ok"]} are right & `ok`,
 {run["wrong_ok"]} wrong & `ok`.
 *Decides in*: draws in which 30 % less or more turns a comparison; nothing changes in the others.
+It is 0 too where no draw gets there: several inputs at once, fleets, live estimates.
 The last two columns: change of the draws that are right & `ok` and wrong & `ok`, and in brackets
-the draws that change their class at all; – is none."""
+the draws that change their class at all; – is none. *Not run*: numbers that
+decide in some draws, which `python benchmarks/thresholds --measure --draws 2` identifies again."""
 
 
 def page(effects: Mapping[str, Any] | None = None) -> str:
@@ -103,7 +105,7 @@ def page(effects: Mapping[str, Any] | None = None) -> str:
             continue
         effect = numbers.get(key)
         still += effect is not None and not any((*effect["less"], *effect["more"]))
-        decides = "?" if effect is None else str(effect["moved"])
+        decides = str(run["moved"].get(key, "?")) if run else "?"
         ends = (_effect(effect, "less"), _effect(effect, "more"))
         rows["tuned"].append(_row(one, _cell(one.says), f"`{tuned[key]}`", decides, *ends))
     head = _INTRO.format(tuned=len(rows["tuned"]), none=still, records=_records(run))
