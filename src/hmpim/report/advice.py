@@ -60,6 +60,7 @@ _ADVICE = {
     "unmodelled": "Use the measured response where it differs from the model.",
     "lack_of_fit": "Use the measured response where it differs from the model.",
     "bandwidth_disagrees": "Take the bandwidth of the measured response.",
+    "grazed_bandwidth": "Read the Bode plot instead, or lower the noise.",
     "halves_disagree": "Repeat the test: the unit may have changed while it ran.",
     "not_converged": "Repeat the test with a stronger stimulus.",
     "negative_delay": "Read delay and dynamics together: feedforward can make the output lead.",

@@ -17,7 +17,7 @@ from hmpim.identify.judgement.reach import (
     short_record,
 )
 from hmpim.identify.result import Estimate
-from hmpim.identify.result.groups import MODELLED, PHASE_SPLIT, TIMING
+from hmpim.identify.result.groups import MODELLED, PHASE_SPLIT
 from hmpim.model.dynamics import STRUCTURES
 from tests_support import field_chirp, second_order_lag
 
@@ -108,7 +108,11 @@ def test_an_output_before_its_input_casts_doubt_on_what_a_clock_moves(clean):
 
     assert negative_delay(at(-0.001)) == ()  # zero is within its error
     (found,) = negative_delay(at(-0.003))
-    assert (found.code, found.severity, found.parameters) == ("negative_delay", "doubt", TIMING)
+    assert (found.code, found.severity, found.parameters) == (
+        "negative_delay",
+        "doubt",
+        PHASE_SPLIT,
+    )
 
 
 @pytest.mark.parametrize(("lines", "doubted"), [(1, True), (2, True), (20, False)])

@@ -2,8 +2,10 @@
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
+from hmpim import Record, identify
 from hmpim.identify.judgement.response import bandwidth_disagrees
 
 
@@ -40,3 +42,26 @@ def test_both_apart_are_one_sentence_about_both(clean):
     both = moved(moved(clean, "bandwidth_phase90", 0.05), "bandwidth_3db", 0.05)
     (found,) = bandwidth_disagrees(both)
     assert {"bandwidth_phase90", "bandwidth_3db", "delay", "damping_ratio"} <= set(found.parameters)
+
+
+def notched(delay):
+    """A notch at 40 Hz: behind 0.002333 s its phase just touches -90 degrees."""
+    fs, n = 500.0, 4000
+    t = np.arange(n) / fs
+    u = np.sin(2 * np.pi * (0.5 * t + 6.0 * t**2)) * np.hanning(n) ** 0.25
+    f = np.fft.rfftfreq(2 * n, 1 / fs)
+    s = 2j * np.pi * f / (2 * np.pi * 40.0)
+    answer = (1 + 0.1 * s + s**2) / (1 + 1.6 * s + s**2) * np.exp(-2j * np.pi * f * delay)
+    y = np.fft.irfft(np.fft.rfft(u, 2 * n) * answer, 2 * n)[:n]
+    y += 0.01 * np.random.default_rng(4).standard_normal(n)
+    record = Record.from_arrays({"u": u}, {"y": y}, fs=fs)
+    return identify(record)["y", "u"]
+
+
+def test_a_bandwidth_that_the_phase_grazes_is_doubted_and_a_clear_one_is_not():
+    clear = notched(0.006)
+    assert "grazed_bandwidth" not in {w.code for w in clear.warnings}
+    assert clear.bandwidth_phase90.verdict == "ok"
+    grazing = notched(0.002333)
+    assert "grazed_bandwidth" in {w.code for w in grazing.warnings}
+    assert grazing.verdict == "doubtful"

@@ -26,7 +26,7 @@ from hmpim.identify.judgement.residual import (
     noise_on_the_input,
     uneven_noise,
 )
-from hmpim.identify.judgement.response import bandwidth_disagrees
+from hmpim.identify.judgement.response import bandwidth_disagrees, grazed_bandwidth
 from hmpim.identify.judgement.structure import missed_pole, other_order
 from hmpim.identify.worth import ROUNDING
 from hmpim.record import Finding
@@ -48,6 +48,7 @@ CHECKS: tuple[Check, ...] = (
     few_lines,
     integrator,
     beyond_band,
+    grazed_bandwidth,
     halves_disagree,
     other_order,
     missed_pole,
@@ -69,6 +70,7 @@ SAMPLED: tuple[Check, ...] = (
     coloured_noise,
     few_lines,
     beyond_band,
+    grazed_bandwidth,
     halves_disagree,
     noise_colour_of,
 )

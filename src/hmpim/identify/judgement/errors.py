@@ -35,6 +35,9 @@ def weak_excitation(evidence: Evidence) -> tuple[Finding, ...]:
         ("natural_frequency", p.natural_frequency),
         ("damping_ratio", p.damping_ratio),
         ("time_constant", p.time_constant if p.natural_frequency is None else None),
+        ("bandwidth_phase90", p.bandwidth_phase90),
+        ("bandwidth_phase90_without_delay", p.bandwidth_phase90_without_delay),
+        ("bandwidth_3db", p.bandwidth_3db),
     )
     findings = []
     for name, estimate in named:
@@ -46,7 +49,7 @@ def weak_excitation(evidence: Evidence) -> tuple[Finding, ...]:
         findings.append(
             Finding(
                 code="weak_excitation",
-                message=f"The record hardly tells the {name.replace('_', ' ')}: its standard "
+                message=f"The record barely determines the {name.replace('_', ' ')}: its standard "
                 f"deviation is {100 * min(spread, 99.0):.0f} % of its value. Excite more around "
                 "the natural frequency, or longer.",
                 severity="doubt",
@@ -73,7 +76,7 @@ def weak_delay(evidence: Evidence) -> tuple[Finding, ...]:
     return (
         Finding(
             code="weak_excitation",
-            message=f"The record hardly tells the delay: its standard deviation is "
+            message=f"The record barely determines the delay: its standard deviation is "
             f"{p.delay.spread:.2g} s. Excite more, or sweep higher.",
             severity="doubt",
             parameters=blurred,

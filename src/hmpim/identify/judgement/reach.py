@@ -201,7 +201,7 @@ def negative_delay(evidence: Evidence) -> tuple[Finding, ...]:
             message=f"The delay is negative ({delay.value:.4g} s): the output moves before the "
             "input. Check that the input column is not stamped late, and which column is which.",
             severity="doubt" if by_a_lead else "info",
-            parameters=TIMING,
+            parameters=PHASE_SPLIT if by_a_lead else TIMING,
         ),
     )
 

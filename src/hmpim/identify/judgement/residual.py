@@ -1,5 +1,7 @@
 """What the model leaves over: lack of fit, colour, halves that disagree, noise on the input."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from hmpim.identify.arrays import Real
@@ -9,7 +11,7 @@ from hmpim.identify.judgement.evidence import Evidence, structure_in_words
 from hmpim.identify.noise.colour import noise_colour
 from hmpim.identify.noise.input_noise import input_noise
 from hmpim.identify.result.groups import GAIN, MODELLED
-from hmpim.identify.worth import MATERIAL, PART, TOLERATED, WORTH
+from hmpim.identify.worth import FEW, MATERIAL, PART, TOLERATED, WORTH
 from hmpim.record import Finding
 
 __all__ = [
@@ -29,31 +31,52 @@ _FAST = 9
 
 
 def lack_of_fit(evidence: Evidence) -> tuple[Finding, ...]:
-    """Say that the residual still follows the input; a doubt from 3 % of the output on."""
-    if evidence.misfit.probability >= FALSE_ALARM:
+    """Say that the residual still follows the input.
+
+    A doubt on all figures from 3 % of the output on. Where it is a good part of the residual, one
+    on the noise, and on each figure that it may move by a hundredth: at most its deviation, for
+    white noise, times the root of what follows the input over the noise (Cauchy and Schwarz).
+    """
+    misfit = evidence.misfit
+    if misfit.probability >= FALSE_ALARM:
         return ()
-    owed = float(np.sqrt(evidence.misfit.share)) * evidence.unexplained
+    owed = float(np.sqrt(misfit.share)) * evidence.unexplained
     name = structure_in_words(evidence.joint.best.fit.structure.name)
-    if owed <= TOLERATED and evidence.misfit.share > PART:
-        return (
-            Finding(
-                code="lack_of_fit",
-                message="Much of the residual follows the input: the noise is less than it seems, "
-                f"as about {100 * owed:.2g} % of the output (r.m.s.) is not described by the "
-                f"{name} model.",
-                severity="doubt",
-                parameters=("noise_std",),
-            ),
+    message = (
+        f"The residual still follows the input: about {100 * owed:.2g} % of the output "
+        f"(r.m.s.) is not described by the {name} model. "
+        "Look at the Bode plot where model and measurement part."
+    )
+    large = owed > TOLERATED
+    found = Finding(
+        code="lack_of_fit",
+        message=message,
+        severity="doubt" if large else "info",
+        parameters=MODELLED,
+    )
+    if large or misfit.share <= 2 * FEW:  # the noise would be off by few per cent
+        return (found,)
+    moved = _moved(evidence) if owed > WORTH and misfit.share > PART else ("noise_std",)
+    return (replace(found, severity="doubt", parameters=moved),)
+
+
+def _moved(evidence: Evidence) -> tuple[str, ...]:
+    """Figures that a misfit along their own slopes may move by a hundredth, and the noise."""
+    joint = evidence.joint
+    count = joint.problem.counted * joint.effective_share
+    times = float(np.sqrt(count * evidence.misfit.share))
+    motion = MATERIAL * float(joint.best.fit.prediction.std())
+    sizes = {"bias": motion, "delay": FEW / evidence.fs, "delay_low_frequency": FEW / evidence.fs}
+    known = {name: getattr(evidence.readings.parameters, name) for name in MODELLED}
+    return tuple(
+        name
+        for name, e in known.items()
+        if e is not None
+        and (
+            name == "noise_std"
+            or times * e.spread
+            > sizes.get(name, MATERIAL * max(abs(e.value), 1.0 if name == "peak_gain_db" else 0.0))
         )
-    return (
-        Finding(
-            code="lack_of_fit",
-            message=f"The residual still follows the input: about {100 * owed:.2g} % of the output "
-            f"(r.m.s.) is not described by the {name} model. "
-            "Look at the Bode plot where model and measurement part.",
-            severity="doubt" if owed > TOLERATED else "info",
-            parameters=MODELLED,
-        ),
     )
 
 
@@ -114,7 +137,8 @@ def halves_disagree(evidence: Evidence) -> tuple[Finding, ...]:
         joint.problem.y,
         share=joint.weighed_share,
     )
-    if halves.probability >= FALSE_ALARM or halves.owed <= TOLERATED:
+    alarm = FALSE_ALARM * evidence.joint.weighed_share  # the share of coloured noise is estimated
+    if halves.probability >= alarm or halves.owed <= FEW:
         return ()
     return (
         Finding(

@@ -1,17 +1,41 @@
-"""Bandwidths that the measured response and the model put apart."""
+"""Bandwidths that measured response and model put apart, and those that a graze leaves open."""
+
+from collections.abc import Callable
 
 import numpy as np
 
+from hmpim.identify.arrays import Real
 from hmpim.identify.chance import DEVIATIONS
 from hmpim.identify.judgement.evidence import Evidence
+from hmpim.identify.reading.figures import system_of
 from hmpim.identify.result.groups import PHASE_SPLIT
 from hmpim.identify.worth import TOLERATED
+from hmpim.model.response import RationalDelay, phase, response
 from hmpim.record import Finding
 
-__all__ = ["bandwidth_disagrees"]
+__all__ = ["bandwidth_disagrees", "grazed_bandwidth"]
 
 _GAIN_SHAPE = ("natural_frequency", "damping_ratio", "time_constant", "peak_gain_db")
 """What shapes the gain about -3 dB."""
+
+_POINTS = 400
+"""Frequencies at which a curve is looked at for turns."""
+
+_Level = Callable[[RationalDelay, Real], Real]
+
+
+def _above_half(system: RationalDelay, frequency: Real) -> Real:
+    """Gain over that at DC, above half the power, as a logarithm."""
+    gain = np.abs(response(system, frequency) / response(system, np.zeros(1)))
+    return np.asarray(np.log(gain) + 0.5 * np.log(2.0))
+
+
+_LEVELS: dict[str, _Level] = {
+    "bandwidth_phase90": lambda system, f: phase(system, f) + np.pi / 2,
+    "bandwidth_phase90_without_delay": lambda system, f: phase(system, f, delay=False) + np.pi / 2,
+    "bandwidth_3db": _above_half,
+}
+"""Height of the response above the level of each bandwidth."""
 
 
 def bandwidth_disagrees(evidence: Evidence) -> tuple[Finding, ...]:
@@ -51,3 +75,58 @@ def bandwidth_disagrees(evidence: Evidence) -> tuple[Finding, ...]:
             code="bandwidth_disagrees", message=message, severity="doubt", parameters=parameters
         ),
     )
+
+
+def grazed_bandwidth(evidence: Evidence) -> tuple[Finding, ...]:
+    """Doubt a bandwidth where the curve turns about its level by less than the error there.
+
+    A notch takes the phase to -89° and back: whether it crosses -90° is left to the noise, and
+    no error bar at one of the crossings covers the other.
+    """
+    structure, p = evidence.joint.best.fit.structure, evidence.readings.parameters
+    system = evidence.readings.system
+    if structure.order < 2 or structure.integrators or structure.dc_zeros or structure.sampled:
+        return ()
+    grid = np.geomspace(evidence.band[1] * 1e-3, evidence.band[1], _POINTS)
+    touched = []
+    for name, level in _LEVELS.items():
+        found = getattr(p, name)
+        place = _nearest_turn(grid, level(system, grid), np.inf if found is None else found.value)
+        if place is None:
+            continue
+        at = np.array([place])
+
+        def height(
+            vector: Real, level: _Level = level, at: Real = at
+        ) -> float:  # one level at a time
+            return float(level(system_of(structure, vector, evidence.fs), at)[0])
+
+        error = float(np.sqrt(evidence.readings.variance(height)))
+        if abs(height(evidence.readings.vector)) < DEVIATIONS * error:
+            touched.append((name, place))
+    if not touched:
+        return ()
+    return (
+        Finding(
+            code="grazed_bandwidth",
+            message="The response comes so close to the level of a bandwidth at "
+            f"{touched[0][1]:.4g} Hz that this record does not show whether it crosses it there. "
+            "Read the Bode plot instead, or lower the noise.",
+            severity="doubt",
+            parameters=tuple(name for name, _ in touched),
+        ),
+    )
+
+
+def _nearest_turn(frequency: Real, height: Real, crossing: float) -> float | None:
+    """Frequency at which a curve above its level turns before its crossing, or comes back after.
+
+    None where it does neither, as a curve that falls all the way.
+    """
+    inner = height[1:-1]
+    turns = np.flatnonzero((inner <= height[:-2]) & (inner < height[2:])) + 1
+    before = [i for i in turns if frequency[i] < crossing]
+    after = [i for i in turns if frequency[i] > crossing and height[i] < 0]
+    after = [i for i in after[:1] if np.any(height[i:] > 0)]
+    nearest = min([*before, *after], key=lambda i: abs(height[i]), default=None)
+    return None if nearest is None else float(frequency[nearest])

@@ -26,7 +26,7 @@ _OF_THE_RECORD = frozenset(
 )
 """Codes of doubts that the measured response shares; the others are about the model."""
 
-_WITHHELD = frozenset({"few_lines", "feedback", "halves_disagree", "nonlinear"})
+_WITHHELD = frozenset({"few_lines", "feedback", "halves_disagree", "lack_of_fit", "nonlinear"})
 """Codes of doubts under which a figure's error is not known: its interval is withheld.
 
 Under the last three the record contradicts the model itself, and an interval made with it held in
