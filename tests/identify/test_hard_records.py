@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import scipy.signal
 
 import hmpim
 from hmpim.errors import RecordError
@@ -135,3 +136,17 @@ def test_small_spikes_show_once_the_large_ones_are_out(field_record):
     pair = hmpim.identify(hmpim.Record.from_arrays({"u": u}, {"y": noisy}, fs=200.0))["y", "u"]
     assert "8 samples" in next(w.message for w in pair.warnings if w.code == "spikes")
     assert pair.parameters.noise_std.value == pytest.approx(0.01, rel=0.15)
+
+
+def test_losses_so_dense_that_no_output_is_clear_of_them_are_noise():
+    rng = np.random.default_rng(3)
+    t = np.arange(1600) / 200
+    u = np.sin(2 * np.pi * (0.2 * t + 0.3 * t**2))
+    y = scipy.signal.lsim(([1.0], [1 / 6.0**2, 2 * 0.4 / 6.0, 1.0]), u, t)[1]
+    y += 0.02 * rng.standard_normal(t.size)
+    kept = rng.random(t.size) > 0.08
+    pair = hmpim.identify(hmpim.Record.from_arrays({"u": u[kept]}, {"y": y[kept]}, time=t[kept]))[
+        "y", "u"
+    ]
+    assert pair.scale_factor.value == pytest.approx(1.0, abs=0.01)
+    assert pair.natural_frequency.value == pytest.approx(6.0 / (2 * np.pi), rel=0.02)

@@ -14,7 +14,8 @@ from hmpim.identify.fitting.sampled_rows import part_of
 from hmpim.identify.fitting.trial import Trial
 from hmpim.identify.noise.whiteness import effective_share
 from hmpim.identify.signals import longest_lag
-from hmpim.identify.worth import PART
+from hmpim.identify.worth import FEW, PART
+from hmpim.model.sampled import MARGIN
 from hmpim.record import Intersample
 
 __all__ = ["begins_of", "count_in", "in_motion", "look_again"]
@@ -55,7 +56,9 @@ def count_in(
     counted[: begins or 0] = False
     counted[n - ahead :] = False
     if known is not None:
-        counted &= _unaffected(known, _memory(fits))
+        clear = counted & _unaffected(known, _memory(fits))
+        if np.count_nonzero(clear) >= FEW * np.count_nonzero(counted):
+            counted = clear  # else what was filled in is part of the noise
     return Seen(valid=counted, begins=begins)
 
 
@@ -99,9 +102,9 @@ def look_again(problem: Problem, trial: Trial, seen: Seen, *, lag: int) -> Seen 
     """Samples that count after all, now that the structure is known; None if they are the same.
 
     What a band-limited input does at the ends of a record is not known: a command that starts from
-    rest has a corner there, and a spline rings about it for a few samples. Where the residual is
-    far above the noise at samples that answer those, they do not count. If what is before is
-    still no noise, the record does not begin at rest.
+    rest has a corner there, and a spline rings about it for a few samples, a finer one for longer.
+    Where the residual is far above the noise at samples that answer those, they do not count. If
+    what is before is still no noise, the record does not begin at rest.
 
     Parameters
     ----------
@@ -119,7 +122,8 @@ def look_again(problem: Problem, trial: Trial, seen: Seen, *, lag: int) -> Seen 
     innovations = problem.innovations(trial.fit.prediction, trial.fit.residual)
     if trial.intersample == "bandlimited":
         late = np.arange(count) - trial.fit.delay
-        ringing = (np.abs(late) <= _RINGS) | (late >= count - 1 - _RINGS)
+        reach = _RINGS if problem.source.oversampling == 1 else MARGIN
+        ringing = (np.abs(late) <= reach) | (late >= count - 1 - reach)
         if _stands_out(innovations, told & ringing, told & ~ringing):
             return replace(seen, valid=~ringing if seen.valid is None else seen.valid & ~ringing)
     if seen.begins is not None:
