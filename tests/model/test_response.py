@@ -107,3 +107,23 @@ def test_poles_lost_to_rounding_have_no_time_constant():
         step=0.005,
     )
     assert dominant_time_constant(lost) is None
+
+
+def section(frequency, damping):
+    return np.concatenate([[1.0], second_order_coefficients(frequency, damping)])
+
+
+@pytest.mark.parametrize("place", [26.6, 27.3, 41.0, 88.8])
+def test_a_mode_narrower_than_the_grid_is_the_peak_all_the_same(place):
+    below = np.convolve(section(place, 0.002), section(120.0, 0.5))
+    system = RationalDelay(delay=0.0, numerator=np.ones(1), denominator=below)
+    found = peak_gain(system, highest=200.0)
+    gain = np.abs(response(system, np.linspace(place * 0.99, place * 1.01, 20_001)))
+    assert found.gain_db == pytest.approx(20 * np.log10(gain.max()), abs=0.01)
+    assert found.frequency == pytest.approx(place, rel=1e-3)
+
+
+def test_a_narrow_notch_is_seen_by_the_bandwidth():
+    top, below = section(33.0, 1e-4), section(33.0, 0.01)
+    system = RationalDelay(delay=0.0, numerator=top, denominator=below)
+    assert bandwidth_3db(system, highest=200.0) == pytest.approx(33.0, rel=0.02)

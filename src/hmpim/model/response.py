@@ -155,6 +155,26 @@ def _first_crossing(frequency: NDArray[np.float64], values: NDArray[np.float64])
     return int(below[0]) if below.size else None
 
 
+_LIGHT = 0.2
+"""Damping below which a mode may be narrower than the grid's steps of a sixteenth."""
+
+_AROUND = np.array([-10.0, -3.0, -1.0, -0.3, 0.0, 0.3, 1.0, 3.0, 10.0])
+"""Widths of a light mode or a notch at which a curve is looked at about it."""
+
+
+def _places(system: RationalDelay, highest: float) -> NDArray[np.float64]:
+    """Frequencies that show every turn of a response: a grid, and more about light roots."""
+    grid = _grid(highest)
+    if system.step is not None:
+        return grid
+    roots = np.concatenate([_roots(system.numerator), _roots(system.denominator)])
+    light = roots[(roots.imag > 0) & (np.abs(roots.real) < _LIGHT * roots.imag)] / (2 * np.pi)
+    if not light.size:
+        return grid
+    about = (light.imag[:, None] + np.abs(light.real)[:, None] * _AROUND).ravel()
+    return np.unique(np.concatenate([grid, about[(about > 0) & (about < highest)]]))
+
+
 @lru_cache(maxsize=8)
 def _grid(highest: float) -> NDArray[np.float64]:
     grid = np.concatenate([[0.0], np.geomspace(highest * 1e-4, highest, 150)])
@@ -172,19 +192,16 @@ def bandwidth_phase(
         phase = _single_phase(system, late=system.delay if delay else 0.0)
         return lambda f: phase(f) + lag
 
-    return _lowest(
-        lambda f: turned(f) + lag, single if system.step is None else None, highest=highest
-    )
+    places = _places(system, highest)
+    return _lowest(lambda f: turned(f) + lag, single if system.step is None else None, places)
 
 
 def _lowest(
     margin: Callable[[NDArray[np.float64]], NDArray[np.float64]],
     single: Callable[[], Callable[[float], float]] | None,
-    *,
-    highest: float,
+    grid: NDArray[np.float64],
 ) -> float | None:
     """Lowest frequency in Hz at which a margin falls to 0; `single` makes it for one at a time."""
-    grid = _grid(highest)
     i = _first_crossing(grid, margin(grid))
     if i is None:
         return None
@@ -237,7 +254,7 @@ def bandwidth_3db(system: RationalDelay, *, highest: float) -> float | None:
         power = _single_gain(system)
         return lambda f: power(f) - 0.5
 
-    return _lowest(margin, single if system.step is None else None, highest=highest)
+    return _lowest(margin, single if system.step is None else None, _places(system, highest))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -256,7 +273,7 @@ def peak_gain(system: RationalDelay, *, highest: float) -> PeakGain | None:
     For a second-order lag this is -20 lg(2ζ√(1-ζ²)) (paper, Fig. 16; Ogata, Modern Control
     Engineering, 1970, ch. 9).
     """
-    grid = _grid(highest)
+    grid = _places(system, highest)
     gain = np.abs(response(system, grid) / system.numerator[0])
     i = int(np.argmax(gain))
     if i == 0:

@@ -61,6 +61,7 @@ _ADVICE = {
     "lack_of_fit": "Use the measured response where it differs from the model.",
     "bandwidth_disagrees": "Take the bandwidth of the measured response.",
     "grazed_bandwidth": "Read the Bode plot instead, or lower the noise.",
+    "unsampled_input": "Sample faster, or filter the command before it is sampled.",
     "halves_disagree": "Repeat the test: the unit may have changed while it ran.",
     "not_converged": "Repeat the test with a stronger stimulus.",
     "negative_delay": "Read delay and dynamics together: feedforward can make the output lead.",

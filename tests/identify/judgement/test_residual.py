@@ -12,6 +12,7 @@ from hmpim.identify.judgement.residual import (
     noise_colour_of,
     noise_on_the_input,
     uneven_noise,
+    unsampled_input,
 )
 from hmpim.identify.noise.misfit import Misfit
 from hmpim.identify.result.groups import GAIN, MODELLED
@@ -100,3 +101,14 @@ def test_noise_that_grows_with_a_fast_input_is_doubted_where_stamps_jitter(clean
     )
     assert uneven_noise(replace(strewn, jittered=False)) == ()
     assert uneven_noise(replace(clean, jittered=True)) == ()
+
+
+def test_an_input_that_moves_beyond_half_the_rate_makes_the_noise_doubtful(clean):
+    fine = np.random.default_rng(2).standard_normal(8 * clean.u.size)
+    smooth = np.convolve(fine, np.hanning(22), mode="same")[::8]
+    folded = replace(clean, u=30.0 * smooth / smooth.std() * clean.u.std())
+    (found,) = unsampled_input(folded)
+    assert (found.severity, found.parameters) == ("doubt", ("noise_std",))
+    assert unsampled_input(clean) == ()
+    white = np.random.default_rng(2).standard_normal(clean.u.size)
+    assert unsampled_input(replace(clean, u=white)) == ()

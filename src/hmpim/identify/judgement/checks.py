@@ -25,6 +25,7 @@ from hmpim.identify.judgement.residual import (
     noise_colour_of,
     noise_on_the_input,
     uneven_noise,
+    unsampled_input,
 )
 from hmpim.identify.judgement.response import bandwidth_disagrees, grazed_bandwidth
 from hmpim.identify.judgement.structure import missed_pole, other_order
@@ -59,6 +60,7 @@ CHECKS: tuple[Check, ...] = (
     noise_colour_of,
     noise_on_the_input,
     uneven_noise,
+    unsampled_input,
     feedback,
     bandwidth_disagrees,
 )

@@ -25,6 +25,7 @@ __all__ = [
     "natural_frequency_beyond",
     "negative_delay",
     "short_record",
+    "windowed_power",
 ]
 
 _OUTSIDE = 2.0
@@ -208,7 +209,7 @@ def negative_delay(evidence: Evidence) -> tuple[Finding, ...]:
 
 def _at_the_line(evidence: Evidence) -> str:
     """Gain and phase at the only line, in a sentence."""
-    power = _windowed_power(evidence.u)
+    power = windowed_power(evidence.u)
     near = int(np.argmax(power)) + np.arange(-3, 4)
     place = float(near @ power[near] / power[near].sum()) * evidence.fs / evidence.u.size
     value = complex(response(evidence.readings.system, np.array([place]))[0])
@@ -218,10 +219,12 @@ def _at_the_line(evidence: Evidence) -> str:
     )
 
 
-def _windowed_power(u: Real) -> Real:
-    """Power behind a Blackman-Harris window, without what a constant has there."""
+def windowed_power(u: Real) -> Real:
+    """Power in each bin behind a Blackman-Harris window, without what a constant has there."""
     window = scipy.signal.windows.blackmanharris(u.size, sym=False)
-    return np.asarray(np.abs(scipy.fft.rfft((u - window @ u / window.sum()) * window)) ** 2)
+    level = (u - window @ u / window.sum()) * window
+    scale = 2.0 / (float(window @ window) * u.size)
+    return np.asarray(np.abs(scipy.fft.rfft(level)) ** 2 * scale)
 
 
 @kept
@@ -234,7 +237,7 @@ def count_lines(u: Real) -> int:
     >>> count_lines(np.sin(2 * np.pi * 3.3 * time)), count_lines(np.sin(time**2)) > 4
     (1, True)
     """
-    power = _windowed_power(u)
+    power = windowed_power(u)
     above = power > _FEET * power.max()
     edges = np.diff(np.concatenate([[0], above.astype(np.int8), [0]]))
     widths = np.flatnonzero(edges == -1) - np.flatnonzero(edges == 1)

@@ -8,10 +8,12 @@ from hmpim.identify.arrays import Real
 from hmpim.identify.chance import DEVIATIONS, FALSE_ALARM
 from hmpim.identify.fitting.halves import compare_halves
 from hmpim.identify.judgement.evidence import Evidence, structure_in_words
+from hmpim.identify.judgement.reach import windowed_power
 from hmpim.identify.noise.colour import noise_colour
 from hmpim.identify.noise.input_noise import input_noise
 from hmpim.identify.result.groups import GAIN, MODELLED
 from hmpim.identify.worth import FEW, MATERIAL, PART, TOLERATED, WORTH
+from hmpim.model import response
 from hmpim.record import Finding
 
 __all__ = [
@@ -21,10 +23,14 @@ __all__ = [
     "noise_colour_of",
     "noise_on_the_input",
     "uneven_noise",
+    "unsampled_input",
 ]
 
 _MOSTLY_NOISE = 0.5
 """R.m.s. of the residual over that of the output beyond which its colour matters too."""
+
+_FEWEST = 256
+"""Samples from which the end of an input's spectrum is known."""
 
 _FAST = 9
 """Samples over which the size of what is fast in the input is taken."""
@@ -182,6 +188,40 @@ def noise_on_the_input(evidence: Evidence) -> tuple[Finding, ...]:
             "command instead of its measurement, if you have it.",
             severity="doubt" if noise.attenuation > MATERIAL else "info",
             parameters=(*GAIN, "noise_std"),
+        ),
+    )
+
+
+def unsampled_input(evidence: Evidence) -> tuple[Finding, ...]:
+    """Doubt the noise where the input still moves at half the rate, and so beyond it.
+
+    What lies beyond, by the fall of its spectrum over the last octave, is folded into the band and
+    answered there; it is no noise of the sensor.
+    """
+    joint, size = evidence.joint, evidence.u.size
+    if joint.best.intersample != "bandlimited" or size < _FEWEST:
+        return ()
+    power = windowed_power(evidence.u)
+    octave = power.size // 16
+    low, high = power[7 * octave : 8 * octave].mean(), power[-octave:].mean()
+    steep = float(np.log2(low / high)) if high > 0.0 else 0.0
+    if steep < 1.0:  # as white noise, or none at all
+        return ()
+    frequency = np.arange(1, power.size) / size * evidence.fs
+    folded = high * (2.0 * (1.0 - frequency / evidence.fs)) ** -steep
+    answered = np.abs(response(evidence.readings.system, frequency)) ** 2
+    noise = float(np.mean(_counted(evidence) ** 2))
+    share = float(folded @ answered) / noise if noise > 0.0 else 0.0
+    if share <= 2 * FEW:
+        return ()
+    return (
+        Finding(
+            code="unsampled_input",
+            message="The input moves faster than half the rate: about "
+            f"{100 * min(share, 1.0):.2g} % of what is taken for noise answers motion between "
+            "its samples. Sample faster, or filter the command before it is sampled.",
+            severity="doubt",
+            parameters=("noise_std",),
         ),
     )
 
