@@ -126,3 +126,18 @@ def test_a_few_lines_tell_no_more_than_gain_and_phase_at_each(evidence_of, lines
         assert finding.severity == "doubt"
         assert set(MODELLED) - set(finding.parameters) == {"bias", "noise_std"}
         assert f"excites {lines} frequenc" in finding.message
+
+
+def test_a_free_response_as_slow_as_a_drift_makes_the_bias_doubtful(clean):
+    begun = replace(clean.joint, forgotten=50)
+    best, system = begun.best, clean.readings.system
+    fit = replace(best.fit, structure=replace(best.fit.structure, name="two_modes"))
+    slow = np.convolve(system.denominator, [1.0, clean.u.size / clean.fs / 10])
+    readings = replace(clean.readings, system=replace(system, denominator=slow))
+    joint = replace(begun, best=replace(best, fit=fit))
+    (found,) = initial_transient(replace(clean, joint=joint, readings=readings))
+    assert (found.severity, found.parameters) == ("doubt", ("bias",))
+    (found,) = initial_transient(replace(clean, joint=joint))
+    assert found.severity == "info"  # a fast mode is forgotten soon
+    (found,) = initial_transient(replace(clean, joint=begun, readings=readings))
+    assert found.severity == "info"  # a plain model has no pole to spare for a drift

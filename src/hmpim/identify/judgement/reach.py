@@ -11,7 +11,7 @@ from hmpim.identify.fitting.growth import scale_of
 from hmpim.identify.judgement.evidence import Evidence, structure_in_words
 from hmpim.identify.kept import kept
 from hmpim.identify.result.groups import MODELLED, PHASE_SPLIT, TIMING
-from hmpim.identify.worth import PAST
+from hmpim.identify.worth import MUCH, PAST
 from hmpim.model import response, slowest_time_constant
 from hmpim.record import Finding
 
@@ -50,18 +50,26 @@ _BANDWIDTHS = ("bandwidth_phase90", "bandwidth_phase90_without_delay", "bandwidt
 
 
 def initial_transient(evidence: Evidence) -> tuple[Finding, ...]:
-    """Say what was left out because the record does not begin at rest."""
+    """Say what was left out because the record does not begin at rest.
+
+    The free response of a slow pole that a plain model lacks looks as a drift does: there the
+    bias is in doubt.
+    """
     joint = evidence.joint
     if not joint.forgotten:
         return ()
+    slowest = slowest_time_constant(evidence.readings.system.denominator)
+    lasting = 5.0 * slowest * evidence.fs > MUCH * joint.problem.y.size
+    drifts = lasting and joint.best.fit.structure.name not in PLAIN
     return (
         Finding(
             code="initial_transient",
             message="The record does not begin at rest: the free response of its state is fitted "
             f"with it, and its first {joint.forgotten / evidence.fs:.4g} s, which answer input "
-            "before the record, are left out.",
-            severity="info",
-            parameters=(),
+            "before the record, are left out."
+            + (f" It lasts {5.0 * slowest:.3g} s and may be a drift." if drifts else ""),
+            severity="doubt" if drifts else "info",
+            parameters=("bias",) if drifts else (),
         ),
     )
 
