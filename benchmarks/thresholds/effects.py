@@ -52,13 +52,12 @@ def _cached() -> None:
 
     from families import study
 
-    if not hasattr(study.draw_of, "cache_info"):
-        simulated = cache(lambda name, seed, index: _of(study.FAMILIES[name], seed, index))
-        _of = study.draw_of
-        study.draw_of = lambda family, seed, index: simulated(family.name, seed, index)
-        study.draw_of.cache_info = simulated.cache_info  # type: ignore[attr-defined]
+    if study.draw_of is _SIMULATED.get("draw_of"):
+        return
+    study.draw_of = _SIMULATED["draw_of"] = cache(study.draw_of)
 
 
+_SIMULATED: dict[str, Any] = {}
 _FOUND: dict[str, Constant] = {}
 _PLACES: dict[str, dict[str, str]] = {}
 

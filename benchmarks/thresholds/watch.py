@@ -73,7 +73,7 @@ def _watched(keys: Sequence[tuple[str, str]], value: Callable[[], Any], names: d
             names[name] = other
             try:
                 same = _same(here, value())
-            except Exception:
+            except Exception:  # what an expression raises with another value moves it too
                 same = False
             finally:
                 names[name] = kept

@@ -11,7 +11,7 @@ from collections.abc import Callable, Hashable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 from functools import wraps
-from typing import Any, ParamSpec, TypeVar
+from typing import Any, ParamSpec, TypeVar, cast
 
 import numpy as np
 
@@ -72,7 +72,7 @@ def kept(function: Callable[P, T]) -> Callable[P, T]:
             return function(*args, **kwargs)
         if key in known:
             known.move_to_end(key)
-            return known[key]  # type: ignore[no-any-return]  # made by this function
+            return cast(T, known[key])
         found = function(*args, **kwargs)
         if isinstance(found, np.ndarray):
             found.flags.writeable = False

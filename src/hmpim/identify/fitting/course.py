@@ -158,11 +158,15 @@ def interpolate_finely(course: Course) -> Course:
     What is missed between the samples biases an estimate by its share of the output; the noise
     spreads it by its own share over the root of their number.
     """
+    if course.alone and course.natural != "bandlimited":
+        return course
     best, count = course.best, course.problem.counted
     seen = np.sqrt(best.cost / count) / max(float(np.std(best.prediction)), np.finfo(float).tiny)
     wanted = PART * float(seen / np.sqrt(count))
+    if wanted >= course.data.precision:
+        return course
     used = course.data.problem("bandlimited", course.counted).source.oversampling
-    if wanted >= course.data.precision or interpolation_error(course.data.u, used) <= wanted:
+    if interpolation_error(course.data.u, used) <= wanted:
         return course
     finer = replace(course, data=replace(course.data, sources={}, precision=wanted))
     if course.natural != "bandlimited":

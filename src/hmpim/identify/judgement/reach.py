@@ -227,6 +227,7 @@ def _at_the_line(evidence: Evidence) -> str:
     )
 
 
+@kept
 def windowed_power(u: Real) -> Real:
     """Power in each bin behind a Blackman-Harris window, without what a constant has there."""
     window = scipy.signal.windows.blackmanharris(u.size, sym=False)

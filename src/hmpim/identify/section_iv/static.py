@@ -52,10 +52,16 @@ def time_corrected_error(u: ArrayLike, y: ArrayLike, lag: int) -> Real:
     >>> time_corrected_error([1, 2, 3, 4, 5], [9, 0, 1, 2, 3], lag=1)
     array([1., 1., 1., 1.])
     """
+    truth, answer = _answered(u, y, lag)
+    return truth[: answer.size] - answer
+
+
+def _answered(u: ArrayLike, y: ArrayLike, lag: int) -> tuple[Real, Real]:
+    """Return the input, (n,), and the output that answers it `lag` samples later, (n - lag,)."""
     truth, measured = as_pair(u, y)
     if not 0 <= lag <= truth.size - 4:
         raise ArgumentError(f"lag is {lag} samples; give 0 to {truth.size - 4} for this record")
-    return truth[: truth.size - lag] - measured[lag:]
+    return truth, measured[lag:]
 
 
 def bias_by_autocorrelation(error: ArrayLike) -> float:
@@ -173,12 +179,9 @@ def scale_factor_near_dc(u: ArrayLike, y: ArrayLike, lag: int, bias: float) -> f
     >>> round(scale_factor_near_dc(u, 1.02 * u + 0.6, lag=0, bias=0.6), 9)
     1.02
     """
-    truth, measured = as_pair(u, y)
-    if not 0 <= lag <= truth.size - 4:
-        raise ArgumentError(f"lag is {lag} samples; give 0 to {truth.size - 4} for this record")
-    count = min(initial_period(truth), truth.size - lag)
-    excitation = truth[:count]
-    corrected = measured[lag : lag + count]
+    truth, answer = _answered(u, y, lag)
+    count = min(initial_period(truth), answer.size)
+    excitation, corrected = truth[:count], answer[:count]
     means = []
     for side in (excitation, -excitation):
         top = float(side.max())
