@@ -52,7 +52,7 @@ def test_a_record_cut_in_mid_motion_gives_what_the_whole_one_gives():
     structure, u = STRUCTURES["second_order"], _record(1200)
     theta = np.array([9.4, np.log(6.0), 1.5])
     whole = Part(_problem(u, u), structure, theta)
-    y = 2.0 * whole.rows[0] + 0.6
+    y = whole.driven(np.array([2.0])) + 0.6
     begins = 20
     valid = np.arange(800) >= begins
     late = Problem(
@@ -75,7 +75,8 @@ def test_two_inputs_and_a_drift_are_found_in_one_fit():
     drift = np.linspace(-1.0, 1.0, 600)
     one, two = _problem(u, u), _problem(v, u)
     theta = [np.array([9.4, np.log(6.0), 1.5]), np.array([3.2, np.log(5.0)])]
-    y = 2.0 * Part(one, first, theta[0]).rows[0] + 0.5 * Part(two, second, theta[1]).rows[0]
+    y = Part(one, first, theta[0]).driven(np.array([2.0]))
+    y = y + Part(two, second, theta[1]).driven(np.array([0.5]))
     y = y + 0.6 + 0.3 * drift
     problems = [_problem(w, y, nuisance=drift[None, :]) for w in (u, v)]
     found = fit_together(
@@ -86,3 +87,16 @@ def test_two_inputs_and_a_drift_are_found_in_one_fit():
         assert fit.linear[0] == pytest.approx(gain, rel=1e-4)
     assert found[0].linear[-1] == pytest.approx(0.6, rel=1e-4)
     assert found[0].nuisance[0] == pytest.approx(0.3, rel=1e-4)
+
+
+def test_an_input_about_ten_million_is_answered_as_one_about_zero():
+    structure, u = STRUCTURES["second_order"], _record(600)
+    theta = np.array([9.4, np.log(6.0), 1.5])
+    y = Part(_problem(u, u), structure, theta).driven(np.array([2.0])) + 0.6
+    start = theta + np.array([0.5, 0.1, -0.2])
+    plain, far = (
+        fit_structure(_problem(u + level, y), structure, start, precision=1e-9)
+        for level in (0.0, 1e7)
+    )
+    np.testing.assert_allclose(far.theta, plain.theta, rtol=1e-6)
+    np.testing.assert_allclose(far.linear, plain.linear - [0.0, 2e7], rtol=1e-6)

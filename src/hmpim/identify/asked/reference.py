@@ -205,7 +205,7 @@ def _moved(problem: Problem, fit: Fit, step: Real) -> Fit:
     )
     linear = fit.linear + step[unknown:]
     part = part_of(problem, fit.structure, theta)
-    own = linear[:-1] @ part.rows + linear[-1]
+    own = part.driven(linear[:-1]) + linear[-1]
     others = part.free if problem.nuisance is None else np.vstack([part.free, problem.nuisance])
     if others.shape[0]:
         counted, target = problem.masked(others), problem.masked(problem.y - own)

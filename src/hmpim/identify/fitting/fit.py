@@ -145,12 +145,14 @@ class _Evaluation:
         """What each input makes of the output."""
         weights = self.weights()
         fixed, problem = weights[-1], self.problems[0]
+        levels = [weights[2 * i][0] * part.level for i, part in enumerate(self.parts)]
+        bias = fixed[0] - sum(levels)  # as if no input stood anywhere but at zero
         residual = problem.y - self.linear @ self.rows
         if problem.valid is not None:
             residual = residual * problem.valid
         out = []
         for i, part in enumerate(self.parts):
-            own = weights[2 * i] @ part.rows + fixed[0]
+            own = weights[2 * i] @ part.rows + (bias + levels[i])
             if part.free.shape[0]:
                 own = own + weights[2 * i + 1] @ part.free
             if len(self.parts) == 1 and problem.nuisance is not None:
@@ -159,7 +161,7 @@ class _Evaluation:
                 Fit(
                     structure=part.structure,
                     theta=part.theta,
-                    linear=np.append(weights[2 * i], fixed[0]),
+                    linear=np.append(weights[2 * i], bias),
                     prediction=own,
                     residual=residual,
                     cost=float(residual @ residual),
@@ -208,6 +210,7 @@ def jacobian(
     free = part.free[: 0 if problem.begins is None else None]
     bias = np.ones((1, problem.y.size))
     rows = np.vstack([part.slopes(fit.linear[:-1], fit.initial), part.rows, bias, *more])
+    rows[fit.theta.size] += part.level
     counted = problem.masked(rows)
     others = [free] if problem.nuisance is None else [free, problem.nuisance]
     return without(counted, problem.masked(np.vstack(others)))

@@ -219,9 +219,9 @@ def response_to_square(problem: Problem, fit: Fit) -> Real:
     """
     lag = _PROBE * scale_of(fit)
     richer, theta = one_more_pole(fit.structure), with_pole(fit.structure, fit.theta, lag)
-    there = fit.linear[:-1] @ part_of(problem, richer, theta).rows
+    there = part_of(problem, richer, theta).driven(fit.linear[:-1])
     if fit.initial.size or not fit.prediction.size:
-        here = fit.linear[:-1] @ part_of(problem, fit.structure, fit.theta).rows
+        here = part_of(problem, fit.structure, fit.theta).driven(fit.linear[:-1])
     else:  # what was predicted, less what is beside the input
         here = fit.prediction - fit.linear[-1]
         if problem.nuisance is not None:

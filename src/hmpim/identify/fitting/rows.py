@@ -128,10 +128,12 @@ class Part:
         self._numerators = _powers(structure)
         expanded = self._poles.expand(self._numerators)
         self.rows = self._added(expanded)
-        """Responses that the numerator's coefficients multiply, shape (m, n)."""
-        level = self._source.first
-        if level and structure.dc_zeros == 0:
-            self.rows[0] += level * self._since() if structure.integrators else level
+        """Responses that the numerator's coefficients multiply, shape (m, n), `level` not added."""
+        first = self._source.first
+        self.level = 0.0 if structure.dc_zeros or structure.integrators else first
+        """What the scale factor multiplies at every sample: beside a bias, all but the same row."""
+        if first and structure.integrators:
+            self.rows[0] += first * self._since()
         self._since_start: Complex | None = None
         self.free = np.empty((0, problem.y.size))
         """Free responses, shape (order, n)."""
@@ -143,6 +145,10 @@ class Part:
             count = structure.order + structure.integrators
             impulses = np.eye(count)[structure.integrators :]
             self.free = _real(self._poles.expand(impulses).simple, self._since_start)
+
+    def driven(self, numerator: Real) -> Real:
+        """What the input does, (n,), with `numerator`, (m,), before its `rows`."""
+        return np.asarray(numerator @ self.rows + numerator[0] * self.level)
 
     def slopes(self, numerator: Real, initial: Real) -> Real:
         """Derivatives of what the input does by theta, shape (1 + order, n).

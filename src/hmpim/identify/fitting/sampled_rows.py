@@ -40,10 +40,10 @@ class SampledPart:
         ]
         for _ in range(structure.zeros):
             rows.append(np.diff(rows[-1], prepend=0.0))
-        self._moving = np.stack(rows)
-        self.rows = self._moving.copy()
-        """Responses that the numerator's coefficients multiply, shape (m, n)."""
-        self.rows[0] += source.first
+        self.rows = np.stack(rows)
+        """Responses that the numerator's coefficients multiply, shape (m, n), `level` not added."""
+        self.level = source.first
+        """What the scale factor multiplies at every sample."""
         self.free = np.empty((0, n))
         """Free responses, shape (order, n)."""
         if problem.begins is not None and structure.order:
@@ -52,13 +52,17 @@ class SampledPart:
                 blows[k, problem.begins + k] = 1.0
             self.free = np.asarray(scipy.signal.lfilter(np.ones(1), self._below, blows))
 
+    def driven(self, numerator: Real) -> Real:
+        """What the input does, (n,), with `numerator`, (m,), before its `rows`."""
+        return np.asarray(numerator @ self.rows + numerator[0] * self.level)
+
     def slopes(self, numerator: Real, initial: Real) -> Real:
         """Derivatives by theta, shape (1 + order, n); a whole number of samples has none."""
         order = self.structure.order
         out = np.zeros((1 + order, self.rows.shape[1]))
         if not order:
             return out
-        forced = numerator @ self._moving
+        forced = numerator @ self.rows
         free = initial @ self.free if initial.size else np.zeros(forced.size)
         turned = -scipy.signal.lfilter(np.ones(1), self._below, forced + free)
         by_coefficient = np.stack(

@@ -259,8 +259,8 @@ def _member(u: Real, structure: Structure, mode: Intersample, low: Real, high: R
     for k, place in enumerate(places):
         theta = theta_at(place)
         lag = _PROBE * float(np.exp(-place[1]))  # over 1/ω, the unit's own
-        rows[k] = Part(problem, structure, theta).rows[0]
-        there = Part(problem, richer, with_pole(structure, theta, lag)).rows[0]
+        rows[k] = Part(problem, structure, theta).driven(np.ones(1))
+        there = Part(problem, richer, with_pole(structure, theta, lag)).driven(np.ones(1))
         grown[k] = (there - rows[k]) / lag**2
     means = rows.mean(axis=1, keepdims=True)
     rows -= means
