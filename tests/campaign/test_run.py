@@ -304,6 +304,26 @@ def test_load_of_all_axes_together_is_predicted_and_refused(tmp_path, monkeypatc
         run_campaign(table_plan(level=0.99), tmp_path)
 
 
+def test_all_axes_at_once_are_identified_as_their_record_is(tmp_path):
+    """One answer to one question: the campaign's, and that of the record it has kept."""
+    pytest.importorskip("mujoco")
+    plan = table_plan(level=0.5)
+    both = replace(plan.tests[0], axes=("roll", "yaw"), rates=(500.0,), loads=("acceptance",))
+    (case,) = run_campaign(replace(plan, tests=(both,)), tmp_path)
+    found = hmpim.identify(hmpim.load(tmp_path / "records" / f"{case['id']}.h5"))
+    assert [pair["axis"] for pair in case["pairs"]] == ["roll", "yaw"]
+    for pair in case["pairs"]:
+        again = found[pair["output"], pair["input"]].to_dict()
+        assert {name: pair[name] for name in again} == json.loads(json.dumps(again))
+    assert [(c["from"], c["to"]) for c in case["couplings"]] == [("roll", "yaw"), ("yaw", "roll")]
+    for coupling in case["couplings"]:
+        names = f"{coupling['to']}.position", f"{coupling['from']}.command"
+        response, (low, high) = found[names].frequency_response, coupling["band"]
+        seen = (response.frequency >= low) & (response.frequency <= high)
+        assert coupling["gain"] == np.median(np.abs(response.response[seen]))
+        assert coupling["std"] < 0.1
+
+
 def test_a_rate_the_table_cannot_take_is_refused_before_the_first_case_moves(tmp_path, monkeypatch):
     pytest.importorskip("mujoco")
     from hmpim.rigs.table import MotionTable

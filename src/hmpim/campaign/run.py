@@ -4,7 +4,7 @@ import json
 import math
 import zlib
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from itertools import permutations
 from pathlib import Path
 from typing import Any
 
@@ -17,8 +17,7 @@ from hmpim.campaign.rig import CampaignRig, Player, make_rig
 from hmpim.errors import ArgumentError, FormatError, HmpimError
 from hmpim.formats.atomic import write_text
 from hmpim.formats.recording import save_recording
-from hmpim.identify import identify
-from hmpim.identify.frf.multivariable import response_matrix
+from hmpim.identify import Identification, identify
 from hmpim.identify.section_iv.spectrum import decibel, spectrum
 from hmpim.record import Record
 from hmpim.stimulus import Stimulus
@@ -35,7 +34,6 @@ CASE_SCHEMA = "hmpim/campaign-case/2"
 CAMPAIGN_SCHEMA = "hmpim/campaign/2"
 _PLAYED = 5  # times as long as a design takes: what is left is told from it
 _A_PERIOD = 10.0  # samples kept of each period of the fastest motion
-_WAIT = 0.5  # s at rest before and after the motion of an axis that count
 Progress = Callable[[int, int, str], None]
 
 
@@ -167,15 +165,19 @@ def _measured(
     torque = rig.check(case, stimuli)  # once more, right before anything moves
     record = rig.play(case, stimuli, np.random.default_rng(seed))
     save_recording(record, raw, stimuli=stimuli, rig=f"{plan.name}: {case.id}")
-    pairs = []
-    for axis in case.axes:
-        alone = _alone(record, axis, band=plan.axis(axis, test=case.test).band)
-        try:
-            found = identify(alone).to_dict()["pairs"][0]
-        except HmpimError as error:  # a dead encoder, for instance: say where
-            raise type(error)(f"case {case.id}: {error}") from error
-        known = {"known": rig.known(case, axis), "bins": _bins(alone)}
-        pairs.append({"axis": axis, **known, **found})
+    try:
+        found = identify(record)
+    except HmpimError as error:  # a dead encoder, for instance: say where
+        raise type(error)(f"case {case.id}: {error}") from error
+    pairs = [
+        {
+            "axis": axis,
+            "known": rig.known(case, axis),
+            "bins": _bins(record, axis, band=plan.axis(axis, test=case.test).band),
+            **found[f"{axis}.position", f"{axis}.command"].to_dict(),
+        }
+        for axis in case.axes
+    ]
     done: dict[str, Any] = _finite(
         {
             "schema": CASE_SCHEMA,
@@ -184,90 +186,51 @@ def _measured(
             "stimuli": [_described(stimulus) for stimulus in stimuli],
             "torque": torque,
             "pairs": pairs,
-            "couplings": _couplings(plan, case, record, rig) if len(case.axes) > 1 else [],
+            "couplings": _couplings(plan, case, found, rig) if len(case.axes) > 1 else [],
         }
     )
     return done
 
 
-def _alone(record: Record, axis: str, *, band: tuple[float, float]) -> Record:
-    """One axis out of a record of several, from just before it moves to just after.
-
-    Each position is identified against its own command: what other axes couple in is small, and
-    the same estimator then serves one axis alone and all at once. While an axis waits for the
-    others it tells of the friction that it sticks by, and of nothing else.
-    """
-    command, position = (record.channel(f"{axis}.{name}") for name in ("command", "position"))
-    start, stop = 0, command.values.size
-    if len(record.inputs) > 1 and command.values.size == position.values.size:
-        moves = np.flatnonzero(np.diff(command.values)) + 1
-        if moves.size:
-            wait = _WAIT * (stop - 1) / float(command.time[-1] - command.time[0])
-            start = max(start, int(moves[0] - wait))
-            stop = min(stop, int(moves[-1] + wait) + 1)
-    clocks = {id(c.time): c.time[start:stop] for c in (command, position)}
-    command, position = (
-        replace(c, time=clocks[id(c.time)], values=c.values[start:stop])
-        for c in (command, position)
-    )
-    return Record(
-        inputs=(command,),
-        outputs=(position,),
-        fs=record.fs,
-        band=band,
-        intersample=record.intersample,
-        source=record.source,
-    )
-
-
-def _bins(record: Record) -> dict[str, list[float]]:
-    """Ratio of the spectra at the bins of the record, as the paper takes it, in the band."""
-    u, y = (channel.values for channel in (record.inputs[0], record.outputs[0]))
-    low, high = record.band or (0.0, np.inf)
+def _bins(record: Record, axis: str, *, band: tuple[float, float]) -> dict[str, list[float]]:
+    """Ratio of an axis's spectra at the bins of the record, as the paper takes it, in the band."""
+    u, y = (record.channel(f"{axis}.{name}").values for name in ("command", "position"))
     above = spectrum(y - y.mean(), record.fs, window="gaussian", alpha=1.5, pad=0)
     below = spectrum(u - u.mean(), record.fs, window="gaussian", alpha=1.5, pad=0)
-    seen = (above.frequency >= low) & (above.frequency <= high) & (np.abs(below.value) > 0.0)
+    seen = (above.frequency >= band[0]) & (above.frequency <= band[1])
+    seen &= np.abs(below.value) > 0.0
     ratio = above.value[seen] / below.value[seen]
     columns = {"frequency": above.frequency[seen], "real": ratio.real, "imag": ratio.imag}
     return {name: [float(f"{x:.6g}") for x in values.tolist()] for name, values in columns.items()}
 
 
-def _couplings(plan: Plan, case: Case, record: Record, rig: CampaignRig) -> list[dict[str, Any]]:
-    """Gain from each command to each other position, where all axes are excited together.
+def _couplings(
+    plan: Plan, case: Case, found: Identification, rig: CampaignRig
+) -> list[dict[str, Any]]:
+    """Gain from each command to each other position, off the responses that were identified.
 
     Beside it stands the exact one where the rig knows it, the median over the same frequencies.
     """
-    bands = [plan.axis(axis, test=case.test).band for axis in case.axes]
-    low, high = max(band[0] for band in bands), min(band[1] for band in bands)
-    inputs = [record.channel(f"{axis}.command").values for axis in case.axes]
-    outputs = [record.channel(f"{axis}.position").values for axis in case.axes]
-    matrix = response_matrix(
-        np.stack(inputs), np.stack(outputs), case.rate, band=(max(low, 0.02 * high), 0.75 * high)
-    )
-    seen = matrix.usable & (matrix.frequency >= 0.25 * high) & (matrix.frequency <= 0.5 * high)
-    if not seen.any():
-        return []
-    gain = np.median(np.abs(matrix.response[seen]), axis=0)
-    std = np.median(matrix.std[seen], axis=0)
-
-    def exact(source: str, target: str) -> float | None:
-        known = rig.coupling(case, source, target, matrix.frequency[seen])
-        return None if known is None else float(np.median(known))
-
-    return [
-        {
-            "from": source,
-            "to": target,
-            "band": [0.25 * high, 0.5 * high],
-            "gain": float(gain[j, i]),
-            "std": float(std[j, i]),
-            "exact": exact(source, target),
-            "usable_percent": 100.0 * float(np.mean(matrix.usable)),
-        }
-        for i, source in enumerate(case.axes)
-        for j, target in enumerate(case.axes)
-        if i != j
-    ]
+    high = min(plan.axis(axis, test=case.test).band[1] for axis in case.axes)
+    band = (0.25 * high, 0.5 * high)
+    told = []
+    for source, target in permutations(case.axes, 2):
+        response = found[f"{target}.position", f"{source}.command"].frequency_response
+        seen = (response.frequency >= band[0]) & (response.frequency <= band[1])
+        if not seen.any():
+            continue
+        exact = rig.coupling(case, source, target, response.frequency[seen])
+        told.append(
+            {
+                "from": source,
+                "to": target,
+                "band": list(band),
+                "gain": float(np.median(np.abs(response.response[seen]))),
+                "std": float(np.median(response.std[seen])),
+                "exact": None if exact is None else float(np.median(exact)),
+            }
+        )
+    return told
 
 
 def _described(stimulus: Stimulus) -> dict[str, Any]:

@@ -297,13 +297,7 @@ def _refine(
     valid = None if bool(counted.all()) else counted
     problems = [replace(fits[j].problem, y=y, valid=valid, whitening=whitening) for j in some]
     begun = [fits[j].best.fit for j in some]
-    found = fit_all(
-        problems,
-        [fit.structure for fit in begun],
-        [fit.theta for fit in begun],
-        iterations=8,
-        precision=1e-3,
-    )
+    found = fit_all(problems, [fit.structure for fit in begun], [fit.theta for fit in begun])
     parts = {j: fit.prediction - fit.linear[-1] for j, fit in zip(some, found, strict=True)}
     total = sum(parts.values(), np.zeros(y.size))
     for j, fit in zip(some, found, strict=True):
