@@ -121,7 +121,8 @@ def uniform(record: Record) -> Aligned:
       (see `hmpim.record.held`). The rest folds in the output, which `identify` puts right.
 
     Inside a gap the filling is a cubic (Hermite) between the two edges, with slopes limited so
-    that it never leaves the range between them.
+    that it never leaves the range between them; a short gap is bridged by an autoregression of the
+    channel where that foretells samples that are known better (see `hmpim.record.bridge`).
 
     Parameters
     ----------

@@ -7,6 +7,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from hmpim.record.bridge import bridged
 from hmpim.record.channel import Channel, Intersample
 from hmpim.record.clock import Clock
 from hmpim.record.resample import CROSSINGS, PASSED, band_limited, share_above
@@ -69,8 +70,24 @@ def on_grid(
         values[valid] = _interpolated(channel, clock, grid[valid], intersample, fs)
     if not valid.all():
         own = channel.time if not on_clock else clock.start + clock.index / clock.fs
-        values[~valid] = _filled(own, channel.values, clock, grid[~valid], intersample)
+        values[~valid] = _filled(own, channel.values, grid[~valid], intersample)
+        if smooth:
+            values = _bridged(grid, values, valid)
     return values, valid
+
+
+def _bridged(
+    grid: NDArray[np.float64], values: NDArray[np.float64], valid: NDArray[np.bool_]
+) -> NDArray[np.float64]:
+    """Short gaps from the samples around them."""
+
+    def rule(known: NDArray[np.bool_]) -> NDArray[np.float64]:
+        out = values.copy()
+        lost = valid & ~known
+        out[lost] = _filled(grid[known], values[known], grid[lost], None)
+        return out
+
+    return bridged(values, valid, rule)
 
 
 def is_reduced(channel: Channel, clock: Clock, fs: float) -> bool:
@@ -117,7 +134,7 @@ def _reduced(
             values[mine] = band_limited(whole, place, ratio=ratio)
         known |= mine
     if not known.all():
-        values[~known] = _filled(channel.time, channel.values, clock, grid[~known], None)
+        values[~known] = _filled(channel.time, channel.values, grid[~known], None)
     return values, known
 
 
@@ -226,7 +243,6 @@ def _sharpen(
 def _filled(
     time: NDArray[np.float64],
     values: NDArray[np.float64],
-    clock: Clock,
     at: NDArray[np.float64],
     intersample: Intersample | None,
 ) -> NDArray[np.float64]:

@@ -57,7 +57,8 @@ def count_in(
     counted[n - ahead :] = False
     if known is not None:
         clear = counted & _unaffected(known, _memory(fits))
-        if np.count_nonzero(clear) >= FEW * np.count_nonzero(counted):
+        few = np.count_nonzero(clear) < FEW * np.count_nonzero(counted)
+        if not few and _stands_out(fit.residual, counted & ~clear, clear):
             counted = clear  # else what was filled in is part of the noise
     return Seen(valid=counted, begins=begins)
 
