@@ -25,7 +25,7 @@ from pathlib import Path
 import numpy as np
 from scipy import signal
 
-from hmpim.identify.frf.local import local_polynomial_response, local_response
+from hmpim.identify.frf.local import local_response
 from hmpim.identify.frf.neighbours import transform
 
 FS, BAND, DELAY, NATURAL, DAMPING, BIAS, NOISE = 200.0, (0.1, 20.0), 0.15, 10.0, 0.4, 0.6, 0.1
@@ -57,11 +57,6 @@ def truth(f: np.ndarray) -> np.ndarray:
 
 def ours(u: np.ndarray, y: np.ndarray) -> Response:
     found = local_response(u, y, FS, band=BAND, delay=DELAY)
-    return found.frequency, found.response
-
-
-def polynomials(u: np.ndarray, y: np.ndarray) -> Response:
-    found = local_polynomial_response(u, y, FS, band=BAND, delay=DELAY)
     return found.frequency, found.response
 
 
@@ -136,10 +131,7 @@ def main() -> None:
     parser.add_argument("--seeds", type=int, default=300)
     parser.add_argument("--json", type=Path)
     options = parser.parse_args()
-    rows = {
-        "local_response": study(ours, options.seeds),
-        "local_polynomial_response": study(polynomials, options.seeds),
-    }
+    rows = {"local_response": study(ours, options.seeds)}
     few = min(options.seeds, 10)
     width = int(best_of(lambda w: published(int(w)), (15, 25, 40, 60, 80, 99), few))
     rows[f"McKelvey-Guerin, best width {width}"] = study(published(width), options.seeds)

@@ -1,7 +1,6 @@
 """Identification: from a record to every parameter, each with its error bar (paper, section IV)."""
 
-from hmpim.identify.frf.averaged import Averaged, averaged_response, coherence_significance
-from hmpim.identify.frf.local import local_polynomial_response, local_response
+from hmpim.identify.frf.local import local_response
 from hmpim.identify.frf.multivariable import ResponseMatrix, response_matrix
 from hmpim.identify.identify import identify
 from hmpim.identify.records.alike import same_at_levels
@@ -47,7 +46,6 @@ from hmpim.identify.uses.validate import Bounds, Check, OutputValidation, Valida
 
 __all__ = [
     "Alike",
-    "Averaged",
     "Bounds",
     "Candidate",
     "Change",
@@ -82,8 +80,6 @@ __all__ = [
     "Trend",
     "Validation",
     "Verdict",
-    "averaged_response",
-    "coherence_significance",
     "compare",
     "compare_levels",
     "compress",
@@ -92,7 +88,6 @@ __all__ = [
     "identify",
     "identify_levels",
     "identify_repeats",
-    "local_polynomial_response",
     "local_response",
     "measurable",
     "paper_analysis",

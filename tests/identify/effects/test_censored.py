@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from hmpim.errors import RecordError
-from hmpim.identify.effects.censored import censored_covariance, fit_censored, fit_held
+from hmpim.identify.effects.censored import fit_censored
 from hmpim.identify.effects.held import rows_at_updates
 from hmpim.identify.effects.hold import Updates, detect_hold, updates
 from hmpim.identify.effects.masked import masked_spectrum
@@ -165,8 +165,8 @@ def test_with_nothing_clipped_it_is_least_squares(source, clean, truth):
     assert found.noise_std == pytest.approx(np.sqrt(plain.cost / freedom), rel=1e-6)
     rows = jacobian(problem, plain)
     bound = found.noise_std**2 * np.linalg.inv(rows @ rows.T)
-    got = censored_covariance(problem, found, None, white=True)
-    np.testing.assert_allclose(np.sqrt(np.diag(got)), np.sqrt(np.diag(bound)), rtol=5e-3)
+    std = np.sqrt(np.diag(found.covariance))
+    np.testing.assert_allclose(std, np.sqrt(np.diag(bound)), rtol=5e-3)
     white = -0.5 * np.count_nonzero(valid) * (np.log(2 * np.pi * plain.cost / (freedom + 5)) + 1)
     assert found.log_likelihood == pytest.approx(white, abs=1e-3)
 
@@ -198,7 +198,7 @@ def test_a_whole_period_leaves_the_instant_open(source, truth):
     y = sensor.respond(CHIRP, fs=FS, rng=2)
     problem = Problem(source=source, y=y, valid=None, longest_delay=1000.0)
     plain = fit_structure(problem, STRUCTURE, truth.theta)
-    found = fit_held(problem, plain, updates(detect_hold(y, FS), y.size, FS))
+    found = fit_censored(problem, plain, None, arrivals=updates(detect_hold(y, FS), y.size, FS))
     assert np.sqrt(found.covariance[0, 0]) == pytest.approx(1 / np.sqrt(12), rel=0.05)
     assert abs(found.fit.delay - 30.0) < 0.55
     # Values are 0.74 samples old when they show and 3.74 when they go.

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from scipy import signal
 
 from hmpim.errors import ArgumentError, RecordError
-from hmpim.identify.frf.local import local_polynomial_response
+from hmpim.identify.frf.local import local_response
 
 FS, BAND = 200.0, (0.1, 20.0)
 SEEDS = int(os.environ.get("HMPIM_SEEDS", "60"))
@@ -42,7 +42,7 @@ def study(*, noise: float, delay: float, seeds: int) -> tuple[np.ndarray, ...]:
     errors, stds = [], []
     for seed in range(seeds):
         y = CLEAN + noise * np.random.default_rng(seed).standard_normal(CLEAN.size)
-        found = local_polynomial_response(U, y, FS, band=BAND, delay=delay)
+        found = local_response(U, y, FS, band=BAND, delay=delay)
         errors.append(found.response - second_order(found.frequency))
         stds.append(found.std)
     return found.frequency, np.array(errors), np.array(stds)
@@ -90,8 +90,8 @@ def test_without_noise_what_remains_is_curvature() -> None:
 
 def test_more_noise_more_stated_error_in_proportion() -> None:
     y = np.random.default_rng(0).standard_normal(U.size)
-    one = local_polynomial_response(U, U + 0.1 * y, FS, band=BAND, widths=(20,))
-    ten = local_polynomial_response(U, U + 1.0 * y, FS, band=BAND, widths=(20,))
+    one = local_response(U, U + 0.1 * y, FS, band=BAND)
+    ten = local_response(U, U + 1.0 * y, FS, band=BAND)
     np.testing.assert_allclose(ten.std, 10 * one.std, rtol=1e-3)
 
 
@@ -101,7 +101,7 @@ def test_a_delayed_scaled_biased_copy_is_exact(
     k: int, scale: float, sign: int, bias: float
 ) -> None:
     y = sign * scale * np.concatenate((np.zeros(k), U[: U.size - k])) + bias
-    found = local_polynomial_response(U, y, FS, band=BAND, delay=k / FS)
+    found = local_response(U, y, FS, band=BAND, delay=k / FS)
     true = sign * scale * np.exp(-2j * np.pi * found.frequency * k / FS)
     np.testing.assert_allclose(found.response, true, rtol=2e-4, atol=0)
 
@@ -110,18 +110,18 @@ def test_a_delayed_scaled_biased_copy_is_exact(
 @given(st.floats(0.01, 100.0), st.floats(0.01, 100.0), st.integers(0, 2**32 - 1))
 def test_units_scale_response_and_error_alike(of_u: float, of_y: float, seed: int) -> None:
     y = CLEAN + 0.1 * np.random.default_rng(seed).standard_normal(CLEAN.size)
-    one = local_polynomial_response(U, y, FS, band=BAND, delay=0.15)
-    other = local_polynomial_response(of_u * U, of_y * y, FS, band=BAND, delay=0.15)
+    one = local_response(U, y, FS, band=BAND, delay=0.15)
+    other = local_response(of_u * U, of_y * y, FS, band=BAND, delay=0.15)
     np.testing.assert_allclose(other.response, of_y / of_u * one.response, rtol=1e-6)
-    np.testing.assert_allclose(other.std, of_y / of_u * one.std, rtol=1e-6)
+    np.testing.assert_allclose(other.std, of_y / of_u * one.std, rtol=1e-5)
 
 
 @settings(max_examples=20)
 @given(st.floats(-1000, 1000))
 def test_a_bias_makes_no_difference(bias: float) -> None:
     y = CLEAN + 0.1 * np.random.default_rng(1).standard_normal(CLEAN.size)
-    one = local_polynomial_response(U, y, FS, band=BAND, delay=0.15)
-    other = local_polynomial_response(U, y + bias, FS, band=BAND, delay=0.15)
+    one = local_response(U, y, FS, band=BAND, delay=0.15)
+    other = local_response(U, y + bias, FS, band=BAND, delay=0.15)
     np.testing.assert_allclose(other.response, one.response, atol=1e-7)
 
 
@@ -133,7 +133,7 @@ def test_a_fraction_of_a_sample_of_delay() -> None:
     frequency = np.fft.rfftfreq(1000, 1 / FS)
     u = np.fft.irfft(spectrum)
     y = np.fft.irfft(spectrum * np.exp(-2j * np.pi * frequency * 0.3 / FS))
-    found = local_polynomial_response(u, y, FS, band=(1.0, 90.0), delay=0.3 / FS)
+    found = local_response(u, y, FS, band=(1.0, 90.0), delay=0.3 / FS)
     true = np.exp(-2j * np.pi * found.frequency * 0.3 / FS)
     np.testing.assert_allclose(found.response, true, atol=1e-6)
 
@@ -144,7 +144,7 @@ def test_the_transient_of_a_record_that_starts_in_motion_is_taken_out() -> None:
     rng = np.random.default_rng(5)
     u = rng.standard_normal(2000)
     y = 2 * u + 3 * np.exp(-8 * t) * np.cos(2 * np.pi * 9 * t)
-    found = local_polynomial_response(u, y, FS, band=(5.0, 15.0), widths=(10,))
+    found = local_response(u, y, FS, band=(5.0, 15.0))
     plain = np.fft.rfft(y)[50:151] / np.fft.rfft(u)[50:151]
     assert np.median(np.abs(found.response - 2)) < 0.1 * np.median(np.abs(plain - 2))
 
@@ -167,7 +167,7 @@ def test_a_sweep_through_a_slow_pole_keeps_its_low_end() -> None:
     w = 2 * np.pi
     b, a = signal.bilinear([w], [1, w], fs)
     y = signal.lfilter(b, a, u) + 0.01 * np.random.default_rng(0).standard_normal(t.size)
-    found = local_polynomial_response(u, y, fs, band=(0.1, 100.0))
+    found = local_response(u, y, fs, band=(0.1, 100.0))
     z = np.exp(2j * np.pi * found.frequency / fs)
     true = np.polyval(b, z) / np.polyval(a, z)
     low = found.frequency < 3
@@ -175,7 +175,7 @@ def test_a_sweep_through_a_slow_pole_keeps_its_low_end() -> None:
 
 
 def test_frequencies_are_bins_inside_the_band() -> None:
-    found = local_polynomial_response(U, U, FS, band=(2.0, 7.0))
+    found = local_response(U, U, FS, band=(2.0, 7.0))
     np.testing.assert_allclose(found.frequency, np.arange(20, 71) * 0.1)
     assert found.coherence is None
 
@@ -183,7 +183,7 @@ def test_frequencies_are_bins_inside_the_band() -> None:
 @pytest.mark.parametrize("points", [1, 10, 400])
 def test_many_bins_are_thinned_by_a_constant_ratio(points: int) -> None:
     u = np.random.default_rng(0).standard_normal(20_000)
-    found = local_polynomial_response(u, u, FS, band=(1.0, 90.0), points=points)
+    found = local_response(u, u, FS, band=(1.0, 90.0), points=points)
     assert found.frequency.size <= points
     assert found.frequency[0] == pytest.approx(1.0)
     steps = np.diff(np.log(found.frequency))
@@ -197,24 +197,10 @@ def test_many_bins_are_thinned_by_a_constant_ratio(points: int) -> None:
 def test_short_records_and_wild_delays_give_finite_numbers(samples: int, delay: float) -> None:
     rng = np.random.default_rng(samples)
     u = rng.standard_normal(samples)
-    found = local_polynomial_response(u, u, FS, band=(1.0, 100.0), delay=delay)
+    found = local_response(u, u, FS, band=(1.0, 100.0), delay=delay)
     assert found.frequency.size > 0
     assert np.all(np.isfinite(found.response))
     assert np.all(np.isfinite(found.std))
-
-
-def test_where_nothing_is_excited_the_error_says_so() -> None:
-    # Eight lines between 1 and 8 Hz, and nothing but rounding beyond; the widest window, a
-    # third of the band's bins, reaches 19.7 Hz.
-    t = np.arange(2000) / FS
-    u = sum(np.sin(2 * np.pi * f * t + f**2) for f in range(1, 9))
-    y = u + 0.1 * np.random.default_rng(0).standard_normal(2000)
-    found = local_polynomial_response(np.asarray(u), y, FS, band=(1.0, 60.0))
-    assert np.all(np.isfinite(found.std))
-    inside, outside = found.frequency <= 8, found.frequency > 28
-    assert found.std[inside].max() < 0.05
-    assert np.all(np.abs(found.response - 1)[inside] < 4 * found.std[inside])
-    assert found.std[outside].min() > 10
 
 
 @pytest.mark.parametrize(
@@ -222,11 +208,7 @@ def test_where_nothing_is_excited_the_error_says_so() -> None:
     [
         ({"delay": float("inf")}, "delay is inf s"),
         ({"delay": float("nan")}, "delay is nan s"),
-        ({"order": 7}, "order is 7"),
-        ({"order": -1}, "order is -1"),
         ({"points": 0}, "points is 0"),
-        ({"widths": ()}, r"widths is \(\)"),
-        ({"widths": (5, 0)}, r"widths is \(5, 0\)"),
         ({"band": (5.01, 5.02)}, "no bin in it, only multiples of 0.1 Hz"),
         ({"band": (0.1, 101.0)}, "band is"),
     ],
@@ -234,15 +216,15 @@ def test_where_nothing_is_excited_the_error_says_so() -> None:
 def test_bad_options_are_refused(change: dict[str, object], message: str) -> None:
     options: dict[str, object] = {"band": BAND} | change
     with pytest.raises(ArgumentError, match=message):
-        local_polynomial_response(U, U, FS, **options)  # type: ignore[arg-type]
+        local_response(U, U, FS, **options)  # type: ignore[arg-type]
 
 
 def test_bad_records_are_refused() -> None:
     with pytest.raises(RecordError, match="the record has 15 samples"):
-        local_polynomial_response(U[:15], U[:15], FS, band=(20.0, 60.0))
+        local_response(U[:15], U[:15], FS, band=(20.0, 60.0))
     with pytest.raises(RecordError, match=r"u is constant at 0\.1"):
-        local_polynomial_response(np.full(777, 0.1), U[:777], FS, band=BAND)
+        local_response(np.full(777, 0.1), U[:777], FS, band=BAND)
     with pytest.raises(RecordError, match="u has 2000 samples and y has 1999"):
-        local_polynomial_response(U, U[:-1], FS, band=BAND)
+        local_response(U, U[:-1], FS, band=BAND)
     with pytest.raises(ArgumentError, match="fs is 0"):
-        local_polynomial_response(U, U, 0.0, band=BAND)
+        local_response(U, U, 0.0, band=BAND)

@@ -25,7 +25,7 @@ from hmpim.identify.effects.saturation import Saturation
 from hmpim.identify.fitting.fit import Fit, Problem, fit_structure
 from hmpim.identify.noise.whiteness import is_white
 
-__all__ = ["CensoredFit", "censored_covariance", "fit_censored", "fit_held"]
+__all__ = ["CensoredFit", "fit_censored"]
 
 _LARGEST_STEP = 0.5
 """Most that a parameter of the dynamics may change in one step, relative to its size above 1."""
@@ -177,83 +177,6 @@ def fit_censored(
             data = _levels_again(data, state)
             state = _evaluated(data, state.fit, state.log_sigma) or state
     return _finished(data, state, converged)
-
-
-def fit_held(problem: Problem, fit: Fit, arrivals: Updates) -> CensoredFit:
-    """Fit one structure to an output that is held between updates.
-
-    The delay found is that of the values, without the time for which they are held: a fit
-    that knows nothing of the hold finds about half the hold's period more.
-
-    Parameters
-    ----------
-    problem : Problem
-        The data.
-    fit : Fit
-        Where to start, and the structure: a fit that knows nothing of the hold does.
-    arrivals : Updates
-        From `hmpim.identify.effects.hold.updates`.
-
-    Raises
-    ------
-    RecordError
-        If there are fewer updates than parameters.
-
-    Examples
-    --------
-    >>> from hmpim.identify.effects.hold import detect_hold, updates
-    >>> from hmpim.model import STRUCTURES, prepare_input
-    >>> time = np.arange(2000) / 200
-    >>> taken = np.floor(time * 60 + 1e-9) / 60  # a sensor of 60 Hz recorded at 200 Hz
-    >>> u, y = np.sin(time * (1 + time)), np.sin((taken - 0.02) * (1 + taken - 0.02))
-    >>> data = Problem(source=prepare_input(u, "bandlimited"), y=y, valid=None, longest_delay=50)
-    >>> arrivals = updates(detect_hold(y, 200.0), 2000, 200.0)
-    >>> plain = fit_structure(data, STRUCTURES["static"], np.array([5.0]))
-    >>> held = fit_held(data, plain, arrivals)
-    >>> round(plain.delay / 200, 3), round(held.fit.delay / 200, 3)
-    (0.028, 0.019)
-
-    When between two samples the sensor reads, such a record cannot tell better:
-
-    >>> round(float(held.covariance[0, 0]) ** 0.5 / 200, 4)
-    0.0005
-    """
-    return fit_censored(problem, fit, None, arrivals=arrivals)
-
-
-def censored_covariance(
-    problem: Problem,
-    censored: CensoredFit,
-    saturation: Saturation | None,
-    *,
-    arrivals: Updates | None = None,
-    white: bool,
-) -> Real:
-    """Covariance of `theta` and `linear` of a fit to a clipped or held output.
-
-    The inverse of the observed information if the noise is white; else the sandwich, with
-    the colour of the generalised residual (C. Gourieroux, A. Monfort, E. Renault and
-    A. Trognon, Journal of Econometrics 34, 1987).
-
-    Parameters
-    ----------
-    problem, censored, saturation, arrivals
-        As given to and returned by `fit_censored`.
-    white : bool
-        Whether to take the noise as white.
-
-    Returns
-    -------
-    ndarray, shape (p, p)
-        Infinite where the record does not see a direction.
-    """
-    data = _data(problem, saturation, arrivals)
-    sigma = censored.noise_std * _shrink(censored.index.size, censored.fit)
-    state = _evaluated(data, censored.fit, float(np.log(sigma)))
-    size = censored.covariance.shape[0]
-    if state is None:
-        return np.full((size, size), np.inf)
-    return _with_age(_covariance(state, white=white)[:size, :size], data)
 
 
 def _data(

@@ -2,7 +2,6 @@
 
 local           one record: local polynomials and rational functions, chosen by the data
 neighbours, polynomial, rational, choice   the parts of it
-averaged        H1, H2, Hv over segments or repeats, with coherence
 multivariable   several inputs at once
 gaps            outputs with gaps
 """

@@ -1,28 +1,22 @@
 """Cross- and autocorrelation, and the delay at the peak (paper, equations 8 and 10)."""
 
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 import scipy
 from numpy.typing import ArrayLike, NDArray
 
-from hmpim.errors import ArgumentError, RecordError
+from hmpim.errors import RecordError
 from hmpim.identify.arrays import Real
-from hmpim.identify.signals import as_pair, as_signal, check_rate
+from hmpim.identify.signals import as_pair, as_signal
 
 __all__ = [
     "Correlation",
     "CorrelationPeak",
-    "Polarity",
     "autocorrelation",
     "correlation_peak",
     "cross_correlation",
-    "delay_by_correlation",
 ]
-
-Polarity = Literal["auto", "positive", "negative"]
-"""Which extreme of a correlation counts as its peak."""
 
 # A trough is taken for the peak only where it is this much deeper than the peak is high:
 # a narrow-band signal has troughs nearly as deep as its peak beside it.
@@ -61,7 +55,9 @@ def cross_correlation(x: ArrayLike, y: ArrayLike) -> Correlation:
     FFT, with zeros enough that nothing wraps around.
 
     With y(n-k) as printed, a `y` that is `x` delayed peaks at a negative lag: to read a
-    delay as positive, pass the later signal first, as `delay_by_correlation` does.
+    delay as positive, pass the later signal first. Its peak then is the paper's delay, a whole
+    number of samples: the pure delay plus what the dynamics add, 170 ms for the system of
+    Fig. 17, whose pure delay is 150 ms.
 
     Parameters
     ----------
@@ -119,20 +115,17 @@ def autocorrelation(x: ArrayLike) -> Correlation:
     return cross_correlation(array, array)
 
 
-def correlation_peak(correlation: Correlation, *, polarity: Polarity = "auto") -> CorrelationPeak:
+def correlation_peak(correlation: Correlation) -> CorrelationPeak:
     """Return the peak of a correlation over the lags 0 to a quarter of their number.
 
     Only lags k >= 0 count, since an output cannot come before its cause, and only those at
-    which at least half of the record overlaps.
+    which at least half of the record overlaps. The peak is the highest value, as in the paper,
+    unless the lowest is 1.25 times as far from zero: then the device turns the sign.
 
     Parameters
     ----------
     correlation : Correlation
         Of the output with the input, in this order.
-    polarity : {'auto', 'positive', 'negative'}
-        'positive' takes the highest value, as the paper does; 'negative' the lowest, for a
-        device that turns the sign; 'auto' the highest, unless the lowest is 1.25 times as
-        far from zero.
 
     Returns
     -------
@@ -156,56 +149,5 @@ def correlation_peak(correlation: Correlation, *, polarity: Polarity = "auto") -
     # What the FFT leaves of an exact zero is rounding, not correlation.
     if np.max(np.abs(value)) == 0:
         raise RecordError("the correlation is zero at every lag; one of the signals is dead")
-    match polarity:
-        case "positive":
-            lag = high
-        case "negative":
-            lag = low
-        case "auto":
-            lag = low if -value[low] > _TROUGH_MARGIN * max(value[high], 0.0) else high
-        case _:
-            raise ArgumentError(f"polarity is {polarity!r}; give auto, positive or negative")
+    lag = low if -value[low] > _TROUGH_MARGIN * max(value[high], 0.0) else high
     return CorrelationPeak(lag=lag, value=float(value[lag]))
-
-
-def delay_by_correlation(
-    u: ArrayLike, y: ArrayLike, fs: float, *, polarity: Polarity = "auto"
-) -> float:
-    """Return the paper's processing delay: the lag at which equation (8) peaks.
-
-    It is a whole number of samples, and it is the pure delay plus what the dynamics add:
-    170 ms for the system of the paper's Fig. 17, whose pure delay is 150 ms. Equation (8) is
-    used with the measurement first, R(k) = (1/N) Σ y(n) u(n-k), so that a late output has a
-    positive delay. Only lags from zero to half the record are searched.
-
-    Parameters
-    ----------
-    u, y : array_like, shape (n,)
-        Input and output on one clock, any units.
-    fs : float
-        Sampling rate, Hz.
-    polarity : {'auto', 'positive', 'negative'}
-        As in `correlation_peak`.
-
-    Returns
-    -------
-    float
-        Delay in s, not negative, a multiple of 1/fs.
-
-    Raises
-    ------
-    RecordError
-        For unequal lengths, fewer than four samples, NaN or infinity, or dead signals.
-    ArgumentError
-        If `fs` is not positive.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> u = np.sin(np.arange(200) ** 2 / 500)
-    >>> delay_by_correlation(u, np.roll(u, 7), fs=100.0)
-    0.07
-    """
-    check_rate(fs)
-    first, second = as_pair(u, y)
-    return correlation_peak(cross_correlation(second, first), polarity=polarity).lag / fs
