@@ -1,4 +1,4 @@
-"""Records of one stimulus done together, where the parameters alone are asked for.
+"""Records of one stimulus done together.
 
 The first records of a stimulus are identified one by one; what they share is learnt from them
 (`hmpim.identify.fleets`) and kept in the process for the tasks that follow. A record for which that
@@ -8,8 +8,10 @@ the first alone is made a `Record`: the others are compared with it, sample by s
 
 import hashlib
 import time
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass, field, replace
+from itertools import chain, pairwise
 from typing import Any
 
 import numpy as np
@@ -17,13 +19,15 @@ from numpy.typing import NDArray
 
 from hmpim.batch.reading import Read, recorded
 from hmpim.batch.request import Request
-from hmpim.batch.rows import Row, fleet_table
+from hmpim.batch.rows import Row, fleet_table, rows_of
 from hmpim.batch.samples import Samples
-from hmpim.identify import PairIdentification, excited_band
+from hmpim.identify import Identification, PairIdentification, excited_band
 from hmpim.identify.fleets.fleet import Fleet, fit_fleet, learn_fleet
+from hmpim.identify.fleets.whole import Whole, learn_whole, whole_pairs
 from hmpim.identify.kept import keeping
+from hmpim.identify.result import RecordSummary
 from hmpim.identify.threads import one_thread
-from hmpim.record import Record
+from hmpim.record import Record, uniform
 
 __all__ = ["One", "Together", "identified_together"]
 
@@ -35,7 +39,9 @@ _KEPT = 8
 _CLOCK = 1e-6
 """Share of a sample by which a stamp may be off a uniform clock."""
 
-_FLEETS: dict[str, Fleet | None] = {}
+_FLEETS: dict[str, Fleet | Whole | None] = {}
+"""What records of a stimulus share, by its digest: beyond their parameters if all is kept."""
+
 _FIRST: dict[str, list[PairIdentification | None]] = {}
 """What `identify` said of the first records of a stimulus, by its digest."""
 
@@ -116,20 +122,43 @@ def identified_together(
         Columns of metadata.
     """
     groups, single = _grouped(items, request)
-    rows = [row for read in single for row in one(read)[0]]
+    rows = list(_in_turn(single, one))
     tables: list[Any] = []
     for group in groups:
         left = list(range(len(group.items)))
         with keeping():
             if group.key not in _FLEETS:
                 left = _learn_from(group, request, one, rows)
-            fleet = _FLEETS.get(group.key)
-            if fleet is not None and left:
-                table, left = _by_fleet(fleet, group, left, request, told=told, metadata=metadata)
+            shared = _FLEETS.get(group.key)
+            if isinstance(shared, Whole) and left:
+                found, left = _everything(shared, group, left, request, told=told)
+                rows += found
+            elif isinstance(shared, Fleet) and left:
+                table, left = _by_fleet(shared, group, left, request, told=told, metadata=metadata)
                 tables.append(table)
             for i in left:
                 rows += one(_read(group.items[i], request))[0]
     return Together(rows=rows, tables=tables)
+
+
+def _in_turn(reads: Iterable[Read], one: One) -> Iterator[Row]:
+    """Identify one after the other, what follows from an input kept while the next has it too."""
+    with ExitStack() as scope:
+        for read, after in pairwise(chain(reads, [None])):
+            assert read is not None
+            shared = _same_inputs(read, after)
+            if shared:
+                scope.enter_context(keeping())
+            yield from one(read)[0]
+            if not shared:
+                scope.close()
+
+
+def _same_inputs(one: Read, other: Read | None) -> bool:
+    if other is None or one.record is None or other.record is None:
+        return False
+    first, second = ([c.values for c in r.inputs] for r in (one.record, other.record))
+    return len(first) == len(second) and all(map(np.array_equal, first, second))
 
 
 def _grouped(items: Sequence[Read | Samples], request: Request) -> tuple[list[_Group], list[Read]]:
@@ -171,7 +200,7 @@ def _learn_from(group: _Group, request: Request, one: One, rows: list[Row]) -> l
         first.append(pair)
     if worth and len(first) >= _LEARNT_FROM:
         pairs = [pair for pair in first[:_LEARNT_FROM] if pair is not None]
-        _keep(_FLEETS, group.key, _learnt(group.record, pairs))
+        _keep(_FLEETS, group.key, _learnt(group.record, pairs, whole=request.keep == "results"))
     else:
         _keep(_FIRST, group.key, first)
     return list(range(min(needed, count), count))
@@ -207,6 +236,43 @@ def _by_fleet(
     return table, [i for i, sound in zip(some, fit.sound.tolist(), strict=True) if not sound]
 
 
+def _everything(
+    whole: Whole, group: _Group, some: list[int], request: Request, *, told: Told
+) -> tuple[list[Row], list[int]]:
+    """Rows of the records that can be done together, with all that is said; and the others."""
+    begin = time.thread_time()
+    record, items = group.record, [group.items[i] for i in some]
+    outputs = np.stack([group.outputs[i] for i in some])
+    names = (record.inputs[0], record.outputs[0])
+    with one_thread():
+        fit = fit_fleet(whole.fleet, outputs, units=(names[0].unit, names[1].unit))
+        pairs = whole_pairs(
+            whole,
+            fit,
+            outputs,
+            names=(names[0].name, names[1].name),
+            findings=uniform(record).findings,
+        )
+    digests = _digests(record, items, outputs, request)
+    seconds = (time.thread_time() - begin) / len(items)
+    rows: list[Row] = []
+    left: list[int] = []
+    for i, item, pair, digest in zip(some, items, pairs, digests, strict=True):
+        own = item.record if isinstance(item, Read) else record
+        if pair is None or own is None or own.findings != record.findings:
+            left.append(i)
+            continue
+        result = Identification(
+            record=RecordSummary(
+                fs=record.fs, samples=record.samples, sha256=digest, source=own.source
+            ),
+            pairs=(replace(pair, stopping=own.stopping),),
+        )
+        read = Read(address=item.address, record=record, metadata=told(item))
+        rows += rows_of(read, result, seconds=seconds, whole=True)
+    return rows, left
+
+
 def _digests(
     record: Record,
     items: Sequence[Read | Samples],
@@ -224,11 +290,14 @@ def _digests(
     return told
 
 
-def _learnt(record: Record, pairs: Sequence[PairIdentification]) -> Fleet | None:
+def _learnt(
+    record: Record, pairs: Sequence[PairIdentification], *, whole: bool
+) -> Fleet | Whole | None:
     u = record.inputs[0].values
     band = record.band or excited_band(u, record.fs)
     with one_thread():
-        return learn_fleet(u, pairs, fs=record.fs, band=band)
+        fleet = learn_fleet(u, pairs, fs=record.fs, band=band)
+        return learn_whole(fleet, pairs) if whole and fleet is not None else fleet
 
 
 def _keep(known: dict[str, Any], key: str, value: Any) -> None:

@@ -1,24 +1,19 @@
 """One task: some records read, identified, and written as one part."""
 
 import time
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import ExitStack
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import chain, pairwise
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from hmpim.batch.addresses import Address
-from hmpim.batch.alike import One, Together, identified_together
+from hmpim.batch.alike import Together, identified_together
 from hmpim.batch.parts import PARTS, part_name, write_part
-from hmpim.batch.reading import Read, read_items, recorded
+from hmpim.batch.reading import Read, read_items
 from hmpim.batch.request import Request
 from hmpim.batch.rows import Row, failed, rows_of, table_of
 from hmpim.batch.samples import Samples, reason_of
 from hmpim.identify import PairIdentification, identify
-from hmpim.identify.kept import keeping
 
 __all__ = ["Done", "Task", "do_task", "give_up"]
 
@@ -124,30 +119,7 @@ def _found(task: Task, items: Sequence[Read | Samples]) -> Together:
     def one(read: Read) -> tuple[Sequence[Row], PairIdentification | None]:
         return _identified(replace(read, metadata=told(read)), task.request)
 
-    if task.request.keep == "parameters":
-        return identified_together(items, task.request, one, told=told, metadata=task.metadata)
-    reads = (item if isinstance(item, Read) else recorded(item, task.request) for item in items)
-    return Together(rows=list(_in_turn(reads, one)), tables=())
-
-
-def _in_turn(reads: Iterable[Read], one: One) -> Iterator[Row]:
-    """Identify one after the other, what follows from an input kept while the next has it too."""
-    with ExitStack() as scope:
-        for read, after in pairwise(chain(reads, [None])):
-            assert read is not None
-            shared = _same_inputs(read, after)
-            if shared:
-                scope.enter_context(keeping())
-            yield from one(read)[0]
-            if not shared:
-                scope.close()
-
-
-def _same_inputs(one: Read, other: Read | None) -> bool:
-    if other is None or one.record is None or other.record is None:
-        return False
-    first, second = ([c.values for c in r.inputs] for r in (one.record, other.record))
-    return len(first) == len(second) and all(map(np.array_equal, first, second))
+    return identified_together(items, task.request, one, told=told, metadata=task.metadata)
 
 
 def _table(found: Together, task: Task) -> Any:

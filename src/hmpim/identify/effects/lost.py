@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from hmpim.identify.arrays import Mask, Real
 from hmpim.identify.worth import FEW, MUCH, PART
 
-__all__ = ["find_frozen", "find_repeated", "find_spikes", "stands_out"]
+__all__ = ["find_frozen", "find_repeated", "find_spikes", "stand_out", "stands_out"]
 
 _FAR = 8.0
 """Standard deviations, by the samples around it, from which a sample is a spike."""
@@ -42,8 +42,14 @@ def stands_out(residual: Real) -> bool:
     >>> stands_out(noise), stands_out(np.append(noise, 20.0))
     (False, True)
     """
-    away = np.abs(residual - np.median(residual))
-    return bool(away.max() > _FAR * 1.4826 * np.median(away) > 0.0)
+    return bool(stand_out(residual))
+
+
+def stand_out(residuals: Real) -> Mask:
+    """The same of many residuals, shape (..., n): which of them, shape (...)."""
+    away = np.abs(residuals - np.median(residuals, axis=-1, keepdims=True))
+    bulk = np.median(away, axis=-1)
+    return np.asarray((away.max(axis=-1) > _FAR * 1.4826 * bulk) & (bulk > 0.0))
 
 
 def find_spikes(y: Real, prediction: Real, *, clipped: Mask | None = None) -> Mask | None:

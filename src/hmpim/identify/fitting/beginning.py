@@ -18,12 +18,12 @@ from hmpim.identify.worth import FEW, PART
 from hmpim.model.sampled import MARGIN
 from hmpim.record import Intersample
 
-__all__ = ["begins_of", "count_in", "in_motion", "look_again"]
+__all__ = ["REACH", "RINGS", "begins_of", "count_in", "in_motion", "look_again", "stand_out_of"]
 
-_REACH = 4
+REACH = 4
 """Samples by which what lies between the samples reaches back: half of a spline's support."""
 
-_RINGS = 8
+RINGS = 8
 """Samples about a corner over which a spline through it rings."""
 
 _FIRST = 8
@@ -72,7 +72,7 @@ def begins_of(problem: Problem, fit: Fit, *, lag: int) -> int | None:
     the cross-correlation, `lag`, is the later one, and costs a few samples.
     """
     latest = max(fit.delay, float(lag) if lag <= problem.y.size * PART else 0.0, 0.0)
-    begins = int(np.ceil(latest)) + _REACH
+    begins = int(np.ceil(latest)) + REACH
     if begins > longest_lag(problem.y.size) or fit.objective <= 0.0:
         return None
     late = np.arange(problem.y.size) >= begins
@@ -123,7 +123,7 @@ def look_again(problem: Problem, trial: Trial, seen: Seen, *, lag: int) -> Seen 
     innovations = problem.innovations(trial.fit.prediction, trial.fit.residual)
     if trial.intersample == "bandlimited":
         late = np.arange(count) - trial.fit.delay
-        reach = _RINGS if problem.source.oversampling == 1 else MARGIN
+        reach = RINGS if problem.source.oversampling == 1 else MARGIN
         ringing = (np.abs(late) <= reach) | (late >= count - 1 - reach)
         if _stands_out(innovations, told & ringing, told & ~ringing):
             return replace(seen, valid=~ringing if seen.valid is None else seen.valid & ~ringing)
@@ -146,11 +146,30 @@ def _counts(problem: Problem) -> Mask:
 
 def _stands_out(innovations: Real, some: Mask, others: Mask) -> bool:
     """Whether some samples hold more than the noise that the others show."""
-    if not some.any() or not others.any():
-        return False
-    level = float(np.median(innovations[others] ** 2)) / 0.455  # of a squared Gaussian
-    limit = _TWICE * level * float(scipy.special.chdtri(int(np.count_nonzero(some)), FALSE_ALARM))
-    return float(np.sum(innovations[some] ** 2)) > limit
+    told = some | others
+    return bool(stand_out_of(innovations[told][None], some[told][None])[0])
+
+
+def stand_out_of(innovations: Real, some: Mask) -> Mask:
+    """Which residuals hold more in some samples than the noise that their others show.
+
+    Parameters
+    ----------
+    innovations : ndarray, shape (k, n)
+        Residuals, whitened.
+    some : ndarray of bool, shape (k, n)
+        The samples that are asked for; the others tell the noise.
+    """
+    squares = innovations**2
+    counts = np.count_nonzero(some, axis=1)
+    told = (counts > 0) & (counts < some.shape[1])
+    level = np.zeros(some.shape[0])
+    for count in np.unique(counts[told]):  # as many others: one array
+        alike = told & (counts == count)
+        others = squares[alike][~some[alike]].reshape(-1, some.shape[1] - count)
+        level[alike] = np.median(others, axis=1) / 0.455  # of a squared Gaussian
+    limit = _TWICE * level * scipy.special.chdtri(np.maximum(counts, 1), FALSE_ALARM)
+    return np.asarray(told & (np.sum(squares * some, axis=1) > limit))
 
 
 def _memory(fits: list[Fit]) -> int:

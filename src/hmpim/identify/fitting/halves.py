@@ -14,7 +14,7 @@ import scipy
 
 from hmpim.identify.arrays import Real
 
-__all__ = ["Halves", "compare_halves"]
+__all__ = ["Halves", "compare_halves", "halves_of"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -53,25 +53,41 @@ def compare_halves(rows: Real, residual: Real, y: Real, *, share: float) -> Halv
     >>> compare_halves(rows, drifting + 0.1 * rows[0], drifting, share=1.0).probability < 1e-6
     True
     """
-    n = residual.size
-    variance = float(residual @ residual) / max(n - rows.shape[0], 1)
-    statistic, degrees, owed = 0.0, 0, 0.0
+    probability, owed = halves_of(rows[None], residual[None], y[None], share=share)
+    return Halves(probability=float(probability[0]), owed=float(owed[0]))
+
+
+def halves_of(rows: Real, residual: Real, y: Real, *, share: float) -> tuple[Real, Real]:
+    """Compare the halves of many fits; probabilities and what is owed, shape (k,), as `Halves`.
+
+    Parameters
+    ----------
+    rows : ndarray, shape (k, p, n)
+        Derivatives of the predictions.
+    residual, y : ndarray, shape (k, n)
+        What is left over, and the outputs.
+    share : float
+        Independent samples per sample.
+    """
+    count, p, n = rows.shape
+    tiny = np.finfo(float).tiny
+    variance = np.vecdot(residual, residual) / max(n - p, 1)
+    statistic, degrees, owed = np.zeros(count), np.zeros(count), np.zeros(count)
     for half in (slice(0, n // 2), slice(n // 2, n)):
-        part, left, out = rows[:, half], residual[half], y[half]
-        slope = part @ left
-        gram = part @ part.T
-        scale = np.sqrt(np.maximum(np.diag(gram), np.finfo(float).tiny))
-        values, vectors = np.linalg.eigh(gram / np.outer(scale, scale))
-        seen = values > 1e-8 * values[-1]
-        gained = float(np.sum((vectors.T @ (slope / scale))[seen] ** 2 / values[seen]))
-        gained = min(gained, float(left @ left))
+        part, left, out = rows[:, :, half], residual[:, half], y[:, half]
+        slope = (part @ left[:, :, None])[:, :, 0]
+        gram = part @ part.transpose(0, 2, 1)
+        scale = np.sqrt(np.maximum(np.einsum("iaa->ia", gram), tiny))
+        values, vectors = np.linalg.eigh(gram / (scale[:, :, None] * scale[:, None, :]))
+        seen = values > 1e-8 * values[:, -1:]
+        along = (vectors.transpose(0, 2, 1) @ (slope / scale)[:, :, None])[:, :, 0]
+        gained = np.sum(np.where(seen, along**2 / np.where(seen, values, 1.0), 0.0), axis=1)
+        gained = np.minimum(gained, np.vecdot(left, left))
         statistic += gained
-        degrees += int(np.count_nonzero(seen))
-        spread = float(np.sum((out - out.mean()) ** 2))
-        owed = max(owed, float(np.sqrt(gained / spread)) if spread else 0.0)
-    if variance == 0.0:
-        return Halves(probability=1.0, owed=0.0)
-    free = max(degrees - rows.shape[0], 1)
-    return Halves(
-        probability=float(scipy.special.chdtrc(free, share * statistic / variance)), owed=owed
-    )
+        degrees += np.count_nonzero(seen, axis=1)
+        spread = np.sum((out - out.mean(axis=1, keepdims=True)) ** 2, axis=1)
+        owed = np.maximum(owed, np.sqrt(gained / np.where(spread > 0, spread, np.inf)))
+    told = variance > 0
+    free = np.maximum(degrees - p, 1)
+    chance = scipy.special.chdtrc(free, share * statistic / np.where(told, variance, 1.0))
+    return np.where(told, chance, 1.0), np.where(told, owed, 0.0)

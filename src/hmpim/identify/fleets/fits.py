@@ -13,8 +13,9 @@ from numpy.typing import NDArray
 from hmpim.identify.arrays import Mask, Real
 from hmpim.identify.fitting.data import shifted
 from hmpim.identify.fleets.learnt import Fleet, Member
+from hmpim.identify.fleets.surface import Surface
 
-__all__ = ["Errors", "Fits", "errors_of", "fitted_all"]
+__all__ = ["Errors", "Fits", "descended", "errors_of", "fitted_all"]
 
 Flags = Mask
 
@@ -71,7 +72,7 @@ def fitted_all(fleet: Fleet, centred: Real, means: Real, power: Real) -> list[Fi
 def _fitted(fleet: Fleet, member: Member, z: Real, means: Real, power: Real, start: Real) -> Fits:
     """Fit all records under one assumption."""
     outside = np.maximum(power - _dots(z, z), 0.0)
-    theta = _descended(fleet, member, z, outside, start)
+    theta = descended(member.surface, z, outside, start, samples=fleet.u.size)
     value = member.surface.values(theta)
     g = value[:, :-1]
     gain = _dots(z, g) / _dots(g, g)
@@ -142,22 +143,35 @@ def errors_of(fleet: Fleet, fit: Fits, some: NDArray[np.intp]) -> Errors:
     )
 
 
-def _descended(fleet: Fleet, member: Member, z: Real, outside: Real, start: Real) -> Real:
+def descended(surface: Surface, z: Real, outside: Real, start: Real, *, samples: int) -> Real:
     """Gauss-Newton for all records at once, the gain solved exactly at each step.
 
     A record that has arrived is left out of what follows.
+
+    Parameters
+    ----------
+    surface : Surface
+        Places in a basis, and the mean in the last column, of responses of unit gain.
+    z : ndarray, shape (k, r)
+        The records in that basis.
+    outside : ndarray, shape (k,)
+        Power outside of it.
+    start : ndarray, shape (k, p)
+        Where to begin.
+    samples : int
+        Of a record.
     """
-    low, high = member.surface.low, member.surface.high
+    low, high = surface.low, surface.high
     best, least = start.copy(), np.full(z.shape[0], np.inf)
     theta, step, share = start.copy(), np.zeros_like(start), np.ones(z.shape[0])
     on = np.arange(z.shape[0])
     for _ in range(_STEPS):
-        cost, fresh, gained = _step(member, theta, z[on], outside[on])
+        cost, fresh, gained = _step(surface, theta, z[on], outside[on])
         better = cost < least[on]
         best[on[better]], least[on[better]] = theta[better], cost[better]
         step = np.where(better[:, None], fresh, step)
         share = np.where(better, 1.0, share / 4)
-        stay = gained >= _NEGLIGIBLE * cost / fleet.u.size
+        stay = gained >= _NEGLIGIBLE * cost / samples
         on, step, share = on[stay], step[stay], share[stay]
         if on.size == 0:
             break
@@ -165,9 +179,9 @@ def _descended(fleet: Fleet, member: Member, z: Real, outside: Real, start: Real
     return best
 
 
-def _step(member: Member, theta: Real, z: Real, outside: Real) -> tuple[Real, Real, Real]:
+def _step(surface: Surface, theta: Real, z: Real, outside: Real) -> tuple[Real, Real, Real]:
     """Cost of each record, the step from there, and by how much it lowers the cost."""
-    value, slope = member.surface.at(theta)
+    value, slope = surface.at(theta)
     g, dg = value[:, :-1], slope[:, :, :-1]
     square = _dots(g, g)
     gain = _dots(z, g) / square

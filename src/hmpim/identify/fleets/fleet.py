@@ -26,7 +26,7 @@ from hmpim.identify.chance import CLEARLY, DEVIATIONS, FALSE_ALARM, LIKELIER, ON
 from hmpim.identify.effects.imperfections import find_imperfections
 from hmpim.identify.fleets.fits import Errors, Fits, errors_of, fitted_all
 from hmpim.identify.fleets.learnt import Fleet, Member, learn_fleet
-from hmpim.identify.fleets.pole import with_tails
+from hmpim.identify.fleets.pole import Tails, with_tails
 from hmpim.identify.judgement.between_samples import SHIFT, SIZES, WIDE
 from hmpim.identify.noise.misfit import misfits
 from hmpim.identify.noise.whiteness import are_white
@@ -35,7 +35,7 @@ from hmpim.identify.result import Estimate, Parameters
 from hmpim.identify.result.error_bars import noise_estimate
 from hmpim.record import Intersample
 
-__all__ = ["Column", "Fleet", "FleetFit", "fit_fleet", "learn_fleet"]
+__all__ = ["Column", "Fleet", "FleetFit", "Group", "fit_fleet", "learn_fleet"]
 
 Flags = Mask
 
@@ -94,6 +94,44 @@ _ENDS = ("value", "std", "low", "high")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Group:
+    """Records for which one assumption is taken; k of them.
+
+    Parameters
+    ----------
+    fit : Fits
+        All records under that assumption.
+    some : integer ndarray, shape (k,)
+        Which they are.
+    others : sequence of (Fits, ndarray of bool)
+        All records under each other assumption, and of which of these it stays possible.
+    errors : Errors
+        What the fit leaves uncertain.
+    residual : ndarray, shape (k, n)
+        What it leaves over.
+    alone, spanned : mapping of str to Column
+        Figures with intervals of this fit alone, and such as cover all that stays possible.
+    tails : mapping of int to Tails
+        Of those that ask for one more pole, by their place among these.
+    sound : ndarray of bool, shape (k,)
+        As in `FleetFit`.
+    codes : sequence of tuple of str
+        As in `FleetFit`.
+    """
+
+    fit: Fits
+    some: NDArray[np.intp]
+    others: list[tuple[Fits, Flags]]
+    errors: Errors
+    residual: Real
+    alone: dict[str, Column]
+    spanned: dict[str, Column]
+    tails: dict[int, Tails]
+    sound: Flags
+    codes: list[tuple[str, ...]]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class FleetFit:
     """Parameters of many records.
 
@@ -110,6 +148,8 @@ class FleetFit:
         would move the delay and is not excluded, 'structure' where one more pole is as likely.
     fit_percent : ndarray, shape (N,)
         100 (1 - ||y - ŷ|| / ||y - mean y||).
+    groups : tuple of Group
+        The records by the assumption that is taken, and all that was found on the way.
     """
 
     columns: Mapping[str, Column]
@@ -117,6 +157,7 @@ class FleetFit:
     intersample: tuple[Intersample, ...]
     codes: tuple[tuple[str, ...], ...]
     fit_percent: Real
+    groups: tuple[Group, ...]
 
     def parameters(self, i: int) -> Parameters | None:
         """Return those of one record; None if it is not sound."""
@@ -151,6 +192,7 @@ def fit_fleet(fleet: Fleet, outputs: Real, *, units: tuple[str, str] = ("", ""))
     columns = {name: Column.empty(count, _unit(name, units)) for name in names}
     sound = np.zeros(count, dtype=bool)
     codes: list[tuple[str, ...]] = [()] * count
+    groups: list[Group] = []
     for k, fit in enumerate(fits):
         some = np.flatnonzero(chosen == k)
         if some.size == 0:
@@ -160,10 +202,12 @@ def fit_fleet(fleet: Fleet, outputs: Real, *, units: tuple[str, str] = ("", ""))
             for j, rival in enumerate(fits)
             if j != k
         ]
-        told, sound[some], said = _told(fleet, fit, some, open_, outputs[some], units)
-        for name, column in told.items():
-            columns[name].put(some, column, sound[some])
-        for i, own in zip(some.tolist(), said, strict=True):
+        group = _told(fleet, fit, some, open_, outputs[some], units)
+        groups.append(group)
+        sound[some] = group.sound
+        for name, column in group.spanned.items():
+            columns[name].put(some, column, group.sound)
+        for i, own in zip(some.tolist(), group.codes, strict=True):
             codes[i] = own
     cost = np.choose(chosen, [fit.cost for fit in fits])
     return FleetFit(
@@ -172,6 +216,7 @@ def fit_fleet(fleet: Fleet, outputs: Real, *, units: tuple[str, str] = ("", ""))
         intersample=tuple(fleet.members[k].intersample for k in chosen.tolist()),
         codes=tuple(codes),
         fit_percent=100.0 * (1.0 - np.sqrt(cost / np.maximum(power, np.finfo(float).tiny))),
+        groups=tuple(groups),
     )
 
 
@@ -195,7 +240,7 @@ def _told(
     others: list[tuple[Fits, Flags]],
     outputs: Real,
     units: tuple[str, str],
-) -> tuple[dict[str, Column], Flags, list[tuple[str, ...]]]:
+) -> Group:
     """Parameters of some records under the assumption that is taken; which are sound; what is said.
 
     The records are `some` of those fitted; `others` tells which other assumptions stay possible.
@@ -221,12 +266,14 @@ def _told(
     sound[sound] = _is_continuous(outputs[sound], fleet.fs)
     alone, spanned = _columns(fleet, fit, some, others, errors, units)
     codes = [("intersample",) * moved for moved in apart.tolist()]
+    asking: dict[int, Tails] = {}
     for i in np.flatnonzero(sound & (asked > _ASKS)).tolist():
         own = Parameters(**{name: column.estimate(i) for name, column in alone.items()})
         tails = with_tails(fleet, fit.member, theta[i], outputs[i], own, highest=highest)
         sound[i] = tails is not None
         if tails is not None and tails.open:
             codes[i] = ("structure", *codes[i])
+            asking[i] = tails
             _widen(spanned, i, own, tails.parameters)
     for name in SIZES:
         if name in spanned:
@@ -236,7 +283,18 @@ def _told(
             beyond = spanned[name].value > highest
             for end in _ENDS:
                 getattr(spanned[name], end)[beyond] = np.nan
-    return spanned, sound, codes
+    return Group(
+        fit=fit,
+        some=some,
+        others=others,
+        errors=errors,
+        residual=residual,
+        alone=alone,
+        spanned=spanned,
+        tails=asking,
+        sound=sound,
+        codes=codes,
+    )
 
 
 def _columns(

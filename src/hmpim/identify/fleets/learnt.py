@@ -25,7 +25,7 @@ from hmpim.model.dynamics import STRUCTURES, Structure
 from hmpim.model.sampled import SampledInput, prepare_input
 from hmpim.record import BETWEEN, Intersample
 
-__all__ = ["Fleet", "Member", "box_around", "learn_fleet", "theta_at"]
+__all__ = ["Fleet", "Member", "box_around", "is_alike", "learn_fleet", "spanning", "theta_at"]
 
 
 _DEGREE = 9
@@ -134,7 +134,7 @@ def learn_fleet(
         Excited band in Hz.
     """
     structure = STRUCTURES["second_order"]
-    plain = [pair for pair in pairs if _is_plain(pair)]
+    plain = [pair for pair in pairs if is_alike(pair)]
     modes = [pair.intersample for pair in plain]
     found = max(BETWEEN, key=modes.count)
     alike = [pair for pair in plain if pair.intersample == found]
@@ -164,7 +164,7 @@ def learn_fleet(
     )
 
 
-def _is_plain(pair: PairIdentification) -> bool:
+def is_alike(pair: PairIdentification) -> bool:
     """Whether nothing but its structure, clearly, is said of a unit."""
     if pair.structure != "second_order":  # of a simpler one, a second pole is never clearly absent
         return False
@@ -277,6 +277,33 @@ def _member(u: Real, structure: Structure, mode: Intersample, low: Real, high: R
         lost=float(left + np.linalg.norm(surface.error)),
         source=source,
     )
+
+
+def spanning(
+    source: SampledInput, structure: Structure, low: Real, high: Real, *, degree: int
+) -> tuple[Real, Surface]:
+    """Basis and surface of what one structure makes of a stimulus, by the fit's own parameters.
+
+    Parameters
+    ----------
+    source : SampledInput
+        The stimulus, prepared.
+    structure : Structure
+        Which.
+    low, high : ndarray, shape (p,)
+        Corners of the box.
+    degree : int
+        Of the polynomial.
+    """
+    size = source.samples
+    problem = Problem(source=source, y=np.zeros(size), valid=None, longest_delay=float(size))
+    places = places_in(low, high, degree)
+    rows = np.stack([Part(problem, structure, p).driven(np.ones(1)) for p in places])
+    means = rows.mean(axis=1, keepdims=True)
+    rows -= means
+    basis = _basis_of(rows)
+    values = np.hstack([rows @ basis.T, means])
+    return basis, Surface.fitted(low, high, places, values, degree=degree)
 
 
 def _basis_of(rows: Real) -> Real:

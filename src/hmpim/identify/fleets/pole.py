@@ -34,10 +34,13 @@ class Tails:
         With intervals that cover it.
     open : bool
         Whether it is as likely, but for its price; if not, they are what they were.
+    delay : float
+        The delay with one more pole, in s.
     """
 
     parameters: Parameters
     open: bool
+    delay: float = 0.0
 
 
 def with_tails(
@@ -89,4 +92,8 @@ def with_tails(
         rivals=growth.rivals,
         hidden=growth.hidden,
     )
-    return Tails(parameters=spanned(own, joint, fs=fleet.fs, highest=highest), open=True)
+    return Tails(
+        parameters=spanned(own, joint, fs=fleet.fs, highest=highest),
+        open=True,
+        delay=growth.rivals[0].fit.delay / fleet.fs,
+    )

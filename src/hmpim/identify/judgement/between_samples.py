@@ -1,11 +1,13 @@
 """Other assumptions on what the input does between its samples, and what they would move."""
 
+from collections.abc import Iterable
+
 from hmpim.identify.judgement.evidence import Evidence, structure_in_words
 from hmpim.identify.reading.spanned import rivals_of
 from hmpim.identify.result.groups import PHASE_SPLIT
-from hmpim.record import Finding
+from hmpim.record import Finding, Intersample
 
-__all__ = ["SHIFT", "SIZES", "WIDE", "other_intersample", "wide_span"]
+__all__ = ["SHIFT", "SIZES", "WIDE", "other_intersample", "undetermined_between", "wide_span"]
 
 SHIFT = 0.05
 """Difference of the delay, in samples, from which another assumption is worth a word."""
@@ -33,20 +35,42 @@ _WORDS = {"zoh": "held", "foh": "linear", "bandlimited": "band-limited"}
 def other_intersample(evidence: Evidence) -> tuple[Finding, ...]:
     """Name the assumptions that fit as well: the intervals cover them."""
     best = evidence.joint.best
+    rivals = [
+        (
+            trial.intersample,
+            trial.fit.delay - best.fit.delay,
+            trial.fit.structure.name if trial.fit.structure.name != best.fit.structure.name else "",
+        )
+        for trial in rivals_of(evidence.joint)
+    ]
+    return undetermined_between(best.intersample, rivals)
+
+
+def undetermined_between(
+    taken: Intersample, rivals: Iterable[tuple[Intersample, float, str]]
+) -> tuple[Finding, ...]:
+    """Name the assumptions that fit as well as the one that is taken, if they move the delay.
+
+    Parameters
+    ----------
+    taken : {'zoh', 'foh', 'bandlimited'}
+        The assumption that is taken.
+    rivals : iterable of (intersample, float, str)
+        Each that fits as well, by how many samples it moves the delay, and the structure that
+        goes with it if that is another one, else empty.
+    """
     moves = []
-    for trial in rivals_of(evidence.joint):
-        apart = trial.fit.delay - best.fit.delay
-        other = trial.fit.structure.name != best.fit.structure.name
+    for mode, apart, other in rivals:
         if other or abs(apart) > SHIFT:
-            model = f" with a {structure_in_words(trial.fit.structure.name)} model" if other else ""
-            moves.append(f"{_WORDS[trial.intersample]}{model} by {apart:+.2f} samples")
+            model = f" with a {structure_in_words(other)} model" if other else ""
+            moves.append(f"{_WORDS[mode]}{model} by {apart:+.2f} samples")
     if not moves:
         return ()
     return (
         Finding(
             code="intersample",
             message="This record cannot tell what the input does between its samples. "
-            f"{_WORDS[best.intersample].capitalize()} is assumed; the delay would move if it is "
+            f"{_WORDS[taken].capitalize()} is assumed; the delay would move if it is "
             f"{', and if '.join(moves)}. The intervals cover this. State it with intersample=.",
             severity="info",
             parameters=_SHIFTED,

@@ -15,7 +15,7 @@ from hmpim.identify.kept import kept
 from hmpim.identify.result.groups import MODELLED
 from hmpim.record import Finding
 
-__all__ = ["feedback"]
+__all__ = ["chances_of_an_answer", "feedback"]
 
 
 _AHEAD = 12
@@ -43,13 +43,7 @@ def feedback(evidence: Evidence) -> tuple[Finding, ...]:
     inside = inside if counts is None else inside[counts[inside]]
     if inside.size < 10 * _AHEAD:
         return ()
-    own = _future_of(u, inside)
-    if not own.size.size:
-        return ()
-    cross = _products_with(u, left, inside)
-    along = own.direction.T @ (cross[_FUTURE] - own.told.T @ cross[_PAST])
-    gained = float(np.sum(along**2 / own.size)) / float(left[inside].var())
-    if scipy.special.chdtrc(own.size.size, gained) > FALSE_ALARM:
+    if float(chances_of_an_answer(u, left[None], inside)[0]) > FALSE_ALARM:
         return ()
     coloured = not evidence.readings.white
     return (
@@ -63,6 +57,33 @@ def feedback(evidence: Evidence) -> tuple[Finding, ...]:
             parameters=MODELLED,
         ),
     )
+
+
+def chances_of_an_answer(u: Real, left: Real, inside: NDArray[np.intp] | None = None) -> Real:
+    """Chance, for each of many residuals, that no answer of the input makes what is seen.
+
+    Parameters
+    ----------
+    u : ndarray, shape (n,)
+        The input.
+    left : ndarray, shape (k, n)
+        What models leave over of outputs to it.
+    inside : integer ndarray, optional
+        Samples that count; all that have as many neighbours as are looked at by default.
+
+    Returns
+    -------
+    ndarray, shape (k,)
+        1 where the input's past tells all of its future.
+    """
+    inside = np.arange(_AHEAD, u.size - _AHEAD) if inside is None else inside
+    own = _future_of(u, inside)
+    if not own.size.size:
+        return np.ones(left.shape[0])
+    cross = _products_with(u, left, inside)
+    along = own.direction.T @ (cross[_FUTURE] - own.told.T @ cross[_PAST])
+    gained = np.sum(along**2 / own.size[:, None], axis=0) / left[:, inside].var(axis=1)
+    return np.asarray(scipy.special.chdtrc(own.size.size, gained))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -87,10 +108,10 @@ def _future_of(u: Real, inside: NDArray[np.intp]) -> _Future:
 
 
 def _products_with(u: Real, left: Real, inside: NDArray[np.intp]) -> Real:
-    """Products of a constant and an input's lags, past first, with what is left."""
-    cross = np.zeros(2 * _AHEAD + 2)
+    """Products of a constant and an input's lags, past first, with what is left, (lags, k)."""
+    cross = np.zeros((2 * _AHEAD + 2, left.shape[0]))
     for rows, some in _lags_of(u, inside):
-        cross += rows @ left[some]
+        cross += rows @ left[:, some].T
     return cross
 
 

@@ -1,6 +1,7 @@
 """What lies outside the band, before the record's start or beyond its end."""
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 import scipy
@@ -25,6 +26,7 @@ __all__ = [
     "natural_frequency_beyond",
     "negative_delay",
     "short_record",
+    "unreached",
     "windowed_power",
 ]
 
@@ -161,16 +163,18 @@ def beyond_band(evidence: Evidence) -> tuple[Finding, ...]:
     missing = [(words, name) for words, name in asked if getattr(p, name) is None]
     if structure.integrators or structure.dc_zeros or not missing:
         return ()
-    return (
-        Finding(
-            code="beyond_band",
-            message="Not reached within the excited band, which ends at "
-            f"{evidence.band[1]:.4g} Hz: "
-            + ", ".join(words for words, _ in missing)
-            + ". Sweep higher to measure it.",
-            severity="info",
-            parameters=tuple(name for _, name in missing),
-        ),
+    return (unreached(missing, band_end=evidence.band[1]),)
+
+
+def unreached(missing: Sequence[tuple[str, str]], *, band_end: float) -> Finding:
+    """Name the bandwidths, in words and as fields, that a band with this end in Hz cannot tell."""
+    return Finding(
+        code="beyond_band",
+        message=f"Not reached within the excited band, which ends at {band_end:.4g} Hz: "
+        + ", ".join(words for words, _ in missing)
+        + ". Sweep higher to measure it.",
+        severity="info",
+        parameters=tuple(name for _, name in missing),
     )
 
 

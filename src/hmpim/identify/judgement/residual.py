@@ -9,6 +9,7 @@ from hmpim.identify.chance import DEVIATIONS, FALSE_ALARM
 from hmpim.identify.fitting.halves import compare_halves
 from hmpim.identify.judgement.evidence import Evidence, structure_in_words
 from hmpim.identify.judgement.reach import windowed_power
+from hmpim.identify.kept import kept
 from hmpim.identify.noise.colour import noise_colour
 from hmpim.identify.noise.input_noise import input_noise
 from hmpim.identify.result.groups import GAIN, MODELLED
@@ -18,6 +19,7 @@ from hmpim.record import Finding
 
 __all__ = [
     "coloured_noise",
+    "folded_power",
     "halves_disagree",
     "lack_of_fit",
     "noise_colour_of",
@@ -198,17 +200,12 @@ def unsampled_input(evidence: Evidence) -> tuple[Finding, ...]:
     What lies beyond, by the fall of its spectrum over the last octave, is folded into the band and
     answered there; it is no noise of the sensor.
     """
-    joint, size = evidence.joint, evidence.u.size
-    if joint.best.intersample != "bandlimited" or size < _FEWEST:
+    if evidence.joint.best.intersample != "bandlimited":
         return ()
-    power = windowed_power(evidence.u)
-    octave = power.size // 16
-    low, high = power[7 * octave : 8 * octave].mean(), power[-octave:].mean()
-    steep = float(np.log2(low / high)) if high > 0.0 else 0.0
-    if steep < 1.0:  # as white noise, or none at all
+    folded = folded_power(evidence.u, evidence.fs)
+    if not folded.any():
         return ()
-    frequency = np.arange(1, power.size) / size * evidence.fs
-    folded = high * (2.0 * (1.0 - frequency / evidence.fs)) ** -steep
+    frequency = np.arange(1, folded.size + 1) / evidence.u.size * evidence.fs
     answered = np.abs(response(evidence.readings.system, frequency)) ** 2
     noise = float(np.mean(_counted(evidence) ** 2))
     share = float(folded @ answered) / noise if noise > 0.0 else 0.0
@@ -224,6 +221,32 @@ def unsampled_input(evidence: Evidence) -> tuple[Finding, ...]:
             parameters=("noise_std",),
         ),
     )
+
+
+@kept
+def folded_power(u: Real, fs: float) -> Real:
+    """Power that an input has beyond half the rate, at the frequencies into which it is folded.
+
+    By the fall of its spectrum over the last octave; all 0 where there is none to be told.
+
+    Parameters
+    ----------
+    u : ndarray, shape (n,)
+        The input.
+    fs : float
+        Rate in Hz.
+    """
+    power = windowed_power(u)
+    nothing = np.zeros(power.size - 1)
+    if u.size < _FEWEST:
+        return nothing
+    octave = power.size // 16
+    low, high = power[7 * octave : 8 * octave].mean(), power[-octave:].mean()
+    steep = float(np.log2(low / high)) if high > 0.0 else 0.0
+    if steep < 1.0:  # as white noise, or none at all
+        return nothing
+    frequency = np.arange(1, power.size) / u.size * fs
+    return np.asarray(high * (2.0 * (1.0 - frequency / fs)) ** -steep)
 
 
 def _counted(evidence: Evidence) -> Real:

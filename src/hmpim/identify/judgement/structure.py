@@ -8,7 +8,7 @@ from hmpim.identify.result.groups import PHASE_SPLIT
 from hmpim.identify.worth import TOLERATED
 from hmpim.record import Finding
 
-__all__ = ["missed_pole", "other_order"]
+__all__ = ["barely_told", "missed_pole", "other_order"]
 
 
 def other_order(evidence: Evidence) -> tuple[Finding, ...]:
@@ -17,17 +17,35 @@ def other_order(evidence: Evidence) -> tuple[Finding, ...]:
     if not joint.rivals:
         return ()
     rival = joint.rivals[0].fit
-    poles, chosen = rival.structure.order, joint.best.fit.structure.name
     return (
-        Finding(
-            code="structure",
-            message=f"This record barely distinguishes {poles - 1} from {poles} poles. A "
-            f"{structure_in_words(chosen)} model is taken; with one more pole the delay would be "
-            f"{rival.delay / evidence.fs:.4g} s. The intervals cover this. Lower the noise, or "
-            "sweep higher, to tell.",
-            severity="info",
-            parameters=PHASE_SPLIT,
+        barely_told(
+            joint.best.fit.structure.name,
+            poles=rival.structure.order,
+            delay=rival.delay / evidence.fs,
         ),
+    )
+
+
+def barely_told(chosen: str, *, poles: int, delay: float) -> Finding:
+    """Say that a structure with one more pole is as likely as the chosen one.
+
+    Parameters
+    ----------
+    chosen : str
+        The structure that is taken.
+    poles : int
+        Of the one with one more.
+    delay : float
+        That it has, in s.
+    """
+    return Finding(
+        code="structure",
+        message=f"This record barely distinguishes {poles - 1} from {poles} poles. A "
+        f"{structure_in_words(chosen)} model is taken; with one more pole the delay would be "
+        f"{delay:.4g} s. The intervals cover this. Lower the noise, or "
+        "sweep higher, to tell.",
+        severity="info",
+        parameters=PHASE_SPLIT,
     )
 
 

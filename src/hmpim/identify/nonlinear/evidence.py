@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from hmpim.identify.arrays import Real
+from hmpim.identify.arrays import Mask, Real
 from hmpim.identify.chance import FALSE_ALARM, LIKELIER, searched
 from hmpim.identify.fitting.fit import Fit, Problem, jacobian
 from hmpim.identify.noise.whiteness import is_white
@@ -20,7 +20,7 @@ from hmpim.identify.nonlinear.mechanisms import Mechanism, compare_mechanisms
 from hmpim.identify.nonlinear.sweep_phase import SweepPhase, sweep_phase
 from hmpim.identify.worth import MUCH, PART
 
-__all__ = ["Look", "Seen", "look_at", "plainer_of", "thinned"]
+__all__ = ["Look", "Seen", "are_curved", "look_at", "plainer_of", "thinned"]
 
 _GAIN = searched(36)
 """Log-likelihood that a trace must bring; in linear systems the best of all reaches 7."""
@@ -198,22 +198,44 @@ def _curved(fit: Fit, problem: Problem) -> bool:
     """Whether a white residual follows square, cube or direction of the linear model's output."""
     counted = slice(None) if problem.valid is None else problem.valid
     x = fit.prediction - fit.linear[-1]
-    size = float(np.std(x))
-    if size == 0:
-        return False
-    step = np.gradient(x)
-    traces = np.stack([np.ones_like(x), x, step, x**2, x**3 / size, np.sign(step) * size])
-    rows, e = traces[:, counted], fit.residual[counted]
-    scale = np.sqrt(np.einsum("ij,ij->i", rows, rows))
-    gram = rows @ rows.T / np.outer(scale, scale)
-    moment = rows @ e / scale
+    return bool(are_curved(x[None], fit.residual[None], counted)[0])
+
+
+def are_curved(models: Real, residuals: Real, counted: Mask | slice = slice(None)) -> Mask:
+    """Which white residuals follow square, cube or direction of what their linear models say.
+
+    Parameters
+    ----------
+    models : ndarray, shape (k, n)
+        Outputs of the models, without bias.
+    residuals : ndarray, shape (k, n)
+        What they leave over.
+    counted : ndarray of bool, shape (n,), or slice
+        Samples that count.
+
+    Returns
+    -------
+    ndarray of bool, shape (k,)
+    """
+    size = np.std(models, axis=1)
+    told, e = size > 0, residuals[:, counted]
+    size = np.where(told, size, 1.0)[:, None]
+    step = np.gradient(models, axis=1)
+    traces = np.stack(
+        [np.ones_like(models), models, step, models**2, models**3 / size, np.sign(step) * size],
+        axis=1,
+    )
+    rows = traces[:, :, counted]
+    scale = np.sqrt(np.vecdot(rows, rows))
+    scale = np.where(scale > 0, scale, 1.0)
+    gram = rows @ rows.transpose(0, 2, 1) / (scale[:, :, None] * scale[:, None, :])
+    moment = (rows @ e[:, :, None])[:, :, 0] / scale
     # What each gains beside a constant, the output, and its rate.
-    mixed = np.linalg.solve(gram[:3, :3] + 1e-9 * np.eye(3), gram[:3, 3:])
-    left = 1.0 - np.einsum("ij,ij->j", mixed, gram[:3, 3:])
-    taken = (moment[3:] - mixed.T @ moment[:3]) ** 2
-    told = left > 1e-6
-    needed = 2 * np.log(1 / FALSE_ALARM) * float(e @ e) / e.size
-    return bool(np.any(taken[told] > needed * left[told]))
+    mixed = np.linalg.solve(gram[:, :3, :3] + 1e-9 * np.eye(3), gram[:, :3, 3:])
+    left = 1.0 - np.einsum("kij,kij->kj", mixed, gram[:, :3, 3:])
+    taken = (moment[:, 3:] - np.einsum("kij,ki->kj", mixed, moment[:, :3])) ** 2
+    needed = 2 * np.log(1 / FALSE_ALARM) * np.vecdot(e, e)[:, None] / e.shape[1]
+    return np.asarray(told & np.any((left > 1e-6) & (taken > needed * left), axis=1))
 
 
 def _lines(u: Real, problem: Problem) -> Lines | None:

@@ -20,7 +20,7 @@ from hmpim.model.response import (
     RationalDelay,
 )
 
-__all__ = ["Readings", "read_parameters"]
+__all__ = ["Readings", "from_lag", "read_parameters"]
 
 
 _ROUNDING = 1e-13
@@ -129,7 +129,7 @@ def read_parameters(
         units=(input_unit, output_unit),
     )
     return Readings(
-        parameters=replace(parameters, delay_correlation=_from_lag(delay_correlation, fs)),
+        parameters=replace(parameters, delay_correlation=from_lag(delay_correlation, fs)),
         system=system,
         vector=vector,
         covariance=cov,
@@ -178,7 +178,7 @@ def _wandering(cov: Real, residual: Real, counted: int) -> Real:
     return np.asarray(cov * np.outer(stretch, stretch))
 
 
-def _from_lag(delay: float | None, fs: float) -> Estimate | None:
+def from_lag(delay: float | None, fs: float) -> Estimate | None:
     """The paper's delay is a whole number of samples: uniform over one sample."""
     if delay is None:
         return None

@@ -1,0 +1,201 @@
+"""Which records of a fleet `identify` would say nothing more of: its own tests, for all at once.
+
+A fit of all together tells parameters; that nothing else is to be said takes the tests that
+`identify` makes of what a fit leaves over. Here each is made for all records of a group by the
+same functions, with the same chances. A record for which any of them is not clearly quiet is for
+`identify` itself, so that no finding is lost and none is made up.
+"""
+
+from collections.abc import Iterator
+
+import numpy as np
+import scipy
+from numpy.typing import NDArray
+
+from hmpim.identify.arrays import Complex, Mask, Real
+from hmpim.identify.chance import EXCLUDED, FALSE_ALARM
+from hmpim.identify.effects.lost import stand_out
+from hmpim.identify.fitting.beginning import REACH, RINGS, stand_out_of
+from hmpim.identify.fitting.halves import halves_of
+from hmpim.identify.fleets.fleet import Fleet, Group
+from hmpim.identify.judgement.feedback import chances_of_an_answer
+from hmpim.identify.judgement.residual import folded_power
+from hmpim.identify.kept import kept
+from hmpim.identify.nonlinear.evidence import are_curved
+from hmpim.identify.nonlinear.harmonics import any_harmonic
+from hmpim.identify.nonlinear.sweep_phase import SweepPhase
+from hmpim.identify.signals import longest_lag
+from hmpim.identify.worth import FEW, MUCH, PART
+from hmpim.model.sampled import MARGIN
+
+__all__ = ["are_quiet"]
+
+Places = NDArray[np.intp]
+
+_AT_ONCE = 16
+"""Records whose derivatives are held at once."""
+
+_TOLD = ("scale_factor", "natural_frequency", "damping_ratio", "bandwidth_phase90",
+         "bandwidth_phase90_without_delay", "bandwidth_3db")  # fmt: skip
+"""Figures whose deviation is held against them."""
+
+_BLURRED = 2.0
+"""Deviation of the delay, in samples, up to which it is always known well enough."""
+
+
+def are_quiet(
+    fleet: Fleet, group: Group, outputs: Real, *, behind: Real, sweep: SweepPhase | None
+) -> Mask:
+    """Return which records of a group give no test of `identify` anything to say.
+
+    Parameters
+    ----------
+    fleet : Fleet
+        What the records share.
+    group : Group
+        Of k records.
+    outputs : ndarray, shape (k, n)
+        Theirs.
+    behind : ndarray, shape (k, s)
+        Least sums of squares that simpler structures leave of each.
+    sweep : SweepPhase or None
+        The stimulus' phase, if it is a sweep.
+
+    Returns
+    -------
+    ndarray of bool, shape (k,)
+    """
+    quiet = group.sound & _is_told(fleet, group, behind)
+    lags, ahead = _lags(fleet.u, outputs)
+    quiet &= ~ahead & ~stand_out(group.residual)
+    for test in (_unfolded, _unanswered):
+        some = np.flatnonzero(quiet)
+        quiet[some] = test(fleet, group, some)
+    some = np.flatnonzero(quiet)
+    quiet[some] = _linear(fleet, group, some, sweep)
+    some = np.flatnonzero(quiet)
+    for part, rows in _derivatives(fleet, group, some):
+        left = group.residual[part]
+        chance, owed = halves_of(rows, left, outputs[part], share=1.0)
+        quiet[part] = (chance >= FALSE_ALARM) | (owed <= FEW)
+        quiet[part] &= _from_rest(fleet, group, part, rows, lags[part])
+    return np.asarray(quiet)
+
+
+def _is_told(fleet: Fleet, group: Group, behind: Real) -> Mask:
+    """Where each figure is known well enough, and no simpler structure comes near."""
+    fit, fs, n = group.fit, fleet.fs, fleet.u.size
+    cost = fit.cost[group.some]
+    told = n * np.log(behind / cost[:, None]).min(axis=1) > 2 * EXCLUDED
+    for name in _TOLD:
+        if name in group.alone:
+            column = group.alone[name]
+            told &= column.std <= MUCH * np.abs(column.value)
+    delay = group.alone["delay"]
+    told &= (delay.value > 0) & (delay.std <= np.maximum(_BLURRED / fs, MUCH * delay.value))
+    # The slower of two poles, 1 + 2ζ s/ω + s²/ω².
+    omega, zeta = np.exp(fit.theta[group.some, 1:].T)
+    slowest = (zeta + np.sqrt(np.maximum(zeta**2 - 1.0, 0.0))) / omega
+    slowest = np.where(zeta < 1.0, 1.0 / (zeta * omega), slowest)
+    told &= np.maximum(fit.theta[group.some, 0], 0.0) + 5.0 * slowest <= n
+    return np.asarray(told & (slowest <= MUCH * n))
+
+
+def _lags(u: Real, outputs: Real) -> tuple[Places, Mask]:
+    """Lag of the greatest likeness of each output, and whether it is greater ahead."""
+    longest = longest_lag(u.size)
+    length = scipy.fft.next_fast_len(u.size + longest + 1, real=True)
+    spectra = scipy.fft.rfft(outputs - outputs.mean(axis=1, keepdims=True), length)
+    likeness = np.abs(scipy.fft.irfft(np.conj(_transform(u, length)) * spectra, length))
+    late, early = likeness[:, : longest + 1], likeness[:, length - longest :]
+    return late.argmax(axis=1), early.max(axis=1) >= late.max(axis=1)
+
+
+@kept
+def _transform(u: Real, length: int) -> Complex:
+    return np.asarray(scipy.fft.rfft(u - u.mean(), length), dtype=np.complex128)
+
+
+def _unfolded(fleet: Fleet, group: Group, some: Places) -> Mask:
+    """Where what the stimulus does beyond half the rate is certainly no part of the noise."""
+    if group.fit.member.intersample != "bandlimited":
+        return np.ones(some.size, dtype=bool)
+    which = group.some[some]
+    peak = 10 ** (np.maximum(group.fit.figures["peak_gain_db"][which], 0.0) / 10)
+    most = float(folded_power(fleet.u, fleet.fs).sum()) * group.fit.gain[which] ** 2 * peak
+    return np.asarray(most <= 2 * FEW * group.fit.cost[which] / fleet.u.size)
+
+
+def _unanswered(fleet: Fleet, group: Group, some: Places) -> Mask:
+    """Where the stimulus answers nothing of the noise."""
+    return np.asarray(chances_of_an_answer(fleet.u, group.residual[some]) > FALSE_ALARM)
+
+
+def _linear(fleet: Fleet, group: Group, some: Places, sweep: SweepPhase | None) -> Mask:
+    """Where nothing of the residual is what a linear system cannot make."""
+    quiet = np.ones(some.size, dtype=bool)
+    for at in range(0, some.size, _AT_ONCE):
+        part = some[at : at + _AT_ONCE]
+        which = group.some[part]
+        values = group.fit.member.surface.values(group.fit.theta[which])
+        # Without the bias: as the model itself has it, its mean included.
+        models = values[:, :-1] @ group.fit.member.basis + values[:, -1:]
+        models *= group.fit.gain[which, None]
+        quiet[at : at + _AT_ONCE] = ~are_curved(models, group.residual[part])
+    if sweep is not None:
+        for k in np.flatnonzero(quiet):
+            delay = float(group.fit.theta[group.some[some[k]], 0]) / fleet.fs
+            residual = group.residual[some[k]]
+            quiet[k] = any_harmonic(residual, sweep, fleet.fs, delay=delay) > FALSE_ALARM
+    return quiet
+
+
+def _derivatives(fleet: Fleet, group: Group, some: Places) -> Iterator[tuple[Places, Real]]:
+    """Some records, and the derivatives of their predictions, shape (k, 5, n)."""
+    for at in range(0, some.size, _AT_ONCE):
+        part = some[at : at + _AT_ONCE]
+        rows = np.empty((part.size, group.errors.rows.shape[1] + 1, fleet.u.size))
+        rows[:, :-1] = group.errors.rows[part] @ group.fit.member.basis
+        rows[:, -1] = 1.0
+        yield part, rows
+
+
+def _from_rest(fleet: Fleet, group: Group, part: Places, rows: Real, lags: Places) -> Mask:
+    """Where the record begins at rest, as `hmpim.identify.fitting.beginning` asks it.
+
+    Neither what comes before the first answer is more than noise, nor what rings at the ends, nor
+    is there a free response.
+    """
+    n = fleet.u.size
+    left, which = group.residual[part], group.some[part]
+    delay = group.fit.theta[which, 0]
+    lag = np.where(lags <= PART * n, lags, 0)
+    begins = np.ceil(np.maximum(np.maximum(delay, lag), 0.0)).astype(np.intp) + REACH
+    at = np.arange(n)
+    early = at < begins[:, None]
+    quiet = (begins <= longest_lag(n)) & ~stand_out_of(left, early)
+    if group.fit.member.intersample == "bandlimited":
+        away = at - delay[:, None]
+        reach = RINGS if group.fit.member.source.oversampling == 1 else MARGIN
+        ringing = (np.abs(away) <= reach) | (away >= n - 1 - reach)
+        quiet &= ~stand_out_of(left, ringing)
+    omega, zeta = np.exp(group.fit.theta[which, 1:].T)
+    since = np.maximum(at - begins[:, None], 0)
+    turn = omega * np.sqrt(zeta**2 - 1.0 + 0j)
+    decay = -(zeta * omega)[:, None] * since
+    both = np.exp(decay + turn[:, None] * since) + np.exp(decay - turn[:, None] * since)
+    apart = np.exp(decay + turn[:, None] * since) - np.exp(decay - turn[:, None] * since)
+    free = np.stack([both.real, (apart / turn[:, None]).real], axis=1)
+    late = np.concatenate([rows, free], axis=1) * ~early[:, None, :]
+    left = left * ~early
+    gram = late @ late.transpose(0, 2, 1)
+    scale = np.sqrt(np.maximum(np.einsum("iaa->ia", gram), np.finfo(float).tiny))
+    gram /= scale[:, :, None] * scale[:, None, :]
+    slope = (late @ left[:, :, None])[:, :, 0] / scale
+    inverse = np.linalg.pinv(gram, rcond=1e-12, hermitian=True)
+    gained = np.einsum("ia,iab,ib->i", slope, inverse, slope)
+    power = np.vecdot(left, left)
+    count = n - begins
+    rest = np.maximum(power - gained, np.finfo(float).tiny)
+    statistic = count * np.log(np.maximum(power, np.finfo(float).tiny) / rest)
+    return np.asarray(quiet & (statistic <= scipy.special.chdtri(2, FALSE_ALARM)))

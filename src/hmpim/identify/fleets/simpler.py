@@ -1,0 +1,135 @@
+"""Simpler structures beside that of a fleet, fitted to all its records at once.
+
+`hmpim.identify` weighs them against the one that is chosen, and says by how much they are behind.
+What such a structure makes of one stimulus is a surface of one or two parameters, held as
+`hmpim.identify.fleets.learnt` holds that of the fleet.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from hmpim.identify.arrays import Real
+from hmpim.identify.fitting.candidates import fit_plain
+from hmpim.identify.fitting.fit import fit_structure
+from hmpim.identify.fitting.rows import Problem
+from hmpim.identify.fitting.start import rough_response
+from hmpim.identify.fleets.fits import descended
+from hmpim.identify.fleets.learnt import Fleet, box_around, spanning
+from hmpim.identify.fleets.surface import Surface
+from hmpim.identify.result import PairIdentification
+from hmpim.identify.signals import longest_lag
+from hmpim.model.dynamics import STRUCTURES, Structure, StructureName
+from hmpim.model.sampled import prepare_input
+from hmpim.record import Intersample
+
+__all__ = ["Simpler", "costs_of", "learn_simpler"]
+
+_DEGREE = 9
+
+_LEAST = (0.02, 0.005)
+"""Deviations between units that are allowed for anyway: samples, and the logarithm of a time."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Simpler:
+    """One structure that is weighed against that of the fleet.
+
+    Parameters
+    ----------
+    structure : Structure
+        Which.
+    intersample : {'zoh', 'foh', 'bandlimited'}
+        What the stimulus does between its samples.
+    basis : ndarray, shape (r, n)
+        Orthonormal, each row without mean.
+    surface : Surface
+        As of a `Member`, a function of the fit's own parameters.
+    """
+
+    structure: Structure
+    intersample: Intersample
+    basis: Real
+    surface: Surface
+
+
+def learn_simpler(
+    fleet: Fleet, pairs: Sequence[PairIdentification], outputs: Sequence[Real]
+) -> tuple[Simpler, ...] | None:
+    """Learn where the simpler structures lie; None where records were held against different ones.
+
+    Parameters
+    ----------
+    fleet : Fleet
+        What the records share.
+    pairs : sequence of PairIdentification
+        What `identify` said of some of them.
+    outputs : sequence of ndarray, shape (n,)
+        Of these.
+    """
+    tried = [
+        frozenset(
+            (c.structure, c.intersample)
+            for c in pair.candidates
+            if c.structure != fleet.structure.name
+        )
+        for pair in pairs
+    ]
+    if not tried or any(one != tried[0] for one in tried):
+        return None
+    if any(mode != fleet.natural for _, mode in tried[0]):
+        return None
+    names: tuple[StructureName, ...] = tuple(n for n in STRUCTURES if n in {s for s, _ in tried[0]})
+    if any(STRUCTURES[name].order > 1 or STRUCTURES[name].parameters > 5 for name in names):
+        return None
+    places = [_places(fleet, output, names) for output in outputs]
+    return tuple(
+        _learnt(fleet, STRUCTURES[name], np.array([own[name] for own in places])) for name in names
+    )
+
+
+def _places(fleet: Fleet, y: Real, names: tuple[StructureName, ...]) -> dict[str, Real]:
+    """Where the fit of each structure ends for one output."""
+    longest = longest_lag(y.size)
+    problem = Problem(
+        source=prepare_input(fleet.u, fleet.natural), y=y, valid=None, longest_delay=longest + 2.0
+    )
+    rough = rough_response(fleet.u, y, longest_delay=longest)
+    fits = fit_plain(problem, rough, (fleet.structure.name, *names))
+    return {
+        fit.structure.name: fit_structure(problem, fit.structure, fit.theta, precision=1e-6).theta
+        for fit in fits
+        if fit.structure.name in names
+    }
+
+
+def _learnt(fleet: Fleet, structure: Structure, places: Real) -> Simpler:
+    low, high = box_around(places, np.array(_LEAST[: places.shape[1]]))
+    source = prepare_input(fleet.u, fleet.natural)
+    basis, surface = spanning(source, structure, low, high, degree=_DEGREE)
+    return Simpler(structure=structure, intersample=fleet.natural, basis=basis, surface=surface)
+
+
+def costs_of(fleet: Fleet, one: Simpler, centred: Real, power: Real) -> Real:
+    """Least sum of squares that a simpler structure leaves of each output, shape (k,).
+
+    Parameters
+    ----------
+    fleet : Fleet
+        What the records share.
+    one : Simpler
+        The structure.
+    centred : ndarray, shape (k, n)
+        Outputs less their means.
+    power : ndarray, shape (k,)
+        Sums of their squares.
+    """
+    z = centred @ one.basis.T
+    outside = np.maximum(power - np.vecdot(z, z), 0.0)
+    surface = one.surface
+    start = np.tile((surface.low + surface.high) / 2, (z.shape[0], 1))
+    theta = descended(surface, z, outside, start, samples=fleet.u.size)
+    g = surface.values(theta)[:, :-1]
+    taken = np.vecdot(z, g) ** 2 / np.vecdot(g, g)
+    return np.asarray(np.maximum(power - taken, 0.0))

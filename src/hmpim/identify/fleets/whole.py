@@ -1,0 +1,298 @@
+"""Everything that `identify` says, of the records of a fleet of which nothing else is to be said.
+
+The parameters are those of `fleet.py`; `quiet.py` makes the tests. What is left is read off as
+`hmpim.identify.pair` reads it: the measured response and its bandwidths, the paper's steps, and
+what simpler structures leave. Those are the only candidates there are: a record that asks for
+richer ones is not quiet.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields
+
+import numpy as np
+
+from hmpim.identify.arrays import Real
+from hmpim.identify.chance import DEVIATIONS
+from hmpim.identify.fleets.fleet import Column, Fleet, FleetFit, Group, fit_fleet
+from hmpim.identify.fleets.learnt import is_alike
+from hmpim.identify.fleets.quiet import are_quiet
+from hmpim.identify.fleets.simpler import Simpler, costs_of, learn_simpler
+from hmpim.identify.frf.local import local_response
+from hmpim.identify.judgement.between_samples import undetermined_between
+from hmpim.identify.judgement.reach import count_lines, unreached
+from hmpim.identify.judgement.structure import barely_told
+from hmpim.identify.judgement.verdict import judged
+from hmpim.identify.noise.input_noise import input_noise
+from hmpim.identify.nonlinear.lines import find_period
+from hmpim.identify.nonlinear.sweep_phase import SweepPhase, sweep_phase
+from hmpim.identify.reading.bandwidth import response_bandwidths
+from hmpim.identify.reading.readings import from_lag
+from hmpim.identify.result import (
+    Candidate,
+    Estimate,
+    Nonlinearity,
+    PairIdentification,
+    Parameters,
+    ResponseBandwidths,
+)
+from hmpim.identify.section_iv.paper import paper_estimates
+from hmpim.identify.worth import TOLERATED, WORTH
+from hmpim.model import RationalDelay
+from hmpim.record import Finding
+
+__all__ = ["Whole", "learn_whole", "whole_pairs"]
+
+_LONGEST = 32768
+"""Samples of a record that `identify` looks at one by one."""
+
+_SPARE = 6
+"""Figures that the lines of a stimulus must tell: four of a second-order model, and two more."""
+
+_APART = 0.05
+"""Standard deviations by which a figure of a unit that was learnt from may be off."""
+
+_BANDWIDTHS = (
+    ("-90° frequency", "bandwidth_phase90"),
+    ("-90° frequency without delay", "bandwidth_phase90_without_delay"),
+    ("-3 dB frequency", "bandwidth_3db"),
+)
+
+_NOTHING = Nonlinearity(share=0.0, even=0.0, odd=0.0, noise=1.0, linear=0.0, nonlinear=0.0)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Whole:
+    """What the records of a fleet share beyond their parameters.
+
+    Parameters
+    ----------
+    fleet : Fleet
+        The parameters' part.
+    simpler : tuple of Simpler
+        Structures that are weighed against that of the fleet.
+    sweep : SweepPhase or None
+        The stimulus' phase, if it is a sweep.
+    """
+
+    fleet: Fleet
+    simpler: tuple[Simpler, ...]
+    sweep: SweepPhase | None
+
+
+def learn_whole(fleet: Fleet, pairs: Sequence[PairIdentification]) -> Whole | None:
+    """Learn from some units what everything takes; None where each must be asked by itself.
+
+    What is learnt is held against what it is learnt from: where anything is said of these units
+    that `identify` did not say, nothing is learnt.
+
+    Parameters
+    ----------
+    fleet : Fleet
+        From `learn_fleet`.
+    pairs : sequence of PairIdentification
+        What `identify` said of some units.
+    """
+    u, fs = fleet.u, fleet.fs
+    sweep = sweep_phase(u, fs)
+    noise = input_noise(u, fs, band=fleet.band)
+    if u.size > _LONGEST or (sweep is None and find_period(u) is not None):
+        return None
+    if 2 * count_lines(u) < _SPARE or (noise is not None and noise.attenuation > WORTH):
+        return None
+    known = [pair for pair in pairs if is_alike(pair)]
+    outputs = [output for pair in known if (output := _output(pair)) is not None]
+    if not known or len(outputs) < len(known):
+        return None
+    simpler = learn_simpler(fleet, known, outputs)
+    if not simpler:
+        return None
+    whole = Whole(fleet=fleet, simpler=simpler, sweep=sweep)
+    every = np.stack(outputs)
+    again = whole_pairs(whole, fit_fleet(fleet, every), every)
+    told = [own is None or _is_said(own, pair) for own, pair in zip(again, known, strict=True)]
+    return whole if all(told) else None
+
+
+def _output(pair: PairIdentification) -> Real | None:
+    if pair.prediction is None or pair.residual is None:
+        return None
+    return np.asarray(pair.prediction + pair.residual)
+
+
+def _is_said(own: PairIdentification, pair: PairIdentification) -> bool:
+    """Whether what all together say of a unit is what was said of it alone."""
+    if own.intersample != pair.intersample or own.verdict != pair.verdict:
+        return False
+    if not {w.code for w in pair.warnings} >= {w.code for w in own.warnings}:
+        return False
+    for name in (field.name for field in fields(Parameters)):
+        one, other = getattr(own.parameters, name), getattr(pair.parameters, name)
+        if (one is None) != (other is None):
+            return False
+        if one is None or other is None:
+            continue
+        if abs(one.value - other.value) > _APART * other.spread:
+            return False
+    return True
+
+
+def whole_pairs(
+    whole: Whole,
+    fit: FleetFit,
+    outputs: Real,
+    *,
+    names: tuple[str, str] = ("u", "y"),
+    findings: tuple[Finding, ...] = (),
+) -> list[PairIdentification | None]:
+    """Everything that `identify` says of many records; None for those that it must be asked for.
+
+    Parameters
+    ----------
+    whole : Whole
+        From `learn_whole`.
+    fit : FleetFit
+        From `fit_fleet`.
+    outputs : ndarray, shape (N, n)
+        One output a row.
+    names : (str, str)
+        Of input and output.
+    findings : tuple of Finding
+        What is said of the stimulus and the clock.
+    """
+    fleet, count = whole.fleet, outputs.shape[1]
+    centred = outputs - outputs.mean(axis=1, keepdims=True)
+    power = np.vecdot(centred, centred)
+    simpler = np.stack([costs_of(fleet, one, centred, power) for one in whole.simpler], axis=1)
+    found: list[PairIdentification | None] = [None] * outputs.shape[0]
+    for group in fit.groups:
+        behind, some = simpler[group.some], group.some
+        quiet = are_quiet(fleet, group, outputs[some], behind=behind, sweep=whole.sweep)
+        for k in np.flatnonzero(quiet).tolist():
+            i = int(some[k])
+            y = outputs[i]
+            system = _system(fleet, group, k)
+            response = local_response(fleet.u, y, fleet.fs, delay=system.delay, band=fleet.band)
+            own = _parameters(group.alone, k)
+            measured = response_bandwidths(
+                response, system, own, fs=fleet.fs, intersample=group.fit.member.intersample
+            )
+            if _disagree(measured, own):
+                continue
+            paper = paper_estimates(fleet.u, y, fleet.fs, band=fleet.band)
+            pair = PairIdentification(
+                input=names[0],
+                output=names[1],
+                structure=fleet.structure.name,
+                intersample=group.fit.member.intersample,
+                fit_percent=float(fit.fit_percent[i]),
+                parameters=_parameters(fit.columns, i, from_lag(paper.delay, fleet.fs)),
+                paper=paper,
+                frequency_response=response,
+                numerator=(1.0,),
+                denominator=(*system.denominator[::-1].tolist(),),
+                candidates=_candidates(whole, fit, group, k, behind[k], float(power[i])),
+                warnings=(*findings, *_findings(fleet, group, k, own, count)),
+                from_response=measured,
+                nonlinearity=_NOTHING,
+                covariance=_covariance(fleet, group, k),
+            )
+            found[i] = judged(pair)
+    return found
+
+
+def _system(fleet: Fleet, group: Group, k: int) -> RationalDelay:
+    """The model of one record, in s."""
+    i = int(group.some[k])
+    delay, omega, zeta = group.fit.theta[i]
+    omega, zeta = float(np.exp(omega)) * fleet.fs, float(np.exp(zeta))
+    return RationalDelay(
+        delay=float(delay) / fleet.fs,
+        numerator=np.array([float(group.fit.gain[i])]),
+        denominator=np.array([1.0, 2 * zeta / omega, omega**-2]),
+    )
+
+
+def _parameters(
+    columns: Mapping[str, Column], k: int, delay_correlation: Estimate | None = None
+) -> Parameters:
+    told = {name: column.estimate(k) for name, column in columns.items()}
+    return Parameters(**told, delay_correlation=delay_correlation)
+
+
+def _covariance(fleet: Fleet, group: Group, k: int) -> Real:
+    """Of delay, scale factor, and the denominator's coefficients, highest power first."""
+    i = int(group.some[k])
+    _, omega, zeta = group.fit.theta[i]
+    second = float(np.exp(-2 * omega)) / fleet.fs**2
+    first = 2 * float(np.exp(zeta - omega)) / fleet.fs
+    slopes = np.array(
+        [
+            [1.0 / fleet.fs, 0.0, 0.0, 0.0],
+            [0.0, 0.0, 0.0, 1.0],
+            [0.0, -2.0 * second, 0.0, 0.0],
+            [0.0, -first, first, 0.0],
+        ]
+    )
+    inner = group.errors.variance[k] * group.errors.inner[k]
+    return np.asarray(slopes @ inner @ slopes.T)
+
+
+def _disagree(measured: ResponseBandwidths, own: Parameters) -> bool:
+    """Whether bandwidths of response and model are apart beyond their error bars."""
+    for _, name in _BANDWIDTHS:
+        one, other = getattr(measured, name), getattr(own, name)
+        if one is None or other is None:
+            continue
+        allowed = DEVIATIONS * float(np.hypot(one.spread, other.spread))
+        if not abs(one.value - other.value) <= max(allowed, TOLERATED * other.value):
+            return True
+    return False
+
+
+def _candidates(
+    whole: Whole, fit: FleetFit, group: Group, k: int, behind: Real, power: float
+) -> tuple[Candidate, ...]:
+    """All structures that were tried, the likeliest first."""
+    fleet, i = whole.fleet, int(group.some[k])
+    n = fleet.u.size
+    tried = [
+        (fleet.structure, one.member.intersample, float(one.cost[i]), one is group.fit)
+        for one in (group.fit, *(other for other, _ in group.others))
+    ]
+    tried += [
+        (one.structure, one.intersample, float(cost), False)
+        for one, cost in zip(whole.simpler, behind, strict=True)
+    ]
+    found = [
+        Candidate(
+            structure=structure.name,
+            intersample=mode,
+            criterion=float(n * np.log(cost / n) + structure.parameters * np.log(n)),
+            fit_percent=float(100.0 * (1.0 - np.sqrt(cost / power))),
+            chosen=chosen,
+        )
+        for structure, mode, cost, chosen in tried
+    ]
+    return tuple(sorted(found, key=lambda c: c.criterion))
+
+
+def _findings(fleet: Fleet, group: Group, k: int, own: Parameters, n: int) -> tuple[Finding, ...]:
+    """What is said of a quiet record: what it cannot tell, which its intervals cover."""
+    i = int(group.some[k])
+    found: list[Finding] = []
+    missing = [(words, name) for words, name in _BANDWIDTHS if getattr(own, name) is None]
+    if missing:
+        found.append(unreached(missing, band_end=fleet.band[1]))
+    tails = group.tails.get(k)
+    if tails is not None:
+        poles = fleet.structure.order + 1
+        found.append(barely_told(fleet.structure.name, poles=poles, delay=tails.delay))
+    rivals = sorted(
+        (float(other.cost[i]), other) for other, stays in group.others if bool(stays[k])
+    )
+    apart = [
+        (other.member.intersample, float(other.theta[i, 0] - group.fit.theta[i, 0]), "")
+        for _, other in rivals
+    ]
+    found += undetermined_between(group.fit.member.intersample, apart)
+    return tuple(found)
