@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+from scipy.linalg import expm
 
 from families.drive import Drive, Samples
 from families.simulate import linear_output
@@ -82,28 +83,44 @@ def backlash(system: System, drive: Drive, half: float) -> np.ndarray:
     return play(inner, half)[::FINE] + system.bias
 
 
-def _second_order(system: System, drive: Drive, force, grip: float) -> np.ndarray:
+def _second_order(system: System, drive: Drive, extra, band: float) -> np.ndarray:
+    """Exact steps of the linear part under a force that is constant over each.
+
+    Parameters
+    ----------
+    system, drive
+        The linear part, of two poles, and what drives it.
+    extra : callable
+        Restoring force beside that of the linear spring, by deflection, in deflections.
+    band : float
+        Dry friction in deflections: it stands within so much of its command.
+    """
     (natural, damping), *_ = system.pairs
     omega, step = 2 * np.pi * natural, 1 / (FINE * drive.fs)
     t = _fine_time(drive, system.delay)
-    u = np.interp(t, _fine_time(drive), finely(drive), left=0.0)
-    hold = step * grip
+    u = np.interp(t + 0.5 * step, _fine_time(drive), finely(drive), left=0.0)
+    slopes = np.array([[0, 1, 0], [-(omega**2), -2 * damping * omega, omega**2], [0, 0, 0]])
+    (a, b, p), (c, d, q), _ = expm(slopes * step).tolist()
     y = v = 0.0
     out = np.empty(u.size)
     for k, target in enumerate(u.tolist()):
         out[k] = y
-        v += step * (omega**2 * (target - force(y)) - 2 * damping * omega * v)
-        v = 0.0 if abs(v) <= hold else v - hold * (1.0 if v > 0 else -1.0)
-        y += step * v
+        wanted = target - extra(y + 0.5 * step * v)
+        if band:
+            if v == 0.0 and abs(wanted - y) <= band:
+                continue
+            ahead = v if v != 0.0 else wanted - y
+            wanted -= band if ahead > 0 else -band
+        y, now = a * y + b * v + p * wanted, c * y + d * v + q * wanted
+        v = 0.0 if band and now * v < 0 else now
     return system.gain * out[::FINE] + system.bias
 
 
 def friction(system: System, drive: Drive, band: float) -> np.ndarray:
     """A second-order axis with dry friction: it stands within `band` of its command."""
-    (natural, _), *_ = system.pairs
-    return _second_order(system, drive, lambda y: y, band * (2 * np.pi * natural) ** 2)
+    return _second_order(system, drive, lambda y: 0.0, band)
 
 
 def spring(system: System, drive: Drive, cubic: float) -> np.ndarray:
     """A second-order axis whose spring hardens (or, below 0, softens) with deflection."""
-    return _second_order(system, drive, lambda y: y + cubic * y * y * y, 0.0)
+    return _second_order(system, drive, lambda y: cubic * y * y * y, 0.0)

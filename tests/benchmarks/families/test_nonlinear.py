@@ -35,8 +35,8 @@ def test_a_slew_limited_step_is_a_ramp():
 
 def test_without_friction_or_cubic_force_the_axis_is_linear():
     expected = linear_output(AXIS, SLOW)
-    assert nonlinear.friction(AXIS, SLOW, 0.0) == pytest.approx(expected, abs=0.012)
-    assert nonlinear.spring(AXIS, SLOW, 0.0) == pytest.approx(expected, abs=0.012)
+    assert nonlinear.friction(AXIS, SLOW, 0.0) == pytest.approx(expected, abs=2e-5)
+    assert nonlinear.spring(AXIS, SLOW, 0.0) == pytest.approx(expected, abs=2e-5)
     fine = nonlinear.through(AXIS, SLOW, nonlinear.finely(SLOW))[:: nonlinear.FINE]
     assert fine == pytest.approx(expected, abs=1e-4)
 
