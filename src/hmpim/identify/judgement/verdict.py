@@ -26,11 +26,23 @@ _OF_THE_RECORD = frozenset(
 )
 """Codes of doubts that the measured response shares; the others are about the model."""
 
-_WITHHELD = frozenset({"few_lines", "feedback", "halves_disagree", "lack_of_fit", "nonlinear"})
+_WITHHELD = frozenset(
+    {
+        "few_lines",
+        "feedback",
+        "halves_disagree",
+        "initial_transient",
+        "lack_of_fit",
+        "nonlinear",
+        "unsampled_input",
+    }
+)
 """Codes of doubts under which a figure's error is not known: its interval is withheld.
 
-Under the last three the record contradicts the model itself, and an interval made with it held in
-about half of the study of families; what noise alone does to the figure is known all the same."""
+Either the record contradicts the model itself, or what noise cannot do to the figure something else
+does (a slow free response to the bias, motion between the samples to the noise). Intervals made
+with such a model held in about half of the study of families; what noise alone does to the figure
+is known all the same."""
 
 _UNTOLD = frozenset({"few_lines"})
 """Those under which that is not known either."""
