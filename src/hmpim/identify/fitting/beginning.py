@@ -18,7 +18,16 @@ from hmpim.identify.worth import FEW, PART
 from hmpim.model.sampled import MARGIN
 from hmpim.record import Intersample
 
-__all__ = ["REACH", "RINGS", "begins_of", "count_in", "in_motion", "look_again", "stand_out_of"]
+__all__ = [
+    "REACH",
+    "RINGS",
+    "begin_later",
+    "begins_of",
+    "count_in",
+    "in_motion",
+    "look_again",
+    "stand_out_of",
+]
 
 REACH = 4
 """Samples by which what lies between the samples reaches back: half of a spline's support."""
@@ -128,7 +137,7 @@ def look_again(problem: Problem, trial: Trial, seen: Seen, *, lag: int) -> Seen 
         if _stands_out(innovations, told & ringing, told & ~ringing):
             return replace(seen, valid=~ringing if seen.valid is None else seen.valid & ~ringing)
     if seen.begins is not None:
-        return None
+        return begin_later(seen, trial.fit)
     begins = begins_of(problem, trial.fit, lag=lag)
     if begins is None and problem.noise is not None:
         # Noise of the colour of a mode explains its free response, and more of it than there is.
@@ -137,6 +146,18 @@ def look_again(problem: Problem, trial: Trial, seen: Seen, *, lag: int) -> Seen 
         return None
     after = np.arange(count) >= begins
     return Seen(valid=after if seen.valid is None else seen.valid & after, begins=begins)
+
+
+def begin_later(seen: Seen, fit: Fit) -> Seen | None:
+    """Samples that count where a fit has a longer delay than those before; None if none goes.
+
+    What comes before the delay answers input before the record, which no free response describes.
+    """
+    begins, size = int(np.ceil(fit.delay)) + REACH, fit.residual.size
+    if seen.begins is None or begins <= seen.begins or begins > longest_lag(size):
+        return None
+    late = np.arange(size) >= begins
+    return Seen(valid=late if seen.valid is None else seen.valid & late, begins=begins)
 
 
 def _counts(problem: Problem) -> Mask:

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from hmpim.identify.fitting.beginning import count_in
+from hmpim.identify.fitting.beginning import begin_later, count_in
 from hmpim.identify.fitting.candidates import (
     almost_integrates,
     fit_plain,
@@ -221,7 +221,9 @@ def enrich(
         leading = min(richer, key=lambda f: f.objective)
         from_rest = refit(data.problem(course.natural, course.given), leading)
         resting = count_in(data, course.natural, [from_rest], course.given, course.known)
-        if resting.begins is None:  # it was the structure that was wrong, not the beginning
+        if resting.begins is not None:
+            resting = begin_later(course.counted, leading)
+        if resting is not None:  # it was the structure that was wrong, not the beginning
             course = replace(course, counted=resting)
             fits = [refit(course.problem, f) for f in fits]
             richer = [refit(course.problem, f) for f in richer]
