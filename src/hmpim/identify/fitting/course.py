@@ -39,6 +39,9 @@ __all__ = [
     "turn_ahead",
 ]
 
+_LEVELS = 3
+"""Levels of a switched input: two of a binary sequence, and the rest before it."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Course:
@@ -262,14 +265,17 @@ def _bridged(y: NDArray[np.float64], valid: NDArray[np.bool_]) -> NDArray[np.flo
 def _looks_held(u: NDArray[np.float64]) -> bool:
     """Whether an input stands still most of the time and then jumps, as a held one does.
 
-    What moves between two samples moves at one instant only if it stood before and stands after.
+    What moves between two samples moves at one instant only if it stood before and stands after;
+    what has three levels at most and goes from one to another again and again is switched.
     """
     jumps = np.abs(np.diff(u))
     moves = jumps > 0
+    if np.count_nonzero(moves) > _LEVELS and np.unique(u).size <= _LEVELS:
+        return True
     count = int(np.count_nonzero(moves))
     alone = moves & ~np.append(moves[1:], False) & ~np.append(False, moves[:-1])
     return bool(
-        2 * count < moves.size
+        2 * count <= moves.size + 1
         and jumps.max() > FEW * np.ptp(u)
         and 2 * np.count_nonzero(alone) > count
     )
