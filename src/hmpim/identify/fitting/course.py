@@ -224,10 +224,11 @@ def enrich(
         leading = min(richer, key=lambda f: f.objective)
         from_rest = refit(data.problem(course.natural, course.given), leading)
         resting = count_in(data, course.natural, [from_rest], course.given, course.known)
-        if resting.begins is not None:
-            resting = begin_later(course.counted, leading)
-        if resting is not None:  # it was the structure that was wrong, not the beginning
-            course = replace(course, counted=resting)
+        # Else it was the structure that was wrong, not the beginning.
+        late = resting.begins is not None
+        moved = begin_later(course.counted, leading) if late else resting
+        if moved is not None:
+            course = replace(course, counted=moved)
             fits = [refit(course.problem, f) for f in fits]
             richer = [refit(course.problem, f) for f in richer]
     if richer:
