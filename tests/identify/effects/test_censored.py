@@ -7,7 +7,6 @@ from hmpim.errors import RecordError
 from hmpim.identify.effects.censored import fit_censored
 from hmpim.identify.effects.held import rows_at_updates
 from hmpim.identify.effects.hold import Updates, detect_hold, updates
-from hmpim.identify.effects.masked import masked_spectrum
 from hmpim.identify.effects.saturation import Saturation, detect_saturation
 from hmpim.identify.fitting.fit import Fit, Problem, fit_structure, jacobian
 from hmpim.identify.threads import one_thread
@@ -223,17 +222,6 @@ def test_rows_between_samples_agree_with_another_delay(intersample):
         basis = slice(theta.size, None)
         error = np.abs(rows[basis, k] - moved[basis, k]) / scale[basis]
         assert error.max() < (1e-4 if intersample == "bandlimited" else 2e-3)
-
-
-def test_the_colour_between_gaps():
-    rng = np.random.default_rng(0)
-    e = np.zeros(20000)
-    for k in range(1, e.size):
-        e[k] = 0.9 * e[k - 1] + rng.standard_normal()
-    known = np.arange(e.size) % 30 > 8
-    omega = np.array([0.01, 0.1, 0.5, 2.0])
-    expected = 0.19 / np.abs(1 - 0.9 * np.exp(-1j * omega)) ** 2
-    np.testing.assert_allclose(masked_spectrum(e, known, omega), expected, rtol=0.2)
 
 
 def test_a_record_that_is_all_clipped_is_refused(source, clean):

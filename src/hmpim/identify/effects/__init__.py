@@ -2,7 +2,7 @@
 
 imperfections   all of them found, and the fit refined for them
 said            what is said of them, and the figures read off them
-saturation, smeared, masked   clipped levels, exact or behind noise
+saturation, smeared   clipped levels, exact or behind noise
 hold, held      a data hold: period and phase, and the fit at its updates
 censored        the fit that counts clipped and held samples as what they are
 quantization    the rounding step

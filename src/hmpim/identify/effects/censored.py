@@ -20,9 +20,9 @@ from hmpim.errors import RecordError
 from hmpim.identify.arrays import Mask, Real
 from hmpim.identify.effects.held import held_prediction, rows_at_updates
 from hmpim.identify.effects.hold import Updates
-from hmpim.identify.effects.masked import masked_spectrum
 from hmpim.identify.effects.saturation import Saturation
 from hmpim.identify.fitting.fit import Fit, Problem, fit_structure
+from hmpim.identify.noise.autoregression import autoregression, spectrum_behind
 from hmpim.identify.noise.whiteness import is_white
 
 __all__ = ["CensoredFit", "fit_censored"]
@@ -363,7 +363,8 @@ def _coloured_scores(state: _State) -> tuple[Real, float]:
     length = scipy.fft.next_fast_len(2 * state.slope.size, real=True)
     spectra = scipy.fft.rfft(weighted, length)
     omega = 2 * np.pi * np.arange(spectra.shape[1]) / length
-    power = masked_spectrum(state.slope, state.inside, omega)
+    power = spectrum_behind(autoregression(state.slope, state.inside), omega)
+    power /= np.mean(np.concatenate([power, power[1:-1]]))
     fewer = float(np.mean(np.concatenate([power, power[1:-1]]) ** 2))
     power[1 : (length + 1) // 2] *= 2.0  # both signs of frequency
     return np.asarray(((spectra * power) @ spectra.conj().T).real / length), fewer

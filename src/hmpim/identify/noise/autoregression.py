@@ -3,7 +3,9 @@
 Least squares on the samples whose whole past is known (the covariance method: Kay, Modern
 Spectral Estimation, 1988, ch. 7), which tells wander and lines without bias. One Cholesky
 decomposition gives what every order leaves over; the order is that of H. Akaike's criterion (IEEE
-Trans. Autom. Control 19, 1974).
+Trans. Autom. Control 19, 1974). All that asks for the colour of a noise asks here; the products
+of samples and their past come from the samples, from statistics, or, where the filter must be
+stable, from the autocovariance (Yule and Walker).
 """
 
 import numpy as np
@@ -19,14 +21,15 @@ __all__ = [
     "autoregression",
     "autoregressive_spectrum",
     "innovation_gain",
+    "spectrum_behind",
     "whitening_filter",
+    "yule_walker",
 ]
 
 LONGEST = 30
 """Greatest order that is tried."""
 
 _BLOCK = 65_536
-_LONGEST_AUTOREGRESSION = 30
 _FLICKER_BINS = 32
 _INNOVATION_ORDER = 12
 _MOST_INNOVATIONS = 100_000
@@ -75,19 +78,25 @@ def whitening_filter(gram: Real, count: int) -> Real:
     >>> whitening_filter(100 * np.array([[1.0, 0.5], [0.5, 1.0]]), 100).tolist()
     [1.0, -0.49...]
     """
-    longest = gram.shape[0] - 1
-    # Latest sample last: the factor's last row holds what each order explains of it.
-    scale = np.sqrt(max(float(gram[0, 0]), np.finfo(float).tiny))
-    ordered = np.roll(gram, -1, axis=(0, 1)) / scale**2
-    ordered += 1e-13 * np.trace(ordered) * np.eye(longest + 1)
-    factor = np.linalg.cholesky(ordered)
-    explained = np.concatenate([[0.0], np.cumsum(factor[-1, :-1] ** 2)])
-    left = np.maximum(ordered[-1, -1] - explained, np.finfo(float).tiny)
-    order = int(np.argmin(count * np.log(left) + 2.0 * np.arange(longest + 1)))
+    if not gram[0, 0] > 0.0:
+        return np.ones(1)
+    left, ordered = _left(gram)
+    order = int(np.argmin(count * np.log(left) + 2.0 * np.arange(left.size)))
     if order == 0:
         return np.ones(1)
     weights = np.linalg.solve(ordered[:order, :order], ordered[:order, -1])
     return np.concatenate([[1.0], -weights])
+
+
+def _left(gram: Real) -> tuple[Real, Real]:
+    """Share of its power that each order leaves of a sample; the products, it standing last."""
+    scale = max(float(gram[0, 0]), np.finfo(float).tiny)
+    # Latest sample last: the factor's last row holds what each order explains of it.
+    ordered = np.roll(gram, -1, axis=(0, 1)) / scale
+    ordered += 1e-13 * np.trace(ordered) * np.eye(gram.shape[0])
+    factor = np.linalg.cholesky(ordered)
+    explained = np.concatenate([[0.0], np.cumsum(factor[-1, :-1] ** 2)])
+    return np.maximum(ordered[-1, -1] - explained, np.finfo(float).tiny), ordered
 
 
 def _reach(valid: Mask | None) -> int:
@@ -144,16 +153,41 @@ def innovation_gain(y: Real, residual: Real) -> float:
 
 
 def _innovation(x: Real) -> float:
-    """Mean square of what an autoregression with a constant does not foresee."""
-    order = min(_INNOVATION_ORDER, x.size // 10)
-    past = [x[order - k : x.size - k] for k in range(1, order + 1)]
-    rows = np.stack([np.ones(x.size - order), *past])
-    weights = np.linalg.lstsq(rows.T, x[order:], rcond=None)[0]
-    return float(np.mean((x[order:] - weights @ rows) ** 2))
+    """Mean square of what an autoregression of that order does not foresee, the mean taken off."""
+    gram, count = _moments(x - x.mean(), None, min(_INNOVATION_ORDER, x.size // 10))
+    return float(gram[0, 0] * _left(gram)[0][-1] / count) if gram[0, 0] > 0.0 else 0.0
+
+
+def yule_walker(residual: Real, longest: int = LONGEST) -> tuple[Real, float]:
+    """The same filter from the autocovariance, stable always, and the power that it leaves.
+
+    Parameters
+    ----------
+    residual : ndarray, shape (n,)
+        0 where a sample does not count.
+    longest : int
+        Greatest order that is tried; less for fewer than ten times as many samples.
+
+    Examples
+    --------
+    >>> from scipy.signal import lfilter
+    >>> noise = lfilter([1.0], [1.0, -0.9], np.random.default_rng(0).standard_normal(5000))
+    >>> filtering, left = yule_walker(noise)
+    >>> filtering[:2].round(2).tolist(), round(left, 1)
+    ([1.0, -0.9], 1.0)
+    """
+    gram = scipy.linalg.toeplitz(autocovariance(residual, min(longest, residual.size // 10)))
+    noise = whitening_filter(gram, residual.size)
+    return noise, float(noise @ gram[: noise.size, : noise.size] @ noise)
+
+
+def spectrum_behind(noise: Real, omega: Real) -> Real:
+    """Power spectrum of what a filter turns into white noise of power 1, at rad per sample."""
+    return np.asarray(np.abs(np.exp(-1j * np.outer(omega, np.arange(noise.size))) @ noise) ** -2)
 
 
 def autoregressive_spectrum(residual: Real, omega: Real) -> Real:
-    """Power spectrum of the residual from an autoregression fitted to it (Yule-Walker).
+    """Power spectrum of the residual from an autoregression fitted to it.
 
     Parameters
     ----------
@@ -165,25 +199,10 @@ def autoregressive_spectrum(residual: Real, omega: Real) -> Real:
     Returns
     -------
     ndarray, shape (m,)
-        Equal to the variance at every frequency if the noise is white. The order is chosen
-        by Akaike's criterion, at most 30 (Kay, Modern Spectral Estimation, ch. 7).
+        Equal to the variance at every frequency if the noise is white.
     """
-    n = residual.size
-    longest = min(_LONGEST_AUTOREGRESSION, n // 10)
-    r = autocovariance(residual, longest)
-    best = (n * np.log(r[0]), r[0], np.zeros(0))
-    for order in range(1, longest + 1):
-        coefficients = scipy.linalg.solve_toeplitz(r[:order], r[1 : order + 1])
-        variance = float(r[0] - coefficients @ r[1 : order + 1])
-        if variance <= 0:
-            break
-        criterion = n * np.log(variance) + 2 * order
-        if criterion < best[0]:
-            best = (criterion, variance, coefficients)
-    _, variance, coefficients = best
-    steps = np.arange(1, coefficients.size + 1)
-    transfer = 1.0 - np.exp(-1j * np.outer(omega, steps)) @ coefficients
-    power = variance / np.abs(transfer) ** 2
+    noise, left = yule_walker(residual)
+    power = left * spectrum_behind(noise, omega)
     flicker = _flicker(residual, omega)
     return np.asarray(np.where(flicker > 0, flicker, power))
 

@@ -14,10 +14,10 @@ import scipy
 from numpy.typing import NDArray
 
 from hmpim.identify.arrays import Mask, Real
-from hmpim.identify.noise.whiteness import autocovariance
+from hmpim.identify.noise.autoregression import yule_walker
 from hmpim.identify.nonlinear.sweep_phase import SweepPhase
 
-__all__ = ["HIGHEST", "HarmonicFit", "SweepView", "fit_harmonics", "view_of", "whitener"]
+__all__ = ["HIGHEST", "HarmonicFit", "SweepView", "fit_harmonics", "view_of"]
 
 _ORDERS = (2, 3, 4, 5)
 """Orders looked for; 1 and the mean are taken up with them."""
@@ -217,7 +217,8 @@ def fit_harmonics(
     e = e[view.index]
     weights, _, _ = _solved(_gram(columns, view), _moments(e[None], columns, view)[0])
     count = columns.shape[0]
-    whitening = whitener(e - _expanded(columns, weights.reshape(-1, count), view))
+    left = e - _expanded(columns, weights.reshape(-1, count), view)
+    whitening, _ = yule_walker(left, _LONGEST_AUTOREGRESSION)
     white_e = scipy.signal.lfilter(whitening, [1.0], e)
     white = scipy.signal.lfilter(whitening, [1.0], columns, axis=1)
     weights, covariance, used = _solved(_gram(white, view), _moments(white_e[None], white, view)[0])
@@ -288,21 +289,3 @@ def _expanded(columns: Real, weights: Real, view: SweepView) -> Real:
     for column, weight in zip(columns, weights.T, strict=True):
         out += column * np.interp(view.along, grid, weight)
     return out
-
-
-def whitener(e: Real, *, longest: int = _LONGEST_AUTOREGRESSION) -> Real:
-    """Coefficients 1, -a1, … of the autoregression that Akaike's criterion chooses."""
-    longest = min(longest, e.size // 20)
-    r = autocovariance(e, longest)
-    if r[0] <= 0:
-        return np.ones(1)
-    best, chosen = e.size * np.log(r[0]), np.zeros(0)
-    for order in range(1, longest + 1):
-        coefficients = scipy.linalg.solve_toeplitz(r[:order], r[1 : order + 1])
-        variance = float(r[0] - coefficients @ r[1 : order + 1])
-        if variance <= 1e-12 * r[0]:
-            break
-        criterion = e.size * np.log(variance) + 2 * order
-        if criterion < best:
-            best, chosen = criterion, coefficients
-    return np.concatenate([[1.0], -chosen])

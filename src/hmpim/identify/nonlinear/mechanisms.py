@@ -27,7 +27,7 @@ import scipy
 
 from hmpim.identify.arrays import Mask, Real
 from hmpim.identify.fitting.fit import Fit, Problem, jacobian
-from hmpim.identify.nonlinear.harmonic_regression import whitener
+from hmpim.identify.noise.autoregression import yule_walker
 from hmpim.model.sampled import delayed_response, prepare_input
 
 __all__ = [
@@ -305,7 +305,7 @@ def _fitted(hypothesis: Hypothesis, e: Real, background: Real, counted: Mask) ->
         return None
     weight = max(float(alone @ e) / power, 0.0)
     left = e - (background @ e) @ background - weight * alone
-    colour = whitener(left[counted], longest=_LONGEST_AUTOREGRESSION)
+    colour, _ = yule_walker(left[counted], _LONGEST_AUTOREGRESSION)
     # Samples that do not count are passed over: what is left keeps its linear relation.
     rows = scipy.signal.lfilter(colour, [1.0], np.vstack([background, h])[:, counted], axis=1)
     white = scipy.signal.lfilter(colour, [1.0], e[counted])
