@@ -20,6 +20,7 @@ from hmpim.identify.frf.local import local_response
 from hmpim.identify.judgement import Evidence, attempt, judge
 from hmpim.identify.judgement.unfollowed import unfollowed
 from hmpim.identify.noise.misfit import Misfit, misfit
+from hmpim.identify.nonlinear.bends import Bend, bends
 from hmpim.identify.nonlinear.nonlinearity import Inspection, inspect_nonlinearity
 from hmpim.identify.reading.bandwidth import response_bandwidths
 from hmpim.identify.reading.coefficients import coefficients_of, highest_first
@@ -116,8 +117,10 @@ def _pair(
     response = (
         _measured(question, found, joint, readings, i) if matrix is None else matrix.columns[i]
     )
-    bent = () if inspection is None else inspection.findings
-    evidence, unmade = _evidence(question, found, readings, joint, response, i, bool(bent))
+    said = () if inspection is None else inspection.findings
+    none: tuple[Bend, ...] = ()
+    moves, unmoved = attempt("bends", lambda: _bends(question, found, joint, i, said), none)
+    evidence, unmade = _evidence(question, found, readings, joint, response, i, moves, bool(said))
     parameters, seen = with_imperfections(
         evidence.spanned or readings.parameters, found, censored, output.unit
     )
@@ -126,9 +129,9 @@ def _pair(
         *(() if question.instrument is None else (question.instrument.finding(),)),
         *judge(evidence),
         *seen,
-        *(finding for finding in bent if finding.code not in known),
+        *(finding for finding in said if finding.code not in known),
         *(() if drifting is None else (drift_finding(drifting, aligned.fs, output.unit),)),
-        *(*unseen, *unmade),
+        *(*unseen, *unmoved, *unmade),
     )
     fit = joint.best.fit
     numerator, denominator = coefficients_of(readings.system)
@@ -161,6 +164,7 @@ def _evidence(
     joint: JointFit,
     response: FrequencyResponse,
     i: int,
+    moves: tuple[Bend, ...],
     nonlinear: bool,
 ) -> tuple[Evidence, tuple[Finding, ...]]:
     """What the checks look at, and what of it could not be made."""
@@ -185,13 +189,20 @@ def _evidence(
     evidence = Evidence(
         joint=joint,
         readings=readings,
-        spanned=spanned(readings.parameters, joint, fs=fs, highest=min(band[1], fs / 2)),
+        spanned=spanned(
+            readings.parameters,
+            joint,
+            fs=fs,
+            highest=min(band[1], fs / 2),
+            bent=[one.farthest for one in moves if not one.counts],
+        ),
         misfit=left,
         u=u,
         fs=fs,
         band=band,
         fit_percent=_fit_percent(joint),
-        nonlinear=nonlinear,
+        bends=moves,
+        nonlinear=nonlinear or any(one.certain for one in moves),
         held=found.hold is not None,
         measured=from_response,
         through=question.instrument is not None,
@@ -240,6 +251,28 @@ def _inspected(
         others=[other.values for other in aligned.inputs if other is not source],
         floor=max(found.rounding, ROUNDING * float(np.std(output.values))),
         unit=output.unit,
+    )
+
+
+def _bends(
+    question: Question, found: Imperfections, joint: JointFit, i: int, said: tuple[Finding, ...]
+) -> tuple[Bend, ...]:
+    """How far a nonlinearity may have moved the figures; not asked where all are doubted for it.
+
+    Nor of several inputs, of a loop, and of software.
+    """
+    best = joint.best
+    doubted = any(finding.severity == "doubt" for finding in said)
+    alone = question.inputs is None and question.instrument is None
+    if doubted or not alone or best.fit.structure.sampled:
+        return ()
+    return bends(
+        question.aligned.inputs[i].values,
+        joint.weighed,
+        best.fit,
+        intersample=best.intersample,
+        fs=question.aligned.fs,
+        floor=max(found.rounding, ROUNDING * float(np.std(question.output.values))),
     )
 
 

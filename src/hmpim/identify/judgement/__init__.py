@@ -7,6 +7,7 @@ errors           error bars that are too wide, a fit that did not end
 reach            what lies outside the band, before the record's start or beyond its end
 structure        other numbers of poles that the record does not exclude
 between_samples  other assumptions on what the input does between its samples
+bent             figures that a nonlinearity has moved
 response         bandwidths that the measured response contradicts
 failed           a check that raises costs itself, and nothing else
 unfollowed       an output that a constant explains as well

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Sequence
 from functools import partial
 
+from hmpim.identify.judgement.bent import bent
 from hmpim.identify.judgement.between_samples import other_intersample, wide_span
 from hmpim.identify.judgement.errors import not_converged, weak_delay, weak_excitation
 from hmpim.identify.judgement.evidence import Evidence
@@ -63,6 +64,7 @@ CHECKS: tuple[Check, ...] = (
     unsampled_input,
     feedback,
     bandwidth_disagrees,
+    bent,
 )
 """All checks of one pair; each one's findings come in this order."""
 

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from hmpim.identify.arrays import Real
 from hmpim.identify.fitting.trial import JointFit
 from hmpim.identify.noise.misfit import Misfit
+from hmpim.identify.nonlinear.bends import Bend
 from hmpim.identify.reading.readings import Readings
 from hmpim.identify.result import Parameters, ResponseBandwidths
 
@@ -36,6 +37,8 @@ class Evidence:
     spanned : Parameters or None
         What was read off it, with intervals that cover every model the record allows; None where
         it allows no other.
+    bends : tuple of Bend
+        Nonlinearities that the record leaves in question; none where figures are doubted anyway.
     nonlinear : bool
         Whether the residual is known to be nonlinear, and so asks for no pole.
     held : bool
@@ -55,6 +58,7 @@ class Evidence:
     fit_percent: float
     measured: ResponseBandwidths
     spanned: Parameters | None = None
+    bends: tuple[Bend, ...] = ()
     nonlinear: bool = False
     held: bool = False
     through: bool = False

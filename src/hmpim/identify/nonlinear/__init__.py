@@ -8,5 +8,6 @@ lines                 lines of a periodic input left out
 mechanisms            friction, backlash, rate limit, hard and soft springs
 harmonic_kinds        what each of them leaves at the harmonics
 evidence              which of them the record speaks for
+bends                 how far a nonlinearity moves a linear fit
 words                 sentences
 """

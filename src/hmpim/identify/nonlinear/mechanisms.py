@@ -31,6 +31,8 @@ from hmpim.identify.noise.autoregression import yule_walker
 from hmpim.model.sampled import delayed_response, prepare_input
 
 __all__ = [
+    "LONGEST_AUTOREGRESSION",
+    "RATES",
     "Hypothesis",
     "Kind",
     "Mechanism",
@@ -38,6 +40,7 @@ __all__ = [
     "hypotheses",
     "play",
     "rate_limited",
+    "stretch_of",
 ]
 
 Kind = Literal[
@@ -49,12 +52,13 @@ Kind = Literal[
     "saturation",
     "asymmetry",
     "curvature",
+    "dead_zone",
 ]
 
 _GAPS = (0.002, 0.005, 0.01, 0.02, 0.04, 0.08, 0.15, 0.25, 0.4)
 """Half gaps tried, over the output's largest deviation."""
 
-_RATES = (0.15, 0.25, 0.35, 0.45, 0.55, 0.65, 0.75, 0.85, 0.93)
+RATES = (0.15, 0.25, 0.35, 0.45, 0.55, 0.65, 0.75, 0.85, 0.93)
 """Speeds tried, over the largest of the linear model."""
 
 _LEVELS = (0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.88, 0.95)
@@ -63,7 +67,8 @@ _LEVELS = (0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.88, 0.95)
 _STICKS = 0.01
 """Speed, over the largest, at which friction is fully turned around: below the sampling's reach."""
 
-_LONGEST_AUTOREGRESSION = 10
+LONGEST_AUTOREGRESSION = 10
+"""Order of the noise that a trace is held against, at most."""
 
 _LONGEST = 32768
 """Samples looked at; of a longer record the stretch with the greatest residual."""
@@ -201,7 +206,7 @@ def compare_mechanisms(problem: Problem, fit: Fit, *, fs: float) -> tuple[Mechan
     """
     if not np.any(fit.residual) or np.ptp(fit.prediction) == 0:
         return ()
-    here = _where(fit.residual)
+    here = stretch_of(fit.residual)
     counted = np.ones(problem.y.size, dtype=bool) if problem.valid is None else problem.valid
     background = _background(problem, fit, here)
     x = fit.prediction[here] - fit.linear[-1]
@@ -215,7 +220,7 @@ def compare_mechanisms(problem: Problem, fit: Fit, *, fs: float) -> tuple[Mechan
     return tuple(sorted(best.values(), key=lambda m: -m.likelihood))
 
 
-def _where(residual: Real) -> slice:
+def stretch_of(residual: Real) -> slice:
     """The stretch that is looked at: all, or the part of a long record with most to explain."""
     n = residual.size
     if n <= _LONGEST:
@@ -243,7 +248,7 @@ def _shifted(x: Real, by: int) -> Real:
     return x[index]
 
 
-def hypotheses(x: Real, denominator: Real, fs: float) -> Iterator[Hypothesis]:
+def hypotheses(x: Real, denominator: Real, fs: float, *, every: int = 1) -> Iterator[Hypothesis]:
     """Every kind with every value tried.
 
     Parameters
@@ -254,6 +259,8 @@ def hypotheses(x: Real, denominator: Real, fs: float) -> Iterator[Hypothesis]:
         Of the dynamics that a force goes through, by rising powers of s per sample.
     fs : float
         Rate in Hz.
+    every : int
+        One of so many values is tried, in the middle of each run of them.
     """
     largest = float(np.max(np.abs(x)))
     step = np.gradient(x)
@@ -277,16 +284,16 @@ def hypotheses(x: Real, denominator: Real, fs: float) -> Iterator[Hypothesis]:
         yield Hypothesis(kind="asymmetry", trace=-through(square))
         yield Hypothesis(kind="asymmetry", trace=through(square))
         yield Hypothesis(kind="friction", trace=-through(np.tanh(step / (_STICKS * fastest))))
-    for gap in _GAPS:
+    for gap in _GAPS[every // 2 :: every]:
         half = gap * largest
         trace = (play(x, half) - x) / half
         yield Hypothesis(kind="backlash", trace=trace, spacing=0.15 * half)
-    for level in _LEVELS:
+    for level in _LEVELS[every // 2 :: every]:
         size = level * largest
         yield Hypothesis(
             kind="saturation", trace=np.clip(x, -size, size) - x, size=size, spacing=0.05 * largest
         )
-    for rate in _RATES:
+    for rate in RATES[every // 2 :: every]:
         size = rate * fastest
         yield Hypothesis(
             kind="rate_limit",
@@ -305,7 +312,7 @@ def _fitted(hypothesis: Hypothesis, e: Real, background: Real, counted: Mask) ->
         return None
     weight = max(float(alone @ e) / power, 0.0)
     left = e - (background @ e) @ background - weight * alone
-    colour, _ = yule_walker(left[counted], _LONGEST_AUTOREGRESSION)
+    colour, _ = yule_walker(left[counted], LONGEST_AUTOREGRESSION)
     # Samples that do not count are passed over: what is left keeps its linear relation.
     rows = scipy.signal.lfilter(colour, [1.0], np.vstack([background, h])[:, counted], axis=1)
     white = scipy.signal.lfilter(colour, [1.0], e[counted])

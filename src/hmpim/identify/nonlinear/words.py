@@ -16,6 +16,7 @@ KIND_WORDS: dict[Kind, str] = {
     "rate_limit": "a rate limit",
     "saturation": "clipping",
     "asymmetry": "an asymmetric response",
+    "dead_zone": "a dead zone of the command",
     "curvature": "a scale factor that changes with the deflection",
 }
 

@@ -12,15 +12,16 @@ from dataclasses import fields, replace
 
 import numpy as np
 
+from hmpim.identify.arrays import Real
 from hmpim.identify.chance import CLEARLY, LIKELIER, SEEN
-from hmpim.identify.fitting.fit import Fit
+from hmpim.identify.fitting.fit import Fit, within_reach
 from hmpim.identify.fitting.growth import as_if_hidden
 from hmpim.identify.fitting.trial import JointFit, Trial
-from hmpim.identify.reading.figures import figures_of
+from hmpim.identify.reading.figures import figures_at, figures_of
 from hmpim.identify.result import Estimate, Parameters
 from hmpim.identify.result.groups import PHASE_SPLIT
 
-__all__ = ["MOVES", "rivals_of", "spanned"]
+__all__ = ["MOVES", "bent_figures", "rivals_of", "spanned"]
 
 MOVES = 0.05
 """Share of an interval's half width from which another assumption widens it."""
@@ -49,7 +50,14 @@ def _is_as_likely(trial: Trial, joint: JointFit) -> bool:
     return behind < 2 * LIKELIER and (extra <= 0 or extra * price - behind > SEEN * extra)
 
 
-def spanned(parameters: Parameters, joint: JointFit, *, fs: float, highest: float) -> Parameters:
+def spanned(
+    parameters: Parameters,
+    joint: JointFit,
+    *,
+    fs: float,
+    highest: float,
+    bent: Iterable[Real] = (),
+) -> Parameters:
     """Widen each interval to what it would be under the other assumptions, or with one more pole.
 
     The other fits see the same data with all but the same sensitivity, so that each interval is
@@ -63,6 +71,8 @@ def spanned(parameters: Parameters, joint: JointFit, *, fs: float, highest: floa
         With the other trials.
     fs, highest : float
         Rate, and frequency beyond which no bandwidth is read off, in Hz.
+    bent : iterable of ndarray, shape (p,)
+        What nonlinearities that may be there add to the fit's parameters.
     """
 
     def figures(fits: Iterable[Fit]) -> list[dict[str, float | None]]:
@@ -74,6 +84,7 @@ def spanned(parameters: Parameters, joint: JointFit, *, fs: float, highest: floa
     if hidden is not None and (joint.rivals or hidden.may_hide):
         longest = figures_of(as_if_hidden(fit, hidden), fs=fs, highest=highest, split_alone=True)
         richer.append({name: longest[name] for name in PHASE_SPLIT})
+    richer += [bent_figures(fit, moved, fs=fs, highest=highest) for moved in bent]
     moved = {}
     for name in (field.name for field in fields(parameters)):
         own = getattr(parameters, name)
@@ -87,6 +98,29 @@ def spanned(parameters: Parameters, joint: JointFit, *, fs: float, highest: floa
             whole = replace(whole, ci95=(min(lows), max(highs)))
         moved[name] = whole
     return replace(parameters, **moved)
+
+
+def bent_figures(fit: Fit, moved: Real, *, fs: float, highest: float) -> dict[str, float | None]:
+    """Figures where a nonlinearity adds so much to the parameters, as far as those allow it.
+
+    Parameters
+    ----------
+    fit : Fit
+        The linear fit.
+    moved : ndarray, shape (p,)
+        What is added to `theta` and `linear`.
+    fs, highest : float
+        As for `spanned`.
+    """
+    size = fit.theta.size
+    theta = within_reach(
+        fit.structure,
+        fit.theta + moved[:size],
+        delays=(-np.inf, np.inf),
+        samples=fit.prediction.size,
+    )
+    vector = np.concatenate([theta, fit.linear + moved[size:]])
+    return figures_at(fit.structure, vector, fs=fs, highest=highest)
 
 
 def _given(found: list[dict[str, float | None]], name: str) -> list[float]:

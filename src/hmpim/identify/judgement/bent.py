@@ -1,0 +1,65 @@
+"""Figures that a nonlinearity has moved."""
+
+from collections.abc import Sequence
+
+from hmpim.identify.chance import HALF
+from hmpim.identify.judgement.between_samples import SIZES
+from hmpim.identify.judgement.evidence import Evidence
+from hmpim.identify.nonlinear.bends import Bend
+from hmpim.identify.nonlinear.words import KIND_WORDS
+from hmpim.identify.reading.spanned import MOVES, bent_figures
+from hmpim.identify.result.groups import MODELLED
+from hmpim.identify.worth import FEW
+from hmpim.record import Finding
+
+__all__ = ["bent"]
+
+
+def bent(evidence: Evidence) -> tuple[Finding, ...]:
+    """Doubt the figures that a nonlinearity moves by more than a small part of their interval.
+
+    How far it moves them is known to first order, for traces that are none of them exact: enough
+    to tell which figures it leaves alone. What is small or only possible widens the intervals.
+    """
+    sure = [one for one in evidence.bends if one.counts]
+    if not sure:
+        return ()
+    moved = _moved(evidence, sure)
+    parameters = (*moved, *(("noise_std",) if sure[0].share > 2 * FEW else ()))
+    if not parameters:
+        return ()
+    kinds = " or ".join(dict.fromkeys(KIND_WORDS[one.kind] for one in sure))
+    sized = [
+        f"{name.replace('_', ' ')} by {100 * moved[name]:.2g} %"
+        for name in SIZES
+        if moved.get(name, 0.0) > 0.0
+    ]
+    which = f" It moves figures of a linear model: {', '.join(sized)}." if sized else ""
+    return (
+        Finding(
+            code="nonlinear",
+            message=f"What the model leaves over looks like {kinds}, "
+            f"{100 * sure[0].effect:.2g} % of the output (r.m.s.).{which} Identify at several "
+            "amplitudes to see where the linear model holds.",
+            severity="doubt",
+            parameters=parameters,
+        ),
+    )
+
+
+def _moved(evidence: Evidence, sure: Sequence[Bend]) -> dict[str, float]:
+    """Figures that move, and by what share of themselves; 0 where one is no longer given."""
+    fit, fs = evidence.joint.best.fit, evidence.fs
+    others = [
+        bent_figures(fit, one.moved, fs=fs, highest=min(evidence.band[1], fs / 2)) for one in sure
+    ]
+    moved = {}
+    for name in MODELLED:
+        own = getattr(evidence.readings.parameters, name)
+        if own is None or name == "noise_std":
+            continue
+        values = [other.get(name) for other in others]
+        far = max((abs(value - own.value) for value in values if value is not None), default=0.0)
+        if None in values or far > MOVES * HALF * own.spread:
+            moved[name] = far / abs(own.value) if own.value else 0.0
+    return moved

@@ -1,0 +1,239 @@
+"""By how much a nonlinearity may have moved the figures of a linear fit.
+
+A linear fit takes up what of a nonlinearity looks linear: a row left out of a regression moves its
+other weights by their regression on that row (H. Theil, Rev. Int. Statist. Inst. 25, 1957). So each
+kind's trace (`hmpim.identify.nonlinear.mechanisms`, and at the input a dead zone and a limit of
+speed, seen through the model) stands as one more row beside the fit's derivatives, with noise that
+is an autoregression. Whether it belongs there is a score test (C. R. Rao, Proc. Cambridge Phil.
+Soc. 44, 1948), of any input, by what it leaves at the input's own frequency and beside it; how far
+the fit moves with it follows from the same regression.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+import scipy
+
+from hmpim.identify.arrays import Real
+from hmpim.identify.chance import CLEARLY, HALF, searched
+from hmpim.identify.fitting.enrich import PLAIN
+from hmpim.identify.fitting.fit import Fit, Problem, jacobian
+from hmpim.identify.fitting.least_squares import solved
+from hmpim.identify.fitting.sampled_rows import part_of
+from hmpim.identify.noise.autoregression import yule_walker
+from hmpim.identify.noise.whiteness import is_white
+from hmpim.identify.nonlinear.mechanisms import (
+    LONGEST_AUTOREGRESSION,
+    RATES,
+    Hypothesis,
+    Kind,
+    hypotheses,
+    rate_limited,
+    stretch_of,
+)
+from hmpim.identify.worth import MATERIAL, PART, WORTH
+from hmpim.model.sampled import prepare_input
+from hmpim.record import Intersample
+
+__all__ = ["Bend", "bends"]
+
+_EVERY = 3
+"""Of a kind's values every so many is tried: its neighbours leave traces that are much alike."""
+
+_DEAD = (0.02, 0.1, 0.4)
+"""Half widths of a dead zone tried, over the largest input."""
+
+_ALIKE = 1e-8
+"""Share of a trace's power that must be left beside what a linear change explains."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Bend:
+    """One kind of nonlinearity that the record leaves in question.
+
+    Parameters
+    ----------
+    kind : str
+        Name as in `hmpim.identify.nonlinear.mechanisms`.
+    gain : float
+        Log-likelihood that it brings.
+    certain : bool
+        Whether the likeliest kind brings more than a linear unit's record would by chance.
+    effect : float
+        R.m.s. of all it does, over that of the output about its mean.
+    share : float
+        Share of the residual's power that it explains.
+    whole : bool
+        Whether the likeliest kind leaves white noise beside a plain structure. A rich one may
+        have been taken for the nonlinearity's sake.
+    moved : ndarray, shape (p,)
+        What it adds to the parameters of the fit: `theta`, then `linear`.
+    """
+
+    kind: Kind
+    gain: float
+    certain: bool
+    effect: float
+    share: float
+    whole: bool
+    moved: Real
+
+    @property
+    def counts(self) -> bool:
+        """Whether it is there, and too large, or too little of it known, for an interval."""
+        return self.certain and self.effect > (MATERIAL if self.whole else WORTH)
+
+    @property
+    def farthest(self) -> Real:
+        """What it adds at most: its weight is known as well as its likelihood says."""
+        return np.asarray(self.moved * (1.0 + HALF / np.sqrt(2.0 * self.gain)))
+
+
+def bends(
+    u: Real, problem: Problem, fit: Fit, *, intersample: Intersample, fs: float, floor: float = 0.0
+) -> tuple[Bend, ...]:
+    """Find the kinds of nonlinearity that the record leaves in question, the likeliest first.
+
+    Parameters
+    ----------
+    u : ndarray, shape (n,)
+        Input samples.
+    problem, fit
+        The data with the noise as they were weighed, and the linear fit.
+    intersample : str
+        What the input does between its samples.
+    fs : float
+        Rate in Hz.
+    floor : float
+        R.m.s. up to which nothing is said, in the output's unit: the error of rounding.
+
+    Returns
+    -------
+    tuple of Bend
+        Empty where the odds for the likeliest are below 400 to 1; else every one that explains
+        nearly as much, for no trace is exact.
+
+    Examples
+    --------
+    >>> from hmpim.identify.fitting.fit import fit_structure
+    >>> from hmpim.model import STRUCTURES
+    >>> u = np.sin(np.arange(3000) / 30 * (1 + np.arange(3000) / 3000))
+    >>> y = u - np.clip(u, -0.1, 0.1) + 0.01 * np.random.default_rng(0).standard_normal(3000)
+    >>> data = Problem(source=prepare_input(u, "foh"), y=y, valid=None, longest_delay=9.0)
+    >>> fit = fit_structure(data, STRUCTURES["static"], np.zeros(1))
+    >>> best = bends(u, data, fit, intersample="foh", fs=100.0)[0]
+    >>> best.kind, best.certain, abs(fit.linear + best.moved[1:]).round(2).tolist()
+    ('dead_zone', True, [1.0, 0.0])
+    """
+    u, problem, fit = _shortened(u, problem, fit, intersample)
+    if not np.any(fit.residual) or np.ptp(fit.prediction) == 0.0:
+        return ()
+    tried = [
+        *hypotheses(fit.prediction - fit.linear[-1], fit.denominator, fs, every=_EVERY),
+        *_at_the_input(u, problem, fit, intersample, fs),
+    ]
+    traces = np.stack([one.trace for one in tried])
+    rows = jacobian(problem, fit, *traces)
+    residual = problem.innovations(fit.prediction, fit.residual)
+    if problem.counts is not None:
+        rows, residual = rows[:, problem.counts], residual[problem.counts]
+    slopes, seen = np.split(rows, [rows.shape[0] - len(tried)])
+    weights, gains, whole = _scored(slopes, seen, residual)
+    told = np.std(traces * weights[:, None], axis=1) > floor
+    gains = np.where(told & (weights > 0.0), gains, 0.0)
+    most = float(gains.max())
+    if most <= CLEARLY:
+        return ()
+    spread = float(np.std(problem.y if problem.valid is None else problem.y[problem.valid]))
+    gram = slopes @ slopes.T
+    return tuple(
+        Bend(
+            kind=tried[i].kind,
+            gain=float(gains[i]),
+            certain=most > searched(len(tried)),
+            effect=float(weights[i] * np.std(traces[i])) / spread,
+            share=-float(np.expm1(-2.0 * gains[i] / residual.size)),
+            whole=whole and fit.structure.name in PLAIN,
+            moved=-solved(gram, slopes @ seen[i] * weights[i]),
+        )
+        for i in np.argsort(-gains)
+        if gains[i] > most - max(CLEARLY, PART * most)
+    )
+
+
+def _shortened(
+    u: Real, problem: Problem, fit: Fit, intersample: Intersample
+) -> tuple[Real, Problem, Fit]:
+    """The stretch of a long record with most to explain; it begins in mid-motion."""
+    here = stretch_of(fit.residual)
+    if here == slice(0, u.size):
+        return u, problem, fit
+    part = replace(
+        problem,
+        source=prepare_input(u[here], intersample, rest=False),
+        y=problem.y[here],
+        valid=None if problem.valid is None else problem.valid[here],
+        nuisance=None if problem.nuisance is None else problem.nuisance[:, here],
+        noise=None,
+        told=None,
+        begins=0,
+    )
+    own = replace(
+        fit,
+        prediction=fit.prediction[here],
+        residual=fit.residual[here],
+        initial=np.zeros(fit.structure.order),
+    )
+    return u[here], part if problem.noise is None else part.coloured(problem.noise), own
+
+
+def _at_the_input(
+    u: Real, problem: Problem, fit: Fit, intersample: Intersample, fs: float
+) -> Iterator[Hypothesis]:
+    """What a dead zone or a limited speed of the command leaves behind the model."""
+
+    def through(bent: Real) -> Real:
+        other = replace(problem, source=prepare_input(bent, intersample))
+        return np.asarray(fit.linear[:-1] @ part_of(other, fit.structure, fit.theta).rows)
+
+    largest, fastest = float(np.max(np.abs(u))), float(np.max(np.abs(np.diff(u))))
+    for half in _DEAD:
+        inside = np.clip(u, -half * largest, half * largest)
+        yield Hypothesis(kind="dead_zone", trace=-through(inside))
+    for rate in RATES[_EVERY::2]:
+        late = rate_limited(u, rate * fastest) - u
+        yield Hypothesis(kind="rate_limit", trace=through(late), size=rate * fastest * fs)
+
+
+def _scored(slopes: Real, seen: Real, residual: Real) -> tuple[Real, Real, bool]:
+    """Weight of each trace beside the slopes, what it gains, and whether the best leaves noise."""
+    weights, gains, left = _regressed(slopes, seen, residual, np.ones(1))
+    best = int(np.argmax(gains))
+    rest = left[-1] - weights[best] * left[best]
+    colour, _ = yule_walker(rest, LONGEST_AUTOREGRESSION)
+    weights, gains, _ = _regressed(slopes, seen, residual, colour)
+    return weights, gains, is_white(rest)
+
+
+def _regressed(slopes: Real, seen: Real, residual: Real, colour: Real) -> tuple[Real, Real, Real]:
+    """The same in noise of one colour; and what no slope explains, the residual's last."""
+    rows = np.vstack([slopes, seen, residual])
+    if colour.size > 1:
+        rows = scipy.signal.lfilter(colour, [1.0], rows, axis=1)
+    scale = np.linalg.norm(rows, axis=1)
+    scale = np.where(scale > 0.0, scale, 1.0)
+    p = slopes.shape[0]
+    q, r = np.linalg.qr((rows[:p] / scale[:p, None]).T)
+    q = q[:, np.abs(np.diag(r)) > _ALIKE]
+    left = rows[p:] - (rows[p:] @ q) @ q.T
+    beside, own = left[:-1], left[-1]
+    power = np.einsum("ij,ij->i", beside, beside)
+    told = power > _ALIKE * scale[p:-1] ** 2
+    weights = np.where(told, beside @ own, 0.0) / np.where(told, power, 1.0)
+    total = float(own @ own)
+    freedom = max(residual.size - q.shape[1], 1)
+    if total == 0.0:
+        return weights, np.zeros(weights.size), left
+    taken = np.minimum(weights**2 * power / total, 1.0 - np.finfo(float).eps)
+    return weights, -0.5 * freedom * np.log1p(-taken), left

@@ -1,0 +1,62 @@
+"""Figures that a nonlinearity has moved are doubted, and no others."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from hmpim.identify.judgement.bent import bent
+from hmpim.identify.nonlinear.bends import Bend
+from hmpim.identify.reading.spanned import spanned
+
+GAIN = 3  # of delay, two of the denominator, scale factor, bias
+
+
+def bend(evidence, *, certain=True, effect=0.02, whole=False, moved=GAIN):
+    """Half a per cent more scale factor, or of another parameter."""
+    fit = evidence.joint.best.fit
+    shift = np.zeros(fit.theta.size + fit.linear.size)
+    shift[moved] = 0.005
+    return Bend(
+        kind="dead_zone",
+        gain=200.0,
+        certain=certain,
+        effect=effect,
+        share=0.05,
+        whole=whole,
+        moved=shift,
+    )
+
+
+def test_only_what_it_moves_is_doubted(clean):
+    (found,) = bent(replace(clean, bends=(bend(clean),)))
+    assert (found.code, found.severity) == ("nonlinear", "doubt")
+    assert found.parameters == ("scale_factor",)
+    assert "a dead zone of the command" in found.message
+    assert "scale factor by 0.5 %" in found.message
+
+
+def test_a_good_part_of_the_residual_is_no_noise(clean):
+    (found,) = bent(replace(clean, bends=(replace(bend(clean), share=0.3),)))
+    assert found.parameters == ("scale_factor", "noise_std")
+
+
+@pytest.mark.parametrize(
+    "small",
+    [{"certain": False}, {"effect": 0.002}, {"effect": 0.008, "whole": True}],
+)
+def test_what_is_possible_or_small_casts_no_doubt(clean, small):
+    assert bent(replace(clean, bends=(bend(clean, **small),))) == ()
+
+
+def test_what_casts_no_doubt_widens_the_interval_to_its_side(clean):
+    def intervals(bent):
+        own, highest = clean.readings.parameters, clean.band[1]
+        return spanned(own, clean.joint, fs=clean.fs, highest=highest, bent=bent)
+
+    plain, wide = intervals([]), intervals([bend(clean).farthest])
+    assert wide.natural_frequency == plain.natural_frequency
+    assert wide.scale_factor.ci95[0] == plain.scale_factor.ci95[0]
+    own = clean.readings.parameters.scale_factor.ci95[1]
+    assert plain.scale_factor.ci95[1] < own + 0.005
+    assert wide.scale_factor.ci95[1] - own == pytest.approx(0.005 * 1.098, rel=0.01)
