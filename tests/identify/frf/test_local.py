@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from scipy import signal
 
 from hmpim.errors import ArgumentError, RecordError
-from hmpim.identify.frf.local import local_response
+from hmpim.identify.frf.local import local_response, local_responses
 
 FS, BAND = 200.0, (0.1, 20.0)
 SEEDS = int(os.environ.get("HMPIM_SEEDS", "60"))
@@ -228,3 +228,22 @@ def test_bad_records_are_refused() -> None:
         local_response(U, U[:-1], FS, band=BAND)
     with pytest.raises(ArgumentError, match="fs is 0"):
         local_response(U, U, 0.0, band=BAND)
+
+
+def test_many_outputs_at_once_say_what_each_says_alone():
+    """To rounding, whatever the delays: those of different samples are fitted apart."""
+    rng = np.random.default_rng(6)
+    time = np.arange(1000) / 100
+    u = np.sin(2 * np.pi * (0.2 * time + 0.9 * time**2))
+    lag, below = [0.1, 0.1], [1.0, -1.5, 0.7]
+    delays = np.array([0.03, 0.034, 0.071])
+    outputs = np.stack(
+        [np.interp(time - d, time, signal.lfilter(lag, below, u), left=0.0) for d in delays]
+    )
+    outputs += 0.01 * rng.standard_normal(outputs.shape)
+    together = local_responses(u, outputs, 100.0, band=(0.2, 18.0), delays=delays)
+    for one, y, delay in zip(together, outputs, delays, strict=True):
+        alone = local_response(u, y, 100.0, band=(0.2, 18.0), delay=float(delay))
+        assert np.array_equal(one.frequency, alone.frequency)
+        assert np.abs(one.response - alone.response).max() < 1e-6 * alone.std.min()
+        assert one.std == pytest.approx(alone.std, rel=1e-6)

@@ -17,7 +17,7 @@ from hmpim.identify.fleets.fleet import Column, Fleet, FleetFit, Group, fit_flee
 from hmpim.identify.fleets.learnt import is_alike
 from hmpim.identify.fleets.quiet import are_quiet
 from hmpim.identify.fleets.simpler import Simpler, costs_of, learn_simpler
-from hmpim.identify.frf.local import local_response
+from hmpim.identify.frf.local import local_responses
 from hmpim.identify.judgement.between_samples import undetermined_between
 from hmpim.identify.judgement.reach import count_lines, unreached
 from hmpim.identify.judgement.structure import barely_told
@@ -167,11 +167,18 @@ def whole_pairs(
     for group in fit.groups:
         behind, some = simpler[group.some], group.some
         quiet = are_quiet(fleet, group, outputs[some], behind=behind, sweep=whole.sweep)
-        for k in np.flatnonzero(quiet).tolist():
+        places = np.flatnonzero(quiet)
+        responses = local_responses(
+            fleet.u,
+            outputs[some[places]],
+            fleet.fs,
+            delays=group.fit.theta[some[places], 0] / fleet.fs,
+            band=fleet.band,
+        )
+        for k, response in zip(places.tolist(), responses, strict=True):
             i = int(some[k])
             y = outputs[i]
             system = _system(fleet, group, k)
-            response = local_response(fleet.u, y, fleet.fs, delay=system.delay, band=fleet.band)
             own = _parameters(group.alone, k)
             measured = response_bandwidths(
                 response, system, own, fs=fleet.fs, intersample=group.fit.member.intersample

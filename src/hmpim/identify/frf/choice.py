@@ -1,6 +1,7 @@
 """Which local fit to take at each frequency, and how much of its error is bend, not noise."""
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,7 +10,7 @@ from hmpim.identify.arrays import Mask, Real
 from hmpim.identify.frf.neighbours import LocalFit
 from hmpim.identify.worth import TOLERATED
 
-__all__ = ["choose"]
+__all__ = ["choose", "picked"]
 
 # What is judged is averaged over this many frequencies on either side.
 _NEIGHBOURS = 30
@@ -40,9 +41,9 @@ def choose(
 
     Returns
     -------
-    chosen : integer ndarray, shape (c,)
+    chosen : integer ndarray, shape (..., c)
         Place in polynomials and rationals, one after the other.
-    bent : ndarray, shape (c,) or (c, m)
+    bent : ndarray, shape (..., c) or (c, m)
         Variance to be added, in the unit of G squared.
 
     Examples
@@ -57,50 +58,57 @@ def choose(
     """
     tried = (*polynomials, *rationals)
     shape = tried[0].response.shape
-    position = np.arange(shape[0])
+    missed = np.stack([fit.prediction_error for fit in tried])
 
     def stacked(name: str) -> Real:
-        return np.stack([getattr(fit, name) for fit in tried]).reshape(len(tried), shape[0], -1)
+        values = [np.broadcast_to(getattr(fit, name), shape) for fit in tried]
+        return np.stack(values).reshape(*missed.shape, -1)
 
     response, spread, power = stacked("response"), stacked("spread"), stacked("power")
-    missed = np.stack([fit.prediction_error for fit in tried])
     # A window that came to nothing must not make nothing of those beyond its reach.
     mean = _averaged(np.minimum(missed, 1e6 * missed.min(axis=0)))
     least = mean.min(axis=0)
-    bent = np.maximum(mean - (1 + TOLERATED) * least, 0.0)[:, :, None] / power
-    credible = (mean <= _CREDIBLE * least)[:, :, None]
-    variance = spread * least[:, None]
+    bent = np.maximum(mean - (1 + TOLERATED) * least, 0.0)[..., None] / power
+    credible = (mean <= _CREDIBLE * least)[..., None]
+    variance = spread * least[..., None]
     # Fits come in pairs, with and without T: the same kind one width down stands two before.
     kinds = (range(len(polynomials)), range(len(polynomials), len(tried)))
     fuller = [(k, k - 1) for kind in kinds for k in kind[1::2]]
     narrower = [(k, k - 2) for kind in kinds for k in kind[2:]]
-    fit, reference = np.array(fuller + narrower).T
-    parted = _beyond(response[fit] - response[reference], variance[reference], credible[reference])
-    np.maximum.at(bent, fit, parted)
+    for fit, reference in fuller + narrower:
+        apart = response[fit] - response[reference]
+        parted = _beyond(apart, variance[reference], credible[reference])
+        np.maximum(bent[fit], parted, out=bent[fit])
     with np.errstate(over="ignore"):  # a hopeless fit costs infinitely much
-        cost = np.sum((variance + bent) * power[0], axis=2)
+        cost = np.sum((variance + bent) * power[0], axis=-1)
     best = np.argmin(cost, axis=0)
     polynomial = (best >= 2) & (best < len(polynomials))
     below = np.where(polynomial, best - 2, best)
-    cheap = cost[below, position] <= _DEAREST * cost[best, position]
+    cheap = picked(cost, below) <= _DEAREST * picked(cost, best)
     chosen = np.asarray(np.where(cheap, below, best), dtype=np.int64)
-    return chosen, bent[chosen, position].reshape(shape)
+    return chosen, np.asarray(picked(bent, chosen[..., None])).reshape(shape)
+
+
+def picked(values: NDArray[Any], chosen: NDArray[np.int64]) -> NDArray[Any]:
+    """Return at each place the one of the values, shape (k, ...), that is chosen, shape (...)."""
+    return np.asarray(np.take_along_axis(values, chosen[None], axis=0)[0])
 
 
 def _beyond(apart: Real, variance: Real, credible: Mask) -> Real:
     """Return |difference|² beyond the variance of a credible reference, over neighbours."""
     against = np.maximum(variance, 1e-150)  # a record without noise must not overflow
-    excess = _averaged(np.where(credible, np.abs(apart) ** 2 / against - 1.0, 0.0))
+    square = apart.real**2 + apart.imag**2
+    places = np.where(credible, square / against - 1.0, 0.0)
+    excess = np.stack([_averaged(places[..., j]) for j in range(places.shape[-1])], axis=-1)
     return np.asarray(np.where(credible, np.maximum(excess, 0.0) * variance, 0.0))
 
 
 def _averaged(values: Real) -> Real:
-    """Average along the second axis over neighbours on either side, fewer at the ends."""
-    count = values.shape[1]
+    """Average along the last axis over neighbours on either side, fewer at the ends."""
+    count = values.shape[-1]
     reach = min(_NEIGHBOURS, count // 2)
     position = np.arange(count)
     begin, end = np.maximum(position - reach, 0), np.minimum(position + reach + 1, count)
-    total = np.zeros((values.shape[0], count + 1, *values.shape[2:]))
-    np.cumsum(values, axis=1, out=total[:, 1:])
-    number = (end - begin).reshape(-1, *[1] * (values.ndim - 2))
-    return np.asarray((total[:, end] - total[:, begin]) / number)
+    total = np.zeros((*values.shape[:-1], count + 1))
+    np.cumsum(values, axis=-1, out=total[..., 1:])
+    return np.asarray((total[..., end] - total[..., begin]) / (end - begin))

@@ -10,14 +10,14 @@ from numpy.typing import ArrayLike, NDArray
 
 from hmpim.errors import ArgumentError, RecordError
 from hmpim.identify.arrays import Real
-from hmpim.identify.frf.choice import choose
+from hmpim.identify.frf.choice import choose, picked
 from hmpim.identify.frf.neighbours import LocalFit, Spectra, centres_in_band, transform
 from hmpim.identify.frf.polynomial import polynomial_fits
 from hmpim.identify.frf.rational import rational_fits
 from hmpim.identify.result import FrequencyResponse
-from hmpim.identify.signals import as_pair, check_band, check_rate
+from hmpim.identify.signals import as_pair, check_band, check_rate, whole_lag
 
-__all__ = ["local_response"]
+__all__ = ["local_response", "local_responses"]
 
 _FEWEST_SAMPLES = 16
 _ORDER = 2
@@ -30,6 +30,8 @@ _NARROWEST_RATIONAL = 20
 # Bins in all windows of one width of rational functions, beyond which they cost too much; a
 # record so long has neighbours enough for polynomials.
 _AFFORDABLE = 60_000
+# Records of one input that are fitted at once: as many as a processor's cache holds.
+_AT_ONCE = 8
 
 
 def local_response(
@@ -91,7 +93,57 @@ def local_response(
     True
     """
     first, second = _checked(u, y, fs, band, delay=delay, points=points)
-    return _single(first, second, fs, delay=delay, band=band, points=points)
+    (told,) = _many(first, second[None], fs, delays=np.array([delay]), band=band, points=points)
+    return told
+
+
+def local_responses(
+    u: Real,
+    outputs: Real,
+    fs: float,
+    *,
+    band: tuple[float, float],
+    delays: Real,
+    points: int = 400,
+) -> list[FrequencyResponse]:
+    """Return the responses of many outputs to one input, each as `local_response` finds it.
+
+    What follows from the input alone is made once, and the fits are made of many records at once.
+
+    Parameters
+    ----------
+    u : ndarray, shape (n,)
+        Input, n >= 16.
+    outputs : ndarray, shape (k, n)
+        One output a row.
+    fs, band, points
+        As for `local_response`.
+    delays : ndarray, shape (k,)
+        Pure delay of each in s.
+
+    Returns
+    -------
+    list of FrequencyResponse
+        One for each output.
+
+    Examples
+    --------
+    >>> t = np.arange(2000) / 200
+    >>> u = np.sin(2 * np.pi * (0.1 * t + t**2))
+    >>> y = np.stack([2 * u, 3 * np.concatenate((np.zeros(30), u[:-30]))])
+    >>> two = local_responses(u, y, 200.0, band=(0.1, 20.0), delays=np.array([0.0, 0.15]))
+    >>> [bool(np.allclose(np.abs(one.response), k)) for one, k in zip(two, (2.0, 3.0))]
+    [True, True]
+    """
+    found: dict[int, FrequencyResponse] = {}
+    lags = np.array([whole_lag(float(delay), fs, u.size) for delay in delays])
+    for lag in np.unique(lags):
+        alike = np.flatnonzero(lags == lag)
+        for at in range(0, alike.size, _AT_ONCE):
+            some = alike[at : at + _AT_ONCE]
+            told = _many(u, outputs[some], fs, delays=delays[some], band=band, points=points)
+            found.update(zip(some.tolist(), told, strict=True))
+    return [found[i] for i in range(outputs.shape[0])]
 
 
 def _checked(
@@ -126,27 +178,30 @@ def _centres(spectra: Spectra, band: tuple[float, float], points: int) -> NDArra
 def _cut(spectra: Spectra, highest: int) -> Spectra:
     """Leave out the bins that no window reaches: most of a long record's."""
     end = highest + max(highest // 2, _WIDEST) + 1
-    return Spectra(frequency=spectra.frequency[:end], u=spectra.u[:end], y=spectra.y[:end])
+    return Spectra(frequency=spectra.frequency[:end], u=spectra.u[:end], y=spectra.y[..., :end])
 
 
-def _single(
-    u: Real, y: Real, fs: float, *, delay: float, band: tuple[float, float], points: int
-) -> FrequencyResponse:
-    """Polynomials first; what they predict starts the rational functions; then choose of all."""
-    spectra = transform(u, y, fs, delay)
+def _many(
+    u: Real, y: Real, fs: float, *, delays: Real, band: tuple[float, float], points: int
+) -> list[FrequencyResponse]:
+    """Polynomials first; what they predict starts the rational functions; then choose of all.
+
+    Of outputs of shape (k, n), delayed by as many whole samples.
+    """
+    spectra = transform(u, y, fs, delays)
     centre = _centres(spectra, band, points)
     spectra = _cut(spectra, int(centre[-1]))
     polynomials = _polynomials(spectra, centre)
     widths = _rational_widths(centre, spectra.u.size)
     if not widths:
-        return _answer(spectra, centre, delay, polynomials, ())
+        return _answers(spectra, centre, delays, polynomials, ())
     chosen, _ = choose(polynomials, ())
-    g = np.stack([fit.response for fit in polynomials])[chosen, np.arange(centre.size)]
+    g = picked(np.stack([fit.response for fit in polynomials]), chosen)
     inside = np.arange(centre[0], centre[-1] + 1)
     smooth = spectra.y.copy()
-    smooth[inside] = spectra.u[inside] * np.interp(inside, centre, g)
+    smooth[:, inside] = spectra.u[inside] * np.stack([np.interp(inside, centre, own) for own in g])
     rationals = rational_fits(spectra, centre, widths, smooth)
-    return _answer(spectra, centre, delay, polynomials, rationals)
+    return _answers(spectra, centre, delays, polynomials, rationals)
 
 
 def _polynomials(spectra: Spectra, centre: NDArray[np.int64]) -> list[LocalFit]:
@@ -175,21 +230,22 @@ def _rational_widths(centre: NDArray[np.int64], bins: int) -> tuple[int, ...]:
     return tuple(reversed(widths))
 
 
-def _answer(
+def _answers(
     spectra: Spectra,
     centre: NDArray[np.int64],
-    delay: float,
+    delays: Real,
     polynomials: list[LocalFit],
     rationals: list[LocalFit] | tuple[()],
-) -> FrequencyResponse:
+) -> list[FrequencyResponse]:
+    """What is chosen of all fits of each record, the delay put back."""
     chosen, bent = choose(polynomials, rationals)
-    tried, rows = (*polynomials, *rationals), np.arange(centre.size)
-    response = np.stack([fit.response for fit in tried])[chosen, rows]
-    variance = np.stack([fit.spread * fit.noise for fit in tried])[chosen, rows]
+    tried = (*polynomials, *rationals)
+    response = picked(np.stack([fit.response for fit in tried]), chosen)
+    variance = picked(np.stack([fit.spread * fit.noise for fit in tried]), chosen)
     frequency = spectra.frequency[centre]
-    return FrequencyResponse(
-        frequency=frequency,
-        response=response * np.exp(-2j * np.pi * frequency * delay),
-        std=np.sqrt(variance + bent),
-        coherence=None,
-    )
+    response = response * np.exp(-2j * np.pi * frequency * delays[:, None])
+    std = np.sqrt(variance + bent)
+    return [
+        FrequencyResponse(frequency=frequency, response=one, std=own, coherence=None)
+        for one, own in zip(response, std, strict=True)
+    ]

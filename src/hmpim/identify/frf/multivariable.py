@@ -411,9 +411,10 @@ def _read_off(
     else:
         with np.errstate(all="ignore"):
             slopes = windows.powers(DENOMINATOR_ORDER)[:, 1:]
-            start = linear_start(linear, slopes, smooth)
-            found = gauss_newton(linear, slopes, y, start, steps=_STEPS)
-        inverse, rows, theta = found.inverse, found.rows, found.state.theta
+            columns, powers = linear.swapaxes(1, 2), slopes.T
+            start = linear_start(columns, powers, smooth)
+            found = gauss_newton(columns, powers, y, start, steps=_STEPS)
+        inverse, rows, theta = found.inverse, found.rows.swapaxes(1, 2), found.state.theta
         fitted, denominator = found.state.fitted, found.state.denominator
     squares = np.sum(np.abs(y - fitted) ** 2, axis=1)
     squares = np.maximum(squares, 1e-15 * np.sum(np.abs(y) ** 2, axis=1))

@@ -42,7 +42,7 @@ class Spectra:
     frequency : ndarray, shape (b,)
         Hz, from 0 to below fs/2.
     u, y : complex ndarray, shape (b,)
-        Input and output; 0 at DC.
+        Input and output; 0 at DC. Of many outputs `y` has shape (..., b).
     """
 
     frequency: Real
@@ -84,20 +84,27 @@ class Windows:
         return np.asarray(self.x[:, None] ** np.arange(order + 1))
 
     def view(self, values: Complex, reach: int) -> Complex:
-        """Return the windows of values that `mirrored` made, shape (w, s)."""
-        return np.asarray(sliding_window_view(values, self.size)[self.start + reach])
+        """Return the windows of values that `mirrored` made, shape (..., w, s)."""
+        views = sliding_window_view(values, self.size, axis=-1)
+        return np.asarray(views[..., self.start + reach, :])
 
     def forms(self, vectors: Complex, inverse: Complex) -> Real:
-        """Return v V vᴴ for vectors of each centre, (c, k, q), V of its window, (w, q, q)."""
+        """Return v V vᴴ, (..., c, k), for vectors of each centre, (..., c, k, q).
+
+        V, (..., w, q, q), is that of its window.
+        """
         # Centres of one window stand together, so each window takes one product of matrices.
         first = np.searchsorted(self.near, np.arange(self.start.size))
         slot = np.arange(self.near.size) - first[self.near]
-        shape = (self.start.size, int(slot.max()) + 1, *vectors.shape[1:])
+        outer, (kinds, q) = vectors.shape[:-3], vectors.shape[-2:]
+        shape = (*outer, self.start.size, int(slot.max()) + 1, kinds, q)
         padded = np.zeros(shape, dtype=np.complex128)
-        padded[self.near, slot] = vectors
-        conjugate = np.conj(padded).reshape(shape[0], -1, shape[3])
-        product = (conjugate @ inverse.swapaxes(1, 2)).reshape(shape)
-        return np.asarray(np.sum(padded * product, axis=3).real[self.near, slot])
+        padded[..., self.near, slot, :, :] = vectors
+        conjugate = np.conj(padded).reshape(*outer, self.start.size, -1, q)
+        product = (conjugate @ inverse.swapaxes(-1, -2)).reshape(shape)
+        # Real parts alone of the products are asked for.
+        told = np.vecdot(padded.view(np.float64), np.conj(product).view(np.float64))
+        return np.asarray(told[..., self.near, slot, :])
 
     def without_dc(self) -> Real:
         """Return 1 for bins that count and 0 at DC, shape (w, s)."""
@@ -107,6 +114,8 @@ class Windows:
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class LocalFit:
     """What one local method at one width says at every centre; all of shape (c,).
+
+    Of many outputs at once they have shape (..., c), or one that is broadcast to it.
 
     Parameters
     ----------
@@ -130,18 +139,18 @@ class LocalFit:
 
 
 def mirrored(values: Complex, reach: int) -> Complex:
-    """Return a spectrum with `reach` negative frequencies before it.
+    """Return spectra, (..., b), with `reach` negative frequencies before them.
 
     Examples
     --------
     >>> mirrored(np.array([0, 1 + 2j, 3 + 4j]), 1).tolist()
     [(1-2j), 0j, (1+2j), (3+4j)]
     """
-    return np.concatenate((np.conj(values[reach:0:-1]), values))
+    return np.concatenate((np.conj(values[..., reach:0:-1]), values), axis=-1)
 
 
-def transform(u: Real, y: Real, fs: float, delay: float) -> Spectra:
-    """Transform a record, the delay taken out.
+def transform(u: Real, y: Real, fs: float, delay: float | Real) -> Spectra:
+    """Transform a record, the delay taken out; or many of one input, delayed by as many samples.
 
     Its whole samples go by comparing y(n + k) with u(n), so that no response to the stimulus
     lies beyond the end of the record; the rest goes by its phase. Of a long record the last
@@ -149,12 +158,14 @@ def transform(u: Real, y: Real, fs: float, delay: float) -> Spectra:
 
     Parameters
     ----------
-    u, y : ndarray, shape (n,)
-        Input and output.
+    u : ndarray, shape (n,)
+        Input.
+    y : ndarray, shape (n,) or (k, n)
+        Output, or many.
     fs : float
         Hz.
-    delay : float
-        Seconds.
+    delay : float or ndarray, shape (k,)
+        Seconds; of many outputs in one and the same sample.
 
     Examples
     --------
@@ -163,16 +174,18 @@ def transform(u: Real, y: Real, fs: float, delay: float) -> Spectra:
     >>> bool(np.allclose(s.u, s.y))
     True
     """
-    lag = whole_lag(delay, fs, u.size)
+    late = np.atleast_1d(delay)
+    lag = whole_lag(float(late[0]), fs, u.size)
     length = u.size - abs(lag)
     if length > _LONG:
         length = int(scipy.fft.prev_fast_len(length, real=True))
     count = (length - 1) // 2 + 1  # without the bin at fs/2, which is real
     frequency = np.asarray(np.arange(count) * (fs / length), dtype=np.float64)
     spectrum_u = _transform(u[max(-lag, 0) :][:length], count)
-    spectrum_y = scipy.fft.rfft(y[max(lag, 0) :][:length])[:count]
-    spectrum_y = spectrum_y * np.exp(2j * np.pi * frequency * (delay - lag / fs))
-    spectrum_y[0] = 0.0
+    spectrum_y = scipy.fft.rfft(y[..., max(lag, 0) :][..., :length])[..., :count]
+    turn = np.exp(2j * np.pi * frequency * (late[:, None] - lag / fs))
+    spectrum_y = spectrum_y * turn.reshape(*y.shape[:-1], count)
+    spectrum_y[..., 0] = 0.0
     return Spectra(frequency=frequency, u=spectrum_u, y=spectrum_y)
 
 

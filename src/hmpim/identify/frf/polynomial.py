@@ -56,7 +56,7 @@ class _Solver:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class _Right:
-    """What the output says of each window: the right sides, (w, q), and its power, (w,)."""
+    """What the outputs say of each window: right sides, (..., w, q), and power, (..., w)."""
 
     right: Complex
     power: Real
@@ -99,7 +99,7 @@ def polynomial_fits(
     for width in widths:
         solver = _solver(spectra.u, centre, width, order)
         right = _right_of(spectra, solver, width)
-        fits.extend(_solve(solver, way, right, spectra.y[centre]) for way in solver.ways)
+        fits.extend(_solve(solver, way, right, spectra.y[..., centre]) for way in solver.ways)
     return fits
 
 
@@ -150,22 +150,21 @@ def _way(windows: Windows, gram: Complex, here: Real, row: Complex, columns: int
 
 
 def _moments(products: Complex, windows: Windows, reach: int, powers: Real) -> Complex:
-    """Σ A x^p over each window, shape (k, w, p), of products A, (k, b), that `mirrored` made."""
-    views = sliding_window_view(products, windows.size, axis=1)
+    """Σ A x^p over each window, (..., w, p), of products A, (..., b), that `mirrored` made."""
+    views = sliding_window_view(products, windows.size, axis=-1)
     start = windows.start + reach
     chunk = max(_CHUNK // windows.size, 1)
-    some = [views[:, start[k : k + chunk]] @ powers for k in range(0, start.size, chunk)]
-    return np.concatenate(some, axis=1)
+    some = [views[..., start[k : k + chunk], :] @ powers for k in range(0, start.size, chunk)]
+    return np.concatenate(some, axis=-2)
 
 
 def _right_of(spectra: Spectra, solver: _Solver, width: int) -> _Right:
     reach = min(width, spectra.u.size - 1)
     products = np.stack((np.conj(spectra.u) * spectra.y, spectra.y, np.abs(spectra.y) ** 2 + 0j))
-    folded = np.concatenate((np.conj(products[:, reach:0:-1]), products), axis=1)
-    both, alone, power = _moments(folded, solver.windows, reach, solver.powers)
+    both, alone, power = _moments(mirrored(products, reach), solver.windows, reach, solver.powers)
     return _Right(
-        right=np.concatenate((both / solver.size[:, None], alone), axis=1),
-        power=power[:, 0].real,
+        right=np.concatenate((both / solver.size[:, None], alone), axis=-1),
+        power=power[..., 0].real,
     )
 
 
@@ -174,18 +173,18 @@ def _solve(solver: _Solver, way: _Way, of_output: _Right, y: Complex) -> LocalFi
     inverse, spread, leverage = way
     columns, terms = inverse.shape[1], solver.here.shape[1]
     windows, near, row = solver.windows, solver.windows.near, solver.row
-    right = of_output.right[:, :columns]
-    theta = (inverse @ right[:, :, None])[:, :, 0]
-    left = of_output.power - np.sum(np.conj(right) * theta, axis=1).real
+    right = of_output.right[..., :columns]
+    theta = (inverse @ right[..., None])[..., 0]
+    left = of_output.power - np.vecdot(right, theta).real
     # The difference of two nearly equal sums is never less than its rounding.
     left = np.maximum(left, 1e-15 * of_output.power)
     noise = left / np.maximum(windows.counted - columns, 1)
-    theta, size = theta[near], solver.size[near]
-    missed = y - np.sum(row[:, :columns] * theta, axis=1)
+    theta, size = theta[..., near, :], solver.size[near]
+    missed = y - np.sum(row[:, :columns] * theta, axis=-1)
     return LocalFit(
-        response=np.sum(solver.here * theta[:, :terms], axis=1) / size,
+        response=np.sum(solver.here * theta[..., :terms], axis=-1) / size,
         spread=spread / size**2,
-        noise=noise[near],
+        noise=noise[..., near],
         power=size**2,
         prediction_error=np.abs(missed / np.maximum(1.0 - leverage, 1e-6)) ** 2,
     )

@@ -50,11 +50,11 @@ class RationalState:
 
     Parameters
     ----------
-    theta : complex ndarray, shape (w, q)
+    theta : complex ndarray, shape (..., w, q)
         Coefficients of the linear columns, then of A without its constant 1.
-    denominator, fitted : complex ndarray, shape (w, s)
+    denominator, fitted : complex ndarray, shape (..., w, s)
         A, and Y as fitted, on the window's bins.
-    squares : ndarray, shape (w,)
+    squares : ndarray, shape (..., w)
         Σ |Y - fitted|²; infinite where the iterate ran off.
     """
 
@@ -72,10 +72,11 @@ class RationalSolution:
     ----------
     state : RationalState
         The best iterate of each window.
-    rows : complex ndarray, shape (w, s, q)
+    rows : complex ndarray, shape (..., w, q, s)
         Derivatives of the fitted Y.
-    inverse : complex ndarray, shape (w, q, q)
-        Of rowsᴴ rows: the covariance of `theta` where the noise of a bin is 1.
+    inverse : complex ndarray, shape (..., w, q, q)
+        Of the products of the conjugates with them: the covariance of `theta` where the noise of
+        a bin is 1.
     """
 
     state: RationalState
@@ -96,7 +97,7 @@ def rational_fits(
         Bins to answer at.
     widths : tuple of int
         Neighbours on either side, each at least 6.
-    smooth : complex ndarray, shape (b,)
+    smooth : complex ndarray, shape (..., b), as that of `spectra.y`
         Y as a first estimate predicts it, nearly free of noise; starts the iteration.
 
     Returns
@@ -138,18 +139,18 @@ def _fit(
     windows: Windows, u: Complex, y: Complex, smooth: Complex, power: Real, steps: int
 ) -> list[LocalFit]:
     terms = _NUMERATOR + 1
-    powers = windows.powers(max(_NUMERATOR, TRANSIENT_ORDER, DENOMINATOR_ORDER))
-    slopes = powers[:, 1 : DENOMINATOR_ORDER + 1]
-    b = u[:, :, None] * powers[:, :terms]
-    t = windows.without_dc()[:, :, None] * powers[:, : TRANSIENT_ORDER + 1]
-    both: Complex = np.concatenate((b, t), axis=2)
+    powers = windows.powers(max(_NUMERATOR, TRANSIENT_ORDER, DENOMINATOR_ORDER)).T
+    slopes = powers[1 : DENOMINATOR_ORDER + 1]
+    b = u[:, None, :] * powers[:terms]
+    t = windows.without_dc()[:, None, :] * powers[: TRANSIENT_ORDER + 1]
+    both: Complex = np.concatenate((b, t), axis=1)
     full = gauss_newton(both, slopes, y, linear_start(both, slopes, smooth), steps=steps)
     plain = gauss_newton(b, slopes, y, restricted(full, terms), steps=(steps + 1) // 2)
     return [_read_off(windows, found, y, power) for found in (full, plain)]
 
 
 def solved(gram: Complex, right: Complex) -> tuple[Complex, Complex]:
-    """Return inverse, (w, q, q), and solution, (w, q), of normal equations, columns scaled.
+    """Return inverse, (..., q, q), and solution, (..., q), of normal equations, columns scaled.
 
     Examples
     --------
@@ -159,39 +160,42 @@ def solved(gram: Complex, right: Complex) -> tuple[Complex, Complex]:
     """
     scaled, scale = _scaled(gram)
     inverse: Complex = np.asarray(
-        np.linalg.inv(scaled) * scale[:, :, None] * scale[:, None, :], dtype=np.complex128
+        np.linalg.inv(scaled) * (scale[..., :, None] * scale[..., None, :]), dtype=np.complex128
     )
-    return inverse, (inverse @ right)[:, :, 0]
+    return inverse, (inverse @ right)[..., 0]
 
 
 def _solution(gram: Complex, right: Complex) -> Complex:
     """Solution alone, in a third of the time."""
     scaled, scale = _scaled(gram)
-    return np.asarray(np.linalg.solve(scaled, right * scale[:, :, None])[:, :, 0] * scale)
+    return np.asarray(np.linalg.solve(scaled, right * scale[..., None])[..., 0] * scale)
 
 
 def _scaled(gram: Complex) -> tuple[Complex, Real]:
     """Normal equations of columns of size 1, and by what each was multiplied."""
-    index = np.arange(gram.shape[1])
-    scale = 1.0 / np.sqrt(np.maximum(gram[:, index, index].real, 1e-300))
-    scaled = gram * scale[:, :, None] * scale[:, None, :]
-    scaled[:, index, index] += _RIDGE * gram.shape[1]
+    index = np.arange(gram.shape[-1])
+    scale = 1.0 / np.sqrt(np.maximum(gram[..., index, index].real, 1e-300))
+    scaled = gram * (scale[..., :, None] * scale[..., None, :])
+    scaled[..., index, index] += _RIDGE * gram.shape[-1]
     return scaled, scale
 
 
 def linear_start(linear: Complex, slopes: Real, smooth: Complex) -> Complex:
-    """Solve A Y = linear columns · coefficients for a Y nearly free of noise, shape (w, q).
+    """Solve A Y = linear columns · coefficients for a Y nearly free of noise, shape (..., w, q).
 
     Examples
     --------
     >>> x = np.linspace(-1, 1, 9)
     >>> y = (2.0 / (1 + 0.5j * x))[None]
-    >>> np.abs(linear_start(np.ones((1, 9, 1)) + 0j, x[:, None], y)).round(9).tolist()
+    >>> np.abs(linear_start(np.ones((1, 1, 9)) + 0j, x[None], y)).round(9).tolist()
     [[2.0, 0.5]]
     """
-    start = np.concatenate((linear, -smooth[:, :, None] * slopes), axis=2)
-    left = np.conj(start.swapaxes(1, 2))
-    return _solution(left @ start, left @ smooth[:, :, None])
+    count, shape = linear.shape[-2], smooth.shape
+    start = np.empty((*shape[:-1], count + slopes.shape[0], shape[-1]), dtype=np.complex128)
+    start[..., :count, :] = linear
+    np.multiply(-smooth[..., None, :], slopes, out=start[..., count:, :])
+    left = np.conj(start)
+    return _solution(left @ start.swapaxes(-1, -2), left @ smooth[..., None])
 
 
 def restricted(found: RationalSolution, kept: int) -> Complex:
@@ -199,16 +203,16 @@ def restricted(found: RationalSolution, kept: int) -> Complex:
 
     θ₁ - V₁₂ V₂₂⁻¹ θ₂, V the inverse of the products: least squares under θ₂ = 0.
     """
-    q = found.state.theta.shape[1]
+    q = found.state.theta.shape[-1]
     out = np.arange(kept, q - DENOMINATOR_ORDER)
     stay = np.delete(np.arange(q), out)
-    part = found.inverse[:, :, out]
-    scale = 1.0 / np.sqrt(np.maximum(part[:, out, np.arange(out.size)].real, 1e-300))
-    block = part[:, out] * scale[:, :, None] * scale[:, None, :]
-    block[:, np.arange(out.size), np.arange(out.size)] += _RIDGE
-    gone = np.linalg.solve(block, (found.state.theta[:, out] * scale)[:, :, None])
-    change = (part[:, stay] * scale[:, None, :]) @ gone
-    return np.asarray(found.state.theta[:, stay] - change[:, :, 0])
+    part = found.inverse[..., out]
+    scale = 1.0 / np.sqrt(np.maximum(part[..., out, np.arange(out.size)].real, 1e-300))
+    block = part[..., out, :] * (scale[..., :, None] * scale[..., None, :])
+    block[..., np.arange(out.size), np.arange(out.size)] += _RIDGE
+    gone = np.linalg.solve(block, (found.state.theta[..., out] * scale)[..., None])
+    change = (part[..., stay, :] * scale[..., None, :]) @ gone
+    return np.asarray(found.state.theta[..., stay] - change[..., 0])
 
 
 def gauss_newton(
@@ -218,13 +222,13 @@ def gauss_newton(
 
     Parameters
     ----------
-    linear : complex ndarray, shape (w, s, l)
+    linear : complex ndarray, shape (w, l, s)
         Columns of B and T.
-    slopes : ndarray, shape (s, d)
+    slopes : ndarray, shape (d, s)
         Powers of x from the first.
-    y : complex ndarray, shape (w, s)
-        Y.
-    theta : complex ndarray, shape (w, l + d)
+    y : complex ndarray, shape (..., w, s)
+        Y; of many records at once with an axis before.
+    theta : complex ndarray, shape (..., w, l + d)
         Start, such as that of `linear_start`.
     steps : int
         At least 1; each window keeps its best iterate.
@@ -233,16 +237,16 @@ def gauss_newton(
     --------
     >>> x = np.linspace(-1, 1, 9)
     >>> y = (2.0 / (1 + 0.5j * x))[None]
-    >>> ones, start = np.ones((1, 9, 1)) + 0j, np.array([[1.9 + 0j, 0.4j]])
-    >>> found = gauss_newton(ones, x[:, None], y, start, steps=4)
+    >>> ones, start = np.ones((1, 1, 9)) + 0j, np.array([[1.9 + 0j, 0.4j]])
+    >>> found = gauss_newton(ones, x[None], y, start, steps=4)
     >>> np.abs(found.state.theta).round(9).tolist()
     [[2.0, 0.5]]
     """
     state = _state(linear, slopes, y, theta)
     for k in range(steps):
         rows = _jacobian(linear, slopes, state)
-        left = np.conj(rows.swapaxes(1, 2))
-        gram, right = left @ rows, left @ (y - state.fitted)[:, :, None]
+        left = np.conj(rows)
+        gram, right = left @ rows.swapaxes(-1, -2), left @ (y - state.fitted)[..., None]
         if k < steps - 1:
             step = _solution(gram, right)
         else:
@@ -253,10 +257,11 @@ def gauss_newton(
 
 
 def _state(linear: Complex, slopes: Real, y: Complex, theta: Complex) -> RationalState:
-    count = linear.shape[2]
-    denominator = 1.0 + theta[:, count:] @ slopes.T
-    fitted = (linear @ theta[:, :count, None])[:, :, 0] / denominator
-    squares = np.sum(np.abs(y - fitted) ** 2, axis=1)
+    count = linear.shape[-2]
+    denominator = 1.0 + theta[..., count:] @ slopes
+    fitted = (theta[..., None, :count] @ linear)[..., 0, :] / denominator
+    left = y - fitted
+    squares = np.vecdot(left, left).real
     return RationalState(
         theta=theta,
         denominator=denominator,
@@ -266,11 +271,11 @@ def _state(linear: Complex, slopes: Real, y: Complex, theta: Complex) -> Rationa
 
 
 def _jacobian(linear: Complex, slopes: Real, state: RationalState) -> Complex:
-    count = linear.shape[2]
-    rows = np.empty((*linear.shape[:2], count + slopes.shape[1]), dtype=np.complex128)
+    count, shape = linear.shape[-2], state.fitted.shape
+    rows = np.empty((*shape[:-1], count + slopes.shape[0], shape[-1]), dtype=np.complex128)
     inverse = 1.0 / state.denominator
-    np.multiply(linear, inverse[:, :, None], out=rows[:, :, :count])
-    np.multiply(-(state.fitted * inverse)[:, :, None], slopes, out=rows[:, :, count:])
+    np.multiply(linear, inverse[..., None, :], out=rows[..., :count, :])
+    np.multiply(-(state.fitted * inverse)[..., None, :], slopes, out=rows[..., count:, :])
     return rows
 
 
@@ -280,9 +285,9 @@ def _better(one: RationalState, other: RationalState) -> RationalState:
     if take.all():
         return other
     return RationalState(
-        theta=np.where(take[:, None], other.theta, one.theta),
-        denominator=np.where(take[:, None], other.denominator, one.denominator),
-        fitted=np.where(take[:, None], other.fitted, one.fitted),
+        theta=np.where(take[..., None], other.theta, one.theta),
+        denominator=np.where(take[..., None], other.denominator, one.denominator),
+        fitted=np.where(take[..., None], other.fitted, one.fitted),
         squares=np.where(take, other.squares, one.squares),
     )
 
@@ -290,23 +295,24 @@ def _better(one: RationalState, other: RationalState) -> RationalState:
 def _read_off(windows: Windows, found: RationalSolution, y: Complex, power: Real) -> LocalFit:
     """Response, its spread and the prediction error at each centre."""
     terms, near, place = _NUMERATOR + 1, windows.near, windows.place
-    state, row = found.state, found.rows[near, place]
+    state, row = found.state, found.rows.swapaxes(-1, -2)[..., near, place, :]
     x = windows.x[place][:, None]
-    a = state.denominator[near, place]
+    a = state.denominator[..., near, place]
     size = np.sqrt(power[near])
     b = x ** np.arange(terms)
-    response = np.sum(b * state.theta[near, :terms], axis=1) / a / size
-    slope = np.zeros_like(row)
-    slope[:, :terms] = b / (a * size)[:, None]
-    slope[:, -DENOMINATOR_ORDER:] = -(response / a)[:, None] * x ** np.arange(
+    response = np.sum(b * state.theta[..., near, :terms], axis=-1) / a / size
+    pair = np.zeros((*a.shape, 2, row.shape[-1]), dtype=np.complex128)
+    pair[..., 0, :terms] = b / (a * size)[..., None]
+    pair[..., 0, -DENOMINATOR_ORDER:] = -(response / a)[..., None] * x ** np.arange(
         1, DENOMINATOR_ORDER + 1
     )
-    forms = windows.forms(np.stack((slope, row), axis=1), found.inverse)
-    spread, leverage = forms[:, 0], forms[:, 1]
-    missed = (y - state.fitted)[near, place]
-    squares = np.maximum(state.squares, 1e-15 * np.sum(np.abs(y) ** 2, axis=1))
-    noise = (squares / np.maximum(windows.counted - row.shape[1], 1))[near]
-    error = np.abs(missed / np.maximum(1.0 - leverage, 1e-6)) ** 2
+    pair[..., 1, :] = row
+    forms = windows.forms(pair, found.inverse)
+    spread, leverage = forms[..., 0], forms[..., 1]
+    missed = (y - state.fitted)[..., near, place] / np.maximum(1.0 - leverage, 1e-6)
+    error = missed.real**2 + missed.imag**2
+    squares = np.maximum(state.squares, 1e-15 * np.vecdot(y, y).real)
+    noise = (squares / np.maximum(windows.counted - row.shape[-1], 1))[..., near]
     failed = ~(np.isfinite(response) & np.isfinite(spread) & np.isfinite(error))
     return LocalFit(
         response=np.where(failed, 0.0, response),
