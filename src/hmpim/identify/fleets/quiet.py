@@ -35,6 +35,9 @@ Places = NDArray[np.intp]
 _AT_ONCE = 16
 """Records whose derivatives are held at once."""
 
+_FORGOTTEN = 40.0
+"""Time constants after which nothing is left of a free response: e⁻⁴⁰ is rounding."""
+
 _TOLD = ("scale_factor", "natural_frequency", "damping_ratio", "bandwidth_phase90",
          "bandwidth_phase90_without_delay", "bandwidth_3db")  # fmt: skip
 """Figures whose deviation is held against them."""
@@ -179,13 +182,9 @@ def _from_rest(fleet: Fleet, group: Group, part: Places, rows: Real, lags: Place
         reach = RINGS if group.fit.member.source.oversampling == 1 else MARGIN
         ringing = (np.abs(away) <= reach) | (away >= n - 1 - reach)
         quiet &= ~stand_out_of(left, ringing)
-    omega, zeta = np.exp(group.fit.theta[which, 1:].T)
     since = np.maximum(at - begins[:, None], 0)
-    turn = omega * np.sqrt(zeta**2 - 1.0 + 0j)
-    decay = -(zeta * omega)[:, None] * since
-    both = np.exp(decay + turn[:, None] * since) + np.exp(decay - turn[:, None] * since)
-    apart = np.exp(decay + turn[:, None] * since) - np.exp(decay - turn[:, None] * since)
-    free = np.stack([both.real, (apart / turn[:, None]).real], axis=1)
+    free = _free_responses(np.exp(group.fit.theta[which, 1:]), n)
+    free = np.take_along_axis(free, since[:, None, :], axis=2)
     late = np.concatenate([rows, free], axis=1) * ~early[:, None, :]
     left = left * ~early
     gram = late @ late.transpose(0, 2, 1)
@@ -199,3 +198,18 @@ def _from_rest(fleet: Fleet, group: Group, part: Places, rows: Real, lags: Place
     rest = np.maximum(power - gained, np.finfo(float).tiny)
     statistic = count * np.log(np.maximum(power, np.finfo(float).tiny) / rest)
     return np.asarray(quiet & (statistic <= scipy.special.chdtri(2, FALSE_ALARM)))
+
+
+def _free_responses(modes: Real, samples: int) -> Real:
+    """Both free responses of second-order units, ω in rad a sample and ζ, (k, 2); (k, 2, n)."""
+    omega, zeta = modes[:, 0, None], modes[:, 1, None]
+    away = omega * np.sqrt(zeta**2 - 1.0 + 0j)
+    slowest = float((zeta * omega - np.maximum(away.real, 0.0)).min())
+    lasting = min(samples, int(_FORGOTTEN / slowest) + 1)  # later there is nothing
+    at = np.arange(lasting)
+    first, second = (np.exp((sign * away - zeta * omega) * at) for sign in (1.0, -1.0))
+    apart = np.where(np.abs(away) > 0.0, away, 1.0)
+    out = np.zeros((modes.shape[0], 2, samples))
+    out[:, 0, :lasting] = (first + second).real
+    out[:, 1, :lasting] = ((first - second) / apart).real
+    return out

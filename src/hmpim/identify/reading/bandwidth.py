@@ -8,6 +8,7 @@ far measurement and model part there, and where the measurement crosses.
 
 import numpy as np
 
+from hmpim.identify.arrays import Complex, Real
 from hmpim.identify.reading.sampled_response import sampled_response
 from hmpim.identify.result import Estimate, FrequencyResponse, Parameters, ResponseBandwidths
 from hmpim.identify.result.error_bars import estimate
@@ -46,8 +47,16 @@ def ratio_at(
     ratio = measured.response[near] / modelled
     std = measured.std[near] / np.abs(modelled)
     weight = 1.0 / np.maximum(std, 1e-12)
-    line = np.polynomial.polynomial.polyfit(f - frequency, ratio, 1, w=weight)
-    return complex(line[0]), float(np.median(std))
+    return _height(f - frequency, ratio, weight**2), float(np.median(std))
+
+
+def _height(x: Real, y: Complex, weight: Real) -> complex:
+    """Height at 0 of the weighted least-squares line through points, some of them apart."""
+    total = float(weight.sum())
+    middle, mean = float(weight @ x) / total, complex(weight @ y) / total
+    away = weight * (x - middle)
+    spread = float(away @ (x - middle))
+    return mean - middle * complex(away @ y) / spread if spread > 0.0 else mean
 
 
 def response_bandwidths(

@@ -7,7 +7,8 @@ import scipy
 from numpy.typing import ArrayLike, NDArray
 
 from hmpim.errors import RecordError
-from hmpim.identify.arrays import Real
+from hmpim.identify.arrays import Complex, Real
+from hmpim.identify.kept import kept
 from hmpim.identify.signals import as_pair, as_signal
 
 __all__ = [
@@ -82,8 +83,18 @@ def cross_correlation(x: ArrayLike, y: ArrayLike) -> Correlation:
     """
     first, second = as_pair(x, y)
     n = first.size
-    value = np.asarray(scipy.signal.correlate(first, second, mode="full", method="fft")) / n
+    length = int(scipy.fft.next_fast_len(2 * n - 1, real=True))
+    around = scipy.fft.irfft(
+        scipy.fft.rfft(first, length) * np.conj(_padded(second, length)), length
+    )
+    value = np.concatenate((around[length - n + 1 :], around[:n])) / n
     return Correlation(lag=np.arange(1 - n, n), value=value)
+
+
+@kept
+def _padded(x: Real, length: int) -> Complex:
+    """Transform of a signal with zeros behind it."""
+    return np.asarray(scipy.fft.rfft(x, length), dtype=np.complex128)
 
 
 def autocorrelation(x: ArrayLike) -> Correlation:

@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 from hmpim.arguments import checked
 from hmpim.errors import ArgumentError, RecordError
 from hmpim.identify.arrays import Complex, Mask, Real
+from hmpim.identify.kept import kept
 from hmpim.identify.result import PaperEstimates
 from hmpim.identify.section_iv import response as reading
 from hmpim.identify.section_iv.correlation import (
@@ -266,12 +267,22 @@ def paper_estimates(
     time = _time_steps(stimulus, measured)
     n = stimulus.size
     length = n + padding(n)
-    both = np.stack((stimulus, measured))
-    both -= both.mean(axis=1, keepdims=True)
-    value = np.asarray(scipy.fft.rfft(both * window_samples("gaussian", n), length, axis=-1))
-    steps = _frequency_steps(value[0], value[1], fs / length, span, time, fs)
+    answered = scipy.fft.rfft((measured - measured.mean()) * _taper(n), length)
+    steps = _frequency_steps(_tapered(stimulus, length), answered, fs / length, span, time, fs)
     frequency = np.asarray(scipy.fft.rfftfreq(length, 1 / fs), dtype=np.float64)[steps.inside]
     return _estimates(time, steps, frequency, fs)
+
+
+@kept
+def _taper(samples: int) -> Real:
+    return window_samples("gaussian", samples)
+
+
+@kept
+def _tapered(u: Real, length: int) -> Complex:
+    """Transform of a stimulus without its mean, behind the paper's window, zeros padded."""
+    value = scipy.fft.rfft((u - u.mean()) * _taper(u.size), length)
+    return np.asarray(value, dtype=np.complex128)
 
 
 def _band(u: Real, fs: float, band: tuple[float, float] | None) -> tuple[float, float]:

@@ -219,6 +219,7 @@ def ratio(y: Complex, u: Complex) -> Complex:
     return out
 
 
+@kept
 def well_excited(u: Complex) -> Mask:
     """Return which bins of a stimulus's spectrum are no notch between better ones.
 

@@ -7,6 +7,7 @@ from numpy.typing import ArrayLike
 
 from hmpim.errors import ArgumentError
 from hmpim.identify.arrays import Real
+from hmpim.identify.kept import kept
 from hmpim.identify.signals import as_pair, as_signal
 
 __all__ = [
@@ -98,6 +99,7 @@ def bias_by_autocorrelation(error: ArrayLike) -> float:
     return -rms if array.mean() > 0 else rms
 
 
+@kept
 def initial_period(u: ArrayLike) -> int:
     """Return how many samples the first full cycle of the excitation takes.
 
