@@ -120,7 +120,8 @@ def _pair(
     said = () if inspection is None else inspection.findings
     none: tuple[Bend, ...] = ()
     moves, unmoved = attempt("bends", lambda: _bends(question, found, joint, i, said), none)
-    evidence, unmade = _evidence(question, found, readings, joint, response, i, moves, bool(said))
+    bent = 0.0 if inspection is None or not said else inspection.summary.nonlinear
+    evidence, unmade = _evidence(question, found, readings, joint, response, i, moves, bent)
     parameters, seen = with_imperfections(
         evidence.spanned or readings.parameters, found, censored, output.unit
     )
@@ -165,7 +166,7 @@ def _evidence(
     response: FrequencyResponse,
     i: int,
     moves: tuple[Bend, ...],
-    nonlinear: bool,
+    nonlinear: float,
 ) -> tuple[Evidence, tuple[Finding, ...]]:
     """What the checks look at, and what of it could not be made."""
     fs, band, fit = question.aligned.fs, _band(question, i), joint.best.fit
@@ -194,7 +195,7 @@ def _evidence(
             joint,
             fs=fs,
             highest=min(band[1], fs / 2),
-            bent=[one.farthest for one in moves if not one.counts],
+            bent=[one.farthest for one in moves],
         ),
         misfit=left,
         u=u,
@@ -202,7 +203,7 @@ def _evidence(
         band=band,
         fit_percent=_fit_percent(joint),
         bends=moves,
-        nonlinear=nonlinear or any(one.certain for one in moves),
+        nonlinear=max([nonlinear, *(one.share for one in moves if one.certain)]),
         held=found.hold is not None,
         measured=from_response,
         through=question.instrument is not None,

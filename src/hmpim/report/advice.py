@@ -56,6 +56,7 @@ _ADVICE = {
     "friction": "Test at a larger level as well, and compare.",
     "hardening": "Test at several levels, and state the one that each figure is for.",
     "nonlinear": "Test at a smaller level too. Where figures differ, state their level.",
+    "other_dynamics": "Sweep higher, or use the measured response.",
     "structure": "Record for longer or excite more, if the number of poles matters.",
     "unmodelled": "Use the measured response where it differs from the model.",
     "lack_of_fit": "Use the measured response where it differs from the model.",

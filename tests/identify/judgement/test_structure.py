@@ -70,7 +70,7 @@ def test_a_second_pole_is_asked_for_or_cannot_be_excluded(evidence_of):
 
 def test_a_nonlinear_residual_asks_for_no_pole(evidence_of):
     bent = lagging((0.05, 0.02), 0.005, evidence_of)
-    assert missed_pole(replace(bent, nonlinear=True)) == ()
+    assert missed_pole(replace(bent, nonlinear=0.6)) == ()
 
 
 def with_assumption(evidence, name, *, delay, criterion):

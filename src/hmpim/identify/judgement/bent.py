@@ -9,7 +9,7 @@ from hmpim.identify.nonlinear.bends import Bend
 from hmpim.identify.nonlinear.words import KIND_WORDS
 from hmpim.identify.reading.spanned import MOVES, bent_figures
 from hmpim.identify.result.groups import MODELLED
-from hmpim.identify.worth import FEW
+from hmpim.identify.worth import FEW, WORTH
 from hmpim.record import Finding
 
 __all__ = ["bent"]
@@ -19,7 +19,8 @@ def bent(evidence: Evidence) -> tuple[Finding, ...]:
     """Doubt the figures that a nonlinearity moves by more than a small part of their interval.
 
     How far it moves them is known to first order, for traces that are none of them exact: enough
-    to tell which figures it leaves alone. What is small or only possible widens the intervals.
+    to tell which figures it leaves alone. What is small or only possible widens the intervals: no
+    figure is doubted for less than a model must be right to.
     """
     sure = [one for one in evidence.bends if one.counts]
     if not sure:
@@ -60,6 +61,6 @@ def _moved(evidence: Evidence, sure: Sequence[Bend]) -> dict[str, float]:
             continue
         values = [other.get(name) for other in others]
         far = max((abs(value - own.value) for value in values if value is not None), default=0.0)
-        if None in values or far > MOVES * HALF * own.spread:
+        if None in values or far > max(MOVES * HALF * own.spread, WORTH * abs(own.value)):
             moved[name] = far / abs(own.value) if own.value else 0.0
     return moved

@@ -39,8 +39,8 @@ class Evidence:
         it allows no other.
     bends : tuple of Bend
         Nonlinearities that the record leaves in question; none where figures are doubted anyway.
-    nonlinear : bool
-        Whether the residual is known to be nonlinear, and so asks for no pole.
+    nonlinear : float
+        Share of the residual's power that is known to be nonlinear; 0 where none is.
     held : bool
         Whether the output is held, so that its measured response shows the hold too.
     through : bool
@@ -59,7 +59,7 @@ class Evidence:
     measured: ResponseBandwidths
     spanned: Parameters | None = None
     bends: tuple[Bend, ...] = ()
-    nonlinear: bool = False
+    nonlinear: float = 0.0
     held: bool = False
     through: bool = False
     jittered: bool = False

@@ -12,6 +12,7 @@ from hmpim.identify.chance import FALSE_ALARM
 from hmpim.identify.fitting.least_squares import solved
 from hmpim.identify.judgement.evidence import Evidence
 from hmpim.identify.kept import kept
+from hmpim.identify.nonlinear.lines import find_period
 from hmpim.identify.result.groups import MODELLED
 from hmpim.record import Finding
 
@@ -36,8 +37,10 @@ def feedback(evidence: Evidence) -> tuple[Finding, ...]:
     all the same (L. Ljung, System Identification, 2nd ed., ch. 13.4).
     """
     left, u = evidence.readings.innovations, evidence.u
-    if evidence.through or evidence.nonlinear or left.size != u.size or u.size < 20 * _AHEAD:
-        return ()  # a sweep's harmonics are its future
+    if evidence.through or left.size != u.size or u.size < 20 * _AHEAD:
+        return ()
+    if evidence.nonlinear or find_period(u) is not None:
+        return ()  # a sweep's harmonics are its future; that of a periodic input is its past
     inside = np.arange(_AHEAD, u.size - _AHEAD)
     counts = evidence.joint.weighed.counts
     inside = inside if counts is None else inside[counts[inside]]

@@ -52,23 +52,32 @@ def barely_told(chosen: str, *, poles: int, delay: float) -> Finding:
 def missed_pole(evidence: Evidence) -> tuple[Finding, ...]:
     """Doubt the delay where the record asks for other dynamics, or cannot exclude a slow pole."""
     hidden = evidence.joint.hidden
-    if hidden is None or evidence.nonlinear or evidence.joint.rivals:
+    bent = evidence.nonlinear > 0.5  # most of what is left asks for no pole
+    if hidden is None or bent or evidence.joint.rivals:
         return ()
     order, fs = evidence.joint.best.fit.structure.order, evidence.fs
     moved = float(np.sqrt(abs(hidden.squared)))
     if abs(hidden.squared) > DEVIATIONS * hidden.std and moved > TOLERATED * hidden.scale:
-        message = (
-            f"The record asks for other dynamics than {order} pole{'s' * (order != 1)} "
-            f"({abs(hidden.squared) / hidden.std:.0f} standard deviations), and the delay may be "
-            f"{moved / fs:.2g} s off. Lower the noise, or sweep higher, until a richer structure "
-            "can be told."
+        return (
+            Finding(
+                code="other_dynamics",
+                message=f"The record asks for other dynamics than {order} "
+                f"pole{'s' * (order != 1)} ({abs(hidden.squared) / hidden.std:.0f} standard "
+                f"deviations), and the delay may be {moved / fs:.2g} s off. Lower the noise, or "
+                "sweep higher, until a richer structure can be told.",
+                severity="doubt",
+                parameters=PHASE_SPLIT,
+            ),
         )
-    elif hidden.may_hide:
-        message = (
-            f"A further pole with a time constant of up to {hidden.limit / fs:.3g} s would not "
-            "show in this record, and would shorten the delay by as much; the intervals cover it. "
-            "Lower the noise, or sweep higher."
-        )
-    else:
+    if not hidden.may_hide:
         return ()
-    return (Finding(code="structure", message=message, severity="doubt", parameters=PHASE_SPLIT),)
+    return (
+        Finding(
+            code="structure",
+            message=f"A further pole with a time constant of up to {hidden.limit / fs:.3g} s would "
+            "not show in this record, and would shorten the delay by as much; the intervals cover "
+            "it. Lower the noise, or sweep higher.",
+            severity="doubt",
+            parameters=PHASE_SPLIT,
+        ),
+    )

@@ -34,6 +34,7 @@ _WITHHELD = frozenset(
         "initial_transient",
         "lack_of_fit",
         "nonlinear",
+        "other_dynamics",
         "unsampled_input",
     }
 )
