@@ -39,22 +39,16 @@ class NoiseColour:
         The likelier description; a line is left out of it.
     coefficient : float
         Correlation between one sample and the next: the AR(1) coefficient.
-    coefficient_std : float
-        Its standard deviation were the noise AR(1).
     exponent : float
         α of a power spectrum that goes as f^-α; 0 is white, 1 flicker, 2 random walk.
     line_frequency : float or None
         Frequency of the strongest line that stands out of the noise, Hz.
-    line_amplitude : float or None
-        Its amplitude, in the residual's unit.
     """
 
     kind: Colour
     coefficient: float
-    coefficient_std: float
     exponent: float
     line_frequency: float | None
-    line_amplitude: float | None
 
     @property
     def description(self) -> str:
@@ -139,12 +133,8 @@ def noise_colour(residual: ArrayLike, fs: float) -> NoiseColour:
     return NoiseColour(
         kind=kind,
         coefficient=rho,
-        coefficient_std=float(np.sqrt((1 - rho * rho) / n)),
         exponent=exponent,
         line_frequency=line,
-        line_amplitude=None
-        if line is None
-        else _amplitude(as_signal("residual", residual), line / fs),
     )
 
 
@@ -241,23 +231,11 @@ def _line(e: Real, fs: float) -> float | None:
     return float((k + 0.5 * (left - right) / (left - 2 * here + right)) * fs / n)
 
 
-def _pair(size: int, frequency: float) -> Real:
-    """Cosine and sine at `frequency` in cycles per sample, shape (2, n)."""
-    phase = 2 * np.pi * frequency * np.arange(size)
-    return np.stack([np.cos(phase), np.sin(phase)])
-
-
-def _weights(e: Real, frequency: float) -> Real:
-    rows = _pair(e.size, frequency)
-    return np.asarray(np.linalg.solve(rows @ rows.T, rows @ (e - e.mean())))
-
-
 def _tone(e: Real, frequency: float) -> Real:
-    return np.asarray(_weights(e, frequency) @ _pair(e.size, frequency))
-
-
-def _amplitude(e: Real, frequency: float) -> float:
-    return float(np.hypot(*_weights(e, frequency)))
+    """Part of a residual, its mean 0, that is a line at `frequency` in cycles per sample."""
+    phase = 2 * np.pi * frequency * np.arange(e.size)
+    rows = np.stack([np.cos(phase), np.sin(phase)])
+    return np.asarray(np.linalg.solve(rows @ rows.T, rows @ e) @ rows)
 
 
 def _likelier(e: Real) -> tuple[Colour, float]:

@@ -2,8 +2,7 @@
 
 paper                     all of them in their order
 correlation               the delay where two records resemble each other most, (8)
-static                    the r.m.s. error as bias, the scale factor of the first cycle, (9)-(13)
-noise_by_autocorrelation  the noise from the error's autocorrelation, (14)
+static                    bias, scale factor of the first cycle and noise, (9)-(14)
 windows, spectrum         windowed and padded spectra, (15)-(18)
 response                  magnitude and phase, the delay's phase removed, (19)-(25)
 """

@@ -18,10 +18,10 @@ from hmpim.identify.section_iv.correlation import (
     correlation_peak,
     cross_correlation,
 )
-from hmpim.identify.section_iv.noise_by_autocorrelation import noise_by_autocorrelation
 from hmpim.identify.section_iv.spectrum import decibel, excited_band, padding, ratio, well_excited
 from hmpim.identify.section_iv.static import (
     bias_by_autocorrelation,
+    noise_by_autocorrelation,
     scale_factor_near_dc,
     time_corrected_error,
 )

@@ -3,9 +3,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hmpim.errors import ArgumentError
 from hmpim.identify.section_iv.correlation import autocorrelation
-from hmpim.identify.section_iv.noise_by_autocorrelation import noise_by_autocorrelation
+from hmpim.identify.section_iv.static import noise_by_autocorrelation
 
 
 @given(st.floats(-5, 5), st.floats(0.01, 2), st.integers(0, 2**32 - 1))
@@ -18,27 +17,19 @@ def test_equation_14_mean_square_less_square_of_the_mean(
     assert noise_by_autocorrelation(error) ** 2 == pytest.approx(printed, rel=1e-6, abs=1e-12)
 
 
-@pytest.mark.parametrize("infinity", ["mean", "lags"])
-def test_white_noise_on_a_bias_is_found(infinity: str) -> None:
+def test_white_noise_on_a_bias_is_found() -> None:
     error = 0.6 + 0.1 * np.random.default_rng(5).standard_normal(20_000)
     # four standard deviations of the estimate, which is sigma / sqrt(2 n)
-    found = noise_by_autocorrelation(error, infinity=infinity)  # type: ignore[arg-type]
+    found = noise_by_autocorrelation(error)
     assert found == pytest.approx(0.1, abs=4 * 0.1 / np.sqrt(40_000))
 
 
 def test_a_bias_alone_has_no_noise() -> None:
-    # exactly zero at far lags too, up to the rounding of the transform under the root
     assert noise_by_autocorrelation(np.full(100, 0.5)) == 0.0
-    assert noise_by_autocorrelation(np.full(100, 0.5), infinity="lags") < 1e-7
 
 
 @given(st.floats(-10, 10), st.floats(0.1, 10))
 def test_noise_ignores_bias_and_scales(bias: float, scale: float) -> None:
     error = np.random.default_rng(2).standard_normal(200)
-    one = noise_by_autocorrelation(error, infinity="mean")
+    one = noise_by_autocorrelation(error)
     assert noise_by_autocorrelation(scale * error + bias) == pytest.approx(scale * one, rel=1e-9)
-
-
-def test_unknown_infinity_is_refused() -> None:
-    with pytest.raises(ArgumentError, match="infinity is 'never'"):
-        noise_by_autocorrelation(np.arange(9.0), infinity="never")  # type: ignore[arg-type]
