@@ -226,6 +226,9 @@ def test_a_held_input_through_a_real_circuit(measured):
     assert 1 / (2 * np.pi * pair.time_constant.value) == pytest.approx(28.6, rel=0.03)
     assert pair.delay.value == pytest.approx(1.28e-3, abs=0.1e-3)
     assert hmpim.predict(pair, full, start=half).fit_percent > 98
+    assert pair.delay.verdict == pair.time_constant.verdict == "doubtful"  # a second stage hides
+    assert pair.scale_factor.verdict == pair.bandwidth_3db.verdict == "ok"
+    assert "other_dynamics" in {finding.code for finding in pair.warnings}
 
 
 @pytest.mark.real_data

@@ -264,6 +264,17 @@ def test_the_silverbox_hardens_in_one_record_and_over_levels(measured):
 
 
 @pytest.mark.real_data
+def test_a_hardening_spring_is_not_taken_for_a_second_mode(measured):
+    pair = hmpim.identify(hmpim.read(measured / "silverbox" / "schroeder.csv"))["output", "input"]
+    assert pair.structure == "second_order"
+    assert pair.damping_ratio.value == pytest.approx(0.0495, abs=0.0005)
+    assert pair.damping_ratio.verdict == pair.natural_frequency.verdict == "doubtful"
+    assert pair.damping_ratio.ci95 is None
+    (finding,) = (found for found in pair.warnings if found.code == "nonlinear")
+    assert "hardening spring" in finding.message
+
+
+@pytest.mark.real_data
 def test_hardware_that_is_linear_enough_is_not_doubted_for_it(measured):
     """The circuit's converters bend by a per cent, seen and said; the loop by far less."""
     circuit = hmpim.read(measured / "rcrc" / "prbs.csv").between(0.0, 8.0)

@@ -20,7 +20,7 @@ from hmpim.identify.frf.local import local_response
 from hmpim.identify.judgement import Evidence, attempt, judge
 from hmpim.identify.judgement.unfollowed import unfollowed
 from hmpim.identify.noise.misfit import Misfit, misfit
-from hmpim.identify.nonlinear.bends import Bend, bends
+from hmpim.identify.nonlinear.bends import Bend, bends, is_bent_instead
 from hmpim.identify.nonlinear.nonlinearity import Inspection, inspect_nonlinearity
 from hmpim.identify.reading.bandwidth import response_bandwidths
 from hmpim.identify.reading.coefficients import coefficients_of, highest_first
@@ -99,10 +99,14 @@ def _pair(
     aligned, output, drifting = question.aligned, question.output, joined.drifting
     source, band = aligned.inputs[i], _band(question, i)
     joint, censored, covariance = _refined(question, found, joined, i)
+    plain = plainer(joint) if question.inputs is None and covariance is None else None
     inspection, unseen = attempt(
-        "nonlinearity", lambda: _inspected(question, found, joint, i, covariance), None
+        "nonlinearity", lambda: _inspected(question, found, joint, i, plain), None
     )
-    joint = joint if inspection is None else taking(joint, inspection.fit)
+    if inspection is not None and inspection.fit is not joint.best.fit:
+        joint = taking(joint, inspection.fit)
+    elif plain is not None and _is_bent(question, found, joint, plain):
+        joint = taking(joint, plain)
     y = output.values if matrix is None else joint.problem.y
     paper = paper_estimates(source.values, y, aligned.fs, band=band)
     readings = read_parameters(
@@ -236,7 +240,7 @@ def _refined(
 
 
 def _inspected(
-    question: Question, found: Imperfections, joint: JointFit, i: int, covariance: Real | None
+    question: Question, found: Imperfections, joint: JointFit, i: int, plain: Fit | None
 ) -> Inspection | None:
     """What of the residual is nonlinear; not asked of a loop."""
     if question.instrument is not None:
@@ -248,10 +252,25 @@ def _inspected(
         joint.problem,
         joint.best.fit,
         fs=aligned.fs,
-        plain=plainer(joint) if question.inputs is None and covariance is None else None,
+        plain=plain,
         others=[other.values for other in aligned.inputs if other is not source],
         floor=max(found.rounding, ROUNDING * float(np.std(output.values))),
         unit=output.unit,
+    )
+
+
+def _is_bent(question: Question, found: Imperfections, joint: JointFit, plain: Fit) -> bool:
+    """Whether a plain fit and a nonlinearity take the place of a rich one; not asked of a loop."""
+    if question.instrument is not None or joint.best.fit.structure.sampled:
+        return False
+    return is_bent_instead(
+        question.aligned.inputs[0].values,
+        joint.problem,
+        joint.best.fit,
+        plain,
+        intersample=joint.best.intersample,
+        fs=question.aligned.fs,
+        floor=max(found.rounding, ROUNDING * float(np.std(question.output.values))),
     )
 
 

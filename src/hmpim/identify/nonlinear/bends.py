@@ -36,7 +36,7 @@ from hmpim.identify.worth import MATERIAL, PART, WORTH
 from hmpim.model.sampled import prepare_input
 from hmpim.record import Intersample
 
-__all__ = ["Bend", "bends"]
+__all__ = ["Bend", "bends", "is_bent_instead"]
 
 _EVERY = 3
 """Of a kind's values every so many is tried: its neighbours leave traces that are much alike."""
@@ -160,6 +160,37 @@ def bends(
         for i in np.argsort(-gains)
         if gains[i] > most - max(CLEARLY, PART * most)
     )
+
+
+def is_bent_instead(
+    u: Real,
+    problem: Problem,
+    fit: Fit,
+    plain: Fit,
+    *,
+    intersample: Intersample,
+    fs: float,
+    floor: float = 0.0,
+) -> bool:
+    """Whether a plain fit and one nonlinearity explain more than a rich fit, with its own or none.
+
+    A spring that hardens is described better by a second mode than by none.
+
+    Parameters
+    ----------
+    u, problem, fit, intersample, fs, floor
+        As for `bends`; `fit` is the rich one.
+    plain : Fit
+        Of a plain structure, to the same data.
+    """
+    bent = bends(u, problem, plain, intersample=intersample, fs=fs, floor=floor)
+    if not bent or not bent[0].certain or fit.cost <= 0.0:
+        return False
+    gained = 0.5 * problem.counted * float(np.log(plain.cost / fit.cost))
+    if bent[0].gain <= gained:
+        return False
+    own = bends(u, problem, fit, intersample=intersample, fs=fs, floor=floor)
+    return bent[0].gain > gained + (own[0].gain if own else 0.0)
 
 
 def _shortened(
