@@ -29,6 +29,7 @@ from hmpim.identify.frf.neighbours import (
 from hmpim.identify.frf.rational import (
     DENOMINATOR_ORDER,
     TRANSIENT_ORDER,
+    Columns,
     gauss_newton,
     linear_start,
     solved,
@@ -387,10 +388,10 @@ def _fits(
     power = np.maximum(np.sum(np.abs(block) ** 2, axis=1) / windows.counted[:, None], floor)
     block = block / np.sqrt(power)[:, None, :]
     order = TRANSIENT_ORDER if smooth is not None else _ORDER
-    powers = windows.powers(max(order, _ORDER))
-    b = (block[:, :, :, None] * powers[:, None, :_TERMS]).reshape(*seen.shape, -1)
-    t = windows.without_dc()[:, :, None] * powers[:, : order + 1]
-    both = np.concatenate((b, t), axis=2)
+    inputs, terms = block.swapaxes(1, 2), (_ORDER,) * block.shape[2]
+    one = windows.without_dc()[:, None, :].astype(np.complex128)
+    b = Columns.of(inputs, terms, windows.x)
+    both = Columns.of(np.concatenate((inputs, one), axis=1), (*terms, order), windows.x)
     start = None if smooth is None else windows.view(mirrored(smooth, reach), reach)
     return (
         _read_off(windows, both, seen, power, start),
@@ -399,40 +400,39 @@ def _fits(
 
 
 def _read_off(
-    windows: Windows, linear: Complex, y: Complex, power: Real, smooth: Complex | None
+    windows: Windows, columns: Columns, y: Complex, power: Real, smooth: Complex | None
 ) -> _Joint:
     """Solve over each window, and read off each centre."""
     m, near, place = power.shape[1], windows.near, windows.place
     if smooth is None:
-        left = np.conj(linear.swapaxes(1, 2))
-        inverse, theta = solved(left @ linear, left @ y[:, :, None])
-        rows, fitted = linear, (linear @ theta[:, :, None])[:, :, 0]
+        linear = columns.linear
+        left = np.conj(linear)
+        inverse, theta = solved(left @ linear.swapaxes(1, 2), left @ y[:, :, None])
+        row, fitted = linear[near, :, place], (theta[:, None] @ linear)[:, 0]
         denominator = np.ones_like(y)
     else:
         with np.errstate(all="ignore"):
-            slopes = windows.powers(DENOMINATOR_ORDER)[:, 1:]
-            columns, powers = linear.swapaxes(1, 2), slopes.T
-            start = linear_start(columns, powers, smooth)
-            found = gauss_newton(columns, powers, y, start, steps=_STEPS)
-        inverse, rows, theta = found.inverse, found.rows.swapaxes(1, 2), found.state.theta
+            found = gauss_newton(columns, y, linear_start(columns, smooth), steps=_STEPS)
+            row = found.rows(columns, windows)
+        inverse, theta = found.inverse, found.state.theta
         fitted, denominator = found.state.fitted, found.state.denominator
     squares = np.sum(np.abs(y - fitted) ** 2, axis=1)
     squares = np.maximum(squares, 1e-15 * np.sum(np.abs(y) ** 2, axis=1))
-    freedom = np.maximum(windows.counted - rows.shape[2], 1)
+    freedom = np.maximum(windows.counted - row.shape[1], 1)
     noise = squares / freedom
     x = windows.x[place][:, None]
     a, size = denominator[near, place], np.sqrt(power[near])
     b = x ** np.arange(_TERMS)
     numerator = theta[near, : m * _TERMS].reshape(near.size, m, _TERMS)
     response = np.sum(numerator * b[:, None], axis=2) / a[:, None]
-    slope = np.zeros((near.size, m, rows.shape[2]), dtype=np.complex128)
+    slope = np.zeros((near.size, m, row.shape[1]), dtype=np.complex128)
     for j in range(m):
         slope[:, j, j * _TERMS : (j + 1) * _TERMS] = b / a[:, None]
         if smooth is not None:
             slope[:, j, -DENOMINATOR_ORDER:] = -(response[:, j] / a)[:, None] * x ** np.arange(
                 1, DENOMINATOR_ORDER + 1
             )
-    inverse_near, row = inverse[near], rows[near, place]
+    inverse_near = inverse[near]
     joint = slope @ inverse_near @ np.conj(slope.swapaxes(1, 2))
     leverage = np.sum(row * (inverse_near @ np.conj(row)[:, :, None])[:, :, 0], axis=1).real
     missed = (y - fitted)[near, place] / np.maximum(1.0 - leverage, 1e-6)

@@ -14,6 +14,7 @@ included, so it knows what the denominator costs.
 """
 
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +25,7 @@ from hmpim.identify.frf.neighbours import LocalFit, Spectra, Windows, mirrored, 
 __all__ = [
     "DENOMINATOR_ORDER",
     "TRANSIENT_ORDER",
+    "Columns",
     "RationalSolution",
     "RationalState",
     "gauss_newton",
@@ -32,6 +34,8 @@ __all__ = [
     "restricted",
     "solved",
 ]
+
+Integer = NDArray[np.int64]
 
 _NUMERATOR = 2
 TRANSIENT_ORDER = 3
@@ -66,22 +70,127 @@ class RationalState:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class RationalSolution:
-    """Where the iteration ended, with the derivatives there and the inverse of their products.
+    """Where the iteration ended, and the inverse of the products of the derivatives there.
 
     Parameters
     ----------
     state : RationalState
         The best iterate of each window.
-    rows : complex ndarray, shape (..., w, q, s)
-        Derivatives of the fitted Y.
+    before : RationalState
+        That before the last step, which was small: derivatives are taken there.
     inverse : complex ndarray, shape (..., w, q, q)
-        Of the products of the conjugates with them: the covariance of `theta` where the noise of
-        a bin is 1.
+        Of the products of the conjugates of the derivatives with them: the covariance of `theta`
+        where the noise of a bin is 1.
     """
 
     state: RationalState
-    rows: Complex
+    before: RationalState
     inverse: Complex
+
+    def rows(self, columns: "Columns", windows: Windows) -> Complex:
+        """Derivatives of the fitted Y at each centre, shape (..., c, q)."""
+        near, place, x = windows.near, windows.place, windows.x
+        a = self.before.denominator[..., near, place][..., None]
+        bent = -self.before.fitted[..., near, place][..., None] / a
+        slopes = x[place][:, None] ** np.arange(1, DENOMINATOR_ORDER + 1)
+        return np.concatenate((columns.linear[near, :, place] / a, bent * slopes), axis=-1)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Columns:
+    """Linear columns C x^p, p = 0 up to an order, of some carriers C, over all windows.
+
+    The products of all columns are moments Σ conj(C) C' x^p, so that few sums give all of them.
+
+    Parameters
+    ----------
+    carriers : complex ndarray, shape (w, a, s)
+        The inputs, and 1 where there is a T.
+    orders : tuple of int
+        Highest power with each.
+    powers : ndarray, shape (k, s)
+        x^p, p = 0 up to twice the highest power of all.
+    linear : complex ndarray, shape (w, l, s)
+        The columns themselves.
+    """
+
+    carriers: Complex
+    orders: tuple[int, ...]
+    powers: Real
+    linear: Complex
+
+    @classmethod
+    def of(cls, carriers: Complex, orders: tuple[int, ...], x: Real) -> "Columns":
+        """Make them; x from -1 to 1, shape (s,)."""
+        most = max(*orders, DENOMINATOR_ORDER)
+        powers = np.asarray(x ** np.arange(2 * most + 1)[:, None])
+        each = [carriers[:, a, None] * powers[: p + 1] for a, p in enumerate(orders)]
+        return cls(
+            carriers=carriers,
+            orders=orders,
+            powers=powers,
+            linear=np.concatenate(each, axis=1),
+        )
+
+    @property
+    def slopes(self) -> Real:
+        """Powers of x that A is made of, shape (d, s)."""
+        return self.powers[1 : DENOMINATOR_ORDER + 1]
+
+    def normal(self, over: Complex | None, bent: Complex, left: Complex) -> tuple[Complex, Complex]:
+        """Normal equations of the columns over A, and of `bent` times the powers of A.
+
+        Parameters
+        ----------
+        over : complex ndarray, shape (..., w, s), or None
+            1 / A; None for 1.
+        bent : complex ndarray, shape (..., w, s)
+            What carries the powers of A.
+        left : complex ndarray, shape (..., w, s)
+            The right side.
+
+        Returns
+        -------
+        gram : complex ndarray, shape (..., w, q, q)
+        right : complex ndarray, shape (..., w, q, 1)
+        """
+        shape, count = bent.shape, len(self.orders) + 1
+        carriers = np.empty((*shape[:-1], count, shape[-1]), dtype=np.complex128)
+        scaled = carriers[..., :-1, :]
+        if over is None:
+            scaled[...] = self.carriers
+        else:
+            np.multiply(self.carriers, over[..., None, :], out=scaled)
+        carriers[..., -1, :] = bent
+        mirror = np.conj(carriers)
+        pairs, product, carrier, power = _places(self.orders)
+        products = np.empty((*shape[:-1], len(pairs) + count, shape[-1]), dtype=np.complex128)
+        for k, (i, j) in enumerate(pairs):
+            np.multiply(mirror[..., i, :], carriers[..., j, :], out=products[..., k, :])
+        np.multiply(mirror, left[..., None, :], out=products[..., len(pairs) :, :])
+        real = np.empty((2, *products.shape))
+        real[0], real[1] = products.real, products.imag
+        sums = real @ self.powers.T
+        moments = sums[0] + 1j * sums[1]
+        gram = moments[..., product, np.add.outer(power, power)]
+        gram.imag *= np.where(np.greater.outer(carrier, carrier), -1.0, 1.0)
+        right = moments[..., len(pairs) + carrier, power]
+        return gram, right[..., None]
+
+
+_Places = tuple[list[tuple[int, int]], Integer, Integer, Integer]
+
+
+@cache
+def _places(orders: tuple[int, ...]) -> _Places:
+    """Pairs of carriers, A's own the last; that of each product of columns; carrier and power."""
+    count = len(orders) + 1
+    pairs = [(i, j) for i in range(count) for j in range(i, count)]
+    last = np.arange(1, DENOMINATOR_ORDER + 1)
+    power = np.concatenate([*(np.arange(p + 1) for p in orders), last])
+    carrier = np.repeat(np.arange(count), [*(p + 1 for p in orders), last.size])
+    low, high = np.minimum.outer(carrier, carrier), np.maximum.outer(carrier, carrier)
+    return pairs, low * count - low * (low - 1) // 2 + high - low, carrier, power
 
 
 def rational_fits(
@@ -138,15 +247,16 @@ def rational_fits(
 def _fit(
     windows: Windows, u: Complex, y: Complex, smooth: Complex, power: Real, steps: int
 ) -> list[LocalFit]:
-    terms = _NUMERATOR + 1
-    powers = windows.powers(max(_NUMERATOR, TRANSIENT_ORDER, DENOMINATOR_ORDER)).T
-    slopes = powers[1 : DENOMINATOR_ORDER + 1]
-    b = u[:, None, :] * powers[:terms]
-    t = windows.without_dc()[:, None, :] * powers[: TRANSIENT_ORDER + 1]
-    both: Complex = np.concatenate((b, t), axis=1)
-    full = gauss_newton(both, slopes, y, linear_start(both, slopes, smooth), steps=steps)
-    plain = gauss_newton(b, slopes, y, restricted(full, terms), steps=(steps + 1) // 2)
-    return [_read_off(windows, found, y, power) for found in (full, plain)]
+    one = windows.without_dc()[:, None, :].astype(np.complex128)
+    b = Columns.of(u[:, None, :], (_NUMERATOR,), windows.x)
+    carriers = np.concatenate((u[:, None, :], one), axis=1)
+    both = Columns.of(carriers, (_NUMERATOR, TRANSIENT_ORDER), windows.x)
+    full = gauss_newton(both, y, linear_start(both, smooth), steps=steps)
+    plain = gauss_newton(b, y, restricted(full, _NUMERATOR + 1), steps=(steps + 1) // 2)
+    return [
+        _read_off(windows, columns, found, y, power)
+        for columns, found in ((both, full), (b, plain))
+    ]
 
 
 def solved(gram: Complex, right: Complex) -> tuple[Complex, Complex]:
@@ -180,22 +290,18 @@ def _scaled(gram: Complex) -> tuple[Complex, Real]:
     return scaled, scale
 
 
-def linear_start(linear: Complex, slopes: Real, smooth: Complex) -> Complex:
+def linear_start(columns: Columns, smooth: Complex) -> Complex:
     """Solve A Y = linear columns · coefficients for a Y nearly free of noise, shape (..., w, q).
 
     Examples
     --------
     >>> x = np.linspace(-1, 1, 9)
     >>> y = (2.0 / (1 + 0.5j * x))[None]
-    >>> np.abs(linear_start(np.ones((1, 1, 9)) + 0j, x[None], y)).round(9).tolist()
-    [[2.0, 0.5]]
+    >>> one = Columns.of(np.ones((1, 1, 9)) + 0j, (0,), x)
+    >>> np.abs(linear_start(one, y)).round(9).tolist()
+    [[2.0, 0.5, 0.0]]
     """
-    count, shape = linear.shape[-2], smooth.shape
-    start = np.empty((*shape[:-1], count + slopes.shape[0], shape[-1]), dtype=np.complex128)
-    start[..., :count, :] = linear
-    np.multiply(-smooth[..., None, :], slopes, out=start[..., count:, :])
-    left = np.conj(start)
-    return _solution(left @ start.swapaxes(-1, -2), left @ smooth[..., None])
+    return _solution(*columns.normal(None, -smooth, smooth))
 
 
 def restricted(found: RationalSolution, kept: int) -> Complex:
@@ -215,17 +321,13 @@ def restricted(found: RationalSolution, kept: int) -> Complex:
     return np.asarray(found.state.theta[..., stay] - change[..., 0])
 
 
-def gauss_newton(
-    linear: Complex, slopes: Real, y: Complex, theta: Complex, *, steps: int
-) -> RationalSolution:
-    """Fit Y = (linear columns · coefficients) / A, A = 1 + slopes · coefficients.
+def gauss_newton(columns: Columns, y: Complex, theta: Complex, *, steps: int) -> RationalSolution:
+    """Fit Y = (linear columns · coefficients) / A, A = 1 + powers of x · coefficients.
 
     Parameters
     ----------
-    linear : complex ndarray, shape (w, l, s)
-        Columns of B and T.
-    slopes : ndarray, shape (d, s)
-        Powers of x from the first.
+    columns : Columns
+        Those of B and T.
     y : complex ndarray, shape (..., w, s)
         Y; of many records at once with an axis before.
     theta : complex ndarray, shape (..., w, l + d)
@@ -237,29 +339,27 @@ def gauss_newton(
     --------
     >>> x = np.linspace(-1, 1, 9)
     >>> y = (2.0 / (1 + 0.5j * x))[None]
-    >>> ones, start = np.ones((1, 1, 9)) + 0j, np.array([[1.9 + 0j, 0.4j]])
-    >>> found = gauss_newton(ones, x[None], y, start, steps=4)
+    >>> one, start = Columns.of(np.ones((1, 1, 9)) + 0j, (0,), x), np.array([[1.9, 0.4j, 0.0]])
+    >>> found = gauss_newton(one, y, start, steps=4)
     >>> np.abs(found.state.theta).round(9).tolist()
-    [[2.0, 0.5]]
+    [[2.0, 0.5, 0.0]]
     """
-    state = _state(linear, slopes, y, theta)
+    state = _state(columns, y, theta)
     for k in range(steps):
-        rows = _jacobian(linear, slopes, state)
-        left = np.conj(rows)
-        gram, right = left @ rows.swapaxes(-1, -2), left @ (y - state.fitted)[..., None]
+        over = 1.0 / state.denominator
+        gram, right = columns.normal(over, -state.fitted * over, y - state.fitted)
         if k < steps - 1:
             step = _solution(gram, right)
         else:
             inverse, step = solved(gram, right)
-        state = _better(state, _state(linear, slopes, y, state.theta + step))
-    # The last step was small, so the derivatives before it serve.
-    return RationalSolution(state=state, rows=rows, inverse=inverse)
+        before, state = state, _better(state, _state(columns, y, state.theta + step))
+    return RationalSolution(state=state, before=before, inverse=inverse)
 
 
-def _state(linear: Complex, slopes: Real, y: Complex, theta: Complex) -> RationalState:
-    count = linear.shape[-2]
-    denominator = 1.0 + theta[..., count:] @ slopes
-    fitted = (theta[..., None, :count] @ linear)[..., 0, :] / denominator
+def _state(columns: Columns, y: Complex, theta: Complex) -> RationalState:
+    count = columns.linear.shape[-2]
+    denominator = 1.0 + theta[..., count:] @ columns.slopes
+    fitted = (theta[..., None, :count] @ columns.linear)[..., 0, :] / denominator
     left = y - fitted
     squares = np.vecdot(left, left).real
     return RationalState(
@@ -268,15 +368,6 @@ def _state(linear: Complex, slopes: Real, y: Complex, theta: Complex) -> Rationa
         fitted=fitted,
         squares=np.where(np.isfinite(squares), squares, np.inf),
     )
-
-
-def _jacobian(linear: Complex, slopes: Real, state: RationalState) -> Complex:
-    count, shape = linear.shape[-2], state.fitted.shape
-    rows = np.empty((*shape[:-1], count + slopes.shape[0], shape[-1]), dtype=np.complex128)
-    inverse = 1.0 / state.denominator
-    np.multiply(linear, inverse[..., None, :], out=rows[..., :count, :])
-    np.multiply(-(state.fitted * inverse)[..., None, :], slopes, out=rows[..., count:, :])
-    return rows
 
 
 def _better(one: RationalState, other: RationalState) -> RationalState:
@@ -292,10 +383,12 @@ def _better(one: RationalState, other: RationalState) -> RationalState:
     )
 
 
-def _read_off(windows: Windows, found: RationalSolution, y: Complex, power: Real) -> LocalFit:
+def _read_off(
+    windows: Windows, columns: Columns, found: RationalSolution, y: Complex, power: Real
+) -> LocalFit:
     """Response, its spread and the prediction error at each centre."""
     terms, near, place = _NUMERATOR + 1, windows.near, windows.place
-    state, row = found.state, found.rows.swapaxes(-1, -2)[..., near, place, :]
+    state, row = found.state, found.rows(columns, windows)
     x = windows.x[place][:, None]
     a = state.denominator[..., near, place]
     size = np.sqrt(power[near])
