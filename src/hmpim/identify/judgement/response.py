@@ -5,11 +5,11 @@ from collections.abc import Callable
 import numpy as np
 
 from hmpim.identify.arrays import Real
-from hmpim.identify.chance import DEVIATIONS
+from hmpim.identify.chance import DEVIATIONS, HALF
 from hmpim.identify.judgement.evidence import Evidence
 from hmpim.identify.reading.figures import system_of
 from hmpim.identify.result.groups import PHASE_SPLIT
-from hmpim.identify.worth import TOLERATED
+from hmpim.identify.worth import PART, TOLERATED
 from hmpim.model.response import RationalDelay, phase, response
 from hmpim.record import Finding
 
@@ -41,7 +41,8 @@ _LEVELS: dict[str, _Level] = {
 def bandwidth_disagrees(evidence: Evidence) -> tuple[Finding, ...]:
     """Doubt bandwidths apart beyond their error bars, and what of the model shapes them.
 
-    Of an output that is held the measured response shows the hold too: there it says nothing.
+    Of an output that is held the measured response shows the hold too: there it says nothing; nor
+    where its own interval is wide, as beside another input that is hardly told apart.
     """
     if evidence.held:
         return ()
@@ -54,7 +55,7 @@ def bandwidth_disagrees(evidence: Evidence) -> tuple[Finding, ...]:
     ):
         one = getattr(evidence.measured, name)
         other = getattr(evidence.readings.parameters, name)
-        if one is None or other is None:
+        if one is None or other is None or HALF * one.spread > PART * one.value:
             continue
         apart = abs(one.value - other.value)
         if apart <= max(
