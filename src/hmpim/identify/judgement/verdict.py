@@ -11,6 +11,7 @@ from hmpim.identify.result import (
     ResponseBandwidths,
     Verdict,
 )
+from hmpim.identify.result.estimate import ParameterVerdict
 from hmpim.record import Finding
 
 __all__ = ["all_doubted", "doubted", "judged", "judged_together"]
@@ -140,7 +141,8 @@ def _withheld(parameters: Parameters, names: frozenset[str], untold: frozenset[s
 
 def _weighed(estimate: Estimate, *, doubtful: bool) -> Estimate:
     withheld = estimate.ci95 is None
-    return replace(estimate, verdict="doubtful" if doubtful or withheld else "ok")
+    verdict: ParameterVerdict = "doubtful" if doubtful or withheld else "ok"
+    return estimate if estimate.verdict == verdict else replace(estimate, verdict=verdict)
 
 
 def _verdict(parameters: Parameters, findings: Iterable[Finding]) -> Verdict:
