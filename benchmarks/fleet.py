@@ -15,6 +15,9 @@ goes to the terminal. On an idle machine of two cores, with the time that each t
     python benchmarks/fleet.py --records 1500 --turns 3 --only unrelated                   # 10 min
     python benchmarks/fleet.py --records 100000 --only shared-parameters --workers 2       # 5 min
     python benchmarks/fleet.py --records 20000 --turns 3 --only shared-parameters          # 5 min
+    python benchmarks/fleet.py --records 20000 --only shared-results --workers 2           # 2 min
+    python benchmarks/fleet.py --records 5000 --only shared-results --odd 0.05 --workers 2 # 1 min
+    python benchmarks/fleet.py --records 2000 --only shared-results --odd 0.5 --workers 2  # 1 min
     python benchmarks/fleet.py --records 100000 --only unrelated --workers 2 --folder DIR  # 75 min
     python benchmarks/fleet.py --growth 1,10,100,1000,10000 --only shared-parameters \\
         --plot docs/images/fleet.svg --table FILE                                          # 2 min
@@ -43,6 +46,9 @@ FS, SAMPLES, ROWS = 200.0, 2000, 100
 UNITS = 5000
 """Units of a shared stimulus at most; beyond, each is measured again with noise of its own."""
 
+LEARNT = 16
+"""Records from which a worker learns what a fleet shares."""
+
 
 def chirp(last: float) -> np.ndarray:
     at = np.arange(SAMPLES) / FS
@@ -61,7 +67,8 @@ def answer(u: np.ndarray, rng: np.random.Generator) -> np.ndarray:
     return hmpim.simulate(model, u, fs=FS, intersample="bandlimited")
 
 
-def write_fleet(path: Path, count: int, *, shared: bool) -> None:
+def write_fleet(path: Path, count: int, *, shared: bool, odd: float = 0.0) -> None:
+    """Write records; of those behind the first 16, a share is clipped, and so not as the others."""
     import pyarrow as pa
     from pyarrow import parquet
 
@@ -80,6 +87,9 @@ def write_fleet(path: Path, count: int, *, shared: bool) -> None:
                 inputs = [chirp(rng.uniform(15.0, 20.0)) for _ in some]
                 outputs = [answer(u, rng) for u in inputs]
             measured = np.stack(outputs) + 0.1 * rng.standard_normal((len(some), SAMPLES))
+            for k in np.flatnonzero(rng.random(len(some)) < odd) if odd else ():
+                if some[k] >= LEARNT:
+                    measured[k] = np.minimum(measured[k], 1.2)
             edges = np.arange(len(some) + 1, dtype=np.int32) * SAMPLES
             columns = [
                 pa.ListArray.from_arrays(edges, np.ravel(values)) for values in (inputs, measured)
@@ -260,6 +270,7 @@ def run(path: Path, out: Path, *, keep: str, workers: int, one_ms: float) -> dic
         "bound": bound,
         "percent_of_bound": 100 * rate / bound,
         "processor_ms": 1e3 * float(np.nanmean(seconds)),
+        "together_percent": 100 * float(np.mean(1e3 * seconds < one_ms / 2)),
         "giving_out_ms": 1e3 * own / len(table),
         "worker_ms": spent,
         "workers_busy": busy / workers,
@@ -277,7 +288,8 @@ def table_of(rows: list[dict]) -> str:
     """Medians over the turns, as a table of docs/performance.md."""
     head = ("records", "workers", "a second", "workers ÷ one `identify`", "whole, s",
             "as many plain loops", "processor a record, ms", "a worker's share of a core",
-            "giving out, MB: quarters 1, 2, 4", "worker, MB: quarters 1, 2, 4")  # fmt: skip
+            "done together, %", "giving out, MB: quarters 1, 2, 4",
+            "worker, MB: quarters 1, 2, 4")  # fmt: skip
     lines = [f"| | {' | '.join(head)} |", f"| {' | '.join(['---'] * (len(head) + 1))} |"]
     for key in dict.fromkeys((r["kind"], r["records"], r["workers"]) for r in rows):
         some = [r for r in rows if (r["kind"], r["records"], r["workers"]) == key]
@@ -289,6 +301,7 @@ def table_of(rows: list[dict]) -> str:
             f"| {key[0]} | {key[1]} | {key[2]} | {middle('rate'):.3g} | {middle('bound'):.3g} | "
             f"{middle('whole_s'):.1f} | "
             f"{told(middle('plain'))} | {middle('worker_ms'):.2f} | {middle('workers_busy'):.2f} | "
+            f"{middle('together_percent'):.1f} | "
             f"{middle('here_at_the_start_mb'):.0f}, {middle('here_mb'):.0f}, "
             f"{middle('here_at_the_end_mb'):.0f} | "
             f"{middle('worker_at_the_start_mb'):.0f}, {middle('worker_mb'):.0f}, "
@@ -361,6 +374,9 @@ def main() -> None:
     parser.add_argument("--turns", type=int, default=1)
     parser.add_argument("--only", default="", help="shared-parameters, shared-results, unrelated")
     parser.add_argument("--workers", default="1,2")
+    parser.add_argument(
+        "--odd", type=float, default=0.0, help="share of shared records that are clipped, 0 to 1"
+    )
     parser.add_argument("--json", type=Path)
     parser.add_argument("--table", type=Path)
     parser.add_argument("--plot", type=Path)
@@ -393,14 +409,15 @@ def turns_of(
 ) -> list[dict]:
     """Turns over one file of records, workers in turn, so that a busy machine slows all."""
     shared, keep = asked
-    path, rows = folder / f"{kind}-{count}.parquet", []
+    name = f"{kind}-{count}" + (f"-{options.odd:g}" if options.odd else "")
+    path, rows = folder / f"{name}.parquet", []
     if not path.exists():
         print(f"{path.stem}: making the records", file=sys.stderr, flush=True)
-        write_fleet(path, count, shared=shared)
+        write_fleet(path, count, shared=shared, odd=options.odd if shared else 0.0)
     for turn in range(options.turns):
         for workers in map(int, options.workers.split(",")):
-            out = folder / f"{path.stem}-{turn}-{workers}"
-            kept = out.with_suffix(".json")
+            out = folder / f"{name}-{turn}-{workers}"
+            kept = folder / f"{out.name}.json"
             if not kept.exists():
                 one_ms = one_identify(path)  # in each turn: the computer's speed changes
                 plain = plain_rate(path, workers) if kind == "unrelated" else float("nan")

@@ -28,9 +28,15 @@ from hmpim.record import BETWEEN, Intersample
 __all__ = ["Fleet", "Member", "box_around", "is_alike", "learn_fleet", "spanning", "theta_at"]
 
 
-_DEGREE = 9
-_SMOOTHER = 7
-"""Degree for what is read off a model, which is off by a millionth of its error bar then."""
+_DEGREES = (9, 12, 15)
+"""Degrees of a surface, tried in turn until it is off by less than the noise lets be seen."""
+
+_SMOOTHER = 9
+"""Degree for what is read off a model."""
+
+_OFF, _ROUGH = 0.05, 0.2
+"""How far a surface may be off, over the noise; and that of another assumption, which only widens
+intervals."""
 
 _UNSEEN = 1e-9
 """Share of the greatest singular value below which a direction of the surface is left out."""
@@ -152,13 +158,18 @@ def learn_fleet(
     if any(tuple(r) != names for r in read):
         return None  # a figure that some units of the box have and others do not
     values = np.array([list(r.values()) for r in read])
+    natural: Intersample = "bandlimited" if len(open_) > 1 else found
+    noise = float(np.median([_noise_over_gain(pair) for pair in alike]))
+    enough = {mode: noise * (_OFF if mode == natural else _ROUGH) for mode in open_}
     return Fleet(
         u=u,
         fs=fs,
         band=band,
         structure=structure,
-        natural="bandlimited" if len(open_) > 1 else found,
-        members=tuple(_member(u, structure, mode, *boxes[mode]) for mode in open_),
+        natural=natural,
+        members=tuple(
+            _member(u, structure, mode, *boxes[mode], enough=enough[mode]) for mode in open_
+        ),
         figures=Surface.fitted(low, high, places, values, degree=_SMOOTHER),
         names=names,
     )
@@ -250,8 +261,26 @@ def theta_at(place: Real) -> Real:
     return np.array([place[0], np.log(2 * zeta / omega), 0.25 / zeta**2])
 
 
-def _member(u: Real, structure: Structure, mode: Intersample, low: Real, high: Real) -> Member:
-    places = places_in(low, high, _DEGREE)
+def _noise_over_gain(pair: PairIdentification) -> float:
+    noise, gain = pair.noise_std, pair.scale_factor
+    return 0.0 if noise is None or gain is None else noise.value / abs(gain.value)
+
+
+def _member(
+    u: Real, structure: Structure, mode: Intersample, low: Real, high: Real, *, enough: float
+) -> Member:
+    """The surface of the first degree that is off by no more than is enough, or of the last."""
+    for degree in _DEGREES:
+        found = _member_of(u, structure, mode, low, high, degree=degree)
+        if found.lost <= enough:
+            break
+    return found
+
+
+def _member_of(
+    u: Real, structure: Structure, mode: Intersample, low: Real, high: Real, *, degree: int
+) -> Member:
+    places = places_in(low, high, degree)
     source = prepare_input(u, mode)
     problem = Problem(source=source, y=np.zeros(u.size), valid=None, longest_delay=float(u.size))
     rows, grown = np.empty((places.shape[0], u.size)), np.empty((places.shape[0], u.size))
@@ -268,12 +297,12 @@ def _member(u: Real, structure: Structure, mode: Intersample, low: Real, high: R
     basis = _basis_of(np.concatenate([rows, grown]))
     inside = rows @ basis.T
     left = np.linalg.norm(rows - inside @ basis, axis=1).max()
-    surface = Surface.fitted(low, high, places, np.hstack([inside, means]), degree=_DEGREE)
+    surface = Surface.fitted(low, high, places, np.hstack([inside, means]), degree=degree)
     return Member(
         intersample=mode,
         basis=basis,
         surface=surface,
-        grown=Surface.fitted(low, high, places, grown @ basis.T, degree=_DEGREE),
+        grown=Surface.fitted(low, high, places, grown @ basis.T, degree=degree),
         lost=float(left + np.linalg.norm(surface.error)),
         source=source,
     )
