@@ -20,7 +20,7 @@ from hmpim.identify.frf.local import local_response
 from hmpim.identify.judgement import Evidence, attempt, judge
 from hmpim.identify.judgement.unfollowed import unfollowed
 from hmpim.identify.noise.misfit import Misfit, misfit
-from hmpim.identify.nonlinear.bends import Bend, bends, is_bent_instead
+from hmpim.identify.nonlinear.bends import Bend, bends, is_bent_instead, plainer_bends
 from hmpim.identify.nonlinear.nonlinearity import Inspection, inspect_nonlinearity
 from hmpim.identify.reading.bandwidth import response_bandwidths
 from hmpim.identify.reading.coefficients import coefficients_of, highest_first
@@ -123,7 +123,7 @@ def _pair(
     )
     said = () if inspection is None else inspection.findings
     none: tuple[Bend, ...] = ()
-    moves, unmoved = attempt("bends", lambda: _bends(question, found, joint, i, said), none)
+    moves, unmoved = attempt("bends", lambda: _bends(question, found, joint, i, plain, said), none)
     bent = 0.0 if inspection is None or not said else inspection.summary.nonlinear
     evidence, unmade = _evidence(question, found, readings, joint, response, i, moves, bent)
     parameters, seen = with_imperfections(
@@ -199,7 +199,7 @@ def _evidence(
             joint,
             fs=fs,
             highest=min(band[1], fs / 2),
-            bent=[one.farthest for one in moves],
+            bent=[(one.fit, one.farthest) for one in moves],
         ),
         misfit=left,
         u=u,
@@ -275,25 +275,26 @@ def _is_bent(question: Question, found: Imperfections, joint: JointFit, plain: F
 
 
 def _bends(
-    question: Question, found: Imperfections, joint: JointFit, i: int, said: tuple[Finding, ...]
+    question: Question,
+    found: Imperfections,
+    joint: JointFit,
+    i: int,
+    plain: Fit | None,
+    said: tuple[Finding, ...],
 ) -> tuple[Bend, ...]:
     """How far a nonlinearity may have moved the figures; not asked where all are doubted for it.
 
     Nor of several inputs, of a loop, and of software.
     """
-    best = joint.best
+    best, fs = joint.best, question.aligned.fs
     doubted = any(finding.severity == "doubt" for finding in said)
     alone = question.inputs is None and question.instrument is None
     if doubted or not alone or best.fit.structure.sampled:
         return ()
-    return bends(
-        question.aligned.inputs[i].values,
-        joint.weighed,
-        best.fit,
-        intersample=best.intersample,
-        fs=question.aligned.fs,
-        floor=max(found.rounding, ROUNDING * float(np.std(question.output.values))),
-    )
+    u = question.aligned.inputs[i].values
+    floor = max(found.rounding, ROUNDING * float(np.std(question.output.values)))
+    own = bends(u, joint.weighed, best.fit, intersample=best.intersample, fs=fs, floor=floor)
+    return (*own, *plainer_bends(u, joint, plain, fs=fs, floor=floor))
 
 
 def _measured(

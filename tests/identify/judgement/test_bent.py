@@ -24,6 +24,7 @@ def bend(evidence, *, certain=True, effect=0.02, whole=False, moved=GAIN):
         effect=effect,
         share=0.05,
         whole=whole,
+        fit=fit,
         moved=shift,
     )
 
@@ -54,7 +55,7 @@ def test_what_casts_no_doubt_widens_the_interval_to_its_side(clean):
         own, highest = clean.readings.parameters, clean.band[1]
         return spanned(own, clean.joint, fs=clean.fs, highest=highest, bent=bent)
 
-    plain, wide = intervals([]), intervals([bend(clean).farthest])
+    plain, wide = intervals([]), intervals([(clean.joint.best.fit, bend(clean).farthest)])
     assert wide.natural_frequency == plain.natural_frequency
     assert wide.scale_factor.ci95[0] == plain.scale_factor.ci95[0]
     own = clean.readings.parameters.scale_factor.ci95[1]

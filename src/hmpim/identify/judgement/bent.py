@@ -50,10 +50,8 @@ def bent(evidence: Evidence) -> tuple[Finding, ...]:
 
 def _moved(evidence: Evidence, sure: Sequence[Bend]) -> dict[str, float]:
     """Figures that move, and by what share of themselves; 0 where one is no longer given."""
-    fit, fs = evidence.joint.best.fit, evidence.fs
-    others = [
-        bent_figures(fit, one.moved, fs=fs, highest=min(evidence.band[1], fs / 2)) for one in sure
-    ]
+    fs, highest = evidence.fs, min(evidence.band[1], evidence.fs / 2)
+    others = [bent_figures(one.fit, one.moved, fs=fs, highest=highest) for one in sure]
     moved = {}
     for name in MODELLED:
         own = getattr(evidence.readings.parameters, name)

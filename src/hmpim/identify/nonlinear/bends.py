@@ -17,10 +17,12 @@ import scipy
 
 from hmpim.identify.arrays import Real
 from hmpim.identify.chance import CLEARLY, HALF, searched
+from hmpim.identify.fitting.data import FINAL_PRECISION
 from hmpim.identify.fitting.enrich import PLAIN
-from hmpim.identify.fitting.fit import Fit, Problem, jacobian
+from hmpim.identify.fitting.fit import Fit, Problem, fit_structure, jacobian
 from hmpim.identify.fitting.least_squares import solved
 from hmpim.identify.fitting.sampled_rows import part_of
+from hmpim.identify.fitting.trial import JointFit
 from hmpim.identify.noise.autoregression import yule_walker
 from hmpim.identify.noise.whiteness import is_white
 from hmpim.identify.nonlinear.mechanisms import (
@@ -36,7 +38,7 @@ from hmpim.identify.worth import MATERIAL, PART, WORTH
 from hmpim.model.sampled import prepare_input
 from hmpim.record import Intersample
 
-__all__ = ["Bend", "bends", "is_bent_instead"]
+__all__ = ["Bend", "bends", "is_bent_instead", "plainer_bends"]
 
 _EVERY = 3
 """Of a kind's values every so many is tried: its neighbours leave traces that are much alike."""
@@ -67,8 +69,10 @@ class Bend:
     whole : bool
         Whether the likeliest kind leaves white noise beside a plain structure. A rich one may
         have been taken for the nonlinearity's sake.
+    fit : Fit
+        The linear fit beside which it stands.
     moved : ndarray, shape (p,)
-        What it adds to the parameters of the fit: `theta`, then `linear`.
+        What it adds to the parameters of that fit: `theta`, then `linear`.
     """
 
     kind: Kind
@@ -77,6 +81,7 @@ class Bend:
     effect: float
     share: float
     whole: bool
+    fit: Fit
     moved: Real
 
     @property
@@ -126,6 +131,7 @@ def bends(
     >>> best.kind, best.certain, abs(fit.linear + best.moved[1:]).round(2).tolist()
     ('dead_zone', True, [1.0, 0.0])
     """
+    given = fit
     u, problem, fit = _shortened(u, problem, fit, intersample)
     if not np.any(fit.residual) or np.ptp(fit.prediction) == 0.0:
         return ()
@@ -155,6 +161,7 @@ def bends(
             effect=float(weights[i] * np.std(traces[i])) / spread,
             share=-float(np.expm1(-2.0 * gains[i] / residual.size)),
             whole=whole and fit.structure.name in PLAIN,
+            fit=given,
             moved=-solved(gram, slopes @ seen[i] * weights[i]),
         )
         for i in np.argsort(-gains)
@@ -183,6 +190,8 @@ def is_bent_instead(
     plain : Fit
         Of a plain structure, to the same data.
     """
+    if fit.cost < PART * plain.cost:  # no kind makes that up
+        return False
     bent = bends(u, problem, plain, intersample=intersample, fs=fs, floor=floor)
     if not bent or not bent[0].certain or fit.cost <= 0.0:
         return False
@@ -191,6 +200,37 @@ def is_bent_instead(
         return False
     own = bends(u, problem, fit, intersample=intersample, fs=fs, floor=floor)
     return bent[0].gain > gained + (own[0].gain if own else 0.0)
+
+
+def plainer_bends(
+    u: Real, joint: JointFit, plain: Fit | None, *, fs: float, floor: float = 0.0
+) -> tuple[Bend, ...]:
+    """Find the kinds beside which a plainer structure is about as likely as the rich one chosen.
+
+    Parameters
+    ----------
+    u : ndarray, shape (n,)
+        Input samples.
+    joint : JointFit
+        With the rich structure.
+    plain : Fit or None
+        Of the plain structure, to the same data; without one there is nothing to find.
+    fs, floor : float
+        As for `bends`.
+    """
+    best, problem = joint.best, joint.weighed
+    if plain is None or plain.structure.parameters >= best.fit.structure.parameters:
+        return ()
+    plain = fit_structure(problem, plain.structure, plain.theta, precision=FINAL_PRECISION)
+    if best.fit.objective < PART * plain.objective:  # no kind makes that up
+        return ()
+    count = problem.counted * joint.weighed_share
+    fewer = best.fit.structure.parameters - plain.structure.parameters - 1
+    behind = count * np.log(plain.objective / best.fit.objective) - fewer * np.log(count)
+    found = bends(u, problem, plain, intersample=best.intersample, fs=fs, floor=floor)
+    return tuple(
+        replace(one, whole=False) for one in found if behind - 2.0 * one.gain < 2.0 * CLEARLY
+    )
 
 
 def _shortened(

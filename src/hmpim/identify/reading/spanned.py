@@ -56,7 +56,7 @@ def spanned(
     *,
     fs: float,
     highest: float,
-    bent: Iterable[Real] = (),
+    bent: Iterable[tuple[Fit, Real]] = (),
 ) -> Parameters:
     """Widen each interval to what it would be under the other assumptions, or with one more pole.
 
@@ -71,8 +71,8 @@ def spanned(
         With the other trials.
     fs, highest : float
         Rate, and frequency beyond which no bandwidth is read off, in Hz.
-    bent : iterable of ndarray, shape (p,)
-        What nonlinearities that may be there add to the fit's parameters.
+    bent : iterable of (Fit, ndarray), shape (p,)
+        A linear fit, and what a nonlinearity that may be there adds to its parameters.
     """
 
     def figures(fits: Iterable[Fit]) -> list[dict[str, float | None]]:
@@ -84,7 +84,7 @@ def spanned(
     if hidden is not None and (joint.rivals or hidden.may_hide):
         longest = figures_of(as_if_hidden(fit, hidden), fs=fs, highest=highest, split_alone=True)
         richer.append({name: longest[name] for name in PHASE_SPLIT})
-    richer += [bent_figures(fit, moved, fs=fs, highest=highest) for moved in bent]
+    richer += [bent_figures(*one, fs=fs, highest=highest) for one in bent]
     moved = {}
     for name in (field.name for field in fields(parameters)):
         own = getattr(parameters, name)
