@@ -26,7 +26,7 @@ from hmpim.identify.reading.bandwidth import response_bandwidths
 from hmpim.identify.reading.coefficients import coefficients_of, highest_first
 from hmpim.identify.reading.propagation import response_std
 from hmpim.identify.reading.readings import Readings, read_parameters
-from hmpim.identify.reading.spanned import spanned
+from hmpim.identify.reading.spanned import blurred, spanned
 from hmpim.identify.result import (
     Candidate,
     FrequencyResponse,
@@ -40,7 +40,7 @@ from hmpim.identify.result.error_bars import estimate, noise_estimate
 from hmpim.identify.result.groups import EVERY
 from hmpim.identify.section_iv.paper import paper_estimates
 from hmpim.identify.section_iv.spectrum import excited_band
-from hmpim.identify.worth import ROUNDING
+from hmpim.identify.worth import ROUNDING, WORTH
 from hmpim.record import Finding
 
 __all__ = ["Described", "describe", "describe_dead"]
@@ -191,16 +191,17 @@ def _evidence(
         lambda: misfit(u, fit.residual, delay=fit.delay, band=(band[0] / fs, band[1] / fs)),
         Misfit(share=0.0, probability=1.0),
     )
+    whole = spanned(
+        readings.parameters,
+        joint,
+        fs=fs,
+        highest=min(band[1], fs / 2),
+        bent=[(one.fit, one.farthest) for one in moves],
+    )
     evidence = Evidence(
         joint=joint,
         readings=readings,
-        spanned=spanned(
-            readings.parameters,
-            joint,
-            fs=fs,
-            highest=min(band[1], fs / 2),
-            bent=[(one.fit, one.farthest) for one in moves],
-        ),
+        spanned=blurred(whole, WORTH) if any(one.counts for one in moves) else whole,
         misfit=left,
         u=u,
         fs=fs,

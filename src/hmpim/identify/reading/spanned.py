@@ -19,9 +19,12 @@ from hmpim.identify.fitting.growth import as_if_hidden
 from hmpim.identify.fitting.trial import JointFit, Trial
 from hmpim.identify.reading.figures import figures_at, figures_of
 from hmpim.identify.result import Estimate, Parameters
-from hmpim.identify.result.groups import PHASE_SPLIT
+from hmpim.identify.result.groups import MODELLED, PHASE_SPLIT
 
-__all__ = ["MOVES", "bent_figures", "rivals_of", "spanned"]
+__all__ = ["MOVES", "bent_figures", "blurred", "rivals_of", "spanned"]
+
+DECIBELS = float(20.0 / np.log(10.0))
+"""Of a small share of a gain, by that share."""
 
 MOVES = 0.05
 """Share of an interval's half width from which another assumption widens it."""
@@ -97,6 +100,27 @@ def spanned(
             lows, highs = zip(*(e.ci95 for e in (tail, whole) if e.ci95), strict=True)
             whole = replace(whole, ci95=(min(lows), max(highs)))
         moved[name] = whole
+    return replace(parameters, **moved)
+
+
+def blurred(parameters: Parameters, share: float) -> Parameters:
+    """Widen each interval by a share of its figure on either side.
+
+    Parameters
+    ----------
+    parameters : Parameters
+        As `spanned` gives them.
+    share : float
+        To which no linear model is right where a nonlinearity is known to be there.
+    """
+    moved = {}
+    for name in MODELLED:
+        own = getattr(parameters, name)
+        if own is None or own.ci95 is None or None in own.ci95 or name == "noise_std":
+            continue
+        room = share * (DECIBELS if name == "peak_gain_db" else abs(own.value))
+        low, high = own.ci95
+        moved[name] = replace(own, std=None, ci95=(low - room, high + room))
     return replace(parameters, **moved)
 
 
