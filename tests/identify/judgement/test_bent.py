@@ -7,12 +7,13 @@ import pytest
 
 from hmpim.identify.judgement.bent import bent
 from hmpim.identify.nonlinear.bends import Bend
-from hmpim.identify.reading.spanned import spanned
+from hmpim.identify.reading.spanned import blurred, spanned
+from hmpim.identify.result.groups import MODELLED
 
 GAIN = 3  # of delay, two of the denominator, scale factor, bias
 
 
-def bend(evidence, *, certain=True, effect=0.02, whole=False, moved=GAIN):
+def bend(evidence, *, certain=True, effect=0.02, white=False, moved=GAIN):
     """Half a per cent more scale factor, or of another parameter."""
     fit = evidence.joint.best.fit
     shift = np.zeros(fit.theta.size + fit.linear.size)
@@ -23,7 +24,7 @@ def bend(evidence, *, certain=True, effect=0.02, whole=False, moved=GAIN):
         certain=certain,
         effect=effect,
         share=0.05,
-        whole=whole,
+        white=white,
         fit=fit,
         moved=shift,
     )
@@ -39,12 +40,12 @@ def test_only_what_it_moves_is_doubted(clean):
 
 def test_a_good_part_of_the_residual_is_no_noise(clean):
     (found,) = bent(replace(clean, bends=(replace(bend(clean), share=0.3),)))
-    assert found.parameters == ("scale_factor", "noise_std")
+    assert set(found.parameters) == {"scale_factor", "noise_std"}
 
 
 @pytest.mark.parametrize(
     "small",
-    [{"certain": False}, {"effect": 0.002}, {"effect": 0.008, "whole": True}],
+    [{"certain": False}, {"effect": 0.002}, {"effect": 0.008, "white": True}],
 )
 def test_what_is_possible_or_small_casts_no_doubt(clean, small):
     assert bent(replace(clean, bends=(bend(clean, **small),))) == ()
@@ -61,3 +62,24 @@ def test_what_casts_no_doubt_widens_the_interval_to_its_side(clean):
     own = clean.readings.parameters.scale_factor.ci95[1]
     assert plain.scale_factor.ci95[1] < own + 0.005
     assert wide.scale_factor.ci95[1] - own == pytest.approx(0.005 * 1.098, rel=0.01)
+
+
+def test_what_neither_a_rich_structure_nor_a_nonlinearity_describes_is_doubted_whole(clean):
+    joint = clean.joint
+    fit = replace(joint.best.fit, structure=replace(joint.best.fit.structure, name="two_modes"))
+    rich = replace(clean, joint=replace(joint, best=replace(joint.best, fit=fit)))
+    (found,) = bent(replace(rich, bends=(bend(clean),)))
+    assert set(found.parameters) == set(MODELLED)
+    (found,) = bent(replace(rich, bends=(bend(clean, white=True),)))
+    assert found.parameters == ("scale_factor",)
+
+
+def test_every_interval_has_room_for_what_no_linear_model_is_right_to(clean):
+    own = clean.readings.parameters
+    wide = blurred(own, 0.003)
+    for name, room in (("delay", 0.003 * 0.15), ("peak_gain_db", 20 * np.log10(1.003))):
+        before, after = getattr(own, name), getattr(wide, name)
+        assert after.value == before.value
+        assert after.ci95[1] - before.ci95[1] == pytest.approx(room, rel=0.01)
+        assert before.ci95[0] - after.ci95[0] == pytest.approx(room, rel=0.01)
+    assert wide.noise_std == own.noise_std

@@ -2,7 +2,8 @@
 
 from collections.abc import Sequence
 
-from hmpim.identify.chance import HALF
+from hmpim.identify.chance import FALSE_ALARM, HALF
+from hmpim.identify.fitting.enrich import PLAIN
 from hmpim.identify.judgement.between_samples import SIZES
 from hmpim.identify.judgement.evidence import Evidence
 from hmpim.identify.nonlinear.bends import Bend
@@ -20,13 +21,18 @@ def bent(evidence: Evidence) -> tuple[Finding, ...]:
 
     How far it moves them is known to first order, for traces that are none of them exact: enough
     to tell which figures it leaves alone. What is small or only possible widens the intervals: no
-    figure is doubted for less than a model must be right to.
+    figure is doubted for less than a model must be right to. Where a rich structure and a
+    nonlinearity leave what is no noise, neither describes the record.
     """
     sure = [one for one in evidence.bends if one.counts]
     if not sure:
         return ()
     moved = _moved(evidence, sure)
-    parameters = (*moved, *(("noise_std",) if sure[0].share > 2 * FEW else ()))
+    left = not sure[0].white or evidence.misfit.probability < FALSE_ALARM
+    if left and evidence.joint.best.fit.structure.name not in PLAIN:
+        moved = dict.fromkeys(MODELLED, 0.0) | moved  # taken for its sake, and in vain
+    noise = {"noise_std"} if sure[0].share > 2 * FEW else set()
+    parameters = tuple(name for name in MODELLED if name in moved.keys() | noise)
     if not parameters:
         return ()
     kinds = " or ".join(dict.fromkeys(KIND_WORDS[one.kind] for one in sure))

@@ -66,9 +66,8 @@ class Bend:
         R.m.s. of all it does, over that of the output about its mean.
     share : float
         Share of the residual's power that it explains.
-    whole : bool
-        Whether the likeliest kind leaves white noise beside a plain structure. A rich one may
-        have been taken for the nonlinearity's sake.
+    white : bool
+        Whether the likeliest kind leaves white noise.
     fit : Fit
         The linear fit beside which it stands.
     moved : ndarray, shape (p,)
@@ -80,14 +79,19 @@ class Bend:
     certain: bool
     effect: float
     share: float
-    whole: bool
+    white: bool
     fit: Fit
     moved: Real
 
     @property
     def counts(self) -> bool:
-        """Whether it is there, and too large, or too little of it known, for an interval."""
-        return self.certain and self.effect > (MATERIAL if self.whole else WORTH)
+        """Whether it is there, and too large, or too little of it known, for an interval.
+
+        All is known where it leaves noise beside a plain structure; a rich one may have been taken
+        for its sake.
+        """
+        known = self.white and self.fit.structure.name in PLAIN
+        return self.certain and self.effect > (MATERIAL if known else WORTH)
 
     @property
     def farthest(self) -> Real:
@@ -145,7 +149,7 @@ def bends(
     if problem.counts is not None:
         rows, residual = rows[:, problem.counts], residual[problem.counts]
     slopes, seen = np.split(rows, [rows.shape[0] - len(tried)])
-    weights, gains, whole = _scored(slopes, seen, residual)
+    weights, gains, white = _scored(slopes, seen, residual)
     told = np.std(traces * weights[:, None], axis=1) > floor
     gains = np.where(told & (weights > 0.0), gains, 0.0)
     most = float(gains.max())
@@ -160,7 +164,7 @@ def bends(
             certain=most > searched(len(tried)),
             effect=float(weights[i] * np.std(traces[i])) / spread,
             share=-float(np.expm1(-2.0 * gains[i] / residual.size)),
-            whole=whole and fit.structure.name in PLAIN,
+            white=white,
             fit=given,
             moved=-solved(gram, slopes @ seen[i] * weights[i]),
         )
@@ -229,7 +233,7 @@ def plainer_bends(
     behind = count * np.log(plain.objective / best.fit.objective) - fewer * np.log(count)
     found = bends(u, problem, plain, intersample=best.intersample, fs=fs, floor=floor)
     return tuple(
-        replace(one, whole=False) for one in found if behind - 2.0 * one.gain < 2.0 * CLEARLY
+        replace(one, white=False) for one in found if behind - 2.0 * one.gain < 2.0 * CLEARLY
     )
 
 

@@ -23,9 +23,6 @@ from hmpim.identify.result.groups import MODELLED, PHASE_SPLIT
 
 __all__ = ["MOVES", "bent_figures", "blurred", "rivals_of", "spanned"]
 
-DECIBELS = float(20.0 / np.log(10.0))
-"""Of a small share of a gain, by that share."""
-
 MOVES = 0.05
 """Share of an interval's half width from which another assumption widens it."""
 
@@ -118,7 +115,8 @@ def blurred(parameters: Parameters, share: float) -> Parameters:
         own = getattr(parameters, name)
         if own is None or own.ci95 is None or None in own.ci95 or name == "noise_std":
             continue
-        room = share * (DECIBELS if name == "peak_gain_db" else abs(own.value))
+        size = 20.0 / np.log(10.0) if name == "peak_gain_db" else abs(own.value)
+        room = float(share * size)
         low, high = own.ci95
         moved[name] = replace(own, std=None, ci95=(low - room, high + room))
     return replace(parameters, **moved)
