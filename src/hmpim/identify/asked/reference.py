@@ -23,6 +23,7 @@ from hmpim.identify.frf.local import local_response
 from hmpim.identify.noise.covariance import covariance
 from hmpim.identify.noise.whiteness import is_white
 from hmpim.identify.result import FrequencyResponse
+from hmpim.identify.worth import MATERIAL
 from hmpim.model.sampled import prepare_input
 from hmpim.record import Aligned, Finding, Record, uniform
 
@@ -39,9 +40,6 @@ _LONGEST = 256
 
 _SHARE = 8
 """Samples for each of its weights, at least."""
-
-_MOVES = 0.01
-"""Share of the input's power that the reference must move."""
 
 _STEPS = 40
 _NEGLIGIBLE = 1e-4
@@ -139,7 +137,7 @@ def instrument_of(name: str, reference: Real, u: Real) -> Instrument:
         if criterion < least:
             best, least = found, criterion
         lags *= 2
-    if float(best.var()) < _MOVES * float(level.var()):
+    if float(best.var()) < MATERIAL * float(level.var()):
         raise RecordError(
             f"reference {name!r} moves hardly any of the input; check which channel it is"
         )

@@ -20,7 +20,7 @@ from hmpim.identify.fitting.trial import JointFit
 from hmpim.identify.noise.covariance import covariance
 from hmpim.identify.noise.whiteness import is_white
 from hmpim.identify.result.groups import EVERY
-from hmpim.identify.worth import FEW, NEARLY, PART
+from hmpim.identify.worth import FEW, MATERIAL, NEARLY, PART
 from hmpim.record import Finding
 
 __all__ = ["is_swapped", "lags_behind", "swapped_finding"]
@@ -42,12 +42,6 @@ _ROWS = 20_000
 
 _FEWEST = 200
 """Samples that are looked at, at least."""
-
-_FLOOR = 0.01
-"""Share (r.m.s.) of a channel below which what is left over is not told apart."""
-
-_AGAINST = -0.05
-"""Evidence at another step that acquits."""
 
 
 def is_swapped(u: Real, y: Real, valid: Mask) -> bool:
@@ -86,7 +80,7 @@ def is_swapped(u: Real, y: Real, valid: Mask) -> bool:
         return False
     u, y, valid = _thinned(u, y, valid)
     evidence = [_evidence(u, y, valid, step) for step in _STEPS]
-    if max(evidence) <= PART or min(evidence) <= _AGAINST:
+    if max(evidence) <= PART or min(evidence) <= -FEW:
         return False
     change, known = np.diff(y), valid[1:] & valid[:-1]
     return any(_evidence(u[1:], change, known, step, lead=_LEAD) > FEW for step in _STEPS)
@@ -183,7 +177,8 @@ def _future_needed(
         return 0.0
     past, both = slice(_WEIGHTS - lead, 3 * _WEIGHTS + 1 - lead), slice(0, 2 * _WEIGHTS + 1)
     alone, together = (
-        max(0.0, 1.0 - _told(gram[at, at], product[at]) / power) + _FLOOR**2 for at in (past, both)
+        max(0.0, 1.0 - _told(gram[at, at], product[at]) / power) + MATERIAL**2
+        for at in (past, both)
     )
     return 0.5 * float(np.log(alone / together))
 

@@ -17,7 +17,7 @@ from hmpim.identify.arrays import Complex, Mask, Real
 from hmpim.identify.frf.neighbours import centres_in_band, mirrored, windows_around
 from hmpim.identify.result.inputs import BOUND, Alike, InputSet
 from hmpim.identify.section_iv.spectrum import excited_band
-from hmpim.identify.worth import MUCH
+from hmpim.identify.worth import DEEPEST, MUCH
 
 __all__ = ["input_set", "own_band"]
 
@@ -25,9 +25,6 @@ _POINTS = 240
 _TERMS = 3
 _SINGULAR = 1e6
 """Condition beyond which it is rounding, and infinite."""
-
-_DEEP = 10 ** (-50 / 20)
-"""Level, relative to the highest, down to which an input still tells something."""
 
 
 def own_band(u: Real, fs: float, stated: tuple[float, float] | None) -> tuple[float, float]:
@@ -58,7 +55,7 @@ def own_band(u: Real, fs: float, stated: tuple[float, float] | None) -> tuple[fl
         return low, high
     power = np.abs(scipy.fft.rfft(u - u.mean())) ** 2
     level = np.sqrt(np.convolve(power, np.ones(5) / 5, mode="same"))
-    reached = np.flatnonzero(level >= _DEEP * level.max())
+    reached = np.flatnonzero(level >= np.sqrt(DEEPEST) * level.max())
     high = max(high, float(reached[-1]) * fs / u.size)
     return max(low, stated[0]), max(min(high, stated[1]), 2 * max(low, stated[0]))
 

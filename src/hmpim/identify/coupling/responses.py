@@ -22,12 +22,12 @@ from hmpim.identify.result import (
 )
 from hmpim.identify.result.error_bars import estimate
 from hmpim.identify.result.groups import EVERY, MODELLED
-from hmpim.identify.worth import FEW, MUCH, NEARLY, PAST
+from hmpim.identify.worth import FEW, MOST, MUCH, NEARLY, PART, PAST
 from hmpim.record import Aligned, Finding, Record, Signal
 
 __all__ = ["Responses", "inputs_of", "responses_of", "settled", "unrelated"]
 
-_MENTIONED, _DOUBTED = 0.1, 0.5
+_MENTIONED = 0.1
 """Shares of an input's band in which it is not told from others: for a word, for a doubt."""
 
 _LARGEST_DB = 6.0
@@ -36,7 +36,7 @@ _LARGEST_DB = 6.0
 _UPPER = 1.2
 """Standard deviations of |error| that a bound adds: 95 % where the gain is well seen, more else."""
 
-_SEEN, _SEEN_SHARE = 4.0, 0.2
+_SEEN = 4.0
 """Standard deviations, and share of the frequencies, at which a response shows a coupling."""
 
 _MANY = 1e6
@@ -160,7 +160,7 @@ def unrelated(output: str, source: str, response: FrequencyResponse) -> Finding:
     DC; or there is none, and what it would be at most.
     """
     seen = np.abs(response.response) > _SEEN * response.std
-    if response.frequency.size and np.mean(seen) > _SEEN_SHARE:
+    if response.frequency.size and np.mean(seen) > PART:
         k = int(np.argmax(np.where(seen, np.abs(response.response), 0.0)))
         level = 20 * float(np.log10(np.abs(response.response[k])))
         return Finding(
@@ -248,7 +248,7 @@ def settled(
             others = [inputs.names.index(name) for name in group.names if name != pair.input]
             # A coupling too weak to be seen may have been taken for this one.
             hidden = not joined.strong[i] and not all(joined.related[j] for j in others)
-            findings.append(_coupled(group, doubt=group.share >= _DOUBTED or hidden))
+            findings.append(_coupled(group, doubt=group.share >= MOST or hidden))
     return replace(pair, parameters=parameters, warnings=tuple(findings))
 
 

@@ -24,9 +24,6 @@ _FEWEST = 10
 _RICHER = 1.5
 """Some changes must exceed the smallest by so much: a rounded ramp changes by one step each."""
 
-_FASTEST = 1.05
-"""Samples between updates below which they cannot be told from one per sample."""
-
 _STILL = 6.0
 """Change over the usual one that counts as an update where noise was added after the hold."""
 
@@ -210,10 +207,10 @@ def _coarse_period(
 ) -> float | None:
     """Period in samples at which the changes crowd on the circle, refined over longer stretches."""
     # Just below a whole number of samples the odd run is shorter, and rare.
-    low, high = max(0.9 * shortest, _FASTEST), float(shortest + 1)
+    low, high = max(0.9 * shortest, 1 + FEW), float(shortest + 1)
     if shortest == 1:  # 5/4 and 5/3 crowd alike; but nearly all updates show
         mean = float(np.mean(runs))
-        low, high = max(NEARLY * mean, _FASTEST), 1.01 * mean
+        low, high = max(NEARLY * mean, 1 + FEW), 1.01 * mean
         if high <= low:
             return None
     count = min(200, changed.size)
@@ -226,13 +223,13 @@ def _coarse_period(
         power = np.array([np.abs(np.exp(2j * np.pi * c / t).mean()) for t in trial])
         best = float(trial[np.argmax(power)])
         expected = best / np.pi * np.sin(np.pi / best)
-        if best < _FASTEST or power.max() < NEARLY * expected:
+        if best < 1 + FEW or power.max() < NEARLY * expected:
             return None
         if count >= changed.size - stretch:
             if stretch == 0:
                 return best
             stretch = 0
-        low, high = max(best - 3 * finest, _FASTEST), best + 3 * finest
+        low, high = max(best - 3 * finest, 1 + FEW), best + 3 * finest
         count = min(2 * count, changed.size - stretch)
 
 

@@ -18,7 +18,7 @@ from hmpim.errors import RecordError
 from hmpim.identify.arrays import Mask, Real
 from hmpim.identify.effects.smeared import smeared_plateaus
 from hmpim.identify.signals import as_signal
-from hmpim.identify.worth import MUCH
+from hmpim.identify.worth import MUCH, TOLERATED
 
 __all__ = ["NoiseAt", "Saturation", "detect_saturation"]
 
@@ -47,9 +47,6 @@ _BENT = 1.0
 
 _LOPSIDED = 2.2
 """Time spent coming near the level over time spent leaving it; a settling step gives more."""
-
-_COARSEST = 0.03
-"""Noise, over the signal's span, beyond which a plateau with scatter needs a prediction."""
 
 _NOISY = 1.0
 """Noise over the resolution from which equal values at the extreme cannot be chance; rounding
@@ -207,7 +204,7 @@ def _upper(y: Real, prediction: Real | None, step: float) -> _Side | None:
     if exact is not None and _is_clipped(y, exact, prediction, step, span):
         return exact
     sigma = _scatter(y)
-    if prediction is None and max(step, 1e-6 * span) < sigma < _COARSEST * span:
+    if prediction is None and max(step, 1e-6 * span) < sigma < TOLERATED * span:
         side = _scattered(y, sigma)
         if side is not None and _is_clipped(y, side, None, step, span):
             return side

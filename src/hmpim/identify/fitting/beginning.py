@@ -14,7 +14,7 @@ from hmpim.identify.fitting.sampled_rows import part_of
 from hmpim.identify.fitting.trial import Trial
 from hmpim.identify.noise.whiteness import effective_share
 from hmpim.identify.signals import longest_lag
-from hmpim.identify.worth import FEW, PART
+from hmpim.identify.worth import FEW, PART, TWICE
 from hmpim.model.sampled import MARGIN
 from hmpim.record import Intersample
 
@@ -40,9 +40,6 @@ _FIRST = 8
 
 _LEFT = 4
 """Samples for each parameter that must be left."""
-
-_TWICE = 2.0
-"""Factor on what the beginning may hold, for noise that is not white or not Gaussian."""
 
 
 def in_motion(u: Real) -> bool:
@@ -189,7 +186,8 @@ def stand_out_of(innovations: Real, some: Mask) -> Mask:
         alike = told & (counts == count)
         others = squares[alike][~some[alike]].reshape(-1, some.shape[1] - count)
         level[alike] = np.median(others, axis=1) / 0.455  # of a squared Gaussian
-    limit = _TWICE * level * scipy.special.chdtri(np.maximum(counts, 1), FALSE_ALARM)
+    # Twice as much, for noise that is not white or not Gaussian.
+    limit = TWICE * level * scipy.special.chdtri(np.maximum(counts, 1), FALSE_ALARM)
     return np.asarray(told & (np.sum(squares * some, axis=1) > limit))
 
 

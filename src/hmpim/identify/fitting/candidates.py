@@ -5,7 +5,7 @@ import numpy as np
 from hmpim.identify.arrays import Real
 from hmpim.identify.chance import CLEARLY, FALSE_ALARM
 from hmpim.identify.fitting.beginning import in_motion
-from hmpim.identify.fitting.data import HOPELESS, Data, Seen, band_of, shifted
+from hmpim.identify.fitting.data import Data, Seen, band_of, shifted
 from hmpim.identify.fitting.enrich import (
     INTEGRATING,
     PLAIN,
@@ -21,7 +21,7 @@ from hmpim.identify.fitting.unexplained import unexplained_response
 from hmpim.identify.noise.misfit import misfit
 from hmpim.identify.noise.whiteness import effective_share, is_white
 from hmpim.identify.signals import longest_lag
-from hmpim.identify.worth import FEW, MATERIAL, MUCH, PART
+from hmpim.identify.worth import FEW, MATERIAL, MUCH, PART, TWICE
 from hmpim.model.dynamics import STRUCTURES, Structure, StructureName, coefficients_of
 from hmpim.model.response import slowest_time_constant
 from hmpim.record import BETWEEN, Intersample
@@ -52,9 +52,6 @@ _AT_ONCE = 4
 _TASTE = 4
 """Steps taken from each start before the best one is followed to its end."""
 
-_FALLING = 4.0
-"""After so many steps a structure is given up if its sum of squares is this far from hopeful."""
-
 _PRECISION = 1e-2
 """Precision of a fit that is weighed against others, see `fit_structure`."""
 
@@ -77,9 +74,9 @@ def fit_plain(
             starts = starting_values(rough, structure, thorough=False)
         steps = 2 if settled else _TASTE
         fit = fit_structure(problem, structure, starts[0], iterations=steps)
-        hopeful = min((f.objective for f in fits), default=np.inf) * HOPELESS
+        hopeful = min((f.objective for f in fits), default=np.inf) * TWICE
         white = fit.objective < hopeful and is_white(fit.residual)
-        if not white and fit.objective < _FALLING * hopeful:
+        if not white and fit.objective < TWICE**2 * hopeful:
             rivals = starts[1:]
             if not settled:
                 rivals += starting_values(rough, structure)
@@ -96,7 +93,7 @@ def fit_plain(
     least = min(fit.objective for fit in fits)
     return [
         fit
-        if fit.converged or fit.objective > _FALLING * least
+        if fit.converged or fit.objective > TWICE**2 * least
         else fit_structure(problem, fit.structure, fit.theta)
         for fit in fits
     ]
@@ -154,7 +151,7 @@ def reduced(problem: Problem, fits: list[Fit], richer: list[Fit]) -> list[Fit]:
         late -= float(best.linear[1] / best.linear[0])
 
     def better(fit: Fit) -> Fit:
-        if fit.objective <= HOPELESS * best.objective:
+        if fit.objective <= TWICE * best.objective:
             return fit
         tried = [
             fit_structure(problem, fit.structure, np.concatenate([[late - c[0]], theta]))
@@ -197,7 +194,7 @@ def _best_of(problem: Problem, structure: Structure, starts: list[Real], rivals:
         for theta in starts
     ]
     best = min(tried, key=lambda fit: fit.objective)
-    if best.converged or best.objective > HOPELESS * leading.objective:
+    if best.converged or best.objective > TWICE * leading.objective:
         return best
     return fit_structure(problem, structure, best.theta, precision=precision)
 
@@ -277,9 +274,9 @@ def fit_under_each_assumption(
     if alone:
         return fitted
     least = min(fit.objective for fit in fits)
-    leading = [fit for fit in fits if fit.objective < HOPELESS * least]
+    leading = [fit for fit in fits if fit.objective < TWICE * least]
     trailing = [
-        fit for fit in fits if fit.objective >= HOPELESS * least and fit.structure.name in PLAIN
+        fit for fit in fits if fit.objective >= TWICE * least and fit.structure.name in PLAIN
     ]
     others = [mode for mode in BETWEEN if mode != natural]
 

@@ -14,7 +14,7 @@ from hmpim.identify.fitting.candidates import (
     is_worth_explaining,
     reduced,
 )
-from hmpim.identify.fitting.data import HOPELESS, Data, Seen, band_of, follows, refit
+from hmpim.identify.fitting.data import Data, Seen, band_of, follows, refit
 from hmpim.identify.fitting.enrich import PLAIN
 from hmpim.identify.fitting.fit import Fit, Problem
 from hmpim.identify.fitting.least_squares import solved
@@ -23,7 +23,7 @@ from hmpim.identify.fitting.unrelated import says_nothing
 from hmpim.identify.fitting.whitening import prewhitened_of
 from hmpim.identify.noise.whiteness import is_white
 from hmpim.identify.signals import longest_lag
-from hmpim.identify.worth import FEW, PART
+from hmpim.identify.worth import FEW, PART, TWICE
 from hmpim.model.dynamics import StructureName
 from hmpim.model.sampled import interpolation_error
 from hmpim.record import Intersample
@@ -138,7 +138,7 @@ def turn_ahead(course: Course) -> Course:
         return course
     found = fit_plain(ahead.problem(course.natural, shorter), rough, course.plain or PLAIN)
     least = min(f.objective for f in found) / count
-    if HOPELESS * least > best.objective / course.problem.counted:
+    if TWICE * least > best.objective / course.problem.counted:
         return course
     return replace(course, data=ahead, given=shorter, counted=shorter, fits=found)
 

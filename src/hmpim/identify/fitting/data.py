@@ -17,7 +17,6 @@ from hmpim.record import Intersample
 
 __all__ = [
     "FINAL_PRECISION",
-    "HOPELESS",
     "Data",
     "Seen",
     "band_of",
@@ -26,10 +25,6 @@ __all__ = [
     "refit",
     "shifted",
 ]
-
-HOPELESS = 2.0
-"""A structure whose sum of squares is this many times the least is not tried again at once
-under the other assumptions."""
 
 FINAL_PRECISION = 1e-6
 """Precision of the chosen fit, see `fit_structure`."""

@@ -12,6 +12,7 @@ import numpy as np
 from hmpim.identify.arrays import Complex, Real
 from hmpim.identify.fitting.fit import Fit
 from hmpim.identify.fitting.start import RoughResponse, starting_values
+from hmpim.identify.worth import FEW
 from hmpim.model.dynamics import STRUCTURES, Structure, StructureName, theta_of
 
 __all__ = ["INTEGRATING", "PLAIN", "RICH", "Proposal", "integrator_starts", "members", "proposals"]
@@ -43,9 +44,6 @@ _DELAYS = 7
 
 _PROMISING = 1e3
 """Squared error on the rough response, over the least, up to which a structure is promising."""
-
-_BEATS = 0.95
-"""Squared error on the rough response, over that of the best fit so far, which must be beaten."""
 
 _REWEIGHTINGS = 6
 
@@ -136,7 +134,7 @@ def proposals(
         error = found[0][0] if found else float("inf")
         out.append(Proposal(structure=structure, starts=tuple(starts), error=error))
     if not all_of_them:
-        out = [proposal for proposal in out if proposal.error < _BEATS * _error(rough, fit)]
+        out = [proposal for proposal in out if proposal.error < (1 - FEW) * _error(rough, fit)]
     least = min((proposal.error for proposal in out), default=0.0)
 
     def rank(proposal: Proposal) -> tuple[bool, int]:

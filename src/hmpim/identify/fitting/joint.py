@@ -28,7 +28,7 @@ from hmpim.identify.fitting.course import (
     start,
     turn_ahead,
 )
-from hmpim.identify.fitting.data import FINAL_PRECISION, HOPELESS, refit
+from hmpim.identify.fitting.data import FINAL_PRECISION, refit
 from hmpim.identify.fitting.enrich import INTEGRATING, PLAIN, RICH
 from hmpim.identify.fitting.fit import Fit, fit_structure
 from hmpim.identify.fitting.growth import grow, hidden_pole
@@ -37,6 +37,7 @@ from hmpim.identify.fitting.trial import JointFit, Trial, likeliest_of, trial_of
 from hmpim.identify.fitting.unrelated import is_unrelated
 from hmpim.identify.fitting.whitening import is_contradicted, noise_of, refit_whitened
 from hmpim.identify.noise.whiteness import effective_share, is_white
+from hmpim.identify.worth import TWICE
 from hmpim.model.dynamics import Structure, StructureName
 from hmpim.record import BETWEEN, Intersample
 
@@ -129,7 +130,7 @@ def weigh_and_look_again(
             (mode, fit)
             for mode, fit in fitted
             if (mode, fit.structure) != chosen
-            and (fit.cost < HOPELESS**2 * best.fit.cost or fit.structure.name in PLAIN)
+            and (fit.cost < TWICE**2 * best.fit.cost or fit.structure.name in PLAIN)
         ]
         fitted = [(mode, refit(course.data.problem(mode, again), fit)) for mode, fit in hopeful]
         course, trials, best, share = _weigh(course, fitted)

@@ -21,7 +21,7 @@ from hmpim.identify.fitting.start import coarse_lag
 from hmpim.identify.fitting.trial import JointFit, trial_of
 from hmpim.identify.fitting.unrelated import is_unrelated
 from hmpim.identify.noise.whiteness import effective_share
-from hmpim.identify.worth import ROUNDING
+from hmpim.identify.worth import ROUNDING, TWICE
 from hmpim.model.dynamics import FILTERS, Structure
 from hmpim.model.filters import nyquist_taps, section_parameters
 from hmpim.model.sampled import prepare_input
@@ -50,7 +50,7 @@ _ROUNDING = 1e-11
 _REFINED = 4
 """Times that input and output are filtered by the poles found."""
 
-_TASTE, _HOPEFUL = 6, 2.0
+_TASTE = 6
 """Steps from each start, and sum of squares over the least up to which it is followed on."""
 
 _POLISHED = 1e-6
@@ -215,7 +215,7 @@ def _followed(
     least = min(fit.cost for fit in fits)
     return [
         fit
-        if fit.cost > _HOPEFUL * least or not fit.structure.order
+        if fit.cost > TWICE * least or not fit.structure.order
         else fit_structure(problem, fit.structure, fit.theta, precision=_POLISHED)
         for fit in fits
     ]

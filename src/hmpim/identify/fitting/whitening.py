@@ -9,7 +9,6 @@ from hmpim.identify.arrays import Real
 from hmpim.identify.chance import FALSE_ALARM
 from hmpim.identify.fitting.data import (
     FINAL_PRECISION,
-    HOPELESS,
     Data,
     Seen,
     follows,
@@ -20,7 +19,7 @@ from hmpim.identify.fitting.trial import Trial
 from hmpim.identify.noise.autoregression import autoregression
 from hmpim.identify.noise.covariance import covariance
 from hmpim.identify.signals import longest_lag
-from hmpim.identify.worth import PART
+from hmpim.identify.worth import PART, TWICE
 from hmpim.record import Intersample
 
 __all__ = ["is_contradicted", "noise_of", "prewhitened_of", "refit_whitened"]
@@ -71,7 +70,7 @@ def refit_whitened(
     least = min(fit.objective for _, fit in fitted)
     out = []
     for mode, fit in fitted:
-        steps = _RETURNS if fit.objective < HOPELESS * least else 0
+        steps = _RETURNS if fit.objective < TWICE * least else 0
         problem = data.problem(mode, seen)
         out.append((mode, fit_structure(problem, fit.structure, fit.theta, iterations=steps)))
     return out

@@ -14,13 +14,11 @@ from hmpim.identify.arrays import Mask, Real
 from hmpim.identify.fitting.data import shifted
 from hmpim.identify.fleets.learnt import Fleet, Member
 from hmpim.identify.fleets.surface import Surface
+from hmpim.identify.worth import FEW
 
 __all__ = ["Errors", "Fits", "descended", "errors_of", "fitted_all"]
 
 Flags = Mask
-
-_OFF = 0.05
-"""Error of the figures' surface, in standard deviations of each, that is let pass."""
 
 _STEPS = 12
 
@@ -139,7 +137,7 @@ def errors_of(fleet: Fleet, fit: Fits, some: NDArray[np.intp]) -> Errors:
             "scale_factor": np.sqrt(covariance[:, size, size]),
             "bias": np.sqrt(of_bias),
         },
-        exact=(fleet.figures.error <= _OFF * deviations + 1e-12).all(axis=1),
+        exact=(fleet.figures.error <= FEW * deviations + 1e-12).all(axis=1),
     )
 
 

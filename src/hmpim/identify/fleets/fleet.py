@@ -27,26 +27,17 @@ from hmpim.identify.effects.imperfections import find_imperfections
 from hmpim.identify.fleets.fits import Errors, Fits, errors_of, fitted_all
 from hmpim.identify.fleets.learnt import Fleet, Member, learn_fleet
 from hmpim.identify.fleets.pole import Tails, with_tails
-from hmpim.identify.judgement.between_samples import SHIFT, SIZES, WIDE
+from hmpim.identify.judgement.between_samples import SIZES
 from hmpim.identify.noise.misfit import misfits
 from hmpim.identify.noise.whiteness import are_white
-from hmpim.identify.reading.spanned import MOVES
 from hmpim.identify.result import Estimate, Parameters
 from hmpim.identify.result.error_bars import noise_estimate
+from hmpim.identify.worth import FEW, PART
 from hmpim.record import Intersample
 
 __all__ = ["Column", "Fleet", "FleetFit", "Group", "fit_fleet", "learn_fleet"]
 
 Flags = Mask
-
-_OFF = 0.05
-"""Error of the surface, in standard deviations of a parameter, that is let pass."""
-
-_ROUGH = 0.2
-"""The same where another assumption only widens an interval: a tenth of its half width at most.
-
-A held input's response bends where the delay passes a whole sample, which no polynomial follows.
-"""
 
 _ASKS = 0.98 * ONE_SIDED
 """Standard deviations from which one more pole is asked for: a little early, as the basis is not
@@ -252,9 +243,9 @@ def _told(
     for rival, stays in others:
         there = rival.theta[some]
         sound &= ~stays | _is_plain(
-            rival.member, there, rival.gain[some], errors.variance, off=_ROUGH
+            rival.member, there, rival.gain[some], errors.variance, off=PART
         )
-        apart |= stays & (np.abs(there[:, 0] - theta[:, 0]) > SHIFT)
+        apart |= stays & (np.abs(there[:, 0] - theta[:, 0]) > FEW)
     highest = min(fleet.band[1], fleet.fs / 2)
     if "natural_frequency" in fleet.names:  # beyond the band no peak is told
         sound &= fit.figures["natural_frequency"][some] < highest
@@ -314,7 +305,7 @@ def _columns(
         moved = [np.where(stays, rival.figures[name][some] - value, 0.0) for rival, stays in others]
         every = np.array([0.0 * value, *moved])
         below, above = every.min(axis=0), every.max(axis=0)
-        widened = np.maximum(above, -below) > MOVES * half * std
+        widened = np.maximum(above, -below) > FEW * half * std
         low, high = value - half * std, value + half * std
         alone[name] = column(std=std, low=low, high=high)
         spanned[name] = column(
@@ -352,7 +343,7 @@ def _widen(columns: dict[str, Column], i: int, own: Parameters, tails: Parameter
 def _is_wide(column: Column) -> Flags:
     """Whether what several models allow is no figure any more."""
     return np.asarray(
-        np.isnan(column.std) & (column.high - column.low > 2 * WIDE * np.abs(column.value))
+        np.isnan(column.std) & (column.high - column.low > PART * np.abs(column.value))
     )
 
 
@@ -383,7 +374,7 @@ def _unit(name: str, units: tuple[str, str]) -> str:
 
 
 def _is_plain(
-    member: Member, theta: Real, gain: Real, variance: Real, *, off: float = _OFF
+    member: Member, theta: Real, gain: Real, variance: Real, *, off: float = FEW
 ) -> Flags:
     """Whether each unit lies inside the box, and the surface is exact enough for its noise."""
     inside = member.surface.holds(theta) & np.isfinite(theta).all(axis=1)

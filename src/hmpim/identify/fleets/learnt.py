@@ -20,7 +20,7 @@ from hmpim.identify.fitting.rows import Part, Problem
 from hmpim.identify.fleets.surface import Surface, places_in
 from hmpim.identify.reading.figures import figures_at
 from hmpim.identify.result import PairIdentification
-from hmpim.identify.worth import NEARLY
+from hmpim.identify.worth import FEW, NEARLY, PART
 from hmpim.model.dynamics import STRUCTURES, Structure
 from hmpim.model.sampled import SampledInput, prepare_input
 from hmpim.record import BETWEEN, Intersample
@@ -33,10 +33,6 @@ _DEGREES = (9, 12, 15)
 
 _SMOOTHER = 9
 """Degree for what is read off a model."""
-
-_OFF, _ROUGH = 0.05, 0.2
-"""How far a surface may be off, over the noise; and that of another assumption, which only widens
-intervals."""
 
 _UNSEEN = 1e-9
 """Share of the greatest singular value below which a direction of the surface is left out."""
@@ -160,7 +156,7 @@ def learn_fleet(
     values = np.array([list(r.values()) for r in read])
     natural: Intersample = "bandlimited" if len(open_) > 1 else found
     noise = float(np.median([_noise_over_gain(pair) for pair in alike]))
-    enough = {mode: noise * (_OFF if mode == natural else _ROUGH) for mode in open_}
+    enough = {mode: noise * (FEW if mode == natural else PART) for mode in open_}
     return Fleet(
         u=u,
         fs=fs,

@@ -25,7 +25,7 @@ from hmpim.identify.nonlinear.evidence import are_curved
 from hmpim.identify.nonlinear.harmonics import any_harmonic
 from hmpim.identify.nonlinear.sweep_phase import SweepPhase
 from hmpim.identify.signals import longest_lag
-from hmpim.identify.worth import FEW, MUCH, PART
+from hmpim.identify.worth import BLURRED, FEW, MUCH, PART
 from hmpim.model.sampled import MARGIN
 
 __all__ = ["are_quiet"]
@@ -41,9 +41,6 @@ _FORGOTTEN = 40.0
 _TOLD = ("scale_factor", "natural_frequency", "damping_ratio", "bandwidth_phase90",
          "bandwidth_phase90_without_delay", "bandwidth_3db")  # fmt: skip
 """Figures whose deviation is held against them."""
-
-_BLURRED = 2.0
-"""Deviation of the delay, in samples, up to which it is always known well enough."""
 
 
 def are_quiet(
@@ -95,7 +92,7 @@ def _is_told(fleet: Fleet, group: Group, behind: Real) -> Mask:
             column = group.alone[name]
             told &= column.std <= MUCH * np.abs(column.value)
     delay = group.alone["delay"]
-    told &= (delay.value > 0) & (delay.std <= np.maximum(_BLURRED / fs, MUCH * delay.value))
+    told &= (delay.value > 0) & (delay.std <= np.maximum(BLURRED / fs, MUCH * delay.value))
     # The slower of two poles, 1 + 2ζ s/ω + s²/ω².
     omega, zeta = np.exp(fit.theta[group.some, 1:].T)
     slowest = (zeta + np.sqrt(np.maximum(zeta**2 - 1.0, 0.0))) / omega

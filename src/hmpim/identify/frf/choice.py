@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from hmpim.identify.arrays import Mask, Real
 from hmpim.identify.frf.neighbours import LocalFit
-from hmpim.identify.worth import TOLERATED
+from hmpim.identify.worth import TOLERATED, TWICE
 
 __all__ = ["choose", "picked"]
 
@@ -17,8 +17,6 @@ _NEIGHBOURS = 30
 # Fits that predict within this of the best count as equally good.
 # A fit is a reference for others if it predicts within this of the best.
 _CREDIBLE = 1.25
-# The next narrower window is taken unless the square of its error is this much greater.
-_DEAREST = 2.0
 
 
 def choose(
@@ -84,7 +82,7 @@ def choose(
     best = np.argmin(cost, axis=0)
     polynomial = (best >= 2) & (best < len(polynomials))
     below = np.where(polynomial, best - 2, best)
-    cheap = picked(cost, below) <= _DEAREST * picked(cost, best)
+    cheap = picked(cost, below) <= TWICE * picked(cost, best)
     chosen = np.asarray(np.where(cheap, below, best), dtype=np.int64)
     return chosen, np.asarray(picked(bent, chosen[..., None])).reshape(shape)
 

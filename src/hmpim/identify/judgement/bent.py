@@ -8,7 +8,7 @@ from hmpim.identify.judgement.between_samples import SIZES
 from hmpim.identify.judgement.evidence import Evidence
 from hmpim.identify.nonlinear.bends import Bend
 from hmpim.identify.nonlinear.words import KIND_WORDS
-from hmpim.identify.reading.spanned import MOVES, bent_figures
+from hmpim.identify.reading.spanned import bent_figures
 from hmpim.identify.result.groups import MODELLED
 from hmpim.identify.worth import FEW, WORTH
 from hmpim.record import Finding
@@ -65,6 +65,6 @@ def _moved(evidence: Evidence, sure: Sequence[Bend]) -> dict[str, float]:
             continue
         values = [other.get(name) for other in others]
         far = max((abs(value - own.value) for value in values if value is not None), default=0.0)
-        if None in values or far > max(MOVES * HALF * own.spread, WORTH * abs(own.value)):
+        if None in values or far > max(FEW * HALF * own.spread, WORTH * abs(own.value)):
             moved[name] = far / abs(own.value) if own.value else 0.0
     return moved

@@ -5,15 +5,10 @@ from collections.abc import Iterable
 from hmpim.identify.judgement.evidence import Evidence, structure_in_words
 from hmpim.identify.reading.spanned import rivals_of
 from hmpim.identify.result.groups import PHASE_SPLIT
+from hmpim.identify.worth import FEW, PART
 from hmpim.record import Finding, Intersample
 
-__all__ = ["SHIFT", "SIZES", "WIDE", "other_intersample", "undetermined_between", "wide_span"]
-
-SHIFT = 0.05
-"""Difference of the delay, in samples, from which another assumption is worth a word."""
-
-WIDE = 0.1
-"""Half width of an interval over its figure, from which what it covers is no figure any more."""
+__all__ = ["SIZES", "other_intersample", "undetermined_between", "wide_span"]
 
 SIZES = (
     "scale_factor",
@@ -61,7 +56,7 @@ def undetermined_between(
     """
     moves = []
     for mode, apart, other in rivals:
-        if other or abs(apart) > SHIFT:
+        if other or abs(apart) > FEW:
             model = f" with a {structure_in_words(other)} model" if other else ""
             moves.append(f"{_WORDS[mode]}{model} by {apart:+.2f} samples")
     if not moves:
@@ -88,7 +83,7 @@ def wide_span(evidence: Evidence) -> tuple[Finding, ...]:
         if estimate is None or own is None or estimate.ci95 is None or estimate.ci95 == own.ci95:
             continue
         low, high = estimate.ci95
-        if high - low > 2 * WIDE * abs(estimate.value):
+        if high - low > PART * abs(estimate.value):
             wide[name] = (low, high)
     if not wide:
         return ()

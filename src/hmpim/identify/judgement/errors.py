@@ -3,13 +3,10 @@
 from hmpim.identify.judgement.evidence import Evidence
 from hmpim.identify.result import Estimate
 from hmpim.identify.result.groups import MODELLED
-from hmpim.identify.worth import MUCH
+from hmpim.identify.worth import BLURRED, MUCH
 from hmpim.record import Finding
 
 __all__ = ["not_converged", "weak_delay", "weak_excitation"]
-
-_BLURRED = 2.0
-"""Standard deviation of the delay, in samples, up to which it is always known well enough."""
 
 
 def not_converged(evidence: Evidence) -> tuple[Finding, ...]:
@@ -69,7 +66,7 @@ def weak_delay(evidence: Evidence) -> tuple[Finding, ...]:
             ("delay_low_frequency", p.delay_low_frequency),
         )
         if estimate is not None
-        and estimate.spread > max(_BLURRED / evidence.fs, MUCH * abs(estimate.value))
+        and estimate.spread > max(BLURRED / evidence.fs, MUCH * abs(estimate.value))
     )
     if p.delay is None or "delay" not in blurred:
         return ()

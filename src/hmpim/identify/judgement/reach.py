@@ -12,7 +12,7 @@ from hmpim.identify.fitting.growth import scale_of
 from hmpim.identify.judgement.evidence import Evidence, structure_in_words
 from hmpim.identify.kept import kept
 from hmpim.identify.result.groups import MODELLED, PHASE_SPLIT, TIMING
-from hmpim.identify.worth import MUCH, PAST
+from hmpim.identify.worth import DEEPEST, MUCH, PAST, TWICE
 from hmpim.model import response, slowest_time_constant
 from hmpim.record import Finding
 
@@ -30,14 +30,8 @@ __all__ = [
     "windowed_power",
 ]
 
-_OUTSIDE = 2.0
-"""Mode of a richer structure, over the end of the excited band, that no record tells."""
-
-_FEET = 1e-5
-"""Power of an input over its greatest, below which it excites nothing."""
-
-_LINE, _APART = 7, 4
-"""Width in bins of a line behind a Blackman-Harris window, and bins by which two are told apart."""
+_LOBE = 4
+"""Bins from the middle of a Blackman-Harris window's main lobe to its first zero."""
 
 _SPARE = 2
 """What lines must tell beyond the figures, for a wrong structure to show."""
@@ -45,8 +39,8 @@ _SPARE = 2
 _OF_RATE = 0.4
 """Share of the rate that a sweep may end at."""
 
-_LEADS, _STAMPED_LATE = 2.0, 5.0
-"""Time constants, and samples, by which a missing lead or a stamp may have an output ahead."""
+_STAMPED_LATE = 5.0
+"""Samples by which a stamp may have an output ahead."""
 
 _BANDWIDTHS = ("bandwidth_phase90", "bandwidth_phase90_without_delay", "bandwidth_3db")
 
@@ -81,7 +75,7 @@ def fast_mode(evidence: Evidence) -> tuple[Finding, ...]:
     name = evidence.joint.best.fit.structure.name
     poles = np.roots(evidence.readings.system.denominator[::-1])
     fastest = float(np.max(np.abs(poles), initial=0.0) / (2 * np.pi))
-    if name in PLAIN or fastest <= _OUTSIDE * evidence.band[1]:
+    if name in PLAIN or fastest <= TWICE * evidence.band[1]:
         return ()
     return (
         Finding(
@@ -207,7 +201,7 @@ def negative_delay(evidence: Evidence) -> tuple[Finding, ...]:
     if delay is None or latest is None or latest >= 0:
         return ()
     fit = evidence.joint.best.fit
-    by_a_lead = -fit.delay < max(_LEADS * scale_of(fit), _STAMPED_LATE)
+    by_a_lead = -fit.delay < max(TWICE * scale_of(fit), _STAMPED_LATE)
     return (
         Finding(
             code="negative_delay",
@@ -251,10 +245,10 @@ def count_lines(u: Real) -> int:
     (1, True)
     """
     power = windowed_power(u)
-    above = power > _FEET * power.max()
+    above = power > DEEPEST * power.max()
     edges = np.diff(np.concatenate([[0], above.astype(np.int8), [0]]))
     widths = np.flatnonzero(edges == -1) - np.flatnonzero(edges == 1)
-    return int(np.sum(1 + np.maximum(widths - _LINE, 0) // _APART))
+    return int(np.sum(1 + np.maximum(widths - (2 * _LOBE - 1), 0) // _LOBE))
 
 
 def few_lines(evidence: Evidence) -> tuple[Finding, ...]:

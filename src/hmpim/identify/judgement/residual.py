@@ -13,7 +13,7 @@ from hmpim.identify.kept import kept
 from hmpim.identify.noise.colour import noise_colour
 from hmpim.identify.noise.input_noise import input_noise
 from hmpim.identify.result.groups import GAIN, MODELLED
-from hmpim.identify.worth import FEW, MATERIAL, PART, TOLERATED, WORTH
+from hmpim.identify.worth import FEW, MATERIAL, MOST, PART, TOLERATED, WORTH
 from hmpim.model import response
 from hmpim.record import Finding
 
@@ -27,9 +27,6 @@ __all__ = [
     "uneven_noise",
     "unsampled_input",
 ]
-
-_MOSTLY_NOISE = 0.5
-"""R.m.s. of the residual over that of the output beyond which its colour matters too."""
 
 _FEWEST = 256
 """Samples from which the end of an input's spectrum is known."""
@@ -98,7 +95,7 @@ def coloured_noise(evidence: Evidence) -> tuple[Finding, ...]:
             code="coloured_noise",
             message="The residual is not white (one independent sample in "
             f"{1 / evidence.joint.effective_share:.3g}); the error bars are widened for it.",
-            severity="doubt" if evidence.unexplained > _MOSTLY_NOISE and follows else "info",
+            severity="doubt" if evidence.unexplained > MOST and follows else "info",
             parameters=MODELLED,
         ),
     )

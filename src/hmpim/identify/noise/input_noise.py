@@ -13,15 +13,9 @@ from numpy.typing import ArrayLike
 from hmpim.identify.arrays import Real
 from hmpim.identify.kept import kept
 from hmpim.identify.signals import as_signal, check_band, check_rate
-from hmpim.identify.worth import NEARLY, PAST
+from hmpim.identify.worth import NEARLY, PAST, TWICE
 
 __all__ = ["InputNoise", "input_noise"]
-
-_STANDS_OUT = 4.0
-"""Mean power over the floor's from which a stretch of the spectrum counts as excited."""
-
-_FLAT = 4.0
-"""Ratio of the floor's two halves up to which it counts as white noise rather than a skirt."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -105,7 +99,7 @@ def input_noise(u: ArrayLike, fs: float, *, band: tuple[float, float]) -> InputN
     if variance <= 1e-20 * float(np.ptp(samples)) ** 2 or halves[1] <= 0:
         return None
     # Steps and kinks of the stimulus fall off with frequency; noise does not.
-    if not 1.0 / _FLAT < halves[0] / halves[1] < _FLAT or not _is_rough(samples, variance):
+    if not TWICE**-2 < halves[0] / halves[1] < TWICE**2 or not _is_rough(samples, variance):
         return None
     inside = slice(
         max(int(band[0] * samples.size / fs), 1), int(np.ceil(band[1] * samples.size / fs)) + 1
@@ -124,7 +118,7 @@ def _end(power: Real) -> int:
     width = max(power.size // 50, 5)
     summed = np.cumsum(np.concatenate([[0.0], power]))
     mean = (summed[width:] - summed[:-width]) / width
-    above = np.flatnonzero(mean > _STANDS_OUT * _level(power[-(power.size // 4) :]))
+    above = np.flatnonzero(mean > TWICE**2 * _level(power[-(power.size // 4) :]))
     return int(above[-1]) + width // 2 if above.size else power.size
 
 

@@ -18,19 +18,12 @@ from hmpim.identify.nonlinear.harmonics import Harmonics, any_harmonic, sweep_ha
 from hmpim.identify.nonlinear.lines import Lines, detection_lines, find_period
 from hmpim.identify.nonlinear.mechanisms import Mechanism, compare_mechanisms
 from hmpim.identify.nonlinear.sweep_phase import SweepPhase, sweep_phase
-from hmpim.identify.worth import MUCH, PART
+from hmpim.identify.worth import MOST, MUCH, PART, TOLERATED
 
 __all__ = ["Look", "Seen", "are_curved", "look_at", "plainer_of", "thinned"]
 
 _GAIN = searched(36)
 """Log-likelihood that a trace must bring; in linear systems the best of all reaches 7."""
-
-_PERIODIC = 0.5
-"""The same for an input that repeats."""
-
-_APART_SHARE = 0.03
-"""The same as a share of what the likeliest kind gains, more where that explains less: no trace
-is exact."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -139,7 +132,7 @@ def _by_traces(look: Look, fit: Fit, white: bool) -> Seen:
     power = fit.cost / max(look.problem.counted, 1)
     least = 0.0
     if not white:  # dynamics left out resemble every kind a little, more so at few lines
-        least = power * (PART if find_period(look.u) is None else _PERIODIC)
+        least = power * (PART if find_period(look.u) is None else MOST)
     found = tuple(
         m
         for m in compare_mechanisms(look.problem, fit, fs=look.fs)
@@ -167,7 +160,7 @@ def _likely(kinds: tuple[Mechanism, ...], evidence: float) -> tuple[Mechanism, .
 
     def behind(other: Mechanism) -> float:
         alike = {first.kind, other.kind} == {"friction", "backlash"}
-        share = (PART if alike else _APART_SHARE) + 0.5 * unexplained
+        share = (PART if alike else TOLERATED) + 0.5 * unexplained
         return max(searched(1), share * first.gain)
 
     return tuple(m for m in kinds if m.likelihood > first.likelihood - behind(m))

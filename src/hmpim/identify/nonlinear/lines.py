@@ -16,19 +16,11 @@ from numpy.typing import ArrayLike
 from hmpim.errors import ArgumentError
 from hmpim.identify.arrays import Complex, Real
 from hmpim.identify.signals import as_pair, as_signal
+from hmpim.identify.worth import MATERIAL
 
 __all__ = ["LineLevel", "Lines", "detection_lines", "find_period"]
 
 Parity = Literal["even", "odd"]
-
-_EXCITED = 1e-2
-"""Amplitude over the greatest from which a line counts as excited."""
-
-_SILENT = 1e-4
-"""Amplitude over the greatest up to which it counts as left out."""
-
-_REPEATS = 1e-4
-"""Power of the difference from period to period over the input's: a clean repetition."""
 
 _FEWEST = 4
 """Lines that a level is averaged over."""
@@ -119,7 +111,7 @@ def find_period(u: ArrayLike) -> int | None:
     moved = np.flatnonzero(different > 0.1)
     if moved.size == 0:
         return None
-    good = np.flatnonzero(different < _REPEATS)
+    good = np.flatnonzero(different < MATERIAL**2)
     good = good[good > moved[0]]
     if good.size == 0:
         return None
@@ -173,10 +165,10 @@ def detection_lines(u: ArrayLike, y: ArrayLike, *, period: int) -> Lines | None:
     mean_u, mean_y = np.abs(U.mean(axis=0)), Y.mean(axis=0)
     scatter = np.sum(np.abs(Y - mean_y) ** 2, axis=0) / (periods - 1) / periods
     mean_u[0] = 0.0
-    excited = np.flatnonzero(mean_u > _EXCITED * mean_u.max())
+    excited = np.flatnonzero(mean_u > MATERIAL * mean_u.max())
     line = np.arange(mean_u.size)
     within = (line >= max(excited[0], 1)) & (line <= min(excited[-1], mean_u.size - 2))
-    silent = within & (mean_u < _SILENT * mean_u.max())
+    silent = within & (mean_u < MATERIAL**2 * mean_u.max())
     if np.count_nonzero(silent) < _FEWEST:
         return None
     signal = float(np.sqrt(np.mean(np.abs(mean_y[excited]) ** 2)))

@@ -20,11 +20,9 @@ from hmpim.identify.fitting.trial import JointFit, Trial
 from hmpim.identify.reading.figures import figures_at, figures_of
 from hmpim.identify.result import Estimate, Parameters
 from hmpim.identify.result.groups import MODELLED, PHASE_SPLIT
+from hmpim.identify.worth import FEW
 
-__all__ = ["MOVES", "bent_figures", "blurred", "rivals_of", "spanned"]
-
-MOVES = 0.05
-"""Share of an interval's half width from which another assumption widens it."""
+__all__ = ["bent_figures", "blurred", "rivals_of", "spanned"]
 
 
 def rivals_of(joint: JointFit) -> tuple[Trial, ...]:
@@ -156,6 +154,6 @@ def _hull(own: Estimate, values: list[float]) -> Estimate:
     if low is None or high is None or not values:
         return own
     below, above = min([own.value, *values]) - own.value, max([own.value, *values]) - own.value
-    if max(above, -below) <= MOVES * (high - low) / 2:
+    if max(above, -below) <= FEW * (high - low) / 2:
         return own
     return replace(own, std=None, ci95=(low + below, high + above))

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from hmpim.errors import ArgumentError
 from hmpim.identify.arrays import Real
+from hmpim.identify.worth import FEW
 
 __all__ = [
     "bandwidth_3db",
@@ -24,9 +25,6 @@ __all__ = [
     "phase",
     "phase_without_delay",
 ]
-
-# "Near DC" is the lowest twentieth of the excited band.
-_NEAR_DC = 0.05
 
 
 def magnitude(response: ArrayLike) -> Real:
@@ -96,7 +94,8 @@ def near_dc(bins: int) -> int:
     >>> near_dc(800)
     40
     """
-    return max(math.ceil(_NEAR_DC * bins), 1)
+    # "Near DC" is the lowest twentieth of the excited band.
+    return max(math.ceil(FEW * bins), 1)
 
 
 def delay_phase(frequency: ArrayLike, delay: float) -> Real:

@@ -9,6 +9,7 @@ from hmpim.errors import ArgumentError
 from hmpim.identify.arrays import Real
 from hmpim.identify.kept import kept
 from hmpim.identify.signals import as_pair, as_signal
+from hmpim.identify.worth import FEW, MOST
 
 __all__ = [
     "bias_by_autocorrelation",
@@ -17,11 +18,6 @@ __all__ = [
     "scale_factor_near_dc",
     "time_corrected_error",
 ]
-
-# Equation (13) divides by the excitation: only points above this part of the peak count.
-_NONZERO = 0.5
-# A crossing of zero counts once the excitation has gone this part of its peak beyond it.
-_HYSTERESIS = 0.05
 
 
 def time_corrected_error(u: ArrayLike, y: ArrayLike, lag: int) -> Real:
@@ -132,7 +128,7 @@ def initial_period(u: ArrayLike) -> int:
     101
     """
     excitation = as_signal("u", u)
-    threshold = _HYSTERESIS * float(np.max(np.abs(excitation)))
+    threshold = FEW * float(np.max(np.abs(excitation)))
     side = np.where(excitation > threshold, 1, np.where(excitation < -threshold, -1, 0))
     beyond = np.flatnonzero(side)
     if beyond.size == 0:
@@ -189,7 +185,8 @@ def scale_factor_near_dc(u: ArrayLike, y: ArrayLike, lag: int, bias: float) -> f
     for side in (excitation, -excitation):
         top = float(side.max())
         if top > 0:
-            used = side >= _NONZERO * top
+            # Equation (13) divides by the excitation: only its upper half counts.
+            used = side >= MOST * top
             means.append(float(np.mean((corrected[used] - bias) / excitation[used])))
     return sum(means) / len(means) if means else None
 

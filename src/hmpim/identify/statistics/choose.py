@@ -13,7 +13,7 @@ from hmpim.errors import RecordError
 from hmpim.identify.arrays import Real
 from hmpim.identify.chance import FALSE_ALARM
 from hmpim.identify.fitting.candidates import nested
-from hmpim.identify.fitting.data import HOPELESS, shifted
+from hmpim.identify.fitting.data import shifted
 from hmpim.identify.fitting.enrich import INTEGRATING, PLAIN, RICH, members, proposals
 from hmpim.identify.fitting.growth import HiddenPole, grow
 from hmpim.identify.fitting.least_squares import solved
@@ -28,7 +28,7 @@ from hmpim.identify.statistics.products import Products
 from hmpim.identify.statistics.reach import AHEAD
 from hmpim.identify.statistics.start import excited, rough_of
 from hmpim.identify.statistics.statistics import Statistics
-from hmpim.identify.worth import MATERIAL
+from hmpim.identify.worth import MATERIAL, TWICE
 from hmpim.model.dynamics import STRUCTURES, Structure, StructureName
 from hmpim.record import BETWEEN, Intersample
 
@@ -212,7 +212,7 @@ def choose(
     if left.noise.size > 1 and search.follows(_least(fits)).probability >= FALSE_ALARM:
         search.products = search.whitened(left.noise)
         least = _least(fits).fit.objective
-        fits = [search.again(f) for f in fits if f.fit.objective < HOPELESS**2 * least]
+        fits = [search.again(f) for f in fits if f.fit.objective < TWICE**2 * least]
     return _decided(search, natural, fits, band, names=names, alone=alone)
 
 
@@ -331,7 +331,7 @@ def _moved(
     out = []
     for mode in (m for m in BETWEEN if m != natural):
         for fitted in fits:
-            if fitted.fit.objective < HOPELESS * least:
+            if fitted.fit.objective < TWICE * least:
                 theta = shifted(fitted.fit.theta, natural, mode)
                 out.append(search.fit(mode, fitted.fit.structure, theta))
     return out

@@ -20,7 +20,7 @@ from hmpim.identify.statistics.misfit import Asked, asked_of, misfit_of
 from hmpim.identify.statistics.products import Products
 from hmpim.identify.statistics.reach import Reach
 from hmpim.identify.statistics.statistics import Statistics
-from hmpim.identify.worth import PAST
+from hmpim.identify.worth import FEW, PAST
 from hmpim.record import Intersample
 from hmpim.stimulus import Stimulus
 
@@ -41,10 +41,6 @@ residual follows the input, where it is alone."""
 
 _BETWEEN = 1.05
 """Growth of the record before it is asked again whether the residual follows the input."""
-
-_TURN = 0.05
-"""Cycles of the highest frequency by which the delay may move before what is asked for is made
-anew about it."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -199,7 +195,7 @@ class LiveEstimator:
         """Whether a fit's delay has moved away from what is asked for, made before this look."""
         if fitted is None or self._asks is None or self._made:
             return False
-        return abs(self._asks.delay - fitted.fit.delay) * self._band()[1] > _TURN
+        return abs(self._asks.delay - fitted.fit.delay) * self._band()[1] > FEW
 
     def _asked_about(self, fitted: Fitted) -> Asked:
         return asked_of(fitted.fit.delay, self._band(), fitted.products)
