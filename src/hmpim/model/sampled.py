@@ -145,7 +145,7 @@ def interpolation_error(u: NDArray[np.float64], oversampling: int) -> float:
 def _oversampling(deviation: NDArray[np.float64], precision: float) -> int:
     """Factor that brings the content of the input below the spline's good band."""
     for factor in (1, 2):
-        if interpolation_error(deviation, factor) <= precision:
+        if precision == np.inf or interpolation_error(deviation, factor) <= precision:
             return factor
     return 4
 

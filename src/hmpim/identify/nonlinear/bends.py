@@ -150,7 +150,8 @@ def bends(
         rows, residual = rows[:, problem.counts], residual[problem.counts]
     slopes, seen = np.split(rows, [rows.shape[0] - len(tried)])
     weights, gains, white = _scored(slopes, seen, residual)
-    told = np.std(traces * weights[:, None], axis=1) > floor
+    sizes = np.std(traces, axis=1)
+    told = np.abs(weights) * sizes > floor
     gains = np.where(told & (weights > 0.0), gains, 0.0)
     most = float(gains.max())
     if most <= CLEARLY:
@@ -162,7 +163,7 @@ def bends(
             kind=tried[i].kind,
             gain=float(gains[i]),
             certain=most > searched(len(tried)),
-            effect=float(weights[i] * np.std(traces[i])) / spread,
+            effect=float(weights[i] * sizes[i]) / spread,
             share=-float(np.expm1(-2.0 * gains[i] / residual.size)),
             white=white,
             fit=given,
@@ -269,7 +270,9 @@ def _at_the_input(
     """What a dead zone or a limited speed of the command leaves behind the model."""
 
     def through(bent: Real) -> Real:
-        other = replace(problem, source=prepare_input(bent, intersample))
+        # A trace is told from noise, not measured: its spline need be no finer than the samples.
+        source = prepare_input(bent, intersample, precision=np.inf)
+        other = replace(problem, source=source, begins=None)
         return np.asarray(fit.linear[:-1] @ part_of(other, fit.structure, fit.theta).rows)
 
     largest, fastest = float(np.max(np.abs(u))), float(np.max(np.abs(np.diff(u))))
@@ -296,7 +299,7 @@ def _regressed(slopes: Real, seen: Real, residual: Real, colour: Real) -> tuple[
     rows = np.vstack([slopes, seen, residual])
     if colour.size > 1:
         rows = scipy.signal.lfilter(colour, [1.0], rows, axis=1)
-    scale = np.linalg.norm(rows, axis=1)
+    scale = np.sqrt(np.einsum("ij,ij->i", rows, rows))
     scale = np.where(scale > 0.0, scale, 1.0)
     p = slopes.shape[0]
     q, r = np.linalg.qr((rows[:p] / scale[:p, None]).T)

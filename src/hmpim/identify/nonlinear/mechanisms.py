@@ -130,12 +130,13 @@ def play(x: Real, half_gap: float) -> Real:
     >>> play(np.array([0.0, 1.0, 2.0, 1.5, 0.0]), 0.5).tolist()
     [0.0, 0.5, 1.5, 1.5, 0.5]
     """
-    out = x.tolist()
-    low, high = (x - half_gap).tolist(), (x + half_gap).tolist()
-    now = out[0]
-    for k in range(len(out)):
-        now = min(max(now, low[k]), high[k])
-        out[k] = now
+    out, now = [], float(x[0])
+    for low, high in zip((x - half_gap).tolist(), (x + half_gap).tolist(), strict=True):
+        if now < low:
+            now = low
+        elif now > high:
+            now = high
+        out.append(now)
     return np.array(out)
 
 
@@ -147,12 +148,21 @@ def rate_limited(x: Real, step: float) -> Real:
     >>> rate_limited(np.array([0.0, 3.0, 3.0, 3.0]), 1.0).tolist()
     [0.0, 1.0, 2.0, 3.0]
     """
-    target = x.tolist()
-    now = target[0]
-    for k in range(1, len(target)):
-        now += min(max(target[k] - now, -step), step)
-        target[k] = now
-    return np.array(target)
+    target, reached = x.tolist(), 0
+    out = target.copy()
+    for lost in np.flatnonzero(np.abs(np.diff(x)) > step).tolist():
+        if lost < reached:
+            continue  # behind already
+        now = target[lost]
+        for reached in range(lost + 1, len(target)):  # until it has caught up
+            ahead = target[reached] - now
+            if -step <= ahead <= step:
+                break
+            now += step if ahead > 0.0 else -step
+            out[reached] = now
+        else:
+            break
+    return np.array(out)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -279,10 +289,11 @@ def hypotheses(x: Real, denominator: Real, fs: float, *, every: int = 1) -> Iter
     yield Hypothesis(kind="asymmetry", trace=square)
     yield Hypothesis(kind="asymmetry", trace=-square)
     if denominator[0] > 0 and denominator.size > 1:  # an integrator gives way to any force
-        yield Hypothesis(kind="hardening", trace=-through(cube))
-        yield Hypothesis(kind="softening", trace=through(cube))
-        yield Hypothesis(kind="asymmetry", trace=-through(square))
-        yield Hypothesis(kind="asymmetry", trace=through(square))
+        stiff, uneven = through(cube), through(square)
+        yield Hypothesis(kind="hardening", trace=-stiff)
+        yield Hypothesis(kind="softening", trace=stiff)
+        yield Hypothesis(kind="asymmetry", trace=-uneven)
+        yield Hypothesis(kind="asymmetry", trace=uneven)
         yield Hypothesis(kind="friction", trace=-through(np.tanh(step / (_STICKS * fastest))))
     for gap in _GAPS[every // 2 :: every]:
         half = gap * largest
