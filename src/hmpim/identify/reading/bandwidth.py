@@ -19,6 +19,10 @@ from hmpim.record import Intersample
 __all__ = ["ratio_at", "response_bandwidths"]
 
 _FEWEST = 5
+"""Frequencies of the measured response that a line is laid through at least."""
+
+_BESIDE = 2
+"""Of them on either side."""
 
 _MANY = 1e6
 """Degrees of freedom behind a response's error bars, in effect."""
@@ -39,7 +43,8 @@ def ratio_at(
     apart = np.abs(measured.frequency - frequency)
     if apart.size < _FEWEST:
         return None
-    if not measured.frequency[0] <= frequency <= measured.frequency[-1]:
+    below = int(np.count_nonzero(measured.frequency <= frequency))
+    if min(below, apart.size - below) < _BESIDE:  # a line through one side reaches too far
         return None
     near = apart <= max(PART * frequency, float(np.partition(apart, _FEWEST - 1)[_FEWEST - 1]))
     f = measured.frequency[near]
