@@ -119,4 +119,5 @@ def test_how_many_seeds_turn_a_pair_of_the_table(name, tests, most, tmp_path):
     for which, seen in cases.items():
         widest = max(seen.spread.items(), key=lambda item: item[1], default=("", 1.0))
         print(f"{which}: pair {flips(seen.pair)}, {seen.flips}, widest {widest}")
-        assert flips(seen.pair) <= most, which
+    turned = {which: flips(seen.pair) for which, seen in cases.items()}
+    assert max(turned.values()) <= most, turned

@@ -68,6 +68,21 @@ def test_a_second_pole_is_asked_for_or_cannot_be_excluded(evidence_of):
     assert missed_pole(lagging((0.05,), 0.005, evidence_of)) == ()
 
 
+@pytest.mark.parametrize(
+    ("deviations", "severity", "close"),
+    [(2.5, None, False), (3.5, "info", True), (4.5, "doubt", True), (9.0, "doubt", False)],
+)
+def test_a_statistic_close_to_its_level_is_said_on_both_sides(clean, deviations, severity, close):
+    hidden = clean.joint.hidden
+    squared = (0.5 * hidden.scale) ** 2
+    asked = replace(hidden, squared=squared, std=squared / deviations)
+    found = missed_pole(replace(clean, joint=replace(clean.joint, hidden=asked)))
+    assert [f.severity for f in found] == ([severity] if severity else [])
+    for finding in found:
+        assert f"{deviations:.1f} standard deviations; a doubt from 3.9 on" in finding.message
+        assert ("Another run may give the other verdict." in finding.message) == close
+
+
 def test_a_nonlinear_residual_asks_for_no_pole(evidence_of):
     bent = lagging((0.05, 0.02), 0.005, evidence_of)
     assert missed_pole(replace(bent, nonlinear=0.6)) == ()

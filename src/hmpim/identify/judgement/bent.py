@@ -45,7 +45,7 @@ def bent(evidence: Evidence) -> tuple[Finding, ...]:
     return (
         Finding(
             code="nonlinear",
-            message=f"What the model leaves over looks like {kinds}, "
+            message=f"The residual looks like {kinds}, "
             f"{100 * sure[0].effect:.2g} % of the output (r.m.s.).{which} Identify at several "
             "amplitudes to see where the linear model holds.",
             severity="doubt",

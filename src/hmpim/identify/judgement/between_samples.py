@@ -95,7 +95,7 @@ def wide_span(evidence: Evidence) -> tuple[Finding, ...]:
     return (
         Finding(
             code="intersample" if between else "structure",
-            message=f"Models that this record does not tell apart differ widely: {named}. "
+            message=f"Models that this record cannot distinguish differ widely: {named}. "
             + ("State what the input does between its samples" if between else "Sweep higher")
             + ", or lower the noise.",
             severity="doubt",

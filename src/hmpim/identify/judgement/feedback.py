@@ -52,7 +52,7 @@ def feedback(evidence: Evidence) -> tuple[Finding, ...]:
     return (
         Finding(
             code="feedback",
-            message="What the model leaves over moves the input afterwards: the unit was in a "
+            message="The residual moves the input afterwards: the unit was in a "
             "loop"
             + (", and the figures take noise for answer. " if coloured else ". ")
             + "Identify it through what drives the loop (reference=, --reference).",

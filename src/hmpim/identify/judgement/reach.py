@@ -82,7 +82,7 @@ def fast_mode(evidence: Evidence) -> tuple[Finding, ...]:
             code="extrapolated",
             message=f"A {structure_in_words(name)} model needs a mode at {fastest:.4g} Hz, beyond "
             f"the excited band, which ends at {evidence.band[1]:.4g} Hz: the delay may not be "
-            "constant, or the clocks may part. Check the time stamps, or "
+            "constant, or the clocks may drift apart. Check the time stamps, or "
             f"{_sweep_to(fastest, evidence)}.",
             severity="doubt",
             parameters=PHASE_SPLIT,

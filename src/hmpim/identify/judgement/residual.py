@@ -50,7 +50,7 @@ def lack_of_fit(evidence: Evidence) -> tuple[Finding, ...]:
     message = (
         f"The residual still follows the input: about {100 * owed:.2g} % of the output "
         f"(r.m.s.) is not described by the {name} model. "
-        "Look at the Bode plot where model and measurement part."
+        "Look at the Bode plot where model and measurement differ."
     )
     large = owed > TOLERATED
     found = Finding(
@@ -124,7 +124,7 @@ def uneven_noise(evidence: Evidence) -> tuple[Finding, ...]:
     return (
         Finding(
             code="uneven_noise",
-            message=f"What the model leaves over grows with what is fast in the input: about "
+            message=f"The residual grows with the speed of the input: about "
             f"{100 * min(share, 1.0):.0f} % of its power is not the sensor's noise, as with time "
             "stamps that jitter. Record with a hardware clock.",
             severity="doubt",
@@ -148,7 +148,7 @@ def halves_disagree(evidence: Evidence) -> tuple[Finding, ...]:
     return (
         Finding(
             code="halves_disagree",
-            message="The two halves of the record ask for different models, worth "
+            message="The two halves of the record require different models, which differ by "
             f"{100 * halves.owed:.2g} % of the output (r.m.s.): the unit changed during "
             "the test, or answers large and small motion differently. Repeat it, or lower the "
             "amplitude.",
@@ -166,7 +166,7 @@ def noise_colour_of(evidence: Evidence) -> tuple[Finding, ...]:
     return (
         Finding(
             code="noise_colour",
-            message=f"What the model leaves over is {colour.description}. "
+            message=f"The residual is {colour.description}. "
             "Look for hum, drift or motion that the model does not have.",
             severity="info",
             parameters=("noise_std",),

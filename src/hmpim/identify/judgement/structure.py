@@ -50,22 +50,40 @@ def barely_told(chosen: str, *, poles: int, delay: float) -> Finding:
 
 
 def missed_pole(evidence: Evidence) -> tuple[Finding, ...]:
-    """Doubt the delay where the record asks for other dynamics, or cannot exclude a slow pole."""
+    """Doubt the delay where the record asks for other dynamics, or cannot exclude a slow pole.
+
+    A statistic within one deviation of its level may fall on the other side of it in another run:
+    that is said on both sides.
+    """
     hidden = evidence.joint.hidden
     bent = evidence.nonlinear > 0.5  # most of what is left asks for no pole
     if hidden is None or bent or evidence.joint.rivals:
         return ()
     order, fs = evidence.joint.best.fit.structure.order, evidence.fs
     moved = float(np.sqrt(abs(hidden.squared)))
-    if abs(hidden.squared) > DEVIATIONS * hidden.std and moved > TOLERATED * hidden.scale:
+    asked = abs(hidden.squared) / hidden.std if hidden.std > 0.0 else 0.0
+    close = "Another run may give the other verdict. " if abs(asked - DEVIATIONS) < 1.0 else ""
+    level = f"({asked:.1f} standard deviations; a doubt from {DEVIATIONS:.1f} on)"
+    poles = f"{order} pole{'s' * (order != 1)}"
+    matters = moved > TOLERATED * hidden.scale
+    if asked > DEVIATIONS and matters:
         return (
             Finding(
                 code="other_dynamics",
-                message=f"The record asks for other dynamics than {order} "
-                f"pole{'s' * (order != 1)} ({abs(hidden.squared) / hidden.std:.0f} standard "
-                f"deviations), and the delay may be {moved / fs:.2g} s off. Lower the noise, or "
-                "sweep higher, until a richer structure can be told.",
+                message=f"The record requires other dynamics than {poles} {level}, and the delay "
+                f"may be {moved / fs:.2g} s off. {close}Lower the noise, or sweep higher, until a "
+                "richer structure can be distinguished.",
                 severity="doubt",
+                parameters=PHASE_SPLIT,
+            ),
+        )
+    if close and matters and not hidden.may_hide:
+        return (
+            Finding(
+                code="structure",
+                message=f"The record almost requires other dynamics than {poles} {level}. {close}"
+                "Lower the noise, or sweep higher.",
+                severity="info",
                 parameters=PHASE_SPLIT,
             ),
         )

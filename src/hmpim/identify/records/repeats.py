@@ -271,8 +271,8 @@ def _pair(found: tuple[PairIdentification, ...]) -> RepeatedPair:
         findings.append(
             Finding(
                 code="structure",
-                message=f"The repeats were found to be {', '.join(structures)}. Where they differ "
-                "the record hardly tells; state one with structures=.",
+                message=f"The repeats were found to be {', '.join(structures)}. The "
+                "records barely distinguish them; state one with structures=.",
                 severity="doubt",
                 parameters=PHASE_SPLIT,
             )
@@ -285,7 +285,7 @@ def _pair(found: tuple[PairIdentification, ...]) -> RepeatedPair:
         findings.append(
             Finding(
                 code="unmodelled",
-                message=f"{unmodelled:.3g} (r.m.s.) of what the model leaves over comes back in "
+                message=f"{unmodelled:.3g} (r.m.s.) of the residual comes back in "
                 "every repeat: it is not noise. Look at the residual beside the stimulus.",
                 severity="doubt",
                 parameters=MODELLED,

@@ -391,7 +391,7 @@ def _tests(
         admitted = power <= worst * float(np.mean(model_std[scored] ** 2))
         name = f"follows_{pair.input}" if len(pairs) > 1 else "follows_input"
         told = (
-            f"The residual follows {pair.input!r} no more than chance would have it"
+            f"The residual is not correlated with {pair.input!r} beyond chance"
             if left.probability >= FALSE_ALARM
             else f"{100 * left.share:.2g} % of the residual follows {pair.input!r}"
             + (", which the error bars admit" if admitted else "")

@@ -266,7 +266,7 @@ def _of_look(look: Look, passed_at: str) -> str:
         words += f" The whole band is played at {passed_at}."
     if look.parameters.delay is not None and look.parameters.delay.verdict != "ok":
         words += (
-            " Doubtful: what the fit leaves over still follows the input, or what it says lies "
+            " Doubtful: the residual still follows the input, or what it says lies "
             "outside of what was played."
         )
     return words
