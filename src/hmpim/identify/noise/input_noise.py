@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from hmpim.identify.arrays import Real
 from hmpim.identify.kept import kept
 from hmpim.identify.signals import as_signal, check_band, check_rate
-from hmpim.identify.worth import NEARLY, PAST, TWICE
+from hmpim.identify.worth import NEARLY, PART, PAST, TWICE
 
 __all__ = ["InputNoise", "input_noise"]
 
@@ -78,7 +78,7 @@ def input_noise(u: ArrayLike, fs: float, *, band: tuple[float, float]) -> InputN
     check_rate(fs)
     check_band(band, fs)
     samples = as_signal("u", u)
-    if np.ptp(samples) == 0:
+    if np.mean(np.diff(samples) == 0.0) > PART:  # noise repeats no value
         return None
     window = np.asarray(
         scipy.signal.windows.blackmanharris(samples.size, sym=False), dtype=np.float64
@@ -105,11 +105,13 @@ def input_noise(u: ArrayLike, fs: float, *, band: tuple[float, float]) -> InputN
         max(int(band[0] * samples.size / fs), 1), int(np.ceil(band[1] * samples.size / fs)) + 1
     )
     total = float(np.mean(power[inside]))
+    if total < TWICE**2 * variance:  # the band does not stand out: all of it is the stimulus
+        return None
     std = float(np.sqrt(variance))
     return InputNoise(
         std=std,
         std_std=std / float(np.sqrt(floor.size)),
-        attenuation=min(variance / total, 1.0),
+        attenuation=variance / total,
     )
 
 
