@@ -201,7 +201,7 @@ def _evidence(
     evidence = Evidence(
         joint=joint,
         readings=readings,
-        spanned=blurred(whole, WORTH) if any(one.counts for one in moves) else whole,
+        spanned=blurred(whole, WORTH) if any(one.matters for one in moves) else whole,
         misfit=left,
         u=u,
         fs=fs,

@@ -84,6 +84,11 @@ class Bend:
     moved: Real
 
     @property
+    def matters(self) -> bool:
+        """Whether it is there, and worth a word."""
+        return self.certain and self.effect > WORTH
+
+    @property
     def counts(self) -> bool:
         """Whether it is there, and too large, or too little of it known, for an interval.
 
