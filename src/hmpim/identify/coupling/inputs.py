@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 
 from hmpim.identify.arrays import Complex, Mask, Real
 from hmpim.identify.frf.neighbours import centres_in_band, mirrored, windows_around
-from hmpim.identify.result.inputs import BOUND, Alike, InputSet
+from hmpim.identify.result.inputs import Alike, InputSet
 from hmpim.identify.section_iv.spectrum import excited_band
-from hmpim.identify.worth import DEEPEST, MUCH
+from hmpim.identify.worth import DEEPEST, MATERIAL, MUCH
 
 __all__ = ["input_set", "own_band"]
 
@@ -106,7 +106,7 @@ def input_set(
             continue
         condition[some], shares = _conditions([spectra[j] for j in which], centre[some])
         for k, share in zip(some, shares, strict=True):
-            if condition[k] > BOUND:
+            if condition[k] > MATERIAL**-0.5:
                 involved[k] = tuple(names[j] for j in which[share > MUCH * share.max()])
     return InputSet(
         names=tuple(names),

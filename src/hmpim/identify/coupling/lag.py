@@ -13,6 +13,7 @@ import numpy as np
 
 from hmpim.identify.arrays import Real
 from hmpim.identify.fitting.fit import Fit, Problem
+from hmpim.identify.worth import FEW
 from hmpim.model.sampled import delayed_response
 
 __all__ = ["Lag", "lag_of"]
@@ -20,9 +21,6 @@ __all__ = ["Lag", "lag_of"]
 _POINTS = 16
 _EARLIEST = -1.0
 """Least delay thought possible of a coupling, in samples."""
-
-_CLOSE = 0.1
-"""Least lag that is told from none, in samples."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -73,7 +71,7 @@ def lag_of(problem: Problem, fit: Fit, others: Real) -> Lag | None:
     for _ in range(2):  # the second time no further than the first had anything
         found = []
         for lag in top * (np.arange(_POINTS) / (_POINTS - 1.0)):
-            held = max(float(lag), _CLOSE)
+            held = max(float(lag), FEW)
             delay = total - float(lag)
             rows = _answers(problem, delay, held)
             seen = clean(rows)
@@ -92,7 +90,7 @@ def lag_of(problem: Problem, fit: Fit, others: Real) -> Lag | None:
         sigma2 = float(costs.min()) / max(problem.counted - others.shape[0] - 3, 1)
         weight = np.exp(-0.5 * (costs - costs.min()) / sigma2)
         reached = max(p[0] for p, w in zip(likely, weight, strict=True) if w > 1e-3)
-        top = min(1.3 * reached + _CLOSE, top)
+        top = min(1.3 * reached + FEW, top)
     lags = np.array([p[0] for p in likely])
     delays = np.array([p[1] for p in likely])
     variances = sigma2 * np.array([p[2] for p in likely])

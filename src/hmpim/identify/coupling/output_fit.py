@@ -24,16 +24,13 @@ from hmpim.identify.fitting.fit import fit_together as fit_all
 from hmpim.identify.fitting.joint import joint_fit
 from hmpim.identify.fitting.trial import JointFit
 from hmpim.identify.noise.whiteness import effective_share, is_white
-from hmpim.identify.worth import NEARLY, PART
+from hmpim.identify.worth import NEARLY, PART, TWICE
 from hmpim.model.dynamics import StructureName
 from hmpim.model.response import slowest_time_constant
 from hmpim.model.sampled import prepare_input
 from hmpim.record import Intersample
 
 __all__ = ["OutputFit", "fit_together"]
-
-_PERIODS = 4.0
-"""Periods of a coupling's corner frequency that the record must hold."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -326,7 +323,7 @@ def _whitening(
 def _too_slow(fit: Fit, samples: int) -> bool:
     """Whether a coupling is one of drifts only: its corner below a few periods of the record."""
     slowest = slowest_time_constant(fit.denominator)
-    return bool(2 * np.pi * slowest * _PERIODS > samples)
+    return bool(2 * np.pi * slowest * TWICE > samples)
 
 
 def _apart(problems: list[Problem], shared: list[Mask]) -> list[Problem]:

@@ -7,6 +7,7 @@ import numpy as np
 
 from hmpim.errors import RecordError
 from hmpim.identify.arrays import Real
+from hmpim.identify.chance import DEVIATIONS
 from hmpim.identify.coupling.inputs import input_set
 from hmpim.identify.coupling.output_fit import OutputFit
 from hmpim.identify.coupling.weak import unsettled
@@ -22,22 +23,13 @@ from hmpim.identify.result import (
 )
 from hmpim.identify.result.error_bars import estimate
 from hmpim.identify.result.groups import EVERY, MODELLED
-from hmpim.identify.worth import FEW, MOST, MUCH, NEARLY, PART, PAST
+from hmpim.identify.worth import FEW, MOST, MUCH, NEARLY, PART, PAST, TWICE
 from hmpim.record import Aligned, Finding, Record, Signal
 
 __all__ = ["Responses", "inputs_of", "responses_of", "settled", "unrelated"]
 
-_MENTIONED = 0.1
-"""Shares of an input's band in which it is not told from others: for a word, for a doubt."""
-
-_LARGEST_DB = 6.0
-"""Standard deviation of a peak, in dB, beyond which it is not told."""
-
 _UPPER = 1.2
 """Standard deviations of |error| that a bound adds: 95 % where the gain is well seen, more else."""
-
-_SEEN = 4.0
-"""Standard deviations, and share of the frequencies, at which a response shows a coupling."""
 
 _MANY = 1e6
 
@@ -159,7 +151,7 @@ def unrelated(output: str, source: str, response: FrequencyResponse) -> Finding:
     Either the response shows a coupling all the same, such as an inertia's, which is nothing at
     DC; or there is none, and what it would be at most.
     """
-    seen = np.abs(response.response) > _SEEN * response.std
+    seen = np.abs(response.response) > DEVIATIONS * response.std
     if response.frequency.size and np.mean(seen) > PART:
         k = int(np.argmax(np.where(seen, np.abs(response.response), 0.0)))
         level = 20 * float(np.log10(np.abs(response.response[k])))
@@ -244,7 +236,7 @@ def settled(
             )
         )
     for group in inputs.alike:
-        if pair.input in group.names and group.share >= _MENTIONED:
+        if pair.input in group.names and group.share >= PART:
             others = [inputs.names.index(name) for name in group.names if name != pair.input]
             # A coupling too weak to be seen may have been taken for this one.
             hidden = not joined.strong[i] and not all(joined.related[j] for j in others)
@@ -303,7 +295,7 @@ def _told(p: Parameters, band: tuple[float, float]) -> tuple[Parameters, list[st
         ("bandwidth_phase90", beyond),
         ("bandwidth_phase90_without_delay", beyond),
         ("bandwidth_3db", beyond),
-        ("peak_gain_db", lambda e: not e.spread <= _LARGEST_DB),
+        ("peak_gain_db", lambda e: not e.spread <= 20 * np.log10(TWICE)),
         ("delay", late),
         ("delay_low_frequency", late),
     ):

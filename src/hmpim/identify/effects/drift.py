@@ -22,16 +22,13 @@ from hmpim.identify.noise.autoregression import innovation_gain
 from hmpim.identify.noise.colour import bias_drift
 from hmpim.identify.noise.covariance import covariance
 from hmpim.identify.noise.whiteness import is_white
-from hmpim.identify.worth import PART
+from hmpim.identify.worth import PART, TWICE
 from hmpim.record import Finding
 
 __all__ = ["Drifting", "drift_finding", "with_drift"]
 
 _DEGREES = (1, 2, 3, 4, 6, 8, 12, 16)
 """Degrees of the polynomial that are weighed against each other."""
-
-_STEEP = 80.0
-"""Power of the slowest motion over that a little faster: 1/f noise has about 20."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -117,7 +114,9 @@ def _asked_for(joint: JointFit) -> bool:
     residual = fit.residual[counted]
     if counted.size < 100:
         return False
-    if _steepness(residual) > _STEEP:
+    # Of 1/f noise: polynomial k has the power of bin k / 2.
+    flicker = np.mean(2.0 / np.arange(1, 5)) / np.mean(1.0 / np.arange(8, 41))  # 20.4
+    if _steepness(residual) > TWICE**2 * flicker:
         return True
     return bias_drift(residual, counted.astype(np.float64)).probability < FALSE_ALARM
 

@@ -13,19 +13,14 @@ from numpy.typing import ArrayLike, NDArray
 
 from hmpim.errors import RecordError
 from hmpim.identify.arrays import Real
+from hmpim.identify.chance import DEVIATIONS
 from hmpim.identify.signals import as_signal, check_rate
-from hmpim.identify.worth import FEW, NEARLY, PART
+from hmpim.identify.worth import FEW, MOST, NEARLY, PART
 
 __all__ = ["Hold", "Updates", "detect_hold", "updates"]
 
 _FEWEST = 10
 """Changes, repeats and distinct values that must be seen: a square wave has two values."""
-
-_RICHER = 1.5
-"""Some changes must exceed the smallest by so much: a rounded ramp changes by one step each."""
-
-_STILL = 6.0
-"""Change over the usual one that counts as an update where noise was added after the hold."""
 
 _ROUNDING = 1e-6
 """Samples by which an update may miss the sample that shows it, by arithmetic alone."""
@@ -167,17 +162,18 @@ def _changed(samples: Real, change: Real) -> NDArray[np.intp]:
     rounding = float(8 * np.finfo(float).eps * np.max(np.abs(samples)))
     least = rounding
     if np.count_nonzero(change <= rounding) < _FEWEST:  # no repeats: noise came after the hold
-        least = _STILL * float(np.median(change))
+        least = DEVIATIONS / 0.6745 * float(np.median(change))
     return np.flatnonzero(change > least) + 1
 
 
 def _is_rich(samples: Real, change: Real, changed: NDArray[np.intp]) -> bool:
     """Whether the output takes many values, by changes of many sizes."""
     jump = change[changed - 1]
-    if np.mean(jump > _RICHER * np.quantile(jump, 0.01)) < 0.05:
+    # A rounded ramp changes by one step each; halfway to two is more.
+    if np.mean(jump > (1 + MOST) * np.quantile(jump, 0.01)) < 0.05:
         return False
     levels = np.sort(samples[changed])
-    apart = _STILL * float(np.median(change)) if change.min() > 0 else 0.0
+    apart = DEVIATIONS / 0.6745 * float(np.median(change)) if change.min() > 0 else 0.0
     return bool(
         1 + np.count_nonzero(np.diff(levels) > apart) >= _FEWEST or _spread_out(levels, apart)
     )

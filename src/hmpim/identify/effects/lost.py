@@ -10,15 +10,10 @@ from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from hmpim.identify.arrays import Mask, Real
-from hmpim.identify.worth import FEW, MUCH, PART
+from hmpim.identify.chance import DEVIATIONS
+from hmpim.identify.worth import FEW, MUCH, PART, TWICE, WORTH
 
 __all__ = ["find_frozen", "find_repeated", "find_spikes", "stand_out", "stands_out"]
-
-_FAR = 8.0
-"""Standard deviations, by the samples around it, from which a sample is a spike."""
-
-_STEPS = 1.5
-"""Motion of the model from sample to sample that a spike must exceed, at an edge above all."""
 
 _LONGEST_SPIKE = 3
 _WINDOW = 51
@@ -28,9 +23,6 @@ _FEWEST_EQUAL = 8
 
 _LONGEST_COPY = 3
 """Samples in a row that may be copies of a frame before a lost one."""
-
-_FEWEST_COPIES = 0.002
-"""Share of copies below which they are chance: at a crest two samples may be alike."""
 
 
 def stands_out(residual: Real) -> bool:
@@ -49,7 +41,8 @@ def stand_out(residuals: Real) -> Mask:
     """The same of many residuals, shape (..., n): which of them, shape (...)."""
     away = np.abs(residuals - np.median(residuals, axis=-1, keepdims=True))
     bulk = np.median(away, axis=-1)
-    return np.asarray((away.max(axis=-1) > _FAR * 1.4826 * bulk) & (bulk > 0.0))
+    # Twice what chance allows: noise need not be Gaussian.
+    return np.asarray((away.max(axis=-1) > TWICE * DEVIATIONS * 1.4826 * bulk) & (bulk > 0.0))
 
 
 def find_spikes(y: Real, prediction: Real, *, clipped: Mask | None = None) -> Mask | None:
@@ -82,7 +75,9 @@ def find_spikes(y: Real, prediction: Real, *, clipped: Mask | None = None) -> Ma
     level = np.median(around, axis=1)
     spread = 1.4826 * np.median(np.abs(around - level[:, None]), axis=1)
     near = sliding_window_view(np.pad(prediction, 1, mode="edge"), 3)
-    least = np.maximum(_FAR * np.maximum(spread, 0.5 * bulk), _STEPS * np.ptp(near, axis=1))
+    least = np.maximum(
+        TWICE * DEVIATIONS * np.maximum(spread, 0.5 * bulk), TWICE * np.ptp(near, axis=1)
+    )
     away = np.abs(residual - level) > least
     first, last = _runs(away)
     for a, b in zip(first, last, strict=True):
@@ -153,7 +148,7 @@ def find_repeated(y: Real) -> Mask | None:
     for a, b in zip(first, last, strict=True):
         if b - a >= _LONGEST_COPY or y[a] in (y.min(), y.max()):
             copies[a : b + 1] = False
-    return copies if np.count_nonzero(copies) >= max(3.0, _FEWEST_COPIES * y.size) else None
+    return copies if np.count_nonzero(copies) >= max(3.0, WORTH * y.size) else None
 
 
 def _runs(flags: Mask) -> tuple[NDArray[np.intp], NDArray[np.intp]]:

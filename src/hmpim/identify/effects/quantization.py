@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 from hmpim.identify.arrays import Real
 from hmpim.identify.chance import SEARCHED
 from hmpim.identify.signals import as_signal
-from hmpim.identify.worth import FEW, NEARLY
+from hmpim.identify.worth import FEW, NEARLY, PART
 
 __all__ = ["Quantization", "detect_quantization"]
 
@@ -28,9 +28,6 @@ _FINEST = 2.0**-22
 
 _CELLS = 1 << 15
 """Cells of the histogram whose transform is searched; steps down to 4 / _CELLS of the range."""
-
-_CLUSTERED = 0.25
-"""Least magnitude of the peak: noise after the rounding of at most a quarter of a step."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -184,7 +181,7 @@ def _by_clusters(samples: Real, span: float) -> Quantization | None:
     best = first + int(np.argmax(power[first:]))
     near = slice(max(first, best // 2), min(2 * best, last))
     level = float(np.median(power[near]))
-    if power[best] < max(SEARCHED / np.log(2) * level, _CLUSTERED**2 * total):
+    if power[best] < max(SEARCHED / np.log(2) * level, PART**2 * total):
         return None
     return _sharpened(samples, 4 * _CELLS * width / best, span)
 

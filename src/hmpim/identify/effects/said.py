@@ -11,19 +11,13 @@ from hmpim.identify.effects.saturation import Saturation
 from hmpim.identify.result import Estimate, Parameters
 from hmpim.identify.result.error_bars import estimate
 from hmpim.identify.result.groups import EVERY, MODELLED
-from hmpim.identify.worth import FEW
+from hmpim.identify.worth import FEW, MOST, MUCH, NEARLY
 from hmpim.record import Finding
 
 __all__ = ["with_imperfections"]
 
 _MANY = 1e6
 """Degrees of freedom behind levels and periods, which are known all but exactly."""
-
-_COARSE = 1.0
-"""Steps of rounding, over the noise, from which quantisation is worth a warning."""
-
-_MUCH_CLIPPED = 0.4
-"""Share of clipped samples beyond which what is found is doubtful: a rectifier clips half."""
 
 
 def with_imperfections(
@@ -63,7 +57,7 @@ def with_imperfections(
 
 def _of_clipping(clipping: Saturation, unit: str) -> Finding:
     """Share and levels; much of it is a doubt."""
-    much = clipping.share > _MUCH_CLIPPED
+    much = clipping.share > NEARLY * MOST  # a rectifier clips half
     levels = [
         f"{name} {level:.6g} {unit}".rstrip()
         for name, level in (("low", clipping.low), ("high", clipping.high))
@@ -108,7 +102,7 @@ def _of_rounding(found: Imperfections, noise: Estimate | None, unit: str) -> lis
             )
         ]
     rounding = found.quantization
-    if rounding is None or noise is None or rounding.step <= _COARSE * noise.value:
+    if rounding is None or noise is None or rounding.step / 12**0.5 <= MUCH * noise.value:
         return []
     return [
         Finding(

@@ -16,9 +16,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from hmpim.errors import RecordError
 from hmpim.identify.arrays import Mask, Real
+from hmpim.identify.chance import ONE_SIDED
 from hmpim.identify.effects.smeared import smeared_plateaus
 from hmpim.identify.signals import as_signal
-from hmpim.identify.worth import MUCH, TOLERATED
+from hmpim.identify.worth import MUCH, NEARLY, TOLERATED, TWICE
 
 __all__ = ["NoiseAt", "Saturation", "detect_saturation"]
 
@@ -35,25 +36,9 @@ _FEWEST = 8
 _VISITS = 2
 """Stays at the level that must look alike, where no prediction helps."""
 
-_STEEPEST = 0.42
-"""Exponent of the density against the distance: 0 if clipped, 1/2 at a crest, 1 if settling."""
-
 _DROP = 12.0
 """Fall over as long again as a visit to the level lasted, in units of what is told apart
 there; a parabolic crest falls 8 to 9."""
-
-_BENT = 1.0
-"""Standard deviations of the noise by which a flat visit may bend or tilt; a crest bends 3 to 6."""
-
-_LOPSIDED = 2.2
-"""Time spent coming near the level over time spent leaving it; a settling step gives more."""
-
-_NOISY = 1.0
-"""Noise over the resolution from which equal values at the extreme cannot be chance; rounding
-by itself makes 0.3."""
-
-_BEYOND = 1.5
-"""How far the prediction must go beyond the level, in standard deviations of its own error."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -295,7 +280,8 @@ def _is_even(below: Real, resolution: float, reach: float) -> bool:
     inside = np.maximum(below, floor) - floor + reach / 100.0
     exponent = 1.0 - inside.size / float(np.sum(np.log((reach - floor) * 1.01 / inside)))
     settled = np.count_nonzero(below < floor) > 0.1 * below.size + 3 * np.sqrt(below.size)
-    return bool(exponent < _STEEPEST and not settled)
+    # The exponent is 0 if clipped, 1/2 at a crest, 1 if settling.
+    return bool(exponent < NEARLY * 0.5 and not settled)
 
 
 def _visits(at: Mask) -> NDArray[np.intp]:
@@ -327,7 +313,7 @@ def _is_flat(y: Real, side: _Side, resolution: float, reach: float) -> bool:
         )
     if min(np.median(coming), np.median(leaving)) < 2.0:  # by a jump: a square wave
         return False
-    if not 1.0 / _LOPSIDED < sum(coming) / sum(leaving) < _LOPSIDED:
+    if not 1.0 / TWICE < sum(coming) / sum(leaving) < TWICE:
         return False
     if side.exact:
         return bool(np.median(falls) > _DROP * resolution)
@@ -340,7 +326,7 @@ def _neither_bends_nor_tilts(y: Real, visits: NDArray[np.intp], sigma: float) ->
     value = np.concatenate([y[first : last + 1] for first, last in visits])
     rows = np.stack([np.ones(place.size), place, place**2])
     weights = np.linalg.lstsq(rows.T, value, rcond=None)[0]
-    return bool(abs(weights[1]) < _BENT * sigma and abs(weights[2]) < _BENT * sigma)
+    return bool(abs(weights[1]) < sigma and abs(weights[2]) < sigma)
 
 
 def _goes_beyond(y: Real, side: _Side, prediction: Real, resolution: float) -> bool:
@@ -358,10 +344,10 @@ def _goes_beyond(y: Real, side: _Side, prediction: Real, resolution: float) -> b
     error = _spread((y - corrected)[free])
     beyond = (corrected - side.level)[side.at]
     runs = int(np.count_nonzero(side.at[1:] & ~side.at[:-1])) + 1
-    least = max(_BEYOND * error / np.sqrt(runs), 0.5 * error, 0.5 * resolution)
+    least = max(ONE_SIDED * error / np.sqrt(runs), 0.5 * error, 0.5 * resolution)
     if np.mean(beyond) > least and np.mean(beyond > 0) > 0.6:
         return True
     # Values that scatter elsewhere and are all alike here, while the prediction moves.
     noise = min(error, _scatter(y))
     moves = float(np.std(beyond))
-    return bool(noise > _NOISY * resolution and moves > max(0.3 * noise, 0.01 * float(np.ptp(y))))
+    return bool(noise > resolution and moves > max(0.3 * noise, 0.01 * float(np.ptp(y))))

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hmpim.identify.arrays import Mask, Real
-from hmpim.identify.chance import CLEARLY, SEARCHED
+from hmpim.identify.chance import CLEARLY, SEARCHED, deviations
 from hmpim.identify.noise.whiteness import effective_share
 from hmpim.identify.worth import MUCH, WORTH
 
@@ -25,9 +25,6 @@ _MOST = 20_000
 
 _STARTS = (0.6, 0.75, 0.85, 0.92, 0.97)
 """Where a level is first looked for: quantiles of the prediction."""
-
-_BENDS = 6.0
-"""Standard deviations by which the output must fall short at an extreme to be looked at."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -142,7 +139,7 @@ def _falls_short(y: Real, rows: Real) -> tuple[bool, bool]:
         weight = float(q[:, -1] @ y) / r[-1, -1]
         left = y - q @ (q.T @ y)
         error = float(np.sqrt(left @ left / y.size)) / abs(r[-1, -1])
-        found.append(weight < -max(_BENDS * error, 0.1))
+        found.append(weight < -max(deviations(2) * error, 0.1))
     return found[0], found[1]
 
 

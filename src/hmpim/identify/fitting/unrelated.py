@@ -11,12 +11,9 @@ from hmpim.identify.fitting.sampled_rows import part_of
 from hmpim.identify.noise.autoregression import autoregression, innovation_gain
 from hmpim.identify.noise.misfit import misfit
 from hmpim.identify.noise.whiteness import effective_share
+from hmpim.identify.worth import TWICE
 
 __all__ = ["is_unrelated", "says_nothing"]
-
-_INNOVATES = 60.0
-"""And by which it must beat "the output is noise of some colour", where the residual is so
-coloured that few of its samples are independent; another sweep reaches about 40."""
 
 
 def says_nothing(u: Real, problem: Problem, fit: Fit, band: tuple[float, float]) -> bool:
@@ -72,7 +69,8 @@ def is_unrelated(problem: Problem, fit: Fit, share: float) -> bool:
         return False
     residual = fit.residual if problem.valid is None else fit.residual[problem.valid]
     # A free response may be any sine or exponential: the input must tell what they cannot.
-    return innovation_gain(y, residual) < _INNOVATES
+    # Twice as much as a search finds: of a coloured residual few samples are independent.
+    return innovation_gain(y, residual) < TWICE * SEARCHED
 
 
 def _without_input(problem: Problem, fit: Fit) -> Real:

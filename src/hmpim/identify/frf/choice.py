@@ -8,15 +8,12 @@ from numpy.typing import NDArray
 
 from hmpim.identify.arrays import Mask, Real
 from hmpim.identify.frf.neighbours import LocalFit
-from hmpim.identify.worth import TOLERATED, TWICE
+from hmpim.identify.worth import PART, TOLERATED, TWICE
 
 __all__ = ["choose", "picked"]
 
 # What is judged is averaged over this many frequencies on either side.
 _NEIGHBOURS = 30
-# Fits that predict within this of the best count as equally good.
-# A fit is a reference for others if it predicts within this of the best.
-_CREDIBLE = 1.25
 
 
 def choose(
@@ -67,7 +64,7 @@ def choose(
     mean = _averaged(np.minimum(missed, 1e6 * missed.min(axis=0)))
     least = mean.min(axis=0)
     bent = np.maximum(mean - (1 + TOLERATED) * least, 0.0)[..., None] / power
-    credible = (mean <= _CREDIBLE * least)[..., None]
+    credible = (mean <= (1 + PART) * least)[..., None]
     variance = spread * least[..., None]
     # Fits come in pairs, with and without T: the same kind one width down stands two before.
     kinds = (range(len(polynomials)), range(len(polynomials), len(tried)))

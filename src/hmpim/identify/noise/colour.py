@@ -16,14 +16,12 @@ from hmpim.identify.chance import SEARCHED
 from hmpim.identify.noise.covariance import covariance
 from hmpim.identify.noise.whiteness import autocovariance, effective_share, is_white
 from hmpim.identify.signals import as_signal, check_rate
+from hmpim.identify.worth import TOLERATED
 
 __all__ = ["Colour", "Drift", "NoiseColour", "bias_drift", "noise_colour"]
 
 Colour = Literal["white", "autoregressive", "power_law"]
 """White; correlated over a few samples (AR(1)); or as a power of the frequency (1/f, wander)."""
-
-_WANDERS = 0.98
-"""Correlation from sample to sample from which a noise counts as wander."""
 
 _NEIGHBOURS = 30
 """Bins on either side that a line is compared with."""
@@ -198,7 +196,7 @@ def _wandering_variance(ramp: Real, e: Real) -> float:
         return 0.0
     r = autocovariance(e, 1)
     kind, exponent = _likelier(e)
-    if kind != "power_law" and r[1] <= _WANDERS * r[0]:
+    if kind != "power_law" and r[1] <= (1 - TOLERATED) * r[0]:
         return 0.0
     n = e.size
     omega = 2 * np.pi * np.arange(n + 1) / (2 * n)

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from hmpim.identify.arrays import Mask, Real
 from hmpim.identify.kept import kept
 from hmpim.identify.signals import as_signal, check_rate
-from hmpim.identify.worth import FEW, MATERIAL, MOST, PART
+from hmpim.identify.worth import DEEPEST, FEW, MATERIAL, MOST, PART
 
 __all__ = ["SweepPhase", "sweep_phase"]
 
@@ -23,9 +23,6 @@ _FEWEST_CROSSINGS = 8
 
 _FINER = 4
 """Samples per sample in which crossings are looked for."""
-
-_DEEPEST = 1e-3
-"""Amplitude over the greatest below which nothing is looked at: leads, rests."""
 
 _REST = 1e-6
 """Amplitude over the greatest that is zero: what resampling rings at rest, a scope's touch of zero.
@@ -97,9 +94,9 @@ def sweep_phase(u: ArrayLike, fs: float) -> SweepPhase | None:
     sample = np.arange(x.size, dtype=np.float64)
     phase = _through(crossings, first, sample)
     envelope = np.interp(sample, 0.5 * (crossings[1:] + crossings[:-1]), peaks)
-    inside = envelope > _DEEPEST * envelope.max()
+    inside = envelope > np.sqrt(DEEPEST) * envelope.max()
     inside &= (sample >= crossings[0]) & (sample <= crossings[-1])
-    level = x / np.maximum(envelope, _DEEPEST * envelope.max())
+    level = x / np.maximum(envelope, np.sqrt(DEEPEST) * envelope.max())
     error = np.where(inside, (level - np.cos(phase)) ** 2, 0.0)
     inside &= _locally(error, level, crossings) < FEW
     power = float(level[inside] @ level[inside])

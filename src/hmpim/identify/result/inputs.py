@@ -8,11 +8,9 @@ import numpy as np
 
 from hmpim.equality import ByValue
 from hmpim.identify.arrays import Mask, Real
+from hmpim.identify.worth import MATERIAL
 
-__all__ = ["BOUND", "Alike", "InputSet", "OutputCoherence"]
-
-BOUND = 10.0
-"""Condition number up to which inputs count as told apart."""
+__all__ = ["Alike", "InputSet", "OutputCoherence"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -90,7 +88,7 @@ class InputSet(ByValue):
     @property
     def usable(self) -> Mask:
         """Where the inputs are told apart: condition at most 10, shape (f,)."""
-        return np.asarray(self.condition <= BOUND)
+        return np.asarray(self.condition <= MATERIAL**-0.5)
 
     def alike_bins(self, samples: int, fs: float) -> tuple[tuple[frozenset[int], Mask], ...]:
         """Inputs that are not told apart, and which bins of a transform of `samples` that is."""

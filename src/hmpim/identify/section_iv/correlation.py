@@ -10,6 +10,7 @@ from hmpim.errors import RecordError
 from hmpim.identify.arrays import Complex, Real
 from hmpim.identify.kept import kept
 from hmpim.identify.signals import as_pair, as_signal
+from hmpim.identify.worth import PART
 
 __all__ = [
     "Correlation",
@@ -18,10 +19,6 @@ __all__ = [
     "correlation_peak",
     "cross_correlation",
 ]
-
-# A trough is taken for the peak only where it is this much deeper than the peak is high:
-# a narrow-band signal has troughs nearly as deep as its peak beside it.
-_TROUGH_MARGIN = 1.25
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -160,5 +157,5 @@ def correlation_peak(correlation: Correlation) -> CorrelationPeak:
     # What the FFT leaves of an exact zero is rounding, not correlation.
     if np.max(np.abs(value)) == 0:
         raise RecordError("the correlation is zero at every lag; one of the signals is dead")
-    lag = low if -value[low] > _TROUGH_MARGIN * max(value[high], 0.0) else high
+    lag = low if -value[low] > (1 + PART) * max(value[high], 0.0) else high
     return CorrelationPeak(lag=lag, value=float(value[lag]))

@@ -11,7 +11,7 @@ from hmpim.identify.arrays import Complex, Mask, Real
 from hmpim.identify.kept import kept
 from hmpim.identify.section_iv.windows import WindowName, window_samples
 from hmpim.identify.signals import as_pair, as_signal, check_rate
-from hmpim.identify.worth import DEEPEST
+from hmpim.identify.worth import DEEPEST, TOLERATED
 
 __all__ = [
     "Spectrum",
@@ -30,8 +30,6 @@ _NOTCH_REACH = 20
 _NOTCH_DEPTH = 0.1
 _SMALLEST = 1e-300  # keeps the logarithm of an exact zero finite: -6000 dB
 _EDGE = 10 ** (-12 / 20)
-_TOP_IS_SIGNAL = 10 ** (-30 / 20)
-_ABOVE_FLOOR = 10 ** (12 / 20)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -329,8 +327,8 @@ def band_of_levels(level: Real, step: float) -> tuple[float, float]:
     top = float(level.max())
     floor = np.sqrt(DEEPEST) * top
     ceiling = float(np.median(level[-max(level.size // 20, 1) :]))
-    if ceiling < _TOP_IS_SIGNAL * top:
-        floor = max(floor, _ABOVE_FLOOR * ceiling)
+    if ceiling < TOLERATED * top:
+        floor = max(floor, ceiling / _EDGE)
     velocity = np.where(level >= floor, level * frequency, 0.0)
     low = int(np.argmax(level >= _EDGE * top))
     high = int(np.flatnonzero(velocity >= _EDGE * velocity.max())[-1])

@@ -13,6 +13,7 @@ from hmpim.identify.fitting.start import RoughResponse
 from hmpim.identify.section_iv.spectrum import band_of_levels
 from hmpim.identify.statistics.reach import AHEAD
 from hmpim.identify.statistics.statistics import Statistics
+from hmpim.identify.worth import DEEPEST
 
 __all__ = ["correlations", "excited", "power_of", "rough_of"]
 
@@ -20,8 +21,6 @@ _RIDGE = 1e-5
 """Of the greatest power of the input; where there is less, the response is pulled to 0."""
 
 _STEPS = 200
-_FLOOR = 1e-5
-"""Power of the input, over its greatest, below which a frequency is not excited."""
 
 
 def correlations(statistics: Statistics) -> tuple[Real, Real]:
@@ -90,7 +89,7 @@ def rough_of(statistics: Statistics) -> RoughResponse:
         2j * np.pi * np.arange(power.size) * AHEAD / length
     )
     power[0] = 0.0
-    bins = np.flatnonzero(power > _FLOOR * power.max())
+    bins = np.flatnonzero(power > DEEPEST * power.max())
     omega = 2 * np.pi * bins / length
     # The longest lag at which the output follows counts as the delay to begin from.
     lag = int(np.argmax(np.abs(cross[AHEAD:])))
