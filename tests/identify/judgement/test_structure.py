@@ -64,7 +64,7 @@ def test_a_second_pole_is_asked_for_or_cannot_be_excluded(evidence_of):
     assert "barely distinguishes 1 from 2 poles" in asked.message
     (hidden,) = missed_pole(lagging((0.05,), 0.3, evidence_of))
     assert re.search(r"further pole with a time constant of up to .* would not", hidden.message)
-    assert (hidden.severity, hidden.parameters) == ("doubt", PHASE_SPLIT)
+    assert (hidden.severity, hidden.parameters) == ("info", PHASE_SPLIT)
     assert missed_pole(lagging((0.05,), 0.005, evidence_of)) == ()
 
 

@@ -56,16 +56,19 @@ def initial_transient(evidence: Evidence) -> tuple[Finding, ...]:
         return ()
     slowest = slowest_time_constant(evidence.readings.system.denominator)
     lasting = 5.0 * slowest * evidence.fs > MUCH * joint.problem.y.size
-    drifts = lasting and joint.best.fit.structure.name not in PLAIN
+    structure = joint.best.fit.structure
+    drifts = lasting and structure.name not in PLAIN
+    open_ended = structure.integrators > 0
     return (
         Finding(
             code="initial_transient",
             message="The record does not begin at rest: the free response of its state is fitted "
             f"with it, and its first {joint.forgotten / evidence.fs:.4g} s, which answer input "
             "before the record, are left out."
-            + (f" It lasts {5.0 * slowest:.3g} s and may be a drift." if drifts else ""),
-            severity="doubt" if drifts else "info",
-            parameters=("bias",) if drifts else (),
+            + (f" It lasts {5.0 * slowest:.3g} s and may be a drift." if drifts else "")
+            + (" What the integrator held before is part of the bias." if open_ended else ""),
+            severity="doubt" if drifts or open_ended else "info",
+            parameters=("bias",) if drifts or open_ended else (),
         ),
     )
 

@@ -95,7 +95,7 @@ def missed_pole(evidence: Evidence) -> tuple[Finding, ...]:
             message=f"A further pole with a time constant of up to {hidden.limit / fs:.3g} s would "
             "not show in this record, and would shorten the delay by as much; the intervals cover "
             "it. Lower the noise, or sweep higher.",
-            severity="doubt",
+            severity="info",
             parameters=PHASE_SPLIT,
         ),
     )
