@@ -7,6 +7,7 @@ import hmpim
 from hmpim.identify.fleets.fleet import fit_fleet, learn_fleet
 from hmpim.identify.fleets.learnt import box_around
 from hmpim.identify.fleets.surface import Surface, places_in
+from hmpim.identify.fleets.whole import learn_whole, whole_pairs
 
 FS, SAMPLES, LEARNT = 100.0, 600, 6
 NOISE = 0.1
@@ -76,6 +77,31 @@ def test_what_is_not_of_the_kind_is_left_to_itself(fleet):
     fit = fit_fleet(fleet, np.stack([far, faster, clipped, stray, rounded, output(44)]))
     assert fit.sound.tolist() == [False] * 5 + [True]
     assert [fit.parameters(k) is None for k in range(6)] == [True] * 5 + [False]
+
+
+def test_everything_is_said_of_quiet_records_and_of_no_others(fleet):
+    """What a fit of all together passes for sound is still asked what `identify` asks."""
+    whole = learn_whole(fleet, [alone(output(seed)) for seed in range(LEARNT)])
+    assert whole is not None
+    time = np.arange(SAMPLES) / FS
+    plain = output(44)
+    bent = output(46)
+    bent += 0.03 * (bent - 0.3) ** 2  # harmonics of 3 %
+    ringing = output(47)
+    ringing += 1.5 * np.exp(-10.0 * time) * np.cos(2 * np.pi * 6.0 * time)  # not from rest
+    spike = output(48)
+    spike[200] += 10 * NOISE
+    every = np.stack([plain, bent, ringing, spike])
+    fit = fit_fleet(fleet, every)
+    told = whole_pairs(whole, fit, every)
+    assert fit.sound[0]
+    assert told[1:] == [None, None, None]
+    pair, own = alone(plain), told[0]
+    assert own is not None
+    assert own.verdict == pair.verdict == "ok"
+    assert own.warnings == pair.warnings
+    assert own.nonlinearity == pair.nonlinearity
+    assert own.denominator == pytest.approx(pair.denominator, rel=1e-4)
 
 
 def test_units_of_two_kinds_teach_nothing():
