@@ -11,6 +11,7 @@ from hmpim import plots
 from hmpim.plots import Axis, Band, Curve, Figure, Image, Panel, Points, Rule, Span, Words
 from hmpim.plots.bode import pair_bode
 from hmpim.plots.curves import BodeCurve
+from hmpim.plots.draw import with_svg
 from hmpim.plots.draw.frames import frames, ticks
 from hmpim.plots.draw.layout import SIZE, places, text_width
 from hmpim.plots.overlay import beside_bode
@@ -207,3 +208,21 @@ def test_a_long_upright_label_has_room_beside_its_panel():
     label = "Bandwidth, −90° without delay (Hz)"
     assert beside("y") < 150.0
     assert beside(label) >= 0.9 * text_width(label)
+
+
+def test_words_below_a_narrow_panel_stand_upright_and_a_level_word_stays_inside():
+    names = tuple((float(k), name) for k, name in enumerate(("delay at DC", "−90° alone", "bias")))
+    panel = Panel(
+        x=Axis(ticks=names, low=-0.5, high=2.5, label="by bench"),
+        y=Axis(),
+        items=(Rule(at=1.0, axis="y", words="bound", words_at=0.99),),
+    )
+    figure = Figure(panels=(panel,), alt="Names below.")
+    (wide,), _ = places(figure, frames(figure), width=700.0)
+    (narrow,), _ = places(figure, frames(figure), width=220.0)
+    assert (wide.turned, narrow.turned) == (False, True)
+    assert narrow.foot > max(text_width(name) for _, name in names)
+    drawn = with_svg.draw(figure, key="k", width=220.0)
+    assert drawn.count("rotate(-90") == len(names)  # no label beside the panel
+    x = float(drawn.partition(">bound<")[0].rpartition('<text x="')[2].partition('"')[0])
+    assert x + text_width("bound") <= narrow.left + narrow.width + 0.1

@@ -24,6 +24,8 @@ class Place:
     top: float
     width: float
     height: float
+    foot: float  # room of the words on the lower edge
+    turned: bool  # whether these words stand upright, as they would overlap
     x_ticks: list[tuple[float, str]]
     y_ticks: list[tuple[float, str]]
 
@@ -103,7 +105,7 @@ def places(figure: Figure, shown: list[Frame], *, width: float) -> tuple[list[Pl
         beside = len(legend) == 1 and panel.title and _fits(panel, legend[0], inner)
         lines = len(legend) + bool(panel.title) - bool(beside)
         tops[row] = max(tops[row], LINE * lines + 8.0)
-        below = LINE * (panel.x.numbered + bool(panel.x.label)) + 8.0
+        below = _foot(panel.x, inner) + LINE * bool(panel.x.label) + 8.0
         bottoms[row] = max(bottoms[row], below)
         inside[row] = max(inside[row], _UPRIGHT * text_width(panel.y.label))
         heights[row] = max(heights[row], _PER_INCH * figure.heights[panel.row])
@@ -128,6 +130,8 @@ def places(figure: Figure, shown: list[Frame], *, width: float) -> tuple[list[Pl
                 top=start[row] + tops[row],
                 width=inner,
                 height=height,
+                foot=_foot(panel.x, inner),
+                turned=_turned(panel.x, inner),
                 x_ticks=ticks(
                     panel.x, frame.x, most=max(int(inner / _tick_room(panel.x, frame)), 2)
                 ),
@@ -184,6 +188,21 @@ def _rows(figure: Figure, columns: int) -> list[int]:
 def _tick_room(axis: Axis, frame: Frame) -> float:
     longest = max((text_width(words) for _, words in ticks(axis, frame.x, most=8)), default=20.0)
     return max(longest + 14.0, 34.0)
+
+
+def _turned(axis: Axis, width: float) -> bool:
+    """Whether the words of a linear axis would overlap side by side."""
+    longest = max((text_width(words) for _, words in axis.ticks or ()), default=0.0)
+    return axis.scale == "linear" and longest * len(axis.ticks or ()) > width
+
+
+def _foot(axis: Axis, width: float) -> float:
+    """Room of the words below a panel."""
+    if not axis.numbered:
+        return 0.0
+    if not _turned(axis, width):
+        return LINE
+    return max(text_width(words) for _, words in axis.ticks or ()) + 4.0
 
 
 def _possible_labels(panel: Panel, frame: Frame, height: float) -> list[str]:

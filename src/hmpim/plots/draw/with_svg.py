@@ -204,7 +204,7 @@ def _axes(pen: _Pen, panel: Panel, field: _Field, place: Place) -> list[str]:
         parts.append(f'<path d="{edge}" fill="none" stroke="{pen.colour("muted")}"/>')
     if panel.x.numbered:
         parts += [
-            pen.words(x, bottom + LINE, words, anchor="middle")
+            _under(pen, x, bottom, words, turned=place.turned)
             for x, (_, words) in zip(xs, place.x_ticks, strict=True)
         ]
     if panel.y.numbered:
@@ -213,7 +213,7 @@ def _axes(pen: _Pen, panel: Panel, field: _Field, place: Place) -> list[str]:
             for y, (_, words) in zip(ys, place.y_ticks, strict=True)
         ]
     if panel.x.label:
-        down = bottom + LINE * (1 + panel.x.numbered) + 2.0
+        down = bottom + place.foot + LINE + 2.0
         half = 0.5 * text_width(panel.x.label)  # kept inside of the picture
         middle = max(min((left + right) / 2, right + 10.0 - half), place.edge + half)
         parts.append(pen.words(middle, down, panel.x.label, anchor="middle"))
@@ -222,6 +222,15 @@ def _axes(pen: _Pen, panel: Panel, field: _Field, place: Place) -> list[str]:
         turned = f' transform="rotate(-90 {x:.1f} {y:.1f})"'
         parts.append(pen.words(x, y, panel.y.label, anchor="middle", more=turned))
     return parts
+
+
+def _under(pen: _Pen, x: float, bottom: float, words: str, *, turned: bool) -> str:
+    """Words below the lower edge, upright where they would overlap."""
+    if not turned:
+        return pen.words(x, bottom + LINE, words, anchor="middle")
+    across, down = x + 0.35 * SIZE, bottom + 7.0
+    more = f' transform="rotate(-90 {across:.1f} {down:.1f})"'
+    return pen.words(across, down, words, anchor="end", more=more)
 
 
 def _item(
@@ -380,7 +389,8 @@ def _rule(pen: _Pen, item: Rule, field: _Field, place: Place) -> tuple[list[str]
     if not item.words:
         return parts, []
     if not upright:
-        x = place.left + item.words_at * place.width
+        last = place.left + place.width - text_width(item.words)
+        x = max(min(place.left + item.words_at * place.width, last), place.left)
         return parts, [pen.boxed(x, at - 4.0, item.words, anchor="start", colour=item.colour)]
     y = place.top + (1.0 - item.words_at) * place.height + 0.85 * SIZE
     y = min(y, place.top + place.height - 4.0)
