@@ -27,6 +27,17 @@ def test_tab_completes_commands_and_options(monkeypatch, capsys):
     assert options == ["--rig", "--rig-file"]
 
 
+def test_zsh_is_told_commands_with_their_help(monkeypatch, capsys):
+    monkeypatch.setenv("_HMPIM_COMPLETE", "complete_zsh")
+    monkeypatch.setenv("_TYPER_COMPLETE_ARGS", "hmpim ide")
+    with pytest.raises(SystemExit) as ended:
+        app(prog_name="hmpim")
+    assert ended.value.code in (0, None)
+    told = capsys.readouterr().out
+    assert told.startswith('_arguments \'*: :(("identify"')
+    assert "campaign" not in told
+
+
 @pytest.mark.parametrize("command", [["run", "s.csv"], ["workbench"]])
 def test_tab_completes_rigs(command, tmp_path, monkeypatch, capsys):
     (tmp_path / "hmpim.toml").write_text(RIGS)
