@@ -29,7 +29,8 @@ what class a number belongs to.
 - **Arithmetic**: rounding, sizes, caps on iterations, where a search begins and how finely it
   looks.
 
-Numbers without a name in comparisons are not listed: about a hundred.
+What is made of a number, such as `TWICE**2` or `1 - FEW`, moves with it and is not counted again.
+Numbers without a name in comparisons are neither listed nor counted: about a hundred.
 
 {records}
 """

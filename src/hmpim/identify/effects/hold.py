@@ -170,7 +170,7 @@ def _is_rich(samples: Real, change: Real, changed: NDArray[np.intp]) -> bool:
     """Whether the output takes many values, by changes of many sizes."""
     jump = change[changed - 1]
     # A rounded ramp changes by one step each; halfway to two is more.
-    if np.mean(jump > (1 + MOST) * np.quantile(jump, 0.01)) < 0.05:
+    if np.mean(jump > (1 + MOST) * np.quantile(jump, 0.01)) < FEW:
         return False
     levels = np.sort(samples[changed])
     apart = DEVIATIONS / 0.6745 * float(np.median(change)) if change.min() > 0 else 0.0

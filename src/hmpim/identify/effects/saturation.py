@@ -19,7 +19,7 @@ from hmpim.identify.arrays import Mask, Real
 from hmpim.identify.chance import ONE_SIDED
 from hmpim.identify.effects.smeared import smeared_plateaus
 from hmpim.identify.signals import as_signal
-from hmpim.identify.worth import MUCH, NEARLY, TOLERATED, TWICE
+from hmpim.identify.worth import MATERIAL, MUCH, NEARLY, TOLERATED, TWICE
 
 __all__ = ["NoiseAt", "Saturation", "detect_saturation"]
 
@@ -350,4 +350,4 @@ def _goes_beyond(y: Real, side: _Side, prediction: Real, resolution: float) -> b
     # Values that scatter elsewhere and are all alike here, while the prediction moves.
     noise = min(error, _scatter(y))
     moves = float(np.std(beyond))
-    return bool(noise > resolution and moves > max(0.3 * noise, 0.01 * float(np.ptp(y))))
+    return bool(noise > resolution and moves > max(MUCH * noise, MATERIAL * float(np.ptp(y))))

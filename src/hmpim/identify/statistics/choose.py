@@ -28,7 +28,7 @@ from hmpim.identify.statistics.products import Products
 from hmpim.identify.statistics.reach import AHEAD
 from hmpim.identify.statistics.start import excited, rough_of
 from hmpim.identify.statistics.statistics import Statistics
-from hmpim.identify.worth import MATERIAL, TWICE
+from hmpim.identify.worth import FEW, MATERIAL, TWICE
 from hmpim.model.dynamics import STRUCTURES, Structure, StructureName
 from hmpim.record import BETWEEN, Intersample
 
@@ -241,7 +241,7 @@ def _looks_held(statistics: Statistics) -> bool:
     )
     moving = jumps[jumps > 0]
     size = max(float(np.ptp(np.concatenate([run.head_u for run in statistics.runs]))), 1e-300)
-    return bool(0 < moving.size < 0.5 * jumps.size and moving.max() > 0.05 * size)
+    return bool(0 < moving.size < 0.5 * jumps.size and moving.max() > FEW * size)
 
 
 def _least(fits: list[Fitted]) -> Fitted:

@@ -16,6 +16,7 @@ from hmpim.identify.noise.whiteness import autocovariance, effective_share
 from hmpim.identify.result import Identification, PairIdentification
 from hmpim.identify.section_iv.spectrum import excited_band
 from hmpim.identify.uses.predict import to_model
+from hmpim.identify.worth import MATERIAL
 from hmpim.model import Model, draw_models, simulate, slowest_time_constant
 from hmpim.record import Aligned, Record, uniform
 
@@ -411,7 +412,7 @@ def _tests(
         for pair in pairs
         for warning in pair.warnings
     )
-    quiet = float(np.mean(model_std[scored] ** 2)) < 0.01 * models[0].noise_std ** 2
+    quiet = float(np.mean(model_std[scored] ** 2)) < MATERIAL * models[0].noise_std ** 2
     checks.append(
         Check(
             name="whiteness",
