@@ -84,7 +84,8 @@ def _records(run: Mapping[str, Any]) -> str:
 It is 0 too where no draw gets there: several inputs at once, fleets, live estimates.
 The last two columns: change of the draws that are right & `ok` and wrong & `ok`, and in brackets
 the draws that change their class at all; – is none. *Not run*: numbers that
-decide in some draws, which `python benchmarks/thresholds --measure --draws 2` identifies again."""
+decide in some draws, which
+`python benchmarks/thresholds --measure --draws {run["each"]}` identifies again."""
 
 
 def page(effects: Mapping[str, Any] | None = None) -> str:
