@@ -17,7 +17,7 @@ from hmpim.identify.chance import FALSE_ALARM
 from hmpim.identify.identify import identify
 from hmpim.identify.records.alike import check_channels
 from hmpim.identify.result import Estimate, Identification, PairIdentification, Parameters
-from hmpim.identify.worth import TOLERATED, WORTH
+from hmpim.identify.worth import MATERIAL, WORTH
 from hmpim.model.dynamics import FILTERS, STRUCTURES
 from hmpim.record import Finding, Intersample, Record
 
@@ -253,7 +253,7 @@ def compare_levels(
                 message=f"With the amplitude from {most.amplitudes[0]:.4g} to "
                 f"{most.amplitudes[-1]:.4g} the {most.name.replace('_', ' ')} changes by "
                 f"{100 * most.change:+.2g} %, beyond its error; up to "
-                f"{reach:.4g} it stays within {100 * TOLERATED:.0f} %. Use a linear model up to "
+                f"{reach:.4g} it stays within {100 * MATERIAL:.0f} %. Use a linear model up to "
                 "there only.",
                 severity="doubt",
                 parameters=tuple(t.name for t in changed),
@@ -321,7 +321,7 @@ def _linear_up_to(levels: list[Level], trends: tuple[Trend, ...]) -> float:
     for t in trends:
         for a, value, std in zip(t.amplitudes[1:], t.values[1:], t.stds[1:], strict=True):
             moved = abs(value - t.values[0])
-            if moved > TOLERATED * abs(t.values[0]) and moved > 3 * float(np.hypot(std, t.stds[0])):
+            if moved > MATERIAL * abs(t.values[0]) and moved > 3 * float(np.hypot(std, t.stds[0])):
                 before = [level.amplitude for level in levels if level.amplitude < a]
                 reach = min(reach, before[-1])
                 break
