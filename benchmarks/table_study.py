@@ -124,7 +124,7 @@ def levels(tick: Callable[[], None]) -> str:
     exact = exact_bandwidth(MotionTable(), axis="pitch", fs=FS, hold="included")
     return (
         head("peak acceleration, deg/s²", *(f"{peak:g}" for peak in peaks))
-        + line("−90° of samples over samples, friction on, Hz", *rows[True])
+        + line("−90° of the sampled response, friction on, Hz", *rows[True])
         + line("… friction off", *rows[False])
         + line("verdict, friction on", *verdicts)
         + f"\nExact, without friction: {exact:.1f} Hz at every level.\n"
