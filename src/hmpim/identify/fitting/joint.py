@@ -30,7 +30,7 @@ from hmpim.identify.fitting.course import (
 )
 from hmpim.identify.fitting.data import FINAL_PRECISION, refit
 from hmpim.identify.fitting.enrich import INTEGRATING, PLAIN, RICH
-from hmpim.identify.fitting.fit import Fit, fit_structure
+from hmpim.identify.fitting.fit import Fit, Problem, fit_structure
 from hmpim.identify.fitting.growth import grow, hidden_pole
 from hmpim.identify.fitting.software import software_fit
 from hmpim.identify.fitting.trial import JointFit, Trial, likeliest_of, trial_of
@@ -121,9 +121,11 @@ def weigh_and_look_again(
     course, trials, best, share = _weigh(course, fitted)
     for _ in range(_LOOKS):
         data, seen = course.data, course.counted
-        again = look_again(data.problem(best.intersample, seen), best, seen, lag=data.rough.lag)
-        if again is None:
+        problem = data.problem(best.intersample, seen)
+        again = look_again(problem, best, seen, lag=data.rough.lag)
+        if again is None and not _is_needlessly_coloured(problem, best.fit):
             break
+        again = seen if again is None else again
         course = replace(course, counted=again, data=replace(data, noise=None))
         chosen = (best.intersample, best.fit.structure)
         hopeful = [(best.intersample, best.fit)] + [
@@ -135,6 +137,18 @@ def weigh_and_look_again(
         fitted = [(mode, refit(course.data.problem(mode, again), fit)) for mode, fit in hopeful]
         course, trials, best, share = _weigh(course, fitted)
     return course, trials, best, share
+
+
+def _is_needlessly_coloured(problem: Problem, fit: Fit) -> bool:
+    """Whether white noise is left by a fit that is not weighed by a colour.
+
+    Where the fits that led to it had not arrived, that colour is a mode's, under which the mode's
+    free response is no more than noise.
+    """
+    if problem.noise is None or problem.begins is None:
+        return False
+    plain = replace(problem, noise=None, told=None)
+    return is_white(plain.counting(refit(plain, fit).residual))
 
 
 def grow_poles(joint: JointFit, course: Course, structures: tuple[StructureName, ...]) -> JointFit:

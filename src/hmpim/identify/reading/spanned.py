@@ -74,7 +74,8 @@ def spanned(
     """
 
     def figures(fits: Iterable[Fit]) -> list[dict[str, float | None]]:
-        return [figures_of(fit, fs=fs, highest=highest) for fit in fits]
+        # Of another model a bandwidth may lie beyond the band.
+        return [figures_of(fit, fs=fs, highest=fs / 2) for fit in fits]
 
     between = figures(trial.fit for trial in rivals_of(joint))
     richer = figures(trial.fit for trial in joint.rivals)
