@@ -95,8 +95,9 @@ class HiddenPole:
 
     @property
     def may_hide(self) -> bool:
-        """Whether a pole that moves the delay by much would not show, beside none or one."""
-        return self.fit.structure.order <= 1 and self.limit > PART * self.scale
+        """Whether a pole would not show beside none or one, and either is long or leaned to."""
+        far = self.limit > PART * self.scale or self.squared > self.std
+        return self.fit.structure.order <= 1 and far
 
 
 class Fitted(Protocol):
