@@ -68,7 +68,7 @@ def initial_transient(evidence: Evidence) -> tuple[Finding, ...]:
             + (f" It lasts {5.0 * slowest:.3g} s and may be a drift." if drifts else "")
             + (" What the integrator held before is part of the bias." if open_ended else ""),
             severity="doubt" if drifts or open_ended else "info",
-            parameters=("bias",) if drifts or open_ended else (),
+            parameters=(("bias", "time_constant") if drifts else ("bias",) if open_ended else ()),
         ),
     )
 
