@@ -107,7 +107,7 @@ def test_inputs_that_are_one_are_refused_in_one_line(tmp_path, made, named):
     chosen = [part for name in inputs for part in ("--input", name)]
     done = run(path, *chosen, "--output", "y")
     assert done.exit_code == 2
-    assert done.stderr.startswith(f"hmpim: inputs {named} cannot be told apart: over 100 %")
+    assert done.stderr.startswith(f"hmpim: inputs {named} cannot be distinguished: over 100 %")
     assert done.stderr.count("\n") == 1
 
 

@@ -141,7 +141,7 @@ def draw_models(
         if tries > _TRIES * count:
             raise ArgumentError(
                 f"of {tries - 1} draws only {len(drawn)} can be simulated: the coefficients are "
-                "hardly known; measure longer, or identify with plainer structures"
+                "barely known; measure longer, or identify with plainer structures"
             )
         try:
             drawn.append(_one(model, mean + root @ source.standard_normal(mean.size), source))

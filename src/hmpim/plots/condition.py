@@ -87,7 +87,7 @@ def condition_panel(
         y=Axis(label="Condition number (–)", scale="log", low=0.9, high=top),
         items=(
             *(
-                Span(low=low, high=high, colour="limit", opacity=0.12, label="not told apart")
+                Span(low=low, high=high, colour="limit", opacity=0.12, label="not distinguished")
                 for low, high in spans
             ),
             Curve(x=frequency, y=condition, label="inputs"),

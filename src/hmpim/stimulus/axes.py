@@ -314,8 +314,8 @@ def input_condition(
     condition = np.where(condition > _SINGULAR, np.inf, condition)
     if np.all(np.isinf(condition)):
         raise ArgumentError(
-            f"axes {', '.join(labels)} cannot be told apart anywhere from {low:g} to {high:g} Hz; "
-            "excite each of them there, with sweeps that pass at different times"
+            f"axes {', '.join(labels)} cannot be distinguished anywhere from {low:g} to "
+            f"{high:g} Hz; excite each of them there, with sweeps that pass at different times"
         )
     return InputCondition(
         names=labels,
@@ -368,14 +368,14 @@ def _refuse_same(u: FloatArray, labels: tuple[str, ...]) -> None:
             if 1.0 - alike[i, j] ** 2 < _SAME:
                 raise ArgumentError(
                     f"{labels[j]} and {labels[i]} are driven by the same stimulus and cannot be "
-                    "told apart; reverse one of them in time, or use design_axes"
+                    "distinguished; reverse one of them in time, or use design_axes"
                 )
     values, vectors = np.linalg.eigh(unit @ unit.T)
     if values[0] < _SAME:
         among = [label for label, v in zip(labels, vectors[:, 0], strict=True) if abs(v) > 1e-3]
         raise ArgumentError(
-            f"the stimuli of {', '.join(among)} are sums of one another and cannot be told "
-            "apart; use design_axes"
+            f"the stimuli of {', '.join(among)} are sums of one another and cannot be "
+            "distinguished; use design_axes"
         )
 
 

@@ -139,7 +139,7 @@ def instrument_of(name: str, reference: Real, u: Real) -> Instrument:
         lags *= 2
     if float(best.var()) < MATERIAL * float(level.var()):
         raise RecordError(
-            f"reference {name!r} moves hardly any of the input; check which channel it is"
+            f"reference {name!r} accounts for almost none of the input; check which channel it is"
         )
     return Instrument(name=name, reference=reference, u=u, moved=np.asarray(best + u.mean()))
 

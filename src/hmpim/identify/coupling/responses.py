@@ -69,7 +69,7 @@ def inputs_of(aligned: Aligned, record: Record) -> InputSet:
     for group in found.alike:
         if group.share >= NEARLY or (apart < FEW and group is found.alike[0]):
             raise RecordError(
-                f"inputs {', '.join(group.names)} cannot be told apart: over "
+                f"inputs {', '.join(group.names)} cannot be distinguished: over "
                 f"{100 * group.share:.0f} % of the frequencies they excite, one of them is a copy "
                 "of the others, scaled or filtered, or their sum. Drive them one at a time, or "
                 "with sweeps that pass each frequency at different times"
@@ -253,7 +253,7 @@ def _widened(known: Estimate | None, variance: float) -> Estimate | None:
 def _coupled(group: Alike, *, doubt: bool) -> Finding:
     return Finding(
         code="coupled_inputs",
-        message=f"Inputs {', '.join(group.names)} cannot be told apart at {group.where} "
+        message=f"Inputs {', '.join(group.names)} cannot be distinguished at {group.where} "
         f"({100 * group.share:.0f} % of the frequencies they excite): there the error bars rest "
         "on the models alone. Drive them with sweeps that pass each frequency at different times.",
         severity="doubt" if doubt else "info",

@@ -281,8 +281,8 @@ def _refuse_identical(u: Real, low: int, high: int, labels: tuple[str, ...]) -> 
     same = [label for label, s in zip(labels, share, strict=True) if s > 0.1 * share.max()]
     raise RecordError(
         f"{', '.join(same)} move alike over the whole band, but for a factor, so their responses "
-        "cannot be told apart; drive them one at a time, or with sweeps that pass each frequency "
-        "at different times"
+        "cannot be distinguished; drive them one at a time, or with sweeps that pass each "
+        "frequency at different times"
     )
 
 

@@ -54,7 +54,7 @@ def feedback(evidence: Evidence) -> tuple[Finding, ...]:
             code="feedback",
             message="The residual moves the input afterwards: the unit was in a "
             "loop"
-            + (", and the figures take noise for answer. " if coloured else ". ")
+            + (", and the fit treats some of the noise as response. " if coloured else ". ")
             + "Identify it through what drives the loop (reference=, --reference).",
             severity="doubt" if coloured else "info",
             parameters=MODELLED,

@@ -267,9 +267,9 @@ def few_lines(evidence: Evidence) -> tuple[Finding, ...]:
     return (
         Finding(
             code="few_lines",
-            message=f"The input excites {lines} frequenc{'y' if lines == 1 else 'ies'}, which tell "
+            message=f"The input excites {lines} frequenc{'y' if lines == 1 else 'ies'}, which give "
             f"gain and phase there and nothing else: {unknown} figures of a "
-            f"{structure_in_words(fit.structure.name)} model cannot be told from them."
+            f"{structure_in_words(fit.structure.name)} model cannot be found from them."
             f"{_at_the_line(evidence) if lines == 1 else ''} Sweep, or add lines.",
             severity="doubt",
             parameters=tuple(n for n in MODELLED if n not in ("bias", "noise_std")),

@@ -121,7 +121,7 @@ def particular(found: Mechanism, unit: str) -> Finding | None:
             )
         case "friction":
             message = (
-                f"Coulomb friction holds like a deflection of {size}. Motions of that size hardly "
+                f"Coulomb friction holds like a deflection of {size}. Motions of that size barely "
                 "show in the output; use larger ones, or put friction into the model."
             )
         case "backlash":

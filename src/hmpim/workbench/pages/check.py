@@ -16,8 +16,8 @@ __all__ = ["check"]
 
 _WORDS = {
     "limits": "Limits: every axis stays inside, and can be stopped smoothly",
-    "error bars": "Error bars: the run will tell what is asked",
-    "independence": "Independence: the axes can be told apart",
+    "error bars": "Error bars: the run will reach the accuracy asked for",
+    "independence": "Independence: the axes can be distinguished",
     "answer": "Answer: the rig follows at 5 % of the amplitude",
 }
 
