@@ -14,10 +14,10 @@ GAIN = 3  # of delay, two of the denominator, scale factor, bias
 
 
 def bend(evidence, *, certain=True, effect=0.02, white=False, moved=GAIN):
-    """Half a per cent more scale factor, or of another parameter."""
+    """Five per cent more scale factor, or of another parameter."""
     fit = evidence.joint.best.fit
     shift = np.zeros(fit.theta.size + fit.linear.size)
-    shift[moved] = 0.005
+    shift[moved] = 0.05
     return Bend(
         kind="dead_zone",
         gain=200.0,
@@ -35,7 +35,7 @@ def test_only_what_it_moves_is_doubted(clean):
     assert (found.code, found.severity) == ("nonlinear", "doubt")
     assert found.parameters == ("scale_factor",)
     assert "a dead zone of the command" in found.message
-    assert "scale factor by 0.5 %" in found.message
+    assert "scale factor by 5 %" in found.message
 
 
 def test_a_good_part_of_the_residual_is_no_noise(clean):
@@ -60,8 +60,8 @@ def test_what_casts_no_doubt_widens_the_interval_to_its_side(clean):
     assert wide.natural_frequency == plain.natural_frequency
     assert wide.scale_factor.ci95[0] == plain.scale_factor.ci95[0]
     own = clean.readings.parameters.scale_factor.ci95[1]
-    assert plain.scale_factor.ci95[1] < own + 0.005
-    assert wide.scale_factor.ci95[1] - own == pytest.approx(0.005 * 1.098, rel=0.01)
+    assert plain.scale_factor.ci95[1] < own + 0.05
+    assert wide.scale_factor.ci95[1] - own == pytest.approx(0.05 * 1.098, rel=0.01)
 
 
 def test_what_neither_a_rich_structure_nor_a_nonlinearity_describes_is_doubted_whole(clean):

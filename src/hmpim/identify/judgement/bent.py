@@ -10,7 +10,7 @@ from hmpim.identify.nonlinear.bends import Bend
 from hmpim.identify.nonlinear.words import KIND_WORDS
 from hmpim.identify.reading.spanned import bent_figures
 from hmpim.identify.result.groups import MODELLED
-from hmpim.identify.worth import FEW, WORTH
+from hmpim.identify.worth import FEW, MATERIAL, TOLERATED
 from hmpim.record import Finding
 
 __all__ = ["bent"]
@@ -22,14 +22,15 @@ def bent(evidence: Evidence) -> tuple[Finding, ...]:
     How far it moves them is known to first order, for traces that are none of them exact: enough
     to tell which figures it leaves alone. What is small or only possible widens the intervals: no
     figure is doubted for less than a model must be right to. Where a rich structure and a
-    nonlinearity leave what is no noise, neither describes the record.
+    nonlinearity that matters leave what is no noise, neither describes the record.
     """
     sure = [one for one in evidence.bends if one.counts]
     if not sure:
         return ()
     moved = _moved(evidence, sure)
     left = not sure[0].white or evidence.misfit.probability < FALSE_ALARM
-    if left and evidence.joint.best.fit.structure.name not in PLAIN:
+    rich = evidence.joint.best.fit.structure.name not in PLAIN
+    if left and rich and sure[0].effect > MATERIAL:
         moved = dict.fromkeys(MODELLED, 0.0) | moved  # taken for its sake, and in vain
     noise = {"noise_std"} if sure[0].share > 2 * FEW else set()
     parameters = tuple(name for name in MODELLED if name in moved.keys() | noise)
@@ -39,7 +40,7 @@ def bent(evidence: Evidence) -> tuple[Finding, ...]:
     sized = [
         f"{name.replace('_', ' ')} by {100 * moved[name]:.2g} %"
         for name in SIZES
-        if moved.get(name, 0.0) > 0.0
+        if 0.0 < moved.get(name, 0.0) <= 1.0
     ]
     which = f" It moves figures of a linear model: {', '.join(sized)}." if sized else ""
     return (
@@ -65,6 +66,6 @@ def _moved(evidence: Evidence, sure: Sequence[Bend]) -> dict[str, float]:
             continue
         values = [other.get(name) for other in others]
         far = max((abs(value - own.value) for value in values if value is not None), default=0.0)
-        if None in values or far > max(FEW * HALF * own.spread, WORTH * abs(own.value)):
+        if None in values or far > max(FEW * HALF * own.spread, TOLERATED * abs(own.value)):
             moved[name] = far / abs(own.value) if own.value else 0.0
     return moved

@@ -83,6 +83,8 @@ def wide_span(evidence: Evidence) -> tuple[Finding, ...]:
         if estimate is None or own is None or estimate.ci95 is None or estimate.ci95 == own.ci95:
             continue
         low, high = estimate.ci95
+        if own.spread > abs(own.value):  # it is not determined, which another check says
+            continue
         if high - low > PART * abs(estimate.value):
             wide[name] = (low, high)
     if not wide:

@@ -14,7 +14,7 @@ import numpy as np
 
 from hmpim.identify.arrays import Real
 from hmpim.identify.chance import CLEARLY, LIKELIER, SEEN
-from hmpim.identify.fitting.fit import Fit, within_reach
+from hmpim.identify.fitting.fit import Fit
 from hmpim.identify.fitting.growth import as_if_hidden
 from hmpim.identify.fitting.trial import JointFit, Trial
 from hmpim.identify.reading.figures import figures_at, figures_of
@@ -23,6 +23,11 @@ from hmpim.identify.result.groups import MODELLED, PHASE_SPLIT
 from hmpim.identify.worth import FEW
 
 __all__ = ["bent_figures", "blurred", "rivals_of", "spanned"]
+
+_STEP = 1e-6
+"""Step of a derivative: logarithms of times, samples of delay, share of the numerator."""
+
+_TINY = float(np.finfo(float).tiny)
 
 
 def rivals_of(joint: JointFit) -> tuple[Trial, ...]:
@@ -122,7 +127,10 @@ def blurred(parameters: Parameters, share: float) -> Parameters:
 
 
 def bent_figures(fit: Fit, moved: Real, *, fs: float, highest: float) -> dict[str, float | None]:
-    """Figures where a nonlinearity adds so much to the parameters, as far as those allow it.
+    """Figures where a nonlinearity adds so much to the parameters, to first order.
+
+    What a parameter that the record hardly determines takes up leaves a figure that it does alone:
+    the figures' own derivatives along the change say so, and no step as long as the change does.
 
     Parameters
     ----------
@@ -133,15 +141,18 @@ def bent_figures(fit: Fit, moved: Real, *, fs: float, highest: float) -> dict[st
     fs, highest : float
         As for `spanned`.
     """
-    size = fit.theta.size
-    theta = within_reach(
-        fit.structure,
-        fit.theta + moved[:size],
-        delays=(-np.inf, np.inf),
-        samples=fit.prediction.size,
+    vector, size = np.concatenate([fit.theta, fit.linear]), fit.theta.size
+    sides = (
+        float(np.abs(moved[:size]).max()),
+        float(np.abs(moved[size:]).max()) / max(float(np.abs(fit.linear).max()), _TINY),
     )
-    vector = np.concatenate([theta, fit.linear + moved[size:]])
-    return figures_at(fit.structure, vector, fs=fs, highest=highest)
+    part = min(1.0, _STEP / max(*sides, _TINY))
+    here = figures_at(fit.structure, vector, fs=fs, highest=highest)
+    there = figures_at(fit.structure, vector + part * moved, fs=fs, highest=highest)
+    return {
+        name: None if one is None or other is None else one + (other - one) / part
+        for (name, one), other in zip(here.items(), there.values(), strict=True)
+    }
 
 
 def _given(found: list[dict[str, float | None]], name: str) -> list[float]:
