@@ -122,7 +122,8 @@ def blurred(parameters: Parameters, share: float) -> Parameters:
         size = 20.0 / np.log(10.0) if name == "peak_gain_db" else abs(own.value)
         room = float(share * size)
         low, high = own.ci95
-        moved[name] = replace(own, std=None, ci95=(low - room, high + room))
+        wide = replace(own, std=None, ci95=(low - room, high + room))
+        moved[name] = replace(wide, std=wide.spread)
     return replace(parameters, **moved)
 
 
