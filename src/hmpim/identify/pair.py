@@ -100,13 +100,7 @@ def _pair(
     source, band = aligned.inputs[i], _band(question, i)
     joint, censored, covariance = _refined(question, found, joined, i)
     plain = plainer(joint) if question.inputs is None and covariance is None else None
-    inspection, unseen = attempt(
-        "nonlinearity", lambda: _inspected(question, found, joint, i, plain), None
-    )
-    if inspection is not None and inspection.fit is not joint.best.fit:
-        joint = taking(joint, inspection.fit)
-    elif plain is not None and _is_bent(question, found, joint, plain):
-        joint = taking(joint, plain)
+    joint, inspection, unseen = _looked_through(question, found, joint, i, plain)
     y = output.values if matrix is None else joint.problem.y
     paper = paper_estimates(source.values, y, aligned.fs, band=band)
     readings = read_parameters(
@@ -240,6 +234,21 @@ def _refined(
     return *refined, refined[1].covariance
 
 
+def _looked_through(
+    question: Question, found: Imperfections, joint: JointFit, i: int, plain: Fit | None
+) -> tuple[JointFit, Inspection | None, tuple[Finding, ...]]:
+    """The fit, plain where a nonlinearity explains what a rich one was taken for; and the look."""
+    inspection, unseen = attempt(
+        "nonlinearity", lambda: _inspected(question, found, joint, i, plain), None
+    )
+    if inspection is not None and inspection.fit is not joint.best.fit:
+        return taking(joint, inspection.fit), inspection, unseen
+    if plain is None:
+        return joint, inspection, unseen
+    bent_instead, untried = attempt("bends", lambda: _is_bent(question, found, joint, plain), False)
+    return taking(joint, plain) if bent_instead else joint, inspection, (*unseen, *untried)
+
+
 def _inspected(
     question: Question, found: Imperfections, joint: JointFit, i: int, plain: Fit | None
 ) -> Inspection | None:
@@ -255,9 +264,14 @@ def _inspected(
         fs=aligned.fs,
         plain=plain,
         others=[other.values for other in aligned.inputs if other is not source],
-        floor=max(found.rounding, ROUNDING * float(np.std(output.values))),
+        floor=_floor(question, found),
         unit=output.unit,
     )
+
+
+def _floor(question: Question, found: Imperfections) -> float:
+    """R.m.s. that rounding leaves, by the output's steps or by the arithmetic's."""
+    return max(found.rounding, ROUNDING * float(np.std(question.output.values)))
 
 
 def _is_bent(question: Question, found: Imperfections, joint: JointFit, plain: Fit) -> bool:
@@ -271,7 +285,7 @@ def _is_bent(question: Question, found: Imperfections, joint: JointFit, plain: F
         plain,
         intersample=joint.best.intersample,
         fs=question.aligned.fs,
-        floor=max(found.rounding, ROUNDING * float(np.std(question.output.values))),
+        floor=_floor(question, found),
     )
 
 
@@ -293,7 +307,7 @@ def _bends(
     if doubted or not alone or best.fit.structure.sampled:
         return ()
     u = question.aligned.inputs[i].values
-    floor = max(found.rounding, ROUNDING * float(np.std(question.output.values)))
+    floor = _floor(question, found)
     own = bends(u, joint.weighed, best.fit, intersample=best.intersample, fs=fs, floor=floor)
     return (*own, *plainer_bends(u, joint, plain, fs=fs, floor=floor))
 

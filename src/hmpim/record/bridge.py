@@ -7,6 +7,8 @@ import scipy
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
+from hmpim.record.runs import runs_of
+
 __all__ = ["SHORT", "bridged"]
 
 SHORT = 8
@@ -84,8 +86,7 @@ def bridged(
 
 def _run_lengths(flags: NDArray[np.bool_]) -> NDArray[np.intp]:
     """Length of the run of true samples that each is in; 0 elsewhere."""
-    edges = np.diff(np.concatenate([[0], flags.astype(np.int8), [0]]))
-    first, stop = np.flatnonzero(edges == 1), np.flatnonzero(edges == -1)
+    first, stop = runs_of(flags)
     out = np.zeros(flags.size, dtype=np.intp)
     out[flags] = np.repeat(stop - first, stop - first)
     return out

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from hmpim.record.channel import Channel
 from hmpim.record.clock import fit_clock
 from hmpim.record.mend import check_span
+from hmpim.record.runs import runs_of
 
 __all__ = ["Motion", "cut_alike", "find_motions"]
 
@@ -159,8 +160,7 @@ def _rests(
     tolerance = max(3.0 * noise, 1e-9 * span)
     resting = near & (ranges <= tolerance) & (np.abs(means - level) <= max(tolerance, 1e-3 * span))
     # A turning point may lie at the level too, if the channel never rests; it is short.
-    edges = np.flatnonzero(np.diff(np.concatenate(([0], resting.astype(np.int8), [0]))))
-    for first, stop in zip(edges[::2], edges[1::2], strict=True):
+    for first, stop in zip(*runs_of(resting), strict=True):
         resting[first:stop] &= stop - first >= _SHORTEST_REST
     if noise > 0.1 * span or not resting.any():  # what never rests shows no level and no noise
         return np.zeros(count, dtype=np.bool_), float(np.median(values)), 0.0
@@ -169,10 +169,9 @@ def _rests(
 
 def _moving(resting: NDArray[np.bool_]) -> list[tuple[int, int]]:
     """Runs of blocks that do not rest, those merged between which there is only a pause."""
-    edges = np.flatnonzero(np.diff(np.concatenate(([1], resting.astype(np.int8), [1]))))
-    runs = list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
+    moving = [ends.tolist() for ends in runs_of(~resting)]
     merged: list[tuple[int, int]] = []
-    for first, stop in runs:
+    for first, stop in zip(*moving, strict=True):
         if merged and first - merged[-1][1] < _SHORTEST_REST:
             merged[-1] = (merged[-1][0], stop)
         else:

@@ -7,11 +7,11 @@ the model moves on, was not updated, was cut off, or read a fixed word in its pl
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
-from numpy.typing import NDArray
 
 from hmpim.identify.arrays import Mask, Real
 from hmpim.identify.chance import DEVIATIONS
 from hmpim.identify.worth import FEW, MUCH, PART, TWICE, WORTH
+from hmpim.record.runs import runs_of
 
 __all__ = ["find_frozen", "find_repeated", "find_spikes", "stand_out", "stands_out"]
 
@@ -79,8 +79,8 @@ def find_spikes(y: Real, prediction: Real, *, clipped: Mask | None = None) -> Ma
         TWICE * DEVIATIONS * np.maximum(spread, 0.5 * bulk), TWICE * np.ptp(near, axis=1)
     )
     away = np.abs(residual - level) > least
-    first, last = _runs(away)
-    for a, b in zip(first, last, strict=True):
+    first, stop = runs_of(away)
+    for a, b in zip(first, stop - 1, strict=True):
         if b - a >= _LONGEST_SPIKE:
             away[a : b + 1] = False
     return away if away.any() and np.mean(away) < MUCH else None
@@ -106,10 +106,10 @@ def find_frozen(y: Real, prediction: Real, *, step: float = 0.0) -> Mask | None:
     [201, 299]
     """
     repeats = np.concatenate([[False], np.diff(y) == 0.0])
-    first, last = _runs(repeats)
+    first, stop = runs_of(repeats)
     frozen = np.zeros(y.size, dtype=bool)
     least = max(5.0 * step, FEW * float(np.ptp(prediction)))
-    for a, b in zip(first, last, strict=True):
+    for a, b in zip(first, stop - 1, strict=True):
         if b - a + 2 < _FEWEST_EQUAL or y[a] in (y.min(), y.max()):
             continue
         if float(np.ptp(prediction[a - 1 : b + 1])) > least:
@@ -144,14 +144,8 @@ def find_repeated(y: Real) -> Mask | None:
     copies = np.concatenate([[False], np.diff(y) == 0.0])
     if not copies.any() or np.mean(copies) > PART:
         return None
-    first, last = _runs(copies)
-    for a, b in zip(first, last, strict=True):
+    first, stop = runs_of(copies)
+    for a, b in zip(first, stop - 1, strict=True):
         if b - a >= _LONGEST_COPY or y[a] in (y.min(), y.max()):
             copies[a : b + 1] = False
     return copies if np.count_nonzero(copies) >= max(3.0, WORTH * y.size) else None
-
-
-def _runs(flags: Mask) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """First and last sample of each run of true ones."""
-    edges = np.diff(np.concatenate([[0], flags.astype(np.int8), [0]]))
-    return np.flatnonzero(edges == 1), np.flatnonzero(edges == -1) - 1

@@ -139,10 +139,7 @@ def look_again(problem: Problem, trial: Trial, seen: Seen, *, lag: int) -> Seen 
     if begins is None and problem.noise is not None:
         # Noise of the colour of a mode explains its free response, and more of it than there is.
         begins = begins_of(replace(problem, noise=None, told=None), trial.fit, lag=lag)
-    if begins is None:
-        return None
-    after = np.arange(count) >= begins
-    return Seen(valid=after if seen.valid is None else seen.valid & after, begins=begins)
+    return None if begins is None else _from(seen, begins, count)
 
 
 def begin_later(seen: Seen, fit: Fit) -> Seen | None:
@@ -153,6 +150,11 @@ def begin_later(seen: Seen, fit: Fit) -> Seen | None:
     begins, size = int(np.ceil(fit.delay)) + REACH, fit.residual.size
     if seen.begins is None or begins <= seen.begins or begins > longest_lag(size):
         return None
+    return _from(seen, begins, size)
+
+
+def _from(seen: Seen, begins: int, size: int) -> Seen:
+    """The samples that counted, from one on."""
     late = np.arange(size) >= begins
     return Seen(valid=late if seen.valid is None else seen.valid & late, begins=begins)
 

@@ -224,11 +224,11 @@ def enrich(
         leading = min(richer, key=lambda f: f.objective)
         from_rest = refit(data.problem(course.natural, course.given), leading)
         resting = count_in(data, course.natural, [from_rest], course.given, course.known)
-        # Else it was the structure that was wrong, not the beginning.
-        late = resting.begins is not None
-        moved = begin_later(course.counted, leading) if late else resting
-        if moved is not None:
-            course = replace(course, counted=moved)
+        # At rest after all, it was the structure that was wrong, and not the beginning.
+        rests = resting.begins is None
+        counted = resting if rests else begin_later(course.counted, leading)
+        if counted is not None:
+            course = replace(course, counted=counted)
             fits = [refit(course.problem, f) for f in fits]
             richer = [refit(course.problem, f) for f in richer]
     if richer:

@@ -16,7 +16,7 @@ from hmpim.model.dynamics import Structure
 from hmpim.model.poles import PoleResponses, input_responses
 from hmpim.model.sampled import SampledInput
 
-__all__ = ["STAMPED_LATE", "Part", "Problem"]
+__all__ = ["STAMPED_LATE", "Driven", "Part", "Problem"]
 
 STAMPED_LATE = -4.0
 """Least delay in samples that is tried where an output follows its input: stamps may be late."""
@@ -104,7 +104,26 @@ class Problem:
         return bias if self.nuisance is None else np.vstack([bias, self.nuisance])
 
 
-class Part:
+class Driven:
+    """Responses that the numerator's coefficients multiply, and the level beside them.
+
+    Attributes
+    ----------
+    rows : ndarray, shape (m, n)
+        One response for each coefficient, `level` not added.
+    level : float
+        What the scale factor multiplies at every sample: beside a bias, all but the same row.
+    """
+
+    rows: Real
+    level: float
+
+    def driven(self, numerator: Real) -> Real:
+        """What the input does, (n,), with `numerator`, (m,), before its `rows`."""
+        return np.asarray(numerator @ self.rows + numerator[0] * self.level)
+
+
+class Part(Driven):
     """What one input does to the output at given parameters.
 
     Parameters
@@ -128,10 +147,8 @@ class Part:
         self._numerators = _powers(structure)
         expanded = self._poles.expand(self._numerators)
         self.rows = self._added(expanded)
-        """Responses that the numerator's coefficients multiply, shape (m, n), `level` not added."""
         first = self._source.first
         self.level = 0.0 if structure.dc_zeros or structure.integrators else first
-        """What the scale factor multiplies at every sample: beside a bias, all but the same row."""
         if first and structure.integrators:
             self.rows[0] += first * self._since()
         self._since_start: Complex | None = None
@@ -145,10 +162,6 @@ class Part:
             count = structure.order + structure.integrators
             impulses = np.eye(count)[structure.integrators :]
             self.free = _real(self._poles.expand(impulses).simple, self._since_start)
-
-    def driven(self, numerator: Real) -> Real:
-        """What the input does, (n,), with `numerator`, (m,), before its `rows`."""
-        return np.asarray(numerator @ self.rows + numerator[0] * self.level)
 
     def slopes(self, numerator: Real, initial: Real) -> Real:
         """Derivatives of what the input does by theta, shape (1 + order, n).

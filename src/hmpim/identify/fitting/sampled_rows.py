@@ -4,7 +4,7 @@ import numpy as np
 import scipy
 
 from hmpim.identify.arrays import Real
-from hmpim.identify.fitting.rows import Part, Problem
+from hmpim.identify.fitting.rows import Driven, Part, Problem
 from hmpim.model.dynamics import Structure, coefficients_of
 from hmpim.model.filters import nyquist_taps, poles_in_z
 from hmpim.model.sampled import MARGIN, SAMPLES_ALONE
@@ -15,7 +15,7 @@ __all__ = ["SampledPart", "part_of"]
 _STEP = 1e-6
 
 
-class SampledPart:
+class SampledPart(Driven):
     """What software makes of its input at given parameters; the same face as `Part`.
 
     Parameters
@@ -41,9 +41,7 @@ class SampledPart:
         for _ in range(structure.zeros):
             rows.append(np.diff(rows[-1], prepend=0.0))
         self.rows = np.stack(rows)
-        """Responses that the numerator's coefficients multiply, shape (m, n), `level` not added."""
         self.level = source.first
-        """What the scale factor multiplies at every sample."""
         self.free = np.empty((0, n))
         """Free responses, shape (order, n)."""
         if problem.begins is not None and structure.order:
@@ -51,10 +49,6 @@ class SampledPart:
             for k in range(min(structure.order, n - problem.begins)):
                 blows[k, problem.begins + k] = 1.0
             self.free = np.asarray(scipy.signal.lfilter(np.ones(1), self._below, blows))
-
-    def driven(self, numerator: Real) -> Real:
-        """What the input does, (n,), with `numerator`, (m,), before its `rows`."""
-        return np.asarray(numerator @ self.rows + numerator[0] * self.level)
 
     def slopes(self, numerator: Real, initial: Real) -> Real:
         """Derivatives by theta, shape (1 + order, n); a whole number of samples has none."""

@@ -12,7 +12,6 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from hmpim.identify.arrays import Real
-from hmpim.identify.chance import DEVIATIONS
 from hmpim.identify.fleets.fleet import Column, Fleet, FleetFit, Group, fit_fleet
 from hmpim.identify.fleets.learnt import is_alike
 from hmpim.identify.fleets.quiet import are_quiet
@@ -20,6 +19,7 @@ from hmpim.identify.fleets.simpler import Simpler, costs_of, learn_simpler
 from hmpim.identify.frf.local import local_responses
 from hmpim.identify.judgement.between_samples import undetermined_between
 from hmpim.identify.judgement.reach import count_lines, unreached
+from hmpim.identify.judgement.response import are_apart
 from hmpim.identify.judgement.structure import barely_told
 from hmpim.identify.judgement.verdict import judged
 from hmpim.identify.noise.input_noise import input_noise
@@ -33,10 +33,9 @@ from hmpim.identify.result import (
     Nonlinearity,
     PairIdentification,
     Parameters,
-    ResponseBandwidths,
 )
 from hmpim.identify.section_iv.paper import paper_estimates
-from hmpim.identify.worth import TOLERATED, WORTH
+from hmpim.identify.worth import WORTH
 from hmpim.model import RationalDelay
 from hmpim.record import Finding
 
@@ -183,7 +182,9 @@ def whole_pairs(
             measured = response_bandwidths(
                 response, system, own, fs=fleet.fs, intersample=group.fit.member.intersample
             )
-            if _disagree(measured, own):
+            if any(
+                are_apart(getattr(measured, name), getattr(own, name)) for _, name in _BANDWIDTHS
+            ):
                 continue
             paper = paper_estimates(fleet.u, y, fleet.fs, band=fleet.band)
             pair = PairIdentification(
@@ -242,18 +243,6 @@ def _covariance(fleet: Fleet, group: Group, k: int) -> Real:
     )
     inner = group.errors.variance[k] * group.errors.inner[k]
     return np.asarray(slopes @ inner @ slopes.T)
-
-
-def _disagree(measured: ResponseBandwidths, own: Parameters) -> bool:
-    """Whether bandwidths of response and model are apart beyond their error bars."""
-    for _, name in _BANDWIDTHS:
-        one, other = getattr(measured, name), getattr(own, name)
-        if one is None or other is None:
-            continue
-        allowed = DEVIATIONS * float(np.hypot(one.spread, other.spread))
-        if not abs(one.value - other.value) <= max(allowed, TOLERATED * other.value):
-            return True
-    return False
 
 
 def _candidates(

@@ -15,6 +15,7 @@ from hmpim.identify.result.groups import MODELLED, PHASE_SPLIT, TIMING
 from hmpim.identify.worth import DEEPEST, MUCH, PAST, TWICE
 from hmpim.model import response, slowest_time_constant
 from hmpim.record import Finding
+from hmpim.record.runs import runs_of
 
 __all__ = [
     "beyond_band",
@@ -59,6 +60,7 @@ def initial_transient(evidence: Evidence) -> tuple[Finding, ...]:
     structure = joint.best.fit.structure
     drifts = lasting and structure.name not in PLAIN
     open_ended = structure.integrators > 0
+    doubted = ("bias", "time_constant") if drifts else ("bias",) if open_ended else ()
     return (
         Finding(
             code="initial_transient",
@@ -67,8 +69,8 @@ def initial_transient(evidence: Evidence) -> tuple[Finding, ...]:
             "before the record, are left out."
             + (f" It lasts {5.0 * slowest:.3g} s and may be a drift." if drifts else "")
             + (" What the integrator held before is part of the bias." if open_ended else ""),
-            severity="doubt" if drifts or open_ended else "info",
-            parameters=(("bias", "time_constant") if drifts else ("bias",) if open_ended else ()),
+            severity="doubt" if doubted else "info",
+            parameters=doubted,
         ),
     )
 
@@ -249,8 +251,8 @@ def count_lines(u: Real) -> int:
     """
     power = windowed_power(u)
     above = power > DEEPEST * power.max()
-    edges = np.diff(np.concatenate([[0], above.astype(np.int8), [0]]))
-    widths = np.flatnonzero(edges == -1) - np.flatnonzero(edges == 1)
+    first, stop = runs_of(above)
+    widths = stop - first
     return int(np.sum(1 + np.maximum(widths - (2 * _LOBE - 1), 0) // _LOBE))
 
 

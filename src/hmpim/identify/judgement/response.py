@@ -8,6 +8,7 @@ from hmpim.identify.arrays import Real
 from hmpim.identify.chance import DEVIATIONS, HALF
 from hmpim.identify.judgement.evidence import Evidence
 from hmpim.identify.reading.figures import system_of
+from hmpim.identify.result import Estimate
 from hmpim.identify.result.groups import PHASE_SPLIT
 from hmpim.identify.worth import PART, TOLERATED
 from hmpim.model.response import RationalDelay, phase, response
@@ -38,11 +39,22 @@ _LEVELS: dict[str, _Level] = {
 """Height of the response above the level of each bandwidth."""
 
 
+def are_apart(measured: Estimate | None, modelled: Estimate | None) -> bool:
+    """Whether a bandwidth of the response and the model's differ beyond their error bars.
+
+    A measured one whose own interval is wide, as beside another input that is barely
+    distinguished, contradicts nothing.
+    """
+    if measured is None or modelled is None or HALF * measured.spread > PART * measured.value:
+        return False
+    allowed = DEVIATIONS * float(np.hypot(measured.spread, modelled.spread))
+    return not abs(measured.value - modelled.value) <= max(allowed, TOLERATED * modelled.value)
+
+
 def bandwidth_disagrees(evidence: Evidence) -> tuple[Finding, ...]:
     """Doubt bandwidths apart beyond their error bars, and what of the model shapes them.
 
-    Of an output that is held the measured response shows the hold too: there it says nothing; nor
-    where its own interval is wide, as beside another input that is hardly told apart.
+    Of an output that is held the measured response shows the hold too: there it says nothing.
     """
     if evidence.held:
         return ()
@@ -55,12 +67,7 @@ def bandwidth_disagrees(evidence: Evidence) -> tuple[Finding, ...]:
     ):
         one = getattr(evidence.measured, name)
         other = getattr(evidence.readings.parameters, name)
-        if one is None or other is None or HALF * one.spread > PART * one.value:
-            continue
-        apart = abs(one.value - other.value)
-        if apart <= max(
-            DEVIATIONS * float(np.hypot(one.spread, other.spread)), TOLERATED * other.value
-        ):
+        if not are_apart(one, other):
             continue
         touched += [name, *shaped_by]
         message = message or (  # one sentence is enough

@@ -5,7 +5,7 @@ import numpy as np
 from hmpim.identify.chance import DEVIATIONS
 from hmpim.identify.judgement.evidence import Evidence, structure_in_words
 from hmpim.identify.result.groups import PHASE_SPLIT
-from hmpim.identify.worth import TOLERATED
+from hmpim.identify.worth import MOST, TOLERATED
 from hmpim.record import Finding
 
 __all__ = ["barely_told", "missed_pole", "other_order"]
@@ -56,7 +56,7 @@ def missed_pole(evidence: Evidence) -> tuple[Finding, ...]:
     that is said on both sides.
     """
     hidden = evidence.joint.hidden
-    bent = evidence.nonlinear > 0.5  # most of what is left asks for no pole
+    bent = evidence.nonlinear > MOST  # that of what is left asks for no pole
     if hidden is None or bent or evidence.joint.rivals:
         return ()
     order, fs = evidence.joint.best.fit.structure.order, evidence.fs
