@@ -568,7 +568,7 @@ def main() -> None:
     words = [word.strip() for word in options.only.split(",") if word.strip()] or list(SECTIONS)
     for word in words:
         if word not in SECTIONS:
-            parser.error(f"no section is called {word!r}; choose of {', '.join(SECTIONS)}")
+            parser.error(f"no section is called {word!r}; choose one of {', '.join(SECTIONS)}")
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     page = options.out.read_text(encoding="utf-8") if options.only else HEAD
     with Progress(transient=True) as progress:

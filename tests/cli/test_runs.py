@@ -71,7 +71,7 @@ def test_conditions(folder, conditions, names):
         ("delay", "is no condition"),
         ("delay > slow", "'slow' is no number"),
         ("verdict > ok", "is a word; use = or !="),
-        ("mass > 3", "'mass', which no run has; choose of name"),
+        ("mass > 3", "'mass', which no run has; choose one of name"),
         ("delay > 3deg", "cannot be turned into"),
     ],
 )

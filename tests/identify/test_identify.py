@@ -130,7 +130,7 @@ def test_unknown_options_are_refused(field_record):
     _, u, y = field_record
     with pytest.raises(ArgumentError, match="intersample 'cubic' is not known"):
         identify(record(u, y), intersample="cubic")
-    with pytest.raises(ArgumentError, match="structure 'fifth' is not known; choose of"):
+    with pytest.raises(ArgumentError, match="structure 'fifth' is not known; choose one of"):
         identify(record(u, y), structures=["fifth"])
 
 

@@ -99,7 +99,7 @@ def read_bound(text: str) -> Bound:
         raise ArgumentError(f"{text!r} is no bound; write it as 'delay < 5ms'") from None
     if match["name"] not in PARAMETERS:
         raise ArgumentError(
-            f"{text!r} bounds {match['name']!r}, which is no parameter; choose of "
+            f"{text!r} bounds {match['name']!r}, which is no parameter; choose one of "
             f"{', '.join(PARAMETERS)}"
         )
     return Bound(

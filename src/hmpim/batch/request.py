@@ -92,7 +92,7 @@ class Request:
         for name in self.structures:
             if name not in STRUCTURES:
                 raise ArgumentError(
-                    f"structure {name!r} is not known; choose of {list(STRUCTURES)}"
+                    f"structure {name!r} is not known; choose one of {list(STRUCTURES)}"
                 )
 
     @property

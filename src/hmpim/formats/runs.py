@@ -170,8 +170,8 @@ def filter_runs(runs: Sequence[Run], conditions: Sequence[str]) -> tuple[Run, ..
     >>> filter_runs([], ["speed > 3"])
     Traceback (most recent call last):
     ...
-    hmpim.errors.ArgumentError: 'speed > 3' asks for 'speed', which no run has; choose of name, \
-source, rig, input, output, verdict, created, fs, duration, samples, delay, ...
+    hmpim.errors.ArgumentError: 'speed > 3' asks for 'speed', which no run has; choose one of \
+name, source, rig, input, output, verdict, created, fs, duration, samples, delay, ...
     """
     tests = [_condition(text) for text in conditions]
     return tuple(run for run in runs if all(test(run) for test in tests))
@@ -314,7 +314,8 @@ def _condition(text: str) -> Callable[[Run], bool]:
     if name in _FIGURES:
         return _of_figures(name, sign, value, text)
     raise ArgumentError(
-        f"{text!r} asks for {name!r}, which no run has; choose of {', '.join((*_WORDS, *_FIGURES))}"
+        f"{text!r} asks for {name!r}, which no run has; choose one of "
+        f"{', '.join((*_WORDS, *_FIGURES))}"
     )
 
 

@@ -178,9 +178,9 @@ def gentlest(
     chosen = tuple(families)
     for family in chosen:
         if family not in FAMILIES:
-            raise ArgumentError(f"family {family!r} is not known; choose of {list(FAMILIES)}")
+            raise ArgumentError(f"family {family!r} is not known; choose one of {list(FAMILIES)}")
     if not chosen:
-        raise ArgumentError(f"no family is given; choose of {list(FAMILIES)}")
+        raise ArgumentError(f"no family is given; choose one of {list(FAMILIES)}")
     _refuse_beyond(wish, chosen, _steps(progress, "bound", 0, len(chosen)))
     found: list[Candidate] = []
     for k, family in enumerate(sorted(chosen, key=lambda name: name != "multisine")):

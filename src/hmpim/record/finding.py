@@ -46,7 +46,7 @@ class Finding:
     def __post_init__(self) -> None:
         if self.severity not in get_args(Severity):
             raise ArgumentError(
-                f"severity {self.severity!r} is not known; choose of {list(get_args(Severity))}"
+                f"severity {self.severity!r} is not known; choose one of {list(get_args(Severity))}"
             )
 
     def to_dict(self) -> dict[str, Any]:

@@ -278,14 +278,14 @@ def nonlinear_facts(pair: PairIdentification) -> list[tuple[str, str]]:
     ...     kinds=("friction", "backlash"))
     >>> warned = (Finding(code="nonlinear", message="…", severity="info", parameters=()),)
     >>> nonlinear_facts(SimpleNamespace(nonlinearity=found, warnings=warned))[2]
-    ('Kind', 'friction or backlash; this record cannot tell which')
+    ('Kind', 'friction or backlash; this record does not show which')
     """
     found = pair.nonlinearity
     if found is None or not any(warning.code == "nonlinear" for warning in pair.warnings):
         return []
     kind = " or ".join(name.replace("_", " ") for name in found.kinds)
     if len(found.kinds) > 1:
-        kind += "; this record cannot tell which"
+        kind += "; this record does not show which"
     elif found.size is not None:
         kind += f", size {format_estimate(found.size)}"
     parts = [

@@ -123,8 +123,8 @@ def test_the_measured_response_is_the_plants():
 @pytest.mark.parametrize(
     ("name", "words"),
     [
-        ("s", "reference 's' is no channel beside inputs and outputs; there are: r"),
-        ("u", "reference 'u' is no channel beside"),
+        ("s", "reference 's' must be a channel that is neither input nor output; there are: r"),
+        ("u", "reference 'u' must be a channel that is neither"),
     ],
 )
 def test_a_reference_that_is_not_there_is_refused(name, words):

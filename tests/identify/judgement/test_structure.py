@@ -80,7 +80,7 @@ def test_a_statistic_close_to_its_level_is_said_on_both_sides(clean, deviations,
     assert [f.severity for f in found] == ([severity] if severity else [])
     for finding in found:
         assert f"{deviations:.1f} standard deviations; a doubt from 3.9 on" in finding.message
-        assert ("Another run may give the other verdict." in finding.message) == close
+        assert ("Another run may give the opposite verdict." in finding.message) == close
 
 
 def test_a_nonlinear_residual_asks_for_no_pole(evidence_of):

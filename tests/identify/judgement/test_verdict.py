@@ -97,7 +97,7 @@ def test_a_check_that_raises_is_said_and_costs_nothing_else(clean, breaking_chec
     with breaking_checks():
         found = judge(clean, checks=(slips, *CHECKS))
     assert found[0].code == "check_failed"
-    assert "'slips' could not be made (ZeroDivisionError: nothing there)" in found[0].message
+    assert "'slips' failed to run (ZeroDivisionError: nothing there)" in found[0].message
     assert (found[0].severity, found[0].parameters) == ("info", ())
     assert found[1:] == judge(clean)
 

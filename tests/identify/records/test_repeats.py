@@ -153,7 +153,7 @@ def test_what_are_no_repeats_is_refused() -> None:
 def test_what_there_is_not_is_refused_by_name(eight: Repeats) -> None:
     with pytest.raises(RecordError, match=r"there is no pair \('z', 'u'\)"):
         eight["z", "u"]
-    with pytest.raises(RecordError, match="the repeats do not tell 'saturation_low'"):
+    with pytest.raises(RecordError, match="the repeats do not determine 'saturation_low'"):
         eight["y", "u"]["saturation_low"]
 
 

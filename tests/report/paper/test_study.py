@@ -156,7 +156,7 @@ def test_a_part_has_its_own_rows_only():
 
 
 def test_a_figure_of_the_motion_table_is_refused():
-    with pytest.raises(ArgumentError, match=r"figure 24 is not made here; choose of 1, 2, 3"):
+    with pytest.raises(ArgumentError, match=r"figure 24 is not made here; choose one of 1, 2, 3"):
         make_study([12, 24])
 
 

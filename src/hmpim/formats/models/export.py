@@ -175,7 +175,9 @@ def export(
     """
     writer = TARGETS.get(to)
     if writer is None:
-        raise ArgumentError(f"target {to!r} is not known; choose of {', '.join(get_args(Target))}")
+        raise ArgumentError(
+            f"target {to!r} is not known; choose one of {', '.join(get_args(Target))}"
+        )
     if to in _CONTINUOUS and any(pair.intersample == "sampled" for pair in result.pairs):
         raise ArgumentError(
             f"target {to!r} takes systems in continuous time, and this result is of software, "

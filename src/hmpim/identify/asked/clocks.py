@@ -115,9 +115,9 @@ def _settled_finding(names: str, seconds: float) -> Finding:
     return Finding(
         code="held_between",
         message=(
-            f"Values of {names} change between samples of the outputs; what folds there by it was "
-            f"taken out with the model found, until the delay moved by less than "
-            f"{1e6 * seconds:.2g} µs"
+            f"Values of {names} change between samples of the outputs. The model "
+            f"predicts what this folds into them; it was removed repeatedly, until the delay "
+            f"changed by less than {1e6 * seconds:.2g} µs."
         ),
         severity="info",
         parameters=(),

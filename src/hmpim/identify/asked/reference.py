@@ -69,8 +69,8 @@ class Instrument:
         """Say how the pair was identified."""
         return Finding(
             code="through_reference",
-            message=f"The plant is identified through reference {self.name!r}: noise that goes "
-            "round the loop moves no figure.",
+            message=f"The plant is identified through reference {self.name!r}, so noise "
+            "that circulates in the loop biases no figure.",
             severity="info",
             parameters=(),
         )
@@ -98,7 +98,8 @@ def aligned_with_reference(record: Record, reference: str) -> tuple[Aligned, Ins
     if driver is None or driver in record.outputs or driver in record.inputs:
         known = ", ".join(c.name for c in (*record.references, *record.auxiliary)) or "none"
         raise ArgumentError(
-            f"reference {reference!r} is no channel beside inputs and outputs; there are: {known}"
+            f"reference {reference!r} must be a channel that is neither input nor output; "
+            f"there are: {known}"
         )
     aligned = uniform(replace(record, inputs=(*record.inputs, driver), references=(), auxiliary=()))
     source, moves = aligned.inputs

@@ -31,7 +31,8 @@ def checked_intersample(intersample: str, stated: Intersample | None) -> Intersa
         if intersample == known:
             return cast(Intersample, known)
     raise ArgumentError(
-        f"intersample {intersample!r} is not known; choose of auto, zoh, foh, bandlimited, sampled"
+        f"intersample {intersample!r} is not known; choose one of auto, zoh, foh, bandlimited, "
+        "sampled"
     )
 
 
@@ -43,7 +44,7 @@ def checked_structures(
     asked = tuple(structures) if structures is not None else tuple(known)
     for name in asked:
         if name not in known:
-            raise ArgumentError(f"structure {name!r} is not known; choose of {known}")
+            raise ArgumentError(f"structure {name!r} is not known; choose one of {known}")
     return cast(tuple[StructureName, ...], asked)
 
 
@@ -73,8 +74,8 @@ def check_samples(record: Record) -> None:
         largest, span = float(np.abs(channel.values).max()), float(np.ptp(channel.values / 2))
         if largest > _LARGEST or 0.0 < span < 1 / _LARGEST:
             raise RecordError(
-                f"channel {channel.name!r} reaches {largest:.3g}, out of the range from "
-                f"{1 / _LARGEST:g} to {_LARGEST:g} that can be calculated with; give it in another "
+                f"channel {channel.name!r} reaches {largest:.3g}, outside the range from "
+                f"{1 / _LARGEST:g} to {_LARGEST:g} that can be computed; give it in another "
                 "unit, or look for damaged samples"
             )
     if not 1 / _LARGEST < record.fs < _LARGEST:

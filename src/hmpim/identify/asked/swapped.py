@@ -92,13 +92,13 @@ def swapped_finding(source: str, output: str) -> Finding:
     Examples
     --------
     >>> swapped_finding("u", "y").message[:60]
-    "Input 'u' follows output 'y', and not the other way round: t"
+    "Input 'u' follows output 'y', not the other way round: the c"
     """
     return Finding(
         code="swapped",
-        message=f"Input {source!r} follows output {output!r}, and not the other way round: the "
-        "columns are swapped, a clock is late, or the input is made from the output in a loop. "
-        "Name them the other way round, check the stamps, or take the loop's reference as input.",
+        message=f"Input {source!r} follows output {output!r}, not the other way round: the "
+        "columns are swapped, a clock is late, or a loop makes the input from the output. "
+        "Swap the names, check the time stamps, or take the loop's reference as input.",
         severity="doubt",
         parameters=EVERY,
     )

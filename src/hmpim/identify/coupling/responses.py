@@ -164,7 +164,7 @@ def unrelated(output: str, source: str, response: FrequencyResponse) -> Finding:
             parameters=EVERY,
         )
     bound = _bound(response)
-    what = "but nowhere is it told from the other inputs"
+    what = "but it is nowhere distinguished from the other inputs"
     if bound is not None:
         level, low, high = bound
         what = (
@@ -229,7 +229,7 @@ def settled(
             Finding(
                 code="weak_coupling",
                 message=f"The coupling from {pair.input!r} to {pair.output!r} is too weak here, or "
-                f"outside what {pair.input!r} excites, to tell its {words}.{most} "
+                f"outside what {pair.input!r} excites, to determine its {words}.{most} "
                 "Excite it more, or alone.",
                 severity="doubt",
                 parameters=EVERY if "scale_factor" in untold else tuple(untold),

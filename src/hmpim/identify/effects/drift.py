@@ -89,11 +89,11 @@ def drift_finding(drifting: Drifting, fs: float, unit: str) -> Finding:
     rate, std = drifting.rate * fs, drifting.rate_std * fs
     per = f" {unit}/s" if unit else " per s"
     span = f"{float(np.ptp(drifting.trend)):.3g} {unit}".rstrip()
-    shape = "steadily" if drifting.degree == 1 else "not steadily"
+    shape = "steadily" if drifting.degree == 1 else "unsteadily"
     return Finding(
         code="drift",
         message=f"The bias drifts {shape}, by {span} over the record, on average by "
-        f"{rate:.3g} ± {std:.2g}{per}; the drift is taken out, and the bias stated is the mean "
+        f"{rate:.3g} ± {std:.2g}{per}; the drift is removed, and the bias stated is the mean "
         "over the record. Let the unit warm up, or measure the bias before and after.",
         severity="info",
         parameters=("bias",),

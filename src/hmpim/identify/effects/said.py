@@ -66,9 +66,9 @@ def _of_clipping(clipping: Saturation, unit: str) -> Finding:
     return Finding(
         code="saturation",
         message=f"{100 * clipping.share:.1f} % of the samples are clipped "
-        f"({', '.join(levels)}); they count as beyond the level. "
+        f"({', '.join(levels)}); the fit takes them to lie beyond the level. "
         + (
-            "That is too much to rely on: lower the amplitude, or look for a rectifier."
+            "These are too many to rely on: lower the amplitude, or look for a rectifier."
             if much
             else "Lower the amplitude to keep the whole range."
         ),
@@ -81,9 +81,9 @@ def _of_hold(hold: Hold) -> Finding:
     """Period and phase of the updates."""
     return Finding(
         code="hold",
-        message=f"The output is updated every {1e3 * hold.period:.4g} ms only, first at "
-        f"{1e3 * hold.phase:.4g} ms into the record; the delay is that of the values, "
-        "without the time for which they are held.",
+        message=f"The output is updated only every {1e3 * hold.period:.4g} ms, first at "
+        f"{1e3 * hold.phase:.4g} ms into the record; the delay stated excludes the time for "
+        "which each value is held.",
         severity="info",
         parameters=("hold_period", "delay"),
     )
@@ -108,8 +108,8 @@ def _of_rounding(found: Imperfections, noise: Estimate | None, unit: str) -> lis
         Finding(
             code="quantization",
             message=f"The output is rounded to steps of {rounding.step:.4g} {unit}".rstrip()
-            + f", {rounding.step / max(noise.value, 1e-300):.2g} times the noise: errors "
-            "of rounding are not independent; error bars are only as good as that.",
+            + f", {rounding.step / max(noise.value, 1e-300):.2g} times the noise. Rounding "
+            "errors are not independent of each other, so the error bars are approximate.",
             severity="info",
             parameters=MODELLED,
         )
@@ -124,8 +124,7 @@ def _lost_findings(found: Imperfections) -> list[Finding]:
             Finding(
                 code="repeated_frames",
                 message=f"{count} samples ({100 * float(np.mean(found.repeated)):.2g} %) repeat "
-                "the one before them to the last digit, as frames do that were lost on the way; "
-                "they are left out.",
+                "the one before them to the last digit, as lost frames do; they are left out.",
                 severity="info",
                 parameters=(),
             )
@@ -136,7 +135,7 @@ def _lost_findings(found: Imperfections) -> list[Finding]:
         findings.append(
             Finding(
                 code="spikes",
-                message=f"{count} samples ({100 * share:.2g} %) stand far out of those around them "
+                message=f"{count} samples ({100 * share:.2g} %) lie far from their neighbours "
                 "and are left out. Look for loose contacts, lost bits or impacts.",
                 severity="doubt" if many else "info",
                 parameters=MODELLED if many else (),
@@ -146,8 +145,8 @@ def _lost_findings(found: Imperfections) -> list[Finding]:
         findings.append(
             Finding(
                 code="frozen",
-                message="The output stands still where the model moves, over "
-                f"{100 * float(np.mean(found.frozen)):.2g} % of the record, which is left out. "
+                message="The output stands still while the model moves, over "
+                f"{100 * float(np.mean(found.frozen)):.2g} % of the record; that part is left out. "
                 "Look for lost updates, a stuck sensor, or friction.",
                 severity="doubt",
                 parameters=MODELLED,

@@ -42,7 +42,7 @@ def bent(evidence: Evidence) -> tuple[Finding, ...]:
         for name in SIZES
         if 0.0 < moved.get(name, 0.0) <= 1.0
     ]
-    which = f" It moves figures of a linear model: {', '.join(sized)}." if sized else ""
+    which = f" It shifts figures of the linear model: {', '.join(sized)}." if sized else ""
     return (
         Finding(
             code="nonlinear",

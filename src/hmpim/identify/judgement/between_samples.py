@@ -64,8 +64,8 @@ def undetermined_between(
     return (
         Finding(
             code="intersample",
-            message="This record cannot tell what the input does between its samples. "
-            f"{_WORDS[taken].capitalize()} is assumed; the delay would move if it is "
+            message="This record does not determine what the input does between its samples. "
+            f"{_WORDS[taken].capitalize()} is assumed; the delay would shift if it is "
             f"{', and if '.join(moves)}. The intervals cover this. State it with intersample=.",
             severity="info",
             parameters=_SHIFTED,

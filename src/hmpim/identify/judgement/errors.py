@@ -16,7 +16,7 @@ def not_converged(evidence: Evidence) -> tuple[Finding, ...]:
     return (
         Finding(
             code="not_converged",
-            message="The fit stopped before its last step was negligible. "
+            message="The fit stopped before it converged. "
             "Try a longer record, or one with more excitation.",
             severity="doubt",
             parameters=MODELLED,

@@ -33,7 +33,7 @@ def attempt(name: str, look: Callable[[], T], otherwise: T) -> tuple[T, tuple[Fi
     >>> attempt("half", lambda: 1 / 2, 0.0)
     (0.5, ())
     >>> attempt("ratio", lambda: 1 / 0, 0.0)[1][0].message[:57]
-    "The check 'ratio' could not be made (ZeroDivisionError: d"
+    "The check 'ratio' failed to run (ZeroDivisionError: divis"
     """
     try:
         return look(), ()
@@ -45,8 +45,8 @@ def failed(name: str, error: Exception) -> Finding:
     """Say which check raised, and what."""
     return Finding(
         code="check_failed",
-        message=f"The check {name.replace('_', ' ')!r} could not be made ({type(error).__name__}: "
-        f"{error}). The rest of the result stands without it; please report the record.",
+        message=f"The check {name.replace('_', ' ')!r} failed to run ({type(error).__name__}: "
+        f"{error}). The rest of the result is unaffected; please report the record.",
         severity="info",
         parameters=(),
     )

@@ -52,7 +52,7 @@ def feedback(evidence: Evidence) -> tuple[Finding, ...]:
     return (
         Finding(
             code="feedback",
-            message="The residual moves the input afterwards: the unit was in a "
+            message="The residual later appears in the input: the unit was in a feedback "
             "loop"
             + (", and the fit treats some of the noise as response. " if coloured else ". ")
             + "Identify it through what drives the loop (reference=, --reference).",

@@ -64,11 +64,15 @@ def initial_transient(evidence: Evidence) -> tuple[Finding, ...]:
     return (
         Finding(
             code="initial_transient",
-            message="The record does not begin at rest: the free response of its state is fitted "
-            f"with it, and its first {joint.forgotten / evidence.fs:.4g} s, which answer input "
-            "before the record, are left out."
-            + (f" It lasts {5.0 * slowest:.3g} s and may be a drift." if drifts else "")
-            + (" What the integrator held before is part of the bias." if open_ended else ""),
+            message="The record does not begin at rest. The free response of its initial state is "
+            f"fitted too, and its first {joint.forgotten / evidence.fs:.4g} s, which respond to "
+            "input before the record, are left out."
+            + (
+                f" The free response lasts {5.0 * slowest:.3g} s and may be a drift."
+                if drifts
+                else ""
+            )
+            + (" The integrator's initial value is part of the bias." if open_ended else ""),
             severity="doubt" if doubted else "info",
             parameters=doubted,
         ),
@@ -131,7 +135,7 @@ def integrator(evidence: Evidence) -> tuple[Finding, ...]:
         return (
             Finding(
                 code="zero_at_dc",
-                message="A constant input does nothing to the output: it has no gain at DC to "
+                message="A constant input does not move the output: there is no gain at DC to "
                 "measure bandwidths from, and the scale factor is the output per rate of the "
                 "input.",
                 severity="info",
@@ -143,7 +147,7 @@ def integrator(evidence: Evidence) -> tuple[Finding, ...]:
     return (
         Finding(
             code="integrator",
-            message="The output integrates the input: it has no gain at DC to measure bandwidths "
+            message="The output integrates the input: there is no gain at DC to measure bandwidths "
             "from, and the scale factor is the output's rate per input.",
             severity="info",
             parameters=("scale_factor", *_BANDWIDTHS),

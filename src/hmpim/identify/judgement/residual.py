@@ -125,8 +125,8 @@ def uneven_noise(evidence: Evidence) -> tuple[Finding, ...]:
         Finding(
             code="uneven_noise",
             message=f"The residual grows with the speed of the input: about "
-            f"{100 * min(share, 1.0):.0f} % of its power is not the sensor's noise, as with time "
-            "stamps that jitter. Record with a hardware clock.",
+            f"{100 * min(share, 1.0):.0f} % of its power is not the sensor's noise; jittering "
+            "time stamps look like this. Record with a hardware clock.",
             severity="doubt",
             parameters=("noise_std",),
         ),
@@ -150,7 +150,7 @@ def halves_disagree(evidence: Evidence) -> tuple[Finding, ...]:
             code="halves_disagree",
             message="The two halves of the record require different models, which differ by "
             f"{100 * halves.owed:.2g} % of the output (r.m.s.): the unit changed during "
-            "the test, or answers large and small motion differently. Repeat it, or lower the "
+            "the test, or responds differently to large and small motion. Repeat it, or lower the "
             "amplitude.",
             severity="doubt",
             parameters=MODELLED,
@@ -167,7 +167,7 @@ def noise_colour_of(evidence: Evidence) -> tuple[Finding, ...]:
         Finding(
             code="noise_colour",
             message=f"The residual is {colour.description}. "
-            "Look for hum, drift or motion that the model does not have.",
+            "Look for hum, drift or motion that the model does not contain.",
             severity="info",
             parameters=("noise_std",),
         ),
@@ -211,9 +211,9 @@ def unsampled_input(evidence: Evidence) -> tuple[Finding, ...]:
     return (
         Finding(
             code="unsampled_input",
-            message="The input moves faster than half the rate: about "
-            f"{100 * min(share, 1.0):.2g} % of what is taken for noise answers motion between "
-            "its samples. Sample faster, or filter the command before it is sampled.",
+            message="The input moves faster than half the sampling rate: about "
+            f"{100 * min(share, 1.0):.2g} % of what counts as noise is a response to motion "
+            "between its samples. Sample faster, or filter the command before it is sampled.",
             severity="doubt",
             parameters=("noise_std",),
         ),

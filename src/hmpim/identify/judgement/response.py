@@ -117,8 +117,8 @@ def grazed_bandwidth(evidence: Evidence) -> tuple[Finding, ...]:
     return (
         Finding(
             code="grazed_bandwidth",
-            message="The response comes so close to the level of a bandwidth at "
-            f"{touched[0][1]:.4g} Hz that this record does not show whether it crosses it there. "
+            message=f"At {touched[0][1]:.4g} Hz the response comes so close to the level of a "
+            "bandwidth that this record does not show whether it crosses that level. "
             "Read the Bode plot instead, or lower the noise.",
             severity="doubt",
             parameters=tuple(name for name, _ in touched),

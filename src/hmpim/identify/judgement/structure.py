@@ -43,7 +43,7 @@ def barely_told(chosen: str, *, poles: int, delay: float) -> Finding:
         message=f"This record barely distinguishes {poles - 1} from {poles} poles. A "
         f"{structure_in_words(chosen)} model is taken; with one more pole the delay would be "
         f"{delay:.4g} s. The intervals cover this. Lower the noise, or "
-        "sweep higher, to tell.",
+        "sweep higher, to distinguish them.",
         severity="info",
         parameters=PHASE_SPLIT,
     )
@@ -62,7 +62,7 @@ def missed_pole(evidence: Evidence) -> tuple[Finding, ...]:
     order, fs = evidence.joint.best.fit.structure.order, evidence.fs
     moved = float(np.sqrt(abs(hidden.squared)))
     asked = abs(hidden.squared) / hidden.std if hidden.std > 0.0 else 0.0
-    close = "Another run may give the other verdict. " if abs(asked - DEVIATIONS) < 1.0 else ""
+    close = "Another run may give the opposite verdict. " if abs(asked - DEVIATIONS) < 1.0 else ""
     level = f"({asked:.1f} standard deviations; a doubt from {DEVIATIONS:.1f} on)"
     poles = f"{order} pole{'s' * (order != 1)}"
     matters = moved > TOLERATED * hidden.scale
@@ -70,9 +70,9 @@ def missed_pole(evidence: Evidence) -> tuple[Finding, ...]:
         return (
             Finding(
                 code="other_dynamics",
-                message=f"The record requires other dynamics than {poles} {level}, and the delay "
-                f"may be {moved / fs:.2g} s off. {close}Lower the noise, or sweep higher, until a "
-                "richer structure can be distinguished.",
+                message=f"The record requires dynamics other than {poles} {level}, and the delay "
+                f"may be off by {moved / fs:.2g} s. {close}Lower the noise, or sweep higher, until "
+                "a richer structure can be distinguished.",
                 severity="doubt",
                 parameters=PHASE_SPLIT,
             ),
@@ -81,7 +81,7 @@ def missed_pole(evidence: Evidence) -> tuple[Finding, ...]:
         return (
             Finding(
                 code="structure",
-                message=f"The record almost requires other dynamics than {poles} {level}. {close}"
+                message=f"The record almost requires dynamics other than {poles} {level}. {close}"
                 "Lower the noise, or sweep higher.",
                 severity="info",
                 parameters=PHASE_SPLIT,

@@ -65,18 +65,18 @@ def general(
         guess = f"It looks like {KIND_WORDS[kinds[0].kind]}."
     elif kinds:
         names = " or ".join(KIND_WORDS[m.kind] for m in kinds)
-        guess = f"It may be {names}; this record cannot tell which."
+        guess = f"It may be {names}; this record does not show which."
     elif asked:
-        guess = "It fits no single one of the kinds that are tried."
+        guess = "None of the kinds tried fits alone."
     else:
-        guess = "Drive one input at a time to see of which kind it is."
+        guess = "Drive one input at a time to see which kind it is."
     seen = f": {' and '.join(where)}" if where else ""
     left = f"Of the residual's power {nonlinear:.0f} % is nonlinear and {noise:.0f} % noise"
     if not swept:
         left += " or dynamics left out"
     elif linear >= 0.5:
         left += f"; {linear:.0f} % still follows the input"
-    whole = f" All its effect, most of which passes for linear, is {100 * effect:.2g} %."
+    whole = f" Its whole effect, most of which a linear model absorbs, is {100 * effect:.2g} %."
     return Finding(
         code="nonlinear",
         message=f"{100 * share:.2g} % of the output (r.m.s.) is nonlinear{seen}. {guess}"
@@ -104,7 +104,7 @@ def particular(found: Mechanism, unit: str) -> Finding | None:
     ...     kind="backlash", size=0.1, size_std=0.01, gain=99.0, likelihood=0.0, rms=0.02,
     ...     effect=0.05, trace=np.zeros(0))
     >>> particular(found, "deg").message[:54]
-    'There is play of about 0.2 deg in all (half: 0.1 ± 0.0'
+    'There is play of about 0.2 deg in total (half: 0.1 ± 0'
     """
     of = f" {unit}" if unit else ""
     percent = f"{100 * found.size:.2g} ± {100 * found.size_std:.1g} %"
@@ -121,12 +121,13 @@ def particular(found: Mechanism, unit: str) -> Finding | None:
             )
         case "friction":
             message = (
-                f"Coulomb friction holds like a deflection of {size}. Motions of that size barely "
-                "show in the output; use larger ones, or put friction into the model."
+                f"Coulomb friction equals the restoring force at a deflection of {size}. "
+                "Motions of that size barely show in the output; use larger ones, or put friction "
+                "into the model."
             )
         case "backlash":
             message = (
-                f"There is play of about {2 * found.size:.2g}{of} in all (half: {size}). Look at "
+                f"There is play of about {2 * found.size:.2g}{of} in total (half: {size}). Look at "
                 "gears and couplings, or put backlash into the model."
             )
         case "rate_limit":

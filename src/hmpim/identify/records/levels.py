@@ -335,7 +335,7 @@ def _kind(changed: dict[str, Trend]) -> Finding | None:
         return Finding(
             code="friction",
             message=f"The damping ratio falls from {damping.values[0]:.3g} to "
-            f"{damping.values[-1]:.3g} as the amplitude grows, as Coulomb friction makes it. "
+            f"{damping.values[-1]:.3g} as the amplitude grows, as Coulomb friction causes. "
             "Use large motions for the linear model, and put friction into it.",
             severity="info",
             parameters=("damping_ratio",),

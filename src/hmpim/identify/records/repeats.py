@@ -134,7 +134,7 @@ class RepeatedPair:
             if parameter.name == name:
                 return parameter
         known = ", ".join(p.name for p in self.parameters)
-        raise RecordError(f"the repeats do not tell {name!r}; they tell {known}")
+        raise RecordError(f"the repeats do not determine {name!r}; they determine {known}")
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain JSON values; what is no number is null."""
@@ -285,8 +285,8 @@ def _pair(found: tuple[PairIdentification, ...]) -> RepeatedPair:
         findings.append(
             Finding(
                 code="unmodelled",
-                message=f"{unmodelled:.3g} (r.m.s.) of the residual comes back in "
-                "every repeat: it is not noise. Look at the residual beside the stimulus.",
+                message=f"{unmodelled:.3g} (r.m.s.) of the residual recurs in "
+                "every repeat, so it is not noise. Look at the residual beside the stimulus.",
                 severity="doubt",
                 parameters=MODELLED,
             )

@@ -54,7 +54,7 @@ def check_figures(figures: Collection[int] | None) -> frozenset[int]:
     wanted = frozenset(FIGURES if figures is None else figures)
     for number in sorted(wanted - set(FIGURES)):
         raise ArgumentError(
-            f"figure {number} is not made here; choose of {', '.join(map(str, FIGURES))}"
+            f"figure {number} is not made here; choose one of {', '.join(map(str, FIGURES))}"
         )
     return wanted
 

@@ -162,7 +162,7 @@ def load_named(gimbal: Literal["uut", "target"], load: LoadName | Rigid) -> Rigi
         return load
     if load not in get_args(LoadName) or (gimbal, load) not in LOADS:
         known = [name for where, name in LOADS if where == gimbal]
-        raise ArgumentError(f"the {gimbal} gimbal carries no load {load!r}; choose of {known}")
+        raise ArgumentError(f"the {gimbal} gimbal carries no load {load!r}; choose one of {known}")
     return LOADS[gimbal, load]
 
 
