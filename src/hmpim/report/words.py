@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from hmpim.identify import Estimate, Identification, PairIdentification, Verdict
+from hmpim.identify.result.groups import in_words
 from hmpim.plots.candidates import INTERSAMPLE_WORDS
 from hmpim.record import Finding
 from hmpim.report.numbers import format_estimate, format_number
@@ -30,27 +31,24 @@ __all__ = [
 class ParameterWords:
     """A parameter's name in the result, for people, its meaning, and why the paper's differs.
 
-    `differs` is empty where the paper gives no figure; `short` is the name within a sentence,
-    where that is not the label.
+    `differs` is empty where the paper gives no figure.
     """
 
     name: str
     label: str
     meaning: str
     differs: str = ""
-    short: str = ""
 
     @property
     def inline(self) -> str:
         """The name within a sentence."""
-        return self.short or self.label[:1].lower() + self.label[1:]
+        return in_words(self.name)
 
 
 GLOSSARY: tuple[ParameterWords, ...] = (
     ParameterWords(
         name="delay",
         label="Delay, pure",
-        short="delay",
         meaning="Time by which the output lags at every frequency alike: transport, processing, "
         "waiting for the next sample. The lag of the dynamics is not part of it.",
         differs="the peak of the cross-correlation (8) is the delay plus what the dynamics add, "
@@ -59,14 +57,12 @@ GLOSSARY: tuple[ParameterWords, ...] = (
     ParameterWords(
         name="delay_correlation",
         label="Delay, by correlation",
-        short="delay by correlation",
         meaning="Lag at which the cross-correlation of input and output peaks, equation (8): the "
         "pure delay plus what the dynamics add for this input.",
     ),
     ParameterWords(
         name="delay_low_frequency",
         label="Delay, low frequency",
-        short="low-frequency delay",
         meaning="Slope of the phase towards zero frequency: how late a slow movement arrives, "
         "dynamics included.",
     ),
@@ -113,7 +109,6 @@ GLOSSARY: tuple[ParameterWords, ...] = (
     ParameterWords(
         name="bandwidth_phase90",
         label="Bandwidth, −90°",
-        short="−90° bandwidth",
         meaning="Frequency at which the output lags by 90° in all, delay included: the paper's "
         "measure of merit.",
         differs="it is read off one noisy, windowed ratio of spectra",
@@ -121,13 +116,11 @@ GLOSSARY: tuple[ParameterWords, ...] = (
     ParameterWords(
         name="bandwidth_phase90_without_delay",
         label="Bandwidth, −90° without delay",
-        short="−90° bandwidth without delay",
         meaning="Frequency at which the dynamics alone turn the phase by 90°.",
     ),
     ParameterWords(
         name="bandwidth_3db",
         label="Bandwidth, −3 dB",
-        short="−3 dB bandwidth",
         meaning="Frequency at which the magnitude has fallen 3 dB below that at zero frequency.",
         differs="it is read off one noisy, windowed ratio of spectra",
     ),
@@ -145,13 +138,11 @@ GLOSSARY: tuple[ParameterWords, ...] = (
     ParameterWords(
         name="saturation_low",
         label="Saturation, low",
-        short="low saturation",
         meaning="Lowest value that the output reaches: its stop.",
     ),
     ParameterWords(
         name="saturation_high",
         label="Saturation, high",
-        short="high saturation",
         meaning="Highest value that the output reaches: its stop.",
     ),
     ParameterWords(

@@ -44,7 +44,7 @@ def test_figures_that_the_models_allowed_put_far_apart_are_doubtful(clean):
     wide = replace(parameters.bandwidth_phase90, std=None, ci95=(low, high))
     (found,) = wide_span(replace(clean, spanned=replace(parameters, bandwidth_phase90=wide)))
     assert (found.severity, found.parameters) == ("doubt", ("bandwidth_phase90",))
-    assert f"bandwidth phase90 from {low:.4g} to {high:.4g}" in found.message
+    assert f"−90° bandwidth from {low:.4g} to {high:.4g}" in found.message
 
 
 def lagging(poles, noise, evidence_of):

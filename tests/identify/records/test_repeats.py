@@ -1,8 +1,12 @@
+from types import SimpleNamespace
+from typing import Any
+
 import numpy as np
 import pytest
 
 from hmpim.errors import RecordError
-from hmpim.identify.records.repeats import Repeats, identify_repeats
+from hmpim.identify import Estimate, Parameters
+from hmpim.identify.records.repeats import Repeats, _parameter, identify_repeats
 from hmpim.record import Record
 from tests_support import assert_share, room
 
@@ -60,6 +64,29 @@ def test_averages_are_right_and_better_than_one_record(eight: Repeats) -> None:
         assert parameter.agree
     assert pair["bias"].mean.unit == "deg"
     assert pair.findings == ()
+
+
+def told(low: float, high: float, *, value: float = 30.0, std: float | None = None) -> Any:
+    """A pair that states its delay with this interval."""
+    delay = Estimate(value=value, std=std, ci95=(low, high), unit="ms")
+    return SimpleNamespace(parameters=Parameters(delay=delay))
+
+
+def test_a_second_model_moves_all_repeats_alike_and_is_no_scatter() -> None:
+    """Errors of 0.02 about 30, and an interval that reaches to another model's 27.5."""
+    values = (29.98, 30.01, 30.02, 29.99)
+    wide = [told(27.5, v + 0.0392, value=v) for v in values]
+    every = _parameter("delay", tuple(wide))
+    assert every is not None
+    assert every.agree
+    assert every.chi_squared == pytest.approx(0.001 / 0.02**2, rel=0.01)
+    low, high = every.mean.ci95
+    assert low == pytest.approx(27.52, abs=0.05)  # the mean of many knows no better
+    assert high == pytest.approx(30.02, abs=0.001)
+    one = told(29.96, 30.0392, value=30.0, std=0.02)  # one repeat excludes the other model
+    some = _parameter("delay", (*wide, one))
+    assert some is not None
+    assert some.mean.ci95[0] == pytest.approx(30.0 - 1.96 * 0.02 / 5**0.5, abs=0.001)
 
 
 def test_noise_is_what_differs_from_repeat_to_repeat(eight: Repeats) -> None:

@@ -22,7 +22,7 @@ from hmpim.identify.result import (
     Parameters,
 )
 from hmpim.identify.result.error_bars import estimate
-from hmpim.identify.result.groups import EVERY, MODELLED
+from hmpim.identify.result.groups import EVERY, MODELLED, in_words
 from hmpim.identify.worth import FEW, MOST, MUCH, NEARLY, PART, PAST, TWICE
 from hmpim.record import Aligned, Finding, Record, Signal
 
@@ -223,7 +223,7 @@ def settled(
     findings = list(pair.warnings)
     if untold:
         bound = _bound(pair.frequency_response)
-        words = ", ".join(_WORDS[name] for name in untold)
+        words = ", ".join(in_words(name) for name in untold)
         most = "" if bound is None else f" It is below {bound[0]:.0f} dB (95 %)."
         findings.append(
             Finding(
@@ -261,17 +261,17 @@ def _coupled(group: Alike, *, doubt: bool) -> Finding:
     )
 
 
-_WORDS = {
-    "scale_factor": "scale factor",
-    "delay": "delay",
-    "natural_frequency": "natural frequency",
-    "damping_ratio": "damping ratio",
-    "time_constant": "time constant",
-    "bandwidth_phase90": "-90° bandwidth",
-    "bandwidth_phase90_without_delay": "-90° bandwidth without delay",
-    "bandwidth_3db": "-3 dB bandwidth",
-    "peak_gain_db": "peak gain",
-}
+_WITH_GAIN = (
+    "scale_factor",
+    "delay",
+    "natural_frequency",
+    "damping_ratio",
+    "time_constant",
+    "bandwidth_phase90",
+    "bandwidth_phase90_without_delay",
+    "bandwidth_3db",
+    "peak_gain_db",
+)
 
 
 def _told(p: Parameters, band: tuple[float, float]) -> tuple[Parameters, list[str]]:
@@ -305,11 +305,11 @@ def _told(p: Parameters, band: tuple[float, float]) -> tuple[Parameters, list[st
     if "natural_frequency" in gone:
         gone |= {"damping_ratio", "peak_gain_db"}
     if "scale_factor" in gone:
-        gone |= set(_WORDS) | {"delay_low_frequency", "delay_correlation"}
+        gone |= set(_WITH_GAIN) | {"delay_low_frequency", "delay_correlation"}
     present = [n for n in gone if getattr(p, n) is not None]
     return (
         replace(p, **dict.fromkeys(gone, None)),
-        [name for name in _WORDS if name in present],
+        [name for name in _WITH_GAIN if name in present],
     )
 
 

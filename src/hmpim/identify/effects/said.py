@@ -9,6 +9,7 @@ from hmpim.identify.effects.hold import Hold
 from hmpim.identify.effects.imperfections import Imperfections
 from hmpim.identify.effects.saturation import Saturation
 from hmpim.identify.result import Estimate, Parameters
+from hmpim.identify.result.digits import percent
 from hmpim.identify.result.error_bars import estimate
 from hmpim.identify.result.groups import EVERY, MODELLED
 from hmpim.identify.worth import FEW, MOST, MUCH, NEARLY
@@ -123,7 +124,7 @@ def _lost_findings(found: Imperfections) -> list[Finding]:
         findings.append(
             Finding(
                 code="repeated_frames",
-                message=f"{count} samples ({100 * float(np.mean(found.repeated)):.2g} %) repeat "
+                message=f"{count} samples ({percent(float(np.mean(found.repeated)))} %) repeat "
                 "the one before them to the last digit, as lost frames do; they are left out.",
                 severity="info",
                 parameters=(),
@@ -135,7 +136,7 @@ def _lost_findings(found: Imperfections) -> list[Finding]:
         findings.append(
             Finding(
                 code="spikes",
-                message=f"{count} samples ({100 * share:.2g} %) lie far from their neighbours "
+                message=f"{count} samples ({percent(share)} %) lie far from their neighbours "
                 "and are left out. Look for loose contacts, lost bits or impacts.",
                 severity="doubt" if many else "info",
                 parameters=MODELLED if many else (),
@@ -146,7 +147,7 @@ def _lost_findings(found: Imperfections) -> list[Finding]:
             Finding(
                 code="frozen",
                 message="The output stands still while the model moves, over "
-                f"{100 * float(np.mean(found.frozen)):.2g} % of the record; that part is left out. "
+                f"{percent(float(np.mean(found.frozen)))} % of the record; that part is left out. "
                 "Look for lost updates, a stuck sensor, or friction.",
                 severity="doubt",
                 parameters=MODELLED,

@@ -50,11 +50,7 @@ _SPARE = 6
 _APART = 0.05
 """Standard deviations by which a figure of a unit that was learnt from may be off."""
 
-_BANDWIDTHS = (
-    ("-90° frequency", "bandwidth_phase90"),
-    ("-90° frequency without delay", "bandwidth_phase90_without_delay"),
-    ("-3 dB frequency", "bandwidth_3db"),
-)
+_BANDWIDTHS = ("bandwidth_phase90", "bandwidth_phase90_without_delay", "bandwidth_3db")
 
 _NOTHING = Nonlinearity(share=0.0, even=0.0, odd=0.0, noise=1.0, linear=0.0, nonlinear=0.0)
 
@@ -182,9 +178,7 @@ def whole_pairs(
             measured = response_bandwidths(
                 response, system, own, fs=fleet.fs, intersample=group.fit.member.intersample
             )
-            if any(
-                are_apart(getattr(measured, name), getattr(own, name)) for _, name in _BANDWIDTHS
-            ):
+            if any(are_apart(getattr(measured, name), getattr(own, name)) for name in _BANDWIDTHS):
                 continue
             paper = paper_estimates(fleet.u, y, fleet.fs, band=fleet.band)
             pair = PairIdentification(
@@ -276,7 +270,7 @@ def _findings(fleet: Fleet, group: Group, k: int, own: Parameters, n: int) -> tu
     """What is said of a quiet record: what it cannot tell, which its intervals cover."""
     i = int(group.some[k])
     found: list[Finding] = []
-    missing = [(words, name) for words, name in _BANDWIDTHS if getattr(own, name) is None]
+    missing = [name for name in _BANDWIDTHS if getattr(own, name) is None]
     if missing:
         found.append(unreached(missing, band_end=fleet.band[1]))
     tails = group.tails.get(k)

@@ -9,7 +9,8 @@ from hmpim.identify.judgement.evidence import Evidence
 from hmpim.identify.nonlinear.bends import Bend
 from hmpim.identify.nonlinear.words import KIND_WORDS
 from hmpim.identify.reading.spanned import bent_figures
-from hmpim.identify.result.groups import MODELLED
+from hmpim.identify.result.digits import percent
+from hmpim.identify.result.groups import MODELLED, in_words
 from hmpim.identify.worth import FEW, MATERIAL, TOLERATED
 from hmpim.record import Finding
 
@@ -38,7 +39,7 @@ def bent(evidence: Evidence) -> tuple[Finding, ...]:
         return ()
     kinds = " or ".join(dict.fromkeys(KIND_WORDS[one.kind] for one in sure))
     sized = [
-        f"{name.replace('_', ' ')} by {100 * moved[name]:.2g} %"
+        f"{in_words(name)} by {percent(moved[name])} %"
         for name in SIZES
         if 0.0 < moved.get(name, 0.0) <= 1.0
     ]
@@ -47,7 +48,7 @@ def bent(evidence: Evidence) -> tuple[Finding, ...]:
         Finding(
             code="nonlinear",
             message=f"The residual looks like {kinds}, "
-            f"{100 * sure[0].effect:.2g} % of the output (r.m.s.).{which} Identify at several "
+            f"{percent(sure[0].effect)} % of the output (r.m.s.).{which} Identify at several "
             "amplitudes to see where the linear model holds.",
             severity="doubt",
             parameters=parameters,

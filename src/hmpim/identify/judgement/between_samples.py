@@ -4,7 +4,7 @@ from collections.abc import Iterable
 
 from hmpim.identify.judgement.evidence import Evidence, structure_in_words
 from hmpim.identify.reading.spanned import rivals_of
-from hmpim.identify.result.groups import PHASE_SPLIT
+from hmpim.identify.result.groups import PHASE_SPLIT, in_words
 from hmpim.identify.worth import FEW, PART
 from hmpim.record import Finding, Intersample
 
@@ -90,8 +90,7 @@ def wide_span(evidence: Evidence) -> tuple[Finding, ...]:
     if not wide:
         return ()
     named = ", ".join(
-        f"{name.replace('_', ' ')} from {low:.4g} to {high:.4g}"
-        for name, (low, high) in wide.items()
+        f"{in_words(name)} from {low:.4g} to {high:.4g}" for name, (low, high) in wide.items()
     )
     between = bool(rivals_of(evidence.joint))
     return (

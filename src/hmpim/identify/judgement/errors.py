@@ -2,7 +2,7 @@
 
 from hmpim.identify.judgement.evidence import Evidence
 from hmpim.identify.result import Estimate
-from hmpim.identify.result.groups import MODELLED
+from hmpim.identify.result.groups import MODELLED, in_words
 from hmpim.identify.worth import BLURRED, MUCH
 from hmpim.record import Finding
 
@@ -46,7 +46,7 @@ def weak_excitation(evidence: Evidence) -> tuple[Finding, ...]:
         findings.append(
             Finding(
                 code="weak_excitation",
-                message=f"The record barely determines the {name.replace('_', ' ')}: its standard "
+                message=f"The record barely determines the {in_words(name)}: its standard "
                 f"deviation is {100 * min(spread, 99.0):.0f} % of its value. Excite more around "
                 "the natural frequency, or longer.",
                 severity="doubt",

@@ -11,7 +11,7 @@ from hmpim.identify.fitting.enrich import PLAIN
 from hmpim.identify.fitting.growth import scale_of
 from hmpim.identify.judgement.evidence import Evidence, structure_in_words
 from hmpim.identify.kept import kept
-from hmpim.identify.result.groups import MODELLED, PHASE_SPLIT, TIMING
+from hmpim.identify.result.groups import MODELLED, PHASE_SPLIT, TIMING, in_words
 from hmpim.identify.worth import DEEPEST, MUCH, PAST, TWICE
 from hmpim.model import response, slowest_time_constant
 from hmpim.record import Finding
@@ -158,26 +158,26 @@ def integrator(evidence: Evidence) -> tuple[Finding, ...]:
 def beyond_band(evidence: Evidence) -> tuple[Finding, ...]:
     """Name the bandwidths that the excited band does not reach."""
     structure, p = evidence.joint.best.fit.structure, evidence.readings.parameters
-    asked = [("-90° frequency", "bandwidth_phase90")]
+    asked = ["bandwidth_phase90"]
     if structure.order > 1:  # a first-order lag alone never gets to -90°
-        asked.append(("-90° frequency without delay", "bandwidth_phase90_without_delay"))
+        asked.append("bandwidth_phase90_without_delay")
     if structure.order > 0:
-        asked.append(("-3 dB frequency", "bandwidth_3db"))
-    missing = [(words, name) for words, name in asked if getattr(p, name) is None]
+        asked.append("bandwidth_3db")
+    missing = [name for name in asked if getattr(p, name) is None]
     if structure.integrators or structure.dc_zeros or not missing:
         return ()
     return (unreached(missing, band_end=evidence.band[1]),)
 
 
-def unreached(missing: Sequence[tuple[str, str]], *, band_end: float) -> Finding:
-    """Name the bandwidths, in words and as fields, that a band with this end in Hz cannot tell."""
+def unreached(missing: Sequence[str], *, band_end: float) -> Finding:
+    """Name the bandwidths that a band with this end in Hz cannot tell."""
     return Finding(
         code="beyond_band",
         message=f"Not reached within the excited band, which ends at {band_end:.4g} Hz: "
-        + ", ".join(words for words, _ in missing)
+        + ", ".join(in_words(name) for name in missing)
         + ". Sweep higher to measure it.",
         severity="info",
-        parameters=tuple(name for _, name in missing),
+        parameters=tuple(missing),
     )
 
 

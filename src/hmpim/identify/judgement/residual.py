@@ -12,6 +12,7 @@ from hmpim.identify.judgement.reach import windowed_power
 from hmpim.identify.kept import kept
 from hmpim.identify.noise.colour import noise_colour
 from hmpim.identify.noise.input_noise import input_noise
+from hmpim.identify.result.digits import percent
 from hmpim.identify.result.groups import GAIN, MODELLED
 from hmpim.identify.worth import FEW, MATERIAL, MOST, PART, TOLERATED, WORTH
 from hmpim.model import response
@@ -48,7 +49,7 @@ def lack_of_fit(evidence: Evidence) -> tuple[Finding, ...]:
     owed = float(np.sqrt(misfit.share)) * evidence.unexplained
     name = structure_in_words(evidence.joint.best.fit.structure.name)
     message = (
-        f"The residual still follows the input: about {100 * owed:.2g} % of the output "
+        f"The residual still follows the input: about {percent(owed)} % of the output "
         f"(r.m.s.) is not described by the {name} model. "
         "Look at the Bode plot where model and measurement differ."
     )
@@ -149,7 +150,7 @@ def halves_disagree(evidence: Evidence) -> tuple[Finding, ...]:
         Finding(
             code="halves_disagree",
             message="The two halves of the record require different models, which differ by "
-            f"{100 * halves.owed:.2g} % of the output (r.m.s.): the unit changed during "
+            f"{percent(halves.owed)} % of the output (r.m.s.): the unit changed during "
             "the test, or responds differently to large and small motion. Repeat it, or lower the "
             "amplitude.",
             severity="doubt",
@@ -183,7 +184,7 @@ def noise_on_the_input(evidence: Evidence) -> tuple[Finding, ...]:
         Finding(
             code="input_noise",
             message=f"The input carries noise of {noise.std:.3g} (standard deviation), which "
-            f"lowers the gain found by about {100 * noise.attenuation:.2g} %. Use the "
+            f"lowers the gain found by about {percent(noise.attenuation)} %. Use the "
             "command instead of its measurement, if you have it.",
             severity="doubt" if noise.attenuation > MATERIAL else "info",
             parameters=(*GAIN, "noise_std"),
@@ -212,7 +213,7 @@ def unsampled_input(evidence: Evidence) -> tuple[Finding, ...]:
         Finding(
             code="unsampled_input",
             message="The input moves faster than half the sampling rate: about "
-            f"{100 * min(share, 1.0):.2g} % of what counts as noise is a response to motion "
+            f"{percent(min(share, 1.0))} % of what counts as noise is a response to motion "
             "between its samples. Sample faster, or filter the command before it is sampled.",
             severity="doubt",
             parameters=("noise_std",),

@@ -9,7 +9,7 @@ from hmpim.identify.chance import DEVIATIONS, HALF
 from hmpim.identify.judgement.evidence import Evidence
 from hmpim.identify.reading.figures import system_of
 from hmpim.identify.result import Estimate
-from hmpim.identify.result.groups import PHASE_SPLIT
+from hmpim.identify.result.groups import PHASE_SPLIT, in_words
 from hmpim.identify.worth import PART, TOLERATED
 from hmpim.model.response import RationalDelay, phase, response
 from hmpim.record import Finding
@@ -60,10 +60,10 @@ def bandwidth_disagrees(evidence: Evidence) -> tuple[Finding, ...]:
         return ()
     touched: list[str] = []
     message = ""
-    for name, words, shaped_by in (
-        ("bandwidth_phase90", "-90° bandwidth", PHASE_SPLIT),
-        ("bandwidth_phase90_without_delay", "-90° bandwidth without delay", PHASE_SPLIT),
-        ("bandwidth_3db", "-3 dB bandwidth", _GAIN_SHAPE),
+    for name, shaped_by in (
+        ("bandwidth_phase90", PHASE_SPLIT),
+        ("bandwidth_phase90_without_delay", PHASE_SPLIT),
+        ("bandwidth_3db", _GAIN_SHAPE),
     ):
         one = getattr(evidence.measured, name)
         other = getattr(evidence.readings.parameters, name)
@@ -71,7 +71,7 @@ def bandwidth_disagrees(evidence: Evidence) -> tuple[Finding, ...]:
             continue
         touched += [name, *shaped_by]
         message = message or (  # one sentence is enough
-            f"The {words} is {one.value:.4g} Hz by the measured response and "
+            f"The {in_words(name)} is {one.value:.4g} Hz by the measured response and "
             f"{other.value:.4g} Hz by the model, further apart than their errors allow. Look "
             "at the Bode plot there before using either."
         )

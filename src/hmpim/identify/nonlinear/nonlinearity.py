@@ -24,6 +24,7 @@ from hmpim.identify.nonlinear.mechanisms import Mechanism
 from hmpim.identify.nonlinear.sweep_phase import sweep_phase
 from hmpim.identify.nonlinear.words import general, particular
 from hmpim.identify.result import Estimate, HarmonicCurve, Nonlinearity
+from hmpim.identify.result.digits import percent
 from hmpim.identify.signals import as_signal
 from hmpim.identify.worth import MATERIAL, WORTH
 from hmpim.record import Finding
@@ -211,7 +212,7 @@ def _where(seen: Seen, output: float) -> list[str]:
     where = []
     if seen.harmonics is not None:
         where = [
-            f"{100 * seen.harmonics.rms(parity) / output:.2g} % in {name} harmonics of the sweep"
+            f"{percent(seen.harmonics.rms(parity) / output)} % in {name} harmonics of the sweep"
             for name, parity in (("odd", 1), ("even", 0))
             if seen.harmonics.probability(parity) < FALSE_ALARM
         ]
@@ -220,7 +221,7 @@ def _where(seen: Seen, output: float) -> list[str]:
         where = [f"{'even' if even else 'odd'} in the deflection"]
     if seen.lines is not None:
         where += [
-            f"{100 * level.share:.2g} % at {level.parity} lines left out"
+            f"{percent(level.share)} % at {level.parity} lines left out"
             for level in seen.lines.levels
             if level.probability < FALSE_ALARM
         ]

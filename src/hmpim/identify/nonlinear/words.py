@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 
 from hmpim.identify.nonlinear.mechanisms import Kind, Mechanism
+from hmpim.identify.result.digits import percent
 from hmpim.identify.result.groups import MODELLED
 from hmpim.record import Finding
 
@@ -76,10 +77,10 @@ def general(
         left += " or dynamics left out"
     elif linear >= 0.5:
         left += f"; {linear:.0f} % still follows the input"
-    whole = f" Its whole effect, most of which a linear model absorbs, is {100 * effect:.2g} %."
+    whole = f" Its whole effect, most of which a linear model absorbs, is {percent(effect)} %."
     return Finding(
         code="nonlinear",
-        message=f"{100 * share:.2g} % of the output (r.m.s.) is nonlinear{seen}. {guess}"
+        message=f"{percent(share)} % of the output (r.m.s.) is nonlinear{seen}. {guess}"
         f"{whole if effect > 1.5 * share else ''} {left}. "
         "Identify at several amplitudes to see where the linear model holds.",
         severity="doubt" if doubt else "info",
@@ -107,7 +108,7 @@ def particular(found: Mechanism, unit: str) -> Finding | None:
     'There is play of about 0.2 deg in total (half: 0.1 ± 0'
     """
     of = f" {unit}" if unit else ""
-    percent = f"{100 * found.size:.2g} ± {100 * found.size_std:.1g} %"
+    share = f"{100 * found.size:.2g} ± {100 * found.size_std:.1g} %"
     size = f"{found.size:.2g} ± {found.size_std:.1g}{of}"
     match found.kind:
         case "hardening" | "softening":
@@ -115,9 +116,9 @@ def particular(found: Mechanism, unit: str) -> Finding | None:
             # Of a cubic force beside a sinusoid three quarters act like a spring; half of a
             # spring's change goes into the frequency.
             message = (
-                f"The restoring force is {percent} {way} proportion at the largest deflection, "
-                f"so the natural frequency there is about {37.5 * found.size:.2g} % {moves} than "
-                "for small motion. Use a smaller amplitude for the linear model."
+                f"At the largest deflection the restoring force is {share} {way} that of a linear "
+                f"spring, so the natural frequency there is about {percent(0.375 * found.size)} % "
+                f"{moves} than for small motion. Use a smaller amplitude for the linear model."
             )
         case "friction":
             message = (

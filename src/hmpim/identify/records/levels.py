@@ -17,6 +17,7 @@ from hmpim.identify.chance import FALSE_ALARM
 from hmpim.identify.identify import identify
 from hmpim.identify.records.alike import check_channels
 from hmpim.identify.result import Estimate, Identification, PairIdentification, Parameters
+from hmpim.identify.result.groups import in_words
 from hmpim.identify.worth import MATERIAL, WORTH
 from hmpim.model.dynamics import FILTERS, STRUCTURES
 from hmpim.record import Finding, Intersample, Record
@@ -251,7 +252,7 @@ def compare_levels(
             Finding(
                 code="nonlinear",
                 message=f"With the amplitude from {most.amplitudes[0]:.4g} to "
-                f"{most.amplitudes[-1]:.4g} the {most.name.replace('_', ' ')} changes by "
+                f"{most.amplitudes[-1]:.4g} the {in_words(most.name)} changes by "
                 f"{100 * most.change:+.2g} %, beyond its error; up to "
                 f"{reach:.4g} it stays within {100 * MATERIAL:.0f} %. Use a linear model up to "
                 "there only.",

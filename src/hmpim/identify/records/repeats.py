@@ -15,7 +15,7 @@ import scipy
 from hmpim.arguments import checked
 from hmpim.errors import RecordError
 from hmpim.identify.arrays import Real
-from hmpim.identify.chance import FALSE_ALARM
+from hmpim.identify.chance import FALSE_ALARM, HALF
 from hmpim.identify.identify import identify
 from hmpim.identify.judgement import judged_together
 from hmpim.identify.noise.whiteness import effective_share
@@ -28,7 +28,7 @@ from hmpim.identify.result import (
     Parameters,
 )
 from hmpim.identify.result.error_bars import estimate, noise_estimate
-from hmpim.identify.result.groups import EVERY, MODELLED, PHASE_SPLIT
+from hmpim.identify.result.groups import EVERY, MODELLED, PHASE_SPLIT, in_words
 from hmpim.identify.result.lookup import find_pair
 from hmpim.record import Finding, Intersample, Record
 
@@ -37,6 +37,9 @@ __all__ = ["RepeatedPair", "RepeatedParameter", "Repeats", "identify_repeats"]
 SCHEMA = "hmpim/repeats/1"
 
 # Chance of doubting right error bars, on either side.
+_ROUNDING = 1e-12
+"""Reach over value that is arithmetic's and not the record's."""
+
 # A whole number of samples, which may well be the same every time.
 _COUNTED = "delay_correlation"
 
@@ -51,7 +54,8 @@ class RepeatedParameter:
         As in `Parameters`.
     mean : Estimate
         Weighted by 1/std². Its std is that of the weights, or what the scatter says if that is
-        more (R. T. Birge, Phys. Rev. 40, 1932).
+        more (R. T. Birge, Phys. Rev. 40, 1932). Where the interval of every repeat reaches to
+        another model, so does that of the mean, and its std is None.
     values : tuple of float
         One for each repeat that has one.
     repeatability : float
@@ -314,7 +318,15 @@ def _pair(found: tuple[PairIdentification, ...]) -> RepeatedPair:
 def _told(name: str, found: tuple[PairIdentification, ...]) -> list[Estimate]:
     """Estimates of one parameter that have an error."""
     estimates = [e for pair in found if (e := getattr(pair.parameters, name)) is not None]
-    return [e for e in estimates if 0 < e.spread < np.inf]
+    return [e for e in estimates if 0 < e.spread < np.inf and min(_sides(e)) > 0]
+
+
+def _sides(one: Estimate) -> tuple[float, float]:
+    """How far the 95 % interval reaches below and above, by a normal error or as stated."""
+    low, high = one.ci95 or (None, None)
+    if one.std is not None or low is None or high is None:
+        return HALF * one.spread, HALF * one.spread
+    return one.value - low, high - one.value
 
 
 def _parameter(name: str, found: tuple[PairIdentification, ...]) -> RepeatedParameter | None:
@@ -323,33 +335,44 @@ def _parameter(name: str, found: tuple[PairIdentification, ...]) -> RepeatedPara
     if len(estimates) < 2:
         return None
     values = np.array([e.value for e in estimates])
-    weights = 1.0 / np.array([e.spread for e in estimates]) ** 2
+    # An interval that covers several models has its own error on the shorter side. The longer one
+    # reaches to a model that would move all repeats alike: their scatter knows nothing of it, and
+    # one repeat that excludes that model excludes it for all.
+    sides = np.array([_sides(e) for e in estimates])
+    own = sides.min(axis=1) / HALF
+    alike = (sides - HALF * own[:, np.newaxis]).min(axis=0)
+    weights = 1.0 / own**2
     mean = float(weights @ values / weights.sum())
     statistic = float(weights @ (values - mean) ** 2)
     freedom = values.size - 1
     probability = float(scipy.stats.chi2.sf(statistic, freedom))
     widened = max(1.0, statistic / freedom) if probability < FALSE_ALARM else 1.0
+    # Where the scatter is what counts, so are its few degrees of freedom.
+    average = estimate(
+        mean,
+        widened / float(weights.sum()),
+        freedom=freedom if widened > 1 else 1e9,
+        unit=estimates[0].unit,
+    )
+    if alike.max() > _ROUNDING * abs(mean):
+        low, high = _sides(average)
+        average = replace(average, std=None, ci95=(mean - low - alike[0], mean + high + alike[1]))
+    too_small = probability > 1 - FALSE_ALARM and all(e.std is not None for e in estimates)
     return RepeatedParameter(
         name=name,
-        # Where the scatter is what counts, so are its few degrees of freedom.
-        mean=estimate(
-            mean,
-            widened / float(weights.sum()),
-            freedom=freedom if widened > 1 else 1e9,
-            unit=estimates[0].unit,
-        ),
+        mean=average,
         values=tuple(float(v) for v in values),
         repeatability=float(values.std(ddof=1)),
         chi_squared=statistic,
         freedom=freedom,
         probability=probability,
-        agree=probability >= FALSE_ALARM and (name == _COUNTED or probability <= 1 - FALSE_ALARM),
+        agree=probability >= FALSE_ALARM and (name == _COUNTED or not too_small),
     )
 
 
 def _doubt(parameter: RepeatedParameter, output: str) -> Finding:
     ratio = float(np.sqrt(parameter.chi_squared / parameter.freedom))
-    words = parameter.name.replace("_", " ")
+    words = in_words(parameter.name)
     if parameter.probability < FALSE_ALARM:
         return Finding(
             code="scatter",

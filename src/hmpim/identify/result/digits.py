@@ -2,7 +2,7 @@
 
 import math
 
-__all__ = ["aside", "interval", "plus_minus"]
+__all__ = ["aside", "interval", "percent", "plus_minus"]
 
 _MOST_PLACES = 7
 _LARGEST_PLAIN = 1e7
@@ -98,6 +98,17 @@ def interval(low: float | None, high: float | None, *, value: float, std: float 
             return "not known"
         return f"{written(low)} or more" if low is not None else f"{written(high or 0.0)} or less"
     return f"{written(low)} to {written(high)}"
+
+
+def percent(share: float) -> str:
+    """Write a share in per cent, to two digits.
+
+    Examples
+    --------
+    >>> percent(0.0213), percent(0.999), percent(1.4)
+    ('2.1', '100', '140')
+    """
+    return f"{float(f'{100.0 * share:.2g}'):g}"
 
 
 def _places(std: float, *, short: bool = False) -> int | None:

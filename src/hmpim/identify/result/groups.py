@@ -2,9 +2,9 @@
 
 from dataclasses import fields
 
-from hmpim.identify.result import Parameters
+from hmpim.identify.result.parameters import Parameters
 
-__all__ = ["EVERY", "GAIN", "MODELLED", "PHASE_SPLIT", "TIMING"]
+__all__ = ["EVERY", "GAIN", "MODELLED", "PHASE_SPLIT", "TIMING", "in_words"]
 
 EVERY = tuple(f.name for f in fields(Parameters))
 """Every parameter."""
@@ -46,3 +46,27 @@ GAIN = (
     "peak_gain_db",
 )
 """Those that depend on the size of the response."""
+
+_IN_WORDS = {
+    "delay_correlation": "delay by correlation",
+    "delay_low_frequency": "low-frequency delay",
+    "noise_std": "noise",
+    "bandwidth_phase90": "−90° bandwidth",
+    "bandwidth_phase90_without_delay": "−90° bandwidth without delay",
+    "bandwidth_3db": "−3 dB bandwidth",
+    "peak_gain_db": "peak gain",
+    "saturation_low": "low saturation",
+    "saturation_high": "high saturation",
+    "quantization_step": "quantisation step",
+}
+
+
+def in_words(name: str) -> str:
+    """Return a parameter's name within a sentence.
+
+    Examples
+    --------
+    >>> in_words("bandwidth_3db"), in_words("damping_ratio")
+    ('−3 dB bandwidth', 'damping ratio')
+    """
+    return _IN_WORDS.get(name, name.replace("_", " "))
