@@ -38,6 +38,13 @@ def test_figure_12_to_files(tmp_path):
     assert "of 1000 deg/s\n" in out.output
 
 
+def test_a_limit_that_is_not_given_is_not_printed():
+    out = run("--band", "0.1", "10", "--duration", "5", "--fs", "200", "--amplitude", "2")
+    assert out.exit_code == 0, out.output
+    assert " of 2" in out.output
+    assert "inf" not in out.output
+
+
 def test_printed_waveform_and_stated_extinction(tmp_path):
     run(*FIG_12, "--lead", "0", "--extinction", "0.5", "--json", str(tmp_path / "s.json"))
     data = json.loads((tmp_path / "s.json").read_text())

@@ -174,4 +174,5 @@ def design(
         typer.echo(f"gain {stimulus.gain:.6g}, extinction n = {stimulus.extinction:g}")
     for order, name in enumerate(QUANTITIES if limits.jerk < float("inf") else QUANTITIES[:3]):
         peak, limit = getattr(stimulus.peaks, name), getattr(limits, name)
-        typer.echo(f"peak {name:<12} {peak:>10.5g} of {limit:g} {rate_label(unit, order)}".rstrip())
+        bound = f"of {limit:g} " if limit < float("inf") else ""
+        typer.echo(f"peak {name:<12} {peak:>10.5g} {bound}{rate_label(unit, order)}".rstrip())
