@@ -15,13 +15,17 @@ from hmpim.identify import (
     Parameters,
 )
 from hmpim.model import delayed_response, prepare_input
+from hmpim.plots import bode
 from hmpim.plots.curves import (
+    BodeCurve,
     decibels,
     deviation_curve,
     measured_curve,
     model_curve,
     output_hold,
+    stretches,
 )
+from hmpim.plots.description import Band, Curve, Points
 
 NOTHING = np.empty(0)
 
@@ -172,3 +176,48 @@ def test_seen_through_samples_a_held_output_is_in_the_model():
     np.testing.assert_allclose(seen.phase - plain.phase, np.degrees(np.angle(late)))
     np.testing.assert_allclose(seen.magnitude_db - plain.magnitude_db, decibels(late))
     np.testing.assert_array_equal(model_curve(held, f).phase, model_curve(pair, f).phase)
+
+
+def two_bands(step=0.1):
+    """Frequencies from 0.1 to 0.7 Hz and from 3 to 9 Hz."""
+    every = step * np.arange(1, 91)
+    return every[(every < 0.75) | (every > 2.95)]
+
+
+def test_line_and_band_are_interrupted_where_nothing_was_measured():
+    f = two_bands()
+    curve = measured_curve(FrequencyResponse(frequency=f, response=1 + 0j * f, std=0.1 + 0 * f))
+    figure = bode([("measured", "input", curve)])
+    for panel in figure.panels:
+        bands, (line,) = panel.of(Band), panel.of(Curve)
+        assert [(b.x[0].round(1), b.x[-1].round(1)) for b in bands] == [(0.1, 0.7), (3.0, 9.0)]
+        gap = ~np.isfinite(line.y)
+        assert line.x[gap] == pytest.approx([1.85])
+        assert np.isfinite(panel.of(Points)[0].y).all()
+    assert [b.label for b in figure.panels[0].of(Band)] == ["95 % band", ""]
+
+
+@pytest.mark.parametrize(
+    "f",
+    [
+        0.1 * np.arange(1, 400),
+        np.geomspace(0.1, 20.0, 400),
+        0.05 * np.unique(np.rint(np.geomspace(1, 4000, 400))),  # whole bins, as they are thinned
+        np.array([1.0, 5.0]),
+    ],
+)
+def test_a_grid_without_a_gap_is_one_stretch(f):
+    assert stretches(f) == [slice(0, f.size)]
+
+
+def test_the_first_and_the_last_mark_are_seen_whole():
+    f = np.geomspace(0.1, 20.0, 50)
+    flat = np.zeros(50)
+    (axis, _) = (
+        p.x
+        for p in bode(
+            [("a", "model", BodeCurve(frequency=f, magnitude_db=flat, phase=flat))]
+        ).panels
+    )
+    assert axis.low < 0.99 * f[0]
+    assert axis.high > 1.01 * f[-1]

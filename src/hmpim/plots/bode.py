@@ -9,7 +9,14 @@ from numpy.typing import NDArray
 
 from hmpim.errors import ArgumentError
 from hmpim.plots.candidates import INTERSAMPLE_WORDS
-from hmpim.plots.curves import BodeCurve, deviation_curve, measured_curve, model_curve
+from hmpim.plots.curves import (
+    BodeCurve,
+    deviation_curve,
+    interrupted,
+    measured_curve,
+    model_curve,
+    stretches,
+)
 from hmpim.plots.description import Axis, Band, Curve, Figure, Item, Panel, Points, Rule
 from hmpim.plots.style import Colour, plain
 
@@ -18,6 +25,7 @@ if TYPE_CHECKING:
 
 __all__ = ["Mark", "bode", "bode_items", "pair_bode", "pair_deviation"]
 
+_MARGIN = 0.012  # of the axis at either end: the first and the last mark are seen whole
 MOST_POINTS = 70  # measured ones with bars of their own; more would hide the model
 
 
@@ -86,7 +94,7 @@ def bode(
         phase += lower
     heights = [_heights([c for _, _, c in curves], name, shown) for name in _QUANTITIES]
     reference = f"dB re 1 {plain(magnitude_unit)}" if magnitude_unit else "dB"
-    low, high = shown or (None, None)
+    low, high = (None, None) if shown is None else shown if band else _with_room(shown)
     x = Axis(scale="log", low=low, high=high, numbered=False)
     panels = (
         Panel(
@@ -172,8 +180,9 @@ def bode_items(
 ) -> tuple[list[Item], list[Item]]:
     """Return what is drawn of one curve in the magnitude's panel and in the phase's.
 
-    A measured curve, one with a band, is a line in its band, and some of its points stand out
-    with error bars of their own; a model's is a dashed line.
+    A measured curve, one with a band, is a line in its band, both interrupted where nothing was
+    measured, and some of its points stand out with error bars of their own; a model's is a
+    dashed line.
 
     Parameters
     ----------
@@ -203,8 +212,15 @@ def bode_items(
             continue
         some = _spread(f)
         items += [
-            Band(x=f, low=low, high=high, label=words and "95 % band", colour=colour, opacity=0.28),
-            Curve(x=f, y=middle, colour=colour, width=0.7, opacity=0.7),
+            Band(
+                x=f[part], low=low[part], high=high[part], colour=colour, opacity=0.28,
+                label="" if part.start or not words else "95 % band",
+            )
+            for part in stretches(f)
+        ]  # fmt: skip
+        line, levels = interrupted(f, middle)
+        items += [
+            Curve(x=line, y=levels, colour=colour, width=0.7, opacity=0.7),
             Points(
                 x=f[some], y=middle[some], low=low[some], high=high[some], label=words,
                 colour=colour, size=4.6, filled=False,
@@ -329,8 +345,8 @@ def pair_deviation(pair: "PairIdentification", *, fs: float | None = None) -> Fi
     zero = Rule(at=0.0, axis="y", colour="model", width=1.2)
     panels = []
     for panel in figure.panels:
-        (band,) = panel.of(Band)
-        reach = _common_reach(band.low, band.high)
+        bands = panel.of(Band)
+        reach = _common_reach(*(np.concatenate([getattr(b, e) for b in bands]) for e in _ENDS))
         y = replace(panel.y, low=-reach, high=reach)
         panels.append(replace(panel, y=y, items=(*panel.items, zero)))
     return replace(
@@ -340,6 +356,9 @@ def pair_deviation(pair: "PairIdentification", *, fs: float | None = None) -> Fi
         alt="Magnitude and phase of the measured response over the model's, with the 95 % band "
         f"around them, from {positive[0]:.4g} to {positive[-1]:.4g} Hz.",
     )
+
+
+_ENDS = ("low", "high")
 
 
 def _common_reach(low: NDArray[np.float64], high: NDArray[np.float64]) -> float:
@@ -390,6 +409,11 @@ def _whole_band(curves: Sequence[BodeCurve]) -> tuple[float, float] | None:
     if not filled:
         return None
     return min(float(f[0]) for f in filled), max(float(f[-1]) for f in filled)
+
+
+def _with_room(ends: tuple[float, float]) -> tuple[float, float]:
+    room = (ends[1] / ends[0]) ** _MARGIN
+    return ends[0] / room, ends[1] * room
 
 
 def _heights(

@@ -1,6 +1,7 @@
 """The curves behind a Bode plot: a fitted model's response, a measured one with its band."""
 
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,10 +13,19 @@ from hmpim.model.response import RationalDelay, phase, response
 if TYPE_CHECKING:
     from hmpim.identify import FrequencyResponse, PairIdentification
 
-__all__ = ["BodeCurve", "deviation_curve", "measured_curve", "model_curve", "output_hold"]
+__all__ = [
+    "BodeCurve",
+    "deviation_curve",
+    "interrupted",
+    "measured_curve",
+    "model_curve",
+    "output_hold",
+    "stretches",
+]
 
 ALIASES = 60  # on either side; what is left out is below 0.3 % even without dynamics
 _WHOLE = 1e-4  # of a sample: a period this near to a whole number of samples counts as one
+GAP = 3.0  # times a step beside it: a larger one is no step, but nothing was measured in between
 Z95 = 1.959963984540054  # 97.5 % point of the normal distribution
 
 
@@ -221,6 +231,44 @@ def measured_curve(measured: "FrequencyResponse", *, near: BodeCurve | None = No
         phase_low=angles - swing,
         phase_high=angles + swing,
     )
+
+
+def stretches(frequency: NDArray[np.float64]) -> list[slice]:
+    """Return the parts of a measured response between which nothing was measured.
+
+    Parameters
+    ----------
+    frequency : ndarray, shape (m,)
+        Hz, increasing.
+
+    Examples
+    --------
+    >>> stretches(np.array([0.1, 0.2, 0.3, 3.0, 3.1, 3.2]))
+    [slice(0, 3, None), slice(3, 6, None)]
+    """
+    step = np.diff(frequency)
+    if step.size < 2:
+        return [slice(0, frequency.size)]
+    padded = np.concatenate(([np.inf], step, [np.inf]))
+    ends = np.flatnonzero(step > GAP * np.minimum(padded[:-2], padded[2:])) + 1
+    edges = [0, *(int(end) for end in ends), frequency.size]
+    return [slice(a, b) for a, b in pairwise(edges)]
+
+
+def interrupted(
+    frequency: NDArray[np.float64], values: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return a curve that is interrupted where nothing was measured.
+
+    Examples
+    --------
+    >>> f = np.array([0.1, 0.2, 0.3, 3.0, 3.1, 3.2])
+    >>> interrupted(f, 0.0 * f)[1]
+    array([ 0.,  0.,  0., nan,  0.,  0.,  0.])
+    """
+    gaps = [part.start for part in stretches(frequency)[1:]]
+    middle = [0.5 * (frequency[k - 1] + frequency[k]) for k in gaps]
+    return np.insert(frequency, gaps, middle), np.insert(values, gaps, np.nan)
 
 
 def deviation_curve(measured: BodeCurve, model: BodeCurve) -> BodeCurve:

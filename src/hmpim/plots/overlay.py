@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hmpim.identify.result.digits import plus_minus
-from hmpim.plots.curves import BodeCurve
+from hmpim.plots.curves import BodeCurve, interrupted
 from hmpim.plots.description import Axis, Curve, Dashes, Figure, Item, Panel, Rule
 from hmpim.plots.style import Colour, axis_label
 
@@ -49,16 +49,17 @@ def overlaid_bode(
     phase_items: list[Item] = []
     magnitude_items: list[Item] = []
     for i, (label, curve) in enumerate(curves):
+        f, level = interrupted(curve.frequency, curve.magnitude_db)
         look = Curve(
-            x=curve.frequency,
-            y=curve.magnitude_db,
+            x=f,
+            y=level,
             label=label,
             colour=_COLOURS[i % len(_COLOURS)],
             dashes=_DASHES[(i + i // len(_COLOURS)) % len(_DASHES)],
             width=_width(i) if pairs else 1.2,
         )
         magnitude_items.append(look)
-        phase_items.append(replace(look, y=curve.phase))
+        phase_items.append(replace(look, y=interrupted(curve.frequency, curve.phase)[1]))
     for i, bandwidth in enumerate(bandwidths):
         if bandwidth is not None:
             mark = _interval(*bandwidth)

@@ -248,3 +248,35 @@ def test_many_outputs_at_once_say_what_each_says_alone():
         assert np.array_equal(one.frequency, alone.frequency)
         assert np.abs(one.response - alone.response).max() < 1e-6 * alone.std.min()
         assert one.std == pytest.approx(alone.std, rel=1e-6)
+
+
+def two_bands(noise: float, seed: int = 0) -> tuple[np.ndarray, np.ndarray]:
+    """Two periods of 20 s at lines of 0.05 Hz up to 0.7 Hz, and from 3 to 18 Hz."""
+    rng = np.random.default_rng(seed)
+    n, lines = 4000, np.arange(1, 361)
+    lines = lines[(lines <= 14) | (lines >= 60)]
+    spectrum = np.zeros(n // 2 + 1, complex)
+    spectrum[lines] = np.exp(2j * np.pi * rng.random(lines.size))
+    answered = spectrum * second_order(np.arange(n // 2 + 1) * FS / n)
+    u, y = (np.tile(np.fft.irfft(s, n), 2) for s in (spectrum, answered))
+    return u, y + noise * float(y.std()) * rng.standard_normal(y.size)
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.03])
+def test_nothing_is_said_where_nothing_moved(noise: float) -> None:
+    u, y = two_bands(noise)
+    found = local_response(u, y, FS, band=(0.05, 18.0), delay=0.15)
+    f = found.frequency
+    assert not ((f > 1.0) & (f < 2.7)).any()
+    low, high = f[f < 2.0], f[f > 2.0]
+    assert low.size >= 14
+    assert high.max() == pytest.approx(18.0, abs=0.03)
+    assert np.abs(high - 3.0).min() < 0.02
+
+
+def test_a_spectrum_that_falls_has_no_gap() -> None:
+    """A small step's falls by 60 dB, a sweep's ripples: both move everywhere."""
+    step = np.where(np.arange(2000) > 100, 1.0, 0.0)
+    for u in (step, U):
+        found = local_response(u, u, FS, band=(0.1, 99.0), points=4000)
+        assert np.diff(found.frequency).max() < 0.11

@@ -6,6 +6,7 @@ predicts a bin from its neighbours alone.
 """
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike, NDArray
 
 from hmpim.errors import ArgumentError, RecordError
@@ -16,6 +17,7 @@ from hmpim.identify.frf.polynomial import polynomial_fits
 from hmpim.identify.frf.rational import rational_fits
 from hmpim.identify.result import FrequencyResponse
 from hmpim.identify.signals import as_pair, check_band, check_rate, whole_lag
+from hmpim.identify.worth import DEEPEST
 
 __all__ = ["local_response", "local_responses"]
 
@@ -66,7 +68,8 @@ def local_response(
     Returns
     -------
     FrequencyResponse
-        At bins of the record inside the band. `std` is from the residual around each frequency
+        At bins of the record inside the band, without gaps that the input leaves in its
+        spectrum. `std` is from the residual around each frequency
         and, where the chosen fit predicts worse than the best, from what it lacks. `coherence`
         is None: there is one segment only.
 
@@ -172,7 +175,21 @@ def _centres(spectra: Spectra, band: tuple[float, float], points: int) -> NDArra
             f"band is ({band[0]:g}, {band[1]:g}) Hz, and the record has no bin in it, only "
             f"multiples of {step:g} Hz; give a wider band or a longer record"
         )
-    return centres_in_band(low, high, points)
+    centre = centres_in_band(low, high, points)
+    return centre[_excited(spectra.u, centre)]
+
+
+def _excited(u: NDArray[np.complex128], centre: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """Where the input moves within the narrowest window, or on one side of it not at all.
+
+    Between two parts of the spectrum with nothing in between, a fit would tell only how it
+    bridges them. What leaks into the gap, Hann's window takes away.
+    """
+    power = np.abs(u - 0.5 * (np.roll(u, 1) + np.roll(u, -1)))[: centre[-1] + 1] ** 2
+    power[0] = 0.0  # the mean
+    near = scipy.ndimage.maximum_filter1d(power, 4 * (_ORDER + 1) + 1)
+    below, above = np.maximum.accumulate(power), np.maximum.accumulate(power[::-1])[::-1]
+    return np.asarray(near >= DEEPEST * np.minimum(below, above))[centre]
 
 
 def _cut(spectra: Spectra, highest: int) -> Spectra:

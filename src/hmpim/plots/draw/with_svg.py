@@ -132,9 +132,12 @@ class _Pen:
         )
 
     def boxed(self, x: float, y: float, text: str, *, anchor: str, colour: Colour) -> str:
-        """Words with a rim of paper, so that they can be read over lines."""
-        rim = f' paint-order="stroke" stroke="{self.colour("paper")}" stroke-width="4"'
-        return self.words(x, y, text, anchor=anchor, colour=colour, more=rim)
+        """Words on a plate of paper, so that they can be read over lines."""
+        width = text_width(text) + 2.0
+        left = x - 1.0 - {"start": 0.0, "middle": 0.5, "end": 1.0}[anchor] * (width - 2.0)
+        box = f'x="{left:.1f}" y="{y - SIZE:.1f}" width="{width:.1f}" height="{1.3 * SIZE:.1f}"'
+        plate = f'<rect {box} fill="{self.colour("paper")}" fill-opacity="0.85"/>'
+        return plate + self.words(x, y, text, anchor=anchor, colour=colour)
 
 
 class _Field:
