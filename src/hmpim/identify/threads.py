@@ -1,20 +1,31 @@
-"""Small matrices gain nothing from several BLAS threads, and lose much on a busy machine.
+"""What identification asks of its process: one BLAS thread, and memory that is not given back.
 
-On a loaded two-core machine a matrix exponential of 8 by 8 took 16 ms with OpenBLAS's own
-threads and 0.012 ms with one, so identification asks for one while it runs.
+Small matrices gain nothing from several BLAS threads, and lose much on a busy machine: on a loaded
+two-core machine a matrix exponential of 8 by 8 took 16 ms with OpenBLAS's own threads and 0.012 ms
+with one.
+
+A record of 10 000 samples passes some hundred arrays of a megabyte through the allocator. The GNU
+C library hands each back to the system and has it cleared and mapped anew, page by page, until
+a block as large as `_BLOCK` was freed once (mallopt(3), M_MMAP_THRESHOLD). That took a sixth of
+the time; twice such a block is what may be kept for it.
 """
 
 from contextlib import AbstractContextManager
 from functools import cache
 from typing import Any
 
+import numpy as np
 from threadpoolctl import ThreadpoolController
 
 __all__ = ["one_thread"]
 
+_BLOCK = 31 << 20
+"""Bytes: just below the 32 MiB from which on nothing is learnt."""
+
 
 @cache
 def _controller() -> ThreadpoolController:
+    np.empty(_BLOCK, dtype=np.uint8)  # freed at once, and never touched
     return ThreadpoolController()  # looks up the loaded libraries once, about 1 ms
 
 

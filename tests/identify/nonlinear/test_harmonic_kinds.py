@@ -98,3 +98,16 @@ def test_the_quick_look_gives_honest_chances_in_white_noise():
     assert np.mean(np.array(chances) < 0.05) > 0.005
     assert min(chances) > 1e-5
     assert any_harmonic(np.zeros(T.size), sweep, FS) == 1.0
+
+
+@pytest.mark.parametrize("kind", ["smooth", "noisy", "steps"])
+def test_backlash_moves_as_it_does_sample_by_sample(kind):
+    rng = np.random.default_rng(4)
+    noise = np.cumsum(rng.standard_normal(500))
+    x = {"smooth": 8 * np.sin(np.arange(500) ** 1.5 / 300), "noisy": noise, "steps": noise.round()}
+    for half_gap in (0.3, 1.0, 4.0):
+        now, expected = x[kind][0], []
+        for value in x[kind]:
+            now = min(max(now, value - half_gap), value + half_gap)
+            expected.append(now)
+        assert play(x[kind], half_gap).tolist() == expected

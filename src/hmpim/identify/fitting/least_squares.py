@@ -31,7 +31,10 @@ def solved_exactly(rows: Real, target: Real) -> tuple[Real, float]:
 
 
 def solved(gram: Real, moment: Real, damping: float = 0.0) -> Real:
-    """Solve normal equations, scaled to unit diagonal; directions without content stay 0."""
+    """Solve normal equations, scaled to unit diagonal; directions without content stay 0.
+
+    `moment` has shape (k,), or (k, m) for as many right sides.
+    """
     diagonal = gram.diagonal()
     scale = np.sqrt(np.where(diagonal > 1e-200 * diagonal.max(), diagonal, 1.0))
     scaled = gram / (scale[:, None] * scale)
@@ -40,8 +43,9 @@ def solved(gram: Real, moment: Real, damping: float = 0.0) -> Real:
     if info:
         raise np.linalg.LinAlgError("eigenvalues of the normal equations did not converge")
     keep = values > _UNSEEN * values[-1]
-    projected = (vectors.T @ (moment / scale))[keep] / (values[keep] + damping)
-    return np.asarray(vectors[:, keep] @ projected / scale)
+    seen = vectors[:, keep] / scale[:, None]
+    projected = (moment.T @ seen) / (values[keep] + damping)
+    return np.asarray(seen @ projected.T)
 
 
 def without(rows: Real, others: Real) -> Real:

@@ -55,11 +55,13 @@ def choose(
     shape = tried[0].response.shape
     missed = np.stack([fit.prediction_error for fit in tried])
 
-    def stacked(name: str) -> Real:
-        values = [np.broadcast_to(getattr(fit, name), shape) for fit in tried]
-        return np.stack(values).reshape(*missed.shape, -1)
+    def stacked(name: str, kind: type = float) -> NDArray[Any]:
+        out = np.empty((len(tried), *shape), dtype=kind)
+        for own, fit in zip(out, tried, strict=True):
+            own[...] = getattr(fit, name)
+        return out.reshape(*missed.shape, -1)
 
-    response, spread, power = stacked("response"), stacked("spread"), stacked("power")
+    response, spread, power = stacked("response", complex), stacked("spread"), stacked("power")
     # A window that came to nothing must not make nothing of those beyond its reach.
     mean = _averaged(np.minimum(missed, 1e6 * missed.min(axis=0)))
     least = mean.min(axis=0)
@@ -70,10 +72,12 @@ def choose(
     kinds = (range(len(polynomials)), range(len(polynomials), len(tried)))
     fuller = [(k, k - 1) for kind in kinds for k in kind[1::2]]
     narrower = [(k, k - 2) for kind in kinds for k in kind[2:]]
-    for fit, reference in fuller + narrower:
-        apart = response[fit] - response[reference]
-        parted = _beyond(apart, variance[reference], credible[reference])
-        np.maximum(bent[fit], parted, out=bent[fit])
+    for pairs in (fuller, narrower):
+        if pairs:
+            fit, reference = np.array(pairs).T
+            apart = response[fit] - response[reference]
+            parted = _beyond(apart, variance[reference], credible[reference])
+            bent[fit] = np.maximum(bent[fit], parted)
     with np.errstate(over="ignore"):  # a hopeless fit costs infinitely much
         cost = np.sum((variance + bent) * power[0], axis=-1)
     best = np.argmin(cost, axis=0)
@@ -94,7 +98,7 @@ def _beyond(apart: Real, variance: Real, credible: Mask) -> Real:
     against = np.maximum(variance, 1e-150)  # a record without noise must not overflow
     square = apart.real**2 + apart.imag**2
     places = np.where(credible, square / against - 1.0, 0.0)
-    excess = np.stack([_averaged(places[..., j]) for j in range(places.shape[-1])], axis=-1)
+    excess = np.moveaxis(_averaged(np.moveaxis(places, -1, 0)), 0, -1)
     return np.asarray(np.where(credible, np.maximum(excess, 0.0) * variance, 0.0))
 
 

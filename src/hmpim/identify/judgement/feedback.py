@@ -104,7 +104,7 @@ def _future_of(u: Real, inside: NDArray[np.intp]) -> _Future:
     for rows, _ in _lags_of(u, inside):
         gram += rows @ rows.T
     # Of the future what the past does not tell (a Schur complement).
-    told = np.column_stack([solved(gram[_PAST, _PAST], c) for c in gram[_PAST, _FUTURE].T])
+    told = solved(gram[_PAST, _PAST], gram[_PAST, _FUTURE])
     size, direction = np.linalg.eigh(gram[_FUTURE, _FUTURE] - gram[_FUTURE, _PAST] @ told)
     seen = size > 1e-9 * float(np.trace(gram) - gram[0, 0])
     return _Future(size=size[seen], direction=direction[:, seen], told=told)

@@ -291,32 +291,34 @@ def _at_the_input(
 
 def _scored(slopes: Real, seen: Real, residual: Real) -> tuple[Real, Real, bool]:
     """Weight of each trace beside the slopes, what it gains, and whether the best leaves noise."""
-    weights, gains, left = _regressed(slopes, seen, residual, np.ones(1))
+    weights, gains, basis = _regressed(slopes, seen, residual, np.ones(1))
     best = int(np.argmax(gains))
-    rest = left[-1] - weights[best] * left[best]
+    rest = residual - weights[best] * seen[best]
+    rest -= basis @ (rest @ basis)
     colour, _ = yule_walker(rest, LONGEST_AUTOREGRESSION)
-    weights, gains, _ = _regressed(slopes, seen, residual, colour)
+    if colour.size > 1:
+        weights, gains, _ = _regressed(slopes, seen, residual, colour)
     return weights, gains, is_white(rest)
 
 
 def _regressed(slopes: Real, seen: Real, residual: Real, colour: Real) -> tuple[Real, Real, Real]:
-    """The same in noise of one colour; and what no slope explains, the residual's last."""
-    rows = np.vstack([slopes, seen, residual])
+    """The same in noise of one colour; and a basis of what the slopes explain, shape (n, k)."""
     if colour.size > 1:
-        rows = scipy.signal.lfilter(colour, [1.0], rows, axis=1)
-    scale = np.sqrt(np.einsum("ij,ij->i", rows, rows))
-    scale = np.where(scale > 0.0, scale, 1.0)
-    p = slopes.shape[0]
-    q, r = np.linalg.qr((rows[:p] / scale[:p, None]).T)
+        rows = scipy.signal.lfilter(colour, [1.0], np.vstack([slopes, seen, residual]), axis=1)
+        slopes, seen, residual = rows[: slopes.shape[0]], rows[slopes.shape[0] : -1], rows[-1]
+    size = np.sqrt(np.vecdot(slopes, slopes))
+    q, r = np.linalg.qr((slopes / np.where(size > 0.0, size, 1.0)[:, None]).T)
     q = q[:, np.abs(np.diag(r)) > _ALIKE]
-    left = rows[p:] - (rows[p:] @ q) @ q.T
-    beside, own = left[:-1], left[-1]
-    power = np.einsum("ij,ij->i", beside, beside)
-    told = power > _ALIKE * scale[p:-1] ** 2
-    weights = np.where(told, beside @ own, 0.0) / np.where(told, power, 1.0)
-    total = float(own @ own)
+    # Of trace and residual what the slopes leave of them, which need not be made itself.
+    along, own = seen @ q, residual @ q
+    whole = np.vecdot(seen, seen)
+    power = whole - np.vecdot(along, along)
+    told = power > _ALIKE * whole
+    product = seen @ residual - along @ own
+    weights = np.where(told, product, 0.0) / np.where(told, power, 1.0)
+    total = float(residual @ residual - own @ own)
     freedom = max(residual.size - q.shape[1], 1)
-    if total == 0.0:
-        return weights, np.zeros(weights.size), left
+    if total <= 0.0:
+        return weights, np.zeros(weights.size), q
     taken = np.minimum(weights**2 * power / total, 1.0 - np.finfo(float).eps)
-    return weights, -0.5 * freedom * np.log1p(-taken), left
+    return weights, -0.5 * freedom * np.log1p(-np.where(told, taken, 0.0)), q

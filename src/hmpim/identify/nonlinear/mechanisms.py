@@ -130,14 +130,15 @@ def play(x: Real, half_gap: float) -> Real:
     >>> play(np.array([0.0, 1.0, 2.0, 1.5, 0.0]), 0.5).tolist()
     [0.0, 0.5, 1.5, 1.5, 0.5]
     """
-    out, now = [], float(x[0])
-    for low, high in zip((x - half_gap).tolist(), (x + half_gap).tolist(), strict=True):
-        if now < low:
-            now = low
-        elif now > high:
-            now = high
-        out.append(now)
-    return np.array(out)
+    low, high = x - half_gap, x + half_gap
+    # From one reversal of x to the next the output moves one way: only there it must be known.
+    way = np.sign(np.diff(x))
+    turns = np.append(np.flatnonzero(way[1:] * way[:-1] <= 0.0) + 1, x.size - 1)
+    before, now = np.empty(turns.size), float(x[0])
+    for k, (least, most) in enumerate(zip(low[turns].tolist(), high[turns].tolist(), strict=True)):
+        before[k] = now
+        now = min(max(now, least), most)
+    return np.clip(np.repeat(before, np.diff(turns, prepend=-1)), low, high)
 
 
 def rate_limited(x: Real, step: float) -> Real:
