@@ -15,6 +15,7 @@ from numpy.polynomial.legendre import legvander
 from hmpim.identify.arrays import Real
 from hmpim.identify.chance import FALSE_ALARM
 from hmpim.identify.fitting.candidates import almost_integrates
+from hmpim.identify.fitting.enrich import PLAIN
 from hmpim.identify.fitting.fit import jacobian
 from hmpim.identify.fitting.least_squares import solved, without
 from hmpim.identify.fitting.trial import JointFit, Trial
@@ -79,9 +80,20 @@ def with_drift(first: JointFit, fitted: Callable[[Real, bool], JointFit]) -> Dri
     columns = columns[:degree]
     # The structure is chosen once more, now that the drift is known.
     joint = fitted(columns, is_white(joint.best.fit.residual))
-    if _gain(joint, degree, first, 0) < 0.0:
+    if _gain(joint, degree, first, 0) < 0.0 and not _passes_for_drift(first, joint):
         return None
     return _described(joint, columns)
+
+
+def _passes_for_drift(first: JointFit, drifting: JointFit) -> bool:
+    """Whether a rich model has a pole as slow as the record where plain dynamics and a drift do.
+
+    Of the two the drift leaves gain and bandwidths what they are.
+    """
+    fit, plain = first.best.fit, drifting.best.fit
+    slow = almost_integrates(fit) and not fit.structure.integrators
+    rich = fit.structure.parameters > plain.structure.parameters
+    return slow and rich and plain.structure.name in PLAIN and is_white(plain.residual)
 
 
 def drift_finding(drifting: Drifting, fs: float, unit: str) -> Finding:

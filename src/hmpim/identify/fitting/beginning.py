@@ -12,7 +12,7 @@ from hmpim.identify.fitting.fit import Fit, Problem, jacobian
 from hmpim.identify.fitting.least_squares import solved
 from hmpim.identify.fitting.sampled_rows import part_of
 from hmpim.identify.fitting.trial import Trial
-from hmpim.identify.noise.whiteness import effective_share
+from hmpim.identify.noise.whiteness import effective_share, is_white
 from hmpim.identify.signals import longest_lag
 from hmpim.identify.worth import FEW, PART, TWICE
 from hmpim.model.sampled import MARGIN
@@ -109,7 +109,8 @@ def look_again(problem: Problem, trial: Trial, seen: Seen, *, lag: int) -> Seen 
     """Samples that count after all, now that the structure is known; None if they are the same.
 
     What a band-limited input does at the ends of a record is not known: a command that starts from
-    rest has a corner there, and a spline rings about it for a few samples, a finer one for longer.
+    rest has a corner there, and a spline rings about it for a few samples, a finer one for longer,
+    and for as long as it stands out of the noise.
     Where the residual is far above the noise at samples that answer those, they do not count. If
     what is before is still no noise, the record does not begin at rest.
 
@@ -128,10 +129,16 @@ def look_again(problem: Problem, trial: Trial, seen: Seen, *, lag: int) -> Seen 
     told = _counts(problem)
     innovations = problem.innovations(trial.fit.prediction, trial.fit.residual)
     if trial.intersample == "bandlimited":
-        late = np.arange(count) - trial.fit.delay
         reach = RINGS if problem.source.oversampling == 1 else MARGIN
-        ringing = (np.abs(late) <= reach) | (late >= count - 1 - reach)
+        ringing = _ringing(count, trial.fit.delay, reach)
+        if problem.noise is not None and is_white(trial.fit.residual[told & ~ringing]):
+            innovations = trial.fit.residual  # it is the ends that have the colour
         if _stands_out(innovations, told & ringing, told & ~ringing):
+            while reach < FEW * count:
+                wider = _ringing(count, trial.fit.delay, 2 * reach)
+                if not _stands_out(innovations, told & wider & ~ringing, told & ~wider):
+                    break
+                reach, ringing = 2 * reach, wider
             return replace(seen, valid=~ringing if seen.valid is None else seen.valid & ~ringing)
     if seen.begins is not None:
         return begin_later(seen, trial.fit)
@@ -140,6 +147,12 @@ def look_again(problem: Problem, trial: Trial, seen: Seen, *, lag: int) -> Seen 
         # Noise of the colour of a mode explains its free response, and more of it than there is.
         begins = begins_of(replace(problem, noise=None, told=None), trial.fit, lag=lag)
     return None if begins is None else _from(seen, begins, count)
+
+
+def _ringing(count: int, delay: float, reach: int) -> Mask:
+    """Samples that answer those within reach of either end of the record."""
+    late = np.arange(count) - delay
+    return np.asarray((np.abs(late) <= reach) | (late >= count - 1 - reach))
 
 
 def begin_later(seen: Seen, fit: Fit) -> Seen | None:

@@ -21,7 +21,7 @@ from hmpim.identify.fitting.unexplained import unexplained_response
 from hmpim.identify.noise.misfit import misfit
 from hmpim.identify.noise.whiteness import effective_share, is_white
 from hmpim.identify.signals import longest_lag
-from hmpim.identify.worth import FEW, MATERIAL, MUCH, PART, TWICE
+from hmpim.identify.worth import FEW, MUCH, PART, TWICE, WORTH
 from hmpim.model.dynamics import STRUCTURES, Structure, StructureName, coefficients_of
 from hmpim.model.response import slowest_time_constant
 from hmpim.record import BETWEEN, Intersample
@@ -205,9 +205,7 @@ def is_worth_explaining(problem: Problem, fit: Fit, data: Data) -> bool:
     left = misfit(data.u, fit.residual, delay=fit.delay, band=band)
     spread = _spread(problem)
     owed = float(np.sqrt(left.share * fit.cost / spread)) if spread else 0.0
-    if left.probability < FALSE_ALARM and (
-        owed > MATERIAL or _misses_part(problem, fit, data, band)
-    ):
+    if left.probability < FALSE_ALARM and (owed > WORTH or _misses_part(problem, fit, data, band)):
         return True
     return _is_poor(fit, spread)
 

@@ -31,14 +31,14 @@ from hmpim.identify.fitting.course import (
 from hmpim.identify.fitting.data import FINAL_PRECISION, refit
 from hmpim.identify.fitting.enrich import INTEGRATING, PLAIN, RICH
 from hmpim.identify.fitting.fit import Fit, Problem, fit_structure
-from hmpim.identify.fitting.growth import grow, hidden_pole
+from hmpim.identify.fitting.growth import Growth, grow, hidden_pole
 from hmpim.identify.fitting.software import software_fit
 from hmpim.identify.fitting.trial import JointFit, Trial, likeliest_of, trial_of
 from hmpim.identify.fitting.unrelated import is_unrelated
 from hmpim.identify.fitting.whitening import is_contradicted, noise_of, refit_whitened
 from hmpim.identify.noise.whiteness import effective_share, is_white
 from hmpim.identify.worth import TWICE
-from hmpim.model.dynamics import Structure, StructureName
+from hmpim.model.dynamics import StructureName
 from hmpim.record import BETWEEN, Intersample
 
 __all__ = ["joint_fit"]
@@ -152,38 +152,74 @@ def _is_needlessly_coloured(problem: Problem, fit: Fit) -> bool:
 
 
 def grow_poles(joint: JointFit, course: Course, structures: tuple[StructureName, ...]) -> JointFit:
-    """Add poles that the likelihood pays for, and note what it leaves open."""
-    best, weighed = joint.best, joint.weighed
+    """Add poles that the likelihood pays for, and note what it leaves open.
+
+    Where a pole is missing, half a sample or a zero may stand in for it: the likeliest natural
+    trials without zeros and with them grow too, and one leads that has become the likelier.
+    """
+    growth = _grown_from(joint, joint.best, course, structures)
+    led, found = joint.best, list(joint.trials)
+    found += growth.grown
+    if growth.grown:
+        led = growth.grown[-1]
+    for rival in _others_to_grow(joint, course.natural):
+        one = _grown_from(joint, rival, course, structures)
+        found += one.grown
+        if one.grown and one.grown[-1].criterion < led.criterion:
+            growth, led = one, one.grown[-1]
+    joint = replace(joint, trials=tuple(found), rivals=growth.rivals, hidden=growth.hidden)
+    return joint if led is joint.best else _led_by(led, joint, course)
+
+
+def _led_by(led: Trial, joint: JointFit, course: Course) -> JointFit:
+    """The joint fit with another best trial, polished, and that under the other assumptions."""
+    weighed = course.data.problem(led.intersample, course.counted)
+    polished = fit_structure(weighed, led.fit.structure, led.fit.theta, precision=FINAL_PRECISION)
     count = weighed.counted * joint.weighed_share
-
-    def refit(structure: Structure, theta: NDArray[np.float64]) -> Trial:
-        return trial_of(best.intersample, fit_structure(weighed, structure, theta), count)
-
-    growth = grow(
-        best,
-        hidden=lambda trial: hidden_pole(weighed, trial.fit),
-        refit=refit,
-        count=count,
-        names=structures,
-        white=lambda trial: is_white(trial.fit.residual),
-    )
-    if not growth.grown:
-        return replace(joint, rivals=growth.rivals, hidden=growth.hidden)
-    *between, last = growth.grown
-    polished = fit_structure(weighed, last.fit.structure, last.fit.theta, precision=FINAL_PRECISION)
-    best = trial_of(last.intersample, polished, count)
+    best = trial_of(led.intersample, polished, count)
     others = () if course.alone else (m for m in BETWEEN if m != best.intersample)
     problems = {mode: course.data.problem(mode, course.counted) for mode in others}
     moved = [
         trial_of(mode, refit_between(problem, polished, best.intersample, mode), count)
         for mode, problem in problems.items()
     ]
-    return replace(
-        joint,
-        best=best,
-        trials=(*joint.trials, *between, *moved, best),
-        rivals=growth.rivals,
-        hidden=growth.hidden,
+    trials = [*(trial for trial in joint.trials if trial is not led), *moved, best]
+    fresh = settle(course, trials, best, joint.effective_share)
+    return replace(fresh, rivals=joint.rivals, hidden=joint.hidden)
+
+
+def _others_to_grow(joint: JointFit, natural: Intersample) -> list[Trial]:
+    """The likeliest natural trials without zeros and with them, but for the best itself."""
+    hopeful = [
+        trial
+        for trial in joint.trials
+        if trial.intersample == natural
+        and trial.fit.objective < TWICE * joint.best.fit.objective
+        and trial.fit.structure.integrators == joint.best.fit.structure.integrators
+    ]
+    found = []
+    for with_zeros in (False, True):
+        alike = [t for t in hopeful if bool(t.fit.structure.zeros) == with_zeros]
+        if alike and joint.best not in alike:
+            found.append(min(alike, key=lambda trial: trial.criterion))
+    return found
+
+
+def _grown_from(
+    joint: JointFit, trial: Trial, course: Course, structures: tuple[StructureName, ...]
+) -> Growth[Trial]:
+    """Where a trial ends that poles are added to."""
+    problem = course.data.problem(trial.intersample, course.counted)
+    count = problem.counted * joint.weighed_share
+    return grow(
+        trial,
+        hidden=lambda one: hidden_pole(problem, one.fit),
+        refit=lambda structure, theta: trial_of(
+            trial.intersample, fit_structure(problem, structure, theta), count
+        ),
+        count=count,
+        names=structures,
+        white=lambda one: is_white(one.fit.residual),
     )
 
 

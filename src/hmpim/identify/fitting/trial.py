@@ -80,9 +80,10 @@ def trial_of(mode: Intersample, fit: Fit, count: float, *, floor: float = 0.0) -
 
 
 def likeliest_of(trials: list[Trial], natural: Intersample) -> Trial:
-    """The likeliest trial; under the natural assumption unless the odds are beyond 20."""
+    """The likeliest trial; a natural one no richer than it unless the odds are beyond 20."""
     best = min(trials, key=lambda trial: trial.criterion)
-    rivals = [trial for trial in trials if trial.intersample == natural]
+    most = best.fit.structure.parameters
+    rivals = [t for t in trials if t.intersample == natural and t.fit.structure.parameters <= most]
     if not rivals or best in rivals:
         return best
     rival = min(rivals, key=lambda trial: trial.criterion)

@@ -4,6 +4,7 @@ import numpy as np
 
 from hmpim.identify.chance import DEVIATIONS
 from hmpim.identify.judgement.evidence import Evidence, structure_in_words
+from hmpim.identify.reading.spanned import plainer_rivals
 from hmpim.identify.result.groups import PHASE_SPLIT
 from hmpim.identify.worth import MOST, TOLERATED
 from hmpim.record import Finding
@@ -15,13 +16,34 @@ def other_order(evidence: Evidence) -> tuple[Finding, ...]:
     """Name a structure with one more pole that is as likely: the intervals cover it."""
     joint = evidence.joint
     if not joint.rivals:
-        return ()
+        return _plainer(evidence)
     rival = joint.rivals[0].fit
     return (
         barely_told(
             joint.best.fit.structure.name,
             poles=rival.structure.order,
             delay=rival.delay / evidence.fs,
+        ),
+    )
+
+
+def _plainer(evidence: Evidence) -> tuple[Finding, ...]:
+    """Name the plainer structure that is almost as likely: the intervals cover it."""
+    joint = evidence.joint
+    rivals = plainer_rivals(joint)
+    if not rivals:
+        return ()
+    rival = min(rivals, key=lambda trial: trial.criterion).fit
+    return (
+        Finding(
+            code="structure",
+            message="This record barely distinguishes the "
+            f"{structure_in_words(joint.best.fit.structure.name)} model from the "
+            f"{structure_in_words(rival.structure.name)} one, with which the delay would be "
+            f"{rival.delay / evidence.fs:.4g} s. The intervals cover this. Lower the noise, or "
+            "sweep higher, to tell.",
+            severity="info",
+            parameters=PHASE_SPLIT,
         ),
     )
 

@@ -22,7 +22,7 @@ from hmpim.identify.result import Estimate, Parameters
 from hmpim.identify.result.groups import MODELLED, PHASE_SPLIT
 from hmpim.identify.worth import FEW
 
-__all__ = ["bent_figures", "blurred", "rivals_of", "spanned"]
+__all__ = ["bent_figures", "blurred", "plainer_rivals", "rivals_of", "spanned"]
 
 _STEP = 1e-6
 """Step of a derivative: logarithms of times, samples of delay, share of the numerator."""
@@ -43,6 +43,25 @@ def rivals_of(joint: JointFit) -> tuple[Trial, ...]:
         if trial.intersample != best.intersample:
             others.setdefault(trial.intersample, trial)
     return tuple(t for t in others.values() if t.criterion - best.criterion < 2 * CLEARLY)
+
+
+def plainer_rivals(joint: JointFit) -> tuple[Trial, ...]:
+    """Trials of other structures, with no more parameters, that the record does not exclude.
+
+    Under the chosen assumption. Their price is less, so that the odds are Schwarz's.
+    """
+    best = joint.best
+    if best.fit.structure.sampled:
+        return ()
+    most = best.fit.structure.parameters
+    return tuple(
+        trial
+        for trial in joint.trials
+        if trial.intersample == best.intersample
+        and trial.fit.structure != best.fit.structure
+        and trial.fit.structure.parameters <= most
+        and trial.criterion - best.criterion < 2 * LIKELIER
+    )
 
 
 def _is_as_likely(trial: Trial, joint: JointFit) -> bool:
@@ -83,7 +102,7 @@ def spanned(
         return [figures_of(fit, fs=fs, highest=fs / 2) for fit in fits]
 
     between = figures(trial.fit for trial in rivals_of(joint))
-    richer = figures(trial.fit for trial in joint.rivals)
+    richer = figures(trial.fit for trial in (*joint.rivals, *plainer_rivals(joint)))
     hidden, fit = joint.hidden, joint.best.fit
     if hidden is not None and (joint.rivals or hidden.may_hide):
         longest = figures_of(as_if_hidden(fit, hidden), fs=fs, highest=highest, split_alone=True)

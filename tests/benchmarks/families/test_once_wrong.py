@@ -1,0 +1,37 @@
+"""Draws that were called ok and were wrong, one for each mechanism that mends them."""
+
+import pytest
+from families.catalogue import FAMILIES
+from families.study import draw_of, identified, one
+
+
+@pytest.mark.parametrize(
+    ("family", "seed", "index"),
+    [
+        ("Bessel", 403, 2),  # a linear input stands in for a fifth pole
+        ("Bessel", 222, 0),  # and for a third
+        ("first order, held sweep", 403, 0),  # a second pole stands in for a held input
+        ("non-minimum phase", 403, 13),  # the plainer structure is almost as likely
+        ("3-2-1-1", 222, 5),
+        ("second order with a zero", 403, 11),  # a held input hides that a zero is missing
+        ("clean", 222, 8),  # a spline rings for long at the end of a sweep
+    ],
+)
+def test_a_draw_that_was_wrong_and_ok_is_not(family, seed, index):
+    assert one(family, seed, index, True).cell != "wrong_ok"
+
+
+def test_the_plainer_structure_that_is_almost_as_likely_is_named_and_covered():
+    draw = draw_of(FAMILIES["non-minimum phase"], 403, 13)
+    pair = identified(draw).pairs[0]
+    low, high = pair.parameters.delay.ci95
+    assert low < draw.figures["delay"].value < high
+    said = [w.message for w in pair.warnings if w.code == "structure"]
+    assert any("barely distinguishes" in text and "with a zero" in text for text in said)
+
+
+def test_what_the_fit_leaves_over_and_would_be_doubted_for_is_explained():
+    draw = draw_of(FAMILIES["second order with a zero"], 403, 11)
+    pair = identified(draw).pairs[0]
+    assert pair.structure == "second_order_zero"
+    assert pair.verdict == "ok"
