@@ -2,6 +2,7 @@
 
 import json
 import tomllib
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,8 +10,9 @@ import pytest
 import hmpim
 from hmpim.campaign import parse_plan, read_plan, run_campaign, shipped_plan
 from hmpim.campaign.crossing import first_crossing, samples_bandwidth
-from hmpim.campaign.grids import PARAMETERS
-from hmpim.campaign.study import make_study
+from hmpim.campaign.grids import PARAMETERS, case_grid
+from hmpim.campaign.pictures import section_pictures
+from hmpim.campaign.study import Reading, make_study
 from hmpim.campaign.write import study_page, write_study
 from hmpim.rigs.table import AXES
 from tests_support import in_studies
@@ -101,7 +103,10 @@ def test_demo_finds_all_five_axes_and_shows_them(demo):
     (section,) = study_page(study).sections
     (picture,) = section.pictures
     labels = [item.label for item in picture.figure.panels[0].items]
-    assert labels[:5] == ["roll", "yaw", "pitch", "azimuth", "elevation"]
+    noisy = picture.caption.partition("Not drawn")[2]  # what would cover the plot
+    five = ["roll", "yaw", "pitch", "azimuth", "elevation"]
+    assert labels == [axis for axis in five if axis not in noisy]
+    assert len(labels) >= 4
     assert [grid.caption.split(" ")[0] for grid in section.grids] == ["Couplings"]
     page = (folder / "study.html").read_text(encoding="utf-8")
     assert page.count('class="pass"') == 10  # in the table of the axes, and check by check
@@ -228,3 +233,32 @@ def test_without_figures_each_test_shows_all_its_cases_by_what_sets_them_apart(t
     inner, outer = section.found
     assert inner.count("−90° at ") == outer.count("−90° at ") == 2
     assert "(250 Hz); " in inner
+
+
+@pytest.mark.parametrize(("share", "drawn"), [(0.4, False), (0.6, True)])
+def test_a_curve_is_drawn_if_half_of_its_axis_is_known(demo, share, drawn):
+    row = demo[0].rows[0]
+    f = np.geomspace(0.1, 10.0, 200)
+    std = np.where(np.arange(200) < 200 * share, 0.1, 0.5)
+    told = {"frequency": f.tolist(), "real": [1.0] * 200, "imag": [0.0] * 200, "std": std.tolist()}
+    one = replace(row, pair={**row.pair, "frequency_response": told})
+    (figure,) = demo[0].plan.figures
+    pictures = section_pictures([row, one], figure, [])
+    labels = [item.label for item in pictures[0].figure.panels[0].items]
+    assert len(labels) == 1 + drawn
+    assert ("Not drawn" in pictures[0].caption) is not drawn
+
+
+def test_a_positive_figure_whose_error_exceeds_it_is_not_determined(demo):
+    row = demo[0].rows[0]
+    vague = {
+        **row.parameters,
+        "natural_frequency": Reading(value=3.0, std=5.0, unit="Hz"),
+        "damping_ratio": Reading(value=0.4, std=0.3),
+        "bias": Reading(value=0.1, std=0.5, unit="deg"),
+    }
+    grid = case_grid([replace(row, parameters=vague)], "")
+    cells = dict(zip(grid.columns, grid.rows[0], strict=True))
+    assert cells["fn (Hz)"] == "not determined"
+    assert cells["ζ"] == "0.40 ± 0.30"
+    assert cells["Bias (deg)"] == "0.10 ± 0.50"

@@ -15,6 +15,7 @@ import pytest
 import hmpim
 from hmpim.campaign import expand, parse_plan, read_plan, run_campaign, shipped_plan
 from hmpim.campaign.cases import prepare
+from hmpim.campaign.grids import change_grid
 from hmpim.campaign.rig import make_rig
 from hmpim.campaign.study import make_study, study_dict
 from hmpim.campaign.write import write_study
@@ -243,6 +244,8 @@ def test_comparison_finds_what_moved_and_only_that(finished, tmp_path):
     assert not any(change.differs for change in stepped.changes)
     other = make_study(plan, moved, earlier=earlier)
     assert [(c.axis, c.quantity) for c in other.changes if c.differs] == [("inner", "delay")]
+    # On a phone the two figures stand beside their names, and the long name of the case after them.
+    assert change_grid(other).columns == ("Axis", "Quantity", "Before", "Now", "Case")
 
 
 def test_page_needs_nothing_from_outside(finished, tmp_path):

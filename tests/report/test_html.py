@@ -358,3 +358,35 @@ def test_figures_and_numbers_are_files_of_their_own(found, tmp_path, monkeypatch
     response = np.genfromtxt(tmp_path / "response-1.csv", delimiter=",", names=True)
     measured = found["y", "u"].frequency_response
     np.testing.assert_allclose(response["real"] + 1j * response["imag"], measured.response)
+
+
+def test_a_page_has_true_minuses_and_says_what_to_do_once(found):
+    pair = found.pairs[0]
+    bias = replace(pair.parameters.bias, value=-0.6, ci95=(-0.62, -0.58))
+    said = (
+        "Sweep -1 higher. Lower the level of the stimulus, or widen the range.",
+        "Late by 3 samples",
+    )
+    warned = tuple(
+        Finding(code=code, message=message, severity="doubt", parameters=())
+        for code, message in zip(("saturation", "rate"), said, strict=True)
+    )
+    changed = replace(pair, parameters=replace(pair.parameters, bias=bias), warnings=warned)
+    text = render(replace(found, pairs=(changed,)))
+    page = Page(text)
+    shown = " ".join(page.text.values())
+    assert "−0.62" in shown
+    assert not re.search(
+        r"(?<![\w.])-\d", re.sub(r"<svg.*?</svg>|<style.*?</style>", "", text, flags=re.S)
+    )
+    assert text.count("or widen the range") == 2  # where it leads, and where all are listed
+    assert "Late by 3 samples. <code" in text
+    assert "<code>--fs</code>" in text
+    assert "`" not in shown
+
+
+def test_the_sheet_leads_with_the_verdict_alone(found, tmp_path):
+    sheet(found, tmp_path / "s.html")
+    text = (tmp_path / "s.html").read_text("utf-8")
+    banner = text[text.index('<div class="verdict') :]
+    assert re.search(r"<strong>([^<]*)</strong>", banner)[1] == "Model identified:"

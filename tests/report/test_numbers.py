@@ -6,7 +6,14 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from hmpim.identify import Estimate
-from hmpim.report.numbers import format_estimate, format_interval, format_number, plus_minus
+from hmpim.report.numbers import (
+    format_estimate,
+    format_interval,
+    format_number,
+    format_value,
+    plus_minus,
+    typeset,
+)
 
 values = st.floats(-1e12, 1e12)
 errors = st.floats(1e-12, 1e9)
@@ -73,3 +80,37 @@ def test_the_interval_reads_back(value, std):
 def test_no_number_is_a_dash():
     assert format_number(None) == "–"
     assert format_number(0.31234) == "0.3123"
+
+
+@pytest.mark.parametrize(
+    ("value", "std", "low", "unit", "positive", "text"),
+    [
+        (3.0, 5.0, -7.0, "Hz", False, "not determined"),
+        (0.4, 0.5, -0.6, "", True, "not determined"),
+        (0.4, 0.5, -0.6, "", False, "0.40 ± 0.50"),  # a bias, say
+        (3.0, 2.0, -1.0, "Hz", False, "3.0 ± 2.0"),  # known to be about three
+        (3.0, 5.0, 0.2, "Hz", False, "3.0 ± 5.0"),  # its interval excludes nothing at all
+    ],
+)
+def test_a_positive_figure_that_may_be_nothing_is_not_determined(
+    value, std, low, unit, positive, text
+):
+    estimate = Estimate(value=value, std=std, ci95=(low, value + 2 * std), unit=unit)
+    assert format_value(estimate, positive=positive) == text
+    bounded = format_interval(estimate, positive=positive).endswith("or less")
+    assert bounded == (text == "not determined")
+
+
+@pytest.mark.parametrize(
+    ("text", "shown"),
+    [
+        ("-0.5 to -0.1", "−0.5 to −0.1"),
+        ("(1.5 ± 0.2)e-09", "(1.5 ± 0.2)·10⁻⁹"),
+        ("1.5e+07 Hz", "1.5·10⁷ Hz"),
+        ("2026-11-23", "2026-11-23"),
+        ("u-1.csv, --from, /tmp/-1", "u-1.csv, --from, /tmp/-1"),
+        ("791c8e749", "791c8e749"),
+    ],
+)
+def test_numbers_are_typeset_and_names_are_not(text, shown):
+    assert typeset(text) == shown

@@ -6,7 +6,7 @@ from dataclasses import replace
 from typing import Any
 
 from hmpim.campaign.study import Reading, Row, Study
-from hmpim.report.numbers import plus_minus
+from hmpim.report.numbers import NOT_DETERMINED, plus_minus
 from hmpim.report.study import Grid
 from hmpim.report.words import GLOSSARY
 
@@ -33,8 +33,8 @@ PARAMETERS = (
 )
 """Parameters of the table of cases, and their columns."""
 
-_TOLD = ("delay", "natural_frequency", "damping_ratio", "bandwidth_phase90")
-_VAGUE = 10.0  # times its own size: an error that leaves nothing told
+_POSITIVE = {words.name for words in GLOSSARY if words.positive}
+_VAGUE = 10.0  # times its own size: an error of a delay that leaves nothing told
 _LABELS = {words.name: words.label for words in GLOSSARY}
 _INLINE = {words.name: words.inline for words in GLOSSARY}
 
@@ -81,7 +81,7 @@ def case_grid(rows: Sequence[Row], caption: str, *, explained: bool = False) -> 
         {
             **dict(zip(names, _named(row), strict=True)),
             **dict(zip(found, (_cell(row, name) for name, _ in PARAMETERS), strict=True)),
-            "−90° of the response (Hz)": _shown(row.measured_bandwidth),
+            "−90° of the response (Hz)": _shown(row.measured_bandwidth, "bandwidth_phase90"),
             **({"−90° exact (Hz)": _exact(row)} if exact else {}),
         }
         for row in rows
@@ -187,16 +187,23 @@ def _exact(row: Row) -> str:
 
 def _cell(row: Row, name: str) -> str:
     reading = row.parameters.get(name)
-    if reading is not None and name in _TOLD and reading.std > _VAGUE * abs(reading.value):
+    if name == "delay" and reading is not None and reading.std > _VAGUE * abs(reading.value):
         return "–"
     if name == "delay" and reading is not None:
         reading = replace(reading, value=1e3 * reading.value, std=1e3 * reading.std)
-    return _shown(reading)
+    return _shown(reading, name)
 
 
-def _shown(reading: Reading | None) -> str:
+def _with_unit(reading: Reading, name: str) -> str:
+    shown = _shown(reading, name)
+    return shown if shown == NOT_DETERMINED else f"{shown}\u00a0{reading.unit}".rstrip()
+
+
+def _shown(reading: Reading | None, name: str) -> str:
     if reading is None:
         return "–"
+    if name in _POSITIVE and math.inf > reading.std > abs(reading.value):
+        return NOT_DETERMINED
     return plus_minus(reading.value, reading.std) + ("" if reading.verdict == "ok" else " ?")
 
 
@@ -211,7 +218,7 @@ def check_grid(study: Study) -> Grid:
                 check.row.case_id,
                 _LABELS.get(check.wanted.quantity, check.wanted.quantity),
                 f"{bounds(check.wanted.low, check.wanted.high)} {unit}".rstrip(),
-                _shown(check.reading),
+                _shown(check.reading, check.wanted.quantity),
                 check.outcome,
             )
         )
@@ -284,14 +291,14 @@ def change_grid(study: Study) -> Grid:
     return Grid(
         caption=f"Compared with the earlier study: {len(moved)} of {len(study.changes)} figures "
         f"differ by more than three standard deviations{whole}",
-        columns=("Axis", "Case", "Quantity", "Before", "Now"),
+        columns=("Axis", "Quantity", "Before", "Now", "Case"),
         rows=tuple(
             (
                 change.axis,
-                change.case_id,
                 _LABELS.get(change.quantity, change.quantity),
-                f"{_shown(change.before)} {change.before.unit}".rstrip(),
-                f"{_shown(change.now)} {change.now.unit}".rstrip(),
+                _with_unit(change.before, change.quantity),
+                _with_unit(change.now, change.quantity),
+                change.case_id,
             )
             for change in moved
         ),

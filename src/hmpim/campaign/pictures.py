@@ -23,6 +23,7 @@ _MODES = ("P", "PV", "PVA")
 _MOST_BESIDE = 3  # columns that a page has room for
 _MARKED = "Upright lines mark the −90° bandwidths."
 _CLEAR = 0.3  # share of the response: what is less sure is left out
+_HALF = 0.5  # share of the axis over which a curve is clear: of less, noise is what is seen
 
 
 def section_pictures(
@@ -45,22 +46,36 @@ def section_pictures(
         return [_picture("levels", figure.title, words, drawn)]
     if figure.compare == "axes":
         over = _overlaid(rows, rows, "axes")
-        return [] if over is None else [_picture("axes", figure.title, words, over, more=_MARKED)]
+        more = _MARKED + _left_out(rows, rows, "axes")
+        return [] if over is None else [_picture("axes", figure.title, words, over, more=more)]
     for axis in dict.fromkeys(row.axis for row in rows):
         if figure.compare == "fence":
             fence = _fence([row for row in rows if row.axis == axis])
             pictures.append(_picture(axis, f"{figure.title}: {axis}", words, fence))
             continue
-        over = _overlaid([row for row in rows if row.axis == axis], rows, figure.compare)
+        some = [row for row in rows if row.axis == axis]
+        over = _overlaid(some, rows, figure.compare)
         if over is not None:
             title = f"{figure.title}: {axis}"
-            pictures.append(_picture(axis, title, words, over, more=_MARKED))
+            more = _MARKED + _left_out(some, rows, figure.compare)
+            pictures.append(_picture(axis, title, words, over, more=more))
     return pictures
+
+
+def _left_out(rows: Sequence[Row], every: Sequence[Row], compare: Compare) -> str:
+    """Which curves are not drawn, and why."""
+    noisy = [case_label(row, compare, every) for row in rows if not _is_clear(row)]
+    if not noisy:
+        return ""
+    return (
+        f" Not drawn, as less than half of it is known to {100 * _CLEAR:.0f} %: {'; '.join(noisy)}."
+    )
 
 
 def _overlaid(rows: Sequence[Row], every: Sequence[Row], compare: Compare) -> Description | None:
     """Responses side by side where they are few, else over each other; bandwidths marked."""
-    seen = [(row, curve) for row in rows if (curve := _curve(row)) is not None]
+    drawn = [row for row in rows if _is_clear(row)]
+    seen = [(row, curve) for row in drawn if (curve := _curve(row)) is not None]
     if not seen:
         return None
     if compare == "modes":
@@ -153,6 +168,18 @@ def pair_of(row: Row, *, clear: bool = False) -> PairIdentification:
             "candidates": [],
         }
     )
+
+
+def _is_clear(row: Row) -> bool:
+    """Whether a response is known over at least half of the axis that it is drawn on."""
+    response = row.pair["frequency_response"]
+    f = np.array(response["frequency"], dtype=np.float64)
+    if not np.any(f > 0):
+        return False
+    parts = zip(response["real"], response["imag"], response["std"], strict=True)
+    clear = [std is not None and std < _CLEAR * math.hypot(re, im) for re, im, std in parts]
+    width = np.gradient(np.log(f)) if f.size > 1 else np.ones(1)  # each one's share of the axis
+    return bool(width[clear].sum() >= _HALF * width.sum())
 
 
 def _curve(row: Row) -> BodeCurve | None:

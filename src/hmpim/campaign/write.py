@@ -25,6 +25,7 @@ from hmpim.campaign.plan import FigurePlan
 from hmpim.campaign.sheets import write_sheets
 from hmpim.campaign.study import Study, study_dict
 from hmpim.formats.atomic import replacing, write_text
+from hmpim.report.numbers import typeset
 from hmpim.report.study import Grid, Section, StudyPage, render_study
 
 __all__ = [
@@ -234,7 +235,7 @@ def markdown(page: StudyPage, pictures: str) -> str:
 
 def _grid(grid: Grid) -> list[str]:
     def line(cells: Sequence[str]) -> str:
-        return "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"
+        return "| " + " | ".join(typeset(cell).replace("|", "\\|") for cell in cells) + " |"
 
     ruler = line(["---"] * len(grid.columns))
     note = [grid.note, ""] if grid.note else []

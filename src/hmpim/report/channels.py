@@ -224,16 +224,10 @@ def channels_page(found: Survey, path: str | PathLike[str], *, source: str) -> N
     source : str
         The file as the person named it.
     """
-    from jinja2 import Environment, PackageLoader, StrictUndefined
     from markupsafe import Markup
 
-    environment = Environment(
-        loader=PackageLoader("hmpim.report"),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
+    from hmpim.report.html import page_environment
+
     rows = []
     reasons = dict(found.proposal.reasons)
     for k, (d, series) in enumerate(zip(found.descriptions, found.series, strict=True)):
@@ -252,15 +246,19 @@ def channels_page(found: Survey, path: str | PathLike[str], *, source: str) -> N
                 "picture": picture,
             }
         )
-    page = environment.get_template("channels.html.j2").render(
-        file=found.file,
-        form=found.contents.format,
-        time=_time_words(found),
-        rows=rows,
-        lines=[*_odd(found.descriptions), *(f.message for f in _findings(found))],
-        words=found.words,
-        proposed=_proposed(found, source),
-        shown=_PICTURES,
+    page = (
+        page_environment()
+        .get_template("channels.html.j2")
+        .render(
+            file=found.file,
+            form=found.contents.format,
+            time=_time_words(found),
+            rows=rows,
+            lines=[*_odd(found.descriptions), *(f.message for f in _findings(found))],
+            words=found.words,
+            proposed=_proposed(found, source),
+            shown=_PICTURES,
+        )
     )
     write_text(path, "\n".join(printable(line) for line in page.splitlines()) + "\n")
 

@@ -13,6 +13,7 @@ from hmpim.identify import Identification
 from hmpim.plots.style import printable
 from hmpim.report.about import About
 from hmpim.report.figures import Picture
+from hmpim.report.numbers import typeset
 from hmpim.report.svg import inline_svg
 from hmpim.report.view import report_view
 from hmpim.stimulus import Stimulus
@@ -225,7 +226,21 @@ def page_environment(*packages: str) -> "Environment":
             )
         )
 
+    def _with_code(text: str) -> Markup:
+        """Words between backticks as code."""
+        parts = [
+            Markup("<code>{}</code>" if k % 2 else "{}").format(part)
+            for k, part in enumerate(text.split("`"))
+        ]
+        return Markup("").join(parts)
+
+    def shown(value: Any) -> Any:
+        return (
+            typeset(value) if isinstance(value, str) and not hasattr(value, "__html__") else value
+        )
+
     environment = Environment(
+        finalize=shown,
         loader=ChoiceLoader([PackageLoader(name) for name in (*packages, "hmpim.report")]),
         autoescape=True,
         undefined=StrictUndefined,
@@ -233,4 +248,5 @@ def page_environment(*packages: str) -> "Environment":
         lstrip_blocks=True,
     )
     environment.globals["svg"] = svg
+    environment.filters["code"] = _with_code
     return environment

@@ -1,16 +1,40 @@
 """Numbers for people: the error to two digits, the value to match."""
 
+import re
+
 from hmpim.identify import Estimate
 from hmpim.identify.result.digits import aside, interval, plus_minus
 
-__all__ = ["format_estimate", "format_interval", "format_number", "format_value", "plus_minus"]
+__all__ = [
+    "NOT_DETERMINED",
+    "format_estimate",
+    "format_interval",
+    "format_number",
+    "format_value",
+    "plus_minus",
+    "typeset",
+]
+
+NOT_DETERMINED = "not determined"
+"""In place of a positive figure that may be nothing, and whose error exceeds it."""
+
+_MINUS = re.compile(r"(?<![\w./=-])-(?=\d)")
+_POWER = re.compile(r"(?<=[\d)])e([+-])0*(\d+)\b")
+_RAISED = str.maketrans("0123456789-", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻")
 
 _ROUNDING = 1e-12
 """Error over value that is arithmetic's and not the record's."""
 
 
-def format_value(estimate: Estimate) -> str:
+def format_value(estimate: Estimate, *, positive: bool = False) -> str:
     """Write an estimate without its unit: ``value ± std``, or how far it may lie to either side.
+
+    Parameters
+    ----------
+    estimate : Estimate
+        What was found.
+    positive : bool
+        Whether it is of a quantity that cannot be 0 or less, as any in Hz.
 
     Examples
     --------
@@ -26,17 +50,15 @@ def format_value(estimate: Estimate) -> str:
     >>> format_value(Estimate(value=35.7572, std=0.2, ci95=None, unit="Hz", verdict="doubtful"))
     '35.76 ± ?'
     >>> format_value(Estimate(value=21.3, std=7183.0, ci95=(-14000.0, 14500.0), unit="Hz"))
-    '21 ± 7200'
+    'not determined'
     """
+    if _undetermined(estimate, positive):
+        return NOT_DETERMINED
     if estimate.ci95 is None:
         return f"{format_number(estimate.value)} ± ?"
     if _exact(estimate):
         return f"{estimate.value:.10g} ± 0"
     if estimate.std is not None:
-        if estimate.unit == "Hz" and estimate.std > abs(estimate.value):
-            # No frequency is 0, as rounding to the error would have it.
-            error = float(f"{estimate.std:.2g}")
-            return f"{estimate.value:.2g} ± {error:g}"
         return plus_minus(estimate.value, estimate.std)
     return aside(estimate.value, *estimate.ci95)
 
@@ -49,7 +71,19 @@ def format_estimate(estimate: Estimate) -> str:
     >>> format_estimate(Estimate(value=9.987, std=0.03, ci95=(9.928, 10.046), unit="Hz"))
     '9.987 ± 0.030 Hz'
     """
-    return f"{format_value(estimate)} {estimate.unit}".rstrip()
+    value = format_value(estimate)
+    return value if value == NOT_DETERMINED else f"{value} {estimate.unit}".rstrip()
+
+
+def _undetermined(estimate: Estimate, positive: bool) -> bool:
+    """Whether a positive figure may be nothing, and its error exceeds it."""
+    low = (estimate.ci95 or (None, None))[0]
+    return (
+        (positive or estimate.unit == "Hz")
+        and estimate.ci95 is not None
+        and (low is None or low <= 0.0)
+        and estimate.spread > abs(estimate.value)
+    )
 
 
 def _exact(estimate: Estimate) -> bool:
@@ -58,8 +92,15 @@ def _exact(estimate: Estimate) -> bool:
     return known and estimate.spread <= _ROUNDING * abs(estimate.value)
 
 
-def format_interval(estimate: Estimate) -> str:
+def format_interval(estimate: Estimate, *, positive: bool = False) -> str:
     """Write the 95 % interval with as many places as the value has.
+
+    Parameters
+    ----------
+    estimate : Estimate
+        What was found.
+    positive : bool
+        As for `format_value`: such an interval does not reach below 0.
 
     Examples
     --------
@@ -67,10 +108,14 @@ def format_interval(estimate: Estimate) -> str:
     '9.928 to 10.046'
     >>> format_interval(Estimate(value=0.15, std=None, ci95=(0.1474, None), unit="s"))
     '0.1474 or more'
+    >>> format_interval(Estimate(value=3.0, std=5.0, ci95=(-7.0, 13.0), unit="Hz"))
+    '13.0 or less'
     """
     if _exact(estimate) or estimate.ci95 is None:
         return "–"
-    low, high = estimate.ci95 or (None, None)
+    low, high = estimate.ci95
+    if high is not None and _undetermined(estimate, positive):
+        low = None
     return interval(low, high, value=estimate.value, std=estimate.std)
 
 
@@ -83,3 +128,15 @@ def format_number(value: float | None) -> str:
     ('0.17', '1235', '–')
     """
     return "–" if value is None else f"{value:.4g}"
+
+
+def typeset(text: str) -> str:
+    """Return text with a true minus before numbers, and powers of ten as powers.
+
+    Examples
+    --------
+    >>> typeset("-0.5 to 1.2e-07, 2026-11-23, u-1, --from -3")
+    '−0.5 to 1.2·10⁻⁷, 2026-11-23, u-1, --from −3'
+    """
+    raised = _POWER.sub(lambda m: "·10" + (m[1].strip("+") + m[2]).translate(_RAISED), text)
+    return _MINUS.sub("−", raised)

@@ -9,6 +9,7 @@ from typing import Any
 from hmpim.errors import MissingExtraError
 from hmpim.plots.style import printable
 from hmpim.report.figures import Picture
+from hmpim.report.numbers import typeset
 
 __all__ = ["check_pdf", "pdf"]
 
@@ -126,7 +127,7 @@ def _data(view: dict[str, Any], drawn: Any, *, sheet: bool) -> dict[str, Any]:
             }
             for f in view["findings"]
         ],
-        "summary": view["summary"],
+        "summary": _clean_summary(view["summary"]),
         "truth": view["with_truth"],
         "pairs": pairs,
         "more": [] if sheet else [drawn(picture) for picture in (*more, *view["pictures"])],
@@ -134,5 +135,12 @@ def _data(view: dict[str, Any], drawn: Any, *, sheet: bool) -> dict[str, Any]:
     }
 
 
+def _clean_summary(summary: dict[str, Any] | None) -> dict[str, Any] | None:
+    if summary is None:
+        return None
+    rows = [{**r, "cells": [_clean(cell) for cell in r["cells"]]} for r in summary["rows"]]
+    return {**summary, "rows": rows}
+
+
 def _clean(text: object) -> str:
-    return printable(str(text))
+    return printable(typeset(str(text)))

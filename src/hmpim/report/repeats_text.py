@@ -57,7 +57,7 @@ def repeats_table(pair: RepeatedPair) -> "Table":
         ratio = (parameter.chi_squared / parameter.freedom) ** 0.5
         cells = (
             words.label,
-            format_value(parameter.mean),
+            format_value(parameter.mean, positive=words.positive),
             parameter.mean.unit,
             format_number(parameter.repeatability),
             f"{ratio:.2f}",

@@ -83,9 +83,9 @@ def parameter_table(
             cells += ["–", "", "", ""]
         else:
             cells += [
-                format_value(estimate),
+                format_value(estimate, positive=words.positive),
                 estimate.unit,
-                format_interval(estimate),
+                format_interval(estimate, positive=words.positive),
                 estimate.verdict,
             ]
         cells.append(format_number(paper) if words.differs else "")

@@ -79,10 +79,7 @@ def report_view(
         "notes": list(notes),
         "findings": [
             {
-                "message": f.message,
-                "code": f.code,
-                "severity": f.severity,
-                "advice": advice(f),
+                **_finding_view(f),
                 "where": _where(f, main),
             }
             for f in leading
@@ -141,6 +138,20 @@ def _where(finding: Finding, pairs: Sequence[PairIdentification]) -> str:
     return f"{first} (and {more} more)" if more else first
 
 
+def _finding_view(finding: Finding) -> dict[str, str]:
+    """A finding's sentences, and what to do unless they say it already."""
+    message = finding.message.rstrip()
+    message += "" if message.endswith((".", "!", "?")) else "."
+    todo = advice(finding)
+    known = todo.rstrip(".").lower() in message.lower()
+    return {
+        "message": message,
+        "code": finding.code,
+        "severity": finding.severity,
+        "advice": "" if known else todo,
+    }
+
+
 def _summary(pairs: Sequence[PairIdentification]) -> dict[str, Any]:
     """One row for each pair that counts: its leading figures and its verdict."""
     labels = {words.name: words.label for words in GLOSSARY}
@@ -196,10 +207,7 @@ def _pair_view(
         "verdict": pair.verdict,
         "verdict_words": VERDICTS[pair.verdict],
         "sentence": pair_sentence(pair),
-        "warnings": [
-            {"message": w.message, "code": w.code, "severity": w.severity, "advice": advice(w)}
-            for w in by_weight(pair.warnings)
-        ],
+        "warnings": [_finding_view(w) for w in by_weight(pair.warnings)],
         "rows": _rows(pair, truth),
         "untold": untold(pair),
         "candidates": [
@@ -232,9 +240,13 @@ def _rows(pair: PairIdentification, truth: Mapping[str, float]) -> list[dict[str
             {
                 "name": words.name,
                 "label": words.label,
-                "value": "–" if estimate is None else format_value(estimate),
+                "value": "–"
+                if estimate is None
+                else format_value(estimate, positive=words.positive),
                 "unit": "" if estimate is None else estimate.unit,
-                "interval": "" if estimate is None else format_interval(estimate),
+                "interval": ""
+                if estimate is None
+                else format_interval(estimate, positive=words.positive),
                 "verdict": "" if estimate is None else estimate.verdict,
                 "paper": format_number(paper) if words.differs else "",
                 "remark": remark(words, estimate, paper),

@@ -31,13 +31,15 @@ __all__ = [
 class ParameterWords:
     """A parameter's name in the result, for people, its meaning, and why the paper's differs.
 
-    `differs` is empty where the paper gives no figure.
+    `differs` is empty where the paper gives no figure; `positive` says that the quantity cannot
+    be 0 or less.
     """
 
     name: str
     label: str
     meaning: str
     differs: str = ""
+    positive: bool = False
 
     @property
     def inline(self) -> str:
@@ -85,6 +87,7 @@ GLOSSARY: tuple[ParameterWords, ...] = (
         label="Noise",
         meaning="Standard deviation of the part of the output that the model cannot predict.",
         differs="equation (14) counts the error that scale factor and dynamics cause as noise",
+        positive=True,
     ),
     ParameterWords(
         name="natural_frequency",
@@ -93,6 +96,7 @@ GLOSSARY: tuple[ParameterWords, ...] = (
         "alone turn the phase by 90°.",
         differs="it is read off a noisy phase from which (25) takes the delay of (8), which is "
         "too long",
+        positive=True,
     ),
     ParameterWords(
         name="damping_ratio",
@@ -100,11 +104,13 @@ GLOSSARY: tuple[ParameterWords, ...] = (
         meaning="Damping of second-order dynamics over critical damping: below 0.7 the magnitude "
         "has a peak, above 1 the step response does not overshoot.",
         differs="it is read off the peak of a noisy, windowed magnitude",
+        positive=True,
     ),
     ParameterWords(
         name="time_constant",
         label="Time constant",
         meaning="Time in which first-order dynamics go 63 % of the way after a step.",
+        positive=True,
     ),
     ParameterWords(
         name="bandwidth_phase90",
@@ -112,17 +118,20 @@ GLOSSARY: tuple[ParameterWords, ...] = (
         meaning="Frequency at which the output lags by 90° in all, delay included: the paper's "
         "measure of merit.",
         differs="it is read off one noisy, windowed ratio of spectra",
+        positive=True,
     ),
     ParameterWords(
         name="bandwidth_phase90_without_delay",
         label="Bandwidth, −90° without delay",
         meaning="Frequency at which the dynamics alone turn the phase by 90°.",
+        positive=True,
     ),
     ParameterWords(
         name="bandwidth_3db",
         label="Bandwidth, −3 dB",
         meaning="Frequency at which the magnitude has fallen 3 dB below that at zero frequency.",
         differs="it is read off one noisy, windowed ratio of spectra",
+        positive=True,
     ),
     ParameterWords(
         name="peak_gain_db",
@@ -134,6 +143,7 @@ GLOSSARY: tuple[ParameterWords, ...] = (
         name="hold_period",
         label="Hold period",
         meaning="Interval at which the output is renewed and then held.",
+        positive=True,
     ),
     ParameterWords(
         name="saturation_low",
@@ -149,6 +159,7 @@ GLOSSARY: tuple[ParameterWords, ...] = (
         name="quantization_step",
         label="Quantisation step",
         meaning="Smallest step of the output.",
+        positive=True,
     ),
 )
 

@@ -88,16 +88,10 @@ def render_page(study: Study) -> str:
     >>> render_page(Study(pictures={}, rows=()))[:15]
     '<!DOCTYPE html>'
     """
-    from jinja2 import Environment, PackageLoader, StrictUndefined
     from markupsafe import Markup
 
-    environment = Environment(
-        loader=PackageLoader("hmpim.report.paper"),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
+    from hmpim.report.html import page_environment
+
     figures: list[dict[str, Any]] = [
         {
             "name": picture.title if number == ALIASING else f"Fig. {number}",
@@ -120,9 +114,8 @@ def render_page(study: Study) -> str:
         {"cells": cells(row), "figure": row.figure if row.figure in study.pictures else None}
         for row in study.rows
     ]
-    return environment.get_template("paper.html.j2").render(
-        figures=figures, rows=rows, columns=COLUMNS
-    )
+    template = page_environment("hmpim.report.paper").get_template("paper.html.j2")
+    return template.render(figures=figures, rows=rows, columns=COLUMNS)
 
 
 def _save(figure: Figure, path: Path, kind: str) -> None:
