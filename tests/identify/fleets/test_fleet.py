@@ -104,6 +104,12 @@ def test_everything_is_said_of_quiet_records_and_of_no_others(fleet):
     assert own.denominator == pytest.approx(pair.denominator, rel=1e-4)
 
 
+def test_a_record_that_almost_asks_for_other_dynamics_is_left_to_itself(fleet):
+    outputs = np.stack([output(seed) for seed in (256, 433, 44)])
+    assert "structure" in {warning.code for warning in alone(outputs[0]).warnings}
+    assert fit_fleet(fleet, outputs).sound.tolist() == [False, False, True]
+
+
 def test_units_of_two_kinds_teach_nothing():
     pairs = [alone(output(seed)) for seed in range(LEARNT - 1)]
     other = alone(sweep() + 0.02 * np.random.default_rng(0).standard_normal(SAMPLES))

@@ -22,12 +22,13 @@ import scipy
 from numpy.typing import NDArray
 
 from hmpim.identify.arrays import Mask, Real
-from hmpim.identify.chance import CLEARLY, DEVIATIONS, FALSE_ALARM, LIKELIER, ONE_SIDED
+from hmpim.identify.chance import CLEARLY, FALSE_ALARM, LIKELIER, ONE_SIDED
 from hmpim.identify.effects.imperfections import find_imperfections
 from hmpim.identify.fleets.fits import Errors, Fits, errors_of, fitted_all
 from hmpim.identify.fleets.learnt import Fleet, Member, learn_fleet
 from hmpim.identify.fleets.pole import Tails, with_tails
 from hmpim.identify.judgement.between_samples import SIZES
+from hmpim.identify.judgement.structure import ALMOST
 from hmpim.identify.noise.misfit import misfits
 from hmpim.identify.noise.whiteness import are_white
 from hmpim.identify.result import Estimate, Parameters
@@ -42,6 +43,9 @@ Flags = Mask
 _ASKS = 0.98 * ONE_SIDED
 """Standard deviations from which one more pole is asked for: a little early, as the basis is not
 exact; the fit to the record itself then decides."""
+
+_CLOSE = 0.98 * ALMOST
+"""The same, from which on `identify` says that it almost asks for other dynamics."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -250,7 +254,7 @@ def _told(
     if "natural_frequency" in fleet.names:  # beyond the band no peak is told
         sound &= fit.figures["natural_frequency"][some] < highest
     asked = _asks_for_a_pole(fit, some, errors)
-    sound &= asked > -DEVIATIONS
+    sound &= asked > -_CLOSE
     model = fit.gain[some, None] * fit.member.surface.values(theta)[:, :-1] @ fit.member.basis
     residual = outputs - outputs.mean(axis=1, keepdims=True) - model
     sound[sound] = _leaves_noise(fleet, theta[sound], residual[sound])
@@ -261,7 +265,7 @@ def _told(
     for i in np.flatnonzero(sound & (asked > _ASKS)).tolist():
         own = Parameters(**{name: column.estimate(i) for name, column in alone.items()})
         tails = with_tails(fleet, fit.member, theta[i], outputs[i], own, highest=highest)
-        sound[i] = tails is not None
+        sound[i] = tails is not None and (tails.open or asked[i] < _CLOSE)
         if tails is not None and tails.open:
             codes[i] = ("structure", *codes[i])
             asking[i] = tails

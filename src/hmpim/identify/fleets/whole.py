@@ -159,6 +159,7 @@ def whole_pairs(
     power = np.vecdot(centred, centred)
     simpler = np.stack([costs_of(fleet, one, centred, power) for one in whole.simpler], axis=1)
     found: list[PairIdentification | None] = [None] * outputs.shape[0]
+    bandwidths = [name for name in _BANDWIDTHS if name in fleet.names]
     for group in fit.groups:
         behind, some = simpler[group.some], group.some
         quiet = are_quiet(fleet, group, outputs[some], behind=behind, sweep=whole.sweep)
@@ -174,7 +175,7 @@ def whole_pairs(
             i = int(some[k])
             y = outputs[i]
             system = _system(fleet, group, k)
-            own = _parameters(group.alone, k)
+            own = _parameters({name: group.alone[name] for name in bandwidths}, k)
             measured = response_bandwidths(
                 response, system, own, fs=fleet.fs, intersample=group.fit.member.intersample
             )

@@ -9,7 +9,10 @@ from hmpim.identify.result.groups import PHASE_SPLIT
 from hmpim.identify.worth import MOST, TOLERATED
 from hmpim.record import Finding
 
-__all__ = ["barely_told", "missed_pole", "other_order"]
+__all__ = ["ALMOST", "barely_told", "missed_pole", "other_order"]
+
+ALMOST = DEVIATIONS - 1.0
+"""Standard deviations from which on another run may ask for other dynamics."""
 
 
 def other_order(evidence: Evidence) -> tuple[Finding, ...]:
@@ -84,7 +87,8 @@ def missed_pole(evidence: Evidence) -> tuple[Finding, ...]:
     order, fs = evidence.joint.best.fit.structure.order, evidence.fs
     moved = float(np.sqrt(abs(hidden.squared)))
     asked = abs(hidden.squared) / hidden.std if hidden.std > 0.0 else 0.0
-    close = "Another run may give the opposite verdict. " if abs(asked - DEVIATIONS) < 1.0 else ""
+    may_turn = abs(asked - DEVIATIONS) < DEVIATIONS - ALMOST
+    close = "Another run may give the opposite verdict. " if may_turn else ""
     level = f"({asked:.1f} standard deviations; a doubt from {DEVIATIONS:.1f} on)"
     poles = f"{order} pole{'s' * (order != 1)}"
     matters = moved > TOLERATED * hidden.scale

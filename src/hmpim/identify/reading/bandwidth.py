@@ -6,6 +6,8 @@ flat, its phase does not wrap, and a straight line through the neighbours of a f
 far measurement and model part there, and where the measurement crosses.
 """
 
+from dataclasses import replace
+
 import numpy as np
 
 from hmpim.identify.arrays import Complex, Real
@@ -13,7 +15,7 @@ from hmpim.identify.reading.sampled_response import sampled_response
 from hmpim.identify.result import Estimate, FrequencyResponse, Parameters, ResponseBandwidths
 from hmpim.identify.result.error_bars import estimate
 from hmpim.identify.worth import PART
-from hmpim.model import RationalDelay, phase, response
+from hmpim.model import RationalDelay, response
 from hmpim.record import Intersample
 
 __all__ = ["ratio_at", "response_bandwidths"]
@@ -97,12 +99,15 @@ def response_bandwidths(
         if found is None:
             return None
         ratio, std = found
+        steep = _slope(system, value)
         if kind == "gain":
-            steep = _gain_slope(system, value)
-            shift, spread = -(abs(ratio) - 1.0) / steep, (std / np.sqrt(2)) / abs(steep)
+            rise = steep.real
+            shift = -(abs(ratio) - 1.0) / rise
         else:
-            steep = _phase_slope(system, value, delay=kind == "phase")
-            shift, spread = -float(np.angle(ratio)) / steep, (std / np.sqrt(2)) / abs(steep)
+            late = 2 * np.pi * system.delay if kind == "phase" else 0.0
+            rise = steep.imag - late
+            shift = -float(np.angle(ratio)) / rise
+        spread = std / np.sqrt(2) / abs(rise)
         return estimate(value + shift, float(spread) ** 2, freedom=_MANY, unit="Hz")
 
     return ResponseBandwidths(
@@ -114,15 +119,8 @@ def response_bandwidths(
     )
 
 
-def _gain_slope(system: RationalDelay, f: float) -> float:
-    """Derivative of ln|G| by frequency, 1/Hz."""
+def _slope(system: RationalDelay, f: float) -> complex:
+    """Derivative of ln G by frequency, 1/Hz, without the delay: of the gain, and of the phase."""
     step = 1e-4 * f
-    low, high = np.abs(response(system, np.array([f - step, f + step])))
-    return float(np.log(high / low) / (2 * step))
-
-
-def _phase_slope(system: RationalDelay, f: float, *, delay: bool) -> float:
-    """Derivative of the phase by frequency, rad/Hz."""
-    step = 1e-4 * f
-    low, high = phase(system, np.array([f - step, f + step]), delay=delay)
-    return float((high - low) / (2 * step))
+    low, high = response(replace(system, delay=0.0), np.array([f - step, f + step]))
+    return complex(np.log(high / low) / (2 * step))
