@@ -102,3 +102,23 @@ def test_bad_input_is_one_line(folder, tmp_path):
     done = run("runs", folder, "--where", "name = alone*", "--compare")
     assert done.exit_code == 2
     assert "0 of these runs have a result" in done.stderr
+
+
+def test_what_a_hidden_folder_holds_is_no_run(tmp_path):
+    (tmp_path / ".workbench" / "checks").mkdir(parents=True)
+    record = bench(0.05, 1)
+    hmpim.save(record, tmp_path / ".workbench" / "checks" / "run.h5")
+    hmpim.save(record, tmp_path / "seen.h5")
+    assert [found.name for found in find_runs(tmp_path).runs] == ["seen.h5"]
+    assert [found.name for found in find_runs(tmp_path / ".workbench").runs] == ["checks/run.h5"]
+
+
+def test_of_two_copies_of_a_record_the_nearest_has_the_result(tmp_path):
+    record = bench(0.05, 1)
+    for name in ("a", "b"):
+        (tmp_path / name).mkdir()
+        hmpim.save(record, tmp_path / name / "run.h5")
+    hmpim.save(record, tmp_path / "b" / "again.h5")
+    hmpim.save(hmpim.identify(record), tmp_path / "b" / "run.json")
+    found = {run.name: run.found is not None for run in find_runs(tmp_path).runs}
+    assert found == {"a/run.h5": False, "b/again.h5": False, "b/run.h5": True}

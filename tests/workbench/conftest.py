@@ -30,6 +30,7 @@ def served(tmp_path_factory):
     ended(bench)
     errors = (folder / "errors.txt").read_text()
     assert "Traceback" not in errors, errors
+    assert "been deleted" not in errors, errors
 
 
 @pytest.fixture(scope="session")

@@ -269,6 +269,45 @@ def test_a_foreign_file_is_dropped_identified_read_by_eye_and_reported(page, ser
     page.get_by_text("0.15, by hand").wait_for()
 
 
+PANEL = "() => document.querySelector('.hm-picture')._fullLayout._size"
+NAMES = """() => [...document.querySelectorAll('.hm-picture')].flatMap((plot) => {
+    const room = plot.getBoundingClientRect();
+    const words = [...plot.querySelectorAll('.shape-label, .annotation, .g-xtitle, .g-ytitle')];
+    const boxes = words.map((w) => [w.textContent, w.getBoundingClientRect()]);
+    const beyond = (b) => b.left < room.left - 1 || b.right > room.right + 1
+        || b.top < room.top - 1 || b.bottom > room.bottom + 1;
+    const out = boxes.filter(([, b]) => b.width && beyond(b)).map(([t]) => `${t} is cut`);
+    const cursors = [...plot.querySelectorAll('.shape-label')];
+    for (const cursor of cursors) for (const [t, b] of boxes) {
+        const a = cursor.getBoundingClientRect();
+        if (t !== cursor.textContent && b.width && a.left < b.right && b.left < a.right
+            && a.top < b.bottom && b.top < a.bottom) out.push(`${cursor.textContent} over ${t}`);
+    }
+    return out;
+})"""
+
+
+@pytest.mark.browser
+def test_a_narrower_window_keeps_the_height_of_plots_and_paper_has_no_controls(page, served):
+    save(recorded(), served.runs / "narrow.h5")
+    wish = Analysis(file="narrow.h5", inputs=("u",), outputs=("y",))
+    go(page, served, "analyse", desk_of(served, Desk(name=secrets.token_hex(8), analysis=wish)))
+    page.wait_for_selector(".hm-picture[data-drawn]")
+    page.wait_for_function("() => [...document.querySelectorAll('.hm-picture')]"
+                           ".every((p) => p.dataset.drawn)")  # fmt: skip
+    wide = page.evaluate(PANEL)
+    assert page.evaluate(NAMES) == []
+    page.set_viewport_size({"width": 390, "height": 800})
+    page.wait_for_function("() => document.querySelector('.hm-picture')._fullLayout.width < 390")
+    page.wait_for_timeout(1500)
+    assert page.evaluate(NAMES) == []
+    assert page.evaluate(PANEL)["h"] == pytest.approx(wide["h"], abs=3.0)
+    page.emulate_media(media="print")
+    for control in ("nav", "main button", "main input", ".q-uploader", ".modebar"):
+        assert not [c for c in page.locator(control).all() if c.is_visible()], control
+    assert page.get_by_text("Record: narrow.h5").is_visible()
+
+
 def test_a_file_too_large_is_refused_and_a_hostile_name_stays_inside(page, served):
     go(page, served, "analyse")
     before = {p for p in served.runs.parent.rglob("*") if p.is_file()}

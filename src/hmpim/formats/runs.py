@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, fields
 from datetime import UTC, datetime
 from fnmatch import fnmatchcase
+from functools import partial
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -100,7 +101,9 @@ class Folder:
 def find_runs(folder: str | PathLike[str]) -> Folder:
     """Read every record and every result in a folder and those below; join those of one run.
 
-    A result belongs to the record whose digest it names.
+    Hidden folders, such as what the workbench keeps for itself, are left out.
+
+    A result belongs to the record whose digest it names; of copies of it, to the nearest.
 
     Parameters
     ----------
@@ -129,6 +132,8 @@ def find_runs(folder: str | PathLike[str]) -> Folder:
     results: list[tuple[Path, Identification]] = []
     unreadable: list[tuple[str, str]] = []
     for path in sorted(p for p in place.rglob("*") if p.is_file()):
+        if any(part.startswith(".") for part in path.relative_to(place).parts[:-1]):
+            continue
         kind = _kind(path)
         try:
             if kind == "result":
@@ -241,32 +246,40 @@ def _joined(
     records: Sequence[tuple[Path, Record, str, str]],
     results: Sequence[tuple[Path, Identification]],
 ) -> Iterator[Run]:
-    by_digest: dict[str, list[tuple[Path, Identification]]] = {}
+    alike: dict[str, list[Path]] = {}
+    for path, record, *_ in records:
+        alike.setdefault(record.sha256, []).append(path)
+    of_record: dict[Path, list[tuple[Path, Identification]]] = {}
+    left: list[tuple[Path, Identification]] = []
     for path, found in results:
-        by_digest.setdefault(found.record.sha256, []).append((path, found))
+        same = alike.get(found.record.sha256, [])
+        kept = of_record.setdefault(min(same, key=partial(_apart, path)), []) if same else left
+        kept.append((path, found))
     for path, record, created, rig in records:
-        mine: list[tuple[Path | None, Identification | None]] = [
-            *by_digest.pop(record.sha256, [])
-        ] or [(None, None)]
-        for result, identified in mine:
+        mine: list[tuple[Path | None, Identification | None]] = [*of_record.get(path, [])]
+        for result, identified in mine or [(None, None)]:
             yield _of_record(
                 place, path, record, created or _changed(path), rig, result, identified
             )
-    for left in by_digest.values():
-        for path, found in left:
-            yield Run(
-                name=str(path.relative_to(place)),
-                created=_changed(path),
-                source="",
-                rig="",
-                inputs=tuple(dict.fromkeys(pair.input for pair in found.pairs)),
-                outputs=tuple(dict.fromkeys(pair.output for pair in found.pairs)),
-                fs=found.record.fs,
-                duration=found.record.samples / found.record.fs,
-                samples=found.record.samples,
-                result=path,
-                found=found,
-            )
+    for path, found in left:
+        yield Run(
+            name=str(path.relative_to(place)),
+            created=_changed(path),
+            source="",
+            rig="",
+            inputs=tuple(dict.fromkeys(pair.input for pair in found.pairs)),
+            outputs=tuple(dict.fromkeys(pair.output for pair in found.pairs)),
+            fs=found.record.fs,
+            duration=found.record.samples / found.record.fs,
+            samples=found.record.samples,
+            result=path,
+            found=found,
+        )
+
+
+def _apart(result: Path, record: Path) -> tuple[bool, bool]:
+    """How unlike two places are: folder first, then name; of copies the nearest has the result."""
+    return record.parent != result.parent, not result.stem.startswith(record.stem)
 
 
 def _of_record(

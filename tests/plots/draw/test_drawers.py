@@ -226,3 +226,17 @@ def test_words_below_a_narrow_panel_stand_upright_and_a_level_word_stays_inside(
     assert drawn.count("rotate(-90") == len(names)  # no label beside the panel
     x = float(drawn.partition(">bound<")[0].rpartition('<text x="')[2].partition('"')[0])
     assert x + text_width("bound") <= narrow.left + narrow.width + 0.1
+
+
+@pytest.mark.parametrize(("share", "between"), [(True, 20.0), (False, 60.0)])
+def test_panels_of_plotly_have_their_height_and_room_between_them(share, between):
+    panel = Panel(x=Axis(label="Time (s)"), y=Axis(label="y (V)"), title="A title")
+    panels = (panel, replace(panel, row=1), replace(panel, row=2))
+    figure = Figure(panels=panels, heights=(1.4, 2.0, 1.1), share_x=share, alt="Nothing.")
+    layout = figure.to_plotly()["layout"]
+    inside = layout["height"] - layout["margin"]["t"] - layout["margin"]["b"]
+    domains = [layout[f"yaxis{number}"]["domain"] for number in ("", "2", "3")]
+    heights = [inside * (top - foot) for foot, top in domains]
+    assert heights == pytest.approx([96 * inches for inches in figure.heights], abs=1.0)
+    gaps = [inside * (above[0] - below[1]) for above, below in pairwise(domains)]
+    assert min(gaps) > between

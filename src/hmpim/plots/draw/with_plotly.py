@@ -38,6 +38,7 @@ _MARKERS: dict[Marker, str] = {
 }  # fmt: skip
 _PER_INCH = 96.0
 _GAP = 0.09  # between columns, as a share of the width
+_ABOVE, _BELOW = 40, 52  # px beside the panels: legend; numbers and name of the axis
 
 
 def draw(figure: Figure, *, most_points: int = 4000) -> dict[str, Any]:
@@ -67,8 +68,8 @@ def draw(figure: Figure, *, most_points: int = 4000) -> dict[str, Any]:
     data: list[dict[str, Any]] = []
     layout: dict[str, Any] = {
         "meta": {"alt": figure.alt},
-        "height": round(_PER_INCH * (sum(figure.heights) + 0.8)),
-        "margin": {"l": 64, "r": 16, "t": 40, "b": 48},
+        "height": round(_PER_INCH * _inches(figure) + _ABOVE + _BELOW),
+        "margin": {"l": 64, "r": 16, "t": _ABOVE, "b": _BELOW},
         "paper_bgcolor": "rgba(0,0,0,0)",
         "plot_bgcolor": "rgba(0,0,0,0)",
         "legend": {"orientation": "h", "x": 1.0, "xanchor": "right", "y": 1.0, "yanchor": "bottom"},
@@ -143,11 +144,20 @@ def _width(figure: Figure, panel: Panel) -> list[float]:
 
 def _height(figure: Figure, panel: Panel) -> list[float]:
     """Share of the height, from below; panels that share an axis stand closer."""
-    gap = 0.25 if figure.share_x else 0.6
-    whole = sum(figure.heights) + gap * (len(figure.heights) - 1)
-    above = sum(figure.heights[: panel.row]) + gap * panel.row
+    whole = _inches(figure)
+    above = sum(figure.heights[: panel.row]) + _between(figure) * panel.row
     top = 1.0 - above / whole
     return [max(top - figure.heights[panel.row] / whole, 0.0), top]
+
+
+def _inches(figure: Figure) -> float:
+    """From the top of the first panel to the foot of the last."""
+    return sum(figure.heights) + _between(figure) * (len(figure.heights) - 1)
+
+
+def _between(figure: Figure) -> float:
+    """Inches between two panels: room for a title, and for an axis of its own."""
+    return 0.25 if figure.share_x else 0.75
 
 
 _Parts = tuple[list[dict[str, Any]], list[dict[str, Any]], list[dict[str, Any]]]
@@ -288,7 +298,7 @@ def _image(item: Image) -> dict[str, Any]:
         "y": middles(item.y, rows), "zmin": item.low, "zmax": item.high, "name": item.label,
         "colorscale": {"grey": "Greys", "viridis": "Viridis"}[item.palette],
         "reversescale": item.palette == "grey", "showscale": bool(item.label),
-        "colorbar": {"title": {"text": _safe(item.label)}},
+        "colorbar": {"title": {"text": _safe(item.label), "side": "right"}},
     }  # fmt: skip
 
 

@@ -42,7 +42,7 @@ class AnalysePage:
         self.looked: Looked | None = None
         self.result: ResultView | None = None
         self.automatic: tuple[tuple[Question, int], Identification] | None = None
-        with ui.element("div").classes("hm-side"):
+        with ui.element("div").classes("hm-side hm-screen"):
             with card("Record"):
                 self._uploader()
                 self.files = ui.select(
@@ -193,8 +193,8 @@ class AnalysePage:
         with failures_said():
             if not wish.inputs or not wish.outputs:
                 raise ArgumentError("choose at least one input and one output")
-            question = self.question
-            self.button.disable()
+            question, button = self.question, self.button
+            button.disable()
             self.shown.clear()
             with self.shown, ui.row().classes("hm-row"):
                 ui.spinner()
@@ -206,7 +206,8 @@ class AnalysePage:
             finally:
                 if not self.shown.is_deleted:  # else the page was left meanwhile
                     self.shown.clear()
-                    self.button.enable()
+                if not button.is_deleted:  # another file has another one
+                    button.enable()
             if self.shown.is_deleted:
                 return
             if beside is None:

@@ -39,16 +39,18 @@ class CampaignPage:
                     "Folder, inside that of the runs",
                     value=self.wish.out,
                     on_change=lambda e: self._set(out=e.value),
-                )
-                with ui.element("div").classes("hm-row"):
+                ).classes("hm-screen")
+                with ui.element("div").classes("hm-row hm-screen"):
                     self.start = ui.button("Start or resume", on_click=self._start)
                     self.stop = ui.button("Stop", on_click=self.campaigns.stop)
                     self.stop.props("color=negative")
                 self.bar = ui.linear_progress(0.0, show_value=False)
-                self.bar.props('aria-label="Share of the campaign that is done"')
+                self.bar.classes("hm-screen").props(
+                    'aria-label="Share of the campaign that is done"'
+                )
                 self.said = ui.label().classes("hm-verdict").props('role="status"')
                 self.links = ui.element("div")
-            with card("Plans that ship"):
+            with card("Plans that ship", printed=False):
                 for name in PLANS:
                     ui.button(name, on_click=lambda name=name: self._load(name)).props("flat")
         with ui.element("div").classes("hm-body"), card("Plan"):
@@ -59,8 +61,10 @@ class CampaignPage:
                     on_change=lambda e: self._set(plan=e.value),
                 )
                 .props("autogrow debounce=300 spellcheck=false")
+                .classes("hm-screen")
                 .style("font-family: ui-monospace, monospace")
             )
+            self.paper = ui.label(self.wish.plan).classes("hm-pre hm-on-paper")
             ui.button("Check the plan", on_click=self._check).props("flat")
         self.command = Command()
         self._say_command()
@@ -74,6 +78,7 @@ class CampaignPage:
 
     def _set(self, **changes: Any) -> None:
         self.window.change(campaign=replace(self.wish, **changes))
+        self.paper.set_text(self.wish.plan)
         self._say_command()
 
     def _say_command(self) -> None:

@@ -39,7 +39,7 @@ class CheckPage:
     def __init__(self, window: Window) -> None:
         self.window, self.bench = window, window.workbench.rig
         self.asked: tuple[int, str] | None = None
-        with ui.element("div").classes("hm-side"), card("Rig"):
+        with ui.element("div").classes("hm-side hm-screen"), card("Rig"):
             self.choice = rig_choice(window)
             ui.label(
                 "The check arms the rig, moves it at 5 % of the amplitude, and disarms it."
@@ -52,10 +52,11 @@ class CheckPage:
                 .classes("hm-stop")
             )
         with ui.element("div").classes("hm-body"), card("Before a run"):
+            self.rig = ui.label().classes("hm-on-paper")
             self.verdict = ui.label().classes("hm-verdict").props('role="status"')
             with ui.element("ul").classes("hm-lights"):
                 self.lights = {name: self._light(name) for name in LIGHTS}
-            ui.link("To the run", f"/run?desk={window.name}")
+            ui.link("To the run", f"/run?desk={window.name}").classes("hm-screen")
         self.command = Command(
             "from hmpim.experiment.readiness import limits_light, error_light, ...\n"
             "limits_light(rig, stimuli), error_light(stimuli, model=model, noise_std=0.1, "
@@ -101,6 +102,7 @@ class CheckPage:
         self._noted()
         desk, bench = self.window.desk, self.bench
         running = bench.state == "running"
+        self.rig.set_text(f"Rig: {desk.rig}")
         mine = self.asked is not None and self.asked[0] == bench.count
         fresh = desk.checked.digest == digest(desk.wish, desk.rig)
         self.button.set_enabled(bool(desk.rig) and bench.state != "running")

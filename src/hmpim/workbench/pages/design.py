@@ -59,7 +59,7 @@ class DesignPage:
         self.spectrogram_of: tuple[Wish, int] | None = None
         self.spectrum_at = 0.0
         self.resting: asyncio.Task[None] | None = None
-        with ui.element("div").classes("hm-side"):
+        with ui.element("div").classes("hm-side hm-screen"):
             with card("Sliders"):
                 self._sliders()
                 ui.label(_RESTING).classes("hm-soft")
@@ -79,11 +79,13 @@ class DesignPage:
         with ui.element("div").classes("hm-body"):
             with card("Design"):
                 self.said = Words()
+                self.bands = ui.label().classes("hm-on-paper")
                 self.tables = ui.element("div").classes("hm-body")
                 with ui.element("div").classes("hm-row"):
                     ui.button("Save and download", icon="download", on_click=self._save)
             with card("Pictures"):
                 self.axis = ui.select({0: ""}, label="Axis", value=0, on_change=self.draw)
+                self.axis.classes("hm-screen")
                 self.plot = ui.element("div")
         self.command = Command()
         self._axes()
@@ -279,6 +281,8 @@ class DesignPage:
             self._refuse(error)
 
     def _tabulate(self, found: Designed, errors: tuple[tuple[str, ...], ...]) -> None:
+        bands = (f"{row.name} {row.low:g} to {row.high:g} Hz".strip() for row in self.wish.rows)
+        self.bands.set_text(f"Swept: {'; '.join(bands)}")
         self.tables.clear()
         with self.tables:
             heads = ("Axis", "Quantity", "Peak", "Limit", "")

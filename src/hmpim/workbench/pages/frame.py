@@ -135,7 +135,7 @@ def failures_said() -> Iterator[None]:
 
 
 @contextmanager
-def card(title: str, *, wide: bool = False) -> Iterator[ui.element]:
+def card(title: str, *, wide: bool = False, printed: bool = True) -> Iterator[ui.element]:
     """A part of a page with its own heading.
 
     Parameters
@@ -144,8 +144,10 @@ def card(title: str, *, wide: bool = False) -> Iterator[ui.element]:
         In a few words.
     wide : bool
         Whether it takes the whole width.
+    printed : bool
+        Whether it is of any use on paper.
     """
-    classes = "hm-card hm-wide" if wide else "hm-card"
+    classes = "hm-card" + " hm-wide" * wide + " hm-screen" * (not printed)
     with ui.element("section").classes(classes).props(f'aria-label="{title}"') as section:
         heading(title)
         yield section

@@ -94,6 +94,7 @@ class ResultView:
         with card("Verdict"):
             classes = _CLASSES.get(str(result.verdict), "hm-bad")
             ui.label(headline(result)).classes(f"hm-verdict {classes}")
+            ui.label(f"Record: {self.owner.wish.file}").classes("hm-on-paper")
             if self.automatic is not None and self.beside is not None:
                 ui.label(
                     f"✎ By hand: {self.owner.question.set_by_hand}. Automatic: "
@@ -117,7 +118,7 @@ class ResultView:
 
     def _hand(self) -> None:
         wish = self.owner.wish
-        with card("By hand"):
+        with card("By hand", printed=False):
             ui.label(
                 "Drag the lines in the plots, or type; the automatic values stay in the table."
             ).classes("hm-soft")

@@ -63,7 +63,7 @@ class RunPage:
         self.measured: tuple[str, int] = ("", -1)  # axis and samples of the last response
         self.looked: tuple[str, float] = ("", -1.0)  # axis and time of the last look
         with ui.element("div").classes("hm-side"):
-            with card("Rig"):
+            with card("Rig", printed=False):
                 self.choice = rig_choice(window)
                 self.state = (
                     ui.label().props('role="status" aria-live="polite"').classes("hm-verdict")
@@ -80,20 +80,20 @@ class RunPage:
                 )
                 ui.label("The Escape key stops too.").classes("hm-soft")
             with card("Estimate so far"):
-                self.axis = ui.select([], label="Axis").props("dense")
+                self.axis = ui.select([], label="Axis").props("dense").classes("hm-screen")
                 self.told = ui.label().classes("hm-soft")
-                self.estimates = ui.element("div")
+                self.estimates = ui.element("div").classes("hm-shown")
             with card("Log"):
-                self.log = ui.label().classes("hm-pre")
+                self.log = ui.label().classes("hm-pre hm-shown")
                 self.log.props('tabindex=0 role="log" aria-label="The last lines of the log"')
         with ui.element("div").classes("hm-body"):
             with card("Command and response"):
                 self.progress = ui.label("Nothing is running.").classes("hm-soft")
-                self.chart = ui.element("div")
+                self.chart = ui.element("div").classes("hm-shown")
             with card("Error bar, closing in on what was asked"):
-                self.bars = ui.element("div")
+                self.bars = ui.element("div").classes("hm-later")
             with card("Bode plot so far"):
-                self.plot = ui.element("div")
+                self.plot = ui.element("div").classes("hm-later")
             self.after = ui.element("div").classes("hm-body")
         self.command = Command(_command(window))
         ui.keyboard(on_key=self._key, ignore=[])

@@ -34,7 +34,7 @@ class RunsPage:
     def __init__(self, window: Window) -> None:
         self.window = window
         self.folder = str(window.workbench.settings.runs)
-        with ui.element("div").classes("hm-side"):
+        with ui.element("div").classes("hm-side hm-screen"):
             with card("Which runs"):
                 self.where = ui.input("Only those with", placeholder="name = *roll*, delay < 3ms")
                 self.wanted = ui.input("Specification", placeholder="bandwidth_phase90 > 9.12")
@@ -72,7 +72,7 @@ class RunsPage:
             if not found.rows:
                 ui.label("There are no runs yet.").classes("hm-soft")
                 return
-            whole = ui.element("div").classes("hm-table")
+            whole = ui.element("div").classes("hm-table hm-runs")
             whole.props('tabindex=0 role="region" aria-label="Runs of the folder"')
             with whole, ui.element("table"):
                 with ui.element("thead"), ui.element("tr"):
@@ -120,7 +120,8 @@ class RunsPage:
                     self.wanted.value or "",
                 )
             finally:
-                self.button.enable()
+                if not self.button.is_deleted:
+                    self.button.enable()
             if self.shown.is_deleted:
                 return
             self.shown.clear()

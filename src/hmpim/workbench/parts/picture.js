@@ -34,6 +34,71 @@ function size() {
   return Math.max(1, parseFloat(getComputedStyle(document.documentElement).fontSize) / 16);
 }
 
+const PAPER = matchMedia("print");
+
+// About as wide as letters are on average, as a share of their size.
+const LETTER = 0.52;
+
+// Words in so many pixels, in lines of about equal length.
+function wrapped(words, room, letters) {
+  const lines = Math.ceil((words.length * LETTER * letters) / Math.max(room, letters));
+  if (lines < 2 || !words.includes(" ")) return words;
+  const most = words.length / lines;
+  const out = [""];
+  for (const word of words.split(" ")) {
+    const last = out[out.length - 1];
+    if (last && last.length + word.length / 2 > most && out.length < lines) out.push(word);
+    else out[out.length - 1] = last ? `${last} ${word}` : word;
+  }
+  return out.join("<br>");
+}
+
+// Where a value stands in its panel, as a share of the axis.
+function share(axis, value) {
+  const [low, high] = axis.range;
+  return (value - low) / (high - low);
+}
+
+// Ticks at values of their own keep apart from each other by so many pixels.
+function thinned(axis, room, apart) {
+  if (axis.tickmode !== "array") return;
+  let last = -Infinity;
+  const kept = [...axis.tickvals.keys()].filter((k) => {
+    const at = room * share(axis, axis.tickvals[k]);
+    if (at - last < apart) return false;
+    last = at;
+    return true;
+  });
+  axis.tickvals = kept.map((k) => axis.tickvals[k]);
+  axis.ticktext = kept.map((k) => axis.ticktext[k]);
+}
+
+// Fits the words of a layout into a picture of this width: names of axes are wrapped, and the words
+// on a line stay inside the panel.
+function fitted(layout, width, letters) {
+  const across = width - layout.margin.l - layout.margin.r;
+  const down = layout.height - layout.margin.t - layout.margin.b;
+  for (const [key, axis] of Object.entries(layout)) {
+    if (!/^[xy]axis\d*$/.test(key)) continue;
+    const [first, last] = axis.domain ?? [0, 1];
+    const room = (key[0] === "x" ? across : down) * (last - first);
+    if (axis.title) {
+      axis.title = { ...axis.title, text: wrapped(axis.title.text, room, 1.15 * letters) };
+    }
+    if (key[0] === "x") thinned(axis, room, 2.5 * letters);
+  }
+  for (const note of layout.annotations ?? []) {
+    const axis = /^x\d*$/.test(note.xref) && layout[note.xref.replace("x", "xaxis")];
+    if (!axis || note.xanchor === "center") continue;
+    const [first, last] = axis.domain ?? [0, 1];
+    const room = across * (last - first);
+    const wide = 1.1 * LETTER * letters * note.text.length;
+    const at = room * share(axis, note.x);
+    const beyond = note.xanchor === "left" ? Math.max(0, at + wide - room) : Math.min(0, at - wide);
+    if (beyond) note.xshift = (note.xshift ?? 0) - beyond;
+  }
+}
+
 // Pictures of a page are drawn one after the other, and the page answers between two of them.
 let turn = Promise.resolve();
 
@@ -86,8 +151,9 @@ export default {
     this.Plotly = Plotly;
     await inTurn(() => this.$el.isConnected && this.update());
     if (!this.drawn) return; // it was taken away meanwhile
-    this.sizes = new ResizeObserver(() => this.drawn && Plotly.Plots.resize(this.$el));
+    this.sizes = new ResizeObserver(() => this.resized());
     this.sizes.observe(this.$el);
+    PAPER.addEventListener("change", this.update);
     this.theme = new MutationObserver(() => {
       const dark = document.body.classList.contains("body--dark");
       if (dark !== this.dark) this.update(); // other classes come and go while one scrolls or types
@@ -97,7 +163,9 @@ export default {
   unmounted() {
     this.sizes?.disconnect();
     this.theme?.disconnect();
+    PAPER.removeEventListener("change", this.update);
     clearTimeout(this.fitting);
+    clearTimeout(this.resizing);
     this.Plotly?.purge(this.$el);
   },
   methods: {
@@ -113,11 +181,19 @@ export default {
       if (!this.drawn || this.waiting) return; // it is drawn with all else that comes first
       this.waiting = setTimeout(() => this.update(), 0);
     },
+    // Another width asks for another drawing; on paper there is no time for more than that.
+    resized() {
+      if (!this.drawn || !this.$el.clientWidth || this.$el.clientWidth === this.width) return;
+      clearTimeout(this.resizing);
+      if (PAPER.matches) this.update();
+      else this.resizing = setTimeout(() => this.update(), 100);
+    },
     async update() {
       clearTimeout(this.waiting);
       this.waiting = 0;
       if (!this.Plotly) return;
-      const dark = (this.dark = document.body.classList.contains("body--dark"));
+      this.dark = document.body.classList.contains("body--dark");
+      const dark = this.dark && !PAPER.matches;
       const { figure, cursors } = this.current;
       const plain = { data: unpacked(figure.data), layout: unpacked(figure.layout) };
       const { data, layout } = dark ? recoloured(plain) : plain;
@@ -129,16 +205,29 @@ export default {
       layout.margin = Object.fromEntries(
         Object.entries(layout.margin ?? {}).map(([side, room]) => [side, room * grown]),
       );
-      if (this.$el.clientWidth < 600) {
-        layout.margin = { ...layout.margin, l: 8, r: 6 };
+      this.width = layout.width = this.$el.clientWidth;
+      const narrow = this.width < 600;
+      if (narrow) {
+        layout.margin = { ...layout.margin, l: 48, r: 6 };
+        layout.font.size = 11;
         layout.legend = { ...layout.legend, font: { size: 10 } };
       }
+      fitted(layout, this.width, layout.font.size);
+      const panels = layout.height - layout.margin.t - layout.margin.b;
+      if ((cursors ?? []).some((c) => c.panel === "")) { // their names stand above the first panel
+        layout.legend.y = 1 + (1.5 * layout.font.size) / panels;
+        layout.height += 1.5 * layout.font.size;
+        layout.margin.t += 1.5 * layout.font.size;
+      }
       this.fixed = (layout.shapes ?? []).length;
-      layout.shapes = [...(layout.shapes ?? []), ...(cursors ?? []).map(this.shape)];
+      layout.shapes = [...(layout.shapes ?? []), ...(cursors ?? []).map((c) => this.shape(c, layout))];
       const like = likeness(data, layout);
       if (this.drawn && like && like === this.like) await this.move(data, layout);
       else {
         await this.redraw(data, layout, cursors);
+        // what stands around the panels has taken some of their room: it is given back
+        const lost = panels - this.$el._fullLayout._size.h;
+        if (lost > 2) await this.Plotly.relayout(this.$el, { height: layout.height + lost });
         this.ends = ends(layout);
       }
       this.like = like;
@@ -149,7 +238,7 @@ export default {
       // shapes are dragged at once with this alone; "editable" only makes them ask for a click first
       const edits = { shapePosition: (cursors ?? []).length > 0 };
       const config = {
-        displaylogo: false, responsive: true, scrollZoom: false, edits,
+        displaylogo: false, responsive: false, scrollZoom: false, edits,
         modeBarButtonsToRemove: ["select2d", "lasso2d", "autoScale2d"],
       };
       await this.Plotly.react(this.$el, data, layout, config);
@@ -189,7 +278,9 @@ export default {
       }
       this.Plotly.animate(this.$el, { data: [], traces: [], layout: fitted }, AT_ONCE);
     },
-    shape(c) {
+    shape(c, layout) {
+      const axis = layout[`xaxis${c.panel}`];
+      const at = axis.type === "log" ? Math.log10(c.at) : c.at;
       const across = c.axis === "y";
       const along = { [across ? "y0" : "x0"]: c.at, [across ? "y1" : "x1"]: c.at };
       const ends = across ? { x0: 0, x1: 1 } : { y0: 0, y1: 1 };
@@ -198,7 +289,10 @@ export default {
         xref: across ? `x${c.panel} domain` : `x${c.panel}`,
         yref: across ? `y${c.panel}` : `y${c.panel} domain`,
         line: { color: c.colour ?? "#b0417f", width: 4, dash: "solid" },
-        label: { text: c.label, textposition: "start", font: { size: 12 * this.grown }, textangle: 0 },
+        label: { // above the panel, to the side where there is room
+          text: c.label, textposition: "end", yanchor: "bottom", textangle: 0, padding: 2,
+          xanchor: share(axis, at) < 0.5 ? "left" : "right", font: { size: layout.font.size },
+        },
       };
     },
     moved(event) {

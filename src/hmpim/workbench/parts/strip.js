@@ -1,4 +1,5 @@
 // A strip of command and response of one axis, drawn by uPlot.
+const PAPER = matchMedia("print");
 let loading;
 
 function library() {
@@ -29,12 +30,22 @@ export default {
     if (this.early) this.show(...this.early);
     this.sizes = new ResizeObserver(() => this.plot?.setSize(this.size()));
     this.sizes.observe(this.$el);
+    this.theme = new MutationObserver(this.inked); // light, dark and paper have inks of their own
+    this.theme.observe(document.body, { attributes: true, attributeFilter: ["class"] });
+    PAPER.addEventListener("change", this.inked);
   },
   unmounted() {
     this.sizes?.disconnect();
+    this.theme?.disconnect();
+    PAPER.removeEventListener("change", this.inked);
     this.plot?.destroy();
   },
   methods: {
+    inked() {
+      const ink = getComputedStyle(this.$el).color;
+      if (ink !== this.ink) this.plot?.redraw(false, true);
+      this.ink = ink;
+    },
     size() {
       return { width: Math.max(this.$el.clientWidth, 100), height: 150 * this.grown() };
     },
