@@ -21,7 +21,7 @@ from hmpim.identify.fitting.unexplained import unexplained_response
 from hmpim.identify.noise.misfit import misfit
 from hmpim.identify.noise.whiteness import effective_share, is_white
 from hmpim.identify.signals import longest_lag
-from hmpim.identify.worth import FEW, MUCH, PART, TWICE, WORTH
+from hmpim.identify.worth import FEW, MATERIAL, MUCH, PART, TWICE
 from hmpim.model.dynamics import STRUCTURES, Structure, StructureName, coefficients_of
 from hmpim.model.response import slowest_time_constant
 from hmpim.record import BETWEEN, Intersample
@@ -199,13 +199,13 @@ def _best_of(problem: Problem, structure: Structure, starts: list[Real], rivals:
     return fit_structure(problem, structure, best.theta, precision=precision)
 
 
-def is_worth_explaining(problem: Problem, fit: Fit, data: Data) -> bool:
-    """Whether the residual follows the input by more than a small share of output or response."""
+def is_worth_explaining(problem: Problem, fit: Fit, data: Data, *, share: float = MATERIAL) -> bool:
+    """Whether the residual follows the input by more than a share of output or response."""
     band = band_of(data)
     left = misfit(data.u, fit.residual, delay=fit.delay, band=band)
     spread = _spread(problem)
     owed = float(np.sqrt(left.share * fit.cost / spread)) if spread else 0.0
-    if left.probability < FALSE_ALARM and (owed > WORTH or _misses_part(problem, fit, data, band)):
+    if left.probability < FALSE_ALARM and (owed > share or _misses_part(problem, fit, data, band)):
         return True
     return _is_poor(fit, spread)
 

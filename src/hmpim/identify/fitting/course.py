@@ -23,7 +23,7 @@ from hmpim.identify.fitting.unrelated import says_nothing
 from hmpim.identify.fitting.whitening import prewhitened_of
 from hmpim.identify.noise.whiteness import is_white
 from hmpim.identify.signals import longest_lag
-from hmpim.identify.worth import FEW, PART, TWICE
+from hmpim.identify.worth import FEW, PART, TWICE, WORTH
 from hmpim.model.dynamics import StructureName
 from hmpim.model.sampled import interpolation_error
 from hmpim.record import Intersample
@@ -212,14 +212,21 @@ def is_unanswered(course: Course, fitted: list[tuple[Intersample, Fit]]) -> bool
 def enrich(
     course: Course, fitted: list[tuple[Intersample, Fit]]
 ) -> tuple[Course, list[tuple[Intersample, Fit]]]:
-    """Richer structures while what is left over follows the input, then the plain ones again."""
+    """Richer structures while what is left over follows the input, then the plain ones again.
+
+    What is little, and would be doubted all the same, counts as a lack of dynamics only where a
+    richer structure leaves white noise: of real hardware it is something else as a rule.
+    """
     data, plain = course.data, course.plain
     mode, best = min(fitted, key=lambda item: item[1].objective)
-    asked = is_worth_explaining(data.problem(mode, course.counted), best, data)
-    if plain and not asked and not almost_integrates(best):
+    problem = data.problem(mode, course.counted)
+    asked = not plain or is_worth_explaining(problem, best, data) or almost_integrates(best)
+    if not asked and not is_worth_explaining(problem, best, data, share=WORTH):
         return course, fitted
     fits = course.fits
     richer = fit_rich(data, course.problem, fits, course.others, all_of_them=not plain)
+    if not asked and not any(is_white(fit.residual) for fit in richer):
+        return course, fitted
     if richer and course.counted.begins is not None:
         leading = min(richer, key=lambda f: f.objective)
         from_rest = refit(data.problem(course.natural, course.given), leading)
