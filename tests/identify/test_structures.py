@@ -102,6 +102,62 @@ def test_the_model_simulates_what_was_identified(found):
     assert prediction.fit_percent == pytest.approx(pair.fit_percent, abs=0.01)
 
 
+PLACES, DAMPINGS = [5.0, 8.0, 13.0, 21.0, 33.0], [0.04, 0.03, 0.05, 0.03, 0.04]
+GAINS, LATE = [1.0, 0.6, -0.4, 0.7, 0.5], 0.0171
+
+
+@pytest.fixture(scope="module")
+def modes():
+    """A record of five modes in parallel, and what is identified from it."""
+    fine = np.arange(int(FS * DURATION) * FINE) / (FS * FINE)
+    y = np.zeros(fine.size // FINE)
+    for gain, place, damping in zip(GAINS, PLACES, DAMPINGS, strict=True):
+        one = ([gain], mode(place, damping))
+        y += signal.lsim(one, chirp(fine - LATE), fine)[1][::FINE]
+    noise = np.random.default_rng(5).standard_normal(y.size)
+    record = hmpim.Record.from_arrays(
+        {"u": chirp(fine[::FINE])},
+        {"y": y + 0.3 + 0.02 * np.std(y) * noise},
+        fs=FS,
+        intersample="bandlimited",
+    )
+    return record, hmpim.identify(record)["y", "u"]
+
+
+def test_five_modes_are_grown_from_the_peaks(modes):
+    record, pair = modes
+    assert pair.structure == "five_modes"
+    assert pair.verdict == "ok"
+    truth = {
+        "delay": LATE,
+        "bias": 0.3,
+        "scale_factor": sum(GAINS),
+        "natural_frequency": PLACES[0],
+        "damping_ratio": DAMPINGS[0],
+    }
+    for parameter, value in truth.items():
+        estimate = getattr(pair, parameter)
+        assert abs(estimate.value - value) < 4.5 * estimate.spread, parameter
+    poles = np.roots(pair.denominator)
+    found = sorted(abs(p) / OMEGA for p in poles if p.imag > 0)
+    np.testing.assert_allclose(found, PLACES, rtol=2e-3)
+    assert hmpim.predict(pair, record, start=0.0).fit_percent == pytest.approx(
+        pair.fit_percent, abs=0.01
+    )
+
+
+def test_a_model_of_five_modes_responds_as_their_sum(modes):
+    _, pair = modes
+    frequency = np.linspace(0.5, 50.0, 300)
+    s = 2j * np.pi * frequency
+    exact = sum(
+        gain / np.polyval(mode(place, damping), s)
+        for gain, place, damping in zip(GAINS, PLACES, DAMPINGS, strict=True)
+    ) * np.exp(-s * LATE)
+    response = hmpim.frequency_response(hmpim.to_model(pair), frequency)
+    np.testing.assert_allclose(response, exact, atol=0.01 * np.abs(exact).max())
+
+
 @pytest.mark.parametrize("name", sorted(STRUCTURES))
 def test_parameters_of_a_fit_and_coefficients_undo_each_other(name):
     structure = STRUCTURES[name]

@@ -3,7 +3,15 @@
 import numpy as np
 import pytest
 
-from hmpim.model.poles import PoleResponses, input_responses, partial_fractions
+from hmpim.model.discrete import discretise
+from hmpim.model.dynamics import STRUCTURES, denominator_of, numerator_of
+from hmpim.model.poles import (
+    PoleResponses,
+    input_responses,
+    partial_fractions,
+    rational_response,
+)
+from hmpim.model.response import RationalDelay, response
 from hmpim.model.sampled import delayed_response, prepare_input
 
 
@@ -55,3 +63,60 @@ def test_several_numerators_are_expanded_at_once():
     exact = numerators @ s ** np.arange(4) / (2 * ((s + 1) ** 2 + 1) * (s + 3))
     found = np.sum(simple / (s - poles), axis=1) + constant
     np.testing.assert_allclose(found, exact, rtol=1e-14)
+
+
+EIGHT = STRUCTURES["eight_modes"]
+PLACES = 0.05 * 1.35 ** np.arange(8)
+"""Natural frequencies in radians per sample."""
+SECTIONS = np.stack([2 * 0.03 / PLACES, 1 / PLACES**2], axis=1)
+GAINS = np.array([1.0, 0.5, -0.7, 0.4, 0.9, -0.3, 0.6, 0.2])
+WEIGHTS = np.concatenate([[GAINS.sum()], GAINS[1:]])
+
+
+def _eight():
+    coefficients = SECTIONS.ravel()
+    return numerator_of(EIGHT, coefficients, WEIGHTS), denominator_of(EIGHT, coefficients)
+
+
+def test_the_polynomials_of_eight_modes_are_their_sum():
+    numerator, denominator = _eight()
+    system = RationalDelay(delay=0.0, numerator=numerator, denominator=denominator)
+    s = 1j * np.linspace(0.01, 1.0, 500)
+    exact = sum(g / (1 + c1 * s + c2 * s**2) for g, (c1, c2) in zip(GAINS, SECTIONS, strict=True))
+    found = response(system, s.imag / (2 * np.pi))
+    np.testing.assert_allclose(found, exact, atol=1e-11 * np.abs(exact).max())
+
+
+@pytest.mark.parametrize("mode", ["zoh", "foh", "bandlimited"])
+def test_eight_modes_are_simulated_as_their_sum(sweep, mode):
+    source, (numerator, denominator) = prepare_input(sweep, mode), _eight()
+    found = rational_response(source, delay=3.3, numerator=numerator, denominator=denominator)
+    exact = sum(
+        g * delayed_response(source, delay=3.3, denominator=np.array([1.0, *section]))[0]
+        for g, section in zip(GAINS, SECTIONS, strict=True)
+    )
+    np.testing.assert_allclose(found, exact, atol=1e-9 * np.abs(exact).max())
+
+
+def test_eight_modes_are_stepped_exactly(sweep):
+    numerator, denominator = _eight()
+    system = RationalDelay(delay=3.3, numerator=numerator, denominator=denominator)
+    step = discretise(system, fs=1.0, intersample="zoh")
+    assert np.abs(np.linalg.eigvals(step.transition)).max() < 1.0
+    source = prepare_input(sweep, "zoh")
+    exact = rational_response(source, delay=3.3, numerator=numerator, denominator=denominator)
+    held = np.concatenate([np.zeros(step.delay + 2), sweep - sweep[0]])
+    x, y = np.zeros(step.order), []
+    for k in range(sweep.size):
+        v = held[k : k + 3][::-1]
+        x = step.transition @ x + step.drive @ v
+        y.append(step.output @ x + step.feed @ v)
+    np.testing.assert_allclose(y, exact, atol=1e-9 * np.abs(exact).max())
+
+
+def test_many_equal_poles_are_no_sum_of_single_ones(sweep):
+    """Their residues would cancel: the companion matrix answers for them."""
+    source, below = prepare_input(sweep, "foh"), np.poly(-np.ones(8))[::-1]
+    once = delayed_response(source, delay=2.0, denominator=below)[0]
+    found = rational_response(source, delay=2.0, numerator=np.ones(1), denominator=below)
+    np.testing.assert_array_equal(found, once)

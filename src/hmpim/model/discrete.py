@@ -19,10 +19,11 @@ from numpy.typing import NDArray
 from hmpim.errors import ArgumentError
 from hmpim.model.causal import causal_filter
 from hmpim.model.filters import in_z
+from hmpim.model.poles import modal_form
 from hmpim.model.response import RationalDelay, response
 from hmpim.record import Intersample
 
-__all__ = ["TAPS", "Discrete", "RowPiece", "discretise", "rows_between"]
+__all__ = ["TAPS", "Discrete", "RowPiece", "discretise", "realised", "rows_between"]
 
 _Real = NDArray[np.float64]
 
@@ -179,7 +180,7 @@ def discretise(
     rest = total - ahead
     whole = int(rest + _WHOLE)
     fraction = max(rest - whole, 0.0)
-    generator, entry, output, through = _realised(system, fs)
+    generator, entry, output, through = realised(system, fs)
     between: Intersample = "zoh" if intersample == "zoh" else "foh"
     row = _row(generator, entry, output, through, fraction, 0.0, between)
     n = output.size
@@ -272,12 +273,15 @@ def _response(step: Discrete, z: NDArray[np.complex128]) -> NDArray[np.complex12
     return np.asarray(states @ step.output + direct)
 
 
-def _realised(system: RationalDelay, fs: float) -> tuple[_Real, _Real, _Real, float]:
+def realised(system: RationalDelay, fs: float) -> tuple[_Real, _Real, _Real, float]:
     """State matrices per sample, scaled so that their entries are alike in size."""
     a = np.trim_zeros(system.denominator * fs ** np.arange(system.denominator.size), "b")
     b = system.numerator * fs ** np.arange(system.numerator.size)
     if a.size == 1:
         return np.zeros((0, 0)), np.zeros(0), np.zeros(0), float(b[0] / a[0])
+    modal = modal_form(b, a)
+    if modal is not None:
+        return modal
     A, B, C, D = scipy.signal.tf2ss(b[::-1], a[::-1])
     balanced, (scale, _) = scipy.linalg.matrix_balance(A, permute=False, separate=True)
     entry, output = B[:, 0] / scale, C[0] * scale

@@ -3,6 +3,9 @@
 Every structure is ``B(s) / A(s)`` with B(0) = A(0) = 1 after the scale factor is taken out;
 an integrator has s A(s) below instead. A(s) is a product of sections ``1 + c1 s`` and
 ``1 + c1 s + c2 s²`` with positive coefficients, so that every model tried is stable.
+
+Of many modes B(s) is no list of powers of s, whose responses are then too much alike to be told
+apart, but a sum: each mode's gain over its own section, ``g1 / A1(s) + g2 / A2(s) + …``.
 """
 
 from dataclasses import dataclass
@@ -18,6 +21,7 @@ __all__ = [
     "StructureName",
     "coefficients_of",
     "denominator_of",
+    "numerator_of",
     "second_order_coefficients",
     "theta_of",
 ]
@@ -37,6 +41,10 @@ StructureName = Literal[
     "two_modes",
     "three_modes",
     "four_modes",
+    "five_modes",
+    "six_modes",
+    "seven_modes",
+    "eight_modes",
     "washout",
     "band_pass",
     "integrator",
@@ -80,6 +88,10 @@ class Structure:
     sampled : bool
         Whether it is a filter in z: a pole then is at z = e^s of its section's, zeros are powers
         of 1 - 1/z, and the delay is a whole number of samples (`hmpim.model.filters`).
+    parallel : bool
+        Whether it is a sum of sections of order 2. With 2 zeros less than poles each has a gain;
+        a fit then has, for the numerator's coefficients, the gain at DC and the gains of the
+        second section on. With 1 less each has a numerator of degree 1, and a fit has those.
     """
 
     name: StructureName
@@ -89,6 +101,7 @@ class Structure:
     dc_zeros: int = 0
     nyquist_zeros: int = 0
     sampled: bool = False
+    parallel: bool = False
 
     @property
     def order(self) -> int:
@@ -98,7 +111,8 @@ class Structure:
     @property
     def parameters(self) -> int:
         """How many parameters a fit has: delay, denominator, numerator, bias, and noise."""
-        return 1 + self.order + (self.zeros + 1 - self.dc_zeros) + 2
+        above = len(self.sections) if self.parallel else self.zeros + 1 - self.dc_zeros
+        return 1 + self.order + above + 2
 
 
 STRUCTURES: dict[StructureName, Structure] = {
@@ -116,8 +130,12 @@ STRUCTURES: dict[StructureName, Structure] = {
         Structure(name="fifth_order", sections=(2, 2, 1)),
         Structure(name="sixth_order", sections=(2, 2, 2)),
         Structure(name="two_modes", sections=(2, 2), zeros=2),
-        Structure(name="three_modes", sections=(2, 2, 2), zeros=4),
-        Structure(name="four_modes", sections=(2, 2, 2, 2), zeros=6),
+        Structure(name="three_modes", sections=(2,) * 3, zeros=4, parallel=True),
+        Structure(name="four_modes", sections=(2,) * 4, zeros=6, parallel=True),
+        Structure(name="five_modes", sections=(2,) * 5, zeros=8, parallel=True),
+        Structure(name="six_modes", sections=(2,) * 6, zeros=10, parallel=True),
+        Structure(name="seven_modes", sections=(2,) * 7, zeros=12, parallel=True),
+        Structure(name="eight_modes", sections=(2,) * 8, zeros=14, parallel=True),
         Structure(name="washout", sections=(1,), zeros=1, dc_zeros=1),
         Structure(name="band_pass", sections=(2,), zeros=1, dc_zeros=1),
         Structure(name="integrator", sections=(), integrators=1),
@@ -176,6 +194,48 @@ def denominator_of(structure: Structure, coefficients: ArrayLike) -> NDArray[np.
         product = np.convolve(product, section)
         start += order
     return product
+
+
+def numerator_of(
+    structure: Structure, coefficients: ArrayLike, weights: ArrayLike
+) -> NDArray[np.float64]:
+    """B(s) by rising powers of s, the scale factor included.
+
+    Parameters
+    ----------
+    structure : Structure
+        Which sections.
+    coefficients : array_like, shape (order,)
+        As for `denominator_of`.
+    weights : array_like, shape (m,)
+        The linear parameters of a fit: the coefficients of B themselves, or of sections in
+        parallel the gain at DC and the gains of the second section on.
+
+    Returns
+    -------
+    ndarray, shape (zeros + 1,)
+
+    Examples
+    --------
+    2/(1 + s + s²) + 1/(1 + 2s + s²) has a gain of 3 at DC:
+
+    >>> pair = Structure(name="two_modes", sections=(2, 2), zeros=2, parallel=True)
+    >>> numerator_of(pair, [1.0, 1.0, 2.0, 1.0], [3.0, 1.0]).tolist()
+    [3.0, 5.0, 3.0]
+    """
+    told = np.asarray(weights, dtype=np.float64)
+    if not structure.parallel:
+        return np.concatenate([np.zeros(structure.dc_zeros), told])
+    gains = told.copy()
+    gains[0] -= told[1:].sum()
+    sections = np.insert(np.reshape(coefficients, (-1, 2)).astype(np.float64), 0, 1.0, axis=1)
+    total = np.zeros(structure.zeros + 1)
+    for k, gain in enumerate(gains):
+        product = np.array([gain])
+        for section in np.delete(sections, k, axis=0):
+            product = np.convolve(product, section)
+        total += product
+    return total
 
 
 def coefficients_of(structure: Structure, theta: ArrayLike) -> NDArray[np.float64]:

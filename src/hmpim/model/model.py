@@ -11,8 +11,9 @@ from hmpim.arguments import checked, generator, numbers_of
 from hmpim.errors import ArgumentError
 from hmpim.model.chain import Chain, Readout, chain_of, run_chain
 from hmpim.model.filters import in_z
+from hmpim.model.poles import rational_response
 from hmpim.model.response import RationalDelay, response
-from hmpim.model.sampled import delayed_response, prepare_input
+from hmpim.model.sampled import prepare_input
 from hmpim.model.spread import Spread
 from hmpim.record import Intersample
 
@@ -346,18 +347,16 @@ def simulate(
         raise ArgumentError(f"u has {samples.size} samples; give two or more")
     system = model.system
     source = prepare_input(samples, intersample)
-    powers = system.numerator.size
-    rows = delayed_response(
+    y = rational_response(
         source,
         delay=system.delay * fs,
+        numerator=system.numerator * fs ** np.arange(system.numerator.size),
         denominator=system.denominator * fs ** np.arange(system.denominator.size),
-        powers=powers,
     )
-    weights = system.numerator * fs ** np.arange(powers)
     level: float | NDArray[np.float64] = float(system.numerator[0]) * source.first
     if system.denominator[0] == 0:
         level = level * np.maximum(np.arange(source.samples) / fs - system.delay, 0.0)
-    y = weights @ rows + level + model.bias
+    y = y + level + model.bias
     if rng is not None:
         y = y + model.noise_std * generator(rng).standard_normal(y.size)
     return np.asarray(y)

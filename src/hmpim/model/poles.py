@@ -23,13 +23,39 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from hmpim.model.sampled import MARGIN, SampledInput, spline_at, spline_signs
+from hmpim.model.sampled import (
+    MARGIN,
+    SampledInput,
+    delayed_response,
+    spline_at,
+    spline_signs,
+)
 
-__all__ = ["PoleResponses", "input_responses", "partial_fractions", "placed", "pole_taps"]
+__all__ = [
+    "APART",
+    "PoleResponses",
+    "input_responses",
+    "modal_form",
+    "parted",
+    "partial_fractions",
+    "placed",
+    "pole_taps",
+    "rational_response",
+]
 
 _NODES = 24
 _QUADRATURE = 12.0
 """Modulus up to which quadrature gives φ to the last digit; beyond it the recursion from e^z."""
+
+APART = 2e-4
+"""Least distance of two poles, over their size: a double pole is taken as two that are as near,
+which changes no response by more than the square of this."""
+
+_AGREES = 1e-8
+"""Share of the largest response by which a sum of poles may miss it."""
+
+_COMPANION = 6
+"""Poles up to which a companion matrix, and powers of z, keep them apart."""
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -257,6 +283,103 @@ def _reaching(source: SampledInput, begin: int) -> tuple[Real, int]:
 def _kept(fine: NDArray[Any], source: SampledInput, first: int) -> NDArray[Any]:
     factor = source.oversampling
     return fine[first : first + factor * (source.samples - 1) + 1 : factor]
+
+
+def parted(poles: Complex) -> Complex:
+    """Poles of different sections that coincide, moved apart."""
+    for i in range(1, poles.size):
+        for j in range(i):
+            if abs(poles[i] - poles[j]) < APART * abs(poles[i]):
+                poles[i] *= 1.0 + 2.0 * APART
+    return poles
+
+
+def rational_response(
+    source: SampledInput, *, delay: float, numerator: Real, denominator: Real
+) -> Real:
+    """Response of e^(-sτ) B(s)/A(s) to an input's deviation from its first sample, from rest.
+
+    Parameters
+    ----------
+    source, delay
+        As for `PoleResponses`.
+    numerator, denominator : ndarray, shapes (m + 1,) and (n + 1,)
+        B and A by rising powers of s per sample, m at most n.
+
+    Returns
+    -------
+    ndarray, shape (n,)
+
+    Examples
+    --------
+    >>> from hmpim.model.sampled import prepare_input
+    >>> held = prepare_input(np.array([0.0, 1.0, 1.0, 1.0]), "zoh")
+    >>> lag = rational_response(held, delay=0.0, numerator=np.ones(1), denominator=np.array([1, 2]))
+    >>> lag.round(6).tolist()
+    [0.0, 0.0, 0.393469, 0.632121]
+    """
+    denominator = np.trim_zeros(denominator, "b")
+    expanded = _expanded(numerator, denominator)
+    if expanded is None:
+        rows = delayed_response(source, delay=delay, denominator=denominator, powers=numerator.size)
+        return np.asarray(numerator @ rows)
+    poles, residues, through = expanded
+    out = (residues @ PoleResponses(source, delay, poles).values).real
+    if through:
+        out += through * input_responses(source, delay, slopes=False)[0]
+    return np.asarray(out)
+
+
+def modal_form(numerator: Real, denominator: Real) -> tuple[Real, Real, Real, float] | None:
+    """State matrices of B(s)/A(s) of many poles, each pair a block of its own.
+
+    None of few poles, or of such as are too much alike to be told apart.
+
+    Parameters
+    ----------
+    numerator, denominator : ndarray, shapes (m + 1,) and (n + 1,)
+        B and A by rising powers of s, m at most n.
+
+    Returns
+    -------
+    generator, entry, output : ndarray, shapes (n, n), (n,) and (n,)
+    through : float
+    """
+    expanded = _expanded(numerator, denominator)
+    if expanded is None:
+        return None
+    poles, residues, through = expanded
+    blocks, entry, output = [], [], []
+    for p, r in zip(poles, residues, strict=True):
+        if p.imag:
+            blocks.append(np.array([[p.real, -p.imag], [p.imag, p.real]]))
+            entry += [1.0, 0.0]
+            output += [r.real, -r.imag]
+        else:
+            blocks.append(np.array([[p.real]]))
+            entry.append(1.0)
+            output.append(r.real)
+    return scipy.linalg.block_diag(*blocks), np.array(entry), np.array(output), through
+
+
+def _expanded(numerator: Real, denominator: Real) -> tuple[Complex, Complex, float] | None:
+    """Poles, one of each conjugate pair, residues that stand for both, and what is fed through.
+
+    None of few poles, and where the sum does not come to B/A, as of many that coincide.
+    """
+    if denominator.size - 1 <= _COMPANION:
+        return None
+    every = parted(np.roots(denominator[::-1]).astype(np.complex128))
+    simple, constants, _ = partial_fractions(numerator[None, :], every, float(denominator[-1]))
+    s = 1j * np.abs(every)
+    exact = np.polynomial.polynomial.polyval(s, numerator)
+    exact = exact / np.polynomial.polynomial.polyval(s, denominator)
+    error = np.sum(simple[0] / (s[:, None] - every), axis=1) + constants[0] - exact
+    if not np.abs(error).max() <= _AGREES * np.abs(exact).max():
+        return None
+    kept = every.imag >= 0.0
+    doubled = np.where(every.imag > 0.0, 2.0, 1.0)
+    return every[kept], (simple[0] * doubled)[kept], float(constants[0])
 
 
 def partial_fractions(

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from hmpim.identify.fitting.sections import poles_of
-from hmpim.model.dynamics import STRUCTURES, coefficients_of, denominator_of
+from hmpim.model.dynamics import STRUCTURES, Structure, coefficients_of, denominator_of
 
 S = 0.3 + 0.9j
 THETA = {
@@ -57,4 +57,27 @@ def test_slopes_are_derivatives(name):
     for row, found in enumerate(value(poles, by_sections)):
         step = 1e-6 * np.eye(theta.size)[row]
         up, down = (rational(structure, theta + s * step, numerator) for s in (1.0, -1.0))
+        np.testing.assert_allclose(found, (up - down) / 2e-6, rtol=1e-8)
+
+
+PAIR = Structure(name="two_modes", sections=(2, 2), zeros=3, parallel=True)
+
+
+def _sum(theta, numerator):
+    c1, c2, d1, d2 = coefficients_of(PAIR, theta)
+    first = (numerator[0] + numerator[1] * S) / (1 + c1 * S + c2 * S**2)
+    return first + (numerator[2] + numerator[3] * S) / (1 + d1 * S + d2 * S**2)
+
+
+def test_sections_in_parallel_add_up():
+    """One with two real poles, one with a conjugate pair."""
+    theta, numerator = np.array([0.4, 0.2, -0.6, 9.0]), np.array([1.0, 0.3, -0.5, 0.2])
+    poles = poles_of(PAIR, theta)
+    rows = value(poles, poles.expand(np.eye(4)))
+    np.testing.assert_allclose(rows @ numerator, _sum(theta, numerator), rtol=1e-12)
+    by_delay, by_sections = poles.slopes(numerator)
+    np.testing.assert_allclose(value(poles, by_delay), [-S * _sum(theta, numerator)], rtol=1e-12)
+    for row, found in enumerate(value(poles, by_sections)):
+        step = 1e-6 * np.eye(4)[row]
+        up, down = (_sum(theta + s * step, numerator) for s in (1.0, -1.0))
         np.testing.assert_allclose(found, (up - down) / 2e-6, rtol=1e-8)

@@ -8,6 +8,7 @@ from hmpim.identify.fitting.beginning import in_motion
 from hmpim.identify.fitting.data import Data, Seen, band_of, shifted
 from hmpim.identify.fitting.enrich import (
     INTEGRATING,
+    MODES,
     PLAIN,
     RICH,
     integrator_starts,
@@ -16,6 +17,7 @@ from hmpim.identify.fitting.enrich import (
 )
 from hmpim.identify.fitting.fit import Fit, Problem, fit_structure
 from hmpim.identify.fitting.growth import one_more_pole, scale_of, with_pole
+from hmpim.identify.fitting.modes import grown_modes
 from hmpim.identify.fitting.start import RoughResponse, rough_response, starting_values
 from hmpim.identify.fitting.unexplained import unexplained_response
 from hmpim.identify.noise.misfit import misfit
@@ -133,6 +135,8 @@ def fit_rich(
         best = min(found, key=lambda fit: fit.objective)
         if not is_worth_explaining(problem, best, data) and is_white(best.residual):
             break
+    else:
+        found += grown_modes(problem, data, best, members(structures, MODES))
     if found and not is_white(min(found, key=lambda fit: fit.objective).residual):
         # Poles without end follow what no linear model describes: friction, rounding.
         found = [fit for fit in found if fit.structure.order <= _SURE]
@@ -147,8 +151,9 @@ def reduced(problem: Problem, fits: list[Fit], richer: list[Fit]) -> list[Fit]:
     best = min(richer, key=lambda f: f.objective)
     sections = _sections(best)
     late = best.delay + sum(float(c[0]) for _, c in sections)
-    if best.structure.zeros and best.linear.size > 2 and best.linear[0]:
-        late -= float(best.linear[1] / best.linear[0])
+    above = best.numerator
+    if above.size > 1 and above[0]:
+        late -= float(above[1] / above[0])
 
     def better(fit: Fit) -> Fit:
         if fit.objective <= TWICE * best.objective:

@@ -15,7 +15,16 @@ from hmpim.identify.fitting.start import RoughResponse, starting_values
 from hmpim.identify.worth import FEW
 from hmpim.model.dynamics import STRUCTURES, Structure, StructureName, theta_of
 
-__all__ = ["INTEGRATING", "PLAIN", "RICH", "Proposal", "integrator_starts", "members", "proposals"]
+__all__ = [
+    "INTEGRATING",
+    "MODES",
+    "PLAIN",
+    "RICH",
+    "Proposal",
+    "integrator_starts",
+    "members",
+    "proposals",
+]
 
 PLAIN: tuple[StructureName, ...] = ("static", "first_order", "second_order")
 RICH: tuple[StructureName, ...] = (
@@ -28,10 +37,16 @@ RICH: tuple[StructureName, ...] = (
     "fifth_order",
     "sixth_order",
     "two_modes",
-    "three_modes",
-    "four_modes",
     "washout",
     "band_pass",
+)
+MODES: tuple[StructureName, ...] = (
+    "three_modes",
+    "four_modes",
+    "five_modes",
+    "six_modes",
+    "seven_modes",
+    "eight_modes",
 )
 INTEGRATING: tuple[StructureName, ...] = (
     "integrator",
@@ -146,7 +161,7 @@ def proposals(
 def _error(rough: RoughResponse, fit: Fit) -> float:
     """Squared error of a fit on the rough response."""
     s = 1j * rough.omega
-    b, a = (np.polynomial.polynomial.polyval(s, c) for c in (fit.linear[:-1], fit.denominator))
+    b, a = (np.polynomial.polynomial.polyval(s, c) for c in (fit.numerator, fit.denominator))
     response = b / a * np.exp(-1j * rough.omega * (fit.delay - rough.lag))
     return float(rough.weight @ np.abs(rough.response - response) ** 2)
 

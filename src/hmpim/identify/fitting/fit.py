@@ -18,7 +18,7 @@ from hmpim.identify.fitting.climb import climb
 from hmpim.identify.fitting.least_squares import solved, solved_exactly, without
 from hmpim.identify.fitting.rows import Part, Problem
 from hmpim.identify.fitting.sampled_rows import SampledPart, part_of
-from hmpim.model.dynamics import Structure, coefficients_of, denominator_of
+from hmpim.model.dynamics import Structure, coefficients_of, denominator_of, numerator_of
 from hmpim.model.response import slowest_time_constant
 from hmpim.model.sampled import SAMPLES_ALONE
 
@@ -56,7 +56,8 @@ class Fit:
         Delay in samples, then the parameters of the denominator's sections (`coefficients_of`),
         time in samples.
     linear : ndarray, shape (m + 1,)
-        Numerator coefficients by rising power of s (the first is the scale factor), bias.
+        Numerator coefficients by rising power of s (the first is the scale factor), or what
+        `numerator_of` takes instead; bias.
     prediction : ndarray, shape (n,)
         Output of the fitted model, drift and free response included; where there are several
         inputs, what this one and the bias make of it.
@@ -94,6 +95,12 @@ class Fit:
     def denominator(self) -> Real:
         """A(s) by rising powers of s per sample, shape (order + 1,)."""
         return denominator_of(self.structure, coefficients_of(self.structure, self.theta[1:]))
+
+    @property
+    def numerator(self) -> Real:
+        """B(s) by rising powers of s per sample, shape (zeros + 1,)."""
+        coefficients = coefficients_of(self.structure, self.theta[1:])
+        return numerator_of(self.structure, coefficients, self.linear[:-1])
 
     @property
     def memory(self) -> float:

@@ -143,7 +143,7 @@ def one_more_pole(structure: Structure) -> Structure:
     """
     pairs = [order for order in structure.sections if order == 2]
     sections = (*pairs, *((2,) if 1 in structure.sections else (1,)))
-    richer = replace(structure, sections=sections)
+    richer = replace(structure, sections=sections, parallel=False)
     return _named(richer) or richer
 
 
@@ -220,7 +220,8 @@ def response_to_square(problem: Problem, fit: Fit) -> Real:
     """
     lag = _PROBE * scale_of(fit)
     richer, theta = one_more_pole(fit.structure), with_pole(fit.structure, fit.theta, lag)
-    there = part_of(problem, richer, theta).driven(fit.linear[:-1])
+    above = fit.numerator[fit.structure.dc_zeros :]
+    there = part_of(problem, richer, theta).driven(above)
     if fit.initial.size or not fit.prediction.size:
         here = part_of(problem, fit.structure, fit.theta).driven(fit.linear[:-1])
     else:  # what was predicted, less what is beside the input

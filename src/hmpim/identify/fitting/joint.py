@@ -29,7 +29,7 @@ from hmpim.identify.fitting.course import (
     turn_ahead,
 )
 from hmpim.identify.fitting.data import FINAL_PRECISION, refit
-from hmpim.identify.fitting.enrich import INTEGRATING, PLAIN, RICH
+from hmpim.identify.fitting.enrich import INTEGRATING, MODES, PLAIN, RICH
 from hmpim.identify.fitting.fit import Fit, Problem, fit_structure
 from hmpim.identify.fitting.growth import Growth, grow, hidden_pole
 from hmpim.identify.fitting.software import software_fit
@@ -54,7 +54,7 @@ def joint_fit(
     valid: NDArray[np.bool_] | None = None,
     known: NDArray[np.bool_] | None = None,
     intersample: Intersample | None = None,
-    structures: tuple[StructureName, ...] = (*PLAIN, *RICH, *INTEGRATING),
+    structures: tuple[StructureName, ...] = (*PLAIN, *RICH, *MODES, *INTEGRATING),
     nuisance: NDArray[np.float64] | None = None,
     growing: bool = True,
 ) -> JointFit:

@@ -11,7 +11,7 @@ import numpy as np
 import scipy
 
 from hmpim.identify.arrays import Complex, Mask, Real
-from hmpim.identify.fitting.sections import Expansion, Poles, poles_of
+from hmpim.identify.fitting.sections import Expansion, Parallel, Poles, poles_of
 from hmpim.model.dynamics import Structure
 from hmpim.model.poles import PoleResponses, input_responses
 from hmpim.model.sampled import SampledInput
@@ -140,7 +140,7 @@ class Part(Driven):
         self.structure, self.theta = structure, theta
         self._source = problem.source
         self._delay = float(theta[0])
-        self._poles: Poles = poles_of(structure, theta[1:])
+        self._poles: Poles | Parallel = poles_of(structure, theta[1:])
         upper = self._poles.upper
         self._answers = PoleResponses(self._source, self._delay, upper) if upper.size else None
         self._fed: Real | None = None
@@ -212,7 +212,17 @@ class Part(Driven):
 
 
 def _powers(structure: Structure) -> Real:
-    """Numerators 1, s, s², … that a structure has, by rising powers, shape (m, zeros + 1)."""
+    """Numerators 1, s, s², … that a structure has, by rising powers, shape (m, zeros + 1).
+
+    Of sections in parallel, as `Parallel` has them: the first alone, and each other less the first.
+    """
+    if structure.parallel and structure.zeros == structure.order - 1:
+        return np.eye(structure.order)
+    if structure.parallel:
+        gains = np.zeros((len(structure.sections), structure.order))
+        gains[:, ::2] = np.eye(len(structure.sections))
+        gains[1:, 0] = -1.0
+        return gains
     return np.asarray(np.eye(structure.zeros + 1)[structure.dc_zeros :])
 
 

@@ -9,17 +9,14 @@ degree less than A and an impulse for an input: one expansion serves all.
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 
 from hmpim.identify.arrays import Complex, Mask, Real
 from hmpim.model.dynamics import Structure, coefficients_of
-from hmpim.model.poles import partial_fractions
+from hmpim.model.poles import APART, parted, partial_fractions
 
-__all__ = ["Expansion", "Poles", "poles_of"]
-
-_APART = 2e-4
-"""Least distance of two poles, over their size: a double pole is taken as two that are as near,
-which changes no response by more than the square of this."""
+__all__ = ["Expansion", "Parallel", "Poles", "poles_of"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -142,7 +139,63 @@ class Poles:
         return np.asarray(rows[:, self.kept] * np.where(self.upper.imag > 0, 2.0, 1.0))
 
 
-def poles_of(structure: Structure, theta: Real) -> Poles:
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Parallel:
+    """Sections of order 2 in parallel, with the face of `Poles`.
+
+    A numerator is one of degree 1 for each section in turn: a₁ + b₁s over A₁, a₂ + b₂s over A₂, ….
+    Each sum of poles is then one section's own, however many there are.
+
+    Parameters
+    ----------
+    sections : tuple of Poles
+        One for each.
+    """
+
+    sections: tuple[Poles, ...]
+
+    @property
+    def upper(self) -> Complex:
+        """One of each conjugate pair."""
+        return np.concatenate([one.upper for one in self.sections])
+
+    def expand(self, numerators: Real) -> Expansion:
+        """Rows of the sum, one for each row of `numerators`, shape (rows, 2 sections)."""
+        split = np.split(numerators, len(self.sections), axis=1)
+        expanded = [one.expand(n) for one, n in zip(self.sections, split, strict=True)]
+        return Expansion(
+            simple=np.hstack([e.simple for e in expanded]),
+            double=None,
+            direct=np.zeros(numerators.shape[0]),
+            rate=None,
+        )
+
+    def slopes(self, numerator: Real) -> tuple[Expansion, Expansion]:
+        """Rows of the derivatives by the delay, and by the sections' parameters."""
+        split = np.split(numerator, len(self.sections))
+        pairs = [one.slopes(n) for one, n in zip(self.sections, split, strict=True)]
+        late, own = [pair[0] for pair in pairs], [pair[1] for pair in pairs]
+        by_delay = Expansion(
+            simple=np.hstack([e.simple for e in late]),
+            double=None,
+            direct=np.sum([e.direct for e in late], axis=0),
+            rate=None,
+        )
+        by_sections = Expansion(
+            simple=_blocks([e.simple for e in own]),
+            double=_blocks([e.double for e in own if e.double is not None]),
+            direct=np.concatenate([e.direct for e in own]),
+            rate=None,
+        )
+        return by_delay, by_sections
+
+
+def _blocks(parts: list[Complex]) -> Complex:
+    """Matrices along the diagonal, 0 elsewhere."""
+    return np.asarray(scipy.linalg.block_diag(*parts), dtype=np.complex128)
+
+
+def poles_of(structure: Structure, theta: Real) -> Poles | Parallel:
     """Poles of a structure at the parameters of its sections.
 
     Parameters
@@ -156,8 +209,8 @@ def poles_of(structure: Structure, theta: Real) -> Poles:
     --------
     >>> from hmpim.model.dynamics import STRUCTURES
     >>> found = poles_of(STRUCTURES["second_order"], np.array([0.0, 1.0]))  # 1 + s + s²
-    >>> found.every.round(3).tolist()
-    [(-0.5+0.866j), (-0.5-0.866j)]
+    >>> found.upper.round(3).tolist()
+    [(-0.5+0.866j)]
     """
     flat = coefficients_of(structure, theta)
     every = [0.0 + 0.0j] * structure.integrators
@@ -169,7 +222,19 @@ def poles_of(structure: Structure, theta: Real) -> Poles:
         section += [k] * order
         coefficients.append(c)
         start += order
-    poles = _parted(np.array(every, dtype=np.complex128))
+    if structure.parallel:
+        return Parallel(
+            sections=tuple(
+                Poles(
+                    every=(pair := np.array(_pair(c[0], c[1]))),
+                    kept=pair.imag >= 0.0,
+                    section=np.zeros(2, dtype=np.intp),
+                    coefficients=(c,),
+                )
+                for c in coefficients
+            )
+        )
+    poles = parted(np.array(every, dtype=np.complex128))
     return Poles(
         every=poles,
         kept=poles.imag >= 0.0,
@@ -181,19 +246,10 @@ def poles_of(structure: Structure, theta: Real) -> Poles:
 def _pair(c1: float, c2: float) -> list[complex]:
     """Roots of 1 + c₁s + c₂s², never nearer than told apart."""
     inside = 1.0 - 4.0 * c2 / c1**2
-    if abs(inside) < _APART**2:
-        inside = _APART**2
+    if abs(inside) < APART**2:
+        inside = APART**2
     if inside < 0.0:
         real, imag = -c1 / (2.0 * c2), c1 * float(np.sqrt(-inside)) / (2.0 * c2)
         return [complex(real, imag), complex(real, -imag)]
     slow = -2.0 / (c1 * (1.0 + float(np.sqrt(inside))))
     return [complex(slow), complex(1.0 / (c2 * slow))]
-
-
-def _parted(poles: Complex) -> Complex:
-    """Poles of different sections that coincide, moved apart."""
-    for i in range(1, poles.size):
-        for j in range(i):
-            if abs(poles[i] - poles[j]) < _APART * abs(poles[i]):
-                poles[i] *= 1.0 + 2.0 * _APART
-    return poles

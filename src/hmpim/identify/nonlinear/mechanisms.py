@@ -28,7 +28,8 @@ import scipy
 from hmpim.identify.arrays import Mask, Real
 from hmpim.identify.fitting.fit import Fit, Problem, jacobian
 from hmpim.identify.noise.autoregression import yule_walker
-from hmpim.model.sampled import delayed_response, prepare_input
+from hmpim.model.poles import rational_response
+from hmpim.model.sampled import prepare_input
 
 __all__ = [
     "LONGEST_AUTOREGRESSION",
@@ -280,7 +281,7 @@ def hypotheses(x: Real, denominator: Real, fs: float, *, every: int = 1) -> Iter
     def through(force: Real) -> Real:
         """Answer of the dynamics, without delay, to a force given in the output's unit."""
         source = prepare_input(force, "foh")
-        answer = delayed_response(source, delay=0.0, denominator=denominator)[0]
+        answer = rational_response(source, delay=0.0, numerator=np.ones(1), denominator=denominator)
         return np.asarray(answer + source.first)
 
     share = x / largest

@@ -7,7 +7,7 @@ from hmpim.identify.fitting.fit import Fit
 from hmpim.identify.reading.propagation import gradient
 from hmpim.identify.result import Estimate, Parameters
 from hmpim.identify.result.error_bars import estimate
-from hmpim.model.dynamics import Structure, coefficients_of, denominator_of
+from hmpim.model.dynamics import Structure, coefficients_of, denominator_of, numerator_of
 from hmpim.model.filters import in_delta
 from hmpim.model.response import (
     PeakGain,
@@ -45,9 +45,10 @@ def system_of(structure: Structure, vector: Real, fs: float) -> RationalDelay:
         return RationalDelay(
             delay=float(vector[0]) / fs, numerator=above, denominator=below, step=1.0 / fs
         )
-    denominator = denominator_of(structure, coefficients_of(structure, vector[1 : 1 + order]))
+    coefficients = coefficients_of(structure, vector[1 : 1 + order])
+    denominator = denominator_of(structure, coefficients)
     told = vector[1 + order : -1] * fs**structure.integrators
-    numerator = np.concatenate([np.zeros(structure.dc_zeros), told])
+    numerator = numerator_of(structure, coefficients, told)
     return RationalDelay(
         delay=float(vector[0]) / fs,
         numerator=numerator / fs ** np.arange(numerator.size),

@@ -9,6 +9,7 @@ import scipy
 
 from hmpim.identify.arrays import Complex, Real
 from hmpim.model import RationalDelay, response
+from hmpim.model.discrete import realised
 from hmpim.record import Intersample
 
 __all__ = ["sampled_response"]
@@ -70,20 +71,13 @@ def _held(system: RationalDelay, frequency: Real, fs: float) -> Complex:
     """
     whole = np.floor(system.delay * fs + 1e-9)
     late = float(max(system.delay * fs - whole, 0.0))
-    a = system.denominator * fs ** np.arange(system.denominator.size)
-    b = np.zeros(a.size)
-    b[: system.numerator.size] = system.numerator * fs ** np.arange(system.numerator.size)
-    a, b = np.trim_zeros(a, "b"), b[: np.trim_zeros(a, "b").size]
-    order = a.size - 1
+    rows, entry, output, direct = realised(system, fs)
+    order = output.size
     z = np.exp(2j * np.pi * frequency / fs)
-    direct = b[-1] / a[-1]
     older = 1.0 / z if late > 1e-9 else np.ones(z.size)
     if not order:
         return np.asarray(direct * older * z**-whole)
-    rows = np.eye(order, k=1)  # controllable form, scaled to the leading coefficient
-    rows[-1] = -a[:-1] / a[-1]
-    output = b[:-1] / a[-1] - direct * a[:-1] / a[-1]
-    first, second = _stepped(rows, late), _stepped(rows, 1.0 - late)
+    first, second = _stepped(rows, entry, late), _stepped(rows, entry, 1.0 - late)
     step = second[:order, :order] @ first[:order, :order]
     from_older = second[:order, :order] @ first[:order, order]
     drive = from_older[:, None] / z + second[:order, order][:, None]
@@ -92,10 +86,10 @@ def _held(system: RationalDelay, frequency: Real, fs: float) -> Complex:
     return np.asarray((states @ output + direct * older) * z**-whole)
 
 
-def _stepped(rows: Real, span: float) -> Real:
+def _stepped(rows: Real, entry: Real, span: float) -> Real:
     """Transition over a span of the states, with an input that stands still as last state."""
-    order = rows.shape[0]
+    order = entry.size
     wide = np.zeros((order + 1, order + 1))
     wide[:order, :order] = rows
-    wide[order - 1, order] = 1.0
+    wide[:order, order] = entry
     return np.asarray(scipy.linalg.expm(wide * span))

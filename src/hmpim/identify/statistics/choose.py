@@ -14,7 +14,7 @@ from hmpim.identify.arrays import Real
 from hmpim.identify.chance import FALSE_ALARM
 from hmpim.identify.fitting.candidates import nested
 from hmpim.identify.fitting.data import shifted
-from hmpim.identify.fitting.enrich import INTEGRATING, PLAIN, RICH, members, proposals
+from hmpim.identify.fitting.enrich import INTEGRATING, MODES, PLAIN, RICH, members, proposals
 from hmpim.identify.fitting.growth import HiddenPole, grow
 from hmpim.identify.fitting.least_squares import solved
 from hmpim.identify.fitting.rows import Part, Problem
@@ -196,7 +196,7 @@ def choose(
     search = _Search(
         statistics, Products(statistics, skipped=statistics.lags if conditioned else 0), band
     )
-    names = tuple(n for n in structures or (*PLAIN, *RICH) if n not in INTEGRATING)
+    names = tuple(n for n in structures or (*PLAIN, *RICH, *MODES) if n not in INTEGRATING)
     natural: Intersample = intersample or ("zoh" if _looks_held(statistics) else "bandlimited")
     alone = intersample is not None or natural == "zoh"
     rough = rough_of(statistics)
@@ -205,7 +205,7 @@ def choose(
         skipped = 0 if _rests(search, fits) else _memory(_least(fits))
         search.products = Products(statistics, skipped=skipped)
         fits = [search.again(f) for f in fits]
-    fits = _enriched(search, natural, rough, fits, members(names, RICH))
+    fits = _enriched(search, natural, rough, fits, members(names, (*RICH, *MODES[:2])))
     fits = [f for f in fits if f.fit.structure.name in names] or fits
     fits += _moved(search, natural, fits, alone=alone)
     left = left_over(search.products, _least(fits))
