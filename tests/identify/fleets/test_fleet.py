@@ -1,5 +1,7 @@
 """Records fitted together say what each says alone, or that they do not."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -108,6 +110,13 @@ def test_a_record_that_almost_asks_for_other_dynamics_is_left_to_itself(fleet):
     outputs = np.stack([output(seed) for seed in (256, 433, 44)])
     assert "structure" in {warning.code for warning in alone(outputs[0]).warnings}
     assert fit_fleet(fleet, outputs).sound.tolist() == [False, False, True]
+
+
+def test_a_unit_held_against_more_structures_does_not_keep_the_others_apart(fleet):
+    pairs = [alone(output(seed)) for seed in range(LEARNT)]
+    rival = next(c for c in pairs[0].candidates if c.structure == "first_order")
+    more = (*pairs[0].candidates, replace(rival, intersample="zoh"))
+    assert learn_whole(fleet, [replace(pairs[0], candidates=more), *pairs[1:]]) is not None
 
 
 def test_units_of_two_kinds_teach_nothing():

@@ -5,6 +5,7 @@ What such a structure makes of one stimulus is a surface of one or two parameter
 `hmpim.identify.fleets.learnt` holds that of the fleet.
 """
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -57,7 +58,7 @@ class Simpler:
 def learn_simpler(
     fleet: Fleet, pairs: Sequence[PairIdentification], outputs: Sequence[Real]
 ) -> tuple[Simpler, ...] | None:
-    """Learn where the simpler structures lie; None where records were held against different ones.
+    """Learn where the simpler structures lie; None where most were held against different ones.
 
     Parameters
     ----------
@@ -76,14 +77,20 @@ def learn_simpler(
         )
         for pair in pairs
     ]
-    if not tried or any(one != tried[0] for one in tried):
+    if not tried:
         return None
-    if any(mode != fleet.natural for _, mode in tried[0]):
+    # One whose first climb was not at its end is held against them under other assumptions as well.
+    ordinary, count = Counter(tried).most_common(1)[0]
+    if 2 * count < len(tried) or any(mode != fleet.natural for _, mode in ordinary):
         return None
-    names: tuple[StructureName, ...] = tuple(n for n in STRUCTURES if n in {s for s, _ in tried[0]})
+    names: tuple[StructureName, ...] = tuple(n for n in STRUCTURES if n in {s for s, _ in ordinary})
     if any(STRUCTURES[name].order > 1 or STRUCTURES[name].parameters > 5 for name in names):
         return None
-    places = [_places(fleet, output, names) for output in outputs]
+    places = [
+        _places(fleet, output, names)
+        for output, own in zip(outputs, tried, strict=True)
+        if own == ordinary
+    ]
     return tuple(
         _learnt(fleet, STRUCTURES[name], np.array([own[name] for own in places])) for name in names
     )
