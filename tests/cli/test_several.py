@@ -1,6 +1,8 @@
 """`hmpim identify a.csv b.csv …`: repeats, levels, and inputs that are one and the same."""
 
+import html
 import json
+import re
 
 import numpy as np
 import pytest
@@ -85,12 +87,12 @@ def test_levels_say_where_the_unit_is_linear(tmp_path):
     assert "hardening" in [warning["code"] for warning in data["pairs"][0]["warnings"]]
 
 
-def test_several_records_and_one_page_do_not_go_together(tmp_path):
+def test_several_records_and_one_sheet_do_not_go_together(tmp_path):
     files = [write(tmp_path / f"{k}.csv", {"u": U, "y": U}) for k in range(2)]
-    done = run(*files, "--input", "u", "--output", "y", "--report", tmp_path / "r.html")
+    done = run(*files, "--input", "u", "--output", "y", "--sign", tmp_path / "r.html")
     assert done.exit_code == 2
     assert done.stderr == (
-        "hmpim: --report is about one record, and 2 are given; leave it out, or give one\n"
+        "hmpim: --sign is about one record, and 2 are given; leave it out, or give one\n"
     )
 
 
@@ -119,3 +121,63 @@ def test_levels_and_repeats_are_told_apart():
     assert not same_at_levels([record(U), record(1.01 * U)])
     assert not same_at_levels([record(U), record(U[::-1].copy())])
     assert not same_at_levels([record(U), record(-2 * U)])
+
+
+def test_repeats_have_a_page(tmp_path):
+    files = [
+        write(
+            tmp_path / f"run{k}.csv", {"u": U, "y": output(U, natural=8.0 + 0.5 * (k == 2), seed=k)}
+        )
+        for k in range(3)
+    ]
+    page = tmp_path / "r.html"
+    done = run(
+        *files, "--input", "u", "--output", "y", "-q", "--report", page, "--operator", "M. Ohm"
+    )
+    assert done.exit_code == 0, done.stderr
+    text = page.read_text(encoding="utf-8")
+    assert "Operator: M. Ohm" in text
+    assert 'class="verdict doubtful"' in text  # one run has another natural frequency
+    averages, by_run = (cells(text, caption) for caption in ("Averages over", "By run"))
+    natural = averages["Natural frequency"]
+    assert natural[-1] == "do not agree"
+    assert float(natural[5].split(" / ")[0].replace("·10⁴", "e4").replace("·10³", "e3")) > 100.0
+    assert averages["Scale factor"][-1] == "agree"
+    assert list(by_run) == ["run0.csv", "run1.csv", "run2.csv"]
+    assert "8.5" in " ".join(by_run["run2.csv"])
+    drawn = text[text.index("<svg") : text.index("</svg>")]
+    assert all(f"run{k}.csv" in drawn for k in range(3))  # each run's response, by name
+
+
+def cells(text, caption):
+    """Rows of the table with this caption, by what they are called."""
+    table = text[text.index(f"<caption><span>{caption}") :]
+    rows = re.findall(r"<tr>(.*?)</tr>", table[: table.index("</table>")], re.S)[1:]
+    shown = [[html.unescape(c) for c in re.findall(r"<t[dh][^>]*>(.*?)</t[dh]>", r)] for r in rows]
+    return {row[0]: row[1:] for row in shown}
+
+
+def test_levels_have_a_page(tmp_path):
+    files = [
+        write(
+            tmp_path / f"{k}.csv",
+            {"u": k * U, "y": output(k * U, natural=8.0 + 0.2 * (k - 1), seed=k)},
+        )
+        for k in (1, 2, 4)
+    ]
+    page = tmp_path / "l.html"
+    done = run(*files, "--input", "u", "--output", "y", "-q", "--report", page)
+    assert done.exit_code == 0, done.stderr
+    shown = cells(page.read_text(encoding="utf-8"), "By amplitude")["Natural frequency (Hz)"]
+    assert [float(cell.split("\u00a0")[0].split(" ")[0]) for cell in shown[:3]] == pytest.approx(
+        [8.0, 8.2, 8.6], abs=0.05
+    )
+
+
+def test_several_records_have_no_pdf_and_say_so(tmp_path):
+    files = [
+        write(tmp_path / f"{k}.csv", {"u": U, "y": output(U, natural=8.0, seed=k)}) for k in (0, 1)
+    ]
+    done = run(*files, "--report", tmp_path / "r.pdf")
+    assert done.exit_code == 2
+    assert "several records have an HTML page only; name it r.html" in done.stderr

@@ -166,8 +166,8 @@ def identify(
     if holdout is not None and not 0.0 < holdout < 1.0:
         raise ArgumentError(f"--holdout {holdout:g} is not a share between 0 and 1; give 0.5, say")
 
-    paper = {"--report": report, "--sign": sign, "--figures": figures}
-    single: dict[str, object] = {**paper, "--holdout": holdout, "--at": at or None}
+    single: dict[str, object] = {"--sign": sign, "--figures": figures}
+    single |= {"--holdout": holdout, "--at": at or None}
     single |= {"--structure": structure or None, "--hand": hand or None}
     single["--reference"] = reference
     by_hand = _by_hand(hand or [])
@@ -200,10 +200,18 @@ def identify(
         ),
         every=sweep == "all",
     )
+    about = about_of(title, under_test, test, operator, date)
     if len(given) > 1:
         _check_single(len(given), single)
         identify_several(
-            given, _named(records, given), intersample=intersample.value, json=json, quiet=quiet
+            given,
+            _named(records, given),
+            intersample=intersample.value,
+            json=json,
+            quiet=quiet,
+            report=report,
+            about=about,
+            notes=note or (),
         )
         return
     (data,) = given
@@ -226,7 +234,6 @@ def identify(
         print_result(result, output_console())
         for sentence in said:
             say(sentence)
-    about = about_of(title, under_test, test, operator, date)
     notes = [*(note or ()), *said]
     write_result(result, json=json, report=report, notes=notes, about=about)
     write_beside(result, sign=sign, figures=figures, about=about, notes=notes)

@@ -9,6 +9,7 @@ from hmpim.cli.terminal import output_console, working
 if TYPE_CHECKING:
     from hmpim.identify import Levels
     from hmpim.record import Record
+    from hmpim.report import About
 
 __all__ = ["identify_several"]
 
@@ -20,24 +21,35 @@ def identify_several(
     intersample: str,
     json: Path | None,
     quiet: bool,
+    report: Path | None = None,
+    about: "About | None" = None,
+    notes: Sequence[str] = (),
 ) -> None:
     """Average repeats, or compare levels, whichever the records are."""
     from hmpim.identify import identify_levels, identify_repeats, same_at_levels
     from hmpim.report import print_levels, print_repeats
+    from hmpim.report.several import check_several, levels_report, repeats_report
 
+    names = [path.name for path in paths]
+    if report is not None:
+        check_several(report)
     with working(f"Identifying {len(records)} records"):
         if same_at_levels(records):
             levels = identify_levels(records, intersample=intersample)
             if not quiet:
-                print_levels(levels, [path.name for path in paths], output_console())
+                print_levels(levels, names, output_console())
             if json is not None:
                 _write(_levels_dict(levels), json)
+            if report is not None:
+                levels_report(levels, names, report, about=about, notes=notes)
             return
         repeats = identify_repeats(records, intersample=intersample)
     if not quiet:
         print_repeats(repeats, output_console())
     if json is not None:
         _write(repeats.to_dict(), json)
+    if report is not None:
+        repeats_report(repeats, names, report, about=about, notes=notes)
 
 
 def _levels_dict(levels: "Levels") -> dict[str, Any]:

@@ -21,6 +21,7 @@ def trend(
     *,
     name: str = "value",
     specified: Sequence[tuple[str, float]] = (),
+    mean: "Estimate | None" = None,
 ) -> Figure:
     """Describe how a parameter went from run to run.
 
@@ -34,6 +35,8 @@ def trend(
         Of the parameter, for the axis.
     specified : sequence of (str, float)
         What it should be: words such as '> 9.12 Hz', and where the line stands.
+    mean : Estimate, optional
+        Over all runs: a line in its 95 % interval.
 
     Examples
     --------
@@ -67,6 +70,12 @@ def trend(
         )
         for k, (words, at) in enumerate(specified)
     ]
+    if mean is not None:
+        least, most = mean.ci95 or (None, None)
+        line = Rule(
+            at=mean.value, low=least, high=most, axis="y", label="mean", colour="other", width=1.2
+        )
+        rules.append(line)
     ticks = tuple((float(k), plain(label)) for k, label in enumerate(labels))
     return Figure(
         panels=(

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from rich.console import Console
     from rich.table import Table
 
-__all__ = ["print_levels", "print_repeats", "repeats_table"]
+__all__ = ["percent_words", "print_levels", "print_repeats", "repeats_table"]
 
 
 def repeats_table(pair: RepeatedPair) -> "Table":
@@ -61,7 +61,7 @@ def repeats_table(pair: RepeatedPair) -> "Table":
             parameter.mean.unit,
             format_number(parameter.repeatability),
             f"{ratio:.2f}",
-            _percent(parameter.probability),
+            percent_words(parameter.probability),
             "yes" if parameter.agree else "no",
             parameter.mean.verdict,
         )
@@ -92,7 +92,7 @@ def print_repeats(repeats: Repeats, console: "Console") -> None:
     for pair in repeats.pairs:
         console.print(Text(printable(f"{pair.input} → {pair.output}"), style="bold"))
         if not pair.parameters:
-            console.print(Text("No parameter is told by two records or more."))
+            console.print(Text("No parameter is determined by two records or more."))
         else:
             console.print(repeats_table(pair))
         if pair.noise_std is not None:
@@ -126,7 +126,7 @@ def print_levels(levels: Levels, names: Sequence[str], console: "Console") -> No
             console.print(_trend_table(compared.trends))
             console.print(Text(f"Linear up to an amplitude of {compared.linear_up_to:.4g}."))
         else:
-            console.print(Text("No parameter is told at two levels or more."))
+            console.print(Text("No parameter is determined at two levels or more."))
         _print_findings(compared.findings, console)
 
 
@@ -152,7 +152,7 @@ def _trend_table(trends: Sequence[Trend]) -> "Table":
             labels.get(trend.name, trend.name),
             *(known.get(a, "–") for a in amplitudes),
             f"{100 * trend.change:+.2g} %",
-            _percent(trend.probability),
+            percent_words(trend.probability),
         ]
         table.add_row(*(Text(cell) for cell in cells))
     return table
@@ -163,12 +163,12 @@ def _print_findings(findings: Sequence[Finding], console: "Console") -> None:
         console.print(finding_line(finding))
 
 
-def _percent(probability: float) -> str:
+def percent_words(probability: float) -> str:
     """Chance in per cent.
 
     Examples
     --------
-    >>> _percent(1.0), _percent(0.0432), _percent(1e-9)
+    >>> percent_words(1.0), percent_words(0.0432), percent_words(1e-9)
     ('100 %', '4.3 %', '< 0.1 %')
     """
     if probability < 0.001:

@@ -1,0 +1,400 @@
+"""One page for several records of one test: repeats and their scatter, or levels."""
+
+from collections.abc import Sequence
+from datetime import UTC, datetime
+from importlib.metadata import version
+from os import PathLike
+from pathlib import Path
+
+import numpy as np
+
+from hmpim.errors import ArgumentError
+from hmpim.formats.atomic import write_text
+from hmpim.identify import Estimate, Identification, PairIdentification, Parameters
+from hmpim.identify.records.levels import LevelComparison, Levels
+from hmpim.identify.records.repeats import RepeatedPair, Repeats
+from hmpim.identify.result.groups import in_words
+from hmpim.plots.curves import BodeCurve, measured_curve, model_curve
+from hmpim.plots.overlay import overlaid_bode
+from hmpim.plots.trend import trend
+from hmpim.record import Finding
+from hmpim.report.about import About
+from hmpim.report.figures import Picture
+from hmpim.report.html import check_page
+from hmpim.report.numbers import (
+    format_interval,
+    format_number,
+    format_value,
+    plus_minus,
+)
+from hmpim.report.repeats_text import percent_words
+from hmpim.report.study import Grid, Section, StudyPage, render_study
+from hmpim.report.words import GLOSSARY, VERDICTS, by_weight, label_of, structure_words
+
+__all__ = ["check_several", "levels_report", "repeats_report"]
+
+_BY_RUN = (
+    "delay",
+    "scale_factor",
+    "bias",
+    "noise_std",
+    "natural_frequency",
+    "damping_ratio",
+    "time_constant",
+    "bandwidth_phase90",
+    "bandwidth_3db",
+)
+"""Parameters of the table by run."""
+
+_DRAWN = ("bandwidth_phase90", "delay", "natural_frequency", "scale_factor")
+"""Parameters that are drawn over the runs."""
+
+
+def check_several(path: str | PathLike[str]) -> None:
+    """Refuse a page of several records that is no HTML page.
+
+    Raises
+    ------
+    ArgumentError
+        If it is named as something else.
+
+    Examples
+    --------
+    >>> check_several("r.pdf")
+    Traceback (most recent call last):
+    hmpim.errors.ArgumentError: 'r.pdf': several records have an HTML page only; name it r.html
+    """
+    check_page(path)
+    place = Path(path)
+    if place.suffix.lower() == ".pdf":
+        raise ArgumentError(
+            f"{str(place)!r}: several records have an HTML page only; name it "
+            f"{place.with_suffix('.html').name}"
+        )
+
+
+def repeats_report(
+    repeats: Repeats,
+    names: Sequence[str],
+    path: str | PathLike[str],
+    *,
+    about: About | None = None,
+    notes: Sequence[str] = (),
+) -> None:
+    """Write the page of several records of one stimulus.
+
+    Averages with their errors, the chi-squared test of these against the scatter, a table by
+    run, and the measured responses over each other.
+
+    Parameters
+    ----------
+    repeats : Repeats
+        From `hmpim.identify_repeats`.
+    names : sequence of str
+        Of the records, in the order given.
+    path : path-like
+        The HTML page; replaced as a whole, or not at all.
+    about : About, optional
+        Title, unit under test, test, operator, date.
+    notes : sequence of str
+        Plain sentences under the verdict.
+
+    Raises
+    ------
+    ArgumentError
+        If `path` is named as something else than a page.
+    """
+    check_several(path)
+    parameters = [parameter for pair in repeats.pairs for parameter in pair.parameters]
+    agree = sum(parameter.agree for parameter in parameters)
+    doubts = any(f.severity == "doubt" for pair in repeats.pairs for f in pair.findings)
+    page = StudyPage(
+        title=_title(about, f"{len(names)} records of one stimulus"),
+        description=_about(about, notes),
+        headline=f"{len(names)} repeats: the scatter of {agree} of {len(parameters)} parameters "
+        "agrees with their stated errors.",
+        met=True if parameters else None,
+        doubtful=doubts or agree < len(parameters),
+        grids=tuple(_averages(pair, several=len(repeats.pairs) > 1) for pair in repeats.pairs),
+        sections=tuple(_repeated(pair, repeats.results, names) for pair in repeats.pairs),
+        facts=_facts(repeats.results, names),
+    )
+    write_text(path, render_study(page))
+
+
+def levels_report(
+    levels: Levels,
+    names: Sequence[str],
+    path: str | PathLike[str],
+    *,
+    about: About | None = None,
+    notes: Sequence[str] = (),
+) -> None:
+    """Write the page of one stimulus at several levels.
+
+    Parameters
+    ----------
+    levels : Levels
+        From `hmpim.identify.identify_levels`.
+    names, path, about, notes
+        As for `repeats_report`.
+
+    Raises
+    ------
+    ArgumentError
+        If `path` is named as something else than a page.
+    """
+    check_several(path)
+    doubts = any(f.severity == "doubt" for one in levels.comparisons for f in one.findings)
+    pairs = levels.results[0].pairs
+    ends = [f"{one.linear_up_to:.4g}" for one in levels.comparisons if one.trends]
+    said = f"linear up to an amplitude of {', '.join(ends)}" if ends else "no trend is known"
+    page = StudyPage(
+        title=_title(about, f"{len(names)} levels of one stimulus"),
+        description=_about(about, notes),
+        headline=f"{len(names)} levels: {said}.",
+        met=True if ends else None,
+        doubtful=doubts,
+        grids=(),
+        sections=tuple(
+            _levelled(pair, compared, levels.results, names)
+            for pair, compared in zip(pairs, levels.comparisons, strict=True)
+        ),
+        facts=_facts(levels.results, names),
+    )
+    write_text(path, render_study(page))
+
+
+def _title(about: About | None, otherwise: str) -> str:
+    return about.title if about is not None and about.title else otherwise
+
+
+def _about(about: About | None, notes: Sequence[str]) -> str:
+    about = about or About()
+    known = (
+        ("Unit under test", about.under_test),
+        ("Test", about.test),
+        ("Operator", about.operator),
+        ("Date", about.date or datetime.now(UTC).strftime("%Y-%m-%d")),
+    )
+    head = "; ".join(f"{name}: {value}" for name, value in known if value)
+    return " ".join([f"{head}.", *notes])
+
+
+def _facts(results: Sequence[Identification], names: Sequence[str]) -> tuple[tuple[str, str], ...]:
+    first = results[0].record
+    now = datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC")
+    sums = (
+        f"{name} {result.record.sha256[:16]}" for name, result in zip(names, results, strict=True)
+    )
+    return (
+        ("Records", ", ".join(names)),
+        ("Sampling rate", f"{first.fs:.7g} Hz"),
+        ("Length", f"{first.samples / first.fs:.6g} s"),
+        ("SHA-256", ", ".join(sums)),
+        ("Made by", f"hmpim {version('hmpim')}, {now}"),
+    )
+
+
+def _repeated(
+    pair: RepeatedPair, results: Sequence[Identification], names: Sequence[str]
+) -> Section:
+    each = [result[pair.output, pair.input] for result in results]
+    said = [_sentence(finding) for finding in by_weight(pair.findings)]
+    if pair.noise_std is not None:
+        noise = f"{format_value(pair.noise_std)} {pair.noise_std.unit}".rstrip()
+        said.append(f"Noise, from what differs between the records: {noise}.")
+    if np.isfinite(pair.response_scatter):
+        said.append(
+            f"The measured responses scatter {pair.response_scatter:.2f} times as much as their "
+            "stated errors (r.m.s. over the frequencies)."
+        )
+    if not pair.parameters:
+        said.append("No parameter is determined by two records or more.")
+    averages = {parameter.name: parameter.mean for parameter in pair.parameters}
+    pictures = _pictures(each, results[0].record.fs, names, averages)
+    return Section(
+        title=f"{pair.input} → {pair.output}",
+        observed="",
+        found=tuple(said),
+        grids=(_by_run(each, names),),
+        pictures=pictures,
+    )
+
+
+def _averages(pair: RepeatedPair, *, several: bool) -> Grid:
+    found = {parameter.name: parameter for parameter in pair.parameters}
+    rows = []
+    for words in GLOSSARY:
+        one = found.get(words.name)
+        if one is None:
+            continue
+        rows.append(
+            (
+                words.label,
+                format_value(one.mean, positive=words.positive),
+                one.mean.unit or "–",
+                one.mean.verdict,
+                format_interval(one.mean, positive=words.positive),
+                format_number(one.repeatability),
+                f"{one.chi_squared:.3g} / {one.freedom}",
+                percent_words(one.probability),
+                "agree" if one.agree else "do not agree",
+            )
+        )
+    return Grid(
+        caption="Averages over the runs"
+        + (f", {pair.input} → {pair.output}" if several else ""),
+        columns=(
+            "Parameter", "Mean ± std", "Unit", "Verdict", "95 % interval", "Repeatability",
+            "χ² / degrees of freedom", "Chance", "Stated errors",
+        ),
+        rows=tuple(rows),
+        note="Mean: weighted by 1/std². Repeatability: standard deviation from run to run. "
+        "χ²: the squared distances of the runs from their mean over their stated variances, "
+        "about as large as its degrees of freedom if the stated errors are right. Chance: of a "
+        "larger χ² if they are.",
+    )  # fmt: skip
+
+
+def _by_run(each: Sequence[PairIdentification], names: Sequence[str]) -> Grid:
+    known = [n for n in _BY_RUN if any(getattr(pair.parameters, n) is not None for pair in each)]
+    units = {name: _unit(each, name) for name in known}
+    return Grid(
+        caption="By run: value ± standard deviation; ? marks a doubtful value",
+        columns=(
+            "Run",
+            "Verdict",
+            "Structure",
+            "Fit (%)",
+            *(label_of(name) + (f" ({units[name]})" if units[name] else "") for name in known),
+        ),
+        rows=tuple(
+            (
+                name,
+                VERDICTS[pair.verdict],
+                structure_words(pair.structure),
+                f"{pair.fit_percent:.2f}",
+                *(_cell(getattr(pair.parameters, one), one) for one in known),
+            )
+            for name, pair in zip(names, each, strict=True)
+        ),
+    )
+
+
+def _unit(each: Sequence[PairIdentification], name: str) -> str:
+    known: list[Estimate] = [e for p in each if (e := getattr(p.parameters, name)) is not None]
+    return known[0].unit
+
+
+_POSITIVE = {words.name for words in GLOSSARY if words.positive}
+
+
+def _cell(estimate: Estimate | None, name: str) -> str:
+    if estimate is None:
+        return "–"
+    doubt = "" if estimate.verdict == "ok" else " ?"
+    return format_value(estimate, positive=name in _POSITIVE) + doubt
+
+
+def _pictures(
+    each: Sequence[PairIdentification],
+    fs: float,
+    names: Sequence[str],
+    averages: dict[str, Estimate],
+) -> tuple[Picture, ...]:
+    pictures = []
+    curves = [(name, c) for name, pair in zip(names, each, strict=True) if (c := _curve(pair, fs))]
+    if curves:
+        bandwidth = averages.get("bandwidth_phase90")
+        marked = bandwidth is not None and bandwidth.spread < bandwidth.value
+        mark = (bandwidth.value, bandwidth.spread) if marked and bandwidth is not None else None
+        caption = "Measured frequency response of each record."
+        caption += " The upright line marks the mean −90° bandwidth." if mark else ""
+        pictures.append(
+            Picture(
+                key="responses",
+                title="Measured responses",
+                caption=caption,
+                description=f"Bode plot of {len(curves)} measured responses over each other.",
+                figure=overlaid_bode(curves, bandwidths=[mark], pairs=False),
+            )
+        )
+    for name in _DRAWN:
+        estimates = [getattr(pair.parameters, name) for pair in each]
+        if sum(estimate is not None for estimate in estimates) < 2:
+            continue
+        label, mean = label_of(name), averages.get(name)
+        words = in_words(name)
+        pictures.append(
+            Picture(
+                key=name,
+                title=label,
+                caption=f"{words[:1].upper()}{words[1:]} of each record with its 95 % interval"
+                + (", and the mean with its own." if mean is not None else "."),
+                description=f"{label} of {len(names)} records in their order.",
+                figure=trend(names, estimates, name=label, mean=mean),
+            )
+        )
+    return tuple(pictures)
+
+
+def _curve(pair: PairIdentification, fs: float) -> BodeCurve | None:
+    seen = pair.frequency_response.frequency
+    seen = seen[seen > 0]
+    if not seen.size:
+        return None
+    return measured_curve(pair.frequency_response, near=model_curve(pair, seen, fs=fs))
+
+
+def _levelled(
+    pair: PairIdentification,
+    compared: LevelComparison,
+    results: Sequence[Identification],
+    names: Sequence[str],
+) -> Section:
+    each = [result[pair.output, pair.input] for result in results]
+    said = [_sentence(finding) for finding in by_weight(compared.findings)]
+    if not compared.trends:
+        said.append("No parameter is determined at two levels or more.")
+    grids = [_by_run(each, names)]
+    if compared.trends:
+        grids.insert(0, _trends(compared, pair.parameters))
+    return Section(
+        title=f"{pair.input} → {pair.output}",
+        observed="",
+        found=tuple(said),
+        grids=tuple(grids),
+        pictures=_pictures(each, results[0].record.fs, names, {}),
+    )
+
+
+def _trends(compared: LevelComparison, units: Parameters) -> Grid:
+    amplitudes = sorted({a for one in compared.trends for a in one.amplitudes})
+    rows = []
+    for one in compared.trends:
+        known = {
+            a: plus_minus(value, std)
+            for a, value, std in zip(one.amplitudes, one.values, one.stds, strict=True)
+        }
+        estimate = getattr(units, one.name)
+        unit = f" ({estimate.unit})" if estimate is not None and estimate.unit else ""
+        rows.append(
+            (
+                label_of(one.name) + unit,
+                *(known.get(a, "–") for a in amplitudes),
+                f"{100 * one.change:+.2f} %",
+                percent_words(one.probability),
+            )
+        )
+    return Grid(
+        caption="By amplitude: value ± standard deviation",
+        columns=("Parameter", *(f"{a:.4g}" for a in amplitudes), "Change", "Chance"),
+        rows=tuple(rows),
+        note="Change: from the smallest to the largest amplitude. Chance: of such differences if "
+        "the parameter were the same at every level.",
+    )
+
+
+def _sentence(finding: Finding) -> str:
+    return f"{'Doubt' if finding.severity == 'doubt' else 'Note'}: {finding.message}"
