@@ -10,9 +10,11 @@ import hmpim
 from batch_support import FS, write_rows
 from hmpim.batch import study
 from hmpim.batch.expect import held_against, read_bound
+from hmpim.batch.pictures import distribution, sequence
 from hmpim.batch.run import Cluster
 from hmpim.batch.study import _order, outliers, write_study
 from hmpim.batch.summary import summary_of
+from hmpim.plots.draw.frames import ticks
 
 
 @pytest.fixture(scope="module")
@@ -104,3 +106,33 @@ def test_records_stand_in_the_order_of_their_making_where_the_stamps_tell_it(ste
     places, along = _order(table, np.arange(4))
     assert along.startswith(said)
     assert places.tolist() == pytest.approx([0.0, last / 3, 2 * last / 3, last])
+
+
+@pytest.mark.parametrize("count", [1, 4, 10, 11, 70, 1000, 90_000])
+def test_the_first_and_the_last_record_are_seen_and_ticks_are_few(count):
+    names = tuple(f"u{k:05d}.csv" for k in range(count))
+    places = np.arange(float(count))
+    figure = sequence(places, places, name="delay", unit="s", along="Record, by name", names=names)
+    x = figure.panels[0].x
+    assert (x.low, x.high) == (-0.5, count - 0.5)
+    shown = ticks(x, (x.low, x.high))
+    assert len(shown) == min(count, 10) if count <= 10 else 5 <= len(shown) <= 10
+    if count <= 10:
+        assert [words for _, words in shown] == list(names)
+    else:
+        assert all(at + 1 == int(words) for at, words in shown)  # its number, from 1
+
+
+def test_days_have_room_at_both_ends():
+    x = (
+        sequence(np.array([0.0, 30.0]), np.ones(2), name="delay", unit="s", along="Days")
+        .panels[0]
+        .x
+    )
+    assert x.low < 0.0
+    assert x.high > 30.0
+
+
+def test_records_are_counted_in_whole_numbers():
+    (panel,) = distribution(np.array([1.0, 1.0, 2.0]), name="delay", unit="s").panels
+    assert [words for _, words in ticks(panel.y, (0.0, 2.2))] == ["0", "1", "2"]

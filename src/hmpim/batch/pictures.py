@@ -20,6 +20,11 @@ FOR_A_MEDIAN = 60
 """Records from which on a running median is drawn: three blocks of twenty."""
 
 _MOST_GROUPS = 24
+_MARGIN = 0.02
+"""Of the axis at either end."""
+_FEW_NAMES = 10
+_MOST_TICKS = 8
+_STEPS = tuple(m * 10**k for k in range(10) for m in (1, 2, 5))
 
 
 def distribution(values: Real, *, name: str, unit: str, bounds: tuple[float, ...] = ()) -> Figure:
@@ -58,7 +63,7 @@ def distribution(values: Real, *, name: str, unit: str, bounds: tuple[float, ...
         panels=(
             Panel(
                 x=Axis(label=axis_label(label_of(name), unit)),
-                y=Axis(label="Records", low=0.0),
+                y=Axis(label="Records", low=0.0, whole=True),
                 items=items,
             ),
         ),
@@ -67,7 +72,14 @@ def distribution(values: Real, *, name: str, unit: str, bounds: tuple[float, ...
 
 
 def sequence(
-    places: Real, values: Real, *, name: str, unit: str, along: str, bounds: tuple[float, ...] = ()
+    places: Real,
+    values: Real,
+    *,
+    name: str,
+    unit: str,
+    along: str,
+    bounds: tuple[float, ...] = (),
+    names: tuple[str, ...] = (),
 ) -> Figure:
     """Describe values one after the other, with their running median.
 
@@ -81,6 +93,15 @@ def sequence(
         Of the quantity, and of the places.
     bounds : tuple of float
         Limits to be drawn.
+    names : tuple of str
+        Of the records, where each has a place of its own: few are named, many numbered from 1.
+
+    Examples
+    --------
+    >>> figure = sequence(
+    ...     np.arange(2.0), np.ones(2), name="delay", unit="s", along="Record", names=("a", "b"))
+    >>> figure.panels[0].x.ticks, figure.panels[0].x.low
+    (((0.0, 'a'), (1.0, 'b')), -0.5)
     """
     every = np.unique(np.linspace(0, values.size - 1, _MOST_POINTS).astype(int))
     far = np.argsort(np.abs(values - np.median(values)))[-50:]
@@ -98,13 +119,28 @@ def sequence(
     return Figure(
         panels=(
             Panel(
-                x=Axis(label=along),
+                x=_along(places, along, names),
                 y=Axis(label=axis_label(label_of(name), unit)),
                 items=tuple(items),
             ),
         ),
         alt=f"{name} of {values.size} records along {along}, with the running median.",
     )
+
+
+def _along(places: Real, label: str, names: tuple[str, ...]) -> Axis:
+    """Axis of the records, with room for the first and the last mark."""
+    low, high = (float(places.min()), float(places.max())) if places.size else (0.0, 0.0)
+    if not names:
+        room = _MARGIN * (high - low) or 0.5
+        return Axis(label=label, low=low - room, high=high + room)
+    if len(names) <= _FEW_NAMES:
+        shown = [(k, plain(name)[:14]) for k, name in enumerate(names)]
+    else:
+        step = next(s for s in _STEPS if len(names) <= _MOST_TICKS * s)
+        shown = [(0, "1"), *((k - 1, str(k)) for k in range(step, len(names) + 1, step) if k > 1)]
+    ticks = tuple((float(at), words) for at, words in shown)
+    return Axis(label=label, low=-0.5, high=len(names) - 0.5, ticks=ticks, grid=False)
 
 
 def groups(some: Mapping[str, Real], *, name: str, unit: str, by: str) -> Figure:

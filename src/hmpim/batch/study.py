@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from datetime import UTC, datetime
 from importlib.metadata import version
 from os import PathLike
+from os.path import commonpath
 
 import numpy as np
 import scipy
@@ -16,6 +17,7 @@ from hmpim.batch.summary import ParameterSummary, Summary, column, summary_of
 from hmpim.batch.table import BatchTable
 from hmpim.formats.atomic import write_text
 from hmpim.report.figures import Picture
+from hmpim.report.numbers import plus_minus
 from hmpim.report.study import Grid, Section, StudyPage, render_study
 from hmpim.report.words import label_of
 from hmpim.units import conversion_factor
@@ -164,7 +166,7 @@ def _between(table: BatchTable, found: Summary) -> tuple[Grid, ...]:
             (
                 label_of(row.name) + (f" ({row.unit})" if row.unit else ""),
                 str(told.units),
-                f"{told.mean:.6g} ± {told.mean_std:.2g}",
+                plus_minus(told.mean, told.mean_std),
                 f"{told.spread:.3g}",
                 f"{low:.3g} to {high:.3g}",
                 f"{100 * told.share:.0f} %",
@@ -259,7 +261,13 @@ def _section(
             + (", with the running median." if some.size >= FOR_A_MEDIAN else "."),
             description=f"{row.name} along {along.lower()}.",
             figure=sequence(
-                places[order], some[order], name=row.name, unit=row.unit, along=along, bounds=bounds
+                places[order],
+                some[order],
+                name=row.name,
+                unit=row.unit,
+                along=along,
+                bounds=bounds,
+                names=_names(table, there) if along == _BY_NAME else (),
             ),
         )
     )
@@ -295,7 +303,12 @@ def _standing_out(
         caption="Records that stand out",
         columns=("Record", "Value", "95 % interval", "Robust deviations"),
         rows=tuple(
-            (name, f"{some[k]:.6g}", _interval(low, high), f"{min(away[k], 1e6):.1f}")
+            (
+                name,
+                f"{some[k]:.6g}",
+                _interval(low, high),
+                f"{away[k]:.1f}" if away[k] < 1e6 else "∞",
+            )
             for name, k, low, high in zip(names, worst, *ends, strict=True)
         ),
     )
@@ -341,6 +354,13 @@ def _order(table: BatchTable, there: NDArray[np.int64]) -> tuple[Real, str]:
     places = np.empty(names.size)
     places[np.argsort(names, kind="stable")] = np.arange(names.size)
     return places, _BY_NAME
+
+
+def _names(table: BatchTable, there: NDArray[np.int64]) -> tuple[str, ...]:
+    """Names of the records in their order, without the folder that all have in common."""
+    names = sorted(table.to_arrow(["record"]).column(0).take(there).to_pylist())
+    common = commonpath(names) if len(names) > 1 and all("/" in name for name in names) else ""
+    return tuple(name.removeprefix(common).lstrip("/") for name in names)
 
 
 def _stamp(word: str | None) -> float | None:

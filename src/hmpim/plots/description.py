@@ -62,6 +62,8 @@ class Axis:
         Whether its ticks have numbers; False where another panel below shows the same.
     grid : bool
         Whether its ticks have lines across the panel.
+    whole : bool
+        Whether it counts: its ticks are whole numbers.
     """
 
     label: str = ""
@@ -72,6 +74,7 @@ class Axis:
     ticks: tuple[tuple[float, str], ...] | None = None
     numbered: bool = True
     grid: bool = True
+    whole: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

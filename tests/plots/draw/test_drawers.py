@@ -1,6 +1,7 @@
 """Every way of drawing shows the same: the data, the ends, the ticks, the words."""
 
 import json
+import re
 from dataclasses import replace
 from itertools import combinations, pairwise
 
@@ -240,3 +241,12 @@ def test_panels_of_plotly_have_their_height_and_room_between_them(share, between
     assert heights == pytest.approx([96 * inches for inches in figure.heights], abs=1.0)
     gaps = [inside * (above[0] - below[1]) for above, below in pairwise(domains)]
     assert min(gaps) > between
+
+
+def test_a_long_number_at_the_end_of_an_axis_stays_inside_of_the_picture():
+    marked = ((0.0, "0"), (1.0, "0.0472500000"))
+    line = Curve(x=np.array([0.0, 1.0]), y=np.zeros(2))
+    panel = Panel(x=Axis(low=0.0, high=1.0, ticks=marked), y=Axis(), items=(line,))
+    text = Figure(panels=(panel,), alt="A long number.").to_svg(width=400.0)
+    (x,) = re.findall(r'<text x="([\d.]+)"[^>]*>0\.0472500000<', text)
+    assert float(x) + 0.5 * text_width("0.0472500000") <= 400.0

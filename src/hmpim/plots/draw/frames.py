@@ -175,6 +175,8 @@ def ticks(axis: Axis, ends: tuple[float, float], *, most: int = 7) -> list[tuple
     ['0', '100']
     >>> [words for _, words in ticks(Axis(scale="log"), (0.1, 20.0), most=8)]
     ['0.1', '0.2', '0.5', '1', '2', '5', '10', '20']
+    >>> [words for _, words in ticks(Axis(whole=True), (0.0, 3.2))]
+    ['0', '1', '2', '3']
     """
     low, high = min(ends), max(ends)
     if axis.ticks is not None:
@@ -193,7 +195,8 @@ def ticks(axis: Axis, ends: tuple[float, float], *, most: int = 7) -> list[tuple
             steps = [s for s in steps if span <= most * s]
         values = _multiples(low, high, steps[0] if steps else 360.0 * np.ceil(span / 2e3))
     else:
-        values = _multiples(low, high, _round_step(high - low, most))
+        step = _round_step(high - low, most)
+        values = _multiples(low, high, float(np.ceil(step)) if axis.whole else step)
     return list(zip(values, _words(values), strict=True))
 
 

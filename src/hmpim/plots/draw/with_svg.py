@@ -207,7 +207,7 @@ def _axes(pen: _Pen, panel: Panel, field: _Field, place: Place) -> list[str]:
         parts.append(f'<path d="{edge}" fill="none" stroke="{pen.colour("muted")}"/>')
     if panel.x.numbered:
         parts += [
-            _under(pen, x, bottom, words, turned=place.turned)
+            _under(pen, x, bottom, words, right=right, turned=place.turned)
             for x, (_, words) in zip(xs, place.x_ticks, strict=True)
         ]
     if panel.y.numbered:
@@ -227,9 +227,10 @@ def _axes(pen: _Pen, panel: Panel, field: _Field, place: Place) -> list[str]:
     return parts
 
 
-def _under(pen: _Pen, x: float, bottom: float, words: str, *, turned: bool) -> str:
+def _under(pen: _Pen, x: float, bottom: float, words: str, *, right: float, turned: bool) -> str:
     """Words below the lower edge, upright where they would overlap."""
-    if not turned:
+    if not turned:  # a long number at the end of the axis is kept inside of the picture
+        x = min(x, right + 10.0 - 0.5 * text_width(words))
         return pen.words(x, bottom + LINE, words, anchor="middle")
     across, down = x + 0.35 * SIZE, bottom + 7.0
     more = f' transform="rotate(-90 {across:.1f} {down:.1f})"'
