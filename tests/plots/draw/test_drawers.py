@@ -250,3 +250,16 @@ def test_a_long_number_at_the_end_of_an_axis_stays_inside_of_the_picture():
     text = Figure(panels=(panel,), alt="A long number.").to_svg(width=400.0)
     (x,) = re.findall(r'<text x="([\d.]+)"[^>]*>0\.0472500000<', text)
     assert float(x) + 0.5 * text_width("0.0472500000") <= 400.0
+
+
+@pytest.mark.parametrize("height", [70.0, 130.0, 220.0, 400.0])
+def test_numbers_of_a_phase_of_many_turns_do_not_overlap(height):
+    f = np.geomspace(0.1, 20.0, 50)
+    line = Curve(x=f, y=np.linspace(0.0, -1300.0, 50))
+    panel = Panel(x=Axis(scale="log"), y=Axis(degrees=True), items=(line,))
+    figure = Figure(panels=(panel,), alt="Thirteen quarter turns.", heights=(height / 100.0,))
+    text = figure.to_svg(width=350.0)
+    numbers = re.findall(r'<text x="[\d.]+" y="([\d.]+)"[^>]*>−?\d*[05]<', text)
+    across = sorted(float(y) for y in numbers)
+    assert len(across) >= 3
+    assert min(b - a for a, b in pairwise(across) if b - a > 0.5) >= 0.9 * SIZE

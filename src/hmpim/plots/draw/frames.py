@@ -26,6 +26,7 @@ _LINEAR_TO = 10.0  # of 'symlog'
 _TURNS = (1.0, 2.0, 5.0, 15.0, 30.0, 45.0, 90.0, 180.0, 360.0, 720.0)
 _FEW_DEGREES = 20.0  # below, a phase is numbered as anything else
 _MOST_TURNS = 16  # of a phase; a quarter turn each as long as there is room
+_CLOSER = 2.25  # times as many ticks as look well do not yet overlap
 _FROM_QUARTERS = 135.0  # a phase that spans more has ticks of quarter turns at least
 
 
@@ -188,7 +189,8 @@ def ticks(axis: Axis, ends: tuple[float, float], *, most: int = 7) -> list[tuple
         values = values[:: -(-len(values) // most)]
     elif axis.degrees and high - low > _FEW_DEGREES:
         span = high - low
-        steps = [s for s in _TURNS if span <= _MOST_TURNS * s]
+        room = min(_MOST_TURNS, _CLOSER * most)
+        steps = [s for s in _TURNS if span <= room * s]
         if span > _FROM_QUARTERS:
             steps = [s for s in steps if s >= 90.0]
         elif span <= most * 45.0:

@@ -256,7 +256,7 @@ def _item(
     if isinstance(item, Span):
         return [_span(pen, item.axis, item.low, item.high, item.colour, item.opacity, field)], []
     if isinstance(item, Words):
-        return [], [_words(pen, item, field, place)]
+        return [], [_words(pen, item, field, place, panel.bare)]
     if isinstance(item, Bars):
         return _bars(pen, item, field), []
     return [_image(item, field)], []
@@ -410,7 +410,7 @@ def _rule(pen: _Pen, item: Rule, field: _Field, place: Place) -> tuple[list[str]
     return parts, [pen.boxed(x, y, item.words, anchor=anchor, colour=item.colour)]
 
 
-def _words(pen: _Pen, item: Words, field: _Field, place: Place) -> str:
+def _words(pen: _Pen, item: Words, field: _Field, place: Place, bare: bool) -> str:
     if item.at == "share":
         x, y = place.left + item.x * place.width, place.top + (1.0 - item.y) * place.height
     else:
@@ -418,7 +418,8 @@ def _words(pen: _Pen, item: Words, field: _Field, place: Place) -> str:
     anchor = {"left": "start", "middle": "middle", "right": "end"}[item.anchor]
     if item.anchor == "left":  # what would leave the picture is moved in
         x = max(min(x + 5.0, place.left + place.width - text_width(item.text)), place.left + 2.0)
-    return pen.boxed(x, y + 0.35 * SIZE, item.text, anchor=anchor, colour=item.colour)
+    put = pen.words if bare else pen.boxed  # a drawing has no lines behind its words
+    return put(x, y + 0.35 * SIZE, item.text, anchor=anchor, colour=item.colour)
 
 
 def _bars(pen: _Pen, item: Bars, field: _Field) -> list[str]:

@@ -14,7 +14,8 @@ __all__ = ["ALIASING", "chains_chapter"]
 ALIASING = 26
 """Number of the picture of section IV.D.1, which the paper does not draw; its last is 25."""
 
-_WIDE, _HIGH = 1.7, 0.62  # of a box, half of each
+_WIDE, _HIGH = 1.75, 0.62  # of a box, half of each
+_ROW, _PITCH = 3, 4.2  # boxes of a row, and their distance: their words fit on a phone
 _FS, _TONE, _LONG = 20.0, 17.0, 0.6  # Hz, Hz, s
 
 
@@ -48,25 +49,19 @@ def _picture_1() -> Picture:
         ("data hold", ""),
         ("rounding", ""),
     )
-    first, second = chain[:4], chain[4:]
-    boxes = [_Box(words=words, x=4.6 * i + 3.6, y=3.6) for i, words in enumerate(first)]
-    boxes += [_Box(words=words, x=4.6 * i + 3.6, y=0.9) for i, words in enumerate(second)]
-    items: list[Item] = [_text(0.0, 3.95, "truth")]
-    items += _arrow((0.0, 3.6), (boxes[0].x - _WIDE, 3.6))
-    for one, other in pairwise(boxes[:4]):
-        items += _arrow((one.x + _WIDE, 3.6), (other.x - _WIDE, 3.6))
-    # down and back to the second row
-    turn, left = boxes[3].x, 0.6
-    items += [
-        _line((turn, turn), (3.6 - _HIGH, 2.25)),
-        _line((left, turn), (2.25, 2.25)),
-        _line((left, left), (0.9, 2.25)),
-        *_arrow((left, 0.9), (boxes[4].x - _WIDE, 0.9)),
+    boxes = [
+        _Box(words=words, x=_PITCH * (i % _ROW) + 3.0, y=6.2 - 2.6 * (i // _ROW))
+        for i, words in enumerate(chain)
     ]
-    for one, other in pairwise(boxes[4:]):
-        items += _arrow((one.x + _WIDE, 0.9), (other.x - _WIDE, 0.9))
-    items += _arrow((boxes[6].x + _WIDE, 0.9), (boxes[6].x + 4.6, 0.9))
-    items += [_text(boxes[6].x + 2.1, 1.35, "measured")]
+    items: list[Item] = [_text(0.0, 7.2, "truth"), *_arrow((0.0, 6.2), (boxes[0].x - _WIDE, 6.2))]
+    for k, (one, other) in enumerate(pairwise(boxes), start=1):
+        if k % _ROW:
+            items += _arrow((one.x + _WIDE, one.y), (other.x - _WIDE, other.y))
+        else:
+            items += _next_row(one, other)
+    last = boxes[-1]
+    items += _arrow((last.x + _WIDE, last.y), (last.x + 5.0, last.y))
+    items += [_text(last.x + _WIDE + 0.2, last.y + 0.45, "measured")]
     for box in boxes:
         items += _box(box)
     words = ", ".join(" ".join(part for part in words if part) for words in chain)
@@ -77,36 +72,56 @@ def _picture_1() -> Picture:
         "the number that is read. The order matters: a held value carries its noise along, and a "
         "clipped one is clipped before it is held and rounded.",
         description=f"Seven steps one after another: {words}.",
-        figure=_diagram(items, 20.0, "The sensor chain in seven steps."),
+        figure=_diagram(items, 13.2, 7.6, "The sensor chain in seven steps."),
     )
 
 
-def _picture_6() -> Picture:
-    stimulus = _Box(words=("HMPIM", "stimulus"), x=2.0, y=3.6)
-    unit = _Box(words=("unit", "under test"), x=7.2, y=3.6)
-    joint = _Box(words=("joint fit,", "error bars"), x=17.6, y=3.6)
-    steps = [
-        _Box(words=("(8) cross-", "correlation"), x=2.0, y=1.1),
-        _Box(words=("(9) to (11)", "error"), x=7.2, y=1.1),
-        _Box(words=("(12) to (14)", "line, noise"), x=12.4, y=1.1),
-        _Box(words=("(15) to (25)", "spectra"), x=17.6, y=1.1),
+def _next_row(one: _Box, other: _Box) -> list[Item]:
+    """From the end of a row down and back to the beginning of the next."""
+    middle, left = 0.5 * (one.y + other.y), 0.5
+    return [
+        _line((one.x, one.x), (middle, one.y - _HIGH)),
+        _line((left, one.x), (middle, middle)),
+        _line((left, left), (other.y, middle)),
+        *_arrow((left, other.y), (other.x - _WIDE, other.y)),
     ]
+
+
+def _picture_6() -> Picture:
+    top, bus, rows = 6.8, 4.75, (3.4, 0.9)
+    stimulus, unit, joint = (
+        _Box(words=words, x=_PITCH * i + 2.3, y=top)
+        for i, words in enumerate(
+            (("HMPIM", "stimulus"), ("unit", "under test"), ("joint fit,", "error bars"))
+        )
+    )
+    columns = (0.5, 6.7)  # lines that the steps of each column hang on
+    named = (
+        (("(8) cross-", "correlation"), "delay"),
+        (("(9) to (11)", "error"), "bias"),
+        (("(12) to (14)", "line, noise"), "scale factor, noise"),
+        (("(15) to (25)", "spectra"), "bandwidth, fn, ζ"),
+    )
+    steps = [
+        _Box(words=words, x=columns[i % 2] + 2.9, y=rows[i // 2])
+        for i, (words, _) in enumerate(named)
+    ]
+    branch = 0.5 * (unit.x + joint.x)
     items: list[Item] = [
-        *_arrow((stimulus.x + _WIDE, 3.6), (unit.x - _WIDE, 3.6)),
-        *_arrow((unit.x + _WIDE, 3.6), (joint.x - _WIDE, 3.6)),
-        _text(12.4, 4.0, "true and measured angle", middle=True),
-        _line((12.4, 12.4), (2.35, 3.6)),
-        _line((2.0, 17.6), (2.35, 2.35)),
-        *(_line((box.x, box.x), (1.1 + _HIGH, 2.35)) for box in steps),
+        *_arrow((stimulus.x + _WIDE, top), (unit.x - _WIDE, top)),
+        *_arrow((unit.x + _WIDE, top), (joint.x - _WIDE, top)),
+        _text(branch + 0.1, 5.65, "true and"),
+        _text(branch + 0.1, 5.15, "measured"),
+        _line((branch, branch), (bus, top)),
+        _line((columns[0], branch), (bus, bus)),
+        *(_line((at, at), (rows[1], bus)) for at in columns),
         *(
-            _text(box.x, 0.05, words, middle=True)
-            for box, words in zip(
-                steps,
-                ("delay", "bias", "scale factor, noise", "bandwidth, fn, ζ"),
-                strict=True,
-            )
+            _text(box.x, box.y - 1.05, words, middle=True)
+            for box, (_, words) in zip(steps, named, strict=True)
         ),
     ]
+    for i, box in enumerate(steps):
+        items += _arrow((columns[i % 2], box.y), (box.x - _WIDE, box.y))
     for box in (stimulus, unit, joint, *steps):
         items += _box(box)
     return Picture(
@@ -117,16 +132,19 @@ def _picture_6() -> Picture:
         "steps nothing.",
         description="The stimulus drives the unit under test; true and measured angle go to the "
         "paper's four steps and to the joint fit.",
-        figure=_diagram(items, 20.0, "From stimulus to parameters."),
+        figure=_diagram(items, 12.6, 7.5, "From stimulus to parameters."),
     )
 
 
-def _diagram(items: list[Item], width: float, alt: str) -> Figure:
+def _diagram(items: list[Item], width: float, height: float, alt: str) -> Figure:
     bare = Axis(low=-0.3, high=width + 0.3, ticks=(), grid=False)
     panel = Panel(
-        x=bare, y=Axis(low=-0.3, high=4.6, ticks=(), grid=False), items=tuple(items), legend=False
+        x=bare,
+        y=Axis(low=-0.5, high=height, ticks=(), grid=False),
+        items=tuple(items),
+        legend=False,
     )
-    return Figure(panels=(panel,), alt=alt, heights=(2.3,))
+    return Figure(panels=(panel,), alt=alt, heights=(0.45 * height,))
 
 
 def _text(x: float, y: float, words: str, *, middle: bool = False) -> Words:
