@@ -17,7 +17,7 @@ from hmpim.identify.fitting.data import Data
 from hmpim.identify.fitting.fit import Fit, Problem, fit_structure
 from hmpim.identify.fitting.start import RoughResponse, rough_response
 from hmpim.identify.noise.whiteness import is_white
-from hmpim.identify.worth import PART
+from hmpim.identify.worth import PART, PAST
 from hmpim.model.dynamics import Structure
 
 __all__ = ["grown_modes"]
@@ -34,9 +34,6 @@ _DELAYS = 3
 _FINE = 0.3
 """Steps of the delay turn the highest frequency by so much, in rad."""
 
-_ROUNDS = 2
-"""Times that they are grown."""
-
 _TASTE = 12
 """Steps from each start before the best is followed to its end."""
 
@@ -45,7 +42,8 @@ def grown_modes(problem: Problem, data: Data, best: Fit, structures: list[Struct
     """Fits of sections in parallel, one more each time, until white noise is left.
 
     They are grown at the delay of the best fit so far, and once more at the delay that they come
-    to themselves if that leaves more than noise: at a wrong delay some modes stand for it.
+    to themselves if that leaves more than noise, or a mode beyond the band: at a wrong delay some
+    modes stand for it.
 
     Parameters
     ----------
@@ -56,12 +54,12 @@ def grown_modes(problem: Problem, data: Data, best: Fit, structures: list[Struct
     best : Fit
         The best fit so far, for its delay.
     structures : list of Structure
-        The parallel ones that may be chosen.
+        Those that may be chosen, each of so many sections of order 2.
     """
     found: list[Fit] = []
-    for _ in range(_ROUNDS if structures else 0):
-        found += _grown(problem, data, best.delay, structures)
-        if not found or is_white(found[-1].residual):
+    for again in (False, True) if structures else ():
+        found += _grown(problem, data, best.delay, structures, known=again)
+        if not found or (is_white(found[-1].residual) and _is_inside(found[-1], data)):
             break
         best = min(found, key=lambda fit: fit.objective)
     return [
@@ -71,32 +69,47 @@ def grown_modes(problem: Problem, data: Data, best: Fit, structures: list[Struct
     ]
 
 
-def _grown(problem: Problem, data: Data, delay: float, structures: list[Structure]) -> list[Fit]:
+def _is_inside(fit: Fit, data: Data) -> bool:
+    """Whether all modes are where the record tells them."""
+    c1, shape = np.exp(fit.theta[1::2]), fit.theta[2::2]
+    return bool(np.all(PAST * data.rough.omega[-1] * c1 * np.sqrt(shape) > 1.0))
+
+
+def _grown(
+    problem: Problem, data: Data, delay: float, structures: list[Structure], *, known: bool
+) -> list[Fit]:
     """Fits of one more section each time, while one more explains a good part of what is left."""
     named = {len(structure.sections): structure for structure in structures}
     found: list[Fit] = []
     theta, rough, least = np.array([delay]), data.rough, np.inf
     for count in range(1, max(named) + 1):
-        free = replace(structures[0], sections=(2,) * count, zeros=2 * count - 1)
+        sections = (2,) * count
+        free = replace(structures[0], sections=sections, zeros=2 * count - 1, parallel=True)
+        gains = named.get(count, replace(free, zeros=2 * count - 2))
         theta = np.concatenate([theta, _peak(rough)])
         held = replace(problem, shortest_delay=theta[0], longest_delay=theta[0])
-        turned = fit_structure(held, free, theta, iterations=_TASTE)
-        poles = turned.theta[1:]
-        starts = [np.append(late, poles) for late in _delays(data.rough, poles, turned.memory)]
-        gains = named.get(count, replace(free, zeros=2 * count - 2))
+        leading = fit_structure(held, gains if known else free, theta, iterations=_TASTE)
+        starts = [leading.theta] if known else [theta, *_turned_back(data.rough, leading)]
         fit = min(
-            (fit_structure(problem, gains, start, iterations=_TASTE) for start in [theta, *starts]),
+            (fit_structure(problem, gains, start, iterations=_TASTE) for start in starts),
             key=lambda fit: fit.objective,
         )
-        if not fit.converged and fit.objective < turned.objective:
+        if not fit.converged and fit.objective < leading.objective:
             fit = fit_structure(problem, gains, fit.theta)
         found += [fit] if count in named else []
-        leading = min(turned, fit, key=lambda fit: fit.objective)
+        if not known and fit.objective < leading.objective:
+            leading = fit
         if is_white(fit.residual) or leading.objective > (1.0 - PART) * least:
             break
         theta, least = leading.theta, leading.objective
         rough = rough_response(data.u, leading.residual, longest_delay=0, lag=data.rough.lag)
     return found
+
+
+def _turned_back(rough: RoughResponse, fit: Fit) -> list[Real]:
+    """Starts at a fit's poles and the likeliest delays."""
+    poles = fit.theta[1:]
+    return [np.append(late, poles) for late in _delays(rough, poles, fit.memory)]
 
 
 def _shapes(omega: Real, theta: Real) -> Complex:
