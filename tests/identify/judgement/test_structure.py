@@ -104,9 +104,9 @@ def with_assumption(evidence, name, *, delay, criterion):
 @pytest.mark.parametrize(
     ("name", "criterion", "words"),
     [
-        ("second_order", 1.0, "if it is held by -0.50 samples"),
-        ("second_order", -8.0, "if it is held by -0.50 samples"),
-        ("first_order", -2.0, "if it is held with a first-order model by -0.50 samples"),
+        ("second_order", 1.0, "by −0.50 samples if it is held."),
+        ("second_order", -8.0, "by −0.50 samples if it is held."),
+        ("first_order", -2.0, "by −0.50 samples if it is held with a first-order model"),
     ],
 )
 def test_another_assumption_between_samples_is_named(clean, name, criterion, words):

@@ -58,15 +58,16 @@ def undetermined_between(
     for mode, apart, other in rivals:
         if other or abs(apart) > FEW:
             model = f" with a {structure_in_words(other)} model" if other else ""
-            moves.append(f"{_WORDS[mode]}{model} by {apart:+.2f} samples")
+            size = f"{apart:+.2f}".replace("-", "−")
+            moves.append(f"by {size} samples if it is {_WORDS[mode]}{model}")
     if not moves:
         return ()
     return (
         Finding(
             code="intersample",
             message="This record does not determine what the input does between its samples. "
-            f"{_WORDS[taken].capitalize()} is assumed; the delay would shift if it is "
-            f"{', and if '.join(moves)}. The intervals cover this. State it with intersample=.",
+            f"{_WORDS[taken].capitalize()} is assumed; the delay would shift "
+            f"{', and '.join(moves)}. The intervals cover this. State it with intersample=.",
             severity="info",
             parameters=_SHIFTED,
         ),
