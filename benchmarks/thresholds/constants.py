@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-__all__ = ["ROOT", "Constant", "constants", "imported", "module_name"]
+__all__ = ["ROOT", "Constant", "bare", "constants", "imported", "module_name"]
 
 ROOT = Path(__file__).parents[2] / "src" / "hmpim" / "identify"
 _NAME = re.compile(r"_?[A-Z][A-Z0-9_]*")
@@ -92,6 +92,34 @@ def _of_file(path: Path) -> Iterator[Constant]:
 def constants() -> list[Constant]:
     """All of them, by file and place."""
     return [one for path in sorted(ROOT.rglob("*.py")) for one in _of_file(path)]
+
+
+def _is_arithmetic(number: float) -> bool:
+    """Whether it is a half, a double or rounding, and so no choice."""
+    size = abs(number)
+    return size in (0.0, 0.5, 1.0, 2.0) or size <= 1e-6 or size >= 1e6
+
+
+def bare(source: str) -> list[tuple[int, float]]:
+    """Fractions without a name that decide in comparisons, with their lines.
+
+    Counts, which are whole numbers, are no fractions; neither are halves, doubles and rounding.
+
+    Examples
+    --------
+    >>> bare("seen = x > 0.3 * y or x < 0.5 * fs or x > 1e-9 * y or n < 3")
+    [(1, 0.3)]
+    """
+    return sorted(
+        {
+            (n.lineno, n.value)
+            for compare in ast.walk(ast.parse(source))
+            if isinstance(compare, ast.Compare)
+            for n in ast.walk(compare)
+            if isinstance(n, ast.Constant) and isinstance(n.value, float)
+            if not _is_arithmetic(n.value)
+        }
+    )
 
 
 def imported(path: Path) -> dict[str, tuple[str, str]]:

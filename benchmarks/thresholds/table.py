@@ -30,7 +30,8 @@ what class a number belongs to.
   looks.
 
 What is made of a number, such as `TWICE**2` or `1 - FEW`, moves with it and is not counted again.
-Numbers without a name in comparisons are neither listed nor counted: about a hundred.
+Without a name, comparisons hold counts, halves, doubles and rounding (up to 1e-6, or from 1e6) and
+no other number: a test reads the source.
 
 {records}
 """

@@ -14,6 +14,7 @@ import math
 import scipy.special
 
 __all__ = [
+    "BULK",
     "CLEARLY",
     "COVERAGE",
     "DEVIATIONS",
@@ -90,6 +91,9 @@ ONE_SIDED = float(scipy.special.ndtri(COVERAGE))
 
 SEEN = float(scipy.special.chdtri(1, 1 - COVERAGE))
 """Twice the log-likelihood that one parameter more gains as seldom by chance: 3.84."""
+
+BULK = float(scipy.special.ndtri(0.75))
+"""Deviations within which half of all normal errors lie: 0.674."""
 
 LIKELIER = -math.log(1 - COVERAGE)
 """Log-likelihood of the same odds, 20 to 1: 3.0."""

@@ -29,6 +29,15 @@ def test_every_constant_has_one_class():
     assert {one.key for one in some} == entries(some, known).keys()
 
 
+def test_no_comparison_of_identify_holds_a_number_that_has_no_name():
+    found = {
+        f"{path.relative_to(numbers.ROOT)}:{line}": value
+        for path in sorted(numbers.ROOT.rglob("*.py"))
+        for line, value in numbers.bare(path.read_text())
+    }
+    assert found == {}, "name it, with its origin in benchmarks/thresholds/origins.toml"
+
+
 def test_a_number_that_moved_to_another_file_keeps_its_class():
     moved = numbers.Constant(file="new.py", name="_FAR", text="8.0", says="")
     assert entries([moved], ["old.py:_FAR", "old.py:_NEAR"]) == {"new.py:_FAR": "old.py:_FAR"}

@@ -83,6 +83,16 @@ def test_an_ideal_clip_is_found_to_the_sample(u, step, with_prediction):
     assert found.high_std == pytest.approx(step / np.sqrt(12), abs=1e-9)
 
 
+@pytest.mark.parametrize("step", [0.0, 0.01, 0.03])
+def test_a_sine_of_which_half_is_clipped_is_seen_without_a_prediction(step):
+    """Its plateaus are as long as what lies between them."""
+    y = np.minimum(SLOW, 0.0)
+    if step:
+        y = step * np.rint(y / step)
+    found = detect_saturation(y, step=step)
+    assert (found.high, found.low) == (0.0, None)
+
+
 def test_noise_before_the_clip_repeats_the_level():
     sensor = Sensor(noise_std=0.05, saturation_high=0.7, natural_frequency=10.0, damping_ratio=0.4)
     y = sensor.respond(CHIRP, fs=FS, rng=3)

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hmpim.identify.arrays import Real
+from hmpim.identify.chance import FALSE_ALARM
 from hmpim.identify.fitting.fit import Fit, Problem
 from hmpim.identify.worth import FEW
 from hmpim.model.sampled import delayed_response
@@ -20,7 +21,7 @@ __all__ = ["Lag", "lag_of"]
 
 _POINTS = 16
 _EARLIEST = -1.0
-"""Least delay thought possible of a coupling, in samples."""
+"""Least delay of a coupling, in samples: causal, to the sample that stamps may be off."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -89,7 +90,7 @@ def lag_of(problem: Problem, fit: Fit, others: Real) -> Lag | None:
         costs = np.array([p[3] for p in likely])
         sigma2 = float(costs.min()) / max(problem.counted - others.shape[0] - 3, 1)
         weight = np.exp(-0.5 * (costs - costs.min()) / sigma2)
-        reached = max(p[0] for p, w in zip(likely, weight, strict=True) if w > 1e-3)
+        reached = max(p[0] for p, w in zip(likely, weight, strict=True) if w > FALSE_ALARM)
         top = min(1.3 * reached + FEW, top)
     lags = np.array([p[0] for p in likely])
     delays = np.array([p[1] for p in likely])

@@ -24,6 +24,7 @@ from hmpim.identify.effects.saturation import Saturation
 from hmpim.identify.fitting.fit import Fit, Problem, fit_structure
 from hmpim.identify.noise.autoregression import autoregression, spectrum_behind
 from hmpim.identify.noise.whiteness import is_white
+from hmpim.identify.worth import NEARLY
 
 __all__ = ["CensoredFit", "fit_censored"]
 
@@ -232,7 +233,7 @@ def _start(data: _Data, fit: Fit) -> _State:
         valid[data.arrivals.index[inside]] = True
         begun = fit_structure(replace(data.problem, valid=valid), fit.structure, fit.theta)
     theta = begun.theta.copy()
-    if data.arrivals.index.size < 0.9 * data.problem.y.size:
+    if data.arrivals.index.size < NEARLY * data.problem.y.size:
         gaps = np.diff(data.arrivals.index)
         theta[0] -= 0.5 * float(np.median(gaps)) if begun is fit else 0.5
     begun = replace(begun, theta=theta)

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from hmpim.errors import RecordError
 from hmpim.identify.arrays import Real
-from hmpim.identify.chance import DEVIATIONS
+from hmpim.identify.chance import BULK, DEVIATIONS
 from hmpim.identify.signals import as_signal, check_rate
 from hmpim.identify.worth import FEW, MOST, NEARLY, PART
 
@@ -162,7 +162,7 @@ def _changed(samples: Real, change: Real) -> NDArray[np.intp]:
     rounding = float(8 * np.finfo(float).eps * np.max(np.abs(samples)))
     least = rounding
     if np.count_nonzero(change <= rounding) < _FEWEST:  # no repeats: noise came after the hold
-        least = DEVIATIONS / 0.6745 * float(np.median(change))
+        least = DEVIATIONS / BULK * float(np.median(change))
     return np.flatnonzero(change > least) + 1
 
 
@@ -170,10 +170,10 @@ def _is_rich(samples: Real, change: Real, changed: NDArray[np.intp]) -> bool:
     """Whether the output takes many values, by changes of many sizes."""
     jump = change[changed - 1]
     # A rounded ramp changes by one step each; halfway to two is more.
-    if np.mean(jump > (1 + MOST) * np.quantile(jump, 0.01)) < FEW:
+    if np.mean(jump > (1 + MOST) * np.quantile(jump, FEW)) < FEW:
         return False
     levels = np.sort(samples[changed])
-    apart = DEVIATIONS / 0.6745 * float(np.median(change)) if change.min() > 0 else 0.0
+    apart = DEVIATIONS / BULK * float(np.median(change)) if change.min() > 0 else 0.0
     return bool(
         1 + np.count_nonzero(np.diff(levels) > apart) >= _FEWEST or _spread_out(levels, apart)
     )

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
 from hmpim.identify.arrays import Mask, Real
-from hmpim.identify.chance import DEVIATIONS
+from hmpim.identify.chance import BULK, DEVIATIONS
 from hmpim.identify.worth import FEW, MUCH, PART, TWICE, WORTH
 from hmpim.record.runs import runs_of
 
@@ -42,7 +42,7 @@ def stand_out(residuals: Real) -> Mask:
     away = np.abs(residuals - np.median(residuals, axis=-1, keepdims=True))
     bulk = np.median(away, axis=-1)
     # Twice what chance allows: noise need not be Gaussian.
-    return np.asarray((away.max(axis=-1) > TWICE * DEVIATIONS * 1.4826 * bulk) & (bulk > 0.0))
+    return np.asarray((away.max(axis=-1) > TWICE * DEVIATIONS / BULK * bulk) & (bulk > 0.0))
 
 
 def find_spikes(y: Real, prediction: Real, *, clipped: Mask | None = None) -> Mask | None:
@@ -68,12 +68,12 @@ def find_spikes(y: Real, prediction: Real, *, clipped: Mask | None = None) -> Ma
     counted = residual if clipped is None else residual[~clipped]
     if counted.size < 2 * _WINDOW or not stands_out(counted):
         return None
-    bulk = 1.4826 * float(np.median(np.abs(counted - np.median(counted))))
+    bulk = float(np.median(np.abs(counted - np.median(counted)))) / BULK
     if clipped is not None:
         residual = np.where(clipped, np.median(counted), residual)
     around = sliding_window_view(np.pad(residual, _WINDOW // 2, mode="reflect"), _WINDOW)
     level = np.median(around, axis=1)
-    spread = 1.4826 * np.median(np.abs(around - level[:, None]), axis=1)
+    spread = np.median(np.abs(around - level[:, None]), axis=1) / BULK
     near = sliding_window_view(np.pad(prediction, 1, mode="edge"), 3)
     least = np.maximum(
         TWICE * DEVIATIONS * np.maximum(spread, 0.5 * bulk), TWICE * np.ptp(near, axis=1)
@@ -148,4 +148,4 @@ def find_repeated(y: Real) -> Mask | None:
     for a, b in zip(first, stop - 1, strict=True):
         if b - a >= _LONGEST_COPY or y[a] in (y.min(), y.max()):
             copies[a : b + 1] = False
-    return copies if np.count_nonzero(copies) >= max(3.0, WORTH * y.size) else None
+    return copies if np.count_nonzero(copies) >= max(3, WORTH * y.size) else None

@@ -161,7 +161,7 @@ def _significant_digits(levels: Real, step: float) -> bool:
     if levels.size < 100:
         return False
     phase = np.exp(2j * np.pi * levels / (10.0 * step))
-    near = np.abs(np.angle(phase * np.conj(phase[np.argmax(np.abs(levels))]))) < 0.1
+    near = np.abs(np.angle(phase * np.conj(phase[np.argmax(np.abs(levels))]))) < np.pi / 10
     return bool(np.mean(near) > NEARLY)
 
 
@@ -203,7 +203,7 @@ def _sharpened(samples: Real, step: float, span: float) -> Quantization | None:
         step = moved
     left = samples - origin - step * k
     error = float(np.std(left))
-    if error > 0.26 * step:  # uniform would be 0.29
+    if error > NEARLY * step / np.sqrt(12):  # no nearer to the grid than any values are
         return None
     return Quantization(
         step=step, std=float(error / np.sqrt(spread)), offset=float(origin % step), exact=False

@@ -16,29 +16,25 @@ from numpy.typing import ArrayLike, NDArray
 
 from hmpim.errors import RecordError
 from hmpim.identify.arrays import Mask, Real
-from hmpim.identify.chance import ONE_SIDED
+from hmpim.identify.chance import BULK, DEVIATIONS, FALSE_ALARM, ONE_SIDED, deviations
 from hmpim.identify.effects.smeared import smeared_plateaus
 from hmpim.identify.signals import as_signal
-from hmpim.identify.worth import MATERIAL, MUCH, NEARLY, TOLERATED, TWICE
+from hmpim.identify.worth import FEW, MATERIAL, MOST, MUCH, NEARLY, TOLERATED, TWICE
 
 __all__ = ["NoiseAt", "Saturation", "detect_saturation"]
 
 NoiseAt = Literal["before", "after"]
 """Whether the noise is clipped with the signal, or added to what was clipped."""
 
-_CROWDED = 4.0
-"""Samples at the level over those expected from just below. A sinusoid's crest gives 2.4 to 3,
-a flattened one, as of sin x + (1/9) sin 3x, 3.5."""
+_CROWDED = 3.5
+"""Samples at a flattened crest, as of sin x + (1/9) sin 3x, over those expected from just below;
+a sinusoid's gives 2.4 to 3."""
 
 _FEWEST = 8
 """Samples that must be at the level, and just below it, before anything is said."""
 
 _VISITS = 2
 """Stays at the level that must look alike, where no prediction helps."""
-
-_DROP = 12.0
-"""Fall over as long again as a visit to the level lasted, in units of what is told apart
-there; a parabolic crest falls 8 to 9."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -53,7 +49,7 @@ class Saturation:
         Their standard deviations.
     clipped_low, clipped_high : ndarray of bool, shape (n,)
         Samples at the level. With noise added after the clipping these are the samples
-        within three of its standard deviations, or whose prediction lies beyond the level.
+        within 3.9 of its standard deviations, or whose prediction lies beyond the level.
     noise : {'before', 'after'}
         Whether the clipped values are all alike (noise comes before) or scatter (after).
     tolerance : float
@@ -198,7 +194,7 @@ def _upper(y: Real, prediction: Real | None, step: float) -> _Side | None:
 
 def _spread(x: Real) -> float:
     """Standard deviation of the bulk, from the median of the magnitude."""
-    return float(np.median(np.abs(x - np.median(x))) / 0.6745)
+    return float(np.median(np.abs(x - np.median(x))) / BULK)
 
 
 def _scatter(y: Real) -> float:
@@ -221,24 +217,25 @@ def _exact(y: Real, span: float, step: float) -> _Side | None:
 def _scattered(y: Real, sigma: float) -> _Side | None:
     """A crowd of samples within a few `sigma` of the top."""
     top = float(y.max())
-    upper = y[y > top - 20.0 * sigma]  # a level more than 6 below the top is none
-    level = top - 3.0 * sigma
+    most = deviations(y.size) * sigma  # a level further below the top is none
+    upper = y[y > top - 2.0 * most]
+    level = top - DEVIATIONS * sigma
     for _ in range(50):  # climbs to where the values are densest
         weight = np.exp(-0.5 * ((upper - level) / sigma) ** 2)
         moved = float(weight @ upper / weight.sum())
-        done = abs(moved - level) < 1e-3 * sigma
+        done = abs(moved - level) < 1e-6 * sigma
         level = moved
         if done:
             break
-    near = np.abs(y - level) < 3.0 * sigma
+    near = np.abs(y - level) < DEVIATIONS * sigma
     count = int(np.count_nonzero(near))
-    if count < 3 * _FEWEST or np.any(y > level + 6.0 * sigma):
+    if count < 3 * _FEWEST or top > level + most:
         return None
     width = float(np.std(y[near]))
     return _Side(
         level=float(np.mean(y[near])),
         std=width / float(np.sqrt(count)),
-        at=y > level - 3.0 * sigma,
+        at=y > level - DEVIATIONS * sigma,
         exact=False,
     )
 
@@ -269,9 +266,7 @@ def _is_crowded(count: int, below: Real, resolution: float) -> bool:
     room = max(float(distances[nearest - 1]), 2.0 * resolution) - resolution
     found = np.count_nonzero(distances < room + resolution) + 1
     expected = found * resolution / room
-    return bool(
-        count > _CROWDED * expected and scipy.stats.poisson.sf(count - 1, 2.5 * expected) < 1e-6
-    )
+    return bool(scipy.special.pdtrc(count - 1, _CROWDED * expected) < FALSE_ALARM)
 
 
 def _is_even(below: Real, resolution: float, reach: float) -> bool:
@@ -279,9 +274,8 @@ def _is_even(below: Real, resolution: float, reach: float) -> bool:
     floor = max(resolution, reach / 100.0)
     inside = np.maximum(below, floor) - floor + reach / 100.0
     exponent = 1.0 - inside.size / float(np.sum(np.log((reach - floor) * 1.01 / inside)))
-    settled = np.count_nonzero(below < floor) > 0.1 * below.size + 3 * np.sqrt(below.size)
     # The exponent is 0 if clipped, 1/2 at a crest, 1 if settling.
-    return bool(exponent < NEARLY * 0.5 and not settled)
+    return bool(exponent < NEARLY * 0.5)
 
 
 def _visits(at: Mask) -> NDArray[np.intp]:
@@ -301,23 +295,18 @@ def _is_flat(y: Real, side: _Side, resolution: float, reach: float) -> bool:
         return False
     distance = side.level - y
     near = distance < reach
-    coming, leaving, falls = [], [], []
+    coming, leaving = [], []
     for first, last in visits:
         length = last - first + 1
         before = near[max(first - length, 0) : first][::-1]
         after = near[last + 1 : last + 1 + length]
         coming.append(before.size if before.all() else int(np.argmin(before)))
         leaving.append(after.size if after.all() else int(np.argmin(after)))
-        falls.append(
-            max(distance[max(first - length, 0)], distance[min(last + length, y.size - 1)])
-        )
     if min(np.median(coming), np.median(leaving)) < 2.0:  # by a jump: a square wave
         return False
     if not 1.0 / TWICE < sum(coming) / sum(leaving) < TWICE:
         return False
-    if side.exact:
-        return bool(np.median(falls) > _DROP * resolution)
-    return _neither_bends_nor_tilts(y, visits, resolution / 3.0)
+    return side.exact or _neither_bends_nor_tilts(y, visits, resolution / 3.0)
 
 
 def _neither_bends_nor_tilts(y: Real, visits: NDArray[np.intp], sigma: float) -> bool:
@@ -335,7 +324,7 @@ def _goes_beyond(y: Real, side: _Side, prediction: Real, resolution: float) -> b
     rows = np.stack([np.ones(y.size), prediction, slope, np.gradient(slope)])
     free = ~side.at
     between = free & (y > y.min() + resolution)  # the other end may be clipped too
-    if np.count_nonzero(between) > 0.1 * y.size:
+    if np.count_nonzero(between) > FEW * y.size:
         free = between
     if np.count_nonzero(free) < 4 * rows.shape[0]:
         return False
@@ -345,7 +334,7 @@ def _goes_beyond(y: Real, side: _Side, prediction: Real, resolution: float) -> b
     beyond = (corrected - side.level)[side.at]
     runs = int(np.count_nonzero(side.at[1:] & ~side.at[:-1])) + 1
     least = max(ONE_SIDED * error / np.sqrt(runs), 0.5 * error, 0.5 * resolution)
-    if np.mean(beyond) > least and np.mean(beyond > 0) > 0.6:
+    if np.mean(beyond) > least and np.mean(beyond > 0) > MOST:
         return True
     # Values that scatter elsewhere and are all alike here, while the prediction moves.
     noise = min(error, _scatter(y))

@@ -13,7 +13,7 @@ import numpy as np
 from hmpim.identify.arrays import Mask, Real
 from hmpim.identify.chance import CLEARLY, SEARCHED, deviations
 from hmpim.identify.noise.whiteness import effective_share
-from hmpim.identify.worth import MUCH, WORTH
+from hmpim.identify.worth import FEW, MUCH, WORTH
 
 __all__ = ["Plateaus", "smeared_plateaus"]
 
@@ -139,7 +139,7 @@ def _falls_short(y: Real, rows: Real) -> tuple[bool, bool]:
         weight = float(q[:, -1] @ y) / r[-1, -1]
         left = y - q @ (q.T @ y)
         error = float(np.sqrt(left @ left / y.size)) / abs(r[-1, -1])
-        found.append(weight < -max(deviations(2) * error, 0.1))
+        found.append(weight < -max(deviations(2) * error, FEW))
     return found[0], found[1]
 
 
@@ -159,7 +159,7 @@ def _settled(y: Real, rows: Real, low: float, high: float) -> _Split | None:
     below, above = q < low, q > high
     for _ in range(30):
         free = ~(below | above)
-        if np.count_nonzero(free) < max(4 * rows.shape[0], 0.1 * y.size):
+        if np.count_nonzero(free) < max(4 * rows.shape[0], FEW * y.size):
             return None
         weights = np.linalg.lstsq(rows[:, free].T, y[free], rcond=None)[0]
         q = weights @ rows

@@ -112,7 +112,7 @@ def climb(
             damping *= 10.0
             refused += 1
         fell, best = best.cost - trial.cost, trial
-        if fell < negligible and damping < 1e-3:
+        if fell < negligible and damping <= 10 * _DAMPING:
             return best, True
         if fell < _POORLY * hoped:
             damping *= 2.0

@@ -23,6 +23,7 @@ from hmpim.model.response import slowest_time_constant
 from hmpim.model.sampled import SAMPLES_ALONE
 
 __all__ = [
+    "FORGETS",
     "Fit",
     "Problem",
     "fit_structure",
@@ -40,7 +41,7 @@ _SHORTEST_TIME_CONSTANT = 0.02
 _SHAPES = (1e-4, 1e6)
 """Bounds of 1 / (4ζ²): from a second pole 10 000 times as fast as the first, to ζ = 0.0005."""
 
-_FORGETS = 5.0
+FORGETS = 5.0
 """Time constants after which what came before is forgotten (0.7 % left)."""
 
 
@@ -105,7 +106,7 @@ class Fit:
     @property
     def memory(self) -> float:
         """Samples after which a state is forgotten: five times the slowest time constant."""
-        return _FORGETS * slowest_time_constant(self.denominator)
+        return FORGETS * slowest_time_constant(self.denominator)
 
 
 class _Evaluation:

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from hmpim.identify.arrays import Complex, Real
 from hmpim.identify.kept import kept
+from hmpim.identify.worth import MUCH
 from hmpim.model.dynamics import Structure, theta_of
 
 __all__ = ["RoughResponse", "coarse_lag", "rough_response", "starting_values"]
@@ -228,7 +229,7 @@ def starting_values(
     found.sort(key=lambda item: item[0])
     starts: list[Real] = []
     for _, theta in found:
-        if all(np.max(np.abs(theta - other)) > 0.3 for other in starts):
+        if all(np.max(np.abs(theta - other)) > MUCH for other in starts):
             starts.append(theta)
     return starts[:count]
 

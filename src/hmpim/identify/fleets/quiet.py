@@ -16,6 +16,7 @@ from hmpim.identify.arrays import Complex, Mask, Real
 from hmpim.identify.chance import EXCLUDED, FALSE_ALARM
 from hmpim.identify.effects.lost import stand_out
 from hmpim.identify.fitting.beginning import REACH, RINGS, stand_out_of
+from hmpim.identify.fitting.fit import FORGETS
 from hmpim.identify.fitting.halves import halves_of
 from hmpim.identify.fleets.fleet import Fleet, Group
 from hmpim.identify.judgement.feedback import chances_of_an_answer
@@ -97,7 +98,7 @@ def _is_told(fleet: Fleet, group: Group, behind: Real) -> Mask:
     omega, zeta = np.exp(fit.theta[group.some, 1:].T)
     slowest = (zeta + np.sqrt(np.maximum(zeta**2 - 1.0, 0.0))) / omega
     slowest = np.where(zeta < 1.0, 1.0 / (zeta * omega), slowest)
-    told &= np.maximum(fit.theta[group.some, 0], 0.0) + 5.0 * slowest <= n
+    told &= np.maximum(fit.theta[group.some, 0], 0.0) + FORGETS * slowest <= n
     return np.asarray(told & (slowest <= MUCH * n))
 
 

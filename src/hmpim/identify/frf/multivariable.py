@@ -35,6 +35,7 @@ from hmpim.identify.frf.rational import (
     solved,
 )
 from hmpim.identify.signals import as_signal, check_band, check_rate
+from hmpim.identify.worth import PART
 
 __all__ = ["ResponseMatrix", "response_matrix"]
 
@@ -278,7 +279,7 @@ def _refuse_identical(u: Real, low: int, high: int, labels: tuple[str, ...]) -> 
     if values[-1] > _IDENTICAL * values[0]:
         return
     share = np.abs(left[:, -1])
-    same = [label for label, s in zip(labels, share, strict=True) if s > 0.1 * share.max()]
+    same = [label for label, s in zip(labels, share, strict=True) if s > PART * share.max()]
     raise RecordError(
         f"{', '.join(same)} move alike over the whole band, but for a factor, so their responses "
         "cannot be distinguished; drive them one at a time, or with sweeps that pass each "

@@ -8,6 +8,7 @@ import scipy
 
 from hmpim.identify.arrays import Real
 from hmpim.identify.fitting.enrich import PLAIN
+from hmpim.identify.fitting.fit import FORGETS
 from hmpim.identify.fitting.growth import scale_of
 from hmpim.identify.judgement.evidence import Evidence, structure_in_words
 from hmpim.identify.kept import kept
@@ -56,7 +57,7 @@ def initial_transient(evidence: Evidence) -> tuple[Finding, ...]:
     if not joint.forgotten:
         return ()
     slowest = slowest_time_constant(evidence.readings.system.denominator)
-    lasting = 5.0 * slowest * evidence.fs > MUCH * joint.problem.y.size
+    lasting = FORGETS * slowest * evidence.fs > MUCH * joint.problem.y.size
     structure = joint.best.fit.structure
     drifts = lasting and structure.name not in PLAIN
     open_ended = structure.integrators > 0
@@ -68,7 +69,7 @@ def initial_transient(evidence: Evidence) -> tuple[Finding, ...]:
             f"fitted too, and its first {joint.forgotten / evidence.fs:.4g} s, which respond to "
             "input before the record, are left out."
             + (
-                f" The free response lasts {5.0 * slowest:.3g} s and may be a drift."
+                f" The free response lasts {FORGETS * slowest:.3g} s and may be a drift."
                 if drifts
                 else ""
             )
@@ -184,7 +185,7 @@ def unreached(missing: Sequence[str], *, band_end: float) -> Finding:
 def short_record(evidence: Evidence) -> tuple[Finding, ...]:
     """Doubt what is read off a record that ends before the system has settled."""
     system = evidence.readings.system
-    settle = max(system.delay, 0.0) + 5.0 * slowest_time_constant(system.denominator)
+    settle = max(system.delay, 0.0) + FORGETS * slowest_time_constant(system.denominator)
     length = evidence.joint.problem.y.size / evidence.fs
     if settle <= length:
         return ()

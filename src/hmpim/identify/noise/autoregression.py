@@ -13,6 +13,7 @@ import scipy
 from numpy.lib.stride_tricks import sliding_window_view
 
 from hmpim.identify.arrays import Mask, Real
+from hmpim.identify.chance import HALF
 from hmpim.identify.noise.whiteness import autocovariance
 from hmpim.identify.worth import PART
 
@@ -222,7 +223,7 @@ def _flicker(residual: Real, omega: Real) -> Real:
     steps = np.log(bins) - np.mean(np.log(bins))
     slope = float(steps @ level / (steps @ steps))
     error = np.pi / np.sqrt(6.0 * float(steps @ steps))
-    if slope > -2.0 * error:
+    if slope > -HALF * error:
         return np.zeros_like(omega)
     at = np.maximum(omega * n / (2 * np.pi), 0.5)
     power = np.exp(np.mean(level) + slope * (np.log(at) - np.mean(np.log(bins))))

@@ -11,6 +11,7 @@ import scipy
 from numpy.typing import ArrayLike
 
 from hmpim.identify.arrays import Real
+from hmpim.identify.chance import BULK
 from hmpim.identify.kept import kept
 from hmpim.identify.signals import as_signal, check_band, check_rate
 from hmpim.identify.worth import NEARLY, PART, PAST, TWICE
@@ -132,5 +133,5 @@ def _level(power: Real) -> float:
 def _is_rough(samples: Real, variance: float) -> bool:
     """Whether noise shows between jumps as well; a clean square wave stands still there."""
     third = np.diff(samples, 3)
-    usual = float(np.median(np.abs(third))) / 0.6745 / np.sqrt(20.0)
+    usual = float(np.median(np.abs(third))) / BULK / np.sqrt(20.0)
     return bool(usual > 0.5 * np.sqrt(variance))

@@ -4,7 +4,7 @@ import numpy as np
 import scipy
 
 from hmpim.identify.arrays import Complex, Mask, Real
-from hmpim.identify.chance import FALSE_ALARM
+from hmpim.identify.chance import DEVIATIONS, FALSE_ALARM
 from hmpim.identify.kept import kept
 
 __all__ = ["are_white", "autocovariance", "effective_share", "is_white"]
@@ -95,5 +95,5 @@ def effective_share(residual: Real) -> float:
         return 1.0
     r = autocovariance(residual, lags)
     rho = r[1:] / r[0]
-    rho = rho[np.abs(rho) > 3.0 / np.sqrt(residual.size)]
+    rho = rho[np.abs(rho) > DEVIATIONS / np.sqrt(residual.size)]
     return float(1.0 / (1.0 + 2.0 * np.sum(rho**2)))

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 from hmpim.errors import ArgumentError
 from hmpim.identify.arrays import Complex, Real
 from hmpim.identify.signals import as_pair, as_signal
-from hmpim.identify.worth import MATERIAL
+from hmpim.identify.worth import MATERIAL, PART
 
 __all__ = ["LineLevel", "Lines", "detection_lines", "find_period"]
 
@@ -108,7 +108,7 @@ def find_period(u: ArrayLike) -> int | None:
     lag = np.arange(n // 2 + 1)
     both = power[n - lag] + (power[n] - power[lag])
     different = (both - 2 * product) / np.maximum(both, np.finfo(float).tiny)
-    moved = np.flatnonzero(different > 0.1)
+    moved = np.flatnonzero(different > PART)
     if moved.size == 0:
         return None
     good = np.flatnonzero(different < MATERIAL**2)

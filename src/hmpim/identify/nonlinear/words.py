@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from hmpim.identify.nonlinear.mechanisms import Kind, Mechanism
 from hmpim.identify.result.digits import percent
 from hmpim.identify.result.groups import MODELLED
+from hmpim.identify.worth import MOST
 from hmpim.record import Finding
 
 __all__ = ["KIND_WORDS", "general", "particular"]
@@ -81,7 +82,7 @@ def general(
     return Finding(
         code="nonlinear",
         message=f"{percent(share)} % of the output (r.m.s.) is nonlinear{seen}. {guess}"
-        f"{whole if effect > 1.5 * share else ''} {left}. "
+        f"{whole if effect > (1 + MOST) * share else ''} {left}. "
         "Identify at several amplitudes to see where the linear model holds.",
         severity="doubt" if doubt else "info",
         parameters=MODELLED,

@@ -10,6 +10,9 @@ from hmpim.record import Record, uniform
 
 __all__ = ["check_alike", "check_apart", "check_channels", "same_at_levels"]
 
+_SAME_RATE = 1e-3
+"""Share by which the rates of two clocks may differ and still be one rate."""
+
 # Inputs of two repeats are the same if their difference is at most this share of their size.
 
 
@@ -67,7 +70,7 @@ def check_alike(records: tuple[Record, ...]) -> None:
     first = records[0]
     aligned = [uniform(record) for record in records]
     for k, record in enumerate(records[1:], start=1):
-        if abs(record.fs / first.fs - 1) > 1e-3:
+        if abs(record.fs / first.fs - 1) > _SAME_RATE:
             raise RecordError(
                 f"record {k} is at {record.fs:g} Hz and record 0 at {first.fs:g} Hz; resample one"
             )

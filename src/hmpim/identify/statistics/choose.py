@@ -11,7 +11,7 @@ import scipy
 
 from hmpim.errors import RecordError
 from hmpim.identify.arrays import Real
-from hmpim.identify.chance import FALSE_ALARM
+from hmpim.identify.chance import DEVIATIONS, FALSE_ALARM
 from hmpim.identify.fitting.candidates import nested
 from hmpim.identify.fitting.data import shifted
 from hmpim.identify.fitting.enrich import INTEGRATING, MODES, PLAIN, RICH, members, proposals
@@ -350,7 +350,7 @@ def left_over(products: Products, fitted: Fitted) -> LeftOver:
     white = rho.size == 0 or scipy.special.chdtrc(rho.size, box) > FALSE_ALARM
     if white and not products.order:
         power, count = fitted.fit.objective, products.counted
-    clear = rho[np.abs(rho) > 3.0 / np.sqrt(count)]
+    clear = rho[np.abs(rho) > DEVIATIONS / np.sqrt(count)]
     noise = np.ones(1) if white else whitening_filter(gram, count)
     return LeftOver(
         power=power / count,

@@ -8,6 +8,7 @@ import numpy as np
 from hmpim.arguments import checked
 from hmpim.errors import RecordError
 from hmpim.identify.arrays import Mask, Real
+from hmpim.identify.fitting.fit import FORGETS
 from hmpim.identify.result import Estimate, PairIdentification
 from hmpim.model import Model, Spread, simulate, slowest_time_constant
 from hmpim.record import Record, uniform
@@ -143,7 +144,7 @@ def predict(pair: PairIdentification, record: Record, *, start: float | None = N
     predicted = simulate(model, u.values, fs=aligned.fs, intersample=pair.intersample)
     if start is None:
         slowest = _slowest(model)
-        start = aligned.start + max(model.delay, 0.0) + 5.0 * slowest
+        start = aligned.start + max(model.delay, 0.0) + FORGETS * slowest
     scored = y.valid & (aligned.time >= start)
     if np.count_nonzero(scored) < 2:
         raise RecordError(

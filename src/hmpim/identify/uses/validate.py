@@ -9,8 +9,9 @@ import scipy
 from hmpim.arguments import checked
 from hmpim.errors import ArgumentError, RecordError
 from hmpim.identify.arrays import Mask, Real
-from hmpim.identify.chance import FALSE_ALARM, HALF
+from hmpim.identify.chance import DEVIATIONS, FALSE_ALARM, HALF
 from hmpim.identify.effects.hold import Hold, detect_hold, updates
+from hmpim.identify.fitting.fit import FORGETS
 from hmpim.identify.noise.misfit import misfit
 from hmpim.identify.noise.whiteness import autocovariance, effective_share
 from hmpim.identify.result import Identification, PairIdentification
@@ -55,7 +56,7 @@ class Bounds:
     chance: float | None = FALSE_ALARM
 
     def __post_init__(self) -> None:
-        if self.fit_percent is not None and not self.fit_percent < 100.0:
+        if self.fit_percent is not None and not self.fit_percent < 100:
             raise ArgumentError(f"fit_percent = {self.fit_percent!r} cannot be met; stay below 100")
         if self.noise_ratio is not None and not self.noise_ratio > 1.0:
             raise ArgumentError(
@@ -248,7 +249,7 @@ def _validated(
     model_std = _model_std(models, pairs, aligned)
     for level, side in ((models[0].saturation_low, -1.0), (models[0].saturation_high, 1.0)):
         if level is not None:  # near a level, noise decides what is clipped
-            scored &= side * (level - predicted) > 3.0 * noise
+            scored &= side * (level - predicted) > DEVIATIONS * noise
             scored &= side * (level - y.values) > 0
     if np.count_nonzero(scored) < 2 * _LAGS:
         raise RecordError(
@@ -284,7 +285,7 @@ def _held(models: Sequence[Model], y: Real, fs: float) -> Hold | None:
 
 def _settled(models: Sequence[Model], aligned: Aligned) -> Mask:
     wait = max(
-        max(m.delay, 0.0) + 5.0 * slowest_time_constant(np.asarray(m.denominator[::-1]))
+        max(m.delay, 0.0) + FORGETS * slowest_time_constant(np.asarray(m.denominator[::-1]))
         for m in models
     )
     return np.asarray(aligned.time >= aligned.start + wait)
