@@ -17,10 +17,14 @@ from hmpim.identify import HarmonicCurve, Identification, InputSet, Nonlinearity
 from hmpim.identify.identify import identify
 from hmpim.identify.result.inputs import OutputCoherence
 from hmpim.plots import Figure
+from hmpim.plots.draw.frames import legend_items
+from hmpim.plots.draw.layout import text_width
 from hmpim.record import Finding, Record
 from hmpim.report import About, render, report, sheet, write_figures
 from hmpim.report.advice import advice
+from hmpim.report.figures import pair_pictures
 from hmpim.report.study import StudyPage, render_study
+from hmpim.report.svg import PHONE
 from hmpim.stimulus import Limits, design
 
 VOID = {"meta", "link", "br", "hr", "img", "input"}
@@ -390,3 +394,15 @@ def test_the_sheet_leads_with_the_verdict_alone(found, tmp_path):
     text = (tmp_path / "s.html").read_text("utf-8")
     banner = text[text.index('<div class="verdict') :]
     assert re.search(r"<strong>([^<]*)</strong>", banner)[1] == "Model identified:"
+
+
+def test_every_legend_fits_a_phone(found):
+    pictures = pair_pictures(found, found.pairs[0])
+    labels = [
+        item.label
+        for picture in pictures
+        for panel in picture.figure.panels
+        for item in legend_items(panel)
+    ]
+    assert len(labels) > 8
+    assert [label for label in labels if text_width(label) + 60.0 > PHONE] == []

@@ -244,7 +244,7 @@ def _section(
         Picture(
             key=f"{row.name}-distribution",
             title=f"{title}: distribution",
-            caption="Number of records; what lies far out is counted in the outermost bars.",
+            caption="Number of records; outliers are counted in the outermost bars.",
             description=f"Histogram of {row.name}.",
             figure=distribution(some, name=row.name, unit=row.unit, bounds=bounds),
         )
@@ -279,7 +279,7 @@ def _section(
             Picture(
                 key=f"{row.name}-by-{len(pictures)}",
                 title=f"{title} by {by}",
-                caption="Median of each group, and the range that holds nine tenths of it.",
+                caption="Median of each group, with its range from 5 % to 95 %.",
                 description=f"{row.name} by {by}.",
                 figure=groups(grouped, name=row.name, unit=row.unit, by=by),
             )

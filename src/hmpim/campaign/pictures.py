@@ -21,7 +21,7 @@ __all__ = ["pair_of", "section_pictures"]
 _BESIDE: tuple[Compare, ...] = ("rates", "loads", "excitation")
 _MODES = ("P", "PV", "PVA")
 _MOST_BESIDE = 3  # columns that a page has room for
-_MARKED = "Upright lines mark the −90° bandwidths."
+_MARKED = "Vertical lines mark the −90° bandwidths."
 _CLEAR = 0.3  # share of the response: what is less sure is left out
 _HALF = 0.5  # share of the axis over which a curve is clear: of less, noise is what is seen
 

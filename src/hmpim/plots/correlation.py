@@ -96,7 +96,7 @@ def error_autocorrelation(
     items: list[Item] = [Curve(x=lags, y=correlation, colour="output")]
     if bias is not None:
         fall = np.ones_like(lags) if duration is None else 1.0 - np.abs(lags) / duration
-        words = "what the jointly fitted bias alone would give"
+        words = "from the fitted bias alone"
         items.append(Curve(x=lags, y=bias**2 * fall, label=words, colour="ink", dashes="--"))
     squared = f"{unit}²" if unit else ""
     return Figure(

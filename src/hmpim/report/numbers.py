@@ -108,6 +108,8 @@ def format_interval(estimate: Estimate, *, positive: bool = False) -> str:
     '9.928 to 10.046'
     >>> format_interval(Estimate(value=0.15, std=None, ci95=(0.1474, None), unit="s"))
     '0.1474 or more'
+    >>> format_interval(Estimate(value=4.46, std=None, ci95=(4.08895, 4.92893), unit="Hz"))
+    '4.09 to 4.93'
     >>> format_interval(Estimate(value=3.0, std=5.0, ci95=(-7.0, 13.0), unit="Hz"))
     '13.0 or less'
     """
@@ -116,6 +118,11 @@ def format_interval(estimate: Estimate, *, positive: bool = False) -> str:
     low, high = estimate.ci95
     if high is not None and _undetermined(estimate, positive):
         low = None
+    if estimate.std is None and low is not None and high is not None:
+        # To as many places as the value beside it.
+        shown = aside(estimate.value, low, high).partition(" ")[0]
+        places = len(shown.partition(".")[2])
+        return f"{low:.{places}f} to {high:.{places}f}"
     return interval(low, high, value=estimate.value, std=estimate.std)
 
 

@@ -310,7 +310,7 @@ def _pictures(
         marked = bandwidth is not None and bandwidth.spread < bandwidth.value
         mark = (bandwidth.value, bandwidth.spread) if marked and bandwidth is not None else None
         caption = "Measured frequency response of each record."
-        caption += " The upright line marks the mean −90° bandwidth." if mark else ""
+        caption += " The vertical line marks the mean −90° bandwidth." if mark else ""
         pictures.append(
             Picture(
                 key="responses",

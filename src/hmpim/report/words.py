@@ -65,7 +65,7 @@ GLOSSARY: tuple[ParameterWords, ...] = (
     ParameterWords(
         name="delay_low_frequency",
         label="Delay, low frequency",
-        meaning="Slope of the phase towards zero frequency: how late a slow movement arrives, "
+        meaning="Slope of the phase towards zero frequency: how late slow motion arrives, "
         "dynamics included.",
     ),
     ParameterWords(
@@ -109,13 +109,13 @@ GLOSSARY: tuple[ParameterWords, ...] = (
     ParameterWords(
         name="time_constant",
         label="Time constant",
-        meaning="Time in which first-order dynamics go 63 % of the way after a step.",
+        meaning="Time that first-order dynamics take to cover 63 % of a step.",
         positive=True,
     ),
     ParameterWords(
         name="bandwidth_phase90",
         label="Bandwidth, −90°",
-        meaning="Frequency at which the output lags by 90° in all, delay included: the paper's "
+        meaning="Frequency at which the output lags by 90° in total, delay included: the paper's "
         "measure of merit.",
         differs="it is read off one noisy, windowed ratio of spectra",
         positive=True,
@@ -142,7 +142,7 @@ GLOSSARY: tuple[ParameterWords, ...] = (
     ParameterWords(
         name="hold_period",
         label="Hold period",
-        meaning="Interval at which the output is renewed and then held.",
+        meaning="Interval at which the output is updated; in between it is held.",
         positive=True,
     ),
     ParameterWords(

@@ -81,7 +81,7 @@ def montecarlo_page(plan: Plan, found: MonteCarlo) -> StudyPage:
 
 
 def _percent(share: Share) -> str:
-    return f"{100 * share.share:.1f} % ({100 * share.low:.1f} to {100 * share.high:.1f})"
+    return f"{100 * share.share:.1f}\u00a0% ({100 * share.low:.1f} to {100 * share.high:.1f})"
 
 
 def _parameters(found: MonteCarlo) -> Grid:
@@ -155,9 +155,11 @@ def _shares(shares: list[Share]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 def _by_region(quantity: str, found: MonteCarlo) -> Section:
     some = [region for region in found.regions if region.quantity == quantity]
+    group, _, name = quantity.replace("_", " ").rpartition(".")
+    words = f"{name} ({group})" if group else name
     names = [_range(region) for region in some]
     grid = Grid(
-        caption=f"Quarters of {quantity}",
+        caption=f"Quarters of {words}",
         columns=(
             "From … to", "Over the bound", "95 % interval contains truth", "Structure right", "ok",
             "ok and wrong",
@@ -177,7 +179,7 @@ def _by_region(quantity: str, found: MonteCarlo) -> Section:
     pictures = (
         _picture(
             f"{quantity}-coverage",
-            f"Coverage by {quantity}",
+            f"Coverage by {words}",
             "Share of all intervals that contain the truth, by quarter.",
             names,
             _shares([r.coverage for r in some]),
@@ -186,7 +188,7 @@ def _by_region(quantity: str, found: MonteCarlo) -> Section:
         ),
         _picture(
             f"{quantity}-structure",
-            f"Structure right by {quantity}",
+            f"Structure right by {words}",
             "Share of draws whose structure is right, by quarter.",
             names,
             _shares([r.right_structure for r in some]),
@@ -194,7 +196,7 @@ def _by_region(quantity: str, found: MonteCarlo) -> Section:
             "Structure right (%)",
         ),
     )
-    return Section(title=f"By {quantity}", observed="", found=(), grids=(grid,), pictures=pictures)
+    return Section(title=f"By {words}", observed="", found=(), grids=(grid,), pictures=pictures)
 
 
 def _range(region: Region) -> str:
