@@ -109,23 +109,23 @@ def batch(
     report: Annotated[
         Path | None,
         typer.Option(
-            "--report", metavar="FILE", help="Where the page goes; DIR/study.html by default."
+            "--report", metavar="FILE", help="File for the page; DIR/study.html by default."
         ),
     ] = None,
     resume: Annotated[
         bool,
         typer.Option(
             "--resume/--fresh",
-            help="Go on where an earlier run of the same batch stopped, or start anew.",
+            help="Continue where an earlier run of the same batch stopped, or start anew.",
         ),
     ] = True,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No progress, no table.")] = False,
 ) -> None:
     """Identify many records, on all cores or on a cluster.
 
-    Writes Parquet parts that pandas, Polars and DuckDB read, and one page. A record that fails is
-    a row with the reason. Stopped at any time, the same command goes on where it was. Exit code 1:
-    a record does not meet a bound.
+    Writes Parquet parts that pandas, Polars and DuckDB read, and one page. A record that fails
+    gets a row with the reason. If it is stopped, the same command continues from there.
+    Exit code 1: a record does not meet a bound.
     """
     page = out / "study.html" if report is None else report
     check_files(reads={"the metadata": metadata}, writes={"--report": page}, folders={"--out": out})

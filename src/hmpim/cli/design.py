@@ -111,7 +111,7 @@ def design(
 ) -> None:
     """Design a stimulus inside position, rate and acceleration limits.
 
-    The amplitude is taken to its limit, then the extinction factor is raised until rate
+    The amplitude is set to its limit, then the extinction factor is raised until rate
     and acceleration fit. The axis starts and ends at rest. Multisines are shaped as the
     limits are; binary sequences and steps move from level to level smoothly.
 

@@ -54,7 +54,7 @@ def export(
             "--out",
             "-o",
             metavar="PATH",
-            help="File to write; a folder for c. Its name is the model's.",
+            help="File to write; a folder for c. The model takes its name.",
         ),
     ],
     output: Annotated[
@@ -92,7 +92,8 @@ def export(
 ) -> None:
     """Write what was identified as a model for another tool, error bars and origin included.
 
-    docs/models.md says what each target holds exactly, and what it approximates by how much.
+    docs/models.md states what each target represents exactly, what it approximates, and how
+    closely.
     """
     from hmpim.formats.models import export as write
 

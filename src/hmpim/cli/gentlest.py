@@ -1,4 +1,4 @@
-"""`hmpim gentlest`: the gentlest stimulus that buys a wanted accuracy inside limits."""
+"""`hmpim gentlest`: the gentlest stimulus that gives a wanted accuracy inside limits."""
 
 import json
 from collections.abc import Iterator
@@ -41,24 +41,28 @@ def gentlest(
     scale_factor: Annotated[float, typer.Option(help="Rough scale factor.")] = 1.0,
     range_: Annotated[
         tuple[float, float] | None,
-        typer.Option("--range", metavar="F1 F2", help="Natural frequency lies between, Hz."),
+        typer.Option("--range", metavar="F1 F2", help="Range of the natural frequency, Hz."),
     ] = None,
     damping_range: Annotated[
         tuple[float, float] | None,
-        typer.Option(metavar="Z1 Z2", help="Damping ratio lies between."),
+        typer.Option(metavar="Z1 Z2", help="Range of the damping ratio."),
     ] = None,
     delay_range: Annotated[
         tuple[float, float] | None,
-        typer.Option(metavar="S1 S2", help="Delay lies between, seconds."),
+        typer.Option(metavar="S1 S2", help="Range of the delay, seconds."),
     ] = None,
-    delay_error: Annotated[float, typer.Option(help="Wanted at 95 %, seconds.")] = 0.005,
+    delay_error: Annotated[
+        float, typer.Option(help="Wanted 95 % error of the delay, seconds.")
+    ] = 0.005,
     frequency_error: Annotated[
-        float, typer.Option(help="Wanted at 95 %, share of the natural frequency.")
+        float, typer.Option(help="Wanted 95 % error, as a share of the natural frequency.")
     ] = 0.017,
     scale_error: Annotated[
-        float, typer.Option(help="Wanted at 95 %, share of the scale factor.")
+        float, typer.Option(help="Wanted 95 % error, as a share of the scale factor.")
     ] = 0.02,
-    damping_error: Annotated[float, typer.Option(help="Wanted at 95 %, absolute.")] = 0.04,
+    damping_error: Annotated[
+        float, typer.Option(help="Wanted 95 % error of the damping ratio.")
+    ] = 0.04,
     amplitude: Annotated[float, typer.Option(help="Position limit, in the unit.")] = _INFINITE,
     max_rate: Annotated[float, typer.Option(help="Velocity limit, unit per second.")] = _INFINITE,
     max_acceleration: Annotated[
@@ -88,9 +92,9 @@ def gentlest(
         Path | None, typer.Option(help="Picture of gentleness against accuracy, PNG.")
     ] = None,
 ) -> None:
-    """Find the gentlest stimulus that buys a wanted accuracy inside limits.
+    """Find the gentlest stimulus that gives a wanted accuracy inside limits.
 
-    Exit code 1 if no stimulus does; the message says what would.
+    Exit code 1 if no stimulus does; the message then says what would be needed.
 
     Example:
 

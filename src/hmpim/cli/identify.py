@@ -71,9 +71,9 @@ def identify(
         list[Path],
         typer.Argument(
             metavar="RECORD...",
-            help="File with the record, such as a CSV file with a header. Several of one stimulus "
-            "are averaged and their error bars held against their scatter; at several amplitudes "
-            "they tell where the unit is linear.",
+            help="File with the record, such as a CSV file with a header. Several records of one"
+            " stimulus are averaged, and their error bars compared with their scatter; "
+            "records at several amplitudes show where the unit is linear.",
         ),
     ],
     input_: Input = None,
@@ -94,7 +94,8 @@ def identify(
         Between,
         typer.Option(
             "--intersample",
-            help="What the input does between samples: held, linear, band-limited, or found.",
+            help="What the input does between samples. zoh: held; foh: linear; bandlimited; "
+            "sampled: software; auto: found from the record.",
         ),
     ] = Between.AUTO,
     reference: Annotated[

@@ -39,10 +39,10 @@ def montecarlo(
     ] = None,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No progress, no table.")] = False,
 ) -> None:
-    """Draw systems, stimuli and noise; identify each; compare what is found with the truth.
+    """Draw systems, stimuli and noise; identify each; compare the results with the truth.
 
-    The same seed gives the same figures, whatever the number of workers. Stopped at any time, the
-    same command goes on where it was.
+    The same seed gives the same figures, whatever the number of workers. If it is stopped, the
+    same command continues from there.
     """
     from dataclasses import replace
     from json import dumps

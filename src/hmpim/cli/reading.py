@@ -99,8 +99,8 @@ Offset = Annotated[
     typer.Option(
         "--offset",
         metavar="NAME=TIME|?",
-        help="How late the clock of a channel, or of a --beside file, is, such as y=3.2ms; "
-        "? if it is not known. May be repeated.",
+        help="By how much the clock of a channel, or of a --beside file, is late, such as "
+        "y=3.2ms; ? if unknown. May be repeated.",
     ),
 ]
 Beside = Annotated[
@@ -125,7 +125,7 @@ StampChoice = Annotated[
 ]
 Sheet = Annotated[
     str | None,
-    typer.Option("--sheet", metavar="NAME", help="Sheet of a workbook with several."),
+    typer.Option("--sheet", metavar="NAME", help="Sheet to read, if the file has several."),
 ]
 
 _QUANTITY = re.compile(r"^\s*(?P<number>[-+]?[\d.]+(?:[eE][-+]?\d+)?)\s*(?P<unit>\S*)\s*$")

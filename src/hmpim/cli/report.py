@@ -44,7 +44,7 @@ def report(
 ) -> None:
     """Write a saved result as a page or PDF, a sheet to sign, or figures and tables.
 
-    The signals are no part of a saved result; `hmpim identify --report` shows them as well.
+    A saved result does not contain the signals; `hmpim identify --report` shows them as well.
     """
     check_files(
         reads={"the result": result},

@@ -52,9 +52,7 @@ def run(
     ] = None,
     axis: Annotated[
         str,
-        typer.Option(
-            "--axis", metavar="NAME", help="Axis that moves, where the stimulus names none."
-        ),
+        typer.Option("--axis", metavar="NAME", help="Axis to move, if the stimulus names none."),
     ] = "",
     output: Annotated[
         Path | None,
@@ -62,7 +60,7 @@ def run(
             "-o",
             "--output",
             metavar="FILE",
-            help="Where the record goes; one in .h5 is written as it comes, and survives a kill.",
+            help="File for the record. An .h5 file is written during the run and survives a kill.",
         ),
     ] = None,
     until: Annotated[
@@ -79,7 +77,7 @@ def run(
         typer.Option(
             "--pair",
             metavar="OUTPUT INPUT",
-            help="What --until is about, where several channels are recorded.",
+            help="Output and input that --until refers to, if several channels are recorded.",
         ),
     ] = None,
     log: Annotated[
@@ -92,16 +90,16 @@ def run(
         bool,
         typer.Option(
             "--watchdog/--no-watchdog",
-            help="Refuse a rig that nothing would stop if this process were killed. Without: a "
-            "separate process drives the rig, and outlives this one to stop it.",
+            help="Refuse a rig that nothing would stop if this process were killed. "
+            "--no-watchdog: a separate process drives the rig, and stops it if this one is killed.",
         ),
     ] = True,
     feel: Annotated[
         bool | None,
         typer.Option(
             "--feel/--no-feel",
-            help="Begin with a small motion, and raise the level in steps. On for a rig that "
-            "states no limits of its own.",
+            help="Begin with a small motion, and raise the level in steps. On by default for a "
+            "rig that states no limits of its own.",
         ),
     ] = None,
     live: Annotated[
@@ -116,7 +114,7 @@ def run(
         ),
     ] = "",
     tick_rate: Annotated[
-        float, typer.Option("--tick-rate", metavar="HZ", help="Pulses a second of the tick.")
+        float, typer.Option("--tick-rate", metavar="HZ", help="Pulses of the tick per second.")
     ] = 1000.0,
     seed: Annotated[
         int | None,

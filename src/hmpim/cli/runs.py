@@ -18,7 +18,7 @@ def runs(
         typer.Option(
             "--where",
             metavar="CONDITION",
-            help="Keep only what meets it: 'delay > 3ms', 'verdict = ok', 'name = *roll*', "
+            help="Keep only the runs that meet it: 'delay > 3ms', 'verdict = ok', 'name = *roll*', "
             "'created >= 2026-11-20'; may be repeated.",
         ),
     ] = None,

@@ -29,7 +29,7 @@ def table(
         ),
     ],
     rate: Annotated[
-        float, typer.Option("--rate", metavar="HZ", help="Commands and samples a second.")
+        float, typer.Option("--rate", metavar="HZ", help="Commands and samples per second.")
     ] = 1000.0,
     mode: Annotated[
         str,
@@ -44,8 +44,8 @@ def table(
         typer.Option(
             "--sensor",
             metavar="FILE",
-            help="Serve no table but the sensor that this rig file describes, on one axis that "
-            "follows exactly.",
+            help="Serve the sensor that this rig file describes, on one axis that follows "
+            "exactly, in place of the table.",
         ),
     ] = None,
     watchdog: Annotated[
@@ -59,21 +59,25 @@ def table(
     ] = (None),
     trace: Annotated[
         Path | None,
-        typer.Option("--trace", metavar="FILE", help="Write every tick as CSV: what it truly did."),
+        typer.Option(
+            "--trace", metavar="FILE", help="Write the true motion at every tick, as CSV."
+        ),
     ] = None,
     clock_offset: Annotated[
         float,
-        typer.Option("--clock-offset", metavar="S", help="Let its clock be ahead by this much."),
+        typer.Option("--clock-offset", metavar="S", help="Set its clock ahead by this much."),
     ] = 0.0,
     clock_drift: Annotated[
         float,
-        typer.Option("--clock-drift", metavar="PPM", help="Let its clock gain so many µs in 1 s."),
+        typer.Option(
+            "--clock-drift", metavar="PPM", help="Let its clock gain this many µs per second."
+        ),
     ] = 0.0,
 ) -> None:
     """Serve the simulated five-axis table, or a sensor, over UDP until Ctrl-C.
 
-    It checks every command against Fig. 4's limits, brakes after the watchdog's silence, and
-    comes to rest inside its limits.
+    It checks every command against Fig. 4's limits, brakes when no command comes for the
+    watchdog's time, and comes to rest inside its limits.
     """
     from hmpim.experiment.priority import undelayed
     from hmpim.rigs import SkewedClock, SystemClock

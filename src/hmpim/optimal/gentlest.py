@@ -1,4 +1,4 @@
-"""The gentlest stimulus that buys a wanted accuracy (section III's trade, solved)."""
+"""The gentlest stimulus that gives a wanted accuracy (section III's trade, solved)."""
 
 import itertools
 import math
@@ -102,7 +102,7 @@ def gentlest(
     families: Sequence[Family] = FAMILIES,
     progress: Progress | None = None,
 ) -> Gentlest:
-    """Find the gentlest stimulus that buys a wanted accuracy inside limits.
+    """Find the gentlest stimulus that gives a wanted accuracy inside limits.
 
     Parameters
     ----------
