@@ -3,11 +3,8 @@
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cache
 from pathlib import Path
 from typing import Any
-
-import numpy as np
 
 from hmpim.batch.addresses import Address
 from hmpim.batch.alike import Together, identified_together
@@ -19,9 +16,6 @@ from hmpim.batch.samples import Samples, reason_of
 from hmpim.identify import PairIdentification, identify
 
 __all__ = ["Done", "Task", "do_task", "give_up"]
-
-_FREED = 24 * 2**20
-"""Bytes of a block whose freeing sets what is kept: glibc goes by the largest below 32 MB."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -92,7 +86,6 @@ def do_task(task: Task) -> Done:
     """
     if task.path.exists():
         return Done(records=len(task.addresses))
-    _keep_memory()
     begin = time.perf_counter()
     items = list(read_items(task.addresses, task.request))
     read_by = time.perf_counter()
@@ -106,16 +99,6 @@ def do_task(task: Task) -> Done:
         identifying=done_by - read_by,
         writing=time.perf_counter() - done_by,
     )
-
-
-@cache
-def _keep_memory() -> None:
-    """Have the C library keep what is freed, up to twice so much, for what is asked for next.
-
-    Arrays of a megabyte come and go with each record. As long as glibc has met none that is larger,
-    it gives their pages back each time, and the kernel clears new ones: 3 ms a record.
-    """
-    np.empty(_FREED, dtype=np.uint8)
 
 
 def give_up(task: Task, reason: str) -> Done:
