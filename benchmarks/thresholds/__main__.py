@@ -14,7 +14,10 @@ from pathlib import Path
 
 
 def measure(count: int, jobs: int, seconds: float, trace: Path | None) -> None:
-    """Measure the tuned numbers: those that decide in the fewest draws first."""
+    """Measure the tuned numbers: those that decide in the fewest draws first.
+
+    Each is stored once all its draws are done; with the same trace, only those left are run.
+    """
     from thresholds.effects import draws, perturbed, traced
     from thresholds.table import EFFECTS, origins
 
@@ -36,20 +39,31 @@ def measure(count: int, jobs: int, seconds: float, trace: Path | None) -> None:
         "wrong_ok": cells.count("wrong_ok"),
         "moved": {key: len(where[key]) for key in order},
     }
-    numbers = {key: {"less": [0, 0, 0], "more": [0, 0, 0]} for key in order}
-    tasks = [(key, end, draw) for key in order for end in (0, 1) for draw in where[key]]
-    open_ = {key: 2 * len(where[key]) for key in order}
+    numbers = {}
+    if trace is not None and EFFECTS.exists():
+        stored = json.loads(EFFECTS.read_text())
+        numbers = stored["numbers"] if stored["run"] == run else {}
+    left = [key for key in order if key not in numbers]
+    tasks = [(key, end, draw) for key in left for end in (0, 1) for draw in where[key]]
+    open_ = {key: 2 * len(where[key]) for key in left}
+    found = {key: {"less": [0, 0, 0], "more": [0, 0, 0]} for key in left}
+
+    def store() -> None:
+        numbers.update({key: found[key] for key in left if open_[key] == 0})
+        EFFECTS.write_text(json.dumps({"run": run, "numbers": numbers}, indent=1) + "\n")
+
     begin = time.time()
+    store()
     for (key, end, draw), seen in perturbed(tasks, jobs=jobs, seconds=seconds):
         was, now = base[draw]["cell"], seen["cell"]
-        effect = numbers[key]["more" if end else "less"]
+        effect = found[key]["more" if end else "less"]
         effect[0] += (now == "right_ok") - (was == "right_ok")
         effect[1] += (now == "wrong_ok") - (was == "wrong_ok")
         effect[2] += now != was
         open_[key] -= 1
+        if open_[key] == 0:
+            store()
     print(f"{len(tasks)} draws again in {time.time() - begin:.0f} s", file=sys.stderr)
-    whole = {key: numbers[key] for key in order if open_[key] == 0}
-    EFFECTS.write_text(json.dumps({"run": run, "numbers": whole}, indent=1) + "\n")
 
 
 def main() -> int:
@@ -64,7 +78,11 @@ def main() -> int:
     parser.add_argument(
         "--seconds", type=float, default=1e9, help="to spend on changed numbers at most"
     )
-    parser.add_argument("--trace", type=Path, help="what was watched: read if there, else written")
+    parser.add_argument(
+        "--trace",
+        type=Path,
+        help="what was watched: read if there, else written; stopped, the same command goes on",
+    )
     given = parser.parse_args()
     if given.measure:
         measure(given.draws, given.jobs, given.seconds, given.trace)

@@ -64,6 +64,37 @@ def test_a_date_that_somebody_gave_goes_before_the_file_s_own():
     assert (places.tolist(), along) == ([0.0, 1.0, 9.0], "Minutes since the first (created)")
 
 
+def test_dates_are_found_under_any_name_and_serial_numbers_are_none():
+    days = [f"2026-03-0{k} 10:00:00" for k in (1, 2, 5)]
+    told = Told(meta_serial=["20260101", "20260102", "20260109"], meta_start=days)
+    places, along = study._order(told, np.arange(3))
+    assert (places.tolist(), along) == ([0.0, 1.0, 4.0], "Days since the first (start)")
+
+
+def test_records_are_in_the_order_in_which_people_count():
+    told = Told(record=["fleet.parquet#10", "fleet.parquet#9", "fleet.parquet#100"])
+    places, along = study._order(told, np.arange(3))
+    assert (places.tolist(), along) == ([1.0, 0.0, 2.0], "Record, by name")
+    every = study._names(told, np.arange(3))
+    assert every == ("fleet.parquet#9", "fleet.parquet#10", "fleet.parquet#100")
+
+
+def test_records_a_sample_apart_do_not_stand_out_where_most_are_equal():
+    """A delay read to whole samples: the deviation is that of its rounding, and not zero."""
+    values = np.array([0.045] * 101 + [0.040] * 19)
+    std, name = 0.005 / np.sqrt(12), [f"r{k}" for k in range(120)]
+    half = 1.96 * std
+    columns = {"d": values, "d_std": np.full(120, std), "d_low": values - half}
+    told = Told(record=name, **columns, d_high=values + half)
+    row = SimpleNamespace(name="d")
+    said, _ = study._standing_out(told, row, values, np.arange(120))
+    assert said[0].startswith("No record stands out")
+    values[7] = 0.1
+    said, (grid,) = study._standing_out(told, row, values, np.arange(120))
+    assert said[0].startswith("1 record lies")
+    assert [cells[0] for cells in grid.rows] == ["r7"]
+
+
 def test_an_interval_over_several_models_has_the_error_bar_of_the_likeliest():
     table = Told(d=[5.0, 5.0], d_std=[0.1, None], d_low=[4.8, 2.0], d_high=[5.2, 5.196])
     assert study._own_errors(table, "d") == pytest.approx([0.1, 0.1])

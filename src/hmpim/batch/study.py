@@ -1,5 +1,6 @@
 """The page of a batch: each parameter's distribution, what stands out, trends, groups, bounds."""
 
+import re
 from collections.abc import Sequence
 from datetime import UTC, datetime
 from importlib.metadata import version
@@ -26,7 +27,7 @@ __all__ = ["outliers", "study_page", "write_study"]
 
 _HALF = 1.96
 _TIMES = ("recorded", "date", "time", "datetime", "timestamp", "created")
-"""Columns of metadata that may say when a record was made."""
+"""Columns of metadata that may say when a record was made, before any other that holds dates."""
 
 _BY_NAME = "Record, by name"
 _SPANS = (("Days", 86_400.0), ("Hours", 3600.0), ("Minutes", 60.0), ("Seconds", 1.0))
@@ -111,25 +112,31 @@ def study_page(
     )  # fmt: skip
 
 
-def outliers(values: Real) -> tuple[Real, float]:
+def outliers(values: Real, error: float = 0.0) -> tuple[Real, float]:
     """How far each value is from the middle, in robust deviations, and how far is too far.
 
-    The deviation is 1.4826 times the median distance from the median. The threshold is the one
-    that the farthest of so many normal values passes with a chance of 1 %.
+    The deviation is 1.4826 times the median distance from the median, but no less than `error`.
+    The threshold is the one that the farthest of so many normal values passes with a chance of
+    1 %.
 
     Parameters
     ----------
     values : ndarray, shape (n,)
         Finite.
+    error : float
+        Standard deviation of one value by its own noise or rounding: most values may be equal.
 
     Examples
     --------
     >>> away, limit = outliers(np.append(np.linspace(-1, 1, 99), 50.0))
     >>> np.flatnonzero(away > limit).tolist(), round(limit, 2)
     ([99], 3.89)
+    >>> away, limit = outliers(np.append(np.full(99, 0.045), 0.040), error=0.0014)
+    >>> bool((away > limit).any())
+    False
     """
     middle = np.median(values)
-    spread = 1.4826 * float(np.median(np.abs(values - middle)))
+    spread = max(1.4826 * float(np.median(np.abs(values - middle))), error)
     limit = float(-scipy.special.ndtri(_FALSE_ALARM / 2 / max(values.size, 1)))
     if spread == 0.0:
         return np.where(values == middle, 0.0, np.inf), limit
@@ -292,7 +299,9 @@ def _standing_out(
     table: BatchTable, row: ParameterSummary, some: Real, there: NDArray[np.int64]
 ) -> tuple[tuple[str, ...], tuple[Grid, ...]]:
     """What is said of records far from the others, and the farthest of them."""
-    away, limit = outliers(some)
+    errors = _own_errors(table, row.name)[there]
+    errors = errors[np.isfinite(errors)]
+    away, limit = outliers(some, float(np.median(errors)) if errors.size else 0.0)
     far = np.flatnonzero(away > limit)
     if not far.size:
         return (f"No record stands out (none beyond {limit:.1f} robust deviations).",), ()
@@ -334,14 +343,15 @@ def _interval(low: float, high: float) -> str:
 
 
 def _order(table: BatchTable, there: NDArray[np.int64]) -> tuple[Real, str]:
-    """When each record was made; without that, its place in the alphabet.
+    """When each record was made; without that, its place by name, `unit2` before `unit10`.
 
     Stamps closer than a second on average are when files were written, not when tests were made.
     """
-    for name in _TIMES:
-        if name not in table.metadata:
-            continue
+    named = [name for name in _TIMES if name in table.metadata]
+    for name in (*named, *(name for name in table.metadata if name not in named)):
         words = table.to_arrow([f"meta_{name}"]).column(0).take(there).to_pylist()
+        if not words or _stamp(words[0]) is None:
+            continue
         stamps = [_stamp(word) for word in words]
         if all(stamp is not None for stamp in stamps):
             seconds = np.array(stamps, dtype=np.float64)
@@ -350,22 +360,30 @@ def _order(table: BatchTable, there: NDArray[np.int64]) -> tuple[Real, str]:
                 continue
             unit, length = next(u for u in _SPANS if seconds.max() >= 2.0 * u[1] or u[1] == 1.0)
             return seconds / length, f"{unit} since the first ({name})"
-    names = np.array(table.to_arrow(["record"]).column(0).take(there).to_pylist())
-    places = np.empty(names.size)
-    places[np.argsort(names, kind="stable")] = np.arange(names.size)
+    names = table.to_arrow(["record"]).column(0).take(there).to_pylist()
+    order = sorted(range(len(names)), key=lambda k: _counted(names[k]))
+    places = np.empty(len(names))
+    places[order] = np.arange(len(names))
     return places, _BY_NAME
+
+
+def _counted(name: str) -> tuple[str | int, ...]:
+    """A name in pieces that compare as people count: words and whole numbers in turn."""
+    return tuple(int(w) if k % 2 else w for k, w in enumerate(re.split("([0-9]+)", name)))
 
 
 def _names(table: BatchTable, there: NDArray[np.int64]) -> tuple[str, ...]:
     """Names of the records in their order, without the folder that all have in common."""
-    names = sorted(table.to_arrow(["record"]).column(0).take(there).to_pylist())
+    names = table.to_arrow(["record"]).column(0).take(there).to_pylist()
+    names.sort(key=_counted)
     common = commonpath(names) if len(names) > 1 and all("/" in name for name in names) else ""
     return tuple(name.removeprefix(common).lstrip("/") for name in names)
 
 
 def _stamp(word: str | None) -> float | None:
     try:
-        return None if not word else datetime.fromisoformat(word).timestamp()
+        # A serial number such as 20260101 is no date.
+        return datetime.fromisoformat(word).timestamp() if word and {"-", "T"} & set(word) else None
     except ValueError:
         return None
 
