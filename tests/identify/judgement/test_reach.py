@@ -136,7 +136,10 @@ def test_a_free_response_as_slow_as_a_drift_makes_the_bias_doubtful(clean):
     readings = replace(clean.readings, system=replace(system, denominator=slow))
     joint = replace(begun, best=replace(best, fit=fit))
     (found,) = initial_transient(replace(clean, joint=joint, readings=readings))
-    assert (found.severity, found.parameters) == ("doubt", ("bias", "time_constant"))
+    assert (found.severity, found.parameters) == (
+        "doubt",
+        ("bias", "time_constant", "natural_frequency", "damping_ratio"),
+    )
     (found,) = initial_transient(replace(clean, joint=joint))
     assert found.severity == "info"  # a fast mode is forgotten soon
     (found,) = initial_transient(replace(clean, joint=begun, readings=readings))

@@ -31,6 +31,9 @@ __all__ = ["Drifting", "drift_finding", "with_drift"]
 _DEGREES = (1, 2, 3, 4, 6, 8, 12, 16)
 """Degrees of the polynomial that are weighed against each other."""
 
+_FEWEST = 100
+"""Samples from which on a drift is told from noise: six for each degree of the polynomial."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Drifting:
@@ -92,6 +95,7 @@ def _passes_for_drift(first: JointFit, drifting: JointFit) -> bool:
     """
     fit, plain = first.best.fit, drifting.best.fit
     slow = almost_integrates(fit) and not fit.structure.integrators
+    slow = slow and drifting.problem.counted >= _FEWEST  # fewer have no shape of their own
     rich = fit.structure.parameters > plain.structure.parameters
     return slow and rich and plain.structure.name in PLAIN and is_white(plain.residual)
 
@@ -124,7 +128,7 @@ def _asked_for(joint: JointFit) -> bool:
         return True
     counted = np.arange(problem.y.size) if problem.valid is None else np.flatnonzero(problem.valid)
     residual = fit.residual[counted]
-    if counted.size < 100:
+    if counted.size < _FEWEST:
         return False
     # Of 1/f noise: polynomial k has the power of bin k / 2.
     flicker = np.mean(2.0 / np.arange(1, 5)) / np.mean(1.0 / np.arange(8, 41))  # 20.4

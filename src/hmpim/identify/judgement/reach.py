@@ -44,6 +44,9 @@ _OF_RATE = 0.4
 _STAMPED_LATE = 5.0
 """Samples by which a stamp may have an output ahead."""
 
+_OF_SLOWEST = ("time_constant", "natural_frequency", "damping_ratio")
+"""What is read off the slowest poles."""
+
 _BANDWIDTHS = ("bandwidth_phase90", "bandwidth_phase90_without_delay", "bandwidth_3db")
 
 
@@ -51,7 +54,7 @@ def initial_transient(evidence: Evidence) -> tuple[Finding, ...]:
     """Say what was left out because the record does not begin at rest.
 
     The free response of a slow pole that a plain model lacks looks as a drift does: there the
-    bias is in doubt.
+    bias is in doubt, and what is read off that pole.
     """
     joint = evidence.joint
     if not joint.forgotten:
@@ -61,7 +64,7 @@ def initial_transient(evidence: Evidence) -> tuple[Finding, ...]:
     structure = joint.best.fit.structure
     drifts = lasting and structure.name not in PLAIN
     open_ended = structure.integrators > 0
-    doubted = ("bias", "time_constant") if drifts else ("bias",) if open_ended else ()
+    doubted = ("bias", *_OF_SLOWEST) if drifts else ("bias",) if open_ended else ()
     return (
         Finding(
             code="initial_transient",
