@@ -269,6 +269,11 @@ def test_a_foreign_file_is_dropped_identified_read_by_eye_and_reported(page, ser
     page.get_by_text("0.15, by hand").wait_for()
 
 
+LEGEND = """() => {
+    const plot = document.querySelector('.hm-picture'), room = plot.getBoundingClientRect();
+    const foot = plot.querySelector('.legend').getBoundingClientRect().bottom;
+    return [foot, room.top + plot._fullLayout._size.t];
+}"""
 PANEL = "() => document.querySelector('.hm-picture')._fullLayout._size"
 NAMES = """() => [...document.querySelectorAll('.hm-picture')].flatMap((plot) => {
     const room = plot.getBoundingClientRect();
@@ -302,6 +307,11 @@ def test_a_narrower_window_keeps_the_height_of_plots_and_paper_has_no_controls(p
     page.wait_for_timeout(1500)
     assert page.evaluate(NAMES) == []
     assert page.evaluate(PANEL)["h"] == pytest.approx(wide["h"], abs=3.0)
+    page.set_viewport_size({"width": 1280, "height": 800})
+    page.wait_for_function("() => document.querySelector('.hm-picture')._fullLayout.width > 600")
+    page.wait_for_timeout(1500)
+    legend, panel = page.evaluate(LEGEND)
+    assert legend <= panel
     page.emulate_media(media="print")
     for control in ("nav", "main button", "main input", ".q-uploader", ".modebar"):
         assert not [c for c in page.locator(control).all() if c.is_visible()], control

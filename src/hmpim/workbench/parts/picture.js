@@ -227,7 +227,10 @@ export default {
         await this.redraw(data, layout, cursors);
         // what stands around the panels has taken some of their room: it is given back
         const lost = panels - this.$el._fullLayout._size.h;
-        if (lost > 2) await this.Plotly.relayout(this.$el, { height: layout.height + lost });
+        // a legend stays where it was when it stood higher, until the height is set anew
+        if (lost > 2 || this.drawn) {
+          await this.Plotly.relayout(this.$el, { height: layout.height + Math.max(lost, 0.5) });
+        }
         this.ends = ends(layout);
       }
       this.like = like;
