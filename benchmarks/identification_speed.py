@@ -1,9 +1,10 @@
 """Speed of one identification against a hand-written scipy fit with a good start.
 
 All see the same record in the same process, turn by turn, so that a busy machine slows all. Times
-are processor times of the thread, which other work lengthens least. The hand-written fits are given the structure, and start within 10 % of the truth; the package
-is given nothing. One is written for speed: the response by transforms of the whole record. The
-other is what the manual of scipy leads to: `curve_fit` over `signal.lsim`. Run with `make bench`.
+are processor times of the thread, which other work lengthens least. The hand-written fits are
+given the structure, and start within 10 % of the truth; the package is given nothing. One is
+written for speed: the response by transforms of the whole record. The other is what the manual of
+scipy leads to: `curve_fit` over `signal.lsim`. Run with `make bench`.
 """
 
 from __future__ import annotations
