@@ -282,9 +282,11 @@ def realised(system: RationalDelay, fs: float) -> tuple[_Real, _Real, _Real, flo
     modal = modal_form(b, a)
     if modal is not None:
         return modal
-    A, B, C, D = scipy.signal.tf2ss(b[::-1], a[::-1])
+    most = float(np.abs(b).max()) or 1.0  # of any unit
+    A, B, C, D = scipy.signal.tf2ss(b[::-1] / most, a[::-1])
+    D = D * most
     balanced, (scale, _) = scipy.linalg.matrix_balance(A, permute=False, separate=True)
-    entry, output = B[:, 0] / scale, C[0] * scale
+    entry, output = B[:, 0] / scale, C[0] * most * scale
     size = np.abs(entry).max()  # the state counts in units of what comes in
     return np.asarray(balanced), np.asarray(entry / size), np.asarray(output * size), float(D[0, 0])
 

@@ -44,7 +44,9 @@ def checked_structures(
     asked = tuple(structures) if structures is not None else tuple(known)
     for name in asked:
         if name not in known:
-            raise ArgumentError(f"structure {name!r} is not known; choose one of {known}")
+            raise ArgumentError(
+                f"structure {name!r} is not known; choose one of {', '.join(known)}"
+            )
     return cast(tuple[StructureName, ...], asked)
 
 

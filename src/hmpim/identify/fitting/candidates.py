@@ -136,7 +136,9 @@ def fit_rich(
         if not is_worth_explaining(problem, best, data) and is_white(best.residual):
             break
     else:
-        found += grown_modes(problem, data, best, members(structures, ("two_modes", *MODES)))
+        # In mid-motion the rough response, from which other structures start, shows no two modes.
+        names = MODES if problem.begins is None else ("two_modes", *MODES)
+        found += grown_modes(problem, data, best, members(structures, names))
     if found and not is_white(min(found, key=lambda fit: fit.objective).residual):
         # Poles without end follow what no linear model describes: friction, rounding.
         found = [fit for fit in found if fit.structure.order <= _SURE]

@@ -14,6 +14,7 @@ from hmpim.identify.judgement.evidence import Evidence
 from hmpim.identify.kept import kept
 from hmpim.identify.nonlinear.lines import find_period
 from hmpim.identify.result.groups import MODELLED
+from hmpim.identify.worth import MOST
 from hmpim.record import Finding
 
 __all__ = ["chances_of_an_answer", "feedback"]
@@ -39,7 +40,8 @@ def feedback(evidence: Evidence) -> tuple[Finding, ...]:
     left, u = evidence.readings.innovations, evidence.u
     if evidence.through or left.size != u.size or u.size < 20 * _AHEAD:
         return ()
-    if evidence.nonlinear or find_period(u) is not None:
+    bent = evidence.nonlinear > 0.0 and evidence.unexplained < MOST
+    if bent or find_period(u) is not None:
         return ()  # a sweep's harmonics are its future; that of a periodic input is its past
     inside = np.arange(_AHEAD, u.size - _AHEAD)
     counts = evidence.joint.weighed.counts

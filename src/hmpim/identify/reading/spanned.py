@@ -20,7 +20,7 @@ from hmpim.identify.fitting.trial import JointFit, Trial
 from hmpim.identify.reading.figures import figures_at, figures_of
 from hmpim.identify.result import Estimate, Parameters
 from hmpim.identify.result.groups import MODELLED, PHASE_SPLIT
-from hmpim.identify.worth import FEW
+from hmpim.identify.worth import FEW, TWICE
 
 __all__ = ["bent_figures", "blurred", "plainer_rivals", "rivals_of", "spanned"]
 
@@ -61,6 +61,7 @@ def plainer_rivals(joint: JointFit) -> tuple[Trial, ...]:
         and trial.fit.structure != best.fit.structure
         and trial.fit.structure.parameters <= most
         and trial.criterion - best.criterion < 2 * LIKELIER
+        and trial.fit.objective < TWICE * best.fit.objective  # else they are of other data
     )
 
 
