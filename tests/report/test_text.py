@@ -4,9 +4,11 @@ from dataclasses import replace
 from rich.console import Console
 
 from hmpim.identify.judgement import judged
+from hmpim.identify.records.levels import Trend
 from hmpim.record import Finding
 from hmpim.report import print_result
 from hmpim.report.numbers import format_value
+from hmpim.report.repeats_text import _trend_table
 from hmpim.report.words import GLOSSARY, off_by
 
 
@@ -68,3 +70,16 @@ def test_hostile_names_do_not_reach_the_terminal(hostile):
     text = printed(hostile)
     assert "\x1b" not in text
     assert "<script>" in text
+
+
+def test_a_change_of_more_than_all_is_written_in_full():
+    trend = Trend(
+        name="delay",
+        amplitudes=(1.0, 2.0),
+        values=(0.01, 0.024),
+        stds=(1e-4, 1e-4),
+        probability=1e-9,
+        change=1.4,
+    )
+    table = _trend_table((trend,))
+    assert [str(next(column.cells)) for column in table.columns][-2:] == ["+140 %", "< 0.1 %"]

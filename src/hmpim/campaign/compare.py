@@ -8,6 +8,7 @@ from typing import Any
 from hmpim.campaign.crossing import first_crossing, samples_bandwidth
 from hmpim.campaign.plan import Compare
 from hmpim.campaign.study import Reading, Row
+from hmpim.identify.result.digits import percent as in_percent
 
 __all__ = [
     "HEARD",
@@ -113,7 +114,7 @@ def _percent(value: float, base: float) -> float:
 
 def _apart(a: float, b: float) -> str:
     percent = abs(_percent(b, a))
-    return "less than 0.01 %" if percent < 0.01 else f"{percent:.2g} %"
+    return "less than 0.01 %" if percent < 0.01 else f"{in_percent(0.01 * percent)} %"
 
 
 def _rates(axis: str, rows: list[Row]) -> str:
@@ -323,8 +324,10 @@ def _fence(axis: str, rows: list[Row]) -> str:
         high = row.stimulus["band"][1]
         std = _scatter(row, 0.5 * high, 0.9 * high)
         if std is not None:
-            parts.append(f"{std:.2g} % at {row.rate:g} Hz")
-        jumps.append(f"{_bin_scatter(row, 0.5 * high, 0.9 * high):.2g} % at {row.rate:g} Hz")
+            parts.append(f"{in_percent(0.01 * std)} % at {row.rate:g} Hz")
+        jumps.append(
+            f"{in_percent(0.01 * _bin_scatter(row, 0.5 * high, 0.9 * high))} % at {row.rate:g} Hz"
+        )
     bin_width = 1.0 / (rows[0].stimulus["samples"] / rows[0].rate)
     if not parts:
         return ""

@@ -372,14 +372,14 @@ def _common_reach(low: NDArray[np.float64], high: NDArray[np.float64]) -> float:
 
 def _marks(pair: "PairIdentification") -> list[Mark]:
     found = pair.parameters
-    named: tuple[tuple[Estimate | None, str, str, Literal["magnitude", "phase"]], ...] = (
-        (found.bandwidth_phase90, "−90° at ", "", "phase"),
-        (found.bandwidth_phase90_without_delay, "−90° at ", " without delay", "phase"),
-        (found.bandwidth_3db, "−3 dB at ", "", "magnitude"),
-        (found.natural_frequency, "natural frequency ", "", "magnitude"),
+    named: tuple[tuple[Estimate | None, str, Literal["magnitude", "phase"]], ...] = (
+        (found.bandwidth_phase90, "−90° at", "phase"),
+        (found.bandwidth_phase90_without_delay, "−90° without delay at", "phase"),
+        (found.bandwidth_3db, "−3 dB at", "magnitude"),
+        (found.natural_frequency, "natural frequency", "magnitude"),
     )
     marks = []
-    for estimate, before, after, axes in named:
+    for estimate, words, axes in named:
         if estimate is None:
             continue
         low, high = estimate.ci95 or (None, None)
@@ -388,7 +388,7 @@ def _marks(pair: "PairIdentification") -> list[Mark]:
         marks.append(
             Mark(
                 frequency=estimate.value,
-                label=f"{before}{_in_words(estimate)}{after}",
+                label=f"{words} {_in_words(estimate)}",
                 axes=axes,
                 low=low,
                 high=high,

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING
 
 from hmpim.identify.records.levels import Levels, Trend
 from hmpim.identify.records.repeats import RepeatedPair, Repeats
+from hmpim.identify.result.digits import percent
 from hmpim.plots.style import printable
 from hmpim.record import Finding
 from hmpim.report.numbers import format_estimate, format_number, format_value, plus_minus
@@ -151,7 +152,7 @@ def _trend_table(trends: Sequence[Trend]) -> "Table":
         cells = [
             labels.get(trend.name, trend.name),
             *(known.get(a, "–") for a in amplitudes),
-            f"{100 * trend.change:+.2g} %",
+            f"{'+' if trend.change > 0 else ''}{percent(trend.change)} %",
             percent_words(trend.probability),
         ]
         table.add_row(*(Text(cell) for cell in cells))

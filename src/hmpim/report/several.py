@@ -13,6 +13,7 @@ from hmpim.formats.atomic import write_text
 from hmpim.identify import Estimate, Identification, PairIdentification, Parameters
 from hmpim.identify.records.levels import LevelComparison, Levels
 from hmpim.identify.records.repeats import RepeatedPair, Repeats
+from hmpim.identify.result.digits import percent
 from hmpim.identify.result.groups import in_words
 from hmpim.plots.curves import BodeCurve, measured_curve, model_curve
 from hmpim.plots.overlay import overlaid_bode
@@ -383,7 +384,7 @@ def _trends(compared: LevelComparison, units: Parameters) -> Grid:
             (
                 label_of(one.name) + unit,
                 *(known.get(a, "–") for a in amplitudes),
-                f"{100 * one.change:+.2f} %",
+                f"{'+' if one.change > 0 else ''}{percent(one.change)} %",
                 percent_words(one.probability),
             )
         )

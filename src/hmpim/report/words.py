@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from hmpim.identify import Estimate, Identification, PairIdentification, Verdict
+from hmpim.identify.result.digits import percent
 from hmpim.identify.result.groups import in_words
 from hmpim.plots.candidates import INTERSAMPLE_WORDS
 from hmpim.record import Finding
@@ -304,8 +305,8 @@ def nonlinear_facts(pair: PairIdentification) -> list[tuple[str, str]]:
         ("nonlinear", found.nonlinear),
     ]
     return [
-        ("Nonlinear part", f"{100 * found.share:.2g} % of the output (r.m.s.)"),
-        ("Odd, even", f"{100 * found.odd:.2g} %, {100 * found.even:.2g} %"),
+        ("Nonlinear part", f"{percent(found.share)} % of the output (r.m.s.)"),
+        ("Odd, even", f"{percent(found.odd)} %, {percent(found.even)} %"),
         ("Kind", kind or "like none of those that are tried"),
         ("The residual's power", ", ".join(f"{100 * part:.0f} % {name}" for name, part in parts)),
     ]

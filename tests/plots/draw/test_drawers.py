@@ -86,6 +86,7 @@ def test_a_band_without_end_is_drawn_to_the_edge():
         (Axis(degrees=True), (-380.0, 20.0), 7, "−360 −270 −180 −90 0"),
         (Axis(degrees=True), (-1300.0, 90.0), 7, None),
         (Axis(degrees=True), (-40.0, 5.0), 7, "−30 −15 0"),
+        (Axis(degrees=True), (-14.0, 14.0), 3, "−10 −5 0 5 10"),
         (Axis(), (0.0, 10.0), 6, "0 2 4 6 8 10"),
         (Axis(), (-2e-6, 2e-6), 5, "−2e−6 −1e−6 0 1e−6 2e−6"),
         (Axis(scale="log"), (0.1, 1000.0), 5, "0.1 1 10 100 1000"),
@@ -171,6 +172,7 @@ def test_a_result_is_drawn_with_its_marks_in_their_intervals(identified):
         assert estimate.text in rule.words
         assert estimate.text in figure.alt
     assert [curve.label for curve in phase.of(Curve)][-1] == "model without delay"
+    assert any(r.words.startswith("−90° without delay at ") for r in phase.of(Rule))
     measured = phase.of(Points)[0]
     assert (measured.low < measured.high).all()
 

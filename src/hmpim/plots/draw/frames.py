@@ -26,6 +26,7 @@ _LINEAR_TO = 10.0  # of 'symlog'
 _TURNS = (1.0, 2.0, 5.0, 15.0, 30.0, 45.0, 90.0, 180.0, 360.0, 720.0)
 _FEW_DEGREES = 20.0  # below, a phase is numbered as anything else
 _MOST_TURNS = 16  # of a phase; a quarter turn each as long as there is room
+_FEWEST = 3  # numbers of an axis that say how long it is
 _CLOSER = 2.25  # times as many ticks as look well do not yet overlap
 _FROM_QUARTERS = 135.0  # a phase that spans more has ticks of quarter turns at least
 
@@ -195,7 +196,10 @@ def ticks(axis: Axis, ends: tuple[float, float], *, most: int = 7) -> list[tuple
             steps = [s for s in steps if s >= 90.0]
         elif span <= most * 45.0:
             steps = [s for s in steps if span <= most * s]
-        values = _multiples(low, high, steps[0] if steps else 360.0 * np.ceil(span / 2e3))
+        step = steps[0] if steps else 360.0 * np.ceil(span / 2e3)
+        values = _multiples(low, high, step)
+        if len(values) < _FEWEST:  # it lies about one of them
+            values = _multiples(low, high, max((s for s in _TURNS if s < step), default=step))
     else:
         step = _round_step(high - low, most)
         values = _multiples(low, high, float(np.ceil(step)) if axis.whole else step)
