@@ -1,8 +1,6 @@
 """One page for several records of one test: repeats and their scatter, or levels."""
 
 from collections.abc import Sequence
-from datetime import UTC, datetime
-from importlib.metadata import version
 from os import PathLike
 from pathlib import Path
 
@@ -19,7 +17,7 @@ from hmpim.plots.curves import BodeCurve, measured_curve, model_curve
 from hmpim.plots.overlay import overlaid_bode
 from hmpim.plots.trend import trend
 from hmpim.record import Finding
-from hmpim.report.about import About
+from hmpim.report.about import About, made_by
 from hmpim.report.figures import Picture
 from hmpim.report.html import check_page
 from hmpim.report.numbers import (
@@ -171,20 +169,12 @@ def _title(about: About | None, otherwise: str) -> str:
 
 
 def _about(about: About | None, notes: Sequence[str]) -> str:
-    about = about or About()
-    known = (
-        ("Unit under test", about.under_test),
-        ("Test", about.test),
-        ("Operator", about.operator),
-        ("Date", about.date or datetime.now(UTC).strftime("%Y-%m-%d")),
-    )
-    head = "; ".join(f"{name}: {value}" for name, value in known if value)
+    head = "; ".join(f"{name}: {value}" for name, value in (about or About()).rows() if value)
     return " ".join([f"{head}.", *notes])
 
 
 def _facts(results: Sequence[Identification], names: Sequence[str]) -> tuple[tuple[str, str], ...]:
     first = results[0].record
-    now = datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC")
     sums = (
         f"{name} {result.record.sha256[:16]}" for name, result in zip(names, results, strict=True)
     )
@@ -193,7 +183,7 @@ def _facts(results: Sequence[Identification], names: Sequence[str]) -> tuple[tup
         ("Sampling rate", f"{first.fs:.7g} Hz"),
         ("Length", f"{first.samples / first.fs:.6g} s"),
         ("SHA-256", ", ".join(sums)),
-        ("Made by", f"hmpim {version('hmpim')}, {now}"),
+        made_by(),
     )
 
 

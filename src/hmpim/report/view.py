@@ -1,14 +1,12 @@
 """Everything that a report shows, as text and pictures: for the page, the PDF and the sheet."""
 
 from collections.abc import Mapping, Sequence
-from datetime import UTC, datetime
-from importlib.metadata import version
 from typing import Any
 
 from hmpim.identify import Identification, PairIdentification
 from hmpim.plots.candidates import INTERSAMPLE_WORDS
 from hmpim.record import Finding
-from hmpim.report.about import About
+from hmpim.report.about import About, made_by
 from hmpim.report.advice import advice, leading_findings
 from hmpim.report.figures import Picture, pair_pictures, stimulus_picture
 from hmpim.report.inputs import inputs_view
@@ -116,12 +114,7 @@ def _title(result: Identification) -> str:
 def _about(about: About, result: Identification) -> list[tuple[str, str]]:
     """Head of the report; what is not known has a line to be filled in on the sheet."""
     source = result.record.source
-    return [
-        ("Unit under test", about.under_test),
-        ("Test", about.test or (str(source) if source else "")),
-        ("Operator", about.operator),
-        ("Date", about.date or datetime.now(UTC).strftime("%Y-%m-%d")),
-    ]
+    return about.rows(test=str(source) if source else "")
 
 
 def _named(pair: PairIdentification) -> str:
@@ -188,12 +181,7 @@ def _facts(result: Identification) -> list[tuple[str, str]]:
     if result.data is not None and result.data.band is not None:
         low, high = result.data.band
         facts.append(("Excited band", f"{low:g} to {high:g} Hz"))
-    now = datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC")
-    return [
-        *facts,
-        ("SHA-256 of the record", record.sha256 or "unknown"),
-        ("Made by", f"hmpim {version('hmpim')}, {now}"),
-    ]
+    return [*facts, ("SHA-256 of the record", record.sha256 or "unknown"), made_by()]
 
 
 def _pair_view(

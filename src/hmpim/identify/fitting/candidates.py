@@ -33,8 +33,8 @@ __all__ = [
     "fit_plain",
     "fit_rich",
     "fit_under_each_assumption",
-    "is_worth_explaining",
     "nested",
+    "owed_to_input",
     "reduced",
     "refit_between",
 ]
@@ -133,7 +133,7 @@ def fit_rich(
             starts = [*_grown(p.structure, [*fits, *found]), *p.starts]
             found.append(_best_of(problem, p.structure, starts, [*fits, *found]))
         best = min(found, key=lambda fit: fit.objective)
-        if not is_worth_explaining(problem, best, data) and is_white(best.residual):
+        if owed_to_input(problem, best, data) <= MATERIAL and is_white(best.residual):
             break
     else:
         # In mid-motion the rough response, from which other structures start, shows no two modes.
@@ -206,15 +206,20 @@ def _best_of(problem: Problem, structure: Structure, starts: list[Real], rivals:
     return fit_structure(problem, structure, best.theta, precision=precision)
 
 
-def is_worth_explaining(problem: Problem, fit: Fit, data: Data, *, share: float = MATERIAL) -> bool:
-    """Whether the residual follows the input by more than a share of output or response."""
+def owed_to_input(problem: Problem, fit: Fit, data: Data) -> float:
+    """Share of the output (r.m.s.) by which the residual follows the input; 0 if by chance.
+
+    Infinite where a part of the response is missed, or much of the output is left over.
+    """
     band = band_of(data)
     left = misfit(data.u, fit.residual, delay=fit.delay, band=band)
     spread = _spread(problem)
-    owed = float(np.sqrt(left.share * fit.cost / spread)) if spread else 0.0
-    if left.probability < FALSE_ALARM and (owed > share or _misses_part(problem, fit, data, band)):
-        return True
-    return _is_poor(fit, spread)
+    owed = 0.0
+    if left.probability < FALSE_ALARM:
+        owed = float(np.sqrt(left.share * fit.cost / spread)) if spread else 0.0
+        if owed <= MATERIAL and _misses_part(problem, fit, data, band):
+            owed = np.inf
+    return np.inf if owed <= MATERIAL and _is_poor(fit, spread) else owed
 
 
 def _spread(problem: Problem) -> float:

@@ -11,7 +11,7 @@ from hmpim.identify.fitting.candidates import (
     fit_plain,
     fit_rich,
     fit_under_each_assumption,
-    is_worth_explaining,
+    owed_to_input,
     reduced,
 )
 from hmpim.identify.fitting.data import Data, Seen, band_of, follows, refit
@@ -23,7 +23,7 @@ from hmpim.identify.fitting.unrelated import says_nothing
 from hmpim.identify.fitting.whitening import prewhitened_of
 from hmpim.identify.noise.whiteness import is_white
 from hmpim.identify.signals import longest_lag
-from hmpim.identify.worth import FEW, PART, TWICE, WORTH
+from hmpim.identify.worth import FEW, MATERIAL, PART, TWICE, WORTH
 from hmpim.model.dynamics import StructureName
 from hmpim.model.sampled import interpolation_error
 from hmpim.record import Intersample
@@ -219,9 +219,9 @@ def enrich(
     """
     data, plain = course.data, course.plain
     mode, best = min(fitted, key=lambda item: item[1].objective)
-    problem = data.problem(mode, course.counted)
-    asked = not plain or is_worth_explaining(problem, best, data) or almost_integrates(best)
-    if not asked and not is_worth_explaining(problem, best, data, share=WORTH):
+    owed = owed_to_input(data.problem(mode, course.counted), best, data)
+    asked = not plain or owed > MATERIAL or almost_integrates(best)
+    if not asked and owed <= WORTH:
         return course, fitted
     fits = course.fits
     richer = fit_rich(data, course.problem, fits, course.others, all_of_them=not plain)

@@ -40,13 +40,8 @@ RICH: tuple[StructureName, ...] = (
     "washout",
     "band_pass",
 )
-MODES: tuple[StructureName, ...] = (
-    "three_modes",
-    "four_modes",
-    "five_modes",
-    "six_modes",
-    "seven_modes",
-    "eight_modes",
+MODES: tuple[StructureName, ...] = tuple(
+    name for name, structure in STRUCTURES.items() if structure.parallel
 )
 INTEGRATING: tuple[StructureName, ...] = (
     "integrator",

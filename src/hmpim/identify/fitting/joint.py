@@ -158,10 +158,7 @@ def grow_poles(joint: JointFit, course: Course, structures: tuple[StructureName,
     trials without zeros and with them grow too, and one leads that has become the likelier.
     """
     growth = _grown_from(joint, joint.best, course, structures)
-    led, found = joint.best, list(joint.trials)
-    found += growth.grown
-    if growth.grown:
-        led = growth.grown[-1]
+    led, found = (joint.best, *growth.grown)[-1], [*joint.trials, *growth.grown]
     for rival in _others_to_grow(joint, course.natural):
         one = _grown_from(joint, rival, course, structures)
         found += one.grown

@@ -36,7 +36,6 @@ __all__ = ["RepeatedPair", "RepeatedParameter", "Repeats", "identify_repeats"]
 
 SCHEMA = "hmpim/repeats/1"
 
-# Chance of doubting right error bars, on either side.
 _ROUNDING = 1e-12
 """Reach over value that is arithmetic's and not the record's."""
 
