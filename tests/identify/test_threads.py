@@ -17,13 +17,18 @@ y = np.interp(t - 0.05, t, u) + 0.1 * np.random.default_rng(0).standard_normal(t
 record = hmpim.Record.from_arrays({"u": u}, {"y": y}, fs=1000.0)
 for _ in range(2):
     hmpim.identify(record)
-before = resource.getrusage(resource.RUSAGE_SELF).ru_minflt
-hmpim.identify(record)
-print(resource.getrusage(resource.RUSAGE_SELF).ru_minflt - before)
+faults = []
+for _ in range(4):
+    before = resource.getrusage(resource.RUSAGE_SELF).ru_minflt
+    hmpim.identify(record)
+    faults.append(resource.getrusage(resource.RUSAGE_SELF).ru_minflt - before)
+print(min(faults))
 """
 
 
 @pytest.mark.skipif(platform.libc_ver()[0] != "glibc", reason="another allocator")
 def test_a_record_is_identified_in_the_memory_of_the_one_before():
     told = subprocess.run([sys.executable, "-c", RECORDS], capture_output=True, check=True)
-    assert int(told.stdout) < 500  # pages of 4 kB; some 4 000 where each array is mapped anew
+    # Pages of 4 kB: some 4 000 each time where every array is mapped anew. One run of several
+    # may find the heap in pieces and ask for a few hundred, so the least of four counts.
+    assert int(told.stdout) < 500
