@@ -10,6 +10,7 @@ from families.study import draw_of, identified, one
     [
         ("Bessel", 403, 2),  # a linear input stands in for a fifth pole
         ("Bessel", 222, 0),  # and for a third
+        ("Bessel", 404, 6),  # a sixth pole would not show, and takes of the delay
         ("first order, held sweep", 403, 0),  # a second pole stands in for a held input
         ("non-minimum phase", 403, 13),  # the plainer structure is almost as likely
         ("3-2-1-1", 222, 5),
@@ -37,3 +38,7 @@ def test_what_the_fit_leaves_over_and_would_be_doubted_for_is_explained():
     pair = identified(draw).pairs[0]
     assert pair.structure == "second_order_zero"
     assert pair.verdict == "ok"
+
+
+def test_two_modes_are_grown_where_a_clipped_record_begins_in_motion():
+    assert one("by chance", 404, 9, True).cell == "right_ok"

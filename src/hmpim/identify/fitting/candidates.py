@@ -136,9 +136,9 @@ def fit_rich(
         if owed_to_input(problem, best, data) <= MATERIAL and is_white(best.residual):
             break
     else:
-        # In mid-motion the rough response, from which other structures start, shows no two modes.
-        names = MODES if problem.begins is None else ("two_modes", *MODES)
-        found += grown_modes(problem, data, best, members(structures, names))
+        grown = grown_modes(problem, data, best, members(structures, ("two_modes", *MODES)))
+        # Two modes that explain part of what follows the input stand for what is not linear.
+        found += [f for f in grown if f.cost < PART * best.cost]
     if found and not is_white(min(found, key=lambda fit: fit.objective).residual):
         # Poles without end follow what no linear model describes: friction, rounding.
         found = [fit for fit in found if fit.structure.order <= _SURE]

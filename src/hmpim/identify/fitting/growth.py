@@ -95,9 +95,14 @@ class HiddenPole:
 
     @property
     def may_hide(self) -> bool:
-        """Whether a pole would not show beside none or one, and either is long or leaned to."""
+        """Whether one more pole of a chain would not show, and either is long or leaned to.
+
+        Not of two poles, which the paper's sensors have, and of a sum of modes.
+        """
         far = self.limit > PART * self.scale or self.squared > self.std
-        return self.fit.structure.order <= 1 and far
+        structure = self.fit.structure
+        chain = structure.order <= 1 or (structure.order > 2 and not structure.zeros)
+        return chain and far
 
 
 class Fitted(Protocol):
