@@ -137,7 +137,7 @@ def test_an_input_in_motion_is_continued_without_a_corner():
     assert missed(rest=False) < 0.3 * missed(rest=True)
 
 
-@pytest.mark.parametrize("precision", [1e-3, 1e-5, 1e-6])
+@pytest.mark.parametrize("precision", [1e-3, 1e-5, 1e-6, 1e-8])
 def test_a_sweep_is_interpolated_as_closely_as_asked(precision):
     index = np.arange(2000)
     u = np.sin(np.pi * 0.2 / index.size * index**2) * np.hanning(index.size)

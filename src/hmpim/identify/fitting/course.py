@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from hmpim.identify.chance import BULK
 from hmpim.identify.fitting.beginning import begin_later, count_in
 from hmpim.identify.fitting.candidates import (
     almost_integrates,
@@ -25,7 +26,7 @@ from hmpim.identify.noise.whiteness import is_white
 from hmpim.identify.signals import longest_lag
 from hmpim.identify.worth import FEW, MATERIAL, PART, TWICE, WORTH
 from hmpim.model.dynamics import StructureName
-from hmpim.model.sampled import interpolation_error
+from hmpim.model.sampled import WINDOW, interpolation_error
 from hmpim.record import Intersample
 
 __all__ = [
@@ -156,25 +157,34 @@ def free_from_wander(course: Course) -> Course:
 
 
 def interpolate_finely(course: Course) -> Course:
-    """The same with the input interpolated as closely as the noise lets it be seen.
+    """The same with the input interpolated as closely as the noise lets it be seen."""
+    finer = interpolated_for(course, course.best)
+    if finer is None or course.natural != "bandlimited":
+        return finer or course
+    return replace(finer, fits=[refit(finer.problem, fit) for fit in course.fits])
+
+
+def interpolated_for(course: Course, fit: Fit) -> Course | None:
+    """The same with the input interpolated as closely as a fit asks for; None where it is.
 
     What is missed between the samples biases an estimate by its share of the output; the noise
-    spreads it by its own share over the root of their number.
+    spreads it by its own share over the root of their number. Samples that the ends of the record
+    spoil are no noise: the median does not see them.
     """
     if course.alone and course.natural != "bandlimited":
-        return course
-    best, count = course.best, course.problem.counted
-    seen = np.sqrt(best.cost / count) / max(float(np.std(best.prediction)), np.finfo(float).tiny)
-    wanted = PART * float(seen / np.sqrt(count))
-    if wanted >= course.data.precision:
-        return course
-    used = course.data.problem("bandlimited", course.counted).source.oversampling
-    if interpolation_error(course.data.u, used) <= wanted:
-        return course
-    finer = replace(course, data=replace(course.data, sources={}, precision=wanted))
-    if course.natural != "bandlimited":
-        return finer
-    return replace(finer, fits=[refit(finer.problem, fit) for fit in course.fits])
+        return None
+    problem = course.data.problem("bandlimited", course.counted)
+    residual = fit.residual if problem.valid is None else fit.residual[problem.valid]
+    spread = max(float(np.std(fit.prediction)), np.finfo(float).tiny)
+    seen = float(np.median(np.abs(residual))) / BULK / spread
+    wanted = PART * seen / float(np.sqrt(residual.size))
+    if wanted * TWICE >= course.data.precision:
+        return None
+    used = problem.source.oversampling
+    windowed = 0.0 if used == 1 else min(WINDOW, course.data.precision)
+    if max(interpolation_error(course.data.u, used), windowed) <= wanted:
+        return None
+    return replace(course, data=replace(course.data, sources={}, precision=wanted))
 
 
 def find_beginning(course: Course) -> Course:

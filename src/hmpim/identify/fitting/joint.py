@@ -24,6 +24,7 @@ from hmpim.identify.fitting.course import (
     find_beginning,
     free_from_wander,
     interpolate_finely,
+    interpolated_for,
     is_unanswered,
     start,
     turn_ahead,
@@ -123,9 +124,12 @@ def weigh_and_look_again(
         data, seen = course.data, course.counted
         problem = data.problem(best.intersample, seen)
         again = look_again(problem, best, seen, lag=data.rough.lag)
-        if again is None and not _is_needlessly_coloured(problem, best.fit):
+        natural = best.intersample == "bandlimited"
+        finer = interpolated_for(course, best.fit) if natural else None
+        if (again, finer) == (None, None) and not _is_needlessly_coloured(problem, best.fit):
             break
         again = seen if again is None else again
+        data = (finer or course).data
         course = replace(course, counted=again, data=replace(data, noise=None))
         chosen = (best.intersample, best.fit.structure)
         hopeful = [(best.intersample, best.fit)] + [
