@@ -23,6 +23,14 @@ def test_every_spike_and_no_other_sample_is_found():
     assert np.flatnonzero(find_spikes(y, CHIRP)).tolist() == where.tolist()
 
 
+def test_a_spike_beside_fast_motion_stands_out_of_samples_as_fast():
+    fast, small = np.sin(0.45 * np.pi * np.arange(2000)), noisy(std=0.005) - CHIRP
+    y, where = fast + small, np.array([400, 1203])
+    y[where] += [2.2, -2.6]
+    y[700] = fast[701]  # late, which is no spike
+    assert np.flatnonzero(find_spikes(y, fast)).tolist() == where.tolist()
+
+
 def test_what_lasts_longer_is_no_spike():
     y = noisy()
     y[300:310] += 5.0

@@ -74,16 +74,31 @@ def find_spikes(y: Real, prediction: Real, *, clipped: Mask | None = None) -> Ma
     around = sliding_window_view(np.pad(residual, _WINDOW // 2, mode="reflect"), _WINDOW)
     level = np.median(around, axis=1)
     spread = np.median(np.abs(around - level[:, None]), axis=1) / BULK
-    near = sliding_window_view(np.pad(prediction, 1, mode="edge"), 3)
-    least = np.maximum(
-        TWICE * DEVIATIONS * np.maximum(spread, 0.5 * bulk), TWICE * np.ptp(near, axis=1)
-    )
-    away = np.abs(residual - level) > least
+    away = np.abs(residual - level)
+    motion = np.ptp(sliding_window_view(np.pad(prediction, 1, mode="edge"), 3), axis=1)
+    # A sample that comes late is off by its motion at most, and is no spike.
+    moving = np.clip(TWICE * DEVIATIONS * _spread_by_speed(away, motion), motion, TWICE * motion)
+    away = away > np.maximum(TWICE * DEVIATIONS * np.maximum(spread, 0.5 * bulk), moving)
     first, stop = runs_of(away)
     for a, b in zip(first, stop - 1, strict=True):
         if b - a >= _LONGEST_SPIKE:
             away[a : b + 1] = False
     return away if away.any() and np.mean(away) < MUCH else None
+
+
+def _spread_by_speed(away: Real, motion: Real) -> Real:
+    """Deviation at each sample, (n,), that its motion explains: of those that move as fast.
+
+    What is off in time, or in the model, leaves a share of the motion, at an edge in one of three.
+    """
+    order = np.argsort(motion)
+    largest = sliding_window_view(np.pad(away, 1, mode="edge"), 3).max(axis=1)
+    least = np.finfo(float).eps * max(float(motion.max()), float(largest.max()))
+    share = (largest / np.maximum(motion, max(least, np.finfo(float).tiny)))[order]
+    alike = sliding_window_view(np.pad(share, _WINDOW // 2, mode="reflect"), _WINDOW)
+    out = np.empty(away.size)
+    out[order] = np.median(alike, axis=1) / BULK * motion[order]
+    return out
 
 
 def find_frozen(y: Real, prediction: Real, *, step: float = 0.0) -> Mask | None:
