@@ -168,9 +168,7 @@ def _interpolator(factor: int, missed: float) -> NDArray[np.float64]:
     )
 
 
-def _interpolated(
-    extended: NDArray[np.float64], factor: int, missed: float
-) -> NDArray[np.float64]:
+def _interpolated(extended: NDArray[np.float64], factor: int, missed: float) -> NDArray[np.float64]:
     """Band-limited interpolation by a windowed sinc; beyond the margins the input stands still."""
     kernel = _interpolator(factor, max(missed, float(np.finfo(float).eps)))
     more = max(kernel.size // (2 * factor) - MARGIN, 0)

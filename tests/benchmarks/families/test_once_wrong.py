@@ -18,6 +18,10 @@ from families.study import draw_of, identified, one
         ("thermal", 404, 0),  # a slow pole stands for the drift, and is not the axis's
         ("50 to 120 samples", 404, 4),  # as many polynomials as cycles are no drift
         ("clean", 222, 8),  # a spline rings for long at the end of a sweep
+        ("spikes", 404, 26),  # a spike beside motion as fast as it is high
+        ("spikes", 404, 45),
+        ("1/f", 404, 2),  # what the noise does below its lowest bins moves the bias
+        ("1/f", 404, 23),
     ],
 )
 def test_a_draw_that_was_wrong_and_ok_is_not(family, seed, index):
@@ -42,3 +46,11 @@ def test_what_the_fit_leaves_over_and_would_be_doubted_for_is_explained():
 
 def test_two_modes_are_grown_where_a_clipped_record_begins_in_motion():
     assert one("by chance", 404, 9, True).cell == "right_ok"
+
+
+@pytest.mark.parametrize("index", [7, 31])
+def test_the_scale_of_a_record_of_120_db_holds(index):
+    # The window that interpolated the input was off at DC by more than the noise is.
+    draw = draw_of(FAMILIES["clean"], 404, index)
+    low, high = identified(draw).pairs[0].parameters.scale_factor.ci95
+    assert low < draw.figures["scale_factor"].value < high

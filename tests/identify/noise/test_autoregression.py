@@ -5,7 +5,12 @@ import pytest
 from scipy.linalg import solve_toeplitz
 from scipy.signal import lfilter
 
-from hmpim.identify.noise.autoregression import autoregression, spectrum_behind, yule_walker
+from hmpim.identify.noise.autoregression import (
+    autoregression,
+    deviation_of_mean,
+    spectrum_behind,
+    yule_walker,
+)
 from hmpim.identify.noise.whiteness import autocovariance
 
 NOISE = lfilter([1.0], [1.0, -0.9], np.random.default_rng(0).standard_normal(20_000))
@@ -31,3 +36,29 @@ def test_products_from_the_autocovariance_solve_the_equations_of_yule_and_walker
 def test_silence_has_no_colour() -> None:
     noise, left = yule_walker(np.zeros(100))
     assert (noise.tolist(), left) == ([1.0], 0.0)
+
+
+def rising(slope: float, seed: int, n: int = 2000) -> np.ndarray:
+    """Noise with power as f^-slope down to a quarter of its lowest bin."""
+    shape = np.maximum(np.arange(2 * n + 1), 1.0) ** (-slope / 2)
+    white = np.fft.rfft(np.random.default_rng(seed).standard_normal(4 * n))
+    return np.fft.irfft(shape * white)[:n]
+
+
+@pytest.mark.parametrize(
+    ("made", "widest"),
+    [
+        (lambda seed: rising(0.5, seed), 1.6),
+        (lambda seed: rising(1.0, seed), 1.6),
+        (lambda seed: lfilter([1.0], [1.0, -0.9], rising(0.0, seed, 2500))[500:], 1.6),
+    ],
+    ids=["slope 0.5", "1/f", "AR(0.9)"],
+)
+def test_the_mean_of_a_noise_scatters_as_stated(made, widest) -> None:
+    noises = [made(seed) for seed in range(200)]
+    means = np.array([noise.mean() for noise in noises])
+    stated = np.array([deviation_of_mean(noise - noise.mean(), noise.size) for noise in noises])
+    pulls = np.abs(means / stated)
+    assert np.mean(pulls < 1.96) > 0.85  # an autoregression alone: 0.4 under 1/f noise
+    assert np.mean(pulls > 4.0) < 0.02
+    assert np.median(stated) < widest * means.std()

@@ -13,7 +13,7 @@ import scipy
 from numpy.lib.stride_tricks import sliding_window_view
 
 from hmpim.identify.arrays import Mask, Real
-from hmpim.identify.chance import HALF
+from hmpim.identify.chance import COVERAGE, HALF
 from hmpim.identify.noise.whiteness import autocovariance
 from hmpim.identify.worth import PART
 
@@ -21,6 +21,7 @@ __all__ = [
     "LONGEST",
     "autoregression",
     "autoregressive_spectrum",
+    "deviation_of_mean",
     "innovation_gain",
     "spectrum_behind",
     "whitening_filter",
@@ -32,6 +33,11 @@ LONGEST = 30
 
 _BLOCK = 65_536
 _FLICKER_BINS = 32
+_FEWEST_BINS = 8
+
+_SLOPES = (0.5, 1.0, 1.5)
+"""Powers of 1/f between white noise and a random walk, which are autoregressions themselves."""
+
 _INNOVATION_ORDER = 12
 _MOST_INNOVATIONS = 100_000
 
@@ -204,27 +210,76 @@ def autoregressive_spectrum(residual: Real, omega: Real) -> Real:
     """
     noise, left = yule_walker(residual)
     power = left * spectrum_behind(noise, omega)
-    flicker = _flicker(residual, omega)
-    return np.asarray(np.where(flicker > 0, flicker, power))
+    at = omega * residual.size / (2 * np.pi)
+    low = at <= _low_bins(residual).size
+    weights, kinds = _kinds(residual, noise, left, at[low])
+    power[low] = kinds[np.argmax(weights)]
+    return np.asarray(power)
 
 
-def _flicker(residual: Real, omega: Real) -> Real:
-    """Power that rises towards DC as f^-α, which a short autoregression levels off; 0 if none.
+def deviation_of_mean(residual: Real, counted: int) -> float:
+    """Deviation of the mean of a noise, widened for what the noise does not say of its power at DC.
 
-    A straight line through the logarithm of the first bins of the periodogram, whose scatter
-    about it is known: standard deviation π/√6, mean -0.577 (Kay, Modern Spectral Estimation).
+    The variance of a mean is the power at half a bin over the samples. That power is known by the
+    lowest bins alone: given the kind of noise, the mean is distributed as Student's t, and the
+    kinds are averaged by how likely they are. 1.96 of these deviations hold with 95 %.
+
+    Parameters
+    ----------
+    residual : ndarray, shape (n,)
+        The noise, its mean taken off.
+    counted : int
+        Samples that the mean was taken of.
+
+    Examples
+    --------
+    >>> noise = np.random.default_rng(0).standard_normal(5000)
+    >>> round(deviation_of_mean(noise, 5000) * 5000**0.5, 1)
+    1.3
     """
-    n = residual.size
-    bins = np.arange(1, min(_FLICKER_BINS, n // 8) + 1)
-    if bins.size < 8:
-        return np.zeros_like(omega)
-    wave = scipy.fft.rfft(residual)[bins]
-    level = np.log(np.maximum(np.abs(wave) ** 2 / n, np.finfo(float).tiny)) + 0.5772
-    steps = np.log(bins) - np.mean(np.log(bins))
-    slope = float(steps @ level / (steps @ steps))
-    error = np.pi / np.sqrt(6.0 * float(steps @ steps))
-    if slope > -HALF * error:
-        return np.zeros_like(omega)
-    at = np.maximum(omega * n / (2 * np.pi), 0.5)
-    power = np.exp(np.mean(level) + slope * (np.log(at) - np.mean(np.log(bins))))
-    return np.asarray(np.where(at <= bins[-1], power, 0.0))
+    weights, kinds = _kinds(residual, *yule_walker(residual), np.array([0.5]))
+    spread = np.sqrt(kinds[:, 0] / counted)
+    freedom = 2 * max(_low_bins(residual).size, 1)
+    if not spread.any():
+        return 0.0
+
+    def outside(limit: float) -> float:
+        beyond = scipy.special.stdtr(freedom, -limit / np.maximum(spread, np.finfo(float).tiny))
+        return float(2.0 * weights @ beyond - (1.0 - COVERAGE))
+
+    most = float(spread.max()) * float(scipy.special.stdtrit(freedom, 0.5 + COVERAGE / 2))
+    return float(scipy.optimize.brentq(outside, 0.0, most)) / HALF
+
+
+def _low_bins(residual: Real) -> Real:
+    """The bins that an autoregression does not tell apart; none of a short record."""
+    count = min(_FLICKER_BINS, residual.size // 8)
+    return np.arange(1.0, count + 1.0) if count >= _FEWEST_BINS else np.empty(0)
+
+
+def _kinds(residual: Real, noise: Real, left: float, at: Real) -> tuple[Real, Real]:
+    """How likely each kind of noise is by the lowest bins, (k,), and its power there, (k, m).
+
+    An autoregression, or power that rises towards DC as f^-α, which a short one levels off. With
+    the level unknown, bins I about a shape s have the likelihood Π s⁻¹ (Σ I/s)^-N (P. Whittle,
+    1953); beforehand all kinds are as likely.
+
+    Parameters
+    ----------
+    residual : ndarray, shape (n,)
+    noise, left
+        Of `yule_walker`.
+    at : ndarray, shape (m,)
+        Bins, from a half on.
+    """
+    n, bins, at = residual.size, _low_bins(residual), np.maximum(at, 0.5)
+    behind = left * spectrum_behind(noise, 2 * np.pi * np.concatenate([bins, at]) / n)
+    if not bins.size or not behind.all():
+        return np.ones(1), behind[None, bins.size :]
+    seen = np.abs(scipy.fft.rfft(residual)[1 : bins.size + 1]) ** 2 / n
+    rising = np.concatenate([bins, at]) ** -np.array(_SLOPES)[:, None]
+    shapes = np.vstack([behind, rising])
+    inside, outside = shapes[:, : bins.size], shapes[:, bins.size :]
+    levels = np.mean(seen / inside, axis=1)
+    likelihood = -np.sum(np.log(inside), axis=1) - bins.size * np.log(levels)
+    return scipy.special.softmax(likelihood), levels[:, None] * outside

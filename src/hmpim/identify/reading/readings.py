@@ -9,7 +9,7 @@ from hmpim.identify.arrays import Real
 from hmpim.identify.fitting.fit import jacobian
 from hmpim.identify.fitting.nested import widened
 from hmpim.identify.fitting.trial import JointFit
-from hmpim.identify.noise.autoregression import autoregressive_spectrum
+from hmpim.identify.noise.autoregression import deviation_of_mean
 from hmpim.identify.noise.covariance import covariance
 from hmpim.identify.noise.whiteness import is_white
 from hmpim.identify.reading.figures import read_figures
@@ -165,12 +165,8 @@ def _in_whole_samples(joint: JointFit) -> bool:
 
 
 def _wandering(cov: Real, residual: Real, counted: int) -> Real:
-    """Widen the bias to what noise does that rises towards DC below what an autoregression tells.
-
-    The variance of a mean is the noise's power at half a bin over the samples.
-    """
-    slowest = np.array([np.pi / residual.size])
-    known = float(autoregressive_spectrum(residual, slowest)[0]) / counted
+    """Widen the bias to noise that rises towards DC below what an autoregression tells."""
+    known = deviation_of_mean(residual, counted) ** 2
     if known <= cov[-1, -1]:
         return cov
     stretch = np.ones(cov.shape[0])
