@@ -22,6 +22,9 @@ from families.study import draw_of, identified, one
         ("spikes", 404, 45),
         ("1/f", 404, 2),  # what the noise does below its lowest bins moves the bias
         ("1/f", 404, 23),
+        ("ramp", 404, 5),  # a second order is asked for, but not for the price of its poles
+        ("ramp", 404, 26),
+        ("noisy", 404, 28),
     ],
 )
 def test_a_draw_that_was_wrong_and_ok_is_not(family, seed, index):

@@ -4,7 +4,7 @@ import numpy as np
 
 from hmpim.identify.chance import DEVIATIONS
 from hmpim.identify.judgement.evidence import Evidence, structure_in_words
-from hmpim.identify.reading.spanned import plainer_rivals
+from hmpim.identify.reading.spanned import asked_rivals, plainer_rivals
 from hmpim.identify.result.groups import PHASE_SPLIT
 from hmpim.identify.worth import MOST, TOLERATED
 from hmpim.record import Finding
@@ -31,9 +31,9 @@ def other_order(evidence: Evidence) -> tuple[Finding, ...]:
 
 
 def _plainer(evidence: Evidence) -> tuple[Finding, ...]:
-    """Name the plainer structure that is almost as likely: the intervals cover it."""
+    """Name the structure that is almost as likely, plainer or richer: the intervals cover it."""
     joint = evidence.joint
-    rivals = plainer_rivals(joint)
+    rivals = (*plainer_rivals(joint), *asked_rivals(joint))
     if not rivals:
         return ()
     rival = min(rivals, key=lambda trial: trial.criterion).fit

@@ -11,9 +11,11 @@ from collections.abc import Iterable
 from dataclasses import fields, replace
 
 import numpy as np
+import scipy
 
 from hmpim.identify.arrays import Real
-from hmpim.identify.chance import CLEARLY, LIKELIER, SEEN
+from hmpim.identify.chance import CLEARLY, COVERAGE, LIKELIER, SEEN
+from hmpim.identify.fitting.enrich import PLAIN
 from hmpim.identify.fitting.fit import Fit
 from hmpim.identify.fitting.growth import as_if_hidden
 from hmpim.identify.fitting.trial import JointFit, Trial
@@ -22,7 +24,7 @@ from hmpim.identify.result import Estimate, Parameters
 from hmpim.identify.result.groups import MODELLED, PHASE_SPLIT
 from hmpim.identify.worth import FEW, TWICE
 
-__all__ = ["bent_figures", "blurred", "plainer_rivals", "rivals_of", "spanned"]
+__all__ = ["asked_rivals", "bent_figures", "blurred", "plainer_rivals", "rivals_of", "spanned"]
 
 _STEP = 1e-6
 """Step of a derivative: logarithms of times, samples of delay, share of the numerator."""
@@ -65,6 +67,26 @@ def plainer_rivals(joint: JointFit) -> tuple[Trial, ...]:
     )
 
 
+def asked_rivals(joint: JointFit) -> tuple[Trial, ...]:
+    """Plain trials with more parameters that the record asks for by more than chance.
+
+    Under the chosen assumption, which was taken for their price alone.
+    """
+    best = joint.best
+    if best.fit.structure.name not in PLAIN:
+        return ()
+    count = joint.weighed.counted * joint.weighed_share
+    found = []
+    for trial in joint.trials:
+        extra = trial.fit.structure.parameters - best.fit.structure.parameters
+        if trial.intersample != best.intersample or trial.fit.structure.name not in PLAIN:
+            continue
+        gain = count * float(np.log(best.fit.objective / max(trial.fit.objective, _TINY)))
+        if extra > 0 and gain > scipy.special.chdtri(extra, 1.0 - COVERAGE):
+            found.append(trial)
+    return tuple(found)
+
+
 def _is_as_likely(trial: Trial, joint: JointFit) -> bool:
     """Whether another filter or delay may be the true one; more taps than are seen say nothing."""
     behind = trial.criterion - joint.best.criterion
@@ -103,7 +125,9 @@ def spanned(
         return [figures_of(fit, fs=fs, highest=fs / 2) for fit in fits]
 
     between = figures(trial.fit for trial in rivals_of(joint))
-    richer = figures(trial.fit for trial in (*joint.rivals, *plainer_rivals(joint)))
+    richer = figures(
+        trial.fit for trial in (*joint.rivals, *plainer_rivals(joint), *asked_rivals(joint))
+    )
     hidden, fit = joint.hidden, joint.best.fit
     if hidden is not None and (joint.rivals or hidden.may_hide):
         longest = figures_of(as_if_hidden(fit, hidden), fs=fs, highest=highest, split_alone=True)
