@@ -1,5 +1,7 @@
 """Fits of every structure: plain ones, richer ones where asked for, each between the samples."""
 
+from collections.abc import Iterable
+
 import numpy as np
 
 from hmpim.identify.arrays import Real
@@ -82,7 +84,7 @@ def fit_plain(
             rivals = starts[1:]
             if not settled:
                 rivals += starting_values(rough, structure)
-            for theta in rivals:
+            for theta in _distinct(rivals, [] if settled else starts[:1]):
                 rival = fit_structure(problem, structure, theta, iterations=_TASTE)
                 fit = min(fit, rival, key=lambda f: f.objective)
         settled = settled or white
@@ -99,6 +101,16 @@ def fit_plain(
         else fit_structure(problem, fit.structure, fit.theta)
         for fit in fits
     ]
+
+
+def _distinct(starts: Iterable[Real], tried: Iterable[Real] = ()) -> list[Real]:
+    """Starts that are neither among those already tried nor the same as an earlier one."""
+    known = {start.tobytes() for start in tried}
+    found: dict[bytes, Real] = {}
+    for start in starts:
+        if start.tobytes() not in known:
+            found.setdefault(start.tobytes(), start)
+    return list(found.values())
 
 
 def fit_rich(
@@ -198,7 +210,7 @@ def _best_of(problem: Problem, structure: Structure, starts: list[Real], rivals:
     precision = _PRECISION / effective_share(leading.residual)
     tried = [
         fit_structure(problem, structure, theta, iterations=_LONG_TASTE, precision=precision)
-        for theta in starts
+        for theta in _distinct(starts)
     ]
     best = min(tried, key=lambda fit: fit.objective)
     if best.converged or best.objective > TWICE * leading.objective:
