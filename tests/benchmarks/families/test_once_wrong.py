@@ -25,6 +25,7 @@ from families.study import draw_of, identified, one
         ("ramp", 404, 5),  # a second order is asked for, but not for the price of its poles
         ("ramp", 404, 26),
         ("noisy", 404, 28),
+        ("noisy", 404, 9),  # a pole that would not show moves the -3 dB bandwidth too
     ],
 )
 def test_a_draw_that_was_wrong_and_ok_is_not(family, seed, index):

@@ -145,14 +145,12 @@ def _slopes(
 
 
 def _marks_of(
-    structure: Structure, system: RationalDelay, *, highest: float, split_alone: bool = False
+    structure: Structure, system: RationalDelay, *, highest: float
 ) -> tuple[_Marks, PeakGain | None]:
     """-90° with the delay and without, -3 dB, the peak's frequency; and the peak."""
     steady = _is_steady(structure)
     dynamic = structure.order > 0 and steady
     split = bandwidth_phase(system, highest=highest, delay=False) if dynamic else None
-    if split_alone:
-        return (None, split, None, None), None
     peak = peak_gain(system, highest=highest) if dynamic else None
     marks = (
         bandwidth_phase(system, highest=highest) if steady else None,
@@ -163,9 +161,7 @@ def _marks_of(
     return marks, peak
 
 
-def figures_of(
-    fit: Fit, *, fs: float, highest: float, split_alone: bool = False
-) -> dict[str, float | None]:
+def figures_of(fit: Fit, *, fs: float, highest: float) -> dict[str, float | None]:
     """Values alone of what `read_parameters` gives with error bars, the noise apart.
 
     Parameters
@@ -174,19 +170,17 @@ def figures_of(
         Any fit.
     fs, highest : float
         As for `read_parameters`.
-    split_alone : bool
-        Whether `PHASE_SPLIT` is all that is asked; what else is looked for along a curve is None.
     """
     vector = np.concatenate([fit.theta, fit.linear])
-    return figures_at(fit.structure, vector, fs=fs, highest=highest, split_alone=split_alone)
+    return figures_at(fit.structure, vector, fs=fs, highest=highest)
 
 
 def figures_at(
-    structure: Structure, vector: Real, *, fs: float, highest: float, split_alone: bool = False
+    structure: Structure, vector: Real, *, fs: float, highest: float
 ) -> dict[str, float | None]:
     """The same at any parameters, `vector` as `Readings` has it."""
     system = system_of(structure, vector, fs)
-    marks, peak = _marks_of(structure, system, highest=highest, split_alone=split_alone)
+    marks, peak = _marks_of(structure, system, highest=highest)
     return _values(structure, vector, system, marks, peak, fs)
 
 

@@ -130,8 +130,8 @@ def spanned(
     )
     hidden, fit = joint.hidden, joint.best.fit
     if hidden is not None and (joint.rivals or hidden.may_hide):
-        longest = figures_of(as_if_hidden(fit, hidden), fs=fs, highest=highest, split_alone=True)
-        richer.append({name: longest[name] for name in PHASE_SPLIT})
+        longest = figures_of(as_if_hidden(fit, hidden), fs=fs, highest=highest)
+        richer.append({name: longest[name] for name in (*PHASE_SPLIT, "bandwidth_3db")})
     richer += [bent_figures(*one, fs=fs, highest=highest) for one in bent]
     moved = {}
     for name in (field.name for field in fields(parameters)):
