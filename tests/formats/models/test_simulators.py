@@ -179,6 +179,29 @@ def test_modelica_compiles_and_responds_in_rumoca(name, tmp_path):
     assert np.abs(y - wave)[t > 1.0].max() < limit * abs(truth)
 
 
+@pytest.mark.parametrize(
+    ("numerator", "denominator"),
+    [((-0.004, 1.0), SO), ((0.02, 1.0), (0.03, 1.0))],
+    ids=["non-minimum phase", "fed through"],
+)
+def test_modelica_takes_weights_below_zero_and_what_is_fed_through(
+    numerator, denominator, tmp_path
+):
+    rumoca = pytest.importorskip("rumoca")
+    model = replace(PLAIN, numerator=numerator, denominator=denominator, delay=0.0, bias=-0.3)
+    (file,) = export(result_of(model), to="modelica", path=tmp_path / "axis.mo")
+    bench = (
+        "model Bench\n  axis a;\nequation\n  a.u = sin(18.849555921538759 * time);\nend Bench;\n"
+    )
+    compiled = rumoca.Session().loads(file.read_text(encoding="utf-8") + bench, model="Bench")
+    fine = rumoca.SimConfig(rtol=1e-7, atol=1e-8)
+    ran = compiled.simulate(t=(0.0, 1.5), dt=0.001, config=fine)
+    t, y = np.array(ran.time), np.array(ran["a.y"])
+    truth = frequency_response(model, np.array([3.0]))[0]
+    wave = -0.3 + np.imag(truth * np.exp(6j * np.pi * t))
+    assert np.abs(y - wave)[t > 1.0].max() < 1e-5 * abs(truth)
+
+
 def test_modelica_clips_holds_and_rounds(tmp_path):
     rumoca = pytest.importorskip("rumoca")
     model = replace(

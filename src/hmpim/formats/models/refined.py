@@ -8,17 +8,22 @@ from math import factorial
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hmpim.formats.models.source import Source
+from hmpim.model.poles import modal_form
 
 __all__ = [
     "REFINE",
+    "modal_matrices",
     "pade_error",
     "pade_order",
     "refined_error",
     "refined_values",
     "refined_words",
 ]
+
+StateMatrices = tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], float]
 
 REFINE = 20
 """Steps of the finer grid for each sample."""
@@ -77,6 +82,7 @@ def refined_values(source: Source) -> dict[str, Any]:
         "denominator": below[::-1],
         "level": 0.0 if integrates else float(top[0] / below[0]),
         "integrates": integrates,
+        "modal": modal_matrices(source),
         "bias": model.bias,
         "noise_std": model.noise_std,
         "low": model.saturation_low,
@@ -91,6 +97,25 @@ def refined_values(source: Source) -> dict[str, Any]:
         "imag": seen.response.imag,
         "std": seen.std,
     }
+
+
+def modal_matrices(source: Source) -> StateMatrices | None:
+    """State matrices of a model of many poles in s, each mode a block of its own.
+
+    None of up to six poles, whose transfer function keeps its digits.
+
+    Returns
+    -------
+    generator, entry, output : ndarray, shapes (n, n), (n,) and (n,)
+    through : float
+    """
+    system, fs = source.causal().system, source.fs
+    per_sample = (c * fs ** np.arange(c.size) for c in (system.numerator, system.denominator))
+    parts = modal_form(*per_sample)
+    if parts is None:
+        return None
+    generator, entry, output, through = parts
+    return generator * fs, entry * fs, output, through
 
 
 def pade_error(order: int, turn: float) -> float:
