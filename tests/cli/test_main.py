@@ -67,6 +67,31 @@ def test_stopping_from_the_keyboard_ends_with_130(tmp_path, monkeypatch):
     assert "Traceback" not in done.stderr
 
 
+STARTED = """
+import builtins, os, signal, sys
+plain, path = builtins.__import__, sys.argv.pop()
+
+def stopping(name, *rest, **more):
+    if name == path:
+        os.kill(os.getpid(), signal.SIGINT)
+    return plain(name, *rest, **more)
+
+signal.signal(signal.SIGINT, signal.default_int_handler)
+builtins.__import__ = stopping
+import hmpim_start
+sys.argv = ["hmpim", "--version"]
+hmpim_start.main()
+"""
+
+
+@pytest.mark.parametrize(("at", "code"), [("hmpim.cli.main", 130), ("numpy", 130), ("", 0)])
+def test_stopping_while_the_command_line_is_imported_shows_no_traceback(at, code):
+    command = [sys.executable, "-c", STARTED, at or "nothing"]
+    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=300)
+    assert (done.returncode, done.stderr) == (code, "")
+    assert done.stdout == ("" if code else f"hmpim {version('hmpim')}\n")
+
+
 def test_a_defect_is_not_hidden(tmp_path, monkeypatch):
     def broken(*_, **__):
         raise ZeroDivisionError("a defect")

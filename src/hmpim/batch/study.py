@@ -2,8 +2,7 @@
 
 import re
 from collections.abc import Sequence
-from datetime import UTC, datetime
-from importlib.metadata import version
+from datetime import datetime
 from os import PathLike
 from os.path import commonpath
 
@@ -17,6 +16,7 @@ from hmpim.batch.pictures import FOR_A_MEDIAN, distribution, groups, sequence
 from hmpim.batch.summary import ParameterSummary, Summary, column, summary_of
 from hmpim.batch.table import BatchTable
 from hmpim.formats.atomic import write_text
+from hmpim.report.about import made_by
 from hmpim.report.figures import Picture
 from hmpim.report.numbers import plus_minus
 from hmpim.report.study import Grid, Section, StudyPage, render_study
@@ -107,7 +107,7 @@ def study_page(
             ("Parts", str(len(table.paths))),
             ("Settings", f"{table.request.keep}; inputs {table.request.inputs or 'as stated'}; "
              f"outputs {table.request.outputs or 'as stated'}"),
-            ("Made by", f"hmpim {version('hmpim')}, {datetime.now(UTC):%Y-%m-%d %H:%M UTC}"),
+            made_by(),
         ),
     )  # fmt: skip
 

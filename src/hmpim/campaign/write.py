@@ -6,7 +6,6 @@ import json
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from importlib.metadata import version
 from pathlib import Path
 
 from hmpim.campaign.compare import findings
@@ -25,6 +24,7 @@ from hmpim.campaign.plan import FigurePlan
 from hmpim.campaign.sheets import write_sheets
 from hmpim.campaign.study import Study, study_dict
 from hmpim.formats.atomic import replacing, write_text
+from hmpim.report.about import made_by
 from hmpim.report.numbers import typeset
 from hmpim.report.study import Grid, Section, StudyPage, render_study
 
@@ -143,7 +143,7 @@ def study_page(study: Study) -> StudyPage:
             ("Length of each test", f"{study.plan.duration:g} s, plus the return to rest"),
             ("Seed", str(study.plan.seed)),
             ("Plan", study.plan.digest[:12]),
-            ("Made by", f"hmpim {version('hmpim')}"),
+            made_by(),
         ),
     )
 

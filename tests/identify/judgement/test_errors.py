@@ -41,6 +41,16 @@ def test_an_error_without_end_is_doubtful_too(clean):
     endless = replace(p, scale_factor=replace(p.scale_factor, std=float("inf"), ci95=None))
     (found,) = weak_excitation(replace(clean, readings=replace(clean.readings, parameters=endless)))
     assert found.parameters == ("scale_factor",)
+    assert "does not determine the scale factor: its standard deviation exceeds" in found.message
+
+
+def test_a_deviation_is_stated_in_per_cent_only_below_the_value(clean):
+    (some,) = weak_excitation(with_std(clean, natural_frequency=4.0))
+    assert "barely determines the natural frequency" in some.message
+    assert "40 % of its value" in some.message
+    (none,) = weak_excitation(with_std(clean, natural_frequency=1e4))
+    assert "does not determine the natural frequency" in none.message
+    assert "%" not in none.message
 
 
 def test_a_delay_is_weak_beyond_two_samples_and_a_third_of_itself(clean):

@@ -1,14 +1,12 @@
 """The page of a Monte Carlo study."""
 
-from datetime import UTC, datetime
-from importlib.metadata import version
-
 import numpy as np
 
 from hmpim.batch.montecarlo.plan import Plan
 from hmpim.batch.montecarlo.summary import FAR, MonteCarlo, Region, Share
 from hmpim.plots import Axis, Figure, Panel, Points, Rule
 from hmpim.plots.style import axis_label
+from hmpim.report.about import made_by
 from hmpim.report.figures import Picture
 from hmpim.report.study import Grid, Section, StudyPage
 from hmpim.report.words import label_of
@@ -75,7 +73,7 @@ def montecarlo_page(plan: Plan, found: MonteCarlo) -> StudyPage:
             ("Seed", str(plan.seed)),
             ("Plan", plan.digest[:16]),
             ("Not identified", "; ".join(found.reasons) or "none"),
-            ("Made by", f"hmpim {version('hmpim')}, {datetime.now(UTC):%Y-%m-%d %H:%M UTC}"),
+            made_by(),
         ),
     )
 

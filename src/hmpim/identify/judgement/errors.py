@@ -40,20 +40,29 @@ def weak_excitation(evidence: Evidence) -> tuple[Finding, ...]:
     for name, estimate in named:
         if estimate is None:
             continue
-        spread = estimate.spread / abs(estimate.value) if estimate.value else float("inf")
-        if spread <= MUCH:
+        if estimate.spread <= MUCH * abs(estimate.value):
             continue
         findings.append(
             Finding(
                 code="weak_excitation",
-                message=f"The record barely determines the {in_words(name)}: its standard "
-                f"deviation is {100 * min(spread, 99.0):.0f} % of its value. Excite more around "
-                "the natural frequency, or longer.",
+                message=f"{_how_well(in_words(name), estimate)}. Excite more around the natural "
+                "frequency, or longer.",
                 severity="doubt",
                 parameters=(name,),
             )
         )
     return tuple(findings)
+
+
+def _how_well(words: str, estimate: Estimate) -> str:
+    """State a deviation in per cent of the value while it is below the value."""
+    if estimate.spread < abs(estimate.value):
+        percent = 100 * estimate.spread / abs(estimate.value)
+        return (
+            f"The record barely determines the {words}: its standard deviation is "
+            f"{percent:.0f} % of its value"
+        )
+    return f"The record does not determine the {words}: its standard deviation exceeds its value"
 
 
 def weak_delay(evidence: Evidence) -> tuple[Finding, ...]:
