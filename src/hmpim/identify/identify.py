@@ -28,6 +28,7 @@ from hmpim.identify.statistics.statistics import Statistics
 from hmpim.identify.steps import (
     drift_or_levels,
     fit,
+    limit_speed,
     look,
     look_again,
     mark_swapped,
@@ -168,5 +169,6 @@ def identify_output(question: Question) -> Described:
         if not seen.counts_otherwise_than(before):
             break
         fitted = fit(question, seen)
+    question, fitted = limit_speed(question, seen, fitted)
     fitted = through_reference(question, fitted)
     return describe(question, seen, fitted)

@@ -22,6 +22,7 @@ from hmpim.identify.judgement.unfollowed import unfollowed
 from hmpim.identify.noise.misfit import Misfit, misfit
 from hmpim.identify.nonlinear.bends import Bend, bends, is_bent_instead, plainer_bends
 from hmpim.identify.nonlinear.nonlinearity import Inspection, inspect_nonlinearity
+from hmpim.identify.nonlinear.speed import speed_finding
 from hmpim.identify.reading.bandwidth import response_bandwidths
 from hmpim.identify.reading.coefficients import coefficients_of, highest_first
 from hmpim.identify.reading.propagation import response_std
@@ -102,7 +103,9 @@ def _pair(
     plain = plainer(joint) if question.inputs is None and covariance is None else None
     joint, inspection, unseen = _looked_through(question, found, joint, i, plain)
     y = output.values if matrix is None else joint.problem.y
-    paper = paper_estimates(source.values, y, aligned.fs, band=band)
+    limited = question.limited
+    command = source.values if limited is None else limited.recorded
+    paper = paper_estimates(command, y, aligned.fs, band=band)
     readings = read_parameters(
         joint,
         fs=aligned.fs,
@@ -126,6 +129,7 @@ def _pair(
     known = {finding.code for finding in seen}
     findings = (
         *(() if question.instrument is None else (question.instrument.finding(),)),
+        *(() if limited is None else (speed_finding(limited, aligned.fs, source.unit),)),
         *judge(evidence),
         *seen,
         *(finding for finding in said if finding.code not in known),
@@ -207,6 +211,7 @@ def _evidence(
         measured=from_response,
         through=question.instrument is not None,
         jittered=any(finding.code == "jitter" for finding in question.aligned.findings),
+        limited=question.limited is not None,
     )
     return evidence, (*unread, *untested)
 

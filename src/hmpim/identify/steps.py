@@ -20,9 +20,18 @@ from hmpim.identify.effects.lost import stands_out
 from hmpim.identify.fitting.trial import JointFit
 from hmpim.identify.kept import kept
 from hmpim.identify.noise.whiteness import is_white
+from hmpim.identify.nonlinear.speed import beside_speed, explains_more, limited_command
 from hmpim.model.dynamics import StructureName
 
-__all__ = ["drift_or_levels", "fit", "look", "look_again", "mark_swapped", "through_reference"]
+__all__ = [
+    "drift_or_levels",
+    "fit",
+    "limit_speed",
+    "look",
+    "look_again",
+    "mark_swapped",
+    "through_reference",
+]
 
 _levels = kept(count_levels)
 
@@ -100,6 +109,29 @@ def look_again(question: Question, seen: Imperfections, fitted: OutputFit) -> Im
     if fitted.drifting is not None and plateau is not None and plateau.noise == "after":
         return replace(again, saturation=None)  # a wander bends the output as a level does
     return again
+
+
+def limit_speed(
+    question: Question, seen: Imperfections, fitted: OutputFit
+) -> tuple[Question, OutputFit]:
+    """Take what a unit of limited speed makes of its command, where that explains more.
+
+    Of one input; not asked of a loop, of software, and where the output follows nothing.
+    """
+    joint, aligned = fitted.fits[0], question.aligned
+    if len(fitted.fits) > 1 or not joint.related or question.instrument or question.swapped:
+        return question, fitted
+    (source,) = aligned.inputs
+    limited = limited_command(source.values, joint)
+    if limited is None:
+        return question, fitted
+    followed = replace(aligned, inputs=(replace(source, values=limited.values),))
+    slower = replace(question, aligned=followed, limited=limited)
+    again = fit(slower, seen)
+    (other,) = again.fits
+    if not explains_more(other.problem, other.best.fit, joint.problem, joint.best.fit):
+        return question, fitted
+    return slower, replace(again, fits=(beside_speed(other, limited.slope),))
 
 
 def through_reference(question: Question, fitted: OutputFit) -> OutputFit:

@@ -55,6 +55,7 @@ _ADVICE = {
     "hold": "Nothing to do if the unit is known to hold its output.",
     "friction": "Test at a larger level as well, and compare.",
     "hardening": "Test at several levels, and state the one that each figure is for.",
+    "rate_limit": "Keep the stimulus below the speed named.",
     "nonlinear": "Test at a smaller level too. Where figures differ, state their level.",
     "other_dynamics": "Sweep higher, or use the measured response.",
     "structure": "Record for longer or excite more, if the number of poles matters.",

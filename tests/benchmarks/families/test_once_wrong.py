@@ -11,6 +11,7 @@ from families.study import draw_of, identified, one
         ("Bessel", 403, 2),  # a linear input stands in for a fifth pole
         ("Bessel", 222, 0),  # and for a third
         ("Bessel", 404, 6),  # a sixth pole would not show, and takes of the delay
+        ("slew", 404, 29),  # two modes stand in for a limit of speed
         ("first order, held sweep", 403, 0),  # a second pole stands in for a held input
         ("non-minimum phase", 403, 13),  # the plainer structure is almost as likely
         ("3-2-1-1", 222, 5),

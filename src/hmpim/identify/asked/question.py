@@ -7,6 +7,7 @@ import numpy as np
 from hmpim.identify.arrays import Mask
 from hmpim.identify.asked.reference import Instrument
 from hmpim.identify.fitting.enrich import PLAIN
+from hmpim.identify.nonlinear.speed import LimitedCommand
 from hmpim.identify.result import InputSet
 from hmpim.model.dynamics import StructureName
 from hmpim.record import Aligned, Finding, Intersample, Record, Signal
@@ -34,6 +35,8 @@ class Question:
         What a loop's reference moves of the input.
     swapped : Finding or None
         Said where the input follows the output: then only plain structures are tried.
+    limited : LimitedCommand or None
+        Of a unit that follows its command up to some speed: then the input is what it follows.
     """
 
     record: Record
@@ -44,6 +47,7 @@ class Question:
     inputs: InputSet | None
     instrument: Instrument | None
     swapped: Finding | None = None
+    limited: LimitedCommand | None = None
 
     @property
     def plain(self) -> tuple[StructureName, ...]:

@@ -47,6 +47,8 @@ class Evidence:
         Whether the pair was identified through a loop's reference.
     jittered : bool
         Whether the stamps strayed from a uniform clock, so that samples are interpolated.
+    limited : bool
+        Whether the input is what a unit of limited speed follows, and not what was recorded.
     """
 
     joint: JointFit
@@ -63,6 +65,7 @@ class Evidence:
     held: bool = False
     through: bool = False
     jittered: bool = False
+    limited: bool = False
 
     @property
     def unexplained(self) -> float:

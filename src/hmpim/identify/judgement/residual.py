@@ -177,6 +177,8 @@ def noise_colour_of(evidence: Evidence) -> tuple[Finding, ...]:
 
 def noise_on_the_input(evidence: Evidence) -> tuple[Finding, ...]:
     """Say that the input is noisy; a doubt where gains come out too small by a hundredth."""
+    if evidence.limited:  # the corners of what is followed are no noise
+        return ()
     noise = input_noise(evidence.u, evidence.fs, band=evidence.band)
     if noise is None or noise.attenuation <= WORTH:
         return ()

@@ -1,0 +1,250 @@
+"""A command that the unit follows at no more than a fixed speed.
+
+Below its servo's greatest speed a unit is linear; beyond, a ramp of that speed takes the place of
+the command until it has caught up. With the speed known all else is linear, so that it is one more
+parameter of the likelihood: it is profiled with the plain structures, on a clock finer than the
+samples, since ramps begin between them.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import scipy
+
+from hmpim.identify.arrays import Real
+from hmpim.identify.chance import CLEARLY
+from hmpim.identify.fitting.data import FINAL_PRECISION
+from hmpim.identify.fitting.enrich import PLAIN
+from hmpim.identify.fitting.fit import Fit, Problem, fit_structure
+from hmpim.identify.fitting.sampled_rows import part_of
+from hmpim.identify.fitting.trial import JointFit
+from hmpim.identify.noise.autoregression import yule_walker
+from hmpim.identify.noise.whiteness import is_white
+from hmpim.identify.nonlinear.bends import bends
+from hmpim.identify.nonlinear.mechanisms import LONGEST_AUTOREGRESSION, RATES, rate_limited
+from hmpim.identify.worth import TWICE
+from hmpim.model.sampled import MARGIN, delayed_response, prepare_input
+from hmpim.record import Finding, Intersample
+
+__all__ = [
+    "LimitedCommand",
+    "beside_speed",
+    "explains_more",
+    "limited_command",
+    "speed_finding",
+]
+
+_FINE = 8
+"""Steps of the finer clock to a sample."""
+
+_LONGEST = 32768
+"""Samples up to which it is asked: ramps are followed one step after the other."""
+
+_SMOOTH: tuple[Intersample, ...] = ("bandlimited", "foh")
+"""What the command may do between its samples; a held one jumps, at any speed."""
+
+_STEP = 0.01
+"""Step in the speed, over the command's fastest, between which the curvature is read."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class LimitedCommand:
+    """What a unit of limited speed makes of its command.
+
+    Parameters
+    ----------
+    speed, std : float
+        Greatest speed and its standard deviation, input's unit per sample.
+    fastest : float
+        Greatest speed of the command, in the same unit.
+    values : ndarray, shape (n,)
+        What the unit follows, at the samples.
+    recorded : ndarray, shape (n,)
+        The command.
+    slope : ndarray, shape (n,)
+        Derivative of the output with the speed, all other parameters kept, to a factor.
+    """
+
+    speed: float
+    std: float
+    fastest: float
+    values: Real
+    recorded: Real
+    slope: Real
+
+
+def limited_command(u: Real, joint: JointFit) -> LimitedCommand | None:
+    """Find the speed beyond which a command is not followed.
+
+    Parameters
+    ----------
+    u : ndarray, shape (n,)
+        The command.
+    joint : JointFit
+        The linear fit; where it is plain and leaves noise, nothing is asked.
+
+    Returns
+    -------
+    LimitedCommand or None
+        None where a limit does not explain more than the linear fit (odds of 400 to 1), or than
+        another kind of nonlinearity.
+
+    Examples
+    --------
+    >>> from hmpim.identify.fitting.joint import joint_fit
+    >>> t = np.arange(2000) / 100
+    >>> u = np.sin(2 * np.pi * (0.1 * t + 0.02 * t**2))
+    >>> y = np.convolve(rate_limited(u, 0.04), np.ones(5) / 5)[:2000]
+    >>> y += 0.01 * np.random.default_rng(0).standard_normal(2000)
+    >>> round(limited_command(u, joint_fit(u, y)).speed, 3)
+    0.04
+    """
+    best, problem = joint.best, joint.problem
+    known = best.fit.structure.name in PLAIN and is_white(best.fit.residual)
+    plain = [trial for trial in joint.trials if trial.fit.structure.name in PLAIN]
+    if known or not plain or u.size > _LONGEST or best.fit.structure.sampled:
+        return None
+    start = min(plain, key=lambda trial: trial.criterion)
+    tried = [_profiled(u, mode, problem, start.fit, best.fit) for mode in _SMOOTH]
+    found = min((one for one in tried if one), key=lambda one: one[1].cost, default=None)
+    if found is None or not explains_more(problem, found[1], problem, best.fit):
+        return None
+    limited, fit = found
+    linear = fit_structure(problem, start.fit.structure, start.fit.theta)
+    gained = 0.5 * problem.counted * float(np.log(linear.cost / fit.cost))
+    others = bends(u, problem, linear, intersample=start.intersample, fs=1.0)
+    if any(one.kind != "rate_limit" and one.gain > gained for one in others):
+        return None
+    return limited
+
+
+def explains_more(limited: Problem, fit: Fit, linear: Problem, best: Fit) -> bool:
+    """Whether a fit with a limit of speed is likelier than a linear one by 400 to 1.
+
+    Both in noise that is an autoregression, the limit for the price of a parameter.
+
+    Parameters
+    ----------
+    limited, fit
+        Data with the limited command, and the fit.
+    linear, best
+        Data with the command, and the best linear fit.
+    """
+    count = limited.counted
+    one, other = (
+        yule_walker(p.masked(f.residual), LONGEST_AUTOREGRESSION)[1]
+        for p, f in ((limited, fit), (linear, best))
+    )
+    if one <= 0.0 or other <= 0.0:
+        return False
+    extra = fit.structure.parameters + 1 - best.structure.parameters
+    return bool(count * np.log(other / one) - extra * np.log(count) > 2.0 * CLEARLY)
+
+
+def speed_finding(limited: LimitedCommand, fs: float, unit: str) -> Finding:
+    """Say how fast the unit follows at most."""
+    per = f" {unit}/s" if unit else " per s"
+    return Finding(
+        code="rate_limit",
+        message=f"The unit follows its command at no more than {limited.speed * fs:.4g} ± "
+        f"{limited.std * fs:.2g}{per}, and is asked for up to {limited.fastest * fs:.4g}. The "
+        "figures are those of the linear part. Keep the stimulus below this speed to measure "
+        "them directly.",
+        severity="info",
+        parameters=(),
+    )
+
+
+def _profiled(
+    u: Real, mode: Intersample, problem: Problem, start: Fit, best: Fit
+) -> tuple[LimitedCommand, Fit] | None:
+    """The speed at which the sum of squares is least, and the fit; None where none is near."""
+    fine = _finely(u, mode)
+    fastest = float(np.max(np.abs(np.diff(fine))))
+    rest = problem.begins is None
+
+    def fit_at(share: float, *starts: Fit) -> Fit:
+        followed = _followed(fine, share * fastest)
+        source = prepare_input(followed, "bandlimited", rest=rest)
+        data = replace(problem, source=source, told=None)
+        fits = (fit_structure(data, start.structure, one.theta) for one in starts)
+        return min(fits, key=lambda fit: fit.cost)
+
+    at, least = 1.0, start
+    for share in reversed(RATES):
+        fit = fit_at(share, start) if least is start else fit_at(share, start, least)
+        if fit.cost < least.cost or least is start:
+            at, least = share, fit
+        elif fit.cost > TWICE**2 * least.cost:
+            break  # slower ones leave still more
+    if least.cost > min(TWICE * best.cost, start.cost):
+        return None
+    found = scipy.optimize.minimize_scalar(
+        lambda share: fit_at(share, least).cost,
+        bounds=(at - 10 * _STEP, min(at + 10 * _STEP, 1.0)),
+        method="bounded",
+        options={"xatol": _STEP**2},
+    )
+    share = float(found.x)
+    fit = fit_at(share, least)
+    slower, faster = (fit_at(share + step, fit) for step in (-_STEP, _STEP))
+    curvature = (slower.cost + faster.cost - 2.0 * fit.cost) / _STEP**2
+    if curvature <= 0.0:
+        return None
+    ahead, behind = (_followed(fine, (share + step) * fastest) for step in (_STEP, -_STEP))
+    moved = replace(problem, source=prepare_input(ahead - behind, "bandlimited"), begins=None)
+    limited = LimitedCommand(
+        speed=_FINE * share * fastest,
+        std=_FINE * fastest * float(np.sqrt(2.0 * fit.cost / problem.counted / curvature)),
+        fastest=_FINE * fastest,
+        values=_followed(fine, share * fastest),
+        recorded=u,
+        slope=np.asarray(fit.linear[:-1] @ part_of(moved, fit.structure, fit.theta).rows),
+    )
+    return limited, fit
+
+
+def beside_speed(joint: JointFit, slope: Real) -> JointFit:
+    """The joint fit with the speed free to move too, so that error bars have room for it.
+
+    Parameters
+    ----------
+    joint : JointFit
+        To the command as it is followed.
+    slope : ndarray, shape (n,)
+        Derivative of the output with the speed.
+    """
+    rows = slope[None]
+    if joint.problem.nuisance is not None:
+        rows = np.vstack([joint.problem.nuisance, rows])
+    weighed = replace(joint.weighed, nuisance=rows)
+    structure, theta = joint.best.fit.structure, joint.best.fit.theta
+    fit = fit_structure(weighed, structure, theta, precision=FINAL_PRECISION)
+    best = replace(joint.best, fit=fit)
+    return replace(
+        joint,
+        problem=replace(joint.problem, nuisance=rows),
+        weighed=weighed,
+        best=best,
+        trials=tuple(best if trial is joint.best else trial for trial in joint.trials),
+    )
+
+
+def _finely(u: Real, mode: Intersample) -> Real:
+    """A command on the finer clock, from its first sample to its last."""
+    source = prepare_input(u, mode)
+    still = np.ones(1)
+    steps = [delayed_response(source, delay=-k / _FINE, denominator=still)[0] for k in range(_FINE)]
+    return np.asarray(source.first + np.stack(steps, axis=1).ravel()[: 1 - _FINE])
+
+
+def _followed(fine: Real, step: float) -> Real:
+    """What is followed at so much a fine step, below half the rate, at the samples."""
+    out, reach = rate_limited(fine, step), MARGIN * _FINE
+    kernel = scipy.signal.firwin(2 * reach + 1, 1.0 / _FINE, window=("kaiser", 12.0))
+    reach = min(reach, out.size - 1)
+    before = 2.0 * out[0] - out[reach:0:-1]
+    after = 2.0 * out[-1] - out[-2 : -2 - reach : -1]
+    longer = np.concatenate([before, out, after])
+    smooth = scipy.signal.oaconvolve(longer, kernel, mode="same")
+    return np.asarray(smooth[reach : reach + out.size : _FINE])
