@@ -41,6 +41,9 @@ def test_figures_are_those_of_the_record(colour):
     for name in FIGURES:
         here, there = getattr(compressed, name), getattr(whole, name)
         assert abs(here.value - there.value) < 0.05 * there.std, name
+        if name == "bias" and colour:  # the lowest bins, which tell kinds of noise, are not kept
+            assert 0.7 * there.std < here.std < 1.03 * there.std
+            continue
         assert here.std == pytest.approx(there.std, rel=0.03), name
     assert compressed.noise_std.value == pytest.approx(whole.noise_std.value, rel=0.02)
     assert "no_samples" in [finding.code for finding in compressed.warnings]
