@@ -1,3 +1,4 @@
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -6,7 +7,7 @@ import pytest
 
 from hmpim.errors import RecordError
 from hmpim.identify import Estimate, Parameters
-from hmpim.identify.records.repeats import Repeats, _parameter, identify_repeats
+from hmpim.identify.records.repeats import Repeats, _doubts, _parameter, identify_repeats
 from hmpim.record import Record
 from tests_support import assert_share, room
 
@@ -136,6 +137,20 @@ def test_what_changes_between_repeats_is_seen() -> None:
     assert pair["time_constant"].agree
     assert [f.code for f in pair.findings] == ["scatter"]
     assert "scale factor" in pair.findings[0].message
+
+
+def test_what_scatters_is_said_once_for_all_parameters() -> None:
+    found = repeats(6, noise=0.01, drift=0.05)["y", "u"].parameters
+    apart = [replace(p, chi_squared=49.0 * p.freedom, probability=0.0, agree=False) for p in found]
+    quiet = [replace(p, chi_squared=0.04 * p.freedom, probability=1.0, agree=False) for p in found]
+    (more,) = _doubts(apart, "y")
+    assert more.parameters == tuple(p.name for p in found)
+    assert more.message.count("repeatability as the error") == 1
+    assert "scale factor 7 times" in more.message
+    more, less = _doubts([apart[0], *quiet[1:]], "y")
+    assert (more.parameters, less.parameters[0]) == ((found[0].name,), found[1].name)
+    assert "0.2 times the stated error" in less.message
+    assert _doubts([p for p in found if p.agree], "y") == []
 
 
 def test_copies_of_one_record_are_not_repeats() -> None:

@@ -280,9 +280,7 @@ def _pair(found: tuple[PairIdentification, ...]) -> RepeatedPair:
                 parameters=PHASE_SPLIT,
             )
         )
-    findings.extend(
-        _doubt(parameter, found[0].output) for parameter in parameters if not parameter.agree
-    )
+    findings.extend(_doubts(parameters, found[0].output))
     noise, unmodelled, probability = _split(told)
     if probability is not None and unmodelled and probability < FALSE_ALARM:
         findings.append(
@@ -369,26 +367,39 @@ def _parameter(name: str, found: tuple[PairIdentification, ...]) -> RepeatedPara
     )
 
 
-def _doubt(parameter: RepeatedParameter, output: str) -> Finding:
-    ratio = float(np.sqrt(parameter.chi_squared / parameter.freedom))
-    words = in_words(parameter.name)
-    if parameter.probability < FALSE_ALARM:
-        return Finding(
-            code="scatter",
-            message=f"The {words} of {output!r} scatters from repeat to repeat {ratio:.3g} times "
-            "as much as its stated error. Something changes between the repeats, or the model "
-            "lacks something; use the repeatability as its error.",
-            severity="doubt",
-            parameters=(parameter.name,),
-        )
-    return Finding(
-        code="scatter",
-        message=f"The {words} of {output!r} scatters from repeat to repeat only {ratio:.3g} times "
-        "as much as its stated error. The stated error is too large, or the repeats are not "
-        "independent records.",
-        severity="doubt",
-        parameters=(parameter.name,),
+def _doubts(parameters: Sequence[RepeatedParameter], output: str) -> list[Finding]:
+    """State once what scatters more than its stated error, and once what scatters less."""
+    more = [p for p in parameters if not p.agree and p.probability < FALSE_ALARM]
+    less = [p for p in parameters if not p.agree and p.probability >= FALSE_ALARM]
+    causes = (
+        (
+            more,
+            "more",
+            "Something changes between the repeats, or the model lacks something; use the "
+            "repeatability as the error.",
+        ),
+        (
+            less,
+            "less",
+            "The stated errors are too large, or the repeats are not independent records.",
+        ),
     )
+    return [
+        Finding(
+            code="scatter",
+            message=f"From repeat to repeat {output!r} scatters {how} than the stated errors "
+            f"allow: {', '.join(map(_times, found))} the stated error. {cause}",
+            severity="doubt",
+            parameters=tuple(p.name for p in found),
+        )
+        for found, how, cause in causes
+        if found
+    ]
+
+
+def _times(parameter: RepeatedParameter) -> str:
+    ratio = float(np.sqrt(parameter.chi_squared / parameter.freedom))
+    return f"{in_words(parameter.name)} {ratio:.3g} times"
 
 
 def _averaged(found: tuple[PairIdentification, ...]) -> tuple[FrequencyResponse, float]:
