@@ -40,7 +40,6 @@ from hmpim.identify.result import (
 from hmpim.identify.result.error_bars import estimate, noise_estimate
 from hmpim.identify.result.groups import EVERY
 from hmpim.identify.section_iv.paper import paper_estimates
-from hmpim.identify.section_iv.spectrum import excited_band
 from hmpim.identify.worth import ROUNDING, WORTH
 from hmpim.record import Finding
 
@@ -98,7 +97,7 @@ def _pair(
 ) -> PairIdentification:
     """Say all that is known of an output that follows an input."""
     aligned, output, drifting = question.aligned, question.output, joined.drifting
-    source, band = aligned.inputs[i], _band(question, i)
+    source, band = aligned.inputs[i], question.band(i)
     joint, censored, covariance = _refined(question, found, joined, i)
     plain = plainer(joint) if question.inputs is None and covariance is None else None
     joint, inspection, unseen = _looked_through(question, found, joint, i, plain)
@@ -171,7 +170,7 @@ def _evidence(
     nonlinear: float,
 ) -> tuple[Evidence, tuple[Finding, ...]]:
     """What the checks look at, and what of it could not be made."""
-    fs, band, fit = question.aligned.fs, _band(question, i), joint.best.fit
+    fs, band, fit = question.aligned.fs, question.band(i), joint.best.fit
     u = question.aligned.inputs[i].values
     from_response, unread = attempt(
         "response_bandwidths",
@@ -214,14 +213,6 @@ def _evidence(
         limited=question.limited is not None,
     )
     return evidence, (*unread, *untested)
-
-
-def _band(question: Question, i: int) -> tuple[float, float]:
-    """Band in Hz that an input excites."""
-    if question.inputs is not None:
-        return question.inputs.bands[i]
-    source, aligned = question.aligned.inputs[i], question.aligned
-    return question.record.band or excited_band(source.values, aligned.fs)
 
 
 def _refined(
@@ -325,7 +316,7 @@ def _measured(
     Noise decides which samples near a level are clipped, so those that are left are not a fair
     choice; the model alone in place of the others would pull the response towards the level.
     """
-    u, fs, band = question.aligned.inputs[i].values, question.aligned.fs, _band(question, i)
+    u, fs, band = question.aligned.inputs[i].values, question.aligned.fs, question.band(i)
     fit, y = joint.best.fit, joint.problem.y  # without the drift
     if question.instrument is not None:
         return response_through(question.instrument, y, fs, band=band)
@@ -383,7 +374,7 @@ def _untold(
 ) -> PairIdentification:
     """Say what little can be said of an output that does not follow the input."""
     aligned, output = question.aligned, question.output
-    source, band = aligned.inputs[i], _band(question, i)
+    source, band = aligned.inputs[i], question.band(i)
     counted = output.values[output.valid]
     mean, variance = float(counted.mean()), float(counted.var(ddof=1))
     return PairIdentification(

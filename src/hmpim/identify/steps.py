@@ -22,7 +22,6 @@ from hmpim.identify.kept import kept
 from hmpim.identify.noise.input_noise import input_noise
 from hmpim.identify.noise.whiteness import is_white
 from hmpim.identify.nonlinear.speed import beside_speed, explains_more, limited_command
-from hmpim.identify.section_iv.spectrum import excited_band
 from hmpim.identify.worth import WORTH
 from hmpim.model.dynamics import StructureName
 
@@ -128,8 +127,7 @@ def limit_speed(
     limited = limited_command(source.values, joint)
     if limited is None:
         return question, fitted
-    band = question.record.band or excited_band(source.values, aligned.fs)
-    noise = input_noise(source.values, aligned.fs, band=band)
+    noise = input_noise(source.values, aligned.fs, band=question.band(0))
     if noise is not None and noise.attenuation > WORTH:
         return question, fitted  # a limit of speed smooths the noise of a measured command
     followed = replace(aligned, inputs=(replace(source, values=limited.values),))

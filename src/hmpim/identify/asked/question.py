@@ -9,6 +9,7 @@ from hmpim.identify.asked.reference import Instrument
 from hmpim.identify.fitting.enrich import PLAIN
 from hmpim.identify.nonlinear.speed import LimitedCommand
 from hmpim.identify.result import InputSet
+from hmpim.identify.section_iv.spectrum import excited_band
 from hmpim.model.dynamics import StructureName
 from hmpim.record import Aligned, Finding, Intersample, Record, Signal
 
@@ -64,3 +65,10 @@ class Question:
         """Samples at which every input was measured, shape (n,); None when all were."""
         told = np.logical_and.reduce([source.valid for source in self.aligned.inputs])
         return None if bool(told.all()) else np.asarray(told)
+
+    def band(self, i: int) -> tuple[float, float]:
+        """Band in Hz that an input excites."""
+        if self.inputs is not None:
+            return self.inputs.bands[i]
+        source, aligned = self.aligned.inputs[i], self.aligned
+        return self.record.band or excited_band(source.values, aligned.fs)

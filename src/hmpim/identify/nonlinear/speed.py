@@ -7,6 +7,7 @@ samples, since ramps begin between them.
 """
 
 from dataclasses import dataclass, replace
+from functools import cache
 
 import numpy as np
 import scipy
@@ -238,13 +239,19 @@ def _finely(u: Real, mode: Intersample) -> Real:
     return np.asarray(source.first + np.stack(steps, axis=1).ravel()[: 1 - _FINE])
 
 
+@cache
+def _below_half_the_rate() -> Real:
+    """Windowed sinc on the finer clock that keeps what the samples can tell."""
+    size = 2 * MARGIN * _FINE + 1
+    return np.asarray(scipy.signal.firwin(size, 1.0 / _FINE, window=("kaiser", 12.0)))
+
+
 def _followed(fine: Real, step: float) -> Real:
     """What is followed at so much a fine step, below half the rate, at the samples."""
-    out, reach = rate_limited(fine, step), MARGIN * _FINE
-    kernel = scipy.signal.firwin(2 * reach + 1, 1.0 / _FINE, window=("kaiser", 12.0))
-    reach = min(reach, out.size - 1)
+    out = rate_limited(fine, step)
+    reach = min(MARGIN * _FINE, out.size - 1)
     before = 2.0 * out[0] - out[reach:0:-1]
     after = 2.0 * out[-1] - out[-2 : -2 - reach : -1]
     longer = np.concatenate([before, out, after])
-    smooth = scipy.signal.oaconvolve(longer, kernel, mode="same")
+    smooth = scipy.signal.oaconvolve(longer, _below_half_the_rate(), mode="same")
     return np.asarray(smooth[reach : reach + out.size : _FINE])
