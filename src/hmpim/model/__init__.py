@@ -13,6 +13,7 @@ from hmpim.model.dynamics import (
     theta_of,
 )
 from hmpim.model.margin import AddedPhase, Margin, add_to_loop
+from hmpim.model.mode import Mode
 from hmpim.model.model import Model, frequency_response, simulate
 from hmpim.model.response import (
     PeakGain,
@@ -34,6 +35,7 @@ __all__ = [
     "Chain",
     "Discrete",
     "Margin",
+    "Mode",
     "Model",
     "PeakGain",
     "RationalDelay",

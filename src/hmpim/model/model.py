@@ -11,6 +11,7 @@ from hmpim.arguments import checked, generator, numbers_of
 from hmpim.errors import ArgumentError
 from hmpim.model.chain import Chain, Readout, chain_of, run_chain
 from hmpim.model.filters import in_z
+from hmpim.model.mode import Mode, modes_of
 from hmpim.model.poles import rational_response
 from hmpim.model.response import RationalDelay, response
 from hmpim.model.sampled import prepare_input
@@ -112,6 +113,18 @@ class Model:
                 f"denominator {self.denominator} has a pole at {poles[np.argmax(poles.real)]:.4g}; "
                 "only stable dynamics can be simulated"
             )
+
+    @property
+    def modes(self) -> tuple[Mode, ...]:
+        """Pairs of conjugate poles, the lowest first, with their errors; none of software."""
+        if self.intersample == "sampled":
+            return ()
+        falling = self.system.denominator[::-1]
+        poles = len(self.denominator) - 1 - (self.denominator[-1] == 0.0)
+        known = None
+        if self.spread is not None and poles:
+            known = np.array(self.spread.covariance)[-poles:, -poles:]
+        return modes_of(falling, known)
 
     @property
     def system(self) -> RationalDelay:

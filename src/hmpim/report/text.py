@@ -7,6 +7,7 @@ from hmpim.identify import Identification, PairIdentification
 from hmpim.plots.style import printable
 from hmpim.record import Finding
 from hmpim.report.inputs import gain_rows
+from hmpim.report.modes import MODES_SAID, mode_rows
 from hmpim.report.numbers import format_interval, format_number, format_value
 from hmpim.report.words import (
     GLOSSARY,
@@ -134,6 +135,8 @@ def print_result(
         several = result.inputs is not None and pair.parameters.scale_factor is None
         if not several:
             console.print(parameter_table(pair, truth=truth))
+            if modes := mode_rows(pair):
+                console.print(_mode_table(modes))
         said = leading(pair)  # the sentence says it
         for warning in by_weight(pair.warnings):
             if warning is not said:
@@ -155,6 +158,19 @@ def finding_line(finding: Finding) -> "Text":
 
     lead = ("Doubt: ", "bold yellow") if finding.severity == "doubt" else ("Note: ", "bold")
     return Text.assemble(lead, printable(finding.message))
+
+
+def _mode_table(modes: list[tuple[str, str]]) -> "Table":
+    from rich.box import SIMPLE_HEAD
+    from rich.table import Table
+
+    table = Table(box=SIMPLE_HEAD, pad_edge=False)
+    table.add_column(MODES_SAID)
+    table.add_column("Natural frequency, Hz", justify="right")
+    table.add_column("Damping ratio", justify="right")
+    for number, (natural, damping) in enumerate(modes, 1):
+        table.add_row(str(number), natural, damping)
+    return table
 
 
 def _gain_table(result: Identification) -> "Table":

@@ -10,6 +10,7 @@ from hmpim.report.about import About, made_by
 from hmpim.report.advice import advice, leading_findings
 from hmpim.report.figures import Picture, pair_pictures, stimulus_picture
 from hmpim.report.inputs import inputs_view
+from hmpim.report.modes import MODES_SAID, mode_rows
 from hmpim.report.numbers import format_estimate, format_interval, format_number, format_value
 from hmpim.report.words import (
     GLOSSARY,
@@ -198,6 +199,8 @@ def _pair_view(
         "warnings": [_finding_view(w) for w in by_weight(pair.warnings)],
         "rows": _rows(pair, truth),
         "untold": untold(pair),
+        "modes": mode_rows(pair),
+        "modes_said": MODES_SAID,
         "candidates": [
             {
                 "structure": structure_words(c.structure),

@@ -1,17 +1,21 @@
 """Six modes, identified and exported: every tool answers as the identification does."""
 
 import csv
+import io
 import json
 import runpy
 
 import numpy as np
 import pytest
+from rich.console import Console
 from scipy.io import loadmat
 
 import hmpim
 from hmpim.errors import ArgumentError
 from hmpim.formats.models import export, fmu
 from hmpim.model import Model
+from hmpim.report import print_result
+from hmpim.report.modes import mode_rows
 from tests_support import run_octave
 
 from .conftest import compiled_c
@@ -183,3 +187,28 @@ def test_files_that_are_read_hold_the_response(result, tmp_path):
     document = json.loads(file.read_text(encoding="utf-8"))
     assert document["denominator"] == list(pair.denominator)
     assert document["covariance"]["of"][-1] == "denominator s^1"
+
+
+def test_every_mode_is_stated_with_an_error_that_holds(result, tmp_path):
+    modes = hmpim.to_model(result["y", "u"]).modes
+    assert len(modes) == len(MODES)
+    for mode, (_, natural, damping) in zip(modes, MODES, strict=True):
+        assert abs(mode.natural_frequency - natural) < 4 * mode.natural_frequency_std
+        assert abs(mode.damping_ratio - damping) < 4 * mode.damping_ratio_std
+        assert mode.natural_frequency_std < 1e-2 * natural
+        assert mode.damping_ratio_std < 0.1 * damping
+    lowest = result["y", "u"].natural_frequency
+    assert modes[0].natural_frequency == pytest.approx(lowest.value, rel=1e-9)
+    hmpim.report(result, tmp_path / "six.html")
+    page = (tmp_path / "six.html").read_text(encoding="utf-8")
+    stream = io.StringIO()
+    print_result(result, Console(file=stream, width=120))
+    rows = mode_rows(result["y", "u"])
+    assert len(rows) == len(MODES)
+    for natural, damping in rows:
+        assert f"{natural}</td>" in page
+        assert f"{damping}</td>" in page
+        assert any(natural in line and damping in line for line in stream.getvalue().splitlines())
+    (file,) = export(result, to="json", path=tmp_path / "six.json")
+    stated = json.loads(file.read_text(encoding="utf-8"))["modes"]
+    assert [one["natural_frequency"] for one in stated] == [m.natural_frequency for m in modes]

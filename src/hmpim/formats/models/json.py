@@ -1,6 +1,7 @@
 """JSON: the model, its errors and its origin as plain values."""
 
 import json
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -43,6 +44,7 @@ def json_document(source: Source) -> dict[str, Any]:
             "of": ["delay", *above, *(f"denominator s^{power}" for power in below)],
             "values": [list(row) for row in spread.covariance],
         },
+        "modes": [asdict(mode) for mode in model.modes],
         "structure": pair.structure,
         "fit_percent": pair.fit_percent,
         "verdict": pair.verdict,
