@@ -170,3 +170,9 @@ def test_a_spectrum_that_falls_as_1_over_f_has_no_notch() -> None:
 
 def test_no_stimulus_at_all_is_nowhere_excited() -> None:
     assert not well_excited(np.zeros(5, dtype=complex)).any()
+
+
+def test_an_excited_band_ends_at_half_the_rate_however_bins_round() -> None:
+    u = np.random.default_rng(0).standard_normal(60)
+    assert 30 * (500.0 / 60) > 250.0  # the last bin
+    assert excited_band(u, 500.0)[1] == 250.0

@@ -14,25 +14,25 @@ from hmpim.identify.fitting.sampled_rows import part_of
 from hmpim.identify.fitting.trial import Trial
 from hmpim.identify.noise.whiteness import effective_share, is_white
 from hmpim.identify.signals import longest_lag
-from hmpim.identify.worth import FEW, PART, TWICE
-from hmpim.model.sampled import MARGIN
+from hmpim.identify.worth import FEW, PART
+from hmpim.model.sampled import MARGIN, SampledInput
 from hmpim.record import Intersample
 
 __all__ = [
     "REACH",
-    "RINGS",
     "begin_later",
     "begins_of",
     "count_in",
     "in_motion",
     "look_again",
+    "ringing_of",
     "stand_out_of",
 ]
 
 REACH = 4
 """Samples by which what lies between the samples reaches back: half of a spline's support."""
 
-RINGS = 8
+_RINGS = 8
 """Samples about a corner over which a spline through it rings."""
 
 _FIRST = 8
@@ -129,7 +129,7 @@ def look_again(problem: Problem, trial: Trial, seen: Seen, *, lag: int) -> Seen 
     told = _counts(problem)
     innovations = problem.innovations(trial.fit.prediction, trial.fit.residual)
     if trial.intersample == "bandlimited":
-        reach = RINGS if problem.source.oversampling == 1 else MARGIN
+        reach = ringing_of(problem.source)
         ringing = _ringing(count, trial.fit.delay, reach)
         if problem.noise is not None and is_white(trial.fit.residual[told & ~ringing]):
             innovations = trial.fit.residual  # it is the ends that have the colour
@@ -147,6 +147,15 @@ def look_again(problem: Problem, trial: Trial, seen: Seen, *, lag: int) -> Seen 
         # Noise of the colour of a mode explains its free response, and more of it than there is.
         begins = begins_of(replace(problem, noise=None, told=None), trial.fit, lag=lag)
     return None if begins is None else _from(seen, begins, count)
+
+
+def ringing_of(source: SampledInput) -> int:
+    """Samples about a corner over which a spline rings: a finer one for longer.
+
+    Of a record too short to do without them only the first are asked for.
+    """
+    finer = source.oversampling > 1 and FEW * source.samples > MARGIN
+    return MARGIN if finer else _RINGS
 
 
 def _ringing(count: int, delay: float, reach: int) -> Mask:
@@ -201,8 +210,7 @@ def stand_out_of(innovations: Real, some: Mask) -> Mask:
         alike = told & (counts == count)
         others = squares[alike][~some[alike]].reshape(-1, some.shape[1] - count)
         level[alike] = np.median(others, axis=1) / 0.455  # of a squared Gaussian
-    # Twice as much, for noise that is not white or not Gaussian.
-    limit = TWICE * level * scipy.special.chdtri(np.maximum(counts, 1), FALSE_ALARM)
+    limit = level * scipy.special.chdtri(np.maximum(counts, 1), FALSE_ALARM)
     return np.asarray(told & (np.sum(squares * some, axis=1) > limit))
 
 

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from hmpim.identify.arrays import Complex, Mask, Real
 from hmpim.identify.chance import EXCLUDED, FALSE_ALARM
 from hmpim.identify.effects.lost import stand_out
-from hmpim.identify.fitting.beginning import REACH, RINGS, stand_out_of
+from hmpim.identify.fitting.beginning import REACH, ringing_of, stand_out_of
 from hmpim.identify.fitting.fit import FORGETS
 from hmpim.identify.fitting.halves import halves_of
 from hmpim.identify.fleets.fleet import Fleet, Group
@@ -27,7 +27,6 @@ from hmpim.identify.nonlinear.harmonics import any_harmonic
 from hmpim.identify.nonlinear.sweep_phase import SweepPhase
 from hmpim.identify.signals import longest_lag
 from hmpim.identify.worth import BLURRED, FEW, MUCH, PART
-from hmpim.model.sampled import MARGIN
 
 __all__ = ["are_quiet"]
 
@@ -177,7 +176,7 @@ def _from_rest(fleet: Fleet, group: Group, part: Places, rows: Real, lags: Place
     quiet = (begins <= longest_lag(n)) & ~stand_out_of(left, early)
     if group.fit.member.intersample == "bandlimited":
         away = at - delay[:, None]
-        reach = RINGS if group.fit.member.source.oversampling == 1 else MARGIN
+        reach = ringing_of(group.fit.member.source)
         ringing = (np.abs(away) <= reach) | (away >= n - 1 - reach)
         quiet &= ~stand_out_of(left, ringing)
     since = np.maximum(at - begins[:, None], 0)

@@ -39,9 +39,9 @@ def covariance(rows: Real, residual: Real, *, freedom: int, white: bool) -> Real
     scaled = rows / scale[:, None]
     q, r = np.linalg.qr(scaled.T)
     diagonal = np.abs(np.diag(r))
-    if diagonal.min() < 1e-10 * diagonal.max():
+    if diagonal.min() <= 1e-10 * diagonal.max():
         left, values, right = np.linalg.svd(r)
-        inverse = (right.T / np.maximum(values, 1e-10 * values[0])) @ left.T
+        inverse = (right.T / np.maximum(values, 1e-10 * max(values[0], 1.0))) @ left.T
     else:
         inverse = np.linalg.inv(r)
     if white:

@@ -305,7 +305,8 @@ def excited_band(u: ArrayLike, fs: float) -> tuple[float, float]:
     running = np.concatenate(([0.0], np.cumsum(np.concatenate(([0, 0], power, [0, 0])))))
     level = np.sqrt(np.maximum(running[5:] - running[:-5], 0.0))
     level[0] = 0.0
-    return band_of_levels(level, fs / length)
+    low, high = band_of_levels(level, fs / length)
+    return low, min(high, fs / 2)  # a bin's multiple may round to beyond it
 
 
 def band_of_levels(level: Real, step: float) -> tuple[float, float]:
