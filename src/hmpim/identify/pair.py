@@ -11,6 +11,7 @@ from hmpim.identify.coupling.output_fit import OutputFit
 from hmpim.identify.coupling.responses import Responses, responses_of, settled, unrelated
 from hmpim.identify.effects.censored import CensoredFit
 from hmpim.identify.effects.drift import drift_finding
+from hmpim.identify.effects.hum import hum_finding
 from hmpim.identify.effects.imperfections import Imperfections, refine
 from hmpim.identify.effects.said import with_imperfections
 from hmpim.identify.fitting.fit import Fit
@@ -96,7 +97,8 @@ def _pair(
     question: Question, found: Imperfections, joined: OutputFit, i: int, matrix: Responses | None
 ) -> PairIdentification:
     """Say all that is known of an output that follows an input."""
-    aligned, output, drifting = question.aligned, question.output, joined.drifting
+    aligned, output = question.aligned, question.output
+    drifting, humming, beside = joined.drifting, joined.humming, joined.beside
     source, band = aligned.inputs[i], question.band(i)
     joint, censored, covariance = _refined(question, found, joined, i)
     plain = plainer(joint) if question.inputs is None and covariance is None else None
@@ -133,6 +135,7 @@ def _pair(
         *seen,
         *(finding for finding in said if finding.code not in known),
         *(() if drifting is None else (drift_finding(drifting, aligned.fs, output.unit),)),
+        *(() if humming is None else (hum_finding(humming, aligned.fs, output.unit),)),
         *(*unseen, *unmoved, *unmade),
     )
     fit = joint.best.fit
@@ -152,7 +155,7 @@ def _pair(
         warnings=(*aligned.findings, *findings),
         from_response=evidence.measured,
         time=aligned.time,
-        prediction=fit.prediction if drifting is None else fit.prediction + drifting.trend,
+        prediction=fit.prediction if beside is None else fit.prediction + beside,
         residual=fit.residual,
         covariance=highest_first(readings.coefficient_covariance, readings.system),
         nonlinearity=None if inspection is None else inspection.summary,
@@ -224,7 +227,7 @@ def _refined(
     software = joint.best.fit.structure.sampled  # it holds what it said at a sample
     if question.inputs is not None or question.instrument is not None or software:
         return joint, None, covariance
-    refined = refine(joint, found, question.aligned.fs, joined.drifting)
+    refined = refine(joint, found, question.aligned.fs, joined.beside)
     if refined is None:
         return joint, None, covariance
     return *refined, refined[1].covariance

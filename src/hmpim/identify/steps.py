@@ -9,7 +9,9 @@ from hmpim.identify.asked.question import Question
 from hmpim.identify.asked.reference import fit_through
 from hmpim.identify.asked.swapped import is_swapped, lags_behind, swapped_finding
 from hmpim.identify.coupling.output_fit import OutputFit, fit_together
+from hmpim.identify.effects.beside import without_rows
 from hmpim.identify.effects.drift import with_drift
+from hmpim.identify.effects.hum import with_hum
 from hmpim.identify.effects.imperfections import (
     Imperfections,
     count_levels,
@@ -19,10 +21,12 @@ from hmpim.identify.effects.imperfections import (
 from hmpim.identify.effects.lost import stands_out
 from hmpim.identify.fitting.trial import JointFit
 from hmpim.identify.kept import kept
+from hmpim.identify.noise.colour import line_of, tone_of
 from hmpim.identify.noise.input_noise import input_noise
 from hmpim.identify.noise.whiteness import is_white
+from hmpim.identify.nonlinear.lines import find_period
 from hmpim.identify.nonlinear.speed import beside_speed, explains_more, limited_command
-from hmpim.identify.worth import WORTH
+from hmpim.identify.worth import PART, WORTH
 from hmpim.model.dynamics import StructureName
 
 __all__ = [
@@ -59,20 +63,41 @@ def mark_swapped(question: Question, seen: Imperfections) -> Question:
 
 
 def fit(question: Question, seen: Imperfections) -> OutputFit:
-    """Fit every structure, with a bias that drifts where what is left over asks for it."""
+    """Fit every structure, beside hum and a drift where what is left over asks for them."""
     fitted = _fit_once(question, seen, question.structures)
     if len(fitted.fits) > 1 or fitted.fits[0].silent or question.swapped:
         return fitted
+    (joint,) = fitted.fits
+    humming = None
 
-    def with_rows(rows: Real, plainly: bool) -> JointFit:
+    def with_rows(rows: Real, plainly: bool = False) -> JointFit:
         names = question.plain if plainly else question.structures
-        return _fit_once(question, seen, names, rows).fits[0]
+        if humming is None:
+            return _fit_once(question, seen, names, rows).fits[0]
+        beside = _fit_once(question, seen, names, np.vstack([rows, humming.rows]))
+        return without_rows(beside.fits[0], slice(len(rows), None))
 
-    drifting = with_drift(fitted.fits[0], with_rows)
-    if drifting is None:
-        return fitted
-    joint = drifting.joint
-    return replace(fitted, fits=(joint,), related=(joint.related,), drifting=drifting)
+    if not _has_lines(question.aligned.inputs[0].values):
+        humming = with_hum(joint, with_rows)
+    joint = joint if humming is None else humming.joint
+    drifting = with_drift(joint, with_rows)
+    if drifting is not None:
+        joint = drifting.joint
+    if drifting is not None and humming is not None:
+        taken_off = fitted.fits[0].problem.y - joint.problem.y
+        humming = replace(humming, trend=taken_off - drifting.trend)
+    return replace(
+        fitted, fits=(joint,), related=(joint.related,), drifting=drifting, humming=humming
+    )
+
+
+@kept
+def _has_lines(u: Real) -> bool:
+    """Whether an input repeats, or one line is much of it: its distortion then has lines too."""
+    moves = u - u.mean()
+    line = line_of(moves, 1.0)
+    much = line is not None and float(np.var(tone_of(moves, line))) > PART * float(np.var(moves))
+    return much or find_period(u) is not None
 
 
 def drift_or_levels(

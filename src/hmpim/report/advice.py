@@ -38,6 +38,7 @@ _ADVICE = {
     "spikes": "Look for loose contacts and interference; the spikes were left out.",
     "saturation": "Lower the level of the stimulus, or widen the range.",
     "quantization": "Raise the level of the stimulus, or use a finer range.",
+    "hum": "Look for mains hum or vibration; it was removed.",
     "drift": "Let the unit warm up; the drift was removed.",
     "cut_short": "Record until the output has come to rest.",
     "ended_early": "Record until the stimulus is over.",

@@ -36,6 +36,13 @@ def test_a_figure_with_a_third_of_its_value_for_error_is_doubtful_alone(clean, n
     assert name.replace("_", " ") in found.message
 
 
+def test_far_from_zero_input_the_bias_is_as_doubtful_as_the_scale_factor(field_record, evidence_of):
+    _, u, y = field_record
+    far = with_std(evidence_of(u + 50.0, y, structures=("second_order",)), scale_factor=0.4)
+    (found,) = weak_excitation(far)
+    assert found.parameters == ("scale_factor", "bias")
+
+
 def test_an_error_without_end_is_doubtful_too(clean):
     p = clean.readings.parameters
     endless = replace(p, scale_factor=replace(p.scale_factor, std=float("inf"), ci95=None))

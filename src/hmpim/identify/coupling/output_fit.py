@@ -18,6 +18,7 @@ from hmpim.identify.coupling.lag import Lag, lag_of
 from hmpim.identify.coupling.together import gained_by, joint_covariance
 from hmpim.identify.coupling.weak import coupling_fit, whitening_of
 from hmpim.identify.effects.drift import Drifting
+from hmpim.identify.effects.hum import Humming
 from hmpim.identify.fitting.enrich import PLAIN
 from hmpim.identify.fitting.fit import Fit, Problem, jacobian
 from hmpim.identify.fitting.fit import fit_together as fit_all
@@ -59,6 +60,7 @@ class OutputFit:
     strong: tuple[bool, ...]
     lags: tuple[Lag | None, ...]
     drifting: Drifting | None = None
+    humming: Humming | None = None
 
     @property
     def prediction(self) -> Real:
@@ -68,7 +70,15 @@ class OutputFit:
         for fit, told in zip(self.fits, self.related, strict=True):
             if told:
                 total = total + _part(fit)
-        return total if self.drifting is None else total + self.drifting.trend
+        return total if self.beside is None else total + self.beside
+
+    @property
+    def beside(self) -> Real | None:
+        """What moves the output beside the inputs, shape (n,): a drift, hum; None of neither."""
+        if self.drifting is None or self.humming is None:
+            one = self.drifting or self.humming
+            return None if one is None else one.trend
+        return self.drifting.trend + self.humming.trend
 
 
 def fit_together(

@@ -14,12 +14,12 @@ from numpy.polynomial.legendre import legvander
 
 from hmpim.identify.arrays import Real
 from hmpim.identify.chance import FALSE_ALARM
+from hmpim.identify.effects.beside import gain_by_rows, without_rows
 from hmpim.identify.fitting.candidates import almost_integrates
 from hmpim.identify.fitting.enrich import PLAIN
 from hmpim.identify.fitting.fit import jacobian
 from hmpim.identify.fitting.least_squares import solved, without
-from hmpim.identify.fitting.trial import JointFit, Trial
-from hmpim.identify.noise.autoregression import innovation_gain
+from hmpim.identify.fitting.trial import JointFit
 from hmpim.identify.noise.colour import bias_drift
 from hmpim.identify.noise.covariance import covariance
 from hmpim.identify.noise.whiteness import is_white
@@ -83,7 +83,7 @@ def with_drift(first: JointFit, fitted: Callable[[Real, bool], JointFit]) -> Dri
     columns = columns[:degree]
     # The structure is chosen once more, now that the drift is known.
     joint = fitted(columns, is_white(joint.best.fit.residual))
-    if _gain(joint, degree, first, 0) < 0.0 and not _passes_for_drift(first, joint):
+    if gain_by_rows(joint, degree, first) < 0.0 and not _passes_for_drift(first, joint):
         return None
     return _described(joint, columns)
 
@@ -160,7 +160,7 @@ def _degree(joint: JointFit, columns: Real) -> int:
     """Least degree that serves, by Schwarz's criterion on model's residual and polynomial."""
     problem, fit = joint.problem, joint.best.fit
     counts = slice(None) if problem.valid is None else problem.valid
-    left = (fit.residual + problem.masked(fit.nuisance @ columns))[counts]
+    left = (fit.residual + problem.masked(fit.nuisance[: len(columns)] @ columns))[counts]
     count = problem.counted  # of a wander, the more is taken out the better
     best = (np.inf, 1)
     for degree in _DEGREES:
@@ -171,20 +171,12 @@ def _degree(joint: JointFit, columns: Real) -> int:
     return best[1]
 
 
-def _gain(one: JointFit, degree: int, other: JointFit, other_degree: int) -> float:
-    """Schwarz's criterion of another fit less that of one, either residual an autoregression."""
-    counts = slice(None) if one.problem.valid is None else one.problem.valid
-    gained = 2.0 * innovation_gain(other.best.fit.residual[counts], one.best.fit.residual[counts])
-    unknown = one.best.fit.structure.parameters + degree
-    unknown -= other.best.fit.structure.parameters + other_degree
-    return gained - unknown * float(np.log(one.problem.counted))
-
-
 def _described(joint: JointFit, columns: Real) -> Drifting:
     """The fit with the drift taken off the output, its polynomials still free to move."""
     problem, weighed, fit = joint.problem, joint.weighed, joint.best.fit
-    trend = fit.nuisance @ columns
-    others = jacobian(replace(weighed, nuisance=None), fit)
+    own = fit.nuisance[: len(columns)]
+    trend = own @ columns
+    others = jacobian(replace(weighed, nuisance=weighed.fixed()[1 + len(columns) :]), fit)
     slopes = without(weighed.masked(columns), others)
     left = weighed.innovations(fit.prediction, fit.residual)
     weights = covariance(
@@ -194,24 +186,10 @@ def _described(joint: JointFit, columns: Real) -> Drifting:
         white=is_white(left),
     )
     across = (columns[:, -1] - columns[:, 0]) / (problem.y.size - 1)
-    trials = {id(trial): _without_drift(trial, columns) for trial in joint.trials}
     return Drifting(
-        joint=replace(
-            joint,
-            problem=replace(problem, y=problem.y - trend),
-            weighed=replace(joint.weighed, y=problem.y - trend),
-            best=trials.get(id(joint.best)) or _without_drift(joint.best, columns),
-            trials=tuple(trials.values()),
-        ),
+        joint=without_rows(joint, slice(len(columns))),
         trend=trend,
         degree=columns.shape[0],
-        rate=float(across @ fit.nuisance),
+        rate=float(across @ own),
         rate_std=float(np.sqrt(max(float(across @ weights @ across), 0.0))),
     )
-
-
-def _without_drift(trial: Trial, columns: Real) -> Trial:
-    """The same fit, of an output without the drift."""
-    fit = trial.fit
-    plain = replace(fit, prediction=fit.prediction - fit.nuisance @ columns)
-    return replace(trial, fit=plain)

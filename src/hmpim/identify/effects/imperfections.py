@@ -12,7 +12,6 @@ import numpy as np
 from hmpim.errors import RecordError
 from hmpim.identify.arrays import Mask, Real
 from hmpim.identify.effects.censored import CensoredFit, fit_censored
-from hmpim.identify.effects.drift import Drifting
 from hmpim.identify.effects.hold import Hold, Updates, detect_hold, updates
 from hmpim.identify.effects.lost import find_frozen, find_repeated, find_spikes
 from hmpim.identify.effects.quantization import Quantization, detect_quantization
@@ -143,9 +142,12 @@ def _few_levels(y: Real, richest: int) -> int | None:
 
 
 def refine(
-    joint: JointFit, found: Imperfections, fs: float, drifting: Drifting | None = None
+    joint: JointFit, found: Imperfections, fs: float, beside: Real | None = None
 ) -> tuple[JointFit, CensoredFit] | None:
-    """Fit the chosen structure to what was read; None where there is nothing to refine."""
+    """Fit the chosen structure to what was read; None where there is nothing to refine.
+
+    `beside`, (n,), is what moves the output beside its input and has been taken off.
+    """
     if found.saturation is None and found.hold is None:
         return None
     problem = joint.problem
@@ -161,7 +163,7 @@ def refine(
                 trial.fit,
                 found.saturation,
                 arrivals=arrivals,
-                drift=None if drifting is None else drifting.trend,
+                drift=beside,
             )
         except RecordError:  # fewer samples inside the range than parameters
             continue

@@ -3,7 +3,7 @@
 from hmpim.identify.judgement.evidence import Evidence
 from hmpim.identify.result import Estimate
 from hmpim.identify.result.groups import MODELLED, in_words
-from hmpim.identify.worth import BLURRED, MUCH
+from hmpim.identify.worth import BLURRED, MOST, MUCH
 from hmpim.record import Finding
 
 __all__ = ["not_converged", "weak_delay", "weak_excitation"]
@@ -25,7 +25,10 @@ def not_converged(evidence: Evidence) -> tuple[Finding, ...]:
 
 
 def weak_excitation(evidence: Evidence) -> tuple[Finding, ...]:
-    """Doubt each parameter whose standard deviation is above 30 % of its value."""
+    """Doubt each parameter whose standard deviation is above 30 % of its value.
+
+    With the scale factor the bias, where the input is far from zero.
+    """
     p = evidence.readings.parameters
     named: tuple[tuple[str, Estimate | None], ...] = (
         ("scale_factor", p.scale_factor),
@@ -48,10 +51,19 @@ def weak_excitation(evidence: Evidence) -> tuple[Finding, ...]:
                 message=f"{_how_well(in_words(name), estimate)}. Excite more around the natural "
                 "frequency, or longer.",
                 severity="doubt",
-                parameters=(name,),
+                parameters=(name, "bias")
+                if name == "scale_factor" and _moves_the_bias(evidence)
+                else (name,),
             )
         )
     return tuple(findings)
+
+
+def _moves_the_bias(evidence: Evidence) -> bool:
+    """Whether most of the bias's variance is that of the scale factor: zero input is far away."""
+    cov, scale = evidence.readings.covariance, 1 + evidence.joint.best.fit.structure.order
+    shared = cov[scale, -1] ** 2
+    return bool(shared > MOST * cov[scale, scale] * cov[-1, -1])
 
 
 def _how_well(words: str, estimate: Estimate) -> str:

@@ -18,7 +18,7 @@ from hmpim.identify.noise.whiteness import autocovariance, effective_share, is_w
 from hmpim.identify.signals import as_signal, check_rate
 from hmpim.identify.worth import TOLERATED
 
-__all__ = ["Colour", "Drift", "NoiseColour", "bias_drift", "noise_colour"]
+__all__ = ["Colour", "Drift", "NoiseColour", "bias_drift", "line_of", "noise_colour", "tone_of"]
 
 Colour = Literal["white", "autoregressive", "power_law"]
 """White; correlated over a few samples (AR(1)); or as a power of the frequency (1/f, wander)."""
@@ -118,9 +118,9 @@ def noise_colour(residual: ArrayLike, fs: float) -> NoiseColour:
     e = as_signal("residual", residual)
     e = e - e.mean()
     n = e.size
-    line = _line(e, fs)
+    line = line_of(e, fs)
     if line is not None:
-        e = e - _tone(e, line / fs)
+        e = e - tone_of(e, line / fs)
     r = autocovariance(e, 1)
     rho = 0.0 if r[0] == 0 else float(r[1] / r[0])
     rho = float(np.clip(rho + (1 + 3 * rho) / n, -0.9999, 0.9999))  # Kendall's bias
@@ -209,13 +209,14 @@ def _wandering_variance(ramp: Real, e: Real) -> float:
     return float(level * (weights[1:] @ shape[1:]) / n)
 
 
-def _line(e: Real, fs: float) -> float | None:
-    """Frequency in Hz of the strongest narrow line, or None."""
+def line_of(e: Real, fs: float) -> float | None:
+    """Frequency in Hz of the strongest narrow line of samples (n,), their mean 0, or None."""
     n = e.size
     if n < 8 * _NEIGHBOURS:
         return None
     power = np.abs(scipy.fft.rfft(e * np.hanning(n))) ** 2
-    inner = np.arange(_NEIGHBOURS, power.size - _NEIGHBOURS)
+    inner = np.arange(_NEIGHBOURS, power.size)
+    power = np.pad(power, (0, _NEIGHBOURS + 1), mode="reflect")  # beyond half the rate
     summed = np.concatenate([[0.0], np.cumsum(power)])
     wide = summed[inner + _NEIGHBOURS + 1] - summed[inner - _NEIGHBOURS]
     narrow = summed[inner + 3] - summed[inner - 2]
@@ -229,7 +230,7 @@ def _line(e: Real, fs: float) -> float | None:
     return float((k + 0.5 * (left - right) / (left - 2 * here + right)) * fs / n)
 
 
-def _tone(e: Real, frequency: float) -> Real:
+def tone_of(e: Real, frequency: float) -> Real:
     """Part of a residual, its mean 0, that is a line at `frequency` in cycles per sample."""
     phase = 2 * np.pi * frequency * np.arange(e.size)
     rows = np.stack([np.cos(phase), np.sin(phase)])

@@ -409,7 +409,7 @@ def _tests(
         )
     white = _whiteness(residual[scored])
     coloured = any(
-        warning.code in ("coloured_noise", "noise_colour", "quantization")
+        warning.code in ("coloured_noise", "noise_colour", "quantization", "hum")
         for pair in pairs
         for warning in pair.warnings
     )

@@ -1,0 +1,42 @@
+"""What moves an output beside its input: rows of the same fit, then taken off the output."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from hmpim.identify.fitting.trial import JointFit, Trial
+from hmpim.identify.noise.autoregression import innovation_gain
+
+__all__ = ["gain_by_rows", "without_rows"]
+
+
+def gain_by_rows(one: JointFit, count: int, other: JointFit) -> float:
+    """Schwarz's criterion of a fit without `count` rows less that of one with them.
+
+    Either residual is taken as an autoregression.
+    """
+    counts = slice(None) if one.problem.valid is None else one.problem.valid
+    gained = 2.0 * innovation_gain(other.best.fit.residual[counts], one.best.fit.residual[counts])
+    unknown = one.best.fit.structure.parameters + count - other.best.fit.structure.parameters
+    return gained - unknown * float(np.log(one.problem.counted))
+
+
+def without_rows(joint: JointFit, which: slice) -> JointFit:
+    """A fit of the output without what some of its rows explain; they stay free to move."""
+    problem = joint.problem
+    rows = problem.fixed()[1:][which]
+    y = problem.y - joint.best.fit.nuisance[which] @ rows
+
+    def plain(trial: Trial) -> Trial:
+        fit = trial.fit
+        part = fit.nuisance[which] @ rows
+        return replace(trial, fit=replace(fit, prediction=fit.prediction - part))
+
+    trials = {id(trial): plain(trial) for trial in joint.trials}
+    return replace(
+        joint,
+        problem=replace(problem, y=y),
+        weighed=replace(joint.weighed, y=y),
+        best=trials.get(id(joint.best)) or plain(joint.best),
+        trials=tuple(trials.values()),
+    )
