@@ -45,7 +45,7 @@ _levels = kept(count_levels)
 def look(question: Question) -> Imperfections:
     """Find clipped, held, rounded, stuck and lost samples of the output."""
     richest = max(_levels(source.values) for source in question.aligned.inputs)
-    return find_imperfections(question.output.values, question.aligned.fs, richest=richest)
+    return _imperfections(question, richest=richest)
 
 
 def mark_swapped(question: Question, seen: Imperfections) -> Question:
@@ -106,14 +106,13 @@ def drift_or_levels(
     """Take levels behind the noise, where they explain better what was taken for a drift."""
     if fitted.drifting is None or seen.saturation is not None:
         return seen, fitted
-    y, fs = question.output.values, question.aligned.fs
     steady = _fit_once(question, seen, question.structures)
-    plateau = find_imperfections(y, fs, prediction=steady.prediction).saturation
+    plateau = _imperfections(question, prediction=steady.prediction).saturation
     if plateau is None or plateau.noise != "after":
         return seen, fitted
     clipped = replace(seen, saturation=plateau)
     levelled = _fit_once(question, clipped, question.structures)
-    refined = refine(levelled.fits[0], clipped, fs)
+    refined = refine(levelled.fits[0], clipped, question.aligned.fs)
     (drifted,) = fitted.fits
     left = drifted.best.fit.cost / drifted.problem.counted
     if refined is None or refined[1].noise_std ** 2 > left:
@@ -127,8 +126,7 @@ def look_again(question: Question, seen: Imperfections, fitted: OutputFit) -> Im
     asked = seen.saturation is not None or seen.hold is not None
     if not asked and is_white(residual) and not stands_out(residual):
         return seen
-    y, fs = question.output.values, question.aligned.fs
-    again = find_imperfections(y, fs, prediction=fitted.prediction)
+    again = _imperfections(question, prediction=fitted.prediction)
     again = replace(again, levels=seen.levels)
     plateau = again.saturation
     if plateau is None and seen.saturation is not None and seen.saturation.noise == "after":
@@ -136,6 +134,20 @@ def look_again(question: Question, seen: Imperfections, fitted: OutputFit) -> Im
     if fitted.drifting is not None and plateau is not None and plateau.noise == "after":
         return replace(again, saturation=None)  # a wander bends the output as a level does
     return again
+
+
+def _imperfections(
+    question: Question, *, prediction: Real | None = None, richest: int = 0
+) -> Imperfections:
+    """What `hmpim.identify.effects.imperfections.find_imperfections` finds of the output."""
+    output = question.output
+    return find_imperfections(
+        output.values,
+        question.aligned.fs,
+        valid=output.valid,
+        prediction=prediction,
+        richest=richest,
+    )
 
 
 def limit_speed(

@@ -125,3 +125,45 @@ def test_a_third_clipped_leaves_no_bias(seeds):
         assert abs(np.mean(off)) < 0.2 + room(seeds), name
     inside = [[holds(getattr(pair, name), TRUTH[name]) for name in TRUTH] for pair in pairs]
     assert_share(inside, at_least=0.92, at_most=0.98)
+
+
+def spoiled(y, kept=slice(None)):
+    record = hmpim.run(
+        hmpim.Sensor(
+            delay=0.05, natural_frequency=10.0, damping_ratio=0.4, bias=0.1, noise_std=0.02
+        ),
+        STIMULUS,
+        rng=4,
+    )
+    values = y(record.outputs[0].values)
+    bare = hmpim.Record.from_arrays(
+        {"u": record.inputs[0].values[kept]},
+        {"y": values[kept]},
+        time=AT[kept],
+        intersample="bandlimited",
+    )
+    return hmpim.identify(bare)["y", "u"]
+
+
+def test_a_spike_that_is_clipped_is_not_taken_for_the_plateau():
+    def beyond(y):
+        y = y.copy()
+        y[[150, 430, 901]] += 5.0  # where the output is low
+        return np.clip(y, -np.inf, 0.6)
+
+    pair = spoiled(beyond)
+    assert pair.saturation_high.value == pytest.approx(0.6, abs=1e-6)
+    assert pair.noise_std.value == pytest.approx(0.02, rel=0.1)
+    assert_true(pair)
+
+
+def test_a_step_is_found_where_the_output_is_clipped_on_no_level():
+    pair = spoiled(lambda y: np.clip(0.025 * np.rint(y / 0.025), -np.inf, 0.6123))
+    assert pair.quantization_step.value == pytest.approx(0.025, rel=1e-6)
+
+
+def test_samples_filled_in_are_on_no_level():
+    kept = np.random.default_rng(0).uniform(size=2000) > 0.05
+    pair = spoiled(lambda y: 0.025 * np.rint(y / 0.025), kept)
+    assert "gaps" in codes(pair)
+    assert pair.quantization_step.value == pytest.approx(0.025, rel=1e-6)

@@ -59,6 +59,12 @@ def test_levels_moved_to_another_clock_still_cluster():
     assert found.step == pytest.approx(0.1, rel=1e-3)
 
 
+def test_steps_far_below_the_operating_point_are_found():
+    found = detect_quantization(1e7 + 0.02 * np.rint(np.sin(np.arange(2000) / 50) / 0.02))
+    assert found.step == pytest.approx(0.02, rel=1e-6)
+    assert found.exact
+
+
 @pytest.mark.parametrize(
     "y",
     [

@@ -79,3 +79,23 @@ def test_a_pulse_that_rises_over_several_samples_is_not_held():
     pair = hmpim.identify(hmpim.Record.from_arrays({"u": u}, {"y": y}, fs=FS))["y", "u"]
     low, high = pair.delay.ci95
     assert low <= 0.15 <= high
+
+
+def test_a_zero_that_hardly_shows_is_covered():
+    """Of four fifths of a sample, which the price of a parameter keeps out."""
+    model = hmpim.Model(
+        delay=0.15,
+        scale_factor=1.0,
+        numerator=(4e-3, 1.0),
+        denominator=(1 / (2 * np.pi * 10) ** 2, 0.8 / (2 * np.pi * 10), 1.0),
+    )
+    answer = model.simulate(SWEEP, TIME)
+    held = []
+    for seed in range(20):
+        y = answer + 0.3 * np.random.default_rng(seed).standard_normal(TIME.size)
+        record = hmpim.Record.from_arrays({"u": SWEEP}, {"y": y}, fs=FS, intersample="bandlimited")
+        delay = hmpim.identify(record)["y", "u"].delay
+        if delay.verdict == "ok":
+            held.append(delay.ci95[0] <= 0.15 <= delay.ci95[1])
+    assert len(held) >= 5
+    assert_share(held, at_least=0.95)

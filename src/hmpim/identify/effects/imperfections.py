@@ -11,19 +11,24 @@ import numpy as np
 
 from hmpim.errors import RecordError
 from hmpim.identify.arrays import Mask, Real
+from hmpim.identify.chance import BULK, DEVIATIONS
 from hmpim.identify.effects.censored import CensoredFit, fit_censored
 from hmpim.identify.effects.hold import Hold, Updates, detect_hold, updates
-from hmpim.identify.effects.lost import find_frozen, find_repeated, find_spikes
+from hmpim.identify.effects.lost import find_frozen, find_repeated, find_spikes, stands_out
 from hmpim.identify.effects.quantization import Quantization, detect_quantization
 from hmpim.identify.effects.saturation import Saturation, detect_saturation
 from hmpim.identify.fitting.enrich import PLAIN
+from hmpim.identify.fitting.fit import Fit
 from hmpim.identify.fitting.trial import JointFit, Trial
-from hmpim.identify.worth import NEARLY
+from hmpim.identify.worth import FEW, NEARLY, TWICE
 
 __all__ = ["Imperfections", "count_levels", "find_imperfections", "refine"]
 
 _FEWEST_LEVELS = 8
 """Levels that an output must take, unless its input takes as few."""
+
+_ROUNDS = 3
+"""Times that spikes are sought behind clipping: large ones hide smaller ones."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -82,7 +87,12 @@ class Imperfections:
 
 
 def find_imperfections(
-    y: Real, fs: float, *, prediction: Real | None = None, richest: int = 0
+    y: Real,
+    fs: float,
+    *,
+    valid: Mask | None = None,
+    prediction: Real | None = None,
+    richest: int = 0,
 ) -> Imperfections:
     """Look for saturation, hold, quantisation, spikes and standstill in an output.
 
@@ -92,19 +102,24 @@ def find_imperfections(
         Output samples.
     fs : float
         Rate in Hz.
+    valid : ndarray of bool, shape (n,), optional
+        Samples that were recorded; the others are filled in, and on no grid.
     prediction : ndarray, shape (n,), optional
         What a first model says; with it a plateau is told from a crest, and spikes and
         standstill are looked for.
     richest : int
         Levels that the inputs take; 0 where those of the output are not asked for.
     """
-    rounding = detect_quantization(y)
+    recorded = np.ones(y.size, dtype=bool) if valid is None else valid
+    rounding = detect_quantization(y[recorded])
     step = 0.0 if rounding is None else rounding.step
     clipping: Saturation | None = detect_saturation(y, prediction, step=step)
     if clipping is not None and (
         (clipping.low is None and clipping.high is None) or clipping.share > NEARLY
     ):
         clipping = None
+    if rounding is not None and clipping is not None:  # the level is on no grid
+        rounding = detect_quantization(y[recorded & ~clipping.clipped])
     hold = detect_hold(y, fs, prediction)
     spikes = frozen = None
     if prediction is not None and hold is None:
@@ -156,15 +171,14 @@ def refine(
         whole[: problem.begins + _settled(joint)] = False
     arrivals = found.arrivals(problem.y.size, fs)
     tried: list[tuple[float, Trial, CensoredFit]] = []
+
+    def censored_fit(start: Fit, counts: Mask | None) -> CensoredFit:
+        read = replace(problem, valid=counts, nuisance=None, begins=None)
+        return fit_censored(read, start, found.saturation, arrivals=arrivals, drift=beside)
+
     for trial in _worth_refining(joint, found):
         try:
-            censored = fit_censored(
-                replace(problem, valid=whole, nuisance=None, begins=None),
-                trial.fit,
-                found.saturation,
-                arrivals=arrivals,
-                drift=beside,
-            )
+            censored = censored_fit(trial.fit, whole)
         except RecordError:  # fewer samples inside the range than parameters
             continue
         price = trial.fit.structure.parameters * float(np.log(censored.index.size))
@@ -172,6 +186,12 @@ def refine(
     if not tried:  # the first fit stands
         return None
     _, chosen, censored = min(tried, key=lambda item: item[0])
+    for _ in range(_ROUNDS):  # a spike that is clipped has been taken for one of the plateau
+        spikes = _spikes(censored, found.saturation)
+        if spikes is None:
+            break
+        whole = ~spikes if whole is None else np.asarray(whole & ~spikes)
+        censored = censored_fit(censored.fit, whole)
     counted = np.zeros(problem.y.size, dtype=bool)
     counted[censored.index] = True
     fit = replace(censored.fit, residual=censored.fit.residual * counted)
@@ -186,6 +206,21 @@ def refine(
         hidden=None,
     )
     return refined, censored
+
+
+def _spikes(censored: CensoredFit, saturation: Saturation | None) -> Mask | None:
+    """Single samples that no noise of a censored fit explains, (n,); None if there are none."""
+    left = censored.fit.residual
+    inside = np.zeros(left.size, dtype=bool)
+    inside[censored.index] = True
+    counted = left[inside]
+    if saturation is not None:
+        inside &= ~saturation.clipped
+    if not stands_out(counted) or not inside.any():
+        return None
+    bulk = float(np.median(np.abs(left[inside]))) / BULK
+    far = np.abs(left) > TWICE * DEVIATIONS * bulk
+    return far if 0 < np.count_nonzero(far) < FEW * counted.size else None
 
 
 def _settled(joint: JointFit) -> int:

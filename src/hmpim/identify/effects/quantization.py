@@ -26,6 +26,9 @@ _FEWEST_LEVELS = 5
 _FINEST = 2.0**-22
 """Step over the greatest magnitude; below it lies the rounding of single-precision floats."""
 
+_FINEST_DOUBLE = 2.0**-44
+"""The same of values that single precision does not hold."""
+
 _CELLS = 1 << 15
 """Cells of the histogram whose transform is searched; steps down to 4 / _CELLS of the range."""
 
@@ -71,8 +74,8 @@ def detect_quantization(y: ArrayLike) -> Quantization | None:
     -------
     Quantization or None
         None for continuous data, for data rounded to significant digits rather than to a
-        step, for fewer than five levels, and for a step below 2^-22 of the greatest value,
-        where single-precision numbers end.
+        step, for fewer than five levels, and for a step below 2^-22 of the greatest value where
+        all values are single-precision numbers, 2^-44 where they are not.
 
     Raises
     ------
@@ -111,9 +114,10 @@ def _by_distances(levels: Real, largest: float) -> Quantization | None:
     """Find the step of which all distances between neighbours are multiples."""
     gaps = np.diff(levels)
     smallest = float(gaps.min())
+    single = bool(np.all(levels == levels.astype(np.float32)))
     for divisor in (1, 2, 3):  # the smallest distance seen may be a few steps
         rough = smallest / divisor
-        if rough < _FINEST * largest:
+        if rough < (_FINEST if single else _FINEST_DOUBLE) * largest:
             return None
         fitted = _multiples(levels, gaps, rough)
         if fitted is not None:

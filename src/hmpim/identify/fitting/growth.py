@@ -31,6 +31,7 @@ __all__ = [
     "Growth",
     "HiddenPole",
     "as_if_hidden",
+    "as_if_zero",
     "grow",
     "hidden_pole",
     "one_more_pole",
@@ -264,6 +265,29 @@ def as_if_hidden(fit: Fit, hidden: HiddenPole) -> Fit:
         structure=one_more_pole(fit.structure),
         theta=with_pole(fit.structure, theta, lag),
         linear=linear,
+    )
+
+
+def as_if_zero(fit: Fit, hidden: HiddenPole) -> Fit:
+    """Return a fit with the longest zero that q below 0 may stand for, its delay longer by as much.
+
+    Parameters
+    ----------
+    fit : Fit
+        Without it.
+    hidden : HiddenPole
+        What `hidden_pole` says of it.
+    """
+    lead = float(np.sqrt(max(-hidden.squared, 0.0) + HALF * hidden.std))
+    moved = -(lead**2) * hidden.shift
+    theta, linear = np.split(np.concatenate([fit.theta, fit.linear]) + moved, [fit.theta.size])
+    theta[0] += lead
+    numerator = np.convolve(linear[:-1], [1.0, lead])
+    return replace(
+        fit,
+        structure=replace(fit.structure, zeros=fit.structure.zeros + 1),
+        theta=within_reach(fit.structure, theta, delays=(-np.inf, np.inf), samples=_ANY),
+        linear=np.append(numerator, linear[-1]),
     )
 
 

@@ -14,10 +14,10 @@ import numpy as np
 import scipy
 
 from hmpim.identify.arrays import Real
-from hmpim.identify.chance import CLEARLY, COVERAGE, LIKELIER, SEEN
+from hmpim.identify.chance import CLEARLY, COVERAGE, HALF, LIKELIER, SEEN
 from hmpim.identify.fitting.enrich import PLAIN
 from hmpim.identify.fitting.fit import Fit
-from hmpim.identify.fitting.growth import as_if_hidden
+from hmpim.identify.fitting.growth import as_if_hidden, as_if_zero
 from hmpim.identify.fitting.trial import JointFit, Trial
 from hmpim.identify.reading.figures import figures_at, figures_of
 from hmpim.identify.result import Estimate, Parameters
@@ -132,6 +132,11 @@ def spanned(
     if hidden is not None and (joint.rivals or hidden.may_hide):
         longest = figures_of(as_if_hidden(fit, hidden), fs=fs, highest=highest)
         richer.append({name: longest[name] for name in (*PHASE_SPLIT, "bandwidth_3db")})
+    if hidden is not None and abs(hidden.squared) > HALF * hidden.std and hidden.fit is fit:
+        bent = (*bent, (fit, hidden.squared * hidden.shift))  # more than chance asks for it
+        proper = fit.structure.zeros < fit.structure.order and not fit.structure.parallel
+        if hidden.squared < 0.0 and proper:
+            richer += figures([as_if_zero(fit, hidden)])
     richer += [bent_figures(*one, fs=fs, highest=highest) for one in bent]
     moved = {}
     for name in (field.name for field in fields(parameters)):
