@@ -118,8 +118,6 @@ def find_imperfections(
         (clipping.low is None and clipping.high is None) or clipping.share > NEARLY
     ):
         clipping = None
-    if rounding is not None and clipping is not None:  # the level is on no grid
-        rounding = detect_quantization(y[recorded & ~clipping.clipped])
     hold = detect_hold(y, fs, prediction)
     spikes = frozen = None
     if prediction is not None and hold is None:

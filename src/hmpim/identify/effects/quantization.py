@@ -46,7 +46,8 @@ class Quantization:
     offset : float
         One of the levels, between 0 and `step`.
     exact : bool
-        Whether every value lies on the grid; False if something was added after rounding.
+        Whether every value but the extremes lies on the grid; False if something was added after
+        rounding.
     """
 
     step: float
@@ -100,7 +101,9 @@ def detect_quantization(y: ArrayLike) -> Quantization | None:
     levels = _distinct(samples, 64 * np.finfo(float).eps * largest)
     if levels.size < _FEWEST_LEVELS:
         return None
-    return _by_distances(levels, largest) or _by_clusters(samples, span)
+    inner = levels[1:-1]  # a level at which the output is clipped is on no grid
+    told = inner if inner.size >= _FEWEST_LEVELS else levels
+    return _by_distances(told, largest) or _by_clusters(samples, span)
 
 
 def _distinct(samples: Real, tolerance: float) -> Real:

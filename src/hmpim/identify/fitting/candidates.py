@@ -19,6 +19,7 @@ from hmpim.identify.fitting.enrich import (
 )
 from hmpim.identify.fitting.fit import Fit, Problem, fit_structure
 from hmpim.identify.fitting.growth import one_more_pole, scale_of, with_pole
+from hmpim.identify.fitting.held_steps import best_sample, steps_through
 from hmpim.identify.fitting.modes import grown_modes
 from hmpim.identify.fitting.start import RoughResponse, rough_response, starting_values
 from hmpim.identify.fitting.unexplained import unexplained_response
@@ -213,6 +214,8 @@ def _best_of(problem: Problem, structure: Structure, starts: list[Real], rivals:
         for theta in _distinct(starts)
     ]
     best = min(tried, key=lambda fit: fit.objective)
+    if steps_through(structure, held=problem.source.degree == 0):
+        best = best_sample(best, lambda theta: fit_structure(problem, structure, theta))
     if best.converged or best.objective > TWICE * leading.objective:
         return best
     return fit_structure(problem, structure, best.theta, precision=precision)

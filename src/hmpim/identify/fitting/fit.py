@@ -15,6 +15,7 @@ import numpy as np
 
 from hmpim.identify.arrays import Real
 from hmpim.identify.fitting.climb import climb
+from hmpim.identify.fitting.held_steps import kept_in_sample
 from hmpim.identify.fitting.least_squares import solved, solved_exactly, without
 from hmpim.identify.fitting.rows import Part, Problem
 from hmpim.identify.fitting.sampled_rows import SampledPart, part_of
@@ -137,6 +138,9 @@ class _Evaluation:
         rows = [
             part.slopes(weights[2 * i], weights[2 * i + 1]) for i, part in enumerate(self.parts)
         ]
+        for problem, own in zip(self.problems, rows, strict=True):
+            if problem.shortest_delay == problem.longest_delay:
+                own[0] = 0.0  # a delay that is kept
         return self.problems[0].masked(np.vstack(rows))
 
     @property
@@ -315,6 +319,8 @@ def fit_together(
     list of Fit
         One for each input, residual and cost common to all.
     """
+    kept = (kept_in_sample(*one) for one in zip(problems, structures, thetas, strict=True))
+    problems = list(kept)
 
     def bounded(moved: Sequence[Real]) -> list[Real]:
         return [_bounded(p, s, t) for p, s, t in zip(problems, structures, moved, strict=True)]

@@ -7,6 +7,7 @@ import numpy as np
 
 from hmpim.identify.arrays import Real
 from hmpim.identify.fitting.fit import jacobian
+from hmpim.identify.fitting.held_steps import steps_through
 from hmpim.identify.fitting.nested import widened
 from hmpim.identify.fitting.trial import JointFit
 from hmpim.identify.noise.autoregression import deviation_of_mean
@@ -154,14 +155,16 @@ def _covariance(joint: JointFit, rows: Real, residual: Real, *, freedom: int, wh
         inner = covariance(rows[1:], residual, freedom=freedom, white=white)
         full = np.zeros((rows.shape[0], rows.shape[0]))
         full[1:, 1:] = inner
-        full[0, 0] = 1.0 / 12.0  # uniform over the sample in which the delay ends
+        if not fit.structure.order:  # else the ends of the sample are read: `spanned`
+            full[0, 0] = 1.0 / 12.0  # uniform over the sample in which the delay ends
         return full
     return covariance(rows, residual, freedom=freedom, white=white)
 
 
 def _in_whole_samples(joint: JointFit) -> bool:
-    """Whether only the sample in which a delay ends can be seen: a held input, and no dynamics."""
-    return joint.best.fit.structure.name == "static" and joint.best.intersample == "zoh"
+    """Whether only the sample in which a delay ends is seen: a held input that steps through."""
+    structure, held = joint.best.fit.structure, joint.best.intersample == "zoh"
+    return held and (structure.name == "static" or steps_through(structure, held=True))
 
 
 def _wandering(cov: Real, residual: Real, counted: int) -> Real:

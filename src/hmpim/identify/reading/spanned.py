@@ -18,6 +18,7 @@ from hmpim.identify.chance import CLEARLY, COVERAGE, HALF, LIKELIER, SEEN
 from hmpim.identify.fitting.enrich import PLAIN
 from hmpim.identify.fitting.fit import Fit
 from hmpim.identify.fitting.growth import as_if_hidden, as_if_zero
+from hmpim.identify.fitting.held_steps import at_ends, steps_through
 from hmpim.identify.fitting.trial import JointFit, Trial
 from hmpim.identify.reading.figures import figures_at, figures_of
 from hmpim.identify.result import Estimate, Parameters
@@ -124,11 +125,15 @@ def spanned(
         # Of another model a bandwidth may lie beyond the band.
         return [figures_of(fit, fs=fs, highest=fs / 2) for fit in fits]
 
-    between = figures(trial.fit for trial in rivals_of(joint))
+    rivals = rivals_of(joint)
+    between = figures(trial.fit for trial in rivals)
+    between += figures(fit for one in rivals if _steps_through(one) for fit in _ends(one.fit))
     richer = figures(
         trial.fit for trial in (*joint.rivals, *plainer_rivals(joint), *asked_rivals(joint))
     )
     hidden, fit = joint.hidden, joint.best.fit
+    if _steps_through(joint.best):
+        richer += figures(_ends(fit))
     if hidden is not None and (joint.rivals or hidden.may_hide):
         longest = figures_of(as_if_hidden(fit, hidden), fs=fs, highest=highest)
         richer.append({name: longest[name] for name in (*PHASE_SPLIT, "bandwidth_3db")})
@@ -151,6 +156,16 @@ def spanned(
             whole = replace(whole, ci95=(min(lows), max(highs)))
         moved[name] = whole
     return replace(parameters, **moved)
+
+
+def _steps_through(trial: Trial) -> bool:
+    return steps_through(trial.fit.structure, held=trial.intersample == "zoh")
+
+
+def _ends(fit: Fit) -> list[Fit]:
+    """Fits to the same samples, the delay at either end of the sample that it is in."""
+    found = at_ends(fit.structure, fit.theta, fit.linear)
+    return [replace(fit, theta=theta, linear=linear) for theta, linear in found]
 
 
 def blurred(parameters: Parameters, share: float) -> Parameters:

@@ -1,0 +1,121 @@
+"""A held input that steps straight through to the output: the delay ends somewhere in one sample.
+
+Where the numerator is of the denominator's degree, the output jumps with a held input. Then the
+part of a sample by which it is late and the numerator are one and the same to the samples, and the
+likelihood jumps from one whole sample to the next: the delay stays in the middle of its sample,
+the samples about it are tried one by one, and figures are read at both ends of the best one.
+"""
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Protocol, TypeVar
+
+import numpy as np
+import scipy
+
+from hmpim.identify.arrays import Real
+from hmpim.identify.fitting.rows import Problem
+from hmpim.model.dynamics import Structure, coefficients_of, denominator_of
+
+__all__ = ["at_ends", "best_sample", "kept_in_sample", "steps_through"]
+
+_EDGE = 0.01
+"""Share of a sample by which the delay stays inside it."""
+
+
+class _Fitted(Protocol):
+    @property
+    def theta(self) -> Real:
+        """Delay first."""
+
+    @property
+    def objective(self) -> float:
+        """What is least."""
+
+
+F = TypeVar("F", bound=_Fitted)
+
+
+def steps_through(structure: Structure, *, held: bool) -> bool:
+    """Whether the output of dynamics jumps when a held input does."""
+    if not held or structure.sampled or structure.parallel or structure.integrators:
+        return False
+    return structure.order > 0 and structure.zeros == structure.order
+
+
+def kept_in_sample(problem: Problem, structure: Structure, theta: Real) -> Problem:
+    """The problem with the delay kept in the middle of the sample that it is in."""
+    stated = problem.shortest_delay == problem.longest_delay
+    if stated or not steps_through(structure, held=problem.source.degree == 0):
+        return problem
+    middle = float(np.floor(theta[0])) + 0.5
+    return replace(problem, shortest_delay=middle, longest_delay=middle)
+
+
+def best_sample(best: F, refit: Callable[[Real], F]) -> F:
+    """The best of a fit and those one sample earlier or later, until none is better.
+
+    Parameters
+    ----------
+    best : Fit
+        Where to start.
+    refit : callable
+        Fits again from other parameters.
+    """
+    for step in (-1.0, 1.0):
+        while True:
+            there = best.theta.copy()
+            there[0] += step
+            other = refit(there)
+            if not other.objective < best.objective:
+                break
+            best = other
+    return best
+
+
+def at_ends(structure: Structure, theta: Real, linear: Real) -> list[tuple[Real, Real]]:
+    """Parameters that give the same samples, the delay at the beginning and the end of its sample.
+
+    With y = C x + D u behind a delay of d + f samples, d whole, the state is that of the last step
+    of the input, 1 - f before: C e^{A (1 - f)} and D + C Γ(1 - f) are what the samples tell, Γ the
+    integral of e^{At} B, and from them follow C and D at any other f.
+
+    Parameters
+    ----------
+    structure : Structure
+        One of which `steps_through` is true.
+    theta : ndarray, shape (1 + order,)
+        Delay in samples, parameters of the sections.
+    linear : ndarray, shape (m + 1,)
+        Numerator and bias.
+    """
+    below = denominator_of(structure, coefficients_of(structure, theta[1:]))
+    order, first = structure.order, structure.dc_zeros
+    above = np.zeros(order + 1)
+    above[first:] = linear[:-1]
+    through = above[-1] / below[-1]
+    reads = above[:-1] - through * below[:-1]
+    whole = float(np.floor(theta[0]))
+    rest = 1.0 - (theta[0] - whole)
+    moved, fed = _steps(below, rest)
+    seen, at_once = reads @ moved, through + reads @ fed
+    found = []
+    for share in (_EDGE, 1.0 - _EDGE):
+        moved, fed = _steps(below, 1.0 - share)
+        reads = np.linalg.solve(moved.T, seen)
+        through = at_once - float(reads @ fed)
+        above = np.append(reads, 0.0) + through * below
+        delayed = np.concatenate([[whole + share], theta[1:]])
+        found.append((delayed, np.append(above[first:], linear[-1])))
+    return found
+
+
+def _steps(below: Real, time: float) -> tuple[Real, Real]:
+    """e^{At} and Γ(t) of a companion form, `below` by rising powers of s per sample."""
+    order = below.size - 1
+    matrix = np.zeros((order + 1, order + 1))
+    matrix[np.arange(order - 1), np.arange(1, order)] = 1.0
+    matrix[order - 1, :order] = -below[:-1] / below[-1]
+    matrix[order - 1, order] = 1.0 / below[-1]
+    step = scipy.linalg.expm(matrix * time)
+    return step[:order, :order], step[:order, order]

@@ -1,0 +1,67 @@
+"""A held input that steps through: what of a sample it is late, and the numerator, are one."""
+
+import numpy as np
+import pytest
+
+import hmpim
+from hmpim.identify.fitting.fit import Problem
+from hmpim.identify.fitting.held_steps import at_ends, steps_through
+from hmpim.identify.fitting.sampled_rows import part_of
+from hmpim.model import STRUCTURES, prepare_input
+
+FS = 1000.0
+RNG = np.random.default_rng(0)
+HELD = np.repeat(RNG.standard_normal(100), 3)
+
+
+@pytest.mark.parametrize(
+    ("name", "linear"),
+    [
+        ("first_order_zero", [1.2, 0.7, 0.1]),
+        ("second_order_zeros", [1.2, 0.7, 2.0, 0.1]),
+        ("washout", [2.0, 0.1]),
+    ],
+)
+def test_either_end_of_the_sample_gives_the_same_samples(name, linear):
+    structure = STRUCTURES[name]
+    theta, linear = np.array([4.3, 1.1, 0.4])[: 1 + structure.order], np.array(linear)
+    problem = Problem(
+        source=prepare_input(HELD, "zoh"), y=0.0 * HELD, valid=None, longest_delay=50.0
+    )
+    here = part_of(problem, structure, theta).driven(linear[:-1])
+    early, late = at_ends(structure, theta, linear)
+    assert (early[0][0], late[0][0]) == pytest.approx((4.01, 4.99))
+    for there, weights in (early, late):
+        answer = part_of(problem, structure, there).driven(weights[:-1])
+        assert answer == pytest.approx(here, abs=1e-12)
+
+
+def test_only_a_held_input_of_proper_dynamics_steps_through():
+    jumps = {name for name, one in STRUCTURES.items() if steps_through(one, held=True)}
+    assert {"first_order_zero", "second_order_zeros", "washout"} <= jumps
+    assert not jumps & {"static", "first_order", "second_order", "second_order_zero", "two_modes"}
+    assert not any(steps_through(one, held=False) for one in STRUCTURES.values())
+
+
+@pytest.mark.parametrize("late", [0.05, 0.45, 0.95])
+def test_a_lead_lag_behind_a_converter_is_found(late):
+    """The delay is somewhere in its sample, and all that hangs on it as wide."""
+    model = hmpim.Model(
+        delay=(5.0 + late) / FS,
+        scale_factor=-1.2,
+        numerator=(6e-5, 0.016, 1.0),
+        denominator=(8.35e-5, 0.0256, 1.0),
+    )
+    u = np.repeat(np.random.default_rng(3).choice([-1.0, 1.0], 400), 5)
+    answer = model.simulate(u, np.arange(u.size) / FS, intersample="zoh")
+    y = answer + 0.015 * np.random.default_rng(4).standard_normal(u.size)
+    record = hmpim.Record.from_arrays({"u": u}, {"y": y}, fs=FS, intersample="zoh")
+    pair = hmpim.identify(record)["y", "u"]
+    assert pair.structure == "second_order_zeros"
+    low, high = pair.delay.ci95
+    assert (low, high) == pytest.approx((5e-3, 6e-3), abs=3e-5)
+    assert low - 1e-5 <= model.delay <= high + 1e-5
+    truth = {"scale_factor": -1.2, "natural_frequency": 1 / (2 * np.pi * 8.35e-5**0.5)}
+    for name, value in truth.items():
+        figure = getattr(pair, name)
+        assert figure.ci95[0] <= value <= figure.ci95[1], name
