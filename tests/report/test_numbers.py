@@ -89,7 +89,7 @@ def test_no_number_is_a_dash():
         (0.4, 0.5, -0.6, "", True, "not determined"),
         (0.4, 0.5, -0.6, "", False, "0.40 ± 0.50"),  # a bias, say
         (3.0, 2.0, -1.0, "Hz", False, "3.0 ± 2.0"),  # known to be about three
-        (3.0, 5.0, 0.2, "Hz", False, "3.0 ± 5.0"),  # its interval excludes nothing at all
+        (3.0, 5.0, 0.2, "Hz", False, "3.0 −2.8 +10.0"),  # its interval excludes nothing at all
     ],
 )
 def test_a_positive_figure_that_may_be_nothing_is_not_determined(
@@ -114,3 +114,15 @@ def test_a_positive_figure_that_may_be_nothing_is_not_determined(
 )
 def test_numbers_are_typeset_and_names_are_not(text, shown):
     assert typeset(text) == shown
+
+
+def test_an_interval_that_is_not_symmetric_is_written_with_both_sides_wherever_a_figure_stands():
+    from hmpim.plots.bode import _in_words
+
+    sides = Estimate(value=6.9223, std=0.0348, ci95=(6.8911, 6.9905), unit="Hz")
+    assert format_estimate(sides) == "6.922 −0.031 +0.068 Hz"
+    assert format_interval(sides) == "6.891 to 6.990"
+    assert _in_words(sides) == "6.922 −0.031 +0.068 Hz"
+    # The chi-squared interval of a noise is all but symmetric, and its std says as much.
+    noise = Estimate(value=0.001809, std=0.0000896, ci95=(0.001649, 0.002003), unit="deg")
+    assert format_estimate(noise) == "0.001809 ± 0.000090 deg"

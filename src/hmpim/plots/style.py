@@ -1,9 +1,21 @@
 """One look for every picture: colours, fonts, names that are safe, axes that state their unit."""
 
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 from unicodedata import category
 
-__all__ = ["COLOURS", "FONT_SIZE", "WIDTH", "Colour", "axis_label", "plain", "printable"]
+if TYPE_CHECKING:
+    from hmpim.identify import Estimate
+
+__all__ = [
+    "COLOURS",
+    "FONT_SIZE",
+    "WIDTH",
+    "Colour",
+    "axis_label",
+    "lopsided",
+    "plain",
+    "printable",
+]
 
 Colour = Literal["paper", "ink", "muted", "grid", "input", "output", "model", "limit", "other"]
 
@@ -22,6 +34,10 @@ COLOURS: dict[Colour, str] = {
 WIDTH = 7.6  # inches; a page column
 FONT_SIZE = 9.0
 LONGEST_NAME = 40
+
+_SEEN = 0.5
+"""Standard deviations by which an interval's sides may differ and be written as one: about what
+rounding an error to one digit hides."""
 
 
 def plain(text: str) -> str:
@@ -62,3 +78,25 @@ def axis_label(quantity: str, unit: str) -> str:
     ('Position (deg)', 'u (–)')
     """
     return f"{plain(quantity)} ({plain(unit) or '–'})"
+
+
+def lopsided(estimate: "Estimate") -> bool:
+    """Whether ``± std`` would misstate an interval, as it reaches farther to one side.
+
+    False where there is no interval or no standard deviation, or the value lies outside.
+
+    Examples
+    --------
+    >>> from hmpim.identify import Estimate
+    >>> lopsided(Estimate(value=6.922, std=0.035, ci95=(6.891, 6.990), unit="Hz"))
+    True
+    >>> lopsided(Estimate(value=9.987, std=0.030, ci95=(9.928, 10.046), unit="Hz"))
+    False
+    """
+    if estimate.std is None or estimate.ci95 is None:
+        return False
+    low, high = estimate.ci95
+    if low is None or high is None:
+        return True
+    below, above = estimate.value - low, high - estimate.value
+    return min(below, above) >= 0.0 and abs(above - below) > _SEEN * estimate.std

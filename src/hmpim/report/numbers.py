@@ -4,6 +4,7 @@ import re
 
 from hmpim.identify import Estimate
 from hmpim.identify.result.digits import aside, interval, plus_minus
+from hmpim.plots.style import lopsided
 
 __all__ = [
     "NOT_DETERMINED",
@@ -29,6 +30,8 @@ _ROUNDING = 1e-12
 def format_value(estimate: Estimate, *, positive: bool = False) -> str:
     """Write an estimate without its unit: ``value ± std``, or how far it may lie to either side.
 
+    The second where there is no standard deviation, or where the 95 % interval is not symmetric.
+
     Parameters
     ----------
     estimate : Estimate
@@ -42,6 +45,8 @@ def format_value(estimate: Estimate, *, positive: bool = False) -> str:
     '9.987 ± 0.030'
     >>> format_value(Estimate(value=0.15, std=None, ci95=(0.1474, 0.1502), unit="s"))
     '0.15000 −0.00260 +0.00020'
+    >>> format_value(Estimate(value=6.9223, std=0.0348, ci95=(6.8911, 6.9905), unit="Hz"))
+    '6.922 −0.031 +0.068'
     >>> format_value(Estimate(value=0.003, std=7e-19, ci95=(0.003, 0.003), unit="deg"))
     '0.003 ± 0'
 
@@ -58,9 +63,9 @@ def format_value(estimate: Estimate, *, positive: bool = False) -> str:
         return f"{format_number(estimate.value)} ± ?"
     if _exact(estimate):
         return f"{estimate.value:.10g} ± 0"
-    if estimate.std is not None:
-        return plus_minus(estimate.value, estimate.std)
-    return aside(estimate.value, *estimate.ci95)
+    if estimate.std is None or lopsided(estimate):
+        return aside(estimate.value, *estimate.ci95)
+    return plus_minus(estimate.value, estimate.std)
 
 
 def format_estimate(estimate: Estimate) -> str:
@@ -110,6 +115,8 @@ def format_interval(estimate: Estimate, *, positive: bool = False) -> str:
     '0.1474 or more'
     >>> format_interval(Estimate(value=4.46, std=None, ci95=(4.08895, 4.92893), unit="Hz"))
     '4.09 to 4.93'
+    >>> format_interval(Estimate(value=6.9223, std=0.0348, ci95=(6.8911, 6.9905), unit="Hz"))
+    '6.891 to 6.990'
     >>> format_interval(Estimate(value=3.0, std=5.0, ci95=(-7.0, 13.0), unit="Hz"))
     '13.0 or less'
     """
@@ -118,7 +125,7 @@ def format_interval(estimate: Estimate, *, positive: bool = False) -> str:
     low, high = estimate.ci95
     if high is not None and _undetermined(estimate, positive):
         low = None
-    if estimate.std is None and low is not None and high is not None:
+    if (estimate.std is None or lopsided(estimate)) and low is not None and high is not None:
         # To as many places as the value beside it.
         shown = aside(estimate.value, low, high).partition(" ")[0]
         places = len(shown.partition(".")[2])
