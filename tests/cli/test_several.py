@@ -163,11 +163,14 @@ def test_levels_have_a_page(tmp_path):
             tmp_path / f"{k}.csv",
             {"u": k * U, "y": output(k * U, natural=8.0 + 0.2 * (k - 1), seed=k)},
         )
-        for k in (1, 2, 4)
+        for k in (1, 4, 2)
     ]
     page = tmp_path / "l.html"
     done = run(*files, "--input", "u", "--output", "y", "-q", "--report", page)
     assert done.exit_code == 0, done.stderr
+    levels = sorted(np.ptp(k * U) / 2 for k in (1, 2, 4))  # pictures are in this order
+    named = ", ".join(f"{one:.4g}" for one in levels)
+    assert f"Natural frequency at each amplitude: {named}." in page.read_text(encoding="utf-8")
     shown = cells(page.read_text(encoding="utf-8"), "By amplitude")["Natural frequency (Hz)"]
     assert [float(cell.split("\u00a0")[0].split(" ")[0]) for cell in shown[:3]] == pytest.approx(
         [8.0, 8.2, 8.6], abs=0.05

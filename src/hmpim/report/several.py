@@ -293,6 +293,8 @@ def _pictures(
     fs: float,
     names: Sequence[str],
     averages: dict[str, Estimate],
+    *,
+    by: str = "of each record",
 ) -> tuple[Picture, ...]:
     pictures = []
     curves = [(name, c) for name, pair in zip(names, each, strict=True) if (c := _curve(pair, fs))]
@@ -300,7 +302,7 @@ def _pictures(
         bandwidth = averages.get("bandwidth_phase90")
         marked = bandwidth is not None and bandwidth.spread < bandwidth.value
         mark = (bandwidth.value, bandwidth.spread) if marked and bandwidth is not None else None
-        caption = "Measured frequency response of each record."
+        caption = f"Measured frequency response {by}."
         caption += " The vertical line marks the mean −90° bandwidth." if mark else ""
         pictures.append(
             Picture(
@@ -321,9 +323,9 @@ def _pictures(
             Picture(
                 key=name,
                 title=label,
-                caption=f"{words[:1].upper()}{words[1:]} of each record with its 95 % interval"
+                caption=f"{words[:1].upper()}{words[1:]} {by} with its 95 % interval"
                 + (", and the mean with its own." if mean is not None else "."),
-                description=f"{label} of {len(names)} records in their order.",
+                description=f"{label} {by}: {', '.join(names)}.",
                 figure=trend(names, estimates, name=label, mean=mean),
             )
         )
@@ -349,6 +351,7 @@ def _levelled(
     if not compared.trends:
         said.append("No parameter is determined at two levels or more.")
     grids = [_by_run(each, names)]
+    rising = sorted(range(len(each)), key=lambda k: compared.amplitudes[k])
     if compared.trends:
         grids.insert(0, _trends(compared, pair.parameters))
     return Section(
@@ -356,7 +359,13 @@ def _levelled(
         observed="",
         found=tuple(said),
         grids=tuple(grids),
-        pictures=_pictures(each, results[0].record.fs, names, {}),
+        pictures=_pictures(
+            [each[k] for k in rising],
+            results[0].record.fs,
+            [f"{compared.amplitudes[k]:.4g}" for k in rising],
+            {},
+            by="at each amplitude",
+        ),
     )
 
 

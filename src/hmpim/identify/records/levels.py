@@ -90,6 +90,8 @@ class LevelComparison:
 
     Parameters
     ----------
+    amplitudes : tuple of float
+        Of the levels, in the order given.
     trends : tuple of Trend
         One per parameter known at two levels or more.
     linear_up_to : float
@@ -99,6 +101,7 @@ class LevelComparison:
         Codes 'nonlinear', 'hardening', 'softening', 'friction'; empty where nothing changes.
     """
 
+    amplitudes: tuple[float, ...]
     trends: tuple[Trend, ...]
     linear_up_to: float
     findings: tuple[Finding, ...]
@@ -263,7 +266,12 @@ def compare_levels(
         kind = _kind({t.name: t for t in changed})
         if kind is not None:
             findings.append(kind)
-    return LevelComparison(trends=trends, linear_up_to=reach, findings=tuple(findings))
+    return LevelComparison(
+        amplitudes=tuple(float(a) for a in amplitudes),
+        trends=trends,
+        linear_up_to=reach,
+        findings=tuple(findings),
+    )
 
 
 def _levels(
