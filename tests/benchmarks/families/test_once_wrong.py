@@ -26,6 +26,10 @@ from families.study import draw_of, identified, one
         ("ramp", 404, 5),  # a second order is asked for, but not for the price of its poles
         ("ramp", 404, 26),
         ("noisy", 404, 28),
+        ("by chance", 406, 24),  # a zero that hardly shows moves the delay
+        ("by chance", 406, 79),  # a spike that is clipped is none of the plateau
+        ("by chance, more", 408, 67),  # a lead-lag steps through: the likelihood jumps
+        ("by chance, more", 408, 101),  # and so it does under the other assumption
         ("noisy", 404, 9),  # a pole that would not show moves the -3 dB bandwidth too
     ],
 )
