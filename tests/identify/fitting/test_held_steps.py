@@ -36,6 +36,18 @@ def test_either_end_of_the_sample_gives_the_same_samples(name, linear):
         assert answer == pytest.approx(here, abs=1e-12)
 
 
+def test_a_pole_that_forgets_within_the_sample_gives_the_same_samples_too():
+    structure, linear = STRUCTURES["second_order_zeros"], np.array([1.2, 0.7, 2.0, 0.1])
+    theta = np.array([4.3, -6.0, 300.0])  # forgotten within a thousandth of a sample
+    problem = Problem(
+        source=prepare_input(HELD, "zoh"), y=0.0 * HELD, valid=None, longest_delay=50.0
+    )
+    here = part_of(problem, structure, theta).driven(linear[:-1])
+    for there, weights in at_ends(structure, theta, linear):
+        answer = part_of(problem, structure, there).driven(weights[:-1])
+        assert answer == pytest.approx(here, abs=1e-9 * np.abs(here).max())
+
+
 def test_only_a_held_input_of_proper_dynamics_steps_through():
     jumps = {name for name, one in STRUCTURES.items() if steps_through(one, held=True)}
     assert {"first_order_zero", "second_order_zeros", "washout"} <= jumps

@@ -22,6 +22,9 @@ __all__ = ["at_ends", "best_sample", "kept_in_sample", "steps_through"]
 _EDGE = 0.01
 """Share of a sample by which the delay stays inside it."""
 
+_FORGOTTEN = 1e-10
+"""Share of a state that is left after a part of a sample, below which it is not seen again."""
+
 
 class _Fitted(Protocol):
     @property
@@ -102,7 +105,8 @@ def at_ends(structure: Structure, theta: Real, linear: Real) -> list[tuple[Real,
     found = []
     for share in (_EDGE, 1.0 - _EDGE):
         moved, fed = _steps(below, 1.0 - share)
-        reads = np.linalg.solve(moved.T, seen)
+        # What is forgotten within the sample is read by nothing.
+        reads = np.linalg.lstsq(moved.T, seen, rcond=_FORGOTTEN)[0]
         through = at_once - float(reads @ fed)
         above = np.append(reads, 0.0) + through * below
         delayed = np.concatenate([[whole + share], theta[1:]])
