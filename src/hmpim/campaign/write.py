@@ -126,8 +126,9 @@ def study_page(study: Study) -> StudyPage:
         replace(
             case_grid(study.rows, "Every case: value ± standard deviation", explained=True),
             folded=True,
+            at_end=True,
         ),
-        *([] if remarks is None else [replace(remarks, folded=True)]),
+        *([] if remarks is None else [replace(remarks, folded=True, at_end=True)]),
     ]
     return StudyPage(
         title=study.plan.name,
@@ -161,7 +162,7 @@ def _section(study: Study, figure: FigurePlan) -> Section:
     coupled = figure.compare in ("excitation", "axes")
     couplings = [c for c in study.couplings if c["case"] in joint and coupled]
     whole = len(rows) == len(study.rows)  # the page has them all in one table already
-    grids = [] if whole else [case_grid(rows, _CASES)]
+    grids = [] if whole else [replace(case_grid(rows, _CASES), on_screen=True)]
     if couplings:
         grids.append(coupling_grid(couplings))
     found = findings(rows, couplings, figure.compare)

@@ -14,7 +14,7 @@ class Grid:
     """A table of text: its caption, its columns, its rows; the first column names the row.
 
     `note` stands below it: how it is to be read. A `folded` one shows its caption until it is
-    opened.
+    opened. On paper one `at_end` stands opened behind the sections, and one `on_screen` not at all.
     """
 
     caption: str
@@ -22,6 +22,8 @@ class Grid:
     rows: tuple[tuple[str, ...], ...]
     note: str = ""
     folded: bool = False
+    at_end: bool = False
+    on_screen: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
