@@ -250,6 +250,16 @@ def test_a_curve_is_drawn_if_half_of_its_axis_is_known(demo, share, drawn):
     assert ("Not drawn" in pictures[0].caption) is not drawn
 
 
+@pytest.mark.parametrize(("compare", "held"), [("modes", True), ("levels", True), ("loads", False)])
+def test_a_picture_of_sampled_responses_says_that_its_phase_has_the_hold(demo, compare, held):
+    row = demo[0].rows[0]
+    (figure,) = demo[0].plan.figures
+    (picture, *_) = section_pictures([row], replace(figure, compare=compare), [])
+    (label,) = {panel.y.label for panel in picture.figure.panels if panel.row}
+    assert (label == "Phase with hold (deg)") is held
+    assert ("includes the hold" in picture.caption) is held
+
+
 def test_a_positive_figure_whose_error_exceeds_it_is_not_determined(demo):
     row = demo[0].rows[0]
     vague = {

@@ -310,12 +310,13 @@ def test_roles_that_were_assumed_are_said_and_those_that_were_not_are_not(tmp_pa
     (finding,) = read(path).findings
     assert (finding.code, finding.severity) == ("assumed_roles", "info")
     assert finding.message == (
-        "'u' is taken as the input and 'y' as the output, by name; name another with "
-        "inputs=[...] or --input and outputs=[...] or --output"
+        "'u' is taken as the input and 'y' as the output, by name. Choose another channel "
+        "with --input or --output (in Python: inputs=[...] or outputs=[...])."
     )
     (finding,) = read(path, inputs=["u"]).findings
     assert finding.message == (
-        "'y' is taken as the output, by name; name another with outputs=[...] or --output"
+        "'y' is taken as the output, by name. Choose another channel with --output "
+        "(in Python: outputs=[...])."
     )
     assert read(path, inputs=["u"], outputs=["y"]).findings == ()
     write_csv(read(path, inputs=["u"], outputs=["y"]), tmp_path / "ours.csv")

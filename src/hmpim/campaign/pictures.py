@@ -13,7 +13,7 @@ from hmpim.plots.curves import BodeCurve, measured_curve, model_curve
 from hmpim.plots.description import Figure as Description
 from hmpim.plots.description import Panel
 from hmpim.plots.fence import picket_fence
-from hmpim.plots.overlay import beside_bode, overlaid_bode, overlaid_levels, waveform_panels
+from hmpim.plots.overlay import PHASE, beside_bode, overlaid_bode, overlaid_levels, waveform_panels
 from hmpim.report.figures import Picture
 
 __all__ = ["pair_of", "section_pictures"]
@@ -22,6 +22,15 @@ _BESIDE: tuple[Compare, ...] = ("rates", "loads", "excitation")
 _MODES = ("P", "PV", "PVA")
 _MOST_BESIDE = 3  # columns that a page has room for
 _MARKED = "Vertical lines mark the −90° bandwidths."
+_SAMPLED: tuple[Compare, ...] = (
+    "levels",
+    "modes",
+)  # compared with the hold: not every case is known without
+_HOLD = "Phase with hold (deg)"
+_MARKED_SAMPLED = (
+    "Vertical lines mark the −90° frequencies of the sampled response. It includes the hold of "
+    "the command; the tables' bandwidths of position commands do not."
+)
 _CLEAR = 0.3  # share of the response: what is less sure is left out
 _HALF = 0.5  # share of the axis over which a curve is clear: of less, noise is what is seen
 
@@ -57,7 +66,8 @@ def section_pictures(
         over = _overlaid(some, rows, figure.compare)
         if over is not None:
             title = f"{figure.title}: {axis}"
-            more = _MARKED + _left_out(some, rows, figure.compare)
+            more = _MARKED_SAMPLED if figure.compare in _SAMPLED else _MARKED
+            more += _left_out(some, rows, figure.compare)
             pictures.append(_picture(axis, title, words, over, more=more))
     return pictures
 
@@ -84,6 +94,7 @@ def _overlaid(rows: Sequence[Row], every: Sequence[Row], compare: Compare) -> De
             [(f"{row.axis}, {row.mode}", curve) for row, curve in seen],
             bandwidths=[_bandwidth(row, compare) for row, _ in seen],
             within=[f"{row.rate:g} Hz" for row, _ in seen],
+            phase_label=_HOLD,
         )
     if compare in _BESIDE and len(seen) <= _MOST_BESIDE:
         return beside_bode(
@@ -94,6 +105,7 @@ def _overlaid(rows: Sequence[Row], every: Sequence[Row], compare: Compare) -> De
         [(case_label(row, compare, every), curve) for row, curve in seen],
         bandwidths=[_bandwidth(row, compare) for row, _ in seen],
         pairs=compare != "axes",
+        phase_label=_HOLD if compare in _SAMPLED else PHASE,
     )
 
 
@@ -194,7 +206,7 @@ def _curve(row: Row) -> BodeCurve | None:
 
 def _bandwidth(row: Row, compare: Compare) -> tuple[float, float] | None:
     """-90° of a row and its standard deviation, as the section's sentences give it."""
-    found = samples_reading(row) if compare in ("levels", "modes") else bandwidth(row)
+    found = samples_reading(row) if compare in _SAMPLED else bandwidth(row)
     if found is None or not found.std < found.value:  # it may lie anywhere
         return None
     return found.value, found.std

@@ -133,8 +133,8 @@ def identify(
         typer.Option(
             "--hand",
             metavar="NAME=VALUE",
-            help="A value read by eye, such as bandwidth_phase90=33: shown beside the automatic "
-            "one; may be repeated.",
+            help="A value read by eye, such as bandwidth_phase90=33: listed next to the "
+            "estimate; may be repeated.",
         ),
     ] = None,
     json: Annotated[

@@ -113,8 +113,8 @@ def assumed_roles(
     >>> names = [ChannelInfo(name=name) for name in ("u", "y")]
     >>> told = Contents(format="text", channels=tuple(names))
     >>> roles = choose_roles(told, "a.csv")
-    >>> assumed_roles(roles, told, inputs=None, outputs=["y"])[0].message[:55]
-    "'u' is taken as the input, by name; name another with i"
+    >>> assumed_roles(roles, told, inputs=None, outputs=["y"])[0].message[:57]
+    "'u' is taken as the input, by name. Choose another channe"
     """
     assumed = [
         (names[0], kind)
@@ -129,8 +129,9 @@ def assumed_roles(
     (first, kind), *rest = assumed
     taken = f"{first!r} is taken as the {kind}"
     taken += "".join(f" and {name!r} as the {kind}" for name, kind in rest)
-    options = " and ".join(f"{kind}s=[...] or --{kind}" for _, kind in assumed)
-    message = f"{taken}, by name; name another with {options}"
+    options = " or ".join(f"--{kind}" for _, kind in assumed)
+    arguments = " or ".join(f"{kind}s=[...]" for _, kind in assumed)
+    message = f"{taken}, by name. Choose another channel with {options} (in Python: {arguments})."
     return (Finding(code="assumed_roles", message=message, severity="info", parameters=()),)
 
 

@@ -11,9 +11,10 @@ from hmpim.plots.curves import BodeCurve, interrupted
 from hmpim.plots.description import Axis, Curve, Dashes, Figure, Item, Panel, Rule
 from hmpim.plots.style import Colour, axis_label
 
-__all__ = ["beside_bode", "overlaid_bode", "overlaid_levels", "waveform_panels"]
+__all__ = ["PHASE", "beside_bode", "overlaid_bode", "overlaid_levels", "waveform_panels"]
 
 _COLOURS: tuple[Colour, ...] = ("input", "output", "other", "limit", "model", "muted")
+PHASE = "Phase (deg)"
 _DASHES: tuple[Dashes, ...] = ("-", "--", "-.")
 
 
@@ -23,6 +24,7 @@ def overlaid_bode(
     bandwidths: Sequence[tuple[float, float] | None] = (),
     phase_level: float | None = -90.0,
     pairs: bool = True,
+    phase_label: str = PHASE,
 ) -> Figure:
     """Describe magnitude and phase of several curves over each other (Figs 19 to 22).
 
@@ -37,6 +39,8 @@ def overlaid_bode(
         Phase in degrees at which a thin line is drawn.
     pairs : bool
         True draws every second curve thin over a wide one: of two that are the same both show.
+    phase_label : str
+        Label of the phase's axis: what the phase contains, where that is not plain.
 
     Examples
     --------
@@ -68,7 +72,7 @@ def overlaid_bode(
         phase_items.append(Rule(at=phase_level, axis="y", colour="muted", dashes=":", width=0.8))
     x = Axis(scale="log", numbered=False)
     magnitude = Axis(label="Magnitude (dB)")
-    phase = Axis(label="Phase (deg)", degrees=True)
+    phase = Axis(label=phase_label, degrees=True)
     filled = [curve for _, curve in curves if curve.frequency.size > 1]
     if filled:
         x = replace(
@@ -98,6 +102,7 @@ def beside_bode(
     *,
     bandwidths: Sequence[tuple[float, float] | None],
     within: Sequence[str] = (),
+    phase_label: str = PHASE,
 ) -> Figure:
     """Describe responses side by side, on the same axes (Figs 19 to 21, 24, 25).
 
@@ -110,6 +115,8 @@ def beside_bode(
         interval, and said in words.
     within : sequence of str
         What tells each curve from the others of its column; nothing where each has its own.
+    phase_label : str
+        Label of the phase's axis: what the phase contains, where that is not plain.
 
     Examples
     --------
@@ -119,7 +126,7 @@ def beside_bode(
     >>> [panel.title for panel in figure.panels[::2]], figure.panels[1].items[-1].words
     (['500 Hz', '1000 Hz'], '−90° at 1.670 ± 0.010 Hz')
     """
-    together = overlaid_bode(curves)  # for its axes, which are the same for all
+    together = overlaid_bode(curves, phase_label=phase_label)  # for axes that all columns share
     labels = list(dict.fromkeys(label for label, _ in curves))
     panels = []
     for column, label in enumerate(labels):

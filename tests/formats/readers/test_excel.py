@@ -93,7 +93,7 @@ def test_a_damaged_workbook_is_said_to_be_one(book, tmp_path):
 def test_another_archive_is_no_workbook(tmp_path):
     with zipfile.ZipFile(tmp_path / "a.xlsx", "w") as archive:
         archive.writestr("time.csv", "time,u,y\n0,1,2\n")
-    with pytest.raises(FormatError, match=r"which no reader knows; those there are read .*Excel, "):
+    with pytest.raises(FormatError, match=r"recognises\. The readers cover .*Excel, "):
         read(tmp_path / "a.xlsx")
 
 

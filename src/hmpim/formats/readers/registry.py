@@ -177,7 +177,7 @@ def _unknown(
     start = head[:8].hex(" ")
     message = (
         f"{path.name!r} is a binary file that starts with the bytes {start}, which no reader "
-        f"knows; those there are read {formats}: export it as one of these, or install a reader"
+        f"recognises. The readers cover {formats}: export it as one of these, or install a reader"
     )
     if failed:
         skipped = "; ".join(f"{b.name}: {b.reason}" for b in failed)
