@@ -171,7 +171,14 @@ def test_levels_have_a_page(tmp_path):
     levels = sorted(np.ptp(k * U) / 2 for k in (1, 2, 4))  # pictures are in this order
     named = ", ".join(f"{one:.4g}" for one in levels)
     assert f"Natural frequency at each amplitude: {named}." in page.read_text(encoding="utf-8")
-    shown = cells(page.read_text(encoding="utf-8"), "By amplitude")["Natural frequency (Hz)"]
+    text = page.read_text(encoding="utf-8")
+    assert f"3 levels: not linear above an amplitude of {levels[0]:.4g}." in text
+    assert text.index("By amplitude of u") < text.index("<svg")  # the figures, then the pictures
+    by_run = cells(text, "By run")  # what was compared is in the other table
+    assert list(by_run) == ["1.csv", "2.csv", "4.csv"]
+    assert [row[0] for row in by_run.values()] == [f"{one:.4g}" for one in levels]
+    assert len(by_run["1.csv"]) == 6  # amplitude, verdict, structure, fit, bias, noise
+    shown = cells(text, "By amplitude")["Natural frequency (Hz)"]
     assert [float(cell.split("\u00a0")[0].split(" ")[0]) for cell in shown[:3]] == pytest.approx(
         [8.0, 8.2, 8.6], abs=0.05
     )
@@ -184,3 +191,32 @@ def test_several_records_have_no_pdf_and_say_so(tmp_path):
     done = run(*files, "--report", tmp_path / "r.pdf")
     assert done.exit_code == 2
     assert "several records have an HTML page only; name it r.html" in done.stderr
+
+
+def test_levels_are_named_with_their_unit_and_a_doubtful_figure_is_marked(tmp_path):
+    pages = []
+    for bent in (0.0, 0.02):
+        records = []
+        for k in (1, 2):
+            y = output(k * U, natural=8.0, seed=k)
+            y = y + bent * np.abs(y) * y * (k == 2)
+            records.append(
+                hmpim.Record.from_arrays({"u": k * U}, {"y": y}, fs=FS, units={"u": "V", "y": "V"})
+            )
+        for k, record in enumerate(records):
+            hmpim.save(record, tmp_path / f"{k}.h5")
+        page = tmp_path / f"{bent}.html"
+        done = run(tmp_path / "0.h5", tmp_path / "1.h5", "--report", page)
+        assert done.exit_code == 0, done.stderr
+        pages.append(page.read_text(encoding="utf-8"))
+        assert "Parameter, at amplitude (V)" in " ".join(done.stdout.split())
+    small, large = (f"{np.ptp(k * U) / 2:.4g}" for k in (1, 2))
+    assert f"2 levels: linear at all amplitudes, from {small} to {large} V." in pages[0]
+    assert 'class="verdict ok"' in pages[0]
+    assert "Doubt" not in pages[0]
+    assert f"Doubt: some figures are doubtful at {large} V." in pages[1]
+    assert 'class="verdict doubtful"' in pages[1]
+    sure, doubtful = cells(pages[1], "By amplitude")["Scale factor"][:2]
+    assert not sure.endswith("?")
+    assert doubtful.endswith("\u00a0?")
+    assert not doubtful.endswith("? ?")

@@ -3,7 +3,10 @@
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from hmpim.identify.records.levels import Levels, Trend
+import numpy as np
+
+from hmpim.identify import Identification, PairIdentification
+from hmpim.identify.records.levels import LevelComparison, Levels, Trend
 from hmpim.identify.records.repeats import RepeatedPair, Repeats
 from hmpim.identify.result.digits import percent
 from hmpim.plots.style import printable
@@ -16,7 +19,14 @@ if TYPE_CHECKING:
     from rich.console import Console
     from rich.table import Table
 
-__all__ = ["percent_words", "print_levels", "print_repeats", "repeats_table"]
+__all__ = [
+    "amplitude_unit",
+    "linear_words",
+    "percent_words",
+    "print_levels",
+    "print_repeats",
+    "repeats_table",
+]
 
 
 def repeats_table(pair: RepeatedPair) -> "Table":
@@ -123,15 +133,62 @@ def print_levels(levels: Levels, names: Sequence[str], console: "Console") -> No
     console.print(Text(f"{len(names)} records of one stimulus at several levels", style="bold"))
     for pair, compared in zip(levels.results[0].pairs, levels.comparisons, strict=True):
         console.print(Text(printable(f"{pair.input} → {pair.output}"), style="bold"))
+        unit = amplitude_unit(levels.results[0], pair, compared)
         if compared.trends:
-            console.print(_trend_table(compared.trends))
-            console.print(Text(f"Linear up to an amplitude of {compared.linear_up_to:.4g}."))
+            console.print(_trend_table(compared.trends, unit))
+            words = linear_words(compared, unit)
+            console.print(Text(f"{words[:1].upper()}{words[1:]}."))
         else:
             console.print(Text("No parameter is determined at two levels or more."))
         _print_findings(compared.findings, console)
 
 
-def _trend_table(trends: Sequence[Trend]) -> "Table":
+def amplitude_unit(
+    result: Identification, pair: PairIdentification, compared: LevelComparison
+) -> str:
+    """Return the unit of the levels: the input's, if they are what it covers; else none is known.
+
+    Parameters
+    ----------
+    result : Identification
+        Of the first record given.
+    pair : PairIdentification
+        Which pair of it.
+    compared : LevelComparison
+        Of that pair.
+    """
+    if result.data is None:
+        return ""
+    channel = result.data.channel(pair.input)
+    covered = float(np.ptp(channel.values)) / 2
+    return channel.unit if np.isclose(covered, compared.amplitudes[0]) else ""
+
+
+def linear_words(compared: LevelComparison, unit: str) -> str:
+    """Say over which amplitudes a pair is linear.
+
+    Examples
+    --------
+    >>> def found(end):
+    ...     return LevelComparison(
+    ...         amplitudes=(1.0, 4.0, 2.0), trends=(), linear_up_to=end, findings=())
+    >>> linear_words(found(4.0), "deg")
+    'linear at all amplitudes, from 1 to 4 deg'
+    >>> linear_words(found(2.0), ""), linear_words(found(1.0), "V")
+    ('linear up to an amplitude of 2', 'not linear above an amplitude of 1 V')
+    """
+    least, most = (f"{end(compared.amplitudes):.4g}" for end in (min, max))
+    up_to = f"{compared.linear_up_to:.4g}"
+    if up_to == most:
+        said = f"linear at all amplitudes, from {least} to {most}"
+    elif up_to == least:
+        said = f"not linear above an amplitude of {least}"
+    else:
+        said = f"linear up to an amplitude of {up_to}"
+    return f"{said} {unit}".rstrip()
+
+
+def _trend_table(trends: Sequence[Trend], unit: str) -> "Table":
     from rich.box import SIMPLE_HEAD
     from rich.table import Table
     from rich.text import Text
@@ -139,7 +196,7 @@ def _trend_table(trends: Sequence[Trend]) -> "Table":
     labels = {words.name: words.label for words in GLOSSARY}
     amplitudes = sorted({a for trend in trends for a in trend.amplitudes})
     table = Table(box=SIMPLE_HEAD, pad_edge=False)
-    table.add_column("Parameter, at amplitude")
+    table.add_column("Parameter, at amplitude" + (f" ({printable(unit)})" if unit else ""))
     for amplitude in amplitudes:
         table.add_column(f"{amplitude:.4g}", justify="right")
     table.add_column("Change", justify="right")

@@ -1,6 +1,7 @@
 """One page for several records of one test: repeats and their scatter, or levels."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
 
@@ -8,7 +9,7 @@ import numpy as np
 
 from hmpim.errors import ArgumentError
 from hmpim.formats.atomic import write_text
-from hmpim.identify import Estimate, Identification, PairIdentification, Parameters
+from hmpim.identify import Estimate, Identification, PairIdentification
 from hmpim.identify.records.levels import LevelComparison, Levels
 from hmpim.identify.records.repeats import RepeatedPair, Repeats
 from hmpim.identify.result.digits import percent
@@ -26,7 +27,7 @@ from hmpim.report.numbers import (
     format_value,
     plus_minus,
 )
-from hmpim.report.repeats_text import percent_words
+from hmpim.report.repeats_text import amplitude_unit, linear_words, percent_words
 from hmpim.report.study import Grid, Section, StudyPage, render_study
 from hmpim.report.words import GLOSSARY, VERDICTS, by_weight, label_of, structure_words
 
@@ -144,21 +145,26 @@ def levels_report(
         If `path` is named as something else than a page.
     """
     check_several(path)
-    doubts = any(f.severity == "doubt" for one in levels.comparisons for f in one.findings)
     pairs = levels.results[0].pairs
-    ends = [f"{one.linear_up_to:.4g}" for one in levels.comparisons if one.trends]
-    said = f"linear up to an amplitude of {', '.join(ends)}" if ends else "no trend is known"
+    told = [
+        _rising(pair, compared, levels.results, names)
+        for pair, compared in zip(pairs, levels.comparisons, strict=True)
+    ]
+    known = [one for one in told if one.compared.trends]
+    said = "; ".join(
+        (f"{one.name} " if len(told) > 1 else "") + linear_words(one.compared, one.unit)
+        for one in known
+    )
     page = StudyPage(
         title=_title(about, f"{len(names)} levels of one stimulus"),
         description=_about(about, notes),
-        headline=f"{len(names)} levels: {said}.",
-        met=True if ends else None,
-        doubtful=doubts,
-        grids=(),
-        sections=tuple(
-            _levelled(pair, compared, levels.results, names)
-            for pair, compared in zip(pairs, levels.comparisons, strict=True)
+        headline=f"{len(names)} levels: {said or 'no trend is known'}.",
+        met=True if known else None,
+        doubtful=any(
+            one.unsure or any(f.severity == "doubt" for f in one.compared.findings) for one in told
         ),
+        grids=tuple(_trends(one, several=len(told) > 1) for one in known),
+        sections=tuple(_levelled(one) for one in told),
         facts=_facts(levels.results, names),
     )
     write_text(path, render_study(page))
@@ -248,13 +254,25 @@ def _averages(pair: RepeatedPair, *, several: bool) -> Grid:
     )  # fmt: skip
 
 
-def _by_run(each: Sequence[PairIdentification], names: Sequence[str]) -> Grid:
-    known = [n for n in _BY_RUN if any(getattr(pair.parameters, n) is not None for pair in each)]
+def _by_run(
+    each: Sequence[PairIdentification],
+    names: Sequence[str],
+    at: tuple[str, Sequence[str]] | None = None,
+    *,
+    without: Sequence[str] = (),
+) -> Grid:
+    """Table with a row for each run; `at` is one more column, its heading and its cells."""
+    known = [
+        name
+        for name in _BY_RUN
+        if name not in without and any(getattr(p.parameters, name) is not None for p in each)
+    ]
     units = {name: _unit(each, name) for name in known}
     return Grid(
         caption="By run: value ± standard deviation; ? marks a doubtful value",
         columns=(
             "Run",
+            *([] if at is None else [at[0]]),
             "Verdict",
             "Structure",
             "Fit (%)",
@@ -263,12 +281,13 @@ def _by_run(each: Sequence[PairIdentification], names: Sequence[str]) -> Grid:
         rows=tuple(
             (
                 name,
+                *([] if at is None else [at[1][k]]),
                 VERDICTS[pair.verdict],
                 structure_words(pair.structure),
                 f"{pair.fit_percent:.2f}",
                 *(_cell(getattr(pair.parameters, one), one) for one in known),
             )
-            for name, pair in zip(names, each, strict=True)
+            for k, (name, pair) in enumerate(zip(names, each, strict=True))
         ),
     )
 
@@ -284,8 +303,8 @@ _POSITIVE = {words.name for words in GLOSSARY if words.positive}
 def _cell(estimate: Estimate | None, name: str) -> str:
     if estimate is None:
         return "–"
-    doubt = "" if estimate.verdict == "ok" else " ?"
-    return format_value(estimate, positive=name in _POSITIVE) + doubt
+    shown = format_value(estimate, positive=name in _POSITIVE)
+    return shown if estimate.verdict == "ok" or shown.endswith("?") else f"{shown} ?"
 
 
 def _pictures(
@@ -340,59 +359,106 @@ def _curve(pair: PairIdentification, fs: float) -> BodeCurve | None:
     return measured_curve(pair.frequency_response, near=model_curve(pair, seen, fs=fs))
 
 
-def _levelled(
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Levelled:
+    """One pair at all levels, by rising amplitude; `labels` are what the levels are called."""
+
+    name: str
+    input: str
+    unit: str
+    fs: float
+    compared: LevelComparison
+    runs: tuple[str, ...]
+    each: tuple[PairIdentification, ...]
+    labels: tuple[str, ...]
+
+    @property
+    def unsure(self) -> list[str]:
+        """Levels at which the record by itself is not called ok."""
+        pairs = zip(self.labels, self.each, strict=True)
+        return [label for label, pair in pairs if pair.verdict != "ok"]
+
+
+def _rising(
     pair: PairIdentification,
     compared: LevelComparison,
     results: Sequence[Identification],
     names: Sequence[str],
-) -> Section:
-    each = [result[pair.output, pair.input] for result in results]
-    said = [_sentence(finding) for finding in by_weight(compared.findings)]
-    if not compared.trends:
-        said.append("No parameter is determined at two levels or more.")
-    grids = [_by_run(each, names)]
-    rising = sorted(range(len(each)), key=lambda k: compared.amplitudes[k])
-    if compared.trends:
-        grids.insert(0, _trends(compared, pair.parameters))
-    return Section(
-        title=f"{pair.input} → {pair.output}",
-        observed="",
-        found=tuple(said),
-        grids=tuple(grids),
-        pictures=_pictures(
-            [each[k] for k in rising],
-            results[0].record.fs,
-            [f"{compared.amplitudes[k]:.4g}" for k in rising],
-            {},
-            by="at each amplitude",
-        ),
+) -> _Levelled:
+    order = sorted(range(len(names)), key=lambda k: compared.amplitudes[k])
+    unit = amplitude_unit(results[0], pair, compared)
+    return _Levelled(
+        name=f"{pair.input} → {pair.output}",
+        input=pair.input,
+        unit=unit,
+        fs=results[0].record.fs,
+        compared=compared,
+        runs=tuple(names[k] for k in order),
+        each=tuple(results[k][pair.output, pair.input] for k in order),
+        labels=tuple(f"{compared.amplitudes[k]:.4g} {unit}".rstrip() for k in order),
     )
 
 
-def _trends(compared: LevelComparison, units: Parameters) -> Grid:
-    amplitudes = sorted({a for one in compared.trends for a in one.amplitudes})
+def _levelled(one: _Levelled) -> Section:
+    said = [_sentence(finding) for finding in by_weight(one.compared.findings)]
+    if one.unsure:
+        said.append(f"Doubt: some figures are doubtful at {', '.join(one.unsure)}.")
+    if not one.compared.trends:
+        said.append("No parameter is determined at two levels or more.")
+    alike = len({pair.structure for pair in one.each}) == 1  # else each has figures of its own
+    shown = [moved.name for moved in one.compared.trends] if alike else []
+    pictures = _pictures(one.each, one.fs, one.labels, {}, by="at each amplitude")
+    return Section(
+        title=one.name,
+        observed="",
+        found=tuple(said),
+        grids=(_by_run(one.each, one.runs, ("Amplitude", one.labels), without=shown),),
+        pictures=_in_columns(pictures),
+    )
+
+
+def _in_columns(pictures: Sequence[Picture]) -> tuple[Picture, ...]:
+    """Parameters first; the responses, as high as two of them, where two columns come out even."""
+    low = [picture for picture in pictures if picture.key != "responses"]
+    high = [picture for picture in pictures if picture.key == "responses"]
+    at = max(len(low) - 1 + len(low) % 2, 0)
+    return (*low[:at], *high, *low[at:])
+
+
+def _trends(one: _Levelled, *, several: bool) -> Grid:
+    """How each parameter goes with the amplitude, as compared: by one structure at all levels."""
+    first = one.each[0]
+    amplitudes = sorted(one.compared.amplitudes)
     rows = []
-    for one in compared.trends:
-        known = {
-            a: plus_minus(value, std)
-            for a, value, std in zip(one.amplitudes, one.values, one.stds, strict=True)
-        }
-        estimate = getattr(units, one.name)
-        unit = f" ({estimate.unit})" if estimate is not None and estimate.unit else ""
-        rows.append(
-            (
-                label_of(one.name) + unit,
-                *(known.get(a, "–") for a in amplitudes),
-                f"{'+' if one.change > 0 else ''}{percent(one.change)} %",
-                percent_words(one.probability),
+    for moved in one.compared.trends:
+        own = [getattr(pair.parameters, moved.name) for pair in one.each]
+        alike = [pair.structure == first.structure for pair in one.each]
+        kept = {e.value for e, same in zip(own, alike, strict=True) if same and e is not None}
+        # Found once more, by the structure of the smallest amplitude.
+        again = {
+            amplitude: plus_minus(value, std)
+            for amplitude, value, std in zip(
+                moved.amplitudes, moved.values, moved.stds, strict=True
             )
-        )
+            if value not in kept
+        }
+        cells = [
+            _cell(estimate, moved.name) if same else again.get(amplitude, "–")
+            for amplitude, estimate, same in zip(amplitudes, own, alike, strict=True)
+        ]
+        unit = f" ({own[0].unit})" if own[0] is not None and own[0].unit else ""
+        change = f"{'+' if moved.change > 0 else ''}{percent(moved.change)} %"
+        chance = percent_words(moved.probability)
+        rows.append((label_of(moved.name) + unit, *cells, change, chance))
+    caption = f"By amplitude of {one.input}" + (f", {one.name}" if several else "")
+    doubt = any(cell.endswith("?") for row in rows for cell in row)
     return Grid(
-        caption="By amplitude: value ± standard deviation",
-        columns=("Parameter", *(f"{a:.4g}" for a in amplitudes), "Change", "Chance"),
+        caption=caption + f": value ± standard deviation{'; ? marks a doubtful value' * doubt}",
+        columns=("Parameter", *one.labels, "Change", "Chance"),
         rows=tuple(rows),
-        note="Change: from the smallest to the largest amplitude. Chance: of such differences if "
-        "the parameter were the same at every level.",
+        note="Amplitude: half the range that the input covers. Change: from the smallest to the "
+        "largest amplitude. Chance: of such differences if the parameter were the same at every "
+        "level.",
     )
 
 

@@ -36,6 +36,12 @@ class Section:
     grids: tuple[Grid, ...]
     pictures: tuple[Picture, ...]
 
+    def is_tall(self, picture: Picture) -> bool:
+        """Whether a picture is twice as high as another of its section, beside which it stands."""
+        return sum(picture.figure.heights) >= 2.0 * min(
+            sum(p.figure.heights) for p in self.pictures
+        )
+
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class StudyPage:
