@@ -14,7 +14,7 @@ from hmpim.plots.bode import pair_bode
 from hmpim.plots.curves import BodeCurve
 from hmpim.plots.draw import with_svg
 from hmpim.plots.draw.frames import frames, ticks
-from hmpim.plots.draw.layout import SIZE, places, text_width
+from hmpim.plots.draw.layout import LINE, SIZE, places, text_width
 from hmpim.plots.overlay import beside_bode
 from hmpim.plots.style import COLOURS
 
@@ -265,3 +265,13 @@ def test_numbers_of_a_phase_of_many_turns_do_not_overlap(height):
     across = sorted(float(y) for y in numbers)
     assert len(across) >= 3
     assert min(b - a for a, b in pairwise(across) if b - a > 0.5) >= 0.9 * SIZE
+
+
+def test_a_long_label_does_not_meet_the_numbers_of_the_row_that_it_makes_higher():
+    y = np.array([13.9975, 14.0009])
+    label = "Bandwidth, −90° without delay (Hz)"
+    panel = Panel(x=Axis(), y=Axis(label=label), items=(Curve(x=np.array([0.0, 24.0]), y=y),))
+    figure = Figure(panels=(panel,), alt="", heights=(1.5,))
+    (place,), _ = places(figure, frames(figure), width=600.0)
+    longest = max(text_width(words) for _, words in place.y_ticks)
+    assert place.left - 7.0 - longest > place.edge + LINE

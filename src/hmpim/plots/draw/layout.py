@@ -89,8 +89,10 @@ def places(figure: Figure, shown: list[Frame], *, width: float) -> tuple[list[Pl
     columns = 1 if _narrow(figure, width) else figure.columns
     rows = _rows(figure, columns)
     lefts = [0.0] * columns
-    for panel, frame in panels:
-        labels = _possible_labels(panel, frame, _PER_INCH * figure.heights[panel.row])
+    upright = max(_UPRIGHT * text_width(panel.y.label) for panel in figure.panels)
+    for panel, frame in panels:  # a long label makes a row higher, which then has more ticks
+        height = max(_PER_INCH * figure.heights[panel.row], upright + 8.0)
+        labels = _possible_labels(panel, frame, height)
         room = max((text_width(words) for words in labels if panel.y.numbered), default=0.0)
         column = 0 if columns == 1 else panel.column
         lefts[column] = max(lefts[column], room + 12.0 + LINE * bool(panel.y.label))
