@@ -10,7 +10,7 @@ import hmpim
 from batch_support import FS, write_rows
 from hmpim.batch import study
 from hmpim.batch.expect import held_against, read_bound
-from hmpim.batch.pictures import distribution, sequence
+from hmpim.batch.pictures import distribution, groups, sequence
 from hmpim.batch.run import Cluster
 from hmpim.batch.study import _order, outliers, write_study
 from hmpim.batch.summary import summary_of
@@ -35,9 +35,42 @@ def test_bounds_are_held_against_intervals(table, tmp_path):
     assert (found.failed, found.untold) == (3, 0)
     page = (tmp_path / "study.html").read_text(encoding="utf-8")
     assert "3 outside the specification" in page
+    assert page.index("<span>Specification") < page.index("<span>Results")
     assert "Scale factor by bench" in page
     assert ">nan" not in page
     assert summary_of(table).verdicts["ok"] + summary_of(table).verdicts.get("doubtful", 0) == 8
+
+
+def test_bounds_that_intervals_hold_are_undecided_and_not_met(table, tmp_path):
+    def page(bound):
+        (found,) = write_study(table, tmp_path / "study.html", bounds=[read_bound(bound)])
+        assert found.failed == 0
+        return found, (tmp_path / "study.html").read_text(encoding="utf-8")
+
+    found, met = page("scale_factor < 9.0")
+    assert (found.passed, "All bounds are met." in met) == (8, True)
+    assert 'class="verdict ok"' in met
+    largest = float(np.max(table.to_arrow(["scale_factor"]).column(0).to_numpy()))
+    found, open_ = page(f"scale_factor < {largest!r}")
+    assert (found.passed, found.unsure) == (7, 1)
+    assert "None is outside the specification. 1 undecided" in open_
+    assert "All bounds are met" not in open_
+    assert '<td class="pass">' not in open_
+    assert 'class="verdict doubtful"' in open_
+
+
+def test_moments_are_no_groups_and_days_are():
+    said = {"created": [f"2026-03-01T10:0{k // 3}:00" for k in range(6)]}
+    said |= {"day": [f"2026-03-0{1 + k // 3}" for k in range(6)]}
+    told = Told(**{f"meta_{name}": words for name, words in said.items()})
+    assert list(study._labels(told, ())) == ["day"]
+    assert list(study._labels(told, ("created",))) == ["created"]  # unless they are asked for
+
+
+def test_names_below_an_axis_keep_what_sets_them_apart():
+    values = {f"at a level of {k}.5 deg": np.ones(3) for k in range(3)}
+    (panel,) = groups(values, name="delay", unit="s", by="test").panels
+    assert [words for _, words in panel.x.ticks] == [f"…el of {k}.5 deg" for k in range(3)]
 
 
 class Told:

@@ -145,7 +145,9 @@ def test_repeats_have_a_page(tmp_path):
     assert averages["Scale factor"][-1] == "agree"
     assert list(by_run) == ["run0.csv", "run1.csv", "run2.csv"]
     assert "8.5" in " ".join(by_run["run2.csv"])
-    drawn = text[text.index("<svg") : text.index("</svg>")]
+    first = text.index("Bode plot of 3 measured responses")
+    assert text.index("−90° bandwidth of each record") < first  # beside two parameters, not above
+    drawn = text[first : text.index("</svg>", first)]
     assert all(f"run{k}.csv" in drawn for k in range(3))  # each run's response, by name
 
 

@@ -1,6 +1,6 @@
 """Pictures of many values: how they are distributed, in which order, and in which groups."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +24,8 @@ _MARGIN = 0.02
 """Of the axis at either end."""
 _FEW_NAMES = 10
 _MOST_TICKS = 8
+_LONGEST = 14
+"""Characters of a name below an axis."""
 _STEPS = tuple(m * 10**k for k in range(10) for m in (1, 2, 5))
 
 
@@ -135,7 +137,7 @@ def _along(places: Real, label: str, names: tuple[str, ...]) -> Axis:
         room = _MARGIN * (high - low) or 0.5
         return Axis(label=label, low=low - room, high=high + room)
     if len(names) <= _FEW_NAMES:
-        shown = [(k, plain(name)[:14]) for k, name in enumerate(names)]
+        shown = list(enumerate(_short(names)))
     else:
         step = next(s for s in _STEPS if len(names) <= _MOST_TICKS * s)
         shown = [(0, "1"), *((k - 1, str(k)) for k in range(step, len(names) + 1, step) if k > 1)]
@@ -156,7 +158,7 @@ def groups(some: Mapping[str, Real], *, name: str, unit: str, by: str) -> Figure
     shown = list(some.items())[:_MOST_GROUPS]
     low, median, high = np.array([np.quantile(v, (0.05, 0.5, 0.95)) for _, v in shown]).T
     at = np.arange(len(shown), dtype=np.float64)
-    words = tuple((float(k), plain(label)[:14]) for k, (label, _) in enumerate(shown))
+    words = tuple((float(k), label) for k, label in enumerate(_short([key for key, _ in shown])))
     return Figure(
         panels=(
             Panel(
@@ -167,3 +169,19 @@ def groups(some: Mapping[str, Real], *, name: str, unit: str, by: str) -> Figure
         ),
         alt=f"Median of {name} and the range of nine tenths, by {by}, for {len(shown)} groups.",
     )
+
+
+def _short(names: Sequence[str]) -> list[str]:
+    """Names cut to what an axis has room for: at the end, or before it where ends differ.
+
+    Examples
+    --------
+    >>> _short(["a", "acceptance, cold"]), _short(["the mass of unit 5", "the mass of unit 6"])
+    (['a', 'acceptance, c…'], ['…ass of unit 5', '…ass of unit 6'])
+    """
+    whole = [plain(name) for name in names]
+    room = _LONGEST - 1
+    cut = [name if len(name) <= _LONGEST else f"{name[:room]}…" for name in whole]
+    if len(set(cut)) == len(set(whole)):
+        return cut
+    return [name if len(name) <= _LONGEST else f"…{name[-room:]}" for name in whole]

@@ -87,21 +87,33 @@ def study_page(
     ok = found.verdicts.get("ok", 0)
     rows = sum(found.verdicts.values())
     headline = f"{found.records - failed} of {found.records} records identified; {ok} of {rows} ok."
-    if outcomes:
-        headline += f" {missed} outside the specification." if missed else " All bounds are met."
+    unsure = sum(outcome.unsure for outcome in outcomes)
+    untold = sum(outcome.untold for outcome in outcomes)
+    if missed:
+        headline += f" {missed} outside the specification."
+    elif outcomes:
+        decided = not unsure and not untold
+        headline += " All bounds are met." if decided else " None is outside the specification."
+    headline += f" {unsure} undecided, their intervals holding the bound." if unsure else ""
+    headline += f" {untold} without the figure." if untold else ""
     labels = _labels(table, by)
     return StudyPage(
         title=f"{found.records} records",
         description="",
         headline=headline,
         met=None if not outcomes else missed == 0,
+        doubtful=unsure + untold > 0,
         grids=(
+            *_specified(outcomes),
             _figures(found),
             *_between(table, found),
-            *_specified(outcomes),
             *_reasons(found),
         ),
-        sections=tuple(_section(table, row, outcomes, labels) for row in found.parameters),
+        sections=tuple(
+            _section(table, row, outcomes, labels)
+            for row in found.parameters
+            if row.count > 1 or found.records == 1
+        ),
         facts=(
             ("Folder", str(table.folder)),
             ("Parts", str(len(table.paths))),
@@ -205,7 +217,7 @@ def _specified(outcomes: Sequence[Outcome]) -> tuple[Grid, ...]:
             (
                 o.bound.text,
                 *(str(n) for n in (o.passed, o.failed, o.unsure, o.untold)),
-                "fail" if o.failed else "pass",
+                "fail" if o.failed else "undecided" if o.unsure or o.untold else "pass",
             )
             for o in outcomes
         ),
@@ -227,7 +239,7 @@ def _labels(table: BatchTable, by: Sequence[str]) -> dict[str, list[str | None]]
     for name in by or table.metadata:
         values = table.to_arrow([f"meta_{name}"]).column(0).to_pylist()
         kinds = {v for v in values if v is not None}
-        if by or 2 <= len(kinds) <= _MOST_GROUPS:
+        if by or (2 <= len(kinds) <= _MOST_GROUPS and not all(map(_is_moment, kinds))):
             labels[name] = values
     return labels
 
@@ -386,6 +398,11 @@ def _stamp(word: str | None) -> float | None:
         return datetime.fromisoformat(word).timestamp() if word and {"-", "T"} & set(word) else None
     except ValueError:
         return None
+
+
+def _is_moment(word: str) -> bool:
+    """Whether a label is a time of day: those of one minute are no group."""
+    return ":" in word and _stamp(word) is not None
 
 
 def _grouped(values: Real, labels: Sequence[str | None]) -> dict[str, Real]:

@@ -169,7 +169,7 @@ def batch(
         for outcome in outcomes:
             say(
                 f"{outcome.bound.text}: {outcome.passed} meet it, {outcome.failed} do not, "
-                f"{outcome.unsure} not sure"
+                f"{outcome.unsure} undecided, {outcome.untold} without the figure"
             )
         say(f"Parts: {out / 'parts'}")
         say(f"Page:  {page}")

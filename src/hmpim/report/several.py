@@ -348,7 +348,7 @@ def _pictures(
                 figure=trend(names, estimates, name=label, mean=mean),
             )
         )
-    return tuple(pictures)
+    return _in_columns(pictures)
 
 
 def _curve(pair: PairIdentification, fs: float) -> BodeCurve | None:
@@ -413,7 +413,7 @@ def _levelled(one: _Levelled) -> Section:
         observed="",
         found=tuple(said),
         grids=(_by_run(one.each, one.runs, ("Amplitude", one.labels), without=shown),),
-        pictures=_in_columns(pictures),
+        pictures=pictures,
     )
 
 

@@ -8,6 +8,7 @@ import pytest
 import hmpim
 from hmpim.batch.montecarlo import read_plan, run, run_montecarlo, shipped_plan, sum_up
 from hmpim.batch.montecarlo.draw import one_draw
+from hmpim.batch.montecarlo.study import montecarlo_page
 from hmpim.batch.pool import here_pool
 
 PLAN = """
@@ -57,6 +58,10 @@ def test_the_same_seed_gives_the_same_rows(plan, tmp_path, monkeypatch):
     assert found.draws == 6
     assert sum(map(sum, found.verdicts.values())) == 6
     assert sum(region.right_structure.count for region in found.regions) == 6
+
+    (errors, *_), *_ = (section.pictures for section in montecarlo_page(plan, found).sections)
+    (panel,) = errors.figure.panels
+    assert panel.x.high - panel.x.ticks[-1][0] > 0.8  # the line's words stand behind the last mark
 
 
 @pytest.mark.few(12)

@@ -220,7 +220,8 @@ def _picture(
     figure = Figure(
         panels=(
             Panel(
-                x=Axis(ticks=ticks, low=-0.5, high=len(names) - 0.5, grid=False),
+                # Room behind the last mark for the words on the line.
+                x=Axis(ticks=ticks, low=-0.5, high=len(names) - 0.5 + 0.4 * len(rule), grid=False),
                 y=Axis(label=label),
                 items=(Points(x=at, y=value, low=low, high=high, size=5.0), *rule),
             ),
