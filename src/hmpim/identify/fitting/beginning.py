@@ -12,9 +12,9 @@ from hmpim.identify.fitting.fit import Fit, Problem, jacobian
 from hmpim.identify.fitting.least_squares import solved
 from hmpim.identify.fitting.sampled_rows import part_of
 from hmpim.identify.fitting.trial import Trial
-from hmpim.identify.noise.whiteness import effective_share, is_white
+from hmpim.identify.noise.whiteness import are_white, effective_share, is_white
 from hmpim.identify.signals import longest_lag
-from hmpim.identify.worth import FEW, PART
+from hmpim.identify.worth import FEW, PART, TWICE
 from hmpim.model.sampled import MARGIN, SampledInput
 from hmpim.record import Intersample
 
@@ -210,7 +210,9 @@ def stand_out_of(innovations: Real, some: Mask) -> Mask:
         alike = told & (counts == count)
         others = squares[alike][~some[alike]].reshape(-1, some.shape[1] - count)
         level[alike] = np.median(others, axis=1) / 0.455  # of a squared Gaussian
-    limit = level * scipy.special.chdtri(np.maximum(counts, 1), FALSE_ALARM)
+    # Twice as much where the others are not white: they hold more than noise.
+    spare = np.where(are_white(np.where(some, 0.0, innovations)), 1.0, TWICE)
+    limit = spare * level * scipy.special.chdtri(np.maximum(counts, 1), FALSE_ALARM)
     return np.asarray(told & (np.sum(squares * some, axis=1) > limit))
 
 
