@@ -260,6 +260,25 @@ def test_a_picture_of_sampled_responses_says_that_its_phase_has_the_hold(demo, c
     assert ("includes the hold" in picture.caption) is held
 
 
+def test_a_lopsided_interval_is_written_with_both_sides(demo):
+    study, _ = demo
+    row = next(row for row in study.rows if row.axis == "elevation")
+    readings = {
+        "bandwidth_phase90": Reading(value=6.9223, std=0.0348, unit="Hz", ci95=(6.8911, 6.9905)),
+        "delay": Reading(value=0.0079, std=0.0013, unit="s", ci95=(0.0068, 0.0104)),
+        "bias": Reading(value=0.1, std=0.01, unit="deg", ci95=(0.08, 0.12)),
+    }
+    grid = case_grid([replace(row, parameters=readings)], "")
+    cells = dict(zip(grid.columns, grid.rows[0], strict=True))
+    assert cells["−90° (Hz)"] == "6.922 −0.031 +0.068"
+    assert cells["Delay (ms)"] == "7.9 −1.1 +2.5"
+    assert (
+        "−a +b states how far"
+        in case_grid([replace(row, parameters=readings)], "", explained=True).note
+    )
+    assert cells["Bias (deg)"] == "0.100 ± 0.010"
+
+
 def test_a_positive_figure_whose_error_exceeds_it_is_not_determined(demo):
     row = demo[0].rows[0]
     vague = {

@@ -43,7 +43,7 @@ def samples_reading(row: Row) -> Reading | None:
     if start is None:
         return None
     found = samples_bandwidth(row.pair["frequency_response"], near=start.value)
-    return start if found is None else replace(start, value=found)
+    return start if found is None else replace(start, value=found, ci95=None)
 
 
 def case_label(row: Row, compare: Compare, among: Sequence[Row]) -> str:

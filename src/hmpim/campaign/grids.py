@@ -6,7 +6,8 @@ from dataclasses import replace
 from typing import Any
 
 from hmpim.campaign.study import Reading, Row, Study
-from hmpim.report.numbers import NOT_DETERMINED, plus_minus
+from hmpim.plots.style import with_error
+from hmpim.report.numbers import NOT_DETERMINED
 from hmpim.report.study import Grid
 from hmpim.report.words import GLOSSARY
 
@@ -44,6 +45,7 @@ _READING = (
     "response is the same, read off the measured response"
 )
 _DOUBTFUL = "? marks a doubtful figure; the others of its row are reliable"
+_SIDES = "−a +b states how far a 95 % interval that is not symmetric reaches to either side"
 _EXACT = "exact is the linearised mechanics of the simulated table, without friction"
 _NEGATIVE = (
     "a negative delay belongs to the fit, not to the unit: where feedforward or friction shape "
@@ -91,6 +93,8 @@ def case_grid(rows: Sequence[Row], caption: str, *, explained: bool = False) -> 
         for name in (told[0] if told else names)
         if name not in usual or any(cells[name] != usual[name] for cells in told)
     ]
+    if any(" +" in cell for cells in told for cell in cells.values()):
+        said.append(_SIDES)
     return Grid(
         caption=caption,
         columns=tuple(columns),
@@ -142,6 +146,8 @@ def axis_grid(study: Study) -> Grid:
     caption = "Each axis: value ± standard deviation"
     if any(row[1].endswith("?") for row in rows):
         caption += "; ? marks a doubtful value"
+    if any(" +" in row[1] for row in rows):
+        caption += f"; {_SIDES}"
     return Grid(caption=caption, columns=columns, rows=tuple(rows))
 
 
@@ -190,8 +196,18 @@ def _cell(row: Row, name: str) -> str:
     if name == "delay" and reading is not None and reading.std > _VAGUE * abs(reading.value):
         return "–"
     if name == "delay" and reading is not None:
-        reading = replace(reading, value=1e3 * reading.value, std=1e3 * reading.std)
+        reading = _in_ms(reading)
     return _shown(reading, name)
+
+
+def _in_ms(reading: Reading) -> Reading:
+    ends = [None if end is None else 1e3 * end for end in reading.ci95 or ()]
+    return replace(
+        reading,
+        value=1e3 * reading.value,
+        std=1e3 * reading.std,
+        ci95=(ends[0], ends[1]) if ends else None,
+    )
 
 
 def _with_unit(reading: Reading, name: str) -> str:
@@ -204,7 +220,7 @@ def _shown(reading: Reading | None, name: str) -> str:
         return "–"
     if name in _POSITIVE and math.inf > reading.std > abs(reading.value):
         return NOT_DETERMINED
-    return plus_minus(reading.value, reading.std) + ("" if reading.verdict == "ok" else " ?")
+    return with_error(reading.estimate) + ("" if reading.verdict == "ok" else " ?")
 
 
 def check_grid(study: Study) -> Grid:

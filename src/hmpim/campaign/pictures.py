@@ -8,7 +8,7 @@ import numpy as np
 from hmpim.campaign.compare import HEARD, bandwidth, case_label, samples_reading
 from hmpim.campaign.plan import Compare, FigurePlan
 from hmpim.campaign.study import Row
-from hmpim.identify import PairIdentification
+from hmpim.identify import Estimate, PairIdentification
 from hmpim.plots.curves import BodeCurve, measured_curve, model_curve
 from hmpim.plots.description import Figure as Description
 from hmpim.plots.description import Panel
@@ -204,9 +204,9 @@ def _curve(row: Row) -> BodeCurve | None:
     return measured_curve(pair.frequency_response, near=model_curve(pair, seen, fs=row.rate))
 
 
-def _bandwidth(row: Row, compare: Compare) -> tuple[float, float] | None:
-    """-90° of a row and its standard deviation, as the section's sentences give it."""
+def _bandwidth(row: Row, compare: Compare) -> Estimate | None:
+    """-90° of a row, as the section's sentences give it."""
     found = samples_reading(row) if compare in _SAMPLED else bandwidth(row)
     if found is None or not found.std < found.value:  # it may lie anywhere
         return None
-    return found.value, found.std
+    return found.estimate

@@ -10,6 +10,7 @@ from typing import Any, Literal
 from hmpim.campaign.cases import expand
 from hmpim.campaign.plan import QUANTITIES, Plan, Specification
 from hmpim.errors import FormatError
+from hmpim.identify import Estimate, ParameterVerdict
 
 __all__ = [
     "SCHEMA",
@@ -32,12 +33,23 @@ _ROUNDING = 1e-9  # share of a reading: a step of the encoder is known to the la
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Reading:
-    """A value, its standard deviation, infinite where the record cannot tell, and its verdict."""
+    """A value, its standard deviation, infinite where the record cannot tell, and its verdict.
+
+    `ci95` is its 95 % interval, None for one that is withheld or not known.
+    """
 
     value: float
     std: float
     unit: str = ""
-    verdict: str = "ok"
+    verdict: ParameterVerdict = "ok"
+    ci95: tuple[float | None, float | None] | None = None
+
+    @property
+    def estimate(self) -> Estimate:
+        """The same as an estimate, which has no infinite error."""
+        return Estimate(
+            value=self.value, std=self.std, ci95=self.ci95, unit=self.unit, verdict=self.verdict
+        )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -166,7 +178,7 @@ def reading_of(data: dict[str, Any] | None) -> Reading | None:
     Examples
     --------
     >>> reading_of({"value": 2.0, "std": None, "unit": "Hz"})
-    Reading(value=2.0, std=inf, unit='Hz', verdict='ok')
+    Reading(value=2.0, std=inf, unit='Hz', verdict='ok', ci95=None)
     """
     if data is None or data["value"] is None:
         return None
@@ -176,6 +188,7 @@ def reading_of(data: dict[str, Any] | None) -> Reading | None:
         std=math.inf if std is None else std,
         unit=data.get("unit", ""),
         verdict=data.get("verdict", "ok"),
+        ci95=None if (ends := data.get("ci95")) is None else (ends[0], ends[1]),
     )
 
 
@@ -344,6 +357,7 @@ def _json(reading: Reading | None) -> dict[str, Any] | None:
         "std": _number(reading.std),
         "unit": reading.unit,
         "verdict": reading.verdict,
+        "ci95": None if reading.ci95 is None else list(reading.ci95),
     }
 
 

@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hmpim.errors import ArgumentError
-from hmpim.identify.result.digits import aside
 from hmpim.plots.candidates import INTERSAMPLE_WORDS
 from hmpim.plots.curves import (
     BodeCurve,
@@ -19,7 +18,7 @@ from hmpim.plots.curves import (
     stretches,
 )
 from hmpim.plots.description import Axis, Band, Curve, Figure, Item, Panel, Points, Rule
-from hmpim.plots.style import Colour, lopsided, plain
+from hmpim.plots.style import Colour, lopsided, plain, with_error
 
 if TYPE_CHECKING:
     from hmpim.identify import Estimate, Identification, PairIdentification
@@ -400,8 +399,8 @@ def _marks(pair: "PairIdentification") -> list[Mark]:
 
 def _in_words(estimate: "Estimate") -> str:
     """An estimate with its error; one whose error is withheld with four digits."""
-    if estimate.ci95 is not None and lopsided(estimate):
-        return f"{aside(estimate.value, *estimate.ci95)} {estimate.unit}".rstrip()
+    if lopsided(estimate):
+        return f"{with_error(estimate)} {estimate.unit}".rstrip()
     if estimate.ci95 is not None:
         return estimate.text
     return f"{estimate.value:.4g} {estimate.unit}, doubtful"

@@ -2,14 +2,17 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from hmpim.identify.result.digits import plus_minus
 from hmpim.plots.curves import BodeCurve, interrupted
 from hmpim.plots.description import Axis, Curve, Dashes, Figure, Item, Panel, Rule
-from hmpim.plots.style import Colour, axis_label
+from hmpim.plots.style import Colour, axis_label, with_error
+
+if TYPE_CHECKING:
+    from hmpim.identify import Estimate
 
 __all__ = ["PHASE", "beside_bode", "overlaid_bode", "overlaid_levels", "waveform_panels"]
 
@@ -21,7 +24,7 @@ _DASHES: tuple[Dashes, ...] = ("-", "--", "-.")
 def overlaid_bode(
     curves: Sequence[tuple[str, BodeCurve]],
     *,
-    bandwidths: Sequence[tuple[float, float] | None] = (),
+    bandwidths: Sequence["Estimate | None"] = (),
     phase_level: float | None = -90.0,
     pairs: bool = True,
     phase_label: str = PHASE,
@@ -32,9 +35,9 @@ def overlaid_bode(
     ----------
     curves : sequence of (label, BodeCurve)
         Drawn in this order, told apart by colour and then by dashes; their bands are left out.
-    bandwidths : sequence of (float, float) or None
-        -90° frequency of each curve and its standard deviation, in Hz: a thin line in the
-        phase's panel, its 95 % interval shaded.
+    bandwidths : sequence of Estimate or None
+        -90° frequency of each curve in Hz: a thin line in the phase's panel, its 95 % interval
+        shaded.
     phase_level : float, optional
         Phase in degrees at which a thin line is drawn.
     pairs : bool
@@ -66,7 +69,7 @@ def overlaid_bode(
         phase_items.append(replace(look, y=interrupted(curve.frequency, curve.phase)[1]))
     for i, bandwidth in enumerate(bandwidths):
         if bandwidth is not None:
-            mark = _interval(*bandwidth)
+            mark = _interval(bandwidth)
             phase_items.append(replace(mark, colour=_COLOURS[i % len(_COLOURS)], dashes=":"))
     if phase_level is not None:
         phase_items.append(Rule(at=phase_level, axis="y", colour="muted", dashes=":", width=0.8))
@@ -100,7 +103,7 @@ def overlaid_bode(
 def beside_bode(
     curves: Sequence[tuple[str, BodeCurve]],
     *,
-    bandwidths: Sequence[tuple[float, float] | None],
+    bandwidths: Sequence["Estimate | None"],
     within: Sequence[str] = (),
     phase_label: str = PHASE,
 ) -> Figure:
@@ -110,9 +113,8 @@ def beside_bode(
     ----------
     curves : sequence of (label, BodeCurve)
         A column for each label.
-    bandwidths : sequence of (float, float) or None
-        -90° frequency of each curve and its standard deviation, in Hz: marked with its 95 %
-        interval, and said in words.
+    bandwidths : sequence of Estimate or None
+        -90° frequency of each curve in Hz: marked with its 95 % interval, and said in words.
     within : sequence of str
         What tells each curve from the others of its column; nothing where each has its own.
     phase_label : str
@@ -122,7 +124,9 @@ def beside_bode(
     --------
     >>> f = np.geomspace(0.1, 10.0, 50)
     >>> curve = BodeCurve(frequency=f, magnitude_db=0.0 * f, phase=-54.0 * f)
-    >>> figure = beside_bode([("500 Hz", curve), ("1000 Hz", curve)], bandwidths=[(1.67, 0.01)] * 2)
+    >>> from hmpim.identify import Estimate
+    >>> found = Estimate(value=1.67, std=0.01, ci95=(1.65, 1.69), unit="Hz")
+    >>> figure = beside_bode([("500 Hz", curve), ("1000 Hz", curve)], bandwidths=[found] * 2)
     >>> [panel.title for panel in figure.panels[::2]], figure.panels[1].items[-1].words
     (['500 Hz', '1000 Hz'], '−90° at 1.670 ± 0.010 Hz')
     """
@@ -141,7 +145,7 @@ def beside_bode(
                 items.append(replace(line, colour=colour, dashes=dashes))
                 found = bandwidths[i]
                 if found is not None:
-                    mark = _marked(*found, place=place) if panel.row else _interval(*found)
+                    mark = _marked(found, place=place) if panel.row else _interval(found)
                     if within:  # columns are narrow: the dotted line says what is marked
                         mark = replace(mark, words=mark.words.removeprefix("−90° at "))
                         mark = replace(mark, colour=colour, dashes=dashes)
@@ -164,15 +168,17 @@ def beside_bode(
     )
 
 
-def _interval(value: float, std: float) -> Rule:
-    """A frequency with its 95 % interval."""
-    return Rule(at=value, low=value - 1.96 * std, high=value + 1.96 * std)
+def _interval(found: "Estimate") -> Rule:
+    """A frequency with its 95 % interval; of one that is withheld, what noise alone does."""
+    half = 1.96 * found.spread
+    low, high = found.ci95 or (found.value - half, found.value + half)
+    return Rule(at=found.value, low=low, high=high)
 
 
-def _marked(value: float, std: float, *, place: int) -> Rule:
+def _marked(found: "Estimate", *, place: int) -> Rule:
     return replace(
-        _interval(value, std),
-        words=f"−90° at {plus_minus(value, std)} Hz",
+        _interval(found),
+        words=f"−90° at {with_error(found)} Hz",
         words_at=0.2 - 0.12 * place,
         side="left",
     )

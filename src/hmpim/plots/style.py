@@ -15,6 +15,7 @@ __all__ = [
     "lopsided",
     "plain",
     "printable",
+    "with_error",
 ]
 
 Colour = Literal["paper", "ink", "muted", "grid", "input", "output", "model", "limit", "other"]
@@ -100,3 +101,23 @@ def lopsided(estimate: "Estimate") -> bool:
         return True
     below, above = estimate.value - low, high - estimate.value
     return min(below, above) >= 0.0 and abs(above - below) > _SEEN * estimate.std
+
+
+def with_error(estimate: "Estimate") -> str:
+    """Write a value with its standard deviation, or with both sides of a lopsided interval.
+
+    A withheld interval has the standard deviation of the noise alone.
+
+    Examples
+    --------
+    >>> from hmpim.identify import Estimate
+    >>> with_error(Estimate(value=6.9223, std=0.0348, ci95=(6.8911, 6.9905), unit="Hz"))
+    '6.922 −0.031 +0.068'
+    >>> with_error(Estimate(value=6.9223, std=0.0348, ci95=None, unit="Hz"))
+    '6.922 ± 0.035'
+    """
+    from hmpim.identify.result.digits import aside, plus_minus  # not at the start of a command
+
+    if estimate.ci95 is not None and (estimate.std is None or lopsided(estimate)):
+        return aside(estimate.value, *estimate.ci95)
+    return plus_minus(estimate.value, estimate.spread)

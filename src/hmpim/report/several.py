@@ -319,8 +319,7 @@ def _pictures(
     curves = [(name, c) for name, pair in zip(names, each, strict=True) if (c := _curve(pair, fs))]
     if curves:
         bandwidth = averages.get("bandwidth_phase90")
-        marked = bandwidth is not None and bandwidth.spread < bandwidth.value
-        mark = (bandwidth.value, bandwidth.spread) if marked and bandwidth is not None else None
+        mark = bandwidth if bandwidth is not None and bandwidth.spread < bandwidth.value else None
         caption = f"Measured frequency response {by}."
         caption += " The vertical line marks the mean −90° bandwidth." if mark else ""
         pictures.append(

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from hmpim import plots
+from hmpim.identify import Estimate
 from hmpim.plots import Axis, Band, Curve, Figure, Image, Panel, Points, Rule, Span, Words
 from hmpim.plots.bode import pair_bode
 from hmpim.plots.curves import BodeCurve
@@ -129,6 +130,10 @@ def test_numbers_of_an_axis_leave_room_for_its_label(reach, height):
     assert text_width("−") > text_width("-")  # a true minus is as wide as a plus
 
 
+def estimate(value, std=0.1):
+    return Estimate(value=value, std=std, ci95=(value - 2 * std, value + 3 * std), unit="Hz")
+
+
 def test_columns_share_their_axes_and_each_curve_has_its_mark():
     names = ["P", "P", "PV", "PV"]
     curves = [
@@ -137,7 +142,7 @@ def test_columns_share_their_axes_and_each_curve_has_its_mark():
     ]
     figure = beside_bode(
         curves,
-        bandwidths=[(30.0, 0.1), (29.0, 0.1), None, (20.0, 0.1)],
+        bandwidths=[estimate(30.0), estimate(29.0), None, estimate(20.0)],
         within=["500 Hz", "1000 Hz"] * 2,
     )
     assert figure.columns == 2
@@ -146,6 +151,9 @@ def test_columns_share_their_axes_and_each_curve_has_its_mark():
         [rule.at for rule in panel.of(Rule) if rule.axis == "x"] for panel in figure.panels[1::2]
     ]
     assert upright == [[30.0, 29.0], [20.0]]
+    (last,) = (rule for rule in figure.panels[3].of(Rule) if rule.axis == "x")
+    assert (last.low, last.high) == (19.8, 20.3)
+    assert last.words == "20.00 −0.20 +0.30 Hz"
     assert [line.label for line in figure.panels[2].of(Curve)] == ["500 Hz", "1000 Hz"]
     assert figure.panels[3].of(Rule)[-1].colour == figure.panels[3].of(Curve)[-1].colour
 
