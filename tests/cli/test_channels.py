@@ -91,7 +91,7 @@ def test_a_file_without_time_is_listed_and_says_what_it_needs(tmp_path):
     [
         (None, "there is no file|does not exist|No such file"),
         (b"", "is empty"),
-        (b"\x7fELF" + bytes(100), "no reader knows"),
+        (b"\x7fELF" + bytes(100), "no reader recognises"),
         (b"a,b\nx,y\nz,w\n", "no rows of numbers"),
     ],
 )

@@ -81,5 +81,5 @@ def test_a_change_of_more_than_all_is_written_in_full():
         probability=1e-9,
         change=1.4,
     )
-    table = _trend_table((trend,))
+    table = _trend_table((trend,), "")
     assert [str(next(column.cells)) for column in table.columns][-2:] == ["+140 %", "< 0.1 %"]

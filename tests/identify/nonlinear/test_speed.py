@@ -62,9 +62,10 @@ def test_the_paper_s_figures_are_those_of_the_command(pair):
     assert pair.paper.delay == free.paper.delay
 
 
-def test_the_error_of_the_limit_is_in_the_error_bars():
+@pytest.mark.few(5)
+def test_the_error_of_the_limit_is_in_the_error_bars(seeds):
     errors = []
-    for seed in range(20):
+    for seed in range(seeds):
         found = hmpim.identify(swept(30.0, noise=0.03, seed=seed))["y", "u"].parameters
         errors += [
             (getattr(found, name).value - truth) / getattr(found, name).std

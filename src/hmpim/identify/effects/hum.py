@@ -12,10 +12,12 @@ import scipy
 
 from hmpim.identify.arrays import Real
 from hmpim.identify.effects.beside import gain_by_rows, without_rows
+from hmpim.identify.fitting.enrich import PLAIN
 from hmpim.identify.fitting.least_squares import solved
 from hmpim.identify.fitting.trial import JointFit
 from hmpim.identify.noise.colour import line_of
 from hmpim.identify.noise.whiteness import is_white
+from hmpim.identify.worth import MOST
 from hmpim.record import Finding
 
 __all__ = ["Humming", "hum_finding", "with_hum"]
@@ -55,7 +57,7 @@ class Humming:
     amplitudes: tuple[float, ...]
 
 
-def with_hum(first: JointFit, fitted: Callable[[Real], JointFit]) -> Humming | None:
+def with_hum(first: JointFit, fitted: Callable[[Real, bool], JointFit]) -> Humming | None:
     """Fit again beside the lines of the residual, where that gains more than it costs.
 
     Parameters
@@ -63,7 +65,8 @@ def with_hum(first: JointFit, fitted: Callable[[Real], JointFit]) -> Humming | N
     first : JointFit
         Without lines; of an input without lines, whose distortion has none either.
     fitted : callable
-        Makes the joint fit with rows for the lines.
+        Makes the joint fit with rows for the lines; of the plain structures only if the second
+        argument is true.
 
     Returns
     -------
@@ -72,11 +75,12 @@ def with_hum(first: JointFit, fitted: Callable[[Real], JointFit]) -> Humming | N
     """
     if is_white(first.problem.counting(first.best.fit.residual)):
         return None
-    frequencies = _lines(first)
+    frequencies, share = _lines(first)
     if not frequencies:
         return None
     rows = np.vstack([_rows_of(first, one) for one in frequencies])
-    joint = fitted(rows)
+    # Lines that are the lesser part of what is left over hid no dynamics.
+    joint = fitted(rows, share < MOST and first.best.fit.structure.name in PLAIN)
     if gain_by_rows(joint, rows.shape[0], first) < 0.0:
         return None
     parts = joint.best.fit.nuisance.reshape(-1, _ROWS)
@@ -108,12 +112,13 @@ def hum_finding(humming: Humming, fs: float, unit: str) -> Finding:
     )
 
 
-def _lines(joint: JointFit) -> list[float]:
-    """Frequencies of the residual's lines, in cycles per sample, one after the other."""
+def _lines(joint: JointFit) -> tuple[list[float], float]:
+    """Frequencies of the residual's lines, in cycles per sample, and their share of its power."""
     residual, valid = joint.best.fit.residual, joint.problem.valid
     told = np.ones(residual.size) if valid is None else valid.astype(np.float64)
     left = np.where(told > 0.0, residual - residual[told > 0.0].mean(), 0.0)
     found: list[float] = []
+    whole = float(left @ left)
     while len(found) < _MOST:
         line = line_of(left, 1.0)
         if line is None:
@@ -122,7 +127,7 @@ def _lines(joint: JointFit) -> list[float]:
         phase = 2 * np.pi * found[-1] * np.arange(left.size)
         rows = np.stack([np.cos(phase), np.sin(phase)]) * told
         left = left - solved(rows @ rows.T, rows @ left) @ rows
-    return found
+    return found, 1.0 - float(left @ left) / whole if found else 0.0
 
 
 def _refined(left: Real, line: float) -> float:

@@ -117,7 +117,8 @@ def _by_distances(levels: Real, largest: float) -> Quantization | None:
     """Find the step of which all distances between neighbours are multiples."""
     gaps = np.diff(levels)
     smallest = float(gaps.min())
-    single = bool(np.all(levels == levels.astype(np.float32)))
+    with np.errstate(over="ignore"):
+        single = bool(np.all(levels == levels.astype(np.float32)))
     for divisor in (1, 2, 3):  # the smallest distance seen may be a few steps
         rough = smallest / divisor
         if rough < (_FINEST if single else _FINEST_DOUBLE) * largest:

@@ -212,16 +212,18 @@ def _wandering_variance(ramp: Real, e: Real) -> float:
 def line_of(e: Real, fs: float) -> float | None:
     """Frequency in Hz of the strongest narrow line of samples (n,), their mean 0, or None."""
     n = e.size
-    if n < 8 * _NEIGHBOURS:
+    size = float(np.max(np.abs(e)))
+    if n < 8 * _NEIGHBOURS or size == 0.0:
         return None
-    power = np.abs(scipy.fft.rfft(e * np.hanning(n))) ** 2
+    power = np.abs(scipy.fft.rfft(e / size * np.hanning(n))) ** 2
+    rounding = np.finfo(float).eps ** 2 * float(power.max())
     inner = np.arange(_NEIGHBOURS, power.size)
     power = np.pad(power, (0, _NEIGHBOURS + 1), mode="reflect")  # beyond half the rate
     summed = np.concatenate([[0.0], np.cumsum(power)])
     wide = summed[inner + _NEIGHBOURS + 1] - summed[inner - _NEIGHBOURS]
     narrow = summed[inner + 3] - summed[inner - 2]
     around = (wide - narrow) / (2 * _NEIGHBOURS - 4)
-    ratio = power[inner] / np.maximum(around, np.finfo(float).tiny)
+    ratio = power[inner] / np.maximum(around, rounding)
     best = int(np.argmax(ratio))
     if ratio[best] < SEARCHED:
         return None
