@@ -98,7 +98,7 @@ def _pair(
 ) -> PairIdentification:
     """Say all that is known of an output that follows an input."""
     aligned, output = question.aligned, question.output
-    drifting, humming, beside = joined.drifting, joined.humming, joined.beside
+    drifting, humming, disturbance = joined.drifting, joined.humming, joined.disturbance
     source, band = aligned.inputs[i], question.band(i)
     joint, censored, covariance = _refined(question, found, joined, i)
     plain = plainer(joint) if question.inputs is None and covariance is None else None
@@ -155,7 +155,7 @@ def _pair(
         warnings=(*aligned.findings, *findings),
         from_response=evidence.measured,
         time=aligned.time,
-        prediction=fit.prediction if beside is None else fit.prediction + beside,
+        prediction=fit.prediction if disturbance is None else fit.prediction + disturbance,
         residual=fit.residual,
         covariance=highest_first(readings.coefficient_covariance, readings.system),
         nonlinearity=None if inspection is None else inspection.summary,
@@ -227,7 +227,7 @@ def _refined(
     software = joint.best.fit.structure.sampled  # it holds what it said at a sample
     if question.inputs is not None or question.instrument is not None or software:
         return joint, None, covariance
-    refined = refine(joint, found, question.aligned.fs, joined.beside)
+    refined = refine(joint, found, question.aligned.fs, joined.disturbance)
     if refined is None:
         return joint, None, covariance
     return *refined, refined[1].covariance

@@ -9,7 +9,7 @@ from hmpim.identify.asked.question import Question
 from hmpim.identify.asked.reference import fit_through
 from hmpim.identify.asked.swapped import is_swapped, lags_behind, swapped_finding
 from hmpim.identify.coupling.output_fit import OutputFit, fit_together
-from hmpim.identify.effects.beside import without_rows
+from hmpim.identify.effects.disturbance import without_rows
 from hmpim.identify.effects.drift import with_drift
 from hmpim.identify.effects.hum import with_hum
 from hmpim.identify.effects.imperfections import (
@@ -63,21 +63,22 @@ def mark_swapped(question: Question, seen: Imperfections) -> Question:
 
 
 def fit(question: Question, seen: Imperfections) -> OutputFit:
-    """Fit every structure, beside hum and a drift where what is left over asks for them."""
+    """Fit every structure, with hum and a drift where the residual asks for them."""
     fitted = _fit_once(question, seen, question.structures)
     if len(fitted.fits) > 1 or fitted.fits[0].silent or question.swapped:
         return fitted
     (joint,) = fitted.fits
     humming = None
 
-    def with_rows(rows: Real, plainly: bool = False) -> JointFit:
+    def with_rows(rows: Real, plainly: bool) -> JointFit:
         names = question.plain if plainly else question.structures
         if humming is None:
             return _fit_once(question, seen, names, rows).fits[0]
-        beside = _fit_once(question, seen, names, np.vstack([rows, humming.rows]))
-        return without_rows(beside.fits[0], slice(len(rows), None))
+        both = _fit_once(question, seen, names, np.vstack([rows, humming.rows]))
+        return without_rows(both.fits[0], slice(len(rows), None))
 
-    if not _has_lines(question.aligned.inputs[0].values):
+    coloured = not is_white(joint.problem.counting(joint.best.fit.residual))
+    if coloured and not _has_lines(question.aligned.inputs[0].values):
         humming = with_hum(joint, with_rows)
     joint = joint if humming is None else humming.joint
     drifting = with_drift(joint, with_rows)

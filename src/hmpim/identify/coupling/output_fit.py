@@ -70,11 +70,11 @@ class OutputFit:
         for fit, told in zip(self.fits, self.related, strict=True):
             if told:
                 total = total + _part(fit)
-        return total if self.beside is None else total + self.beside
+        return total if self.disturbance is None else total + self.disturbance
 
     @property
-    def beside(self) -> Real | None:
-        """What moves the output beside the inputs, shape (n,): a drift, hum; None of neither."""
+    def disturbance(self) -> Real | None:
+        """What moves the output apart from the inputs, shape (n,): drift and hum, or None."""
         if self.drifting is None or self.humming is None:
             one = self.drifting or self.humming
             return None if one is None else one.trend

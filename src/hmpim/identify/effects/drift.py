@@ -14,7 +14,7 @@ from numpy.polynomial.legendre import legvander
 
 from hmpim.identify.arrays import Real
 from hmpim.identify.chance import FALSE_ALARM
-from hmpim.identify.effects.beside import gain_by_rows, without_rows
+from hmpim.identify.effects.disturbance import gain_by_rows, without_rows
 from hmpim.identify.fitting.candidates import almost_integrates
 from hmpim.identify.fitting.enrich import PLAIN
 from hmpim.identify.fitting.fit import jacobian

@@ -1,4 +1,4 @@
-"""Mains hum on the output: sinusoids beside the bias, fitted together with everything else.
+"""Mains hum on the output: sinusoids, fitted together with everything else.
 
 Looked for where the residual holds a line that the input has not. Each is three rows of the same
 fit: a cosine, a sine, and what a frequency a little off would add, so that the error bars know it.
@@ -11,12 +11,11 @@ import numpy as np
 import scipy
 
 from hmpim.identify.arrays import Real
-from hmpim.identify.effects.beside import gain_by_rows, without_rows
+from hmpim.identify.effects.disturbance import gain_by_rows, without_rows
 from hmpim.identify.fitting.enrich import PLAIN
 from hmpim.identify.fitting.least_squares import solved
 from hmpim.identify.fitting.trial import JointFit
 from hmpim.identify.noise.colour import line_of
-from hmpim.identify.noise.whiteness import is_white
 from hmpim.identify.worth import MOST
 from hmpim.record import Finding
 
@@ -34,7 +33,7 @@ _ROWS = 3
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Humming:
-    """A fit beside lines of a frequency of their own.
+    """A fit together with lines of a frequency of their own.
 
     Parameters
     ----------
@@ -58,12 +57,13 @@ class Humming:
 
 
 def with_hum(first: JointFit, fitted: Callable[[Real, bool], JointFit]) -> Humming | None:
-    """Fit again beside the lines of the residual, where that gains more than it costs.
+    """Fit again with the lines of the residual, where that gains more than it costs.
 
     Parameters
     ----------
     first : JointFit
-        Without lines; of an input without lines, whose distortion has none either.
+        Without lines, its residual not white; of an input without lines, whose distortion has
+        none either.
     fitted : callable
         Makes the joint fit with rows for the lines; of the plain structures only if the second
         argument is true.
@@ -73,8 +73,6 @@ def with_hum(first: JointFit, fitted: Callable[[Real, bool], JointFit]) -> Hummi
     Humming or None
         None where there are none, by Schwarz's criterion.
     """
-    if is_white(first.problem.counting(first.best.fit.residual)):
-        return None
     frequencies, share = _lines(first)
     if not frequencies:
         return None

@@ -155,11 +155,11 @@ def _few_levels(y: Real, richest: int) -> int | None:
 
 
 def refine(
-    joint: JointFit, found: Imperfections, fs: float, beside: Real | None = None
+    joint: JointFit, found: Imperfections, fs: float, disturbance: Real | None = None
 ) -> tuple[JointFit, CensoredFit] | None:
     """Fit the chosen structure to what was read; None where there is nothing to refine.
 
-    `beside`, (n,), is what moves the output beside its input and has been taken off.
+    `disturbance`, (n,), is what moves the output apart from its input and has been taken off.
     """
     if found.saturation is None and found.hold is None:
         return None
@@ -172,7 +172,7 @@ def refine(
 
     def censored_fit(start: Fit, counts: Mask | None) -> CensoredFit:
         read = replace(problem, valid=counts, nuisance=None, begins=None)
-        return fit_censored(read, start, found.saturation, arrivals=arrivals, drift=beside)
+        return fit_censored(read, start, found.saturation, arrivals=arrivals, drift=disturbance)
 
     for trial in _worth_refining(joint, found):
         try:

@@ -1,4 +1,4 @@
-"""What moves an output beside its input: rows of the same fit, then taken off the output."""
+"""What moves an output apart from its input: rows of the same fit, then taken off the output."""
 
 from dataclasses import replace
 
