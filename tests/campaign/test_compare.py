@@ -260,7 +260,7 @@ def test_a_picture_of_sampled_responses_says_that_its_phase_has_the_hold(demo, c
     assert ("includes the hold" in picture.caption) is held
 
 
-def test_a_lopsided_interval_is_written_with_both_sides(demo):
+def test_an_asymmetric_interval_is_written_with_both_sides(demo):
     study, _ = demo
     row = next(row for row in study.rows if row.axis == "elevation")
     readings = {

@@ -18,7 +18,7 @@ from hmpim.plots.curves import (
     stretches,
 )
 from hmpim.plots.description import Axis, Band, Curve, Figure, Item, Panel, Points, Rule
-from hmpim.plots.style import Colour, lopsided, plain, with_error
+from hmpim.plots.style import Colour, plain
 
 if TYPE_CHECKING:
     from hmpim.identify import Estimate, Identification, PairIdentification
@@ -399,8 +399,6 @@ def _marks(pair: "PairIdentification") -> list[Mark]:
 
 def _in_words(estimate: "Estimate") -> str:
     """An estimate with its error; one whose error is withheld with four digits."""
-    if lopsided(estimate):
-        return f"{with_error(estimate)} {estimate.unit}".rstrip()
     if estimate.ci95 is not None:
         return estimate.text
     return f"{estimate.value:.4g} {estimate.unit}, doubtful"

@@ -12,7 +12,6 @@ __all__ = [
     "WIDTH",
     "Colour",
     "axis_label",
-    "lopsided",
     "plain",
     "printable",
     "with_error",
@@ -35,10 +34,6 @@ COLOURS: dict[Colour, str] = {
 WIDTH = 7.6  # inches; a page column
 FONT_SIZE = 9.0
 LONGEST_NAME = 40
-
-_SEEN = 0.5
-"""Standard deviations by which an interval's sides may differ and be written as one: about what
-rounding an error to one digit hides."""
 
 
 def plain(text: str) -> str:
@@ -81,30 +76,8 @@ def axis_label(quantity: str, unit: str) -> str:
     return f"{plain(quantity)} ({plain(unit) or '–'})"
 
 
-def lopsided(estimate: "Estimate") -> bool:
-    """Whether ``± std`` would misstate an interval, as it reaches farther to one side.
-
-    False where there is no interval or no standard deviation, or the value lies outside.
-
-    Examples
-    --------
-    >>> from hmpim.identify import Estimate
-    >>> lopsided(Estimate(value=6.922, std=0.035, ci95=(6.891, 6.990), unit="Hz"))
-    True
-    >>> lopsided(Estimate(value=9.987, std=0.030, ci95=(9.928, 10.046), unit="Hz"))
-    False
-    """
-    if estimate.std is None or estimate.ci95 is None:
-        return False
-    low, high = estimate.ci95
-    if low is None or high is None:
-        return True
-    below, above = estimate.value - low, high - estimate.value
-    return min(below, above) >= 0.0 and abs(above - below) > _SEEN * estimate.std
-
-
 def with_error(estimate: "Estimate") -> str:
-    """Write a value with its standard deviation, or with both sides of a lopsided interval.
+    """Write a value with its standard deviation, or with both sides of an asymmetric interval.
 
     A withheld interval has the standard deviation of the noise alone.
 
@@ -118,6 +91,6 @@ def with_error(estimate: "Estimate") -> str:
     """
     from hmpim.identify.result.digits import aside, plus_minus  # not at the start of a command
 
-    if estimate.ci95 is not None and (estimate.std is None or lopsided(estimate)):
+    if estimate.ci95 is not None and (estimate.std is None or estimate.asymmetric):
         return aside(estimate.value, *estimate.ci95)
     return plus_minus(estimate.value, estimate.spread)

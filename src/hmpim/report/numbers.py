@@ -4,7 +4,6 @@ import re
 
 from hmpim.identify import Estimate
 from hmpim.identify.result.digits import aside, interval, plus_minus
-from hmpim.plots.style import lopsided
 
 __all__ = [
     "NOT_DETERMINED",
@@ -63,7 +62,7 @@ def format_value(estimate: Estimate, *, positive: bool = False) -> str:
         return f"{format_number(estimate.value)} ± ?"
     if _exact(estimate):
         return f"{estimate.value:.10g} ± 0"
-    if estimate.std is None or lopsided(estimate):
+    if estimate.std is None or estimate.asymmetric:
         return aside(estimate.value, *estimate.ci95)
     return plus_minus(estimate.value, estimate.std)
 
@@ -125,7 +124,7 @@ def format_interval(estimate: Estimate, *, positive: bool = False) -> str:
     low, high = estimate.ci95
     if high is not None and _undetermined(estimate, positive):
         low = None
-    if (estimate.std is None or lopsided(estimate)) and low is not None and high is not None:
+    if (estimate.std is None or estimate.asymmetric) and low is not None and high is not None:
         # To as many places as the value beside it.
         shown = aside(estimate.value, low, high).partition(" ")[0]
         places = len(shown.partition(".")[2])

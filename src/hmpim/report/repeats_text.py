@@ -3,9 +3,6 @@
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-import numpy as np
-
-from hmpim.identify import Identification, PairIdentification
 from hmpim.identify.records.levels import LevelComparison, Levels, Trend
 from hmpim.identify.records.repeats import RepeatedPair, Repeats
 from hmpim.identify.result.digits import percent
@@ -20,7 +17,6 @@ if TYPE_CHECKING:
     from rich.table import Table
 
 __all__ = [
-    "amplitude_unit",
     "linear_words",
     "percent_words",
     "print_levels",
@@ -133,7 +129,7 @@ def print_levels(levels: Levels, names: Sequence[str], console: "Console") -> No
     console.print(Text(f"{len(names)} records of one stimulus at several levels", style="bold"))
     for pair, compared in zip(levels.results[0].pairs, levels.comparisons, strict=True):
         console.print(Text(printable(f"{pair.input} → {pair.output}"), style="bold"))
-        unit = amplitude_unit(levels.results[0], pair, compared)
+        unit = compared.unit
         if compared.trends:
             console.print(_trend_table(compared.trends, unit))
             words = linear_words(compared, unit)
@@ -141,27 +137,6 @@ def print_levels(levels: Levels, names: Sequence[str], console: "Console") -> No
         else:
             console.print(Text("No parameter is determined at two levels or more."))
         _print_findings(compared.findings, console)
-
-
-def amplitude_unit(
-    result: Identification, pair: PairIdentification, compared: LevelComparison
-) -> str:
-    """Return the unit of the levels: the input's, if they are what it covers; else none is known.
-
-    Parameters
-    ----------
-    result : Identification
-        Of the first record given.
-    pair : PairIdentification
-        Which pair of it.
-    compared : LevelComparison
-        Of that pair.
-    """
-    if result.data is None:
-        return ""
-    channel = result.data.channel(pair.input)
-    covered = float(np.ptp(channel.values)) / 2
-    return channel.unit if np.isclose(covered, compared.amplitudes[0]) else ""
 
 
 def linear_words(compared: LevelComparison, unit: str) -> str:

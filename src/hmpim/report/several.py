@@ -27,7 +27,7 @@ from hmpim.report.numbers import (
     format_value,
     plus_minus,
 )
-from hmpim.report.repeats_text import amplitude_unit, linear_words, percent_words
+from hmpim.report.repeats_text import linear_words, percent_words
 from hmpim.report.study import Grid, Section, StudyPage, render_study
 from hmpim.report.words import GLOSSARY, VERDICTS, by_weight, label_of, structure_words
 
@@ -385,16 +385,15 @@ def _rising(
     names: Sequence[str],
 ) -> _Levelled:
     order = sorted(range(len(names)), key=lambda k: compared.amplitudes[k])
-    unit = amplitude_unit(results[0], pair, compared)
     return _Levelled(
         name=f"{pair.input} → {pair.output}",
         input=pair.input,
-        unit=unit,
+        unit=compared.unit,
         fs=results[0].record.fs,
         compared=compared,
         runs=tuple(names[k] for k in order),
         each=tuple(results[k][pair.output, pair.input] for k in order),
-        labels=tuple(f"{compared.amplitudes[k]:.4g} {unit}".rstrip() for k in order),
+        labels=tuple(f"{compared.amplitudes[k]:.4g} {compared.unit}".rstrip() for k in order),
     )
 
 

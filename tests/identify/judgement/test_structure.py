@@ -104,9 +104,13 @@ def with_assumption(evidence, name, *, delay, criterion):
 @pytest.mark.parametrize(
     ("name", "criterion", "words"),
     [
-        ("second_order", 1.0, "by −0.50 samples if it is held."),
-        ("second_order", -8.0, "by −0.50 samples if it is held."),
-        ("first_order", -2.0, "by −0.50 samples if it is held with a first-order model"),
+        ("second_order", 1.0, "it may also be held, with a delay 0.50 samples shorter."),
+        ("second_order", -8.0, "it may also be held, with a delay 0.50 samples shorter."),
+        (
+            "first_order",
+            -2.0,
+            "it may also be held, with a first-order model and a delay 0.50 samples shorter.",
+        ),
     ],
 )
 def test_another_assumption_between_samples_is_named(clean, name, criterion, words):

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from hmpim.errors import ArgumentError
-from hmpim.identify.records.levels import compare_levels
+from hmpim.identify.records.levels import compare_levels, identify_levels
 from hmpim.identify.result import Estimate, Parameters
+from hmpim.record import Record
 
 
 def estimate(value: float, std: float) -> Estimate:
@@ -54,6 +55,45 @@ def test_the_linear_range_ends_where_two_percent_are_passed():
     results = [level(f, 0.4) for f in (10.0, 10.05, 10.1, 10.5, 11.0)]
     assert compare_levels(results, [1, 2, 3, 4, 5]).linear_up_to == 3
     assert compare_levels(results[:2], [1, 2]).linear_up_to == 2
+
+
+@pytest.mark.parametrize(
+    ("frequencies", "unit", "words"),
+    [
+        ([10.0, 10.01, 10.5], "deg", "From an amplitude of 1 to one of 3 deg, the natural"),
+        ([10.0, 10.01, 10.5], "", "From an amplitude of 1 to one of 3, the natural"),
+        (
+            [10.0, 10.01, 10.5],
+            "deg",
+            "Up to 2 deg, no parameter clearly changes by more than 1 %: ",
+        ),
+        ([10.0, 10.4, 10.5], "deg", "Use a linear model at the smallest amplitude only."),
+        ([10.0, 10.01, 10.06], "", "Up to 3, no parameter clearly changes by more than 1 %."),
+    ],
+)
+def test_amplitudes_are_stated_with_their_unit(frequencies, unit, words):
+    found = compare_levels([level(f, 0.4, std=0.0001) for f in frequencies], [1, 2, 3], unit=unit)
+    assert found.unit == unit
+    assert words in found.findings[0].message
+
+
+def test_the_unit_is_the_inputs_unless_amplitudes_are_given():
+    t = np.arange(500) / 100
+    sweep = np.sin(2 * np.pi * (0.1 * t + 1.0 * t**2))
+    rng = np.random.default_rng(1)
+    records = [
+        Record.from_arrays(
+            {"u": gain * sweep},
+            {"y": gain * sweep + 0.001 * rng.standard_normal(500)},
+            fs=100.0,
+            units={"u": "V", "y": "V"},
+        )
+        for gain in (0.5, 1.0)
+    ]
+    own = identify_levels(records, structures=["static"])
+    assert own["y", "u"].unit == "V"
+    given = identify_levels(records, amplitudes=[1, 2], structures=["static"])
+    assert given["y", "u"].unit == ""
 
 
 def test_what_a_level_cannot_tell_is_left_out():

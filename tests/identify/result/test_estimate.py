@@ -58,6 +58,21 @@ def test_an_interval_of_its_own_is_shown_on_both_sides(ci95, written, spread):
     assert found.spread == pytest.approx(spread, rel=1e-4)
 
 
+@pytest.mark.parametrize(
+    ("ci95", "written"),
+    [
+        ((0.1474, 0.1502), "0.15000 −0.00260 +0.00020 s"),
+        ((0.1474, None), "0.1500 −0.0026 +? s"),
+        ((0.14981, 0.15019), "0.15000 ± 0.00009 s"),
+        ((0.14982, 0.15021), "0.15000 ± 0.00009 s"),  # a difference that rounding hides
+        ((0.1501, 0.1502), "0.15000 ± 0.00009 s"),  # the value lies outside
+    ],
+)
+def test_an_asymmetric_interval_is_written_with_both_sides(ci95, written):
+    assert str(delay(ci95=ci95)) == written
+    assert delay(ci95=ci95).asymmetric == ("±" not in written)
+
+
 def test_what_is_no_number_is_none_and_json_has_only_numbers():
     lost = delay(std=math.inf, ci95=(-math.inf, math.inf))
     assert (lost.std, lost.ci95) == (None, None)

@@ -57,21 +57,34 @@ def undetermined_between(
     moves = []
     for mode, apart, other in rivals:
         if other or abs(apart) > FEW:
-            model = f" with a {structure_in_words(other)} model" if other else ""
-            size = f"{apart:+.2f}".replace("-", "−")
-            moves.append(f"by {size} samples if it is {_WORDS[mode]}{model}")
+            model = f"{_a_model(other)} and " if other else ""
+            moves.append(f"{_WORDS[mode]}, with {model}{_delay(apart)}")
     if not moves:
         return ()
     return (
         Finding(
             code="intersample",
             message="This record does not determine what the input does between its samples. "
-            f"{_WORDS[taken].capitalize()} is assumed; the delay would shift "
-            f"{', and '.join(moves)}. The intervals cover this. State it with intersample=.",
+            f"The input is taken as {_WORDS[taken]}; it may also be {', or '.join(moves)}. "
+            "The intervals cover this. If you know it, state it with intersample=.",
             severity="info",
             parameters=_SHIFTED,
         ),
     )
+
+
+def _a_model(structure: str) -> str:
+    """Name a structure, a remark on it behind: 'a first-order model (with a zero)'."""
+    name, _, remark = structure_in_words(structure).partition(" (")
+    return f"a {name} model" + (f" ({remark}" if remark else "")
+
+
+def _delay(apart: float) -> str:
+    """Compare a delay that is so many samples longer with the one that is stated."""
+    size = f"{abs(apart):.2f}"
+    if size == "0.00":
+        return "the same delay"
+    return f"a delay {size} samples {'longer' if apart > 0.0 else 'shorter'}"
 
 
 def wide_span(evidence: Evidence) -> tuple[Finding, ...]:

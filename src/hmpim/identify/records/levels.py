@@ -96,15 +96,18 @@ class LevelComparison:
         One per parameter known at two levels or more.
     linear_up_to : float
         Greatest amplitude up to which no parameter leaves its value at the smallest one by
-        more than 2 % and by more than its error.
+        more than 1 % and by more than its error.
     findings : tuple of Finding
         Codes 'nonlinear', 'hardening', 'softening', 'friction'; empty where nothing changes.
+    unit : str
+        Of the amplitudes; empty where it is not known.
     """
 
     amplitudes: tuple[float, ...]
     trends: tuple[Trend, ...]
     linear_up_to: float
     findings: tuple[Finding, ...]
+    unit: str = ""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -203,7 +206,8 @@ def identify_levels(
             ]
             for record, result in zip(given, results, strict=True)
         ]
-        comparisons.append(compare_levels(alike, heights))
+        unit = given[0].channel(pair.input).unit if amplitudes is None else ""
+        comparisons.append(compare_levels(alike, heights, unit=unit))
     return Levels(results=tuple(results), comparisons=tuple(comparisons))
 
 
@@ -213,7 +217,10 @@ def _only(structure: str) -> list[str]:
 
 
 def compare_levels(
-    results: Sequence[PairIdentification | Parameters], amplitudes: Sequence[float]
+    results: Sequence[PairIdentification | Parameters],
+    amplitudes: Sequence[float],
+    *,
+    unit: str = "",
 ) -> LevelComparison:
     """Compare what was identified at several amplitudes of one stimulus.
 
@@ -223,6 +230,8 @@ def compare_levels(
         One per level.
     amplitudes : sequence of float
         One per level, positive; in any order.
+    unit : str
+        Of the amplitudes, for the sentences.
 
     Returns
     -------
@@ -254,11 +263,10 @@ def compare_levels(
         findings.append(
             Finding(
                 code="nonlinear",
-                message=f"With the amplitude from {most.amplitudes[0]:.4g} to "
-                f"{most.amplitudes[-1]:.4g} the {in_words(most.name)} changes by "
-                f"{100 * most.change:+.2g} %, beyond its error; up to "
-                f"{reach:.4g} it stays within {100 * MATERIAL:.0f} %. Use a linear model up to "
-                "there only.",
+                message=f"From an amplitude of {most.amplitudes[0]:.4g} to one of "
+                f"{f'{most.amplitudes[-1]:.4g} {unit}'.rstrip()}, the {in_words(most.name)} "
+                f"changes by {100 * most.change:+.2g} %, more than its error explains. "
+                + _linear_range(levels, reach, unit),
                 severity="doubt",
                 parameters=tuple(t.name for t in changed),
             )
@@ -271,6 +279,7 @@ def compare_levels(
         trends=trends,
         linear_up_to=reach,
         findings=tuple(findings),
+        unit=unit,
     )
 
 
@@ -295,6 +304,16 @@ def _levels(
         for r, amplitude in zip(results, amplitudes, strict=True)
     ]
     return sorted(levels, key=lambda level: level.amplitude)
+
+
+def _linear_range(levels: list[Level], reach: float, unit: str) -> str:
+    """Up to where a linear model serves, as a sentence."""
+    if reach == levels[0].amplitude:
+        return "Use a linear model at the smallest amplitude only."
+    end = f"{reach:.4g} {unit}".rstrip()
+    same = f"Up to {end}, no parameter clearly changes by more than {100 * MATERIAL:.0f} %"
+    only = "" if reach == levels[-1].amplitude else ": use a linear model up to there only"
+    return f"{same}{only}."
 
 
 def _estimate(level: Level, name: str) -> Estimate | None:

@@ -19,6 +19,10 @@ __all__ = [
 ParameterVerdict = Literal["ok", "doubtful"]
 Verdict = Literal["ok", "doubtful", "not_identifiable"]
 
+_SEEN = 0.5
+"""Standard deviations by which an interval's sides may differ and be written as one: about what
+rounding an error to one digit hides."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
 class Estimate:
@@ -78,10 +82,31 @@ class Estimate:
         return max(self.value - low, high - self.value) / HALF
 
     @property
-    def text(self) -> str:
-        """Value and error with their unit: '0.15000 ± 0.00009 s'."""
-        low, high = self.ci95 or (None, None)
+    def asymmetric(self) -> bool:
+        """Whether ``± std`` would misstate the interval, as it reaches farther to one side.
+
+        False where there is no interval or no standard deviation, or the value lies outside.
+
+        Examples
+        --------
+        >>> Estimate(value=6.922, std=0.035, ci95=(6.891, 6.990), unit="Hz").asymmetric
+        True
+        >>> Estimate(value=9.987, std=0.030, ci95=(9.928, 10.046), unit="Hz").asymmetric
+        False
+        """
         if self.std is None or self.ci95 is None:
+            return False
+        low, high = self.ci95
+        if low is None or high is None:
+            return True
+        below, above = self.value - low, high - self.value
+        return min(below, above) >= 0.0 and abs(above - below) > _SEEN * self.std
+
+    @property
+    def text(self) -> str:
+        """Value and error with their unit: '0.15000 ± 0.00009 s', '6.922 −0.031 +0.068 Hz'."""
+        low, high = self.ci95 or (None, None)
+        if self.std is None or self.ci95 is None or self.asymmetric:
             number = aside(self.value, low, high)
         else:
             number = plus_minus(self.value, self.std, short=True)
