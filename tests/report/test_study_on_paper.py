@@ -1,8 +1,9 @@
-"""A study's page on paper, printed by a browser: what stands on how many sheets."""
+"""A study's page in a browser: what stands on how many sheets, and whether it fits a screen."""
 
 import re
 import shutil
 import subprocess
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -44,18 +45,26 @@ def page(*, every=(), cases=()):
 
 
 @pytest.fixture
-def sheets(tmp_path):
+def browse(tmp_path):
     chromium = shutil.which("chromium") or missing("chromium", "the browser Chromium")
 
-    def count(shown):
-        source, target = tmp_path / "study.html", tmp_path / "study.pdf"
-        source.write_text(render_study(shown), encoding="utf-8")
-        options = ("--headless", "--no-sandbox", "--disable-gpu", "--no-pdf-header-footer")
-        subprocess.run(
-            [chromium, *options, f"--user-data-dir={tmp_path / 'profile'}",
-             f"--print-to-pdf={target}", source.as_uri()],
+    def browse(text, *options):
+        source = tmp_path / "study.html"
+        source.write_text(text, encoding="utf-8")
+        options = ("--headless", "--no-sandbox", "--disable-gpu", *options)
+        return subprocess.run(
+            [chromium, *options, f"--user-data-dir={tmp_path / 'profile'}", source.as_uri()],
             check=True, capture_output=True, timeout=120,
-        )  # fmt: skip
+        ).stdout.decode()  # fmt: skip
+
+    return browse
+
+
+@pytest.fixture
+def sheets(browse, tmp_path):
+    def count(shown):
+        target = tmp_path / "study.pdf"
+        browse(render_study(shown), "--no-pdf-header-footer", f"--print-to-pdf={target}")
         return len(re.findall(rb"/Type\s*/Page\b", target.read_bytes()))
 
     return count
@@ -67,3 +76,50 @@ def test_the_first_figure_stands_on_the_first_sheet_and_each_case_once_behind_al
     assert sheets(page(cases=[on_screen])) == 1
     every = Grid(caption="All", columns=("Case", "−90°"), rows=MANY, folded=True, at_end=True)
     assert sheets(page(every=[every])) > 2
+
+
+NAMES = (
+    "Axis", "Verdict", "Test", "Load", "At once", "Mode", "Rate (Hz)", "Peak acc. (deg/s²)",
+    "−90° (Hz)", "fn (Hz)", "ζ", "Delay (ms)", "Noise (deg)", "Scale", "Bias (deg)",
+    "−90° of the response (Hz)", "−90° exact (Hz)",
+)  # fmt: skip
+WIDEST = (
+    "elevation", "doubtful", "acceleration-outer", "bracket+projector", "axes at once", "PVA",
+    "1000", "16442", "22.245 −0.094 +0.569", "10.57 −0.65 +1.35 ?", "0.7855 −0.0030 +0.0191 ?",
+    "-0.29 −2.84 +0.24 ?", "0.00288 −0.00034 +0.00045", "0.99977 −0.00033 +0.00047",
+    "-0.000334 ± 0.000094 ?", "19.505 ± 0.038 ?", "115.54",
+)  # fmt: skip
+CASES = Grid(
+    caption="Cases",
+    columns=NAMES,
+    rows=(WIDEST,),
+    dense=True,
+    beneath=("Verdict", "Load", "At once", "Rate (Hz)"),
+)
+
+
+def test_a_dense_table_has_errors_and_some_columns_beneath():
+    heads, (line,) = CASES.heads, CASES.lines
+    assert heads[:3] == [["Axis", "Verdict"], ["Test", "Load", "At once"], ["Mode", "Rate (Hz)"]]
+    assert line[1] == ["acceleration-outer", "bracket+projector", "axes at once"]
+    cells = dict(zip((head[0] for head in heads), line, strict=True))
+    assert cells["−90° (Hz)"] == ["22.245", "−0.094 +0.569"]
+    assert cells["Bias (deg)"] == ["-0.000334 ?", "± 0.000094"]
+    assert cells["−90° exact (Hz)"] == ["115.54"]
+    plain = replace(CASES, dense=False, beneath=())
+    assert [cell for (cell,) in plain.lines[0]] == list(WIDEST)
+
+
+def test_the_table_of_cases_fits_a_screen_of_1280_pixels(browse):
+    measure = (
+        "<script>document.title = [...document.querySelectorAll('.table')].map("
+        "t => t.scrollWidth - t.clientWidth)</script>"
+    )
+
+    def beyond(cases):
+        text = render_study(page(cases=[cases])) + measure
+        seen = browse(text, "--window-size=1280,900", "--dump-dom")
+        return max(int(part) for part in re.search("<title>([0-9,]+)", seen)[1].split(","))
+
+    assert beyond(CASES) == 0
+    assert beyond(replace(CASES, dense=False, beneath=())) > 0

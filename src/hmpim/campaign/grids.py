@@ -70,7 +70,7 @@ def case_grid(rows: Sequence[Row], caption: str, *, explained: bool = False) -> 
     unit = units.pop() if len(units) == 1 else ""
     of_unit = {"Noise": f"Noise ({unit})", "Bias": f"Bias ({unit})"} if unit else {}
     peak = f"Peak acc. ({unit}/s²)" if unit else "Peak acc."
-    names = ("Axis", "Test", "Load", "Mode", "Rate (Hz)", peak, "At once", "Verdict")
+    names = ("Axis", "Verdict", "Test", "Load", "At once", "Mode", "Rate (Hz)", peak)
     found = tuple(of_unit.get(label, label) for _, label in PARAMETERS)
     # A column that says the usual of every row says nothing, of a rig without loads above all.
     usual = {"Load": "acceptance", "Mode": "P", "At once": ""}
@@ -100,6 +100,8 @@ def case_grid(rows: Sequence[Row], caption: str, *, explained: bool = False) -> 
         columns=tuple(columns),
         rows=tuple(tuple(cells[name] for name in columns) for cells in told),
         note="; ".join(said) + "." if explained else "",
+        dense=True,
+        beneath=("Verdict", "Load", "At once", *(["Rate (Hz)"] if "Mode" in columns else [])),
     )
 
 
@@ -173,13 +175,13 @@ def _named(row: Row) -> tuple[str, ...]:
     """What a row is about, and what it is worth."""
     return (
         row.axis,
+        row.verdict.replace("_", " "),
         row.test,
         row.load,
+        "axes at once" if row.together else "",
         row.mode,
         f"{row.rate:g}",
         _plain(row.peaks[2]),
-        "yes" if row.together else "",
-        row.verdict.replace("_", " "),
     )
 
 

@@ -1,5 +1,7 @@
 """One page for a whole study: what passed, every case, and what was compared."""
 
+import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from hmpim.plots.style import printable
@@ -8,6 +10,9 @@ from hmpim.report.html import page_environment
 
 __all__ = ["Grid", "Section", "StudyPage", "render_study"]
 
+_VALUE = re.compile(r"(-?[\d.]+) ((?:±|−).+?)((?: \?)?)")
+"""A value, its error, and the mark of a doubtful one."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Grid:
@@ -15,6 +20,8 @@ class Grid:
 
     `note` stands below it: how it is to be read. A `folded` one shows its caption until it is
     opened. On paper one `at_end` stands opened behind the sections, and one `on_screen` not at all.
+    A `dense` one has its errors beneath their values, and each column that `beneath` names beneath
+    the column before, so that more fits on a line.
     """
 
     caption: str
@@ -24,6 +31,35 @@ class Grid:
     folded: bool = False
     at_end: bool = False
     on_screen: bool = False
+    dense: bool = False
+    beneath: tuple[str, ...] = ()
+
+    @property
+    def heads(self) -> list[list[str]]:
+        """Columns as the page has them: what stands over each, and what beneath that."""
+        return self._together(self.columns)
+
+    @property
+    def lines(self) -> list[list[list[str]]]:
+        """Rows as the page has them: of each cell what it says, and what stands beneath."""
+        return [self._together([*map(self._split, row)]) for row in self.rows]
+
+    def _together(self, cells: Sequence[str | Sequence[str]]) -> list[list[str]]:
+        found: list[list[str]] = []
+        for column, cell in zip(self.columns, cells, strict=True):
+            own = [cell] if isinstance(cell, str) else [*cell]
+            if column in self.beneath and found:
+                found[-1] += own
+            else:
+                found.append(own)
+        return found
+
+    def _split(self, cell: str) -> list[str]:
+        number = _VALUE.fullmatch(cell) if self.dense else None
+        if number is None:
+            return [cell]
+        value, error, doubt = number.groups()
+        return [value + doubt, error]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
