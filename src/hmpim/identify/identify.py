@@ -160,8 +160,8 @@ def identify_output(question: Question) -> Described:
     """Identify one output against every input, together where there are several."""
     if not question.moves:
         return describe_dead(question)
+    question = recognise_software(mark_swapped(question))
     seen = look(question)
-    question = recognise_software(mark_swapped(question, seen))
     fitted = fit(question, seen)
     seen, fitted = drift_or_levels(question, seen, fitted)
     for _ in range(LOOKS):

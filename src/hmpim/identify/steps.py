@@ -13,6 +13,7 @@ from hmpim.identify.effects.disturbance import without_rows
 from hmpim.identify.effects.drift import with_drift
 from hmpim.identify.effects.hum import with_hum
 from hmpim.identify.effects.imperfections import (
+    NOTHING,
     Imperfections,
     count_levels,
     find_imperfections,
@@ -44,11 +45,13 @@ _levels = kept(count_levels)
 
 def look(question: Question) -> Imperfections:
     """Find clipped, held, rounded, stuck and lost samples of the output."""
+    if question.exact:
+        return NOTHING
     richest = max(_levels(source.values) for source in question.aligned.inputs)
     return _imperfections(question, richest=richest)
 
 
-def mark_swapped(question: Question, seen: Imperfections) -> Question:
+def mark_swapped(question: Question) -> Question:
     """Say if the one input there is follows the output; a late clock alone may do it."""
     output = question.output
     if len(question.aligned.inputs) > 1 or question.instrument is not None:
@@ -56,7 +59,7 @@ def mark_swapped(question: Question, seen: Imperfections) -> Question:
     (source,) = question.aligned.inputs
     if not is_swapped(source.values, output.values, source.valid & output.valid):
         return question
-    if lags_behind(_fit_once(question, seen, question.plain).fits[0]):  # it was the clock
+    if lags_behind(_fit_once(question, look(question), question.plain).fits[0]):  # it was the clock
         return question
     finding = swapped_finding(source.name, output.name)
     return replace(question, structures=question.plain, swapped=finding)
@@ -65,7 +68,7 @@ def mark_swapped(question: Question, seen: Imperfections) -> Question:
 def fit(question: Question, seen: Imperfections) -> OutputFit:
     """Fit every structure, with hum and a drift where the residual asks for them."""
     fitted = _fit_once(question, seen, question.structures)
-    if len(fitted.fits) > 1 or fitted.fits[0].silent or question.swapped:
+    if len(fitted.fits) > 1 or fitted.fits[0].silent or question.swapped or question.exact:
         return fitted
     (joint,) = fitted.fits
     humming = None
@@ -123,12 +126,19 @@ def drift_or_levels(
 
 def look_again(question: Question, seen: Imperfections, fitted: OutputFit) -> Imperfections:
     """Look with the model in hand: a plateau can now be told from a crest."""
-    residual = fitted.fits[0].best.fit.residual
+    if question.exact:
+        return seen
+    first = fitted.fits[0]
+    residual = first.best.fit.residual
     asked = seen.saturation is not None or seen.hold is not None
     if not asked and is_white(residual) and not stands_out(residual):
         return seen
-    again = _imperfections(question, prediction=fitted.prediction)
-    again = replace(again, levels=seen.levels)
+    prediction = fitted.prediction.copy()  # of what came before the free response it says nothing
+    prediction[: first.forgotten] = question.output.values[: first.forgotten]
+    again = replace(_imperfections(question, prediction=prediction), levels=seen.levels)
+    told = again.telling(prediction.size, question.aligned.fs)
+    if told is not None and np.ptp(question.output.values[told]) == 0.0:
+        return seen  # all that moves would be taken for spikes
     plateau = again.saturation
     if plateau is None and seen.saturation is not None and seen.saturation.noise == "after":
         return replace(again, saturation=seen.saturation)

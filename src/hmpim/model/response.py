@@ -107,9 +107,9 @@ def _turn(roots: NDArray[np.complex128], omega: NDArray[np.float64]) -> NDArray[
 
 def _turn_in_z(roots: NDArray[np.complex128], omega: NDArray[np.float64]) -> NDArray[np.float64]:
     """Continuous phase of a polynomial in 1 - 1/z, zero at DC, at radians per sample."""
-    places = 1.0 / (1.0 - roots)[:, None]  # 1 - δ/r is 1 - q/z but for a factor
-    outside = np.abs(places) > 1.0 + 1e-9
-    inner = np.where(outside, 1.0 / places, places)
+    inverse = (1.0 - roots)[:, None]  # 1 - δ/r is 1 - q/z but for a factor, q its inverse
+    outside = np.abs(inverse) < 1.0 - 1e-9
+    inner = np.divide(1.0, inverse, out=inverse.copy(), where=~outside)
     sign = np.where(outside, 1.0, -1.0)
     turned = np.angle(1.0 - inner * np.exp(1j * sign * omega)) - np.angle(1.0 - inner)
     return np.asarray((turned - np.where(outside, omega, 0.0)).sum(axis=0))

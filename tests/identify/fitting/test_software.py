@@ -131,3 +131,46 @@ def test_a_task_slower_than_the_record_is_software_too():
     pair = hmpim.identify(record, intersample="sampled")["y"]
     assert pair.delay.value == pytest.approx(7 / FS, abs=1e-12)
     assert pair.hold_period.value == pytest.approx(4 / FS, rel=1e-3)
+
+
+WALK = 5.0 + 0.1 * np.cumsum(np.random.default_rng(0).standard_normal(2000))
+MOVING = {
+    "white": np.random.default_rng(0).standard_normal(2000),
+    "a walk far from 0": WALK,
+    "a cosine sweep": np.cos(2 * np.pi * (0.1 * TIME + TIME**2)),
+}
+FILTERED = {
+    "z-6": lambda u: np.concatenate([np.zeros(6), u[:-6]]),
+    "one pole": lambda u: signal.lfilter([0.2], [1.0, -0.8], u),
+    "Butterworth": lambda u: signal.lfilter(*signal.butter(4, 0.2), u),
+    "elliptic": lambda u: signal.lfilter(*signal.ellip(3, 1, 40, 0.2), u),
+}
+
+
+@pytest.mark.parametrize("name", FILTERED)
+@pytest.mark.parametrize("kind", MOVING)
+def test_a_filter_that_began_from_zero_in_the_midst_of_motion_is_found_without_a_remark(kind, name):
+    """What a filter's memory holds before the record is nobody's: its first samples follow it."""
+    u = MOVING[kind]
+    pair = hmpim.identify(hmpim.Record.from_arrays({"u": u}, {"y": FILTERED[name](u)}, fs=FS))["y"]
+    assert (pair.intersample, pair.verdict) == ("sampled", "ok")
+    assert pair.delay.value == (6 / FS if name == "z-6" else 0.0)
+    assert pair.scale_factor.value == pytest.approx(1.0, rel=1e-9)
+    assert not {w.code for w in pair.warnings} - {"beyond_band", "initial_transient"}
+
+
+@pytest.mark.parametrize("kind", ["white", "a walk far from 0", "a step"])
+def test_a_long_filter_without_poles_is_found_with_all_its_taps(kind):
+    u = {**MOVING, "a step": np.repeat([0.0, 1.0], [100, 1900])}[kind]
+    taps = signal.firwin(20, 0.3)
+    y = signal.lfilter(taps, [1.0], u)
+    pair = hmpim.identify(hmpim.Record.from_arrays({"u": u}, {"y": y}, fs=FS))["y"]
+    assert (pair.structure, pair.intersample, pair.verdict) == ("fir", "sampled", "ok")
+    late = round(pair.delay.value * FS)
+    assert np.pad(pair.numerator, (late, 0)) == pytest.approx(taps[: late + 20], abs=1e-8)
+
+
+def test_so_smooth_an_input_that_any_output_follows_it_tells_of_no_long_filter():
+    u = np.cos(2 * np.pi * (0.1 * TIME + 0.2 * TIME**2))
+    y = signal.lfilter(signal.firwin(21, 0.1), [1.0], u)
+    assert software_fit(u, y).best.fit.structure.zeros < 16

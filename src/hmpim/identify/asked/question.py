@@ -36,6 +36,8 @@ class Question:
         What a loop's reference moves of the input.
     swapped : Finding or None
         Said where the input follows the output: then only plain structures are tried.
+    exact : bool
+        Whether a filter between samples explains all but rounding.
     limited : LimitedCommand or None
         Of a unit that follows its command up to some speed: then the input is what it follows.
     """
@@ -48,6 +50,7 @@ class Question:
     inputs: InputSet | None
     instrument: Instrument | None
     swapped: Finding | None = None
+    exact: bool = False
     limited: LimitedCommand | None = None
 
     @property

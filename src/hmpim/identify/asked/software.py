@@ -35,4 +35,4 @@ def recognise_software(question: Question) -> Question:
     if filters.cost > enough or filters.structure.parameters > min(exact, default=np.inf):
         return question
     names = cast(tuple[StructureName, ...], tuple(FILTERS))
-    return replace(question, intersample="sampled", structures=names)
+    return replace(question, intersample="sampled", structures=names, exact=True)

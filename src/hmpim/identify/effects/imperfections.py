@@ -22,7 +22,7 @@ from hmpim.identify.fitting.fit import Fit
 from hmpim.identify.fitting.trial import JointFit, Trial
 from hmpim.identify.worth import FEW, NEARLY, TWICE
 
-__all__ = ["Imperfections", "count_levels", "find_imperfections", "refine"]
+__all__ = ["NOTHING", "Imperfections", "count_levels", "find_imperfections", "refine"]
 
 _FEWEST_LEVELS = 8
 """Levels that an output must take, unless its input takes as few."""
@@ -84,6 +84,18 @@ class Imperfections:
         if lost is not None:
             told &= ~lost
         return told
+
+
+NOTHING = Imperfections(
+    saturation=None,
+    hold=None,
+    quantization=None,
+    spikes=None,
+    frozen=None,
+    repeated=None,
+    levels=None,
+)
+"""What is seen where a model explains every sample."""
 
 
 def find_imperfections(

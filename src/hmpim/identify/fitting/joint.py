@@ -29,13 +29,13 @@ from hmpim.identify.fitting.course import (
     start,
     turn_ahead,
 )
-from hmpim.identify.fitting.data import FINAL_PRECISION, refit
+from hmpim.identify.fitting.data import FINAL_PRECISION, band_of, refit
 from hmpim.identify.fitting.enrich import INTEGRATING, MODES, PLAIN, RICH
 from hmpim.identify.fitting.fit import Fit, Problem, fit_structure
 from hmpim.identify.fitting.growth import Growth, grow, hidden_pole
 from hmpim.identify.fitting.software import software_fit
 from hmpim.identify.fitting.trial import JointFit, Trial, likeliest_of, trial_of
-from hmpim.identify.fitting.unrelated import is_unrelated
+from hmpim.identify.fitting.unrelated import UNDENIED, says_nothing
 from hmpim.identify.fitting.whitening import is_contradicted, noise_of, refit_whitened
 from hmpim.identify.noise.whiteness import effective_share, is_white
 from hmpim.identify.worth import TWICE
@@ -111,7 +111,9 @@ def settle(course: Course, trials: list[Trial], best: Trial, share: float) -> Jo
         trials=tuple(trials),
         forgotten=course.counted.begins or 0,
         effective_share=share,
-        related=not is_unrelated(plain, best.fit, share),
+        related=not says_nothing(
+            course.data.u, plain, best.fit, band_of(course.data), least=UNDENIED
+        ),
     )
 
 

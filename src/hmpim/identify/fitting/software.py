@@ -8,6 +8,7 @@ McBride, IEEE TAC 10, 1965); the climb is the one of all fits. One triangular fa
 samples serves every structure and every delay.
 """
 
+from bisect import bisect_left
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -19,9 +20,9 @@ from hmpim.identify.fitting.fit import Fit, Problem, fit_structure
 from hmpim.identify.fitting.least_squares import solved_exactly
 from hmpim.identify.fitting.start import coarse_lag
 from hmpim.identify.fitting.trial import JointFit, trial_of
-from hmpim.identify.fitting.unrelated import is_unrelated
+from hmpim.identify.fitting.unrelated import UNDENIED, says_nothing
 from hmpim.identify.noise.whiteness import effective_share
-from hmpim.identify.worth import ROUNDING, TWICE
+from hmpim.identify.worth import MOST, ROUNDING, TWICE
 from hmpim.model.dynamics import FILTERS, Structure
 from hmpim.model.filters import nyquist_taps, section_parameters
 from hmpim.model.sampled import prepare_input
@@ -33,13 +34,16 @@ _ORDER = 4
 """Output samples that an equation reaches back to."""
 
 _TAPS = 16
-"""Input samples that it may take."""
+"""Input samples that it may take beyond the lag of the greatest cross-correlation."""
 
 _ROWS, _GLANCES = 20_000, (160, 1000)
 """Equations, evenly over the record, for starts, and to see whether they hold at all: few first."""
 
 _EARLIER = 40
-"""Samples by which the delay may be below the lag of the greatest cross-correlation."""
+"""Samples by which the delay may be below that lag."""
+
+_LONGEST = 24
+"""Taps of a filter without poles whose differences, up to the last, are known better than 1e-9."""
 
 _NEAR = 3
 """Delays of a structure that are followed to their end."""
@@ -83,6 +87,18 @@ class _Equations:
         found, left = solved_exactly(np.stack(columns), self.factor[:, -1])
         return left, -found[: structure.order]
 
+    @property
+    def left(self) -> float:
+        """Sum of squares that the equations leave, every sample and all structures taken."""
+        return solved_exactly(self.factor[:, :-1].T, self.factor[:, -1])[1]
+
+    @property
+    def foreseen(self) -> float:
+        """Least singular value of the lagged inputs, each of unit size, over the greatest."""
+        lagged = self.factor[:, _ORDER : _ORDER + self.count]
+        found = np.linalg.svd(lagged / np.linalg.norm(lagged, axis=0), compute_uv=False)
+        return float(found[-1] / found[0])
+
     def delays(self, structure: Structure) -> range:
         """Delays at which it has all samples that a structure takes."""
         taken = max(structure.zeros, structure.nyquist_zeros)
@@ -90,11 +106,12 @@ class _Equations:
 
 
 def _equations(u: Real, y: Real, valid: Mask | None, *, most: int = _ROWS) -> _Equations:
-    """Factor what one output sample may follow from; of masked samples, those told alone."""
+    """Factor what one output sample may follow from; of masked samples, those that count alone."""
     lag = coarse_lag(u, y, u.size // 2)
     first = max(lag - _EARLIER, 0)
     last = min(lag + 2 + _TAPS, u.size // 2)
-    told, ar = np.arange(u.size) >= _ORDER, True
+    last = max(min(last, (u.size + 2 * first) // 3 - _ORDER), first)  # two equations an unknown
+    told, ar = np.arange(u.size) >= max(_ORDER, _unknown(u, last)), True
     if valid is not None:
         unbroken = told & valid
         for k in range(1, _ORDER + 1):
@@ -108,6 +125,15 @@ def _equations(u: Real, y: Real, valid: Mask | None, *, most: int = _ROWS) -> _E
     every = np.stack([*rows, np.ones(index.size), y[index]], axis=1)
     factor = np.asarray(np.linalg.qr(every, mode="r"), dtype=np.float64)
     return _Equations(factor=factor, rows=index.size, first=first, count=last + 1 - first, ar=ar)
+
+
+def _unknown(u: Real, reach: int) -> int:
+    """Samples at the start that may follow from input before the record.
+
+    None where most of the input's motion is in them: it is then taken to have been at rest.
+    """
+    steps = np.diff(u) ** 2
+    return reach if float(steps[reach:].sum()) > MOST * float(steps.sum()) else 0
 
 
 def is_exact(u: Real, y: Real) -> bool:
@@ -126,12 +152,7 @@ def is_exact(u: Real, y: Real) -> bool:
     (True, False)
     """
     allowed = ROUNDING**2 * float(y.var()) * min(u.size - _ORDER, _GLANCES[-1])
-    for most in _GLANCES:
-        equations = _equations(u, y, None, most=most)
-        _, left = solved_exactly(equations.factor[:, :-1].T, equations.factor[:, -1])
-        if not left < allowed:
-            return False
-    return True
+    return all(_equations(u, y, None, most=most).left < allowed for most in _GLANCES)
 
 
 def software_fit(
@@ -168,12 +189,15 @@ def software_fit(
     floor = _ROUNDING**2 * float(np.sum(problem.masked(y - y.mean()) ** 2))
     fits = _followed(problem, equations, u, names, exact=floor)
     first = min(fits, key=lambda fit: fit.cost)
-    begins = None if first.cost <= floor else begins_of(problem, first, lag=0)
-    if begins is not None:
-        late = np.arange(y.size) >= begins
-        counted = late if valid is None else valid & late
-        problem = replace(problem, valid=counted, begins=begins)
+    if first.cost > floor and equations.left <= floor:  # but for what came before the record
+        problem = _begun_at(problem, _unknown(u, equations.first + equations.count))
+        fits = _followed(problem, equations, u, names, exact=floor)
+    elif first.cost > floor and (begins := begins_of(problem, first, lag=0)) is not None:
+        problem = _begun_at(problem, begins)
         fits = [fit_structure(problem, fit.structure, fit.theta) for fit in fits]
+    if "fir_16" in names and min(fit.cost for fit in fits) > floor:
+        longer = _long_filter(problem, equations, u, exact=floor)
+        problem, fits = (problem, fits) if longer is None else longer
     share = effective_share(min(fits, key=lambda fit: fit.cost).residual)
     count = problem.counted * share
     trials = [trial_of("sampled", fit, count, floor=floor) for fit in fits]
@@ -183,9 +207,9 @@ def software_fit(
         weighed=problem,
         best=best,
         trials=tuple(trials),
-        forgotten=begins or 0,
+        forgotten=problem.begins or 0,
         effective_share=share,
-        related=not is_unrelated(problem, best.fit, share),
+        related=not says_nothing(u, problem, best.fit, (0.0, 0.5), least=UNDENIED),
     )
 
 
@@ -219,6 +243,45 @@ def _followed(
         else fit_structure(problem, fit.structure, fit.theta, precision=_POLISHED)
         for fit in fits
     ]
+
+
+def _long_filter(
+    problem: Problem, equations: _Equations, u: Real, *, exact: float
+) -> tuple[Problem, list[Fit]] | None:
+    """The shortest filter without poles that leaves nothing but rounding.
+
+    None where there is none, and where the input is so smooth that its own samples foresee each
+    other: so many explain any output. Else with the data that it explains: what follows from input
+    before the record is left out.
+    """
+    allowed = exact * equations.rows / problem.counted
+
+    def holds(first: int, last: int) -> bool:
+        return equations.cost(_transversal(last - first + 1), first)[0] <= allowed
+
+    first, last = equations.first, equations.first + equations.count - 1
+    if equations.foreseen < ROUNDING or not holds(first, last):
+        return None
+    last = first + bisect_left(range(first, last), True, key=lambda k: holds(first, k))
+    first += bisect_left(range(first, last), True, key=lambda k: not holds(k + 1, last))
+    if last - first >= _LONGEST:
+        return None
+    began = _begun_at(problem, _unknown(u, last))
+    return began, [fit_structure(began, _transversal(last - first + 1), np.array([float(first)]))]
+
+
+def _begun_at(problem: Problem, first: int) -> Problem:
+    """The data from a sample on, and the free response of what came before; all from 0."""
+    if not first:
+        return problem
+    late = np.arange(problem.y.size) >= first
+    counted = late if problem.valid is None else problem.valid & late
+    return replace(problem, valid=counted, begins=first)
+
+
+def _transversal(taps: int) -> Structure:
+    """A filter without poles."""
+    return Structure(name="fir", sections=(), zeros=taps - 1, sampled=True)
 
 
 def _refined(problem: Problem, u: Real, structure: Structure, delay: int, below: Real) -> Real:

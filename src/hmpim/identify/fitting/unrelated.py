@@ -8,15 +8,23 @@ from hmpim.identify.chance import FALSE_ALARM, SEARCHED
 from hmpim.identify.fitting.fit import Fit, Problem
 from hmpim.identify.fitting.least_squares import solved
 from hmpim.identify.fitting.sampled_rows import part_of
+from hmpim.identify.fitting.start import coarse_lag
 from hmpim.identify.noise.autoregression import autoregression, innovation_gain
 from hmpim.identify.noise.misfit import misfit
 from hmpim.identify.noise.whiteness import effective_share
 from hmpim.identify.worth import TWICE
 
-__all__ = ["is_unrelated", "says_nothing"]
+__all__ = ["UNDENIED", "is_unrelated", "says_nothing"]
+
+UNDENIED = TWICE * SEARCHED
+"""Log-likelihood that an answer must promise, or a model gain where it is told by innovations.
+
+Twice as much as a search finds: of a coloured residual few samples are independent."""
 
 
-def says_nothing(u: Real, problem: Problem, fit: Fit, band: tuple[float, float]) -> bool:
+def says_nothing(
+    u: Real, problem: Problem, fit: Fit, band: tuple[float, float], *, least: float = SEARCHED
+) -> bool:
     """Whether no model can be expected to explain an output that this fit does not.
 
     A test without a model: input and output pass the filter that leaves white noise of the
@@ -30,9 +38,12 @@ def says_nothing(u: Real, problem: Problem, fit: Fit, band: tuple[float, float])
     problem : Problem
         The output, and the samples that count.
     fit : Fit
-        The best so far; its delay aligns input and output.
+        The best so far. Its delay aligns input and output, or else the lag at which what is left
+        of the two by that filter is most alike.
     band : tuple of float
         Excited band, in cycles per sample.
+    least : float
+        Log-likelihood that an answer without a model must promise.
     """
     if not is_unrelated(problem, fit, effective_share(fit.residual)):
         return False
@@ -42,9 +53,11 @@ def says_nothing(u: Real, problem: Problem, fit: Fit, band: tuple[float, float])
     if problem.valid is not None:
         seen = seen * problem.coloured(noise).told
     seen[: noise.size] = 0.0
-    answer = misfit(heard, seen, delay=fit.delay, band=band)
+    lags = (fit.delay, float(coarse_lag(heard, seen, y.size // 2)))
+    answers = [misfit(heard, seen, delay=lag, band=band) for lag in lags]
+    answer = min(answers, key=lambda one: one.probability)
     reachable = -0.5 * problem.counted * float(np.log1p(-min(answer.share, 0.999)))
-    return answer.probability > FALSE_ALARM or reachable < SEARCHED
+    return answer.probability > FALSE_ALARM or reachable < least
 
 
 def is_unrelated(problem: Problem, fit: Fit, share: float) -> bool:
@@ -69,8 +82,7 @@ def is_unrelated(problem: Problem, fit: Fit, share: float) -> bool:
         return False
     residual = fit.residual if problem.valid is None else fit.residual[problem.valid]
     # A free response may be any sine or exponential: the input must tell what they cannot.
-    # Twice as much as a search finds: of a coloured residual few samples are independent.
-    return innovation_gain(y, residual) < TWICE * SEARCHED
+    return innovation_gain(y, residual) < UNDENIED
 
 
 def _without_input(problem: Problem, fit: Fit) -> Real:

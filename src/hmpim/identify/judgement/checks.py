@@ -81,8 +81,13 @@ SAMPLED: tuple[Check, ...] = (
 """Those that ask something of software, which has neither poles beyond the band nor a clock."""
 
 
-EXACT: tuple[Check, ...] = (initial_transient, few_lines, beyond_band)
-"""Those that ask something of software that is explained to the last digit."""
+_OF_THE_RESIDUAL: frozenset[Check] = frozenset(
+    {
+        *(lack_of_fit, coloured_noise, halves_disagree, noise_colour_of, uneven_noise),
+        *(unsampled_input, feedback, other_order, missed_pole),
+    }
+)
+"""Those that ask something of what a model leaves over; nothing where that is rounding."""
 
 
 def judge(evidence: Evidence, *, checks: Sequence[Check] | None = None) -> tuple[Finding, ...]:
@@ -93,7 +98,8 @@ def judge(evidence: Evidence, *, checks: Sequence[Check] | None = None) -> tuple
     evidence : Evidence
         What there is to look at.
     checks : sequence of callable, optional
-        What to look for; by default `CHECKS`, of software `SAMPLED` or `EXACT`.
+        What to look for; by default `CHECKS`, of software `SAMPLED`, and where all is explained to
+        the last digit without those that ask something of the residual.
 
     Returns
     -------
@@ -101,13 +107,19 @@ def judge(evidence: Evidence, *, checks: Sequence[Check] | None = None) -> tuple
         In the order of the checks; a check that raised stands as 'check_failed'.
     """
     if checks is None:
-        checks = CHECKS
-        if evidence.joint.best.fit.structure.sampled:
-            checks = SAMPLED if evidence.unexplained > ROUNDING else EXACT
+        checks = SAMPLED if evidence.joint.best.fit.structure.sampled else CHECKS
+        if evidence.unexplained < ROUNDING:
+            checks = [check for check in checks if check not in _OF_THE_RESIDUAL]
     found: list[Finding] = []
     for check in checks:
         name = getattr(check, "__name__", type(check).__name__)
         nothing: tuple[Finding, ...] = ()
         said, failure = attempt(name, partial(check, evidence), nothing)
         found += [*said, *failure]
-    return tuple(found)
+    # Of figures that are not given there is nothing more to say.
+    untold = {name for one in found if one.code == "few_lines" for name in one.parameters}
+    return tuple(
+        one
+        for one in found
+        if one.severity == "doubt" or not one.parameters or not untold.issuperset(one.parameters)
+    )

@@ -11,9 +11,9 @@ from hmpim.identify.arrays import Real
 from hmpim.identify.chance import FALSE_ALARM
 from hmpim.identify.fitting.least_squares import solved
 from hmpim.identify.judgement.evidence import Evidence
+from hmpim.identify.judgement.residual import moved_by
 from hmpim.identify.kept import kept
 from hmpim.identify.nonlinear.lines import find_period
-from hmpim.identify.result.groups import MODELLED
 from hmpim.identify.worth import MOST
 from hmpim.record import Finding
 
@@ -31,7 +31,7 @@ _AT_ONCE = 20_000
 
 
 def feedback(evidence: Evidence) -> tuple[Finding, ...]:
-    """Say that what the model leaves over moves the input; a doubt where the noise has a colour.
+    """Say that the residual moves the input; a doubt on what it may move where it has a colour.
 
     A score test (Rao 1948): the input's future, beside its past, explains nothing of a residual
     that it does not answer. A fit under the noise model of a loop whose noise is white is right
@@ -50,6 +50,9 @@ def feedback(evidence: Evidence) -> tuple[Finding, ...]:
         return ()
     if float(chances_of_an_answer(u, left[None], inside)[0]) > FALSE_ALARM:
         return ()
+    moved = moved_by(evidence, 1.0)
+    if moved == ("noise_std",):
+        return ()
     coloured = not evidence.readings.white
     return (
         Finding(
@@ -59,7 +62,7 @@ def feedback(evidence: Evidence) -> tuple[Finding, ...]:
             + (", and the fit treats some of the noise as response. " if coloured else ". ")
             + "Identify it through what drives the loop (reference=, --reference).",
             severity="doubt" if coloured else "info",
-            parameters=MODELLED,
+            parameters=moved,
         ),
     )
 

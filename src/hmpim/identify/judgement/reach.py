@@ -8,13 +8,12 @@ import scipy
 
 from hmpim.identify.arrays import Real
 from hmpim.identify.fitting.enrich import PLAIN
-from hmpim.identify.fitting.fit import FORGETS
 from hmpim.identify.fitting.growth import scale_of
 from hmpim.identify.judgement.evidence import Evidence, structure_in_words
 from hmpim.identify.kept import kept
 from hmpim.identify.result.groups import MODELLED, PHASE_SPLIT, TIMING, in_words
-from hmpim.identify.worth import DEEPEST, MUCH, PAST, TWICE
-from hmpim.model import response, slowest_time_constant
+from hmpim.identify.worth import DEEPEST, FEW, MUCH, PAST, ROUNDING, TWICE
+from hmpim.model import response
 from hmpim.record import Finding
 from hmpim.record.runs import runs_of
 
@@ -44,6 +43,11 @@ _OF_RATE = 0.4
 _STAMPED_LATE = 5.0
 """Samples by which a stamp may have an output ahead."""
 
+_COMPUTED = (
+    " Software that computes each output sample from the input sample of the same instant is one "
+    "sample ahead of a held input: state intersample='sampled' if this is the case."
+)
+
 _OF_SLOWEST = ("time_constant", "natural_frequency", "damping_ratio")
 """What is read off the slowest poles."""
 
@@ -59,8 +63,8 @@ def initial_transient(evidence: Evidence) -> tuple[Finding, ...]:
     joint = evidence.joint
     if not joint.forgotten:
         return ()
-    slowest = slowest_time_constant(evidence.readings.system.denominator)
-    lasting = FORGETS * slowest * evidence.fs > MUCH * joint.problem.y.size
+    memory = joint.best.fit.memory
+    lasting = memory > MUCH * joint.problem.y.size
     structure = joint.best.fit.structure
     drifts = lasting and structure.name not in PLAIN
     open_ended = structure.integrators > 0
@@ -72,7 +76,7 @@ def initial_transient(evidence: Evidence) -> tuple[Finding, ...]:
             f"fitted too, and its first {joint.forgotten / evidence.fs:.4g} s, which respond to "
             "input before the record, are left out."
             + (
-                f" The free response lasts {FORGETS * slowest:.3g} s and may be a drift."
+                f" The free response lasts {memory / evidence.fs:.3g} s and may be a drift."
                 if drifts
                 else ""
             )
@@ -187,8 +191,8 @@ def unreached(missing: Sequence[str], *, band_end: float) -> Finding:
 
 def short_record(evidence: Evidence) -> tuple[Finding, ...]:
     """Doubt what is read off a record that ends before the system has settled."""
-    system = evidence.readings.system
-    settle = max(system.delay, 0.0) + FORGETS * slowest_time_constant(system.denominator)
+    fit = evidence.joint.best.fit
+    settle = (max(fit.delay, 0.0) + fit.memory) / evidence.fs
     length = evidence.joint.problem.y.size / evidence.fs
     if settle <= length:
         return ()
@@ -211,7 +215,7 @@ def negative_delay(evidence: Evidence) -> tuple[Finding, ...]:
     """
     delay = evidence.readings.parameters.delay
     latest = None if delay is None or delay.ci95 is None else delay.ci95[1]
-    if delay is None or latest is None or latest >= 0:
+    if delay is None or latest is None or latest * evidence.fs >= -ROUNDING:
         return ()
     fit = evidence.joint.best.fit
     by_a_lead = -fit.delay < max(TWICE * scale_of(fit), _STAMPED_LATE)
@@ -219,11 +223,18 @@ def negative_delay(evidence: Evidence) -> tuple[Finding, ...]:
         Finding(
             code="negative_delay",
             message=f"The delay is negative ({delay.value:.4g} s): the output moves before the "
-            "input. Check that the input column is not stamped late, and which column is which.",
+            "input. Check that the input column is not stamped late, and which column is which."
+            + (_COMPUTED if _is_computed(evidence) else ""),
             severity="doubt" if by_a_lead else "info",
             parameters=PHASE_SPLIT if by_a_lead else TIMING,
         ),
     )
+
+
+def _is_computed(evidence: Evidence) -> bool:
+    """Whether held samples act one sample early: each at its own instant."""
+    best = evidence.joint.best
+    return best.intersample == "zoh" and abs(best.fit.delay + 1.0) < FEW
 
 
 def _at_the_line(evidence: Evidence) -> str:

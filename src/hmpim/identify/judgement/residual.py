@@ -23,6 +23,7 @@ __all__ = [
     "folded_power",
     "halves_disagree",
     "lack_of_fit",
+    "moved_by",
     "noise_colour_of",
     "noise_on_the_input",
     "uneven_noise",
@@ -62,15 +63,19 @@ def lack_of_fit(evidence: Evidence) -> tuple[Finding, ...]:
     )
     if large or misfit.share <= 2 * FEW:  # the noise would be off by few per cent
         return (found,)
-    moved = _moved(evidence) if owed > WORTH and misfit.share > PART else ("noise_std",)
+    some = owed > WORTH and misfit.share > PART
+    moved = moved_by(evidence, misfit.share) if some else ("noise_std",)
     return (replace(found, severity="doubt", parameters=moved),)
 
 
-def _moved(evidence: Evidence) -> tuple[str, ...]:
-    """Figures that a misfit along their own slopes may move by a hundredth, and the noise."""
+def moved_by(evidence: Evidence, share: float) -> tuple[str, ...]:
+    """Figures that a share of the residual's power may move by a hundredth, and the noise.
+
+    At most, were it along their own slopes.
+    """
     joint = evidence.joint
     count = joint.problem.counted * joint.effective_share
-    times = float(np.sqrt(count * evidence.misfit.share))
+    times = float(np.sqrt(count * share))
     motion = MATERIAL * float(joint.best.fit.prediction.std())
     sizes = {"bias": motion, "delay": FEW / evidence.fs, "delay_low_frequency": FEW / evidence.fs}
     known = {name: getattr(evidence.readings.parameters, name) for name in MODELLED}

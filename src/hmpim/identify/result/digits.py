@@ -12,6 +12,9 @@ _SMALLEST_LONG = 0.01
 _ROUNDING = 1e-10
 """Error over value below which the value's digits are no longer written out to it."""
 
+_ROUGHLY = 0.01
+"""Shorter side of an interval over its longer one to which its digits are written."""
+
 _ONE_DIGIT = 355
 """First three digits of an error from which one digit of it is enough (Particle Data Group)."""
 
@@ -66,10 +69,16 @@ def aside(value: float, low: float | None, high: float | None) -> str:
     '0.1500 −0.0026 +?'
     >>> aside(0.15, None, None)
     '0.15 ± ?'
+    >>> aside(0.15, 0.15 - 2e-12, 0.15 + 2.4e-7)  # one side next to nothing beside the other
+    '0.1500000000 −0.0000000000 +0.0000002400'
+    >>> aside(0.035, 0.035 - 2e-17, 0.035 + 5e-16)  # exact but for rounding
+    '0.035 ± 5e-16'
     """
     reach = [None if end is None else abs(end - value) for end in (low, high)]
     known = [length for length in reach if length]
-    places = _places(min(known)) if known else None
+    if known and len(known) == len(reach) and max(known) < _ROUNDING * abs(value):
+        return f"{value:.10g} ± {max(known):.0e}"
+    places = _places(max(min(known), _ROUGHLY * max(known))) if known else None
     if places is None:
         return f"{_plain(value)} ± ?"
     down, up = ("?" if length is None else _at(length, places) for length in reach)

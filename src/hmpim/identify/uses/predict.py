@@ -88,12 +88,14 @@ def rate_of(pair: PairIdentification) -> float | None:
     return float((pair.time.size - 1) / (pair.time[-1] - pair.time[0]))
 
 
-def _slowest(model: Model) -> float:
-    """Slowest time constant of a model, in s."""
+def settling_time(model: Model) -> float:
+    """Time in s after which a model has forgotten: its delay and five slowest time constants."""
     if model.intersample != "sampled" or model.fs is None:
-        return slowest_time_constant(np.asarray(model.denominator[::-1]))
-    size = np.abs(np.roots(model.denominator))
-    return float(np.max(-1.0 / np.log(np.clip(size, 1e-12, 1 - 1e-12)), initial=0.0) / model.fs)
+        slowest = slowest_time_constant(np.asarray(model.denominator[::-1]))
+    else:
+        size = np.clip(np.abs(np.roots(model.denominator)), 1e-12, 1 - 1e-12)
+        slowest = float(np.max(-1.0 / np.log(size), initial=0.0) / model.fs)
+    return max(model.delay, 0.0) + FORGETS * slowest
 
 
 def _value(estimate: Estimate | None) -> float | None:
@@ -143,8 +145,7 @@ def predict(pair: PairIdentification, record: Record, *, start: float | None = N
     u, y = aligned.signal(pair.input), aligned.signal(pair.output)
     predicted = simulate(model, u.values, fs=aligned.fs, intersample=pair.intersample)
     if start is None:
-        slowest = _slowest(model)
-        start = aligned.start + max(model.delay, 0.0) + FORGETS * slowest
+        start = aligned.start + settling_time(model)
     scored = y.valid & (aligned.time >= start)
     if np.count_nonzero(scored) < 2:
         raise RecordError(

@@ -11,14 +11,13 @@ from hmpim.errors import ArgumentError, RecordError
 from hmpim.identify.arrays import Mask, Real
 from hmpim.identify.chance import DEVIATIONS, FALSE_ALARM, HALF
 from hmpim.identify.effects.hold import Hold, detect_hold, updates
-from hmpim.identify.fitting.fit import FORGETS
 from hmpim.identify.noise.misfit import misfit
 from hmpim.identify.noise.whiteness import autocovariance, effective_share
 from hmpim.identify.result import Identification, PairIdentification
 from hmpim.identify.section_iv.spectrum import excited_band
-from hmpim.identify.uses.predict import to_model
+from hmpim.identify.uses.predict import settling_time, to_model
 from hmpim.identify.worth import MATERIAL
-from hmpim.model import Model, draw_models, simulate, slowest_time_constant
+from hmpim.model import Model, draw_models, simulate
 from hmpim.record import Aligned, Record, uniform
 
 __all__ = ["Bounds", "Check", "OutputValidation", "Validation", "validate"]
@@ -284,10 +283,7 @@ def _held(models: Sequence[Model], y: Real, fs: float) -> Hold | None:
 
 
 def _settled(models: Sequence[Model], aligned: Aligned) -> Mask:
-    wait = max(
-        max(m.delay, 0.0) + FORGETS * slowest_time_constant(np.asarray(m.denominator[::-1]))
-        for m in models
-    )
+    wait = max(settling_time(model) for model in models)
     return np.asarray(aligned.time >= aligned.start + wait)
 
 

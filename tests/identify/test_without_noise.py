@@ -1,0 +1,75 @@
+"""A simulation without noise, as a first try of the tool often is: right, and not accused."""
+
+from dataclasses import fields
+
+import numpy as np
+import pytest
+from scipy import signal
+
+import hmpim
+from hmpim.identify.result import Parameters
+
+FS = 200.0
+POSSIBLE = [field.name for field in fields(Parameters)]
+
+
+@pytest.mark.parametrize("end", [20.0, 90.0])
+def test_a_simulation_without_noise_is_doubted_for_its_noise_alone(end):
+    """Interpolation is all that is left, and follows the input's future; the start is a rest."""
+    chirp = hmpim.Stimulus(waveform=hmpim.Chirp(band=(0.1, end), duration=10.0), fs=FS)
+    sensor = hmpim.Sensor(delay=0.15, natural_frequency=10.0, damping_ratio=0.4)
+    record = hmpim.run(sensor, chirp, rng=0)
+    u, y = record.inputs[0].values, record.outputs[0].values
+    (pair,) = hmpim.identify(hmpim.Record.from_arrays({"u": u}, {"y": y}, fs=FS))
+    found = {name: getattr(pair, name) for name in ("delay", "natural_frequency", "damping_ratio")}
+    assert {name: e.value for name, e in found.items()} == pytest.approx(
+        {"delay": 0.15, "natural_frequency": 10.0, "damping_ratio": 0.4}, rel=1e-7
+    )
+    assert {n for n in POSSIBLE if (e := getattr(pair, n)) and e.verdict != "ok"} <= {"noise_std"}
+    assert not {"feedback", "frozen", "spikes"} & {w.code for w in pair.warnings}
+
+
+def test_one_sine_is_told_once_that_it_shows_gain_and_phase():
+    """Of figures that are not given, no remark says that their intervals cover something."""
+    time = np.arange(2000) / FS
+    y = np.sin(4 * np.pi * (time - 0.027)) + 0.01 * np.random.default_rng(1).standard_normal(2000)
+    record = hmpim.Record.from_arrays({"u": np.sin(4 * np.pi * time)}, {"y": y}, fs=FS)
+    (pair,) = hmpim.identify(record)
+    assert {w.code for w in pair.warnings} == {"initial_transient", "few_lines"}
+
+
+HELD = {
+    "a step": np.repeat([0.0, 1.0], [100, 1900]),
+    "PRBS": np.repeat(np.random.default_rng(0).integers(0, 2, 200) * 2.0 - 1.0, 10),
+    "a walk": np.cumsum(np.random.default_rng(0).standard_normal(2000)) * 0.1,
+}
+
+
+def held_record(u, denominator, late):
+    """Samples of a system behind a held input, to the last digit."""
+    top, below, _ = signal.cont2discrete(([1.0], denominator), 1 / FS, method="zoh")
+    y = signal.lfilter(top.ravel(), below, np.concatenate([np.zeros(late), u])[: u.size])
+    return hmpim.Record.from_arrays({"u": u}, {"y": y}, fs=FS)
+
+
+@pytest.mark.parametrize("late", [0, 7])
+@pytest.mark.parametrize("kind", HELD)
+def test_a_simulation_behind_a_held_input_is_right_without_a_doubt(kind, late):
+    """Rounding is neither a misfit nor a colour, and moves no output before its input."""
+    omega = 2 * np.pi * 5.0
+    (pair,) = hmpim.identify(held_record(HELD[kind], [omega**-2, 0.8 / omega, 1.0], late))
+    assert (pair.structure, pair.intersample, pair.verdict) == ("second_order", "zoh", "ok")
+    assert pair.delay.value == pytest.approx(late / FS, abs=1e-9)
+    assert pair.natural_frequency.value == pytest.approx(5.0, rel=1e-9)
+    assert not {w.code for w in pair.warnings} - {"initial_transient"}
+
+
+def test_a_lag_behind_a_held_input_is_found_where_that_is_stated():
+    """Without it the same samples are software's, one pole and a sample more of delay."""
+    record = held_record(HELD["PRBS"], [0.05, 1.0], 7)
+    (pair,) = hmpim.identify(record)
+    assert (pair.intersample, pair.delay.value) == ("sampled", 8 / FS)
+    (stated,) = hmpim.identify(record, intersample="zoh")
+    assert stated.time_constant.value == pytest.approx(0.05, rel=1e-9)
+    assert stated.delay.value == pytest.approx(0.035, abs=1e-9)
+    assert stated.verdict == "ok"
