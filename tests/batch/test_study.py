@@ -15,6 +15,7 @@ from hmpim.batch.run import Cluster
 from hmpim.batch.study import _order, outliers, write_study
 from hmpim.batch.summary import summary_of
 from hmpim.plots.draw.frames import ticks
+from hmpim.report.study import StudyPage, render_study
 
 
 @pytest.fixture(scope="module")
@@ -110,6 +111,28 @@ def test_records_are_in_the_order_in_which_people_count():
     assert (places.tolist(), along) == ([1.0, 0.0, 2.0], "Record, by name")
     every = study._names(told, np.arange(3))
     assert every == ("fleet.parquet#9", "fleet.parquet#10", "fleet.parquet#100")
+
+
+def test_records_are_named_without_their_common_folder_and_in_full_on_pointing():
+    names = [f"/data/fleet/rig-{1 + k % 2}/r{k}.csv" for k in range(40)]
+    values = np.random.default_rng(1).standard_normal(40)
+    values[5] = 100.0
+    columns = {"d": values, "d_std": np.ones(40), "d_low": values - 2, "d_high": values + 2}
+    told = Told(record=names, **columns)
+    _, (grid,) = study._standing_out(told, SimpleNamespace(name="d"), values, np.arange(40))
+    assert grid.rows[0][0] == "rig-2/r5.csv"
+    page = StudyPage(
+        title="", description="", headline="", met=None, grids=(grid,), sections=(), facts=()
+    )
+    assert '<th scope="row" title="/data/fleet/rig-2/r5.csv">rig-2/r5.csv' in render_study(page)
+    assert study._folder(told) == "/data/fleet/"
+    for records, folder in (
+        (["fleet.parquet#1", "fleet.parquet#10"], ""),
+        (["s3://bin/a/1.csv", "s3://bin/ab/2.csv"], "s3://bin/"),
+        (["a/1.csv", "/data/1.csv"], ""),
+        (["a/1.csv"], "a/"),
+    ):
+        assert study._folder(Told(record=records)) == folder
 
 
 def test_records_a_sample_apart_do_not_stand_out_where_most_are_equal():

@@ -4,7 +4,6 @@ import re
 from collections.abc import Sequence
 from datetime import datetime
 from os import PathLike
-from os.path import commonpath
 
 import numpy as np
 import scipy
@@ -116,6 +115,7 @@ def study_page(
         ),
         facts=(
             ("Folder", str(table.folder)),
+            *([("Records in", _folder(table))] if _folder(table) else []),
             ("Parts", str(len(table.paths))),
             ("Settings", f"{table.request.keep}; inputs {table.request.inputs or 'as stated'}; "
              f"outputs {table.request.outputs or 'as stated'}"),
@@ -319,19 +319,21 @@ def _standing_out(
         return (f"No record stands out (none beyond {limit:.1f} robust deviations).",), ()
     worst = far[np.argsort(-away[far], kind="stable")][:_MOST_ROWS]
     names = table.to_arrow(["record"]).column(0).take(there[worst]).to_pylist()
+    folder = _folder(table)
     ends = [column(table, f"{row.name}_{end}")[there[worst]] for end in ("low", "high")]
     grid = Grid(
         caption="Records that stand out",
         columns=("Record", "Value", "95 % interval", "Robust deviations"),
         rows=tuple(
             (
-                name,
+                name.removeprefix(folder),
                 f"{some[k]:.6g}",
                 _interval(low, high),
                 f"{away[k]:.1f}" if away[k] < 1e6 else "∞",
             )
             for name, k, low, high in zip(names, worst, *ends, strict=True)
         ),
+        hints=tuple(names),
     )
     count = "1 record lies" if far.size == 1 else f"{far.size} records lie"
     return (f"{count} beyond {limit:.1f} robust deviations.",), (grid,)
@@ -388,8 +390,16 @@ def _names(table: BatchTable, there: NDArray[np.int64]) -> tuple[str, ...]:
     """Names of the records in their order, without the folder that all have in common."""
     names = table.to_arrow(["record"]).column(0).take(there).to_pylist()
     names.sort(key=_counted)
-    common = commonpath(names) if len(names) > 1 and all("/" in name for name in names) else ""
-    return tuple(name.removeprefix(common).lstrip("/") for name in names)
+    folder = _folder(table)
+    return tuple(name.removeprefix(folder) for name in names)
+
+
+def _folder(table: BatchTable) -> str:
+    """The folder that all records have in common, up to its slash; empty if there is none."""
+    names = table.to_arrow(["record"]).column(0).to_pylist()
+    first, last = min(names), max(names)  # what these begin with, all between them begin with
+    same = [a == b for a, b in zip(first, last, strict=False)]
+    return str(first[: first.rfind("/", 0, [*same, False].index(False)) + 1])
 
 
 def _stamp(word: str | None) -> float | None:

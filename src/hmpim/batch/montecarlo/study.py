@@ -210,18 +210,17 @@ def _picture(
     wanted: tuple[float, str] | None,
     label: str,
 ) -> Picture:
-    """Points with intervals, one upon the other, and what is wanted as an upright line."""
+    """Points with intervals side by side, and what is wanted as a level line."""
     value, low, high = values
     at = np.arange(len(names), dtype=np.float64)
     ticks = tuple(
         (float(k), _SHORT.get(name, name.replace("_", " "))) for k, name in enumerate(names)
     )
-    rule = () if wanted is None else (Rule(at=wanted[0], axis="y", words=wanted[1]),)
+    rule = () if wanted is None else (Rule(at=wanted[0], axis="y", label=wanted[1]),)
     figure = Figure(
         panels=(
             Panel(
-                # Room behind the last mark for the words on the line.
-                x=Axis(ticks=ticks, low=-0.5, high=len(names) - 0.5 + 0.4 * len(rule), grid=False),
+                x=Axis(ticks=ticks, low=-0.5, high=len(names) - 0.5, grid=False),
                 y=Axis(label=label),
                 items=(Points(x=at, y=value, low=low, high=high, size=5.0), *rule),
             ),

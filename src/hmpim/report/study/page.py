@@ -21,7 +21,8 @@ class Grid:
     `note` stands below it: how it is to be read. A `folded` one shows its caption until it is
     opened. On paper one `at_end` stands opened behind the sections, and one `on_screen` not at all.
     A `dense` one has its errors beneath their values, and each column that `beneath` names beneath
-    the column before, so that more fits on a line.
+    the column before, so that more fits on a line. `hints` say what the names of the rows are
+    short for, none or one for each.
     """
 
     caption: str
@@ -33,6 +34,7 @@ class Grid:
     on_screen: bool = False
     dense: bool = False
     beneath: tuple[str, ...] = ()
+    hints: tuple[str, ...] = ()
 
     @property
     def heads(self) -> list[list[str]]:
@@ -71,6 +73,11 @@ class Section:
     found: tuple[str, ...]
     grids: tuple[Grid, ...]
     pictures: tuple[Picture, ...]
+
+    @property
+    def is_low(self) -> bool:
+        """Whether its pictures have one panel each, so that three sections fill a sheet."""
+        return len(self.pictures) > 1 and all(len(p.figure.heights) == 1 for p in self.pictures)
 
     def is_tall(self, picture: Picture) -> bool:
         """Whether a picture is twice as high as another of its section, beside which it stands."""
