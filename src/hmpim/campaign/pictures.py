@@ -28,8 +28,8 @@ _SAMPLED: tuple[Compare, ...] = (
 )  # compared with the hold: not every case is known without
 _HOLD = "Phase with hold (deg)"
 _MARKED_SAMPLED = (
-    "Vertical lines mark the −90° frequencies of the sampled response. It includes the hold of "
-    "the command; the tables' bandwidths of position commands do not."
+    "Vertical lines mark the −90° frequencies of the sampled response. Its phase includes the hold "
+    "of the command; the tables' bandwidths of position commands do not."
 )
 _CLEAR = 0.3  # share of the response: what is less sure is left out
 _HALF = 0.5  # share of the axis over which a curve is clear: of less, noise is what is seen

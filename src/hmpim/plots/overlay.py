@@ -20,6 +20,10 @@ _COLOURS: tuple[Colour, ...] = ("input", "output", "other", "limit", "model", "m
 PHASE = "Phase (deg)"
 _DASHES: tuple[Dashes, ...] = ("-", "--", "-.")
 
+_HALF_A_TURN = 180.0  # deg: a band this wide leaves the phase unknown
+_DEEPEST = 70.0  # dB below the top: what is lower would flatten the rest
+_ROOM = 0.12  # of a panel's height, for a line of words
+
 
 def overlaid_bode(
     curves: Sequence[tuple[str, BodeCurve]],
@@ -83,12 +87,10 @@ def overlaid_bode(
             low=min(float(c.frequency[0]) for c in filled),
             high=max(float(c.frequency[-1]) for c in filled),
         )
-        # What noise makes of the far end must not set the heights.
-        bottom = min(float(np.nanquantile(c.phase, 0.02)) for c in filled)
-        phase = replace(phase, low=max(bottom, -400.0) - 15.0, high=20.0)
-        bottom = min(float(np.nanquantile(c.magnitude_db, 0.02)) for c in filled)
-        top = max(float(np.nanmax(c.magnitude_db)) for c in filled)
-        magnitude = replace(magnitude, low=max(bottom, -50.0) - 2.0, high=min(top, 20.0) + 2.0)
+        bottom, top = _ends([c.phase[_known(c)] for c in filled])
+        phase = replace(phase, low=bottom - 15.0, high=max(top, 0.0) + 20.0)
+        bottom, top = _ends([c.magnitude_db[_known(c)] for c in filled])
+        magnitude = replace(magnitude, low=max(bottom, top - _DEEPEST) - 2.0, high=top + 2.0)
     lower = replace(x, label="Frequency (Hz)", numbered=True)
     return Figure(
         panels=(
@@ -98,6 +100,20 @@ def overlaid_bode(
         alt="Bode plots over each other: " + ", ".join(label for label, _ in curves) + ".",
         heights=(2.5, 2.5),
     )
+
+
+def _known(curve: BodeCurve) -> NDArray[np.bool_]:
+    """Where the phase is known: what noise makes of the rest must not set the heights."""
+    some = np.isfinite(curve.phase) & np.isfinite(curve.magnitude_db)
+    if curve.phase_low is not None and curve.phase_high is not None:
+        sure = some & (curve.phase_high - curve.phase_low < _HALF_A_TURN)
+        return sure if sure.any() else some
+    return some
+
+
+def _ends(values: Sequence[NDArray[np.float64]]) -> tuple[float, float]:
+    joined = np.concatenate(values)
+    return (float(joined.min()), float(joined.max())) if joined.size else (0.0, 0.0)
 
 
 def beside_bode(
@@ -136,6 +152,8 @@ def beside_bode(
     for column, label in enumerate(labels):
         inside = [i for i, (name, _) in enumerate(curves) if name == label]
         for panel in together.panels:
+            if within and panel.row:  # narrow: the words may reach below the curves' ends
+                panel = replace(panel, y=_with_room(panel.y, 0.2 + _ROOM))
             items: list[Item] = []
             if panel.row:
                 items.append(Rule(at=-90.0, axis="y", colour="muted", dashes=":", width=0.8))
@@ -168,6 +186,13 @@ def beside_bode(
     )
 
 
+def _with_room(axis: Axis, share: float) -> Axis:
+    """The same axis with a share of its length free below."""
+    if axis.low is None or axis.high is None:
+        return axis
+    return replace(axis, low=axis.high - (axis.high - axis.low) / (1.0 - share))
+
+
 def _interval(found: "Estimate") -> Rule:
     """A frequency with its 95 % interval; of one that is withheld, what noise alone does."""
     half = 1.96 * found.spread
@@ -179,7 +204,7 @@ def _marked(found: "Estimate", *, place: int) -> Rule:
     return replace(
         _interval(found),
         words=f"−90° at {with_error(found)} Hz",
-        words_at=0.2 - 0.12 * place,
+        words_at=0.2 - _ROOM * place,
         side="left",
     )
 

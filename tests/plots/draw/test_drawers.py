@@ -16,7 +16,7 @@ from hmpim.plots.curves import BodeCurve
 from hmpim.plots.draw import with_svg
 from hmpim.plots.draw.frames import frames, ticks
 from hmpim.plots.draw.layout import LINE, SIZE, places, text_width
-from hmpim.plots.overlay import beside_bode
+from hmpim.plots.overlay import beside_bode, overlaid_bode
 from hmpim.plots.style import COLOURS
 
 F = np.geomspace(0.1, 100.0, 30)
@@ -156,6 +156,24 @@ def test_columns_share_their_axes_and_each_curve_has_its_mark():
     assert last.words == "20.00 −0.20 +0.30 Hz"
     assert [line.label for line in figure.panels[2].of(Curve)] == ["500 Hz", "1000 Hz"]
     assert figure.panels[3].of(Rule)[-1].colour == figure.panels[3].of(Curve)[-1].colour
+    phase = figure.panels[1].y  # the words of two marks stand below all curves
+    lowest = min(curve.y.min() for panel in figure.panels[1::2] for curve in panel.of(Curve))
+    words = max(rule.words_at for rule in figure.panels[1].of(Rule) if rule.words)
+    assert (lowest - phase.low) / (phase.high - phase.low) > words + 0.1
+
+
+def test_heights_are_those_of_what_is_known():
+    whole = BodeCurve(frequency=F, magnitude_db=60 - 20 * np.log10(F), phase=-54 * F)
+    loud = np.where(F > 30.0, -9000.0, whole.phase)
+    unsure = np.where(F > 30.0, 200.0, 1.0)
+    far = replace(whole, phase=loud, phase_low=loud - unsure, phase_high=loud + unsure)
+    for curve, lowest in ((whole, whole.phase.min()), (far, whole.phase[F <= 30.0].min())):
+        magnitude, phase = (panel.y for panel in overlaid_bode([("one", curve)]).panels)
+        assert lowest - 20.0 < phase.low < lowest
+        assert phase.high == 20.0
+    assert magnitude.high > whole.magnitude_db.max()
+    ahead = replace(whole, phase=170 - F)
+    assert overlaid_bode([("one", ahead)]).panels[1].y.high > 170.0
 
 
 def test_a_mark_that_may_lie_anywhere_is_not_drawn(identified):
