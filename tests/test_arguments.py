@@ -362,8 +362,9 @@ def test_a_wrong_number_of_arguments_stays_pythons_own_error():
     def one(length: float) -> float:
         return length
 
-    with pytest.raises(TypeError, match="unexpected keyword"):
+    with pytest.raises(TypeError, match="unexpected keyword") as raised:
         one(width=1)
+    assert raised.value.__context__ is None  # one error, not one during another
     assert one(length=2) == 2
 
 

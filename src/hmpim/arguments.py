@@ -97,8 +97,8 @@ def _guarded(function: Callable[..., Any], owner: Any) -> Callable[..., Any]:
     def guarded(*args: Any, **kwargs: Any) -> Any:
         try:
             given = signature.bind(*args, **kwargs).arguments
-        except TypeError:  # a name too many or too few: Python says it well
-            return function(*args, **kwargs)
+        except TypeError:
+            given = {}  # a name too many or too few: Python says it well, below
         for name, hint in hints().items():
             if name in given:
                 check_argument(name, given[name], hint)
