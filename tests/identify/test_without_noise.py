@@ -1,6 +1,6 @@
 """A simulation without noise, as a first try of the tool often is: right, and not accused."""
 
-from dataclasses import fields
+from dataclasses import fields, replace
 
 import numpy as np
 import pytest
@@ -73,3 +73,14 @@ def test_a_lag_behind_a_held_input_is_found_where_that_is_stated():
     assert stated.time_constant.value == pytest.approx(0.05, rel=1e-9)
     assert stated.delay.value == pytest.approx(0.035, abs=1e-9)
     assert stated.verdict == "ok"
+
+
+@pytest.mark.parametrize("late", [0, 7])
+def test_compressed_records_without_noise_are_identified_too(late):
+    """Of sums less exact than what is left of them no colour is read."""
+    omega = 2 * np.pi * 5.0
+    record = held_record(HELD["PRBS"], [omega**-2, 0.8 / omega, 1.0], late)
+    (pair,) = hmpim.identify(hmpim.compress(replace(record, intersample="zoh"), lags=1000))
+    assert (pair.structure, pair.verdict) == ("second_order", "ok")
+    assert pair.delay.value == pytest.approx(late / FS, abs=1e-6)
+    assert pair.natural_frequency.value == pytest.approx(5.0, rel=1e-4)

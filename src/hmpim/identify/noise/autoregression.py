@@ -101,7 +101,11 @@ def _left(gram: Real) -> tuple[Real, Real]:
     # Latest sample last: the factor's last row holds what each order explains of it.
     ordered = np.roll(gram, -1, axis=(0, 1)) / scale
     ordered += 1e-13 * np.trace(ordered) * np.eye(gram.shape[0])
-    factor = np.linalg.cholesky(ordered)
+    try:
+        factor = np.linalg.cholesky(ordered)
+    except np.linalg.LinAlgError:  # sums less exact than what is left of them: nearer to white
+        ordered -= 2.0 * np.linalg.eigvalsh(ordered)[0] * np.eye(gram.shape[0])
+        factor = np.linalg.cholesky(ordered)
     explained = np.concatenate([[0.0], np.cumsum(factor[-1, :-1] ** 2)])
     return np.maximum(ordered[-1, -1] - explained, np.finfo(float).tiny), ordered
 

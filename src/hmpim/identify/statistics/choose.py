@@ -41,6 +41,9 @@ _TASTE = 4
 _LONG_TASTE = 12
 """Steps from each start before the best one is followed to its end; of richer structures."""
 
+_ROUNDED = 1e-13
+"""Share of the output's power below which what is left over is the rounding of sums."""
+
 _FINAL_PRECISION = 1e-10
 """Of the chosen fit: 1e-5 standard deviations."""
 
@@ -343,7 +346,11 @@ def left_over(products: Products, fitted: Fitted) -> LeftOver:
     if products.order:
         plain = Products(products.statistics, skipped=products.skipped)
     gram, count = fitted.residual(plain).gram(products.skipped)
-    power = max(float(gram[0, 0]), np.finfo(float).tiny)
+    energy = plain.moments(fitted.rows[:1], fitted.steady[:1]).energy
+    if gram[0, 0] <= _ROUNDED * energy:
+        least = fitted.fit.objective / products.counted
+        return LeftOver(power=least, counted=count, innovation=least, share=1.0, noise=np.ones(1))
+    power = float(gram[0, 0])
     rho = gram[0, 1 : max(min(gram.shape[0], count // 4), 1)] / power
     lags = np.arange(1, rho.size + 1)
     box = count * (count + 2.0) * float(np.sum(rho**2 / (count - lags)))
