@@ -9,6 +9,7 @@ import pytest
 
 import hmpim
 from hmpim.campaign import parse_plan, read_plan, run_campaign, shipped_plan
+from hmpim.campaign.compare import findings
 from hmpim.campaign.crossing import first_crossing, samples_bandwidth
 from hmpim.campaign.grids import PARAMETERS, case_grid
 from hmpim.campaign.pictures import section_pictures
@@ -150,7 +151,7 @@ def test_page_says_how_to_read_it_and_why_a_verdict_is_not_ok(demo):
     study, folder = demo
     page = study_page(study)
     (cases,) = [grid for grid in page.grids if grid.caption.startswith("Every case")]
-    assert "behind the hold" in cases.note
+    assert "without the hold" in cases.note
     assert "without friction" in cases.note
     assert "Noise (deg)" in cases.columns
     assert "Load" not in cases.columns  # the usual one in every row
@@ -277,6 +278,8 @@ def test_an_asymmetric_interval_is_written_with_both_sides(demo):
         in case_grid([replace(row, parameters=readings)], "", explained=True).note
     )
     assert cells["Bias (deg)"] == "0.100 ± 0.010"
+    (said, *_) = findings([replace(row, parameters=readings)], [], "axes")
+    assert said.startswith("elevation: −90° at 6.922 −0.031 +0.068 Hz, 1.1 % below the exact value")
 
 
 def test_a_positive_figure_whose_error_exceeds_it_is_not_determined(demo):

@@ -26,7 +26,7 @@ def bias():
         (0.6 + 0.019, "The two agree"),
         (0.6 + 0.021, "0.021 above: equation (11)"),
         (0.5, "0.1 below: equation (11)"),
-        (None, "The paper's step has no answer"),
+        (None, "The paper's step gives no value"),
     ],
 )
 def test_two_figures_agree_within_two_standard_deviations_and_else_say_why(paper, begins):

@@ -9,6 +9,7 @@ from hmpim.campaign.crossing import first_crossing, samples_bandwidth
 from hmpim.campaign.plan import Compare
 from hmpim.campaign.study import Reading, Row
 from hmpim.identify.result.digits import percent as in_percent
+from hmpim.plots.style import with_error
 
 __all__ = [
     "HEARD",
@@ -237,10 +238,11 @@ def _at_90(row: Row, varied: str) -> str:
     where = f" ({varied})" if varied else ""
     if found is None:
         return f"no bandwidth{where}"
-    text = f"−90° at {found.value:.2f} ± {found.std:.2f} Hz{where}"
+    text = f"−90° at {with_error(found.estimate)} Hz{where}"
     if row.exact_bandwidth is not None:
-        off = f"{_percent(found.value, row.exact_bandwidth):+.1f}".replace("-", "−")
-        text += f", {off} % from {row.exact_bandwidth:.2f} Hz, the exact value without friction"
+        off = _percent(found.value, row.exact_bandwidth)
+        text += f", {abs(off):.1f} % {'above' if off > 0.0 else 'below'} the exact value without "
+        text += f"friction, {row.exact_bandwidth:.2f} Hz"
     return text
 
 
@@ -266,8 +268,8 @@ def _loaded(rows: Sequence[Row]) -> list[str]:
     if not known:
         return []
     return [
-        "Predicted load of all axes together, checked before anything moved: at most "
-        f"{', '.join(known)} of the torque limit."
+        "Predicted peak torque with all axes moving together, checked before any motion, as shares "
+        f"of the limit: {', '.join(known)}."
     ]
 
 
@@ -276,7 +278,7 @@ def _strongest(couplings: Sequence[dict[str, Any]]) -> str:
     low, high = couplings[0]["band"]
     where = f"from {low:g} to {high:g} Hz"
     if not seen:
-        return f"No coupling {where} exceeds its noise by three standard deviations."
+        return f"No coupling {where} exceeds three standard deviations."
     top = max(seen, key=lambda c: c["gain"])
     exact = top.get("exact")
     beside = "" if exact is None else f" (exact without friction: {100 * exact:.2f} %)"

@@ -40,13 +40,13 @@ _LABELS = {words.name: words.label for words in GLOSSARY}
 _INLINE = {words.name: words.inline for words in GLOSSARY}
 
 _READING = (
-    "−90° is that of the fitted model: behind the hold where the record says that its input is "
-    "held (position commands alone, mode P), of the sampled response elsewhere; −90° of the "
-    "response is the same, read off the measured response"
+    "−90° is that of the fitted model, without the hold where the record states that its input is "
+    "held (mode P, position commands alone), and of the sampled response, hold included, "
+    "elsewhere; −90° of the response is the same frequency, read off the measured response"
 )
 _DOUBTFUL = "? marks a doubtful figure; the others of its row are reliable"
 _SIDES = "−a +b states how far a 95 % interval that is not symmetric reaches to either side"
-_EXACT = "exact is the linearised mechanics of the simulated table, without friction"
+_EXACT = "exact is the value for the linearised mechanics of the simulated table, without friction"
 _NEGATIVE = (
     "a negative delay belongs to the fit, not to the unit: where feedforward or friction shape "
     "the response, the fit can trade dynamics for delay"
@@ -345,5 +345,5 @@ def coupling_grid(couplings: Sequence[dict[str, Any]]) -> Grid:
         ),
         rows=tuple(rows),
         note="A gain of less than three standard deviations is mostly noise: it limits how large "
-        "the coupling may be, and does not measure it.",
+        "the coupling may be, but does not measure it.",
     )

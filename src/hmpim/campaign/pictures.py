@@ -78,7 +78,8 @@ def _left_out(rows: Sequence[Row], every: Sequence[Row], compare: Compare) -> st
     if not noisy:
         return ""
     return (
-        f" Not drawn, as less than half of it is known to {100 * _CLEAR:.0f} %: {'; '.join(noisy)}."
+        f" Not drawn: {'; '.join(noisy)} (known to within {100 * _CLEAR:.0f} % over less than half "
+        "of the band)."
     )
 
 

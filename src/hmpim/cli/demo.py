@@ -35,8 +35,8 @@ def demo(
 ) -> None:
     """Design a stimulus inside limits, apply it to a simulated sensor, find its parameters.
 
-    The sensor is that of the paper's Fig. 17, so the true values are known, and stand next to the
-    results.
+    The sensor is that of the paper's Fig. 17, so the true values are known; they are printed next
+    to the results.
     """
     check_files(folders={"--out": out})
     from hmpim.experiment import run

@@ -84,11 +84,13 @@ def design(
     ] = "none",
     unit: Annotated[str, typer.Option(help="Unit of the position, such as deg.")] = "",
     resolution: Annotated[
-        float, typer.Option(help="Step to which the rig rounds positions; 0: none.")
+        float, typer.Option(help="Smallest step of the rig's position command; 0: none.")
     ] = 0.0,
     wanted_snr: Annotated[
         float | None,
-        typer.Option(help="Signal-to-noise ratio wanted at each frequency, dB; less is refused."),
+        typer.Option(
+            help="Lowest signal-to-noise ratio at any frequency, dB; a stimulus below is refused."
+        ),
     ] = None,
     noise: Annotated[
         float | None,
@@ -111,9 +113,9 @@ def design(
 ) -> None:
     """Design a stimulus inside position, rate and acceleration limits.
 
-    The amplitude is set to its limit, then the extinction factor is raised until rate
-    and acceleration fit. The axis starts and ends at rest. Multisines are shaped as the
-    limits are; binary sequences and steps move from level to level smoothly.
+    The amplitude is set to its limit, then the extinction factor is raised until rate and
+    acceleration are within theirs. The axis starts and ends at rest. The spectrum of a
+    multisine follows the limits; binary sequences and steps move smoothly between levels.
 
     Example:
 

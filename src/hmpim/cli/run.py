@@ -83,7 +83,7 @@ def run(
     log: Annotated[
         Path | None,
         typer.Option(
-            "--log", metavar="FILE", help="Each check, arm, stop and fault with its time."
+            "--log", metavar="FILE", help="Write each check, arming, stop and fault with its time."
         ),
     ] = None,
     watchdog: Annotated[

@@ -37,7 +37,7 @@ def table(
     ] = "P",
     load: Annotated[
         str,
-        typer.Option("--load", metavar="NAME", help="What it carries: acceptance, bracket, ..."),
+        typer.Option("--load", metavar="NAME", help="Load on the table: acceptance, bracket, ..."),
     ] = "acceptance",
     sensor: Annotated[
         Path | None,
@@ -51,7 +51,9 @@ def table(
     watchdog: Annotated[
         float,
         typer.Option(
-            "--watchdog", metavar="S", help="Silence after which it brakes, at most 0.1 s."
+            "--watchdog",
+            metavar="S",
+            help="Time without a command after which it brakes, at most 0.1 s.",
         ),
     ] = 0.08,
     seed: Annotated[
@@ -65,12 +67,16 @@ def table(
     ] = None,
     clock_offset: Annotated[
         float,
-        typer.Option("--clock-offset", metavar="S", help="Set its clock ahead by this much."),
+        typer.Option(
+            "--clock-offset", metavar="S", help="Set the table's clock ahead by this much."
+        ),
     ] = 0.0,
     clock_drift: Annotated[
         float,
         typer.Option(
-            "--clock-drift", metavar="PPM", help="Let its clock gain this many µs per second."
+            "--clock-drift",
+            metavar="PPM",
+            help="Let the table's clock gain this many µs per second.",
         ),
     ] = 0.0,
 ) -> None:

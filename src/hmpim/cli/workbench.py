@@ -29,7 +29,7 @@ def workbench(
             "--rig",
             metavar="RIG",
             autocompletion=complete_rig,
-            help="A rig to offer beside those of hmpim.toml; may be repeated.",
+            help="A rig to offer in addition to those of hmpim.toml; may be repeated.",
         ),
     ] = None,
     rig_file: Annotated[
@@ -40,7 +40,10 @@ def workbench(
         bool, typer.Option("--browser/--no-browser", help="Open it in the browser.")
     ] = True,
     max_upload: Annotated[
-        float, typer.Option("--max-upload", metavar="MB", help="Largest file that may be dropped.")
+        float,
+        typer.Option(
+            "--max-upload", metavar="MB", help="Largest file that may be dropped on a page."
+        ),
     ] = 2000.0,
     grace: Annotated[
         float,

@@ -341,7 +341,7 @@ def pair_deviation(pair: "PairIdentification", *, fs: float | None = None) -> Fi
             f"pair {pair.input!r} → {pair.output!r} has no model or no measured response to compare"
         )
     curve = deviation_curve(measured_curve(response, near=model), model)
-    figure = bode([("measured over model", "input", curve)])
+    figure = bode([("measured ÷ model", "input", curve)])
     zero = Rule(at=0.0, axis="y", colour="model", width=1.2)
     panels = []
     for panel in figure.panels:

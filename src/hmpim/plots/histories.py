@@ -169,7 +169,7 @@ def model_over_measurement(
     for row, (part, title) in enumerate(
         (
             (slice(None), "Whole record"),
-            (slice(start, stop), "A tenth of it, where the output moves most"),
+            (slice(start, stop), "One tenth of the record, where the output moves most"),
         )
     ):
         there = time[part]

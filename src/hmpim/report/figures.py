@@ -228,7 +228,7 @@ def _response_pictures(
         pictures.append(
             Picture(
                 key="deviation",
-                title="Measured response over model",
+                title="Measured response divided by the model",
                 caption="Measured response divided by the model. If the model is right, the band "
                 "contains the dashed line at 19 frequencies of 20.",
                 description=f"Magnitude and phase of the measured response over the model's, "
@@ -247,7 +247,7 @@ def _model_pictures(pair: PairIdentification, unit: str) -> list[Picture]:
     return [
         Picture(
             key="model",
-            title="Model over measurement",
+            title="Model and measurement",
             caption="Output of the model and measured output; the fit is "
             f"{pair.fit_percent:.2f} %.",
             description=f"Measured and modelled {pair.output} over time; the fit is "

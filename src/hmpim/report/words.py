@@ -72,9 +72,9 @@ GLOSSARY: tuple[ParameterWords, ...] = (
     ParameterWords(
         name="scale_factor",
         label="Scale factor",
-        meaning="Output over input when both stand still, without the bias.",
-        differs="equation (13) divides samples of the slow beginning, after subtracting the bias "
-        "of (11), which is too large",
+        meaning="Ratio of output to input at zero frequency, without the bias.",
+        differs="equation (13) is a ratio of samples at the slow start of the sweep, after the "
+        "bias of (11), which is too large, is subtracted",
     ),
     ParameterWords(
         name="bias",
@@ -93,10 +93,10 @@ GLOSSARY: tuple[ParameterWords, ...] = (
     ParameterWords(
         name="natural_frequency",
         label="Natural frequency",
-        meaning="Undamped natural frequency of second-order dynamics: the frequency at which they "
-        "alone turn the phase by 90°.",
-        differs="it is read off a noisy phase from which (25) takes the delay of (8), which is "
-        "too long",
+        meaning="Undamped natural frequency of second-order dynamics: the frequency at which "
+        "their own phase is −90°.",
+        differs="it is read off a noisy phase from which (25) subtracts the delay of (8), which "
+        "is too long",
         positive=True,
     ),
     ParameterWords(
@@ -124,7 +124,7 @@ GLOSSARY: tuple[ParameterWords, ...] = (
     ParameterWords(
         name="bandwidth_phase90_without_delay",
         label="Bandwidth, −90° without delay",
-        meaning="Frequency at which the dynamics alone turn the phase by 90°.",
+        meaning="Frequency at which the phase of the dynamics alone, without the delay, is −90°.",
         positive=True,
     ),
     ParameterWords(
@@ -416,7 +416,7 @@ def remark(words: ParameterWords, estimate: Estimate | None, paper: float | None
     if not words.differs:
         return ""
     if paper is None:
-        return "The paper's step has no answer on this record."
+        return "The paper's step gives no value for this record."
     if estimate is None:
         return "The chosen model has none."
     gap = paper - estimate.value
