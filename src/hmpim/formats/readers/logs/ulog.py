@@ -87,10 +87,12 @@ def _values(values: NDArray[Any]) -> NDArray[Any]:
 def _said(file: Any, path: Path) -> Iterator[Finding]:
     lost = [d.duration for d in file.dropouts]
     if lost:
-        message = (
-            f"the logger dropped data {len(lost)} times, {sum(lost)} ms in all and "
-            f"{max(lost)} ms at most at once; look for gaps"
+        how = (
+            f"once, for {lost[0]} ms"
+            if len(lost) == 1
+            else f"{len(lost)} times, for {sum(lost)} ms in total and {max(lost)} ms at most"
         )
+        message = f"the logger dropped data {how}; look for gaps"
         yield Finding(code="dropouts", message=message, severity="info", parameters=())
     if file.file_corruption:
         message = "parts of the file are damaged and were left out; look for gaps"
