@@ -328,6 +328,16 @@ SOFTWARE = (
     ),
     other("alpha-beta tracker", "Position estimate", m.program(m.tracker, SWEEP)),
     other("smoother", "A moving average", m.program(m.smoother, SWEEP)),
+    other(
+        "filter from zero",
+        "One of these, its memory zeros while white numbers were under way",
+        m.program(m.any_filter, k.sequence("white", quiet=False), settled=False),
+    ),
+    other(
+        "filter from zero, PRBS",
+        "The same under a binary sequence",
+        m.program(m.any_filter, k.sequence("prbs", quiet=False), settled=False),
+    ),
     other("several rates", "A task at every 2 to 8 samples", m.several_rates),
     other("held output", "Updated on a slower clock of its own", m.held_output),
     other("two clocks", "Input and output logged at rates of their own", m.two_clocks),

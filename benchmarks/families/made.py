@@ -204,19 +204,24 @@ def program(
     drive: k.MakeDrive,
     *,
     snr: tuple[float, float] | None = None,
+    settled: bool = True,
 ) -> Make:
-    """Software, sample over sample; without noise but rounding, unless `snr` (dB) is given."""
+    """Software, sample over sample; without noise but rounding, unless `snr` (dB) is given.
+
+    Under noise it is stated to be software; without, nothing is.
+    """
 
     def make(rng: np.random.Generator) -> Draw:
         signal = drive(rng)
         u = signal.sampled()
         filter_ = unit(rng)
-        y = filter_.run(u)
+        y = filter_.run(u, settled=settled)
         std = 0.0
         if snr is not None:
             std = float(np.std(y)) * 10 ** (-float(rng.uniform(*snr)) / 20)
             y = y + std * rng.standard_normal(y.size)
-        return _programmed(filter_, signal, u, y, std)
+        draw = _programmed(filter_, signal, u, y, std)
+        return draw if std else replace(draw, options={})
 
     return make
 
@@ -316,6 +321,12 @@ def one_pole(rng: np.random.Generator) -> software.Filter:
     share = float(rng.uniform(0.03, 0.4))
     late = int(rng.integers(0, 10))
     return software.Filter(top=np.array([share]), below=np.array([1.0, share - 1.0]), late=late)
+
+
+def any_filter(rng: np.random.Generator) -> software.Filter:
+    """One of the filters here."""
+    kinds = (pure_delay, one_pole, low_pass, tracker, smoother)
+    return kinds[int(rng.integers(len(kinds)))](rng)
 
 
 def several_rates(rng: np.random.Generator) -> Draw:

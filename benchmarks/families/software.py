@@ -19,8 +19,11 @@ class Filter:
     below: np.ndarray
     late: int = 0
 
-    def run(self, u: np.ndarray) -> np.ndarray:
-        """Output for an input that stood at u[0] before; it starts settled."""
+    def run(self, u: np.ndarray, *, settled: bool = True) -> np.ndarray:
+        """Output for an input that stood at u[0] before, or of a memory that holds zeros."""
+        if not settled:
+            moved = np.concatenate([np.zeros(self.late), u])[: u.size]
+            return lfilter(self.top, self.below, moved)
         moved = np.concatenate([np.full(self.late, u[0]), u])[: u.size]
         return lfilter(self.top, self.below, moved - u[0]) + self.gain * u[0]
 
