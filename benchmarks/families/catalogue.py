@@ -239,6 +239,14 @@ BEGINNINGS = (
 NOISE = (
     family("noisy", "-10 to 10 dB", SECOND, SWEEP, snr=(-10, 10)),
     family("clean", "80 to 120 dB", SECOND, SWEEP, snr=(80, 120)),
+    family("no noise", "200 to 280 dB: rounding alone", SECOND, SWEEP, snr=(200, 280)),
+    family(
+        "no noise, held",
+        "The same behind a converter at the rate, a binary sequence",
+        SECOND,
+        k.sequence("prbs"),
+        snr=(200, 280),
+    ),
     family(
         "clean and held",
         "80 to 120 dB; a converter at the rate",

@@ -28,7 +28,7 @@ from hmpim.identify.reading.bandwidth import response_bandwidths
 from hmpim.identify.reading.coefficients import coefficients_of, highest_first
 from hmpim.identify.reading.propagation import response_std
 from hmpim.identify.reading.readings import Readings, read_parameters
-from hmpim.identify.reading.spanned import blurred, spanned
+from hmpim.identify.reading.spanned import blurred, spanned, without_noise
 from hmpim.identify.result import (
     Candidate,
     FrequencyResponse,
@@ -41,7 +41,7 @@ from hmpim.identify.result import (
 from hmpim.identify.result.error_bars import estimate, noise_estimate
 from hmpim.identify.result.groups import EVERY
 from hmpim.identify.section_iv.paper import paper_estimates
-from hmpim.identify.worth import ROUNDING, WORTH
+from hmpim.identify.worth import INTERPOLATED, ROUNDING, WORTH
 from hmpim.record import Finding
 
 __all__ = ["Described", "describe", "describe_dead"]
@@ -198,10 +198,15 @@ def _evidence(
         highest=min(band[1], fs / 2),
         bent=[(one.fit, one.farthest) for one in moves],
     )
+    if any(one.matters for one in moves):
+        whole = blurred(whole, WORTH)
+    unexplained = 1.0 - _fit_percent(joint) / 100.0
+    if unexplained < INTERPOLATED and not fit.structure.sampled:
+        whole = without_noise(whole)
     evidence = Evidence(
         joint=joint,
         readings=readings,
-        spanned=blurred(whole, WORTH) if any(one.matters for one in moves) else whole,
+        spanned=whole,
         misfit=left,
         u=u,
         fs=fs,

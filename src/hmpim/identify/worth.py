@@ -8,6 +8,7 @@ __all__ = [
     "BLURRED",
     "DEEPEST",
     "FEW",
+    "INTERPOLATED",
     "MATERIAL",
     "MOST",
     "MUCH",
@@ -22,6 +23,9 @@ __all__ = [
 
 ROUNDING = 1e-9
 """Share of an output (r.m.s.) up to which a model explains it to rounding."""
+
+INTERPOLATED = 1e-7
+"""The same up to which it may be the error of interpolation: -140 dB, below a converter's noise."""
 
 WORTH = 0.003
 """Share of a figure, or of an output (r.m.s.), from which an effect is worth a word."""

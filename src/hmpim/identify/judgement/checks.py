@@ -30,7 +30,7 @@ from hmpim.identify.judgement.residual import (
 )
 from hmpim.identify.judgement.response import bandwidth_disagrees, grazed_bandwidth
 from hmpim.identify.judgement.structure import missed_pole, other_order
-from hmpim.identify.worth import ROUNDING
+from hmpim.identify.worth import INTERPOLATED
 from hmpim.record import Finding
 
 __all__ = ["CHECKS", "Check", "judge"]
@@ -87,7 +87,7 @@ _OF_THE_RESIDUAL: frozenset[Check] = frozenset(
         *(unsampled_input, feedback, other_order, missed_pole),
     }
 )
-"""Those that ask something of what a model leaves over; nothing where that is rounding."""
+"""Those that ask something of the residual; nothing where that is the error of interpolation."""
 
 
 def judge(evidence: Evidence, *, checks: Sequence[Check] | None = None) -> tuple[Finding, ...]:
@@ -108,7 +108,7 @@ def judge(evidence: Evidence, *, checks: Sequence[Check] | None = None) -> tuple
     """
     if checks is None:
         checks = SAMPLED if evidence.joint.best.fit.structure.sampled else CHECKS
-        if evidence.unexplained < ROUNDING:
+        if evidence.unexplained < INTERPOLATED:
             checks = [check for check in checks if check not in _OF_THE_RESIDUAL]
     found: list[Finding] = []
     for check in checks:

@@ -23,9 +23,17 @@ from hmpim.identify.fitting.trial import JointFit, Trial
 from hmpim.identify.reading.figures import figures_at, figures_of
 from hmpim.identify.result import Estimate, Parameters
 from hmpim.identify.result.groups import MODELLED, PHASE_SPLIT
-from hmpim.identify.worth import FEW, TWICE
+from hmpim.identify.worth import FEW, ROUNDING, TWICE
 
-__all__ = ["asked_rivals", "bent_figures", "blurred", "plainer_rivals", "rivals_of", "spanned"]
+__all__ = [
+    "asked_rivals",
+    "bent_figures",
+    "blurred",
+    "plainer_rivals",
+    "rivals_of",
+    "spanned",
+    "without_noise",
+]
 
 _STEP = 1e-6
 """Step of a derivative: logarithms of times, samples of delay, share of the numerator."""
@@ -189,6 +197,20 @@ def blurred(parameters: Parameters, share: float) -> Parameters:
         wide = replace(own, std=None, ci95=(low - room, high + room))
         moved[name] = replace(wide, std=wide.spread)
     return replace(parameters, **moved)
+
+
+def without_noise(parameters: Parameters) -> Parameters:
+    """Widen each interval by rounding, and the noise's to 0: the residual need not be noise.
+
+    Parameters
+    ----------
+    parameters : Parameters
+        Of a model whose residual may be the error of interpolation between the samples.
+    """
+    wide, noise = blurred(parameters, ROUNDING), parameters.noise_std
+    if noise is None or noise.ci95 is None:
+        return wide
+    return replace(wide, noise_std=replace(noise, std=None, ci95=(0.0, noise.ci95[1])))
 
 
 def bent_figures(fit: Fit, moved: Real, *, fs: float, highest: float) -> dict[str, float | None]:
