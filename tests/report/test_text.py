@@ -1,10 +1,12 @@
 import io
 from dataclasses import replace
+from types import SimpleNamespace
 
 from rich.console import Console
 
 from hmpim.identify.judgement import judged
-from hmpim.identify.records.levels import Trend
+from hmpim.identify.records.levels import LevelComparison, Trend
+from hmpim.identify.result import Parameters
 from hmpim.record import Finding
 from hmpim.report import print_result
 from hmpim.report.numbers import format_value
@@ -81,5 +83,9 @@ def test_a_change_of_more_than_all_is_written_in_full():
         probability=1e-9,
         change=1.4,
     )
-    table = _trend_table((trend,), "")
+    compared = LevelComparison(
+        amplitudes=(1.0, 2.0), trends=(trend,), linear_up_to=1.0, findings=()
+    )
+    pair = SimpleNamespace(structure="static", parameters=Parameters())
+    table = _trend_table(compared, [pair, pair])
     assert [str(next(column.cells)) for column in table.columns][-2:] == ["+140 %", "< 0.1 %"]

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+from hmpim.identify import Estimate, PairIdentification
 from hmpim.identify.records.levels import LevelComparison, Levels, Trend
 from hmpim.identify.records.repeats import RepeatedPair, Repeats
 from hmpim.identify.result.digits import percent
@@ -17,12 +18,17 @@ if TYPE_CHECKING:
     from rich.table import Table
 
 __all__ = [
+    "level_cells",
     "linear_words",
+    "marked_value",
     "percent_words",
     "print_levels",
     "print_repeats",
     "repeats_table",
 ]
+
+
+_POSITIVE = {words.name for words in GLOSSARY if words.positive}
 
 
 def repeats_table(pair: RepeatedPair) -> "Table":
@@ -131,7 +137,9 @@ def print_levels(levels: Levels, names: Sequence[str], console: "Console") -> No
         console.print(Text(printable(f"{pair.input} → {pair.output}"), style="bold"))
         unit = compared.unit
         if compared.trends:
-            console.print(_trend_table(compared.trends, unit))
+            order = sorted(range(len(names)), key=lambda k: compared.amplitudes[k])
+            each = [levels.results[k][pair.output, pair.input] for k in order]
+            console.print(_trend_table(compared, each))
             words = linear_words(compared, unit)
             console.print(Text(f"{words[:1].upper()}{words[1:]}."))
         else:
@@ -163,27 +171,66 @@ def linear_words(compared: LevelComparison, unit: str) -> str:
     return f"{said} {unit}".rstrip()
 
 
-def _trend_table(trends: Sequence[Trend], unit: str) -> "Table":
+def marked_value(estimate: Estimate | None, name: str) -> str:
+    """Write a parameter's value with its error, a doubtful one with a question mark.
+
+    Examples
+    --------
+    >>> marked_value(Estimate(value=0.4, std=None, ci95=None, verdict="doubtful"), "damping_ratio")
+    '0.4 ± ?'
+    """
+    if estimate is None:
+        return "–"
+    shown = format_value(estimate, positive=name in _POSITIVE)
+    return shown if estimate.verdict == "ok" or shown.endswith("?") else f"{shown} ?"
+
+
+def level_cells(
+    trend: Trend, each: Sequence[PairIdentification], amplitudes: Sequence[float]
+) -> list[str]:
+    """Write one parameter at each level, as compared: by one structure at all of them.
+
+    Parameters
+    ----------
+    trend : Trend
+        Of the parameter.
+    each : sequence of PairIdentification
+        The pair at each level, by rising amplitude.
+    amplitudes : sequence of float
+        Of all levels, rising.
+    """
+    own = [getattr(pair.parameters, trend.name) for pair in each]
+    alike = [pair.structure == each[0].structure for pair in each]
+    kept = {e.value for e, same in zip(own, alike, strict=True) if same and e is not None}
+    # Found once more, by the structure of the smallest amplitude.
+    again = {
+        amplitude: plus_minus(value, std)
+        for amplitude, value, std in zip(trend.amplitudes, trend.values, trend.stds, strict=True)
+        if value not in kept
+    }
+    return [
+        marked_value(estimate, trend.name) if same else again.get(amplitude, "–")
+        for amplitude, estimate, same in zip(amplitudes, own, alike, strict=True)
+    ]
+
+
+def _trend_table(compared: LevelComparison, each: Sequence[PairIdentification]) -> "Table":
     from rich.box import SIMPLE_HEAD
     from rich.table import Table
     from rich.text import Text
 
     labels = {words.name: words.label for words in GLOSSARY}
-    amplitudes = sorted({a for trend in trends for a in trend.amplitudes})
+    amplitudes, unit = sorted(compared.amplitudes), compared.unit
     table = Table(box=SIMPLE_HEAD, pad_edge=False)
     table.add_column("Parameter, at amplitude" + (f" ({printable(unit)})" if unit else ""))
     for amplitude in amplitudes:
         table.add_column(f"{amplitude:.4g}", justify="right")
     table.add_column("Change", justify="right")
     table.add_column("Chance", justify="right")
-    for trend in trends:
-        known = {
-            a: plus_minus(value, std)
-            for a, value, std in zip(trend.amplitudes, trend.values, trend.stds, strict=True)
-        }
+    for trend in compared.trends:
         cells = [
             labels.get(trend.name, trend.name),
-            *(known.get(a, "–") for a in amplitudes),
+            *level_cells(trend, each, amplitudes),
             f"{'+' if trend.change > 0 else ''}{percent(trend.change)} %",
             percent_words(trend.probability),
         ]

@@ -25,9 +25,8 @@ from hmpim.report.numbers import (
     format_interval,
     format_number,
     format_value,
-    plus_minus,
 )
-from hmpim.report.repeats_text import linear_words, percent_words
+from hmpim.report.repeats_text import level_cells, linear_words, marked_value, percent_words
 from hmpim.report.study import Grid, Section, StudyPage, render_study
 from hmpim.report.words import GLOSSARY, VERDICTS, by_weight, label_of, structure_words
 
@@ -285,7 +284,7 @@ def _by_run(
                 VERDICTS[pair.verdict],
                 structure_words(pair.structure),
                 f"{pair.fit_percent:.2f}",
-                *(_cell(getattr(pair.parameters, one), one) for one in known),
+                *(marked_value(getattr(pair.parameters, one), one) for one in known),
             )
             for k, (name, pair) in enumerate(zip(names, each, strict=True))
         ),
@@ -295,16 +294,6 @@ def _by_run(
 def _unit(each: Sequence[PairIdentification], name: str) -> str:
     known: list[Estimate] = [e for p in each if (e := getattr(p.parameters, name)) is not None]
     return known[0].unit
-
-
-_POSITIVE = {words.name for words in GLOSSARY if words.positive}
-
-
-def _cell(estimate: Estimate | None, name: str) -> str:
-    if estimate is None:
-        return "–"
-    shown = format_value(estimate, positive=name in _POSITIVE)
-    return shown if estimate.verdict == "ok" or shown.endswith("?") else f"{shown} ?"
 
 
 def _pictures(
@@ -425,25 +414,11 @@ def _in_columns(pictures: Sequence[Picture]) -> tuple[Picture, ...]:
 
 def _trends(one: _Levelled, *, several: bool) -> Grid:
     """How each parameter goes with the amplitude, as compared: by one structure at all levels."""
-    first = one.each[0]
     amplitudes = sorted(one.compared.amplitudes)
     rows = []
     for moved in one.compared.trends:
         own = [getattr(pair.parameters, moved.name) for pair in one.each]
-        alike = [pair.structure == first.structure for pair in one.each]
-        kept = {e.value for e, same in zip(own, alike, strict=True) if same and e is not None}
-        # Found once more, by the structure of the smallest amplitude.
-        again = {
-            amplitude: plus_minus(value, std)
-            for amplitude, value, std in zip(
-                moved.amplitudes, moved.values, moved.stds, strict=True
-            )
-            if value not in kept
-        }
-        cells = [
-            _cell(estimate, moved.name) if same else again.get(amplitude, "–")
-            for amplitude, estimate, same in zip(amplitudes, own, alike, strict=True)
-        ]
+        cells = level_cells(moved, one.each, amplitudes)
         unit = f" ({own[0].unit})" if own[0] is not None and own[0].unit else ""
         change = f"{'+' if moved.change > 0 else ''}{percent(moved.change)} %"
         chance = percent_words(moved.probability)
