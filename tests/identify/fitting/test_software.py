@@ -147,8 +147,16 @@ FILTERED = {
 }
 
 
-@pytest.mark.parametrize("name", FILTERED)
-@pytest.mark.parametrize("kind", MOVING)
+FROM_ZERO = [*(("white", name) for name in FILTERED), ("a cosine sweep", "z-6")]
+
+
+@pytest.mark.parametrize(
+    ("kind", "name"),
+    [
+        *FROM_ZERO,
+        *in_studies(*((k, n) for k in MOVING for n in FILTERED if (k, n) not in FROM_ZERO)),
+    ],
+)
 def test_a_filter_that_began_from_zero_in_the_midst_of_motion_is_found_without_a_remark(kind, name):
     """What a filter's memory holds before the record is nobody's: its first samples follow it."""
     u = MOVING[kind]
