@@ -100,10 +100,9 @@ class Windows:
         shape = (*outer, self.start.size, int(slot.max()) + 1, kinds, q)
         padded = np.zeros(shape, dtype=np.complex128)
         padded[..., self.near, slot, :, :] = vectors
-        conjugate = np.conj(padded).reshape(*outer, self.start.size, -1, q)
-        product = (conjugate @ inverse.swapaxes(-1, -2)).reshape(shape)
+        product = (padded.reshape(*outer, self.start.size, -1, q) @ inverse).reshape(shape)
         # Real parts alone of the products are asked for.
-        told = np.vecdot(padded.view(np.float64), np.conj(product).view(np.float64))
+        told = np.vecdot(padded.view(np.float64), product.view(np.float64))
         return np.asarray(told[..., self.near, slot, :])
 
     def without_dc(self) -> Real:

@@ -15,6 +15,7 @@ included, so it knows what the denominator costs.
 
 from dataclasses import dataclass
 from functools import cache
+from itertools import combinations_with_replacement
 
 import numpy as np
 from numpy.typing import NDArray
@@ -104,8 +105,10 @@ class Columns:
 
     Parameters
     ----------
-    carriers : complex ndarray, shape (w, a, s)
-        The inputs, and 1 where there is a T.
+    mirrored : complex ndarray, shape (a, w, s)
+        Conjugates of the inputs, and 1 where there is a T.
+    products : ndarray, shape (k, w, s)
+        Real and imaginary parts of conj(C) C' of each two of them, the same for every output.
     orders : tuple of int
         Highest power with each.
     powers : ndarray, shape (k, s)
@@ -114,7 +117,8 @@ class Columns:
         The columns themselves.
     """
 
-    carriers: Complex
+    mirrored: Complex
+    products: Real
     orders: tuple[int, ...]
     powers: Real
     linear: Complex
@@ -125,8 +129,13 @@ class Columns:
         most = max(*orders, DENOMINATOR_ORDER)
         powers = np.asarray(x ** np.arange(2 * most + 1)[:, None])
         each = [carriers[:, a, None] * powers[: p + 1] for a, p in enumerate(orders)]
+        products = []
+        for i, j in combinations_with_replacement(range(len(orders)), 2):
+            product = np.conj(carriers[:, i]) * carriers[:, j]
+            products += [product.real] if i == j else [product.real, product.imag]
         return cls(
-            carriers=carriers,
+            mirrored=np.conj(carriers.swapaxes(0, 1), order="C"),
+            products=np.stack(products),
             orders=orders,
             powers=powers,
             linear=np.concatenate(each, axis=1),
@@ -154,43 +163,76 @@ class Columns:
         gram : complex ndarray, shape (..., w, q, q)
         right : complex ndarray, shape (..., w, q, 1)
         """
-        shape, count = bent.shape, len(self.orders) + 1
-        carriers = np.empty((*shape[:-1], count, shape[-1]), dtype=np.complex128)
-        scaled = carriers[..., :-1, :]
-        if over is None:
-            scaled[...] = self.carriers
-        else:
-            np.multiply(self.carriers, over[..., None, :], out=scaled)
-        carriers[..., -1, :] = bent
-        mirror = np.conj(carriers)
-        pairs, product, carrier, power = _places(self.orders)
-        products = np.empty((*shape[:-1], len(pairs) + count, shape[-1]), dtype=np.complex128)
-        for k, (i, j) in enumerate(pairs):
-            np.multiply(mirror[..., i, :], carriers[..., j, :], out=products[..., k, :])
-        np.multiply(mirror, left[..., None, :], out=products[..., len(pairs) :, :])
-        real = np.empty((2, *products.shape))
-        real[0], real[1] = products.real, products.imag
-        sums = real @ self.powers.T
-        moments = sums[0] + 1j * sums[1]
-        gram = moments[..., product, np.add.outer(power, power)]
-        gram.imag *= np.where(np.greater.outer(carrier, carrier), -1.0, 1.0)
-        right = moments[..., len(pairs) + carrier, power]
-        return gram, right[..., None]
+        outer, size = bent.shape[:-1], bent.shape[-1]
+        places = _places(self.orders)
+        # Real and imaginary parts stand apart, each in one block: all sums are one product.
+        parts = np.empty((places.parts, *outer, size))
+        known = self.products.shape[0]
+        weight = np.ones(()) if over is None else over.real**2 + over.imag**2
+        for part, own in zip(parts, self.products, strict=False):
+            np.multiply(own, weight, out=part)
+        np.add(bent.real**2, bent.imag**2, out=parts[known])
+        mirror = [own if over is None else own * np.conj(over) for own in self.mirrored]
+        each = [own * bent for own in mirror] + [own * left for own in (*mirror, np.conj(bent))]
+        for k, product in enumerate(each):
+            parts[known + 1 + 2 * k], parts[known + 2 + 2 * k] = product.real, product.imag
+        sums = (parts.reshape(places.parts, -1, size) @ self.powers.T).swapaxes(0, 1)
+        moments = sums.reshape(sums.shape[0], -1)
+        gram = np.take(moments, places.gram, axis=1)
+        gram *= places.sign
+        right = np.take(moments, places.right, axis=1)
+        q = places.right.size // 2
+        return (
+            gram.view(np.complex128).reshape(*outer, q, q),
+            right.view(np.complex128).reshape(*outer, q, 1),
+        )
 
 
-_Places = tuple[list[tuple[int, int]], Integer, Integer, Integer]
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Places:
+    """Where the sums of `Columns.normal` stand, real and imaginary parts in turns.
+
+    Parameters
+    ----------
+    parts : int
+        Real products of carriers that are summed, each with all powers.
+    gram, right : integer ndarray, shapes (2 q q,) and (2 q,)
+        Part times the number of powers, plus the power.
+    sign : ndarray, shape (2 q q,)
+        -1 where a product's mirror is summed, 0 where a part is none.
+    """
+
+    parts: int
+    gram: Integer
+    right: Integer
+    sign: Real
 
 
 @cache
 def _places(orders: tuple[int, ...]) -> _Places:
-    """Pairs of carriers, A's own the last; that of each product of columns; carrier and power."""
-    count = len(orders) + 1
-    pairs = [(i, j) for i in range(count) for j in range(i, count)]
+    """Of carriers of these orders, and A's own the last."""
+    inner, powers = len(orders), 2 * max(*orders, DENOMINATOR_ORDER) + 1
+    count = inner + 1
+    pairs = [(i, j) for i in range(inner) for j in range(i, inner)]
+    pairs += [(inner, inner), *((i, inner) for i in range(inner))]
+    part, parts = np.zeros((count, count, 2), dtype=np.int64), 0
+    for i, j in pairs:
+        own = (parts, parts) if i == j else (parts, parts + 1)
+        part[i, j] = part[j, i] = own
+        parts += 1 + (i != j)
     last = np.arange(1, DENOMINATOR_ORDER + 1)
     power = np.concatenate([*(np.arange(p + 1) for p in orders), last])
     carrier = np.repeat(np.arange(count), [*(p + 1 for p in orders), last.size])
-    low, high = np.minimum.outer(carrier, carrier), np.maximum.outer(carrier, carrier)
-    return pairs, low * count - low * (low - 1) // 2 + high - low, carrier, power
+    right = parts + 2 * carrier[:, None] + np.arange(2)
+    imaginary = np.sign(np.subtract.outer(carrier, carrier)) * -1.0
+    return _Places(
+        parts=parts + 2 * count,
+        gram=np.ravel(
+            part[carrier[:, None], carrier] * powers + np.add.outer(power, power)[..., None]
+        ),
+        right=np.ravel(right * powers + power[:, None]),
+        sign=np.ravel(np.stack((np.ones_like(imaginary), imaginary), axis=-1)),
+    )
 
 
 def rational_fits(
