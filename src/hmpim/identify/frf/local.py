@@ -14,7 +14,7 @@ from hmpim.identify.arrays import Real
 from hmpim.identify.frf.choice import choose, picked
 from hmpim.identify.frf.neighbours import LocalFit, Spectra, centres_in_band, transform
 from hmpim.identify.frf.polynomial import polynomial_fits
-from hmpim.identify.frf.rational import rational_fits
+from hmpim.identify.frf.rational import Regressors, rational_fits
 from hmpim.identify.result import FrequencyResponse
 from hmpim.identify.signals import as_pair, check_band, check_rate, whole_lag
 from hmpim.identify.worth import DEEPEST
@@ -142,10 +142,8 @@ def local_responses(
     lags = np.array([whole_lag(float(delay), fs, u.size) for delay in delays])
     for lag in np.unique(lags):
         alike = np.flatnonzero(lags == lag)
-        for at in range(0, alike.size, _AT_ONCE):
-            some = alike[at : at + _AT_ONCE]
-            told = _many(u, outputs[some], fs, delays=delays[some], band=band, points=points)
-            found.update(zip(some.tolist(), told, strict=True))
+        told = _many(u, outputs[alike], fs, delays=delays[alike], band=band, points=points)
+        found.update(zip(alike.tolist(), told, strict=True))
     return [found[i] for i in range(outputs.shape[0])]
 
 
@@ -201,23 +199,38 @@ def _cut(spectra: Spectra, highest: int) -> Spectra:
 def _many(
     u: Real, y: Real, fs: float, *, delays: Real, band: tuple[float, float], points: int
 ) -> list[FrequencyResponse]:
-    """Polynomials first; what they predict starts the rational functions; then choose of all.
+    """Of outputs of shape (k, n), delayed by as many whole samples.
 
-    Of outputs of shape (k, n), delayed by as many whole samples.
+    What follows from the input is made once for all of them.
     """
-    spectra = transform(u, y, fs, delays)
-    centre = _centres(spectra, band, points)
-    spectra = _cut(spectra, int(centre[-1]))
+    found: list[FrequencyResponse] = []
+    for at in range(0, y.shape[0], _AT_ONCE):
+        late = delays[at : at + _AT_ONCE]
+        spectra = transform(u, y[at : at + _AT_ONCE], fs, late)
+        if at == 0:
+            centre = _centres(spectra, band, points)
+            cut = _cut(spectra, int(centre[-1])).u
+            regressors = [
+                Regressors.around(cut, centre, width)
+                for width in _rational_widths(centre, cut.size)
+            ]
+        found += _few(_cut(spectra, int(centre[-1])), centre, late, regressors)
+    return found
+
+
+def _few(
+    spectra: Spectra, centre: NDArray[np.int64], delays: Real, regressors: list[Regressors]
+) -> list[FrequencyResponse]:
+    """Polynomials first; what they predict starts the rational functions; then choose of all."""
     polynomials = _polynomials(spectra, centre)
-    widths = _rational_widths(centre, spectra.u.size)
-    if not widths:
+    if not regressors:
         return _answers(spectra, centre, delays, polynomials, ())
     chosen, _ = choose(polynomials, ())
     g = picked(np.stack([fit.response for fit in polynomials]), chosen)
     inside = np.arange(centre[0], centre[-1] + 1)
     smooth = spectra.y.copy()
     smooth[:, inside] = spectra.u[inside] * np.stack([np.interp(inside, centre, own) for own in g])
-    rationals = rational_fits(spectra, centre, widths, smooth)
+    rationals = rational_fits(spectra, regressors, smooth)
     return _answers(spectra, centre, delays, polynomials, rationals)
 
 

@@ -410,19 +410,19 @@ def _read_off(
         left = np.conj(linear)
         inverse, theta = solved(left @ linear.swapaxes(1, 2), left @ y[:, :, None])
         row, fitted = linear[near, :, place], (theta[:, None] @ linear)[:, 0]
-        denominator = np.ones_like(y)
+        over = np.ones_like(y)
     else:
         with np.errstate(all="ignore"):
             found = gauss_newton(columns, y, linear_start(columns, smooth), steps=_STEPS)
             row = found.rows(columns, windows)
         inverse, theta = found.inverse, found.state.theta
-        fitted, denominator = found.state.fitted, found.state.denominator
+        fitted, over = found.state.fitted, found.state.over
     squares = np.sum(np.abs(y - fitted) ** 2, axis=1)
     squares = np.maximum(squares, 1e-15 * np.sum(np.abs(y) ** 2, axis=1))
     freedom = np.maximum(windows.counted - row.shape[1], 1)
     noise = squares / freedom
     x = windows.x[place][:, None]
-    a, size = denominator[near, place], np.sqrt(power[near])
+    a, size = 1.0 / over[near, place], np.sqrt(power[near])
     b = x ** np.arange(_TERMS)
     numerator = theta[near, : m * _TERMS].reshape(near.size, m, _TERMS)
     response = np.sum(numerator * b[:, None], axis=2) / a[:, None]

@@ -13,6 +13,7 @@ squares of the true residual. The covariance is that of those least squares, the
 included, so it knows what the denominator costs.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
 from itertools import combinations_with_replacement
@@ -29,6 +30,7 @@ __all__ = [
     "Columns",
     "RationalSolution",
     "RationalState",
+    "Regressors",
     "gauss_newton",
     "linear_start",
     "rational_fits",
@@ -57,14 +59,14 @@ class RationalState:
     ----------
     theta : complex ndarray, shape (..., w, q)
         Coefficients of the linear columns, then of A without its constant 1.
-    denominator, fitted : complex ndarray, shape (..., w, s)
-        A, and Y as fitted, on the window's bins.
+    over, fitted : complex ndarray, shape (..., w, s)
+        1 / A, and Y as fitted, on the window's bins.
     squares : ndarray, shape (..., w)
         Σ |Y - fitted|²; infinite where the iterate ran off.
     """
 
     theta: Complex
-    denominator: Complex
+    over: Complex
     fitted: Complex
     squares: Real
 
@@ -90,11 +92,14 @@ class RationalSolution:
 
     def rows(self, columns: "Columns", windows: Windows) -> Complex:
         """Derivatives of the fitted Y at each centre, shape (..., c, q)."""
-        near, place, x = windows.near, windows.place, windows.x
-        a = self.before.denominator[..., near, place][..., None]
-        bent = -self.before.fitted[..., near, place][..., None] / a
-        slopes = x[place][:, None] ** np.arange(1, DENOMINATOR_ORDER + 1)
-        return np.concatenate((columns.linear[near, :, place] / a, bent * slopes), axis=-1)
+        near, place = windows.near, windows.place
+        linear, over = columns.linear[near, :, place], self.before.over[..., near, place, None]
+        count = linear.shape[-1]
+        rows = np.empty((*over.shape[:-1], count + DENOMINATOR_ORDER), dtype=np.complex128)
+        np.multiply(linear, over, out=rows[..., :count])
+        bent = -self.before.fitted[..., near, place, None] * over
+        np.multiply(bent, columns.slopes.T[place], out=rows[..., count:])
+        return rows
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -113,6 +118,8 @@ class Columns:
         Highest power with each.
     powers : ndarray, shape (k, s)
         x^p, p = 0 up to twice the highest power of all.
+    weights : ndarray, shape (s, k)
+        The same, a bin's powers side by side, as sums over bins take them fastest.
     linear : complex ndarray, shape (w, l, s)
         The columns themselves.
     """
@@ -121,6 +128,7 @@ class Columns:
     products: Real
     orders: tuple[int, ...]
     powers: Real
+    weights: Real
     linear: Complex
 
     @classmethod
@@ -138,6 +146,7 @@ class Columns:
             products=np.stack(products),
             orders=orders,
             powers=powers,
+            weights=np.ascontiguousarray(powers.T),
             linear=np.concatenate(each, axis=1),
         )
 
@@ -176,7 +185,7 @@ class Columns:
         each = [own * bent for own in mirror] + [own * left for own in (*mirror, np.conj(bent))]
         for k, product in enumerate(each):
             parts[known + 1 + 2 * k], parts[known + 2 + 2 * k] = product.real, product.imag
-        sums = (parts.reshape(places.parts, -1, size) @ self.powers.T).swapaxes(0, 1)
+        sums = (parts.reshape(places.parts, -1, size) @ self.weights).swapaxes(0, 1)
         moments = sums.reshape(sums.shape[0], -1)
         gram = np.take(moments, places.gram, axis=1)
         gram *= places.sign
@@ -235,8 +244,55 @@ def _places(orders: tuple[int, ...]) -> _Places:
     )
 
 
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Regressors:
+    """What the input alone says of windows of one width.
+
+    Parameters
+    ----------
+    windows : Windows
+        Of this width.
+    power : ndarray, shape (w,)
+        Mean |U|² of each, to which its input is scaled.
+    both, plain : Columns
+        With T, and without.
+    """
+
+    windows: Windows
+    power: Real
+    both: Columns
+    plain: Columns
+
+    @classmethod
+    def around(cls, u: Complex, centre: Integer, width: int) -> "Regressors":
+        """Make them.
+
+        Parameters
+        ----------
+        u : complex ndarray, shape (b,)
+            Transform of the input.
+        centre : integer ndarray, shape (c,)
+            Bins to answer at.
+        width : int
+            Neighbours on either side, at least 6.
+        """
+        windows = windows_around(centre, u.size, width)
+        floor = _NOTHING * float(np.max(np.abs(u)) ** 2)
+        seen = windows.view(mirrored(u, width), width)
+        power = np.maximum(np.sum(np.abs(seen) ** 2, axis=1) / windows.counted, floor)
+        scaled = (seen / np.sqrt(power)[:, None])[:, None, :]
+        one = windows.without_dc()[:, None, :].astype(np.complex128)
+        carriers = np.concatenate((scaled, one), axis=1)
+        return cls(
+            windows=windows,
+            power=power,
+            both=Columns.of(carriers, (_NUMERATOR, TRANSIENT_ORDER), windows.x),
+            plain=Columns.of(scaled, (_NUMERATOR,), windows.x),
+        )
+
+
 def rational_fits(
-    spectra: Spectra, centre: NDArray[np.int64], widths: tuple[int, ...], smooth: Complex
+    spectra: Spectra, regressors: Sequence[Regressors], smooth: Complex
 ) -> list[LocalFit]:
     """Fit rational functions of order 2 over 2, with T and without, over windows of each width.
 
@@ -244,10 +300,8 @@ def rational_fits(
     ----------
     spectra : Spectra
         With the delay taken out.
-    centre : integer ndarray, shape (c,)
-        Bins to answer at.
-    widths : tuple of int
-        Neighbours on either side, each at least 6.
+    regressors : sequence of Regressors
+        Those of `spectra.u`, one for each width.
     smooth : complex ndarray, shape (..., b), as that of `spectra.y`
         Y as a first estimate predicts it, nearly free of noise; starts the iteration.
 
@@ -265,40 +319,29 @@ def rational_fits(
     >>> for k in n[2:]:  # poles at 0.9 exp(±0.44 i)
     ...     y[k] = 1.628 * y[k - 1] - 0.81 * y[k - 2] + u[k]
     >>> s = transform(u, y, 1.0, 0.0)
-    >>> fit = rational_fits(s, np.arange(20, 40), (16,), s.y)[0]
+    >>> fit = rational_fits(s, [Regressors.around(s.u, np.arange(20, 40), 16)], s.y)[0]
     >>> z = np.exp(2j * np.pi * s.frequency[20])
     >>> bool(abs(fit.response[0] * (1 - 1.628 / z + 0.81 / z**2) - 1) < 1e-3)
     True
     """
-    reach = max(widths)
-    folded = [mirrored(v, reach) for v in (spectra.u, spectra.y, smooth)]
-    floor = _NOTHING * float(np.max(np.abs(spectra.u)) ** 2)
+    reach = max(own.windows.size // 2 for own in regressors)
+    folded = [mirrored(v, reach) for v in (spectra.y, smooth)]
     fits = []
-    for width in widths:
-        windows = windows_around(centre, spectra.u.size, width)
-        u, y, start = (windows.view(v, reach) for v in folded)
-        power = np.maximum(np.sum(np.abs(u) ** 2, axis=1) / windows.counted, floor)
+    for own in regressors:
+        y, start = (own.windows.view(v, reach) for v in folded)
         # Sharp features hide in wide windows, whose start is far off; they are also the fewest.
-        steps = 2 if width < 32 else 4
+        steps = 2 if own.windows.size // 2 < 32 else 4
         # An iterate may run off to infinity; it is then not taken.
         with np.errstate(all="ignore"):
-            fits.extend(_fit(windows, u / np.sqrt(power)[:, None], y, start, power, steps))
+            fits.extend(_fit(own, y, start, steps))
     return fits
 
 
-def _fit(
-    windows: Windows, u: Complex, y: Complex, smooth: Complex, power: Real, steps: int
-) -> list[LocalFit]:
-    one = windows.without_dc()[:, None, :].astype(np.complex128)
-    b = Columns.of(u[:, None, :], (_NUMERATOR,), windows.x)
-    carriers = np.concatenate((u[:, None, :], one), axis=1)
-    both = Columns.of(carriers, (_NUMERATOR, TRANSIENT_ORDER), windows.x)
-    full = gauss_newton(both, y, linear_start(both, smooth), steps=steps)
-    plain = gauss_newton(b, y, restricted(full, _NUMERATOR + 1), steps=(steps + 1) // 2)
-    return [
-        _read_off(windows, columns, found, y, power)
-        for columns, found in ((both, full), (b, plain))
-    ]
+def _fit(own: Regressors, y: Complex, smooth: Complex, steps: int) -> list[LocalFit]:
+    full = gauss_newton(own.both, y, linear_start(own.both, smooth), steps=steps)
+    start = restricted(full, _NUMERATOR + 1)
+    plain = gauss_newton(own.plain, y, start, steps=(steps + 1) // 2)
+    return [_read_off(own, own.both, full, y), _read_off(own, own.plain, plain, y)]
 
 
 def solved(gram: Complex, right: Complex) -> tuple[Complex, Complex]:
@@ -388,8 +431,7 @@ def gauss_newton(columns: Columns, y: Complex, theta: Complex, *, steps: int) ->
     """
     state = _state(columns, y, theta)
     for k in range(steps):
-        over = 1.0 / state.denominator
-        gram, right = columns.normal(over, -state.fitted * over, y - state.fitted)
+        gram, right = columns.normal(state.over, -state.fitted * state.over, y - state.fitted)
         if k < steps - 1:
             step = _solution(gram, right)
         else:
@@ -400,13 +442,13 @@ def gauss_newton(columns: Columns, y: Complex, theta: Complex, *, steps: int) ->
 
 def _state(columns: Columns, y: Complex, theta: Complex) -> RationalState:
     count = columns.linear.shape[-2]
-    denominator = 1.0 + theta[..., count:] @ columns.slopes
-    fitted = (theta[..., None, :count] @ columns.linear)[..., 0, :] / denominator
+    over = 1.0 / (1.0 + theta[..., count:] @ columns.slopes)
+    fitted = (theta[..., None, :count] @ columns.linear)[..., 0, :] * over
     left = y - fitted
     squares = np.vecdot(left, left).real
     return RationalState(
         theta=theta,
-        denominator=denominator,
+        over=over,
         fitted=fitted,
         squares=np.where(np.isfinite(squares), squares, np.inf),
     )
@@ -419,28 +461,27 @@ def _better(one: RationalState, other: RationalState) -> RationalState:
         return other
     return RationalState(
         theta=np.where(take[..., None], other.theta, one.theta),
-        denominator=np.where(take[..., None], other.denominator, one.denominator),
+        over=np.where(take[..., None], other.over, one.over),
         fitted=np.where(take[..., None], other.fitted, one.fitted),
         squares=np.where(take, other.squares, one.squares),
     )
 
 
 def _read_off(
-    windows: Windows, columns: Columns, found: RationalSolution, y: Complex, power: Real
+    regressors: Regressors, columns: Columns, found: RationalSolution, y: Complex
 ) -> LocalFit:
     """Response, its spread and the prediction error at each centre."""
+    windows, power = regressors.windows, regressors.power
     terms, near, place = _NUMERATOR + 1, windows.near, windows.place
     state, row = found.state, found.rows(columns, windows)
-    x = windows.x[place][:, None]
-    a = state.denominator[..., near, place]
-    size = np.sqrt(power[near])
-    b = x ** np.arange(terms)
-    response = np.sum(b * state.theta[..., near, :terms], axis=-1) / a / size
-    pair = np.zeros((*a.shape, 2, row.shape[-1]), dtype=np.complex128)
-    pair[..., 0, :terms] = b / (a * size)[..., None]
-    pair[..., 0, -DENOMINATOR_ORDER:] = -(response / a)[..., None] * x ** np.arange(
-        1, DENOMINATOR_ORDER + 1
-    )
+    over, theta = state.over[..., near, place], state.theta[..., near, :terms]
+    over = over / np.sqrt(power[near])
+    b = columns.powers.T[place, :terms]
+    response = np.vecdot(b, theta) * over
+    pair = np.zeros((*over.shape, 2, row.shape[-1]), dtype=np.complex128)
+    np.multiply(b, over[..., None], out=pair[..., 0, :terms])
+    bent = -response * state.over[..., near, place]
+    np.multiply(bent[..., None], columns.slopes.T[place], out=pair[..., 0, -DENOMINATOR_ORDER:])
     pair[..., 1, :] = row
     forms = windows.forms(pair, found.inverse)
     spread, leverage = forms[..., 0], forms[..., 1]
