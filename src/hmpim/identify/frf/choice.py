@@ -98,7 +98,7 @@ def _beyond(apart: Real, variance: Real, credible: Mask) -> Real:
     against = np.maximum(variance, 1e-150)  # a record without noise must not overflow
     square = apart.real**2 + apart.imag**2
     places = np.where(credible, square / against - 1.0, 0.0)
-    excess = np.moveaxis(_averaged(np.moveaxis(places, -1, 0)), 0, -1)
+    excess = _averaged(places.swapaxes(-2, -1)).swapaxes(-2, -1)
     return np.asarray(np.where(credible, np.maximum(excess, 0.0) * variance, 0.0))
 
 

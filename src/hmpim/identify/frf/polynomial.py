@@ -40,7 +40,7 @@ class _Solver:
     size : ndarray, shape (w,)
         By what G's columns are scaled.
     row : complex ndarray, shape (c, q)
-        Columns at each centre.
+        Conjugates of the columns at each centre.
     ways : tuple of (inverse, spread, leverage)
         With T, and without: inverse of the normal equations, (w, q, q), variance of G where the
         noise of a bin is 1, and what a centre's own bin weighs in its fit, both (c,).
@@ -96,9 +96,12 @@ def polynomial_fits(
     [0.0, 0.0]
     """
     fits: list[LocalFit] = []
+    reach = min(max(widths), spectra.u.size - 1)
+    power = spectra.y.real**2 + spectra.y.imag**2
+    products = mirrored(np.stack((np.conj(spectra.u) * spectra.y, spectra.y, power)), reach)
     for width in widths:
         solver = _solver(spectra.u, centre, width, order)
-        right = _right_of(spectra, solver, width)
+        right = _right_of(products, solver, reach)
         fits.extend(_solve(solver, way, right, spectra.y[..., centre]) for way in solver.ways)
     return fits
 
@@ -134,7 +137,7 @@ def _solver(u: Complex, centre: NDArray[np.int64], width: int, order: int) -> _S
         powers=np.ascontiguousarray(powers[:, :terms]),
         here=here,
         size=scale,
-        row=row,
+        row=np.conj(row),
         ways=tuple(_way(windows, gram, here, row, columns) for columns in (2 * terms, terms)),
     )
 
@@ -158,10 +161,8 @@ def _moments(products: Complex, windows: Windows, reach: int, powers: Real) -> C
     return np.concatenate(some, axis=-2)
 
 
-def _right_of(spectra: Spectra, solver: _Solver, width: int) -> _Right:
-    reach = min(width, spectra.u.size - 1)
-    products = np.stack((np.conj(spectra.u) * spectra.y, spectra.y, np.abs(spectra.y) ** 2 + 0j))
-    both, alone, power = _moments(mirrored(products, reach), solver.windows, reach, solver.powers)
+def _right_of(products: Complex, solver: _Solver, reach: int) -> _Right:
+    both, alone, power = _moments(products, solver.windows, reach, solver.powers)
     return _Right(
         right=np.concatenate((both / solver.size[:, None], alone), axis=-1),
         power=power[..., 0].real,
@@ -180,11 +181,11 @@ def _solve(solver: _Solver, way: _Way, of_output: _Right, y: Complex) -> LocalFi
     left = np.maximum(left, 1e-15 * of_output.power)
     noise = left / np.maximum(windows.counted - columns, 1)
     theta, size = theta[..., near, :], solver.size[near]
-    missed = y - np.sum(row[:, :columns] * theta, axis=-1)
+    missed = y - np.vecdot(row[:, :columns], theta)
     return LocalFit(
-        response=np.sum(solver.here * theta[..., :terms], axis=-1) / size,
+        response=np.vecdot(solver.here, theta[..., :terms]) / size,
         spread=spread / size**2,
         noise=noise[..., near],
         power=size**2,
-        prediction_error=np.abs(missed / np.maximum(1.0 - leverage, 1e-6)) ** 2,
+        prediction_error=(missed.real**2 + missed.imag**2) / np.maximum(1.0 - leverage, 1e-6) ** 2,
     )
