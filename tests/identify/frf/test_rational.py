@@ -2,7 +2,8 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from hmpim.identify.frf.local import local_response
+from hmpim.identify.frf.local import local_response, local_responses
+from hmpim.identify.frf.rational import Columns
 
 FS, BAND, DELAY = 200.0, (0.1, 20.0), 0.15
 FINE = 32
@@ -125,3 +126,47 @@ def test_units_do_not_matter(factor: float, records: dict[float, Record]) -> Non
     other = local_response(u / factor, factor * y, FS, band=BAND, delay=DELAY)
     np.testing.assert_allclose(other.response, factor**2 * one.response, rtol=1e-6)
     np.testing.assert_allclose(other.std, factor**2 * one.std, rtol=1e-5)
+
+
+@pytest.mark.parametrize("orders", [(2,), (2, 3), (3, 1, 2)])
+@pytest.mark.parametrize("plain", [False, True])
+def test_normal_equations_are_those_of_the_columns_written_out(
+    orders: tuple[int, ...], plain: bool
+) -> None:
+    """Of three outputs and four windows, over A and without."""
+    rng = np.random.default_rng(0)
+
+    def drawn(*shape: int) -> np.ndarray:
+        return rng.standard_normal(shape) + 1j * rng.standard_normal(shape)
+
+    x, carriers = np.linspace(-1.0, 1.0, 21), drawn(4, len(orders), 21)
+    columns = Columns.of(carriers, orders, x)
+    over, bent, left = drawn(3, 4, 21), drawn(3, 4, 21), drawn(3, 4, 21)
+    gram, right = columns.normal(None if plain else over, bent, left)
+    over = np.ones_like(over) if plain else over
+    linear = [
+        carriers[:, a] * over * x**p for a, most in enumerate(orders) for p in range(most + 1)
+    ]
+    rows = np.stack([*linear, bent * x, bent * x**2], axis=-2)
+    mirror = np.conj(rows)
+    assert gram == pytest.approx(mirror @ rows.swapaxes(-1, -2), rel=1e-12, abs=1e-12)
+    assert right == pytest.approx(mirror @ left[..., None], rel=1e-12, abs=1e-12)
+
+
+def test_what_the_input_alone_says_is_made_once_for_all_outputs_of_one_delay(
+    records: dict[float, Record], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    made = []
+    original = Columns.of
+
+    def counted(*args: object) -> Columns:
+        made.append(args)
+        return original(*args)
+
+    monkeypatch.setattr(Columns, "of", counted)
+    u, clean = records[0.4]
+    noise = 0.1 * np.random.default_rng(0).standard_normal((30, clean.size))
+    local_responses(u, clean + noise[:1], FS, band=BAND, delays=np.full(1, DELAY))
+    of_one = len(made)
+    local_responses(u, clean + noise, FS, band=BAND, delays=np.full(30, DELAY))
+    assert len(made) == 2 * of_one > 0

@@ -110,4 +110,4 @@ def _averaged(values: Real) -> Real:
     begin, end = np.maximum(position - reach, 0), np.minimum(position + reach + 1, count)
     total = np.zeros((*values.shape[:-1], count + 1))
     np.cumsum(values, axis=-1, out=total[..., 1:])
-    return np.asarray((total[..., end] - total[..., begin]) / (end - begin))
+    return np.asarray((total.take(end, axis=-1) - total.take(begin, axis=-1)) / (end - begin))

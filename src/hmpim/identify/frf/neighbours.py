@@ -7,10 +7,10 @@ no correlation into E|error|², so least squares and its variances hold as they 
 """
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import scipy
-from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from hmpim.identify.arrays import Complex, Real
@@ -85,8 +85,13 @@ class Windows:
 
     def view(self, values: Complex, reach: int) -> Complex:
         """Return the windows of values that `mirrored` made, shape (..., w, s)."""
-        views = sliding_window_view(values, self.size, axis=-1)
-        return np.asarray(views[..., self.start + reach, :])
+        # By `take`, whose answer lies in memory as its shape says, which indexing's does not.
+        return np.asarray(values.take(self.start[:, None] + reach + np.arange(self.size), axis=-1))
+
+    def at(self, values: NDArray[Any]) -> NDArray[Any]:
+        """Return what stands at each centre, (..., c), of values on the windows, (..., w, s)."""
+        flat = values.reshape(*values.shape[:-2], -1)
+        return np.asarray(flat.take(self.near * self.size + self.place, axis=-1))
 
     def forms(self, vectors: Complex, inverse: Complex) -> Real:
         """Return v V vᴴ, (..., c, k), for vectors of each centre, (..., c, k, q).

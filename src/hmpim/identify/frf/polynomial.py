@@ -180,12 +180,12 @@ def _solve(solver: _Solver, way: _Way, of_output: _Right, y: Complex) -> LocalFi
     # The difference of two nearly equal sums is never less than its rounding.
     left = np.maximum(left, 1e-15 * of_output.power)
     noise = left / np.maximum(windows.counted - columns, 1)
-    theta, size = theta[..., near, :], solver.size[near]
+    theta, size = theta.take(near, axis=-2), solver.size[near]
     missed = y - np.vecdot(row[:, :columns], theta)
     return LocalFit(
         response=np.vecdot(solver.here, theta[..., :terms]) / size,
         spread=spread / size**2,
-        noise=noise[..., near],
+        noise=noise.take(near, axis=-1),
         power=size**2,
         prediction_error=(missed.real**2 + missed.imag**2) / np.maximum(1.0 - leverage, 1e-6) ** 2,
     )

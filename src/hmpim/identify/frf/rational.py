@@ -93,11 +93,11 @@ class RationalSolution:
     def rows(self, columns: "Columns", windows: Windows) -> Complex:
         """Derivatives of the fitted Y at each centre, shape (..., c, q)."""
         near, place = windows.near, windows.place
-        linear, over = columns.linear[near, :, place], self.before.over[..., near, place, None]
+        linear, over = columns.linear[near, :, place], windows.at(self.before.over)[..., None]
         count = linear.shape[-1]
         rows = np.empty((*over.shape[:-1], count + DENOMINATOR_ORDER), dtype=np.complex128)
         np.multiply(linear, over, out=rows[..., :count])
-        bent = -self.before.fitted[..., near, place, None] * over
+        bent = -windows.at(self.before.fitted)[..., None] * over
         np.multiply(bent, columns.slopes.T[place], out=rows[..., count:])
         return rows
 
@@ -116,10 +116,8 @@ class Columns:
         Real and imaginary parts of conj(C) C' of each two of them, the same for every output.
     orders : tuple of int
         Highest power with each.
-    powers : ndarray, shape (k, s)
+    powers : ndarray, shape (s, k)
         x^p, p = 0 up to twice the highest power of all.
-    weights : ndarray, shape (s, k)
-        The same, a bin's powers side by side, as sums over bins take them fastest.
     linear : complex ndarray, shape (w, l, s)
         The columns themselves.
     """
@@ -128,15 +126,14 @@ class Columns:
     products: Real
     orders: tuple[int, ...]
     powers: Real
-    weights: Real
     linear: Complex
 
     @classmethod
     def of(cls, carriers: Complex, orders: tuple[int, ...], x: Real) -> "Columns":
         """Make them; x from -1 to 1, shape (s,)."""
         most = max(*orders, DENOMINATOR_ORDER)
-        powers = np.asarray(x ** np.arange(2 * most + 1)[:, None])
-        each = [carriers[:, a, None] * powers[: p + 1] for a, p in enumerate(orders)]
+        powers = np.asarray(x[:, None] ** np.arange(2 * most + 1))
+        each = [carriers[:, a, None] * powers.T[: p + 1] for a, p in enumerate(orders)]
         products = []
         for i, j in combinations_with_replacement(range(len(orders)), 2):
             product = np.conj(carriers[:, i]) * carriers[:, j]
@@ -146,14 +143,13 @@ class Columns:
             products=np.stack(products),
             orders=orders,
             powers=powers,
-            weights=np.ascontiguousarray(powers.T),
             linear=np.concatenate(each, axis=1),
         )
 
     @property
     def slopes(self) -> Real:
         """Powers of x that A is made of, shape (d, s)."""
-        return self.powers[1 : DENOMINATOR_ORDER + 1]
+        return self.powers.T[1 : DENOMINATOR_ORDER + 1]
 
     def normal(self, over: Complex | None, bent: Complex, left: Complex) -> tuple[Complex, Complex]:
         """Normal equations of the columns over A, and of `bent` times the powers of A.
@@ -174,7 +170,6 @@ class Columns:
         """
         outer, size = bent.shape[:-1], bent.shape[-1]
         places = _places(self.orders)
-        # Real and imaginary parts stand apart, each in one block: all sums are one product.
         parts = np.empty((places.parts, *outer, size))
         known = self.products.shape[0]
         weight = np.ones(()) if over is None else over.real**2 + over.imag**2
@@ -185,7 +180,7 @@ class Columns:
         each = [own * bent for own in mirror] + [own * left for own in (*mirror, np.conj(bent))]
         for k, product in enumerate(each):
             parts[known + 1 + 2 * k], parts[known + 2 + 2 * k] = product.real, product.imag
-        sums = (parts.reshape(places.parts, -1, size) @ self.weights).swapaxes(0, 1)
+        sums = (parts.reshape(places.parts, -1, size) @ self.powers).swapaxes(0, 1)
         moments = sums.reshape(sums.shape[0], -1)
         gram = np.take(moments, places.gram, axis=1)
         gram *= places.sign
@@ -442,7 +437,10 @@ def gauss_newton(columns: Columns, y: Complex, theta: Complex, *, steps: int) ->
 
 def _state(columns: Columns, y: Complex, theta: Complex) -> RationalState:
     count = columns.linear.shape[-2]
-    over = 1.0 / (1.0 + theta[..., count:] @ columns.slopes)
+    denominator = 1.0 + theta[..., count:] @ columns.slopes
+    # Quicker than a complex division, which guards against what is not taken: overflow.
+    inverse = 1.0 / (denominator.real**2 + denominator.imag**2)
+    over: Complex = np.multiply(np.conj(denominator), inverse, dtype=np.complex128)
     fitted = (theta[..., None, :count] @ columns.linear)[..., 0, :] * over
     left = y - fitted
     squares = np.vecdot(left, left).real
@@ -471,29 +469,29 @@ def _read_off(
     regressors: Regressors, columns: Columns, found: RationalSolution, y: Complex
 ) -> LocalFit:
     """Response, its spread and the prediction error at each centre."""
-    windows, power = regressors.windows, regressors.power
-    terms, near, place = _NUMERATOR + 1, windows.near, windows.place
+    windows, power, terms = regressors.windows, regressors.power, _NUMERATOR + 1
+    near, place = windows.near, windows.place
     state, row = found.state, found.rows(columns, windows)
-    over, theta = state.over[..., near, place], state.theta[..., near, :terms]
-    over = over / np.sqrt(power[near])
-    b = columns.powers.T[place, :terms]
+    theta, own = state.theta[..., :terms].take(near, axis=-2), windows.at(state.over)
+    over = own / np.sqrt(power[near])
+    b = columns.powers[place, :terms]
     response = np.vecdot(b, theta) * over
     pair = np.zeros((*over.shape, 2, row.shape[-1]), dtype=np.complex128)
     np.multiply(b, over[..., None], out=pair[..., 0, :terms])
-    bent = -response * state.over[..., near, place]
-    np.multiply(bent[..., None], columns.slopes.T[place], out=pair[..., 0, -DENOMINATOR_ORDER:])
+    bent = (-response * own)[..., None]
+    np.multiply(bent, columns.slopes.T[place], out=pair[..., 0, -DENOMINATOR_ORDER:])
     pair[..., 1, :] = row
     forms = windows.forms(pair, found.inverse)
     spread, leverage = forms[..., 0], forms[..., 1]
-    missed = (y - state.fitted)[..., near, place] / np.maximum(1.0 - leverage, 1e-6)
+    missed = (windows.at(y) - windows.at(state.fitted)) / np.maximum(1.0 - leverage, 1e-6)
     error = missed.real**2 + missed.imag**2
     squares = np.maximum(state.squares, 1e-15 * np.vecdot(y, y).real)
-    noise = (squares / np.maximum(windows.counted - row.shape[-1], 1))[..., near]
+    noise = squares / np.maximum(windows.counted - row.shape[-1], 1)
     failed = ~(np.isfinite(response) & np.isfinite(spread) & np.isfinite(error))
     return LocalFit(
         response=np.where(failed, 0.0, response),
         spread=np.where(failed, 1.0 / power[near], np.maximum(spread, 0.0)),
-        noise=noise,
+        noise=noise.take(near, axis=-1),
         power=power[near],
         prediction_error=np.where(failed, np.inf, error),
     )

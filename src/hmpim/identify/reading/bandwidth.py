@@ -90,6 +90,7 @@ def response_bandwidths(
         What the input does between its samples: a ratio of sampled spectra contains it, the
         bandwidths of the system behind it do not.
     """
+    still = replace(system, delay=0.0)
 
     def crossing(near: Estimate | None, kind: str) -> Estimate | None:
         if near is None:
@@ -99,7 +100,7 @@ def response_bandwidths(
         if found is None:
             return None
         ratio, std = found
-        steep = _slope(system, value)
+        steep = _slope(still, value)
         if kind == "gain":
             rise = steep.real
             shift = -(abs(ratio) - 1.0) / rise
@@ -119,8 +120,8 @@ def response_bandwidths(
     )
 
 
-def _slope(system: RationalDelay, f: float) -> complex:
-    """Derivative of ln G by frequency, 1/Hz, without the delay: of the gain, and of the phase."""
+def _slope(still: RationalDelay, f: float) -> complex:
+    """Derivative of ln G by frequency, 1/Hz, of a system without delay: of gain, and of phase."""
     step = 1e-4 * f
-    low, high = response(replace(system, delay=0.0), np.array([f - step, f + step]))
+    low, high = response(still, np.array([f - step, f + step]))
     return complex(np.log(high / low) / (2 * step))
