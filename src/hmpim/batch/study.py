@@ -4,6 +4,7 @@ import re
 from collections.abc import Sequence
 from datetime import datetime
 from os import PathLike
+from os.path import commonprefix
 
 import numpy as np
 import scipy
@@ -115,7 +116,7 @@ def study_page(
         ),
         facts=(
             ("Folder", str(table.folder)),
-            *([("Records in", _folder(table))] if _folder(table) else []),
+            *([("Records in", folder)] if (folder := _folder(table)) else []),
             ("Parts", str(len(table.paths))),
             ("Settings", f"{table.request.keep}; inputs {table.request.inputs or 'as stated'}; "
              f"outputs {table.request.outputs or 'as stated'}"),
@@ -397,9 +398,8 @@ def _names(table: BatchTable, there: NDArray[np.int64]) -> tuple[str, ...]:
 def _folder(table: BatchTable) -> str:
     """The folder that all records have in common, up to its slash; empty if there is none."""
     names = table.to_arrow(["record"]).column(0).to_pylist()
-    first, last = min(names), max(names)  # what these begin with, all between them begin with
-    same = [a == b for a, b in zip(first, last, strict=False)]
-    return str(first[: first.rfind("/", 0, [*same, False].index(False)) + 1])
+    begun = str(commonprefix(names))  # noqa: RUF071 - addresses, not paths; cut at a slash
+    return begun[: begun.rfind("/") + 1]
 
 
 def _stamp(word: str | None) -> float | None:

@@ -200,9 +200,6 @@ def _evidence(
     )
     if any(one.matters for one in moves):
         whole = blurred(whole, WORTH)
-    unexplained = 1.0 - _fit_percent(joint) / 100.0
-    if unexplained < INTERPOLATED and not fit.structure.sampled:
-        whole = without_noise(whole)
     evidence = Evidence(
         joint=joint,
         readings=readings,
@@ -220,6 +217,8 @@ def _evidence(
         jittered=any(finding.code == "jitter" for finding in question.aligned.findings),
         limited=question.limited is not None,
     )
+    if evidence.unexplained < INTERPOLATED and not fit.structure.sampled:
+        evidence = replace(evidence, spanned=without_noise(whole))
     return evidence, (*unread, *untested)
 
 

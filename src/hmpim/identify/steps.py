@@ -13,7 +13,6 @@ from hmpim.identify.effects.disturbance import without_rows
 from hmpim.identify.effects.drift import with_drift
 from hmpim.identify.effects.hum import with_hum
 from hmpim.identify.effects.imperfections import (
-    NOTHING,
     Imperfections,
     count_levels,
     find_imperfections,
@@ -46,7 +45,7 @@ _levels = kept(count_levels)
 def look(question: Question) -> Imperfections:
     """Find clipped, held, rounded, stuck and lost samples of the output."""
     if question.exact:
-        return NOTHING
+        return Imperfections()
     richest = max(_levels(source.values) for source in question.aligned.inputs)
     return _imperfections(question, richest=richest)
 

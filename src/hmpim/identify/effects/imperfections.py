@@ -22,7 +22,7 @@ from hmpim.identify.fitting.fit import Fit
 from hmpim.identify.fitting.trial import JointFit, Trial
 from hmpim.identify.worth import FEW, NEARLY, TWICE
 
-__all__ = ["NOTHING", "Imperfections", "count_levels", "find_imperfections", "refine"]
+__all__ = ["Imperfections", "count_levels", "find_imperfections", "refine"]
 
 _FEWEST_LEVELS = 8
 """Levels that an output must take, unless its input takes as few."""
@@ -35,13 +35,13 @@ _ROUNDS = 3
 class Imperfections:
     """What was seen in the output itself; None where nothing was."""
 
-    saturation: Saturation | None
-    hold: Hold | None
-    quantization: Quantization | None
-    spikes: Mask | None
-    frozen: Mask | None
-    repeated: Mask | None
-    levels: int | None
+    saturation: Saturation | None = None
+    hold: Hold | None = None
+    quantization: Quantization | None = None
+    spikes: Mask | None = None
+    frozen: Mask | None = None
+    repeated: Mask | None = None
+    levels: int | None = None
 
     def counts_otherwise_than(self, before: "Imperfections") -> bool:
         """Whether it is clipped or held and was not, or the other way, or lost more samples."""
@@ -84,18 +84,6 @@ class Imperfections:
         if lost is not None:
             told &= ~lost
         return told
-
-
-NOTHING = Imperfections(
-    saturation=None,
-    hold=None,
-    quantization=None,
-    spikes=None,
-    frozen=None,
-    repeated=None,
-    levels=None,
-)
-"""What is seen where a model explains every sample."""
 
 
 def find_imperfections(

@@ -130,7 +130,7 @@ def _equations(u: Real, y: Real, valid: Mask | None, *, most: int = _ROWS) -> _E
 def _unknown(u: Real, reach: int) -> int:
     """Samples at the start that may follow from input before the record.
 
-    None where most of the input's motion is in them: it is then taken to have been at rest.
+    0 where most of the input's motion is in them: it is then taken to have been at rest.
     """
     steps = np.diff(u) ** 2
     return reach if float(steps[reach:].sum()) > MOST * float(steps.sum()) else 0
@@ -196,8 +196,7 @@ def software_fit(
         problem = _begun_at(problem, begins)
         fits = [fit_structure(problem, fit.structure, fit.theta) for fit in fits]
     if "fir_16" in names and min(fit.cost for fit in fits) > floor:
-        longer = _long_filter(problem, equations, u, exact=floor)
-        problem, fits = (problem, fits) if longer is None else longer
+        problem, fits = _long_filter(problem, equations, u, exact=floor) or (problem, fits)
     share = effective_share(min(fits, key=lambda fit: fit.cost).residual)
     count = problem.counted * share
     trials = [trial_of("sampled", fit, count, floor=floor) for fit in fits]

@@ -30,6 +30,7 @@ from hmpim.identify.judgement.residual import (
 )
 from hmpim.identify.judgement.response import bandwidth_disagrees, grazed_bandwidth
 from hmpim.identify.judgement.structure import missed_pole, other_order
+from hmpim.identify.judgement.verdict import UNTOLD, doubted
 from hmpim.identify.worth import INTERPOLATED
 from hmpim.record import Finding
 
@@ -117,7 +118,7 @@ def judge(evidence: Evidence, *, checks: Sequence[Check] | None = None) -> tuple
         said, failure = attempt(name, partial(check, evidence), nothing)
         found += [*said, *failure]
     # Of figures that are not given there is nothing more to say.
-    untold = {name for one in found if one.code == "few_lines" for name in one.parameters}
+    untold = doubted(one for one in found if one.code in UNTOLD)
     return tuple(
         one
         for one in found

@@ -14,7 +14,7 @@ from hmpim.identify.result import (
 from hmpim.identify.result.estimate import ParameterVerdict
 from hmpim.record import Finding
 
-__all__ = ["all_doubted", "doubted", "judged", "judged_together"]
+__all__ = ["UNTOLD", "all_doubted", "doubted", "judged", "judged_together"]
 
 H = TypeVar("H", Parameters, ResponseBandwidths)
 
@@ -46,7 +46,7 @@ does (a slow free response to the bias, motion between the samples to the noise)
 with such a model held in about half of the study of families; what noise alone does to the figure
 is known all the same."""
 
-_UNTOLD = frozenset({"few_lines"})
+UNTOLD = frozenset({"few_lines"})
 """Those under which that is not known either."""
 
 
@@ -63,7 +63,7 @@ def judged(pair: PairIdentification) -> PairIdentification:
     """
     names = doubted(pair.warnings)
     unknown = doubted(w for w in pair.warnings if w.code in _WITHHELD)
-    untold = doubted(w for w in pair.warnings if w.code in _UNTOLD)
+    untold = doubted(w for w in pair.warnings if w.code in UNTOLD)
     parameters = _all_weighed(_withheld(pair.parameters, unknown, untold), names)
     shared = doubted(w for w in pair.warnings if w.code in _OF_THE_RECORD)
     return replace(

@@ -77,7 +77,7 @@ def aside(value: float, low: float | None, high: float | None) -> str:
     reach = [None if end is None else abs(end - value) for end in (low, high)]
     known = [length for length in reach if length]
     if known and len(known) == len(reach) and max(known) < _ROUNDING * abs(value):
-        return f"{value:.10g} ± {max(known):.0e}"
+        return plus_minus(value, max(known))
     places = _places(max(min(known), _ROUGHLY * max(known))) if known else None
     if places is None:
         return f"{_plain(value)} ± ?"

@@ -319,8 +319,7 @@ def _enriched(
 def _owes(search: _Search, fitted: Fitted) -> bool:
     """Whether what is left over follows the input by more than a small share of the output."""
     left = search.follows(fitted)
-    spread = search.products.moments(fitted.rows[:1], fitted.steady[:1]).energy
-    owed = left.share * fitted.fit.objective > MATERIAL**2 * spread
+    owed = left.share * fitted.fit.objective > MATERIAL**2 * search.products.energy
     return left.probability < FALSE_ALARM and bool(owed)
 
 
@@ -346,8 +345,7 @@ def left_over(products: Products, fitted: Fitted) -> LeftOver:
     if products.order:
         plain = Products(products.statistics, skipped=products.skipped)
     gram, count = fitted.residual(plain).gram(products.skipped)
-    energy = plain.moments(fitted.rows[:1], fitted.steady[:1]).energy
-    if gram[0, 0] <= _ROUNDED * energy:
+    if gram[0, 0] <= _ROUNDED * plain.energy:
         least = fitted.fit.objective / products.counted
         return LeftOver(power=least, counted=count, innovation=least, share=1.0, noise=np.ones(1))
     power = float(gram[0, 0])

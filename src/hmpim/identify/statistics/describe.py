@@ -323,7 +323,7 @@ def _unrelated(statistics: Statistics, chosen: Chosen) -> PairIdentification | N
     """Say what little can be said of an output that a constant explains as well."""
     best = chosen.best
     products = best.products
-    spread = products.moments(best.rows, best.steady).energy
+    spread = products.energy
     share = 1.0 if products.order else chosen.left.share
     gained = products.counted * share * float(np.log(max(spread / best.fit.objective, 1.0)))
     if gained > scipy.special.chdtri(best.fit.structure.parameters, FALSE_ALARM):

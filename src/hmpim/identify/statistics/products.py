@@ -7,6 +7,7 @@ The bias is solved for each run, or for all, and taken off too.
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import scipy
@@ -105,6 +106,13 @@ class Products:
     def counted(self) -> int:
         """How many samples count."""
         return sum(run.samples - AHEAD - self.first for run in self._runs)
+
+    @cached_property
+    def energy(self) -> float:
+        """Sum of squares of the outputs that count, the bias taken off."""
+        runs, _, rows = self._inner.shape
+        nothing = np.zeros((runs, 0, rows))
+        return self._without_bias(np.zeros((0, 0)), nothing, np.zeros(0)).energy
 
     def _spectrum(self, autocorrelation: Real) -> Real:
         """Eigenvalues of the circulant that holds the Toeplitz matrix."""

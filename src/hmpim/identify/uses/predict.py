@@ -13,7 +13,7 @@ from hmpim.identify.result import Estimate, PairIdentification
 from hmpim.model import Model, Spread, simulate, slowest_time_constant
 from hmpim.record import Record, uniform
 
-__all__ = ["Prediction", "predict", "rate_of", "to_model"]
+__all__ = ["Prediction", "predict", "rate_of", "settling_time", "to_model"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
