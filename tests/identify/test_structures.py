@@ -49,6 +49,23 @@ CASES = {
         1 / (OMEGA * 9),
     ),
     "second_order": ([1.0], np.polymul(pole(3), pole(15)), 0.0131, None, None, 1 / (OMEGA * 3)),
+    "second_order_zeros": (
+        np.polymul([0.09, 1.0], [0.06, 1.0]),
+        np.polymul([0.17, 1.0], [0.02, 1.0]),
+        0.0131,
+        None,
+        None,
+        None,
+    ),
+    "washout": ([1.0, 0.0], [0.9, 1.0], 0.0131, None, None, 0.9),
+    "washout_second_order": (
+        [1.0, 0.0],
+        np.polymul(mode(10, 0.3), [0.9, 1.0]),
+        0.0231,
+        10.0,
+        0.3,
+        0.9,
+    ),
 }
 
 
@@ -186,3 +203,30 @@ def test_one_structure_can_be_asked_for(field_record):
     record = hmpim.Record.from_arrays({"u": u}, {"y": noisy}, fs=200.0)
     for name in ("first_order", "third_order"):
         assert hmpim.identify(record, structures=[name])["y", "u"].structure == name
+
+
+@pytest.mark.parametrize("seed", [0, 4])
+def test_a_resonance_is_found_in_nine_times_its_power_of_noise(seed):
+    # Of such a residual every test of whiteness is passed, whatever the first start has missed.
+    fine = np.arange(int(FS * 2) * FINE) / (FS * FINE)
+
+    def sweep(time):
+        return np.where(time > 0, np.sin(OMEGA * (time + 9.75 * time**2)), 0.0)
+
+    y = signal.lsim(([1.0], mode(12.5, 0.16)), sweep(fine - 0.015), fine)[1][::FINE]
+    noise = np.random.default_rng(seed).standard_normal(y.size)
+    record = hmpim.Record.from_arrays(
+        {"u": sweep(fine[::FINE])},
+        {"y": y + 0.3 + 3 * np.std(y) * noise},
+        fs=FS,
+        intersample="bandlimited",
+    )
+    pair = hmpim.identify(record)["y", "u"]
+    assert pair.structure == "second_order"
+    for parameter, value in {
+        "delay": 0.015,
+        "natural_frequency": 12.5,
+        "damping_ratio": 0.16,
+    }.items():
+        estimate = getattr(pair, parameter)
+        assert abs(estimate.value - value) < 4.5 * estimate.spread, parameter

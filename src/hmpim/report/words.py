@@ -201,6 +201,7 @@ _STRUCTURES = {
     "eight_modes": "eight modes",
     "washout": "a washout",
     "band_pass": "a band-pass",
+    "washout_second_order": "second order with a washout",
 }
 
 _PARTS = {
@@ -214,6 +215,7 @@ _PARTS = {
     "eight_modes": "eight modes",
     "washout": "a washout",
     "band_pass": "a band-pass",
+    "washout_second_order": "a second order with a washout",
     "integrator": "an integrator",
     "integrator_first_order": "an integrator with a first-order lag",
     "integrator_second_order": "an integrator with a second-order lag",

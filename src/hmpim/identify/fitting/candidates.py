@@ -16,17 +16,18 @@ from hmpim.identify.fitting.enrich import (
     integrator_starts,
     members,
     proposals,
+    without_fast,
 )
 from hmpim.identify.fitting.fit import Fit, Problem, fit_structure
 from hmpim.identify.fitting.growth import one_more_pole, scale_of, with_pole
 from hmpim.identify.fitting.held_steps import best_sample, steps_through
 from hmpim.identify.fitting.modes import grown_modes
-from hmpim.identify.fitting.start import RoughResponse, rough_response, starting_values
+from hmpim.identify.fitting.start import RoughResponse, rough_response, searched, starting_values
 from hmpim.identify.fitting.unexplained import unexplained_response
 from hmpim.identify.noise.misfit import misfit
 from hmpim.identify.noise.whiteness import effective_share, is_white
 from hmpim.identify.signals import longest_lag
-from hmpim.identify.worth import FEW, MATERIAL, MUCH, PART, TWICE
+from hmpim.identify.worth import FEW, MATERIAL, MOST, MUCH, PART, TWICE
 from hmpim.model.dynamics import STRUCTURES, Structure, StructureName, coefficients_of
 from hmpim.model.response import slowest_time_constant
 from hmpim.record import BETWEEN, Intersample
@@ -80,7 +81,13 @@ def fit_plain(
         steps = 2 if settled else _TASTE
         fit = fit_structure(problem, structure, starts[0], iterations=steps)
         hopeful = min((f.objective for f in fits), default=np.inf) * TWICE
+        # A residual of noise for the most part is white whatever the model misses.
+        noisy = fit.cost > MOST * _spread(problem)
         white = fit.objective < hopeful and is_white(fit.residual)
+        if noisy:
+            for theta in searched(rough, structure):
+                rival = fit_structure(problem, structure, theta, iterations=_TASTE)
+                fit = min(fit, rival, key=lambda f: f.objective)
         if not white and fit.objective < TWICE**2 * hopeful:
             rivals = starts[1:]
             if not settled:
@@ -122,7 +129,27 @@ def fit_rich(
     *,
     all_of_them: bool,
 ) -> list[Fit]:
-    """Fits of the richer structures, the plainest first, until nothing is left to explain."""
+    """Fits of the richer structures, the plainest first, until nothing is left to explain.
+
+    And those that are a richer one without what the record does not need of it.
+    """
+    found = _climbed(data, problem, fits, structures, all_of_them=all_of_them)
+    found += _pruned(problem, [*fits, *found], members(structures, (*RICH, *INTEGRATING)))
+    if found and not is_white(min(found, key=lambda fit: fit.objective).residual):
+        # Poles without end follow what no linear model describes: friction, rounding.
+        found = [fit for fit in found if fit.structure.order <= _SURE]
+    return found
+
+
+def _climbed(
+    data: Data,
+    problem: Problem,
+    fits: list[Fit],
+    structures: tuple[StructureName, ...],
+    *,
+    all_of_them: bool,
+) -> list[Fit]:
+    """Fits of richer structures from the rough response, until nothing is left to explain."""
     best = min(fits, key=lambda fit: fit.objective)
     integrating = members(structures, INTEGRATING)
     found: list[Fit] = []
@@ -152,10 +179,50 @@ def fit_rich(
         grown = grown_modes(problem, data, best, members(structures, ("two_modes", *MODES)))
         # Two modes that explain part of what follows the input stand for what is not linear.
         found += [f for f in grown if f.cost < PART * best.cost]
-    if found and not is_white(min(found, key=lambda fit: fit.objective).residual):
-        # Poles without end follow what no linear model describes: friction, rounding.
-        found = [fit for fit in found if fit.structure.order <= _SURE]
     return found
+
+
+def _pruned(problem: Problem, fits: list[Fit], rich: list[Structure]) -> list[Fit]:
+    """Plainer structures from the slowest poles of those near the lead, the richest first.
+
+    A pole or a zero that the record does not need lies anywhere; without it the rest begins close
+    to its best, where a rough response may have proposed nothing of use.
+    """
+    found: list[Fit] = []
+    for structure in sorted(rich, key=lambda one: -one.parameters):
+        every = [*fits, *found]
+        least = min(fit.objective for fit in every)
+
+        def behind(fit: Fit, least: float = least) -> float:
+            return problem.counted * float(np.log(fit.objective / least))
+
+        near = [fit for fit in every if fit.objective < TWICE * least]
+        above = [fit for fit in near if _holds(fit, structure)]
+        if not above or any(f.structure == structure and behind(f) < 2 * CLEARLY for f in near):
+            continue
+        start = without_fast(min(above, key=lambda f: f.structure.parameters), structure)
+        if start is None:
+            continue
+        taste = fit_structure(problem, structure, start, iterations=_TASTE)
+        if taste.objective < TWICE * least:
+            fit = _best_of(problem, structure, [taste.theta], near)
+            if -2 * CLEARLY < behind(fit) < 2 * CLEARLY:  # else it is in another valley
+                found.append(fit)
+    return found
+
+
+def _holds(fit: Fit, plain: Structure) -> bool:
+    """Whether a fit has at least a structure's poles and zeros, and more of either.
+
+    A pole as slow as the record is long holds an integrator.
+    """
+    rich = fit.structure
+    few = plain.zeros <= rich.zeros and plain.dc_zeros >= rich.dc_zeros
+    few = few and plain.order + plain.integrators <= rich.order + rich.integrators
+    alike = plain.integrators == rich.integrators
+    if plain.integrators > rich.integrators:
+        alike = almost_integrates(fit)
+    return few and alike and plain.parameters < rich.parameters
 
 
 def reduced(problem: Problem, fits: list[Fit], richer: list[Fit]) -> list[Fit]:

@@ -24,6 +24,7 @@ __all__ = [
     "integrator_starts",
     "members",
     "proposals",
+    "without_fast",
 ]
 
 PLAIN: tuple[StructureName, ...] = ("static", "first_order", "second_order")
@@ -39,6 +40,7 @@ RICH: tuple[StructureName, ...] = (
     "two_modes",
     "washout",
     "band_pass",
+    "washout_second_order",
 )
 MODES: tuple[StructureName, ...] = tuple(
     name for name, structure in STRUCTURES.items() if structure.parallel
@@ -151,6 +153,42 @@ def proposals(
         return proposal.error > _PROMISING * least, proposal.structure.parameters
 
     return sorted(out, key=rank)
+
+
+def without_fast(fit: Fit, structure: Structure) -> Real | None:
+    """Start of a plainer structure: the slowest poles of a fit; what the others do is delay.
+
+    Parameters
+    ----------
+    fit : Fit
+        With as many poles, or more.
+    structure : Structure
+        The plainer one; its integrator, if the fit has none, stands for the slowest pole.
+
+    Returns
+    -------
+    ndarray, shape (1 + order,), or None where pairs of poles do not divide so
+    """
+    whole = fit.denominator[fit.structure.integrators :]
+    poles = sorted(np.roots(whole[::-1]), key=lambda p: (abs(p), p.imag))
+    slow = poles[: structure.integrators - fit.structure.integrators]
+    kept: list[complex] = []
+    for pole in poles[len(slow) :]:
+        if len(kept) + (1 if pole.imag == 0.0 else 2) <= structure.order and pole.imag >= 0.0:
+            kept += [pole] if pole.imag == 0.0 else [pole, pole.conjugate()]
+    denominator = np.real(np.polynomial.polynomial.polyfromroots(kept))
+    if len(kept) < structure.order or denominator[0] == 0.0 or any(p.imag for p in slow):
+        return None
+    denominator = denominator / denominator[0]
+    coefficients = _sections(denominator, structure)
+    if coefficients is None:
+        return None
+    late = fit.delay + whole[1] + sum((1.0 / p).real for p in slow)
+    late -= denominator[1] if kept else 0.0
+    if structure.zeros == structure.dc_zeros:  # no zero of its own: what the fit's do is delay too
+        first, second = (*fit.numerator, 0.0)[structure.dc_zeros : structure.dc_zeros + 2]
+        late -= second / first if first else 0.0
+    return np.concatenate([[late], theta_of(structure, coefficients)])
 
 
 def _error(rough: RoughResponse, fit: Fit) -> float:

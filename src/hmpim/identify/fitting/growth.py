@@ -34,6 +34,7 @@ __all__ = [
     "as_if_zero",
     "grow",
     "hidden_pole",
+    "made_room",
     "one_more_pole",
     "response_to_square",
     "scale_of",
@@ -102,7 +103,8 @@ class HiddenPole:
         """
         far = self.limit > PART * self.scale or self.squared > self.std
         structure = self.fit.structure
-        chain = structure.order <= 1 or (structure.order > 2 and not structure.zeros)
+        proper = structure.zeros == structure.dc_zeros
+        chain = structure.order <= 1 or (structure.order > 2 and proper)
         return chain and far
 
 
@@ -255,17 +257,27 @@ def as_if_hidden(fit: Fit, hidden: HiddenPole) -> Fit:
     hidden : HiddenPole
         What `hidden_pole` says of it.
     """
-    lag = hidden.limit
-    moved = lag**2 * hidden.shift
+    moved = made_room(fit, hidden)
+    return replace(
+        moved,
+        structure=one_more_pole(fit.structure),
+        theta=with_pole(fit.structure, moved.theta, hidden.limit),
+    )
+
+
+def made_room(fit: Fit, hidden: HiddenPole) -> Fit:
+    """Return the fit to which that pole comes, still without it.
+
+    Parameters
+    ----------
+    fit, hidden
+        As for `as_if_hidden`.
+    """
+    moved = hidden.limit**2 * hidden.shift
     moved[1 : fit.theta.size] = np.clip(moved[1 : fit.theta.size], -_FARTHEST, _FARTHEST)
     theta, linear = np.split(np.concatenate([fit.theta, fit.linear]) + moved, [fit.theta.size])
     theta = within_reach(fit.structure, theta, delays=(-np.inf, np.inf), samples=_ANY)
-    return replace(
-        fit,
-        structure=one_more_pole(fit.structure),
-        theta=with_pole(fit.structure, theta, lag),
-        linear=linear,
-    )
+    return replace(fit, theta=theta, linear=linear)
 
 
 def as_if_zero(fit: Fit, hidden: HiddenPole) -> Fit:

@@ -9,6 +9,10 @@
    transforms. Reweighting by the last denominator (C. K. Sanathanan and J. Koerner, IEEE TAC 8,
    1963) removes its bias.
 4. The few delays at which the output error is least locally are the starts.
+
+Levy's error weighs noise by the denominator. Where noise is most of the output, starts are those
+of a grid of denominators that explain most of the power, the best delay of each by one inverse
+transform: the likelihood itself, of white noise.
 """
 
 from dataclasses import dataclass
@@ -23,7 +27,7 @@ from hmpim.identify.kept import kept
 from hmpim.identify.worth import MUCH
 from hmpim.model.dynamics import Structure, theta_of
 
-__all__ = ["RoughResponse", "coarse_lag", "rough_response", "starting_values"]
+__all__ = ["RoughResponse", "coarse_lag", "rough_response", "searched", "starting_values"]
 
 _STAMPED_LATE = -2
 """Least delay in samples that is looked for where the output follows the input."""
@@ -40,6 +44,12 @@ _PHASE_STEP = 0.3
 _CORNERS = (0.08, 0.25, 1.0)
 """Where, over the highest frequency, the first weight begins to roll off as 1/A would: above
 the system's own corner the response is noise, which an unweighted fit takes at face value."""
+
+_STEPS = 12
+"""Corner frequencies of the grid, over the decade and a half below the highest."""
+
+_SHAPES = (0.1, 0.3, 1.0)
+"""Its damping ratios: neighbours' resonances overlap."""
 
 _TURNS, _LATE = 64, 64
 """Bins of a long record are taken together where a delay of `lag + _LATE` samples turns them
@@ -232,6 +242,36 @@ def starting_values(
         if all(np.max(np.abs(theta - other)) > MUCH for other in starts):
             starts.append(theta)
     return starts[:count]
+
+
+def searched(rough: RoughResponse, structure: Structure, *, count: int = 3) -> list[Real]:
+    """Starts for a pole or two in much noise: what explains most of the power on a grid.
+
+    Parameters
+    ----------
+    rough, structure, count
+        As for `starting_values`; a structure of no other order has none.
+    """
+    if structure.sections not in ((1,), (2,)):
+        return []
+    finer = int(np.clip(np.ceil(rough.omega[-1] / _PHASE_STEP), 1, 8))
+    shifts = np.arange(min(rough.earliest - rough.lag, 0) * finer, 2 * finer + 1)
+    length = rough.length * finer
+    found: list[tuple[float, Real]] = []
+    for corner in rough.omega[-1] * np.geomspace(0.03, 1.0, _STEPS):
+        for shape in _SHAPES if structure.order == 2 else _SHAPES[-1:]:
+            a = np.array([2.0 * shape, 1.0]) if structure.order == 2 else np.ones(1)
+            model = 1.0 / _polynomial(np.concatenate([[1.0], a]), rough.omega / corner)
+            spectrum = np.zeros(length // 2 + 1, dtype=complex)
+            spectrum[rough.bins] = rough.weight * model.conj() * rough.response
+            likeness = scipy.fft.irfft(spectrum, length)[shifts % length] * length / 2
+            explained = likeness**2 / (rough.weight @ np.abs(model) ** 2)
+            best = int(np.argmax(explained))
+            theta = theta_of(structure, a / corner ** np.arange(1, structure.order + 1))
+            delay = rough.lag + shifts[best] / finer
+            found.append((-float(explained[best]), np.concatenate([[delay], theta])))
+    found.sort(key=lambda item: item[0])
+    return [theta for _, theta in found[:count]]
 
 
 def _polynomial(a: Real, x: Real) -> Complex:

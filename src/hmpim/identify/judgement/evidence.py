@@ -99,6 +99,7 @@ def structure_in_words(name: str) -> str:
         "seven_modes": "seven-mode",
         "eight_modes": "eight-mode",
         "band_pass": "band-pass",
+        "washout_second_order": "second-order (with a washout)",
         "two_modes": "two-mode",
         "integrator_first_order": "lagging integrator",
         "integrator_second_order": "second-order lagging integrator",
