@@ -35,8 +35,8 @@ def output(seed: int, delay: float = 0.03, natural: float = 6.0) -> np.ndarray:
     return y + NOISE * rng.standard_normal(SAMPLES)
 
 
-def alone(y: np.ndarray):
-    record = hmpim.Record.from_arrays({"u": sweep()}, {"y": y}, fs=FS)
+def alone(y: np.ndarray, intersample: str | None = None):
+    record = hmpim.Record.from_arrays({"u": sweep()}, {"y": y}, fs=FS, intersample=intersample)
     return hmpim.identify(record)["y", "u"]
 
 
@@ -68,6 +68,35 @@ def test_together_is_as_alone(fleet):
             assert other.ci95 == pytest.approx(one.ci95, abs=0.02 * half), name
             assert (other.std is None) == (one.std is None), name
     assert together.delay.std is None  # it covers all three
+
+
+def test_intervals_cover_a_missing_zero_together_as_they_do_alone(fleet):
+    """By chance one record in forty asks for it: of it the delay's interval is twice as wide."""
+    seeds = (40, 115, 260)
+    fit = fit_fleet(fleet, np.stack([output(seed) for seed in seeds]))
+    assert fit.sound.all()
+    wide = []
+    for k, seed in enumerate(seeds):
+        pair, together = alone(output(seed)), fit.parameters(k)
+        for name in NAMES:
+            one, other = getattr(pair, name), getattr(together, name)
+            half = (one.ci95[1] - one.ci95[0]) / 2
+            assert other.ci95 == pytest.approx(one.ci95, abs=0.02 * half), name
+        wide.append(together.delay.ci95[1] - together.delay.ci95[0])
+    assert min(wide[1:]) > 1.5 * wide[0]
+
+
+def test_an_interval_that_covers_a_missing_zero_does_not_stretch_the_box():
+    """The box holds the fits of the units: what a zero would move is no place of theirs."""
+    ordinary = [alone(output(seed), "bandlimited") for seed in range(LEARNT)]
+    zero = alone(output(115), "bandlimited")
+    assert zero.delay.spread > 3 * ordinary[0].delay.spread
+    sides = []
+    for pairs in (ordinary, [*ordinary, zero]):
+        found = learn_fleet(sweep(), pairs, fs=FS, band=(0.2, 20.0))
+        (member,) = found.members
+        sides.append(member.surface.high[0] - member.surface.low[0])
+    assert sides[1] < 1.2 * sides[0]
 
 
 def test_what_is_not_of_the_kind_is_left_to_itself(fleet):

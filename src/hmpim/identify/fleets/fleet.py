@@ -4,8 +4,8 @@
 once by the same least squares as `hmpim.identify`, in a few numbers instead of thousands.
 The basis is the stimulus' transforms and Gram matrix, made once for all. Every assumption on what
 the stimulus does between its samples is tried, and what the record does not exclude widens the
-intervals, as `hmpim.identify.reading.spanned` does it. The one record in twenty that asks for one
-more pole by chance is fitted with it, as `identify` does.
+intervals, as `hmpim.identify.reading.spanned` does it. The few records that ask by chance for one
+more pole, one in twenty, or for a zero, one in forty, are fitted by themselves, as `identify` does.
 
 The parameters and their errors are those of a fit to the record itself, as long as what the basis
 and the polynomials are off is small beside a standard deviation: `FleetFit.sound` says where it is,
@@ -22,7 +22,7 @@ import scipy
 from numpy.typing import NDArray
 
 from hmpim.identify.arrays import Mask, Real
-from hmpim.identify.chance import CLEARLY, FALSE_ALARM, LIKELIER, ONE_SIDED
+from hmpim.identify.chance import CLEARLY, FALSE_ALARM, HALF, LIKELIER, ONE_SIDED
 from hmpim.identify.effects.imperfections import find_imperfections
 from hmpim.identify.fleets.fits import Errors, Fits, errors_of, fitted_all
 from hmpim.identify.fleets.learnt import Fleet, Member, learn_fleet
@@ -43,6 +43,9 @@ Flags = Mask
 _ASKS = 0.98 * ONE_SIDED
 """Standard deviations from which one more pole is asked for: a little early, as the basis is not
 exact; the fit to the record itself then decides."""
+
+_COVERED = 0.98 * HALF
+"""The same on the other side, from which on a zero or a pair of poles is covered."""
 
 _CLOSE = 0.98 * ALMOST
 """The same, from which on `identify` says that it almost asks for other dynamics."""
@@ -262,14 +265,16 @@ def _told(
     alone, spanned = _columns(fleet, fit, some, others, errors, units)
     codes = [("intersample",) * moved for moved in apart.tolist()]
     asking: dict[int, Tails] = {}
-    for i in np.flatnonzero(sound & (asked > _ASKS)).tolist():
+    for i in np.flatnonzero(sound & ((asked > _ASKS) | (asked < -_COVERED))).tolist():
         own = Parameters(**{name: column.estimate(i) for name, column in alone.items()})
         tails = with_tails(fleet, fit.member, theta[i], outputs[i], own, highest=highest)
         sound[i] = tails is not None and (tails.open or asked[i] < _CLOSE)
-        if tails is not None and tails.open:
+        if tails is None:
+            continue
+        _widen(spanned, i, own, tails.parameters)
+        if tails.open:
             codes[i] = ("structure", *codes[i])
             asking[i] = tails
-            _widen(spanned, i, own, tails.parameters)
     for name in SIZES:
         if name in spanned:
             sound &= ~_is_wide(spanned[name])
@@ -331,7 +336,7 @@ def _columns(
 
 
 def _widen(columns: dict[str, Column], i: int, own: Parameters, tails: Parameters) -> None:
-    """Let the intervals of one record cover one more pole, beside the other assumptions."""
+    """Let the intervals of one record cover one more pole or zero, beside the other assumptions."""
     for name, column in columns.items():
         tail = getattr(tails, name)
         if tail is None or tail.ci95 is None or tail is getattr(own, name):

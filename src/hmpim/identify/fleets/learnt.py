@@ -13,7 +13,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from hmpim.identify.arrays import Real
-from hmpim.identify.chance import HALF
 from hmpim.identify.fitting.data import shifted
 from hmpim.identify.fitting.growth import one_more_pole, with_pole
 from hmpim.identify.fitting.rows import Part, Problem
@@ -229,14 +228,12 @@ def _moved(box: tuple[Real, Real], found: Intersample, mode: Intersample) -> tup
 
 
 def _own_error(pair: PairIdentification) -> float:
-    """Deviation of a delay in s; of an interval that covers several models, of its shorter side."""
-    delay = pair.delay
-    if delay is None or delay.ci95 is None or None in delay.ci95:
-        return np.inf
-    if delay.std is not None:
-        return delay.std
-    low, high = (abs(float(end or 0.0) - delay.value) for end in delay.ci95)
-    return min(low, high) / HALF
+    """Deviation of a delay in s, of the fit alone: its interval may cover other models besides.
+
+    The box is about where the best fit may lie, and a missing pole or zero does not move that.
+    """
+    assert pair.covariance is not None
+    return float(np.sqrt(pair.covariance[0, 0]))
 
 
 def _place(pair: PairIdentification, fs: float) -> Real:

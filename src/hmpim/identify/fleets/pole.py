@@ -1,7 +1,7 @@
-"""One more pole for one record of a fleet: the few that ask for it, most of them by chance.
+"""One more pole or zero for one record of a fleet: the few that ask for it, most of them by chance.
 
-The record itself is fitted here, from where the fit of all ended, and grown as
-`hmpim.identify.fitting.joint` grows a fit.
+The record itself is fitted here, from where the fit of all ended, grown as
+`hmpim.identify.fitting.joint` grows a fit, and its intervals are widened as those of any record.
 """
 
 from dataclasses import dataclass
@@ -26,16 +26,16 @@ _THERE = 1e-4
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Tails:
-    """What one more pole leaves open.
+    """What one more pole or zero leaves open.
 
     Parameters
     ----------
     parameters : Parameters
-        With intervals that cover it.
+        With intervals that cover it where the record asks for it by more than chance.
     open : bool
-        Whether it is as likely, but for its price; if not, they are what they were.
+        Whether one more pole is as likely, but for its price.
     delay : float
-        The delay with one more pole, in s.
+        The delay with that pole, in s.
     """
 
     parameters: Parameters
@@ -79,8 +79,6 @@ def with_tails(
     )
     if growth.grown:
         return None
-    if not growth.rivals:
-        return Tails(parameters=own, open=False)
     joint = JointFit(
         problem=problem,
         weighed=problem,
@@ -94,6 +92,6 @@ def with_tails(
     )
     return Tails(
         parameters=spanned(own, joint, fs=fleet.fs, highest=highest),
-        open=True,
-        delay=growth.rivals[0].fit.delay / fleet.fs,
+        open=bool(growth.rivals),
+        delay=growth.rivals[0].fit.delay / fleet.fs if growth.rivals else 0.0,
     )
