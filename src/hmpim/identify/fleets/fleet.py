@@ -16,6 +16,7 @@ where no pole is to be added. All other records are for `identify`.
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import partial
+from math import isnan
 
 import numpy as np
 import scipy
@@ -76,11 +77,15 @@ class Column:
 
     def estimate(self, i: int) -> Estimate | None:
         """Of one record."""
-        value, std, low, high = (float(getattr(self, end)[i]) for end in _ENDS)
-        if np.isnan(value):
+        value, std = float(self.value[i]), float(self.std[i])
+        if isnan(value):
             return None
-        std_ = None if np.isnan(std) else std
-        return Estimate(value=value, std=std_, ci95=(low, high), unit=self.unit)
+        return Estimate(
+            value=value,
+            std=None if isnan(std) else std,
+            ci95=(float(self.low[i]), float(self.high[i])),
+            unit=self.unit,
+        )
 
     def put(self, some: NDArray[np.intp], other: "Column", kept: Flags) -> None:
         """Take those records of another that are kept."""

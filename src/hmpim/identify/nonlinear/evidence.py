@@ -214,8 +214,9 @@ def are_curved(models: Real, residuals: Real, counted: Mask | slice = slice(None
     told, e = size > 0, residuals[:, counted]
     size = np.where(told, size, 1.0)[:, None]
     step = np.gradient(models, axis=1)
+    square = models**2
     traces = np.stack(
-        [np.ones_like(models), models, step, models**2, models**3 / size, np.sign(step) * size],
+        [np.ones_like(models), models, step, square, square * models / size, np.sign(step) * size],
         axis=1,
     )
     rows = traces[:, :, counted]

@@ -6,11 +6,11 @@ flat, its phase does not wrap, and a straight line through the neighbours of a f
 far measurement and model part there, and where the measurement crosses.
 """
 
-from dataclasses import replace
+from dataclasses import fields, replace
 
 import numpy as np
 
-from hmpim.identify.arrays import Complex, Real
+from hmpim.identify.arrays import Complex, Real, median
 from hmpim.identify.reading.sampled_response import sampled_response
 from hmpim.identify.result import Estimate, FrequencyResponse, Parameters, ResponseBandwidths
 from hmpim.identify.result.error_bars import estimate
@@ -54,7 +54,7 @@ def ratio_at(
     ratio = measured.response[near] / modelled
     std = measured.std[near] / np.abs(modelled)
     weight = 1.0 / np.maximum(std, 1e-12)
-    return _height(f - frequency, ratio, weight**2), float(np.median(std))
+    return _height(f - frequency, ratio, weight**2), median(std)
 
 
 def _height(x: Real, y: Complex, weight: Real) -> complex:
@@ -90,38 +90,35 @@ def response_bandwidths(
         What the input does between its samples: a ratio of sampled spectra contains it, the
         bandwidths of the system behind it do not.
     """
-    still = replace(system, delay=0.0)
+    names = [field.name for field in fields(ResponseBandwidths)]
+    near = {name: e.value for name in names if (e := getattr(modelled, name)) is not None}
+    steepness = _slopes(replace(system, delay=0.0), np.array([*near.values()]))
 
-    def crossing(near: Estimate | None, kind: str) -> Estimate | None:
-        if near is None:
-            return None
-        value = near.value
+    def crossing(name: str, value: float, steep: complex) -> Estimate | None:
         found = ratio_at(measured, system, value, fs, intersample)
         if found is None:
             return None
         ratio, std = found
-        steep = _slope(still, value)
-        if kind == "gain":
+        if name == "bandwidth_3db":
             rise = steep.real
             shift = -(abs(ratio) - 1.0) / rise
         else:
-            late = 2 * np.pi * system.delay if kind == "phase" else 0.0
+            late = 2 * np.pi * system.delay if name == "bandwidth_phase90" else 0.0
             rise = steep.imag - late
             shift = -float(np.angle(ratio)) / rise
         spread = std / np.sqrt(2) / abs(rise)
         return estimate(value + shift, float(spread) ** 2, freedom=_MANY, unit="Hz")
 
     return ResponseBandwidths(
-        bandwidth_phase90=crossing(modelled.bandwidth_phase90, "phase"),
-        bandwidth_phase90_without_delay=crossing(
-            modelled.bandwidth_phase90_without_delay, "phase without delay"
-        ),
-        bandwidth_3db=crossing(modelled.bandwidth_3db, "gain"),
+        **{
+            name: crossing(name, value, steep)
+            for (name, value), steep in zip(near.items(), steepness.tolist(), strict=True)
+        }
     )
 
 
-def _slope(still: RationalDelay, f: float) -> complex:
+def _slopes(still: RationalDelay, f: Real) -> Complex:
     """Derivative of ln G by frequency, 1/Hz, of a system without delay: of gain, and of phase."""
     step = 1e-4 * f
-    low, high = response(still, np.array([f - step, f + step]))
-    return complex(np.log(high / low) / (2 * step))
+    low, high = np.split(response(still, np.concatenate([f - step, f + step])), 2)
+    return np.asarray(np.log(high / low) / (2 * step))

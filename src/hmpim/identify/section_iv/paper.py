@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 
 from hmpim.arguments import checked
 from hmpim.errors import ArgumentError, RecordError
-from hmpim.identify.arrays import Complex, Mask, Real
+from hmpim.identify.arrays import Complex, Mask, Real, median
 from hmpim.identify.kept import kept
 from hmpim.identify.result import PaperEstimates
 from hmpim.identify.section_iv import response as reading
@@ -347,7 +347,7 @@ def _estimates(
     frequency, magnitude = frequency[steps.read], steps.magnitude[steps.read]
     hump = reading.peak_gain(magnitude)
     low = magnitude[: reading.near_dc(magnitude.size)]
-    gain = float(np.median(low)) if low.size else 0.0
+    gain = median(low) if low.size else 0.0
     remaining = steps.phase_without_delay[steps.read]
     return PaperEstimates(
         delay=time.lag / fs,

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hmpim.errors import ArgumentError
-from hmpim.identify.arrays import Real
+from hmpim.identify.arrays import Real, median
 from hmpim.identify.worth import FEW
 
 __all__ = [
@@ -82,7 +82,7 @@ def phase(response: ArrayLike, *, inverted: bool = False) -> Real:
     if g.size == 0:
         return np.zeros(0)
     turning = np.degrees(np.unwrap(np.angle(g)))
-    start = float(np.median(turning[: near_dc(g.size)]))
+    start = median(turning[: near_dc(g.size)])
     return turning - 360.0 * round(start / 360.0)
 
 
@@ -281,7 +281,7 @@ def peak_gain(magnitude: ArrayLike) -> float | None:
         return None
     start = near_dc(g.size)
     top = int(np.argmax(g))
-    gain = float(np.median(g[:start]))
+    gain = median(g[:start])
     if top < start or top == g.size - 1 or gain <= 0:
         return None
     return float(g[top]) / gain
