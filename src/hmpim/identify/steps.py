@@ -90,7 +90,12 @@ def fit(question: Question, seen: Imperfections) -> OutputFit:
         taken_off = fitted.fits[0].problem.y - joint.problem.y
         humming = replace(humming, trend=taken_off - drifting.trend)
     return replace(
-        fitted, fits=(joint,), related=(joint.related,), drifting=drifting, humming=humming
+        fitted,
+        fits=(joint,),
+        related=(joint.related,),
+        drifting=drifting,
+        humming=humming,
+        steady=None if drifting is None else fitted.prediction,
     )
 
 
@@ -107,10 +112,9 @@ def drift_or_levels(
     question: Question, seen: Imperfections, fitted: OutputFit
 ) -> tuple[Imperfections, OutputFit]:
     """Take levels behind the noise, where they explain better what was taken for a drift."""
-    if fitted.drifting is None or seen.saturation is not None:
+    if fitted.steady is None or seen.saturation is not None:
         return seen, fitted
-    steady = _fit_once(question, seen, question.structures)
-    plateau = _imperfections(question, prediction=steady.prediction).saturation
+    plateau = _imperfections(question, prediction=fitted.steady).saturation
     if plateau is None or plateau.noise != "after":
         return seen, fitted
     clipped = replace(seen, saturation=plateau)

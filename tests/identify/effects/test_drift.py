@@ -4,6 +4,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+import scipy.signal
 
 import hmpim
 from tests_support import assert_share, holds, in_studies, study_size
@@ -48,6 +49,29 @@ def steady(rate):
 
 def said(pair):
     return [w.message for w in pair.warnings if w.code == "drift"]
+
+
+def test_a_warm_up_is_no_slow_pole_of_the_unit():
+    # Beside little noise a pole that a zero all but cancels, its state free, looks the same.
+    rng = np.random.default_rng(3)
+    fine = np.arange(16 * 1200) / 1600.0
+    u = np.sin(2 * np.pi * (0.1 * fine + 0.45 * fine**2))
+    system = scipy.signal.lti([1.0], [1 / 28.5**2, 2 * 0.7 / 28.5, 1.0])
+    y = scipy.signal.lsim(system, np.interp(fine - 0.025, fine, u, left=0.0), fine)[1][::16]
+    t = fine[::16]
+    warming = 0.5 * (1 - np.exp(-t / 1.9))
+    record = hmpim.Record.from_arrays(
+        {"u": u[::16]},
+        {"y": y + warming + 0.001 * rng.standard_normal(t.size)},
+        fs=100.0,
+        intersample="bandlimited",
+    )
+    pair = hmpim.identify(record)["y", "u"]
+    assert (pair.structure, pair.verdict) == ("second_order", "ok")
+    for name, truth in (("bias", warming.mean()), ("natural_frequency", 28.5 / (2 * np.pi))):
+        estimate = getattr(pair, name)
+        assert abs(estimate.value - truth) < 4.5 * estimate.spread, name
+    assert said(pair)
 
 
 LONG = ("steady, small", "warming up for long", "slow sine", "random walk")

@@ -52,6 +52,10 @@ class OutputFit:
         Delay and lag of couplings of no more than first order.
     drifting : Drifting or None
         The bias's drift, of an output to one input; the fit's output is without it.
+    humming : Humming or None
+        Its hum, likewise.
+    steady : ndarray, shape (n,), or None
+        Where it drifts, what a fit with a constant bias predicts.
     """
 
     fits: tuple[JointFit, ...]
@@ -61,6 +65,7 @@ class OutputFit:
     lags: tuple[Lag | None, ...]
     drifting: Drifting | None = None
     humming: Humming | None = None
+    steady: Real | None = None
 
     @property
     def prediction(self) -> Real:

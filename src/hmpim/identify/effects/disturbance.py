@@ -13,12 +13,17 @@ __all__ = ["gain_by_rows", "without_rows"]
 def gain_by_rows(one: JointFit, count: int, other: JointFit) -> float:
     """Schwarz's criterion of a fit without `count` rows less that of one with them.
 
-    Either residual is taken as an autoregression.
+    Either residual is taken as an autoregression, of the samples that count in both; an initial
+    state that is fitted has its parameters too.
     """
-    counts = slice(None) if one.problem.valid is None else one.problem.valid
-    gained = 2.0 * innovation_gain(other.best.fit.residual[counts], one.best.fit.residual[counts])
-    unknown = one.best.fit.structure.parameters + count - other.best.fit.structure.parameters
-    return gained - unknown * float(np.log(one.problem.counted))
+    size = one.problem.y.size
+    counts = np.ones(size, bool) if one.problem.valid is None else one.problem.valid.copy()
+    counts[: max(one.forgotten, other.forgotten)] = False
+    fit, former = one.best.fit, other.best.fit
+    gained = 2.0 * innovation_gain(former.residual[counts], fit.residual[counts])
+    unknown = fit.structure.parameters + fit.initial.size + count
+    unknown -= former.structure.parameters + former.initial.size
+    return gained - unknown * float(np.log(counts.sum()))
 
 
 def without_rows(joint: JointFit, which: slice) -> JointFit:

@@ -1,8 +1,10 @@
-"""A bias that drifts: a slow polynomial of time, fitted together with everything else.
+"""A bias that drifts: a slow function of time, fitted together with everything else.
 
-Looked for only where a constant bias leaves a residual that is not white. Its Legendre
-polynomials are rows of the same fit, solved with bias and numerator; the error bars come from the
-derivatives of all.
+Looked for where a constant bias leaves a residual that is not white, or a rich model has a free
+response as slow as a drift. It is a polynomial, or what settles as a body does that warms up,
+exp(-t/T). Legendre's polynomials, or the exponential and its derivative with respect to T, are
+rows of the same fit, solved with bias and numerator; the error bars come from the derivatives of
+all.
 """
 
 from collections.abc import Callable
@@ -31,6 +33,13 @@ __all__ = ["Drifting", "drift_finding", "with_drift"]
 _DEGREES = (1, 2, 3, 4, 6, 8, 12, 16)
 """Degrees of the polynomial that are weighed against each other."""
 
+_SETTLES = (-4.0, 0.7)
+"""Logarithms of the time constants, over the record, at which what settles is looked for: from
+one that is over before the fifth part of a record to one of two records."""
+
+_TRIED = 16
+"""How many."""
+
 _FEWEST = 100
 """Samples from which on a drift is told from noise: six for each degree of the polynomial."""
 
@@ -46,15 +55,15 @@ class Drifting:
         mean over the record.
     trend : ndarray, shape (n,)
         The drift, zero on average, in the output's unit.
-    degree : int
-        Of the polynomial.
+    steady : bool
+        Whether it is a straight line.
     rate, rate_std : float
         Mean rate over the record and its standard deviation, output's unit per sample.
     """
 
     joint: JointFit
     trend: Real
-    degree: int
+    steady: bool
     rate: float
     rate_std: float
 
@@ -79,11 +88,10 @@ def with_drift(first: JointFit, fitted: Callable[[Real, bool], JointFit]) -> Dri
         return None
     columns = _polynomials(first.problem.y.size, _DEGREES[-1])
     joint = fitted(columns, True)
-    degree = _degree(joint, columns)
-    columns = columns[:degree]
+    columns = _shape(joint, columns)
     # The structure is chosen once more, now that the drift is known.
     joint = fitted(columns, is_white(joint.best.fit.residual))
-    if gain_by_rows(joint, degree, first) < 0.0 and not _passes_for_drift(first, joint):
+    if gain_by_rows(joint, len(columns), first) < 0.0 and not _passes_for_drift(first, joint):
         return None
     return _described(joint, columns)
 
@@ -105,7 +113,7 @@ def drift_finding(drifting: Drifting, fs: float, unit: str) -> Finding:
     rate, std = drifting.rate * fs, drifting.rate_std * fs
     per = f" {unit}/s" if unit else " per s"
     span = f"{float(np.ptp(drifting.trend)):.3g} {unit}".rstrip()
-    shape = "steadily" if drifting.degree == 1 else "unsteadily"
+    shape = "steadily" if drifting.steady else "unsteadily"
     return Finding(
         code="drift",
         message=f"The bias drifts {shape}, by {span} over the record, on average by "
@@ -119,7 +127,8 @@ def drift_finding(drifting: Drifting, fs: float, unit: str) -> Finding:
 def _asked_for(joint: JointFit) -> bool:
     """Whether what a fit leaves over is slow, or its model is as slow as a drift."""
     fit, problem = joint.best.fit, joint.problem
-    if almost_integrates(fit) and not fit.structure.integrators:
+    slow = almost_integrates(fit) and not fit.structure.integrators
+    if slow or joint.lingers:
         return True  # the model may have taken the drift for its own
     if is_white(fit.residual):
         return False
@@ -156,19 +165,41 @@ def _polynomials(size: int, degree: int) -> Real:
     return np.asarray(columns - columns.mean(axis=1, keepdims=True))
 
 
-def _degree(joint: JointFit, columns: Real) -> int:
-    """Least degree that serves, by Schwarz's criterion on model's residual and polynomial."""
+def _shape(joint: JointFit, columns: Real) -> Real:
+    """Rows that serve, by Schwarz's criterion on model's residual and polynomial, shape (k, n)."""
     problem, fit = joint.problem, joint.best.fit
     counts = slice(None) if problem.valid is None else problem.valid
     left = (fit.residual + problem.masked(fit.nuisance[: len(columns)] @ columns))[counts]
     count = problem.counted  # of a wander, the more is taken out the better
-    best = (np.inf, 1)
-    for degree in _DEGREES:
-        rows = np.vstack([columns[:degree], np.ones(problem.y.size)])[:, counts]
+
+    def cost(shapes: Real) -> float:
+        rows = np.vstack([shapes, np.ones(problem.y.size)])[:, counts]
         rest = left - solved(rows @ rows.T, rows @ left) @ rows
-        cost = max(float(rest @ rest), np.finfo(float).tiny)
-        best = min(best, (count * float(np.log(cost)) + degree * float(np.log(count)), degree))
-    return best[1]
+        return count * float(np.log(max(float(rest @ rest), np.finfo(float).tiny)))
+
+    settling = _settling(problem.y.size, _slowness(problem.y.size, cost))
+    found = [columns[:degree] for degree in _DEGREES] + [settling]
+    return min(found, key=lambda rows: cost(rows) + len(rows) * float(np.log(count)))
+
+
+def _slowness(size: int, cost: Callable[[Real], float]) -> float:
+    """Time constant in samples of what settles, from a grid and then to its best."""
+    grid = np.log(size) + np.linspace(*_SETTLES, _TRIED)
+    near = grid[int(np.argmin([cost(_settling(size, float(np.exp(t)))[:1]) for t in grid]))]
+    step = grid[1] - grid[0]
+    best = scipy.optimize.minimize_scalar(
+        lambda t: cost(_settling(size, float(np.exp(t)))[:1]),
+        bounds=(near - step, near + step),
+        method="bounded",
+    )
+    return float(np.exp(best.x))
+
+
+def _settling(size: int, slowness: float) -> Real:
+    """exp(-t/T) and its derivative with respect to log T, zero on average, shape (2, n)."""
+    at = np.arange(size) / slowness
+    rows = np.vstack([np.exp(-at), at * np.exp(-at)])
+    return np.asarray(rows - rows.mean(axis=1, keepdims=True))
 
 
 def _described(joint: JointFit, columns: Real) -> Drifting:
@@ -189,7 +220,7 @@ def _described(joint: JointFit, columns: Real) -> Drifting:
     return Drifting(
         joint=without_rows(joint, slice(len(columns))),
         trend=trend,
-        degree=columns.shape[0],
+        steady=len(columns) == 1,
         rate=float(across @ own),
         rate_std=float(np.sqrt(max(float(across @ weights @ across), 0.0))),
     )

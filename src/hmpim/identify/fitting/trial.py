@@ -5,8 +5,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from hmpim.identify.chance import LIKELIER
+from hmpim.identify.fitting.enrich import PLAIN
 from hmpim.identify.fitting.fit import Fit, Problem
 from hmpim.identify.fitting.growth import HiddenPole
+from hmpim.identify.worth import MUCH
 from hmpim.record import Intersample
 
 __all__ = ["JointFit", "Trial", "likeliest_of", "trial_of"]
@@ -60,6 +62,13 @@ class JointFit:
     silent: bool = False
     rivals: tuple[Trial, ...] = ()
     hidden: HiddenPole | None = None
+
+    @property
+    def lingers(self) -> bool:
+        """Whether a free response lasts long that no plain model has: a drift looks like it."""
+        fit = self.best.fit
+        long = fit.memory > MUCH * self.problem.y.size
+        return bool(self.forgotten) and long and fit.structure.name not in PLAIN
 
     @property
     def weighed_share(self) -> float:

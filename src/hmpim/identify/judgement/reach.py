@@ -12,7 +12,7 @@ from hmpim.identify.fitting.growth import scale_of
 from hmpim.identify.judgement.evidence import Evidence, structure_in_words
 from hmpim.identify.kept import kept
 from hmpim.identify.result.groups import MODELLED, PHASE_SPLIT, TIMING, in_words
-from hmpim.identify.worth import DEEPEST, FEW, MUCH, PAST, ROUNDING, TWICE
+from hmpim.identify.worth import DEEPEST, FEW, PAST, ROUNDING, TWICE
 from hmpim.model import response
 from hmpim.record import Finding
 from hmpim.record.runs import runs_of
@@ -64,10 +64,8 @@ def initial_transient(evidence: Evidence) -> tuple[Finding, ...]:
     if not joint.forgotten:
         return ()
     memory = joint.best.fit.memory
-    lasting = memory > MUCH * joint.problem.y.size
-    structure = joint.best.fit.structure
-    drifts = lasting and structure.name not in PLAIN
-    open_ended = structure.integrators > 0
+    drifts = joint.lingers
+    open_ended = joint.best.fit.structure.integrators > 0
     doubted = ("bias", *_OF_SLOWEST) if drifts else ("bias",) if open_ended else ()
     return (
         Finding(
