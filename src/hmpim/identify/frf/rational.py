@@ -441,7 +441,9 @@ def _state(columns: Columns, y: Complex, theta: Complex) -> RationalState:
     # Quicker than a complex division, which guards against what is not taken: overflow.
     inverse = 1.0 / (denominator.real**2 + denominator.imag**2)
     over: Complex = np.multiply(np.conj(denominator), inverse, dtype=np.complex128)
-    fitted = (theta[..., None, :count] @ columns.linear)[..., 0, :] * over
+    # All records of a window in one product: few large ones are quicker than many small.
+    each = theta.reshape(-1, *theta.shape[-2:]).swapaxes(0, 1)[..., :count] @ columns.linear
+    fitted = each.swapaxes(0, 1).reshape(over.shape) * over
     left = y - fitted
     squares = np.vecdot(left, left).real
     return RationalState(
