@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import scipy.signal
 
 from hmpim import Record, identify
 from hmpim.identify.judgement.response import bandwidth_disagrees
@@ -65,3 +66,25 @@ def test_a_bandwidth_that_the_phase_grazes_is_doubted_and_a_clear_one_is_not():
     grazing = notched(0.002333)
     (said,) = [w for w in grazing.warnings if w.code == "grazed_bandwidth"]
     assert (said.severity, said.parameters) == ("doubt", ("bandwidth_phase90",))
+
+
+@pytest.mark.parametrize("rise", [190, 1])
+def test_the_response_to_a_ramp_or_a_step_is_that_of_the_unit(rise):
+    # The record ends elsewhere than it began: without differences that leaks into every bin.
+    fs, n, fine = 500.0, 1500, 16
+    t = np.arange(n * fine) / (fs * fine)
+    u = np.interp(t - 0.2, [0.0, rise / fs], [0.0, 4.0])
+    section = [1 / 57.0**2, 2 * 0.25 / 57.0, 1.0]
+    moved = np.interp(t - 0.21, [0.0, rise / fs], [0.0, 4.0])
+    y = scipy.signal.lsim((1.0, section), moved, t)[1][::fine]
+    y += 0.002 * np.random.default_rng(2).standard_normal(n)
+    pair = identify(Record.from_arrays({"u": u[::fine]}, {"y": y}, fs=fs, intersample="foh"))[
+        "y", "u"
+    ]
+    seen = pair.frequency_response
+    near = seen.frequency < 12.0
+    truth = scipy.signal.freqs([1.0], section, 2 * np.pi * seen.frequency[near])[1]
+    truth = truth * np.exp(-2j * np.pi * seen.frequency[near] * 0.01)
+    error = np.abs(seen.response[near] - truth)
+    assert np.all(error < np.maximum(0.05 * np.abs(truth), 5 * seen.std[near]))
+    assert pair.verdict == "ok"
