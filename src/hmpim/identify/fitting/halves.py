@@ -25,12 +25,15 @@ class Halves:
     ----------
     probability : float
         Chance of so much or more, were one model right for both and the noise white.
+    share : float
+        Of the residual's power, what models of their own would explain.
     owed : float
-        What a half would gain from a model of its own, r.m.s. over that of its own output
-        about the mean; the greater of the two.
+        The same, r.m.s. over that of the whole output. Not over a half's own: of a sweep one half
+        hardly moves, and friction is much of that and nothing of the record.
     """
 
     probability: float
+    share: float
     owed: float
 
 
@@ -42,7 +45,8 @@ def compare_halves(rows: Real, residual: Real, y: Real, *, share: float) -> Halv
     rows : ndarray, shape (p, n)
         Derivatives of the prediction.
     residual, y : ndarray, shape (n,)
-        What is left over, 0 where a sample does not count; the output.
+        What is left over, 0 where a sample does not count; the output about its mean, weighed
+        alike.
     share : float
         Independent samples per sample.
 
@@ -53,28 +57,33 @@ def compare_halves(rows: Real, residual: Real, y: Real, *, share: float) -> Halv
     >>> compare_halves(rows, drifting + 0.1 * rows[0], drifting, share=1.0).probability < 1e-6
     True
     """
-    probability, owed = halves_of(rows[None], residual[None], y[None], share=share)
-    return Halves(probability=float(probability[0]), owed=float(owed[0]))
+    chance, gained = halves_of(rows[None], residual[None], share=share)
+    power, size = (float(np.vecdot(x, x)) for x in (residual, y))
+    return Halves(
+        probability=float(chance[0]),
+        share=float(gained[0]) / power if power > 0 else 0.0,
+        owed=float(np.sqrt(gained[0] / size)) if size > 0 else 0.0,
+    )
 
 
-def halves_of(rows: Real, residual: Real, y: Real, *, share: float) -> tuple[Real, Real]:
-    """Compare the halves of many fits; probabilities and what is owed, shape (k,), as `Halves`.
+def halves_of(rows: Real, residual: Real, *, share: float) -> tuple[Real, Real]:
+    """Compare the halves of many fits; probabilities and sums of squares gained, shape (k,).
 
     Parameters
     ----------
     rows : ndarray, shape (k, p, n)
         Derivatives of the predictions.
-    residual, y : ndarray, shape (k, n)
-        What is left over, and the outputs.
+    residual : ndarray, shape (k, n)
+        What is left over.
     share : float
         Independent samples per sample.
     """
     count, p, n = rows.shape
     tiny = np.finfo(float).tiny
     variance = np.vecdot(residual, residual) / max(n - p, 1)
-    statistic, degrees, owed = np.zeros(count), np.zeros(count), np.zeros(count)
+    statistic, degrees = np.zeros(count), np.zeros(count)
     for half in (slice(0, n // 2), slice(n // 2, n)):
-        part, left, out = rows[:, :, half], residual[:, half], y[:, half]
+        part, left = rows[:, :, half], residual[:, half]
         slope = (part @ left[:, :, None])[:, :, 0]
         gram = part @ part.transpose(0, 2, 1)
         scale = np.sqrt(np.maximum(np.einsum("iaa->ia", gram), tiny))
@@ -82,12 +91,9 @@ def halves_of(rows: Real, residual: Real, y: Real, *, share: float) -> tuple[Rea
         seen = values > 1e-8 * values[:, -1:]
         along = (vectors.transpose(0, 2, 1) @ (slope / scale)[:, :, None])[:, :, 0]
         gained = np.sum(np.where(seen, along**2 / np.where(seen, values, 1.0), 0.0), axis=1)
-        gained = np.minimum(gained, np.vecdot(left, left))
-        statistic += gained
+        statistic += np.minimum(gained, np.vecdot(left, left))
         degrees += np.count_nonzero(seen, axis=1)
-        spread = np.sum((out - out.mean(axis=1, keepdims=True)) ** 2, axis=1)
-        owed = np.maximum(owed, np.sqrt(gained / np.where(spread > 0, spread, np.inf)))
     told = variance > 0
     free = np.maximum(degrees - p, 1)
     chance = scipy.special.chdtrc(free, share * statistic / np.where(told, variance, 1.0))
-    return np.where(told, chance, 1.0), np.where(told, owed, 0.0)
+    return np.where(told, chance, 1.0), np.where(told, statistic, 0.0)

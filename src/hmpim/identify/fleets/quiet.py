@@ -26,7 +26,7 @@ from hmpim.identify.nonlinear.evidence import are_curved
 from hmpim.identify.nonlinear.harmonics import any_harmonic
 from hmpim.identify.nonlinear.sweep_phase import SweepPhase
 from hmpim.identify.signals import longest_lag
-from hmpim.identify.worth import BLURRED, FEW, MUCH, PART
+from hmpim.identify.worth import BLURRED, FEW, MUCH, PART, WORTH
 
 __all__ = ["are_quiet"]
 
@@ -76,8 +76,9 @@ def are_quiet(
     some = np.flatnonzero(quiet)
     for part, rows in _derivatives(fleet, group, some):
         left = group.residual[part]
-        chance, owed = halves_of(rows, left, outputs[part], share=1.0)
-        quiet[part] = (chance >= FALSE_ALARM) | (owed <= FEW)
+        chance, gained = halves_of(rows, left, share=1.0)
+        worth = WORTH**2 * outputs.shape[1] * outputs[part].var(axis=1)
+        quiet[part] = (chance >= FALSE_ALARM) | (gained <= worth)
         quiet[part] &= _from_rest(fleet, group, part, rows, lags[part])
     return np.asarray(quiet)
 

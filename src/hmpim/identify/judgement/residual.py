@@ -140,26 +140,34 @@ def uneven_noise(evidence: Evidence) -> tuple[Finding, ...]:
 
 
 def halves_disagree(evidence: Evidence) -> tuple[Finding, ...]:
-    """Doubt a model that the halves of the record do not share."""
+    """Say that the halves of the record do not share the model.
+
+    Of use as `lack_of_fit` is: what models of their own would explain is held against the whole
+    output, and doubts all figures where it is much of it, else those that it may move.
+    """
     joint, readings = evidence.joint, evidence.readings
+    weighed = joint.weighed
     halves = compare_halves(
         readings.rows,
         readings.innovations,
-        joint.problem.y,
+        weighed.masked(weighed.y - weighed.counting(weighed.y).mean()),
         share=joint.weighed_share,
     )
-    alarm = FALSE_ALARM * evidence.joint.weighed_share  # the share of coloured noise is estimated
-    if halves.probability >= alarm or halves.owed <= FEW:
+    alarm = FALSE_ALARM * joint.weighed_share  # the share of coloured noise is estimated
+    if halves.probability >= alarm or halves.owed <= WORTH:
         return ()
+    moved = MODELLED if halves.owed > TOLERATED else ()
+    if not moved and halves.share > PART:
+        moved = moved_by(evidence, halves.share)
     return (
         Finding(
             code="halves_disagree",
-            message="The two halves of the record require different models, which differ by "
-            f"{percent(halves.owed)} % of the output (r.m.s.): the unit changed during "
-            "the test, or responds differently to large and small motion. Repeat it, or lower the "
-            "amplitude.",
-            severity="doubt",
-            parameters=MODELLED,
+            message="The two halves of the record require different models, which describe "
+            f"{percent(halves.owed)} % of the output (r.m.s.) more than one model does: the unit "
+            "changed during the test, or responds differently to large and small motion. Repeat "
+            "it, or lower the amplitude.",
+            severity="doubt" if moved else "info",
+            parameters=moved or MODELLED,
         ),
     )
 
