@@ -24,7 +24,7 @@ from hmpim.identify.noise.misfit import Misfit, misfit
 from hmpim.identify.nonlinear.bends import Bend, bends, is_bent_instead, plainer_bends
 from hmpim.identify.nonlinear.nonlinearity import Inspection, inspect_nonlinearity
 from hmpim.identify.nonlinear.speed import speed_finding
-from hmpim.identify.reading.bandwidth import response_bandwidths
+from hmpim.identify.reading.bandwidth import disagreeing, less_bias, response_bandwidths
 from hmpim.identify.reading.coefficients import coefficients_of, highest_first
 from hmpim.identify.reading.propagation import response_std
 from hmpim.identify.reading.readings import Readings, read_parameters
@@ -177,13 +177,7 @@ def _evidence(
     u = question.aligned.inputs[i].values
     from_response, unread = attempt(
         "response_bandwidths",
-        lambda: response_bandwidths(
-            response,
-            readings.system,
-            readings.parameters,
-            fs=fs,
-            intersample=joint.best.intersample,
-        ),
+        lambda: _bandwidths(question, joint, readings, response, i),
         ResponseBandwidths(),
     )
     left, untested = attempt(
@@ -220,6 +214,34 @@ def _evidence(
     if evidence.unexplained < INTERPOLATED and not fit.structure.sampled:
         evidence = replace(evidence, spanned=without_noise(whole))
     return evidence, (*unread, *untested)
+
+
+def _bandwidths(
+    question: Question, joint: JointFit, readings: Readings, response: FrequencyResponse, i: int
+) -> ResponseBandwidths:
+    """Bandwidths by the measured response; if apart from the model's, less the estimator's bias.
+
+    Between lines, and beside a notch of the input, a local fit is off whatever the noise: by what
+    it is off where the model's own output is the record.
+    """
+    fs, fit = question.aligned.fs, joint.best.fit
+
+    def read(seen: FrequencyResponse) -> ResponseBandwidths:
+        return response_bandwidths(
+            seen,
+            readings.system,
+            readings.parameters,
+            fs=fs,
+            intersample=joint.best.intersample,
+        )
+
+    found = read(response)
+    alone = question.inputs is None and question.instrument is None
+    if not alone or not disagreeing(found, readings.parameters):
+        return found
+    u = question.aligned.inputs[i].values
+    own = read(_local(u, fit.prediction, fit, fs, question.band(i)))
+    return less_bias(found, own, readings.parameters)
 
 
 def _refined(

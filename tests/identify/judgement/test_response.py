@@ -8,6 +8,7 @@ import scipy.signal
 
 from hmpim import Record, identify
 from hmpim.identify.judgement.response import bandwidth_disagrees
+from hmpim.identify.reading.bandwidth import less_bias
 
 
 def test_a_clean_record_gives_no_finding(clean):
@@ -88,3 +89,34 @@ def test_the_response_to_a_ramp_or_a_step_is_that_of_the_unit(rise):
     error = np.abs(seen.response[near] - truth)
     assert np.all(error < np.maximum(0.05 * np.abs(truth), 5 * seen.std[near]))
     assert pair.verdict == "ok"
+
+
+def test_what_the_estimator_makes_of_four_lines_is_not_held_against_the_model():
+    # Between the lines a local fit is off by more than its error, of the model's own output too.
+    fs, n, fine = 200.0, 3000, 8
+    t = np.arange(n * fine) / (fs * fine)
+    lines = (1.0, 3.1, 7.3, 12.7)
+
+    def motion(time):
+        return sum(np.where(time > 0, np.sin(2 * np.pi * f * time), 0.0) for f in lines)
+
+    section = [1 / 50.0**2, 2 * 0.4 / 50.0, 1.0]
+    y = scipy.signal.lsim((1.0, section), motion(t - 0.03), t)[1][::fine]
+    y += 0.01 * np.random.default_rng(5).standard_normal(n)
+    record = Record.from_arrays(
+        {"u": motion(t[::fine])}, {"y": y}, fs=fs, intersample="bandlimited"
+    )
+    pair = identify(record)["y", "u"]
+    assert pair.verdict == "ok"
+    assert "bandwidth_disagrees" not in {finding.code for finding in pair.warnings}
+    truth = np.sqrt(1 / section[0]) / (2 * np.pi)
+    assert abs(pair.natural_frequency.value - truth) < 4.5 * pair.natural_frequency.spread
+
+
+def test_a_bias_of_the_estimator_is_taken_off_and_adds_to_the_error(clean):
+    stated, measured = clean.readings.parameters, clean.measured
+    true, found = stated.bandwidth_3db.value, measured.bandwidth_3db
+    own = replace(measured, bandwidth_3db=replace(found, value=true + 0.7))
+    corrected = less_bias(measured, own, stated).bandwidth_3db
+    assert corrected.value == pytest.approx(found.value - 0.7)
+    assert corrected.spread == pytest.approx(np.hypot(found.spread, 0.7))

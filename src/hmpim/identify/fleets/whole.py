@@ -19,13 +19,12 @@ from hmpim.identify.fleets.simpler import Simpler, costs_of, learn_simpler
 from hmpim.identify.frf.local import local_responses
 from hmpim.identify.judgement.between_samples import undetermined_between
 from hmpim.identify.judgement.reach import count_lines, unreached
-from hmpim.identify.judgement.response import are_apart
 from hmpim.identify.judgement.structure import barely_told
 from hmpim.identify.judgement.verdict import judged
 from hmpim.identify.noise.input_noise import input_noise
 from hmpim.identify.nonlinear.lines import find_period
 from hmpim.identify.nonlinear.sweep_phase import SweepPhase, sweep_phase
-from hmpim.identify.reading.bandwidth import response_bandwidths
+from hmpim.identify.reading.bandwidth import disagreeing, response_bandwidths
 from hmpim.identify.reading.readings import from_lag
 from hmpim.identify.result import (
     Candidate,
@@ -179,7 +178,7 @@ def whole_pairs(
             measured = response_bandwidths(
                 response, system, own, fs=fleet.fs, intersample=group.fit.member.intersample
             )
-            if any(are_apart(getattr(measured, name), getattr(own, name)) for name in _BANDWIDTHS):
+            if disagreeing(measured, own):
                 continue
             paper = paper_estimates(fleet.u, y, fleet.fs, band=fleet.band)
             pair = PairIdentification(

@@ -5,12 +5,11 @@ from collections.abc import Callable
 import numpy as np
 
 from hmpim.identify.arrays import Real
-from hmpim.identify.chance import DEVIATIONS, HALF
+from hmpim.identify.chance import DEVIATIONS
 from hmpim.identify.judgement.evidence import Evidence
+from hmpim.identify.reading.bandwidth import are_apart
 from hmpim.identify.reading.figures import system_of
-from hmpim.identify.result import Estimate
 from hmpim.identify.result.groups import PHASE_SPLIT, in_words
-from hmpim.identify.worth import PART, TOLERATED
 from hmpim.model.response import RationalDelay, phase, response
 from hmpim.record import Finding
 
@@ -37,18 +36,6 @@ _LEVELS: dict[str, _Level] = {
     "bandwidth_3db": _above_half,
 }
 """Height of the response above the level of each bandwidth."""
-
-
-def are_apart(measured: Estimate | None, modelled: Estimate | None) -> bool:
-    """Whether a bandwidth of the response and the model's differ beyond their error bars.
-
-    A measured one whose own interval is wide, as beside another input that is barely
-    distinguished, contradicts nothing.
-    """
-    if measured is None or modelled is None or HALF * measured.spread > PART * measured.value:
-        return False
-    allowed = DEVIATIONS * float(np.hypot(measured.spread, modelled.spread))
-    return not abs(measured.value - modelled.value) <= max(allowed, TOLERATED * modelled.value)
 
 
 def bandwidth_disagrees(evidence: Evidence) -> tuple[Finding, ...]:

@@ -11,14 +11,15 @@ from dataclasses import fields, replace
 import numpy as np
 
 from hmpim.identify.arrays import Complex, Real, median
+from hmpim.identify.chance import DEVIATIONS, HALF
 from hmpim.identify.reading.sampled_response import sampled_response
 from hmpim.identify.result import Estimate, FrequencyResponse, Parameters, ResponseBandwidths
 from hmpim.identify.result.error_bars import estimate
-from hmpim.identify.worth import PART
+from hmpim.identify.worth import PART, TOLERATED
 from hmpim.model import RationalDelay, response
 from hmpim.record import Intersample
 
-__all__ = ["ratio_at", "response_bandwidths"]
+__all__ = ["are_apart", "disagreeing", "less_bias", "ratio_at", "response_bandwidths"]
 
 _FEWEST = 5
 """Frequencies of the measured response that a line is laid through at least."""
@@ -114,6 +115,50 @@ def response_bandwidths(
             name: crossing(name, value, steep)
             for (name, value), steep in zip(near.items(), steepness.tolist(), strict=True)
         }
+    )
+
+
+def are_apart(measured: Estimate | None, modelled: Estimate | None) -> bool:
+    """Whether a bandwidth of the response and the model's differ beyond their error bars.
+
+    A measured one whose own interval is wide, as beside another input that is barely
+    distinguished, contradicts nothing.
+    """
+    if measured is None or modelled is None or HALF * measured.spread > PART * measured.value:
+        return False
+    allowed = DEVIATIONS * float(np.hypot(measured.spread, modelled.spread))
+    return not abs(measured.value - modelled.value) <= max(allowed, TOLERATED * modelled.value)
+
+
+def disagreeing(measured: ResponseBandwidths, modelled: Parameters) -> bool:
+    """Whether any bandwidth of the response and the model's are apart."""
+    names = (field.name for field in fields(ResponseBandwidths))
+    return any(are_apart(getattr(measured, name), getattr(modelled, name)) for name in names)
+
+
+def less_bias(
+    measured: ResponseBandwidths, own: ResponseBandwidths, modelled: Parameters
+) -> ResponseBandwidths:
+    """Bandwidths of the response without the estimator's bias, which adds to their error.
+
+    Parameters
+    ----------
+    measured, own : ResponseBandwidths
+        From the record, and by the same estimator from the model's output without noise.
+    modelled : Parameters
+        What the second should be.
+    """
+
+    def corrected(name: str) -> Estimate | None:
+        found, biased, true = (getattr(one, name) for one in (measured, own, modelled))
+        if found is None or biased is None or true is None:
+            return None
+        bias = biased.value - true.value
+        variance = found.spread**2 + bias**2
+        return estimate(found.value - bias, variance, freedom=_MANY, unit="Hz")
+
+    return ResponseBandwidths(
+        **{field.name: corrected(field.name) for field in fields(ResponseBandwidths)}
     )
 
 
