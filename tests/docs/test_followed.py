@@ -17,6 +17,7 @@ PAGES = (
     "howto/drone",
     "howto/audio-loop",
     "howto/software",
+    "howto/long-record",
 )
 
 

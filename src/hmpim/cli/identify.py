@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, cast
 
 import typer
 
+from hmpim.cli.compress import statistics_of
 from hmpim.cli.files import check_files
 from hmpim.cli.paging import (
     Date,
@@ -46,7 +47,7 @@ from hmpim.cli.terminal import output_console, say, working
 from hmpim.errors import ArgumentError
 
 if TYPE_CHECKING:
-    from hmpim.identify import Estimate, Identification
+    from hmpim.identify import Estimate, Identification, Statistics
     from hmpim.model.dynamics import StructureName
     from hmpim.record import Record
     from hmpim.report import About
@@ -73,7 +74,8 @@ def identify(
             metavar="RECORD...",
             help="File with the record, such as a CSV file with a header. Several records of one"
             " stimulus are averaged, and their error bars compared with their scatter; "
-            "records at several amplitudes show where the unit is linear.",
+            "records at several amplitudes show where the unit is linear. Files of hmpim compress "
+            "are joined.",
         ),
     ],
     input_: Input = None,
@@ -178,28 +180,38 @@ def identify(
     from hmpim.identify import measurable
     from hmpim.report import print_result
 
-    given = read_records(
+    compressed = statistics_of(
         records,
-        roles={
-            "inputs": input_,
-            "outputs": output,
-            "references": None if reference is None else [reference],
-            "auxiliary": auxiliary,
+        {
+            **{"--input": input_, "--output": output, "--auxiliary": auxiliary, "--fs": fs},
+            **{"--time": time, "--unit": unit, "--from": from_, "--to": to, "--sweep": sweep},
+            **{"--offset": offset, "--beside": beside, "--common": common, "--sheet": sheet},
+            **{"--reference": reference, "--holdout": holdout},
         },
-        fs=fs,
-        time=time,
-        units=units_of(unit),
-        options=reading(
-            start=from_,
-            stop=to,
-            sweep=sweep,
-            offset=offset,
-            beside=beside,
-            common=common,
-            stamps=stamps,
-            sheet=sheet,
-        ),
-        every=sweep == "all",
+    )
+    roles = {"inputs": input_, "outputs": output, "auxiliary": auxiliary}
+    roles["references"] = None if reference is None else [reference]
+    given = (
+        []
+        if compressed is not None
+        else read_records(
+            records,
+            roles=roles,
+            fs=fs,
+            time=time,
+            units=units_of(unit),
+            options=reading(
+                start=from_,
+                stop=to,
+                sweep=sweep,
+                offset=offset,
+                beside=beside,
+                common=common,
+                stamps=stamps,
+                sheet=sheet,
+            ),
+            every=sweep == "all",
+        )
     )
     about = about_of(title, under_test, test, operator, date)
     if len(given) > 1:
@@ -215,22 +227,21 @@ def identify(
             notes=note or (),
         )
         return
-    (data,) = given
-    measurable(at or [], data.fs)
-    part, split = (data, None) if holdout is None else _first_part(data, holdout)
+    held, source = (None, compressed) if compressed is not None else _held_out(given[0], holdout)
+    measurable(at or [], source.fs)
     with working("Identifying"):
         result = find(
-            part,
+            source,
             intersample=intersample.value,
             structures=_structures(structure),
             reference=reference,
         )
-    said = [] if split is None else _predictions(result, data, split)
+    said = [] if held is None else _predictions(result, given[0], held)
     said += _readings(result, at or [])
     if by_hand:
         from hmpim.report.by_hand import hand_notes
 
-        said += [n for pair in result.pairs for n in hand_notes(pair, by_hand, fs=data.fs)]
+        said += [n for pair in result.pairs for n in hand_notes(pair, by_hand, fs=source.fs)]
     if not quiet:
         print_result(result, output_console())
         for sentence in said:
@@ -308,6 +319,7 @@ def _named(records: Sequence[Path], given: "Sequence[Record]") -> list[Path]:
 def _readings(result: "Identification", at: Sequence[float]) -> list[str]:
     """Say gain and phase of each pair at each frequency."""
     from hmpim.identify import gain_and_phase
+    from hmpim.report.by_hand import is_measured
 
     notes = []
     for pair in result.pairs:
@@ -316,7 +328,7 @@ def _readings(result: "Identification", at: Sequence[float]) -> list[str]:
             continue
         for found in gain_and_phase(pair, at, fs=result.record.fs) if at else ():
             measured = "not measured there"
-            if found.gain_db is not None and found.phase is not None:
+            if found.gain_db is not None and found.phase is not None and is_measured(pair):
                 measured = f"measured {_both(found.gain_db, found.phase)}"
             notes.append(
                 f"{pair.output} from {pair.input} at {found.frequency:g} Hz: {measured}; "
@@ -329,12 +341,14 @@ def _both(gain: "Estimate", phase: "Estimate") -> str:
     return f"{gain.value:.3f} ± {gain.spread:.2g} dB, {phase.value:.2f} ± {phase.spread:.2g}°"
 
 
-def _first_part(data: "Record", holdout: float) -> tuple["Record", float]:
-    """Cut off the end that is to be predicted; return the rest, and when the end begins."""
+def _held_out(data: "Record", share: float | None) -> "tuple[float | None, Record | Statistics]":
+    """When the end begins that is to be predicted, and the rest; None and all of it of no share."""
+    if share is None:
+        return None, data
     start = min(float(c.time[0]) for c in (*data.inputs, *data.outputs))
     stop = max(float(c.time[-1]) for c in (*data.inputs, *data.outputs))
-    split = stop - holdout * (stop - start)
-    return data.between(start, split), split
+    split = stop - share * (stop - start)
+    return split, data.between(start, split)
 
 
 def _predictions(result: "Identification", data: "Record", split: float) -> list[str]:

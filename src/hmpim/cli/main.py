@@ -14,6 +14,7 @@ from typer.core import TyperGroup
 from hmpim.cli.batch import batch
 from hmpim.cli.campaign import campaign
 from hmpim.cli.channels import channels
+from hmpim.cli.compress import compress
 from hmpim.cli.demo import demo
 from hmpim.cli.design import design
 from hmpim.cli.export import export
@@ -149,6 +150,9 @@ app.command(epilog="Example: hmpim report r.json -o r.pdf --sign sheet.pdf --ope
     report
 )
 app.command(epilog="Example: hmpim channels test.csv --report channels.html")(channels)
+app.command(epilog="Example: hmpim compress day1.csv day2.csv --input u --output y -o unit.h5")(
+    compress
+)
 app.command(epilog="Example: hmpim runs out --where 'verdict = ok' --compare")(runs)
 app.command(epilog="Example: hmpim run --rig bench s.csv -o run.csv --report r.html")(run)
 app.command(epilog="Example: hmpim rigs --json rigs.json")(rigs)

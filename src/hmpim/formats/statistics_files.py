@@ -14,7 +14,7 @@ from hmpim.identify import Statistics
 from hmpim.identify.statistics.reach import Reach
 from hmpim.identify.statistics.run import Run
 
-__all__ = ["SCHEMA", "read_statistics", "save_statistics"]
+__all__ = ["SCHEMA", "holds_statistics", "read_statistics", "save_statistics"]
 
 SCHEMA = "hmpim/statistics/1"
 
@@ -53,6 +53,23 @@ def save_statistics(statistics: Statistics, path: str | PathLike[str]) -> None:
                 group[name] = getattr(run, name)
         file.attrs["runs"] = len(statistics.runs)
         file.attrs["sha256"] = _digest(statistics.runs)
+
+
+def holds_statistics(path: str | PathLike[str]) -> bool:
+    """Whether a file is one that `save_statistics` writes; False of one that cannot be opened.
+
+    Examples
+    --------
+    >>> holds_statistics("nowhere.h5")
+    False
+    """
+    if not Path(path).is_file():  # a pipe would be read empty
+        return False
+    try:
+        with h5py.File(Path(path), "r") as file:
+            return str(file.attrs.get("schema", "")) == SCHEMA
+    except OSError:  # no HDF5
+        return False
 
 
 def read_statistics(path: str | PathLike[str]) -> Statistics:

@@ -7,7 +7,7 @@ from hmpim.identify import PairIdentification, gain_and_phase
 from hmpim.report.numbers import format_estimate
 from hmpim.report.words import GLOSSARY, structure_words
 
-__all__ = ["fit_note", "hand_notes", "reading_at"]
+__all__ = ["fit_note", "hand_notes", "is_measured", "reading_at"]
 
 _FREQUENCIES = (
     "natural_frequency",
@@ -105,7 +105,18 @@ def reading_at(pair: PairIdentification, frequency: float, *, fs: float) -> str:
     except ArgumentError:
         return ""
     model = f"the model {format_estimate(at.model_gain_db)}, {format_estimate(at.model_phase)}"
-    if at.gain_db is None or at.phase is None:
+    if at.gain_db is None or at.phase is None or not is_measured(pair):
         return f"At {frequency:.4g} Hz nothing was measured; {model}."
     measured = f"{format_estimate(at.gain_db)}, {format_estimate(at.phase)}"
     return f"At {frequency:.4g} Hz: measured {measured}; {model}."
+
+
+def is_measured(pair: PairIdentification) -> bool:
+    """Whether the response of a pair was measured; of compressed records it is the model's own.
+
+    Parameters
+    ----------
+    pair : PairIdentification
+        What was found.
+    """
+    return all(finding.code != "no_samples" for finding in pair.warnings)

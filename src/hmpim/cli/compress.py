@@ -1,0 +1,202 @@
+"""`hmpim compress`: records in, a small file of statistics out; and such files read again."""
+
+from collections.abc import Mapping, Sequence
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from hmpim.cli.files import check_files
+from hmpim.cli.reading import (
+    From,
+    Rate,
+    Sheet,
+    StampChoice,
+    Stamps,
+    Sweep,
+    Time,
+    To,
+    Unit,
+    read_records,
+    reading,
+    units_of,
+)
+from hmpim.cli.terminal import say, working
+from hmpim.errors import ArgumentError
+
+if TYPE_CHECKING:
+    from hmpim.identify import Statistics
+    from hmpim.record import Record
+
+__all__ = ["compress", "statistics_of"]
+
+
+class Bias(StrEnum):
+    """Whether runs that are joined have one bias."""
+
+    OWN = "own"
+    COMMON = "common"
+
+
+def compress(
+    records: Annotated[
+        list[Path],
+        typer.Argument(
+            metavar="RECORD...",
+            help="Records of one unit, or files that this command wrote. Several are joined, each "
+            "as a run of its own.",
+        ),
+    ],
+    out: Annotated[
+        Path, typer.Option("--out", "-o", metavar="FILE", help="File to write, .h5 or .hdf5.")
+    ],
+    input_: Annotated[
+        str | None, typer.Option("--input", metavar="NAME", help="Channel of the input.")
+    ] = None,
+    output: Annotated[
+        str | None, typer.Option("--output", metavar="NAME", help="Channel of the output.")
+    ] = None,
+    fs: Rate = None,
+    time: Time = None,
+    unit: Unit = None,
+    from_: From = None,
+    to: To = None,
+    sweep: Sweep = None,
+    stamps: StampChoice = Stamps.AUTO,
+    sheet: Sheet = None,
+    lags: Annotated[
+        int | None,
+        typer.Option(
+            "--lags",
+            metavar="N",
+            help="Window in samples, into which delay and settling time must fit; by default a "
+            "fifth of the first record, at most 16384.",
+        ),
+    ] = None,
+    bias: Annotated[
+        Bias,
+        typer.Option("--bias", help="Whether each run has a bias of its own, or all have one."),
+    ] = Bias.OWN,
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing.")] = False,
+) -> None:
+    """Compress records to the few kilobytes that identification needs of them.
+
+    `hmpim identify` takes the file as it takes a record; what needs the samples is then left out.
+    """
+    _check_file(out)
+    check_files(reads={"the record": records}, writes={"-o": out})
+
+    from hmpim.formats import save
+
+    roles = {"inputs": input_ and [input_], "outputs": output and [output]}
+    options = reading(start=from_, stop=to, sweep=sweep, stamps=stamps, sheet=sheet)
+    joined: Statistics | None = None
+    for path in records:
+        runs = statistics_of([path], {})
+        if runs is None:
+            given = read_records(
+                [path],
+                roles=roles,
+                fs=fs,
+                time=time,
+                units=units_of(unit),
+                options=options,
+                every=sweep == "all",
+            )
+            window = lags if joined is None else joined.lags
+            runs = _compressed(given, window, (input_, output), bias)
+        joined = runs if joined is None else joined.join(runs, bias=bias.value)
+    if joined is None:  # Typer asks for one record at least
+        return
+    save(joined, out)
+    if not quiet:
+        say(_sentence(joined, out))
+
+
+def statistics_of(
+    paths: Sequence[Path], reading_options: Mapping[str, object]
+) -> "Statistics | None":
+    """Read files of statistics and join their runs; None where the first file is none.
+
+    Parameters
+    ----------
+    paths : sequence of Path
+        Files, all of statistics or none.
+    reading_options : mapping of str to object
+        What was given of the options that are about samples, by option; None where it was not.
+
+    Raises
+    ------
+    ArgumentError
+        If files of both kinds are given, or an option that only a record has a use for.
+    FormatError
+        If a file is damaged.
+    """
+    from hmpim.formats.statistics_files import holds_statistics, read_statistics
+
+    compressed = [path for path in paths if holds_statistics(path)]
+    if not compressed:
+        return None
+    if others := [path for path in paths if path not in compressed]:
+        raise ArgumentError(
+            f"{compressed[0]} holds statistics and {others[0]} does not; compress both with hmpim "
+            "compress, or give the records themselves"
+        )
+    for option, wanted in reading_options.items():
+        if wanted is not None:
+            raise ArgumentError(
+                f"{option} is about the samples of a record, and {compressed[0]} holds statistics "
+                "of them; leave it out, or give the record"
+            )
+    first, *rest = (read_statistics(path) for path in compressed)
+    return first.join(*rest)
+
+
+def _compressed(
+    given: "Sequence[Record]", lags: int | None, named: tuple[str | None, str | None], bias: Bias
+) -> "Statistics":
+    """Each record as a run, with the window of the first."""
+    from hmpim.identify import compress as compressed
+
+    runs: list[Statistics] = []
+    with working("Compressing"):
+        for record in given:
+            source, answer = named
+            channels = (
+                source or _only(record.inputs, "--input"),
+                answer or _only(record.outputs, "--output"),
+            )
+            window = runs[0].lags if runs else lags
+            runs.append(compressed(record, lags=window, channels=channels, bias=bias.value))
+    return runs[0].join(*runs[1:])
+
+
+def _only(channels: Sequence[object], option: str) -> str:
+    """Name of the only channel of a role."""
+    names = [str(getattr(channel, "name", "")) for channel in channels]
+    if len(names) != 1:
+        raise ArgumentError(
+            f"the record has {len(names)} channels for {option} ({', '.join(names)}); statistics "
+            f"are of one input and one output, so name it with {option}"
+        )
+    return names[0]
+
+
+def _check_file(out: Path) -> None:
+    """Refuse a name of which nothing could be written, before any work."""
+    from hmpim.formats.saving import suffixes_of
+    from hmpim.identify import Statistics
+
+    if out.suffix.lower() not in suffixes_of(Statistics):
+        raise ArgumentError(f"-o {out} must end in one of {', '.join(suffixes_of(Statistics))}")
+
+
+def _sentence(statistics: "Statistics", out: Path) -> str:
+    count = len(statistics.runs)
+    source, answer = statistics.names
+    return (
+        f"{out}: {statistics.samples} samples of {source} → {answer} at {statistics.fs:g} Hz in "
+        f"{count} run{'s' if count > 1 else ''}, as statistics of {statistics.nbytes / 1e3:.3g} "
+        f"kB with a window of {statistics.lags / statistics.fs:.3g} s"
+    )
