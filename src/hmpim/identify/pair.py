@@ -41,7 +41,7 @@ from hmpim.identify.result import (
 from hmpim.identify.result.error_bars import estimate, noise_estimate
 from hmpim.identify.result.groups import EVERY
 from hmpim.identify.section_iv.paper import paper_estimates
-from hmpim.identify.worth import INTERPOLATED, MOST, ROUNDING, WORTH
+from hmpim.identify.worth import INTERPOLATED, ROUNDING, WORTH
 from hmpim.record import Finding
 
 __all__ = ["Described", "describe", "describe_dead"]
@@ -361,21 +361,16 @@ def _measured(
 
 
 def _local(u: Real, y: Real, fit: Fit, fs: float, band: tuple[float, float]) -> FrequencyResponse:
-    """Local response; through differences where a record does not end where it began.
+    """Local response; of an integrator through the output's differences, which do not wander.
 
-    That step leaks into every bin. An integrator's output wanders whatever its input does; of
-    what follows a step or a ramp, both are differenced, and the ratio is what it was.
+    Where an integrating output ends is not where it began, and that step leaks into every bin.
     """
     delay = fit.delay / fs
-    if fit.structure.integrators:
-        steps = local_response(u, np.diff(y, prepend=y[0]), fs, delay=delay, band=band)
-        difference = 1.0 - np.exp(-2j * np.pi * steps.frequency / fs)
-        return replace(
-            steps, response=steps.response / difference, std=steps.std / np.abs(difference)
-        )
-    if abs(u[-1] - u[0]) > MOST * np.ptp(u):
-        u, y = np.diff(u, prepend=u[0]), np.diff(y, prepend=y[0])
-    return local_response(u, y, fs, delay=delay, band=band)
+    if not fit.structure.integrators:
+        return local_response(u, y, fs, delay=delay, band=band)
+    steps = local_response(u, np.diff(y, prepend=y[0]), fs, delay=delay, band=band)
+    difference = 1.0 - np.exp(-2j * np.pi * steps.frequency / fs)
+    return replace(steps, response=steps.response / difference, std=steps.std / np.abs(difference))
 
 
 def _spread(joint: JointFit) -> float:

@@ -280,3 +280,15 @@ def test_a_spectrum_that_falls_has_no_gap() -> None:
     for u in (step, U):
         found = local_response(u, u, FS, band=(0.1, 99.0), points=4000)
         assert np.diff(found.frequency).max() < 0.11
+
+
+def test_a_record_that_ends_elsewhere_than_it_began_leaks_into_no_bin():
+    # y[k] = 0.9 y[k - 1] + 0.1 u[k] of a ramp that stays up: no transient is left of differences.
+    u = np.interp(np.arange(1200.0), [80.0, 270.0], [0.0, 4.0])
+    y = np.stack([signal.lfilter([0.1], [1.0, -0.9], u), 2.0 * u + 1.0])
+    ramp, twice = local_responses(u, y, 100.0, band=(0.1, 3.0), delays=np.zeros(2))
+    z = np.exp(-2j * np.pi * ramp.frequency / 100.0)
+    assert np.abs(ramp.response * (1 - 0.9 * z) / 0.1 - 1).max() < 0.01
+    assert np.abs(twice.response / 2.0 - 1).max() < 1e-6
+    alone = local_response(u, y[0], 100.0, band=(0.1, 3.0))
+    assert np.array_equal(alone.response, ramp.response)

@@ -17,7 +17,7 @@ from hmpim.identify.frf.polynomial import polynomial_fits
 from hmpim.identify.frf.rational import Regressors, rational_fits
 from hmpim.identify.result import FrequencyResponse
 from hmpim.identify.signals import as_pair, check_band, check_rate, whole_lag
-from hmpim.identify.worth import DEEPEST
+from hmpim.identify.worth import DEEPEST, MOST
 
 __all__ = ["local_response", "local_responses"]
 
@@ -50,7 +50,8 @@ def local_response(
     At each frequency the data choose between them, with a transient or without, and among
     widths (cross-validation, averaged over 61 frequencies, weighed against the variance of G).
     The delay is taken out first and put back at the end; the bias lies in the bin at DC, which
-    is not used.
+    is not used. Where an input ends elsewhere than it began, as a step or a ramp does, that jump
+    leaks into every bin: both are differenced, which leaves their ratio what it is.
 
     Parameters
     ----------
@@ -203,6 +204,8 @@ def _many(
 
     What follows from the input is made once for all of them.
     """
+    if abs(u[-1] - u[0]) > MOST * np.ptp(u):
+        u, y = np.diff(u, prepend=u[0]), np.diff(y, axis=-1, prepend=y[:, :1])
     found: list[FrequencyResponse] = []
     for at in range(0, y.shape[0], _AT_ONCE):
         late = delays[at : at + _AT_ONCE]
