@@ -6,7 +6,8 @@ from hmpim.identify import Estimate, PaperEstimates, Parameters
 from hmpim.identify.judgement import judged
 from hmpim.identify.result.groups import EVERY
 from hmpim.record import Finding
-from hmpim.report.words import GLOSSARY, headline, remark, untold
+from hmpim.report.untold import untold
+from hmpim.report.words import GLOSSARY, headline, remark
 
 
 def test_every_parameter_is_explained_and_every_figure_of_the_paper_has_its_reason():
@@ -93,5 +94,35 @@ def test_a_unit_without_dynamics_is_not_said_to_have_any(found):
 
 
 def test_what_has_no_figure_is_listed(found):
-    assert "hold period" in untold(found.pairs[0])
-    assert "delay, pure" not in untold(found.pairs[0])
+    (pair,) = found.pairs
+    none = replace(pair, structure="second_order", parameters=Parameters(), warnings=())
+    said = untold(none)
+    assert "Looked for and not found: a held output, saturation, rounding." in said
+    for name in ("natural frequency", "damping ratio", "−3 dB bandwidth", "delay"):
+        assert name in said
+    assert "time constant" not in said  # its slowest poles may ring
+    assert untold(replace(none, verdict="not_identifiable")) == ""
+
+
+@pytest.mark.parametrize(
+    ("structure", "lacking"),
+    [
+        ("static", ("natural frequency", "damping", "without delay", "−3 dB", "peak gain")),
+        ("fir", ("natural frequency", "damping", "without delay", "−3 dB", "peak gain")),
+        ("first_order", ("natural frequency", "damping", "without delay")),
+        ("integrator_second_order", ("bandwidth", "peak gain")),
+    ],
+)
+def test_figures_that_a_model_does_not_have_are_not_called_undetermined(found, structure, lacking):
+    (pair,) = found.pairs
+    said = untold(replace(pair, structure=structure, parameters=Parameters(), warnings=()))
+    assert "scale factor" in said
+    assert not [name for name in lacking if name in said]
+
+
+def test_effects_are_not_called_absent_where_nobody_looked_or_one_is_there(found):
+    (pair,) = found.pairs
+    parts = Parameters(saturation_low=Estimate(value=-1.0, std=0.01, ci95=(-1.02, -0.98)))
+    assert "not found: a held output, rounding." in untold(replace(pair, parameters=parts))
+    blind = Finding(code="no_samples", message="", severity="info", parameters=())
+    assert "not found" not in untold(replace(pair, parameters=parts, warnings=(blind,)))

@@ -9,6 +9,7 @@ from hmpim.record import Finding
 from hmpim.report.inputs import gain_rows
 from hmpim.report.modes import MODES_SAID, mode_rows
 from hmpim.report.numbers import format_interval, format_number, format_value
+from hmpim.report.untold import untold
 from hmpim.report.words import (
     GLOSSARY,
     VERDICTS,
@@ -18,7 +19,6 @@ from hmpim.report.words import (
     off_by,
     pair_sentence,
     paper_value,
-    untold,
 )
 
 if TYPE_CHECKING:
@@ -143,7 +143,7 @@ def print_result(
                 console.print(finding_line(warning))
         missing = untold(pair)
         if missing and not several:
-            console.print(Text(f"Not determined: {missing}.", style="dim"))
+            console.print(Text(missing, style="dim"))
 
 
 def finding_line(finding: Finding) -> "Text":

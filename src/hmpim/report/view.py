@@ -12,6 +12,7 @@ from hmpim.report.figures import Picture, pair_pictures, stimulus_picture
 from hmpim.report.inputs import inputs_view
 from hmpim.report.modes import MODES_SAID, mode_rows
 from hmpim.report.numbers import format_estimate, format_interval, format_number, format_value
+from hmpim.report.untold import untold
 from hmpim.report.words import (
     GLOSSARY,
     VERDICTS,
@@ -23,7 +24,6 @@ from hmpim.report.words import (
     paper_value,
     remark,
     structure_words,
-    untold,
 )
 from hmpim.stimulus import Stimulus
 

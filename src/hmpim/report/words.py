@@ -24,7 +24,6 @@ __all__ = [
     "paper_value",
     "remark",
     "structure_words",
-    "untold",
 ]
 
 
@@ -425,12 +424,6 @@ def remark(words: ParameterWords, estimate: Estimate | None, paper: float | None
     if abs(gap) <= max(2.0 * estimate.spread, 0.002 * abs(estimate.value)):
         return "The two agree."
     return f"{abs(gap):.2g} {'above' if gap > 0 else 'below'}: {words.differs}."
-
-
-def untold(pair: PairIdentification) -> str:
-    """List the parameters that have no estimate, for people; empty if all have one."""
-    missing = [w.label for w in GLOSSARY if getattr(pair.parameters, w.name) is None]
-    return "; ".join(label[:1].lower() + label[1:] for label in missing)
 
 
 def off_by(estimate: Estimate, truth: float) -> str:
