@@ -212,6 +212,10 @@ def test_levels_are_named_with_their_unit_and_a_doubtful_figure_is_marked(tmp_pa
         assert done.exit_code == 0, done.stderr
         pages.append(page.read_text(encoding="utf-8"))
         assert "Parameter, at amplitude (V)" in " ".join(done.stdout.split())
+    data = tmp_path / "l.json"
+    assert run(tmp_path / "0.h5", tmp_path / "1.h5", "--json", data, "-q").exit_code == 0
+    (pair,) = json.loads(data.read_text(encoding="utf-8"))["pairs"]
+    assert pair["amplitude_unit"] == "V"
     small, large = (f"{np.ptp(k * U) / 2:.4g}" for k in (1, 2))
     assert f"2 levels: linear at all amplitudes, from {small} to {large} V." in pages[0]
     assert 'class="verdict ok"' in pages[0]

@@ -60,6 +60,7 @@ def _levels_dict(levels: "Levels") -> dict[str, Any]:
             {
                 "input": pair.input,
                 "output": pair.output,
+                "amplitude_unit": compared.unit,
                 "linear_up_to": compared.linear_up_to,
                 "trends": [
                     {

@@ -123,7 +123,7 @@ def _rows(cases: list[_Case]) -> list[Row]:
             paper="finer at 1000 Hz",
             value=float(case.bins.frequency[1]),
             unit="Hz",
-            why="Does not agree: at one duration T the bins are 1/T apart whatever the rate. Zeros "
+            why="Does not agree: the bins are 1/T apart at any rate, T being the duration. Zeros "
             "after the signal, or a longer T, make them finer.",
         )
         for case in cases

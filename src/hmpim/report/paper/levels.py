@@ -168,7 +168,7 @@ def _rows_13(sweeps: dict[float, Stimulus]) -> list[Row]:
                 stimulus.extinction,
                 0.81,
                 within=0.005,
-                otherwise="T is not printed; 12 s comes nearest in n, 5 s in level.",
+                otherwise="T is not printed; n agrees best at 12 s, the level at 5 s.",
             ),
         )
         for T, stimulus in sweeps.items()
@@ -209,7 +209,8 @@ def _rows_13(sweeps: dict[float, Stimulus]) -> list[Row]:
                 value,
                 20.0,
                 within=1.0,
-                otherwise="The paper reads its own off a plot; no T has both its n and its level.",
+                otherwise="The paper's level is read off a plot; no T gives both its n and its "
+                "level.",
             ),
         )
         for T, value in level.items()

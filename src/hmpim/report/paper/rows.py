@@ -18,7 +18,7 @@ __all__ = [
 ]
 
 SCHEMA = "hmpim/paper/1"
-COLUMNS = ("Where", "Quantity", "Paper", "Ours", "True", "Where they differ, why")
+COLUMNS = ("Where", "Quantity", "Paper", "Ours", "True", "Why they differ")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -133,7 +133,7 @@ def markdown_table(rows: Iterable[Row]) -> str:
     --------
     >>> row = Row(figure=12, where="Fig. 12", quantity="Extinction n", paper="0", value=0.0)
     >>> print(markdown_table([row]), end="")
-    | Where | Quantity | Paper | Ours | True | Where they differ, why |
+    | Where | Quantity | Paper | Ours | True | Why they differ |
     | --- | --- | --- | --- | --- | --- |
     | Fig. 12 | Extinction n | 0 | 0 | – |  |
     """

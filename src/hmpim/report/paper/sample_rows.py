@@ -131,9 +131,9 @@ def _quantities(sample: Sample) -> list[_Quantity]:
     printed = 1.78
     turned = 360.0 * natural * ((many.mean("delay") or 0.0) - system.delay) - 90.0
     without_crossing = (
-        f"With {1e3 * (many.mean('delay') or 0.0):.0f} ms taken out the phase at "
-        f"{natural:g} Hz is {shown(round(turned))}° and not −90°; what crossings there are lie "
-        "where the output has sunk into the noise. With the pure delay out it passes −90° at "
+        f"Without {1e3 * (many.mean('delay') or 0.0):.0f} ms of delay the phase at "
+        f"{natural:g} Hz is {shown(round(turned))}° and not −90°; the few crossings of −90° lie "
+        "where the output is below the noise. Without the pure delay it passes −90° at "
         f"{many.mean('natural_by_pure_delay') or 0.0:.2f} ± "
         f"{many.scatter('natural_by_pure_delay') or 0.0:.2f} Hz."
     )
@@ -159,10 +159,10 @@ def _quantities(sample: Sample) -> list[_Quantity]:
             bound=bound.bias,
             truth=system.bias,
             unit="deg",
-            why="Equation (11) is the r.m.s. error: the noise, and the "
-            f"{left:.2g} deg rms that the dynamics leave over at "
-            f"{sample.stimulus.peaks.position:.3g} deg of amplitude, are in it. Within 3 % it "
-            f"is only up to {_largest(sample, bias=True):.2g} deg of amplitude.",
+            why="Equation (11) is the r.m.s. error, which contains the noise and the "
+            f"{left:.2g} deg rms that the dynamics cause at "
+            f"{sample.stimulus.peaks.position:.3g} deg of amplitude. It is within 3 % "
+            f"only up to {_largest(sample, bias=True):.2g} deg of amplitude.",
         ),
         _Quantity(
             name="Noise, 1σ",
@@ -172,8 +172,8 @@ def _quantities(sample: Sample) -> list[_Quantity]:
             bound=bound.noise_std,
             truth=system.noise_std,
             unit="deg",
-            why="What the dynamics leave over counts as noise in (14). Within 3 % it is only up "
-            f"to {_largest(sample, bias=False):.2g} deg of amplitude; the paper prints none.",
+            why="The error that the dynamics cause counts as noise in (14). It is within 3 % only "
+            f"up to {_largest(sample, bias=False):.2g} deg of amplitude; the paper prints none.",
         ),
         _Quantity(
             name="Scale factor",
@@ -226,7 +226,7 @@ def _quantities(sample: Sample) -> list[_Quantity]:
             unit="Hz",
             why=f"The stated system passes −90° at {phase90(system.delay, natural, damping):.3f} "
             f"Hz; its {1e3 * system.delay:g} ms delay alone would at {most:.3f} Hz. {printed:g} Hz "
-            "lies above both and cannot be reproduced. No system as stated gives it.",
+            "lies above both, so that the stated system cannot give it.",
         ),
     ]
 

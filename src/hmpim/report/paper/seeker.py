@@ -70,8 +70,8 @@ def seeker_chapter() -> Chapter:
             found,
             1.8,
             within=0.05,
-            because="the paper's seeker is not described; ours is made to be alike, and the "
-            "true figure is its closed form's",
+            because="the paper does not describe its seeker; ours is made similar, and the "
+            "true figure is its closed form",
         ),
     )
     return Chapter(pictures={15: picture}, rows=(row,))

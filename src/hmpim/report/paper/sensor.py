@@ -140,8 +140,8 @@ def _rows(analysis: PaperAnalysis) -> tuple[Row, ...]:
             value=found.bias,
             truth=SENSOR.bias,
             unit="deg",
-            why="Not printed. It is the r.m.s. error: the noise is in it, and what the scale "
-            "factor leaves over.",
+            why="Not printed. It is the r.m.s. error, which contains the noise and the error that "
+            "the scale factor causes.",
         ),
         Row(
             figure=10,
@@ -158,7 +158,7 @@ def _rows(analysis: PaperAnalysis) -> tuple[Row, ...]:
             value=found.noise_std,
             truth=SENSOR.noise_std,
             unit="deg",
-            why="Not printed. What the scale factor leaves over counts as noise.",
+            why="Not printed. The error that the scale factor causes counts as noise.",
         ),
     )
 

@@ -43,7 +43,7 @@ def sign_rows(
             value=_rms(u - as_printed),
             truth=math.hypot(sensor.bias, sensor.noise_std),
             unit="deg",
-            why="The sign is wrong: the measurement is late, so that n − δ makes it later still. "
+            why="The sign is wrong: the measurement is late, and n − δ makes it even later. "
             f"n + δ, which is used here, leaves {_rms(u - meant):.3f} deg.",
         ),
         Row(
