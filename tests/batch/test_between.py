@@ -44,6 +44,18 @@ def test_units_do_not_depend_on_the_unit():
     assert other.share == pytest.approx(one.share)
 
 
+def test_one_unit_known_far_better_than_all_others_is_no_division_by_zero():
+    """As a simulation without noise among measured records."""
+    values = np.array([1.0, 1.2, 0.9, 1.1])
+    near, nearer = (
+        between_units(values, np.array([tiny, 0.01, 0.02, 0.01])) for tiny in (1e-5, 1e-19)
+    )
+    assert nearer.share == pytest.approx(near.share, rel=1e-3)
+    assert 0.9 < nearer.share < 1.0
+    even = between_units(values, np.full(4, 0.01))
+    assert even.share == pytest.approx(even.spread**2 / (even.spread**2 + 0.01**2))
+
+
 def test_too_few_units_are_refused():
     with pytest.raises(hmpim.HmpimError, match="two units or more"):
         between_units(np.ones(1), np.ones(1))

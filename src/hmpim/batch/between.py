@@ -127,6 +127,9 @@ def _profiled(x: Real, variance: Real, level: float) -> float:
 
 
 def _typical(variance: Real) -> float:
-    """One over the typical variance within, times units less one (Higgins and Thompson, 2002)."""
-    w = 1.0 / variance
-    return float(w.sum() - (w**2).sum() / w.sum())
+    """One over the typical variance within, times units less one (Higgins and Thompson, 2002).
+
+    Σw - Σw²/Σw as a sum over pairs: where one weight is nearly all, the difference is rounding.
+    """
+    w = np.sort(1.0 / variance)
+    return float(2.0 * (w[1:] / w.sum()) @ np.cumsum(w)[:-1])
