@@ -11,6 +11,7 @@ from hmpim.batch.montecarlo.draw import one_draw
 from hmpim.batch.montecarlo.study import montecarlo_page
 from hmpim.batch.pool import here_pool
 from hmpim.plots import Rule
+from hmpim.report.study import render_study
 
 PLAN = """
 name = "short"
@@ -60,6 +61,7 @@ def test_the_same_seed_gives_the_same_rows(plan, tmp_path, monkeypatch):
     assert sum(map(sum, found.verdicts.values())) == 6
     assert sum(region.right_structure.count for region in found.regions) == 6
 
+    assert "size: A4 portrait" in render_study(montecarlo_page(plan, found))  # one sheet, not two
     (errors, *_), *_ = (section.pictures for section in montecarlo_page(plan, found).sections)
     (panel,) = errors.figure.panels
     (rule,) = (item for item in panel.items if isinstance(item, Rule))

@@ -75,6 +75,7 @@ def montecarlo_page(plan: Plan, found: MonteCarlo) -> StudyPage:
             ("Not identified", "; ".join(found.reasons) or "none"),
             made_by(),
         ),
+        upright=True,
     )
 
 

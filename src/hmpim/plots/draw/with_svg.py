@@ -5,7 +5,6 @@ thinned to what the width can show, its peaks kept.
 """
 
 from collections.abc import Callable
-from functools import cache
 from html import escape
 from typing import Any
 
@@ -30,6 +29,7 @@ from hmpim.plots.description import (
 )
 from hmpim.plots.draw.frames import Frame, frames, legend_items, placed, ticks
 from hmpim.plots.draw.layout import LINE, SIZE, Place, legend_lines, places, stacked, text_width
+from hmpim.plots.draw.paths import path_of, thin_band
 from hmpim.plots.draw.raster import picture_of
 from hmpim.plots.envelope import envelope
 from hmpim.plots.style import COLOURS, Colour
@@ -40,7 +40,6 @@ FloatArray = NDArray[np.float64]
 _PER_INCH = 96.0
 _POINT = 96.0 / 72.0
 _FAR = 9999.0  # px; what lies beyond is not seen and must not overflow
-_TENTHS = 12_000  # of a px: how far right and down the places that are looked up go
 _DASHES: dict[Dashes, str] = {"-": "", "--": "6 3", "-.": "8 3 2 3", ":": "1.5 2.5"}
 
 
@@ -246,9 +245,9 @@ def _item(
     if isinstance(item, Band):
         outline = np.concatenate((field.y(item.high), field.y(item.low)[::-1]))
         x = field.x(np.concatenate((item.x, item.x[::-1])))
-        x, outline = _thin_band(x, outline, place)
+        x, outline = thin_band(x, outline, place.width)
         fill = f'fill="{pen.colour(item.colour)}" fill-opacity="{item.opacity:g}"'
-        return [f'<path d="{_line(x, outline)}Z" {fill}/>'] if x.size else [], []
+        return [f'<path d="{path_of(x, outline)}Z" {fill}/>'] if x.size else [], []
     if isinstance(item, Points):
         return _points(pen, item, field), []
     if isinstance(item, Rule):
@@ -260,47 +259,6 @@ def _item(
     if isinstance(item, Bars):
         return _bars(pen, item, field), []
     return [_image(item, field)], []
-
-
-def _line(x: FloatArray, y: FloatArray) -> str:
-    """A path through points to a tenth of a pixel, interrupted where one is missing."""
-    there = np.isfinite(x) & np.isfinite(y)
-    if not there.any():
-        return ""
-    if there.all():
-        tenths = np.rint(10.0 * np.stack((x, y), axis=1)).astype(np.intp)
-        if tenths.min() >= 0 and tenths.max() < _TENTHS:
-            across, down_to = _words_of_tenths()
-            words = np.stack((across[tenths[:, 0]], down_to[tenths[:, 1]]), axis=1)
-            return "M" + "".join(words.ravel().tolist())[1:]
-    numbers = np.round(np.stack((x, y), axis=1), 1).tolist()
-    if there.all():
-        return "M" + "L".join([f"{a:g} {b:g}" for a, b in numbers])
-    out, down = [], False
-    for (a, b), seen in zip(numbers, there.tolist(), strict=True):
-        if seen:
-            out.append(f"{'L' if down else 'M'}{a:g} {b:g}")
-        down = seen
-    return "".join(out)
-
-
-@cache
-def _words_of_tenths() -> tuple[NDArray[np.object_], NDArray[np.object_]]:
-    """Every place in a picture as the text of a path: it is faster to look up than to write."""
-    numbers = [f"{k / 10.0:g}" for k in range(_TENTHS)]
-    across = np.array([f"L{number} " for number in numbers], dtype=np.object_)
-    return across, np.array(numbers, dtype=np.object_)
-
-
-def _thin_band(x: FloatArray, y: FloatArray, place: Place) -> tuple[FloatArray, FloatArray]:
-    """Keep the highest upper and the lowest lower edge of each pixel."""
-    half = x.size // 2
-    most = int(2 * place.width)
-    if half <= most:
-        return x, y
-    upper = envelope(x[:half], y[:half], most_points=most)
-    lower = envelope(x[half:][::-1], y[half:][::-1], most_points=most)
-    return np.concatenate((upper[0], lower[0][::-1])), np.concatenate((upper[1], lower[1][::-1]))
 
 
 def _stroke(pen: _Pen, colour: Colour, width: float, dashes: Dashes = "-") -> str:
@@ -316,7 +274,7 @@ def _curve(pen: _Pen, item: Curve, panel: Panel, field: _Field, place: Place) ->
     px, py = field.x(x), field.y(y)
     faint = f' opacity="{item.opacity:g}"' if item.opacity < 1.0 else ""
     look = _stroke(pen, item.colour, item.width, item.dashes)
-    parts = [f'<path d="{_line(px, py)}" {look} stroke-linejoin="round"{faint}/>']
+    parts = [f'<path d="{path_of(px, py)}" {look} stroke-linejoin="round"{faint}/>']
     if item.marker:
         parts.append(_marks(pen, px, py, item.marker, item.size, item.colour, True))
     return parts

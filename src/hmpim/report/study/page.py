@@ -91,7 +91,8 @@ class StudyPage:
     """Everything that the page shows, its first table above all.
 
     `met` is None where nothing was specified; `doubtful` says that some of what is met rests on
-    doubtful figures; `sheets` are names and addresses of pages beside it.
+    doubtful figures; `sheets` are names and addresses of pages beside it. One `upright` is printed
+    in portrait: its tables are narrow.
     """
 
     title: str
@@ -103,6 +104,7 @@ class StudyPage:
     facts: tuple[tuple[str, str], ...]
     sheets: tuple[tuple[str, str], ...] = ()
     doubtful: bool = False
+    upright: bool = False
 
 
 def render_study(page: StudyPage) -> str:
