@@ -159,7 +159,7 @@ def steps_of(system: System, drive: Drive) -> np.ndarray:
 
 def _figures(system: System, take: Take) -> dict[str, float]:
     found = figures(system, top=take.drive.fs / 2)
-    if take.u_offset:
+    if take.u_offset and not system.washouts:  # which let no offset through
         found["bias"] = system.bias - system.scale_factor * take.u_offset
     return found
 

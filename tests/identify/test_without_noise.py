@@ -13,9 +13,12 @@ FS = 200.0
 POSSIBLE = [field.name for field in fields(Parameters)]
 
 
-@pytest.mark.parametrize(("end", "doubted"), [(20.0, set()), (90.0, {"noise_std"})])
-def test_a_simulation_without_noise_is_doubted_for_its_noise_at_most(end, doubted):
-    """Interpolation is all that is left, and follows the input's future; the start is a rest."""
+@pytest.mark.parametrize("end", [20.0, 90.0])
+def test_a_simulation_without_noise_is_not_doubted(end):
+    """Interpolation is all that is left, and follows the input's future; the start is a rest.
+
+    At 90 of 100 Hz it is off by more at the end, where that future is missing.
+    """
     chirp = hmpim.Stimulus(waveform=hmpim.Chirp(band=(0.1, end), duration=10.0), fs=FS)
     sensor = hmpim.Sensor(delay=0.15, natural_frequency=10.0, damping_ratio=0.4)
     record = hmpim.run(sensor, chirp, rng=0)
@@ -25,9 +28,9 @@ def test_a_simulation_without_noise_is_doubted_for_its_noise_at_most(end, doubte
     assert {name: e.value for name, e in found.items()} == pytest.approx(
         {"delay": 0.15, "natural_frequency": 10.0, "damping_ratio": 0.4}, rel=1e-7
     )
-    assert {n for n in POSSIBLE if (e := getattr(pair, n)) and e.verdict != "ok"} == doubted
+    assert {n for n in POSSIBLE if (e := getattr(pair, n)) and e.verdict != "ok"} == set()
     assert not {"feedback", "frozen", "spikes"} & {w.code for w in pair.warnings}
-    assert doubted or pair.noise_std.ci95[0] == 0.0
+    assert pair.noise_std.ci95[0] == 0.0
 
 
 def test_one_sine_is_told_once_that_it_shows_gain_and_phase():

@@ -41,7 +41,7 @@ from hmpim.identify.result import (
 from hmpim.identify.result.error_bars import estimate, noise_estimate
 from hmpim.identify.result.groups import EVERY
 from hmpim.identify.section_iv.paper import paper_estimates
-from hmpim.identify.worth import INTERPOLATED, ROUNDING, WORTH
+from hmpim.identify.worth import ROUNDING, WORTH
 from hmpim.record import Finding
 
 __all__ = ["Described", "describe", "describe_dead"]
@@ -211,7 +211,7 @@ def _evidence(
         jittered=any(finding.code == "jitter" for finding in question.aligned.findings),
         limited=question.limited is not None,
     )
-    if evidence.unexplained < INTERPOLATED and not fit.structure.sampled:
+    if evidence.is_without_noise and not fit.structure.sampled:
         evidence = replace(evidence, spanned=without_noise(whole))
     return evidence, (*unread, *untested)
 

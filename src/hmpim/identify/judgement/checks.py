@@ -31,7 +31,6 @@ from hmpim.identify.judgement.residual import (
 from hmpim.identify.judgement.response import bandwidth_disagrees, grazed_bandwidth
 from hmpim.identify.judgement.structure import missed_pole, other_order
 from hmpim.identify.judgement.verdict import UNTOLD, doubted
-from hmpim.identify.worth import INTERPOLATED
 from hmpim.record import Finding
 
 __all__ = ["CHECKS", "Check", "judge"]
@@ -109,7 +108,7 @@ def judge(evidence: Evidence, *, checks: Sequence[Check] | None = None) -> tuple
     """
     if checks is None:
         checks = SAMPLED if evidence.joint.best.fit.structure.sampled else CHECKS
-        if evidence.unexplained < INTERPOLATED:
+        if evidence.is_without_noise:
             checks = [check for check in checks if check not in _OF_THE_RESIDUAL]
     found: list[Finding] = []
     for check in checks:

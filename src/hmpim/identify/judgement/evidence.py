@@ -2,12 +2,15 @@
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from hmpim.identify.arrays import Real
 from hmpim.identify.fitting.trial import JointFit
 from hmpim.identify.noise.misfit import Misfit
 from hmpim.identify.nonlinear.bends import Bend
 from hmpim.identify.reading.readings import Readings
 from hmpim.identify.result import Parameters, ResponseBandwidths
+from hmpim.identify.worth import FEW, INTERPOLATED, WORTH
 
 __all__ = ["Evidence", "structure_in_words"]
 
@@ -71,6 +74,17 @@ class Evidence:
     def unexplained(self) -> float:
         """R.m.s. of the residual over that of the output about its mean."""
         return 1.0 - self.fit_percent / 100.0
+
+    @property
+    def is_without_noise(self) -> bool:
+        """Whether the residual may be the error of interpolation between the samples.
+
+        It is greatest at the ends of a record, for want of the input beyond them.
+        """
+        fit, end = self.joint.best.fit, int(FEW * self.u.size) + 1
+        inner, moves = fit.residual[end:-end], fit.prediction + fit.residual
+        least = INTERPOLATED * float(np.std(moves))
+        return self.unexplained < WORTH and float(np.sqrt(np.mean(inner**2))) < least
 
 
 def structure_in_words(name: str) -> str:
