@@ -8,6 +8,7 @@ from typer.testing import CliRunner
 
 import hmpim
 from hmpim.cli.main import app
+from hmpim.plots import pair_bode
 
 
 def run(*words):
@@ -41,7 +42,14 @@ def test_a_compressed_record_is_identified_from_its_file(folder, tmp_path):
     assert found["y", "u"].delay.value == direct["y", "u"].delay.value
     assert found["y", "u"].delay.value == pytest.approx(0.05, abs=0.002)
     assert "at 3 Hz: not measured there; the model" in done.stdout  # no samples, no measurement
-    assert "no_samples" in page.read_text(encoding="utf-8")
+    words = page.read_text(encoding="utf-8")
+    assert "no_samples" in words
+    assert "identified from statistics, which do not contain the samples" in words
+    assert "Measured frequency response" not in words
+    alt = pair_bode(found["y", "u"]).alt
+    assert "model" in alt
+    assert "measured" not in alt
+    assert "measured" in pair_bode(hmpim.identify(hmpim.load(folder / "a.h5"))["y", "u"]).alt
 
 
 def test_records_and_files_of_statistics_are_joined_run_by_run(folder, tmp_path):

@@ -319,7 +319,7 @@ def _named(records: Sequence[Path], given: "Sequence[Record]") -> list[Path]:
 def _readings(result: "Identification", at: Sequence[float]) -> list[str]:
     """Say gain and phase of each pair at each frequency."""
     from hmpim.identify import gain_and_phase
-    from hmpim.report.by_hand import is_measured
+    from hmpim.plots.curves import is_measured
 
     notes = []
     for pair in result.pairs:

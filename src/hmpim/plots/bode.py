@@ -13,6 +13,7 @@ from hmpim.plots.curves import (
     BodeCurve,
     deviation_curve,
     interrupted,
+    is_measured,
     measured_curve,
     model_curve,
     stretches,
@@ -248,7 +249,8 @@ def pair_bode(
 
     The measured response with its 95 % band, the fitted model over it, the model's phase
     without its delay, and marks with their 95 % intervals at the -90° and -3 dB bandwidths and
-    the natural frequency. One whose interval reaches down to zero is not marked.
+    the natural frequency. One whose interval reaches down to zero is not marked. Of compressed
+    records, whose response is not measured, the model alone.
 
     Parameters
     ----------
@@ -279,7 +281,8 @@ def pair_bode(
     curves: list[tuple[str, Colour, BodeCurve]] = []
     grid = np.geomspace(0.1, 10.0, 400)
     if positive.size:
-        curves.append(("measured", "input", _measured(pair, fs)))
+        if is_measured(pair):
+            curves.append(("measured", "input", _measured(pair, fs)))
         grid = np.geomspace(positive[0], positive[-1], 400)
     whole = model_curve(pair, grid, fs=fs)
     if whole is not None:

@@ -187,6 +187,17 @@ def _near(angle: NDArray[np.float64], phase: NDArray[np.float64]) -> NDArray[np.
     return nearest
 
 
+def is_measured(pair: "PairIdentification") -> bool:
+    """Whether the response of a pair was measured; of compressed records it is the model's own.
+
+    Parameters
+    ----------
+    pair : PairIdentification
+        What was found.
+    """
+    return all(finding.code != "no_samples" for finding in pair.warnings)
+
+
 def measured_curve(measured: "FrequencyResponse", *, near: BodeCurve | None = None) -> BodeCurve:
     """Return a measured response's curve with the band that holds 95 % at each frequency.
 

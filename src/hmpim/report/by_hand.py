@@ -4,10 +4,11 @@ from collections.abc import Mapping
 
 from hmpim.errors import ArgumentError
 from hmpim.identify import PairIdentification, gain_and_phase
+from hmpim.plots.curves import is_measured
 from hmpim.report.numbers import format_estimate
 from hmpim.report.words import GLOSSARY, structure_words
 
-__all__ = ["fit_note", "hand_notes", "is_measured", "reading_at"]
+__all__ = ["fit_note", "hand_notes", "reading_at"]
 
 _FREQUENCIES = (
     "natural_frequency",
@@ -109,14 +110,3 @@ def reading_at(pair: PairIdentification, frequency: float, *, fs: float) -> str:
         return f"At {frequency:.4g} Hz nothing was measured; {model}."
     measured = f"{format_estimate(at.gain_db)}, {format_estimate(at.phase)}"
     return f"At {frequency:.4g} Hz: measured {measured}; {model}."
-
-
-def is_measured(pair: PairIdentification) -> bool:
-    """Whether the response of a pair was measured; of compressed records it is the model's own.
-
-    Parameters
-    ----------
-    pair : PairIdentification
-        What was found.
-    """
-    return all(finding.code != "no_samples" for finding in pair.warnings)

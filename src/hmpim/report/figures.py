@@ -8,6 +8,7 @@ import numpy as np
 from hmpim import plots
 from hmpim.identify import Identification, Nonlinearity, PairIdentification
 from hmpim.identify.section_iv.paper import PaperAnalysis, paper_analysis
+from hmpim.plots.curves import is_measured
 from hmpim.record import Intersample, Record, Signal, uniform
 from hmpim.report.numbers import format_number
 
@@ -213,18 +214,23 @@ def _response_pictures(
             f" The model is drawn from sample to sample, its input {_BETWEEN[pair.intersample]} "
             "samples; the marks are those of the system itself."
         )
+    measured = is_measured(pair)
+    drawn = (
+        "Measured frequency response with its 95 % band at each frequency, and the fitted model."
+    )
+    if not measured:
+        drawn = "The fitted model. Statistics of a record do not keep its measured response."
     pictures = [
         Picture(
             key="bode",
             title="Bode plot",
-            caption="Measured frequency response with its 95 % band at each frequency, and the "
-            f"fitted model.{between}",
+            caption=f"{drawn}{between}",
             description=f"Magnitude and phase of {pair.output} over {pair.input} from {span}: "
             f"{', '.join(marks) or 'no marks'}.",
             figure=plots.pair_bode(pair, input_unit=units[0], output_unit=units[1], fs=fs),
         )
     ]
-    if found.scale_factor is not None:
+    if found.scale_factor is not None and measured:
         pictures.append(
             Picture(
                 key="deviation",

@@ -2,7 +2,7 @@
 
 from hmpim.identify import PairIdentification
 from hmpim.model.dynamics import FILTERS, STRUCTURES, Structure
-from hmpim.report.by_hand import is_measured
+from hmpim.plots.curves import is_measured
 from hmpim.report.words import GLOSSARY
 
 __all__ = ["untold"]

@@ -5,6 +5,7 @@ from typing import Any
 
 from hmpim.identify import Identification, PairIdentification
 from hmpim.plots.candidates import INTERSAMPLE_WORDS
+from hmpim.plots.curves import is_measured
 from hmpim.record import Finding
 from hmpim.report.about import About, made_by
 from hmpim.report.advice import advice, leading_findings
@@ -98,6 +99,7 @@ def report_view(
         "stimulus": None if stimulus is None else stimulus_picture(stimulus),
         "pictures": list(pictures),
         "without_record": result.data is None,
+        "compressed": not all(is_measured(pair) for pair in result.pairs),
         "with_truth": bool(truth),
         "glossary": GLOSSARY,
     }
