@@ -223,3 +223,15 @@ def test_days_have_room_at_both_ends():
 def test_records_are_counted_in_whole_numbers():
     (panel,) = distribution(np.array([1.0, 1.0, 2.0]), name="delay", unit="s").panels
     assert [words for _, words in ticks(panel.y, (0.0, 2.2))] == ["0", "1", "2"]
+
+
+def test_values_that_differ_by_rounding_alone_are_drawn_as_equal():
+    """A step of rounding is found exactly; ticks 1e-18 apart all read 0.01."""
+    values = 0.01 + 1e-18 * np.array([0.0, 2.0, 0.0, 4.0])
+    assert np.ptp(values) > 0.0
+    (bars,) = distribution(values, name="quantization_step", unit="deg").panels
+    assert bars.items[0].x[-1] - bars.items[0].x[0] > 1e-6
+    (along,) = sequence(
+        np.arange(4.0), values, name="quantization_step", unit="deg", along="Record"
+    ).panels
+    assert np.ptp(along.items[0].y) == 0.0

@@ -26,6 +26,8 @@ _FEW_NAMES = 10
 _MOST_TICKS = 8
 _LONGEST = 14
 """Characters of a name below an axis."""
+_ROUNDING = 1e-9
+"""Share of a figure, as of one found exactly."""
 _STEPS = tuple(m * 10**k for k in range(10) for m in (1, 2, 5))
 
 
@@ -47,6 +49,7 @@ def distribution(values: Real, *, name: str, unit: str, bounds: tuple[float, ...
     >>> figure.panels[0].x.label
     'Delay, pure (s)'
     """
+    values = _equalled(values)
     tail = 0.01 if values.size > 50 else 0.0
     low, high = (float(end) for end in np.quantile(values, (tail, 1.0 - tail)))
     if not high > low:
@@ -105,6 +108,7 @@ def sequence(
     >>> figure.panels[0].x.ticks, figure.panels[0].x.low
     (((0.0, 'a'), (1.0, 'b')), -0.5)
     """
+    values = _equalled(values)
     every = np.unique(np.linspace(0, values.size - 1, _MOST_POINTS).astype(int))
     far = np.argsort(np.abs(values - np.median(values)))[-50:]
     shown = np.union1d(every, far)
@@ -128,6 +132,13 @@ def sequence(
         ),
         alt=f"{name} of {values.size} records along {along}, with the running median.",
     )
+
+
+def _equalled(values: Real) -> Real:
+    """Values that differ by rounding alone as equal ones: an axis could not tell them apart."""
+    if values.size and np.ptp(values) <= _ROUNDING * np.abs(values).max():
+        return np.full_like(values, np.median(values))
+    return values
 
 
 def _along(places: Real, label: str, names: tuple[str, ...]) -> Axis:

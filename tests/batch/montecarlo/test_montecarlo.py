@@ -61,7 +61,9 @@ def test_the_same_seed_gives_the_same_rows(plan, tmp_path, monkeypatch):
     assert sum(map(sum, found.verdicts.values())) == 6
     assert sum(region.right_structure.count for region in found.regions) == 6
 
-    assert "size: A4 portrait" in render_study(montecarlo_page(plan, found))  # one sheet, not two
+    assert "size: A4 landscape" in render_study(montecarlo_page(plan, found))
+    bare = montecarlo_page(plan, replace(found, regions=()))
+    assert "size: A4 portrait" in render_study(bare)  # one sheet, not two
     (errors, *_), *_ = (section.pictures for section in montecarlo_page(plan, found).sections)
     (panel,) = errors.figure.panels
     (rule,) = (item for item in panel.items if isinstance(item, Rule))

@@ -75,7 +75,7 @@ def montecarlo_page(plan: Plan, found: MonteCarlo) -> StudyPage:
             ("Not identified", "; ".join(found.reasons) or "none"),
             made_by(),
         ),
-        upright=True,
+        upright=not quantities,  # quarters, two pictures side by side, would be too small
     )
 
 
