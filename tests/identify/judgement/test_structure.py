@@ -79,7 +79,9 @@ def test_a_statistic_close_to_its_level_is_said_on_both_sides(clean, deviations,
     found = missed_pole(replace(clean, joint=replace(clean.joint, hidden=asked)))
     assert [f.severity for f in found] == ([severity] if severity else [])
     for finding in found:
-        assert f"{deviations:.1f} standard deviations; a doubt from 3.9 on" in finding.message
+        assert (
+            f"is {deviations:.1f} standard deviations, and a doubt begins at 3.9" in finding.message
+        )
         assert ("Another run may give the opposite verdict." in finding.message) == close
 
 

@@ -89,14 +89,16 @@ def missed_pole(evidence: Evidence) -> tuple[Finding, ...]:
     asked = abs(hidden.squared) / hidden.std if hidden.std > 0.0 else 0.0
     may_turn = abs(asked - DEVIATIONS) < DEVIATIONS - ALMOST
     close = "Another run may give the opposite verdict. " if may_turn else ""
-    level = f"({asked:.1f} standard deviations; a doubt from {DEVIATIONS:.1f} on)"
+    level = (
+        f"the evidence is {asked:.1f} standard deviations, and a doubt begins at {DEVIATIONS:.1f}"
+    )
     poles = f"{order} pole{'s' * (order != 1)}"
     matters = moved > TOLERATED * hidden.scale
     if asked > DEVIATIONS and matters:
         return (
             Finding(
                 code="other_dynamics",
-                message=f"The record requires dynamics other than {poles} {level}, and the delay "
+                message=f"The record requires dynamics other than {poles}: {level}. The delay "
                 f"may be off by {moved / fs:.2g} s. {close}Lower the noise, or sweep higher, until "
                 "a richer structure can be distinguished.",
                 severity="doubt",
@@ -107,7 +109,7 @@ def missed_pole(evidence: Evidence) -> tuple[Finding, ...]:
         return (
             Finding(
                 code="structure",
-                message=f"The record almost requires dynamics other than {poles} {level}. {close}"
+                message=f"The record almost requires dynamics other than {poles}: {level}. {close}"
                 "Lower the noise, or sweep higher.",
                 severity="info",
                 parameters=PHASE_SPLIT,

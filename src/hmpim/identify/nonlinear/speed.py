@@ -23,6 +23,7 @@ from hmpim.identify.noise.autoregression import yule_walker
 from hmpim.identify.noise.whiteness import is_white
 from hmpim.identify.nonlinear.bends import bends
 from hmpim.identify.nonlinear.mechanisms import LONGEST_AUTOREGRESSION, RATES, rate_limited
+from hmpim.identify.result.digits import plus_minus
 from hmpim.identify.worth import TWICE
 from hmpim.model.sampled import MARGIN, delayed_response, prepare_input
 from hmpim.record import Finding, Intersample
@@ -147,10 +148,10 @@ def speed_finding(limited: LimitedCommand, fs: float, unit: str) -> Finding:
     per = f" {unit}/s" if unit else " per s"
     return Finding(
         code="rate_limit",
-        message=f"The unit follows its command at no more than {limited.speed * fs:.4g} ± "
-        f"{limited.std * fs:.2g}{per}, and is asked for up to {limited.fastest * fs:.4g}. The "
-        "figures are those of the linear part. Keep the stimulus below this speed to measure "
-        "them directly.",
+        message=f"The unit follows its command at no more than "
+        f"{plus_minus(limited.speed * fs, limited.std * fs)}{per}; the command moves at up to "
+        f"{limited.fastest * fs:.4g}{per}. The figures are those of the linear part. Keep the "
+        "stimulus below this speed to measure them directly.",
         severity="info",
         parameters=(),
     )

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 from hmpim.identify.nonlinear.mechanisms import Kind, Mechanism
-from hmpim.identify.result.digits import percent
+from hmpim.identify.result.digits import percent, plus_minus
 from hmpim.identify.result.groups import MODELLED
 from hmpim.identify.worth import MOST
 from hmpim.record import Finding
@@ -105,12 +105,12 @@ def particular(found: Mechanism, unit: str) -> Finding | None:
     >>> found = Mechanism(
     ...     kind="backlash", size=0.1, size_std=0.01, gain=99.0, likelihood=0.0, rms=0.02,
     ...     effect=0.05, trace=np.zeros(0))
-    >>> particular(found, "deg").message[:54]
-    'There is play of about 0.2 deg in total (half: 0.1 ± 0'
+    >>> particular(found, "deg").message[:48]
+    'There is play of 0.200 ± 0.020 deg in total. Loo'
     """
     of = f" {unit}" if unit else ""
-    share = f"{100 * found.size:.2g} ± {100 * found.size_std:.1g} %"
-    size = f"{found.size:.2g} ± {found.size_std:.1g}{of}"
+    share = f"{plus_minus(100 * found.size, 100 * found.size_std)} %"
+    size = f"{plus_minus(found.size, found.size_std)}{of}"
     match found.kind:
         case "hardening" | "softening":
             way, moves = ("above", "higher") if found.kind == "hardening" else ("below", "lower")
@@ -129,17 +129,17 @@ def particular(found: Mechanism, unit: str) -> Finding | None:
             )
         case "backlash":
             message = (
-                f"There is play of about {2 * found.size:.2g}{of} in total (half: {size}). Look at "
-                "gears and couplings, or put backlash into the model."
+                f"There is play of {plus_minus(2 * found.size, 2 * found.size_std)}{of} in total. "
+                "Look at gears and couplings, or put backlash into the model."
             )
         case "rate_limit":
             message = (
-                f"The speed seems limited to about {size}{'/s' if unit else ' per second'}. "
+                f"The speed seems limited to {size}{'/s' if unit else ' per second'}. "
                 "Keep the stimulus's velocity below it."
             )
         case "saturation":
             message = (
-                f"The output seems clipped about {size} from its bias. Drive it less hard, or "
+                f"The output seems clipped {size} from its bias. Drive it less hard, or "
                 "look for a stop."
             )
         case _:
