@@ -79,3 +79,8 @@ def test_weak_noise_makes_no_doubt_and_strong_noise_does(field_record, evidence_
         estimate = getattr(p, name)
         assert (name in doubtful) == (estimate.std > 0.3 * abs(estimate.value))
     assert doubtful
+
+
+def test_a_pole_that_may_lie_anywhere_leaves_the_delay_open(clean):
+    (found,) = weak_excitation(with_std(clean, natural_frequency=1e4))
+    assert found.parameters == ("natural_frequency", "delay")

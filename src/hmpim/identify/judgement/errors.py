@@ -27,7 +27,8 @@ def not_converged(evidence: Evidence) -> tuple[Finding, ...]:
 def weak_excitation(evidence: Evidence) -> tuple[Finding, ...]:
     """Doubt each parameter whose standard deviation is above 30 % of its value.
 
-    With the scale factor the bias, where the input is far from zero.
+    With the scale factor the bias, where the input is far from zero; with the natural frequency the
+    delay, where nothing is known of it: what a pole does that may lie anywhere, a delay does too.
     """
     p = evidence.readings.parameters
     named: tuple[tuple[str, Estimate | None], ...] = (
@@ -51,12 +52,19 @@ def weak_excitation(evidence: Evidence) -> tuple[Finding, ...]:
                 message=f"{_how_well(in_words(name), estimate)}. Excite more around the natural "
                 "frequency, or longer.",
                 severity="doubt",
-                parameters=(name, "bias")
-                if name == "scale_factor" and _moves_the_bias(evidence)
-                else (name,),
+                parameters=(name, *_along(name, estimate, evidence)),
             )
         )
     return tuple(findings)
+
+
+def _along(name: str, estimate: Estimate, evidence: Evidence) -> tuple[str, ...]:
+    """What is in doubt with a parameter that the record does not determine."""
+    if name == "scale_factor" and _moves_the_bias(evidence):
+        return ("bias",)
+    if name == "natural_frequency" and estimate.spread > abs(estimate.value):
+        return ("delay",)
+    return ()
 
 
 def _moves_the_bias(evidence: Evidence) -> bool:
