@@ -45,7 +45,7 @@ def checked_structures(
     for name in asked:
         if name not in known:
             raise ArgumentError(
-                f"structure {name!r} is not known; choose one of {', '.join(known)}"
+                f"structure {str(name)!r} is not known; choose one of {', '.join(known)}"
             )
     return cast(tuple[StructureName, ...], asked)
 
