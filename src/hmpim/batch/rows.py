@@ -1,7 +1,6 @@
 """What is kept of each record: one row for each pair of channels, or one that says what failed."""
 
 import hashlib
-import json
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import fields
 from functools import cache
@@ -128,7 +127,7 @@ def _of_pairs(
     seconds: float,
     whole: bool,
 ) -> list[dict[str, Any]]:
-    text = json.dumps(result.to_dict(), allow_nan=False) if whole else None
+    text = _json(result) if whole else None
     rows = []
     for k, pair in enumerate(result.pairs):
         row = {
@@ -155,6 +154,13 @@ def _of_pairs(
             row["covariance"] = pair.covariance.ravel().tolist()
         rows.append(row)
     return rows
+
+
+def _json(result: Identification) -> str:
+    """All that was found, by a writer that is ten times as fast as Python's own."""
+    import orjson
+
+    return orjson.dumps(result.to_dict(), option=orjson.OPT_SERIALIZE_NUMPY).decode()
 
 
 def failed(address: Address, reason: str, metadata: Mapping[str, str] | None = None) -> Row:

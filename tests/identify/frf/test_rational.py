@@ -141,13 +141,13 @@ def test_normal_equations_are_those_of_the_columns_written_out(
 
     x, carriers = np.linspace(-1.0, 1.0, 21), drawn(4, len(orders), 21)
     columns = Columns.of(carriers, orders, x)
-    over, bent, left = drawn(3, 4, 21), drawn(3, 4, 21), drawn(3, 4, 21)
-    gram, right = columns.normal(None if plain else over, bent, left)
+    over, fitted, left = drawn(4, 3, 21), drawn(4, 3, 21), drawn(4, 3, 21)
     over = np.ones_like(over) if plain else over
+    gram, right = columns.normal(None if plain else over, np.abs(over) ** 2, fitted, left)
     linear = [
-        carriers[:, a] * over * x**p for a, most in enumerate(orders) for p in range(most + 1)
+        carriers[:, a, None] * over * x**p for a, most in enumerate(orders) for p in range(most + 1)
     ]
-    rows = np.stack([*linear, bent * x, bent * x**2], axis=-2)
+    rows = np.stack([*linear, -fitted * over * x, -fitted * over * x**2], axis=-2)
     mirror = np.conj(rows)
     assert gram == pytest.approx(mirror @ rows.swapaxes(-1, -2), rel=1e-12, abs=1e-12)
     assert right == pytest.approx(mirror @ left[..., None], rel=1e-12, abs=1e-12)

@@ -23,7 +23,7 @@ from hmpim.identify.judgement.feedback import chances_of_an_answer
 from hmpim.identify.judgement.residual import folded_power
 from hmpim.identify.kept import kept
 from hmpim.identify.nonlinear.evidence import are_curved
-from hmpim.identify.nonlinear.harmonics import any_harmonic
+from hmpim.identify.nonlinear.harmonics import any_harmonics
 from hmpim.identify.nonlinear.sweep_phase import SweepPhase
 from hmpim.identify.signals import longest_lag
 from hmpim.identify.worth import BLURRED, FEW, MUCH, PART, WORTH
@@ -144,10 +144,13 @@ def _linear(fleet: Fleet, group: Group, some: Places, sweep: SweepPhase | None) 
         models *= group.fit.gain[which, None]
         quiet[at : at + _AT_ONCE] = ~are_curved(models, group.residual[part])
     if sweep is not None:
-        for k in np.flatnonzero(quiet):
-            delay = float(group.fit.theta[group.some[some[k]], 0]) / fleet.fs
-            residual = group.residual[some[k]]
-            quiet[k] = any_harmonic(residual, sweep, fleet.fs, delay=delay) > FALSE_ALARM
+        left = np.flatnonzero(quiet)
+        lags = np.rint(group.fit.theta[group.some[some[left]], 0])
+        for lag in np.unique(lags):
+            part = left[lags == lag]
+            delay = float(lag) / fleet.fs
+            chances = any_harmonics(group.residual[some[part]], sweep, fleet.fs, delay=delay)
+            quiet[part] = chances > FALSE_ALARM
     return quiet
 
 

@@ -33,7 +33,7 @@ from hmpim.identify.result import (
     PairIdentification,
     Parameters,
 )
-from hmpim.identify.section_iv.paper import paper_estimates
+from hmpim.identify.section_iv.paper import estimates_of_many
 from hmpim.identify.worth import WORTH
 from hmpim.model import RationalDelay
 from hmpim.record import Finding
@@ -170,9 +170,9 @@ def whole_pairs(
             delays=group.fit.theta[some[places], 0] / fleet.fs,
             band=fleet.band,
         )
-        for k, response in zip(places.tolist(), responses, strict=True):
+        papers = estimates_of_many(fleet.u, outputs[some[places]], fleet.fs, fleet.band)
+        for k, response, paper in zip(places.tolist(), responses, papers, strict=True):
             i = int(some[k])
-            y = outputs[i]
             system = _system(fleet, group, k)
             own = _parameters({name: group.alone[name] for name in bandwidths}, k)
             measured = response_bandwidths(
@@ -180,7 +180,6 @@ def whole_pairs(
             )
             if disagreeing(measured, own):
                 continue
-            paper = paper_estimates(fleet.u, y, fleet.fs, band=fleet.band)
             pair = PairIdentification(
                 input=names[0],
                 output=names[1],

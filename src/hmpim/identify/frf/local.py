@@ -33,7 +33,7 @@ _NARROWEST_RATIONAL = 20
 # record so long has neighbours enough for polynomials.
 _AFFORDABLE = 60_000
 # Records of one input that are fitted at once: as many as a processor's cache holds.
-_AT_ONCE = 12
+_AT_ONCE = 32
 
 
 def local_response(

@@ -412,11 +412,18 @@ def _read_off(
         row, fitted = linear[near, :, place], (theta[:, None] @ linear)[:, 0]
         over = np.ones_like(y)
     else:
+        slot, centres = windows.slots()
         with np.errstate(all="ignore"):
-            found = gauss_newton(columns, y, linear_start(columns, smooth), steps=_STEPS)
-            row = found.rows(columns, windows)
-        inverse, theta = found.inverse, found.state.theta
-        fitted, over = found.state.fitted, found.state.over
+            start = linear_start(columns, smooth[:, None])
+            found = gauss_newton(columns, y[:, None], start, steps=_STEPS)
+            rows = found.rows(
+                np.take_along_axis(columns.linear, slot[:, None], axis=-1).swapaxes(1, 2),
+                slot,
+                columns.slopes.T[slot],
+            )
+        row = rows.reshape(-1, rows.shape[-1])[centres]
+        inverse, theta = found.inverse[:, 0], found.state.theta[:, 0]
+        fitted, over = found.state.fitted[:, 0], found.state.over[:, 0]
     squares = np.sum(np.abs(y - fitted) ** 2, axis=1)
     squares = np.maximum(squares, 1e-15 * np.sum(np.abs(y) ** 2, axis=1))
     freedom = np.maximum(windows.counted - row.shape[1], 1)

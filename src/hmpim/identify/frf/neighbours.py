@@ -7,7 +7,6 @@ no correlation into E|error|², so least squares and its variances hold as they 
 """
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import scipy
@@ -88,10 +87,23 @@ class Windows:
         # By `take`, whose answer lies in memory as its shape says, which indexing's does not.
         return np.asarray(values.take(self.start[:, None] + reach + np.arange(self.size), axis=-1))
 
-    def at(self, values: NDArray[Any]) -> NDArray[Any]:
-        """Return what stands at each centre, (..., c), of values on the windows, (..., w, s)."""
-        flat = values.reshape(*values.shape[:-2], -1)
-        return np.asarray(flat.take(self.near * self.size + self.place, axis=-1))
+    def views(self, values: Complex, reach: int) -> Complex:
+        """Return the windows of records, (r, b), that `mirrored` made, shape (w, r, s)."""
+        out = np.empty((self.start.size, values.shape[0], self.size), dtype=values.dtype)
+        for own, first in zip(out, (self.start + reach).tolist(), strict=True):
+            own[...] = values[:, first : first + self.size]
+        return out
+
+    def slots(self) -> tuple[Integer, Integer]:
+        """Return the places of each window's centres, (w, k), and where each centre is there, (c,).
+
+        Windows with fewer centres than others repeat their last.
+        """
+        first = np.searchsorted(self.near, np.arange(self.start.size + 1))
+        most = int(np.diff(first).max())
+        slot = np.minimum(first[:-1, None] + np.arange(most), first[1:, None] - 1)
+        at = np.arange(self.near.size) - first[self.near]
+        return self.place[slot], self.near * most + at
 
     def forms(self, vectors: Complex, inverse: Complex) -> Real:
         """Return v V vᴴ, (..., c, k), for vectors of each centre, (..., c, k, q).

@@ -17,7 +17,7 @@ from hmpim.identify.arrays import Mask, Real
 from hmpim.identify.noise.autoregression import yule_walker
 from hmpim.identify.nonlinear.sweep_phase import SweepPhase
 
-__all__ = ["HIGHEST", "HarmonicFit", "SweepView", "fit_harmonics", "view_of"]
+__all__ = ["HIGHEST", "HarmonicFit", "SweepView", "columns_of", "fit_harmonics", "view_of"]
 
 _ORDERS = (2, 3, 4, 5)
 """Orders looked for; 1 and the mean are taken up with them."""
@@ -96,7 +96,7 @@ def view_of(e: Real, sweep: SweepPhase, fs: float, delay: float) -> SweepView | 
     )
 
 
-def _columns(view: SweepView, others: list[Real]) -> Real:
+def columns_of(view: SweepView, others: Sequence[Real] = ()) -> Real:
     """Cosine and sine of order 1 and each of the others, the mean, then what other inputs do."""
     out = np.empty((3 + 2 * len(view.orders) + 2 * len(others), view.phase.size))
     turn = np.exp(1j * view.phase)
@@ -213,7 +213,7 @@ def fit_harmonics(
     late : float
         Delay in samples.
     """
-    columns = _columns(view, [_turned(other, view.index, late) for other in others])
+    columns = columns_of(view, [_turned(other, view.index, late) for other in others])
     e = e[view.index]
     weights, _, _ = _solved(_gram(columns, view), _moments(e[None], columns, view)[0])
     count = columns.shape[0]

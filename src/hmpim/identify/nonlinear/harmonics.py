@@ -11,22 +11,25 @@ linear misfit the residual holds, so a wrong linear structure makes no harmonic.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 import scipy
 from numpy.typing import ArrayLike
 
 from hmpim.errors import RecordError
+from hmpim.identify.arrays import Real
 from hmpim.identify.nonlinear.harmonic_regression import (
     HIGHEST,
     HarmonicFit,
+    columns_of,
     fit_harmonics,
     view_of,
 )
 from hmpim.identify.nonlinear.sweep_phase import SweepPhase, sweep_phase
 from hmpim.identify.signals import as_pair, check_rate
 
-__all__ = ["Harmonic", "Harmonics", "any_harmonic", "sweep_harmonics"]
+__all__ = ["Harmonic", "Harmonics", "any_harmonic", "any_harmonics", "sweep_harmonics"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -177,29 +180,47 @@ def any_harmonic(residual: ArrayLike, sweep: SweepPhase, fs: float, *, delay: fl
     >>> any_harmonic(0.01 * u**2 + noise, sweep, 200.0) < 1e-20
     True
     """
-    e = np.asarray(residual, dtype=np.float64)
-    view = view_of(e, sweep, fs, delay)
+    return float(any_harmonics(np.asarray(residual)[None], sweep, fs, delay=delay)[0])
+
+
+def any_harmonics(residuals: Real, sweep: SweepPhase, fs: float, *, delay: float) -> Real:
+    """The same of many residuals, (k, n), that come as late, to the sample; shape (k,).
+
+    Half a sample turns the harmonics of a stretch alike, and their size is what is asked for.
+
+    Examples
+    --------
+    >>> t = np.arange(2000) / 200
+    >>> u = np.sin(2 * np.pi * (0.1 * t + t**2))
+    >>> noise = 0.01 * np.random.default_rng(0).standard_normal(2000)
+    >>> two = np.stack((noise, 0.01 * u**2 + noise))
+    >>> (any_harmonics(two, sweep_phase(u, 200.0), 200.0, delay=0.0) > 0.01).tolist()
+    [True, False]
+    """
+    chances = np.ones(residuals.shape[0])
+    view = view_of(np.ones(residuals.shape[1]), sweep, fs, np.rint(delay * fs) / fs)
     if view is None:
-        return 1.0
-    e = e[view.index]
-    e = e - e.mean()
-    power = float(e @ e) / e.size
-    if power == 0.0:
-        return 1.0
-    starts = np.searchsorted(view.along, np.arange(view.places))
-    turn = np.exp(1j * view.phase)
-    spun, chances = e * turn, []
-    for k in range(2, max(view.orders) + 1):
-        spun *= turn
-        seen = k * view.rate < 0.5 * HIGHEST
-        if k not in view.orders:
-            continue
-        taken = np.add.reduceat(spun * seen, starts)
-        count = np.add.reduceat(seen.astype(np.float64), starts)
-        used = count > 0
-        statistic = float(np.sum(2.0 * np.abs(taken[used]) ** 2 / count[used])) / power
-        chances.append(float(scipy.special.chdtrc(2 * np.count_nonzero(used), statistic)))
-    return min(1.0, len(chances) * min(chances))
+        return chances
+    e = residuals[:, view.index]
+    counts = e != 0.0
+    number = np.maximum(counts.sum(axis=1), 1)
+    e = (e - (e.sum(axis=1) / number)[:, None]) * counts
+    power = np.vecdot(e, e) / number
+    orders = len(view.orders)
+    columns = columns_of(view)[2 : 2 + 2 * orders].reshape(orders, 2, -1)
+    seen = np.hypot(columns[:, 0], columns[:, 1])
+    statistic, places = np.zeros((2, residuals.shape[0], orders))
+    edges = [*np.searchsorted(view.along, np.arange(view.places)).tolist(), view.index.size]
+    for here in (slice(*pair) for pair in pairwise(edges)):
+        taken = np.tensordot(e[:, here], columns[..., here], axes=(1, 2))
+        count = counts[:, here] @ seen[:, here].T
+        statistic += 2.0 * np.sum(taken**2, axis=-1) / np.maximum(count, 1.0)
+        places += count > 0.5
+    moves = power > 0.0
+    statistic = statistic[moves] / power[moves, None]
+    least = scipy.special.chdtrc(2 * np.maximum(places[moves], 1), statistic).min(axis=1)
+    chances[moves] = np.minimum(1.0, orders * least)
+    return chances
 
 
 def _tested(fit: HarmonicFit, fs: float) -> Harmonics:

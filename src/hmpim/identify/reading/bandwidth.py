@@ -43,19 +43,28 @@ def ratio_at(
     Neighbouring frequencies share bins of the record, so averaging them is not counted as
     lowering the error: the standard deviation is that of one of them.
     """
-    apart = np.abs(measured.frequency - frequency)
+    return _read_at(measured.frequency, *_divided(measured, system, fs, intersample), frequency)
+
+
+def _divided(
+    measured: FrequencyResponse, system: RationalDelay, fs: float, intersample: Intersample
+) -> tuple[Complex, Real]:
+    """Measured over modelled response at each frequency, and the standard deviation of it."""
+    modelled = sampled_response(system, measured.frequency, fs=fs, intersample=intersample)
+    return measured.response / modelled, measured.std / np.abs(modelled)
+
+
+def _read_at(f: Real, ratio: Complex, std: Real, frequency: float) -> tuple[complex, float] | None:
+    """A ratio at a frequency, by the line through its neighbours; None where it has too few."""
+    apart = np.abs(f - frequency)
     if apart.size < _FEWEST:
         return None
-    below = int(np.count_nonzero(measured.frequency <= frequency))
+    below = int(np.count_nonzero(f <= frequency))
     if min(below, apart.size - below) < _BESIDE:  # a line through one side reaches too far
         return None
     near = apart <= max(PART * frequency, float(np.partition(apart, _FEWEST - 1)[_FEWEST - 1]))
-    f = measured.frequency[near]
-    modelled = sampled_response(system, f, fs=fs, intersample=intersample)
-    ratio = measured.response[near] / modelled
-    std = measured.std[near] / np.abs(modelled)
-    weight = 1.0 / np.maximum(std, 1e-12)
-    return _height(f - frequency, ratio, weight**2), median(std)
+    weight = 1.0 / np.maximum(std[near], 1e-12)
+    return _height(f[near] - frequency, ratio[near], weight**2), median(std[near])
 
 
 def _height(x: Real, y: Complex, weight: Real) -> complex:
@@ -93,10 +102,13 @@ def response_bandwidths(
     """
     names = [field.name for field in fields(ResponseBandwidths)]
     near = {name: e.value for name in names if (e := getattr(modelled, name)) is not None}
+    if not near:
+        return ResponseBandwidths()
     steepness = _slopes(replace(system, delay=0.0), np.array([*near.values()]))
+    divided = _divided(measured, system, fs, intersample)
 
     def crossing(name: str, value: float, steep: complex) -> Estimate | None:
-        found = ratio_at(measured, system, value, fs, intersample)
+        found = _read_at(measured.frequency, *divided, value)
         if found is None:
             return None
         ratio, std = found

@@ -18,6 +18,7 @@ __all__ = [
     "autocorrelation",
     "correlation_peak",
     "cross_correlation",
+    "cross_correlations",
 ]
 
 
@@ -79,13 +80,16 @@ def cross_correlation(x: ArrayLike, y: ArrayLike) -> Correlation:
     1
     """
     first, second = as_pair(x, y)
-    n = first.size
+    (value,) = cross_correlations(first[None], second)
+    return Correlation(lag=np.arange(1 - first.size, first.size), value=value)
+
+
+def cross_correlations(x: Real, y: Real) -> Real:
+    """Values of `cross_correlation` of many signals, (k, n), with one, (n,); shape (k, 2n - 1)."""
+    n = y.size
     length = int(scipy.fft.next_fast_len(2 * n - 1, real=True))
-    around = scipy.fft.irfft(
-        scipy.fft.rfft(first, length) * np.conj(_padded(second, length)), length
-    )
-    value = np.concatenate((around[length - n + 1 :], around[:n])) / n
-    return Correlation(lag=np.arange(1 - n, n), value=value)
+    around = scipy.fft.irfft(scipy.fft.rfft(x, length) * np.conj(_padded(y, length)), length)
+    return np.concatenate((around[:, length - n + 1 :], around[:, :n]), axis=1) / n
 
 
 @kept

@@ -1,5 +1,6 @@
 """Section IV of the paper from end to end: every curve, and every figure read off them."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,6 +18,7 @@ from hmpim.identify.section_iv.correlation import (
     autocorrelation,
     correlation_peak,
     cross_correlation,
+    cross_correlations,
 )
 from hmpim.identify.section_iv.spectrum import decibel, excited_band, padding, ratio, well_excited
 from hmpim.identify.section_iv.static import (
@@ -28,7 +30,7 @@ from hmpim.identify.section_iv.static import (
 from hmpim.identify.section_iv.windows import WindowName, window_samples
 from hmpim.identify.signals import as_pair, check_band, check_rate
 
-__all__ = ["PaperAnalysis", "paper_analysis", "paper_estimates"]
+__all__ = ["PaperAnalysis", "estimates_of_many", "paper_analysis", "paper_estimates"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -181,7 +183,7 @@ def paper_analysis(
     check_rate(fs)
     fs = float(fs)
     span = _band(stimulus, fs, band)
-    time = _time_steps(stimulus, measured)
+    time = _time_steps(stimulus, measured, cross_correlation(measured, stimulus))
     n = stimulus.size
     zeros = padding(n) if pad is None else pad
     if zeros < 0:
@@ -195,7 +197,7 @@ def paper_analysis(
     value = np.asarray(scipy.fft.rfft(np.concatenate((plain, plain * taper)), length, axis=-1))
     level = decibel(value)
     frequency = np.asarray(scipy.fft.rfftfreq(length, 1 / fs), dtype=np.float64)
-    steps = _frequency_steps(value[2], value[3], fs / length, span, time, fs)
+    (steps,) = _frequency_steps(value[2], value[3:], fs / length, span, [time], fs)
     inner = autocorrelation(time.error)
     return PaperAnalysis(
         fs=fs,
@@ -262,15 +264,42 @@ def paper_estimates(
     check_rate(fs)
     fs = float(fs)
     span = _band(stimulus, fs, band)
-    if np.ptp(measured) == 0:
-        return PaperEstimates()
-    time = _time_steps(stimulus, measured)
-    n = stimulus.size
+    (found,) = estimates_of_many(stimulus, measured[None], fs, span)
+    return found
+
+
+def estimates_of_many(
+    u: Real, outputs: Real, fs: float, band: tuple[float, float]
+) -> list[PaperEstimates]:
+    """Return `paper_estimates` of many outputs of one stimulus, shape (k, n), all of them checked.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> t = np.arange(2000) / 200
+    >>> u = np.sin(2 * np.pi * (0.1 * t + t**2))
+    >>> late = np.stack([np.roll(u, 30), np.roll(u, 20), np.zeros(2000)])
+    >>> [own.delay for own in estimates_of_many(u, late, 200.0, (0.1, 20.0))]
+    [0.15, 0.1, None]
+    """
+    n = u.size
     length = n + padding(n)
-    answered = scipy.fft.rfft((measured - measured.mean()) * _taper(n), length)
-    steps = _frequency_steps(_tapered(stimulus, length), answered, fs / length, span, time, fs)
-    frequency = np.asarray(scipy.fft.rfftfreq(length, 1 / fs), dtype=np.float64)[steps.inside]
-    return _estimates(time, steps, frequency, fs)
+    found = [PaperEstimates()] * outputs.shape[0]
+    moving = np.flatnonzero(np.ptp(outputs, axis=1) > 0)
+    if moving.size == 0:
+        return found
+    outputs, lags = outputs[moving], np.arange(1 - n, n)
+    times = [
+        _time_steps(u, y, Correlation(lag=lags, value=value))
+        for y, value in zip(outputs, cross_correlations(outputs, u), strict=True)
+    ]
+    tapered = (outputs - outputs.mean(axis=1, keepdims=True)) * _taper(n)
+    answered = np.asarray(scipy.fft.rfft(tapered, length), dtype=np.complex128)
+    every = _frequency_steps(_tapered(u, length), answered, fs / length, band, times, fs)
+    frequency = np.asarray(scipy.fft.rfftfreq(length, 1 / fs), dtype=np.float64)[every[0].inside]
+    for i, time, steps in zip(moving.tolist(), times, every, strict=True):
+        found[i] = _estimates(time, steps, frequency, fs)
+    return found
 
 
 @kept
@@ -294,10 +323,11 @@ def _band(u: Real, fs: float, band: tuple[float, float] | None) -> tuple[float, 
     return band
 
 
-def _time_steps(u: Real, y: Real) -> _TimeSteps:
-    """Sections IV.A to IV.C: equations (8) to (14)."""
-    # The measurement first: a late measurement then peaks at a positive lag.
-    correlation = cross_correlation(y, u)
+def _time_steps(u: Real, y: Real, correlation: Correlation) -> _TimeSteps:
+    """Sections IV.A to IV.C, equations (8) to (14), of the output's correlation with the input.
+
+    The measurement first: a late measurement then peaks at a positive lag.
+    """
     peak = correlation_peak(correlation)
     error = time_corrected_error(u, y, min(peak.lag, u.size - 4))
     bias = bias_by_autocorrelation(error)
@@ -313,32 +343,42 @@ def _time_steps(u: Real, y: Real) -> _TimeSteps:
 
 
 def _frequency_steps(
-    u: Complex, y: Complex, step: float, band: tuple[float, float], time: _TimeSteps, fs: float
-) -> _FrequencySteps:
-    """Section IV.D: equations (18) to (25) on the bins of two spectra inside the band."""
+    u: Complex,
+    y: Complex,
+    step: float,
+    band: tuple[float, float],
+    times: Sequence[_TimeSteps],
+    fs: float,
+) -> list[_FrequencySteps]:
+    """Section IV.D: equations (18) to (25) on the bins of spectra, y of shape (k, m), in a band."""
     # The bin at DC holds the bias and no stimulus.
     first = max(int(np.ceil(band[0] / step - 1e-9)), 1)
     last = min(int(np.floor(band[1] / step + 1e-9)), u.size - 1)
     inside = slice(first, max(last + 1, first))
-    response = ratio(y[inside], u[inside])
+    response = ratio(y[:, inside], u[inside])
     response = np.where(np.isfinite(response), response, 0.0)
     frequency = np.arange(inside.start, inside.stop) * step
     read = well_excited(u[inside])
-    phase = np.zeros(response.size)
-    phase[read] = reading.phase(response[read], inverted=time.inverted)
+    inverted = np.array([time.inverted for time in times])
+    phase = np.zeros(response.shape)
+    phase[:, read] = reading.phase(response[:, read], inverted=inverted)
     if not read.all() and read.any():
         # In a notch the angle is chance: it must not carry a turn into the bins beyond.
-        near = np.interp(frequency, frequency[read], phase[read])
-        angle = np.degrees(np.angle(-response if time.inverted else response))
-        phase[~read] = (near + (angle - near + 180.0) % 360.0 - 180.0)[~read]
-    return _FrequencySteps(
-        inside=inside,
-        read=read,
-        response=response,
-        magnitude=reading.magnitude(response),
-        phase=phase,
-        phase_without_delay=reading.phase_without_delay(frequency, phase, time.lag / fs),
-    )
+        near = np.stack([np.interp(frequency, frequency[read], own[read]) for own in phase])
+        angle = np.degrees(np.angle(np.where(inverted[:, None], -response, response)))
+        phase[:, ~read] = (near + (angle - near + 180.0) % 360.0 - 180.0)[:, ~read]
+    magnitude = reading.magnitude(response)
+    return [
+        _FrequencySteps(
+            inside=inside,
+            read=read,
+            response=response[i],
+            magnitude=magnitude[i],
+            phase=phase[i],
+            phase_without_delay=reading.phase_without_delay(frequency, phase[i], time.lag / fs),
+        )
+        for i, time in enumerate(times)
+    ]
 
 
 def _estimates(

@@ -49,7 +49,7 @@ def magnitude(response: ArrayLike) -> Real:
     return np.hypot(g.real, g.imag)
 
 
-def phase(response: ArrayLike, *, inverted: bool = False) -> Real:
+def phase(response: ArrayLike, *, inverted: ArrayLike = False) -> Real:
     """Return the phase φ of equation (23), tan φ = I/R, in degrees and without jumps.
 
     The arctangent takes the quadrant from the signs of R and I, and the phase is followed
@@ -60,14 +60,15 @@ def phase(response: ArrayLike, *, inverted: bool = False) -> Real:
 
     Parameters
     ----------
-    response : array_like of complex, shape (m,)
-        G(jω) inside the excited band, frequency increasing, all finite.
-    inverted : bool
+    response : array_like of complex, shape (..., m)
+        G(jω) inside the excited band, frequency increasing, all finite; of many devices at once
+        with an axis before.
+    inverted : array_like of bool, shape (...)
         True for a device that turns the sign: the phase is then that of -G.
 
     Returns
     -------
-    ndarray, shape (m,)
+    ndarray, shape (..., m)
         Phase in degrees.
 
     Examples
@@ -77,13 +78,12 @@ def phase(response: ArrayLike, *, inverted: bool = False) -> Real:
     array([ -10., -110., -210., -310., -410.])
     """
     g = np.asarray(response, dtype=np.complex128)
-    if inverted:
-        g = -g
+    g = np.where(np.asarray(inverted)[..., None], -g, g)
     if g.size == 0:
-        return np.zeros(0)
+        return np.zeros(g.shape)
     turning = np.degrees(np.unwrap(np.angle(g)))
-    start = median(turning[: near_dc(g.size)])
-    return turning - 360.0 * round(start / 360.0)
+    start = np.median(turning[..., : near_dc(g.shape[-1])], axis=-1)
+    return np.asarray(turning - 360.0 * np.round(start / 360.0)[..., None])
 
 
 def near_dc(bins: int) -> int:
