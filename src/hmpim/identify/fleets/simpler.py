@@ -105,7 +105,7 @@ def _places(fleet: Fleet, y: Real, names: tuple[StructureName, ...]) -> dict[str
     rough = rough_response(fleet.u, y, longest_delay=longest)
     fits = fit_plain(problem, rough, (fleet.structure.name, *names))
     return {
-        fit.structure.name: fit_structure(problem, fit.structure, fit.theta, precision=1e-6).theta
+        fit.structure.name: fit_structure(problem, fit.structure, fit.theta, precision=1e-3).theta
         for fit in fits
         if fit.structure.name in names
     }
