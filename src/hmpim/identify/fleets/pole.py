@@ -20,9 +20,6 @@ from hmpim.model.dynamics import STRUCTURES, Structure
 
 __all__ = ["Tails", "with_tails"]
 
-_THERE = 1e-4
-"""Precision of the fit without the pole, which begins where it ends but for the surface's error."""
-
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Tails:
@@ -64,11 +61,11 @@ def with_tails(
     longest = longest_lag(y.size) + 2.0  # as of every record
     problem = Problem(source=member.source, y=y, valid=None, longest_delay=longest)
 
-    def refit(structure: Structure, theta: Real, precision: float = 1e-2) -> Trial:
-        fit = fit_structure(problem, structure, theta, precision=precision)
+    def refit(structure: Structure, theta: Real) -> Trial:
+        fit = fit_structure(problem, structure, theta)
         return trial_of(member.intersample, fit, y.size)
 
-    best = refit(fleet.structure, theta_at(place), _THERE)
+    best = refit(fleet.structure, theta_at(place))
     growth = grow(
         best,
         hidden=lambda trial: hidden_pole(problem, trial.fit),
