@@ -138,3 +138,20 @@ def test_couplings_are_found_where_no_plainer_structure_is_asked_for():
     )
     assert result["y0", "u0"].structure in ("second_order", "third_order")
     assert result["y0", "u1"].scale_factor.value == pytest.approx(0.1, abs=0.05)
+
+
+def test_a_late_answer_leaves_fewer_bins_between_two_bands():
+    """Of an input beyond the other's band too few may be left for a response of its own."""
+    fs, n = 100.0, 1000
+    t = np.arange(n) / fs
+
+    def sweep(first, last, t):
+        return np.sin(2 * np.pi * (first * t + (last - first) * t**2 / 20.0))
+
+    noise = 0.001 * np.random.default_rng(0).standard_normal(n)
+    late = np.where(t >= 1.5, sweep(0.1, 10.0, t - 1.5), 0.0)
+    inputs = {"a": sweep(0.1, 10.0, t), "b": sweep(11.9, 0.1, t)}
+    y = late + 0.3 * inputs["b"] + noise
+    result = hmpim.identify(hmpim.Record.from_arrays(inputs, {"y": y}, fs=fs))
+    assert result["y", "a"].delay.value == pytest.approx(1.5, abs=1e-4)
+    assert result["y", "b"].delay.value == pytest.approx(0.0, abs=1e-4)

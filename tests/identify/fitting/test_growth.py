@@ -2,7 +2,9 @@
 
 import numpy as np
 import pytest
+import scipy
 
+from hmpim.identify.fitting import joint
 from hmpim.identify.fitting.growth import as_if_hidden, hidden_pole, one_more_pole, with_pole
 from hmpim.identify.fitting.joint import joint_fit
 from hmpim.identify.reading.readings import read_parameters
@@ -130,3 +132,17 @@ def test_a_pole_that_would_not_show_takes_its_time_from_the_delay(u):
     longest = as_if_hidden(joint.best.fit, joint.hidden)
     assert longest.structure.name == "second_order"
     assert longest.delay < joint.best.fit.delay - 0.5 * joint.hidden.limit
+
+
+def test_a_colour_that_the_grown_fit_contradicts_is_not_weighed_by(u, monkeypatch):
+    clean = answer(u, RESONANT, (4.0,))
+    colour = scipy.signal.lfilter([1.0], [1.0, -0.9], np.random.default_rng(4).standard_normal(N))
+    y = clean + 0.01 * colour
+    names = ("second_order", "third_order")
+    weighed = fitted(u, y, *names)
+    assert weighed.best.fit.structure.name == "third_order"
+    assert weighed.weighed.noise is not None
+    monkeypatch.setattr(
+        joint, "is_contradicted", lambda data, best, seen: best.fit.structure.order > 2
+    )
+    assert fitted(u, y, *names).weighed.noise is None

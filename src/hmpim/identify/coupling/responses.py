@@ -86,16 +86,17 @@ def responses_of(
     moves is taken out by its model.
     """
     # One delay for all inputs: moving them against each other would make them look different.
-    kept = [fit for fit, told in zip(joined.fits, joined.related, strict=True) if told]
+    kept = [fit for fit, strong in zip(joined.fits, joined.strong, strict=True) if strong]
     strongest = min(kept or joined.fits, key=lambda fit: fit.best.fit.cost).best.fit
     delay = min(max(strongest.delay, 0.0), 0.4 * aligned.samples) / aligned.fs
     parts = [fit.best.fit.prediction - fit.best.fit.linear[-1] for fit in joined.fits]
     y, told = output.values, np.asarray(output.valid)
+    span = aligned.samples / aligned.fs - delay
     edges = sorted({edge for band in inputs.bands for edge in band})
     pieces: list[tuple[list[int], ResponseMatrix]] = []
     for low, high in pairwise(edges):
         active = [j for j, band in enumerate(inputs.bands) if band[0] <= low and band[1] >= high]
-        bins = (high - low) * aligned.samples / aligned.fs
+        bins = (high - low) * span
         if not active or bins < 8 * (len(active) + 1) + 2:
             continue
         rest = y

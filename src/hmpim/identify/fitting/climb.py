@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from hmpim.identify.arrays import Mask, Real
 from hmpim.identify.fitting.least_squares import solved
+from hmpim.identify.fitting.regrouped import regrouped
 from hmpim.model.dynamics import Structure
 
 __all__ = ["Evaluated", "climb"]
@@ -84,8 +85,45 @@ def climb(
     bool
         Whether the last step was negligible.
     """
-    edges = np.cumsum([theta.size for theta in thetas])[:-1]
-    best = evaluated(thetas)
+    best, converged = _descended(
+        evaluated(thetas),
+        evaluated,
+        structures=structures,
+        bounded=bounded,
+        counted=counted,
+        iterations=iterations,
+        precision=precision,
+    )
+    other = [regrouped(s, theta) for s, theta in zip(structures, best.thetas, strict=True)]
+    if all(theta is None for theta in other):
+        return best, converged
+    grouped = [
+        here if theta is None else theta for here, theta in zip(best.thetas, other, strict=True)
+    ]
+    again, ended = _descended(
+        evaluated(bounded(grouped)),
+        evaluated,
+        structures=structures,
+        bounded=bounded,
+        counted=counted,
+        iterations=iterations,
+        precision=precision,
+    )
+    return (again, ended) if again.cost <= best.cost else (best, converged)
+
+
+def _descended(
+    best: E,
+    evaluated: Callable[[Sequence[Real]], E],
+    *,
+    structures: Sequence[Structure],
+    bounded: Callable[[Sequence[Real]], list[Real]],
+    counted: int,
+    iterations: int,
+    precision: float,
+) -> tuple[E, bool]:
+    """Where the way down from one grouping of the poles ends, and whether it does."""
+    edges = np.cumsum([theta.size for theta in best.thetas])[:-1]
     damping = _DAMPING
     for _ in range(iterations):
         here = np.concatenate(best.thetas)

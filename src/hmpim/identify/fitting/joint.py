@@ -97,7 +97,7 @@ def joint_fit(
     course, fitted = enrich(course, fitted)
     course, trials, best, share = weigh_and_look_again(course, fitted)
     joint = settle(course, trials, best, share)
-    return grow_poles(joint, course, structures) if growing else joint
+    return ask_for_poles(joint, course, structures) if growing else joint
 
 
 def settle(course: Course, trials: list[Trial], best: Trial, share: float) -> JointFit:
@@ -155,6 +155,22 @@ def _is_needlessly_coloured(problem: Problem, fit: Fit) -> bool:
         return False
     plain = replace(problem, noise=None, told=None)
     return is_white(plain.counting(refit(plain, fit).residual))
+
+
+def ask_for_poles(
+    joint: JointFit, course: Course, structures: tuple[StructureName, ...]
+) -> JointFit:
+    """Add poles, and once more without a colour of the noise that the richer fit contradicts."""
+    grown, data = grow_poles(joint, course, structures), course.data
+    if grown.best is joint.best or data.noise is None:
+        return grown
+    if not is_contradicted(data, grown.best, course.counted):
+        return grown
+    course = replace(course, data=replace(data, noise=None))
+    fitted = [(trial.intersample, trial.fit) for trial in joint.trials]
+    share = joint.effective_share
+    trials, best = _decide(course, refit_whitened(course.data, fitted, course.counted), share)
+    return grow_poles(settle(course, trials, best, share), course, structures)
 
 
 def grow_poles(joint: JointFit, course: Course, structures: tuple[StructureName, ...]) -> JointFit:

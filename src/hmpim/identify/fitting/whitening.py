@@ -22,7 +22,7 @@ from hmpim.identify.signals import longest_lag
 from hmpim.identify.worth import PART, TWICE
 from hmpim.record import Intersample
 
-__all__ = ["is_contradicted", "noise_of", "prewhitened_of", "refit_whitened"]
+__all__ = ["distance_of", "is_contradicted", "noise_of", "prewhitened_of", "refit_whitened"]
 
 _RETURNS = 12
 """Steps that a fit is taken once more when only the noise model has changed."""
@@ -89,5 +89,27 @@ def is_contradicted(data: Data, best: Trial, seen: Seen) -> bool:
     unknown = plain.theta.size
     cov = covariance(rows, plain.residual, freedom=freedom, white=False)[:unknown, :unknown]
     apart = plain.theta - best.fit.theta
-    statistic = float(apart @ np.linalg.pinv(cov, rcond=1e-12, hermitian=True) @ apart)
-    return not statistic < scipy.special.chdtri(unknown, FALSE_ALARM)
+    return not distance_of(apart, cov) < scipy.special.chdtri(unknown, FALSE_ALARM)
+
+
+def distance_of(apart: Real, cov: Real) -> float:
+    """Square of how far two estimates are apart, in deviations: d' C⁻¹ d.
+
+    Each parameter counts in deviations of its own, so that one which the record does not determine,
+    as the delay within a held sample, hides none of the others.
+
+    Parameters
+    ----------
+    apart : ndarray, shape (p,)
+        Difference of the estimates.
+    cov : ndarray, shape (p, p)
+        Its covariance.
+
+    Examples
+    --------
+    >>> round(distance_of(np.array([0.0, 3.0]), np.diag([1e14, 1.0])), 6)
+    9.0
+    """
+    spread = np.sqrt(np.diag(cov))
+    alike = np.linalg.pinv(cov / np.outer(spread, spread), rcond=1e-12, hermitian=True)
+    return float(apart / spread @ alike @ (apart / spread))
