@@ -135,6 +135,19 @@ def test_everything_is_said_of_quiet_records_and_of_no_others(fleet):
     assert own.denominator == pytest.approx(pair.denominator, rel=1e-4)
 
 
+def test_a_nonlinearity_that_widens_an_interval_by_chance_leaves_a_record_to_itself(fleet):
+    """One record in two hundred looks bent enough; alone, its damping's interval says so."""
+    whole = learn_whole(fleet, [alone(output(seed)) for seed in range(LEARNT)])
+    outputs = np.stack([output(seed) for seed in (276, 44)])
+    fit = fit_fleet(fleet, outputs)
+    assert fit.sound.all()
+    assert [pair is None for pair in whole_pairs(whole, fit, outputs)] == [True, False]
+    linear = replace(whole, shapes=whole.shapes[:0])
+    pair, together = alone(outputs[0]), whole_pairs(linear, fit, outputs)[0]
+    ends = np.array([one.parameters.damping_ratio.ci95 for one in (pair, together)])
+    assert np.ptp(ends[0]) > 1.2 * np.ptp(ends[1])
+
+
 def test_a_record_that_almost_asks_for_other_dynamics_is_left_to_itself(fleet):
     outputs = np.stack([output(seed) for seed in (256, 433, 44)])
     assert "structure" in {warning.code for warning in alone(outputs[0]).warnings}

@@ -14,7 +14,7 @@ import numpy as np
 from hmpim.identify.arrays import Real
 from hmpim.identify.fleets.fleet import Column, Fleet, FleetFit, Group, fit_fleet
 from hmpim.identify.fleets.learnt import is_alike
-from hmpim.identify.fleets.quiet import are_quiet
+from hmpim.identify.fleets.quiet import are_quiet, shapes_of
 from hmpim.identify.fleets.simpler import Simpler, costs_of, learn_simpler
 from hmpim.identify.frf.local import local_responses
 from hmpim.identify.judgement.between_samples import undetermined_between
@@ -66,11 +66,14 @@ class Whole:
         Structures that are weighed against that of the fleet.
     sweep : SweepPhase or None
         The stimulus' phase, if it is a sweep.
+    shapes : ndarray, shape (m, n)
+        What nonlinearities leave of the unit in the middle.
     """
 
     fleet: Fleet
     simpler: tuple[Simpler, ...]
     sweep: SweepPhase | None
+    shapes: Real
 
 
 def learn_whole(fleet: Fleet, pairs: Sequence[PairIdentification]) -> Whole | None:
@@ -100,7 +103,7 @@ def learn_whole(fleet: Fleet, pairs: Sequence[PairIdentification]) -> Whole | No
     simpler = learn_simpler(fleet, known, outputs)
     if not simpler:
         return None
-    whole = Whole(fleet=fleet, simpler=simpler, sweep=sweep)
+    whole = Whole(fleet=fleet, simpler=simpler, sweep=sweep, shapes=shapes_of(fleet))
     every = np.stack(outputs)
     again = whole_pairs(whole, fit_fleet(fleet, every), every)
     told = [_is_said(own, pair) for own, pair in zip(again, known, strict=True) if own is not None]
@@ -161,7 +164,14 @@ def whole_pairs(
     bandwidths = [name for name in _BANDWIDTHS if name in fleet.names]
     for group in fit.groups:
         behind, some = simpler[group.some], group.some
-        quiet = are_quiet(fleet, group, outputs[some], behind=behind, sweep=whole.sweep)
+        quiet = are_quiet(
+            fleet,
+            group,
+            outputs[some],
+            behind=behind,
+            sweep=whole.sweep,
+            shapes=whole.shapes,
+        )
         places = np.flatnonzero(quiet)
         responses = local_responses(
             fleet.u,

@@ -38,7 +38,7 @@ from hmpim.identify.worth import MATERIAL, PART, WORTH
 from hmpim.model.sampled import prepare_input
 from hmpim.record import Intersample
 
-__all__ = ["Bend", "bends", "is_bent_instead", "plainer_bends"]
+__all__ = ["Bend", "bends", "bent_shapes", "is_bent_instead", "plainer_bends"]
 
 _EVERY = 3
 """Of a kind's values every so many is tried: its neighbours leave traces that are much alike."""
@@ -144,10 +144,7 @@ def bends(
     u, problem, fit = _shortened(u, problem, fit, intersample)
     if not np.any(fit.residual) or np.ptp(fit.prediction) == 0.0:
         return ()
-    tried = [
-        *hypotheses(fit.prediction - fit.linear[-1], fit.denominator, fs, every=_EVERY),
-        *_at_the_input(u, problem, fit, intersample, fs),
-    ]
+    tried = _tried(u, problem, fit, intersample, fs)
     traces = np.stack([one.trace for one in tried])
     rows = jacobian(problem, fit, *traces)
     residual = problem.innovations(fit.prediction, fit.residual)
@@ -241,6 +238,37 @@ def plainer_bends(
     return tuple(
         replace(one, white=False) for one in found if behind - 2.0 * one.gain < 2.0 * CLEARLY
     )
+
+
+def bent_shapes(
+    u: Real, problem: Problem, fit: Fit, *, intersample: Intersample, fs: float
+) -> Real:
+    """Traces of all kinds beside a fit in white noise, less what a linear change explains, (k, n).
+
+    Each has a sum of squares of 1, so that half the square of its product with a residual of unit
+    variance is the log-likelihood that it brings, where the product is above 0.
+
+    Parameters
+    ----------
+    u, problem, fit, intersample, fs
+        As for `bends`.
+    """
+    traces = np.stack([one.trace for one in _tried(u, problem, fit, intersample, fs)])
+    slopes = jacobian(problem, fit)
+    beside = traces - traces @ np.linalg.pinv(slopes) @ slopes
+    power = np.vecdot(beside, beside)
+    told = power > _ALIKE * np.vecdot(traces, traces)
+    return np.asarray(beside[told] / np.sqrt(power[told, None]))
+
+
+def _tried(
+    u: Real, problem: Problem, fit: Fit, intersample: Intersample, fs: float
+) -> list[Hypothesis]:
+    """Every kind with the values that are tried."""
+    return [
+        *hypotheses(fit.prediction - fit.linear[-1], fit.denominator, fs, every=_EVERY),
+        *_at_the_input(u, problem, fit, intersample, fs),
+    ]
 
 
 def _shortened(
