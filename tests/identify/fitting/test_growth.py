@@ -5,8 +5,17 @@ import pytest
 import scipy
 
 from hmpim.identify.fitting import joint
-from hmpim.identify.fitting.growth import as_if_hidden, hidden_pole, one_more_pole, with_pole
+from hmpim.identify.fitting.fit import Problem, fit_structure
+from hmpim.identify.fitting.growth import (
+    as_if_hidden,
+    grow,
+    hidden_pole,
+    one_more_pole,
+    with_pole,
+)
 from hmpim.identify.fitting.joint import joint_fit
+from hmpim.identify.fitting.trial import trial_of
+from hmpim.identify.noise.whiteness import effective_share
 from hmpim.identify.reading.readings import read_parameters
 from hmpim.identify.reading.spanned import spanned
 from hmpim.model.dynamics import STRUCTURES, coefficients_of, denominator_of, theta_of
@@ -146,3 +155,32 @@ def test_a_colour_that_the_grown_fit_contradicts_is_not_weighed_by(u, monkeypatc
         joint, "is_contradicted", lambda data, best, seen: best.fit.structure.order > 2
     )
     assert fitted(u, y, *names).weighed.noise is None
+
+
+def test_noise_that_is_slow_does_not_hide_a_fast_pole(u):
+    """What counts is how many samples the pole's own response sees, not all that is left over."""
+    slow = scipy.signal.lfilter([1.0], [1.0, -0.995], np.random.default_rng(4).standard_normal(N))
+    y = answer(u, RESONANT, (2.0,)) + 0.006 * slow
+    source = prepare_input(u, "bandlimited")
+    problem = Problem(source=source, y=y, valid=None, longest_delay=800.0)
+    second = STRUCTURES["second_order"]
+    begun = fit_structure(problem, second, np.append(DELAY, theta_of(second, np.array(RESONANT))))
+    few = N * effective_share(begun.residual)
+    hidden = hidden_pole(problem, begun)
+    assert hidden.counted > 10.0 * few
+
+    def refit(structure, theta):
+        return trial_of("bandlimited", fit_structure(problem, structure, theta), few)
+
+    growth = grow(
+        trial_of("bandlimited", begun, few),
+        hidden=lambda trial: hidden_pole(problem, trial.fit),
+        refit=refit,
+        count=few,
+        names=("third_order",),
+        white=lambda trial: False,
+    )
+    (grown,) = growth.grown
+    gain = hidden.counted * np.log(begun.objective / grown.fit.objective)
+    assert gain == pytest.approx((hidden.squared / hidden.std) ** 2, rel=0.3)
+    assert few * np.log(begun.objective / grown.fit.objective) < np.log(few)

@@ -41,6 +41,8 @@ __all__ = [
     "with_pole",
 ]
 
+_TINY = float(np.finfo(float).tiny)
+
 _PROBE = 0.3
 """Time constant, over the fit's own, by which the derivative with respect to q is taken."""
 
@@ -72,6 +74,9 @@ class HiddenPole:
         The fit.
     rows : ndarray, shape (p, n)
         Its derivatives, from `hmpim.identify.fitting.fit.jacobian`.
+    counted : float or None
+        Independent samples along q: colour that lies elsewhere in the spectrum costs it none. None
+        where the noise is known to be white, or is not known in q's direction.
     """
 
     squared: float
@@ -79,6 +84,7 @@ class HiddenPole:
     shift: Real
     fit: Fit
     rows: Real
+    counted: float | None = None
 
     @property
     def scale(self) -> float:
@@ -206,15 +212,17 @@ def hidden_pole(problem: Problem, fit: Fit) -> HiddenPole:
     rows, row = every[:-1], every[-1]
     shift = -solved(rows @ rows.T, rows @ row)
     own = row + shift @ rows  # what no other parameter can do
-    power = max(float(own @ own), np.finfo(float).tiny)
+    power = max(float(own @ own), _TINY)
     white = is_white(problem.counting(left))
     variance = covariance(own[None], left, freedom=freedom, white=white)[0, 0]
+    if_white = float(left @ left) / freedom / power
     return HiddenPole(
         squared=float(own @ left) / power,
         std=float(np.sqrt(variance)),
         shift=shift,
         fit=fit,
         rows=rows,
+        counted=None if white else problem.counted * if_white / max(float(variance), _TINY),
     )
 
 
@@ -323,7 +331,7 @@ def grow(
     refit : callable
         Fits a structure from a start.
     count : float
-        Independent samples.
+        Independent samples, where the test of a pole does not say how many it sees.
     names : tuple of str
         Structures that may be chosen; of others a fit is a rival at most.
     white : callable
@@ -341,12 +349,13 @@ def grow(
             starts.append(_PROBE * test.scale)
         tried = [refit(richer, with_pole(structure, best.fit.theta, lag)) for lag in starts]
         found = min(tried, key=lambda f: f.fit.objective)
-        gain = count * float(np.log(best.fit.objective / found.fit.objective))
+        seen = count if test.counted is None else test.counted
+        gain = seen * float(np.log(best.fit.objective / found.fit.objective))
         if gain < ONE_SIDED**2:
             return Growth(grown=tuple(grown), rivals=(), hidden=test)
         may_be_chosen = richer.name != structure.name and richer.name in names
         sure = richer.order <= _SURE or white(found)
-        if gain < np.log(count) or not may_be_chosen or not sure:
+        if gain < np.log(seen) or not may_be_chosen or not sure:
             return Growth(grown=tuple(grown), rivals=(found,), hidden=test)
         grown.append(found)
         best = found

@@ -29,10 +29,10 @@ from hmpim.identify.fitting.course import (
     start,
     turn_ahead,
 )
-from hmpim.identify.fitting.data import FINAL_PRECISION, band_of, refit
+from hmpim.identify.fitting.data import FINAL_PRECISION, band_of, follows, refit
 from hmpim.identify.fitting.enrich import INTEGRATING, MODES, PLAIN, RICH
 from hmpim.identify.fitting.fit import Fit, Problem, fit_structure
-from hmpim.identify.fitting.growth import Growth, grow, hidden_pole
+from hmpim.identify.fitting.growth import Growth, HiddenPole, grow, hidden_pole
 from hmpim.identify.fitting.software import software_fit
 from hmpim.identify.fitting.trial import JointFit, Trial, likeliest_of, trial_of
 from hmpim.identify.fitting.unrelated import UNDENIED, says_nothing
@@ -230,9 +230,15 @@ def _grown_from(
     """Where a trial ends that poles are added to."""
     problem = course.data.problem(trial.intersample, course.counted)
     count = problem.counted * joint.weighed_share
+
+    def hidden(one: Trial) -> HiddenPole:
+        found = hidden_pole(problem, one.fit)
+        # What still follows the input is no noise, and has no spectrum to count samples by.
+        return replace(found, counted=None) if follows(course.data, one.fit) else found
+
     return grow(
         trial,
-        hidden=lambda one: hidden_pole(problem, one.fit),
+        hidden=hidden,
         refit=lambda structure, theta: trial_of(
             trial.intersample, fit_structure(problem, structure, theta), count
         ),
