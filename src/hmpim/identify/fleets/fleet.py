@@ -37,7 +37,7 @@ from hmpim.identify.result.error_bars import noise_estimate
 from hmpim.identify.worth import FEW, PART
 from hmpim.record import Intersample
 
-__all__ = ["Column", "Fleet", "FleetFit", "Group", "fit_fleet", "learn_fleet"]
+__all__ = ["Column", "Fleet", "FleetFit", "Group", "fit_fleet", "learn_fleet", "widen"]
 
 Flags = Mask
 
@@ -87,6 +87,10 @@ class Column:
             unit=self.unit,
         )
 
+    def copy(self) -> "Column":
+        """Another to write to."""
+        return Column(**{end: getattr(self, end).copy() for end in _ENDS}, unit=self.unit)
+
     def put(self, some: NDArray[np.intp], other: "Column", kept: Flags) -> None:
         """Take those records of another that are kept."""
         for end in _ENDS:
@@ -132,6 +136,14 @@ class Group:
     tails: dict[int, Tails]
     sound: Flags
     codes: list[tuple[str, ...]]
+
+    def has_tail(self, k: int) -> bool:
+        """Whether intervals of one of them cover one more pole or zero."""
+        return any(
+            not np.isnan(column.std[k]) and column.std[k] != self.alone[name].std[k]
+            for name, column in self.spanned.items()
+            if name in self.alone and not np.isnan(column.value[k])
+        )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -276,7 +288,7 @@ def _told(
         sound[i] = tails is not None and (tails.open or asked[i] < _CLOSE)
         if tails is None:
             continue
-        _widen(spanned, i, own, tails.parameters)
+        widen(spanned, i, own, tails.parameters)
         if tails.open:
             codes[i] = ("structure", *codes[i])
             asking[i] = tails
@@ -340,10 +352,10 @@ def _columns(
     return {**alone, "noise_std": noise}, {**spanned, "noise_std": noise}
 
 
-def _widen(columns: dict[str, Column], i: int, own: Parameters, tails: Parameters) -> None:
-    """Let the intervals of one record cover one more pole or zero, beside the other assumptions."""
+def widen(columns: dict[str, Column], i: int, own: Parameters, tails: Parameters) -> None:
+    """Let the intervals of one record cover what `spanned` made of its own, and what they cover."""
     for name, column in columns.items():
-        tail = getattr(tails, name)
+        tail = getattr(tails, name, None)
         if tail is None or tail.ci95 is None or tail is getattr(own, name):
             continue
         low, high = tail.ci95

@@ -4,7 +4,7 @@ The record itself is fitted here, from where the fit of all ended, grown as
 `hmpim.identify.fitting.joint` grows a fit, and its intervals are widened as those of any record.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from hmpim.identify.arrays import Real
 from hmpim.identify.fitting.fit import fit_structure
@@ -18,7 +18,7 @@ from hmpim.identify.result import Parameters
 from hmpim.identify.signals import longest_lag
 from hmpim.model.dynamics import STRUCTURES, Structure
 
-__all__ = ["Tails", "with_tails"]
+__all__ = ["Tails", "alone_of", "joint_of", "with_tails"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -58,14 +58,11 @@ def with_tails(
     highest : float
         Frequency in Hz beyond which no bandwidth is read off.
     """
-    longest = longest_lag(y.size) + 2.0  # as of every record
-    problem = Problem(source=member.source, y=y, valid=None, longest_delay=longest)
+    problem, best = alone_of(fleet, member, place, y)
 
     def refit(structure: Structure, theta: Real) -> Trial:
-        fit = fit_structure(problem, structure, theta)
-        return trial_of(member.intersample, fit, y.size)
+        return trial_of(member.intersample, fit_structure(problem, structure, theta), y.size)
 
-    best = refit(fleet.structure, theta_at(place))
     growth = grow(
         best,
         hidden=lambda trial: hidden_pole(problem, trial.fit),
@@ -76,7 +73,31 @@ def with_tails(
     )
     if growth.grown:
         return None
-    joint = JointFit(
+    joint = replace(joint_of(problem, best), rivals=growth.rivals, hidden=growth.hidden)
+    return Tails(
+        parameters=spanned(own, joint, fs=fleet.fs, highest=highest),
+        open=bool(growth.rivals),
+        delay=growth.rivals[0].fit.delay / fleet.fs if growth.rivals else 0.0,
+    )
+
+
+def alone_of(fleet: Fleet, member: Member, place: Real, y: Real) -> tuple[Problem, Trial]:
+    """Return one record's own data and fit, from where the fit of all together ended.
+
+    Parameters
+    ----------
+    fleet, member, place, y
+        As for `with_tails`.
+    """
+    longest = longest_lag(y.size) + 2.0  # as of every record
+    problem = Problem(source=member.source, y=y, valid=None, longest_delay=longest)
+    fit = fit_structure(problem, fleet.structure, theta_at(place))
+    return problem, trial_of(member.intersample, fit, y.size)
+
+
+def joint_of(problem: Problem, best: Trial) -> JointFit:
+    """Return a fit without rivals, as `hmpim.identify.reading.spanned` takes it."""
+    return JointFit(
         problem=problem,
         weighed=problem,
         best=best,
@@ -84,11 +105,4 @@ def with_tails(
         forgotten=0,
         effective_share=1.0,
         related=True,
-        rivals=growth.rivals,
-        hidden=growth.hidden,
-    )
-    return Tails(
-        parameters=spanned(own, joint, fs=fleet.fs, highest=highest),
-        open=bool(growth.rivals),
-        delay=growth.rivals[0].fit.delay / fleet.fs if growth.rivals else 0.0,
     )

@@ -13,24 +13,22 @@ import scipy
 from numpy.typing import NDArray
 
 from hmpim.identify.arrays import Complex, Mask, Real
-from hmpim.identify.chance import CLEARLY, EXCLUDED, FALSE_ALARM
+from hmpim.identify.chance import EXCLUDED, FALSE_ALARM
 from hmpim.identify.effects.lost import stand_out
 from hmpim.identify.fitting.beginning import REACH, ringing_of, stand_out_of
-from hmpim.identify.fitting.fit import FORGETS, Fit, Problem, fit_structure
+from hmpim.identify.fitting.fit import FORGETS
 from hmpim.identify.fitting.halves import halves_of
 from hmpim.identify.fleets.fleet import Fleet, Group
-from hmpim.identify.fleets.learnt import Member, theta_at
 from hmpim.identify.judgement.feedback import chances_of_an_answer
 from hmpim.identify.judgement.residual import folded_power
 from hmpim.identify.kept import kept
-from hmpim.identify.nonlinear.bends import bends, bent_shapes
 from hmpim.identify.nonlinear.evidence import are_curved
 from hmpim.identify.nonlinear.harmonics import any_harmonics
 from hmpim.identify.nonlinear.sweep_phase import SweepPhase
 from hmpim.identify.signals import longest_lag
 from hmpim.identify.worth import BLURRED, FEW, MUCH, PART, WORTH
 
-__all__ = ["are_quiet", "shapes_of"]
+__all__ = ["are_quiet"]
 
 Places = NDArray[np.intp]
 
@@ -45,19 +43,8 @@ _TOLD = ("scale_factor", "natural_frequency", "damping_ratio", "bandwidth_phase9
 """Figures whose deviation is held against them."""
 
 
-_ASKED = 0.5 * (np.sqrt(2.0 * CLEARLY) - 0.5) ** 2
-"""Log-likelihood half a deviation below CLEARLY, from which a record is asked for a nonlinearity:
-what one leaves of the unit in the middle is not quite what it leaves of each."""
-
-
 def are_quiet(
-    fleet: Fleet,
-    group: Group,
-    outputs: Real,
-    *,
-    behind: Real,
-    sweep: SweepPhase | None,
-    shapes: Real,
+    fleet: Fleet, group: Group, outputs: Real, *, behind: Real, sweep: SweepPhase | None
 ) -> Mask:
     """Return which records of a group give no test of `identify` anything to say.
 
@@ -73,8 +60,6 @@ def are_quiet(
         Least sums of squares that simpler structures leave of each.
     sweep : SweepPhase or None
         The stimulus' phase, if it is a sweep.
-    shapes : ndarray, shape (m, n)
-        What nonlinearities leave of the unit in the middle, from `shapes_of`.
 
     Returns
     -------
@@ -95,43 +80,7 @@ def are_quiet(
         worth = WORTH**2 * outputs.shape[1] * outputs[part].var(axis=1)
         quiet[part] = (chance >= FALSE_ALARM) | (gained <= worth)
         quiet[part] &= _from_rest(fleet, group, part, rows, lags[part])
-    some = np.flatnonzero(quiet)
-    quiet[some] = _unbent(fleet, group, some, outputs, shapes)
     return np.asarray(quiet)
-
-
-def shapes_of(fleet: Fleet) -> Real:
-    """Return what nonlinearities leave of the unit in the middle of a fleet, shape (m, n)."""
-    (member,) = (one for one in fleet.members if one.intersample == fleet.natural)
-    place = (member.surface.low + member.surface.high) / 2
-    values = member.surface.values(place[None])[0]
-    problem, fit = _fitted(fleet, member, place, values[:-1] @ member.basis + values[-1])
-    return bent_shapes(fleet.u, problem, fit, intersample=fleet.natural, fs=fleet.fs)
-
-
-def _fitted(fleet: Fleet, member: Member, place: Real, y: Real) -> tuple[Problem, Fit]:
-    """One record by itself, from where the fit of all ended."""
-    longest = longest_lag(y.size) + 2.0  # as of every record
-    problem = Problem(source=member.source, y=y, valid=None, longest_delay=longest)
-    return problem, fit_structure(problem, fleet.structure, theta_at(place))
-
-
-def _unbent(fleet: Fleet, group: Group, some: Places, outputs: Real, shapes: Real) -> Mask:
-    """Where no nonlinearity is likely enough to widen an interval.
-
-    Units of a fleet are much alike, and so is what a nonlinearity leaves of them: only those are
-    asked by themselves of which that of the unit in the middle takes nearly enough.
-    """
-    found = group.residual[some] @ shapes.T / np.sqrt(group.errors.variance[some, None])
-    gains = 0.5 * np.maximum(found, 0.0) ** 2
-    unbent = np.ones(some.size, dtype=bool)
-    member = group.fit.member
-    for k in np.flatnonzero(gains.max(axis=1, initial=0.0) > _ASKED):
-        i = some[k]
-        place = group.fit.theta[group.some[i]]
-        problem, fit = _fitted(fleet, member, place, outputs[i])
-        unbent[k] = not bends(fleet.u, problem, fit, intersample=member.intersample, fs=fleet.fs)
-    return unbent
 
 
 def _is_told(fleet: Fleet, group: Group, behind: Real) -> Mask:

@@ -12,9 +12,10 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from hmpim.identify.arrays import Real
+from hmpim.identify.fleets.bent import cover_bends, shapes_of
 from hmpim.identify.fleets.fleet import Column, Fleet, FleetFit, Group, fit_fleet
 from hmpim.identify.fleets.learnt import is_alike
-from hmpim.identify.fleets.quiet import are_quiet, shapes_of
+from hmpim.identify.fleets.quiet import are_quiet
 from hmpim.identify.fleets.simpler import Simpler, costs_of, learn_simpler
 from hmpim.identify.frf.local import local_responses
 from hmpim.identify.judgement.between_samples import undetermined_between
@@ -162,17 +163,15 @@ def whole_pairs(
     simpler = np.stack([costs_of(fleet, one, centred, power) for one in whole.simpler], axis=1)
     found: list[PairIdentification | None] = [None] * outputs.shape[0]
     bandwidths = [name for name in _BANDWIDTHS if name in fleet.names]
+    columns = {name: column.copy() for name, column in fit.columns.items()}
     for group in fit.groups:
         behind, some = simpler[group.some], group.some
-        quiet = are_quiet(
-            fleet,
-            group,
-            outputs[some],
-            behind=behind,
-            sweep=whole.sweep,
-            shapes=whole.shapes,
-        )
+        quiet = are_quiet(fleet, group, outputs[some], behind=behind, sweep=whole.sweep)
         places = np.flatnonzero(quiet)
+        own_outputs = outputs[some[places]]
+        places = places[
+            cover_bends(fleet, group, places, own_outputs, shapes=whole.shapes, columns=columns)
+        ]
         responses = local_responses(
             fleet.u,
             outputs[some[places]],
@@ -196,7 +195,7 @@ def whole_pairs(
                 structure=fleet.structure.name,
                 intersample=group.fit.member.intersample,
                 fit_percent=float(fit.fit_percent[i]),
-                parameters=_parameters(fit.columns, i, from_lag(paper.delay, fleet.fs)),
+                parameters=_parameters(columns, i, from_lag(paper.delay, fleet.fs)),
                 paper=paper,
                 frequency_response=response,
                 numerator=(1.0,),
