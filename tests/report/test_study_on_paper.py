@@ -78,6 +78,20 @@ def test_the_first_figure_stands_on_the_first_sheet_and_each_case_once_behind_al
     assert sheets(page(every=[every])) > 2
 
 
+def test_what_the_study_was_made_with_is_never_alone_on_a_sheet(browse, tmp_path):
+    reader = shutil.which("pdftotext") or missing("pdftotext", "pdftotext of Poppler")
+    target, alone = tmp_path / "study.pdf", "About this study"
+    facts = tuple((f"Fact {k}", "as stated") for k in range(6))
+    for count in range(1, 6):
+        shown = page()
+        shown = replace(shown, sections=shown.sections * count, facts=facts)
+        browse(render_study(shown), "--no-pdf-header-footer", f"--print-to-pdf={target}")
+        text = subprocess.run([reader, "-layout", target, "-"], check=True, capture_output=True)
+        last = text.stdout.decode().rstrip("\f").split("\f")[-1]
+        assert alone in last
+        assert not last.lstrip().startswith(alone), count
+
+
 NAMES = (
     "Axis", "Verdict", "Test", "Load", "At once", "Mode", "Rate (Hz)", "Peak acc. (deg/s²)",
     "−90° (Hz)", "fn (Hz)", "ζ", "Delay (ms)", "Noise (deg)", "Scale", "Bias (deg)",
