@@ -1,6 +1,7 @@
 """What is kept of each record: one row for each pair of channels, or one that says what failed."""
 
 import hashlib
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import fields
 from functools import cache
@@ -160,7 +161,23 @@ def _json(result: Identification) -> str:
     """All that was found, by a writer that is ten times as fast as Python's own."""
     import orjson
 
-    return orjson.dumps(result.to_dict(), option=orjson.OPT_SERIALIZE_NUMPY).decode()
+    found = result.to_dict()
+    if not _is_finite(found):  # it would be written as null
+        raise ValueError("a figure is NaN or infinite")
+    return orjson.dumps(found, option=orjson.OPT_SERIALIZE_NUMPY).decode()
+
+
+def _is_finite(value: Any) -> bool:
+    """Whether no number among plain JSON values is NaN or infinite."""
+    if isinstance(value, dict):
+        return all(map(_is_finite, value.values()))
+    if isinstance(value, (list, tuple)):
+        return bool(np.isfinite(value).all()) if _are_floats(value) else all(map(_is_finite, value))
+    return not isinstance(value, float) or math.isfinite(value)
+
+
+def _are_floats(values: Sequence[Any]) -> bool:
+    return set(map(type, values)) == {float}
 
 
 def failed(address: Address, reason: str, metadata: Mapping[str, str] | None = None) -> Row:

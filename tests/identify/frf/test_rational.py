@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 from scipy import signal
 
+from hmpim.identify.frf.columns import Columns
 from hmpim.identify.frf.local import local_response, local_responses
-from hmpim.identify.frf.rational import Columns
 
 FS, BAND, DELAY = 200.0, (0.1, 20.0), 0.15
 FINE = 32

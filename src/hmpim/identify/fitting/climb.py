@@ -1,6 +1,7 @@
 """Levenberg and Marquardt's way down, for anything that is linear but for a few parameters."""
 
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Protocol, TypeVar
 
 import numpy as np
@@ -85,37 +86,30 @@ def climb(
     bool
         Whether the last step was negligible.
     """
-    best, converged = _descended(
-        evaluated(thetas),
-        evaluated,
+    descended = partial(
+        _descended,
+        evaluated=evaluated,
         structures=structures,
         bounded=bounded,
         counted=counted,
         iterations=iterations,
         precision=precision,
     )
+    best, converged = descended(evaluated(thetas))
     other = [regrouped(s, theta) for s, theta in zip(structures, best.thetas, strict=True)]
     if all(theta is None for theta in other):
         return best, converged
     grouped = [
         here if theta is None else theta for here, theta in zip(best.thetas, other, strict=True)
     ]
-    again, ended = _descended(
-        evaluated(bounded(grouped)),
-        evaluated,
-        structures=structures,
-        bounded=bounded,
-        counted=counted,
-        iterations=iterations,
-        precision=precision,
-    )
+    again, ended = descended(evaluated(bounded(grouped)))
     return (again, ended) if again.cost <= best.cost else (best, converged)
 
 
 def _descended(
     best: E,
-    evaluated: Callable[[Sequence[Real]], E],
     *,
+    evaluated: Callable[[Sequence[Real]], E],
     structures: Sequence[Structure],
     bounded: Callable[[Sequence[Real]], list[Real]],
     counted: int,

@@ -10,11 +10,10 @@ from numpy.typing import NDArray
 
 from hmpim.identify.arrays import Mask, Real
 from hmpim.identify.chance import CLEARLY
-from hmpim.identify.fleets.fleet import Column, Fleet, Group, widen
+from hmpim.identify.fleets.fleet import Column, Fleet, Group, parameters_of, widen
 from hmpim.identify.fleets.pole import alone_of, joint_of
 from hmpim.identify.nonlinear.bends import bends, bent_shapes
 from hmpim.identify.reading.spanned import spanned
-from hmpim.identify.result import Parameters
 
 __all__ = ["cover_bends", "shapes_of"]
 
@@ -25,11 +24,12 @@ what one leaves of the unit in the middle is not quite what it leaves of each.""
 
 def shapes_of(fleet: Fleet) -> Real:
     """Return what nonlinearities leave of the unit in the middle of a fleet, shape (m, n)."""
-    (member,) = (one for one in fleet.members if one.intersample == fleet.natural)
+    usual = (one for one in fleet.members if one.intersample == fleet.natural)
+    member = next(usual, fleet.members[0])
     place = (member.surface.low + member.surface.high) / 2
     values = member.surface.values(place[None])[0]
     problem, best = alone_of(fleet, member, place, values[:-1] @ member.basis + values[-1])
-    return bent_shapes(fleet.u, problem, best.fit, intersample=fleet.natural, fs=fleet.fs)
+    return bent_shapes(fleet.u, problem, best.fit, intersample=member.intersample, fs=fleet.fs)
 
 
 def cover_bends(
@@ -74,12 +74,12 @@ def cover_bends(
             continue
         covered[k] = not bent[0].certain and not group.has_tail(i)
         if covered[k]:
-            own = Parameters(**{name: column.estimate(i) for name, column in group.alone.items()})
+            own = parameters_of(group.alone, i)
             wide = spanned(
                 own,
                 joint_of(problem, best),
                 fs=fleet.fs,
-                highest=min(fleet.band[1], fleet.fs / 2),
+                highest=fleet.highest,
                 bent=[(one.fit, one.farthest) for one in bent],
             )
             widen(columns, j, own, wide)

@@ -37,7 +37,16 @@ from hmpim.identify.result.error_bars import noise_estimate
 from hmpim.identify.worth import FEW, PART
 from hmpim.record import Intersample
 
-__all__ = ["Column", "Fleet", "FleetFit", "Group", "fit_fleet", "learn_fleet", "widen"]
+__all__ = [
+    "Column",
+    "Fleet",
+    "FleetFit",
+    "Group",
+    "fit_fleet",
+    "learn_fleet",
+    "parameters_of",
+    "widen",
+]
 
 Flags = Mask
 
@@ -98,6 +107,11 @@ class Column:
 
 
 _ENDS = ("value", "std", "low", "high")
+
+
+def parameters_of(columns: Mapping[str, Column], i: int) -> Parameters:
+    """Return the figures of one record."""
+    return Parameters(**{name: column.estimate(i) for name, column in columns.items()})
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -178,7 +192,7 @@ class FleetFit:
         """Return those of one record; None if it is not sound."""
         if not self.sound[i]:
             return None
-        return Parameters(**{name: column.estimate(i) for name, column in self.columns.items()})
+        return parameters_of(self.columns, i)
 
 
 def fit_fleet(fleet: Fleet, outputs: Real, *, units: tuple[str, str] = ("", "")) -> FleetFit:
@@ -270,9 +284,8 @@ def _told(
             rival.member, there, rival.gain[some], errors.variance, off=PART
         )
         apart |= stays & (np.abs(there[:, 0] - theta[:, 0]) > FEW)
-    highest = min(fleet.band[1], fleet.fs / 2)
     if "natural_frequency" in fleet.names:  # beyond the band no peak is told
-        sound &= fit.figures["natural_frequency"][some] < highest
+        sound &= fit.figures["natural_frequency"][some] < fleet.highest
     asked = _asks_for_a_pole(fit, some, errors)
     sound &= asked > -_CLOSE
     model = fit.gain[some, None] * fit.member.surface.values(theta)[:, :-1] @ fit.member.basis
@@ -283,8 +296,8 @@ def _told(
     codes = [("intersample",) * moved for moved in apart.tolist()]
     asking: dict[int, Tails] = {}
     for i in np.flatnonzero(sound & ((asked > _ASKS) | (asked < -_COVERED))).tolist():
-        own = Parameters(**{name: column.estimate(i) for name, column in alone.items()})
-        tails = with_tails(fleet, fit.member, theta[i], outputs[i], own, highest=highest)
+        own = parameters_of(alone, i)
+        tails = with_tails(fleet, fit.member, theta[i], outputs[i], own)
         sound[i] = tails is not None and (tails.open or asked[i] < _CLOSE)
         if tails is None:
             continue
@@ -297,7 +310,7 @@ def _told(
             sound &= ~_is_wide(spanned[name])
     for name in spanned:
         if name.startswith("bandwidth"):
-            beyond = spanned[name].value > highest
+            beyond = spanned[name].value > fleet.highest
             for end in _ENDS:
                 getattr(spanned[name], end)[beyond] = np.nan
     return Group(
@@ -355,7 +368,7 @@ def _columns(
 def widen(columns: dict[str, Column], i: int, own: Parameters, tails: Parameters) -> None:
     """Let the intervals of one record cover what `spanned` made of its own, and what they cover."""
     for name, column in columns.items():
-        tail = getattr(tails, name, None)
+        tail = getattr(tails, name)
         if tail is None or tail.ci95 is None or tail is getattr(own, name):
             continue
         low, high = tail.ci95

@@ -117,6 +117,11 @@ class Fleet:
     figures: Surface
     names: tuple[str, ...]
 
+    @property
+    def highest(self) -> float:
+        """Frequency in Hz beyond which nothing is read off."""
+        return min(self.band[1], self.fs / 2)
+
 
 def learn_fleet(
     u: Real, pairs: Sequence[PairIdentification], *, fs: float, band: tuple[float, float]

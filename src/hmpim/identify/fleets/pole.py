@@ -40,9 +40,7 @@ class Tails:
     delay: float = 0.0
 
 
-def with_tails(
-    fleet: Fleet, member: Member, place: Real, y: Real, own: Parameters, *, highest: float
-) -> Tails | None:
+def with_tails(fleet: Fleet, member: Member, place: Real, y: Real, own: Parameters) -> Tails | None:
     """Fit one more pole to a record; None if the likelihood pays for it.
 
     Parameters
@@ -55,8 +53,6 @@ def with_tails(
         Its output.
     own : Parameters
         What the fit without the pole says.
-    highest : float
-        Frequency in Hz beyond which no bandwidth is read off.
     """
     problem, best = alone_of(fleet, member, place, y)
 
@@ -75,7 +71,7 @@ def with_tails(
         return None
     joint = replace(joint_of(problem, best), rivals=growth.rivals, hidden=growth.hidden)
     return Tails(
-        parameters=spanned(own, joint, fs=fleet.fs, highest=highest),
+        parameters=spanned(own, joint, fs=fleet.fs, highest=fleet.highest),
         open=bool(growth.rivals),
         delay=growth.rivals[0].fit.delay / fleet.fs if growth.rivals else 0.0,
     )

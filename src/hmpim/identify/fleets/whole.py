@@ -6,14 +6,14 @@ what simpler structures leave. Those are the only candidates there are: a record
 richer ones is not quiet.
 """
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields
+from collections.abc import Sequence
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
 from hmpim.identify.arrays import Real
 from hmpim.identify.fleets.bent import cover_bends, shapes_of
-from hmpim.identify.fleets.fleet import Column, Fleet, FleetFit, Group, fit_fleet
+from hmpim.identify.fleets.fleet import Fleet, FleetFit, Group, fit_fleet, parameters_of
 from hmpim.identify.fleets.learnt import is_alike
 from hmpim.identify.fleets.quiet import are_quiet
 from hmpim.identify.fleets.simpler import Simpler, costs_of, learn_simpler
@@ -29,7 +29,6 @@ from hmpim.identify.reading.bandwidth import disagreeing, response_bandwidths
 from hmpim.identify.reading.readings import from_lag
 from hmpim.identify.result import (
     Candidate,
-    Estimate,
     Nonlinearity,
     PairIdentification,
     Parameters,
@@ -168,26 +167,25 @@ def whole_pairs(
         behind, some = simpler[group.some], group.some
         quiet = are_quiet(fleet, group, outputs[some], behind=behind, sweep=whole.sweep)
         places = np.flatnonzero(quiet)
-        own_outputs = outputs[some[places]]
-        places = places[
-            cover_bends(fleet, group, places, own_outputs, shapes=whole.shapes, columns=columns)
-        ]
+        measured = outputs[some[places]]
+        covered = cover_bends(fleet, group, places, measured, shapes=whole.shapes, columns=columns)
+        places, measured = places[covered], measured[covered]
         responses = local_responses(
             fleet.u,
-            outputs[some[places]],
+            measured,
             fleet.fs,
             delays=group.fit.theta[some[places], 0] / fleet.fs,
             band=fleet.band,
         )
-        papers = estimates_of_many(fleet.u, outputs[some[places]], fleet.fs, fleet.band)
+        papers = estimates_of_many(fleet.u, measured, fleet.fs, fleet.band)
         for k, response, paper in zip(places.tolist(), responses, papers, strict=True):
             i = int(some[k])
             system = _system(fleet, group, k)
-            own = _parameters({name: group.alone[name] for name in bandwidths}, k)
-            measured = response_bandwidths(
+            own = parameters_of({name: group.alone[name] for name in bandwidths}, k)
+            crossings = response_bandwidths(
                 response, system, own, fs=fleet.fs, intersample=group.fit.member.intersample
             )
-            if disagreeing(measured, own):
+            if disagreeing(crossings, own):
                 continue
             pair = PairIdentification(
                 input=names[0],
@@ -195,14 +193,16 @@ def whole_pairs(
                 structure=fleet.structure.name,
                 intersample=group.fit.member.intersample,
                 fit_percent=float(fit.fit_percent[i]),
-                parameters=_parameters(columns, i, from_lag(paper.delay, fleet.fs)),
+                parameters=replace(
+                    parameters_of(columns, i), delay_correlation=from_lag(paper.delay, fleet.fs)
+                ),
                 paper=paper,
                 frequency_response=response,
                 numerator=(1.0,),
                 denominator=(*system.denominator[::-1].tolist(),),
                 candidates=_candidates(whole, fit, group, k, behind[k], float(power[i])),
                 warnings=(*findings, *_findings(fleet, group, k, own, count)),
-                from_response=measured,
+                from_response=crossings,
                 nonlinearity=_NOTHING,
                 covariance=_covariance(fleet, group, k),
             )
@@ -220,13 +220,6 @@ def _system(fleet: Fleet, group: Group, k: int) -> RationalDelay:
         numerator=np.array([float(group.fit.gain[i])]),
         denominator=np.array([1.0, 2 * zeta / omega, omega**-2]),
     )
-
-
-def _parameters(
-    columns: Mapping[str, Column], k: int, delay_correlation: Estimate | None = None
-) -> Parameters:
-    told = {name: column.estimate(k) for name, column in columns.items()}
-    return Parameters(**told, delay_correlation=delay_correlation)
 
 
 def _covariance(fleet: Fleet, group: Group, k: int) -> Real:

@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 from hmpim.errors import ArgumentError, RecordError
 from hmpim.identify.arrays import Complex, Mask, Real
 from hmpim.identify.frf.choice import choose
+from hmpim.identify.frf.columns import DENOMINATOR_ORDER, Columns
 from hmpim.identify.frf.gaps import filled
 from hmpim.identify.frf.neighbours import (
     LocalFit,
@@ -26,14 +27,7 @@ from hmpim.identify.frf.neighbours import (
     mirrored,
     windows_around,
 )
-from hmpim.identify.frf.rational import (
-    DENOMINATOR_ORDER,
-    TRANSIENT_ORDER,
-    Columns,
-    gauss_newton,
-    linear_start,
-    solved,
-)
+from hmpim.identify.frf.rational import TRANSIENT_ORDER, gauss_newton, linear_start, solved
 from hmpim.identify.signals import as_signal, check_band, check_rate
 from hmpim.identify.worth import PART
 
@@ -416,11 +410,7 @@ def _read_off(
         with np.errstate(all="ignore"):
             start = linear_start(columns, smooth[:, None])
             found = gauss_newton(columns, y[:, None], start, steps=_STEPS)
-            rows = found.rows(
-                np.take_along_axis(columns.linear, slot[:, None], axis=-1).swapaxes(1, 2),
-                slot,
-                columns.slopes.T[slot],
-            )
+            rows = found.rows(columns, windows.place[slot])
         row = rows.reshape(-1, rows.shape[-1])[centres]
         inverse, theta = found.inverse[:, 0], found.state.theta[:, 0]
         fitted, over = found.state.fitted[:, 0], found.state.over[:, 0]

@@ -17,10 +17,12 @@ from hmpim.identify.kept import kept
 from hmpim.identify.signals import whole_lag
 
 __all__ = [
+    "Integer",
     "LocalFit",
     "Spectra",
     "Windows",
     "centres_in_band",
+    "forms",
     "mirrored",
     "transform",
     "windows_around",
@@ -95,7 +97,7 @@ class Windows:
         return out
 
     def slots(self) -> tuple[Integer, Integer]:
-        """Return the places of each window's centres, (w, k), and where each centre is there, (c,).
+        """Return the centres of each window, (w, k), and where each centre is among these, (c,).
 
         Windows with fewer centres than others repeat their last.
         """
@@ -103,24 +105,17 @@ class Windows:
         most = int(np.diff(first).max())
         slot = np.minimum(first[:-1, None] + np.arange(most), first[1:, None] - 1)
         at = np.arange(self.near.size) - first[self.near]
-        return self.place[slot], self.near * most + at
+        return slot, self.near * most + at
 
     def forms(self, vectors: Complex, inverse: Complex) -> Real:
-        """Return v V vᴴ, (..., c, k), for vectors of each centre, (..., c, k, q).
+        """Return v V vᴴ, (c, k), for vectors of each centre, (c, k, q).
 
-        V, (..., w, q, q), is that of its window.
+        V, (w, q, q), is that of its window.
         """
-        # Centres of one window stand together, so each window takes one product of matrices.
-        first = np.searchsorted(self.near, np.arange(self.start.size))
-        slot = np.arange(self.near.size) - first[self.near]
-        outer, (kinds, q) = vectors.shape[:-3], vectors.shape[-2:]
-        shape = (*outer, self.start.size, int(slot.max()) + 1, kinds, q)
-        padded = np.zeros(shape, dtype=np.complex128)
-        padded[..., self.near, slot, :, :] = vectors
-        product = (padded.reshape(*outer, self.start.size, -1, q) @ inverse).reshape(shape)
-        # Real parts alone of the products are asked for.
-        told = np.vecdot(padded.view(np.float64), product.view(np.float64))
-        return np.asarray(told[..., self.near, slot, :])
+        slot, centres = self.slots()
+        kinds, q = vectors.shape[1:]
+        told = forms(vectors[slot].reshape(slot.shape[0], -1, q), inverse)
+        return told.reshape(-1, kinds)[centres]
 
     def without_dc(self) -> Real:
         """Return 1 for bins that count and 0 at DC, shape (w, s)."""
@@ -152,6 +147,15 @@ class LocalFit:
     noise: Real
     power: Real
     prediction_error: Real
+
+
+def forms(vectors: Complex, inverse: Complex) -> Real:
+    """Return v V vᴴ, (..., k), for vectors, (..., k, q), and matrices V, (..., q, q).
+
+    Real parts alone of the products are asked for.
+    """
+    product = vectors @ inverse
+    return np.asarray(np.vecdot(vectors.view(np.float64), product.view(np.float64)))
 
 
 def mirrored(values: Complex, reach: int) -> Complex:

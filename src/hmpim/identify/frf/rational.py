@@ -15,20 +15,25 @@ included, so it knows what the denominator costs.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
-from functools import cache
-from itertools import combinations_with_replacement
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hmpim.identify.arrays import Complex, Real
-from hmpim.identify.frf.neighbours import LocalFit, Spectra, Windows, mirrored, windows_around
+from hmpim.identify.frf.columns import DENOMINATOR_ORDER, Columns
+from hmpim.identify.frf.neighbours import (
+    Integer,
+    LocalFit,
+    Spectra,
+    Windows,
+    forms,
+    mirrored,
+    windows_around,
+)
 
 __all__ = [
-    "DENOMINATOR_ORDER",
     "TRANSIENT_ORDER",
-    "Columns",
     "RationalSolution",
     "RationalState",
     "Regressors",
@@ -39,14 +44,9 @@ __all__ = [
     "solved",
 ]
 
-Integer = NDArray[np.int64]
-
 _NUMERATOR = 2
 TRANSIENT_ORDER = 3
 """One more than of B: what a sampled transient rings with is a polynomial in z, not in jω."""
-
-DENOMINATOR_ORDER = 2
-"""One resonance within a window."""
 
 _NOTHING = 1e-24
 _RIDGE = 1e-13
@@ -95,197 +95,20 @@ class RationalSolution:
     before: RationalState
     inverse: Complex
 
-    def rows(self, linear: Complex, place: Integer, x: Complex) -> Complex:
-        """Derivatives of the fitted Y at some places of each window, shape (w, r, k, q).
-
-        Parameters
-        ----------
-        linear : complex ndarray, shape (w, k, l)
-            Linear columns there.
-        place : integer ndarray, shape (w, k)
-            The places.
-        x : complex ndarray, shape (w, k, d)
-            Powers of x there that A is made of.
-        """
-        over = _at(self.before.over, place)[..., None]
+    def rows(self, columns: Columns, place: Integer) -> Complex:
+        """Derivatives of the fitted Y at places of each window, (w, k); shape (w, r, k, q)."""
+        linear, over = columns.at(place), _at(self.before.over, place)[..., None]
         count = linear.shape[-1]
         rows = np.empty((*over.shape[:-1], count + DENOMINATOR_ORDER), dtype=np.complex128)
         np.multiply(linear[:, None], over, out=rows[..., :count])
         bent = -_at(self.before.fitted, place)[..., None] * over
-        np.multiply(bent, x[:, None], out=rows[..., count:])
+        np.multiply(bent, columns.slopes.T[place][:, None], out=rows[..., count:])
         return rows
 
 
 def _at(values: NDArray[Any], place: Integer) -> NDArray[Any]:
     """Values on windows, (w, r, s), at places of each, (w, k); shape (w, r, k)."""
     return np.take_along_axis(values, place[:, None], axis=-1)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Columns:
-    """Linear columns C x^p, p = 0 up to an order, of some carriers C, over all windows.
-
-    The products of all columns are moments Σ conj(C) C' x^p, so that few sums give all of them;
-    what the carriers bring to these is multiplied out once, for every record and every step.
-
-    Parameters
-    ----------
-    products : ndarray, shape (w, s, k)
-        Real and imaginary parts of conj(C) C' x^p of each two carriers.
-    mirrored : complex ndarray, shape (w, s, h)
-        conj(C) x^p, p up to the order and that of A.
-    orders : tuple of int
-        Highest power with each.
-    powers : ndarray, shape (s, p)
-        x^p, p = 0 up to twice the highest power of all.
-    linear : complex ndarray, shape (w, l, s)
-        The columns themselves.
-    """
-
-    products: Real
-    mirrored: Complex
-    orders: tuple[int, ...]
-    powers: Real
-    linear: Complex
-
-    @classmethod
-    def of(cls, carriers: Complex, orders: tuple[int, ...], x: Real) -> "Columns":
-        """Make them of carriers, shape (w, a, s); x from -1 to 1, shape (s,)."""
-        most = max(*orders, DENOMINATOR_ORDER)
-        powers = np.asarray(x[:, None] ** np.arange(2 * most + 1))
-        each = [carriers[:, a, None] * powers.T[: p + 1] for a, p in enumerate(orders)]
-        products = []
-        for i, j in combinations_with_replacement(range(len(orders)), 2):
-            product, count = np.conj(carriers[:, i]) * carriers[:, j], orders[i] + orders[j] + 1
-            parts = [product.real] if i == j else [product.real, product.imag]
-            products += [part[..., None] * powers[:, :count] for part in parts]
-        mirrored = [
-            np.conj(carriers[:, a, :, None]) * powers[:, : p + DENOMINATOR_ORDER + 1]
-            for a, p in enumerate(orders)
-        ]
-        return cls(
-            products=np.concatenate(products, axis=-1),
-            mirrored=np.concatenate(mirrored, axis=-1),
-            orders=orders,
-            powers=powers,
-            linear=np.concatenate(each, axis=1),
-        )
-
-    @property
-    def slopes(self) -> Complex:
-        """Powers of x that A is made of, shape (d, s)."""
-        return np.asarray(self.powers.T[1 : DENOMINATOR_ORDER + 1], dtype=np.complex128)
-
-    def normal(
-        self, over: Complex | None, weight: Real, fitted: Complex, left: Complex
-    ) -> tuple[Complex, Complex]:
-        """Normal equations of the columns over A, and of -fitted / A times the powers of A.
-
-        Parameters
-        ----------
-        over : complex ndarray, shape (w, r, s), or None
-            1 / A; None for 1.
-        weight : ndarray, broadcast to (w, r, s)
-            1 / |A|².
-        fitted : complex ndarray, shape (w, r, s)
-            Y as fitted.
-        left : complex ndarray, shape (w, r, s)
-            The right side.
-
-        Returns
-        -------
-        gram : complex ndarray, shape (w, r, q, q)
-        right : complex ndarray, shape (w, r, q, 1)
-        """
-        windows, records, _ = fitted.shape
-        places, count = _places(self.orders), self.mirrored.shape[-1]
-        turned = np.empty((windows, 2, *fitted.shape[1:]), dtype=np.complex128)
-        np.multiply(fitted, weight, out=turned[:, 0])
-        if over is None:
-            turned[:, 1] = left
-        else:
-            np.multiply(np.conj(over), left, out=turned[:, 1])
-        moments = np.empty((windows, records, places.ends[-1]))
-        ends = places.ends
-        np.matmul(np.broadcast_to(weight, fitted.shape), self.products, out=moments[..., : ends[0]])
-        power = fitted.real**2 + fitted.imag**2
-        power *= weight
-        np.matmul(power, self.powers, out=moments[..., ends[0] : ends[1]])
-        both = turned.reshape(windows, 2 * records, -1) @ self.mirrored
-        both = both.reshape(windows, 2, records, count).view(np.float64)
-        moments[..., ends[1] : ends[2]] = both[:, 0]
-        moments[..., ends[2] : ends[3]] = both[:, 1]
-        own = (np.conj(fitted) * turned[:, 1]) @ self.slopes.T
-        moments[..., ends[3] :] = own.view(np.float64)
-        gram = moments.take(places.gram, axis=-1)
-        gram *= places.sign
-        right = moments.take(places.right, axis=-1)
-        q = places.right.size // 2
-        right[..., -2 * DENOMINATOR_ORDER :] *= -1.0
-        return (
-            gram.view(np.complex128).reshape(windows, records, q, q),
-            right.view(np.complex128)[..., None],
-        )
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class _Places:
-    """Where the sums of `Columns.normal` stand, real and imaginary parts in turns.
-
-    Parameters
-    ----------
-    ends : tuple of int
-        Where the sums of each product of signals end: of 1 / |A|², of |fitted|² / |A|², of
-        fitted / |A|², of the right side over A's conjugate, and of that with fitted.
-    gram, right : integer ndarray, shapes (2 q q,) and (2 q,)
-        Which of them.
-    sign : ndarray, shape (2 q q,)
-        -1 where a sum's mirror or negative is asked for, 0 where a part is none.
-    """
-
-    ends: tuple[int, ...]
-    gram: Integer
-    right: Integer
-    sign: Real
-
-
-@cache
-def _places(orders: tuple[int, ...]) -> _Places:
-    """Of carriers of these orders, and A's own the last."""
-    inner, last = len(orders), DENOMINATOR_ORDER
-    first: dict[tuple[int, int], tuple[int, int]] = {}
-    at = 0
-    for i, j in combinations_with_replacement(range(inner), 2):
-        count = orders[i] + orders[j] + 1
-        first[i, j] = (at, at if i == j else at + count)
-        at += count * (1 + (i != j))
-    own, at = at, at + 2 * max(*orders, last) + 1
-    turned = at + 2 * np.cumsum((0, *(p + last + 1 for p in orders)))
-    rest = 2 * int(turned[-1]) - at
-    column = [(i, p) for i, most in enumerate((*orders, last)) for p in range(most + 1)]
-    column = [(i, p) for i, p in column if i < inner or p > 0]
-    q = len(column)
-    gram, sign = np.zeros((q, q, 2), dtype=np.int64), np.ones((q, q, 2))
-    for a, (i, p) in enumerate(column):
-        for b, (j, r) in enumerate(column):
-            low, high = (i, j) if i <= j else (j, i)
-            mirror = 1.0 if i < j else -1.0
-            if high < inner:
-                gram[a, b] = np.add(first[low, high], p + r)
-                sign[a, b] = 1.0, mirror * (i != j)
-            elif low == inner:
-                gram[a, b], sign[a, b] = own + p + r, (1.0, 0.0)
-            else:
-                gram[a, b] = turned[low] + 2 * (p + r) + np.arange(2)
-                sign[a, b] = -1.0, -mirror
-    second = int(turned[-1]) - at
-    right = [turned[i] + second + 2 * p if i < inner else rest + 2 * (p - 1) for i, p in column]
-    return _Places(
-        ends=(own, at, int(turned[-1]), rest, rest + 2 * last),
-        gram=np.ravel(gram),
-        right=np.ravel(np.array(right)[:, None] + np.arange(2)),
-        sign=np.ravel(sign),
-    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -333,13 +156,13 @@ class Regressors:
         scaled = (seen / np.sqrt(power)[:, None])[:, None, :]
         one = windows.without_dc()[:, None, :].astype(np.complex128)
         carriers = np.concatenate((scaled, one), axis=1)
-        place, centres = windows.slots()
+        slot, centres = windows.slots()
         return cls(
             windows=windows,
             power=power,
             both=Columns.of(carriers, (_NUMERATOR, TRANSIENT_ORDER), windows.x),
             plain=Columns.of(scaled, (_NUMERATOR,), windows.x),
-            place=place,
+            place=windows.place[slot],
             centres=centres,
         )
 
@@ -540,10 +363,8 @@ def _read_off(
     """Response, its spread and the prediction error at each centre, of each record (r, c)."""
     windows, power, terms = regressors.windows, regressors.power, _NUMERATOR + 1
     place, near = regressors.place, regressors.windows.near
-    powers = columns.powers[place].astype(np.complex128)
-    b, x = powers[..., :terms], powers[..., 1 : DENOMINATOR_ORDER + 1]
-    linear = np.take_along_axis(columns.linear, place[:, None], axis=-1).swapaxes(1, 2)
-    row = found.rows(linear, place, x)
+    b, x = columns.powers[place, :terms].astype(np.complex128), columns.slopes.T[place]
+    row = found.rows(columns, place)
     own = _at(found.state.over, place)
     over = own / np.sqrt(power)[:, None, None]
     response = (found.state.theta[..., :terms] @ b.swapaxes(1, 2)) * over
@@ -552,24 +373,23 @@ def _read_off(
     bent = (-response * own)[..., None]
     np.multiply(bent, x[:, None], out=pair[:, :, 0, :, -DENOMINATOR_ORDER:])
     pair[:, :, 1] = row
-    inner = pair.reshape(*own.shape[:2], -1, row.shape[-1]) @ found.inverse
-    # Real parts alone of the products are asked for.
-    forms = np.vecdot(pair.view(np.float64), inner.reshape(pair.shape).view(np.float64))
-    spread, leverage = forms[:, :, 0], forms[:, :, 1]
+    flat = pair.reshape(*own.shape[:2], -1, row.shape[-1])
+    told = forms(flat, found.inverse).reshape(pair.shape[:-1])
+    spread, leverage = told[:, :, 0], told[:, :, 1]
     missed = _at(found.state.left, place) / np.maximum(1.0 - leverage, 1e-6)
     error = missed.real**2 + missed.imag**2
     squares = np.maximum(found.state.squares, 1e-15 * np.vecdot(y, y).real)
     noise = squares / np.maximum(windows.counted - row.shape[-1], 1)[:, None]
     failed = ~(np.isfinite(response) & np.isfinite(spread) & np.isfinite(error))
 
-    def told(values: NDArray[Any]) -> NDArray[Any]:
+    def answers(values: NDArray[Any]) -> NDArray[Any]:
         flat = values.swapaxes(0, 1).reshape(values.shape[1], -1)
         return flat.take(regressors.centres, axis=-1)
 
     return LocalFit(
-        response=told(np.where(failed, 0.0, response)),
-        spread=told(np.where(failed, 1.0 / power[:, None, None], np.maximum(spread, 0.0))),
+        response=answers(np.where(failed, 0.0, response)),
+        spread=answers(np.where(failed, 1.0 / power[:, None, None], np.maximum(spread, 0.0))),
         noise=noise.T.take(near, axis=-1),
         power=power[near],
-        prediction_error=told(np.where(failed, np.inf, error)),
+        prediction_error=answers(np.where(failed, np.inf, error)),
     )

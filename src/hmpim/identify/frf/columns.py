@@ -1,0 +1,190 @@
+"""The columns that local rational functions are fitted by, and their normal equations.
+
+Y = (B U + T) / A is linear in B and T: columns U x^p and x^p over A. Those of A itself are
+-Y / A times the powers of x.
+"""
+
+from dataclasses import dataclass
+from functools import cache
+from itertools import combinations_with_replacement
+
+import numpy as np
+
+from hmpim.identify.arrays import Complex, Real
+from hmpim.identify.frf.neighbours import Integer
+
+__all__ = ["DENOMINATOR_ORDER", "Columns"]
+
+DENOMINATOR_ORDER = 2
+"""Of A: one resonance within a window."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Columns:
+    """Linear columns C x^p, p = 0 up to an order, of some carriers C, over all windows.
+
+    The products of all columns are moments Σ conj(C) C' x^p, so that few sums give all of them;
+    what the carriers bring to these is multiplied out once, for every record and every step.
+
+    Parameters
+    ----------
+    products : ndarray, shape (w, s, k)
+        Real and imaginary parts of conj(C) C' x^p of each two carriers.
+    mirrored : complex ndarray, shape (w, s, h)
+        conj(C) x^p, p up to the order and that of A.
+    orders : tuple of int
+        Highest power with each.
+    powers : ndarray, shape (s, p)
+        x^p, p = 0 up to twice the highest power of all.
+    linear : complex ndarray, shape (w, l, s)
+        The columns themselves.
+    """
+
+    products: Real
+    mirrored: Complex
+    orders: tuple[int, ...]
+    powers: Real
+    linear: Complex
+
+    @classmethod
+    def of(cls, carriers: Complex, orders: tuple[int, ...], x: Real) -> "Columns":
+        """Make them of carriers, shape (w, a, s); x from -1 to 1, shape (s,)."""
+        most = max(*orders, DENOMINATOR_ORDER)
+        powers = np.asarray(x[:, None] ** np.arange(2 * most + 1))
+        each = [carriers[:, a, None] * powers.T[: p + 1] for a, p in enumerate(orders)]
+        products = []
+        for i, j in combinations_with_replacement(range(len(orders)), 2):
+            product, count = np.conj(carriers[:, i]) * carriers[:, j], orders[i] + orders[j] + 1
+            parts = [product.real] if i == j else [product.real, product.imag]
+            products += [part[..., None] * powers[:, :count] for part in parts]
+        mirrored = [
+            np.conj(carriers[:, a, :, None]) * powers[:, : p + DENOMINATOR_ORDER + 1]
+            for a, p in enumerate(orders)
+        ]
+        return cls(
+            products=np.concatenate(products, axis=-1),
+            mirrored=np.concatenate(mirrored, axis=-1),
+            orders=orders,
+            powers=powers,
+            linear=np.concatenate(each, axis=1),
+        )
+
+    @property
+    def slopes(self) -> Complex:
+        """Powers of x that A is made of, shape (d, s)."""
+        return np.asarray(self.powers.T[1 : DENOMINATOR_ORDER + 1], dtype=np.complex128)
+
+    def at(self, place: Integer) -> Complex:
+        """Return the linear columns at places of each window, (w, k); shape (w, k, l)."""
+        return np.take_along_axis(self.linear, place[:, None], axis=-1).swapaxes(1, 2)
+
+    def normal(
+        self, over: Complex | None, weight: Real, fitted: Complex, left: Complex
+    ) -> tuple[Complex, Complex]:
+        """Normal equations of the columns over A, and of -fitted / A times the powers of A.
+
+        Parameters
+        ----------
+        over : complex ndarray, shape (w, r, s), or None
+            1 / A; None for 1.
+        weight : ndarray, broadcast to (w, r, s)
+            1 / |A|².
+        fitted : complex ndarray, shape (w, r, s)
+            Y as fitted.
+        left : complex ndarray, shape (w, r, s)
+            The right side.
+
+        Returns
+        -------
+        gram : complex ndarray, shape (w, r, q, q)
+        right : complex ndarray, shape (w, r, q, 1)
+        """
+        windows, records, _ = fitted.shape
+        places, count = _places(self.orders), self.mirrored.shape[-1]
+        turned = np.empty((windows, 2, *fitted.shape[1:]), dtype=np.complex128)
+        np.multiply(fitted, weight, out=turned[:, 0])
+        if over is None:
+            turned[:, 1] = left
+        else:
+            np.multiply(np.conj(over), left, out=turned[:, 1])
+        moments = np.empty((windows, records, places.ends[-1]))
+        ends = places.ends
+        np.matmul(np.broadcast_to(weight, fitted.shape), self.products, out=moments[..., : ends[0]])
+        power = fitted.real**2 + fitted.imag**2
+        power *= weight
+        np.matmul(power, self.powers, out=moments[..., ends[0] : ends[1]])
+        both = turned.reshape(windows, 2 * records, -1) @ self.mirrored
+        both = both.reshape(windows, 2, records, count).view(np.float64)
+        moments[..., ends[1] : ends[2]] = both[:, 0]
+        moments[..., ends[2] : ends[3]] = both[:, 1]
+        own = (np.conj(fitted) * turned[:, 1]) @ self.slopes.T
+        moments[..., ends[3] :] = own.view(np.float64)
+        gram = moments.take(places.gram, axis=-1)
+        gram *= places.sign
+        right = moments.take(places.right, axis=-1)
+        q = places.right.size // 2
+        right[..., -2 * DENOMINATOR_ORDER :] *= -1.0
+        return (
+            gram.view(np.complex128).reshape(windows, records, q, q),
+            right.view(np.complex128)[..., None],
+        )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Places:
+    """Where the sums of `Columns.normal` stand, real and imaginary parts in turns.
+
+    Parameters
+    ----------
+    ends : tuple of int
+        Where the sums of each product of signals end: of 1 / |A|², of |fitted|² / |A|², of
+        fitted / |A|², of the right side over A's conjugate, and of that with fitted.
+    gram, right : integer ndarray, shapes (2 q q,) and (2 q,)
+        Which of them.
+    sign : ndarray, shape (2 q q,)
+        -1 where a sum's mirror or negative is asked for, 0 where a part is none.
+    """
+
+    ends: tuple[int, ...]
+    gram: Integer
+    right: Integer
+    sign: Real
+
+
+@cache
+def _places(orders: tuple[int, ...]) -> _Places:
+    """Of carriers of these orders, and A's own the last."""
+    inner, last = len(orders), DENOMINATOR_ORDER
+    first: dict[tuple[int, int], tuple[int, int]] = {}
+    at = 0
+    for i, j in combinations_with_replacement(range(inner), 2):
+        count = orders[i] + orders[j] + 1
+        first[i, j] = (at, at if i == j else at + count)
+        at += count * (1 + (i != j))
+    own, at = at, at + 2 * max(*orders, last) + 1
+    turned = at + 2 * np.cumsum((0, *(p + last + 1 for p in orders)))
+    rest = 2 * int(turned[-1]) - at
+    column = [(i, p) for i, most in enumerate((*orders, last)) for p in range(most + 1)]
+    column = [(i, p) for i, p in column if i < inner or p > 0]
+    q = len(column)
+    gram, sign = np.zeros((q, q, 2), dtype=np.int64), np.ones((q, q, 2))
+    for a, (i, p) in enumerate(column):
+        for b, (j, r) in enumerate(column):
+            low, high = (i, j) if i <= j else (j, i)
+            mirror = 1.0 if i < j else -1.0
+            if high < inner:
+                gram[a, b] = np.add(first[low, high], p + r)
+                sign[a, b] = 1.0, mirror * (i != j)
+            elif low == inner:
+                gram[a, b], sign[a, b] = own + p + r, (1.0, 0.0)
+            else:
+                gram[a, b] = turned[low] + 2 * (p + r) + np.arange(2)
+                sign[a, b] = -1.0, -mirror
+    second = int(turned[-1]) - at
+    right = [turned[i] + second + 2 * p if i < inner else rest + 2 * (p - 1) for i, p in column]
+    return _Places(
+        ends=(own, at, int(turned[-1]), rest, rest + 2 * last),
+        gram=np.ravel(gram),
+        right=np.ravel(np.array(right)[:, None] + np.arange(2)),
+        sign=np.ravel(sign),
+    )
