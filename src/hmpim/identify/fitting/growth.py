@@ -38,6 +38,7 @@ __all__ = [
     "one_more_pole",
     "response_to_square",
     "scale_of",
+    "seen_by_pole",
     "with_pole",
 ]
 
@@ -74,9 +75,9 @@ class HiddenPole:
         The fit.
     rows : ndarray, shape (p, n)
         Its derivatives, from `hmpim.identify.fitting.fit.jacobian`.
-    counted : float or None
-        Independent samples along q: colour that lies elsewhere in the spectrum costs it none. None
-        where the noise is known to be white, or is not known in q's direction.
+    own : ndarray, shape (n,), or None
+        The derivative with respect to q, less all that other parameters can do. None of compressed
+        records.
     """
 
     squared: float
@@ -84,7 +85,7 @@ class HiddenPole:
     shift: Real
     fit: Fit
     rows: Real
-    counted: float | None = None
+    own: Real | None = None
 
     @property
     def scale(self) -> float:
@@ -215,15 +216,38 @@ def hidden_pole(problem: Problem, fit: Fit) -> HiddenPole:
     power = max(float(own @ own), _TINY)
     white = is_white(problem.counting(left))
     variance = covariance(own[None], left, freedom=freedom, white=white)[0, 0]
-    if_white = float(left @ left) / freedom / power
     return HiddenPole(
         squared=float(own @ left) / power,
         std=float(np.sqrt(variance)),
         shift=shift,
         fit=fit,
         rows=rows,
-        counted=None if white else problem.counted * if_white / max(float(variance), _TINY),
+        own=own,
     )
+
+
+def seen_by_pole(problem: Problem, hidden: HiddenPole, richer: Fit) -> float | None:
+    """Independent samples that one more pole's response sees in the noise; None in white noise.
+
+    Colour that lies elsewhere in the spectrum costs it none. The noise is what the fit with the
+    pole leaves: what the pole explains is no noise.
+
+    Parameters
+    ----------
+    problem : Problem
+        The data.
+    hidden : HiddenPole
+        What the test said of the pole.
+    richer : Fit
+        The fit that has it.
+    """
+    left = problem.innovations(richer.prediction, richer.residual)
+    if hidden.own is None or is_white(problem.counting(left)):
+        return None
+    freedom = max(problem.counted - hidden.rows.shape[0] - 1, 1)
+    variance = float(covariance(hidden.own[None], left, freedom=freedom, white=False)[0, 0])
+    power = max(float(hidden.own @ hidden.own), _TINY)
+    return problem.counted * float(left @ left) / freedom / power / max(variance, _TINY)
 
 
 def response_to_square(problem: Problem, fit: Fit) -> Real:
@@ -316,7 +340,7 @@ def grow(
     *,
     hidden: Callable[[F], HiddenPole],
     refit: Callable[[Structure, Real], F],
-    count: float,
+    count: Callable[[HiddenPole, F], float],
     names: tuple[StructureName, ...],
     white: Callable[[F], bool],
 ) -> Growth[F]:
@@ -330,8 +354,8 @@ def grow(
         Tests a fit for one more pole.
     refit : callable
         Fits a structure from a start.
-    count : float
-        Independent samples, where the test of a pole does not say how many it sees.
+    count : callable
+        Independent samples that a tested pole sees, the fit that has it given.
     names : tuple of str
         Structures that may be chosen; of others a fit is a rival at most.
     white : callable
@@ -349,7 +373,7 @@ def grow(
             starts.append(_PROBE * test.scale)
         tried = [refit(richer, with_pole(structure, best.fit.theta, lag)) for lag in starts]
         found = min(tried, key=lambda f: f.fit.objective)
-        seen = count if test.counted is None else test.counted
+        seen = count(test, found)
         gain = seen * float(np.log(best.fit.objective / found.fit.objective))
         if gain < ONE_SIDED**2:
             return Growth(grown=tuple(grown), rivals=(), hidden=test)

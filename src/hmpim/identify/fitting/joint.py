@@ -32,7 +32,7 @@ from hmpim.identify.fitting.course import (
 from hmpim.identify.fitting.data import FINAL_PRECISION, band_of, follows, refit
 from hmpim.identify.fitting.enrich import INTEGRATING, MODES, PLAIN, RICH
 from hmpim.identify.fitting.fit import Fit, Problem, fit_structure
-from hmpim.identify.fitting.growth import Growth, HiddenPole, grow, hidden_pole
+from hmpim.identify.fitting.growth import Growth, HiddenPole, grow, hidden_pole, seen_by_pole
 from hmpim.identify.fitting.software import software_fit
 from hmpim.identify.fitting.trial import JointFit, Trial, likeliest_of, trial_of
 from hmpim.identify.fitting.unrelated import UNDENIED, says_nothing
@@ -231,18 +231,19 @@ def _grown_from(
     problem = course.data.problem(trial.intersample, course.counted)
     count = problem.counted * joint.weighed_share
 
-    def hidden(one: Trial) -> HiddenPole:
-        found = hidden_pole(problem, one.fit)
+    def seen(test: HiddenPole, richer: Trial) -> float:
         # What still follows the input is no noise, and has no spectrum to count samples by.
-        return replace(found, counted=None) if follows(course.data, one.fit) else found
+        if follows(course.data, richer.fit):
+            return count
+        return seen_by_pole(problem, test, richer.fit) or count
 
     return grow(
         trial,
-        hidden=hidden,
+        hidden=lambda one: hidden_pole(problem, one.fit),
         refit=lambda structure, theta: trial_of(
             trial.intersample, fit_structure(problem, structure, theta), count
         ),
-        count=count,
+        count=seen,
         names=structures,
         white=lambda one: is_white(one.fit.residual),
     )

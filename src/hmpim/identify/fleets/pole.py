@@ -63,7 +63,7 @@ def with_tails(fleet: Fleet, member: Member, place: Real, y: Real, own: Paramete
         best,
         hidden=lambda trial: hidden_pole(problem, trial.fit),
         refit=refit,
-        count=y.size,
+        count=lambda *_: float(y.size),
         names=tuple(STRUCTURES),
         white=lambda trial: is_white(trial.fit.residual),
     )

@@ -208,10 +208,11 @@ def short_record(evidence: Evidence) -> tuple[Finding, ...]:
 def negative_delay(evidence: Evidence) -> tuple[Finding, ...]:
     """Doubt an output that moves before its input.
 
-    By as much as its time constants a lead that no structure has may move it. Further ahead it is
-    the clock, and the figures are those of the record.
+    Only where every model that the record allows says so. By as much as its time constants a lead
+    that no structure has may move it. Further ahead it is the clock, and the figures are those of
+    the record.
     """
-    delay = evidence.readings.parameters.delay
+    delay = (evidence.spanned or evidence.readings.parameters).delay
     latest = None if delay is None or delay.ci95 is None else delay.ci95[1]
     if delay is None or latest is None or latest * evidence.fs >= -ROUNDING:
         return ()

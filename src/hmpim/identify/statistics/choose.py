@@ -384,7 +384,7 @@ def _decided(
         fits[trials.index(likeliest)],
         hidden=lambda f: hidden_pole_of(f, search.problem(f.intersample)),
         refit=lambda structure, theta: search.fit(likeliest.intersample, structure, theta),
-        count=count,
+        count=lambda *_: count,
         names=names,
         white=lambda f: left_over(search.products, f).noise.size == 1,
     )
