@@ -32,7 +32,14 @@ from hmpim.identify.fitting.course import (
 from hmpim.identify.fitting.data import FINAL_PRECISION, band_of, follows, refit
 from hmpim.identify.fitting.enrich import INTEGRATING, MODES, PLAIN, RICH
 from hmpim.identify.fitting.fit import Fit, Problem, fit_structure
-from hmpim.identify.fitting.growth import Growth, HiddenPole, grow, hidden_pole, seen_by_pole
+from hmpim.identify.fitting.growth import (
+    Growth,
+    HiddenPole,
+    grow,
+    hidden_pole,
+    one_more_pole,
+    seen_by_pole,
+)
 from hmpim.identify.fitting.software import software_fit
 from hmpim.identify.fitting.trial import JointFit, Trial, likeliest_of, trial_of
 from hmpim.identify.fitting.unrelated import UNDENIED, says_nothing
@@ -208,7 +215,11 @@ def _led_by(led: Trial, joint: JointFit, course: Course) -> JointFit:
 
 
 def _others_to_grow(joint: JointFit, natural: Intersample) -> list[Trial]:
-    """The likeliest natural trials without zeros and with them, but for the best itself."""
+    """The likeliest natural trials without zeros and with them, but for the best itself.
+
+    Of a best one with zeros the one with a pole less: from its own start a fit with zeros may have
+    ended elsewhere.
+    """
     hopeful = [
         trial
         for trial in joint.trials
@@ -219,7 +230,10 @@ def _others_to_grow(joint: JointFit, natural: Intersample) -> list[Trial]:
     found = []
     for with_zeros in (False, True):
         alike = [t for t in hopeful if bool(t.fit.structure.zeros) == with_zeros]
-        if alike and joint.best not in alike:
+        if joint.best in alike:
+            own = joint.best.fit.structure
+            alike = [t for t in alike if with_zeros and one_more_pole(t.fit.structure) == own]
+        if alike:
             found.append(min(alike, key=lambda trial: trial.criterion))
     return found
 
