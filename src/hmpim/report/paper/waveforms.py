@@ -6,8 +6,10 @@ from numpy.typing import NDArray
 from hmpim.identify.section_iv.spectrum import decibel, spectrum
 from hmpim.plots import Axis, Curve, Figure, Panel, spectrum_curve, time_histories
 from hmpim.report.figures import Picture
+from hmpim.report.paper.bound import cramer_rao
 from hmpim.report.paper.chapter import Chapter
 from hmpim.report.paper.rows import Row, shown
+from hmpim.report.paper.sample import SYSTEM
 from hmpim.stimulus import (
     Chirp,
     Limits,
@@ -80,6 +82,7 @@ def waveforms_chapter() -> Chapter:
             why="Agrees: the chirp is the only one of the five; the next best has "
             f"{100 * others:.2g} %.",
         ),
+        _row_tests(waves),
     )
     return Chapter(pictures=pictures, rows=rows)
 
@@ -104,6 +107,26 @@ def _persistence(waveform: Waveform) -> float:
     inside = (bins.frequency >= BAND[0] - 1e-9) & (bins.frequency <= BAND[1] + 1e-9)
     level = decibel(bins.value[inside])
     return float(np.mean(level >= level.max() + PERSISTENT))
+
+
+def _row_tests(waves: dict[str, Waveform]) -> Row:
+    """What one record of each waveform can tell of Fig. 17's system: section III's argument."""
+    bounds = {
+        name: cramer_rao(SYSTEM, Stimulus(waveform=wave, fs=FS)).natural_frequency
+        for name, wave in waves.items()
+    }
+    step, chirp = bounds["Step"], bounds["Chirp"]
+    return Row(
+        figure=5,
+        where="Fig. 5",
+        quantity="Smallest possible error of Fig. 17's natural frequency from one record",
+        paper="chirp only",
+        text=", ".join(f"{name.lower()} {shown(bound)} Hz" for name, bound in bounds.items()),
+        truth=SYSTEM.natural_frequency,
+        unit="Hz",
+        why="Cramér-Rao bounds at an amplitude of 1 deg. A ramp does not determine it, and a sine "
+        f"hardly does. A step does, but with {step / chirp:.0f} times the chirp's error.",
+    )
 
 
 def _figure_5(waves: dict[str, Waveform]) -> Figure:
