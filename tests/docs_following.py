@@ -3,8 +3,8 @@
 A block of TOML or Python under a line that ends with "`NAME`:" is a file. A block `console` holds
 commands and lines of what they print: the words of a line must stand in one line of the output,
 in their order, numbers to two parts in a thousand or to the last digit shown; … stands for what
-is left out. Other Python is
-executed, in one space for the whole page, and prints what stands in the block `text` below it.
+is left out. A backslash at the end of a line continues a command. Other Python is executed, in
+one space for the whole page, and prints what stands in the block `text` below it.
 """
 
 import contextlib
@@ -45,7 +45,7 @@ def follow(page: Path) -> None:
 
 def command(text: str) -> None:
     """Run each line that begins with $, and look for those below it in what it prints."""
-    for part in re.split(r"^\$ ", text, flags=re.MULTILINE)[1:]:
+    for part in re.split(r"^\$ ", text.replace("\\\n", " "), flags=re.MULTILINE)[1:]:
         line, *lines = part.splitlines()
         program, *words = shlex.split(line)
         assert program == "hmpim", line

@@ -1,4 +1,4 @@
-"""Tutorial, "what now" and the how-tos that make their own data are followed to the letter."""
+"""Tutorial, "what now", ending early and the how-tos that make their own data are followed to the letter."""
 
 from pathlib import Path
 
@@ -11,6 +11,8 @@ DOCS = Path(__file__).parents[2] / "docs"
 PAGES = (
     "tutorial",
     "doubtful",
+    "live",
+    "software",
     "howto/motion-table",
     "howto/seeker",
     "howto/servo",
