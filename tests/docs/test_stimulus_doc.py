@@ -3,7 +3,16 @@
 import contextlib
 import io
 import re
+import shlex
+import subprocess
 from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from hmpim.cli.main import app
+from tests_support import c_compiler
 
 DOC = Path(__file__).parents[2] / "docs" / "stimulus.md"
 IMAGES = DOC.parent / "images" / "stimulus"
@@ -33,3 +42,17 @@ def test_pictures_shown_are_there():
     names = re.findall(r"images/stimulus/([\w-]+\.png)", DOC.read_text(encoding="utf-8"))
     assert len(names) >= 10
     assert not [name for name in names if not (IMAGES / name).is_file()]
+
+
+def test_the_equations_are_written_compiled_and_printed(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    c_compiler()
+    (script,) = re.findall(r"```sh\n(.*?)```", DOC.read_text(encoding="utf-8"), re.DOTALL)
+    design, compiled = script.replace("\\\n", " ").splitlines()
+    program, *words = shlex.split(design)
+    assert program == "hmpim"
+    assert CliRunner().invoke(app, words).exit_code == 0
+    subprocess.run(compiled, shell=True, check=True)
+    samples = np.genfromtxt("samples.csv", delimiter=",", names=True)
+    assert np.max(np.abs(samples["position"])) == pytest.approx(10.0, rel=1e-3)
+    assert np.max(np.abs(samples["acceleration"])) <= 40000.0

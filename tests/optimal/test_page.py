@@ -2,9 +2,13 @@
 
 import importlib.util
 import re
+import shlex
 from pathlib import Path
 
 import pytest
+from typer.testing import CliRunner
+
+from hmpim.cli.main import app
 
 ROOT = Path(__file__).parents[2]
 PAGE = ROOT / "docs" / "gentlest.md"
@@ -77,3 +81,13 @@ def test_the_examples_run(capsys):
     for block in re.findall(r"```python\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL):
         exec(compile(block, str(PAGE), "exec"), {})
     assert "condition number of the inputs roll, pitch, yaw" in capsys.readouterr().out
+
+
+@pytest.mark.study
+def test_the_command_runs(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (command,) = re.findall(r"```sh\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)
+    done = CliRunner().invoke(app, shlex.split(command.replace("\\\n", " "))[1:])
+    assert done.exit_code == 0, done.stderr
+    assert Path("stimulus.csv").is_file()
+    assert Path("trade.png").is_file()
