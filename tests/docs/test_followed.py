@@ -1,4 +1,4 @@
-"""Tutorial, "what now", ending early and the how-tos that make their own data are followed to the letter."""
+"""Tutorial, guides and how-tos that make their own data are followed to the letter."""
 
 from pathlib import Path
 
