@@ -119,5 +119,15 @@ def test_the_public_names():
 
 @pytest.mark.parametrize("document", sorted((ROOT / "docs").rglob("*.md")), ids=lambda p: p.name)
 def test_links_between_documents_lead_somewhere(document):
-    for target in re.findall(r"\]\(([^)#]+)\)", document.read_text(encoding="utf-8")):
-        assert target.startswith("https://") or (document.parent / target).exists(), target
+    for target in re.findall(r"\]\(([^)\s]+)\)", document.read_text(encoding="utf-8")):
+        place, _, chapter = target.partition("#")
+        page = document.parent / place if place else document
+        assert place.startswith("https://") or page.exists(), target
+        if chapter:
+            assert chapter in anchors(page.read_text(encoding="utf-8")), target
+
+
+def anchors(text):
+    """What the site and GitHub make of a page's headings."""
+    headings = re.findall(r"^#+ (.+)$", text, re.MULTILINE)
+    return {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings}
