@@ -3,11 +3,14 @@
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Complex", "Mask", "Real", "median"]
+__all__ = ["Complex", "Mask", "Real", "every_of", "median"]
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 Mask = NDArray[np.bool_]
+
+_BULK = 60_000
+"""Samples that tell the size of the bulk of a record, to half a per cent."""
 
 
 def median(values: Real) -> float:
@@ -27,3 +30,14 @@ def median(values: Real) -> float:
     if values.size % 2:
         return float(ordered[half])
     return float((ordered[half - 1] + ordered[half]) / 2)
+
+
+def every_of(samples: int) -> int:
+    """Samples from one to the next of those, evenly spread, that tell the size of their bulk.
+
+    Examples
+    --------
+    >>> every_of(10_000), every_of(1_000_000)
+    (1, 17)
+    """
+    return 1 + samples // _BULK

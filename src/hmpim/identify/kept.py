@@ -4,14 +4,18 @@ Half a dozen steps of `hmpim.identify` begin with the input: its transform, its 
 of its sweep, the regressors of its windows; half a dozen ask whether a residual is white. Inside
 `keeping()` each of these is made once for all samples that are met, and found again by the samples
 themselves; outside nothing is kept. `identify` keeps for itself, a batch for all its records.
+
+Many samples are found again only where they stand, and no result as long as they are is kept.
 """
 
 from collections import OrderedDict
 from collections.abc import Callable, Hashable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
+from dataclasses import fields, is_dataclass
 from functools import wraps
 from typing import Any, ParamSpec, TypeVar, cast
+from weakref import ref
 
 import numpy as np
 
@@ -21,9 +25,13 @@ _MOST = 64
 """Results that are kept; that used longest ago goes first."""
 
 _LARGEST = 1 << 18
-"""Bytes of an array up to which anything is kept of it: 32 768 samples."""
+"""Bytes of an array up to which it is told by its samples, and kept: 32 768 samples."""
+
+_Named = dict[int, tuple[ref[np.ndarray], Hashable, Hashable]]
+"""By address: an array, what shows that it is still the same, and what it is called."""
 
 _KEPT: ContextVar[OrderedDict[Hashable, Any] | None] = ContextVar("kept", default=None)
+_NAMED: ContextVar[_Named] = ContextVar("named")
 
 P = ParamSpec("P")
 T = TypeVar("T")
@@ -49,11 +57,12 @@ def keeping() -> Iterator[None]:
     if _KEPT.get() is not None:
         yield
         return
-    token = _KEPT.set(OrderedDict())
+    kept_before, named_before = _KEPT.set(OrderedDict()), _NAMED.set({})
     try:
         yield
     finally:
-        _KEPT.reset(token)
+        _KEPT.reset(kept_before)
+        _NAMED.reset(named_before)
 
 
 def kept(function: Callable[P, T]) -> Callable[P, T]:
@@ -74,6 +83,8 @@ def kept(function: Callable[P, T]) -> Callable[P, T]:
             known.move_to_end(key)
             return cast(T, known[key])
         found = function(*args, **kwargs)
+        if not _is_short(found):
+            return found
         if isinstance(found, np.ndarray):
             found.flags.writeable = False
         known[key] = found
@@ -85,15 +96,37 @@ def kept(function: Callable[P, T]) -> Callable[P, T]:
 
 
 def _key(function: Callable[..., Any], values: tuple[Any, ...]) -> Hashable | None:
-    """The samples themselves, not where they stand; None for so many that none are kept."""
+    """The samples themselves, or for many of them where they stand; None if one is no value."""
     parts: list[Hashable] = [function]
     for value in values:
-        if not isinstance(value, np.ndarray):
-            if not isinstance(value, Hashable):
-                return None
+        if isinstance(value, np.ndarray):
+            parts += [value.shape, value.dtype.char, _name_of(value)]
+        elif isinstance(value, Hashable):
             parts.append(value)
-        elif value.nbytes > _LARGEST:
-            return None
         else:
-            parts += [value.shape, value.dtype.char, value.tobytes()]
+            return None
     return tuple(parts)
+
+
+def _name_of(array: np.ndarray) -> Hashable:
+    """What stands for an array: its bytes, whose hash is made once; of a long one its address."""
+    named = _NAMED.get()
+    long = array.nbytes > _LARGEST
+    shown: Hashable = array.sum().item() if long else array.tobytes()
+    known = named.get(id(array))
+    if known is not None and known[0]() is array and known[1] == shown:
+        return known[2]
+    if len(named) > 4 * _MOST:
+        named.clear()
+    name = object() if long else shown
+    named[id(array)] = ref(array), shown, name
+    return name
+
+
+def _is_short(found: Any) -> bool:
+    """Whether a result holds no long array."""
+    if isinstance(found, np.ndarray):
+        return found.nbytes <= _LARGEST
+    if is_dataclass(found):
+        return all(_is_short(getattr(found, field.name)) for field in fields(found))
+    return True

@@ -1,5 +1,6 @@
 """All that is said of one output and one input, once the joint fit is made."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -202,7 +203,7 @@ def _evidence(
         u=u,
         fs=fs,
         band=band,
-        fit_percent=_fit_percent(joint),
+        fit_percent=_fit_percents(joint, [fit.cost])[0],
         bends=moves,
         nonlinear=max([nonlinear, *(one.share for one in moves if one.certain)]),
         held=found.hold is not None,
@@ -373,28 +374,27 @@ def _local(u: Real, y: Real, fit: Fit, fs: float, band: tuple[float, float]) -> 
     return replace(steps, response=steps.response / difference, std=steps.std / np.abs(difference))
 
 
-def _spread(joint: JointFit) -> float:
+def _fit_percents(joint: JointFit, costs: Sequence[float]) -> list[float]:
+    """100 (1 - ‖residual‖ / ‖deviation of the output‖) of sums of squared residuals."""
     problem = joint.problem
     y = problem.y if problem.valid is None else problem.y[problem.valid]
-    return float(np.sum((y - y.mean()) ** 2))
-
-
-def _fit_percent(joint: JointFit, cost: float | None = None) -> float:
-    cost = joint.best.fit.cost if cost is None else cost
-    return float(100.0 * (1.0 - np.sqrt(cost / _spread(joint))))
+    away = y - y.mean()
+    spread = float(away @ away)
+    return [float(100.0 * (1.0 - np.sqrt(cost / spread))) for cost in costs]
 
 
 def _candidates(joint: JointFit) -> tuple[Candidate, ...]:
     ordered = sorted(joint.trials, key=lambda trial: trial.criterion)
+    told = _fit_percents(joint, [trial.fit.cost for trial in ordered])
     return tuple(
         Candidate(
             structure=trial.fit.structure.name,
             intersample=trial.intersample,
             criterion=trial.criterion,
-            fit_percent=_fit_percent(joint, trial.fit.cost),
+            fit_percent=fit_percent,
             chosen=trial is joint.best,
         )
-        for trial in ordered
+        for trial, fit_percent in zip(ordered, told, strict=True)
     )
 
 

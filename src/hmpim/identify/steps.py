@@ -1,5 +1,6 @@
 """The steps of the algorithm in `hmpim.identify.identify`, in their order."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -14,7 +15,6 @@ from hmpim.identify.effects.drift import with_drift
 from hmpim.identify.effects.hum import with_hum
 from hmpim.identify.effects.imperfections import (
     Imperfections,
-    count_levels,
     find_imperfections,
     refine,
 )
@@ -39,15 +39,12 @@ __all__ = [
     "through_reference",
 ]
 
-_levels = kept(count_levels)
-
 
 def look(question: Question) -> Imperfections:
     """Find clipped, held, rounded, stuck and lost samples of the output."""
     if question.exact:
         return Imperfections()
-    richest = max(_levels(source.values) for source in question.aligned.inputs)
-    return _imperfections(question, richest=richest)
+    return _imperfections(question, inputs=[u.values for u in question.aligned.inputs])
 
 
 def mark_swapped(question: Question) -> Question:
@@ -151,7 +148,7 @@ def look_again(question: Question, seen: Imperfections, fitted: OutputFit) -> Im
 
 
 def _imperfections(
-    question: Question, *, prediction: Real | None = None, richest: int = 0
+    question: Question, *, prediction: Real | None = None, inputs: Sequence[Real] = ()
 ) -> Imperfections:
     """What `hmpim.identify.effects.imperfections.find_imperfections` finds of the output."""
     output = question.output
@@ -160,7 +157,7 @@ def _imperfections(
         question.aligned.fs,
         valid=output.valid,
         prediction=prediction,
-        richest=richest,
+        inputs=inputs,
     )
 
 

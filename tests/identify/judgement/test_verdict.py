@@ -119,7 +119,7 @@ def test_every_check_may_raise_and_the_result_stands(field_record, monkeypatch, 
         (f"{room}.residual", "compare_halves"),
         (f"{room}.residual", "input_noise"),
         (f"{room}.between_samples", "rivals_of"),
-        (f"{room}.reach", "windowed_power"),
+        (f"{room}.reach", "lines_of"),
     ):
         monkeypatch.setattr(sys.modules[place], name, broken)
     with breaking_checks():

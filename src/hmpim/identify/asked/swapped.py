@@ -20,7 +20,8 @@ from hmpim.identify.fitting.trial import JointFit
 from hmpim.identify.noise.covariance import covariance
 from hmpim.identify.noise.whiteness import is_white
 from hmpim.identify.result.groups import EVERY
-from hmpim.identify.worth import FEW, MATERIAL, NEARLY, PART
+from hmpim.identify.section_iv.correlation import likeness
+from hmpim.identify.worth import FEW, MATERIAL, PART
 from hmpim.record import Finding
 
 __all__ = ["is_swapped", "lags_behind", "swapped_finding"]
@@ -74,10 +75,11 @@ def is_swapped(u: Real, y: Real, valid: Mask) -> bool:
     """
     if np.count_nonzero(valid) < _FEWEST:
         return False
-    u, y = (np.where(valid, x - x[valid].mean(), 0.0) for x in (u, y))
-    u, y = (x / (float(np.abs(x).max()) or 1.0) for x in (u, y))
-    if not _is_ahead(u, y):
+    if not valid.all():
+        u, y = (np.where(valid, x - x[valid].mean(), 0.0) for x in (u, y))
+    if not likeness(u, y).is_ahead:
         return False
+    u, y = ((x - x.mean()) / (float(np.abs(x - x.mean()).max()) or 1.0) for x in (u, y))
     u, y, valid = _thinned(u, y, valid)
     evidence = [_evidence(u, y, valid, step) for step in _STEPS]
     if max(evidence) <= PART or min(evidence) <= -FEW:
@@ -119,20 +121,6 @@ def lags_behind(joint: JointFit) -> bool:
     )
     # The logarithm of the first section's time constant comes after the delay.
     return bool(variance[1, 1] < PART**2)
-
-
-def _is_ahead(u: Real, y: Real) -> bool:
-    """Whether `y` is ahead of `u` where they resemble each other most.
-
-    A sine, an integral or a derivative resembles as much on the other side, with the other sign:
-    then it is not told which is ahead.
-    """
-    size = scipy.fft.next_fast_len(2 * u.size, real=True)
-    likeness = scipy.fft.irfft(np.conj(scipy.fft.rfft(u, size)) * scipy.fft.rfft(y, size), size)
-    behind, ahead = likeness[: u.size], likeness[size - u.size + 1 :]
-    peak = float(ahead[np.argmax(np.abs(ahead))])
-    opposite = float((-np.sign(peak) * behind).max())
-    return abs(peak) > float(np.abs(behind).max()) and opposite < NEARLY * abs(peak)
 
 
 def _thinned(u: Real, y: Real, valid: Mask) -> tuple[Real, Real, Mask]:

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from hmpim.errors import RecordError
-from hmpim.identify.arrays import Real
+from hmpim.identify.arrays import Real, every_of, median
 from hmpim.identify.chance import BULK, DEVIATIONS
 from hmpim.identify.signals import as_signal, check_rate
 from hmpim.identify.worth import FEW, MOST, NEARLY, PART
@@ -162,7 +162,7 @@ def _changed(samples: Real, change: Real) -> NDArray[np.intp]:
     rounding = float(8 * np.finfo(float).eps * np.max(np.abs(samples)))
     least = rounding
     if np.count_nonzero(change <= rounding) < _FEWEST:  # no repeats: noise came after the hold
-        least = DEVIATIONS / BULK * float(np.median(change))
+        least = DEVIATIONS / BULK * median(change[:: every_of(change.size)])
     return np.flatnonzero(change > least) + 1
 
 
@@ -173,7 +173,7 @@ def _is_rich(samples: Real, change: Real, changed: NDArray[np.intp]) -> bool:
     if np.mean(jump > (1 + MOST) * np.quantile(jump, FEW)) < FEW:
         return False
     levels = np.sort(samples[changed])
-    apart = DEVIATIONS / BULK * float(np.median(change)) if change.min() > 0 else 0.0
+    apart = DEVIATIONS / BULK * median(change) if change.min() > 0 else 0.0
     return bool(
         1 + np.count_nonzero(np.diff(levels) > apart) >= _FEWEST or _spread_out(levels, apart)
     )

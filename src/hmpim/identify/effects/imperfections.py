@@ -5,6 +5,7 @@ likelihood of what was read is maximised, clipped samples counting as "beyond th
 held ones at the instants of their updates (`hmpim.identify.effects.censored`).
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -22,10 +23,13 @@ from hmpim.identify.fitting.fit import Fit
 from hmpim.identify.fitting.trial import JointFit, Trial
 from hmpim.identify.worth import FEW, NEARLY, TWICE
 
-__all__ = ["Imperfections", "count_levels", "find_imperfections", "refine"]
+__all__ = ["Imperfections", "find_imperfections", "refine"]
 
 _FEWEST_LEVELS = 8
 """Levels that an output must take, unless its input takes as few."""
+
+_HEAD = 64
+"""First samples, of which most outputs take more values."""
 
 _ROUNDS = 3
 """Times that spikes are sought behind clipping: large ones hide smaller ones."""
@@ -92,7 +96,7 @@ def find_imperfections(
     *,
     valid: Mask | None = None,
     prediction: Real | None = None,
-    richest: int = 0,
+    inputs: Sequence[Real] = (),
 ) -> Imperfections:
     """Look for saturation, hold, quantisation, spikes and standstill in an output.
 
@@ -107,11 +111,10 @@ def find_imperfections(
     prediction : ndarray, shape (n,), optional
         What a first model says; with it a plateau is told from a crest, and spikes and
         standstill are looked for.
-    richest : int
-        Levels that the inputs take; 0 where those of the output are not asked for.
+    inputs : sequence of ndarray, shape (n,)
+        Beside which an output may take few values; none where that is not asked for.
     """
-    recorded = np.ones(y.size, dtype=bool) if valid is None else valid
-    rounding = detect_quantization(y[recorded])
+    rounding = detect_quantization(y if valid is None or valid.all() else y[valid])
     step = 0.0 if rounding is None else rounding.step
     clipping: Saturation | None = detect_saturation(y, prediction, step=step)
     if clipping is not None and (
@@ -131,27 +134,22 @@ def find_imperfections(
         spikes=spikes,
         frozen=frozen,
         repeated=find_repeated(y) if rounding is None and hold is None else None,
-        levels=_few_levels(y, richest),
+        levels=_few_levels(y, inputs),
     )
 
 
-def count_levels(x: Real) -> int:
-    """Return how many different values `x` takes.
-
-    Examples
-    --------
-    >>> count_levels(np.array([0.0, 1.0, 1.0, 0.0]))
-    2
-    """
+def _count_levels(x: Real) -> int:
+    """How many different values `x` takes."""
     return int(np.unique(x).size)
 
 
-def _few_levels(y: Real, richest: int) -> int | None:
+def _few_levels(y: Real, inputs: Sequence[Real]) -> int | None:
     """How many values the output takes, if they are few beside those of the inputs."""
-    if not richest:
+    if not inputs or _count_levels(y[:_HEAD]) >= _FEWEST_LEVELS:
         return None
-    levels = count_levels(y)
-    return levels if levels < _FEWEST_LEVELS and richest > 2 * levels else None
+    levels = _count_levels(y)
+    few = levels < _FEWEST_LEVELS and max(_count_levels(u) for u in inputs) > 2 * levels
+    return levels if few else None
 
 
 def refine(

@@ -8,7 +8,7 @@ the model moves on, was not updated, was cut off, or read a fixed word in its pl
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
-from hmpim.identify.arrays import Mask, Real
+from hmpim.identify.arrays import Mask, Real, every_of
 from hmpim.identify.chance import BULK, DEVIATIONS
 from hmpim.identify.worth import FEW, MUCH, PART, TWICE, WORTH
 from hmpim.record.runs import runs_of
@@ -39,8 +39,9 @@ def stands_out(residual: Real) -> bool:
 
 def stand_out(residuals: Real) -> Mask:
     """The same of many residuals, shape (..., n): which of them, shape (...)."""
-    away = np.abs(residuals - np.median(residuals, axis=-1, keepdims=True))
-    bulk = np.median(away, axis=-1)
+    some = slice(None, None, every_of(residuals.shape[-1]))
+    away = np.abs(residuals - np.median(residuals[..., some], axis=-1, keepdims=True))
+    bulk = np.median(away[..., some], axis=-1)
     # Twice what chance allows: noise need not be Gaussian.
     return np.asarray((away.max(axis=-1) > TWICE * DEVIATIONS / BULK * bulk) & (bulk > 0.0))
 

@@ -11,12 +11,12 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
-from hmpim.identify.arrays import Real
+from hmpim.identify.arrays import Real, median
 from hmpim.identify.chance import SEARCHED
 from hmpim.identify.signals import as_signal
-from hmpim.identify.worth import FEW, NEARLY, PART
+from hmpim.identify.worth import FEW, MOST, NEARLY, PART, TWICE
 
 __all__ = ["Quantization", "detect_quantization"]
 
@@ -31,6 +31,9 @@ _FINEST_DOUBLE = 2.0**-44
 
 _CELLS = 1 << 15
 """Cells of the histogram whose transform is searched; steps down to 4 / _CELLS of the range."""
+
+_SOME = 256
+"""Distances, evenly spread over the range, that are asked for a common step before all are."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -108,7 +111,7 @@ def detect_quantization(y: ArrayLike) -> Quantization | None:
 
 def _distinct(samples: Real, tolerance: float) -> Real:
     """Sorted values; those that differ by arithmetic alone count once."""
-    values = np.unique(samples)
+    values = np.sort(samples)
     starts = np.concatenate([[True], np.diff(values) > tolerance])
     return np.asarray(values[starts])
 
@@ -117,35 +120,47 @@ def _by_distances(levels: Real, largest: float) -> Quantization | None:
     """Find the step of which all distances between neighbours are multiples."""
     gaps = np.diff(levels)
     smallest = float(gaps.min())
-    with np.errstate(over="ignore"):
-        single = bool(np.all(levels == levels.astype(np.float32)))
+    # Where a grid's distances are all multiples of a step, so are some of them.
+    some = np.sort(gaps[:: max(1, gaps.size // _SOME)])
+    finest = (_FINEST if _single(levels) else _FINEST_DOUBLE) * largest
     for divisor in (1, 2, 3):  # the smallest distance seen may be a few steps
         rough = smallest / divisor
-        if rough < (_FINEST if single else _FINEST_DOUBLE) * largest:
+        if rough < finest:
             return None
-        fitted = _multiples(levels, gaps, rough)
+        if _common_step(some, rough, TWICE * FEW) is None:
+            continue
+        step = _common_step(np.sort(gaps), rough, FEW)
+        fitted = None if step is None else _multiples(levels, gaps, step)
         if fitted is not None:
             return fitted
     return None
 
 
-def _multiples(levels: Real, gaps: Real, rough: float) -> Quantization | None:
+def _single(levels: Real) -> bool:
+    """Whether all values are single-precision numbers."""
+    with np.errstate(over="ignore"):
+        return all(bool(np.all(x == x.astype(np.float32))) for x in (levels[:_SOME], levels))
+
+
+def _common_step(ordered: Real, step: float, most: float) -> float | None:
+    """Step of which rising distances are multiples, to an r.m.s. share of it; None if of none."""
     # Small distances first: their multiple is sure even while the step is rough.
-    order = np.argsort(gaps)
-    ordered = gaps[order]
-    step = rough
     count = 1
     while True:
         chosen = ordered[:count]
         multiple = np.maximum(np.rint(chosen / step), 1.0)
         step = float(chosen @ multiple / (multiple @ multiple))
-        if count == gaps.size:
+        if count == ordered.size:
             break
-        count = min(2 * count, gaps.size)
-    multiple = np.maximum(np.rint(gaps / step), 1.0)
-    if float(np.sqrt(np.mean((gaps / step - multiple) ** 2))) > FEW:
-        return None
-    k = np.concatenate([[0.0], np.cumsum(multiple)])
+        count = min(2 * count, ordered.size)
+    parts = ordered / step
+    off = parts - np.maximum(np.rint(parts), 1.0)
+    return step if float(np.sqrt(off @ off / off.size)) <= most else None
+
+
+def _multiples(levels: Real, gaps: Real, step: float) -> Quantization | None:
+    """The grid of such a step through all levels."""
+    k = np.concatenate([[0.0], np.cumsum(np.maximum(np.rint(gaps / step), 1.0))])
     centred = k - k.mean()
     spread = float(centred @ centred)
     step = float(centred @ levels / spread)
@@ -181,17 +196,24 @@ def _by_clusters(samples: Real, span: float) -> Quantization | None:
     # A plateau counts as much as its neighbours: it must not ring at all frequencies.
     counts = np.minimum(counts, max(3, int(3 * samples.size / _CELLS)))
     total = float(counts.sum())
-    spectrum = scipy.fft.rfft(counts.astype(np.float32), 4 * _CELLS)  # padded: four points per peak
+    cells = counts.astype(np.float32)
     first, last = 4 * (_FEWEST_LEVELS + 1), _CELLS
-    power = np.abs(spectrum[:last]) ** 2 / total
-    if last - first < 100:
+    # Of two points per peak the nearest stands at half its height at least.
+    least = PART**2 * total**2
+    if float(_power(cells, 2)[first // 2 : last // 2].max()) < (1 - PART) * MOST * least:
         return None
+    power = _power(cells, 4)[:last]
     best = first + int(np.argmax(power[first:]))
     near = slice(max(first, best // 2), min(2 * best, last))
-    level = float(np.median(power[near]))
-    if power[best] < max(SEARCHED / np.log(2) * level, PART**2 * total):
+    if power[best] < max(SEARCHED / np.log(2) * median(power[near]), least):
         return None
     return _sharpened(samples, 4 * _CELLS * width / best, span)
+
+
+def _power(cells: NDArray[np.float32], points: int) -> Real:
+    """Power of the cells' transform, so many points per peak."""
+    spectrum = scipy.fft.rfft(cells, points * cells.size)
+    return np.asarray(spectrum.real**2 + spectrum.imag**2, dtype=np.float64)
 
 
 def _sharpened(samples: Real, step: float, span: float) -> Quantization | None:

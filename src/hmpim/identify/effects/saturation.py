@@ -15,7 +15,7 @@ import scipy
 from numpy.typing import ArrayLike, NDArray
 
 from hmpim.errors import RecordError
-from hmpim.identify.arrays import Mask, Real
+from hmpim.identify.arrays import Mask, Real, every_of, median
 from hmpim.identify.chance import BULK, DEVIATIONS, FALSE_ALARM, ONE_SIDED, deviations
 from hmpim.identify.effects.smeared import smeared_plateaus
 from hmpim.identify.signals import as_signal
@@ -32,6 +32,10 @@ a sinusoid's gives 2.4 to 3."""
 
 _FEWEST = 8
 """Samples that must be at the level, and just below it, before anything is said."""
+
+_FINE = 64
+"""Cells to a deviation of the noise in which values are counted: the place of their crowd moves by
+no more than 1e-5 of it."""
 
 _VISITS = 2
 """Stays at the level that must look alike, where no prediction helps."""
@@ -131,8 +135,9 @@ def detect_saturation(
                 f"y has {samples.size} samples and the prediction {model.size}; "
                 "give one for each sample"
             )
-    high = _upper(samples, model, step)
-    low = _upper(-samples, None if model is None else -model, step)
+    scatter = _scatter(samples)
+    high = _upper(samples, model, step, scatter)
+    low = _upper(-samples, None if model is None else -model, step, scatter)
     if high is None and low is None and model is not None:
         return _smeared(samples, model, step)
     nothing = np.zeros(samples.size, dtype=bool)
@@ -176,30 +181,34 @@ def _smeared(y: Real, prediction: Real, step: float) -> Saturation:
     )
 
 
-def _upper(y: Real, prediction: Real | None, step: float) -> _Side | None:
+def _upper(y: Real, prediction: Real | None, step: float, sigma: float) -> _Side | None:
     """The upper level, by exact ties; without a prediction, by a plateau with scatter too."""
     span = float(np.ptp(y))
     if span == 0.0:
         return None
     exact = _exact(y, span, step)
-    if exact is not None and _is_clipped(y, exact, prediction, step, span):
+    if exact is not None and _is_clipped(y, exact, prediction, step, span, sigma):
         return exact
-    sigma = _scatter(y)
     if prediction is None and max(step, 1e-6 * span) < sigma < TOLERATED * span:
         side = _scattered(y, sigma)
-        if side is not None and _is_clipped(y, side, None, step, span):
+        if side is not None and _is_clipped(y, side, None, step, span, sigma):
             return side
     return None
 
 
 def _spread(x: Real) -> float:
     """Standard deviation of the bulk, from the median of the magnitude."""
-    return float(np.median(np.abs(x - np.median(x))) / BULK)
+    return median(np.abs(x - median(x))) / BULK
 
 
 def _scatter(y: Real) -> float:
-    """Standard deviation of what is not smooth from sample to sample: third differences."""
-    return _spread(np.diff(y, 3)) / float(np.sqrt(20.0))
+    """Standard deviation of what is not smooth from sample to sample: third differences.
+
+    Of many, those that begin at evenly spread samples.
+    """
+    every = every_of(y.size)
+    first, second, third, last = (y[k : y.size - 3 + k : every] for k in range(4))
+    return _spread(last - first + 3.0 * (second - third)) / float(np.sqrt(20.0))
 
 
 def _exact(y: Real, span: float, step: float) -> _Side | None:
@@ -219,10 +228,15 @@ def _scattered(y: Real, sigma: float) -> _Side | None:
     top = float(y.max())
     most = deviations(y.size) * sigma  # a level further below the top is none
     upper = y[y > top - 2.0 * most]
+    cell = ((top - upper) * (_FINE / sigma)).astype(np.intp)
+    held = np.bincount(cell)
+    filled = held > 0
+    held = held[filled]
+    place = np.bincount(cell, weights=upper)[filled] / held
     level = top - DEVIATIONS * sigma
     for _ in range(50):  # climbs to where the values are densest
-        weight = np.exp(-0.5 * ((upper - level) / sigma) ** 2)
-        moved = float(weight @ upper / weight.sum())
+        weight = held * np.exp(-0.5 * ((place - level) / sigma) ** 2)
+        moved = float(weight @ place / weight.sum())
         done = abs(moved - level) < 1e-6 * sigma
         level = moved
         if done:
@@ -240,7 +254,9 @@ def _scattered(y: Real, sigma: float) -> _Side | None:
     )
 
 
-def _is_clipped(y: Real, side: _Side, prediction: Real | None, step: float, span: float) -> bool:
+def _is_clipped(
+    y: Real, side: _Side, prediction: Real | None, step: float, span: float, scatter: float
+) -> bool:
     resolution = max(float(side.level - y[side.at].min()), 0.5 * step, 1e-9 * span)
     if side.exact:
         resolution *= 2.0  # the level stands for half a step on either side
@@ -251,7 +267,7 @@ def _is_clipped(y: Real, side: _Side, prediction: Real | None, step: float, span
     if not _is_crowded(count, below, resolution):
         return False
     if prediction is not None:
-        return _goes_beyond(y, side, prediction, resolution)
+        return _goes_beyond(y, side, prediction, resolution, scatter)
     if below.size < _FEWEST or not _is_even(below, resolution, reach):
         return False
     return _is_flat(y, side, resolution, reach)
@@ -261,10 +277,9 @@ def _is_crowded(count: int, below: Real, resolution: float) -> bool:
     """Whether the level holds more samples than a crest would, judged by what is just below."""
     if below.size == 0:
         return True
-    distances = np.sort(below)
-    nearest = min(max(40, count // 4), count, distances.size)
-    room = max(float(distances[nearest - 1]), 2.0 * resolution) - resolution
-    found = np.count_nonzero(distances < room + resolution) + 1
+    nearest = min(max(40, count // 4), count, below.size)
+    room = max(float(np.partition(below, nearest - 1)[nearest - 1]), 2.0 * resolution) - resolution
+    found = np.count_nonzero(below < room + resolution) + 1
     expected = found * resolution / room
     return bool(scipy.special.pdtrc(count - 1, _CROWDED * expected) < FALSE_ALARM)
 
@@ -318,7 +333,7 @@ def _neither_bends_nor_tilts(y: Real, visits: NDArray[np.intp], sigma: float) ->
     return bool(abs(weights[1]) < sigma and abs(weights[2]) < sigma)
 
 
-def _goes_beyond(y: Real, side: _Side, prediction: Real, resolution: float) -> bool:
+def _goes_beyond(y: Real, side: _Side, prediction: Real, resolution: float, scatter: float) -> bool:
     """Whether the prediction, set right on the other samples, exceeds the level at the level."""
     slope = np.gradient(prediction)
     rows = np.stack([np.ones(y.size), prediction, slope, np.gradient(slope)])
@@ -337,6 +352,6 @@ def _goes_beyond(y: Real, side: _Side, prediction: Real, resolution: float) -> b
     if np.mean(beyond) > least and np.mean(beyond > 0) > MOST:
         return True
     # Values that scatter elsewhere and are all alike here, while the prediction moves.
-    noise = min(error, _scatter(y))
+    noise = min(error, scatter)
     moves = float(np.std(beyond))
     return bool(noise > resolution and moves > max(MUCH * noise, MATERIAL * float(np.ptp(y))))

@@ -19,7 +19,7 @@ from hmpim.identify.fleets.quiet import are_quiet
 from hmpim.identify.fleets.simpler import Simpler, costs_of, learn_simpler
 from hmpim.identify.frf.local import local_responses
 from hmpim.identify.judgement.between_samples import undetermined_between
-from hmpim.identify.judgement.reach import count_lines, unreached
+from hmpim.identify.judgement.reach import lines_of, unreached
 from hmpim.identify.judgement.structure import barely_told
 from hmpim.identify.judgement.verdict import judged
 from hmpim.identify.noise.input_noise import input_noise
@@ -94,7 +94,7 @@ def learn_whole(fleet: Fleet, pairs: Sequence[PairIdentification]) -> Whole | No
     noise = input_noise(u, fs, band=fleet.band)
     if u.size > _LONGEST or (sweep is None and find_period(u) is not None):
         return None
-    if 2 * count_lines(u) < _SPARE or (noise is not None and noise.attenuation > WORTH):
+    if 2 * lines_of(u).count < _SPARE or (noise is not None and noise.attenuation > WORTH):
         return None
     known = [pair for pair in pairs if is_alike(pair)]
     outputs = [output for pair in known if (output := _output(pair)) is not None]

@@ -81,10 +81,11 @@ class Evidence:
 
         It is greatest at the ends of a record, for want of the input beyond them.
         """
+        if self.unexplained >= WORTH:
+            return False
         fit, end = self.joint.best.fit, int(FEW * self.u.size) + 1
         inner, moves = fit.residual[end:-end], fit.prediction + fit.residual
-        least = INTERPOLATED * float(np.std(moves))
-        return self.unexplained < WORTH and float(np.sqrt(np.mean(inner**2))) < least
+        return float(np.sqrt(np.mean(inner**2))) < INTERPOLATED * float(np.std(moves))
 
 
 def structure_in_words(name: str) -> str:

@@ -1,13 +1,12 @@
 """Whether the input answers the noise: a loop around the unit."""
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from hmpim.identify.arrays import Real
+from hmpim.identify.arrays import Mask, Real
 from hmpim.identify.chance import FALSE_ALARM
 from hmpim.identify.fitting.least_squares import solved
 from hmpim.identify.judgement.evidence import Evidence
@@ -27,7 +26,7 @@ _PAST, _FUTURE = slice(0, _AHEAD + 2), slice(_AHEAD + 2, None)
 """Of the lags behind a constant: it and the past, and the future."""
 
 _AT_ONCE = 20_000
-"""Samples whose lags are held at once."""
+"""Samples left out whose lags are held at once."""
 
 
 def feedback(evidence: Evidence) -> tuple[Finding, ...]:
@@ -40,16 +39,15 @@ def feedback(evidence: Evidence) -> tuple[Finding, ...]:
     left, u = evidence.readings.innovations, evidence.u
     if evidence.through or left.size != u.size or u.size < 20 * _AHEAD:
         return ()
-    bent = evidence.nonlinear > 0.0 and evidence.unexplained < MOST
-    if bent or find_period(u) is not None:
-        return ()  # a sweep's harmonics are its future; that of a periodic input is its past
-    inside = np.arange(_AHEAD, u.size - _AHEAD)
+    if evidence.nonlinear > 0.0 and evidence.unexplained < MOST:
+        return ()  # a sweep's harmonics are its future
     counts = evidence.joint.weighed.counts
-    inside = inside if counts is None else inside[counts[inside]]
-    if inside.size < 10 * _AHEAD:
+    if counts is not None and np.count_nonzero(counts[_AHEAD:-_AHEAD]) < 10 * _AHEAD:
         return ()
-    if float(chances_of_an_answer(u, left[None], inside)[0]) > FALSE_ALARM:
+    if float(chances_of_an_answer(u, left[None], counts)[0]) > FALSE_ALARM:
         return ()
+    if find_period(u) is not None:
+        return ()  # the future of a periodic input is its past
     moved = moved_by(evidence, 1.0)
     if moved == ("noise_std",):
         return ()
@@ -67,7 +65,7 @@ def feedback(evidence: Evidence) -> tuple[Finding, ...]:
     )
 
 
-def chances_of_an_answer(u: Real, left: Real, inside: NDArray[np.intp] | None = None) -> Real:
+def chances_of_an_answer(u: Real, left: Real, counts: Mask | None = None) -> Real:
     """Chance, for each of many residuals, that no answer of the input makes what is seen.
 
     Parameters
@@ -76,21 +74,30 @@ def chances_of_an_answer(u: Real, left: Real, inside: NDArray[np.intp] | None = 
         The input.
     left : ndarray, shape (k, n)
         What models leave over of outputs to it.
-    inside : integer ndarray, optional
-        Samples that count; all that have as many neighbours as are looked at by default.
+    counts : ndarray of bool, shape (n,), optional
+        Samples that count; all by default.
 
     Returns
     -------
     ndarray, shape (k,)
         1 where the input's past tells all of its future.
     """
-    inside = np.arange(_AHEAD, u.size - _AHEAD) if inside is None else inside
-    own = _future_of(u, inside)
+    lost = None if counts is None else np.flatnonzero(~counts[_AHEAD:-_AHEAD])
+    own = _future_of(u, lost)
     if not own.size.size:
         return np.ones(left.shape[0])
-    cross = _products_with(u, left, inside)
+    inner = left[:, _AHEAD:-_AHEAD]
+    if lost is not None and lost.size:
+        inner = inner.copy()
+        inner[:, lost] = 0.0
+    count = inner.shape[1] - (0 if lost is None else lost.size)
+    mean = inner.sum(axis=1) / count
+    variance = np.vecdot(inner, inner) / count - mean**2
+    moves = u - u.mean()
+    cross = np.stack([np.correlate(moves, one, "valid") for one in inner], axis=1)
+    cross = np.concatenate([inner.sum(axis=1)[None], cross])
     along = own.direction.T @ (cross[_FUTURE] - own.told.T @ cross[_PAST])
-    gained = np.sum(along**2 / own.size[:, None], axis=0) / left[:, inside].var(axis=1)
+    gained = np.sum(along**2 / own.size[:, None], axis=0) / variance
     return np.asarray(scipy.special.chdtrc(own.size.size, gained))
 
 
@@ -104,10 +111,12 @@ class _Future:
 
 
 @kept
-def _future_of(u: Real, inside: NDArray[np.intp]) -> _Future:
-    gram = np.zeros((2 * _AHEAD + 2, 2 * _AHEAD + 2))
-    for rows, _ in _lags_of(u, inside):
-        gram += rows @ rows.T
+def _future_of(u: Real, lost: NDArray[np.intp] | None) -> _Future:
+    gram = _gram(u - u.mean())
+    if lost is not None:
+        for begin in range(0, lost.size, _AT_ONCE):
+            rows = _lags_at(u - u.mean(), lost[begin : begin + _AT_ONCE])
+            gram -= rows @ rows.T
     # Of the future what the past does not tell (a Schur complement).
     told = solved(gram[_PAST, _PAST], gram[_PAST, _FUTURE])
     size, direction = np.linalg.eigh(gram[_FUTURE, _FUTURE] - gram[_FUTURE, _PAST] @ told)
@@ -115,17 +124,25 @@ def _future_of(u: Real, inside: NDArray[np.intp]) -> _Future:
     return _Future(size=size[seen], direction=direction[:, seen], told=told)
 
 
-def _products_with(u: Real, left: Real, inside: NDArray[np.intp]) -> Real:
-    """Products of a constant and an input's lags, past first, with what is left, (lags, k)."""
-    cross = np.zeros((2 * _AHEAD + 2, left.shape[0]))
-    for rows, some in _lags_of(u, inside):
-        cross += rows @ left[:, some].T
-    return cross
+def _gram(u: Real) -> Real:
+    """Products of a constant and an input's lags, past first, over all samples that have them.
+
+    From lag to lag a product of two loses what stands first, and gains what comes behind.
+    """
+    samples = u.size - 2 * _AHEAD
+    head, tail = u[: 2 * _AHEAD], u[samples:]
+    gram = np.empty((2 * _AHEAD + 2, 2 * _AHEAD + 2))
+    gram[0, 0], gram[0, 1] = samples, u[:samples].sum()
+    gram[0, 2:] = gram[0, 1] + np.cumsum(tail - head)
+    gram[1, 1:] = np.correlate(u, u[:samples], "valid")
+    gram[1:, :2] = gram[:2, 1:].T
+    change = np.outer(tail, tail) - np.outer(head, head)
+    for k in range(2, gram.shape[0]):
+        gram[k, 2:] = gram[k - 1, 1:-1] + change[k - 2]
+    return gram
 
 
-def _lags_of(u: Real, inside: NDArray[np.intp]) -> Iterator[tuple[Real, NDArray[np.intp]]]:
-    """A constant and an input's lags, past first, as rows, so many samples at once; and those."""
-    u, lags = u - u.mean(), np.arange(-_AHEAD, _AHEAD + 1)
-    for begin in range(0, inside.size, _AT_ONCE):
-        some = inside[begin : begin + _AT_ONCE]
-        yield np.vstack([np.ones(some.size), u[some + lags[:, None]]]), some
+def _lags_at(u: Real, places: NDArray[np.intp]) -> Real:
+    """A constant and an input's lags at samples counted from the first that has them."""
+    lags = u[places + np.arange(2 * _AHEAD + 1)[:, None]]
+    return np.concatenate([np.ones((1, places.size)), lags])

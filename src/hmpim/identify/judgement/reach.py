@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 import scipy
@@ -18,12 +19,13 @@ from hmpim.record import Finding
 from hmpim.record.runs import runs_of
 
 __all__ = [
+    "InputLines",
     "beyond_band",
-    "count_lines",
     "fast_mode",
     "few_lines",
     "initial_transient",
     "integrator",
+    "lines_of",
     "natural_frequency_beyond",
     "negative_delay",
     "short_record",
@@ -33,6 +35,9 @@ __all__ = [
 
 _LOBE = 4
 """Bins from the middle of a Blackman-Harris window's main lobe to its first zero."""
+
+_WEIGHTS = np.array([0.35875, -0.244145, 0.07064, -0.00584])
+"""What a Blackman-Harris window adds to a bin, and to each of three on either side of it."""
 
 _SPARE = 2
 """What lines must tell beyond the figures, for a wrong structure to show."""
@@ -88,9 +93,11 @@ def initial_transient(evidence: Evidence) -> tuple[Finding, ...]:
 def fast_mode(evidence: Evidence) -> tuple[Finding, ...]:
     """Doubt a richer structure with a mode far beyond what was excited."""
     name = evidence.joint.best.fit.structure.name
+    if name in PLAIN:
+        return ()
     poles = np.roots(evidence.readings.system.denominator[::-1])
     fastest = float(np.max(np.abs(poles), initial=0.0) / (2 * np.pi))
-    if name in PLAIN or fastest <= TWICE * evidence.band[1]:
+    if fastest <= TWICE * evidence.band[1]:
         return ()
     return (
         Finding(
@@ -248,30 +255,64 @@ def _at_the_line(evidence: Evidence) -> str:
     )
 
 
-@kept
 def windowed_power(u: Real) -> Real:
-    """Power in each bin behind a Blackman-Harris window, without what a constant has there."""
-    window = scipy.signal.windows.blackmanharris(u.size, sym=False)
-    level = (u - window @ u / window.sum()) * window
-    scale = 2.0 / (float(window @ window) * u.size)
-    return np.asarray(np.abs(scipy.fft.rfft(level)) ** 2 * scale)
+    """Power in each bin behind a Blackman-Harris window, without what a constant has there.
+
+    The window is a sum of four cosines, so that it weighs a bin with three on either side.
+    """
+    n = u.size
+    plain = scipy.fft.rfft(u - u.mean())
+    after = plain[-4:-1] if n % 2 == 0 else plain[-3:]
+    wide = np.concatenate([plain[3:0:-1].conj(), plain, after[::-1].conj()])
+    size = plain.size
+    behind = _WEIGHTS[0] * plain
+    for k, weight in enumerate(_WEIGHTS[1:], 1):
+        behind += weight * (wide[3 - k : 3 - k + size] + wide[3 + k : 3 + k + size])
+    behind[:4] -= behind[0] / _WEIGHTS[0] * _WEIGHTS
+    energy = n * (_WEIGHTS[0] ** 2 + 2.0 * (_WEIGHTS[1:] @ _WEIGHTS[1:]))
+    return np.asarray((behind.real**2 + behind.imag**2) * (2.0 / (energy * n)))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class InputLines:
+    """What the spectrum of an input shows.
+
+    Parameters
+    ----------
+    count : int
+        Frequencies that can be told apart.
+    octave, end : float
+        Mean power of a bin where the last octave begins, and where it ends.
+    """
+
+    count: int
+    octave: float
+    end: float
 
 
 @kept
-def count_lines(u: Real) -> int:
-    """How many frequencies an input has that can be told apart.
+def lines_of(u: Real) -> InputLines:
+    """Count the lines of an input, and take the height of its spectrum over the last octave.
+
+    Parameters
+    ----------
+    u : ndarray, shape (n,)
+        The input.
 
     Examples
     --------
     >>> time = np.arange(1000) / 100
-    >>> count_lines(np.sin(2 * np.pi * 3.3 * time)), count_lines(np.sin(time**2)) > 4
+    >>> lines_of(np.sin(2 * np.pi * 3.3 * time)).count, lines_of(np.sin(time**2)).count > 4
     (1, True)
     """
     power = windowed_power(u)
     above = power > DEEPEST * power.max()
     first, stop = runs_of(above)
     widths = stop - first
-    return int(np.sum(1 + np.maximum(widths - (2 * _LOBE - 1), 0) // _LOBE))
+    count = int(np.sum(1 + np.maximum(widths - (2 * _LOBE - 1), 0) // _LOBE))
+    part = max(power.size // 16, 1)
+    octave, end = power[7 * part : 8 * part], power[-part:]
+    return InputLines(count=count, octave=float(octave.mean()), end=float(end.mean()))
 
 
 def few_lines(evidence: Evidence) -> tuple[Finding, ...]:
@@ -279,7 +320,7 @@ def few_lines(evidence: Evidence) -> tuple[Finding, ...]:
 
     A line tells gain and phase where it is, and nothing else.
     """
-    lines = count_lines(evidence.u)
+    lines = lines_of(evidence.u).count
     fit = evidence.joint.best.fit
     unknown = fit.theta.size + fit.linear.size - 1
     if 2 * lines >= unknown + _SPARE:

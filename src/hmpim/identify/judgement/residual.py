@@ -8,8 +8,7 @@ from hmpim.identify.arrays import Real
 from hmpim.identify.chance import DEVIATIONS, FALSE_ALARM
 from hmpim.identify.fitting.halves import compare_halves
 from hmpim.identify.judgement.evidence import Evidence, structure_in_words
-from hmpim.identify.judgement.reach import windowed_power
-from hmpim.identify.kept import kept
+from hmpim.identify.judgement.reach import lines_of
 from hmpim.identify.noise.colour import noise_colour
 from hmpim.identify.noise.input_noise import input_noise
 from hmpim.identify.result.digits import percent
@@ -32,6 +31,9 @@ __all__ = [
 
 _FEWEST = 256
 """Samples from which the end of an input's spectrum is known."""
+
+_BINS = 16_384
+"""Frequencies, evenly spread, at which the answer to what is folded is summed."""
 
 _FAST = 9
 """Samples over which the size of what is fast in the input is taken."""
@@ -218,10 +220,11 @@ def unsampled_input(evidence: Evidence) -> tuple[Finding, ...]:
     folded = folded_power(evidence.u, evidence.fs)
     if not folded.any():
         return ()
-    frequency = np.arange(1, folded.size + 1) / evidence.u.size * evidence.fs
+    every = 1 + folded.size // _BINS
+    frequency = np.arange(1, folded.size + 1, every) / evidence.u.size * evidence.fs
     answered = np.abs(response(evidence.readings.system, frequency)) ** 2
     noise = float(np.mean(_counted(evidence) ** 2))
-    share = float(folded @ answered) / noise if noise > 0.0 else 0.0
+    share = every * float(folded[::every] @ answered) / noise if noise > 0.0 else 0.0
     if share <= 2 * FEW:
         return ()
     return (
@@ -236,7 +239,6 @@ def unsampled_input(evidence: Evidence) -> tuple[Finding, ...]:
     )
 
 
-@kept
 def folded_power(u: Real, fs: float) -> Real:
     """Power that an input has beyond half the rate, at the frequencies into which it is folded.
 
@@ -249,17 +251,15 @@ def folded_power(u: Real, fs: float) -> Real:
     fs : float
         Rate in Hz.
     """
-    power = windowed_power(u)
-    nothing = np.zeros(power.size - 1)
+    nothing = np.zeros(u.size // 2)
     if u.size < _FEWEST:
         return nothing
-    octave = power.size // 16
-    low, high = power[7 * octave : 8 * octave].mean(), power[-octave:].mean()
-    steep = float(np.log2(low / high)) if high > 0.0 else 0.0
+    lines = lines_of(u)
+    steep = float(np.log2(lines.octave / lines.end)) if lines.end > 0.0 else 0.0
     if steep < 1.0:  # as white noise, or none at all
         return nothing
-    frequency = np.arange(1, power.size) / u.size * fs
-    return np.asarray(high * (2.0 * (1.0 - frequency / fs)) ** -steep)
+    frequency = np.arange(1, nothing.size + 1) / u.size * fs
+    return np.asarray(lines.end * (2.0 * (1.0 - frequency / fs)) ** -steep)
 
 
 def _counted(evidence: Evidence) -> Real:

@@ -1,7 +1,5 @@
 """Bandwidths that measured response and model put apart, and those that a graze leaves open."""
 
-from collections.abc import Callable
-
 import numpy as np
 
 from hmpim.identify.arrays import Real
@@ -21,21 +19,16 @@ _GAIN_SHAPE = ("natural_frequency", "damping_ratio", "time_constant", "peak_gain
 _POINTS = 400
 """Frequencies at which a curve is looked at for turns."""
 
-_Level = Callable[[RationalDelay, Real], Real]
 
-
-def _above_half(system: RationalDelay, frequency: Real) -> Real:
-    """Gain over that at DC, above half the power, as a logarithm."""
-    gain = np.abs(response(system, frequency) / response(system, np.zeros(1)))
-    return np.asarray(np.log(gain) + 0.5 * np.log(2.0))
-
-
-_LEVELS: dict[str, _Level] = {
-    "bandwidth_phase90": lambda system, f: phase(system, f) + np.pi / 2,
-    "bandwidth_phase90_without_delay": lambda system, f: phase(system, f, delay=False) + np.pi / 2,
-    "bandwidth_3db": _above_half,
-}
-"""Height of the response above the level of each bandwidth."""
+def _heights(system: RationalDelay, frequency: Real) -> dict[str, Real]:
+    """Height of the response above the level of each bandwidth, the gain as a logarithm."""
+    turned = phase(system, frequency, delay=False) + np.pi / 2
+    at_dc = system.numerator[0] / system.denominator[0]
+    return {
+        "bandwidth_phase90": turned - 2 * np.pi * frequency * system.delay,
+        "bandwidth_phase90_without_delay": turned,
+        "bandwidth_3db": np.log(np.abs(response(system, frequency) / at_dc)) + 0.5 * np.log(2.0),
+    }
 
 
 def bandwidth_disagrees(evidence: Evidence) -> tuple[Finding, ...]:
@@ -84,17 +77,15 @@ def grazed_bandwidth(evidence: Evidence) -> tuple[Finding, ...]:
         return ()
     grid = np.geomspace(evidence.band[1] * 1e-3, evidence.band[1], _POINTS)
     touched = []
-    for name, level in _LEVELS.items():
+    for name, curve in _heights(system, grid).items():
         found = getattr(p, name)
-        place = _nearest_turn(grid, level(system, grid), np.inf if found is None else found.value)
+        place = _nearest_turn(grid, curve, np.inf if found is None else found.value)
         if place is None:
             continue
         at = np.array([place])
 
-        def height(
-            vector: Real, level: _Level = level, at: Real = at
-        ) -> float:  # one level at a time
-            return float(level(system_of(structure, vector, evidence.fs), at)[0])
+        def height(vector: Real, name: str = name, at: Real = at) -> float:
+            return float(_heights(system_of(structure, vector, evidence.fs), at)[name][0])
 
         error = float(np.sqrt(evidence.readings.variance(height)))
         if abs(height(evidence.readings.vector)) < DEVIATIONS * error:

@@ -4,7 +4,7 @@ import numpy as np
 
 from hmpim.identify.arrays import Complex, Real
 from hmpim.identify.fitting.fit import Fit
-from hmpim.identify.reading.propagation import gradient
+from hmpim.identify.reading.propagation import gradient, log_slopes
 from hmpim.identify.result import Estimate, Parameters
 from hmpim.identify.result.error_bars import estimate
 from hmpim.model.dynamics import Structure, coefficients_of, denominator_of, numerator_of
@@ -98,8 +98,9 @@ def read_figures(
     system = system_of(structure, vector, fs)
     marks, peak = _marks_of(structure, system, highest=highest)
     values = _values(structure, vector, system, marks, peak, fs)
-    sensitivity = _Sensitivity(structure, vector, fs, tuple(f for f in marks if f is not None))
-    slopes = _slopes(structure, vector, fs, values) | sensitivity.slopes(values, peak, system)
+    by_coefficient = _by_coefficient(structure, vector, fs)
+    sensitivity = _Sensitivity(structure, system, by_coefficient)
+    slopes = _slopes(structure, vector, fs, values) | sensitivity.slopes(values, peak)
     unit_of = _UNITS | {"scale_factor": _gain_unit(structure, *units), "bias": units[1]}
     read: dict[str, Estimate | None] = {
         name: None
@@ -112,7 +113,6 @@ def read_figures(
         )
         for name, value in values.items()
     }
-    by_coefficient = sensitivity.coefficients
     spread = by_coefficient.T @ cov @ by_coefficient
     return Parameters(noise_std=noise, **read), system, spread
 
@@ -124,14 +124,9 @@ def _slopes(
     axis, order = np.eye(vector.size), structure.order
     slopes = {
         "delay": axis[0] / fs,
-        "delay_low_frequency": axis[0] / fs,
         "scale_factor": _gain_rate(structure, fs) * axis[1 + order],
         "bias": axis[-1],
     }
-    if (order or structure.zeros) and _is_steady(structure):
-        slopes["delay_low_frequency"] = gradient(
-            lambda v: _slope_at_dc(system_of(structure, v, fs)), vector
-        )
     mode, natural = _lowest_mode(structure, vector), values["natural_frequency"]
     if mode is not None and natural is not None:
         stretch = axis[mode + 1] / (2 * vector[mode + 1])
@@ -245,52 +240,45 @@ def _mode_at(vector: Real, mode: int, fs: float) -> tuple[float, float]:
     return 2 * damping * float(np.exp(-vector[mode])) * fs / (2 * np.pi), damping
 
 
+def _by_coefficient(structure: Structure, vector: Real, fs: float) -> Real:
+    """Derivatives of the delay and the coefficients of B and A in s by a fit's vector, (p, q).
+
+    Of the coefficients of A those behind the first that is not zero, which may vary.
+    """
+
+    def coefficients(at: Real) -> Real:
+        system = system_of(structure, at, fs)
+        varied = system.denominator[structure.integrators + 1 :]
+        return np.concatenate([[system.delay], system.numerator, varied])
+
+    rows = []
+    for i, step in enumerate(1e-6 * np.maximum(np.abs(vector), 1e-3)):
+        above, below = vector.copy(), vector.copy()
+        above[i] += step
+        below[i] -= step
+        rows.append((coefficients(above) - coefficients(below)) / (2 * step))
+    return np.stack(rows)
+
+
 class _Sensitivity:
     """Derivatives of ln(G / G(0)) with respect to the fit's vector, and to the frequency."""
 
-    def __init__(
-        self, structure: Structure, vector: Real, fs: float, frequencies: tuple[float, ...]
-    ) -> None:
-        self._places, self._fs = np.array(frequencies), fs
+    def __init__(self, structure: Structure, system: RationalDelay, by_coefficient: Real) -> None:
+        self._structure, self._system, self._by_coefficient = structure, system, by_coefficient
 
-        def curve(system: RationalDelay, f: Real) -> Complex:
-            told = system.numerator[structure.dc_zeros]
-            return np.asarray(response(system, f) / told)
-
-        def coefficients(system: RationalDelay) -> Real:
-            varied = system.denominator[structure.integrators + 1 :]
-            return np.concatenate([[system.delay], system.numerator, varied])
-
-        middle = system_of(structure, vector, fs)
-        here = curve(middle, self._places)
-        self._slopes = np.empty((vector.size, self._places.size), dtype=np.complex128)
-        by_coefficient = []
-        for i, value in enumerate(vector):
-            step = np.zeros(vector.size)
-            step[i] = 1e-6 * max(abs(value), 1e-3)
-            above, below = (system_of(structure, vector + sign * step, fs) for sign in (1.0, -1.0))
-            up, down = curve(above, self._places), curve(below, self._places)
-            self._slopes[i] = (up - down) / (2 * step[i] * here)
-            by_coefficient.append((coefficients(above) - coefficients(below)) / (2 * step[i]))
-        self.coefficients = np.stack(by_coefficient)
-        """Derivatives of the delay and the coefficients of B and A, in s, shape (p, q)."""
-        up, down = (curve(middle, self._places * (1 + sign * 1e-5)) for sign in (1.0, -1.0))
-        self._rates = (up - down) / (2e-5 * np.maximum(self._places, 1e-300) * here)
-
-    def slopes(
-        self, values: dict[str, float | None], peak: PeakGain | None, system: RationalDelay
-    ) -> dict[str, Real]:
+    def slopes(self, values: dict[str, float | None], peak: PeakGain | None) -> dict[str, Real]:
         """Derivatives of the marks with respect to the vector, each shape (p,).
 
         A crossing's by the implicit function: the curve's own error over its slope.
         """
-        told: dict[str, Real] = {}
+        delay = self._by_coefficient[:, 0]
+        told: dict[str, Real] = {"delay_low_frequency": delay + self._late_at_dc()}
         for name, turn in (("bandwidth_phase90", 0.0), ("bandwidth_phase90_without_delay", 1.0)):
             if (value := values[name]) is not None:
                 change, rate = self._at(value)
-                slope, steep = change.imag.copy(), rate.imag + 2 * np.pi * turn * system.delay
-                slope[0] += 2 * np.pi * turn * value / self._fs
-                told[name] = slope / steep
+                late = 2 * np.pi * turn
+                steep = rate.imag + late * self._system.delay
+                told[name] = (change.imag + late * value * delay) / steep
         if (value := values["bandwidth_3db"]) is not None:
             change, rate = self._at(value)
             told["bandwidth_3db"] = change.real / rate.real
@@ -300,10 +288,28 @@ class _Sensitivity:
             told["peak_gain_db"] = 20 / np.log(10) * change.real * (peak.frequency > 0)
         return told
 
+    def _late_at_dc(self) -> Real:
+        """Derivative of what the dynamics add to the delay at low frequency, in s."""
+        above, below = self._system.numerator, self._system.denominator
+        slopes, late = self._by_coefficient[:, 1:], np.zeros(self._by_coefficient.shape[0])
+        if not _is_steady(self._structure):
+            return late
+        if below.size > 1:
+            late = late + slopes[:, above.size]
+        if above.size > 1:
+            late = late - (slopes[:, 1] - above[1] / above[0] * slopes[:, 0]) / above[0]
+        return np.asarray(late * (self._system.step or 1.0))
+
     def _at(self, frequency: float) -> tuple[Complex, complex]:
         """Derivatives with respect to the vector, shape (p,), and to the frequency in Hz."""
-        i = int(np.flatnonzero(self._places == frequency)[0])
-        return self._slopes[:, i], complex(self._rates[i])
+        places = np.maximum(frequency, 1e-300) * np.array([1.0 - 1e-5, 1.0, 1.0 + 1e-5])
+        below, here, above = response(self._system, places)
+        rate = (above - below) / ((places[2] - places[0]) * here)
+        by_delay, by_above, by_below = log_slopes(self._system, places[1:2])
+        told = self._structure.dc_zeros
+        by_above[told] -= 1.0 / self._system.numerator[told]
+        change = self._by_coefficient @ np.concatenate([by_delay, by_above, by_below])[:, 0]
+        return change, complex(rate)
 
 
 def _lowest_mode(structure: Structure, vector: Real) -> int | None:

@@ -8,10 +8,10 @@ from collections.abc import Callable
 
 import numpy as np
 
-from hmpim.identify.arrays import Real
+from hmpim.identify.arrays import Complex, Real
 from hmpim.model import RationalDelay, response
 
-__all__ = ["gradient", "response_std"]
+__all__ = ["gradient", "log_slopes", "response_std"]
 
 
 def gradient(function: Callable[[Real], float], at: Real) -> Real:
@@ -52,19 +52,26 @@ def response_std(system: RationalDelay, covariance: Real, frequency: Real) -> Re
     >>> response_std(late, np.diag([1e-6, 0.0]), np.array([1.0])).round(6).tolist()
     [0.006283]
     """
-    s = 2j * np.pi * frequency
-    powers = (
-        system.variable(frequency)[None, :]
-        ** np.arange(max(system.numerator.size, system.denominator.size))[:, None]
-    )
-    above, below = system.numerator, system.denominator
-    first = int(np.flatnonzero(below)[0]) + 1
-    slopes = np.concatenate(
-        [
-            -s[None, :],
-            powers[: above.size] / (above @ powers[: above.size]),
-            -powers[first : below.size] / (below @ powers[: below.size]),
-        ]
-    )
+    slopes = np.concatenate(log_slopes(system, frequency))
     variance = np.sum(slopes.conj() * (covariance @ slopes), axis=0).real
     return np.asarray(np.abs(response(system, frequency)) * np.sqrt(np.maximum(variance, 0.0)))
+
+
+def log_slopes(system: RationalDelay, frequency: Real) -> tuple[Complex, Complex, Complex]:
+    """Derivatives of the logarithm of a response, at each frequency in Hz, (m,).
+
+    Returns
+    -------
+    delay : ndarray, shape (1, m)
+    numerator : ndarray, shape (k, m)
+    denominator : ndarray, shape (l, m)
+        By the coefficients behind the first that is not zero.
+    """
+    above, below = system.numerator, system.denominator
+    powers = system.variable(frequency)[None, :] ** np.arange(max(above.size, below.size))[:, None]
+    first = int(np.flatnonzero(below)[0]) + 1
+    return (
+        np.asarray(-2j * np.pi * frequency[None, :], dtype=np.complex128),
+        powers[: above.size] / (above @ powers[: above.size]),
+        -powers[first : below.size] / (below @ powers[: below.size]),
+    )

@@ -10,15 +10,16 @@ from hmpim.errors import RecordError
 from hmpim.identify.arrays import Complex, Real
 from hmpim.identify.kept import kept
 from hmpim.identify.signals import as_pair, as_signal
-from hmpim.identify.worth import PART
+from hmpim.identify.worth import NEARLY, PART
 
 __all__ = [
     "Correlation",
     "CorrelationPeak",
+    "Likeness",
     "autocorrelation",
     "correlation_peak",
     "cross_correlation",
-    "cross_correlations",
+    "likeness",
 ]
 
 
@@ -44,6 +45,38 @@ class CorrelationPeak:
 
     lag: int
     value: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Likeness:
+    """How far two signals resemble each other when the output is late, and when it is early.
+
+    Parameters
+    ----------
+    peak : CorrelationPeak
+        The paper's, of the signals as they are.
+    ahead : float
+        Of the signals less their means, the correlation of largest magnitude where the output
+        comes first.
+    behind : (float, float)
+        The greatest and the least where it comes last, or at once.
+    """
+
+    peak: CorrelationPeak
+    ahead: float
+    behind: tuple[float, float]
+
+    @property
+    def is_ahead(self) -> bool:
+        """Whether the output is ahead where the two resemble each other most.
+
+        A sine, an integral or a derivative resembles as much on the other side, with the other
+        sign: then it is not told which is ahead.
+        """
+        sign = -1.0 if self.ahead > 0.0 else 1.0
+        opposite = max(sign * one for one in self.behind)
+        most = max(abs(one) for one in self.behind)
+        return abs(self.ahead) > most and opposite < NEARLY * abs(self.ahead)
 
 
 def cross_correlation(x: ArrayLike, y: ArrayLike) -> Correlation:
@@ -80,22 +113,49 @@ def cross_correlation(x: ArrayLike, y: ArrayLike) -> Correlation:
     1
     """
     first, second = as_pair(x, y)
-    (value,) = cross_correlations(first[None], second)
-    return Correlation(lag=np.arange(1 - first.size, first.size), value=value)
-
-
-def cross_correlations(x: Real, y: Real) -> Real:
-    """Values of `cross_correlation` of many signals, (k, n), with one, (n,); shape (k, 2n - 1)."""
-    n = y.size
+    n = first.size
     length = int(scipy.fft.next_fast_len(2 * n - 1, real=True))
-    around = scipy.fft.irfft(scipy.fft.rfft(x, length) * np.conj(_padded(y, length)), length)
-    return np.concatenate((around[:, length - n + 1 :], around[:, :n]), axis=1) / n
+    spectrum = scipy.fft.rfft(first, length) * np.conj(scipy.fft.rfft(second, length))
+    around = scipy.fft.irfft(spectrum, length)
+    value = np.concatenate((around[length - n + 1 :], around[:n])) / n
+    return Correlation(lag=np.arange(1 - n, n), value=value)
 
 
 @kept
-def _padded(x: Real, length: int) -> Complex:
-    """Transform of a signal with zeros behind it."""
-    return np.asarray(scipy.fft.rfft(x, length), dtype=np.complex128)
+def likeness(u: Real, y: Real) -> Likeness:
+    """Return how an input and an output resemble each other, late and early, in one transform.
+
+    Parameters
+    ----------
+    u, y : ndarray, shape (n,)
+        Both move, and are checked.
+
+    Examples
+    --------
+    >>> seen = likeness(np.array([0.0, 1.0, 0.0, 0.0, 0.0]), np.array([0.0, 0.0, 0.0, 2.0, 0.0]))
+    >>> seen.peak, seen.is_ahead
+    (CorrelationPeak(lag=2, value=0.4...), False)
+    """
+    n, half = u.size, u.size // 2 + 1
+    length = int(scipy.fft.next_fast_len(2 * n - 1, real=True))
+    means, moves = (float(u.mean()), float(y.mean())), y - y.mean()
+    around = scipy.fft.rfft(moves, length)
+    around *= _conjugate(u, length)
+    around = scipy.fft.irfft(around, length, overwrite_x=True)
+    behind, ahead = around[:n], around[length - n + 1 :]
+    # Of the signals as they are, their means on the samples that meet come in addition.
+    value = behind[:half] + (n - np.arange(half)) * (means[0] * means[1])
+    value[1:] -= means[0] * np.cumsum(moves[: half - 1])
+    value[1:] -= means[1] * np.cumsum(u[: n - half : -1] - means[0])
+    early = (float(ahead.max()), float(ahead.min()))
+    late = (float(behind.max()), float(behind.min()))
+    return Likeness(peak=_peak(value / n), ahead=max(early, key=abs), behind=late)
+
+
+@kept
+def _conjugate(u: Real, length: int) -> Complex:
+    """Conjugate transform of an input less its mean, zeros behind it."""
+    return np.asarray(np.conj(scipy.fft.rfft(u - u.mean(), length)), dtype=np.complex128)
 
 
 def autocorrelation(x: ArrayLike) -> Correlation:
@@ -156,7 +216,11 @@ def correlation_peak(correlation: Correlation) -> CorrelationPeak:
     """
     start = int(np.searchsorted(correlation.lag, 0))
     samples = correlation.lag.size - start
-    value = correlation.value[start : start + samples // 2 + 1]
+    return _peak(correlation.value[start : start + samples // 2 + 1])
+
+
+def _peak(value: Real) -> CorrelationPeak:
+    """Peak or trough of a correlation at lags from 0 on."""
     high, low = int(np.argmax(value)), int(np.argmin(value))
     # What the FFT leaves of an exact zero is rounding, not correlation.
     if np.max(np.abs(value)) == 0:

@@ -14,11 +14,11 @@ from hmpim.identify.kept import kept
 from hmpim.identify.result import PaperEstimates
 from hmpim.identify.section_iv import response as reading
 from hmpim.identify.section_iv.correlation import (
-    Correlation,
+    CorrelationPeak,
     autocorrelation,
     correlation_peak,
     cross_correlation,
-    cross_correlations,
+    likeness,
 )
 from hmpim.identify.section_iv.spectrum import decibel, excited_band, padding, ratio, well_excited
 from hmpim.identify.section_iv.static import (
@@ -98,7 +98,6 @@ class PaperAnalysis:
 class _TimeSteps:
     """What sections IV.A to IV.C give."""
 
-    correlation: Correlation
     lag: int
     inverted: bool
     error: Real
@@ -183,7 +182,8 @@ def paper_analysis(
     check_rate(fs)
     fs = float(fs)
     span = _band(stimulus, fs, band)
-    time = _time_steps(stimulus, measured, cross_correlation(measured, stimulus))
+    correlation = cross_correlation(measured, stimulus)
+    time = _time_steps(stimulus, measured, correlation_peak(correlation))
     n = stimulus.size
     zeros = padding(n) if pad is None else pad
     if zeros < 0:
@@ -205,8 +205,8 @@ def paper_analysis(
         window=window,
         alpha=alpha,
         inverted=time.inverted,
-        lag=time.correlation.lag / fs,
-        cross_correlation=time.correlation.value,
+        lag=correlation.lag / fs,
+        cross_correlation=correlation.value,
         error_time=np.arange(time.error.size) / fs,
         error=time.error,
         error_lag=inner.lag / fs,
@@ -264,14 +264,14 @@ def paper_estimates(
     check_rate(fs)
     fs = float(fs)
     span = _band(stimulus, fs, band)
-    (found,) = estimates_of_many(stimulus, measured[None], fs, span)
+    (found,) = estimates_of_many(stimulus, [measured], fs, span)
     return found
 
 
 def estimates_of_many(
-    u: Real, outputs: Real, fs: float, band: tuple[float, float]
+    u: Real, outputs: Sequence[Real] | Real, fs: float, band: tuple[float, float]
 ) -> list[PaperEstimates]:
-    """Return `paper_estimates` of many outputs of one stimulus, shape (k, n), all of them checked.
+    """Return `paper_estimates` of many outputs of one stimulus, each (n,), all of them checked.
 
     Examples
     --------
@@ -284,20 +284,17 @@ def estimates_of_many(
     """
     n = u.size
     length = n + padding(n)
-    found = [PaperEstimates()] * outputs.shape[0]
-    moving = np.flatnonzero(np.ptp(outputs, axis=1) > 0)
-    if moving.size == 0:
+    found = [PaperEstimates()] * len(outputs)
+    moving = [i for i, y in enumerate(outputs) if np.ptp(y) > 0]
+    if not moving:
         return found
-    outputs, lags = outputs[moving], np.arange(1 - n, n)
-    times = [
-        _time_steps(u, y, Correlation(lag=lags, value=value))
-        for y, value in zip(outputs, cross_correlations(outputs, u), strict=True)
-    ]
-    tapered = (outputs - outputs.mean(axis=1, keepdims=True)) * _taper(n)
+    times = [_time_steps(u, outputs[i], likeness(u, outputs[i]).peak) for i in moving]
+    tapered = np.stack([outputs[i] - outputs[i].mean() for i in moving])
+    tapered *= _taper(n)
     answered = np.asarray(scipy.fft.rfft(tapered, length), dtype=np.complex128)
     every = _frequency_steps(_tapered(u, length), answered, fs / length, band, times, fs)
     frequency = np.asarray(scipy.fft.rfftfreq(length, 1 / fs), dtype=np.float64)[every[0].inside]
-    for i, time, steps in zip(moving.tolist(), times, every, strict=True):
+    for i, time, steps in zip(moving, times, every, strict=True):
         found[i] = _estimates(time, steps, frequency, fs)
     return found
 
@@ -323,16 +320,14 @@ def _band(u: Real, fs: float, band: tuple[float, float] | None) -> tuple[float, 
     return band
 
 
-def _time_steps(u: Real, y: Real, correlation: Correlation) -> _TimeSteps:
+def _time_steps(u: Real, y: Real, peak: CorrelationPeak) -> _TimeSteps:
     """Sections IV.A to IV.C, equations (8) to (14), of the output's correlation with the input.
 
     The measurement first: a late measurement then peaks at a positive lag.
     """
-    peak = correlation_peak(correlation)
     error = time_corrected_error(u, y, min(peak.lag, u.size - 4))
     bias = bias_by_autocorrelation(error)
     return _TimeSteps(
-        correlation=correlation,
         lag=u.size - error.size,
         inverted=peak.value < 0,
         error=error,

@@ -3,7 +3,7 @@
 import math
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from hmpim.errors import ArgumentError
 from hmpim.identify.arrays import Real
@@ -18,6 +18,9 @@ __all__ = [
     "scale_factor_near_dc",
     "time_corrected_error",
 ]
+
+_BEGINNING = 4096
+"""Samples in which the first cycle is looked for, before it is in more."""
 
 
 def time_corrected_error(u: ArrayLike, y: ArrayLike, lag: int) -> Real:
@@ -129,17 +132,23 @@ def initial_period(u: ArrayLike) -> int:
     """
     excitation = as_signal("u", u)
     threshold = FEW * float(np.max(np.abs(excitation)))
-    side = np.where(excitation > threshold, 1, np.where(excitation < -threshold, -1, 0))
-    beyond = np.flatnonzero(side)
-    if beyond.size == 0:
-        return excitation.size
-    turns = beyond[1:][np.diff(side[beyond]) != 0]
+    count = min(_BEGINNING, excitation.size)
+    turns = _turns(excitation[:count], threshold)
+    while turns.size < 2 and count < excitation.size:
+        count = min(8 * count, excitation.size)
+        turns = _turns(excitation[:count], threshold)
     if turns.size < 2:
         return excitation.size
     # From the sample that proves the second crossing back to the crossing itself.
     proof = int(turns[1])
     same_side = excitation[: proof + 1] * excitation[proof] > 0
     return proof - int(np.argmin(same_side[::-1])) + 1
+
+
+def _turns(excitation: Real, threshold: float) -> NDArray[np.intp]:
+    """Samples that prove that an excitation has gone to the other side."""
+    beyond = np.flatnonzero(np.abs(excitation) > threshold)
+    return np.asarray(beyond[1:][np.diff(excitation[beyond] > 0.0)])
 
 
 def scale_factor_near_dc(u: ArrayLike, y: ArrayLike, lag: int, bias: float) -> float | None:
