@@ -76,3 +76,25 @@ def test_what_is_kept_is_bounded_and_found_by_the_samples():
     assert len(made) == before
     doubled(u, 99.0)
     assert len(made) == before + 1
+
+
+def test_a_long_array_is_found_again_where_it_stands():
+    made = []
+
+    @kept
+    def ends(u: np.ndarray, whole: bool = False) -> np.ndarray:
+        made.append(u.size)
+        return u if whole else u[[0, -1]]
+
+    u = np.arange(100_000.0)
+    with keeping():
+        first = ends(u)
+        assert ends(u) is first
+        ends(u.copy())
+        assert len(made) == 2
+        u[0] = 7.0  # it was changed: it is another
+        assert ends(u)[0] == 7.0
+        before = len(made)
+        assert ends(u, whole=True) is ends(u, whole=True) is u  # no long result is kept
+        assert len(made) == before + 2
+        assert u.flags.writeable

@@ -152,3 +152,14 @@ def test_false_alarms_stay_below_one_percent(seeds):
 def test_unequal_lengths_are_refused():
     with pytest.raises(RecordError, match="2000 samples and the prediction 1999"):
         detect_saturation(CHIRP, CHIRP[1:])
+
+
+@pytest.mark.parametrize("noise", [0.0, 1e-3])
+def test_two_plateaus_in_a_long_record_are_found(noise):
+    """Their samples are one in a thousand, more than a part of the record would show."""
+    rng = np.random.default_rng(3)
+    y = np.sin(np.arange(200_000) / 100) + noise * rng.standard_normal(200_000)
+    reach = 3.0 * np.exp(-(((np.arange(200_000) - 100_000) / 2000.0) ** 2))
+    found = detect_saturation(np.minimum(y * (1.0 + reach), 3.0))
+    assert found.high == 3.0
+    assert found.low is None

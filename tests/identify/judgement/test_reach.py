@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import scipy
 
 from hmpim.identify.judgement.reach import (
     beyond_band,
@@ -15,6 +16,7 @@ from hmpim.identify.judgement.reach import (
     natural_frequency_beyond,
     negative_delay,
     short_record,
+    windowed_power,
 )
 from hmpim.identify.result import Estimate
 from hmpim.identify.result.groups import MODELLED, PHASE_SPLIT
@@ -145,3 +147,12 @@ def test_a_free_response_as_slow_as_a_drift_makes_the_bias_doubtful(clean):
     assert found.severity == "info"  # a fast mode is forgotten soon
     (found,) = initial_transient(_slowed(begun, clean.u.size / 10))
     assert found.severity == "info"  # a plain model has no such pole to spare
+
+
+@pytest.mark.parametrize("samples", [64, 65, 1000])
+def test_a_window_is_what_neighbouring_bins_add(samples):
+    u = 5.0 + np.sin(np.arange(samples) ** 1.4)
+    window = scipy.signal.windows.blackmanharris(samples, sym=False)
+    level = (u - window @ u / window.sum()) * window
+    wanted = np.abs(scipy.fft.rfft(level)) ** 2 * 2.0 / (window @ window * samples)
+    assert windowed_power(u) == pytest.approx(wanted, rel=1e-9, abs=1e-14 * wanted.max())

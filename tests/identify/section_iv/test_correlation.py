@@ -10,6 +10,7 @@ from hmpim.identify.section_iv.correlation import (
     autocorrelation,
     correlation_peak,
     cross_correlation,
+    likeness,
 )
 
 FS = 200.0
@@ -115,3 +116,16 @@ def test_dead_signals_are_refused() -> None:
 def test_lengths_are_checked() -> None:
     with pytest.raises(RecordError, match="u has 2000 samples and y has 1999"):
         cross_correlation(sweep(), sweep()[:-1])
+
+
+@pytest.mark.parametrize("offsets", [(0.0, 0.0), (3.0, -2.0)])
+@pytest.mark.parametrize("late", [-7, 0, 7, 40])
+def test_one_transform_tells_the_papers_peak_and_who_is_ahead(offsets, late):
+    rng = np.random.default_rng(late + 100)
+    x = np.convolve(rng.standard_normal(601), np.ones(5))
+    u, y = x[50:551] + offsets[0], -1.5 * x[50 - late : 551 - late] + offsets[1]
+    seen = likeness(u, y)
+    wanted = correlation_peak(cross_correlation(y, u))
+    assert seen.peak.lag == wanted.lag
+    assert seen.peak.value == pytest.approx(wanted.value, rel=1e-9)
+    assert seen.is_ahead == (late < 0)

@@ -1,0 +1,33 @@
+"""The input's lags are multiplied from one to the next, whatever samples are left out."""
+
+import numpy as np
+import pytest
+import scipy
+
+from hmpim.identify.judgement.feedback import chances_of_an_answer
+
+
+def by_regression(u, left, counts, ahead=12):
+    """The score test of the input's future beside its past, lag by lag."""
+    places = np.arange(ahead, u.size - ahead)
+    places = places[counts[places]]
+    lags = (u - u.mean())[places + np.arange(-ahead, ahead + 1)[:, None]]
+    past = np.vstack([np.ones(places.size), lags[: ahead + 1]])
+    e, future = left[places], lags[ahead + 1 :]
+    own = future - np.linalg.lstsq(past.T, future.T, rcond=None)[0].T @ past
+    rest = e - np.linalg.lstsq(past.T, e, rcond=None)[0] @ past
+    told = np.linalg.lstsq(own.T, rest, rcond=None)[0] @ own
+    return scipy.special.chdtrc(ahead, float(told @ told) / e.var())
+
+
+@pytest.mark.parametrize("share", [0.0, 0.1])
+def test_the_chance_is_that_of_a_regression(share):
+    rng = np.random.default_rng(4)
+    u = 3.0 + np.convolve(rng.standard_normal(804), [1.0, 0.8, 0.3, 0.1, 0.05], "valid")
+    counts = rng.random(u.size) >= share
+    left = rng.standard_normal((2, u.size))
+    left[1, :-6] += 0.2 * u[6:]
+    found = chances_of_an_answer(u, left, counts if share else None)
+    wanted = [by_regression(u, one, counts) for one in left]
+    assert found == pytest.approx(wanted, rel=1e-6)
+    assert found[0] > 1e-3 > 1e-6 > found[1]
