@@ -377,7 +377,7 @@ def _marks(pair: "PairIdentification") -> list[Mark]:
     found = pair.parameters
     named: tuple[tuple[Estimate | None, str, Literal["magnitude", "phase"]], ...] = (
         (found.bandwidth_phase90, "−90° at", "phase"),
-        (found.bandwidth_phase90_without_delay, "−90° without delay at", "phase"),
+        (found.bandwidth_phase90_without_delay, "−90° without delay", "phase"),
         (found.bandwidth_3db, "−3 dB at", "magnitude"),
         (found.natural_frequency, "natural frequency", "magnitude"),
     )
@@ -401,10 +401,11 @@ def _marks(pair: "PairIdentification") -> list[Mark]:
 
 
 def _in_words(estimate: "Estimate") -> str:
-    """An estimate with its error; one whose error is withheld with four digits."""
+    """An estimate with its error, four digits where it is withheld; ? marks a doubtful one."""
+    doubt = "" if estimate.verdict == "ok" else " ?"
     if estimate.ci95 is not None:
-        return estimate.text
-    return f"{estimate.value:.4g} {estimate.unit}, doubtful"
+        return estimate.text + doubt
+    return f"{estimate.value:.4g} {estimate.unit}{doubt}"
 
 
 def _whole_band(curves: Sequence[BodeCurve]) -> tuple[float, float] | None:

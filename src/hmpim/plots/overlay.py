@@ -41,7 +41,7 @@ def overlaid_bode(
         Drawn in this order, told apart by colour and then by dashes; their bands are left out.
     bandwidths : sequence of Estimate or None
         -90° frequency of each curve in Hz: a thin line in the phase's panel, its 95 % interval
-        shaded.
+        shaded, its value in the legend. One alone is that of all curves, and said beside its line.
     phase_level : float, optional
         Phase in degrees at which a thin line is drawn.
     pairs : bool
@@ -59,12 +59,14 @@ def overlaid_bode(
     """
     phase_items: list[Item] = []
     magnitude_items: list[Item] = []
+    each = len(bandwidths) == len(curves) > 1
     for i, (label, curve) in enumerate(curves):
+        found = bandwidths[i] if each else None
         f, level = interrupted(curve.frequency, curve.magnitude_db)
         look = Curve(
             x=f,
             y=level,
-            label=label,
+            label=label if found is None else f"{label}: −90° at {with_error(found)} Hz",
             colour=_COLOURS[i % len(_COLOURS)],
             dashes=_DASHES[(i + i // len(_COLOURS)) % len(_DASHES)],
             width=_width(i) if pairs else 1.2,
@@ -72,7 +74,9 @@ def overlaid_bode(
         magnitude_items.append(look)
         phase_items.append(replace(look, y=interrupted(curve.frequency, curve.phase)[1]))
     for i, bandwidth in enumerate(bandwidths):
-        if bandwidth is not None:
+        if bandwidth is not None and not each:
+            phase_items.append(_marked(bandwidth, place=0))
+        elif bandwidth is not None:
             mark = _interval(bandwidth)
             phase_items.append(replace(mark, colour=_COLOURS[i % len(_COLOURS)], dashes=":"))
     if phase_level is not None:

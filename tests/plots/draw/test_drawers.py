@@ -198,7 +198,7 @@ def test_a_result_is_drawn_with_its_marks_in_their_intervals(identified):
         assert estimate.text in rule.words
         assert estimate.text in figure.alt
     assert [curve.label for curve in phase.of(Curve)][-1] == "model without delay"
-    assert any(r.words.startswith("−90° without delay at ") for r in phase.of(Rule))
+    assert any(r.words.startswith("−90° without delay ") for r in phase.of(Rule))
     measured = phase.of(Points)[0]
     assert (measured.low < measured.high).all()
 
@@ -301,3 +301,38 @@ def test_a_long_label_does_not_meet_the_numbers_of_the_row_that_it_makes_higher(
     (place,), _ = places(figure, frames(figure), width=600.0)
     longest = max(text_width(words) for _, words in place.y_ticks)
     assert place.left - 7.0 - longest > place.edge + LINE
+
+
+@pytest.mark.parametrize("at", [0.2, 1.5, 10.0, 18.0])
+def test_words_that_fit_on_neither_side_of_their_line_stay_inside_of_a_narrow_picture(at):
+    words = "−90° without delay 10.033 −0.058 +0.084 Hz"
+    axis = Axis(scale="log", label="Frequency (Hz)", low=0.1, high=20.0)
+    panel = Panel(x=axis, y=Axis(label="Phase (deg)"), items=(Rule(at=at, words=words),))
+    text = Figure(panels=(panel,), alt="A mark.").to_svg(width=355.0)
+    x, anchor = re.search(
+        rf'<text x="([\d.]+)"[^>]*?text-anchor="(\w+)"[^>]*>{re.escape(words)}', text
+    ).groups()
+    assert anchor == "start"
+    assert 30.0 < float(x) < 80.0  # beside the axis: a curve that lags leaves room there
+    short = Figure(panels=(replace(panel, items=(Rule(at=at, words="1 Hz"),)),), alt="A mark.")
+    x = float(re.search(r'<text x="([\d.]+)"[^>]*>1 Hz', short.to_svg(width=355.0))[1])
+    assert 40.0 < x < 350.0
+
+
+def test_the_legend_says_each_curve_s_bandwidth_and_a_mean_stands_beside_its_line():
+    curve = BodeCurve(frequency=F, magnitude_db=0.0 * F, phase=-10.0 * F)
+    curves = [("roll", curve), ("yaw", curve)]
+    each = overlaid_bode(curves, bandwidths=[estimate(9.0), None])
+    labels = [c.label for c in each.panels[0].of(Curve)]
+    assert labels == ["roll: −90° at 9.00 −0.20 +0.30 Hz", "yaw"]
+    mean = overlaid_bode(curves, bandwidths=[estimate(9.0)])
+    assert [c.label for c in mean.panels[0].of(Curve)] == ["roll", "yaw"]
+    assert [r.words for r in mean.panels[1].of(Rule) if r.words] == ["−90° at 9.00 −0.20 +0.30 Hz"]
+
+
+def test_a_mark_of_a_doubtful_figure_says_so(identified):
+    pair = identified["y", "u"]
+    vague = replace(pair.parameters.natural_frequency, verdict="doubtful")
+    figure = pair_bode(replace(pair, parameters=replace(pair.parameters, natural_frequency=vague)))
+    said = [r.words for panel in figure.panels for r in panel.of(Rule) if r.words]
+    assert [words.split(" ")[0] for words in said if words.endswith(" Hz ?")] == ["natural"]

@@ -358,13 +358,16 @@ def _rule(pen: _Pen, item: Rule, field: _Field, place: Place) -> tuple[list[str]
     y = min(y, place.top + place.height - 4.0)
     room = text_width(item.words) + 5.0
     right = place.left + place.width
-    left = item.side == "left" or (item.side == "auto" and at > place.left + 0.7 * place.width)
-    if left and at - room < place.left:
-        left = right - at < at - place.left
-    elif not left and at + room > right:
-        left = at - place.left > right - at
-    x = max(at - 5.0, place.left + room) if left else min(at + 5.0, right - room)
-    anchor = "end" if left else "start"
+    fits = {"left": at - room >= place.left, "right": at + room <= right}
+    side = "left" if item.side == "left" else "right"
+    if item.side == "auto" and at > place.left + 0.7 * place.width:
+        side = "left"
+    if not fits[side]:
+        side = "right" if side == "left" else "left"
+    anchor = "end" if side == "left" else "start"
+    x = at - 5.0 if side == "left" else at + 5.0
+    if not fits[side]:  # neither: from the edge at which a curve that lags leaves room
+        anchor, x = "start", place.left + 3.0
     return parts, [pen.boxed(x, y, item.words, anchor=anchor, colour=item.colour)]
 
 
