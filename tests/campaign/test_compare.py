@@ -11,7 +11,7 @@ import hmpim
 from hmpim.campaign import parse_plan, read_plan, run_campaign, shipped_plan
 from hmpim.campaign.compare import findings
 from hmpim.campaign.crossing import first_crossing, samples_bandwidth
-from hmpim.campaign.grids import PARAMETERS, case_grid
+from hmpim.campaign.grids import PARAMETERS, axis_grid, case_grid
 from hmpim.campaign.pictures import section_pictures
 from hmpim.campaign.study import Reading, make_study
 from hmpim.campaign.write import study_page, write_study
@@ -104,11 +104,15 @@ def test_demo_finds_all_five_axes_and_shows_them(demo):
         assert 0.95 < row.parameters["bandwidth_phase90"].value / row.exact_bandwidth < 1.01
     (section,) = study_page(study).sections
     (picture,) = section.pictures
-    labels = [item.label for item in picture.figure.panels[0].items]
+    labels = [item.label.partition(": −90° at ")[0] for item in picture.figure.panels[0].items]
     noisy = picture.caption.partition("Not drawn")[2]  # what would cover the plot
     five = ["roll", "yaw", "pitch", "azimuth", "elevation"]
     assert labels == [axis for axis in five if axis not in noisy]
     assert len(labels) >= 4
+    assert all(" Hz" in item.label for item in picture.figure.panels[0].items)
+    wanted = axis_grid(study).columns.index("Specification")
+    assert all(row[wanted].endswith(" Hz") for row in axis_grid(study).rows)
+    assert study_page(study).doubtful == any(row.verdict != "ok" for row in study.rows)
     assert [grid.caption.split(" ")[0] for grid in section.grids] == ["Couplings"]
     page = (folder / "study.html").read_text(encoding="utf-8")
     assert page.count('class="pass"') == 10  # in the table of the axes, and check by check
@@ -230,7 +234,7 @@ def test_without_figures_each_test_shows_all_its_cases_by_what_sets_them_apart(t
     plan = parse_plan(data)
     (section,) = study_page(make_study(plan, run_campaign(plan, tmp_path))).sections
     (picture,) = section.pictures
-    labels = [item.label for item in picture.figure.panels[0].items]
+    labels = [item.label.partition(": −90° at ")[0] for item in picture.figure.panels[0].items]
     assert labels == ["inner, 250 Hz", "outer, 250 Hz", "inner, 500 Hz", "outer, 500 Hz"]
     inner, outer = section.found
     assert inner.count("−90° at ") == outer.count("−90° at ") == 2

@@ -119,7 +119,7 @@ def axis_grid(study: Study) -> Grid:
         row = shown or next(row for row in study.rows if row.axis == axis)
         wanted = [
             f"{_LABELS.get(c.wanted.quantity, c.wanted.quantity)} "
-            f"{bounds(c.wanted.low, c.wanted.high)}"
+            f"{bounds(c.wanted.low, c.wanted.high)} {c.reading.unit if c.reading else ''}".rstrip()
             for c in checks
             if c.row is row
         ]

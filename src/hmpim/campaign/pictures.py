@@ -9,7 +9,7 @@ from hmpim.campaign.compare import HEARD, bandwidth, case_label, samples_reading
 from hmpim.campaign.plan import Compare, FigurePlan
 from hmpim.campaign.study import Row
 from hmpim.identify import Estimate, PairIdentification
-from hmpim.plots.curves import BodeCurve, measured_curve, model_curve
+from hmpim.plots.curves import BodeCurve, measured_curve, model_curve, stretches
 from hmpim.plots.description import Figure as Description
 from hmpim.plots.description import Panel
 from hmpim.plots.fence import picket_fence
@@ -55,7 +55,7 @@ def section_pictures(
         return [_picture("levels", figure.title, words, drawn)]
     if figure.compare == "axes":
         over = _overlaid(rows, rows, "axes")
-        more = _MARKED + _left_out(rows, rows, "axes")
+        more = _MARKED + _left_out(rows, rows, "axes") + _gaps(rows)
         return [] if over is None else [_picture("axes", figure.title, words, over, more=more)]
     for axis in dict.fromkeys(row.axis for row in rows):
         if figure.compare == "fence":
@@ -67,7 +67,7 @@ def section_pictures(
         if over is not None:
             title = f"{figure.title}: {axis}"
             more = _MARKED_SAMPLED if figure.compare in _SAMPLED else _MARKED
-            more += _left_out(some, rows, figure.compare)
+            more += _left_out(some, rows, figure.compare) + _gaps(some)
             pictures.append(_picture(axis, title, words, over, more=more))
     return pictures
 
@@ -81,6 +81,14 @@ def _left_out(rows: Sequence[Row], every: Sequence[Row], compare: Compare) -> st
         f" Not drawn: {'; '.join(noisy)} (known to within {100 * _CLEAR:.0f} % over less than half "
         "of the band)."
     )
+
+
+def _gaps(rows: Sequence[Row]) -> str:
+    """Why a curve is interrupted, where one is."""
+    drawn = [curve for row in rows if _is_clear(row) and (curve := _curve(row)) is not None]
+    if all(len(stretches(curve.frequency)) == 1 for curve in drawn):
+        return ""
+    return " A curve is interrupted where the axes that move at once cannot be told apart."
 
 
 def _overlaid(rows: Sequence[Row], every: Sequence[Row], compare: Compare) -> Description | None:

@@ -135,7 +135,7 @@ def study_page(study: Study) -> StudyPage:
         description=study.plan.description,
         headline=headline(study),
         met=study.met,
-        doubtful=_resting(study) > 0,
+        doubtful=any(row.verdict != "ok" for row in study.rows),
         grids=tuple(grids),
         sections=tuple(_section(study, figure) for figure in study.plan.figures),
         facts=(
