@@ -136,7 +136,7 @@ def test_repeats_have_a_page(tmp_path):
     )
     assert done.exit_code == 0, done.stderr
     text = page.read_text(encoding="utf-8")
-    assert "Operator: M. Ohm" in text
+    assert "<dt>Operator</dt><dd>M. Ohm</dd>" in text
     assert 'class="verdict doubtful"' in text  # one run has another natural frequency
     averages, by_run = (cells(text, caption) for caption in ("Averages over", "By run"))
     natural = averages["Natural frequency"]
@@ -220,7 +220,8 @@ def test_levels_are_named_with_their_unit_and_a_doubtful_figure_is_marked(tmp_pa
     assert f"2 levels: linear at all amplitudes, from {small} to {large} V." in pages[0]
     assert 'class="verdict ok"' in pages[0]
     assert "Doubt" not in pages[0]
-    assert f"Doubt: some figures are doubtful at {large} V." in pages[1]
+    assert f"Some figures are doubtful at {large} V." in pages[1]
+    assert f"<li>Doubtful at {large} V: " in pages[1]
     assert 'class="verdict doubtful"' in pages[1]
     sure, doubtful = cells(pages[1], "By amplitude")["Scale factor"][:2]
     assert not sure.endswith("?")

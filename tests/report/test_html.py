@@ -13,7 +13,14 @@ import numpy as np
 import pytest
 
 import hmpim
-from hmpim.identify import HarmonicCurve, Identification, InputSet, Nonlinearity, Parameters
+from hmpim.identify import (
+    Estimate,
+    HarmonicCurve,
+    Identification,
+    InputSet,
+    Nonlinearity,
+    Parameters,
+)
 from hmpim.identify.identify import identify
 from hmpim.identify.result.inputs import OutputCoherence
 from hmpim.plots import Figure
@@ -21,7 +28,7 @@ from hmpim.plots.draw.frames import legend_items
 from hmpim.plots.draw.layout import text_width
 from hmpim.record import Finding, Record
 from hmpim.report import About, render, report, sheet, write_figures
-from hmpim.report.advice import advice
+from hmpim.report.advice import said_and_done
 from hmpim.report.figures import pair_pictures
 from hmpim.report.study import StudyPage, render_study
 from hmpim.report.svg import PHONE
@@ -334,7 +341,50 @@ def test_every_doubt_that_can_be_raised_has_something_to_do():
     source = "".join(p.read_text("utf-8") for p in Path(hmpim.__file__).parent.rglob("*.py"))
     raised = re.findall(r'Finding\(\s*code="(\w+)",[^)]*?severity="doubt"', source)
     assert len(set(raised)) > 10
-    assert [code for code in sorted(set(raised) - {"x"}) if not advice(doubt(code))] == []
+    assert [code for code in sorted(set(raised) - {"x"}) if not said_and_done(doubt(code))[1]] == []
+
+
+@pytest.mark.parametrize(
+    ("code", "message", "said", "done"),
+    [
+        ("saturation", "It is clipped. Lower the amplitude.", "It is clipped.", "Lower the amp"),
+        ("noise_colour", "It is coloured. Look for hum.", "It is coloured.", "Look for hum."),
+        ("structure", "A. Sweep higher. Lower the noise.", "A.", "Sweep higher. Lower the noise."),
+        ("intersample", "May be held. State intersample=.", "May be held.", "State what the input"),
+        ("saturation", "It is clipped", "It is clipped.", "Lower the level of the stimulus"),
+    ],
+)
+def test_what_to_do_is_said_once_and_apart_from_what_was_found(found, code, message, said, done):
+    warning = Finding(code=code, message=message, severity="info", parameters=())
+    text = render(replace(found, pairs=(replace(found.pairs[0], warnings=(warning,)),)))
+    above = text[text.index('<ol class="findings">') : text.index("</ol>")]
+    assert f"<li>{said} <code" in above
+    assert f'<span class="todo">{done}' in above
+    assert text.count(done) == 1
+    assert "All findings" not in text  # all are above
+
+
+def test_the_caption_speaks_of_a_model_where_there_is_one(found):
+    pair = found.pairs[0]
+    assert "and the fitted model" in render(found)
+    lost = replace(pair, verdict="not_identifiable", parameters=Parameters(bias=pair.bias))
+    assert "and the fitted model" not in render(replace(found, pairs=(lost,)))
+
+
+def test_a_page_says_how_to_read_an_interval_that_is_not_symmetric(found):
+    told = "Where the interval is not symmetric"
+    pair = found.pairs[0]
+
+    def table(ends):
+        delay = Estimate(value=0.15, std=0.001, ci95=ends, unit="s")
+        changed = replace(pair, parameters=Parameters(delay=delay))
+        page = render(replace(found, pairs=(changed,)))
+        return page[page.index("<caption>") : page.index("</table>")]
+
+    assert told not in table((0.148, 0.152))
+    page = table((0.12, 0.152))
+    assert told in page
+    assert re.search(r'<span class="whole">[\d.]+</span> <span class="whole">−[\d.]+ \+', page)
 
 
 def test_a_pdf_holds_the_same_and_a_sheet_is_one_page(found, hostile, tmp_path):
@@ -383,7 +433,7 @@ def test_a_page_has_true_minuses_and_says_what_to_do_once(found):
     assert not re.search(
         r"(?<![\w.])-\d", re.sub(r"<svg.*?</svg>|<style.*?</style>", "", text, flags=re.S)
     )
-    assert text.count("or widen the range") == 2  # where it leads, and where all are listed
+    assert text.count("or widen the range") == 1  # all findings lead: no list repeats them
     assert "Late by 3 samples. <code" in text
     assert "<code>--fs</code>" in text
     assert "`" not in shown

@@ -1,5 +1,6 @@
 import math
 import re
+from dataclasses import replace
 
 import pytest
 from hypothesis import assume, given
@@ -70,6 +71,7 @@ def test_the_unit_follows_where_there_is_one():
 
 @given(value=st.floats(-1e5, 1e5), std=st.floats(1e-6, 1e5))
 def test_the_interval_reads_back(value, std):
+    assume(std > 1e-10 * abs(value))  # less is the error of arithmetic
     interval = (value - 1.96 * std, value + 1.96 * std)
     text = format_interval(Estimate(value=value, std=std, ci95=interval))
     low, high = (float(part) for part in text.split(" to "))
@@ -126,3 +128,12 @@ def test_an_interval_that_is_not_symmetric_is_written_with_both_sides_wherever_a
     # The chi-squared interval of a noise is all but symmetric, and its std says as much.
     noise = Estimate(value=0.001809, std=0.0000896, ci95=(0.001649, 0.002003), unit="deg")
     assert format_estimate(noise) == "0.001809 ± 0.000090 deg"
+
+
+def test_an_error_of_arithmetic_is_none_and_a_side_that_does_not_reach_is_0():
+    stop = Estimate(value=-6.0, std=1e-10, ci95=(-6.0 - 2e-10, -6.0 + 2e-10), unit="deg")
+    assert format_value(stop) == "-6 ± 0"
+    assert format_interval(stop) == "–"
+    late = Estimate(value=0.02, std=None, ci95=(0.02, 0.03), unit="s")
+    assert format_value(late) == "0.020 −0 +0.010"
+    assert format_value(replace(late, ci95=(0.0199, 0.03))) == "0.02000 −0.00010 +0.01000"

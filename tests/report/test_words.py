@@ -48,7 +48,11 @@ def test_the_headline_is_the_verdict_of_the_worst_pair(found):
     assert headline(replace(found, pairs=(lost,))) == (
         "Not identifiable: output 'y' does not follow input 'u'."
     )
-    assert "1 of 2 pairs can be used" in headline(replace(found, pairs=(pair, lost)))
+    assert headline(replace(found, pairs=(pair, lost))).endswith(
+        "1 of 2 pairs can be used without reservation. Doubtful: u → y (not identifiable)."
+    )
+    late = doubting(pair, (("delay", "bias"), "It slips."))
+    assert "Doubtful: u → y (delay, bias)." in headline(replace(found, pairs=(pair, late)))
 
 
 def doubting(pair, *doubts):

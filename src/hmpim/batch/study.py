@@ -94,7 +94,7 @@ def study_page(
     elif outcomes:
         decided = not unsure and not untold
         headline += " All bounds are met." if decided else " None is outside the specification."
-    headline += f" {unsure} undecided, their intervals holding the bound." if unsure else ""
+    headline += f" {unsure} undecided: the interval contains the bound." if unsure else ""
     headline += f" {untold} without the figure." if untold else ""
     labels = _labels(table, by)
     return StudyPage(

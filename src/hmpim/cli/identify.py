@@ -338,7 +338,9 @@ def _readings(result: "Identification", at: Sequence[float]) -> list[str]:
 
 
 def _both(gain: "Estimate", phase: "Estimate") -> str:
-    return f"{gain.value:.3f} ± {gain.spread:.2g} dB, {phase.value:.2f} ± {phase.spread:.2g}°"
+    from hmpim.report.numbers import plus_minus
+
+    return f"{plus_minus(gain.value, gain.spread)} dB, {plus_minus(phase.value, phase.spread)}°"
 
 
 def _held_out(data: "Record", share: float | None) -> "tuple[float | None, Record | Statistics]":

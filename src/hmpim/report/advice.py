@@ -1,10 +1,11 @@
 """What to do about a finding, and which finding is the cause of which."""
 
+import re
 from collections.abc import Sequence
 
 from hmpim.record import Finding
 
-__all__ = ["MOST_FINDINGS", "advice", "leading_findings"]
+__all__ = ["MOST_FINDINGS", "leading_findings", "said_and_done"]
 
 MOST_FINDINGS = 3
 
@@ -80,15 +81,40 @@ _ADVICE = {
 _ORDER = {code: place for place, code in enumerate(_ADVICE)}
 
 
-def advice(finding: Finding) -> str:
-    """Say what to do about a finding; empty where there is nothing but to know it.
+_SENTENCES = re.compile(r"(?<=[.!?]) (?=[A-Z'])")
+_VERBS = {sentence.split()[0] for sentence in _ADVICE.values()} | {
+    *("Add", "Choose", "Compare", "Excite", "Give", "Lower", "Measure", "Move", "Reduce", "Set"),
+    *("Sweep", "Treat", "Weigh", "Tighten", "Identify", "Shorten", "Slow"),
+}
+"""What an instruction begins with."""
+
+
+def said_and_done(finding: Finding) -> tuple[str, str]:
+    """Part what was found from what to do about it, which is said once.
+
+    What a finding itself asks for is taken, as it knows the case; else what is advised for its
+    kind, and so where it names an argument of Python: a page names the command line's option.
 
     Examples
     --------
-    >>> advice(Finding(code="saturation", message="…", severity="doubt", parameters=()))
-    'Lower the level of the stimulus, or widen the range.'
+    >>> def of(code, message):
+    ...     return Finding(code=code, message=message, severity="doubt", parameters=())
+    >>> said_and_done(of("structure", "Two models differ. Sweep higher, or lower the noise."))
+    ('Two models differ.', 'Sweep higher, or lower the noise.')
+    >>> said_and_done(of("intersample", "It may be held. State it with intersample=."))
+    ('It may be held.', 'State what the input does between samples: `--intersample`.')
+    >>> said_and_done(of("saturation", "7 % of the samples are clipped"))
+    ('7 % of the samples are clipped.', 'Lower the level of the stimulus, or widen the range.')
     """
-    return _ADVICE.get(finding.code, "")
+    message = finding.message.rstrip()
+    message += "" if message.endswith((".", "!", "?")) else "."
+    told = _SENTENCES.split(message)
+    asked: list[str] = []
+    while len(told) > 1 and (told[-1].split()[0] in _VERBS or told[-1].startswith("If you ")):
+        asked.insert(0, told.pop())
+    wanted = " ".join(asked)
+    usual = _ADVICE.get(finding.code, "")
+    return " ".join(told), (usual or wanted) if "=" in wanted else (wanted or usual)
 
 
 def leading_findings(findings: Sequence[Finding]) -> list[Finding]:

@@ -215,11 +215,13 @@ def _response_pictures(
             "samples; the marks are those of the system itself."
         )
     measured = is_measured(pair)
-    drawn = (
-        "Measured frequency response with its 95 % band at each frequency, and the fitted model."
-    )
+    drawn = "Measured frequency response with its 95 % band at each frequency"
+    drawn += "." if found.scale_factor is None else ", and the fitted model."
     if not measured:
         drawn = "The fitted model. Statistics of a record do not keep its measured response."
+    marked = (*(f for _, f in named), found.bandwidth_phase90_without_delay)
+    if any(f is not None and f.verdict != "ok" for f in marked):
+        between += " A question mark follows a doubtful figure."
     pictures = [
         Picture(
             key="bode",

@@ -13,7 +13,7 @@ from hmpim.identify import Identification
 from hmpim.plots.style import printable
 from hmpim.report.about import About
 from hmpim.report.figures import Picture
-from hmpim.report.numbers import typeset
+from hmpim.report.numbers import typeset, value_and_error
 from hmpim.report.svg import inline_svg
 from hmpim.report.view import report_view
 from hmpim.stimulus import Stimulus
@@ -239,6 +239,14 @@ def page_environment(*packages: str) -> "Environment":
             typeset(value) if isinstance(value, str) and not hasattr(value, "__html__") else value
         )
 
+    def whole(text: str) -> Markup:
+        """A value and its error, which a line may part but not break; what is doubtful below."""
+        shown, doubt, _ = typeset(text).partition(" (doubtful)")
+        parts = value_and_error(shown)
+        spans = [Markup('<span class="whole">{}</span>').format(part) for part in parts]
+        mark = Markup(' <span class="doubt">doubtful</span>') if doubt else ""
+        return Markup(" ").join(spans) + mark
+
     environment = Environment(
         finalize=shown,
         loader=ChoiceLoader([PackageLoader(name) for name in (*packages, "hmpim.report")]),
@@ -249,4 +257,5 @@ def page_environment(*packages: str) -> "Environment":
     )
     environment.globals["svg"] = svg
     environment.filters["code"] = _with_code
+    environment.filters["whole"] = whole
     return environment

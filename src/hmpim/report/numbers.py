@@ -13,6 +13,7 @@ __all__ = [
     "format_value",
     "plus_minus",
     "typeset",
+    "value_and_error",
 ]
 
 NOT_DETERMINED = "not determined"
@@ -22,8 +23,11 @@ _MINUS = re.compile(r"(?<![\w./=-])-(?=\d)")
 _POWER = re.compile(r"(?<=[\d)])e([+-])0*(\d+)\b")
 _RAISED = str.maketrans("0123456789-", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻")
 
-_ROUNDING = 1e-12
-"""Error over value that is arithmetic's and not the record's."""
+_ROUNDING = 1e-10
+"""Error over value that is arithmetic's and not the record's: a stop's level, seen often."""
+
+_ERROR = re.compile(r" (?=± |[−+][\d?])")
+_NO_REACH = re.compile(r"(?<=[−+])0\.0+(?![.\d])")
 
 
 def format_value(estimate: Estimate, *, positive: bool = False) -> str:
@@ -46,8 +50,10 @@ def format_value(estimate: Estimate, *, positive: bool = False) -> str:
     '0.15000 −0.00260 +0.00020'
     >>> format_value(Estimate(value=6.9223, std=0.0348, ci95=(6.8911, 6.9905), unit="Hz"))
     '6.922 −0.031 +0.068'
-    >>> format_value(Estimate(value=0.003, std=7e-19, ci95=(0.003, 0.003), unit="deg"))
-    '0.003 ± 0'
+    >>> format_value(Estimate(value=0.02, std=None, ci95=(0.02, 0.03), unit="s"))
+    '0.020 −0 +0.010'
+    >>> format_value(Estimate(value=-6.0, std=1e-10, ci95=(-6.0, -6.0), unit="deg"))
+    '-6 ± 0'
 
     Without an error, four digits are enough:
 
@@ -63,7 +69,7 @@ def format_value(estimate: Estimate, *, positive: bool = False) -> str:
     if _exact(estimate):
         return f"{estimate.value:.10g} ± 0"
     if estimate.std is None or estimate.asymmetric:
-        return aside(estimate.value, *estimate.ci95)
+        return _NO_REACH.sub("0", aside(estimate.value, *estimate.ci95))
     return plus_minus(estimate.value, estimate.std)
 
 
@@ -153,3 +159,14 @@ def typeset(text: str) -> str:
     """
     raised = _POWER.sub(lambda m: "·10" + (m[1].strip("+") + m[2]).translate(_RAISED), text)
     return _MINUS.sub("−", raised)
+
+
+def value_and_error(text: str) -> list[str]:
+    """Part a written estimate where a narrow column may break it: before its error, if any.
+
+    Examples
+    --------
+    >>> value_and_error("0.15000 −0.00260 +0.00020 s"), value_and_error("0.2")
+    (['0.15000', '−0.00260 +0.00020 s'], ['0.2'])
+    """
+    return _ERROR.split(text, maxsplit=1)

@@ -9,7 +9,7 @@ from typing import Any
 from hmpim.errors import MissingExtraError
 from hmpim.plots.style import printable
 from hmpim.report.figures import Picture
-from hmpim.report.numbers import typeset
+from hmpim.report.numbers import typeset, value_and_error
 
 __all__ = ["check_pdf", "pdf"]
 
@@ -99,6 +99,7 @@ def _data(view: dict[str, Any], drawn: Any, *, sheet: bool) -> dict[str, Any]:
         pairs.append(
             {
                 "name": _clean(pair["name"]),
+                "lopsided": pair["lopsided"],
                 "verdict": pair["verdict"],
                 "verdict_words": pair["verdict_words"],
                 "sentence": _clean(pair["sentence"]),
@@ -138,7 +139,10 @@ def _data(view: dict[str, Any], drawn: Any, *, sheet: bool) -> dict[str, Any]:
 def _clean_summary(summary: dict[str, Any] | None) -> dict[str, Any] | None:
     if summary is None:
         return None
-    rows = [{**r, "cells": [_clean(cell) for cell in r["cells"]]} for r in summary["rows"]]
+    rows = [
+        {**r, "cells": ["\n".join(map(_clean, value_and_error(cell))) for cell in r["cells"]]}
+        for r in summary["rows"]
+    ]
     return {**summary, "rows": rows}
 
 

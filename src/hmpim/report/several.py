@@ -23,12 +23,20 @@ from hmpim.report.figures import Picture
 from hmpim.report.html import check_page
 from hmpim.report.numbers import (
     format_interval,
-    format_number,
     format_value,
+    plus_minus,
 )
 from hmpim.report.repeats_text import level_cells, linear_words, marked_value, percent_words
 from hmpim.report.study import Grid, Section, StudyPage, render_study
-from hmpim.report.words import GLOSSARY, VERDICTS, by_weight, label_of, structure_words
+from hmpim.report.words import (
+    GLOSSARY,
+    VERDICTS,
+    by_weight,
+    doubtful_and_ok,
+    label_of,
+    listed,
+    structure_words,
+)
 
 __all__ = ["check_several", "levels_report", "repeats_report"]
 
@@ -109,7 +117,9 @@ def repeats_report(
     doubts = any(f.severity == "doubt" for pair in repeats.pairs for f in pair.findings)
     page = StudyPage(
         title=_title(about, f"{len(names)} records of one stimulus"),
-        description=_about(about, notes),
+        description="",
+        about=tuple((about or About()).rows()),
+        notes=tuple(notes),
         headline=f"{len(names)} repeats: the scatter of {agree} of {len(parameters)} parameters "
         "agrees with their stated errors.",
         met=True if parameters else None,
@@ -150,14 +160,18 @@ def levels_report(
         for pair, compared in zip(pairs, levels.comparisons, strict=True)
     ]
     known = [one for one in told if one.compared.trends]
+    unsure = list(dict.fromkeys(label for one in told for label in one.unsure))
     said = "; ".join(
         (f"{one.name} " if len(told) > 1 else "") + linear_words(one.compared, one.unit)
         for one in known
     )
     page = StudyPage(
         title=_title(about, f"{len(names)} levels of one stimulus"),
-        description=_about(about, notes),
-        headline=f"{len(names)} levels: {said or 'no trend is known'}.",
+        description="",
+        about=tuple((about or About()).rows()),
+        notes=tuple(notes),
+        headline=f"{len(names)} levels: {said or 'no trend is known'}."
+        f"{f' Some figures are doubtful at {listed(unsure)}.' if unsure else ''}",
         met=True if known else None,
         doubtful=any(
             one.unsure or any(f.severity == "doubt" for f in one.compared.findings) for one in told
@@ -171,11 +185,6 @@ def levels_report(
 
 def _title(about: About | None, otherwise: str) -> str:
     return about.title if about is not None and about.title else otherwise
-
-
-def _about(about: About | None, notes: Sequence[str]) -> str:
-    head = "; ".join(f"{name}: {value}" for name, value in (about or About()).rows() if value)
-    return " ".join([f"{head}.", *notes])
 
 
 def _facts(results: Sequence[Identification], names: Sequence[str]) -> tuple[tuple[str, str], ...]:
@@ -232,7 +241,7 @@ def _averages(pair: RepeatedPair, *, several: bool) -> Grid:
                 one.mean.unit or "–",
                 one.mean.verdict,
                 format_interval(one.mean, positive=words.positive),
-                format_number(one.repeatability),
+                _scatter(one.repeatability, one.mean),
                 f"{one.chi_squared:.3g} / {one.freedom}",
                 percent_words(one.probability),
                 "agree" if one.agree else "do not agree",
@@ -253,6 +262,17 @@ def _averages(pair: RepeatedPair, *, several: bool) -> Grid:
     )  # fmt: skip
 
 
+def _scatter(repeatability: float, mean: Estimate) -> str:
+    """From run to run, in the parameter's unit, to two digits.
+
+    Examples
+    --------
+    >>> _scatter(2.864e-5, Estimate(value=0.15, std=4.7e-5, ci95=(0.1499, 0.1501), unit="s"))
+    '0.000029'
+    """
+    return plus_minus(mean.value, repeatability).partition("± ")[2].rstrip("?") or "–"
+
+
 def _by_run(
     each: Sequence[PairIdentification],
     names: Sequence[str],
@@ -269,6 +289,7 @@ def _by_run(
     units = {name: _unit(each, name) for name in known}
     return Grid(
         caption="By run: value ± standard deviation; ? marks a doubtful value",
+        dense=True,
         columns=(
             "Run",
             *([] if at is None else [at[0]]),
@@ -331,6 +352,7 @@ def _pictures(
                 key=name,
                 title=label,
                 caption=f"{words[:1].upper()}{words[1:]} {by} with its 95 % interval"
+                + ("" if all(e is None or e.ci95 for e in estimates) else " where it is known")
                 + (", and the mean with its own." if mean is not None else "."),
                 description=f"{label} {by}: {', '.join(names)}.",
                 figure=trend(names, estimates, name=label, mean=mean),
@@ -388,8 +410,10 @@ def _rising(
 
 def _levelled(one: _Levelled) -> Section:
     said = [_sentence(finding) for finding in by_weight(one.compared.findings)]
-    if one.unsure:
-        said.append(f"Doubt: some figures are doubtful at {', '.join(one.unsure)}.")
+    for label, pair in zip(one.labels, one.each, strict=True):
+        bad, good = doubtful_and_ok(pair)
+        if bad:
+            said.append(f"Doubtful at {label}: {', '.join(bad) if good else 'every figure'}.")
     if not one.compared.trends:
         said.append("No parameter is determined at two levels or more.")
     alike = len({pair.structure for pair in one.each}) == 1  # else each has figures of its own

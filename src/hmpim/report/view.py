@@ -8,11 +8,17 @@ from hmpim.plots.candidates import INTERSAMPLE_WORDS
 from hmpim.plots.curves import is_measured
 from hmpim.record import Finding
 from hmpim.report.about import About, made_by
-from hmpim.report.advice import advice, leading_findings
+from hmpim.report.advice import leading_findings, said_and_done
 from hmpim.report.figures import Picture, pair_pictures, stimulus_picture
 from hmpim.report.inputs import inputs_view
 from hmpim.report.modes import MODES_SAID, mode_rows
-from hmpim.report.numbers import format_estimate, format_interval, format_number, format_value
+from hmpim.report.numbers import (
+    format_estimate,
+    format_interval,
+    format_number,
+    format_value,
+    typeset,
+)
 from hmpim.report.untold import untold
 from hmpim.report.words import (
     GLOSSARY,
@@ -31,6 +37,10 @@ from hmpim.stimulus import Stimulus
 __all__ = ["report_view"]
 
 _FIRST = ("bode", "deviation")  # pictures that are never folded away
+_LOPSIDED = (
+    "Where the interval is not symmetric, −a +b states how far it reaches to either side, in place "
+    "of the standard deviation."
+)
 _SUMMARY = ("bandwidth_phase90", "bandwidth_3db", "delay", "scale_factor")
 
 
@@ -135,16 +145,13 @@ def _where(finding: Finding, pairs: Sequence[PairIdentification]) -> str:
 
 
 def _finding_view(finding: Finding) -> dict[str, str]:
-    """A finding's sentences, and what to do unless they say it already."""
-    message = finding.message.rstrip()
-    message += "" if message.endswith((".", "!", "?")) else "."
-    todo = advice(finding)
-    known = todo.rstrip(".").lower() in message.lower()
+    """What was found, and what to do about it."""
+    message, todo = said_and_done(finding)
     return {
         "message": message,
         "code": finding.code,
         "severity": finding.severity,
-        "advice": "" if known else todo,
+        "advice": todo,
     }
 
 
@@ -170,7 +177,7 @@ def _told(pair: PairIdentification, name: str) -> str:
     estimate = getattr(pair.parameters, name)
     if estimate is None:
         return "–"
-    return format_estimate(estimate) + ("" if estimate.verdict == "ok" else " (doubtful)")
+    return typeset(format_estimate(estimate)) + ("" if estimate.verdict == "ok" else " (doubtful)")
 
 
 def _facts(result: Identification) -> list[tuple[str, str]]:
@@ -192,6 +199,7 @@ def _pair_view(
 ) -> dict[str, Any]:
     """Everything that is shown of a pair, as text."""
     lowest = min((c.criterion for c in pair.candidates), default=0.0)
+    rows = _rows(pair, truth)
     drawn = pair_pictures(result, pair)
     return {
         "name": _named(pair),
@@ -199,7 +207,8 @@ def _pair_view(
         "verdict_words": VERDICTS[pair.verdict],
         "sentence": pair_sentence(pair),
         "warnings": [_finding_view(w) for w in by_weight(pair.warnings)],
-        "rows": _rows(pair, truth),
+        "rows": rows,
+        "lopsided": _LOPSIDED if any(" −" in row["value"] for row in rows) else "",
         "untold": untold(pair),
         "modes": mode_rows(pair),
         "modes_said": MODES_SAID,

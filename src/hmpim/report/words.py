@@ -17,9 +17,11 @@ __all__ = [
     "VERDICTS",
     "ParameterWords",
     "by_weight",
+    "doubtful_and_ok",
     "headline",
     "label_of",
     "leading",
+    "listed",
     "nonlinear_facts",
     "paper_value",
     "remark",
@@ -222,6 +224,9 @@ _PARTS = {
 _ORDERED = re.compile(r"(?P<order>[a-z]+)_order(?P<zeros>|_zero|_zeros)")
 _ZEROS = {"": "", "_zero": " with a zero", "_zeros": " with two zeros"}
 
+_MOST = 4
+"""Pairs, or figures of one, that a sentence names."""
+
 _COUNTS = {1: "one pole", 2: "two poles", 3: "three poles", 4: "four poles"}
 
 _FILTERS = {
@@ -268,8 +273,34 @@ def headline(result: Identification) -> str:
     rest = f" {others} not coupled." if apart else ""
     return (
         f"{VERDICTS[result.verdict]}: {trusted} of {len(result.counted)} pairs can be used without "
-        f"reservation.{rest}"
+        f"reservation.{_weak(result)}{rest}"
     )
+
+
+def _weak(result: Identification) -> str:
+    """Name the pairs that cannot be used without reservation, and their doubtful figures."""
+    said = []
+    for pair in result.counted:
+        bad, _ = doubtful_and_ok(pair)
+        if pair.verdict == "not_identifiable":
+            said.append(f"{pair.input} → {pair.output} (not identifiable)")
+        elif pair.verdict == "doubtful":
+            named = ", ".join(bad[:_MOST]) + (f", {len(bad) - _MOST} more" if bad[_MOST:] else "")
+            said.append(f"{pair.input} → {pair.output}" + (f" ({named})" if bad else ""))
+    if not said:
+        return ""
+    more = f"; {len(said) - _MOST} more" if said[_MOST:] else ""
+    return f" Doubtful: {'; '.join(said[:_MOST])}{more}."
+
+
+def doubtful_and_ok(pair: PairIdentification) -> tuple[list[str], list[str]]:
+    """Figures of the model that are doubtful, and those that are not, as sentences name them."""
+    given = [w for w in GLOSSARY if getattr(pair.parameters, w.name) is not None]
+    # The paper's delay is what it is, whatever the model.
+    given = [w for w in given if w.name != "delay_correlation"]
+    verdicts = {w.inline: getattr(pair.parameters, w.name).verdict for w in given}
+    bad = [name for name, verdict in verdicts.items() if verdict == "doubtful"]
+    return bad, [name for name, verdict in verdicts.items() if verdict == "ok"]
 
 
 def nonlinear_facts(pair: PairIdentification) -> list[tuple[str, str]]:
@@ -363,23 +394,26 @@ def by_weight(warnings: Sequence[Finding]) -> list[Finding]:
 
 def _trust(pair: PairIdentification) -> str:
     """Say which figures are good and which are doubtful, the shorter list by name."""
-    given = [w for w in GLOSSARY if getattr(pair.parameters, w.name) is not None]
-    # The paper's delay is what it is, whatever the model.
-    given = [w for w in given if w.name != "delay_correlation"]
-    bad = [w.inline for w in given if getattr(pair.parameters, w.name).verdict == "doubtful"]
-    good = [w.inline for w in given if getattr(pair.parameters, w.name).verdict == "ok"]
+    bad, good = doubtful_and_ok(pair)
     if not bad:
         return "Every figure is reliable"
     if not good:
         return "No figure of the model is reliable"
     if len(good) < len(bad):
-        return f"Only {_listed(good)} {'is' if len(good) == 1 else 'are'} reliable"
+        return f"Only {listed(good)} {'is' if len(good) == 1 else 'are'} reliable"
     verb = "is" if len(bad) == 1 else "are"
-    doubtful = _listed(bad)
+    doubtful = listed(bad)
     return f"{doubtful[:1].upper()}{doubtful[1:]} {verb} doubtful; the other figures are reliable"
 
 
-def _listed(names: Sequence[str]) -> str:
+def listed(names: Sequence[str]) -> str:
+    """Join names as a sentence does.
+
+    Examples
+    --------
+    >>> listed(["a", "b", "c"])
+    'a, b and c'
+    """
     return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
 
 

@@ -90,9 +90,10 @@ class Section:
 class StudyPage:
     """Everything that the page shows, its first table above all.
 
-    `met` is None where nothing was specified; `doubtful` says that some of what is met rests on
-    doubtful figures; `sheets` are names and addresses of pages beside it. One `upright` is printed
-    in portrait: its tables are narrow.
+    `met` is None where nothing was specified; `doubtful` says that some figures are, whether what
+    is met rests on them or not; `about` stands above all, `notes` below the headline; `sheets` are
+    names and addresses of pages beside it. One `upright` is printed in portrait: its tables are
+    narrow.
     """
 
     title: str
@@ -103,6 +104,8 @@ class StudyPage:
     sections: tuple[Section, ...]
     facts: tuple[tuple[str, str], ...]
     sheets: tuple[tuple[str, str], ...] = ()
+    about: tuple[tuple[str, str], ...] = ()
+    notes: tuple[str, ...] = ()
     doubtful: bool = False
     upright: bool = False
 
