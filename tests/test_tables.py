@@ -24,6 +24,12 @@ def shown():
     return {"stimulus": stimulus, "record": record, "result": result, "pair": result["y", "u"]}
 
 
+def test_statistics_are_one_short_line(shown):
+    line = repr(hmpim.compress(shown["record"]))
+    assert line.startswith("Statistics(u → y, ")
+    assert len(line) < 100
+
+
 class Cells(HTMLParser):
     """Tags and texts of a page, as a browser sees them."""
 
@@ -94,6 +100,11 @@ def test_a_cell_holds_no_control_character_and_has_an_end():
     assert len(page) < 500
 
 
+def test_a_finding_below_a_table_is_read_to_its_end():
+    words = "what to do about it " * 30
+    assert words.strip() in html_table("a", ["x"], [], notes=[words])
+
+
 def test_a_result_of_many_pairs_names_a_few(shown):
     pairs = tuple(
         replace(shown["pair"], input=f"u{j}", output=f"y{k}") for j in range(5) for k in range(5)
@@ -126,6 +137,8 @@ def test_a_picture_that_cannot_be_chosen_says_how(shown):
     read_back = type(shown["result"]).from_dict(shown["result"].to_dict())
     with pytest.raises(hmpim.HmpimError, match=r"no time histories.*identify the record again"):
         plots.model_over_measurement(read_back)
+    with pytest.raises(hmpim.HmpimError, match="a Record is not a PairIdentification"):
+        plots.bode(shown["record"])
     with pytest.raises(hmpim.HmpimError, match="u and y are missing"):
         plots.input_output(pair.time)
     two = Record.from_arrays({"u": [0.0, 1.0], "v": [0.0, 1.0]}, {"y": [0.0, 1.0]}, fs=1.0)

@@ -8,6 +8,9 @@ __all__ = ["html_table", "shortened"]
 _LONGEST = 200
 """Characters of one cell: names of damaged files may be as long as the file."""
 
+_LONGEST_NOTE = 1000
+"""Characters of one line below a table: a finding is read to its end."""
+
 
 def html_table(
     title: str,
@@ -40,7 +43,7 @@ def html_table(
     body = "\n".join(
         "<tr>" + "".join(f"<td>{_text(cell)}</td>" for cell in row) + "</tr>" for row in rows
     )
-    below = "".join(f"\n<p>{_text(note)}</p>" for note in notes)
+    below = "".join(f"\n<p>{_text(note, most=_LONGEST_NOTE)}</p>" for note in notes)
     return (
         f"<table><caption>{_text(title)}</caption>\n<thead><tr>{head}</tr></thead>\n"
         f"<tbody>{body}</tbody></table>{below}"
@@ -59,11 +62,11 @@ def shortened(names: Sequence[str], *, most: int = 4) -> str:
     return ", ".join(_plain(name) for name in names[:most]) + more
 
 
-def _text(words: str) -> str:
-    return escape(_plain(words))
+def _text(words: str, *, most: int = _LONGEST) -> str:
+    return escape(_plain(words, most=most))
 
 
-def _plain(words: str) -> str:
+def _plain(words: str, *, most: int = _LONGEST) -> str:
     """Words without what steers a terminal or a page, and not without end."""
-    short = words if len(words) <= _LONGEST else words[:_LONGEST] + "…"
+    short = words if len(words) <= most else words[:most] + "…"
     return "".join(c if c.isprintable() else " " for c in short)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from hmpim.experiment import ManualClock, RunLog, RunOptions, measure_timing, run
-from hmpim.experiment.timing import TOO_IRREGULAR
+from hmpim.experiment.timing import TOO_IRREGULAR, judge_timing
 from hmpim.identify import identify
 from hmpim.stimulus import Limits, design
 
@@ -89,6 +89,14 @@ def test_commands_and_samples_are_stamped_when_they_went():
     assert np.std(command.time - SWEEP.time) > 2e-4
     found = identify(record)["y", "u"].parameters.time_constant
     assert found.value == pytest.approx(0.02, rel=0.01)
+
+
+def test_a_run_that_is_far_too_late_is_said_in_figures_that_can_be_read():
+    timing = measure_timing(np.arange(1000) / FS + np.linspace(0.0, 4.0, 1000), fs=FS)
+    (finding,) = judge_timing(timing, band=(0.2, 60.0), stamped=False)
+    assert "wrong by 100 % and more there" in finding.message
+    assert "worst: 2 s" in finding.message
+    assert "e+" not in finding.message
 
 
 def test_the_log_says_how_the_run_was_scheduled_and_timed():

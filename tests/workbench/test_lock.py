@@ -1,5 +1,7 @@
 """The lock: who may not pass, and what may not come in."""
 
+from contextlib import nullcontext
+
 import pytest
 
 from hmpim.workbench.lock import Lock
@@ -107,6 +109,27 @@ def test_too_much_is_cut_off_while_it_comes_whatever_the_header_says():
     honest = (b"content-length", b"5000")
     assert answered(LOCK, asked(HOST, OWN, honest), [b"x" * 600])[::3] == (413, [])
     assert answered(LOCK, asked(HOST, OWN), [b"x" * 500] * 2)[0] == 200
+
+
+def test_a_browser_that_goes_away_is_no_defect_and_a_defect_is_one():
+    async def left(scope, receive, send):
+        while (await receive())["type"] != "http.disconnect":
+            pass
+        raise RuntimeError("No response returned.")  # as Starlette says it
+
+    async def broken(scope, receive, send):
+        raise RuntimeError("a defect")
+
+    async def receive():
+        return {"type": "http.disconnect"}
+
+    async def send(message):
+        raise AssertionError(message)
+
+    for application, defect in ((left, False), (broken, True)):
+        lock = Lock(application, token=TOKEN, port=8080, largest=1000)
+        with pytest.raises(RuntimeError, match="a defect") if defect else nullcontext():
+            finished(lock(asked(HOST, OWN), receive, send))
 
 
 def test_a_damaged_length_is_refused_and_no_defect():

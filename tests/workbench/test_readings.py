@@ -7,9 +7,10 @@ import pytest
 import hmpim
 from hmpim.formats import save
 from hmpim.plots import Rule
-from hmpim.workbench.work.record import Question, View, automatic, found, write_report
+from hmpim.workbench.work.record import Question, View, automatic, found, look, write_report
 from hmpim.workbench.work.runs import compared
-from workbench_support import recorded
+from tests_support import designed_once
+from workbench_support import LIMITS, recorded
 
 
 @pytest.fixture(scope="module")
@@ -48,6 +49,30 @@ def test_structure_and_interval_by_hand_stand_beside_the_automatic(folder):
     assert "by hand: first order, the beginning to 8 s; automatic: second order" in notes[0]
     assert "automatic 0.1499" in notes[1]  # of the whole record, not of what was set by hand
     assert "first order, the beginning to 8 s" in (folder / "by hand.html").read_text()
+
+
+def test_the_estimate_so_far_has_the_outputs_unit():
+    from hmpim.workbench.parts.table import look_cells
+
+    record = recorded()
+    stimulus = designed_once(band=(0.1, 20), duration=10, fs=200, limits=LIMITS)
+    look = hmpim.LiveEstimator(stimulus).update(record.inputs[0].values, record.outputs[0].values)
+    columns, rows = look_cells(look, passed=True, unit="deg")
+    units = {row[0]: row[columns.index("Unit")] for row in rows}
+    assert units["Bias"] == units["Noise"] == "deg"
+    assert units["Scale factor"] == ""
+    assert units["Natural frequency"] == "Hz"
+
+
+def test_where_no_channel_stands_out_the_reasons_are_told(tmp_path):
+    record = recorded()
+    still = record.outputs[0].values * 0.0
+    rows = zip(record.inputs[0].time, record.inputs[0].values, still, strict=True)
+    file = tmp_path / "still.csv"
+    file.write_text("time,a,b\n" + "".join(f"{t},{a},{b}\n" for t, a, b in rows))
+    seen = look(str(file))
+    assert (seen.inputs, seen.outputs) == ((), ())
+    assert any(words.startswith("'b': reads 0 from end to end") for words in seen.reasons)
 
 
 def test_a_specification_is_a_line_in_the_trend(folder):

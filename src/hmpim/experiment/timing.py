@@ -67,8 +67,8 @@ class Timing:
         Commands went within 0 ms of their time (median; 99.9 %: 0 ms; worst: 0 ms), 100 % of ...
         """
         return (
-            f"Commands went within {1e3 * self.median:.3g} ms of their time (median; 99.9 %: "
-            f"{1e3 * self.most:.3g} ms; worst: {1e3 * self.worst:.3g} ms), "
+            f"Commands went within {_time(self.median)} of their time (median; 99.9 %: "
+            f"{_time(self.most)}; worst: {_time(self.worst)}), "
             f"{100 * self.within_half:.4g} % of the periods were right to half a period, and "
             f"{self.missed} of {self.commands} commands were a period or more late."
         )
@@ -148,7 +148,7 @@ def judge_timing(
             code="timing",
             message=(
                 f"{timing.words()} That is too irregular for {highest:g} Hz: it alone may be "
-                f"wrong by {100 * share:.3g} % there, and {100 * TOO_IRREGULAR:g} % is borne; run "
+                f"wrong by {_in_percent(share)} there, and {100 * TOO_IRREGULAR:g} % is borne; run "
                 "on a quieter computer, with real-time scheduling, or with a rig that stamps its "
                 "own samples."
             ),
@@ -156,3 +156,12 @@ def judge_timing(
             parameters=("delay", "noise_std"),
         ),
     )
+
+
+def _time(seconds: float) -> str:
+    return f"{1e3 * seconds:.3g} ms" if seconds < 0.9995 else f"{seconds:.3g} s"
+
+
+def _in_percent(share: float) -> str:
+    """A share of the signal; past all of it, how far is no figure to go by."""
+    return f"{100.0 * share:.2g} %" if share < 0.995 else "100 % and more"

@@ -10,7 +10,7 @@ from hmpim.errors import ArgumentError, FormatError, RecordError, UnitError
 from hmpim.formats.readers import Contents, listed
 from hmpim.formats.roles import Roles
 from hmpim.record import Channel, Finding, Record, Series, fit_clock
-from hmpim.record.mend import mend, restarts
+from hmpim.record.mend import check_runs_on, mend, restarts
 from hmpim.units import check_unit
 
 __all__ = ["assemble", "check_units", "cut_runs"]
@@ -93,7 +93,7 @@ def cut_runs(series: Sequence[Series]) -> list[tuple[Series, ...]]:
     Raises
     ------
     RecordError
-        If the clocks of one file do not start again equally often.
+        If the clocks of one file do not start again equally often, or one runs backward.
 
     Examples
     --------
@@ -105,7 +105,9 @@ def cut_runs(series: Sequence[Series]) -> list[tuple[Series, ...]]:
     edges: dict[int, list[int]] = {}
     for s in series:
         if s.time is not None and id(s.time) not in edges:
-            edges[id(s.time)] = [0, *restarts(s.time).tolist(), s.time.size]
+            starts = restarts(s.time)
+            check_runs_on(s.time, starts, of=repr(s.name))
+            edges[id(s.time)] = [0, *starts.tolist(), s.time.size]
     counts = {len(places) - 1 for places in edges.values()}
     if len(counts) > 1:
         few, many = min(counts), max(counts)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from hmpim.arguments import check_argument
 from hmpim.errors import ArgumentError
 from hmpim.plots.candidates import INTERSAMPLE_WORDS
 from hmpim.plots.curves import (
@@ -69,7 +70,7 @@ def bode(
     Raises
     ------
     ArgumentError
-        If a result holds no response to draw.
+        If a result holds no response to draw, or `what` is no result and no curves.
 
     Examples
     --------
@@ -124,10 +125,11 @@ _QUANTITIES: tuple[Literal["magnitude_db", "phase"], ...] = ("magnitude_db", "ph
 
 
 def _result_bode(result: "Identification | PairIdentification") -> Figure:
-    from hmpim.identify import Identification
+    from hmpim.identify import Identification, PairIdentification
     from hmpim.plots.overlay import overlaid_bode
 
     if not isinstance(result, Identification):
+        check_argument("what", result, PairIdentification)
         return pair_bode(result)
     pairs = [pair for pair in result.counted if np.any(pair.frequency_response.frequency > 0)]
     if not pairs:

@@ -11,7 +11,7 @@ from hmpim.record.channel import Channel
 from hmpim.record.finding import Finding
 from hmpim.record.series import Series
 
-__all__ = ["Mended", "check_span", "mend", "restarts"]
+__all__ = ["Mended", "check_runs_on", "check_span", "mend", "restarts"]
 
 _LATE = 8
 """Samples that may follow a stamp that ran ahead before the stamps count as starting again.
@@ -181,6 +181,12 @@ def _ordered(
         )
     else:
         order = order[first]
+        if order.size < 2:
+            raise RecordError(
+                f"time of {of} stands still: all {time.size} samples are stamped "
+                f"{time[order[0]]:.9g} s; name the column of the time with --time, or give the "
+                "rate with --fs (in Python: time=..., fs=...)"
+            )
         message = (
             f"{doubled} of {time.size} stamps of {of} repeat the one before; the first sample of "
             "each is kept"
@@ -251,12 +257,40 @@ def _spread(time: NDArray[np.float64]) -> NDArray[np.float64] | None:
 
 def _check_not_restarted(time: NDArray[np.float64], of: str) -> None:
     starts = restarts(time)
+    check_runs_on(time, starts, of=of)
     if starts.size:
         k = int(starts[0])
         raise RecordError(
             f"time of {of} starts again at sample {k}: {time[k - 1]:.9g} s is followed by "
             f"{time[k]:.9g} s ({starts.size} such in all); the file holds several recordings: "
             "choose a sweep with --sweep, or cut the file there"
+        )
+
+
+def check_runs_on(time: NDArray[np.float64], starts: NDArray[np.int64], *, of: str) -> None:
+    """Refuse a clock that starts again before it has run on by a sample.
+
+    Parameters
+    ----------
+    time : ndarray, shape (n,)
+        Stamps in s.
+    starts : ndarray of int
+        Where it starts again, as `restarts` finds it.
+    of : str
+        Whose clock it is, for the message.
+
+    Raises
+    ------
+    RecordError
+        If it runs backward.
+    """
+    short = np.flatnonzero(np.diff(starts) < 2)
+    if short.size:
+        k = int(starts[short[0]])
+        raise RecordError(
+            f"time of {of} runs backward at {starts.size} of {time.size} samples: "
+            f"{time[k - 1]:.9g} s is followed by {time[k]:.9g} s; sort the rows by time, or cut "
+            "the file there"
         )
 
 

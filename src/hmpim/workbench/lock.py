@@ -123,7 +123,14 @@ class Lock:
             await _refuse(scope, send, 413, self._too_large)
             return
         inside = {**scope, "root_path": f"/{self._token}"}
-        begun = False
+        counted = _counted(receive, self._largest)
+        begun = gone = False
+
+        async def asked() -> Message:
+            nonlocal gone
+            message = await counted()
+            gone = gone or message["type"] == "http.disconnect"
+            return message
 
         async def answer(message: Message) -> None:
             nonlocal begun
@@ -135,10 +142,13 @@ class Lock:
             await send(message)
 
         try:
-            await self._app(inside, _counted(receive, self._largest), answer)
+            await self._app(inside, asked, answer)
         except _TooLargeError:
             if not begun:
                 await _refuse(scope, send, 413, self._too_large)
+        except RuntimeError:  # Starlette's, where nobody is left to answer: no defect, no traceback
+            if begun or not gone:
+                raise
 
     @property
     def _too_large(self) -> str:

@@ -69,6 +69,8 @@ def aside(value: float, low: float | None, high: float | None) -> str:
     '0.1500 −0.0026 +?'
     >>> aside(0.15, None, None)
     '0.15 ± ?'
+    >>> aside(3.1e-15, 0.0, 3.4e-15), aside(3.2e9, 3.18e9, None)
+    ('(3.10 −3.10 +0.30)e-15', '(3.200 −0.020 +?)e+09')
     >>> aside(0.15, 0.15 - 2e-12, 0.15 + 2.4e-7)  # one side next to nothing beside the other
     '0.1500000000 −0.0000000000 +0.0000002400'
     >>> aside(0.035, 0.035 - 2e-17, 0.035 + 5e-16)  # exact but for rounding
@@ -81,8 +83,12 @@ def aside(value: float, low: float | None, high: float | None) -> str:
     places = _places(max(min(known), _ROUGHLY * max(known))) if known else None
     if places is None:
         return f"{_plain(value)} ± ?"
-    down, up = ("?" if length is None else _at(length, places) for length in reach)
-    return f"{_at(value, places)} −{down} +{up}"
+    exponent = _exponent(value, max(known), places)
+    lengths = [None if length is None else length / 10.0**exponent for length in reach]
+    places += exponent
+    down, up = ("?" if length is None else _at(length, places) for length in lengths)
+    number = f"{_at(value / 10.0**exponent, places)} −{down} +{up}"
+    return f"({number})e{exponent:+03d}" if exponent else number
 
 
 def interval(low: float | None, high: float | None, *, value: float, std: float | None) -> str:

@@ -14,6 +14,7 @@ from hmpim.errors import ArgumentError, RecordError
 from hmpim.identify.statistics.reach import Reach
 from hmpim.identify.statistics.run import Run, begun, continued
 from hmpim.record import Intersample, Record, Signal, uniform
+from hmpim.tables import shortened
 
 __all__ = ["Statistics", "compress"]
 
@@ -29,7 +30,7 @@ _FARTHEST = 1e15
 Sharing = Literal["own", "common"]
 
 
-@dataclass(slots=True, kw_only=True, eq=False)
+@dataclass(slots=True, kw_only=True, eq=False, repr=False)
 class Statistics(ByValue):
     """A record, or several, compressed: products at a window of lags, and the ends of each run.
 
@@ -73,6 +74,14 @@ class Statistics(ByValue):
     bias: Sharing = "own"
 
     __hash__ = None  # type: ignore[assignment]
+
+    def __repr__(self) -> str:
+        source, output = (shortened([name]) for name in self.names)
+        runs = f"{len(self.runs)} run{'s' if len(self.runs) != 1 else ''}"
+        return (
+            f"Statistics({source} → {output}, {self.samples} samples in {runs} at {self.fs:g} Hz, "
+            f"{self.lags} lags)"
+        )
 
     @property
     def samples(self) -> int:

@@ -42,6 +42,7 @@ class AnalysePage:
         self.looked: Looked | None = None
         self.result: ResultView | None = None
         self.automatic: tuple[tuple[Question, int], Identification] | None = None
+        self.asked = 0  # so often; what comes back of an earlier asking is of no use any more
         with ui.element("div").classes("hm-side hm-screen"):
             with card("Record"):
                 self._uploader()
@@ -116,6 +117,7 @@ class AnalysePage:
             file=file, inputs=(), outputs=(), fs=None, start=None, stop=None, pair=0, hand={}
         )
         self.result = None
+        self.asked += 1
         self.shown.clear()
         with failures_said():
             await self._looked()
@@ -153,6 +155,10 @@ class AnalysePage:
             for name, note in zip(looked.names, looked.notes, strict=True)
         }
         with card("Channels"):
+            if not looked.inputs or not looked.outputs:
+                ui.label("No input and output stand out; choose them.").classes("hm-doubt")
+                for words in looked.reasons:
+                    ui.label(words).classes("hm-soft")
             for field, words in (("inputs", "Inputs"), ("outputs", "Outputs")):
                 ui.select(
                     named,
@@ -194,6 +200,8 @@ class AnalysePage:
             if not wish.inputs or not wish.outputs:
                 raise ArgumentError("choose at least one input and one output")
             question, button = self.question, self.button
+            self.asked += 1
+            asked = self.asked
             button.disable()
             self.shown.clear()
             with self.shown, ui.row().classes("hm-row"):
@@ -204,11 +212,11 @@ class AnalysePage:
                     self.workers.do(found, question, View(pair=wish.pair)), self._beside(question)
                 )
             finally:
-                if not self.shown.is_deleted:  # else the page was left meanwhile
+                if asked == self.asked and not self.shown.is_deleted:  # else the page was left
                     self.shown.clear()
                 if not button.is_deleted:  # another file has another one
                     button.enable()
-            if self.shown.is_deleted:
+            if asked != self.asked or self.shown.is_deleted:
                 return
             if beside is None:
                 self.automatic = ((question.automatic, made.stamp), made.result)

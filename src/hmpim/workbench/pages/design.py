@@ -2,8 +2,9 @@
 
 import asyncio
 import time
+from collections.abc import Callable, Coroutine
 from dataclasses import replace
-from typing import Any
+from typing import Any, TypeVar
 
 from nicegui import background_tasks, ui
 
@@ -30,7 +31,11 @@ from hmpim.workbench.workers import Latest
 __all__ = ["design"]
 
 _SPECTRUM_EVERY = 0.3  # s between two spectra while a slider moves faster than all can follow
+_MANY = 1_000_000  # samples of a design that takes long: about a second
+_LONG = 0.5  # s after which a design that is not there yet is spoken of
 _REST = 0.3  # s without a change after which tables and spectrogram follow
+
+T = TypeVar("T")
 
 
 def design(window: Window) -> Later:
@@ -226,7 +231,7 @@ class DesignPage:
 
     async def _draw(self) -> None:
         """Show what follows from the wish: what has changed, and first what moves the plots."""
-        wish, axis, soon = self.wish, int(self.axis.value or 0), self.window.workbench.workers.soon
+        wish, axis, soon = self.wish, int(self.axis.value or 0), self._soon
         if self.resting is not None:
             self.resting.cancel()
         moved = (stimulus_part(wish), axis)
@@ -235,7 +240,7 @@ class DesignPage:
         try:
             if moved != self.moved:
                 self.moved, self.windowed = None, None
-                self.found = await soon(designed, wish, axis)
+                self.found = await self._patiently(soon(designed, wish, axis))
                 if self.said.is_deleted:  # the page was left meanwhile
                     return
                 self._picture("motion", self.found.motion)
@@ -256,6 +261,21 @@ class DesignPage:
             self.moved = None
             self._refuse(error)
 
+    @property
+    def _soon(self) -> Callable[..., Coroutine[Any, Any, Any]]:
+        """Where this design is worked on: a long one not where other windows wait for theirs."""
+        workers, wish = self.window.workbench.workers, self.wish
+        samples = len(wish.rows) * wish.duration * wish.fs
+        return workers.soon if samples < _MANY else workers.do
+
+    async def _patiently(self, made: Coroutine[Any, Any, T]) -> T:
+        """What is made; where that takes long, the page says so meanwhile."""
+        task = asyncio.ensure_future(made)
+        await asyncio.wait({task}, timeout=_LONG)
+        if not task.done() and not self.wish.gentlest and not self.said.is_deleted:
+            self.said.say("Designing …", "soft")
+        return await task
+
     def _refuse(self, error: HmpimError) -> None:
         if not self.said.is_deleted:
             self.said.say(" ".join(str(error).split()), "bad")
@@ -267,7 +287,7 @@ class DesignPage:
         if found is None or self.said.is_deleted:
             return
         try:
-            errors = await workers.soon(error_cells, wish)
+            errors = await self._soon(error_cells, wish)
             if self.tables.is_deleted:
                 return
             self._tabulate(found, errors)
@@ -305,7 +325,7 @@ class DesignPage:
     async def _save(self) -> None:
         with failures_said():
             folder = self.window.workbench.settings.runs / "designs"
-            path = await self.window.workbench.workers.soon(save_design, self.wish, str(folder))
+            path = await self._soon(save_design, self.wish, str(folder))
             ui.download.file(path)
             ui.notify(f"Saved as {path}")
 

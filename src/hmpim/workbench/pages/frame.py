@@ -58,7 +58,7 @@ def add_page(workbench: Workbench, name: str, build: Build) -> None:
             return RedirectResponse(f"{_root(request)}/{name}?desk={chosen.name}", 303)
         window = Window(workbench, found.name)
         _frame(window, name)
-        with ui.element("main").classes("hm-main").props('id="main"'):
+        with ui.element("div").classes("hm-main").props('id="main"'):
             ui.label(PAGES[name]).props('role="heading" aria-level="1"').classes("hm-title")
             later = build(window)
         _watch(window, client, name)

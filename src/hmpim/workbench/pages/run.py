@@ -80,7 +80,8 @@ class RunPage:
                 )
                 ui.label("The Escape key stops too.").classes("hm-soft")
             with card("Estimate so far"):
-                self.axis = ui.select([], label="Axis").props("dense").classes("hm-screen")
+                self.axis = ui.select([], label="Axis", on_change=self._anew)
+                self.axis.props("dense").classes("hm-screen")
                 self.told = ui.label().classes("hm-soft")
                 self.estimates = ui.element("div").classes("hm-shown")
             with card("Log"):
@@ -152,12 +153,10 @@ class RunPage:
         live, bench = self.bench.live, self.bench
         if bench.count != self.shown or (live.channels and not self.strips):
             self.shown = bench.count
-            self.measured, self.looked = ("", -1), ("", -1.0)
-            self.told.set_text("")
+            self._anew()
             self.strips = {}
             self.chart.clear()
             self.after.clear()
-            self.estimates.clear()
             with self.chart:
                 for axis in live.axes:
                     self.strips[axis] = Strip(live, axis, limit=live.limits.get(axis))
@@ -171,6 +170,14 @@ class RunPage:
             self.progress.set_text(f"{live.end:.1f} of {live.seconds:.1f} s")
         if bench.ended is not None and not list(self.after):
             self._ended()
+
+    def _anew(self) -> None:
+        """Take away what was shown of another run or axis until this one's is there."""
+        self.told.set_text("")
+        self.measured, self.looked = ("", -1), ("", -1.0)
+        self.pictures.clear()
+        for place in (self.estimates, self.bars, self.plot):
+            place.clear()
 
     def _ended(self) -> None:
         ended, folder = self.bench.ended, self.bench.folder
@@ -205,7 +212,8 @@ class RunPage:
         with suppress(HmpimError):  # the samples cannot be put on one clock yet
             await looks.follow(live, axis, self.window.workbench.workers.do)
         look = looks.look
-        if look is None or self.estimates.is_deleted or self.bench.count != count:
+        left = self.axis.value != axis or self.bench.count != count
+        if look is None or self.estimates.is_deleted or left:
             return
         if (axis, look.time) == self.looked:
             return
@@ -213,7 +221,8 @@ class RunPage:
         self.told.set_text(_of_look(look, "" if looks.passed else f"{looks.passed_at:.1f} s"))
         self.estimates.clear()
         with self.estimates:
-            plain_table(*look_cells(look, passed=looks.passed), title="Estimate so far")
+            unit = live.of(axis)["output"].unit
+            plain_table(*look_cells(look, passed=looks.passed, unit=unit), title="Estimate so far")
         if looks.closing:
             figure = closing_bars(
                 [time for time, _ in looks.closing],
@@ -245,7 +254,8 @@ class RunPage:
                 (command.unit, response.unit),
                 None if looks is None else looks.estimator.statistics.band,
             )
-            if not self.plot.is_deleted and self.bench.count == count:
+            same = self.bench.count == count and self.axis.value == axis
+            if same and not self.plot.is_deleted:
                 self._show("bode", self.plot, figure)
         except HmpimError:
             await asyncio.sleep(0.3)  # too little yet

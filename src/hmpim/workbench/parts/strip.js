@@ -65,7 +65,7 @@ export default {
         {
           ...this.size(), title: "", legend: { live: false }, cursor: { show: false },
           scales: { x: { time: false } },
-          axes: [axis, { ...axis, size: 64 * grown, label: this.unit, labelSize: 16 * grown }],
+          axes: [axis, { ...axis, space: 18 * grown, size: 64 * grown, label: this.unit, labelSize: 16 * grown }],
           series: [{}, line(this.names[0], "#0072b2"), line(this.names[1], "#d55e00"), ...limits],
         },
         [[0], [null], [null], ...limits.map(() => [null])],

@@ -11,6 +11,7 @@ from hmpim.report.words import GLOSSARY, paper_value
 __all__ = ["look_cells", "parameter_cells", "plain_table"]
 
 _VERDICTS = {"ok": "ok", "doubtful": "doubtful"}
+_OF_OUTPUT = ("bias", "noise_std")
 _CLASSES = {"ok": "hm-ok", "doubtful": "hm-doubt", "not identifiable": "hm-bad", "fail": "hm-bad"}
 
 
@@ -103,7 +104,9 @@ def _marked(estimate: Estimate) -> str:
     return f"✎ {format_value(estimate)}" + ("" if estimate.verdict == "ok" else ", doubtful")
 
 
-def look_cells(look: Look, *, passed: bool) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
+def look_cells(
+    look: Look, *, passed: bool, unit: str = ""
+) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
     """Return headings and rows of the estimate so far.
 
     Parameters
@@ -112,6 +115,8 @@ def look_cells(look: Look, *, passed: bool) -> tuple[tuple[str, ...], list[tuple
         What is known so far.
     passed : bool
         Whether the whole band has been played: before that, nothing is called ok.
+    unit : str
+        Of the output, which the stimulus that is played does not know.
     """
     rows: list[tuple[str, ...]] = []
     for words in GLOSSARY:
@@ -123,7 +128,7 @@ def look_cells(look: Look, *, passed: bool) -> tuple[tuple[str, ...], list[tuple
                 (
                     words.label,
                     format_value(estimate),
-                    estimate.unit,
+                    unit if words.name in _OF_OUTPUT else estimate.unit,
                     "too early" if early else verdict,
                 )
             )

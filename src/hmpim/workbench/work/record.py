@@ -22,6 +22,7 @@ from hmpim.report import report
 from hmpim.report.by_hand import fit_note, hand_notes
 from hmpim.report.figures import Picture, pair_pictures
 from hmpim.report.words import structure_words
+from hmpim.tables import shortened
 from hmpim.workbench.drawn import drawn
 
 __all__ = [
@@ -39,6 +40,7 @@ __all__ = [
     "write_report",
 ]
 
+_MOST_REASONS = 12
 Samples = tuple[NDArray[np.float64], NDArray[np.float64]]
 
 
@@ -46,7 +48,8 @@ Samples = tuple[NDArray[np.float64], NDArray[np.float64]]
 class Looked:
     """What a file holds: channels with unit and rate, and what is proposed of them.
 
-    `fs` is None where the file has no time, and the rate must be stated.
+    `fs` is None where the file has no time, and the rate must be stated; `reasons` say of each
+    channel what speaks for or against it.
     """
 
     names: tuple[str, ...]
@@ -54,6 +57,7 @@ class Looked:
     inputs: tuple[str, ...]
     outputs: tuple[str, ...]
     fs: float | None
+    reasons: tuple[str, ...]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -125,12 +129,19 @@ def look(path: str) -> Looked:
     """
     seen = survey(path)
     rates = [d.rate for d in seen.descriptions if d.rate]
+    spoilt: dict[str, list[str]] = {}
+    for d in seen.descriptions:
+        if d.problem:
+            spoilt.setdefault(d.problem, []).append(d.name)
+    reasons = [f"{shortened(names)}: not usable as it is: {why}" for why, names in spoilt.items()]
+    reasons += [f"{name!r}: {reason}" for name, reason in seen.proposal.reasons]
     return Looked(
         names=tuple(d.name for d in seen.descriptions),
         notes=tuple(_note(d.unit, d.rate) for d in seen.descriptions),
         inputs=seen.proposal.inputs,
         outputs=seen.proposal.outputs,
         fs=rates[0] if rates else None,
+        reasons=tuple(reasons[:_MOST_REASONS]),
     )
 
 
