@@ -1,5 +1,7 @@
 """What Tab offers: commands, options, and the rigs that a person described."""
 
+import os
+import shutil
 import subprocess
 import sys
 
@@ -81,3 +83,48 @@ def test_completion_installs_itself_for_bash(tmp_path, monkeypatch, capsys):
         ["bash", "-c", pressed], capture_output=True, text=True, check=True, cwd=tmp_path
     )
     assert done.stdout.split() == ["bench9"]
+
+
+PRESSED = """
+import os, pty, re, select, sys, time
+shell, line, wanted = sys.argv[1:]
+pid, fd = pty.fork()
+if not pid:
+    os.execvp(shell, [shell, "-i"])
+end, seen, typed = time.monotonic() + 120.0, "", False
+while time.monotonic() < end and wanted not in seen:
+    if select.select([fd], [], [], 0.5)[0]:
+        seen += re.sub(r"\\x1b\\[[\\d;?]*\\w", "", os.read(fd, 65536).decode(errors="replace"))
+    elif not typed:  # the prompt is there, and nothing more comes
+        os.write(fd, line.encode() + b"\\t")
+        typed = True
+os.kill(pid, 9)
+os.waitpid(pid, 0)
+sys.exit(0 if wanted in seen else repr(seen))
+"""
+
+
+@pytest.mark.skipif(shutil.which("zsh") is None, reason="zsh is not there")
+def test_zsh_completes_at_the_first_tab(tmp_path):
+    """A shell behind a pseudo terminal, in a home of its own, as a person installs it."""
+    hmpim = tmp_path / "hmpim"
+    hmpim.write_text(f"#!{sys.executable}\nfrom hmpim.cli.main import main; main()\n")
+    hmpim.chmod(0o755)
+    (tmp_path / "hmpim.toml").write_text('[rigs.bench9]\nrig = "table"\n')
+    own = {
+        **os.environ,
+        "HOME": str(tmp_path),
+        "ZDOTDIR": str(tmp_path),
+        "SHELL": "/bin/zsh",
+        "TERM": "xterm",
+        "PATH": f"{tmp_path}{os.pathsep}{os.environ['PATH']}",
+        "_TYPER_COMPLETE_TEST_DISABLE_SHELL_DETECTION": "1",
+    }
+    install = [str(hmpim), "--install-completion", "zsh"]
+    subprocess.run(install, env=own, cwd=tmp_path, check=True, capture_output=True)
+    line, wanted = "hmpim run s.csv --rig be", "--rig bench9"
+    done = subprocess.run(
+        [sys.executable, "-c", PRESSED, "zsh", line, wanted],
+        env=own, cwd=tmp_path, capture_output=True, text=True, check=False, timeout=200,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr

@@ -131,6 +131,7 @@ def test_a_spoilt_cell_in_a_column_that_is_not_asked_for_does_no_harm(file):
         (b"time,u,y\n0,1,\x81\xfe\n", "line 2 holds the byte 0x81, which is not UTF-8"),
         (b"time,u,y\n0,1,\x00\xfe\n", "is a binary file"),
         ("word\nword\nword\n", "holds no rows of numbers"),
+        ('{"schema": "hmpim/identification/2"}\n', "holds JSON and .* with hmpim report"),
         (
             "time,a,b\n0,1,2\n1,3,4\n",
             r"which column is the input; its columns are a, b: .*--input a",

@@ -1,5 +1,6 @@
 """The lock: who may not pass, and what may not come in."""
 
+import asyncio
 from contextlib import nullcontext
 
 import pytest
@@ -113,20 +114,21 @@ def test_too_much_is_cut_off_while_it_comes_whatever_the_header_says():
 
 def test_a_browser_that_goes_away_is_no_defect_and_a_defect_is_one():
     async def left(scope, receive, send):
-        while (await receive())["type"] != "http.disconnect":
-            pass
         raise RuntimeError("No response returned.")  # as Starlette says it
 
     async def broken(scope, receive, send):
         raise RuntimeError("a defect")
 
-    async def receive():
+    async def closed():
         return {"type": "http.disconnect"}
+
+    async def open_still():
+        await asyncio.Event().wait()
 
     async def send(message):
         raise AssertionError(message)
 
-    for application, defect in ((left, False), (broken, True)):
+    for application, receive, defect in ((left, closed, False), (broken, open_still, True)):
         lock = Lock(application, token=TOKEN, port=8080, largest=1000)
         with pytest.raises(RuntimeError, match="a defect") if defect else nullcontext():
             finished(lock(asked(HOST, OWN), receive, send))

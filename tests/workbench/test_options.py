@@ -13,6 +13,7 @@ from hmpim.cli.main import app
         (["--max-upload", "0"], "--max-upload 0 MB takes nothing"),
         (["--grace", "0"], "--grace 0 s"),
         (["--rig-file", "nowhere.toml"], "'nowhere.toml' cannot be read"),
+        (["--rig", "warp drive"], "there is no rig 'warp drive'; there are sensor"),
     ],
 )
 def test_bad_options_are_one_line(tmp_path, monkeypatch, arguments, reason):

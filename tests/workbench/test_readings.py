@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 import hmpim
@@ -73,6 +74,14 @@ def test_where_no_channel_stands_out_the_reasons_are_told(tmp_path):
     seen = look(str(file))
     assert (seen.inputs, seen.outputs) == ((), ())
     assert any(words.startswith("'b': reads 0 from end to end") for words in seen.reasons)
+
+
+def test_a_run_of_several_axes_is_analysed_as_a_whole(tmp_path):
+    u, v = np.random.default_rng(1).standard_normal((2, 400))
+    record = hmpim.Record.from_arrays({"a": u, "b": v}, {"c": u, "d": v}, fs=100.0)
+    save(record, tmp_path / "run.h5")
+    seen = look(str(tmp_path / "run.h5"))
+    assert (seen.inputs, seen.outputs) == (("a", "b"), ("c", "d"))
 
 
 def test_a_specification_is_a_line_in_the_trend(folder):

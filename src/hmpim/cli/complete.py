@@ -1,6 +1,33 @@
 """What the shell offers when Tab is pressed behind an option."""
 
-__all__ = ["complete_rig"]
+import contextlib
+
+__all__ = ["complete_rig", "completing_at_the_first_tab"]
+
+_ZSH = """
+#compdef %(prog_name)s
+
+%(complete_func)s() {
+  eval $(env _TYPER_COMPLETE_ARGS="${words[1,$CURRENT]}" %(autocomplete_var)s=complete_zsh %(prog_name)s)
+}
+
+if [[ $zsh_eval_context[-1] == loadautofunc ]]; then
+  %(complete_func)s "$@"
+else
+  compdef %(complete_func)s %(prog_name)s
+fi
+"""  # noqa: E501
+
+
+def completing_at_the_first_tab() -> None:
+    """Give zsh a script that completes when it is first loaded, too.
+
+    With Typer's own the first Tab of every shell only loads the function, and offers nothing.
+    """
+    with contextlib.suppress(ImportError, AttributeError):  # a later Typer has its own way
+        from typer import _completion_shared
+
+        _completion_shared._completion_scripts["zsh"] = _ZSH
 
 
 def complete_rig(incomplete: str) -> list[tuple[str, str]]:

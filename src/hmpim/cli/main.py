@@ -14,6 +14,7 @@ from typer.core import TyperGroup
 from hmpim.cli.batch import batch
 from hmpim.cli.campaign import campaign
 from hmpim.cli.channels import channels
+from hmpim.cli.complete import completing_at_the_first_tab
 from hmpim.cli.compress import compress
 from hmpim.cli.demo import demo
 from hmpim.cli.design import design
@@ -170,6 +171,7 @@ app.command(epilog="Example: hmpim paper --out docs/build --figures 12 13")(pape
 
 def main() -> None:
     """Run the command line; this is what ``hmpim`` starts."""
+    completing_at_the_first_tab()
     app()
 
 

@@ -58,6 +58,7 @@ def workbench(
 
     It listens on this computer alone. The address holds a token: whoever has it may move the rigs.
     """
+    from hmpim.rigs.catalogue import check_rig, read_description
     from hmpim.workbench import Settings
     from hmpim.workbench.server import Address, serve
 
@@ -68,9 +69,10 @@ def workbench(
     if not 0.0 < grace <= 60.0:
         raise ArgumentError(f"--grace {grace:g} s must be more than 0 and at most 60")
     if rig_file is not None:
-        from hmpim.rigs.catalogue import read_description
-
         read_description(rig_file)
+
+    for name in rig or ():
+        check_rig(name)
 
     def ready(address: Address) -> None:
         say(f"Workbench at {address.url}")

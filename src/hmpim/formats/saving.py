@@ -112,7 +112,7 @@ def load(path: str | PathLike[str]) -> Saved:
             return kind.read(file)
     raise FormatError(
         f"{str(path)!r} holds nothing that hmpim.save writes; a record that other programs wrote "
-        "is read with hmpim.read"
+        "is read with hmpim.read, and identified with hmpim identify"
     )
 
 

@@ -383,7 +383,7 @@ def _read_csv(path: Path) -> list[PlayedStimulus]:
     comments = [line for line in lines if line.startswith("#")]
     rows = [line for line in lines if line and not line.startswith("#")]
     if not rows or not comments:
-        raise FormatError(f"{str(path)!r} has no heading of a stimulus")
+        raise FormatError(f"{str(path)!r} has no heading of a stimulus; make one with hmpim design")
     names = rows[0].split(",")
     table = np.array([[float(v) for v in row.split(",")] for row in rows[1:]])
     columns = dict(zip(names, table.T, strict=True))

@@ -6,6 +6,8 @@ nobody else knows, the request names this host (a rebound name does not), and it
 of this server. The lock stands before the whole application, socket and static files included.
 """
 
+import asyncio
+import contextlib
 import hmac
 import secrets
 from collections.abc import Awaitable, Callable, MutableMapping
@@ -31,6 +33,8 @@ _POLICY = (
     b"default-src 'self' data: blob: 'unsafe-inline' 'unsafe-eval'; object-src 'none'; "
     b"base-uri 'self'; form-action 'self'; frame-ancestors 'none'",
 )
+
+_AT_ONCE = 0.1  # s within which a connection that is closed says so
 
 
 def fresh_token() -> str:
@@ -123,14 +127,7 @@ class Lock:
             await _refuse(scope, send, 413, self._too_large)
             return
         inside = {**scope, "root_path": f"/{self._token}"}
-        counted = _counted(receive, self._largest)
-        begun = gone = False
-
-        async def asked() -> Message:
-            nonlocal gone
-            message = await counted()
-            gone = gone or message["type"] == "http.disconnect"
-            return message
+        begun = False
 
         async def answer(message: Message) -> None:
             nonlocal begun
@@ -142,12 +139,12 @@ class Lock:
             await send(message)
 
         try:
-            await self._app(inside, asked, answer)
+            await self._app(inside, _counted(receive, self._largest), answer)
         except _TooLargeError:
             if not begun:
                 await _refuse(scope, send, 413, self._too_large)
         except RuntimeError:  # Starlette's, where nobody is left to answer: no defect, no traceback
-            if begun or not gone:
+            if begun or not await _has_left(receive):
                 raise
 
     @property
@@ -183,6 +180,16 @@ def _counted(receive: Receive, largest: int) -> Receive:
         return message
 
     return counting
+
+
+async def _has_left(receive: Receive) -> bool:
+    """Whether the browser has closed the connection."""
+    with contextlib.suppress(TimeoutError):
+        async with asyncio.timeout(_AT_ONCE):
+            while (await receive())["type"] != "http.disconnect":
+                pass
+            return True
+    return False
 
 
 async def _refuse(scope: Scope, send: Send, status: int, reason: str) -> None:

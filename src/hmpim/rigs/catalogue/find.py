@@ -10,7 +10,7 @@ from hmpim.rigs.catalogue.kinds import KINDS, load_builder, offered_kinds
 from hmpim.rigs.catalogue.named import named_rigs
 from hmpim.rigs.protocol import LimitsOfAxes, Rig
 
-__all__ = ["FoundRig", "find_rig"]
+__all__ = ["FoundRig", "check_rig", "find_rig"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -86,8 +86,29 @@ def find_rig(
     kind, argument = _parted(text)
     builder = load_builder(kind)
     if builder is None:
-        raise RigError(f"there is no rig {text!r}; there are {', '.join(_known(start))}")
+        raise _unknown(text, start)
     return FoundRig(rig=builder(argument, described), description=described)
+
+
+def check_rig(text: str, *, start: Path | None = None) -> None:
+    """Refuse the name of a rig that is not there; nothing is built.
+
+    Parameters
+    ----------
+    text, start
+        As `find_rig` takes them.
+
+    Raises
+    ------
+    RigError
+        If there is no such rig; the message lists those there are.
+    """
+    if text not in named_rigs(start) and load_builder(_parted(text)[0]) is None:
+        raise _unknown(text, start)
+
+
+def _unknown(text: str, start: Path | None) -> RigError:
+    return RigError(f"there is no rig {text!r}; there are {', '.join(_known(start))}")
 
 
 def _parted(text: str) -> tuple[str, str]:

@@ -144,7 +144,7 @@ class AnalysePage:
         if self.choices.is_deleted:
             return
         if not self.wish.inputs and not self.wish.outputs:
-            self.change(inputs=self.looked.inputs[:1], outputs=self.looked.outputs)
+            self.change(inputs=self.looked.inputs, outputs=self.looked.outputs)
         with self.choices:
             self._choices(self.looked)
         self.command.show(_command(self.wish))

@@ -90,7 +90,7 @@ class CampaignPage:
     def _check(self) -> None:
         with failures_said():
             plan = checked_plan(self.wish.plan)
-            ui.notify(f"{plan.name}: {len(plan.tests)} tests of {len(plan.axes)} axes")
+            ui.notify(f"{plan.name}. Tests: {len(plan.tests)}; axes: {len(plan.axes)}.")
 
     def _start(self) -> None:
         with failures_said():

@@ -4,7 +4,7 @@ import asyncio
 import time
 from collections.abc import Callable, Coroutine
 from dataclasses import replace
-from typing import Any, TypeVar
+from typing import Any
 
 from nicegui import background_tasks, ui
 
@@ -34,8 +34,6 @@ _SPECTRUM_EVERY = 0.3  # s between two spectra while a slider moves faster than 
 _MANY = 1_000_000  # samples of a design that takes long: about a second
 _LONG = 0.5  # s after which a design that is not there yet is spoken of
 _REST = 0.3  # s without a change after which tables and spectrogram follow
-
-T = TypeVar("T")
 
 
 def design(window: Window) -> Later:
@@ -240,10 +238,11 @@ class DesignPage:
         try:
             if moved != self.moved:
                 self.moved, self.windowed = None, None
-                self.found = await self._patiently(soon(designed, wish, axis))
+                made = await self._patiently(soon(designed, wish, axis))
+                self.found = made
                 if self.said.is_deleted:  # the page was left meanwhile
                     return
-                self._picture("motion", self.found.motion)
+                self._picture("motion", made.motion)
                 self.moved = moved
             windowed = (*moved, wish.alpha)
             late = time.monotonic() - self.spectrum_at > _SPECTRUM_EVERY
@@ -268,7 +267,7 @@ class DesignPage:
         samples = len(wish.rows) * wish.duration * wish.fs
         return workers.soon if samples < _MANY else workers.do
 
-    async def _patiently(self, made: Coroutine[Any, Any, T]) -> T:
+    async def _patiently(self, made: Coroutine[Any, Any, Designed]) -> Designed:
         """What is made; where that takes long, the page says so meanwhile."""
         task = asyncio.ensure_future(made)
         await asyncio.wait({task}, timeout=_LONG)

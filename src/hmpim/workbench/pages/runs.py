@@ -50,6 +50,8 @@ class RunsPage:
         with ui.element("div").classes("hm-body"):
             with card("Runs"):
                 self.table = ui.element("div")
+                with self.table:
+                    ui.label("Reading …").classes("hm-soft")
             self.shown = ui.element("div").classes("hm-body").props('aria-live="polite"')
         self.command = Command()
 

@@ -135,10 +135,11 @@ def look(path: str) -> Looked:
             spoilt.setdefault(d.problem, []).append(d.name)
     reasons = [f"{shortened(names)}: not usable as it is: {why}" for why, names in spoilt.items()]
     reasons += [f"{name!r}: {reason}" for name, reason in seen.proposal.reasons]
+    stated = seen.contents.inputs and seen.contents.outputs  # a run's own, all of its axes
     return Looked(
         names=tuple(d.name for d in seen.descriptions),
         notes=tuple(_note(d.unit, d.rate) for d in seen.descriptions),
-        inputs=seen.proposal.inputs,
+        inputs=seen.proposal.inputs if stated else seen.proposal.inputs[:1],
         outputs=seen.proposal.outputs,
         fs=rates[0] if rates else None,
         reasons=tuple(reasons[:_MOST_REASONS]),

@@ -112,7 +112,8 @@ def compared(
         If fewer than two are chosen, or one is not there.
     """
     if len(names) < 2:
-        raise ArgumentError(f"{len(names)} run is chosen; choose two or more to compare")
+        chosen = "one run is" if names else "no run is"
+        raise ArgumentError(f"{chosen} chosen; choose two or more to compare")
     known = {run.name: run for run in find_runs(folder).runs}
     missing = [name for name in names if name not in known]
     if missing:

@@ -114,6 +114,11 @@ def find_dialect(lines: Sequence[str], *, name: str) -> Dialect:
         for decimal in (".", ",")
         if (trial := _tried(rows, sample, delimiter, decimal, rank)) is not None
     ]
+    if not trials and rows[0][1].lstrip().startswith("{"):
+        raise FormatError(
+            f"{name!r} holds JSON and no table of samples; a result that hmpim identify wrote "
+            "is opened with hmpim report, hmpim export or hmpim.load"
+        )
     if not trials and len(rows) == 1:
         cells = next((c for d in delimiters if len(c := _cells(rows[0][1], d)) > 1), None)
         if cells is not None:
