@@ -330,6 +330,8 @@ def test_a_file_too_large_is_refused_and_a_hostile_name_stays_inside(page, serve
         {"name": "<script>..\\alert(1).csv", "mimeType": "text/csv", "buffer": b"t,u,y\n"},
     )
     wait_until(lambda: list((served.runs / "uploads").glob("alert*")), page=page)
+    close = page.get_by_role("button", name="Close").last  # it can be read on its ground
+    assert close.evaluate("(e) => getComputedStyle(e).color") == "rgb(255, 255, 255)"
     new = {p for p in served.runs.parent.rglob("*") if p.is_file()} - before
     assert all(served.runs in p.parents for p in new)
     assert not any("<" in p.name or p.name == "big.csv" for p in new)
