@@ -69,6 +69,17 @@ class Columns:
             linear=np.concatenate(each, axis=1),
         )
 
+    def first(self) -> "Columns":
+        """Those of the first carrier alone."""
+        order = self.orders[0]
+        return Columns(
+            products=self.products[..., : 2 * order + 1],
+            mirrored=self.mirrored[..., : order + DENOMINATOR_ORDER + 1],
+            orders=self.orders[:1],
+            powers=self.powers[:, : 2 * max(order, DENOMINATOR_ORDER) + 1],
+            linear=self.linear[:, : order + 1],
+        )
+
     @property
     def slopes(self) -> Complex:
         """Powers of x that A is made of, shape (d, s)."""
@@ -76,7 +87,7 @@ class Columns:
 
     def at(self, place: Integer) -> Complex:
         """Return the linear columns at places of each window, (w, k); shape (w, k, l)."""
-        return np.take_along_axis(self.linear, place[:, None], axis=-1).swapaxes(1, 2)
+        return np.asarray(self.linear.swapaxes(1, 2)[np.arange(place.shape[0])[:, None], place])
 
     def normal(
         self, over: Complex | None, weight: Real, fitted: Complex, left: Complex

@@ -5,19 +5,24 @@ the transform. Which of them, and over how many neighbours, the data choose by h
 predicts a bin from its neighbours alone.
 """
 
+from collections.abc import Callable
+from functools import cache, partial
+
 import numpy as np
 import scipy
 from numpy.typing import ArrayLike, NDArray
 
 from hmpim.errors import ArgumentError, RecordError
-from hmpim.identify.arrays import Real
+from hmpim.identify.arrays import Complex, Real
+from hmpim.identify.chance import searched
 from hmpim.identify.frf.choice import choose, picked
 from hmpim.identify.frf.neighbours import LocalFit, Spectra, centres_in_band, transform
 from hmpim.identify.frf.polynomial import polynomial_fits
 from hmpim.identify.frf.rational import Regressors, rational_fits
+from hmpim.identify.kept import keeping
 from hmpim.identify.result import FrequencyResponse
 from hmpim.identify.signals import as_pair, check_band, check_rate, whole_lag
-from hmpim.identify.worth import DEEPEST, MOST
+from hmpim.identify.worth import DEEPEST, MOST, PART
 
 __all__ = ["local_response", "local_responses"]
 
@@ -26,7 +31,7 @@ _ORDER = 2
 # Widest window of polynomials, on either side.
 _WIDEST = 1000
 # Each window of polynomials is wider than the last by this.
-_RATIO = 2.0
+_RATIO = 3.5
 # Narrower windows are too short for eight coefficients beside noise.
 _NARROWEST_RATIONAL = 20
 # Bins in all windows of one width of rational functions, beyond which they cost too much; a
@@ -49,6 +54,7 @@ def local_response(
 
     At each frequency the data choose between them, with a transient or without, and among
     widths (cross-validation, averaged over 61 frequencies, weighed against the variance of G).
+    Windows of half the band and a quarter are always tried, narrower ones where these fall short.
     The delay is taken out first and put back at the end; the bias lies in the bin at DC, which
     is not used. Where an input ends elsewhere than it began, as a step or a ramp does, that jump
     leaks into every bin: both are differenced, which leaves their ratio what it is.
@@ -200,44 +206,90 @@ def _cut(spectra: Spectra, highest: int) -> Spectra:
 def _many(
     u: Real, y: Real, fs: float, *, delays: Real, band: tuple[float, float], points: int
 ) -> list[FrequencyResponse]:
-    """Of outputs of shape (k, n), delayed by as many whole samples.
-
-    What follows from the input is made once for all of them.
-    """
+    """Of outputs of shape (k, n), delayed by as many whole samples."""
     if abs(u[-1] - u[0]) > MOST * np.ptp(u):
         u, y = np.diff(u, prepend=u[0]), np.diff(y, axis=-1, prepend=y[:, :1])
     found: list[FrequencyResponse] = []
-    for at in range(0, y.shape[0], _AT_ONCE):
-        late = delays[at : at + _AT_ONCE]
-        spectra = transform(u, y[at : at + _AT_ONCE], fs, late)
-        if at == 0:
-            centre = _centres(spectra, band, points)
-            cut = _cut(spectra, int(centre[-1])).u
-            regressors = [
-                Regressors.around(cut, centre, width)
-                for width in _rational_widths(centre, cut.size)
-            ]
-        found += _few(_cut(spectra, int(centre[-1])), centre, late, regressors)
+    with keeping():
+        for at in range(0, y.shape[0], _AT_ONCE):
+            late = delays[at : at + _AT_ONCE]
+            spectra = transform(u, y[at : at + _AT_ONCE], fs, late)
+            if at == 0:
+                centre = _centres(spectra, band, points)
+                own = cache(partial(Regressors.around, _cut(spectra, int(centre[-1])).u, centre))
+            found += _few(_cut(spectra, int(centre[-1])), centre, late, own)
     return found
 
 
 def _few(
-    spectra: Spectra, centre: NDArray[np.int64], delays: Real, regressors: list[Regressors]
+    spectra: Spectra,
+    centre: NDArray[np.int64],
+    delays: Real,
+    regressors: Callable[[int], Regressors],
 ) -> list[FrequencyResponse]:
-    """Polynomials first; what they predict starts the rational functions; then choose of all."""
-    polynomials = _polynomials(spectra, centre)
-    if not regressors:
-        return _answers(spectra, centre, delays, polynomials, ())
-    chosen, _ = choose(polynomials, ())
-    g = picked(np.stack([fit.response for fit in polynomials]), chosen)
+    """Of as many records as are fitted at once; `regressors` are those of a width."""
+    response, variance = _chosen(spectra, centre, regressors)
+    frequency = spectra.frequency[centre]
+    response = response * np.exp(-2j * np.pi * frequency * delays[:, None])
+    std = np.sqrt(variance)
+    return [
+        FrequencyResponse(frequency=frequency, response=one, std=own, coherence=None)
+        for one, own in zip(response, std, strict=True)
+    ]
+
+
+def _chosen(
+    spectra: Spectra, centre: NDArray[np.int64], regressors: Callable[[int], Regressors]
+) -> tuple[Complex, Real]:
+    """Response and variance at each centre, of each record.
+
+    Polynomials come first; what they predict starts the rational functions, which are fitted over
+    the two widest windows. Narrower ones follow, in turn, for a record that takes the narrowest so
+    far, or polynomials narrower than the next, at many frequencies, or that leaves a bin which is
+    no chance: the power of noise is exponentially distributed.
+    """
+    widths, polynomials = _polynomials(spectra, centre)
+    chosen, bent = choose(polynomials, ())
+    response, variance = _picked(polynomials, chosen, bent)
+    rational = _rational_widths(centre, spectra.u.size)
+    if not rational:
+        return response, variance
     inside = np.arange(centre[0], centre[-1] + 1)
     smooth = spectra.y.copy()
-    smooth[:, inside] = spectra.u[inside] * np.stack([np.interp(inside, centre, own) for own in g])
-    rationals = rational_fits(spectra, regressors, smooth)
-    return _answers(spectra, centre, delays, polynomials, rationals)
+    smooth[:, inside] = spectra.u[inside] * np.stack(
+        [np.interp(inside, centre, own) for own in response]
+    )
+    asking, y = np.arange(spectra.y.shape[0]), spectra.y
+    fits: list[LocalFit] = []
+    for k, width in enumerate(rational):
+        some = Spectra(frequency=spectra.frequency, u=spectra.u, y=y[asking])
+        own, peak = rational_fits(some, regressors(width), smooth[asking])
+        fits = own + fits
+        if k == 0 and len(rational) > 1:
+            continue  # the widest is judged by the next
+        chosen, bent = choose(polynomials, fits)
+        response[asking], variance[asking] = _picked([*polynomials, *fits], chosen, bent)
+        if k + 1 == len(rational):
+            break
+        below = 2 * sum(w < rational[k + 1] for w in widths)
+        first = len(polynomials)
+        narrow = (chosen < below) | ((chosen >= first) & (chosen < first + 2))
+        more = (narrow.mean(axis=-1) > PART) | (peak > searched(spectra.u.size))
+        if not more.any():
+            break
+        asking = asking[more]
+        polynomials, fits = ([fit.of(more) for fit in kind] for kind in (polynomials, fits))
+    return response, variance
 
 
-def _polynomials(spectra: Spectra, centre: NDArray[np.int64]) -> list[LocalFit]:
+def _picked(tried: list[LocalFit], chosen: NDArray[np.int64], bent: Real) -> tuple[Complex, Real]:
+    """Response and variance of what is chosen."""
+    variance = picked(np.stack([fit.spread * fit.noise for fit in tried]), chosen)
+    return picked(np.stack([fit.response for fit in tried]), chosen), variance + bent
+
+
+def _polynomials(spectra: Spectra, centre: NDArray[np.int64]) -> tuple[list[int], list[LocalFit]]:
+    """Widths, and two fits of each."""
     bins = spectra.u.size - 1
     # Each polynomial has order + 1 coefficients, and residuals must be left over.
     order = min(_ORDER, max((bins - 2) // 4 - 1, 0))
@@ -246,12 +298,11 @@ def _polynomials(spectra: Spectra, centre: NDArray[np.int64]) -> list[LocalFit]:
     count = max(int(np.ceil(np.log(top / least) / np.log(_RATIO))), 1)
     widths = tuple(int(w) for w in np.rint(np.geomspace(least, top, count + 1)))
     most = max((bins - 1) // 2, 1)
-    return polynomial_fits(
-        spectra, centre, tuple(sorted({min(max(w, order + 1), most) for w in widths})), order
-    )
+    each = sorted({min(max(w, order + 1), most) for w in widths})
+    return each, polynomial_fits(spectra, centre, tuple(each), order)
 
 
-def _rational_widths(centre: NDArray[np.int64], bins: int) -> tuple[int, ...]:
+def _rational_widths(centre: NDArray[np.int64], bins: int) -> list[int]:
     """Return half the band, a quarter, and so on, as far as each can be paid for."""
     widths = []
     span = int(centre[-1] - centre[0] + 1)
@@ -260,25 +311,4 @@ def _rational_widths(centre: NDArray[np.int64], bins: int) -> tuple[int, ...]:
         if (2 * width + 1) * min(centre.size, 3 * span // width + 1) <= _AFFORDABLE:
             widths.append(width)
         width //= 2
-    return tuple(reversed(widths))
-
-
-def _answers(
-    spectra: Spectra,
-    centre: NDArray[np.int64],
-    delays: Real,
-    polynomials: list[LocalFit],
-    rationals: list[LocalFit] | tuple[()],
-) -> list[FrequencyResponse]:
-    """What is chosen of all fits of each record, the delay put back."""
-    chosen, bent = choose(polynomials, rationals)
-    tried = (*polynomials, *rationals)
-    response = picked(np.stack([fit.response for fit in tried]), chosen)
-    variance = picked(np.stack([fit.spread * fit.noise for fit in tried]), chosen)
-    frequency = spectra.frequency[centre]
-    response = response * np.exp(-2j * np.pi * frequency * delays[:, None])
-    std = np.sqrt(variance + bent)
-    return [
-        FrequencyResponse(frequency=frequency, response=one, std=own, coherence=None)
-        for one, own in zip(response, std, strict=True)
-    ]
+    return widths

@@ -6,7 +6,8 @@ bias and counts nowhere. For circular noise, whose square has no mean, the mirro
 no correlation into E|error|², so least squares and its variances hold as they stand.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
+from typing import Any
 
 import numpy as np
 import scipy
@@ -147,6 +148,11 @@ class LocalFit:
     noise: Real
     power: Real
     prediction_error: Real
+
+    def of(self, records: NDArray[Any]) -> "LocalFit":
+        """Return what it says of some of many records."""
+        each = {f.name: getattr(self, f.name) for f in fields(self)}
+        return LocalFit(**{n: v[records] if v.ndim > 1 else v for n, v in each.items()})
 
 
 def forms(vectors: Complex, inverse: Complex) -> Real:

@@ -13,7 +13,6 @@ squares of the true residual. The covariance is that of those least squares, the
 included, so it knows what the denominator costs.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from typing import Any
 
@@ -48,6 +47,7 @@ _NUMERATOR = 2
 TRANSIENT_ORDER = 3
 """One more than of B: what a sampled transient rings with is a polynomial in z, not in jω."""
 
+_STEPS = 3
 _NOTHING = 1e-24
 _RIDGE = 1e-13
 
@@ -108,7 +108,8 @@ class RationalSolution:
 
 def _at(values: NDArray[Any], place: Integer) -> NDArray[Any]:
     """Values on windows, (w, r, s), at places of each, (w, k); shape (w, r, k)."""
-    return np.take_along_axis(values, place[:, None], axis=-1)
+    windows, records = np.ogrid[: values.shape[0], : values.shape[1]]
+    return np.asarray(values[windows[..., None], records[..., None], place[:, None]])
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -157,35 +158,42 @@ class Regressors:
         one = windows.without_dc()[:, None, :].astype(np.complex128)
         carriers = np.concatenate((scaled, one), axis=1)
         slot, centres = windows.slots()
+        both = Columns.of(carriers, (_NUMERATOR, TRANSIENT_ORDER), windows.x)
         return cls(
             windows=windows,
             power=power,
-            both=Columns.of(carriers, (_NUMERATOR, TRANSIENT_ORDER), windows.x),
-            plain=Columns.of(scaled, (_NUMERATOR,), windows.x),
+            both=both,
+            plain=both.first(),
             place=windows.place[slot],
             centres=centres,
         )
 
 
 def rational_fits(
-    spectra: Spectra, regressors: Sequence[Regressors], smooth: Complex
-) -> list[LocalFit]:
-    """Fit rational functions of order 2 over 2, with T and without, over windows of each width.
+    spectra: Spectra, own: Regressors, smooth: Complex
+) -> tuple[list[LocalFit], Real]:
+    """Fit rational functions of order 2 over 2, with T and without, over windows of one width.
+
+    The iteration starts from the linear problem of Y as a first estimate predicts it, or of Y
+    itself, whichever leaves less: noise spoils the second, and the first may have missed a sharp
+    resonance.
 
     Parameters
     ----------
     spectra : Spectra
         With the delay taken out.
-    regressors : sequence of Regressors
-        Those of `spectra.u`, one for each width.
+    own : Regressors
+        Those of `spectra.u`.
     smooth : complex ndarray, shape (..., b), as that of `spectra.y`
-        Y as a first estimate predicts it, nearly free of noise; starts the iteration.
+        Y as a first estimate predicts it, nearly free of noise.
 
     Returns
     -------
-    list of LocalFit
-        Two for each width: with T, and without. `prediction_error` is infinite where the
-        iteration came to nothing.
+    fits : list of LocalFit
+        Two: with T, and without. `prediction_error` is infinite where the iteration came to
+        nothing.
+    peak : ndarray, shape (...,)
+        Greatest power of a bin that the fit with T leaves, over the mean of its window.
 
     Examples
     --------
@@ -195,22 +203,23 @@ def rational_fits(
     >>> for k in n[2:]:  # poles at 0.9 exp(±0.44 i)
     ...     y[k] = 1.628 * y[k - 1] - 0.81 * y[k - 2] + u[k]
     >>> s = transform(u, y, 1.0, 0.0)
-    >>> fit = rational_fits(s, [Regressors.around(s.u, np.arange(20, 40), 16)], s.y)[0]
+    >>> (fit, _), _ = rational_fits(s, Regressors.around(s.u, np.arange(20, 40), 16), s.y)
     >>> z = np.exp(2j * np.pi * s.frequency[20])
     >>> bool(abs(fit.response[0] * (1 - 1.628 / z + 0.81 / z**2) - 1) < 1e-3)
     True
     """
-    reach = max(own.windows.size // 2 for own in regressors)
-    folded = [mirrored(np.atleast_2d(v), reach) for v in (spectra.y, smooth)]
-    fits = []
-    for own in regressors:
-        y, start = (own.windows.views(v, reach) for v in folded)
-        # Sharp features hide in wide windows, whose start is far off; they are also the fewest.
-        steps = 2 if own.windows.size // 2 < 32 else 4
-        # An iterate may run off to infinity; it is then not taken.
-        with np.errstate(all="ignore"):
-            fits.extend(_fit(own, y, start, steps))
-    return fits if spectra.y.ndim > 1 else [_of_one(fit) for fit in fits]
+    reach = own.windows.size // 2
+    y, start = (
+        own.windows.views(mirrored(np.atleast_2d(v), reach), reach) for v in (spectra.y, smooth)
+    )
+    # An iterate may run off to infinity; it is then not taken.
+    with np.errstate(all="ignore"):
+        full = gauss_newton(own.both, y, _nearest_start(own.both, y, start), steps=_STEPS)
+        plain = gauss_newton(own.plain, y, restricted(full, _NUMERATOR + 1), steps=1)
+        fits = [_read_off(own, own.both, full, y), _read_off(own, own.plain, plain, y)]
+        left = full.state.left.real**2 + full.state.left.imag**2
+        peak = np.max(left.max(axis=-1) / left.mean(axis=-1), axis=0)
+    return (fits, peak) if spectra.y.ndim > 1 else ([_of_one(fit) for fit in fits], peak[0])
 
 
 def _of_one(fit: LocalFit) -> LocalFit:
@@ -224,11 +233,10 @@ def _of_one(fit: LocalFit) -> LocalFit:
     )
 
 
-def _fit(own: Regressors, y: Complex, smooth: Complex, steps: int) -> list[LocalFit]:
-    full = gauss_newton(own.both, y, linear_start(own.both, smooth), steps=steps)
-    start = restricted(full, _NUMERATOR + 1)
-    plain = gauss_newton(own.plain, y, start, steps=(steps + 1) // 2)
-    return [_read_off(own, own.both, full, y), _read_off(own, own.plain, plain, y)]
+def _nearest_start(columns: Columns, y: Complex, smooth: Complex) -> Complex:
+    """From the smoothed output, or from the output itself, whichever leaves less of it."""
+    first, second = (_state(columns, y, linear_start(columns, v)) for v in (smooth, y))
+    return _better(first, second).theta
 
 
 def solved(gram: Complex, right: Complex) -> tuple[Complex, Complex]:
@@ -240,25 +248,49 @@ def solved(gram: Complex, right: Complex) -> tuple[Complex, Complex]:
     >>> x.real.round(9).tolist()
     [[0.5]]
     """
-    scaled, scale = _scaled(gram)
-    inverse: Complex = np.asarray(
-        np.linalg.inv(scaled) * (scale[..., :, None] * scale[..., None, :]), dtype=np.complex128
-    )
+    a, scale = _scaled(gram)
+    q = a.shape[0]
+    # Gauss and Jordan, of all systems at once; positive definite ones need no pivots.
+    for k in range(q):
+        row, column = a[k] / _pivot(a[k, k]), a[:, k].copy()
+        row[k] = 1.0 / _pivot(a[k, k])
+        column[k] = 0.0
+        a[:, k] = 0.0
+        a -= column[:, None] * row
+        a[k] = row
+    a *= scale[:, None] * scale
+    inverse: Complex = np.ascontiguousarray(np.moveaxis(a, -1, 0)).reshape(gram.shape)
     return inverse, (inverse @ right)[..., 0]
 
 
 def _solution(gram: Complex, right: Complex) -> Complex:
     """Solution alone, in a third of the time."""
     scaled, scale = _scaled(gram)
-    return np.asarray(np.linalg.solve(scaled, right * scale[..., None])[..., 0] * scale)
+    q = scaled.shape[0]
+    a = np.concatenate((scaled, (right.reshape(-1, q).T * scale)[:, None]), axis=1)
+    for k in range(q):
+        row = a[k, k + 1 :]
+        row /= _pivot(a[k, k])
+        a[k + 1 :, k + 1 :] -= a[k + 1 :, k, None] * row
+    x = a[:, q]
+    for k in range(q - 1, 0, -1):
+        x[:k] -= a[:k, k] * x[k]
+    return np.ascontiguousarray((x * scale).T).reshape(right.shape[:-1])
+
+
+def _pivot(values: Complex) -> Real:
+    """What rounding has left of a pivot is at least that."""
+    return np.maximum(values.real, _RIDGE)
 
 
 def _scaled(gram: Complex) -> tuple[Complex, Real]:
-    """Normal equations of columns of size 1, and by what each was multiplied."""
-    index = np.arange(gram.shape[-1])
-    scale = 1.0 / np.sqrt(np.maximum(gram[..., index, index].real, 1e-300))
-    scaled = gram * (scale[..., :, None] * scale[..., None, :])
-    scaled[..., index, index] += _RIDGE * gram.shape[-1]
+    """Normal equations of columns of size 1, (q, q, n), and by what each was multiplied, (q, n)."""
+    q = gram.shape[-1]
+    scaled = np.moveaxis(gram.reshape(-1, q, q), 0, -1).copy()
+    index = np.arange(q)
+    scale = 1.0 / np.sqrt(np.maximum(scaled[index, index].real, 1e-300))
+    scaled *= scale[:, None] * scale
+    scaled[index, index] += _RIDGE * q
     return scaled, scale
 
 
