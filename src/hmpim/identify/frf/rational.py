@@ -30,6 +30,7 @@ from hmpim.identify.frf.neighbours import (
     mirrored,
     windows_around,
 )
+from hmpim.identify.worth import MOST
 
 __all__ = [
     "TRANSIENT_ORDER",
@@ -174,9 +175,9 @@ def rational_fits(
 ) -> tuple[list[LocalFit], Real]:
     """Fit rational functions of order 2 over 2, with T and without, over windows of one width.
 
-    The iteration starts from the linear problem of Y as a first estimate predicts it, or of Y
-    itself, whichever leaves less: noise spoils the second, and the first may have missed a sharp
-    resonance.
+    The iteration starts from the linear problem of Y as a first estimate predicts it; or of Y
+    itself, which noise spoils, where that leaves half as much: the first estimate may have missed
+    a sharp resonance.
 
     Parameters
     ----------
@@ -234,9 +235,10 @@ def _of_one(fit: LocalFit) -> LocalFit:
 
 
 def _nearest_start(columns: Columns, y: Complex, smooth: Complex) -> Complex:
-    """From the smoothed output, or from the output itself, whichever leaves less of it."""
-    first, second = (_state(columns, y, linear_start(columns, v)) for v in (smooth, y))
-    return _better(first, second).theta
+    """From the smoothed output, or from the output itself where that leaves half as much of it."""
+    first, second = (linear_start(columns, v) for v in (smooth, y))
+    least, own = (_state(columns, y, theta).squares for theta in (first, second))
+    return np.asarray(np.where((own < MOST * least)[..., None], second, first))
 
 
 def solved(gram: Complex, right: Complex) -> tuple[Complex, Complex]:
