@@ -174,17 +174,6 @@ def test_what_the_input_alone_says_is_made_once_for_all_outputs_of_one_delay(
     assert len(made) == 2 * of_one > 0
 
 
-def test_a_resonance_of_two_bins_is_found_in_noise() -> None:
-    """To 1.2 %: polynomials miss it, and the linear problem of the record itself starts the fit."""
-    u, clean = clean_record(0.01)
-    for seed in range(5):
-        noise = 0.1 * clean.std() * np.random.default_rng(seed).standard_normal(clean.size)
-        found = local_response(u, clean + noise, FS, band=BAND, delay=DELAY)
-        near = np.abs(found.frequency - 10) < 0.25
-        true = second_order(found.frequency, 0.01)
-        assert np.abs(found.response - true)[near].max() < 0.012 * np.abs(true).max()
-
-
 def test_narrow_windows_are_fitted_only_where_wide_ones_fall_short(
     records: dict[float, Record], monkeypatch: pytest.MonkeyPatch
 ) -> None:

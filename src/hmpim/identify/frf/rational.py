@@ -30,7 +30,6 @@ from hmpim.identify.frf.neighbours import (
     mirrored,
     windows_around,
 )
-from hmpim.identify.worth import MOST
 
 __all__ = [
     "TRANSIENT_ORDER",
@@ -48,7 +47,7 @@ _NUMERATOR = 2
 TRANSIENT_ORDER = 3
 """One more than of B: what a sampled transient rings with is a polynomial in z, not in jω."""
 
-_STEPS = 3
+_STEPS = 4
 _NOTHING = 1e-24
 _RIDGE = 1e-13
 
@@ -175,10 +174,6 @@ def rational_fits(
 ) -> tuple[list[LocalFit], Real]:
     """Fit rational functions of order 2 over 2, with T and without, over windows of one width.
 
-    The iteration starts from the linear problem of Y as a first estimate predicts it; or of Y
-    itself, which noise spoils, where that leaves half as much: the first estimate may have missed
-    a sharp resonance.
-
     Parameters
     ----------
     spectra : Spectra
@@ -215,7 +210,7 @@ def rational_fits(
     )
     # An iterate may run off to infinity; it is then not taken.
     with np.errstate(all="ignore"):
-        full = gauss_newton(own.both, y, _nearest_start(own.both, y, start), steps=_STEPS)
+        full = gauss_newton(own.both, y, linear_start(own.both, start), steps=_STEPS)
         plain = gauss_newton(own.plain, y, restricted(full, _NUMERATOR + 1), steps=1)
         fits = [_read_off(own, own.both, full, y), _read_off(own, own.plain, plain, y)]
         left = full.state.left.real**2 + full.state.left.imag**2
@@ -232,13 +227,6 @@ def _of_one(fit: LocalFit) -> LocalFit:
         power=fit.power,
         prediction_error=fit.prediction_error[0],
     )
-
-
-def _nearest_start(columns: Columns, y: Complex, smooth: Complex) -> Complex:
-    """From the smoothed output, or from the output itself where that leaves half as much of it."""
-    first, second = (linear_start(columns, v) for v in (smooth, y))
-    least, own = (_state(columns, y, theta).squares for theta in (first, second))
-    return np.asarray(np.where((own < MOST * least)[..., None], second, first))
 
 
 def solved(gram: Complex, right: Complex) -> tuple[Complex, Complex]:
