@@ -31,7 +31,7 @@ _ORDER = 2
 # Widest window of polynomials, on either side.
 _WIDEST = 1000
 # Each window of polynomials is wider than the last by this.
-_RATIO = 3.5
+_RATIO = 2.0
 # Narrower windows are too short for eight coefficients beside noise.
 _NARROWEST_RATIONAL = 20
 # Bins in all windows of one width of rational functions, beyond which they cost too much; a
