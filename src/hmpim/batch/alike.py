@@ -7,12 +7,14 @@ the first alone is made a `Record`: the others are compared with it, sample by s
 """
 
 import hashlib
+import threading
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
+from contextvars import Context, copy_context
 from dataclasses import dataclass, field, replace
 from itertools import chain, pairwise
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,6 +46,9 @@ _FLEETS: dict[str, Fleet | Whole | None] = {}
 
 _FIRST: dict[str, list[PairIdentification | None]] = {}
 """What `identify` said of the first records of a stimulus, by its digest."""
+
+_OF_THREAD = threading.local()
+"""The stimulus that a thread met last, by its digest, and what is kept of it."""
 
 One = Callable[[Read], tuple[Sequence[Row], PairIdentification | None]]
 Told = Callable[[Read | Samples], Mapping[str, str]]
@@ -124,21 +129,32 @@ def identified_together(
     groups, single = _grouped(items, request)
     rows = list(_in_turn(single, one))
     tables: list[Any] = []
-    for group in groups:
+
+    def do(group: _Group) -> None:
         left = list(range(len(group.items)))
-        with keeping():
-            if group.key not in _FLEETS:
-                left = _learn_from(group, request, one, rows)
-            shared = _FLEETS.get(group.key)
-            if isinstance(shared, Whole) and left:
-                found, left = _everything(shared, group, left, request, told=told)
-                rows += found
-            elif isinstance(shared, Fleet) and left:
-                table, left = _by_fleet(shared, group, left, request, told=told, metadata=metadata)
-                tables.append(table)
-            for i in left:
-                rows += one(_read(group.items[i], request))[0]
+        if group.key not in _FLEETS:
+            left = _learn_from(group, request, one, rows)
+        shared = _FLEETS.get(group.key)
+        if isinstance(shared, Whole) and left:
+            found, left = _everything(shared, group, left, request, told=told)
+            rows.extend(found)
+        elif isinstance(shared, Fleet) and left:
+            table, left = _by_fleet(shared, group, left, request, told=told, metadata=metadata)
+            tables.append(table)
+        for i in left:
+            rows.extend(one(_read(group.items[i], request))[0])
+
+    for group in groups:
+        _kept_of(group.key).run(do, group)
     return Together(rows=rows, tables=tables)
+
+
+def _kept_of(stimulus: str) -> Context:
+    """What this thread keeps of a stimulus (`hmpim.identify.kept`), for the next task as well."""
+    if getattr(_OF_THREAD, "stimulus", None) != stimulus:
+        with keeping():
+            _OF_THREAD.stimulus, _OF_THREAD.kept = stimulus, copy_context()
+    return cast(Context, _OF_THREAD.kept)
 
 
 def _in_turn(reads: Iterable[Read], one: One) -> Iterator[Row]:

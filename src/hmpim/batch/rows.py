@@ -169,15 +169,24 @@ def _json(result: Identification) -> str:
 
 def _is_finite(value: Any) -> bool:
     """Whether no number among plain JSON values is NaN or infinite."""
-    if isinstance(value, dict):
-        return all(map(_is_finite, value.values()))
-    if isinstance(value, (list, tuple)):
-        return bool(np.isfinite(value).all()) if _are_floats(value) else all(map(_is_finite, value))
-    return not isinstance(value, float) or math.isfinite(value)
+    left = [value]
+    for one in left:  # which grows as it is gone through
+        if isinstance(one, dict):
+            left += one.values()
+        elif isinstance(one, (list, tuple)):
+            if not _are_finite(one):
+                left += one
+        elif isinstance(one, float) and not math.isfinite(one):
+            return False
+    return True
 
 
-def _are_floats(values: Sequence[Any]) -> bool:
-    return set(map(type, values)) == {float}
+def _are_finite(values: Sequence[Any]) -> bool:
+    """Whether values are numbers with a finite sum, as those of which one is not never have."""
+    try:
+        return math.isfinite(sum(values))
+    except TypeError:
+        return False
 
 
 def failed(address: Address, reason: str, metadata: Mapping[str, str] | None = None) -> Row:

@@ -30,8 +30,8 @@ __all__ = ["Fleet", "Member", "box_around", "is_alike", "learn_fleet", "spanning
 _DEGREES = (9, 12, 15)
 """Degrees of a surface, tried in turn until it is off by less than the noise lets be seen."""
 
-_SMOOTHER = 9
-"""Degree for what is read off a model."""
+_SMOOTHER = 7
+"""Degree for what is read off a model, and for what one more pole adds."""
 
 _UNSEEN = 1e-9
 """Share of the greatest singular value below which a direction of the surface is left out."""
@@ -281,14 +281,16 @@ def _member_of(
     places = places_in(low, high, degree)
     source = prepare_input(u, mode)
     problem = Problem(source=source, y=np.zeros(u.size), valid=None, longest_delay=float(u.size))
-    rows, grown = np.empty((places.shape[0], u.size)), np.empty((places.shape[0], u.size))
-    richer = one_more_pole(structure)
+    smoother = places_in(low, high, _SMOOTHER)  # the first of the others
+    rows, grown = np.empty((places.shape[0], u.size)), np.empty((smoother.shape[0], u.size))
+    richer, alone = one_more_pole(structure), np.ones(1)
     for k, place in enumerate(places):
         theta = theta_at(place)
-        lag = _PROBE * float(np.exp(-place[1]))  # over 1/ω, the unit's own
-        rows[k] = Part(problem, structure, theta).driven(np.ones(1))
-        there = Part(problem, richer, with_pole(structure, theta, lag)).driven(np.ones(1))
-        grown[k] = (there - rows[k]) / lag**2
+        rows[k] = Part(problem, structure, theta).driven(alone)
+        if k < smoother.shape[0]:
+            lag = _PROBE * float(np.exp(-place[1]))  # over 1/ω, the unit's own
+            there = Part(problem, richer, with_pole(structure, theta, lag)).driven(alone)
+            grown[k] = (there - rows[k]) / lag**2
     means = rows.mean(axis=1, keepdims=True)
     rows -= means
     grown -= grown.mean(axis=1, keepdims=True)
@@ -300,7 +302,7 @@ def _member_of(
         intersample=mode,
         basis=basis,
         surface=surface,
-        grown=Surface.fitted(low, high, places, grown @ basis.T, degree=degree),
+        grown=Surface.fitted(low, high, smoother, grown @ basis.T, degree=_SMOOTHER),
         lost=float(left + np.linalg.norm(surface.error)),
         source=source,
     )

@@ -177,40 +177,68 @@ def _from_rest(fleet: Fleet, group: Group, part: Places, rows: Real, lags: Place
     begins = np.ceil(np.maximum(np.maximum(delay, lag), 0.0)).astype(np.intp) + REACH
     at = np.arange(n)
     early = at < begins[:, None]
-    quiet = (begins <= longest_lag(n)) & ~stand_out_of(left, early)
+    squares = left**2
+    quiet = (begins <= longest_lag(n)) & ~_stand_out(left, squares, early)
     if group.fit.member.intersample == "bandlimited":
         away = at - delay[:, None]
         reach = ringing_of(group.fit.member.source)
         ringing = (np.abs(away) <= reach) | (away >= n - 1 - reach)
-        quiet &= ~stand_out_of(left, ringing)
-    since = np.maximum(at - begins[:, None], 0)
+        quiet &= ~_stand_out(left, squares, ringing)
     free = _free_responses(np.exp(group.fit.theta[which, 1:]), n)
-    free = np.take_along_axis(free, since[:, None, :], axis=2)
-    late = np.concatenate([rows, free], axis=1) * ~early[:, None, :]
-    left = left * ~early
-    gram = late @ late.transpose(0, 2, 1)
+    # What the rows do on the whole, less what they do before: a free response dies out early.
+    first = int(begins.max())
+    last = min(first + free.shape[2], n)
+    since = at[:last] - begins[:, None]
+    there = (since >= 0) & (since < free.shape[2])
+    free = np.take_along_axis(free, np.where(there, since, 0)[:, None], axis=2) * there[:, None]
+    before, known = rows[:, :, :first] * early[:, None, :first], rows.shape[1]
+    gram = np.empty((part.size, known + 2, known + 2))
+    gram[:, :known, :known] = rows @ rows.transpose(0, 2, 1) - before @ before.transpose(0, 2, 1)
+    gram[:, known:, :known] = free @ rows[:, :, :last].transpose(0, 2, 1)
+    gram[:, :known, known:] = gram[:, known:, :known].transpose(0, 2, 1)
+    gram[:, known:, known:] = free @ free.transpose(0, 2, 1)
+    column = left[:, :, None]
+    slope = np.concatenate(
+        [rows @ column - before @ column[:, :first], free @ column[:, :last]], axis=1
+    )[:, :, 0]
     scale = np.sqrt(np.maximum(np.einsum("iaa->ia", gram), np.finfo(float).tiny))
     gram /= scale[:, :, None] * scale[:, None, :]
-    slope = (late @ left[:, :, None])[:, :, 0] / scale
+    slope /= scale
     inverse = np.linalg.pinv(gram, rcond=1e-12, hermitian=True)
     gained = np.einsum("ia,iab,ib->i", slope, inverse, slope)
-    power = np.vecdot(left, left)
+    power = np.sum(squares, axis=1) - np.sum(squares * early, axis=1)
     count = n - begins
     rest = np.maximum(power - gained, np.finfo(float).tiny)
     statistic = count * np.log(np.maximum(power, np.finfo(float).tiny) / rest)
     return np.asarray(quiet & (statistic <= scipy.special.chdtri(2, FALSE_ALARM)))
 
 
+def _stand_out(residual: Real, squares: Real, some: Mask) -> Mask:
+    """`stand_out_of`, asked of those alone that hold more than the least their others may show.
+
+    The median of what is left of a record without c of its samples is no less than that of the
+    whole record c/2 samples below the middle.
+    """
+    counts = np.count_nonzero(some, axis=1)
+    below = (residual.shape[1] - int(counts.max(initial=0)) - 1) // 2
+    if below < 0:
+        return stand_out_of(residual, some)
+    level = np.partition(squares, below, axis=1)[:, below] / 0.455
+    limit = level * scipy.special.chdtri(np.maximum(counts, 1), FALSE_ALARM)
+    out = np.sum(squares * some, axis=1) > limit
+    out[out] = stand_out_of(residual[out], some[out])
+    return np.asarray(out)
+
+
 def _free_responses(modes: Real, samples: int) -> Real:
-    """Both free responses of second-order units, ω in rad a sample and ζ, (k, 2); (k, 2, n)."""
+    """Both free responses of second-order units, ω in rad a sample and ζ, (k, 2); (k, 2, m).
+
+    No longer than the record, and none of them lasts longer than m samples.
+    """
     omega, zeta = modes[:, 0, None], modes[:, 1, None]
     away = omega * np.sqrt(zeta**2 - 1.0 + 0j)
     slowest = float((zeta * omega - np.maximum(away.real, 0.0)).min())
-    lasting = min(samples, int(_FORGOTTEN / slowest) + 1)  # later there is nothing
-    at = np.arange(lasting)
+    at = np.arange(min(samples, int(_FORGOTTEN / slowest) + 1))
     first, second = (np.exp((sign * away - zeta * omega) * at) for sign in (1.0, -1.0))
     apart = np.where(np.abs(away) > 0.0, away, 1.0)
-    out = np.zeros((modes.shape[0], 2, samples))
-    out[:, 0, :lasting] = (first + second).real
-    out[:, 1, :lasting] = ((first - second) / apart).real
-    return out
+    return np.stack([(first + second).real, ((first - second) / apart).real], axis=1)

@@ -86,29 +86,31 @@ def learn_simpler(
     names: tuple[StructureName, ...] = tuple(n for n in STRUCTURES if n in {s for s, _ in ordinary})
     if any(STRUCTURES[name].order > 1 or STRUCTURES[name].parameters > 5 for name in names):
         return None
-    places = [
-        _places(fleet, output, names)
-        for output, own in zip(outputs, tried, strict=True)
-        if own == ordinary
+    usual = [output for output, own in zip(outputs, tried, strict=True) if own == ordinary]
+    places = _places(fleet, usual, names)
+    return tuple(_learnt(fleet, STRUCTURES[name], np.stack(own)) for name, own in places.items())
+
+
+def _places(
+    fleet: Fleet, outputs: Sequence[Real], names: tuple[StructureName, ...]
+) -> dict[StructureName, list[Real]]:
+    """Where the fit of each structure ends for each output; units are alike, so the first helps."""
+    source, n = prepare_input(fleet.u, fleet.natural), fleet.u.size
+    longest = longest_lag(n)
+    problems = [
+        Problem(source=source, y=y, valid=None, longest_delay=longest + 2.0) for y in outputs
     ]
-    return tuple(
-        _learnt(fleet, STRUCTURES[name], np.array([own[name] for own in places])) for name in names
-    )
-
-
-def _places(fleet: Fleet, y: Real, names: tuple[StructureName, ...]) -> dict[str, Real]:
-    """Where the fit of each structure ends for one output."""
-    longest = longest_lag(y.size)
-    problem = Problem(
-        source=prepare_input(fleet.u, fleet.natural), y=y, valid=None, longest_delay=longest + 2.0
-    )
-    rough = rough_response(fleet.u, y, longest_delay=longest)
-    fits = fit_plain(problem, rough, (fleet.structure.name, *names))
-    return {
-        fit.structure.name: fit_structure(problem, fit.structure, fit.theta, precision=1e-3).theta
-        for fit in fits
-        if fit.structure.name in names
+    rough = rough_response(fleet.u, outputs[0], longest_delay=longest)
+    starts = {
+        fit.structure.name: fit.theta
+        for fit in fit_plain(problems[0], rough, (fleet.structure.name, *names))
     }
+    found: dict[StructureName, list[Real]] = {name: [] for name in names}
+    for problem in problems:
+        for name, ends in found.items():
+            start = ends[0] if ends else starts[name]
+            ends.append(fit_structure(problem, STRUCTURES[name], start).theta)
+    return found
 
 
 def _learnt(fleet: Fleet, structure: Structure, places: Real) -> Simpler:

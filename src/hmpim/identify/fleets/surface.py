@@ -17,8 +17,9 @@ from hmpim.identify.arrays import Mask, Real
 __all__ = ["Surface", "places_in"]
 
 
-_OVER = 2.5
-"""Points of the fit for each coefficient."""
+_FEWEST_SPARE = 10
+"""Points of the fit beyond the coefficients: as many as these, or so many. With half as many a
+wide box is held twice as badly; with more it is held no better."""
 
 _CHECKS = 40
 """Points at which the error is measured."""
@@ -37,9 +38,10 @@ def places_in(low: Real, high: Real, degree: int) -> Real:
     Returns
     -------
     ndarray, shape (m, p)
-        Always the same; the last 40 are for the error.
+        Always the same, those of a lower degree first; the last 40 are for the error.
     """
-    count = int(_OVER * len(_powers(low.size, degree))) + _CHECKS
+    size = len(_powers(low.size, degree))
+    count = size + max(size, _FEWEST_SPARE) + _CHECKS
     points = scipy.stats.qmc.Halton(d=low.size, scramble=False).random(count + 1)[1:]
     return np.asarray((low + high) / 2 - (high - low) / 2 * np.cos(np.pi * points))
 
