@@ -11,6 +11,7 @@ from batch_support import FS, write_rows
 from hmpim.batch import study
 from hmpim.batch.expect import held_against, read_bound
 from hmpim.batch.pictures import distribution, groups, sequence
+from hmpim.batch.rows import PARAMETERS
 from hmpim.batch.run import Cluster
 from hmpim.batch.study import _order, outliers, write_study
 from hmpim.batch.summary import summary_of
@@ -74,6 +75,29 @@ def test_names_below_an_axis_keep_what_sets_them_apart():
     assert [words for _, words in panel.x.ticks] == [f"…el of {k}.5 deg" for k in range(3)]
 
 
+def test_a_drift_is_told_in_words_and_a_few_outliers_make_none():
+    day, rng = np.arange(2000.0), np.random.default_rng(5)
+    values = rng.standard_normal(2000)
+    values[-9:] += 300.0
+    assert study.trend(day, values) is None
+    _, low, high = study.trend(day, values - 0.01 * day)
+    assert low < -0.01 < high < low + 4e-4
+    told = study._drift((-0.01, -0.0102, -0.0099), "Hz a day")
+    assert told == "It falls by 0.01 Hz a day (99 % interval 0.0099 to 0.0102)."
+    assert study.trend(np.zeros(50), values[:50]) is None  # all at once
+
+
+def test_records_without_figures_are_named():
+    names = [f"/fleet/unit{k}.csv" for k in range(5)]
+    reasons = ["it is empty", None, "it is noise", "it is empty", None]
+    nothing = {f"{name}{end}": [None] * 5 for name in PARAMETERS for end in ("", "_doubtful")}
+    told = Told(key=names, record=names, verdict=["ok"] * 5, reason=reasons, **nothing)
+    found = summary_of(told)
+    assert [(f.reason, f.count) for f in found.failures] == [("it is empty", 2), ("it is noise", 1)]
+    (grid,) = study._failures(told, found)
+    assert grid.rows == (("unit0.csv", "2", "it is empty"), ("unit2.csv", "1", "it is noise"))
+
+
 class Told:
     """A table of a few columns."""
 
@@ -84,7 +108,8 @@ class Told:
     def to_arrow(self, names):
         import pyarrow as pa
 
-        return pa.table({name: self._columns[name] for name in names})
+        every = {name: pa.array(self._columns[name]) for name in names}
+        return pa.table({k: v.cast("double") if v.type == "null" else v for k, v in every.items()})
 
 
 def test_a_date_that_somebody_gave_goes_before_the_file_s_own():

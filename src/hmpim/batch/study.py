@@ -23,7 +23,7 @@ from hmpim.report.study import Grid, Section, StudyPage, render_study
 from hmpim.report.words import label_of
 from hmpim.units import conversion_factor
 
-__all__ = ["outliers", "study_page", "write_study"]
+__all__ = ["outliers", "study_page", "trend", "write_study"]
 
 _HALF = 1.96
 _TIMES = ("recorded", "date", "time", "datetime", "timestamp", "created")
@@ -34,6 +34,9 @@ _SPANS = (("Days", 86_400.0), ("Hours", 3600.0), ("Minutes", 60.0), ("Seconds", 
 
 _FALSE_ALARM = 0.01
 """Chance that any of a fleet of equal units, normally distributed, stands out."""
+
+_FEWEST_ALONG, _MOST_ALONG = 10, 400
+"""Values that a trend is looked for in at least, and medians of neighbours that tell it at most."""
 
 _MOST_ROWS = 30
 _FEWEST_IN_GROUP = 3
@@ -82,7 +85,7 @@ def study_page(
         Columns of metadata to group by.
     """
     found = summary_of(table)
-    failed = sum(count for _, count in found.reasons)
+    failed = sum(failure.count for failure in found.failures)
     missed = sum(outcome.failed for outcome in outcomes)
     ok = found.verdicts.get("ok", 0)
     rows = sum(found.verdicts.values())
@@ -107,7 +110,7 @@ def study_page(
             *_specified(outcomes),
             _figures(found),
             *_between(table, found),
-            *_reasons(found),
+            *_failures(table, found),
         ),
         sections=tuple(
             _section(table, row, outcomes, labels)
@@ -154,6 +157,36 @@ def outliers(values: Real, error: float = 0.0) -> tuple[Real, float]:
     if spread == 0.0:
         return np.where(values == middle, 0.0, np.inf), limit
     return np.abs(values - middle) / spread, limit
+
+
+def trend(places: Real, values: Real) -> tuple[float, float, float] | None:
+    """Slope of values along their places, with its 99 % interval; None where that holds 0.
+
+    The median of the slopes between all pairs (Theil and Sen), which a few outliers do not move; of
+    many values between medians of neighbours.
+
+    Parameters
+    ----------
+    places, values : ndarray, shape (n,)
+        In the order of the places.
+
+    Examples
+    --------
+    >>> day = np.arange(60.0)
+    >>> noise = np.random.default_rng(0).standard_normal(60)
+    >>> trend(day, noise) is None
+    True
+    >>> slope, low, high = trend(day, noise + 0.2 * day)
+    >>> low < 0.2 < high
+    True
+    """
+    if values.size < _FEWEST_ALONG or places[0] == places[-1]:
+        return None
+    shares = max(min(values.size, _MOST_ALONG), 1)
+    at = np.array([np.median(part) for part in np.array_split(places, shares)])
+    level = np.array([np.median(part) for part in np.array_split(values, shares)])
+    slope, _, low, high = scipy.stats.theilslopes(level, at, alpha=1.0 - _FALSE_ALARM)
+    return (float(slope), float(low), float(high)) if low > 0.0 or high < 0.0 else None
 
 
 def _figures(found: Summary) -> Grid:
@@ -227,11 +260,17 @@ def _specified(outcomes: Sequence[Outcome]) -> tuple[Grid, ...]:
     return (grid,)
 
 
-def _reasons(found: Summary) -> tuple[Grid, ...]:
-    if not found.reasons:
+def _failures(table: BatchTable, found: Summary) -> tuple[Grid, ...]:
+    if not found.failures:
         return ()
-    rows = tuple((str(count), reason) for reason, count in found.reasons[:_MOST_ROWS])
-    return (Grid(caption="Not identified", columns=("Records", "Reason"), rows=rows),)
+    some, folder = found.failures[:_MOST_ROWS], _folder(table)
+    grid = Grid(
+        caption="Not identified",
+        columns=("First of them", "Records", "Reason"),
+        rows=tuple((f.first.removeprefix(folder), str(f.count), f.reason) for f in some),
+        hints=tuple(f.first for f in some),
+    )
+    return (grid,)
 
 
 def _labels(table: BatchTable, by: Sequence[str]) -> dict[str, list[str | None]]:
@@ -271,6 +310,7 @@ def _section(
     ]
     places, along = _order(table, there)
     order = np.argsort(places, kind="stable")
+    drift = trend(places[order], some[order])
     pictures.append(
         Picture(
             key=f"{row.name}-trend",
@@ -305,7 +345,17 @@ def _section(
             )
         )
     said, grids = _standing_out(table, row, some, there)
+    if drift is not None:
+        each = "record" if along == _BY_NAME else along.split("s since", 1)[0].lower()
+        said = (*said, _drift(drift, f"{row.unit} a {each}".strip()))
     return Section(title=title, observed="", found=said, grids=grids, pictures=tuple(pictures))
+
+
+def _drift(drift: tuple[float, float, float], unit: str) -> str:
+    slope, *ends = drift
+    verb = "rises" if slope > 0 else "falls"
+    low, high = sorted(map(abs, ends))
+    return f"It {verb} by {abs(slope):.3g} {unit} (99 % interval {low:.3g} to {high:.3g})."
 
 
 def _standing_out(

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from hmpim.batch.rows import PARAMETERS
 from hmpim.batch.table import BatchTable
 
-__all__ = ["ParameterSummary", "Summary", "column", "summary_of", "unit_of"]
+__all__ = ["Failure", "ParameterSummary", "Summary", "column", "summary_of", "unit_of"]
 
 _UNITS = {
     "delay": "s",
@@ -50,6 +50,25 @@ class ParameterSummary:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Failure:
+    """Why some records have no figures.
+
+    Parameters
+    ----------
+    reason : str
+        The same of all of them.
+    count : int
+        How many they are.
+    first : str
+        The first of them, by name.
+    """
+
+    reason: str
+    count: int
+    first: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Summary:
     """A batch in figures.
 
@@ -61,14 +80,14 @@ class Summary:
         Those that any row has.
     verdicts : mapping of str to int
         Rows by verdict.
-    reasons : tuple of (str, int)
-        Why records failed, the most frequent first.
+    failures : tuple of Failure
+        Why records failed, the most frequent reason first.
     """
 
     records: int
     parameters: tuple[ParameterSummary, ...]
     verdicts: Mapping[str, int]
-    reasons: tuple[tuple[str, int], ...]
+    failures: tuple[Failure, ...]
 
 
 def summary_of(table: BatchTable) -> Summary:
@@ -81,15 +100,17 @@ def summary_of(table: BatchTable) -> Summary:
     """
     import pyarrow.compute as pc
 
-    words = table.to_arrow(["key", "verdict", "reason"])
+    words = table.to_arrow(["key", "record", "verdict", "reason"])
     verdicts = pc.value_counts(words.column("verdict").drop_null()).to_pylist()
-    reasons = pc.value_counts(words.column("reason").drop_null()).to_pylist()
+    failed = words.filter(pc.is_valid(words.column("reason"))).group_by("reason")
+    failures = failed.aggregate([("record", "count"), ("record", "min")]).to_pylist()
     return Summary(
         records=pc.count_distinct(words.column("key")).as_py(),
         parameters=tuple(_distributed(table)),
         verdicts={v["values"]: v["counts"] for v in verdicts},
-        reasons=tuple(
-            sorted(((r["values"], r["counts"]) for r in reasons), key=lambda item: -item[1])
+        failures=tuple(
+            Failure(reason=f["reason"], count=f["record_count"], first=f["record_min"])
+            for f in sorted(failures, key=lambda f: (-f["record_count"], f["record_min"]))
         ),
     )
 

@@ -123,8 +123,9 @@ def batch(
 ) -> None:
     """Identify many records, on all cores or on a cluster.
 
-    Writes Parquet parts that pandas, Polars and DuckDB read, and one page. A record that fails
-    gets a row with the reason. If it is stopped, the same command continues from there.
+    Writes Parquet parts that pandas, Polars and DuckDB read, and one page.
+    A record that fails gets a row with the reason.
+    If it is stopped, the same command continues from there.
     Exit code 1: a record does not meet a bound.
     """
     page = out / "study.html" if report is None else report
@@ -200,8 +201,13 @@ def _print(table: "BatchTable") -> None:
         f"{found.records} records; verdicts: "
         + (", ".join(f"{n} {v}" for v, n in found.verdicts.items()) or "none")
     )
-    for reason, count in found.reasons[:5]:
-        console.print(f"{count} not identified: {reason}", markup=False)
+    for failure in found.failures[:5]:
+        more = f" and {failure.count - 1} more" if failure.count > 1 else ""
+        console.print(
+            f"Not identified: {failure.first}{more}: {failure.reason}",
+            markup=False,
+            highlight=False,
+        )
 
 
 @contextmanager
