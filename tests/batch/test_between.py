@@ -132,3 +132,28 @@ def test_sums_of_another_rate_are_left_out():
 def test_windows_without_groups_are_refused():
     with pytest.raises(hmpim.HmpimError, match="lags = 40 is for records identified as one"):
         Request(lags=40)
+
+
+def test_rates_that_differ_by_rounding_are_one():
+    rng = np.random.default_rng(0)
+    one, other, away = (
+        hmpim.compress(hmpim.Record.from_arrays({"u": u}, {"y": u}, fs=fs), lags=40)
+        for fs, u in ((f, rng.standard_normal(200)) for f in (200.0, 200.00000000000003, 200.001))
+    )
+    assert (one + other).fs == 200.0
+    with pytest.raises(hmpim.HmpimError, match=r"fs is 200\.0 here and 200\.001 there"):
+        one + away
+
+
+def test_a_dead_sensor_is_no_part_of_its_group(tmp_path):
+    rng = np.random.default_rng(1)
+    for k in range(4):
+        u = rng.standard_normal(800)
+        y = np.full(800, 3.0) if k == 3 else 2.0 * u + 0.1 * rng.standard_normal(800)
+        hmpim.save(hmpim.Record.from_arrays({"u": u}, {"y": y}, fs=100.0), tmp_path / f"r{k}.h5")
+    request, here = Request(pool_by="all", lags=40), Cluster(workers=0)
+    table = hmpim.batch(str(tmp_path / "*.h5"), out=tmp_path / "out", request=request, cluster=here)
+    rows = {r["record"]: r for r in table.to_arrow().to_pylist()}
+    assert rows["all"]["meta_records"] == "3"
+    assert rows["all"]["noise_std"] == pytest.approx(0.1, rel=0.1)
+    assert "'y' is constant at 3" in rows[str(tmp_path / "r3.h5")]["reason"]

@@ -21,6 +21,8 @@ from hmpim.batch.request import Request
 from hmpim.batch.rows import group_rows
 from hmpim.errors import ArgumentError
 from hmpim.identify import Identification, Statistics, compress, identify
+from hmpim.identify.asked.refusals import check_moves
+from hmpim.record import uniform
 
 __all__ = ["Group", "Sums", "identify_groups"]
 
@@ -116,6 +118,7 @@ class _Compress:
         if read.record is not None:
             told = {**read.metadata, **self.beside.of(read.address)}
             try:
+                check_moves(uniform(read.record))  # a dead sensor would be a unit's noise
                 one = (1, compress(read.record, lags=self.lags))
                 return Sums(groups={_group_of(told, self.by): one})
             except Exception as error:  # bad data, or a defect that one record meets: others go on

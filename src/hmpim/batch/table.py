@@ -3,6 +3,7 @@
 import json
 from collections.abc import Sequence
 from dataclasses import dataclass
+from difflib import get_close_matches
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -58,8 +59,26 @@ class BatchTable:
         return self.to_arrow(columns).to_pandas()
 
     def to_arrow(self, columns: Sequence[str] | None = None) -> Any:
-        """Return a ``pyarrow.Table``, of all columns or some."""
-        return self.dataset().to_table(columns=None if columns is None else list(columns))
+        """Return a ``pyarrow.Table``, of all columns or some.
+
+        Raises
+        ------
+        ArgumentError
+            If there is no such column.
+        """
+        every = self.dataset()
+        if columns is None:
+            return every.to_table()
+        some = [columns] if isinstance(columns, str) else list(columns)
+        known = every.schema.names
+        for name in some:
+            if name not in known:
+                alike = get_close_matches(name, known, n=3) or [*known[:3], "…"]
+                raise ArgumentError(f"there is no column {name!r}; there is {', '.join(alike)}")
+        return every.to_table(columns=some)
+
+    def __repr__(self) -> str:
+        return f"BatchTable({len(self)} rows in {str(self.folder)!r})"
 
     def __len__(self) -> int:
         return int(self.dataset().count_rows()) if self.paths else 0
@@ -81,8 +100,13 @@ class BatchTable:
         if not some.num_rows:
             names = self.to_arrow(["record"]).column(0).to_pylist()
             whole = sorted({name for name in names if name.endswith(record)})
-            if len(whole) != 1:
-                raise ArgumentError(f"{len(whole)} records are called {record!r}; give its name")
+            if not whole:
+                raise ArgumentError(f"no record is called {record!r}, nor does a name end so")
+            if len(whole) > 1:
+                raise ArgumentError(
+                    f"the names of {len(whole)} records end in {record!r}: {whole[0]!r}, "
+                    f"{whole[1]!r}; give one of them"
+                )
             return self.result(whole[0])
         for row in some.to_pylist():
             if row["result"] is not None:

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from math import isclose
 from typing import Literal
 
 import numpy as np
@@ -26,6 +27,9 @@ _SHORTEST = 32
 _MOST = 10_000_000
 _FARTHEST = 1e15
 """Largest window, and sample of the last knot."""
+
+_ROUNDING = 1e-9
+"""Share by which rates that were read off time stamps may differ: by rounding."""
 
 Sharing = Literal["own", "common"]
 
@@ -176,7 +180,8 @@ class Statistics(ByValue):
         named = ["fs", "lags", "names", "units", "intersample"] + ["bias"] * biases
         for name in named:
             here, there = getattr(self, name), getattr(other, name)
-            if here != there:
+            same = here == there or (name == "fs" and isclose(here, there, rel_tol=_ROUNDING))
+            if not same:
                 raise ArgumentError(
                     f"{name} is {here!r} here and {there!r} there; only runs of one kind can be "
                     "joined, so compress them alike"
