@@ -274,3 +274,16 @@ def test_the_stamp_is_plain(folder_of_records, tmp_path, gain_alone):
     told = json.loads((tmp_path / "out" / "batch.json").read_text())
     assert told["schema"] == "hmpim/batch/1"
     assert Request.from_dict(told["request"]) == Request()
+
+
+def test_a_column_or_a_record_that_is_not_there_is_said_in_one_line(
+    folder_of_records, tmp_path, gain_alone
+):
+    table = hmpim.batch(folder_of_records, out=tmp_path / "out", cluster=HERE)
+    with pytest.raises(hmpim.HmpimError, match=r"no column 'dealy'; there is delay"):
+        table.to_pandas(["dealy"])
+    with pytest.raises(hmpim.HmpimError, match=r"no record is called 'nothing\.h5'"):
+        table.result("nothing.h5")
+    with pytest.raises(hmpim.HmpimError, match=r"names of 5 records end in '\.h5'"):
+        table.result(".h5")
+    assert repr(table) == f"BatchTable(5 rows in {str(tmp_path / 'out')!r})"
