@@ -19,7 +19,7 @@ from weakref import ref
 
 import numpy as np
 
-__all__ = ["keeping", "kept"]
+__all__ = ["keeping", "kept", "recent"]
 
 _MOST = 64
 """Results that are kept; that used longest ago goes first."""
@@ -29,6 +29,9 @@ _LARGEST = 1 << 18
 
 _Named = dict[int, tuple[ref[np.ndarray], Hashable, Hashable]]
 """By address: an array, what shows that it is still the same, and what it is called."""
+
+_FEW = 8
+"""Results that `recent` keeps; of larger inputs the last one alone."""
 
 _KEPT: ContextVar[OrderedDict[Hashable, Any] | None] = ContextVar("kept", default=None)
 _NAMED: ContextVar[_Named] = ContextVar("named")
@@ -93,6 +96,27 @@ def kept(function: Callable[P, T]) -> Callable[P, T]:
         return found
 
     return told
+
+
+def recent(owner: Hashable, nbytes: int) -> "Recent | None":
+    """What one owner has made of late, of inputs of so many bytes; None outside `keeping`."""
+    known = _KEPT.get()
+    if known is None:
+        return None
+    made = known.setdefault((owner, "recent"), Recent())
+    made.most = _FEW if nbytes <= _LARGEST else 1
+    return cast(Recent, made)
+
+
+class Recent(OrderedDict[Hashable, Any]):
+    """A few results, that made longest ago going first."""
+
+    most = 1
+
+    def __setitem__(self, key: Hashable, value: Any) -> None:
+        super().__setitem__(key, value)
+        while len(self) > self.most:
+            self.popitem(last=False)
 
 
 def _key(function: Callable[..., Any], values: tuple[Any, ...]) -> Hashable | None:

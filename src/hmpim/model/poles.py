@@ -15,7 +15,7 @@ each checks the other.
 In this module time is counted in samples.
 """
 
-from functools import cache
+from functools import cache, cached_property
 from math import factorial, floor
 from typing import Any
 
@@ -34,6 +34,8 @@ from hmpim.model.sampled import (
 __all__ = [
     "APART",
     "PoleResponses",
+    "distances",
+    "fractions",
     "input_responses",
     "modal_form",
     "parted",
@@ -172,56 +174,91 @@ class PoleResponses:
     --------
     >>> from hmpim.model.sampled import prepare_input
     >>> held = prepare_input(np.array([0.0, 1.0, 1.0, 1.0]), "zoh")
-    >>> PoleResponses(held, 0.0, np.array([-0.5 + 0j])).values.real.round(6).tolist()
+    >>> PoleResponses(held, 0.0, np.array([-0.5 + 0j])).waves.round(6).tolist()
     [[0.0, 0.0, 0.786939, 1.264241]]
     """
 
     def __init__(self, source: SampledInput, delay: float, poles: Complex) -> None:
         factor = source.oversampling
         begin, lag = placed(source, delay)
-        self._source, self._real = source, poles.imag == 0.0
+        self._source, self._turning = source, np.flatnonzero(poles.imag)
         self._c, self._first = _reaching(source, begin)
         self._taps, self._turned = pole_taps(poles / factor, lag, source.degree)
         self._powers = np.exp(poles[:, None] / factor * np.arange(factor + 1))
-        self._answers = self._recursive(self._filtered(_products(self._taps, self._powers)))
-        self.values = self._kept(self._answers) / factor
-        """Complex, shape (k, n)."""
+        self._answers = self._recursive(_products(self._taps, self._powers) / factor)
+        self.waves = self._kept(self._answers)
+        """Real parts, then the imaginary parts of those that have one, shape (waves, n)."""
 
-    def slopes(self) -> Complex:
-        """Derivatives by p: the responses of e^(-sτ)/(s - p)², shape (k, n)."""
+    @cached_property
+    def slopes(self) -> Real:
+        """Derivatives by p, the responses of e^(-sτ)/(s - p)², as `waves` are."""
         powers = self._powers
         factor = powers.shape[1] - 1
         weights = _products(self._turned, powers)
         weights += _products(self._taps, powers * np.arange(factor + 1))
-        driven = self._filtered(weights)
-        driven[:, 1:] += factor * powers[:, -1:] * self._answers[:, :-1]
-        return np.asarray(self._kept(self._recursive(driven)) / factor**2)
+        return self._kept(self._recursive(weights / factor**2, again=True))
 
-    def _filtered(self, weights: Complex) -> Complex:
+    def summed(self, weights: Complex, waves: Real) -> Real:
+        """Real parts of sums over poles, shape (rows, n), of `waves` or their slopes.
+
+        Parameters
+        ----------
+        weights : complex ndarray, shape (rows, k)
+        waves : ndarray, shape (waves, n)
+        """
+        return np.asarray(self.parts(weights.conj().T).T @ waves)
+
+    def parts(self, each: Complex) -> Real:
+        """Values of each pole, shape (k, n), as `waves` are."""
+        return np.concatenate([each.real, each.imag[self._turning]])
+
+    def _recursive(self, weights: Complex, *, again: bool = False) -> Real:
+        """Weighted sums of coefficients, over 1 - q/z for each pole; z is a sample of the record.
+
+        Where it is `again`, the answers one sample before are driven by too, times q.
+        """
+        start = self._first % self._source.oversampling
+        count = self._first // self._source.oversampling + self._source.samples
+        answers = np.empty((weights.shape[0] + self._turning.size, count))
+        imaginary = dict(
+            zip(self._turning.tolist(), range(weights.shape[0], len(answers)), strict=True)
+        )
+        for k, q in enumerate(self._powers[:, -1].tolist()):
+            at = imaginary.get(k)
+            driven = self._filtered(weights[k].real, start, count)
+            if at is None:
+                if again:
+                    driven[1:] += q.real * self._answers[k, :-1]
+                answers[k] = scipy.signal.lfilter(_ONE, [1.0, -q.real], driven)
+                continue
+            both = np.empty(count, dtype=np.complex128)
+            both.real, both.imag = driven, self._filtered(weights[k].imag, start, count)
+            if again:
+                real, imag = self._answers[k, :-1], self._answers[at, :-1]
+                both.real[1:] += q.real * real - q.imag * imag
+                both.imag[1:] += q.real * imag + q.imag * real
+            both = scipy.signal.lfilter(_ONE, [1.0, -q], both)
+            answers[k], answers[at] = both.real, both.imag
+        return answers
+
+    def _filtered(self, weights: Real, start: int, count: int) -> Real:
         """Weighted sums of the coefficients up to each sample of the record and before it."""
-        reach, factor = weights.shape[1] - 1, self._source.oversampling
-        before, start = divmod(self._first, factor)
-        c = np.concatenate([np.zeros(reach), self._c])
-        count = before + self._source.samples
-        under = np.empty((reach + 1, count))
-        for tap in range(reach + 1):
-            under[tap] = c[start + reach - tap :: factor][:count]
-        out = np.empty((weights.shape[0], count), dtype=np.complex128)
-        out.real = weights.real @ under
-        out.imag = weights.imag @ under
+        factor = self._source.oversampling
+        if factor == 1:
+            return np.convolve(self._c, weights)[:count]
+        out = np.zeros(count)
+        for phase in range(factor):
+            late = phase > start  # the sample before holds it
+            c = self._c[start - phase + factor * late :: factor]
+            part = np.convolve(c, weights[phase::factor])[: count - late]
+            out[late : late + part.size] += part
         return out
 
-    def _recursive(self, driven: Complex) -> Complex:
-        """Each row over 1 - q^factor/z, in which z is one sample of the record."""
-        for k, q in enumerate(self._powers[:, -1]):
-            if self._real[k]:
-                driven[k].real = scipy.signal.lfilter([1.0], [1.0, -q.real], driven[k].real)
-            else:
-                driven[k] = scipy.signal.lfilter([1.0], [1.0, -q], driven[k])
-        return driven
-
-    def _kept(self, answers: Complex) -> Complex:
+    def _kept(self, answers: Real) -> Real:
         return np.asarray(answers[:, self._first // self._source.oversampling :])
+
+
+_ONE = np.ones(1)
 
 
 def _products(taps: Complex, powers: Complex) -> Complex:
@@ -324,7 +361,8 @@ def rational_response(
         rows = delayed_response(source, delay=delay, denominator=denominator, powers=numerator.size)
         return np.asarray(numerator @ rows)
     poles, residues, through = expanded
-    out = (residues @ PoleResponses(source, delay, poles).values).real
+    answers = PoleResponses(source, delay, poles)
+    out = answers.summed(residues[None], answers.waves)[0]
     if through:
         out += through * input_responses(source, delay, slopes=False)[0]
     return np.asarray(out)
@@ -413,16 +451,30 @@ def partial_fractions(
     >>> residues[0].real.tolist(), constants.tolist()
     ([1.0, -4.0], [1.0])
     """
+    apart, product = distances(poles)
+    return (*fractions(numerators, poles, leading * product, leading), apart)
+
+
+def fractions(
+    numerators: Real, poles: Complex, steepness: Complex, leading: float
+) -> tuple[Complex, Real]:
+    """Residues and constants as `partial_fractions` gives them, from A'(p) at each pole."""
+    count = poles.size
+    above = numerators @ poles ** np.arange(numerators.shape[1])[:, None]
+    fed = numerators.shape[1] > count
+    constants = numerators[:, count] / leading if fed else np.zeros(len(numerators))
+    return above / steepness, constants
+
+
+def distances(poles: Complex) -> tuple[Complex, Complex]:
+    """1/(pⱼ - pₖ), 0 on the diagonal, and the product of each pole's differences to all others."""
     count = poles.size
     differences = poles[:, None] - poles
     differences[differences == 0.0] = _NOWHERE
     differences.flat[:: count + 1] = 1.0
     apart = 1.0 / differences
     apart.flat[:: count + 1] = 0.0
-    above = numerators @ poles ** np.arange(numerators.shape[1])[:, None]
-    fed = numerators.shape[1] > count
-    constants = numerators[:, count] / leading if fed else np.zeros(len(numerators))
-    return above / (leading * differences.prod(axis=1)), constants, apart
+    return apart, differences.prod(axis=1)
 
 
 _NOWHERE = complex("nan")

@@ -85,27 +85,33 @@ def begins_of(problem: Problem, fit: Fit, *, lag: int) -> int | None:
     told = _counts(problem)
     valid = told & late
     innovations = problem.innovations(fit.prediction, fit.residual)
-    residual = innovations * late
+    residual = (innovations * told)[begins:]
     count = int(np.count_nonzero(valid))
     if count < _LEFT * fit.structure.parameters:
         return None
     power = float(residual @ residual)
-    share = effective_share(residual[valid])
+    share = effective_share(innovations[valid])
     if _stands_out(innovations, told & ~late, valid):
         return begins
     if not fit.structure.order or power <= 0.0:
         return None
     part = part_of(replace(problem, begins=begins), fit.structure, fit.theta)
-    free = part.free
     known = part if problem.begins is None else None
-    rows = np.vstack([jacobian(problem, fit, part=known), problem.masked(free)]) * valid
-    gained = float((rows @ residual) @ solved(rows @ rows.T, rows @ residual))
+    others = jacobian(problem, fit, part=known)[:, begins:]
+    free = problem.masked(part.free)[:, begins:]
+    if problem.counts is not None:
+        others = others * told[begins:]
+        free = free * told[begins:]
+    mixed = free @ others.T
+    gram = np.block([[others @ others.T, mixed.T], [mixed, free @ free.T]])
+    moment = np.concatenate([others @ residual, free @ residual])
+    gained = float(moment @ solved(gram, moment))
     left = max(power - gained, np.finfo(float).tiny)
     statistic = share * count * float(np.log(power / left))
     return begins if statistic > scipy.special.chdtri(free.shape[0], FALSE_ALARM) else None
 
 
-def look_again(problem: Problem, trial: Trial, seen: Seen, *, lag: int) -> Seen | None:
+def look_again(problem: Problem, trial: Trial, seen: Seen, *, lag: int, rests: bool) -> Seen | None:
     """Samples that count after all, now that the structure is known; None if they are the same.
 
     What a band-limited input does at the ends of a record is not known: a command that starts from
@@ -124,6 +130,8 @@ def look_again(problem: Problem, trial: Trial, seen: Seen, *, lag: int) -> Seen 
         The samples that counted.
     lag : int
         As for `begins_of`.
+    rests : bool
+        Whether it is known from this fit that the record begins at rest.
     """
     count = problem.y.size
     told = _counts(problem)
@@ -142,6 +150,8 @@ def look_again(problem: Problem, trial: Trial, seen: Seen, *, lag: int) -> Seen 
             return replace(seen, valid=~ringing if seen.valid is None else seen.valid & ~ringing)
     if seen.begins is not None:
         return begin_later(seen, trial.fit)
+    if rests:
+        return None
     begins = begins_of(problem, trial.fit, lag=lag)
     if begins is None and problem.noise is not None:
         # Noise of the colour of a mode explains its free response, and more of it than there is.

@@ -68,7 +68,7 @@ def fit_plain(
     """Fit each structure, the richest first, from its own starts and then from the simpler ones.
 
     A residual that is white needs no other start, and tells which simpler structures are
-    hopeless: those get one start and few steps.
+    hopeless: those get one start, and no step that does not lead near.
     """
     fits: list[Fit] = []
     settled = False
@@ -78,9 +78,9 @@ def fit_plain(
             starts = [_without_second_pole(fits[0])]
         else:
             starts = starting_values(rough, structure, thorough=False)
-        steps = 2 if settled else _TASTE
-        fit = fit_structure(problem, structure, starts[0], iterations=steps)
         hopeful = min((f.objective for f in fits), default=np.inf) * TWICE
+        hopeless = TWICE * hopeful if settled else np.inf
+        fit = fit_structure(problem, structure, starts[0], iterations=_TASTE, hopeless=hopeless)
         # A residual of noise for the most part is white whatever the model misses.
         noisy = fit.cost > MOST * _spread(problem)
         white = fit.objective < hopeful and is_white(fit.residual)

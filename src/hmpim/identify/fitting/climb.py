@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from hmpim.identify.arrays import Mask, Real
 from hmpim.identify.fitting.least_squares import solved
 from hmpim.identify.fitting.regrouped import regrouped
+from hmpim.identify.worth import TWICE
 from hmpim.model.dynamics import Structure
 
 __all__ = ["Evaluated", "climb"]
@@ -19,6 +20,9 @@ _DAMPING = 1e-4
 
 _NUDGE = 1e-7
 """Change of a parameter that shows whether a bound is in its way."""
+
+_NEAR = 1e4
+"""Decrement, over what is negligible, up to which one step may be the last."""
 
 _STEEPEST = 1e6
 """The same, from which on no smaller step is tried."""
@@ -58,6 +62,7 @@ def climb(
     counted: int,
     iterations: int,
     precision: float,
+    hopeless: float = np.inf,
 ) -> tuple[E, bool]:
     """Levenberg and Marquardt's way to the least cost.
 
@@ -76,7 +81,7 @@ def climb(
         Keeps parameters where they can be told.
     counted : int
         Samples that count.
-    iterations, precision
+    iterations, precision, hopeless
         As for `fit_structure`.
 
     Returns
@@ -94,6 +99,7 @@ def climb(
         counted=counted,
         iterations=iterations,
         precision=precision,
+        hopeless=hopeless,
     )
     best, converged = descended(evaluated(thetas))
     other = [regrouped(s, theta) for s, theta in zip(structures, best.thetas, strict=True)]
@@ -115,6 +121,7 @@ def _descended(
     counted: int,
     iterations: int,
     precision: float,
+    hopeless: float = np.inf,
 ) -> tuple[E, bool]:
     """Where the way down from one grouping of the poles ends, and whether it does."""
     edges = np.cumsum([theta.size for theta in best.thetas])[:-1]
@@ -125,6 +132,8 @@ def _descended(
         negligible = precision * best.cost / max(counted - here.size - best.linear.size, 1)
         if decrement < negligible:
             return best, True
+        if best.cost - decrement > max(hopeless, best.cost / TWICE**2):
+            return best, False
         refused = 0
         while True:
             step = np.zeros(here.size)
@@ -144,7 +153,8 @@ def _descended(
             damping *= 10.0
             refused += 1
         fell, best = best.cost - trial.cost, trial
-        if fell < negligible and damping <= 10 * _DAMPING:
+        near = decrement < _NEAR * negligible and _left(decrement, fell) < negligible
+        if near or (fell < negligible and damping <= 10 * _DAMPING):
             return best, True
         if fell < _POORLY * hoped:
             damping *= 2.0
@@ -170,6 +180,15 @@ def _free_directions(
         normal, moment = normal[np.ix_(free, free)], moment[free]
     toward = solved(normal, moment) if free.any() else moment
     return free, normal, moment, float(toward @ moment)
+
+
+def _left(decrement: float, fell: float) -> float:
+    """What is left to gain after a step that should have gained its decrement, and so much it did.
+
+    Where the curvature is off by a share ρ, the step gains ρ of the decrement less and leaves ρ²
+    of it; where it is the third derivative that bends the way, 9/4 as much.
+    """
+    return 2.25 * (decrement - fell) ** 2 / decrement
 
 
 def _limited(structure: Structure, theta: Real, step: Real) -> float:

@@ -15,7 +15,7 @@ from hmpim.identify.fitting.candidates import (
     owed_to_input,
     reduced,
 )
-from hmpim.identify.fitting.data import Data, Seen, band_of, follows, refit
+from hmpim.identify.fitting.data import Data, Seen, band_of, follows, polished, refit
 from hmpim.identify.fitting.enrich import PLAIN
 from hmpim.identify.fitting.fit import Fit, Problem
 from hmpim.identify.fitting.least_squares import solved
@@ -39,6 +39,9 @@ __all__ = [
     "start",
     "turn_ahead",
 ]
+
+_SOME = 100
+"""Samples that tell at once of most inputs that they have more levels."""
 
 _LEVELS = 3
 """Levels of a switched input: two of a binary sequence, and the rest before it."""
@@ -64,6 +67,8 @@ class Course:
         Samples as they were given, and those that count.
     fits : list of Fit
         Of the plain structures.
+    settled : Fit or None
+        The best of them where it leaves white noise and the record begins at rest: it is polished.
     """
 
     data: Data
@@ -75,6 +80,7 @@ class Course:
     given: Seen
     counted: Seen
     fits: list[Fit]
+    settled: Fit | None = None
 
     @property
     def problem(self) -> Problem:
@@ -190,6 +196,10 @@ def interpolated_for(course: Course, fit: Fit) -> Course | None:
 def find_beginning(course: Course) -> Course:
     """The samples that count, and the fits to them: the record may not begin at rest."""
     data, natural, seen, fits = course.data, course.natural, course.given, course.fits
+    settled = None
+    if is_white(course.best.residual):
+        settled = polished(course.problem, course.best)
+        fits = [settled if fit is course.best else fit for fit in fits]
     counted = count_in(data, natural, fits, seen, course.known)
     if counted.begins is not None:  # from rest those fits ended anywhere
         problem = data.problem(natural, counted)
@@ -201,8 +211,9 @@ def find_beginning(course: Course) -> Course:
         later = count_in(data, natural, fits, seen, course.known)
         counted = counted if later.begins is None else later
     if counted is not seen:
+        settled = None
         fits = [refit(data.problem(natural, counted), f) for f in fits]
-    return replace(course, counted=counted, fits=fits)
+    return replace(course, counted=counted, fits=fits, settled=settled)
 
 
 def continue_between(course: Course) -> list[tuple[Intersample, Fit]]:
@@ -288,12 +299,16 @@ def _looks_held(u: NDArray[np.float64]) -> bool:
     """
     jumps = np.abs(np.diff(u))
     moves = jumps > 0
-    if np.count_nonzero(moves) > _LEVELS and np.unique(u).size <= _LEVELS:
-        return True
     count = int(np.count_nonzero(moves))
+    if count > _LEVELS and _has_few_levels(u):
+        return True
+    if 2 * count > moves.size + 1:
+        return False
     alone = moves & ~np.append(moves[1:], False) & ~np.append(False, moves[:-1])
-    return bool(
-        2 * count <= moves.size + 1
-        and jumps.max() > FEW * np.ptp(u)
-        and 2 * np.count_nonzero(alone) > count
-    )
+    return bool(jumps.max() > FEW * np.ptp(u) and 2 * np.count_nonzero(alone) > count)
+
+
+def _has_few_levels(u: NDArray[np.float64]) -> bool:
+    """Whether an input stands at three levels at most; a few samples deny it."""
+    some = u[:: u.size // _SOME + 1]
+    return np.unique(some).size <= _LEVELS and np.unique(u).size <= _LEVELS

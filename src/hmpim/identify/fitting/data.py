@@ -21,6 +21,7 @@ __all__ = [
     "Seen",
     "band_of",
     "follows",
+    "polished",
     "prepared",
     "refit",
     "shifted",
@@ -89,6 +90,11 @@ def shifted(
     """Parameters as a start under another assumption: held, the delay fits half a sample less."""
     held = 0.5 * (float(origin == "zoh") - float(mode == "zoh"))
     return np.asarray(theta + held * (np.arange(theta.size) == 0))
+
+
+def polished(problem: Problem, fit: Fit) -> Fit:
+    """The same fit at the final precision."""
+    return fit_structure(problem, fit.structure, fit.theta, precision=FINAL_PRECISION)
 
 
 def refit(problem: Problem, fit: Fit) -> Fit:

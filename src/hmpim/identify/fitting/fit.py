@@ -110,21 +110,44 @@ class Fit:
         return FORGETS * slowest_time_constant(self.denominator)
 
 
+class _Known:
+    """What no parameter moves: output and fixed rows as they count, and their products."""
+
+    def __init__(self, problem: Problem) -> None:
+        self.target = problem.masked(problem.y)
+        self.plain = problem.fixed()
+        self.fixed = problem.masked(self.plain)
+        self.gram = self.fixed @ self.fixed.T
+        self.cross = self.fixed @ self.target
+
+
 class _Evaluation:
     """All inputs at given parameters: linear parameters solved, residual, derivatives on demand."""
 
-    def __init__(self, problems: Sequence[Problem], parts: Sequence[Part | SampledPart]) -> None:
-        self.problems, self.parts = problems, parts
+    def __init__(
+        self, problems: Sequence[Problem], parts: Sequence[Part | SampledPart], known: _Known
+    ) -> None:
+        self.problems, self.parts, self._known = problems, parts, known
         first = problems[0]
         self._blocks = [rows for part in parts for rows in (part.rows, part.free)]
-        self.rows = np.vstack([*self._blocks, first.fixed()])
+        filled = [rows for rows in self._blocks if rows.shape[0]]
+        self.rows = filled[0] if len(filled) == 1 else np.vstack(filled)
         self.counted = first.masked(self.rows)
-        target = first.masked(first.y)
+        own = self.counted.shape[0]
+        self._gram = np.empty((own + len(known.cross),) * 2)
+        self._gram[:own, :own] = self.counted @ self.counted.T
+        self._gram[own:, :own] = known.fixed @ self.counted.T
+        self._gram[:own, own:] = self._gram[own:, :own].T
+        self._gram[own:, own:] = known.gram
         if first.source.degree == SAMPLES_ALONE:  # rounding is all the noise there may be
-            self.linear, _ = solved_exactly(self.counted, target)
+            every = np.vstack([self.counted, known.fixed])
+            self.linear, _ = solved_exactly(every, known.target)
+            self.residual = known.target - self.linear @ every
         else:
-            self.linear = solved(self.counted @ self.counted.T, self.counted @ target)
-        self.residual = target - self.linear @ self.counted
+            cross = np.concatenate([self.counted @ known.target, known.cross])
+            self.linear = solved(self._gram, cross)
+            self.residual = known.target - self.linear[:own] @ self.counted
+            self.residual -= self.linear[own:] @ known.fixed
         self.cost = float(self.residual @ self.residual)
 
     def weights(self) -> list[Real]:
@@ -141,7 +164,7 @@ class _Evaluation:
         for problem, own in zip(self.problems, rows, strict=True):
             if problem.shortest_delay == problem.longest_delay:
                 own[0] = 0.0  # a delay that is kept
-        return self.problems[0].masked(np.vstack(rows))
+        return self.problems[0].masked(rows[0] if len(rows) == 1 else np.vstack(rows))
 
     @property
     def thetas(self) -> list[Real]:
@@ -151,17 +174,20 @@ class _Evaluation:
     def normal(self) -> tuple[Real, Real]:
         """Normal equations of delays and denominators: matrix, and derivative of the cost."""
         rows = self.slopes()
-        return _projected(rows, self.counted), rows @ self.residual
+        mixed = np.hstack([rows @ self.counted.T, rows @ self._known.fixed.T])
+        return rows @ rows.T - mixed @ solved(self._gram, mixed.T), rows @ self.residual
 
     def fits(self, *, converged: bool) -> list[Fit]:
         """What each input makes of the output."""
         weights = self.weights()
-        fixed, problem = weights[-1], self.problems[0]
+        fixed, problem, residual = weights[-1], self.problems[0], self.residual
         levels = [weights[2 * i][0] * part.level for i, part in enumerate(self.parts)]
         bias = fixed[0] - sum(levels)  # as if no input stood anywhere but at zero
-        residual = problem.y - self.linear @ self.rows
-        if problem.valid is not None:
-            residual = residual * problem.valid
+        if problem.noise is not None or problem.whitening is not None:
+            moved = self.linear[: -fixed.size] @ self.rows
+            residual = problem.y - moved - fixed @ self._known.plain
+            if problem.valid is not None:
+                residual = residual * problem.valid
         out = []
         for i, part in enumerate(self.parts):
             own = weights[2 * i] @ part.rows + (bias + levels[i])
@@ -184,13 +210,6 @@ class _Evaluation:
                 )
             )
         return out
-
-
-def _evaluated(
-    problems: Sequence[Problem], structures: Sequence[Structure], thetas: Sequence[Real]
-) -> _Evaluation:
-    parts = [part_of(p, s, t) for p, s, t in zip(problems, structures, thetas, strict=True)]
-    return _Evaluation(problems, parts)
 
 
 def jacobian(
@@ -265,6 +284,7 @@ def fit_structure(
     *,
     iterations: int = 40,
     precision: float = 1e-2,
+    hopeless: float = np.inf,
 ) -> Fit:
     """Fit one structure from one start.
 
@@ -281,6 +301,9 @@ def fit_structure(
     precision : float
         Stop when a step lowers the sum of squares by less than this, in units of σ²; a
         parameter then is within about the root of it, in standard deviations.
+    hopeless : float
+        Stop where a step promises to leave more than this, and more than a quarter of what it
+        begins with.
 
     Returns
     -------
@@ -293,6 +316,7 @@ def fit_structure(
         [theta],
         iterations=iterations,
         precision=precision,
+        hopeless=hopeless,
     )
     return fit
 
@@ -304,6 +328,7 @@ def fit_together(
     *,
     iterations: int = 40,
     precision: float = 1e-2,
+    hopeless: float = np.inf,
 ) -> list[Fit]:
     """Fit one output to several inputs at once, each with a structure of its own.
 
@@ -311,7 +336,7 @@ def fit_together(
     ----------
     problems : sequence of Problem
         One for each input; output, mask, whitening, nuisance and beginning are the first one's.
-    structures, thetas, iterations, precision
+    structures, thetas, iterations, precision, hopeless
         As for `fit_structure`, one structure and start for each input.
 
     Returns
@@ -325,8 +350,11 @@ def fit_together(
     def bounded(moved: Sequence[Real]) -> list[Real]:
         return [_bounded(p, s, t) for p, s, t in zip(problems, structures, moved, strict=True)]
 
+    known = _Known(problems[0])
+
     def evaluated(moved: Sequence[Real]) -> _Evaluation:
-        return _evaluated(problems, structures, moved)
+        parts = [part_of(p, s, t) for p, s, t in zip(problems, structures, moved, strict=True)]
+        return _Evaluation(problems, parts, known)
 
     best, converged = climb(
         evaluated,
@@ -336,12 +364,6 @@ def fit_together(
         counted=problems[0].counted,
         iterations=iterations,
         precision=precision,
+        hopeless=hopeless,
     )
     return best.fits(converged=converged)
-
-
-def _projected(rows: Real, linear: Real) -> Real:
-    """Normal equations of the nonlinear parameters, the linear ones projected out."""
-    mixed = rows @ linear.T
-    inner = linear @ linear.T
-    return np.asarray(rows @ rows.T - mixed @ np.linalg.lstsq(inner, mixed.T, rcond=None)[0])

@@ -29,7 +29,7 @@ from hmpim.identify.fitting.course import (
     start,
     turn_ahead,
 )
-from hmpim.identify.fitting.data import FINAL_PRECISION, band_of, follows, refit
+from hmpim.identify.fitting.data import band_of, follows, polished, refit
 from hmpim.identify.fitting.enrich import INTEGRATING, MODES, PLAIN, RICH
 from hmpim.identify.fitting.fit import Fit, Problem, fit_structure
 from hmpim.identify.fitting.growth import (
@@ -132,7 +132,8 @@ def weigh_and_look_again(
     for _ in range(_LOOKS):
         data, seen = course.data, course.counted
         problem = data.problem(best.intersample, seen)
-        again = look_again(problem, best, seen, lag=data.rough.lag)
+        rests = best.fit is course.settled
+        again = look_again(problem, best, seen, lag=data.rough.lag, rests=rests)
         natural = best.intersample == "bandlimited"
         finer = interpolated_for(course, best.fit) if natural else None
         if (again, finer) == (None, None) and not _is_needlessly_coloured(problem, best.fit):
@@ -200,13 +201,13 @@ def grow_poles(joint: JointFit, course: Course, structures: tuple[StructureName,
 def _led_by(led: Trial, joint: JointFit, course: Course) -> JointFit:
     """The joint fit with another best trial, polished, and that under the other assumptions."""
     weighed = course.data.problem(led.intersample, course.counted)
-    polished = fit_structure(weighed, led.fit.structure, led.fit.theta, precision=FINAL_PRECISION)
+    fit = polished(weighed, led.fit)
     count = weighed.counted * joint.weighed_share
-    best = trial_of(led.intersample, polished, count)
+    best = trial_of(led.intersample, fit, count)
     others = () if course.alone else (m for m in BETWEEN if m != best.intersample)
     problems = {mode: course.data.problem(mode, course.counted) for mode in others}
     moved = [
-        trial_of(mode, refit_between(problem, polished, best.intersample, mode), count)
+        trial_of(mode, refit_between(problem, fit, best.intersample, mode), count)
         for mode, problem in problems.items()
     ]
     trials = [*(trial for trial in joint.trials if trial is not led), *moved, best]
@@ -307,11 +308,8 @@ def _decide(
     count = course.problem.counted * (share if course.data.noise is None else 1.0)
     trials = [trial_of(mode, fit, count) for mode, fit in fitted]
     chosen = likeliest_of(trials, course.natural)
-    polished = fit_structure(
-        course.data.problem(chosen.intersample, course.counted),
-        chosen.fit.structure,
-        chosen.fit.theta,
-        precision=FINAL_PRECISION,
+    fit, problem = chosen.fit, course.data.problem(chosen.intersample, course.counted)
+    best = trial_of(
+        chosen.intersample, fit if fit is course.settled else polished(problem, fit), count
     )
-    best = trial_of(chosen.intersample, polished, count)
     return [best if trial is chosen else trial for trial in trials], best

@@ -10,6 +10,9 @@ __all__ = ["solved", "solved_exactly", "without"]
 _UNSEEN = 1e-13
 """Share of the greatest eigenvalue below which the record does not see a direction."""
 
+_WELL = 1e-4
+"""Least element of a triangular factor down to which no direction is unseen."""
+
 _EXACTLY = 1e-14
 """The share that is not seen where no normal equations are made."""
 
@@ -38,6 +41,13 @@ def solved(gram: Real, moment: Real, damping: float = 0.0) -> Real:
     diagonal = gram.diagonal()
     scale = np.sqrt(np.where(diagonal > 1e-200 * diagonal.max(), diagonal, 1.0))
     scaled = gram / (scale[:, None] * scale)
+    factor, info = scipy.linalg.lapack.dpotrf(scaled)
+    if not info and factor.diagonal().min() > _WELL:
+        if damping:
+            scaled.flat[:: scale.size + 1] += damping
+            factor, _ = scipy.linalg.lapack.dpotrf(scaled)
+        found, _ = scipy.linalg.lapack.dpotrs(factor, (moment.T / scale).T)
+        return np.asarray((found.T / scale).T)
     # The routine of eigh, which takes as long to check its arguments.
     values, vectors, info = scipy.linalg.lapack.dsyevd(scaled, lower=1)
     if info:

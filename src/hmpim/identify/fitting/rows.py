@@ -5,12 +5,14 @@ coefficient of B; the bias; whatever else is linear, such as a drift; and, where
 begin at rest, the free response of the state it begins with.
 """
 
+from copy import copy
 from dataclasses import dataclass, replace
+from math import ceil
 
 import numpy as np
 import scipy
 
-from hmpim.identify.arrays import Complex, Mask, Real
+from hmpim.identify.arrays import Mask, Real
 from hmpim.identify.fitting.sections import Expansion, Parallel, Poles, poles_of
 from hmpim.model.dynamics import Structure
 from hmpim.model.poles import PoleResponses, input_responses
@@ -20,6 +22,10 @@ __all__ = ["STAMPED_LATE", "Driven", "Part", "Problem"]
 
 STAMPED_LATE = -4.0
 """Least delay in samples that is tried where an output follows its input: stamps may be late."""
+
+
+_NOTHING = 50.0
+"""Time constants after which a free response is less than rounding."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -138,6 +144,7 @@ class Part(Driven):
 
     def __init__(self, problem: Problem, structure: Structure, theta: Real) -> None:
         self.structure, self.theta = structure, theta
+        self._since_start: Real | None
         self._source = problem.source
         self._delay = float(theta[0])
         self._poles: Poles | Parallel = poles_of(structure, theta[1:])
@@ -145,23 +152,36 @@ class Part(Driven):
         self._answers = PoleResponses(self._source, self._delay, upper) if upper.size else None
         self._fed: Real | None = None
         self._numerators = _powers(structure)
-        expanded = self._poles.expand(self._numerators)
-        self.rows = self._added(expanded)
+        self.rows = self._added(self._poles.expand(self._numerators))
         first = self._source.first
         self.level = 0.0 if structure.dc_zeros or structure.integrators else first
         if first and structure.integrators:
             self.rows[0] += first * self._since()
-        self._since_start: Complex | None = None
-        self.free = np.empty((0, problem.y.size))
+        self._begin(problem.begins)
+
+    def begun(self, begins: int | None) -> "Part":
+        """The same where the free responses begin elsewhere."""
+        if begins == self._begins:
+            return self
+        other = copy(self)
+        other._begin(begins)
+        return other
+
+    def _begin(self, begins: int | None) -> None:
+        answers, structure, count = self._answers, self.structure, self._source.samples
+        self._begins, self._since_start = begins, None
+        self.free = np.empty((0, count))
         """Free responses, shape (order, n)."""
-        if problem.begins is not None and structure.order:
-            late = np.arange(problem.y.size) - float(problem.begins)
-            after = late >= 0.0
-            self._late = np.where(after, late, 0.0)
-            self._since_start = np.exp(upper[:, None] * self._late) * after
-            count = structure.order + structure.integrators
-            impulses = np.eye(count)[structure.integrators :]
-            self.free = _real(self._poles.expand(impulses).simple, self._since_start)
+        if begins is None or not structure.order or answers is None:
+            return
+        slowest = max(-float(self._poles.upper.real.max()), 1.0 / _NOTHING)
+        lasts = slice(begins, begins + ceil(min(_NOTHING / slowest, count)))
+        self._late = np.maximum(np.arange(count) - float(begins), 0.0)
+        waves = np.exp(self._poles.upper[:, None] * self._late[lasts])
+        self._since_start = np.zeros((len(answers.waves), count))
+        self._since_start[:, lasts] = answers.parts(waves)
+        impulses = np.eye(structure.order + structure.integrators)[structure.integrators :]
+        self.free = answers.summed(self._poles.expand(impulses).simple, self._since_start)
 
     def slopes(self, numerator: Real, initial: Real) -> Real:
         """Derivatives of what the input does by theta, shape (1 + order, n).
@@ -175,20 +195,18 @@ class Part(Driven):
         """
         structure = self.structure
         full: Real = numerator @ self._numerators
-        turned = self._answers.slopes() if self._answers is not None and structure.order else None
-        out = np.empty((self.theta.size, self._source.samples))
-        by_delay, by_sections = self._poles.slopes(full)
-        out[:1] = self._added(by_delay)
+        slopes, answers = self._poles.slopes(full), self._answers
+        out = self._added(slopes)
         if structure.integrators and self._source.first:
             out[0] -= full[0] * self._source.first * (self._since() > 0.0)
-        if structure.order:
-            out[1:] = self._added(by_sections)
-            out[1:] += _real(by_sections.double, turned)
-            if initial.size and self._since_start is not None:
-                state = np.concatenate([np.zeros(structure.integrators), initial])
-                _, free = self._poles.slopes(state)
-                out[1:] += _real(free.simple, self._since_start)
-                out[1:] += _real(free.double, self._late * self._since_start)
+        if answers is None or not structure.order:
+            return out
+        out += answers.summed(slopes.double, answers.slopes)
+        if initial.size and self._since_start is not None:
+            state = np.concatenate([np.zeros(structure.integrators), initial])
+            free = self._poles.slopes(state)
+            out[1:] += answers.summed(free.simple[1:], self._since_start)
+            out[1:] += answers.summed(free.double[1:], self._late * self._since_start)
         return out
 
     def _added(self, expansion: Expansion) -> Real:
@@ -196,7 +214,7 @@ class Part(Driven):
         if self._answers is None:
             out = np.zeros((expansion.direct.size, self._source.samples))
         else:
-            out = _real(expansion.simple, self._answers.values)
+            out = self._answers.summed(expansion.simple, self._answers.waves)
         rate = expansion.rate
         rated = rate is not None and bool(rate.any())
         if rated or expansion.direct.any():
@@ -224,13 +242,3 @@ def _powers(structure: Structure) -> Real:
         gains[1:, 0] = -1.0
         return gains
     return np.asarray(np.eye(structure.zeros + 1)[structure.dc_zeros :])
-
-
-def _real(weights: Complex | None, waves: Complex | None) -> Real:
-    """Real part of a sum over poles."""
-    if weights is None or waves is None:
-        return np.zeros((1, 1))
-    out = weights.real @ waves.real
-    if waves.imag.any():
-        out -= weights.imag @ waves.imag
-    return np.asarray(out)

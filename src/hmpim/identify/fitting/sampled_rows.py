@@ -5,6 +5,7 @@ import scipy
 
 from hmpim.identify.arrays import Real
 from hmpim.identify.fitting.rows import Driven, Part, Problem
+from hmpim.identify.kept import recent
 from hmpim.model.dynamics import Structure, coefficients_of
 from hmpim.model.filters import nyquist_taps, poles_in_z
 from hmpim.model.sampled import MARGIN, SAMPLES_ALONE
@@ -84,7 +85,18 @@ def _below(structure: Structure, theta: Real) -> Real:
 
 
 def part_of(problem: Problem, structure: Structure, theta: Real) -> Part | SampledPart:
-    """Rows of a system in continuous time, or of software."""
-    if problem.source.degree == SAMPLES_ALONE:
+    """Rows of a system in continuous time, or of software.
+
+    A fit is asked for its rows again where it ended: those of the last ones are kept.
+    """
+    source = problem.source
+    if source.degree == SAMPLES_ALONE:
         return SampledPart(problem, structure, theta)
-    return Part(problem, structure, theta)
+    made = recent(part_of, source.coefficients.nbytes)
+    if made is None:
+        return Part(problem, structure, theta)
+    key = (source, structure, theta.tobytes())
+    if key not in made:
+        made[key] = Part(problem, structure, theta)
+    part: Part = made[key]
+    return part.begun(problem.begins)

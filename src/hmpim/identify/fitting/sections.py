@@ -6,17 +6,21 @@ is a sum of single and double ones. The free response of an initial state is B/A
 degree less than A and an impulse for an input: one expansion serves all.
 """
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
-from hmpim.identify.arrays import Complex, Mask, Real
+from hmpim.identify.arrays import Complex, Real
 from hmpim.model.dynamics import Structure, coefficients_of
-from hmpim.model.poles import APART, parted, partial_fractions
+from hmpim.model.poles import APART, distances, fractions, parted
 
 __all__ = ["Expansion", "Parallel", "Poles", "poles_of"]
+
+
+_NONE = np.empty((0, 0), dtype=np.complex128)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -27,18 +31,17 @@ class Expansion:
     ----------
     simple, double : complex ndarray, shape (rows, k)
         Of the responses of 1/(s - p) and 1/(s - p)², one of each conjugate pair: the rows are the
-        real parts. `double` is None where there is none.
+        real parts. Rows of B/A itself have no `double`.
     direct, rate : ndarray, shape (rows,)
         Of the input itself and of its rate. `rate` is None where that has no part.
     """
 
     simple: Complex
-    double: Complex | None
+    double: Complex
     direct: Real
     rate: Real | None
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Poles:
     """Poles of a structure at given parameters, in samples.
 
@@ -46,48 +49,52 @@ class Poles:
     ----------
     every : complex ndarray, shape (order + integrators,)
         All poles.
-    kept : ndarray of bool
-        One of each conjugate pair.
-    section : ndarray of int
+    section : list of int
         Which section each belongs to; -1 for an integrator.
-    coefficients : tuple of ndarray
+    coefficients : sequence of ndarray
         c₁ (and c₂) of each section.
     """
 
-    every: Complex
-    kept: Mask
-    section: NDArray[np.intp]
-    coefficients: tuple[Real, ...]
-
-    @property
-    def upper(self) -> Complex:
+    def __init__(
+        self, every: Complex, section: Sequence[int], coefficients: Sequence[Real]
+    ) -> None:
+        self.every, self.coefficients = every, coefficients
+        self._first = sum(k < 0 for k in section)
+        self._kept = np.flatnonzero(every.imag >= 0.0)
+        self.upper = every[self._kept]
         """One of each conjugate pair."""
-        return self.every[self.kept]
+        self._standing = np.where(self.upper.imag > 0, 2.0, 1.0)
+        self._leading = math.prod(float(c[-1]) for c in coefficients)
+        self._apart, product = distances(every)
+        self._steepness = self._leading * product
 
     def expand(self, numerators: Real) -> Expansion:
         """Rows of B(s)/A(s), one for each row of `numerators`, by rising powers of s."""
-        residues, constants, _ = self._fractions(numerators)
-        return self._expansion(residues, constants)
+        residues, constants = fractions(numerators, self.every, self._steepness, self._leading)
+        return Expansion(simple=self._halved(residues), double=_NONE, direct=constants, rate=None)
 
-    def slopes(self, numerator: Real) -> tuple[Expansion, Expansion]:
-        """Rows of the derivatives of B(s)/A(s): by the delay, and by the sections' parameters.
+    def slopes(self, numerator: Real) -> Expansion:
+        """Rows of the derivatives of B(s)/A(s): by the delay, then by the sections' parameters.
 
         The derivative by the delay is -s B/A. That by a coefficient of a section Aₖ is B/A times
         -s^m/Aₖ, each a sum over poles; in the product of the two
 
             1/((s - p)(s - q)) = (1/(s - p) - 1/(s - q)) / (p - q).
         """
-        (residues,), (constant,), apart = self._fractions(numerator[None, :])
-        by_delay = self._expansion(
-            -(residues * self.every)[None, :],
-            np.array([-residues.sum().real]),
-            rate=np.array([-constant]),
+        (residues,), (constant,) = fractions(
+            numerator[None, :], self.every, self._steepness, self._leading
         )
         factors, fed = self._by_parameters()
-        simple = residues * (factors @ apart.T) + factors * (apart @ residues)
-        simple += fed[:, None] * residues + constant * factors
-        by_sections = self._expansion(-simple, -constant * fed, double=-residues * factors)
-        return by_delay, by_sections
+        simple = np.empty((1 + fed.size, self.every.size), dtype=np.complex128)
+        double, direct, rate = np.zeros_like(simple), np.empty(1 + fed.size), np.zeros(1 + fed.size)
+        simple[0] = -residues * self.every
+        direct[0], rate[0] = -residues.sum().real, -constant
+        simple[1:] = -residues * (factors @ self._apart.T) - factors * (self._apart @ residues)
+        simple[1:] -= fed[:, None] * residues + constant * factors
+        double[1:], direct[1:] = -residues * factors, -constant * fed
+        return Expansion(
+            simple=self._halved(simple), double=self._halved(double), direct=direct, rate=rate
+        )
 
     def _by_parameters(self) -> tuple[Complex, Real]:
         """1/Aₖ times the derivative of Aₖ by each parameter: residues, and what is fed through."""
@@ -95,7 +102,7 @@ class Poles:
         factors = np.zeros((rows, self.every.size), dtype=np.complex128)
         fed = np.ones(rows)
         row = 0
-        at = int(np.count_nonzero(self.section < 0))
+        at = self._first
         for c in self.coefficients:
             p = complex(self.every[at])
             if c.size == 1:
@@ -113,30 +120,9 @@ class Poles:
             at += c.size
         return factors, fed
 
-    def _fractions(self, numerators: Real) -> tuple[Complex, Real, Complex]:
-        leading = 1.0
-        for c in self.coefficients:
-            leading *= float(c[-1])
-        return partial_fractions(numerators, self.every, leading)
-
-    def _expansion(
-        self,
-        simple: Complex,
-        direct: Real,
-        *,
-        double: Complex | None = None,
-        rate: Real | None = None,
-    ) -> Expansion:
-        return Expansion(
-            simple=self._halved(simple),
-            double=None if double is None else self._halved(double),
-            direct=direct,
-            rate=rate,
-        )
-
     def _halved(self, rows: Complex) -> Complex:
         """Weights of one of each conjugate pair, which stands for both."""
-        return np.asarray(rows[:, self.kept] * np.where(self.upper.imag > 0, 2.0, 1.0))
+        return np.asarray(rows[:, self._kept] * self._standing)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -165,29 +151,24 @@ class Parallel:
         expanded = [one.expand(n) for one, n in zip(self.sections, split, strict=True)]
         return Expansion(
             simple=np.hstack([e.simple for e in expanded]),
-            double=None,
+            double=_NONE,
             direct=np.zeros(numerators.shape[0]),
             rate=None,
         )
 
-    def slopes(self, numerator: Real) -> tuple[Expansion, Expansion]:
-        """Rows of the derivatives by the delay, and by the sections' parameters."""
+    def slopes(self, numerator: Real) -> Expansion:
+        """Rows of the derivatives by the delay, then by the sections' parameters."""
         split = np.split(numerator, len(self.sections))
-        pairs = [one.slopes(n) for one, n in zip(self.sections, split, strict=True)]
-        late, own = [pair[0] for pair in pairs], [pair[1] for pair in pairs]
-        by_delay = Expansion(
-            simple=np.hstack([e.simple for e in late]),
-            double=None,
-            direct=np.sum([e.direct for e in late], axis=0),
+        own = [one.slopes(n) for one, n in zip(self.sections, split, strict=True)]
+        direct = np.concatenate([[sum(e.direct[0] for e in own)], *(e.direct[1:] for e in own)])
+        return Expansion(
+            simple=np.vstack(
+                [np.hstack([e.simple[:1] for e in own]), _blocks([e.simple[1:] for e in own])]
+            ),
+            double=_blocks([np.zeros((1, 0), dtype=np.complex128), *(e.double[1:] for e in own)]),
+            direct=direct,
             rate=None,
         )
-        by_sections = Expansion(
-            simple=_blocks([e.simple for e in own]),
-            double=_blocks([e.double for e in own if e.double is not None]),
-            direct=np.concatenate([e.direct for e in own]),
-            rate=None,
-        )
-        return by_delay, by_sections
 
 
 def _blocks(parts: list[Complex]) -> Complex:
@@ -226,21 +207,15 @@ def poles_of(structure: Structure, theta: Real) -> Poles | Parallel:
         return Parallel(
             sections=tuple(
                 Poles(
-                    every=(pair := np.array(_pair(c[0], c[1]))),
-                    kept=pair.imag >= 0.0,
-                    section=np.zeros(2, dtype=np.intp),
-                    coefficients=(c,),
+                    every=np.array(_pair(c[0], c[1]), dtype=np.complex128),
+                    section=[0, 0],
+                    coefficients=[c],
                 )
                 for c in coefficients
             )
         )
     poles = parted(np.array(every, dtype=np.complex128))
-    return Poles(
-        every=poles,
-        kept=poles.imag >= 0.0,
-        section=np.array(section, dtype=np.intp),
-        coefficients=tuple(coefficients),
-    )
+    return Poles(every=poles, section=section, coefficients=coefficients)
 
 
 def _pair(c1: float, c2: float) -> list[complex]:

@@ -8,10 +8,10 @@ import scipy
 from hmpim.identify.arrays import Real
 from hmpim.identify.chance import FALSE_ALARM
 from hmpim.identify.fitting.data import (
-    FINAL_PRECISION,
     Data,
     Seen,
     follows,
+    polished,
 )
 from hmpim.identify.fitting.fit import Fit, Problem, fit_structure, jacobian
 from hmpim.identify.fitting.start import rough_response
@@ -83,7 +83,7 @@ def is_contradicted(data: Data, best: Trial, seen: Seen) -> bool:
     what is left over is no noise but what the model lacks (J. A. Hausman, Econometrica 46, 1978).
     """
     problem = replace(data, noise=None).problem(best.intersample, seen)
-    plain = fit_structure(problem, best.fit.structure, best.fit.theta, precision=FINAL_PRECISION)
+    plain = polished(problem, best.fit)
     rows = jacobian(problem, plain)
     freedom = max(problem.counted - rows.shape[0], 1)
     unknown = plain.theta.size

@@ -11,6 +11,11 @@ __all__ = ["are_white", "autocovariance", "effective_share", "is_white"]
 
 _LAGS = 25
 
+_FEW_LAGS = 60
+"""Lags up to which sums of products are faster than a transform."""
+
+_BLOCK = 16_384
+
 
 def autocovariance(residual: Real, lags: int, spectra: Complex | None = None) -> Real:
     """Biased autocovariance at lags 0..lags, shape (..., lags + 1), the unit of residual squared.
@@ -35,9 +40,14 @@ def autocovariance(residual: Real, lags: int, spectra: Complex | None = None) ->
         for k in range(1, lags + 1):  # less what the end meets at the beginning
             r[..., k] -= np.vecdot(residual[..., :k], residual[..., n - k :])
         return np.asarray(r / n)
-    if lags <= 60 and n < 1_000_000:
-        full = [np.vecdot(residual[..., : n - k], residual[..., k:]) for k in range(lags + 1)]
-        return np.asarray(np.stack(full, axis=-1) / n)
+    if lags <= _FEW_LAGS:  # block by block, each near at hand for all lags
+        r = np.zeros((*residual.shape[:-1], lags + 1))
+        followed = np.concatenate([residual, np.zeros((*residual.shape[:-1], lags))], axis=-1)
+        for row in np.ndindex(residual.shape[:-1]):
+            for start in range(0, n, _BLOCK):
+                end = min(start + _BLOCK, n)
+                r[row] += np.correlate(followed[row][start : end + lags], followed[row][start:end])
+        return np.asarray(r / n)
     length = scipy.fft.next_fast_len(n + lags + 1, real=True)
     power = np.abs(scipy.fft.rfft(residual, length)) ** 2
     return np.asarray(scipy.fft.irfft(power, length)[..., : lags + 1] / n)
