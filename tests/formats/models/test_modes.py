@@ -3,6 +3,7 @@
 import csv
 import io
 import json
+import re
 import runpy
 
 import numpy as np
@@ -200,7 +201,7 @@ def test_every_mode_is_stated_with_an_error_that_holds(result, tmp_path):
     lowest = result["y", "u"].natural_frequency
     assert modes[0].natural_frequency == pytest.approx(lowest.value, rel=1e-9)
     hmpim.report(result, tmp_path / "six.html")
-    page = (tmp_path / "six.html").read_text(encoding="utf-8")
+    page = re.sub(r"</?span[^>]*>|<wbr>", "", (tmp_path / "six.html").read_text(encoding="utf-8"))
     stream = io.StringIO()
     print_result(result, Console(file=stream, width=120))
     rows = mode_rows(result["y", "u"])

@@ -21,8 +21,9 @@ _DAMPING = 1e-4
 _NUDGE = 1e-7
 """Change of a parameter that shows whether a bound is in its way."""
 
-_NEAR = 1e4
-"""Decrement, over what is negligible, up to which one step may be the last."""
+_NEAR = 400.0
+"""Decrement, over what is negligible, up to which one step may be the last: two standard deviations
+at the usual precision."""
 
 _STEEPEST = 1e6
 """The same, from which on no smaller step is tried."""

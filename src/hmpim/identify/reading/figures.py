@@ -283,9 +283,9 @@ class _Sensitivity:
             change, rate = self._at(value)
             told["bandwidth_3db"] = change.real / rate.real
         if peak is not None:
-            # At a maximum the frequency's own shift does not count; without a hump it is 0 dB.
-            change, _ = self._at(peak.frequency)
-            told["peak_gain_db"] = 20 / np.log(10) * change.real * (peak.frequency > 0)
+            told["peak_gain_db"] = np.zeros(delay.size)  # 0 dB, where there is no hump
+            if peak.frequency > 0.0:  # at a maximum the frequency's own shift does not count
+                told["peak_gain_db"] = 20 / np.log(10) * self._at(peak.frequency)[0].real
         return told
 
     def _late_at_dc(self) -> Real:
@@ -302,7 +302,7 @@ class _Sensitivity:
 
     def _at(self, frequency: float) -> tuple[Complex, complex]:
         """Derivatives with respect to the vector, shape (p,), and to the frequency in Hz."""
-        places = np.maximum(frequency, 1e-300) * np.array([1.0 - 1e-5, 1.0, 1.0 + 1e-5])
+        places = frequency * np.array([1.0 - 1e-5, 1.0, 1.0 + 1e-5])
         below, here, above = response(self._system, places)
         rate = (above - below) / ((places[2] - places[0]) * here)
         by_delay, by_above, by_below = log_slopes(self._system, places[1:2])
