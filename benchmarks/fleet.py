@@ -285,7 +285,7 @@ def run(path: Path, out: Path, *, keep: str, workers: int, one_ms: float) -> dic
 
 
 def table_of(rows: list[dict]) -> str:
-    """Medians over the turns, as a table of docs/performance.md."""
+    """Medians over the turns, as a table, for docs/batch.md."""
     head = ("records", "workers", "a second", "workers ÷ one `identify`", "whole, s",
             "as many plain loops", "processor a record, ms", "a worker's share of a core",
             "done together, %", "giving out, MB: quarters 1, 2, 4",
