@@ -107,8 +107,17 @@ def limited_command(u: Real, joint: JointFit) -> LimitedCommand | None:
     if known or not plain or u.size > _LONGEST or best.fit.structure.sampled:
         return None
     start = min(plain, key=lambda trial: trial.criterion)
-    tried = [_profiled(u, mode, problem, start.fit, best.fit) for mode in _SMOOTH]
-    found = min((one for one in tried if one), key=lambda one: one[1].cost, default=None)
+    smooth, joined = _SMOOTH
+    command = _Followed.of(u, smooth, problem, start.fit)
+    near = _nearest(command, best.fit)
+    if near is None:
+        return None
+    found = _profiled(u, command, *near)
+    speed, least = near if found is None else (found[0].speed / _FINE, found[1])
+    other = _Followed.of(u, joined, problem, start.fit)
+    if other.fit(speed, least).cost < TWICE * least.cost:
+        tried = (found, _profiled(u, other, speed, least))
+        found = min((one for one in tried if one), key=lambda one: one[1].cost, default=None)
     if found is None or not explains_more(problem, found[1], problem, best.fit):
         return None
     limited, fit = found
@@ -132,15 +141,20 @@ def explains_more(limited: Problem, fit: Fit, linear: Problem, best: Fit) -> boo
     linear, best
         Data with the command, and the best linear fit.
     """
+    return _likelier(limited, fit, linear, best) > CLEARLY
+
+
+def _likelier(limited: Problem, fit: Fit, linear: Problem, best: Fit) -> float:
+    """Logarithm of those odds."""
     count = limited.counted
     one, other = (
         yule_walker(p.masked(f.residual), LONGEST_AUTOREGRESSION)[1]
         for p, f in ((limited, fit), (linear, best))
     )
     if one <= 0.0 or other <= 0.0:
-        return False
+        return -np.inf
     extra = fit.structure.parameters + 1 - best.structure.parameters
-    return bool(count * np.log(other / one) - extra * np.log(count) > 2.0 * CLEARLY)
+    return 0.5 * float(count * np.log(other / one) - extra * np.log(count))
 
 
 def speed_finding(limited: LimitedCommand, fs: float, unit: str) -> Finding:
@@ -157,51 +171,105 @@ def speed_finding(limited: LimitedCommand, fs: float, unit: str) -> Finding:
     )
 
 
-def _profiled(
-    u: Real, mode: Intersample, problem: Problem, start: Fit, best: Fit
-) -> tuple[LimitedCommand, Fit] | None:
-    """The speed at which the sum of squares is least, and the fit; None where none is near."""
-    fine = _finely(u, mode)
-    fastest = float(np.max(np.abs(np.diff(fine))))
-    rest = problem.begins is None
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Followed:
+    """A command on the finer clock, and the plain fit to it.
 
-    def fit_at(share: float, *starts: Fit) -> Fit:
-        followed = _followed(fine, share * fastest)
-        source = prepare_input(followed, "bandlimited", rest=rest)
-        data = replace(problem, source=source, told=None)
-        fits = (fit_structure(data, start.structure, one.theta) for one in starts)
+    Parameters
+    ----------
+    fine : ndarray
+        The command.
+    fastest : float
+        Its greatest speed, input's unit per fine step.
+    problem, start
+        The data, and the fit.
+    """
+
+    fine: Real
+    fastest: float
+    problem: Problem
+    start: Fit
+
+    @classmethod
+    def of(cls, u: Real, mode: Intersample, problem: Problem, start: Fit) -> "_Followed":
+        """From its samples."""
+        fine = _finely(u, mode)
+        fastest = float(np.max(np.abs(np.diff(fine))))
+        return cls(fine=fine, fastest=fastest, problem=problem, start=start)
+
+    def at(self, speed: float) -> Problem:
+        """The data with what is followed at this speed in the command's place."""
+        rest = self.problem.begins is None
+        source = prepare_input(_followed(self.fine, speed), "bandlimited", rest=rest)
+        return replace(self.problem, source=source, told=None)
+
+    def fit(self, speed: float, *starts: Fit, hopeless: float = np.inf) -> Fit:
+        """The best fit to it from any of the starts."""
+        data, structure = self.at(speed), self.start.structure
+        fits = (fit_structure(data, structure, one.theta, hopeless=hopeless) for one in starts)
         return min(fits, key=lambda fit: fit.cost)
 
-    at, least = 1.0, start
+    def slope(self, speed: float, fit: Fit) -> Real:
+        """Derivative of the output with the speed, to a factor."""
+        step = _STEP * self.fastest
+        change = _followed(self.fine, speed + step) - _followed(self.fine, speed - step)
+        moved = replace(self.problem, source=prepare_input(change, "bandlimited"), begins=None)
+        return np.asarray(fit.linear[:-1] @ part_of(moved, fit.structure, fit.theta).rows)
+
+
+def _nearest(command: _Followed, best: Fit) -> tuple[float, Fit] | None:
+    """Of the speeds tried the one that leaves least; None where no limit is near it.
+
+    A fit that is to leave more than another kind of model is not followed to its end. Beside the
+    derivative with the speed, as in C. R. Rao's score test (Proc. Cambridge Phil. Soc. 44, 1948),
+    what is left shows what the speeds between those tried can explain.
+    """
+    start, hopeless = command.start, TWICE**2 * best.cost
+    speed, least = command.fastest, start
     for share in reversed(RATES):
-        fit = fit_at(share, start) if least is start else fit_at(share, start, least)
+        tried = share * command.fastest
+        starts = (start,) if least is start else (start, least)
+        fit = command.fit(tried, *starts, hopeless=hopeless)
         if fit.cost < least.cost or least is start:
-            at, least = share, fit
+            speed, least = tried, fit
         elif fit.cost > TWICE**2 * least.cost:
             break  # slower ones leave still more
     if least.cost > min(TWICE * best.cost, start.cost):
         return None
+    problem, slope = command.at(speed), command.slope(speed, least)[None]
+    known = problem.nuisance
+    rows = slope if known is None else np.vstack([known, slope])
+    beside = fit_structure(replace(problem, nuisance=rows), least.structure, least.theta)
+    if max(_likelier(problem, one, command.problem, best) for one in (least, beside)) <= 0.0:
+        return None
+    return speed, least
+
+
+def _profiled(
+    u: Real, command: _Followed, near: float, least: Fit
+) -> tuple[LimitedCommand, Fit] | None:
+    """The speed at which the sum of squares is least, and the fit; None where none is near."""
+    fastest = command.fastest
+    at = near / fastest
     found = scipy.optimize.minimize_scalar(
-        lambda share: fit_at(share, least).cost,
-        bounds=(at - 10 * _STEP, min(at + 10 * _STEP, 1.0)),
+        lambda share: command.fit(share * fastest, least).cost,
+        bounds=(at - 10 * _STEP, max(min(at + 10 * _STEP, 1.0), at)),
         method="bounded",
         options={"xatol": _STEP**2},
     )
     share = float(found.x)
-    fit = fit_at(share, least)
-    slower, faster = (fit_at(share + step, fit) for step in (-_STEP, _STEP))
+    fit = command.fit(share * fastest, least)
+    slower, faster = (command.fit((share + step) * fastest, fit) for step in (-_STEP, _STEP))
     curvature = (slower.cost + faster.cost - 2.0 * fit.cost) / _STEP**2
     if curvature <= 0.0:
         return None
-    ahead, behind = (_followed(fine, (share + step) * fastest) for step in (_STEP, -_STEP))
-    moved = replace(problem, source=prepare_input(ahead - behind, "bandlimited"), begins=None)
     limited = LimitedCommand(
         speed=_FINE * share * fastest,
-        std=_FINE * fastest * float(np.sqrt(2.0 * fit.cost / problem.counted / curvature)),
+        std=_FINE * fastest * float(np.sqrt(2.0 * fit.cost / command.problem.counted / curvature)),
         fastest=_FINE * fastest,
-        values=_followed(fine, share * fastest),
+        values=_followed(command.fine, share * fastest),
         recorded=u,
-        slope=np.asarray(fit.linear[:-1] @ part_of(moved, fit.structure, fit.theta).rows),
+        slope=command.slope(share * fastest, fit),
     )
     return limited, fit
 
