@@ -80,3 +80,16 @@ def test_what_is_smaller_than_rounding_is_not_asked():
     y = BENT["dead_zone"](SWEEP) + 0.002 * np.random.default_rng(0).standard_normal(SWEEP.size)
     assert found(SWEEP, y)[1]
     assert found(SWEEP, y, floor=0.1)[1] == ()
+
+
+@pytest.mark.parametrize("last", [884, 1000])
+@pytest.mark.parametrize("off", [-0.02, 0.02])
+def test_a_kind_that_shows_only_where_no_sample_counts_is_not_accused(last, off):
+    y = through(SWEEP) + 0.002 * np.random.default_rng(0).standard_normal(SWEEP.size)
+    y[last] += off  # what follows does not count; the sweep is fast there
+    counts = np.arange(y.size) <= last
+    source = prepare_input(SWEEP, "bandlimited")
+    data = Problem(source=source, y=y, valid=counts, longest_delay=90.0)
+    fit = fit_structure(data, STRUCTURES["second_order"], TRUTH[:3])
+    kinds = bends(SWEEP, data, fit, intersample="bandlimited", fs=FS)
+    assert all(one.effect < 0.1 for one in kinds)

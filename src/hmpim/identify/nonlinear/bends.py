@@ -146,6 +146,10 @@ def bends(
         return ()
     tried = _tried(u, problem, fit, intersample, fs)
     traces = np.stack([one.trace for one in tried])
+    if problem.valid is not None:  # a trace that lies elsewhere is but rounding where they count
+        there = traces[:, problem.valid]
+        shown = np.vecdot(there, there) > _ALIKE * np.vecdot(traces, traces)
+        traces = np.where(shown[:, None], traces, 0.0)
     rows = jacobian(problem, fit, *traces)
     residual = problem.innovations(fit.prediction, fit.residual)
     if problem.counts is not None:
