@@ -65,6 +65,10 @@ def test_coloured_noise_is_said_and_doubted_only_where_it_is_most_of_the_output(
     assert coloured_noise(follows)[0].severity == "doubt"
 
 
+def test_a_residual_that_is_not_white_is_never_said_to_be_white(clean):
+    assert noise_colour_of(replace(clean, readings=replace(clean.readings, white=False))) == ()
+
+
 def test_halves_of_another_delay_cast_doubt(field_record, evidence_of):
     """Two samples later from the middle on."""
     _, u, y = field_record

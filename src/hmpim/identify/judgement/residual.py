@@ -179,6 +179,8 @@ def noise_colour_of(evidence: Evidence) -> tuple[Finding, ...]:
     if evidence.readings.white:
         return ()
     colour = noise_colour(_counted(evidence), evidence.fs)
+    if colour.description == "white":  # none of the colours known
+        return ()
     return (
         Finding(
             code="noise_colour",
