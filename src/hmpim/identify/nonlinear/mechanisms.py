@@ -158,9 +158,12 @@ def rate_limited(x: Real, step: float) -> Real:
         now = target[lost]
         for reached in range(lost + 1, len(target)):  # until it has caught up
             ahead = target[reached] - now
-            if -step <= ahead <= step:
+            if ahead > step:
+                now += step
+            elif ahead < -step:
+                now -= step
+            else:
                 break
-            now += step if ahead > 0.0 else -step
             out[reached] = now
         else:
             break
