@@ -31,3 +31,8 @@ def test_the_chance_is_that_of_a_regression(share):
     wanted = [by_regression(u, one, counts) for one in left]
     assert found == pytest.approx(wanted, rel=1e-6)
     assert found[0] > 1e-3 > 1e-6 > found[1]
+
+
+def test_of_no_records_there_are_no_chances():
+    u = np.random.default_rng(4).standard_normal(800)
+    assert chances_of_an_answer(u, np.empty((0, u.size))).shape == (0,)

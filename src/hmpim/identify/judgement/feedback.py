@@ -84,7 +84,7 @@ def chances_of_an_answer(u: Real, left: Real, counts: Mask | None = None) -> Rea
     """
     lost = None if counts is None else np.flatnonzero(~counts[_AHEAD:-_AHEAD])
     own = _future_of(u, lost)
-    if not own.size.size:
+    if not own.size.size or not left.shape[0]:
         return np.ones(left.shape[0])
     inner = left[:, _AHEAD:-_AHEAD]
     if lost is not None and lost.size:
