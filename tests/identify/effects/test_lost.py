@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import hmpim
-from hmpim.identify.effects.lost import find_frozen, find_spikes
+from hmpim.identify.effects.lost import find_frozen, find_spikes, find_stuck
 
 FS = 200.0
 T = np.arange(2000) / FS
@@ -74,6 +74,34 @@ def test_an_output_whose_input_rests_does_not_stand_still():
 def test_a_rounded_output_does_not_stand_still(step):
     y = step * np.rint(noisy() / step)
     assert find_frozen(y, CHIRP, step=step) is None
+
+
+def test_an_output_that_is_stuck_to_its_end_is_found_without_a_model():
+    y = noisy()
+    assert find_stuck(y, [CHIRP]) is None
+    y[600:] = y[600]
+    assert np.flatnonzero(find_stuck(y, [CHIRP])).tolist() == list(range(601, T.size))
+    resting = np.where(np.arange(T.size) < 600, CHIRP, 0.0)
+    assert find_stuck(y, [resting]) is None
+    assert find_stuck(np.minimum(y, y[600]), [CHIRP]) is None  # clipped
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.1])
+@pytest.mark.parametrize("stuck", [slice(600, None), slice(500, 1500)])
+def test_a_stuck_sensor_is_identified_from_what_it_said_before_and_after(noise, stuck):
+    sensor = hmpim.Sensor(
+        delay=0.15, natural_frequency=10.0, damping_ratio=0.4, bias=0.6, noise_std=noise
+    )
+    record = hmpim.run(sensor, STIMULUS, rng=0)
+    u, y = record.inputs[0].values, record.outputs[0].values.copy()
+    y[stuck] = y[stuck.start]
+    pair = hmpim.identify(hmpim.Record.from_arrays({"u": u}, {"y": y}, fs=FS))["y", "u"]
+    assert "frozen" in {finding.code for finding in pair.warnings}
+    assert pair.delay.verdict == "doubtful"
+    low, high = pair.delay.ci95
+    slack = 0.5 * (high - low)
+    assert low - slack < 0.15 < high + slack
+    assert pair.natural_frequency.value == pytest.approx(10.0, rel=0.2)
 
 
 def test_spikes_cost_next_to_nothing():

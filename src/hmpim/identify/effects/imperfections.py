@@ -15,7 +15,13 @@ from hmpim.identify.arrays import Mask, Real
 from hmpim.identify.chance import BULK, DEVIATIONS
 from hmpim.identify.effects.censored import CensoredFit, fit_censored
 from hmpim.identify.effects.hold import Hold, Updates, detect_hold, updates
-from hmpim.identify.effects.lost import find_frozen, find_repeated, find_spikes, stands_out
+from hmpim.identify.effects.lost import (
+    find_frozen,
+    find_repeated,
+    find_spikes,
+    find_stuck,
+    stands_out,
+)
 from hmpim.identify.effects.quantization import Quantization, detect_quantization
 from hmpim.identify.effects.saturation import Saturation, detect_saturation
 from hmpim.identify.fitting.enrich import PLAIN
@@ -112,7 +118,8 @@ def find_imperfections(
         What a first model says; with it a plateau is told from a crest, and spikes and
         standstill are looked for.
     inputs : sequence of ndarray, shape (n,)
-        Beside which an output may take few values; none where that is not asked for.
+        Beside which an output may take few values, or stand still to its end; none where that is
+        not asked for.
     """
     rounding = detect_quantization(y if valid is None or valid.all() else y[valid])
     step = 0.0 if rounding is None else rounding.step
@@ -123,7 +130,9 @@ def find_imperfections(
         clipping = None
     hold = detect_hold(y, fs, prediction)
     spikes = frozen = None
-    if prediction is not None and hold is None:
+    if prediction is None and hold is None:
+        frozen = find_stuck(y, inputs)
+    elif prediction is not None and hold is None:
         frozen = find_frozen(y, prediction, step=step)
         beyond = None if clipping is None else clipping.clipped
         spikes = find_spikes(y, prediction, clipped=beyond)

@@ -5,15 +5,24 @@ than the model's own motion there could bring. An output that repeats one value 
 the model moves on, was not updated, was cut off, or read a fixed word in its place.
 """
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
 from hmpim.identify.arrays import Mask, Real, every_of
 from hmpim.identify.chance import BULK, DEVIATIONS
-from hmpim.identify.worth import FEW, MUCH, PART, TWICE, WORTH
+from hmpim.identify.worth import FEW, MOST, MUCH, PART, TWICE, WORTH
 from hmpim.record.runs import runs_of
 
-__all__ = ["find_frozen", "find_repeated", "find_spikes", "stand_out", "stands_out"]
+__all__ = [
+    "find_frozen",
+    "find_repeated",
+    "find_spikes",
+    "find_stuck",
+    "stand_out",
+    "stands_out",
+]
 
 _LONGEST_SPIKE = 3
 _WINDOW = 51
@@ -134,6 +143,40 @@ def find_frozen(y: Real, prediction: Real, *, step: float = 0.0) -> Mask | None:
     if not frozen.any() or others.size == 0 or np.mean(others) > MUCH:
         return None
     return frozen
+
+
+def find_stuck(y: Real, inputs: Sequence[Real]) -> Mask | None:
+    """Return the samples at which the output stands still to its end while an input moves, or None.
+
+    Without a model, and so before there is one: a sensor that is stuck for a good part of its
+    record spoils the first fit. What stands at its lowest or highest value is clipped.
+
+    Parameters
+    ----------
+    y : ndarray, shape (n,)
+        Output.
+    inputs : sequence of ndarray, shape (n,)
+        What it should follow.
+
+    Examples
+    --------
+    >>> u = np.sin(np.arange(1000) / 20)
+    >>> y = u + 0.01 * np.random.default_rng(0).normal(size=1000)
+    >>> find_stuck(y, [u]) is None
+    True
+    >>> y[700:] = y[700]
+    >>> np.flatnonzero(find_stuck(y, [u]))[[0, -1]].tolist()
+    [701, 999]
+    """
+    if y.size < _FEWEST_EQUAL or y[-1] != y[-2] or y[-1] in (y.min(), y.max()):
+        return None
+    first = int(np.flatnonzero(y != y[-1])[-1]) + 2
+    others = np.diff(y[:first]) == 0.0
+    if y.size - first < PART * y.size or np.mean(others) > MUCH:
+        return None
+    if not any(np.ptp(u[first:]) > MOST * np.ptp(u) for u in inputs):
+        return None
+    return np.arange(y.size) >= first
 
 
 def find_repeated(y: Real) -> Mask | None:

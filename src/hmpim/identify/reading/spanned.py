@@ -90,7 +90,9 @@ def asked_rivals(joint: JointFit) -> tuple[Trial, ...]:
         extra = trial.fit.structure.parameters - best.fit.structure.parameters
         if trial.intersample != best.intersample or trial.fit.structure.name not in PLAIN:
             continue
-        gain = count * float(np.log(best.fit.objective / max(trial.fit.objective, _TINY)))
+        gain = count * float(
+            np.log(max(best.fit.objective, _TINY) / max(trial.fit.objective, _TINY))
+        )
         if extra > 0 and gain > scipy.special.chdtri(extra, 1.0 - COVERAGE):
             found.append(trial)
     return tuple(found)
