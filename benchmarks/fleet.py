@@ -2,7 +2,7 @@
 
 One Parquet file of records of 10 s at 200 Hz, second order, every unit its own parameters; those
 of `shared` have one stimulus (5 000 units, measured again with new noise), those of `unrelated` a
-chirp each. In each turn one `identify`
+chirp each, and those of `unrelated-csv` a file each. In each turn one `identify`
 after the other is timed in this process, so that a rate stands beside workers ÷ that time; times of
 one are processor times, rates are by the clock. Beside unrelated records stands what as many plain
 processes do in the same turn, each of which only calls `identify` in a loop: what two of them do
@@ -18,7 +18,8 @@ goes to the terminal. On an idle machine of two cores, with the time that each t
     python benchmarks/fleet.py --records 20000 --only shared-results --workers 2           # 2 min
     python benchmarks/fleet.py --records 5000 --only shared-results --odd 0.05 --workers 2 # 1 min
     python benchmarks/fleet.py --records 2000 --only shared-results --odd 0.5 --workers 2  # 1 min
-    python benchmarks/fleet.py --records 100000 --only unrelated --workers 2 --folder DIR  # 75 min
+    python benchmarks/fleet.py --records 100000 --only unrelated --workers 2 --folder DIR  # 45 min
+    python benchmarks/fleet.py --records 1000 --only unrelated,unrelated-csv --workers 2   # 2 min
     python benchmarks/fleet.py --growth 1,10,100,1000,10000 --only shared-parameters \\
         --plot docs/images/fleet.svg --table FILE                                          # 2 min
 """
@@ -96,6 +97,27 @@ def write_fleet(path: Path, count: int, *, shared: bool, odd: float = 0.0) -> No
             ]
             writer.write_table(pa.table([*columns, [FS] * len(some)], schema=schema))
     half.rename(path)
+
+
+def as_csv(path: Path) -> Path:
+    """The same records as CSV, one a file, in a folder beside it."""
+    from pyarrow import parquet
+
+    folder = path.with_suffix("")
+    folder.mkdir(exist_ok=True)
+    at = np.arange(SAMPLES) / FS
+    table = parquet.read_table(path)
+    for k in range(table.num_rows):
+        columns = (at, *(table.column(name)[k].values.to_numpy() for name in ("u", "y")))
+        np.savetxt(
+            folder / f"{k:06d}.csv",
+            np.column_stack(columns),
+            fmt="%.9g",
+            delimiter=",",
+            header="time,u,y",
+            comments="",
+        )
+    return folder
 
 
 def one_identify(path: Path, count: int = 100) -> float:
@@ -372,7 +394,9 @@ def main() -> None:
     parser.add_argument("--records", type=int, default=5000)
     parser.add_argument("--growth", default="", help="so many records each, instead of --records")
     parser.add_argument("--turns", type=int, default=1)
-    parser.add_argument("--only", default="", help="shared-parameters, shared-results, unrelated")
+    parser.add_argument(
+        "--only", default="", help="shared-parameters, shared-results, unrelated, unrelated-csv"
+    )
     parser.add_argument("--workers", default="1,2")
     parser.add_argument(
         "--odd", type=float, default=0.0, help="share of shared records that are clipped, 0 to 1"
@@ -386,6 +410,7 @@ def main() -> None:
         "shared-parameters": (True, "parameters"),
         "shared-results": (True, "results"),
         "unrelated": (False, "results"),
+        "unrelated-csv": (False, "results"),
     }
     chosen = [k for k in kinds if not options.only or k in options.only.split(",")]
     rows = []
@@ -414,14 +439,15 @@ def turns_of(
     if not path.exists():
         print(f"{path.stem}: making the records", file=sys.stderr, flush=True)
         write_fleet(path, count, shared=shared, odd=options.odd if shared else 0.0)
+    source = as_csv(path) if kind == "unrelated-csv" else path
     for turn in range(options.turns):
         for workers in map(int, options.workers.split(",")):
             out = folder / f"{name}-{turn}-{workers}"
             kept = folder / f"{out.name}.json"
             if not kept.exists():
                 one_ms = one_identify(path)  # in each turn: the computer's speed changes
-                plain = plain_rate(path, workers) if kind == "unrelated" else float("nan")
-                found = run(path, out, keep=keep, workers=workers, one_ms=one_ms)
+                plain = plain_rate(path, workers) if not shared else float("nan")
+                found = run(source, out, keep=keep, workers=workers, one_ms=one_ms)
                 told = {"kind": kind, "turn": turn, "plain": plain, **found}
                 kept.write_text(json.dumps(told) + "\n")
                 shutil.rmtree(out)
