@@ -186,3 +186,15 @@ def test_noise_that_is_slow_does_not_hide_a_fast_pole(u):
     gain = seen * np.log(begun.objective / grown.fit.objective)
     assert gain == pytest.approx((hidden.squared / hidden.std) ** 2, rel=0.3)
     assert few * np.log(begun.objective / grown.fit.objective) < np.log(few)
+
+
+def test_a_fit_with_zeros_is_also_reached_from_the_one_with_a_pole_less(u):
+    """From its own start a fit with zeros may end elsewhere: held records of five axes did."""
+    clean = answer(u, RESONANT, (9.0,))
+    slopes = np.gradient(clean), np.gradient(np.gradient(clean))
+    y = noisy(clean + 6.0 * slopes[0] + 20.0 * slopes[1], 0.02, seed=1)
+    names = ("second_order", "second_order_zeros", "third_order", "third_order_zeros")
+    found = fitted(u, y, *names)
+    assert found.best.fit.structure.name == "third_order_zeros"
+    others = joint._others_to_grow(found, "bandlimited")
+    assert "second_order_zeros" in {trial.fit.structure.name for trial in others}
