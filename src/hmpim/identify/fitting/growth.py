@@ -247,7 +247,8 @@ def seen_by_pole(problem: Problem, hidden: HiddenPole, richer: Fit) -> float | N
     freedom = max(problem.counted - hidden.rows.shape[0] - 1, 1)
     variance = float(covariance(hidden.own[None], left, freedom=freedom, white=False)[0, 0])
     power = max(float(hidden.own @ hidden.own), _TINY)
-    return problem.counted * float(left @ left) / freedom / power / max(variance, _TINY)
+    if_white = float(left @ left) / freedom / power
+    return float(problem.counted * if_white / max(variance, _TINY))
 
 
 def response_to_square(problem: Problem, fit: Fit) -> Real:
