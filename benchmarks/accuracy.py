@@ -423,7 +423,7 @@ def several_inputs() -> list[str]:
     for j in range(3):
         cells = [result[f"y{i}", f"u{j}"].scale_factor for i in range(3)]
         lines.append(
-            f"| u{j} | " + " | ".join(f"{c.value:.4f} ± {c.std:.4f}" for c in cells) + " |"
+            f"| u{j} | " + " | ".join(f"{c.value:.4f} ± {c.spread:.4f}" for c in cells) + " |"
         )
     return [
         *lines,
