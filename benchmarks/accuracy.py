@@ -219,7 +219,7 @@ def one_effect(kind: str, seed: int) -> Outcome:
     for name, value in (TRUTH | {"bias": bias}).items():
         estimate = getattr(pair, name)
         if estimate is not None:
-            errors[name] = (estimate.value - value) / estimate.std
+            errors[name] = (estimate.value - value) / estimate.spread
             inside[name] = estimate.ci95[0] <= value <= estimate.ci95[1]
     noise_std = np.nan if pair.noise_std is None else pair.noise_std.value
     return Outcome(errors, inside, noise_std, pair.verdict)
@@ -306,7 +306,7 @@ def one_random(seed: int) -> Draw:
     worst = 0.0
     for name in names:
         estimate = getattr(pair, name)
-        off = np.inf if estimate is None else abs(estimate.value - truth[name]) / estimate.std
+        off = np.inf if estimate is None else abs(estimate.value - truth[name]) / estimate.spread
         worst = max(worst, float(off))
     return Draw(worst, pair.verdict, right)
 
@@ -459,9 +459,9 @@ def field_row(seed: int = 0) -> list[str]:
     return [
         "| tool | the user must supply | delay ms | fn Hz | ζ | time |",
         "| --- | --- | --- | --- | --- | --- |",
-        f"| **hmpim** | **nothing** | {1e3 * pair.delay.value:.2f} ± {1e3 * pair.delay.std:.2f} | "
-        f"{pair.natural_frequency.value:.2f} ± {pair.natural_frequency.std:.2f} | "
-        f"{pair.damping_ratio.value:.3f} ± {pair.damping_ratio.std:.3f} | {spent:.0f} ms |",
+        f"| **hmpim** | **nothing** | {1e3 * pair.delay.value:.2f} ± {1e3 * pair.delay.spread:.2f} | "
+        f"{pair.natural_frequency.value:.2f} ± {pair.natural_frequency.spread:.2f} | "
+        f"{pair.damping_ratio.value:.3f} ± {pair.damping_ratio.spread:.3f} | {spent:.0f} ms |",
         "| scipy, written for this record | the model, a good start | 149.90 ± 0.11 | "
         "9.97 ± 0.03 | 0.400 ± 0.003 | 18 ms |",
         "| scipy the usual way | – | **175** | 0.8 ± 8.7 | 0.48 ± 0.86 | 2 ms |",
