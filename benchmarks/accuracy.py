@@ -113,8 +113,13 @@ def one_field(kind: str, seed: int) -> Outcome:
         estimate = getattr(pair, name)
         if estimate is not None:
             errors[name] = estimate.value - truth
-            inside[name] = estimate.ci95[0] <= truth <= estimate.ci95[1]
+            inside[name] = _holds(estimate, truth)
     return Outcome(errors, inside, pair.noise_std.value, pair.verdict)
+
+
+def _holds(estimate: hmpim.Estimate, truth: float) -> bool:
+    """Whether the interval holds the truth; one that is withheld does not."""
+    return estimate.ci95 is not None and estimate.ci95[0] <= truth <= estimate.ci95[1]
 
 
 UNITS = {"delay": ("ms", 1e3), "natural_frequency": ("Hz", 1), "bandwidth_phase90": ("Hz", 1)}
@@ -220,7 +225,7 @@ def one_effect(kind: str, seed: int) -> Outcome:
         estimate = getattr(pair, name)
         if estimate is not None:
             errors[name] = (estimate.value - value) / estimate.spread
-            inside[name] = estimate.ci95[0] <= value <= estimate.ci95[1]
+            inside[name] = _holds(estimate, value)
     noise_std = np.nan if pair.noise_std is None else pair.noise_std.value
     return Outcome(errors, inside, noise_std, pair.verdict)
 
