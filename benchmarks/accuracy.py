@@ -464,7 +464,8 @@ def field_row(seed: int = 0) -> list[str]:
     return [
         "| tool | the user must supply | delay ms | fn Hz | ζ | time |",
         "| --- | --- | --- | --- | --- | --- |",
-        f"| **hmpim** | **nothing** | {1e3 * pair.delay.value:.2f} ± {1e3 * pair.delay.spread:.2f} | "
+        f"| **hmpim** | **nothing** | {1e3 * pair.delay.value:.2f} ± "
+        f"{1e3 * pair.delay.spread:.2f} | "
         f"{pair.natural_frequency.value:.2f} ± {pair.natural_frequency.spread:.2f} | "
         f"{pair.damping_ratio.value:.3f} ± {pair.damping_ratio.spread:.3f} | {spent:.0f} ms |",
         "| scipy, written for this record | the model, a good start | 149.90 ± 0.11 | "
