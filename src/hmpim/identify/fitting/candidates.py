@@ -136,8 +136,9 @@ def fit_rich(
     found = _climbed(data, problem, fits, structures, all_of_them=all_of_them)
     found += _pruned(problem, [*fits, *found], members(structures, (*RICH, *INTEGRATING)))
     if found and not is_white(min(found, key=lambda fit: fit.objective).residual):
-        # Poles without end follow what no linear model describes: friction, rounding.
-        found = [fit for fit in found if fit.structure.order <= _SURE]
+        # Poles without end, or slower than the record, follow what no linear model describes:
+        # friction, rounding.
+        found = [fit for fit in found if fit.structure.order <= _SURE and not _outlasts(fit)]
     return found
 
 
@@ -312,6 +313,11 @@ def _spread(problem: Problem) -> float:
 def _is_poor(fit: Fit, spread: float) -> bool:
     """Whether much of the output is left over, and it is no white noise."""
     return fit.cost > PART * spread and not is_white(fit.residual)
+
+
+def _outlasts(fit: Fit) -> bool:
+    """Whether a pole that is no integrator outlasts the record."""
+    return not fit.structure.integrators and almost_integrates(fit)
 
 
 def almost_integrates(fit: Fit) -> bool:
