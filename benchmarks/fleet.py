@@ -20,8 +20,8 @@ goes to the terminal. On an idle machine of two cores, with the time that each t
     python benchmarks/fleet.py --records 2000 --only shared-results --odd 0.5 --workers 2  # 1 min
     python benchmarks/fleet.py --records 100000 --only unrelated --workers 2 --folder DIR  # 45 min
     python benchmarks/fleet.py --records 1000 --only unrelated,unrelated-csv --workers 2   # 2 min
-    python benchmarks/fleet.py --growth 1,10,100,1000,10000 --only shared-parameters \\
-        --plot docs/images/fleet.svg --table FILE                                          # 2 min
+    python benchmarks/fleet.py --growth 1,10,100,1000,10000,100000 --only shared-parameters \\
+        --plot docs/images/fleet.svg --table FILE                                          # 7 min
 """
 
 from __future__ import annotations
