@@ -17,7 +17,7 @@ from numpy.polynomial.legendre import legvander
 from hmpim.identify.arrays import Real
 from hmpim.identify.chance import FALSE_ALARM
 from hmpim.identify.effects.disturbance import gain_by_rows, without_rows
-from hmpim.identify.fitting.candidates import almost_integrates
+from hmpim.identify.fitting.candidates import spans_record
 from hmpim.identify.fitting.enrich import PLAIN
 from hmpim.identify.fitting.fit import jacobian
 from hmpim.identify.fitting.least_squares import solved, without
@@ -102,8 +102,7 @@ def _passes_for_drift(first: JointFit, drifting: JointFit) -> bool:
     Of the two the drift leaves gain and bandwidths what they are.
     """
     fit, plain = first.best.fit, drifting.best.fit
-    slow = almost_integrates(fit) and not fit.structure.integrators
-    slow = slow and drifting.problem.counted >= _FEWEST  # fewer have no shape of their own
+    slow = spans_record(fit) and drifting.problem.counted >= _FEWEST  # fewer have no shape
     rich = fit.structure.parameters > plain.structure.parameters
     return slow and rich and plain.structure.name in PLAIN and is_white(plain.residual)
 
@@ -127,8 +126,7 @@ def drift_finding(drifting: Drifting, fs: float, unit: str) -> Finding:
 def _asked_for(joint: JointFit) -> bool:
     """Whether what a fit leaves over is slow, or its model is as slow as a drift."""
     fit, problem = joint.best.fit, joint.problem
-    slow = almost_integrates(fit) and not fit.structure.integrators
-    if slow or joint.lingers:
+    if spans_record(fit) or joint.lingers:
         return True  # the model may have taken the drift for its own
     if is_white(fit.residual):
         return False

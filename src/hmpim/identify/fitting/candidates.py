@@ -41,6 +41,7 @@ __all__ = [
     "owed_to_input",
     "reduced",
     "refit_between",
+    "spans_record",
 ]
 
 _LONG_TASTE = 12
@@ -136,9 +137,9 @@ def fit_rich(
     found = _climbed(data, problem, fits, structures, all_of_them=all_of_them)
     found += _pruned(problem, [*fits, *found], members(structures, (*RICH, *INTEGRATING)))
     if found and not is_white(min(found, key=lambda fit: fit.objective).residual):
-        # Poles without end, or slower than the record, follow what no linear model describes:
+        # Poles without end, or as slow as the record, follow what no linear model describes:
         # friction, rounding.
-        found = [fit for fit in found if fit.structure.order <= _SURE and not _outlasts(fit)]
+        found = [f for f in found if f.structure.order <= _SURE and not spans_record(f)]
     return found
 
 
@@ -315,9 +316,9 @@ def _is_poor(fit: Fit, spread: float) -> bool:
     return fit.cost > PART * spread and not is_white(fit.residual)
 
 
-def _outlasts(fit: Fit) -> bool:
-    """Whether a pole that is no integrator outlasts the record."""
-    return not fit.structure.integrators and almost_integrates(fit)
+def spans_record(fit: Fit) -> bool:
+    """Whether a pole that is no integrator is about as slow as the record is long."""
+    return almost_integrates(fit) and not fit.structure.integrators
 
 
 def almost_integrates(fit: Fit) -> bool:
