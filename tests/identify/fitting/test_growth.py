@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 import scipy
 
+import hmpim
 from hmpim.identify.fitting import joint
 from hmpim.identify.fitting.fit import Problem, fit_structure
 from hmpim.identify.fitting.growth import (
@@ -198,3 +199,17 @@ def test_a_fit_with_zeros_is_also_reached_from_the_one_with_a_pole_less(u):
     assert found.best.fit.structure.name == "third_order_zeros"
     others = joint._others_to_grow(found, "bandlimited")
     assert "second_order_zeros" in {trial.fit.structure.name for trial in others}
+
+
+@pytest.mark.parametrize("seed", [727, 1481])
+def test_a_pole_does_not_pay_for_what_half_a_sample_explains_as_well(seed):
+    """Of 2000 noises on this record three asked for a pole that no unit has."""
+    stimulus = hmpim.Stimulus(waveform=hmpim.Chirp(band=(0.1, 20.0), duration=10.0), fs=200.0)
+    sensor = hmpim.Sensor(delay=0.15, natural_frequency=10.0, damping_ratio=0.4, bias=0.6)
+    record = hmpim.run(sensor, stimulus, rng=0)
+    u, y = record.inputs[0].values, record.outputs[0].values
+    y = y + 0.1 * np.random.default_rng(seed).standard_normal(y.size + 2000)[: y.size]
+    pair = hmpim.identify(hmpim.Record.from_arrays({"u": u}, {"y": y}, fs=200.0))["y", "u"]
+    assert pair.structure == "second_order"
+    assert abs(pair.delay.value - 0.15) < 3e-4
+    assert pair.delay.ci95[0] < 0.1468  # the delay that the pole would leave

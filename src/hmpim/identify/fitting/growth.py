@@ -344,6 +344,7 @@ def grow(
     count: Callable[[HiddenPole, F], float],
     names: tuple[StructureName, ...],
     white: Callable[[F], bool],
+    otherwise: Callable[[F], float] = lambda _: np.inf,
 ) -> Growth[F]:
     """Add poles to a fit as long as the likelihood pays for them.
 
@@ -361,6 +362,9 @@ def grow(
         Structures that may be chosen; of others a fit is a rival at most.
     white : callable
         Whether a fit leaves white noise, as one of many poles must.
+    otherwise : callable
+        Least that is left by fits no richer than one, under other assumptions between the samples:
+        a pole must pay beside them too.
     """
     grown: list[F] = []
     while True:
@@ -380,6 +384,7 @@ def grow(
             return Growth(grown=tuple(grown), rivals=(), hidden=test)
         may_be_chosen = richer.name != structure.name and richer.name in names
         sure = richer.order <= _SURE or white(found)
+        gain = min(gain, seen * float(np.log(otherwise(best) / found.fit.objective)))
         if gain < np.log(seen) or not may_be_chosen or not sure:
             return Growth(grown=tuple(grown), rivals=(found,), hidden=test)
         grown.append(found)

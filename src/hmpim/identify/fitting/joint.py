@@ -252,6 +252,12 @@ def _grown_from(
             return count
         return seen_by_pole(problem, test, richer.fit) or count
 
+    def otherwise(one: Trial) -> float:
+        most = one.fit.structure.parameters
+        others = (t.fit for t in joint.trials if t.intersample != one.intersample)
+        plain = [fit.objective for fit in others if fit.structure.parameters <= most]
+        return min(plain, default=np.inf)
+
     return grow(
         trial,
         hidden=lambda one: hidden_pole(problem, one.fit),
@@ -261,6 +267,7 @@ def _grown_from(
         count=seen,
         names=structures,
         white=lambda one: is_white(one.fit.residual),
+        otherwise=otherwise,
     )
 
 
