@@ -1,6 +1,8 @@
 """Installed, not only cloned: the wheel holds what the code opens, and runs away from the clone."""
 
+import ast
 import os
+import re
 import subprocess
 import sys
 import zipfile
@@ -57,6 +59,26 @@ def test_the_wheel_holds_every_file_of_the_package(wheel):
     ours.add("hmpim_start.py")
     assert ours <= packed, sorted(ours - packed)
     assert {Path(name).suffix for name in ours} >= {".toml", ".j2", ".jinja", ".typed"}
+
+
+def said(path):
+    """Words of a file that somebody may read: not a module's own docstring, not a comment."""
+    text = path.read_text(encoding="utf-8")
+    if path.suffix != ".py":
+        return [text]
+    module = ast.parse(text)
+    own = ast.get_docstring(module, clean=False)
+    strings = [n.value for n in ast.walk(module) if isinstance(n, ast.Constant)]
+    return [one for one in strings if isinstance(one, str) and one != own]
+
+
+def test_no_words_of_the_package_lead_to_files_that_are_not_in_it():
+    """Pages, help, messages and docstrings are read where there is no clone."""
+    elsewhere = re.compile(r"\b(?:docs|tests|benchmarks|examples)/\w|\b[A-Z]{4,}\.md\b")
+    files = [p for p in (SOURCE / "hmpim").rglob("*") if p.is_file() and p.suffix != ".pyc"]
+    assert len(files) > 300
+    found = {path.name: s for path in files for s in said(path) if elsewhere.search(s)}
+    assert not found
 
 
 OPENED = """

@@ -24,6 +24,33 @@ def shown():
     return {"stimulus": stimulus, "record": record, "result": result, "pair": result["y", "u"]}
 
 
+@pytest.fixture(scope="module")
+def several(shown):
+    sensor = hmpim.Sensor(delay=0.15, natural_frequency=10, damping_ratio=0.4, noise_std=0.1)
+    again = hmpim.run(sensor, shown["stimulus"], rng=2)
+    half = hmpim.Record.from_arrays(
+        {"u": again.inputs[0].values / 2}, {"y": again.outputs[0].values / 2}, fs=200.0,
+        units={"u": "deg", "y": "deg"}, intersample=again.intersample,
+    )  # fmt: skip
+    known = {"structures": ["second_order"], "intersample": "bandlimited"}
+    repeats = hmpim.identify_repeats([shown["record"], again], **known)
+    levels = hmpim.identify_levels([shown["record"], half], **known)
+    return {"repeats": repeats, "repeated": repeats["y", "u"],
+            "levels": levels, "compared": levels["y", "u"]}  # fmt: skip
+
+
+def test_several_records_are_a_short_line_and_a_plain_table(several):
+    for name, value in several.items():
+        assert len(repr(value)) < 200, name
+        cells = parsed(value)
+        assert cells.tags.count("table") == 1
+        assert "natural frequency" in cells.words
+    assert repr(several["repeats"]) == "Repeats(2 records: u → y)"
+    assert "2 repeats, 1" in repr(several["repeated"])
+    assert "2 levels, " in repr(several["levels"])
+    assert any("±" in words for words in parsed(several["compared"]).words)
+
+
 def test_statistics_are_one_short_line(shown):
     line = repr(hmpim.compress(shown["record"]))
     assert line.startswith("Statistics(u → y, ")

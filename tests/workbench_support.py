@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import hmpim
+from docs_following import snippet
 from hmpim.experiment.readiness import LIGHTS
 from hmpim.workbench.desks import AxisRow, Checked, Desk, Desks, Wish
 from hmpim.workbench.work.design import digest
@@ -47,12 +48,14 @@ class Served:
 
 
 def serve(folder: Path, *options: str) -> Served:
-    """Start a workbench on an empty folder."""
+    """Start a workbench on an empty folder, by the command that docs/workbench.md shows."""
+    program, *words = snippet("workbench.md", "hmpim workbench").split()
+    assert program == "hmpim"
+    assert words == ["workbench", "--runs", "runs", "--rig", "table"]
     environment = {**os.environ, "PYTHONUNBUFFERED": "1", "XDG_CONFIG_HOME": str(folder)}
     with (folder / "errors.txt").open("w") as errors:
         process = subprocess.Popen(
-            [sys.executable, "-m", "hmpim.cli.main", "workbench", "--no-browser",
-             "--runs", str(folder / "runs"), *options],
+            [sys.executable, "-m", "hmpim.cli.main", *words, "--no-browser", *options],
             cwd=folder, stdout=subprocess.PIPE, stderr=errors,
             text=True, env=environment,
         )  # fmt: skip

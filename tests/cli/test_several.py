@@ -186,13 +186,14 @@ def test_levels_have_a_page(tmp_path):
     )
 
 
-def test_several_records_have_no_pdf_and_say_so(tmp_path):
+def test_several_records_have_a_pdf(tmp_path):
     files = [
         write(tmp_path / f"{k}.csv", {"u": U, "y": output(U, natural=8.0, seed=k)}) for k in (0, 1)
     ]
     done = run(*files, "--report", tmp_path / "r.pdf")
-    assert done.exit_code == 2
-    assert "several records have an HTML page only; name it r.html" in done.stderr
+    assert done.exit_code == 0, done.stderr
+    assert (tmp_path / "r.pdf").read_bytes().startswith(b"%PDF")
+    assert run(*files, "--report", tmp_path / "r.docx").exit_code == 2
 
 
 def test_levels_are_named_with_their_unit_and_a_doubtful_figure_is_marked(tmp_path):

@@ -1,18 +1,16 @@
 """docs/added-phase.md: its code runs and prints what stands there."""
 
 import re
-from pathlib import Path
 
 import pytest
 
-TEXT = (Path(__file__).parents[2] / "docs" / "added-phase.md").read_text(encoding="utf-8")
+from docs_following import snippet
 
 
 def test_the_code_prints_what_stands_there(tmp_path, monkeypatch, capsys):
     pytest.importorskip("mujoco")
     monkeypatch.chdir(tmp_path)
-    (code,) = re.findall(r"```python\n(.*?)```", TEXT, re.DOTALL)
-    (shown,) = re.findall(r"<!-- output -->\n```\n(.*?)```", TEXT, re.DOTALL)
+    code, shown = snippet("added-phase.md", "import"), snippet("added-phase.md", "alone")
     exec(compile(code, "docs/added-phase.md", "exec"), {})
     found, stated = ([float(x) for x in re.findall(r"\d+\.\d", text)]
                      for text in (capsys.readouterr().out, shown))  # fmt: skip

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 import hmpim
+from docs_following import snippet
 from hmpim.identify import Parameters
 from hmpim.record import Finding
 
@@ -72,8 +73,7 @@ def test_the_core_is_what_import_linter_takes_for_it():
 
 
 def test_the_result_has_the_fields_told_of():
-    (example,) = re.findall(r"Result JSON.*?```text\n(.*?)```", TEXT, re.DOTALL)
-    told = json.loads(example)
+    told = json.loads(snippet("architecture.md", '{"schema"'))
     u = np.sin(0.02 * np.arange(400.0) ** 1.5)
     y = 2.0 * u + 0.01 * np.random.default_rng(0).standard_normal(u.size)
     record = hmpim.Record.from_arrays({"u": u}, {"y": y}, fs=100.0)

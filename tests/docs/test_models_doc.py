@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from docs_following import snippet
 from hmpim.cli.main import app
 from hmpim.formats.models import TARGETS
 
@@ -20,7 +21,7 @@ def part(name: str) -> list[str]:
 
 def test_the_code_runs(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
-    (code,) = re.findall(r"```python\n(.*?)```", TEXT, re.DOTALL)
+    code = snippet("models.md", "import hmpim")
     space = {}
     exec(compile(code, "docs/models.md", "exec"), space)
     assert (tmp_path / "model" / "model.c").is_file()

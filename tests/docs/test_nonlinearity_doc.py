@@ -1,14 +1,11 @@
 """docs/nonlinearity.md: its lines run, on a spring that hardens."""
 
-import re
-from pathlib import Path
-
 import numpy as np
 import pytest
 
 import hmpim
+from docs_following import snippet
 
-DOC = Path(__file__).parents[2] / "docs" / "nonlinearity.md"
 FS = 200.0
 TIME = np.arange(1200) / FS
 SWEEP = np.sin(2 * np.pi * (0.2 * TIME + 19.8 / 12 * TIME**2))
@@ -22,10 +19,10 @@ def record(gain):
 
 
 def test_the_lines_run():
-    (code,) = re.findall(r"```python\n(.*?)```", DOC.read_text(encoding="utf-8"), re.DOTALL)
+    code = snippet("nonlinearity.md", "pair = ")
     space = {"hmpim": hmpim, "record": record(2.0)}
     space |= {"gentle": record(0.2), "middle": record(1.0), "strong": record(2.0)}
-    exec(compile(code, DOC.name, "exec"), space)
+    exec(compile(code, "nonlinearity.md", "exec"), space)
     found = space["pair"].nonlinearity
     assert found.kinds == ("curvature",)
     # 3 % of (2 sin)³ is a third harmonic of 0.06 beside a first one of 2.18.

@@ -3,31 +3,23 @@
 import contextlib
 import io
 import re
-import shlex
-import subprocess
 from pathlib import Path
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
-from hmpim.cli.main import app
+from docs_following import execute, lines_of, printing, snippet
 from tests_support import c_compiler
 
 DOC = Path(__file__).parents[2] / "docs" / "stimulus.md"
 IMAGES = DOC.parent / "images" / "stimulus"
-_BLOCK = re.compile(r"```python\n(.*?)```\n(?:\n```text\n(.*?)```)?", re.DOTALL)
-
-
-def blocks_of(text):
-    return [(code, said or "") for code, said in _BLOCK.findall(text)]
 
 
 def test_every_block_runs_and_prints_what_stands_below_it(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     text = DOC.read_text(encoding="utf-8")
     space = {}
-    for number, (code, said) in enumerate(blocks_of(text), start=1):
+    for number, (code, said) in enumerate(printing("stimulus.md"), start=1):
         printed = io.StringIO()
         with contextlib.redirect_stdout(printed):
             exec(compile(code, f"{DOC.name}, block {number}", "exec"), space)
@@ -47,12 +39,8 @@ def test_pictures_shown_are_there():
 def test_the_equations_are_written_compiled_and_printed(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     c_compiler()
-    (script,) = re.findall(r"```sh\n(.*?)```", DOC.read_text(encoding="utf-8"), re.DOTALL)
-    design, compiled = script.replace("\\\n", " ").splitlines()
-    program, *words = shlex.split(design)
-    assert program == "hmpim"
-    assert CliRunner().invoke(app, words).exit_code == 0
-    subprocess.run(compiled, shell=True, check=True)
+    for line in lines_of(snippet("stimulus.md", "hmpim design")):
+        execute(line)
     samples = np.genfromtxt("samples.csv", delimiter=",", names=True)
     assert np.max(np.abs(samples["position"])) == pytest.approx(10.0, rel=1e-3)
     assert np.max(np.abs(samples["acceleration"])) <= 40000.0

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from docs_following import snippet
 from hmpim.rigs.table import AXES
 from tests_support import in_studies
 
@@ -60,7 +61,7 @@ def test_a_case_made_again_is_the_one_that_stands_there(study, case):
 
 
 def test_the_code_runs_and_says_what_stands_there():
-    (code,) = re.findall(r"```python\n(.*?)```", TEXT, re.DOTALL)
+    code = snippet("table.md", "import numpy")
     said = float(re.search(r"bandwidth_phase90  # ([\d.]+) Hz", code)[1])
     space = {}
     exec(compile(code, "docs/table.md", "exec"), space)

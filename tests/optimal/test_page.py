@@ -2,13 +2,11 @@
 
 import importlib.util
 import re
-import shlex
 from pathlib import Path
 
 import pytest
-from typer.testing import CliRunner
 
-from hmpim.cli.main import app
+from docs_following import execute, lines_of, snippet
 
 ROOT = Path(__file__).parents[2]
 PAGE = ROOT / "docs" / "gentlest.md"
@@ -78,7 +76,9 @@ def test_rows_that_are_searched(maker, printed, family):
 
 
 def test_the_examples_run(capsys):
-    for block in re.findall(r"```python\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL):
+    found = snippet("gentlest.md", "from hmpim.optimal import")
+    apart = snippet("gentlest.md", "from hmpim.stimulus import Limits\nfrom hmpim.stimulus.axes")
+    for block in (found, apart):
         exec(compile(block, str(PAGE), "exec"), {})
     assert "condition number of the inputs roll, pitch, yaw" in capsys.readouterr().out
 
@@ -86,8 +86,7 @@ def test_the_examples_run(capsys):
 @pytest.mark.study
 def test_the_command_runs(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    (command,) = re.findall(r"```sh\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)
-    done = CliRunner().invoke(app, shlex.split(command.replace("\\\n", " "))[1:])
-    assert done.exit_code == 0, done.stderr
+    (command,) = lines_of(snippet("gentlest.md", "hmpim gentlest"))
+    execute(command)
     assert Path("stimulus.csv").is_file()
     assert Path("trade.png").is_file()

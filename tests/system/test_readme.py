@@ -9,40 +9,26 @@ from pathlib import Path
 import pytest
 
 import hmpim
+from docs_following import snippet
 
 ROOT = Path(__file__).parents[2]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 
 
-def blocks(language: str) -> list[str]:
-    return re.findall(rf"```{language}\n(.*?)```", README, flags=re.DOTALL)
-
-
 def test_the_lines_of_python_run(capsys):
-    (code,) = blocks("python")
+    code = snippet("README.md", "import hmpim")
     exec(compile(code, "README.md", "exec"), {})
     assert re.fullmatch(r"0\.1\d+ ± 0\.0000\d+ s\n", capsys.readouterr().out)
 
 
 def test_it_is_five_lines():
-    (code,) = blocks("python")
+    code = snippet("README.md", "import hmpim")
     body = [line for line in code.splitlines() if line and not line.startswith("import")]
     assert len(body) == 5
 
 
-def test_the_make_targets_exist():
-    shell = "\n".join(blocks("sh"))
-    makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
-    targets = re.findall(r"^make (\w+)", shell, flags=re.MULTILINE)
-    assert targets == ["demo", "test"]
-    for target in targets:
-        assert re.search(rf"^{target}:", makefile, flags=re.MULTILINE)
-
-
 def test_the_identify_command_runs(tmp_path):
-    (command,) = [
-        line for block in blocks("sh") for line in block.splitlines() if line.startswith("hmpim")
-    ]
+    command = snippet("README.md", "hmpim identify")
     stimulus = hmpim.Stimulus(waveform=hmpim.Chirp(band=(0.1, 20), duration=10), fs=200)
     sensor = hmpim.Sensor(delay=0.05, time_constant=0.05, noise_std=0.02)
     record = hmpim.run(sensor, stimulus, rng=1)

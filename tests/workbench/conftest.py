@@ -25,7 +25,7 @@ def served(tmp_path_factory):
     """A workbench with a motion table that moves in real time, and uploads of at most 1 MB."""
     folder = tmp_path_factory.mktemp("workbench")
     (folder / "hmpim.toml").write_text(RIGS)
-    bench = serve(folder, "--max-upload", "1", "--grace", "10", "--rig", "table")
+    bench = serve(folder, "--max-upload", "1", "--grace", "10")
     yield bench
     ended(bench)
     errors = (folder / "errors.txt").read_text()

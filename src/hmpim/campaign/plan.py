@@ -178,7 +178,7 @@ def read_plan(path: Path) -> Plan:
 
 
 def parse_plan(data: Mapping[str, Any]) -> Plan:
-    """Make a plan of what `tomllib` read; `docs/campaign.md` lists every key.
+    """Make a plan of what `tomllib` read; the plan that ships as ``example`` has every key.
 
     Parameters
     ----------

@@ -33,7 +33,7 @@ def batch(
     paths: Annotated[
         list[str],
         typer.Argument(
-            metavar="PATHS...",
+            metavar="PATHS",
             help="Folders, globs and files with records, local or any address of fsspec. A Parquet "
             "file with a column of records, or an HDF5 file with one group per record, holds many.",
         ),

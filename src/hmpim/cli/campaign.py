@@ -39,15 +39,17 @@ def campaign(
         ),
     ] = True,
     json_file: Annotated[
-        Path | None, typer.Option("--json", help="A second place for study.json.")
+        Path | None, typer.Option("--json", metavar="FILE", help="A second place for study.json.")
     ] = None,
     document: Annotated[
         Path | None,
-        typer.Option("--document", help="A second place for the Markdown, with its pictures."),
+        typer.Option(
+            "--document", metavar="FILE", help="A second place for the Markdown, with its pictures."
+        ),
     ] = None,
     quiet: Annotated[bool, typer.Option("--quiet", help="No progress bar and no table.")] = False,
     example: Annotated[
-        bool, typer.Option("--example", help="Print a plan to start from, and stop.")
+        bool, typer.Option("--example", help="Print a plan that has every key, and stop.")
     ] = False,
 ) -> None:
     """Run a study: axes, command modes, update rates, levels and loads from one plan.

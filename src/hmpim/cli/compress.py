@@ -43,7 +43,7 @@ def compress(
     records: Annotated[
         list[Path],
         typer.Argument(
-            metavar="RECORD...",
+            metavar="RECORD",
             help="Records of one unit, or files that this command wrote. Several are joined, each "
             "as a run of its own.",
         ),

@@ -107,7 +107,10 @@ def design(
         ),
     ] = None,
     json_file: Annotated[
-        Path | None, typer.Option("--json", help="JSON of gain, extinction, peaks and the rest.")
+        Path | None,
+        typer.Option(
+            "--json", metavar="FILE", help="JSON of gain, extinction, peaks and the rest."
+        ),
     ] = None,
     plot: Annotated[Path | None, typer.Option(help="Picture of the time histories, PNG.")] = None,
 ) -> None:

@@ -47,7 +47,14 @@ def export(
     result: Annotated[
         Path, typer.Argument(metavar="RESULT", help="JSON of `hmpim identify --json`.")
     ],
-    to: Annotated[To, typer.Option("--to", help="The target.")],
+    to: Annotated[
+        To,
+        typer.Option(
+            "--to",
+            metavar="TARGET",
+            help=f"One of {', '.join(To)}.",
+        ),
+    ],
     out: Annotated[
         Path,
         typer.Option(
@@ -92,8 +99,8 @@ def export(
 ) -> None:
     """Write what was identified as a model for another tool, error bars and origin included.
 
-    docs/models.md states what each target represents exactly, what it approximates, and how
-    closely.
+    What the target represents exactly, and what it approximates and how closely, is stated in the
+    file that is written.
     """
     from hmpim.formats.models import export as write
 

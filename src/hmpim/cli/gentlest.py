@@ -86,7 +86,10 @@ def gentlest(
         Path | None, typer.Option("-o", "--output", help="CSV of the samples.")
     ] = None,
     json_file: Annotated[
-        Path | None, typer.Option("--json", help="JSON of the stimulus and its predicted errors.")
+        Path | None,
+        typer.Option(
+            "--json", metavar="FILE", help="JSON of the stimulus and its predicted errors."
+        ),
     ] = None,
     plot: Annotated[
         Path | None, typer.Option(help="Picture of gentleness against accuracy, PNG.")

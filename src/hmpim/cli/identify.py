@@ -71,7 +71,7 @@ def identify(
     records: Annotated[
         list[Path],
         typer.Argument(
-            metavar="RECORD...",
+            metavar="RECORD",
             help="File with the record, such as a CSV file with a header. Several records of one"
             " stimulus are averaged, and their error bars compared with their scatter; "
             "records at several amplitudes show where the unit is linear. Files of hmpim compress "
@@ -158,7 +158,8 @@ def identify(
 ) -> None:
     """Find every parameter of a measured record, each with its error bar.
 
-    Several records of one test are averaged, and their scatter is compared with the stated errors.
+    Several records of one test are averaged, and their scatter is compared with the stated errors;
+    records at several amplitudes show where the unit is linear.
     """
     check_files(
         reads={"the record": [*records, *(beside or [])]},

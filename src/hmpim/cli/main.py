@@ -166,7 +166,7 @@ app.command()(gentlest)
 app.command(epilog="Example: hmpim workbench --rig table --runs runs")(workbench)
 app.command(epilog="Example: hmpim export r.json --to c -o model/")(export)
 app.command(epilog="Example: hmpim validate r.json second.csv --fit 90")(validate)
-app.command(epilog="Example: hmpim paper --out docs/build --figures 12 13")(paper)
+app.command(epilog="Example: hmpim paper --out out/paper --figures 12 13")(paper)
 
 
 def main() -> None:

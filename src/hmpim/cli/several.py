@@ -28,11 +28,9 @@ def identify_several(
     """Average repeats, or compare levels, whichever the records are."""
     from hmpim.identify import identify_levels, identify_repeats, same_at_levels
     from hmpim.report import print_levels, print_repeats
-    from hmpim.report.several import check_several, levels_report, repeats_report
+    from hmpim.report.several import levels_report, repeats_report
 
     names = [path.name for path in paths]
-    if report is not None:
-        check_several(report)
     with working(f"Identifying {len(records)} records"):
         if same_at_levels(records):
             levels = identify_levels(records, intersample=intersample)

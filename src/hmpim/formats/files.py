@@ -41,7 +41,7 @@ def read(
     Parameters
     ----------
     path : str or path-like
-        The file; docs/formats.md lists the formats.
+        The file; `hmpim.formats.readers.readers` lists the formats.
     inputs, outputs : sequence of str, optional
         Names of the input and output channels. Without: those that the file states, else the one
         named u, input, command, stimulus or position, and the one named y, output, measured or

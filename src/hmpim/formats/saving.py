@@ -42,7 +42,7 @@ def save(thing: Saved, path: str | PathLike[str]) -> None:
         What to save.
     path : str or path-like
         The file; replaced as a whole, or not at all. Its suffix says in which form: `.h5` for a
-        record (docs/files.md), or `.csv` if all its channels have one clock; `.toml` for a
+        record, or `.csv` if all its channels have one clock; `.toml` for a
         stimulus; `.json` for a result; `.h5` for statistics.
 
     Raises

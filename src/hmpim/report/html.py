@@ -1,6 +1,6 @@
 """One page, one file: the verdict, the figures, the Bode plot, what to do, and the rest folded."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import cache
 from os import PathLike
 from pathlib import Path
@@ -21,7 +21,7 @@ from hmpim.stimulus import Stimulus
 if TYPE_CHECKING:
     from jinja2 import Environment
 
-__all__ = ["check_page", "page_environment", "render", "report", "sheet"]
+__all__ = ["check_page", "page_environment", "render", "report", "sheet", "write_page"]
 
 _PAGES = ("", ".html", ".htm")
 
@@ -131,13 +131,41 @@ def sheet(
 
 
 def _write(view: dict[str, Any], path: str | PathLike[str], *, template: str) -> None:
-    if Path(path).suffix.lower() == ".pdf":
+    def paper() -> bytes:
         from hmpim.report.pdf import pdf
 
+        return pdf(view, sheet=template.startswith("sheet"))
+
+    write_page(path, page=lambda: _page(view, template), paper=paper)
+
+
+def write_page(
+    path: str | PathLike[str], *, page: Callable[[], str], paper: Callable[[], bytes]
+) -> None:
+    """Write a page as a PDF where the file is named so, as HTML elsewhere.
+
+    Parameters
+    ----------
+    path : path-like
+        The file to write; replaced as a whole, or not at all.
+    page, paper : callable
+        Make the HTML, and the PDF.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     for name in ("p.pdf", "p.html"):
+    ...         write_page(Path(folder) / name, page=lambda: "<p>", paper=lambda: b"%PDF")
+    ...         (Path(folder) / name).read_text(encoding="utf-8")
+    '%PDF'
+    '<p>'
+    """
+    if Path(path).suffix.lower() == ".pdf":
         with replacing(path) as place:
-            place.write_bytes(pdf(view, sheet=template.startswith("sheet")))
+            place.write_bytes(paper())
     else:
-        write_text(path, _page(view, template))
+        write_text(path, page())
 
 
 def check_page(path: str | PathLike[str]) -> None:

@@ -1,8 +1,11 @@
-"""The report on paper: the same content, typeset by Typst."""
+"""Pages on paper: the same content, typeset by Typst."""
 
 import json
+import re
 import tempfile
+from collections.abc import Callable
 from importlib.resources import files
+from importlib.resources.abc import Traversable
 from pathlib import Path
 from typing import Any
 
@@ -11,9 +14,15 @@ from hmpim.plots.style import printable
 from hmpim.report.figures import Picture
 from hmpim.report.numbers import typeset, value_and_error
 
-__all__ = ["check_pdf", "pdf"]
+__all__ = ["UPRIGHT", "Drawn", "check_pdf", "pdf", "printed", "typeset_page"]
 
-_ON_PAPER = 620.0  # px across a page between its margins, so that letters have 9 points
+UPRIGHT = 174.0  # mm between the margins of an upright page
+_PER_MM = 620.0 / UPRIGHT  # px, so that letters have 9 points
+
+Drawn = Callable[[Picture, float], dict[str, Any]]
+"""Draws a picture so many mm wide; returns its file, height in mm, title, caption and alt text."""
+
+_SIZE = re.compile(r'viewBox="0 0 ([\d.]+) ([\d.]+)"')
 
 
 def check_pdf() -> None:
@@ -39,9 +48,6 @@ def check_pdf() -> None:
 def pdf(view: dict[str, Any], *, sheet: bool = False) -> bytes:
     """Return a report, or its one-page sheet, as a PDF file.
 
-    Nothing that a file or a person brought is read as Typst's markup: the text goes into JSON,
-    and the template puts it onto the page as it is.
-
     Parameters
     ----------
     view : dict
@@ -62,6 +68,32 @@ def pdf(view: dict[str, Any], *, sheet: bool = False) -> bytes:
     >>> pdf(report_view(Identification(record=summary, pairs=())))[:5]
     b'%PDF-'
     """
+    template = files("hmpim.report").joinpath("templates", "report.typ")
+
+    def data(drawn: Drawn) -> dict[str, Any]:
+        return _data(view, lambda picture: drawn(picture, UPRIGHT), sheet=sheet)
+
+    return typeset_page(template, data)
+
+
+def typeset_page(template: Traversable, data: Callable[[Drawn], dict[str, Any]]) -> bytes:
+    """Return a page as a PDF file.
+
+    Nothing that a file or a person brought is read as Typst's markup: the text goes into JSON,
+    and the template puts it onto the page as it is.
+
+    Parameters
+    ----------
+    template : Traversable
+        Typst; it may import what ``common.typ`` has, and reads ``data.json``.
+    data : callable
+        Given what draws its pictures, returns what the template shows.
+
+    Raises
+    ------
+    MissingExtraError
+        If the extra ``pdf`` is missing.
+    """
     check_pdf()
     import typst
 
@@ -69,28 +101,33 @@ def pdf(view: dict[str, Any], *, sheet: bool = False) -> bytes:
         folder = Path(name)
         count = 0
 
-        def drawn(picture: Picture) -> dict[str, str]:
+        def drawn(picture: Picture, across: float) -> dict[str, Any]:
             nonlocal count
             count += 1
             file = f"{count}.svg"
-            text = picture.figure.to_svg(width=_ON_PAPER, key=f"p{count}")
+            text = picture.figure.to_svg(width=_PER_MM * across, key=f"p{count}")
             (folder / file).write_text(printable(text), encoding="utf-8")
+            (size,) = _SIZE.findall(text)
+            width, height = map(float, size)
             return {
                 "file": file,
-                "title": _clean(picture.title),
-                "caption": _clean(picture.caption),
-                "alt": _clean(picture.description),
+                "height": across * height / width,
+                "title": printed(picture.title),
+                "caption": printed(picture.caption),
+                "alt": printed(picture.description),
             }
 
-        data = _data(view, drawn, sheet=sheet)
-        (folder / "data.json").write_text(json.dumps(data), encoding="utf-8")
-        template = files("hmpim.report").joinpath("templates", "report.typ")
-        (folder / "main.typ").write_text(template.read_text("utf-8"), encoding="utf-8")
+        (folder / "data.json").write_text(json.dumps(data(drawn)), encoding="utf-8")
+        common = files("hmpim.report").joinpath("templates", "common.typ")
+        for place, source in (("common.typ", common), ("main.typ", template)):
+            (folder / place).write_text(source.read_text("utf-8"), encoding="utf-8")
         made: bytes = typst.compile(folder / "main.typ", root=folder)
     return made
 
 
-def _data(view: dict[str, Any], drawn: Any, *, sheet: bool) -> dict[str, Any]:
+def _data(
+    view: dict[str, Any], drawn: Callable[[Picture], dict[str, Any]], *, sheet: bool
+) -> dict[str, Any]:
     """What the template shows, as JSON."""
     pairs = []
     for pair in view["pairs"]:
@@ -98,13 +135,13 @@ def _data(view: dict[str, Any], drawn: Any, *, sheet: bool) -> dict[str, Any]:
         first = pair["first"] if whole else pair["first"][:1] if len(view["pairs"]) == 1 else []
         pairs.append(
             {
-                "name": _clean(pair["name"]),
+                "name": printed(pair["name"]),
                 "lopsided": pair["lopsided"],
                 "verdict": pair["verdict"],
                 "verdict_words": pair["verdict_words"],
-                "sentence": _clean(pair["sentence"]),
+                "sentence": printed(pair["sentence"]),
                 "rows": [
-                    {key: _clean(value) for key, value in row.items()}
+                    {key: printed(value) for key, value in row.items()}
                     for row in pair["rows"]
                     if row["value"] != "–"
                 ],
@@ -115,15 +152,15 @@ def _data(view: dict[str, Any], drawn: Any, *, sheet: bool) -> dict[str, Any]:
     more = [view["stimulus"]] if view["stimulus"] is not None else []
     return {
         "sheet": sheet,
-        "title": _clean(view["title"]),
-        "about": [[name, _clean(value)] for name, value in view["about"]],
-        "headline": _clean(view["headline"]),
+        "title": printed(view["title"]),
+        "about": [[name, printed(value)] for name, value in view["about"]],
+        "headline": printed(view["headline"]),
         "verdict": view["verdict"],
-        "notes": [_clean(note) for note in view["notes"]],
+        "notes": [printed(note) for note in view["notes"]],
         "findings": [
             {
-                "where": _clean(f["where"]),
-                "message": _clean(f["message"]),
+                "where": printed(f["where"]),
+                "message": printed(f["message"]),
                 "advice": f["advice"].replace("`", ""),
             }
             for f in view["findings"]
@@ -132,7 +169,7 @@ def _data(view: dict[str, Any], drawn: Any, *, sheet: bool) -> dict[str, Any]:
         "truth": view["with_truth"],
         "pairs": pairs,
         "more": [] if sheet else [drawn(picture) for picture in (*more, *view["pictures"])],
-        "facts": [[name, _clean(value)] for name, value in view["facts"]],
+        "facts": [[name, printed(value)] for name, value in view["facts"]],
     }
 
 
@@ -140,11 +177,18 @@ def _clean_summary(summary: dict[str, Any] | None) -> dict[str, Any] | None:
     if summary is None:
         return None
     rows = [
-        {**r, "cells": ["\n".join(map(_clean, value_and_error(cell))) for cell in r["cells"]]}
+        {**r, "cells": ["\n".join(map(printed, value_and_error(cell))) for cell in r["cells"]]}
         for r in summary["rows"]
     ]
     return {**summary, "rows": rows}
 
 
-def _clean(text: object) -> str:
+def printed(text: object) -> str:
+    r"""Return words as they stand on paper: true minuses, nothing that cannot be printed.
+
+    Examples
+    --------
+    >>> printed("-0.5\x00")
+    '−0.5�'
+    """
     return printable(typeset(str(text)))

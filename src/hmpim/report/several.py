@@ -1,14 +1,12 @@
 """One page for several records of one test: repeats and their scatter, or levels."""
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from os import PathLike
-from pathlib import Path
 
 import numpy as np
 
-from hmpim.errors import ArgumentError
-from hmpim.formats.atomic import write_text
 from hmpim.identify import Estimate, Identification, PairIdentification
 from hmpim.identify.records.levels import LevelComparison, Levels
 from hmpim.identify.records.repeats import RepeatedPair, Repeats
@@ -20,14 +18,13 @@ from hmpim.plots.trend import trend
 from hmpim.record import Finding
 from hmpim.report.about import About, made_by
 from hmpim.report.figures import Picture
-from hmpim.report.html import check_page
 from hmpim.report.numbers import (
     format_interval,
     format_value,
     plus_minus,
 )
 from hmpim.report.repeats_text import level_cells, linear_words, marked_value, percent_words
-from hmpim.report.study import Grid, Section, StudyPage, render_study
+from hmpim.report.study import Grid, Section, StudyPage, write_study_page
 from hmpim.report.words import (
     GLOSSARY,
     VERDICTS,
@@ -38,7 +35,7 @@ from hmpim.report.words import (
     structure_words,
 )
 
-__all__ = ["check_several", "levels_report", "repeats_report"]
+__all__ = ["levels_report", "repeats_report"]
 
 _BY_RUN = (
     "delay",
@@ -53,31 +50,10 @@ _BY_RUN = (
 )
 """Parameters of the table by run."""
 
+_SHORT = 16  # characters of a name that fits below a picture
+
 _DRAWN = ("bandwidth_phase90", "delay", "natural_frequency", "scale_factor")
 """Parameters that are drawn over the runs."""
-
-
-def check_several(path: str | PathLike[str]) -> None:
-    """Refuse a page of several records that is no HTML page.
-
-    Raises
-    ------
-    ArgumentError
-        If it is named as something else.
-
-    Examples
-    --------
-    >>> check_several("r.pdf")
-    Traceback (most recent call last):
-    hmpim.errors.ArgumentError: 'r.pdf': several records have an HTML page only; name it r.html
-    """
-    check_page(path)
-    place = Path(path)
-    if place.suffix.lower() == ".pdf":
-        raise ArgumentError(
-            f"{str(place)!r}: several records have an HTML page only; name it "
-            f"{place.with_suffix('.html').name}"
-        )
 
 
 def repeats_report(
@@ -100,7 +76,7 @@ def repeats_report(
     names : sequence of str
         Of the records, in the order given.
     path : path-like
-        The HTML page; replaced as a whole, or not at all.
+        The file to write, .html or .pdf; replaced as a whole, or not at all.
     about : About, optional
         Title, unit under test, test, operator, date.
     notes : sequence of str
@@ -109,9 +85,10 @@ def repeats_report(
     Raises
     ------
     ArgumentError
-        If `path` is named as something else than a page.
+        If `path` cannot be written, or is named as something else than a page or a PDF.
+    MissingExtraError
+        If a PDF is wanted and the extra ``pdf`` is not installed.
     """
-    check_several(path)
     parameters = [parameter for pair in repeats.pairs for parameter in pair.parameters]
     agree = sum(parameter.agree for parameter in parameters)
     doubts = any(f.severity == "doubt" for pair in repeats.pairs for f in pair.findings)
@@ -128,7 +105,7 @@ def repeats_report(
         sections=tuple(_repeated(pair, repeats.results, names) for pair in repeats.pairs),
         facts=_facts(repeats.results, names),
     )
-    write_text(path, render_study(page))
+    write_study_page(page, path)
 
 
 def levels_report(
@@ -151,9 +128,10 @@ def levels_report(
     Raises
     ------
     ArgumentError
-        If `path` is named as something else than a page.
+        If `path` cannot be written, or is named as something else than a page or a PDF.
+    MissingExtraError
+        If a PDF is wanted and the extra ``pdf`` is not installed.
     """
-    check_several(path)
     pairs = levels.results[0].pairs
     told = [
         _rising(pair, compared, levels.results, names)
@@ -180,7 +158,7 @@ def levels_report(
         sections=tuple(_levelled(one) for one in told),
         facts=_facts(levels.results, names),
     )
-    write_text(path, render_study(page))
+    write_study_page(page, path)
 
 
 def _title(about: About | None, otherwise: str) -> str:
@@ -326,7 +304,8 @@ def _pictures(
     by: str = "of each record",
 ) -> tuple[Picture, ...]:
     pictures = []
-    curves = [(name, c) for name, pair in zip(names, each, strict=True) if (c := _curve(pair, fs))]
+    short = _told_apart(names)
+    curves = [(name, c) for name, pair in zip(short, each, strict=True) if (c := _curve(pair, fs))]
     if curves:
         bandwidth = averages.get("bandwidth_phase90")
         mark = bandwidth if bandwidth is not None and bandwidth.spread < bandwidth.value else None
@@ -355,10 +334,37 @@ def _pictures(
                 + ("" if all(e is None or e.ci95 for e in estimates) else " where it is known")
                 + (", and the mean with its own." if mean is not None else "."),
                 description=f"{label} {by}: {', '.join(names)}.",
-                figure=trend(names, estimates, name=label, mean=mean),
+                figure=trend(short, estimates, name=label, mean=mean),
             )
         )
     return _in_columns(pictures)
+
+
+def _told_apart(names: Sequence[str]) -> Sequence[str]:
+    """Names for pictures: of long ones, the part in which they differ.
+
+    Examples
+    --------
+    >>> _told_apart(["bench-7_10-00_gimbal.csv", "bench-7_11-00_gimbal.csv"])
+    ['…10', '…11']
+    >>> _told_apart(["run0.csv", "another run of the same unit.csv"])
+    ['run0…', 'another run of …']
+    """
+    if max(map(len, names)) <= _SHORT:
+        return names
+    parts = [re.split(r"([_./ -])", name) for name in names]
+    least = min(map(len, parts))
+    head = _alike(parts, least - 1)
+    tail = _alike([one[::-1] for one in parts], least - 1 - head)
+    marks = ("…", "") if head else ("", "…" * (tail > 0))
+    short = ["".join(one[head : len(one) - tail]).join(marks) for one in parts]
+    short = [one if len(one) <= _SHORT else f"{one[: _SHORT - 1]}…" for one in short]
+    return short if len(set(short)) == len(names) else names
+
+
+def _alike(parts: Sequence[Sequence[str]], most: int) -> int:
+    """How many parts are the same in all, from the first one on."""
+    return next((k for k in range(most) if len({one[k] for one in parts}) > 1), most)
 
 
 def _curve(pair: PairIdentification, fs: float) -> BodeCurve | None:

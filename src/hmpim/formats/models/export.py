@@ -120,8 +120,8 @@ def export(
     """Write what was identified as a model for another tool.
 
     Every export carries the error bars, the units, and where it comes from: the digest of the
-    record, the version of hmpim, the verdict and the warnings. What is exact and what is not, and
-    by how much, is in docs/models.md and in each file.
+    record, the version of hmpim, the verdict and the warnings. Each file states what is exact in it
+    and what is not, and by how much.
 
     Parameters
     ----------
@@ -129,7 +129,7 @@ def export(
         From `hmpim.identify`, or read back.
     to : str
         The target: 'control', 'scipy', 'matlab', 'mat', 'json', 'c', 'python', 'mujoco', 'isaac',
-        'fmu', 'modelica', 'uff58' or 'csv'; docs/models.md tells what each is.
+        'fmu', 'modelica', 'uff58' or 'csv'.
     path : str or path-like
         File to write; for C a folder, made if it is missing. A folder for a target of one file
         gets it under the name of the pair. The name, without its suffix, is the model's.

@@ -1,4 +1,4 @@
-"""Our own record file: HDF5 that grows as samples come and outlives its writer; docs/files.md."""
+"""Our own record file: HDF5 that grows as samples come and outlives its writer."""
 
 from hmpim.formats.recording.heading import FORMAT, Heading
 from hmpim.formats.recording.opened import Opened, Track, open_recording

@@ -17,10 +17,12 @@ from hmpim.identify.chance import FALSE_ALARM
 from hmpim.identify.identify import identify
 from hmpim.identify.records.alike import check_channels
 from hmpim.identify.result import Estimate, Identification, PairIdentification, Parameters
+from hmpim.identify.result.digits import percent, plus_minus
 from hmpim.identify.result.groups import in_words
 from hmpim.identify.worth import MATERIAL, WORTH
 from hmpim.model.dynamics import FILTERS, STRUCTURES
 from hmpim.record import Finding, Intersample, Record
+from hmpim.tables import html_table, shortened
 
 __all__ = [
     "Level",
@@ -109,6 +111,31 @@ class LevelComparison:
     findings: tuple[Finding, ...]
     unit: str = ""
 
+    def __repr__(self) -> str:
+        return f"LevelComparison({self._linear})"
+
+    def _repr_html_(self) -> str:
+        """Return a table of the trends, as a notebook shows it."""
+        levels = sorted(self.amplitudes)
+        rows = []
+        for trend in self.trends:
+            known = zip(trend.amplitudes, trend.values, trend.stds, strict=True)
+            cells = {amplitude: plus_minus(value, std) for amplitude, value, std in known}
+            moved = f"{percent(trend.change)} %", f"{percent(trend.probability)} %"
+            rows.append(
+                [trend.name.replace("_", " "), *(cells.get(a, "–") for a in levels), *moved]
+            )
+        heads = [f"at {level:.4g} {self.unit}".rstrip() for level in levels]
+        notes = [finding.message for finding in self.findings]
+        heads = ["parameter", *heads, "change", "chance"]
+        return html_table(self._linear, heads, rows, notes=notes)
+
+    @property
+    def _linear(self) -> str:
+        least, most = min(self.amplitudes), max(self.amplitudes)
+        said = f"{len(self.amplitudes)} levels, {least:.4g} to {most:.4g} {self.unit}".rstrip()
+        return f"{said}; linear up to {self.linear_up_to:.4g} {self.unit}".rstrip()
+
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Levels:
@@ -128,6 +155,13 @@ class Levels:
     def __getitem__(self, key: tuple[str, str] | str) -> LevelComparison:
         wanted = self.results[0][key]
         return self.comparisons[self.results[0].pairs.index(wanted)]
+
+    def __repr__(self) -> str:
+        return f"Levels({shortened([one._linear for one in self.comparisons])})"
+
+    def _repr_html_(self) -> str:
+        """Return a table for each pair, as a notebook shows it."""
+        return "\n".join(one._repr_html_() for one in self.comparisons)
 
     def __iter__(self) -> Iterator[LevelComparison]:
         return iter(self.comparisons)

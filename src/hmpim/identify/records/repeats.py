@@ -27,10 +27,12 @@ from hmpim.identify.result import (
     PairIdentification,
     Parameters,
 )
+from hmpim.identify.result.digits import percent
 from hmpim.identify.result.error_bars import estimate, noise_estimate
 from hmpim.identify.result.groups import EVERY, MODELLED, PHASE_SPLIT, in_words
 from hmpim.identify.result.lookup import find_pair
 from hmpim.record import Finding, Intersample, Record
+from hmpim.tables import html_table, shortened
 
 __all__ = ["RepeatedPair", "RepeatedParameter", "Repeats", "identify_repeats"]
 
@@ -38,6 +40,9 @@ SCHEMA = "hmpim/repeats/1"
 
 _ROUNDING = 1e-12
 """Reach over value that is arithmetic's and not the record's."""
+
+_HEADS = ("parameter", "mean", "repeatability", "chance", "stated errors agree", "verdict")
+"""Of a notebook's table."""
 
 # A whole number of samples, which may well be the same every time.
 _COUNTED = "delay_correlation"
@@ -139,6 +144,28 @@ class RepeatedPair:
         known = ", ".join(p.name for p in self.parameters)
         raise RecordError(f"the repeats do not determine {name!r}; they determine {known}")
 
+    def __repr__(self) -> str:
+        agree = sum(parameter.agree for parameter in self.parameters)
+        what = f"{len(self.structures)} repeats, {agree} of {len(self.parameters)} parameters agree"
+        return f"RepeatedPair({self._named}: {what})"
+
+    def _repr_html_(self) -> str:
+        """Return a table of the averages, as a notebook shows it."""
+        notes = [finding.message for finding in self.findings]
+        return html_table(f"{self._named}: averages", _HEADS, self._rows, notes=notes)
+
+    @property
+    def _named(self) -> str:
+        return f"{shortened([self.input])} → {shortened([self.output])}"
+
+    @property
+    def _rows(self) -> list[list[str]]:
+        return [
+            [p.name.replace("_", " "), p.mean.text, f"{p.repeatability:.2g} {p.mean.unit}".rstrip(),
+             f"{percent(p.probability)} %", "yes" if p.agree else "no", p.mean.verdict]
+            for p in self.parameters
+        ]  # fmt: skip
+
     def to_dict(self) -> dict[str, Any]:
         """Return plain JSON values; what is no number is null."""
         scatter = self.response_scatter
@@ -173,6 +200,17 @@ class Repeats:
 
     def __getitem__(self, key: tuple[str, str] | str) -> RepeatedPair:
         return find_pair(self.pairs, key, holder="the repeats")
+
+    def __repr__(self) -> str:
+        names = [pair._named for pair in self.pairs]
+        return f"Repeats({len(self.results)} records: {shortened(names)})"
+
+    def _repr_html_(self) -> str:
+        """Return a table of the averages of every pair, as a notebook shows it."""
+        rows = [[pair._named, *row] for pair in self.pairs for row in pair._rows]
+        said = dict.fromkeys(f.message for pair in self.pairs for f in pair.findings)
+        title = f"{len(self.results)} records of one stimulus"
+        return html_table(title, ["from → to", *_HEADS], rows, notes=list(said))
 
     def __iter__(self) -> Iterator[RepeatedPair]:
         return iter(self.pairs)

@@ -85,7 +85,7 @@ class PairIdentification(ByValue):
         )
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the pair as plain JSON values (docs/architecture.md, Result JSON)."""
+        """Return the pair as plain JSON values, an entry of `Identification.to_dict`."""
         return {
             "input": self.input,
             "output": self.output,

@@ -38,6 +38,7 @@ _MARKERS: dict[Marker, str] = {
 }  # fmt: skip
 _PER_INCH = 96.0
 _GAP = 0.09  # between columns, as a share of the width
+_CLEAR = 6  # px between an axis's numbers and its name
 _ABOVE, _BELOW = 40, 52  # px beside the panels: legend; numbers and name of the axis
 
 
@@ -112,7 +113,7 @@ def draw(figure: Figure, *, most_points: int = 4000) -> dict[str, Any]:
 
 def _axis(axis: Axis, ends: tuple[float, float]) -> dict[str, Any]:
     out: dict[str, Any] = {
-        "title": {"text": _safe(axis.label)},
+        "title": {"text": _safe(axis.label), "standoff": _CLEAR},
         "type": "log" if axis.scale == "log" else "linear",
         "range": [float(v) for v in placed(np.array(ends), axis.scale)],
         "showgrid": axis.grid,
@@ -129,6 +130,9 @@ def _axis(axis: Axis, ends: tuple[float, float]) -> dict[str, Any]:
         if axis.scale == "symlog":
             places = placed(places, "symlog")
         out |= {"tickmode": "array", "tickvals": places, "ticktext": [w for _, w in marks]}
+    elif axis.scale == "log":
+        # As many as are written at 1, 2 and 5. Without a format their powers of ten are left out.
+        out |= {"nticks": max(4, int(abs(np.log10(ends[1] / ends[0])) / 0.31)), "tickformat": "~g"}
     elif axis.degrees:
         marks = ticks(axis, ends)
         if len(marks) > 1:

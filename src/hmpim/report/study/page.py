@@ -8,10 +8,12 @@ from hmpim.plots.style import printable
 from hmpim.report.figures import Picture
 from hmpim.report.html import page_environment
 
-__all__ = ["Grid", "Section", "StudyPage", "render_study"]
+__all__ = ["Grid", "Section", "StudyPage", "render_study", "unbroken"]
 
 _VALUE = re.compile(r"(-?[\d.]+) ((?:±|−).+?)((?: \?)?)")
 """A value, its error, and the mark of a doubtful one."""
+
+_BESIDE = 8.5  # inches: a wider picture has none beside it
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -75,9 +77,18 @@ class Section:
     pictures: tuple[Picture, ...]
 
     @property
+    def observed_by(self) -> str:
+        """Who observed what was observed before."""
+        return "The paper" if "Fig" in self.title else "Observed before"
+
+    @property
     def is_low(self) -> bool:
         """Whether its pictures have one panel each, so that three sections fill a sheet."""
         return len(self.pictures) > 1 and all(len(p.figure.heights) == 1 for p in self.pictures)
+
+    def is_broad(self, picture: Picture) -> bool:
+        """Whether a picture takes the width of two."""
+        return picture.figure.width > _BESIDE
 
     def is_tall(self, picture: Picture) -> bool:
         """Whether a picture is twice as high as another of its section, beside which it stands."""
@@ -109,6 +120,13 @@ class StudyPage:
     doubtful: bool = False
     upright: bool = False
 
+    @property
+    def verdict(self) -> str:
+        """Colour of the headline, by the name of a verdict; none where nothing was specified."""
+        if self.met and self.doubtful:
+            return "doubtful"
+        return {True: "ok", False: "not_identifiable", None: ""}[self.met]
+
 
 def render_study(page: StudyPage) -> str:
     """Return the page as HTML that needs no other file and no network.
@@ -123,12 +141,19 @@ def render_study(page: StudyPage) -> str:
     text = (
         page_environment("hmpim.report.study")
         .get_template("study.html.j2")
-        .render(page=page, verdict=_verdict(page))
+        .render(page=page, unbroken=unbroken)
     )
     return "\n".join(printable(line) for line in text.splitlines()) + "\n"
 
 
-def _verdict(page: StudyPage) -> str:
-    if page.met and page.doubtful:
-        return "doubtful"
-    return {True: "ok", False: "not_identifiable", None: ""}[page.met]
+def unbroken(cell: str, marks: Sequence[str] = ("± ", " +", " ?")) -> str:
+    """Break no line at the blanks of these marks: of an error, and of what is doubtful.
+
+    Examples
+    --------
+    >>> unbroken("0.5 ± 0.1 ?").count(chr(0xA0))
+    2
+    """
+    for mark in marks:
+        cell = cell.replace(mark, mark.replace(" ", "\N{NO-BREAK SPACE}"))
+    return cell

@@ -73,7 +73,7 @@ KINDS: tuple[Kind, ...] = (
     Kind(
         name="process",
         form="process:COMMAND",
-        words="a program of any language, over standard input and output; see docs/software.md",
+        words="a program of any language, over standard input and output: a line for each sample",
         builder="hmpim.rigs.catalogue.software:build_process",
     ),
     Kind(
@@ -98,7 +98,7 @@ KINDS: tuple[Kind, ...] = (
     Kind(
         name="udp",
         form="udp://HOST:PORT",
-        words="a rig that speaks the datagrams of docs/rigs.md, such as hmpim table --udp",
+        words="a rig that speaks hmpim's datagrams, such as hmpim table --udp",
         builder="hmpim.rigs.catalogue.wired:build_udp",
     ),
     Kind(

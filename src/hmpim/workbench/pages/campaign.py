@@ -53,10 +53,11 @@ class CampaignPage:
             with card("Plans that ship", printed=False):
                 for name in PLANS:
                     ui.button(name, on_click=lambda name=name: self._load(name)).props("flat")
+                ui.label("example has every key that a plan may have.").classes("hm-soft")
         with ui.element("div").classes("hm-body"), card("Plan"):
             self.text = (
                 ui.textarea(
-                    "The plan (TOML); docs/campaign.md lists every key",
+                    "The plan (TOML)",
                     value=self.wish.plan,
                     on_change=lambda e: self._set(plan=e.value),
                 )

@@ -134,3 +134,4 @@ class RunsPage:
                     Picture(found.trend)
                 with card("Parameters"):
                     plain_table(found.columns, found.cells, title="Parameters of the runs")
+        await self.look()  # verdicts are known now

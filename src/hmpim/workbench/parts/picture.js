@@ -210,7 +210,7 @@ export default {
       if (narrow) {
         layout.margin = { ...layout.margin, l: 48, r: 6 };
         layout.font.size = 11;
-        layout.legend = { ...layout.legend, font: { size: 10 } };
+        layout.legend = { ...layout.legend, font: { size: 11 } };
       }
       fitted(layout, this.width, layout.font.size);
       const panels = layout.height - layout.margin.t - layout.margin.b;
