@@ -151,9 +151,8 @@ def follows(words: list[str], row: list[str]) -> bool:
 
 def alike(word: str, found: str) -> bool:
     if NUMBER.match(word) and NUMBER.match(found):
-        digits = len(word.partition(".")[2])
-        last = 0.6 * 10.0**-digits if digits else 0.0
-        return float(found) == pytest.approx(float(word), rel=2e-3, abs=last)
+        last = 10.0 ** -len(word.partition(".")[2])
+        return float(found) == pytest.approx(float(word), rel=2e-3, abs=0.6 * last)
     return word == found
 
 

@@ -62,7 +62,7 @@ def asked(served, path, headers=None, *, host=None, method="GET", body=None):
 
 def test_the_command_of_its_page_serves_pages_on_loopback_alone(served):
     assert served.url.startswith("http://127.0.0.1:")
-    status, page = asked(served, f"/{served.token}/design")
+    status, page = asked(served, f"/{served.token}/design?desk={desk_of(served)}")
     assert status == 200
     assert b"Design" in page
     assert b"hmpim" in page

@@ -107,8 +107,7 @@ def typeset_page(template: Traversable, data: Callable[[Drawn], dict[str, Any]])
             file = f"{count}.svg"
             text = picture.figure.to_svg(width=_PER_MM * across, key=f"p{count}")
             (folder / file).write_text(printable(text), encoding="utf-8")
-            (size,) = _SIZE.findall(text)
-            width, height = map(float, size)
+            width, height = map(float, _SIZE.findall(text)[0])
             return {
                 "file": file,
                 "height": across * height / width,
