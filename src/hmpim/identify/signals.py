@@ -52,8 +52,10 @@ def as_signal(name: str, values: ArrayLike) -> Real:
     return array
 
 
-def as_pair(u: ArrayLike, y: ArrayLike) -> tuple[Real, Real]:
-    """Return input and output as samples of the same shape (n,).
+def as_pair(
+    u: ArrayLike, y: ArrayLike, *, names: tuple[str, str] = ("u", "y")
+) -> tuple[Real, Real]:
+    """Return two signals, input and output or other ones, as samples of the same shape (n,).
 
     Raises
     ------
@@ -66,10 +68,11 @@ def as_pair(u: ArrayLike, y: ArrayLike) -> tuple[Real, Real]:
     >>> y
     array([0., 2., 4., 6.])
     """
-    first, second = as_signal("u", u), as_signal("y", y)
+    first, second = as_signal(names[0], u), as_signal(names[1], y)
     if first.size != second.size:
         raise RecordError(
-            f"u has {first.size} samples and y has {second.size}; cut them to the same span"
+            f"{names[0]} has {first.size} samples and {names[1]} has {second.size}; cut them to "
+            "the same span"
         )
     return first, second
 

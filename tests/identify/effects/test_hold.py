@@ -97,5 +97,5 @@ def test_an_output_that_follows_at_every_sample_is_not_held(step, noise):
 def test_bad_arguments_are_refused():
     with pytest.raises(ArgumentError, match="fs is 0"):
         detect_hold(CHIRP, 0.0)
-    with pytest.raises(RecordError, match="2000 samples and the prediction 5"):
+    with pytest.raises(RecordError, match="2000 samples and the prediction has 5"):
         detect_hold(held(0.1, noise_std=0.1), FS, np.arange(5.0))

@@ -119,7 +119,7 @@ def test_noise_after_the_clip_leaves_a_broad_plateau():
 def test_a_soft_spring_is_not_a_clip():
     noise = 0.02 * np.random.default_rng(0).standard_normal(2000)
     for bent in (CHIRP - 0.2 * CHIRP**3, np.tanh(CHIRP)):
-        assert smeared_plateaus(bent + noise, CHIRP) is None
+        assert smeared_plateaus(bent + noise, CHIRP) == (None, None)
         found = detect_saturation(bent + noise, CHIRP)
         assert (found.low, found.high) == (None, None)
 
@@ -150,7 +150,7 @@ def test_false_alarms_stay_below_one_percent(seeds):
 
 
 def test_unequal_lengths_are_refused():
-    with pytest.raises(RecordError, match="2000 samples and the prediction 1999"):
+    with pytest.raises(RecordError, match="2000 samples and the prediction has 1999"):
         detect_saturation(CHIRP, CHIRP[1:])
 
 

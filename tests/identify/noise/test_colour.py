@@ -101,7 +101,7 @@ def test_an_input_that_excites_everything_cannot_tell():
 
 
 def test_bad_arguments_are_refused():
-    with pytest.raises(RecordError, match="2000 samples and time 1999"):
+    with pytest.raises(RecordError, match="2000 samples and time has 1999"):
         bias_drift(CHIRP, T[1:])
     with pytest.raises(RecordError, match="does not rise after sample 0"):
         bias_drift(CHIRP, -T)

@@ -85,7 +85,7 @@ def test_each_kind_is_named(kind, size, code):
     found, said = inspected(gentle, physics(gentle, kind, size) + noise)
     assert list(said) == ["nonlinear", code]
     assert "odd harmonics" in said["nonlinear"]
-    best = found.mechanisms[0]
+    best = found.seen.mechanisms[0]
     match kind:
         case "spring":
             # The force at the largest deflection of about 1; the linear fit takes some of it.
@@ -94,19 +94,21 @@ def test_each_kind_is_named(kind, size, code):
             assert best.size == pytest.approx(size, abs=2.5 * best.size_std)
         case _:
             assert best.size == pytest.approx(size, rel=0.35)
-    assert found.shares.noise + found.shares.linear + found.shares.nonlinear == pytest.approx(1.0)
-    assert found.shares.nonlinear > 0.03
+    assert found.summary.noise + found.summary.linear + found.summary.nonlinear == pytest.approx(
+        1.0
+    )
+    assert found.summary.nonlinear > 0.03
 
 
 def test_even_and_odd_curves_of_the_scale_are_told_apart():
     noise = 0.005 * np.random.default_rng(1).standard_normal(T.size)
     even, said = inspected(gentle, physics(gentle, "square", 0.05) + noise)
-    assert even.mechanisms[0].kind == "asymmetry"
-    assert even.mechanisms[0].size == pytest.approx(0.05, rel=0.25)
+    assert even.seen.mechanisms[0].kind == "asymmetry"
+    assert even.seen.mechanisms[0].size == pytest.approx(0.05, rel=0.25)
     assert list(said) == ["nonlinear"]
     assert "even harmonics" in said["nonlinear"]
     odd, said = inspected(gentle, physics(gentle, "cube", 0.1) + noise)
-    assert odd.mechanisms[0].kind == "curvature"
+    assert odd.seen.mechanisms[0].kind == "curvature"
     assert "odd harmonics" in said["nonlinear"]
 
 
@@ -114,7 +116,7 @@ def test_what_is_tiny_is_measured_but_no_warning():
     noise = 1e-4 * np.random.default_rng(1).standard_normal(T.size)
     found, said = inspected(gentle, physics(gentle, "friction", 0.001) + noise)
     assert said == {}
-    assert found.harmonics.probability(1) < 1e-5
+    assert found.seen.harmonics.probability(1) < 1e-5
 
 
 def inputs(kind: str, rng: np.random.Generator):
@@ -189,7 +191,7 @@ def test_kinds_are_told_without_a_sweep_too():
         problem = Problem(source=prepare_input(u, "foh"), y=y, valid=None, longest_delay=100.0)
         fit = fit_structure(problem, STRUCTURES["second_order"], START)
         found = inspect_nonlinearity(u, problem, fit, fs=FS)
-        assert found.harmonics is None
+        assert found.seen.harmonics is None
         assert found.findings[1].code == code
 
 
@@ -201,7 +203,7 @@ def test_a_periodic_input_shows_its_distortion_at_lines_left_out():
     problem = Problem(source=prepare_input(u, "foh"), y=y, valid=None, longest_delay=100.0)
     fit = fit_structure(problem, STRUCTURES["static"], np.zeros(1))
     found = inspect_nonlinearity(u, problem, fit, fs=FS)
-    assert found.lines.period == 1000
+    assert found.seen.lines.period == 1000
     assert "even lines left out" in found.findings[0].message
 
 
@@ -253,7 +255,7 @@ def test_the_silverbox_hardens(measured):
             found = inspect_nonlinearity(u[start:stop], joint.problem, joint.best.fit, fs=fs)
         assert [f.code for f in found.findings] == ["nonlinear", "hardening"]
         assert "odd" in found.findings[0].message
-        assert found.shares.nonlinear > 0.5
+        assert found.summary.nonlinear > 0.5
 
 
 @pytest.mark.real_data
@@ -264,12 +266,12 @@ def test_friction_in_a_tight_loop_is_no_large_nonlinearity(measured):
         joint = joint_fit(u, y, intersample="bandlimited", structures=("second_order",))
         found = inspect_nonlinearity(u, joint.problem, joint.best.fit, fs=1000.0)
     assert found.findings == ()
-    assert found.rms < 1e-3 * np.std(y)
+    assert found.seen.rms < 1e-3 * np.std(y)
 
 
 def test_unequal_lengths_are_refused():
     u = chirp(T)
     problem = Problem(source=prepare_input(u, "foh"), y=u, valid=None, longest_delay=9.0)
     fit = fit_structure(problem, STRUCTURES["static"], np.zeros(1))
-    with pytest.raises(RecordError, match="u has 1999 samples and the output 2000"):
+    with pytest.raises(RecordError, match="u has 1999 samples and the output has 2000"):
         inspect_nonlinearity(u[1:], problem, fit, fs=FS)

@@ -165,7 +165,7 @@ def _moved_at_once(
     """All pairs moved together until none is left out, with the errors of all."""
     _refine(y, fits, [j for j in fits if related[j]], None)
     # What was not white may have been no noise but what one of them had not given back yet.
-    whitening = _whitening(y, fits, related, strong)
+    whitening = whitening_of(_left(y, fits, related, strong))
     _refine(y, fits, [j for j in fits if related[j]], whitening)
     while _together(y, fits, related, strong, whitening, alike):
         _refine(y, fits, [j for j in fits if related[j]], whitening)
@@ -231,26 +231,22 @@ def _fit_couplings(
 ) -> None:
     """Fit, in place, all that is weak, the strongest first."""
     best = fits[strong[0]]
-    mode, counts = best.best.intersample, best.problem.valid
+    mode = best.best.intersample
     weak = [j for j in range(len(inputs)) if j not in strong]
     if not weak:
         return
-
-    def left() -> Real:
-        rest = y - _others(fits, related, None) - best.best.fit.linear[-1]
-        return rest if counts is None else np.asarray(rest * counts)
-
     latest = max(PART * y.size, 4.0 * best.best.fit.delay) + 2.0
-    whitening = whitening_of(left())
+    rest = _left(y, fits, related, strong)
+    whitening = whitening_of(rest)
     sources = {j: prepare_input(inputs[j], mode) for j in weak}
     roughly = tuple(name for name in structures if name == "first_order") or structures
     known = all(j in fits for j in weak)
     for names in (structures,) if known else (roughly, structures):  # each whitened anew
-        for j in sorted(weak, key=lambda j: -_follows_at_all(inputs[j], left())):
+        for j in sorted(weak, key=lambda j: -_follows_at_all(inputs[j], rest)):
             problem = Problem(
                 source=sources[j],
                 y=y - _others(fits, related, j),
-                valid=counts,
+                valid=best.problem.valid,
                 longest_delay=latest,
                 whitening=whitening,
             )
@@ -259,7 +255,8 @@ def _fit_couplings(
         # Not before all are right is one of them tested: alike, they take each other's share.
         while _together(y, fits, related, strong, whitening, alike, drop=names is structures):
             pass
-        whitening = whitening_of(left())
+        rest = _left(y, fits, related, strong)
+        whitening = whitening_of(rest)
 
 
 def _together(
@@ -325,14 +322,14 @@ def _refine(
     return problems, found
 
 
-def _whitening(
+def _left(
     y: Real, fits: dict[int, JointFit], related: dict[int, bool], strong: tuple[int, ...]
-) -> Real | None:
-    """How to whiten what all of them leave over."""
+) -> Real:
+    """What all of them leave over."""
     best = fits[strong[0]]
     rest = y - _others(fits, related, None) - best.best.fit.linear[-1]
     counts = best.problem.valid
-    return whitening_of(rest if counts is None else np.asarray(rest * counts))
+    return rest if counts is None else np.asarray(rest * counts)
 
 
 def _too_slow(fit: Fit, samples: int) -> bool:

@@ -31,7 +31,7 @@ def gained_by(problems: Sequence[Problem], fits: Sequence[Fit], i: int) -> float
         rows = jacobian(p, f)[:-1]
         blocks.append(rows[f.theta.size :] if j == i else rows)
     rows = np.vstack([*blocks, problems[0].masked(np.ones(problems[0].y.size))])
-    residual = _whitened(problems[i], fits[i])
+    residual = problems[i].masked(fits[i].residual)
     full = joint_covariance(rows, residual, freedom=problems[i].counted, white=True)
     start = sum(block.shape[0] for block in blocks[:i])
     span = slice(start, start + blocks[i].shape[0])
@@ -67,7 +67,3 @@ def _orthogonal(rows: Real) -> Real:
         out[k] = 0.0
         out[k, k % rows.shape[1]] = 1.0
     return out
-
-
-def _whitened(problem: Problem, fit: Fit) -> Real:
-    return problem.masked(fit.residual)

@@ -11,10 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from hmpim.errors import RecordError
 from hmpim.identify.arrays import Real, every_of, median
 from hmpim.identify.chance import BULK, DEVIATIONS
-from hmpim.identify.signals import as_signal, check_rate
+from hmpim.identify.signals import as_pair, as_signal, check_rate
 from hmpim.identify.worth import FEW, MOST, NEARLY, PART
 
 __all__ = ["Hold", "Updates", "detect_hold", "updates"]
@@ -186,11 +185,7 @@ def _spread_out(levels: Real, apart: float) -> bool:
 
 
 def _moves_within(samples: Real, changed: NDArray[np.intp], prediction: ArrayLike) -> bool:
-    model = as_signal("prediction", prediction)
-    if model.size != samples.size:
-        raise RecordError(
-            f"y has {samples.size} samples and the prediction {model.size}; give one for each"
-        )
+    _, model = as_pair(samples, prediction, names=("y", "the prediction"))
     motion = np.diff(model)
     standing = np.ones(motion.size, dtype=bool)
     standing[changed - 1] = False

@@ -7,18 +7,17 @@ distance, and a square wave has no values below its extreme at all. Where a pred
 hand the question is simpler: does it go on beyond the level?
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
 import scipy
 from numpy.typing import ArrayLike, NDArray
 
-from hmpim.errors import RecordError
 from hmpim.identify.arrays import Mask, Real, every_of, median
 from hmpim.identify.chance import BULK, DEVIATIONS, FALSE_ALARM, ONE_SIDED, deviations
-from hmpim.identify.effects.smeared import smeared_plateaus
-from hmpim.identify.signals import as_signal
+from hmpim.identify.effects.smeared import Side, smeared_plateaus
+from hmpim.identify.signals import as_pair, as_signal
 from hmpim.identify.worth import FEW, MATERIAL, MOST, MUCH, NEARLY, TOLERATED, TWICE
 
 __all__ = ["NoiseAt", "Saturation", "detect_saturation"]
@@ -80,16 +79,6 @@ class Saturation:
         return float(np.mean(self.clipped))
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class _Side:
-    """One level, seen from below."""
-
-    level: float
-    std: float
-    at: Mask
-    exact: bool
-
-
 def detect_saturation(
     y: ArrayLike, prediction: ArrayLike | None = None, *, step: float = 0.0
 ) -> Saturation:
@@ -126,24 +115,20 @@ def detect_saturation(
     >>> detect_saturation(y).high is None
     True
     """
-    samples = as_signal("y", y)
-    model = None
+    samples, model = as_signal("y", y), None
     if prediction is not None:
-        model = as_signal("prediction", prediction)
-        if model.size != samples.size:
-            raise RecordError(
-                f"y has {samples.size} samples and the prediction {model.size}; "
-                "give one for each sample"
-            )
+        samples, model = as_pair(samples, prediction, names=("y", "the prediction"))
     scatter = _scatter(samples)
     high = _upper(samples, model, step, scatter)
     low = _upper(-samples, None if model is None else -model, step, scatter)
-    if high is None and low is None and model is not None:
-        return _smeared(samples, model, step)
+    if low is not None:
+        low = replace(low, level=-low.level)
+    if high is None and low is None and model is not None:  # only the prediction may show it
+        low, high = smeared_plateaus(samples, model, step=step)
     nothing = np.zeros(samples.size, dtype=bool)
     exact = all(side.exact for side in (low, high) if side is not None)
     return Saturation(
-        low=None if low is None else -low.level,
+        low=None if low is None else low.level,
         high=None if high is None else high.level,
         low_std=None if low is None else low.std,
         high_std=None if high is None else high.std,
@@ -154,34 +139,7 @@ def detect_saturation(
     )
 
 
-def _smeared(y: Real, prediction: Real, step: float) -> Saturation:
-    """Clipping that only the prediction shows."""
-    found = smeared_plateaus(y, prediction, step=step)
-    nothing = np.zeros(y.size, dtype=bool)
-    if found is None:
-        return Saturation(
-            low=None,
-            high=None,
-            low_std=None,
-            high_std=None,
-            clipped_low=nothing,
-            clipped_high=nothing,
-            noise="before",
-            tolerance=0.5 * step,
-        )
-    return Saturation(
-        low=found.low,
-        high=found.high,
-        low_std=None if found.low is None else found.low_std,
-        high_std=None if found.high is None else found.high_std,
-        clipped_low=found.below,
-        clipped_high=found.above,
-        noise="after",
-        tolerance=0.5 * step,
-    )
-
-
-def _upper(y: Real, prediction: Real | None, step: float, sigma: float) -> _Side | None:
+def _upper(y: Real, prediction: Real | None, step: float, sigma: float) -> Side | None:
     """The upper level, by exact ties; without a prediction, by a plateau with scatter too."""
     span = float(np.ptp(y))
     if span == 0.0:
@@ -211,7 +169,7 @@ def _scatter(y: Real) -> float:
     return _spread(last - first + 3.0 * (second - third)) / float(np.sqrt(20.0))
 
 
-def _exact(y: Real, span: float, step: float) -> _Side | None:
+def _exact(y: Real, span: float, step: float) -> Side | None:
     """Samples that share the greatest value, if it is not just any value that recurs."""
     rounding = max(1e-11 * span, 8 * np.finfo(float).eps * float(np.max(np.abs(y))))
     tolerance = max(rounding, 0.5 * step)
@@ -220,10 +178,10 @@ def _exact(y: Real, span: float, step: float) -> _Side | None:
     if np.count_nonzero(at) < _FEWEST:
         return None
     error = step / np.sqrt(12.0) if step else rounding
-    return _Side(level=top, std=float(error), at=at, exact=True)
+    return Side(level=top, std=float(error), at=at, exact=True)
 
 
-def _scattered(y: Real, sigma: float) -> _Side | None:
+def _scattered(y: Real, sigma: float) -> Side | None:
     """A crowd of samples within a few `sigma` of the top."""
     top = float(y.max())
     most = deviations(y.size) * sigma  # a level further below the top is none
@@ -246,7 +204,7 @@ def _scattered(y: Real, sigma: float) -> _Side | None:
     if count < 3 * _FEWEST or top > level + most:
         return None
     width = float(np.std(y[near]))
-    return _Side(
+    return Side(
         level=float(np.mean(y[near])),
         std=width / float(np.sqrt(count)),
         at=y > level - DEVIATIONS * sigma,
@@ -255,7 +213,7 @@ def _scattered(y: Real, sigma: float) -> _Side | None:
 
 
 def _is_clipped(
-    y: Real, side: _Side, prediction: Real | None, step: float, span: float, scatter: float
+    y: Real, side: Side, prediction: Real | None, step: float, span: float, scatter: float
 ) -> bool:
     resolution = max(float(side.level - y[side.at].min()), 0.5 * step, 1e-9 * span)
     if side.exact:
@@ -303,7 +261,7 @@ def _visits(at: Mask) -> NDArray[np.intp]:
     return np.stack([first[inside], last[inside]], axis=1)
 
 
-def _is_flat(y: Real, side: _Side, resolution: float, reach: float) -> bool:
+def _is_flat(y: Real, side: Side, resolution: float, reach: float) -> bool:
     """Whether the level is met and left at speed, the same either way, and is flat between."""
     visits = _visits(side.at)
     if visits.shape[0] < _VISITS:
@@ -333,7 +291,7 @@ def _neither_bends_nor_tilts(y: Real, visits: NDArray[np.intp], sigma: float) ->
     return bool(abs(weights[1]) < sigma and abs(weights[2]) < sigma)
 
 
-def _goes_beyond(y: Real, side: _Side, prediction: Real, resolution: float, scatter: float) -> bool:
+def _goes_beyond(y: Real, side: Side, prediction: Real, resolution: float, scatter: float) -> bool:
     """Whether the prediction, set right on the other samples, exceeds the level at the level."""
     slope = np.gradient(prediction)
     rows = np.stack([np.ones(y.size), prediction, slope, np.gradient(slope)])

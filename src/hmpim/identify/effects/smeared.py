@@ -15,7 +15,7 @@ from hmpim.identify.chance import CLEARLY, SEARCHED, deviations
 from hmpim.identify.noise.whiteness import effective_share
 from hmpim.identify.worth import FEW, MUCH, WORTH
 
-__all__ = ["Plateaus", "smeared_plateaus"]
+__all__ = ["Side", "smeared_plateaus"]
 
 _FEWEST = 12
 """Samples at a level."""
@@ -28,18 +28,13 @@ _STARTS = (0.6, 0.75, 0.85, 0.92, 0.97)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Plateaus:
-    """Levels, their standard deviations, and the samples whose prediction lies beyond.
+class Side:
+    """One level, its standard deviation, the samples at it, and whether their values tie."""
 
-    `low` or `high` is None where that side is not clipped.
-    """
-
-    low: float | None
-    high: float | None
-    low_std: float
-    high_std: float
-    below: Mask
-    above: Mask
+    level: float
+    std: float
+    at: Mask
+    exact: bool
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -53,7 +48,9 @@ class _Split:
     weights: Real
 
 
-def smeared_plateaus(y: Real, prediction: Real, *, step: float = 0.0) -> Plateaus | None:
+def smeared_plateaus(
+    y: Real, prediction: Real, *, step: float = 0.0
+) -> tuple[Side | None, Side | None]:
     """Find levels at which `y` was clipped before noise was added.
 
     Parameters
@@ -65,34 +62,33 @@ def smeared_plateaus(y: Real, prediction: Real, *, step: float = 0.0) -> Plateau
 
     Returns
     -------
-    Plateaus or None
+    low, high : Side or None
+        Samples are at a level where their prediction lies beyond; None where it is not clipped.
 
     Examples
     --------
     >>> p = np.sin(np.arange(2000) / 50)
     >>> noise = 0.1 * np.random.default_rng(0).standard_normal(2000)
-    >>> found = smeared_plateaus(np.minimum(p, 0.7) + noise, p)
-    >>> round(found.high, 1), found.low
+    >>> low, high = smeared_plateaus(np.minimum(p, 0.7) + noise, p)
+    >>> round(high.level, 1), low
     (0.7, None)
-    >>> smeared_plateaus(p + noise, p) is None
-    True
+    >>> smeared_plateaus(p + noise, p)
+    (None, None)
     """
     slope = np.gradient(prediction)
     everything = np.stack([np.ones(y.size), prediction, slope, np.gradient(slope)])
     every = 1 + y.size // _MOST  # a long record tells as well by some of its samples
     rows, prediction, y = everything[:, ::every], prediction[::every], y[::every]
     sides = _falls_short(y, rows)
-    if not any(sides):
-        return None
-    best = _best_split(y, rows, sides)
+    best = _best_split(y, rows, sides) if any(sides) else None
     if best is None:
-        return None
+        return None, None
     # Slow noise bends the output as well: fewer of its samples are independent.
     model = np.clip(best.unclipped, best.low, best.high)
     variance = best.cost / y.size / effective_share(y - model)
     bent = np.vstack([rows, prediction**2, prediction**3])
     if _cost(y, bent) - best.cost < 2 * CLEARLY * variance:
-        return None
+        return None, None
     least = max(MUCH * float(np.sqrt(best.cost / y.size)), step, WORTH * float(np.ptp(y)))
     excess = np.abs(best.unclipped - np.clip(best.unclipped, best.low, best.high))
     kept = tuple(
@@ -101,21 +97,20 @@ def smeared_plateaus(y: Real, prediction: Real, *, step: float = 0.0) -> Plateau
         for clipped, others in ((best.below, (False, sides[1])), (best.above, (sides[0], False)))
     )
     if not any(kept):
-        return None
+        return None, None
     if kept != (bool(best.below.any()), bool(best.above.any())):
         best = _best_split(y, rows, (kept[0], kept[1]))
         if best is None:
-            return None
-    sigma = float(np.sqrt(variance))
-    counts = int(np.count_nonzero(best.below)), int(np.count_nonzero(best.above))
-    unclipped = best.weights @ everything
-    return Plateaus(
-        low=best.low if kept[0] else None,
-        high=best.high if kept[1] else None,
-        low_std=sigma / float(np.sqrt(max(counts[0], 1))),
-        high_std=sigma / float(np.sqrt(max(counts[1], 1))),
-        below=unclipped < best.low if kept[0] else np.zeros(unclipped.size, dtype=bool),
-        above=unclipped > best.high if kept[1] else np.zeros(unclipped.size, dtype=bool),
+            return None, None
+    sigma, unclipped = float(np.sqrt(variance)), best.weights @ everything
+
+    def side(level: float, clipped: Mask, at: Mask) -> Side:
+        std = sigma / float(np.sqrt(max(int(np.count_nonzero(clipped)), 1)))
+        return Side(level=level, std=std, at=at, exact=False)
+
+    return (
+        side(best.low, best.below, unclipped < best.low) if kept[0] else None,
+        side(best.high, best.above, unclipped > best.high) if kept[1] else None,
     )
 
 

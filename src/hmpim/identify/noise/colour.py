@@ -15,7 +15,7 @@ from hmpim.identify.arrays import Real
 from hmpim.identify.chance import SEARCHED
 from hmpim.identify.noise.covariance import covariance
 from hmpim.identify.noise.whiteness import autocovariance, effective_share, is_white
-from hmpim.identify.signals import as_signal, check_rate
+from hmpim.identify.signals import as_pair, as_signal, check_rate
 from hmpim.identify.worth import TOLERATED
 
 __all__ = ["Colour", "Drift", "NoiseColour", "bias_drift", "line_of", "noise_colour", "tone_of"]
@@ -164,9 +164,7 @@ def bias_drift(residual: ArrayLike, time: ArrayLike) -> Drift:
     >>> bool(abs(found.slope - 0.05) < 3 * found.std), found.probability < 1e-4
     (True, True)
     """
-    e, t = as_signal("residual", residual), as_signal("time", time)
-    if e.size != t.size:
-        raise RecordError(f"the residual has {e.size} samples and time {t.size}; give one for each")
+    e, t = as_pair(residual, time, names=("the residual", "time"))
     if not np.all(np.diff(t) > 0):
         k = int(np.argmin(np.diff(t) > 0))
         raise RecordError(f"time does not rise after sample {k} ({t[k]:.9g} s); sort the record")

@@ -14,7 +14,7 @@ from hmpim.identify.chance import FALSE_ALARM, LIKELIER, searched
 from hmpim.identify.fitting.fit import Fit, Problem, jacobian
 from hmpim.identify.noise.whiteness import is_white
 from hmpim.identify.nonlinear.harmonic_kinds import compare_harmonics
-from hmpim.identify.nonlinear.harmonics import Harmonics, any_harmonic, sweep_harmonics
+from hmpim.identify.nonlinear.harmonics import Harmonics, any_harmonics, sweep_harmonics
 from hmpim.identify.nonlinear.lines import Lines, detection_lines, find_period
 from hmpim.identify.nonlinear.mechanisms import Mechanism, compare_mechanisms
 from hmpim.identify.nonlinear.sweep_phase import SweepPhase, sweep_phase
@@ -79,7 +79,7 @@ def _by_harmonics(look: Look, sweep: SweepPhase, fit: Fit, white: bool) -> Seen:
     rate, delay = look.fs / look.block, fit.delay / look.fs
     if (
         white
-        and any_harmonic(residual, sweep, rate, delay=delay) > FALSE_ALARM
+        and any_harmonics(residual[None], sweep, rate, delay=delay)[0] > FALSE_ALARM
         and not _curved(fit, look.problem)
     ):
         return Seen(fit=fit)

@@ -29,7 +29,7 @@ from hmpim.identify.nonlinear.harmonic_regression import (
 from hmpim.identify.nonlinear.sweep_phase import SweepPhase, sweep_phase
 from hmpim.identify.signals import as_pair, check_rate
 
-__all__ = ["Harmonic", "Harmonics", "any_harmonic", "any_harmonics", "sweep_harmonics"]
+__all__ = ["Harmonic", "Harmonics", "any_harmonics", "sweep_harmonics"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -152,41 +152,27 @@ def sweep_harmonics(
     return _tested(fit_harmonics(e, view, others, delay * fs), fs)
 
 
-def any_harmonic(residual: ArrayLike, sweep: SweepPhase, fs: float, *, delay: float = 0.0) -> float:
-    """Chance that noise alone makes the harmonics seen in a white residual: a quick look.
+def any_harmonics(residuals: Real, sweep: SweepPhase, fs: float, *, delay: float) -> Real:
+    """Chances that noise alone makes the harmonics seen in white residuals: a quick look.
 
-    A tenth of the work of `sweep_harmonics`, and only as good as the residual is white: it
+    A tenth of the work of `sweep_harmonics`, and only as good as the residuals are white: it
     tells where nothing need be looked for.
 
     Parameters
     ----------
-    residual : array_like, shape (n,)
+    residuals : ndarray, shape (k, n)
         Output less prediction; 0 where a sample does not count.
     sweep : SweepPhase
         From `hmpim.identify.nonlinear.sweep_phase.sweep_phase`.
     fs : float
         Rate in Hz.
     delay : float
-        Delay of the system, s.
+        Delay of the system, s, to the sample: half a one turns the harmonics of a stretch alike,
+        and their size is what is asked for.
 
-    Examples
-    --------
-    >>> t = np.arange(2000) / 200
-    >>> u = np.sin(2 * np.pi * (0.1 * t + t**2))
-    >>> noise = 0.01 * np.random.default_rng(0).standard_normal(2000)
-    >>> sweep = sweep_phase(u, 200.0)
-    >>> any_harmonic(noise, sweep, 200.0) > 0.01
-    True
-    >>> any_harmonic(0.01 * u**2 + noise, sweep, 200.0) < 1e-20
-    True
-    """
-    return float(any_harmonics(np.asarray(residual)[None], sweep, fs, delay=delay)[0])
-
-
-def any_harmonics(residuals: Real, sweep: SweepPhase, fs: float, *, delay: float) -> Real:
-    """The same of many residuals, (k, n), that come as late, to the sample; shape (k,).
-
-    Half a sample turns the harmonics of a stretch alike, and their size is what is asked for.
+    Returns
+    -------
+    ndarray, shape (k,)
 
     Examples
     --------

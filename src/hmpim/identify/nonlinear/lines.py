@@ -59,8 +59,6 @@ class Lines:
     ----------
     period : int
         Samples.
-    periods : int
-        How many were averaged.
     levels : tuple of LineLevel
         For each parity that has lines left out.
     noise_rms : float
@@ -68,7 +66,6 @@ class Lines:
     """
 
     period: int
-    periods: int
     levels: tuple[LineLevel, ...]
     noise_rms: float
 
@@ -183,7 +180,6 @@ def detection_lines(u: ArrayLike, y: ArrayLike, *, period: int) -> Lines | None:
         return None
     return Lines(
         period=int(period),
-        periods=periods,
         levels=tuple(levels),
         noise_rms=float(np.sqrt(np.mean(scatter[silent]))),
     )

@@ -12,65 +12,35 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hmpim.errors import RecordError
 from hmpim.identify.arrays import Real
 from hmpim.identify.chance import FALSE_ALARM, HALF
 from hmpim.identify.fitting.fit import Fit, Problem
 from hmpim.identify.nonlinear.evidence import Look, Seen, look_at, plainer_of, thinned
 from hmpim.identify.nonlinear.harmonic_regression import SweepView
-from hmpim.identify.nonlinear.harmonics import Harmonics
-from hmpim.identify.nonlinear.lines import Lines
 from hmpim.identify.nonlinear.mechanisms import Mechanism
 from hmpim.identify.nonlinear.sweep_phase import sweep_phase
 from hmpim.identify.nonlinear.words import general, particular
 from hmpim.identify.result import Estimate, HarmonicCurve, Nonlinearity
 from hmpim.identify.result.digits import percent
-from hmpim.identify.signals import as_signal
+from hmpim.identify.signals import as_pair
 from hmpim.identify.worth import MATERIAL, WORTH
 from hmpim.record import Finding
 
-__all__ = ["Inspection", "Shares", "inspect_nonlinearity"]
+__all__ = ["Inspection", "inspect_nonlinearity"]
 
 _LONGEST = 32768
 """Samples of a sweep looked at one by one; longer records are averaged in blocks first."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Shares:
-    """What the power of the residual is made of; the three add to 1.
-
-    Parameters
-    ----------
-    noise : float
-        Noise.
-    linear : float
-        What follows the input at its own frequency: dynamics left out, and the part of a
-        nonlinearity that looks linear. 0 where it is not told from noise.
-    nonlinear : float
-        What no linear system makes.
-    """
-
-    noise: float
-    linear: float
-    nonlinear: float
-
-
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Inspection:
-    """What was found; None where the input does not allow it or there was nothing to ask.
+    """What was found.
 
     Parameters
     ----------
-    harmonics : Harmonics or None
-        For a sweep whose residual gave reason to look.
-    lines : Lines or None
-        For a periodic input with lines left out.
-    mechanisms : tuple of Mechanism
-        The likeliest first; empty where nothing nonlinear was seen.
-    shares : Shares
-        Of the residual's power.
-    rms : float
-        R.m.s. of the nonlinear part, in the output's unit.
+    seen : Seen
+        What the tests gave: harmonics of a sweep whose residual gave reason to look, lines of a
+        periodic input with lines left out, the likeliest kinds.
     findings : tuple of Finding
         Code 'nonlinear' if it matters; then the code of the kind where it can be named:
         'hardening', 'softening', 'friction', 'backlash', 'rate_limit', 'saturation'.
@@ -81,11 +51,7 @@ class Inspection:
         The same, as the result keeps it.
     """
 
-    harmonics: Harmonics | None
-    lines: Lines | None
-    mechanisms: tuple[Mechanism, ...]
-    shares: Shares
-    rms: float
+    seen: Seen
     findings: tuple[Finding, ...]
     fit: Fit
     summary: Nonlinearity
@@ -143,14 +109,10 @@ def inspect_nonlinearity(
     >>> data = Problem(source=prepare_input(u, "bandlimited"), y=y, valid=None, longest_delay=9.0)
     >>> fit = fit_structure(data, STRUCTURES["static"], np.zeros(1))
     >>> found = inspect_nonlinearity(u, data, fit, fs=200.0)
-    >>> found.mechanisms[0].kind, [finding.code for finding in found.findings]
+    >>> found.seen.mechanisms[0].kind, [finding.code for finding in found.findings]
     ('curvature', ['nonlinear'])
     """
-    source = as_signal("u", u)
-    if source.size != problem.y.size:
-        raise RecordError(
-            f"u has {source.size} samples and the output {problem.y.size}; give one for each"
-        )
+    source, _ = as_pair(u, problem.y, names=("u", "the output"))
     counted = problem.y if problem.valid is None else problem.y[problem.valid]
     output = float(np.std(counted))
     block = -(-source.size // _LONGEST)
@@ -168,7 +130,7 @@ def inspect_nonlinearity(
             general(
                 share=seen.rms / output,
                 where=_where(seen, output),
-                made_of=(shares.noise, shares.linear, shares.nonlinear),
+                made_of=shares,
                 kinds=named,
                 effect=seen.effect / output,
                 asked=not others,
@@ -180,11 +142,7 @@ def inspect_nonlinearity(
         if of_kind is not None:
             findings.append(of_kind)
     return Inspection(
-        harmonics=seen.harmonics,
-        lines=seen.lines,
-        mechanisms=seen.mechanisms,
-        shares=shares,
-        rms=seen.rms,
+        seen=seen,
         findings=tuple(findings),
         fit=seen.fit if matters else fit,
         summary=_summary(look, seen, shares, output, unit=unit, named=named),
@@ -196,15 +154,16 @@ def _is_large(seen: Seen, output: float) -> bool:
     return seen.effect > MATERIAL * output
 
 
-def _shares(seen: Seen, power: float) -> Shares:
+def _shares(seen: Seen, power: float) -> tuple[float, float, float]:
+    """Noise, what follows the input at its own frequency, and what no linear system makes."""
     if power <= 0:
-        return Shares(noise=0.0, linear=0.0, nonlinear=0.0)
+        return 0.0, 0.0, 0.0
     if seen.harmonics is None:
         nonlinear = min(seen.rms**2 / power, 1.0)
-        return Shares(noise=1.0 - nonlinear, linear=0.0, nonlinear=nonlinear)
+        return 1.0 - nonlinear, 0.0, nonlinear
     parts = np.square([seen.harmonics.noise_rms, seen.harmonics.fundamental_rms, seen.rms])
     noise, linear, nonlinear = parts / parts.sum()
-    return Shares(noise=float(noise), linear=float(linear), nonlinear=float(nonlinear))
+    return float(noise), float(linear), float(nonlinear)
 
 
 def _where(seen: Seen, output: float) -> list[str]:
@@ -231,7 +190,7 @@ def _where(seen: Seen, output: float) -> list[str]:
 def _summary(
     look: Look,
     seen: Seen,
-    shares: Shares,
+    shares: tuple[float, float, float],
     output: float,
     *,
     unit: str,
@@ -271,13 +230,14 @@ def _summary(
             ci95=(value - HALF * std, value + HALF * std),
             unit=measures.get(named[0].kind, ""),
         )
+    noise, linear, nonlinear = shares
     return Nonlinearity(
         share=seen.rms / output if output else 0.0,
         even=even,
         odd=odd,
-        noise=shares.noise,
-        linear=shares.linear,
-        nonlinear=shares.nonlinear,
+        noise=noise,
+        linear=linear,
+        nonlinear=nonlinear,
         kinds=tuple(m.kind for m in named),
         size=size,
         harmonics=curves,
