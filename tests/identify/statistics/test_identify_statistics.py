@@ -1,5 +1,7 @@
 """Identification from statistics: the same figures as from the samples, and honest bars."""
 
+import functools
+
 import numpy as np
 import pytest
 from scipy.signal import lfilter
@@ -59,6 +61,44 @@ def test_a_run_in_mid_motion_is_conditioned_and_says_so():
     for name, value in TRUE.items():
         estimate = getattr(pair, name)
         assert abs(estimate.value - value) < 4 * estimate.std, name
+
+
+def modes(*pairs):
+    """Numerator and denominator of a sum of modes of equal gains, at (Hz, damping ratio)."""
+    below = [np.array([1 / (2 * np.pi * f) ** 2, 2 * z / (2 * np.pi * f), 1.0]) for f, z in pairs]
+    others = [
+        functools.reduce(np.polymul, [b for j, b in enumerate(below) if j != i])
+        for i in range(len(below))
+    ]
+    above = functools.reduce(np.polyadd, others) / len(below)
+    return tuple(above), tuple(functools.reduce(np.polymul, below))
+
+
+RICHER = {
+    "third_order": ((1.0,), tuple(np.polymul([0.02, 1.0], MODEL.denominator))),
+    "washout": ((0.1, 0.0), (0.1, 1.0)),
+    "two_modes": modes((4.0, 0.05), (9.0, 0.05)),
+}
+
+
+@pytest.mark.parametrize("name", RICHER)
+def test_richer_structures_are_found_as_from_the_record(name):
+    numerator, denominator = RICHER[name]
+    model = hmpim.Model(
+        delay=0.05,
+        scale_factor=1.0,
+        bias=0.6,
+        noise_std=0.01,
+        numerator=numerator,
+        denominator=denominator,
+    )
+    record = chirped(7, 6000, model=model)
+    compressed, whole = identify(compress(record))["y", "u"], identify(record)["y", "u"]
+    assert compressed.structure == whole.structure == name
+    assert (
+        abs(compressed.delay.value - whole.delay.value) < 0.25 * whole.delay.std
+    )  # other samples at the ends
+    assert compressed.delay.std == pytest.approx(whole.delay.std, rel=0.05)
 
 
 def jointly(records, theta, lags, common):

@@ -5,9 +5,10 @@ import pytest
 
 import hmpim
 from hmpim import HmpimError, LiveEstimator
+from hmpim.identify.fitting.fit import fit_structure
 from hmpim.identify.fitting.rows import Part
-from hmpim.identify.statistics.begin import only_told
-from hmpim.identify.statistics.fit import fit_products, pulse
+from hmpim.identify.statistics.fit import Compressed, pulse
+from hmpim.identify.statistics.live import only_told
 from hmpim.identify.statistics.products import Products
 from hmpim.model.dynamics import STRUCTURES
 from hmpim.stimulus import Chirp, Stimulus
@@ -70,31 +71,26 @@ def test_the_estimate_closes_in_and_ends_as_the_whole_record_says(seed):
 def test_a_settled_look_is_the_whole_fit_of_what_was_read():
     u, y = answered(10.0, 2)
     live = LiveEstimator(STIMULUS)
-    problem = pulse(live.statistics.reach, "bandlimited")
+    source = pulse(live.statistics.reach, "bandlimited")
     compared = 0
     for first in range(0, u.size, 10):
         look = live.update(u[first : first + 10], y[first : first + 10])
         if look is None or look.time < 1.0 or first % 20:
             continue
         structure = STRUCTURES["second_order"]
-        whole = fit_products(
-            Products(live.statistics, skipped=0),
-            problem,
-            "bandlimited",
-            structure,
-            np.array([30.0, np.log(3.0), 1.5]),
-            precision=1e-10,
-        )
+        problem = Compressed.of(Products(live.statistics, skipped=0), source)
+        start = np.array([30.0, np.log(3.0), 1.5])
+        whole = fit_structure(problem, structure, start, precision=1e-10)
         std = np.sqrt(np.diag(whole.covariance))
-        zeta = 0.5 / np.sqrt(whole.fit.theta[2])
-        hertz = 2.0 * zeta * np.exp(-whole.fit.theta[1]) * FS / (2.0 * np.pi)
+        zeta = 0.5 / np.sqrt(whole.theta[2])
+        hertz = 2.0 * zeta * np.exp(-whole.theta[1]) * FS / (2.0 * np.pi)
         found = look.parameters
         for here, there in (
-            (found.delay, whole.fit.delay / FS),
+            (found.delay, whole.delay / FS),
             (found.natural_frequency, hertz),
             (found.damping_ratio, zeta),
-            (found.scale_factor, whole.fit.linear[0]),
-            (found.bias, whole.fit.linear[-1]),
+            (found.scale_factor, whole.linear[0]),
+            (found.bias, whole.linear[-1]),
         ):
             assert abs(here.value - there) < 0.05 * here.std
         assert found.delay.std == pytest.approx(std[0] / FS, rel=0.02)
@@ -132,11 +128,10 @@ def test_lags_that_a_run_has_not_lasted_tell_nothing():
     assert (short.lags, whole.lags) == (u.size, 200)
     costs = []
     for statistics in (whole, short):
-        problem = pulse(statistics.reach, "bandlimited")
-        products = Products(statistics, skipped=0)
-        theta = np.array([28.0, 1.0, 2.0])
-        fitted = fit_products(products, problem, "bandlimited", structure, theta)
-        costs.append((fitted.fit.objective, *fitted.fit.theta, *np.diag(fitted.covariance)))
+        source = pulse(statistics.reach, "bandlimited")
+        problem = Compressed.of(Products(statistics, skipped=0), source)
+        fitted = fit_structure(problem, structure, np.array([28.0, 1.0, 2.0]))
+        costs.append((fitted.objective, *fitted.theta, *np.diag(fitted.covariance)))
     assert costs[1] == pytest.approx(costs[0], rel=1e-5)
 
 

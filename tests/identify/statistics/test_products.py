@@ -46,7 +46,7 @@ def test_products_are_those_of_the_samples(kind, skipped, noise):
     bias = "common" if kind == "common" else "own"
     parts = [compress(r, lags=LAGS, knots=knots, bias=bias) for r in records]
     statistics = parts[0] + parts[1]
-    products = Products(statistics, skipped=skipped, noise=np.array(noise))
+    products = Products(statistics, skipped=skipped).whitened(np.array(noise))
     rng = np.random.default_rng(5)
     decay = np.exp(-np.arange(statistics.reach.taps) / 9.0)
     rows = rng.standard_normal((3, decay.size)) * decay

@@ -22,6 +22,7 @@ from hmpim.identify.effects.held import held_prediction, rows_at_updates
 from hmpim.identify.effects.hold import Updates
 from hmpim.identify.effects.saturation import Saturation
 from hmpim.identify.fitting.fit import Fit, Problem, fit_structure
+from hmpim.identify.fitting.least_squares import inverted
 from hmpim.identify.noise.autoregression import autoregression, spectrum_behind
 from hmpim.identify.noise.whiteness import is_white
 from hmpim.identify.worth import NEARLY
@@ -30,6 +31,9 @@ __all__ = ["CensoredFit", "fit_censored"]
 
 _LARGEST_STEP = 0.5
 """Most that a parameter of the dynamics may change in one step, relative to its size above 1."""
+
+_MOST_STEPS = 50
+"""At most so many are taken."""
 
 _NEGLIGIBLE = 1e-6
 """Rise of the log-likelihood, Newton's prediction, at which the fit is done."""
@@ -113,7 +117,6 @@ def fit_censored(
     *,
     arrivals: Updates | None = None,
     drift: Real | None = None,
-    iterations: int = 50,
 ) -> CensoredFit:
     """Fit one structure to an output that was clipped.
 
@@ -129,8 +132,6 @@ def fit_censored(
         Samples in which a held output is updated; every sample by default.
     drift : ndarray, shape (n,), optional
         What was taken off the output, by which the levels move against it; none by default.
-    iterations : int
-        At most so many steps.
 
     Returns
     -------
@@ -159,7 +160,7 @@ def fit_censored(
     data = _data(problem, saturation, arrivals, drift)
     state = _start(data, fit)
     damping, converged = 1e-4, False
-    for count in range(iterations):
+    for count in range(_MOST_STEPS):
         step = _step(state, 0.0)
         if 0.0 <= float(step @ state.score) < _NEGLIGIBLE:
             converged = True
@@ -340,14 +341,9 @@ def _shrink(counted: int, fit: Fit) -> float:
 
 def _covariance(state: _State, *, white: bool) -> Real:
     """Covariance of all parameters and ln σ."""
-    diagonal = np.abs(np.diag(state.information))
-    scale = np.sqrt(np.where(diagonal > 1e-200 * diagonal.max(), diagonal, 1.0))
-    scaled = state.information / np.outer(scale, scale)
-    values, vectors = np.linalg.eigh(scaled)
-    seen = np.maximum(np.abs(values), 1e-14 * np.abs(values).max())
-    inverse = (vectors / seen) @ vectors.T / np.outer(scale, scale)
+    inverse = inverted(state.information)
     if white:
-        return np.asarray(inverse)
+        return inverse
     size = state.rows.shape[0]
     middle = np.zeros(inverse.shape)
     middle[:size, :size], fewer = _coloured_scores(state)

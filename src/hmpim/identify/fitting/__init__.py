@@ -11,7 +11,6 @@ course          the way up to the choice: start, ahead, wander, beginning, enric
 beginning       which samples count, and whether the record begins at rest
 whitening       the noise of all trials, and whether whitening may be trusted
 trial           what was tried, and what is chosen of it
-unexplained     what of the response a fit leaves over
 plainer         a plain structure beside a rich one
 nested          one pole or two: what the record cannot tell
 unrelated       whether an output follows its input at all

@@ -155,7 +155,7 @@ def look_again(problem: Problem, trial: Trial, seen: Seen, *, lag: int, rests: b
     begins = begins_of(problem, trial.fit, lag=lag)
     if begins is None and problem.noise is not None:
         # Noise of the colour of a mode explains its free response, and more of it than there is.
-        begins = begins_of(replace(problem, noise=None, told=None), trial.fit, lag=lag)
+        begins = begins_of(problem.plain, trial.fit, lag=lag)
     return None if begins is None else _from(seen, begins, count)
 
 

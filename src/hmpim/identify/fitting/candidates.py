@@ -7,7 +7,7 @@ import numpy as np
 from hmpim.identify.arrays import Real
 from hmpim.identify.chance import CLEARLY, FALSE_ALARM
 from hmpim.identify.fitting.beginning import in_motion
-from hmpim.identify.fitting.data import Data, Seen, band_of, shifted
+from hmpim.identify.fitting.data import Data, Seen, shifted
 from hmpim.identify.fitting.enrich import (
     INTEGRATING,
     MODES,
@@ -20,12 +20,10 @@ from hmpim.identify.fitting.enrich import (
 )
 from hmpim.identify.fitting.fit import Fit, Problem, fit_structure
 from hmpim.identify.fitting.growth import one_more_pole, scale_of, with_pole
-from hmpim.identify.fitting.held_steps import best_sample, steps_through
+from hmpim.identify.fitting.held_steps import steps_through
 from hmpim.identify.fitting.modes import grown_modes
 from hmpim.identify.fitting.start import RoughResponse, rough_response, searched, starting_values
-from hmpim.identify.fitting.unexplained import unexplained_response
-from hmpim.identify.noise.misfit import misfit
-from hmpim.identify.noise.whiteness import effective_share, is_white
+from hmpim.identify.noise.misfit import unexplained_response
 from hmpim.identify.signals import longest_lag
 from hmpim.identify.worth import FEW, MATERIAL, MOST, MUCH, PART, TWICE
 from hmpim.model.dynamics import STRUCTURES, Structure, StructureName, coefficients_of
@@ -83,8 +81,8 @@ def fit_plain(
         hopeless = TWICE * hopeful if settled else np.inf
         fit = fit_structure(problem, structure, starts[0], iterations=_TASTE, hopeless=hopeless)
         # A residual of noise for the most part is white whatever the model misses.
-        noisy = fit.cost > MOST * _spread(problem)
-        white = fit.objective < hopeful and is_white(fit.residual)
+        noisy = fit.cost > MOST * problem.spread
+        white = fit.objective < hopeful and fit.is_white
         if noisy:
             for theta in searched(rough, structure):
                 rival = fit_structure(problem, structure, theta, iterations=_TASTE)
@@ -136,7 +134,7 @@ def fit_rich(
     """
     found = _climbed(data, problem, fits, structures, all_of_them=all_of_them)
     found += _pruned(problem, [*fits, *found], members(structures, (*RICH, *INTEGRATING)))
-    if found and not is_white(min(found, key=lambda fit: fit.objective).residual):
+    if found and not min(found, key=lambda fit: fit.objective).is_white:
         # Poles without end, or as slow as the record, follow what no linear model describes:
         # friction, rounding.
         found = [f for f in found if f.structure.order <= _SURE and not spans_record(f)]
@@ -159,15 +157,15 @@ def _climbed(
         added = np.cumsum(data.u - data.u[0])
         rough = rough_response(added, data.y, longest_delay=longest_lag(data.y.size))
         for structure in integrating:
-            if found and is_white(min(found, key=lambda fit: fit.objective).residual):
+            if found and min(found, key=lambda fit: fit.objective).is_white:
                 return found
             starts = integrator_starts(rough, structure)
             found.append(_best_of(problem, structure, starts, [*fits, *found]))
-        if is_white(min(found, key=lambda fit: fit.objective).residual):
+        if min(found, key=lambda fit: fit.objective).is_white:
             return found
     rich = members(structures, RICH)
     # A rough response that takes a free response for an answer proposes nothing that is of use.
-    misled = in_motion(data.u) and _is_poor(best, _spread(problem))
+    misled = data.keeps_samples and in_motion(data.u) and _is_poor(best, problem.spread)
     proposed = proposals(data.rough, rich, best, all_of_them=all_of_them or misled)
     for start in range(0, len(proposed), _AT_ONCE):
         some = proposed[start : start + _AT_ONCE]
@@ -175,7 +173,7 @@ def _climbed(
             starts = [*_grown(p.structure, [*fits, *found]), *p.starts]
             found.append(_best_of(problem, p.structure, starts, [*fits, *found]))
         best = min(found, key=lambda fit: fit.objective)
-        if owed_to_input(problem, best, data) <= MATERIAL and is_white(best.residual):
+        if owed_to_input(problem, best, data) <= MATERIAL and best.is_white:
             break
     else:
         grown = grown_modes(problem, data, best, members(structures, ("two_modes", *MODES)))
@@ -277,17 +275,29 @@ def _best_of(problem: Problem, structure: Structure, starts: list[Real], rivals:
     those could tell is not worth making.
     """
     leading = min(rivals, key=lambda fit: fit.objective)
-    precision = _PRECISION / effective_share(leading.residual)
+    precision = _PRECISION / leading.share
     tried = [
         fit_structure(problem, structure, theta, iterations=_LONG_TASTE, precision=precision)
         for theta in _distinct(starts)
     ]
     best = min(tried, key=lambda fit: fit.objective)
     if steps_through(structure, held=problem.source.degree == 0):
-        best = best_sample(best, lambda theta: fit_structure(problem, structure, theta))
+        best = _best_sample(problem, best)
     if best.converged or best.objective > TWICE * leading.objective:
         return best
     return fit_structure(problem, structure, best.theta, precision=precision)
+
+
+def _best_sample(problem: Problem, best: Fit) -> Fit:
+    """The best of a fit and those one sample earlier or later, until none is better."""
+    for step in (-1.0, 1.0):
+        while True:
+            start = np.append(best.theta[0] + step, best.theta[1:])
+            other = fit_structure(problem, best.structure, start)
+            if not other.objective < best.objective:
+                break
+            best = other
+    return best
 
 
 def owed_to_input(problem: Problem, fit: Fit, data: Data) -> float:
@@ -295,25 +305,18 @@ def owed_to_input(problem: Problem, fit: Fit, data: Data) -> float:
 
     Infinite where a part of the response is missed, or much of the output is left over.
     """
-    band = band_of(data)
-    left = misfit(data.u, fit.residual, delay=fit.delay, band=band)
-    spread = _spread(problem)
+    left, spread = data.misfit(fit), problem.spread
     owed = 0.0
     if left.probability < FALSE_ALARM:
         owed = float(np.sqrt(left.share * fit.cost / spread)) if spread else 0.0
-        if owed <= MATERIAL and _misses_part(problem, fit, data, band):
+        if owed <= MATERIAL and data.keeps_samples and _misses_part(problem, fit, data):
             owed = np.inf
     return np.inf if owed <= MATERIAL and _is_poor(fit, spread) else owed
 
 
-def _spread(problem: Problem) -> float:
-    """Sum of squares of the output about its mean."""
-    return float(np.sum((problem.masked(problem.y - problem.y.mean())) ** 2))
-
-
 def _is_poor(fit: Fit, spread: float) -> bool:
     """Whether much of the output is left over, and it is no white noise."""
-    return fit.cost > PART * spread and not is_white(fit.residual)
+    return fit.cost > PART * spread and not fit.is_white
 
 
 def spans_record(fit: Fit) -> bool:
@@ -326,7 +329,7 @@ def almost_integrates(fit: Fit) -> bool:
     return slowest_time_constant(fit.denominator) > MUCH * fit.residual.size
 
 
-def _misses_part(problem: Problem, fit: Fit, data: Data, band: tuple[float, float]) -> bool:
+def _misses_part(problem: Problem, fit: Fit, data: Data) -> bool:
     """Whether the response is missed where the output hardly moves, as at the end of a sweep."""
     span = slice(None)
     if problem.valid is not None:
@@ -335,7 +338,7 @@ def _misses_part(problem: Problem, fit: Fit, data: Data, band: tuple[float, floa
         if counted.size < counted[-1] + 1 - counted[0]:
             return False  # spectra do not bear gaps
     missed = unexplained_response(
-        data.u[span], data.y[span], fit.residual[span], delay=fit.delay, band=band
+        data.u[span], data.y[span], fit.residual[span], delay=fit.delay, band=data.band
     )
     return missed > FEW
 
@@ -345,7 +348,7 @@ def _nests(simple: Fit, rich: Fit) -> bool:
     return (
         simple.structure.name == "first_order"
         and rich.structure.name == "second_order"
-        and (simple.objective <= rich.objective or not is_white(rich.residual))
+        and (simple.objective <= rich.objective or not rich.is_white)
     )
 
 

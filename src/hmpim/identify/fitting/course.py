@@ -15,14 +15,12 @@ from hmpim.identify.fitting.candidates import (
     owed_to_input,
     reduced,
 )
-from hmpim.identify.fitting.data import Data, Seen, band_of, follows, polished, refit
+from hmpim.identify.fitting.data import Data, Seen, follows, polished, refit
 from hmpim.identify.fitting.enrich import PLAIN
 from hmpim.identify.fitting.fit import Fit, Problem
 from hmpim.identify.fitting.least_squares import solved
 from hmpim.identify.fitting.start import rough_response
-from hmpim.identify.fitting.unrelated import says_nothing
 from hmpim.identify.fitting.whitening import prewhitened_of
-from hmpim.identify.noise.whiteness import is_white
 from hmpim.identify.signals import longest_lag
 from hmpim.identify.worth import FEW, MATERIAL, PART, TWICE, WORTH
 from hmpim.model.dynamics import StructureName
@@ -31,11 +29,13 @@ from hmpim.record import Intersample
 
 __all__ = [
     "Course",
+    "begun",
     "continue_between",
     "enrich",
     "find_beginning",
     "free_from_wander",
     "is_unanswered",
+    "looks_held",
     "start",
     "turn_ahead",
 ]
@@ -103,7 +103,7 @@ def start(
     nuisance: NDArray[np.float64] | None,
 ) -> Course:
     """Start from the spectra, and climb with each plain structure."""
-    if intersample is None and _looks_held(u):
+    if intersample is None and looks_held(u):
         intersample = "zoh"  # an input that stands still and jumps does nothing else
     natural: Intersample = "bandlimited" if intersample is None else intersample
     data = Data(
@@ -113,13 +113,20 @@ def start(
         rough=rough_response(u, _level(y, nuisance, valid), longest_delay=longest_lag(u.size)),
         nuisance=nuisance,
     )
+    course = begun(data, natural, structures, Seen(valid=valid, begins=None))
+    return replace(course, alone=intersample is not None, known=known)
+
+
+def begun(
+    data: Data, natural: Intersample, structures: tuple[StructureName, ...], seen: Seen
+) -> Course:
+    """Climb with each plain structure; other assumptions between the samples are left to try."""
     plain = tuple(name for name in structures if name in PLAIN)
-    seen = Seen(valid=valid, begins=None)
     return Course(
         data=data,
         natural=natural,
-        alone=intersample is not None,
-        known=known,
+        alone=False,
+        known=None,
         plain=plain,
         others=tuple(name for name in structures if name not in PLAIN),
         given=seen,
@@ -132,7 +139,7 @@ def turn_ahead(course: Course) -> Course:
     """The same with an output that is ahead of its input, where that leaves clearly less."""
     data, seen, best = course.data, course.given, course.best
     lag = data.rough.ahead
-    if lag is None or is_white(best.residual):
+    if lag is None or best.is_white:
         return course
     level = _level(data.y, data.nuisance, seen.valid)
     rough = rough_response(data.u, level, longest_delay=longest_lag(level.size), lag=lag)
@@ -197,7 +204,7 @@ def find_beginning(course: Course) -> Course:
     """The samples that count, and the fits to them: the record may not begin at rest."""
     data, natural, seen, fits = course.data, course.natural, course.given, course.fits
     settled = None
-    if is_white(course.best.residual):
+    if course.best.is_white:
         settled = polished(course.problem, course.best)
         fits = [settled if fit is course.best else fit for fit in fits]
     counted = count_in(data, natural, fits, seen, course.known)
@@ -227,7 +234,7 @@ def is_unanswered(course: Course, fitted: list[tuple[Intersample, Fit]]) -> bool
     """Whether neither the likelihood nor a test without a model sees an answer."""
     mode, best = min(fitted, key=lambda item: item[1].objective)
     problem = course.data.problem(mode, course.counted)
-    return says_nothing(course.data.u, problem, best, band_of(course.data))
+    return course.data.says_nothing(problem, best)
 
 
 def enrich(
@@ -246,7 +253,7 @@ def enrich(
         return course, fitted
     fits = course.fits
     richer = fit_rich(data, course.problem, fits, course.others, all_of_them=not plain)
-    if not asked and not any(is_white(fit.residual) for fit in richer):
+    if not asked and not any(fit.is_white for fit in richer):
         return course, fitted
     if richer and course.counted.begins is not None:
         leading = min(richer, key=lambda f: f.objective)
@@ -291,7 +298,7 @@ def _bridged(y: NDArray[np.float64], valid: NDArray[np.bool_]) -> NDArray[np.flo
     return np.interp(index, index[valid], y[valid])
 
 
-def _looks_held(u: NDArray[np.float64]) -> bool:
+def looks_held(u: NDArray[np.float64]) -> bool:
     """Whether an input stands still most of the time and then jumps, as a held one does.
 
     What moves between two samples moves at one instant only if it stood before and stands after;

@@ -5,31 +5,29 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from hmpim.identify.chance import FALSE_ALARM
+from hmpim.identify.arrays import Real
+from hmpim.identify.chance import FALSE_ALARM, SEARCHED
 from hmpim.identify.fitting.fit import Fit, Problem, fit_structure
+from hmpim.identify.fitting.growth import HiddenPole, hidden_pole
 from hmpim.identify.fitting.rows import STAMPED_LATE
-from hmpim.identify.fitting.start import RoughResponse
+from hmpim.identify.fitting.start import RoughResponse, rough_response
+from hmpim.identify.fitting.unrelated import says_nothing
 from hmpim.identify.kept import kept
-from hmpim.identify.noise.misfit import misfit
+from hmpim.identify.noise.autoregression import autoregression
+from hmpim.identify.noise.misfit import Misfit, misfit
 from hmpim.identify.signals import longest_lag
 from hmpim.model.sampled import PRECISION, SampledInput, prepare_input
 from hmpim.record import Intersample
 
 __all__ = [
-    "FINAL_PRECISION",
     "Data",
     "Seen",
-    "band_of",
     "follows",
     "polished",
     "prepared",
     "refit",
     "shifted",
 ]
-
-FINAL_PRECISION = 1e-6
-"""Precision of the chosen fit, see `fit_structure`."""
-
 
 prepared = kept(prepare_input)
 """An input prepared under an assumption, as `hmpim.model.sampled.prepare_input` does it."""
@@ -45,7 +43,10 @@ class Seen:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Data:
-    """What every trial shares; inputs are prepared for an assumption when first asked for."""
+    """What every trial shares; inputs are prepared for an assumption when first asked for.
+
+    What the search asks of a fit it asks here: where samples are not kept, others answer.
+    """
 
     u: NDArray[np.float64]
     y: NDArray[np.float64]
@@ -71,17 +72,41 @@ class Data:
         )
         return problem if self.noise is None else problem.coloured(self.noise)
 
+    @property
+    def keeps_samples(self) -> bool:
+        """Whether the samples are there; of a compressed record they are not."""
+        return self.u.size > 0
 
-def band_of(data: Data) -> tuple[float, float]:
-    """Band in which a response was sought, in cycles per sample."""
-    omega = data.rough.omega
-    return float(omega[0] / (2 * np.pi)), float(omega[-1] / (2 * np.pi))
+    @property
+    def band(self) -> tuple[float, float]:
+        """Band in which a response was sought, in cycles per sample."""
+        omega = self.rough.omega
+        return float(omega[0] / (2 * np.pi)), float(omega[-1] / (2 * np.pi))
+
+    def misfit(self, fit: Fit) -> Misfit:
+        """How much of what a fit leaves over still follows the input."""
+        return misfit(self.u, fit.residual, delay=fit.delay, band=self.band)
+
+    def noise_left(self, problem: Problem, fit: Fit) -> Real:
+        """Autoregression of what a fit leaves over, 1 first; 1 alone where it is white."""
+        return autoregression(fit.residual, problem.valid)
+
+    def rough_left(self, fit: Fit) -> RoughResponse:
+        """Rough response of what a fit leaves over."""
+        return rough_response(self.u, fit.residual, longest_delay=0, lag=self.rough.lag)
+
+    def says_nothing(self, problem: Problem, fit: Fit, *, least: float = SEARCHED) -> bool:
+        """Whether no model can be expected to explain an output that this fit does not."""
+        return says_nothing(self.u, problem, fit, self.band, least=least)
+
+    def hidden_pole(self, problem: Problem, fit: Fit) -> HiddenPole:
+        """What the record says of one more pole beside a fit."""
+        return hidden_pole(problem, fit)
 
 
 def follows(data: Data, fit: Fit) -> bool:
     """Whether what a fit leaves over still follows the input."""
-    left = misfit(data.u, fit.residual, delay=fit.delay, band=band_of(data))
-    return left.probability < FALSE_ALARM
+    return data.misfit(fit).probability < FALSE_ALARM
 
 
 def shifted(
@@ -94,7 +119,7 @@ def shifted(
 
 def polished(problem: Problem, fit: Fit) -> Fit:
     """The same fit at the final precision."""
-    return fit_structure(problem, fit.structure, fit.theta, precision=FINAL_PRECISION)
+    return fit_structure(problem, fit.structure, fit.theta, precision=problem.final)
 
 
 def refit(problem: Problem, fit: Fit) -> Fit:

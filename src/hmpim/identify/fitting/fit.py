@@ -8,25 +8,31 @@ closed form. One input or several, with a drift or without, from rest or in mid-
 one optimiser.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import singledispatch
+from typing import Protocol
 
 import numpy as np
 
 from hmpim.identify.arrays import Real
-from hmpim.identify.fitting.climb import climb
+from hmpim.identify.fitting.climb import Evaluated, climb
 from hmpim.identify.fitting.held_steps import kept_in_sample
 from hmpim.identify.fitting.least_squares import solved, solved_exactly, without
 from hmpim.identify.fitting.rows import Part, Problem
 from hmpim.identify.fitting.sampled_rows import SampledPart, part_of
+from hmpim.identify.noise.whiteness import effective_share, is_white
 from hmpim.model.dynamics import Structure, coefficients_of, denominator_of, numerator_of
 from hmpim.model.response import slowest_time_constant
 from hmpim.model.sampled import SAMPLES_ALONE
 
 __all__ = [
     "FORGETS",
+    "Evaluation",
     "Fit",
     "Problem",
+    "bounded_for",
+    "evaluating",
     "fit_structure",
     "fit_together",
     "jacobian",
@@ -108,6 +114,23 @@ class Fit:
     def memory(self) -> float:
         """Samples after which a state is forgotten: five times the slowest time constant."""
         return FORGETS * slowest_time_constant(self.denominator)
+
+    @property
+    def is_white(self) -> bool:
+        """Whether the residual passes for white."""
+        return is_white(self.residual)
+
+    @property
+    def share(self) -> float:
+        """Independent samples per sample of the residual."""
+        return effective_share(self.residual)
+
+
+class Evaluation(Evaluated, Protocol):
+    """A model of every input at given parameters."""
+
+    def fits(self, *, converged: bool) -> "list[Fit]":
+        """What each input makes of the output."""
 
 
 class _Known:
@@ -247,10 +270,32 @@ def jacobian(
     return without(counted, problem.masked(np.vstack(others)))
 
 
-def _bounded(problem: Problem, structure: Structure, theta: Real) -> Real:
+def bounded_for(problem: Problem, structure: Structure, theta: Real) -> Real:
     """Keep delay and time constants where the record can tell them."""
     delays = (problem.shortest_delay, problem.longest_delay)
-    return within_reach(structure, theta, delays=delays, samples=problem.y.size)
+    return within_reach(structure, theta, delays=delays, samples=problem.source.samples)
+
+
+@singledispatch
+def evaluating(
+    first: Problem, problems: Sequence[Problem], structures: Sequence[Structure]
+) -> Callable[[Sequence[Real]], Evaluation]:
+    """How inputs are evaluated at given parameters: by samples; other kinds of problem register.
+
+    Parameters
+    ----------
+    first : Problem
+        The first input's, whose kind decides.
+    problems, structures
+        As for `fit_together`.
+    """
+    known = _Known(first)
+
+    def evaluated(thetas: Sequence[Real]) -> Evaluation:
+        parts = [part_of(p, s, t) for p, s, t in zip(problems, structures, thetas, strict=True)]
+        return _Evaluation(problems, parts, known)
+
+    return evaluated
 
 
 def within_reach(
@@ -348,16 +393,10 @@ def fit_together(
     problems = list(kept)
 
     def bounded(moved: Sequence[Real]) -> list[Real]:
-        return [_bounded(p, s, t) for p, s, t in zip(problems, structures, moved, strict=True)]
-
-    known = _Known(problems[0])
-
-    def evaluated(moved: Sequence[Real]) -> _Evaluation:
-        parts = [part_of(p, s, t) for p, s, t in zip(problems, structures, moved, strict=True)]
-        return _Evaluation(problems, parts, known)
+        return [bounded_for(p, s, t) for p, s, t in zip(problems, structures, moved, strict=True)]
 
     best, converged = climb(
-        evaluated,
+        evaluating(problems[0], problems, structures),
         bounded(thetas),
         structures=structures,
         bounded=bounded,

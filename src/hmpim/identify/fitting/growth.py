@@ -241,8 +241,10 @@ def seen_by_pole(problem: Problem, hidden: HiddenPole, richer: Fit) -> float | N
     richer : Fit
         The fit that has it.
     """
+    if hidden.own is None:
+        return None
     left = problem.innovations(richer.prediction, richer.residual)
-    if hidden.own is None or is_white(problem.counting(left)):
+    if is_white(problem.counting(left)):
         return None
     freedom = max(problem.counted - hidden.rows.shape[0] - 1, 1)
     variance = float(covariance(hidden.own[None], left, freedom=freedom, white=False)[0, 0])

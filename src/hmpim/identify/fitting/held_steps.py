@@ -6,9 +6,7 @@ likelihood jumps from one whole sample to the next: the delay stays in the middl
 the samples about it are tried one by one, and figures are read at both ends of the best one.
 """
 
-from collections.abc import Callable
 from dataclasses import replace
-from typing import Protocol, TypeVar
 
 import numpy as np
 import scipy
@@ -17,26 +15,13 @@ from hmpim.identify.arrays import Real
 from hmpim.identify.fitting.rows import Problem
 from hmpim.model.dynamics import Structure, coefficients_of, denominator_of
 
-__all__ = ["at_ends", "best_sample", "kept_in_sample", "steps_through"]
+__all__ = ["at_ends", "kept_in_sample", "steps_through"]
 
 _EDGE = 0.01
 """Share of a sample by which the delay stays inside it."""
 
 _FORGOTTEN = 1e-10
 """Share of a state that is left after a part of a sample, below which it is not seen again."""
-
-
-class _Fitted(Protocol):
-    @property
-    def theta(self) -> Real:
-        """Delay first."""
-
-    @property
-    def objective(self) -> float:
-        """What is least."""
-
-
-F = TypeVar("F", bound=_Fitted)
 
 
 def steps_through(structure: Structure, *, held: bool) -> bool:
@@ -53,27 +38,6 @@ def kept_in_sample(problem: Problem, structure: Structure, theta: Real) -> Probl
         return problem
     middle = float(np.floor(theta[0])) + 0.5
     return replace(problem, shortest_delay=middle, longest_delay=middle)
-
-
-def best_sample(best: F, refit: Callable[[Real], F]) -> F:
-    """The best of a fit and those one sample earlier or later, until none is better.
-
-    Parameters
-    ----------
-    best : Fit
-        Where to start.
-    refit : callable
-        Fits again from other parameters.
-    """
-    for step in (-1.0, 1.0):
-        while True:
-            there = best.theta.copy()
-            there[0] += step
-            other = refit(there)
-            if not other.objective < best.objective:
-                break
-            best = other
-    return best
 
 
 def at_ends(structure: Structure, theta: Real, linear: Real) -> list[tuple[Real, Real]]:

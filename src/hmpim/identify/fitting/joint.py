@@ -29,27 +29,26 @@ from hmpim.identify.fitting.course import (
     start,
     turn_ahead,
 )
-from hmpim.identify.fitting.data import band_of, follows, polished, refit
+from hmpim.identify.fitting.data import follows, polished, refit
 from hmpim.identify.fitting.enrich import INTEGRATING, MODES, PLAIN, RICH
 from hmpim.identify.fitting.fit import Fit, Problem, fit_structure
 from hmpim.identify.fitting.growth import (
     Growth,
     HiddenPole,
     grow,
-    hidden_pole,
     one_more_pole,
     seen_by_pole,
 )
 from hmpim.identify.fitting.software import software_fit
 from hmpim.identify.fitting.trial import JointFit, Trial, likeliest_of, trial_of
-from hmpim.identify.fitting.unrelated import UNDENIED, says_nothing
+from hmpim.identify.fitting.unrelated import UNDENIED
 from hmpim.identify.fitting.whitening import is_contradicted, noise_of, refit_whitened
-from hmpim.identify.noise.whiteness import effective_share, is_white
+from hmpim.identify.noise.whiteness import is_white
 from hmpim.identify.worth import TWICE
 from hmpim.model.dynamics import StructureName
 from hmpim.record import BETWEEN, Intersample
 
-__all__ = ["joint_fit"]
+__all__ = ["chosen_of", "joint_fit"]
 
 _LOOKS = 2
 """How often the samples that count are looked at again, once there is a structure."""
@@ -98,6 +97,21 @@ def joint_fit(
     course = free_from_wander(course)
     course = interpolate_finely(course)
     course = find_beginning(course)
+    return chosen_of(course, structures, growing=growing)
+
+
+def chosen_of(
+    course: Course, structures: tuple[StructureName, ...], *, growing: bool = True
+) -> JointFit:
+    """What is chosen once the plain structures are fitted to the samples that count.
+
+    Parameters
+    ----------
+    course : Course
+        The plain fits under the natural assumption.
+    structures, growing
+        As for `joint_fit`.
+    """
     fitted = continue_between(course)
     if is_unanswered(course, fitted):
         return give_up(course, fitted)
@@ -107,20 +121,21 @@ def joint_fit(
     return ask_for_poles(joint, course, structures) if growing else joint
 
 
-def settle(course: Course, trials: list[Trial], best: Trial, share: float) -> JointFit:
+def settle(
+    course: Course, trials: list[Trial], best: Trial, share: float, *, silent: bool = False
+) -> JointFit:
     """The chosen trial among all, and the data as they were weighed."""
     weighed = course.data.problem(best.intersample, course.counted)
-    plain = replace(weighed, noise=None, told=None)
     return JointFit(
-        problem=plain,
+        problem=weighed.plain,
         weighed=weighed,
         best=best,
         trials=tuple(trials),
         forgotten=course.counted.begins or 0,
         effective_share=share,
-        related=not says_nothing(
-            course.data.u, plain, best.fit, band_of(course.data), least=UNDENIED
-        ),
+        related=not silent
+        and not course.data.says_nothing(weighed.plain, best.fit, least=UNDENIED),
+        silent=silent,
     )
 
 
@@ -129,7 +144,7 @@ def weigh_and_look_again(
 ) -> tuple[Course, list[Trial], Trial, float]:
     """Weigh all fits, and again where the best of them shows that other samples count."""
     course, trials, best, share = _weigh(course, fitted)
-    for _ in range(_LOOKS):
+    for _ in range(_LOOKS if course.data.keeps_samples else 0):
         data, seen = course.data, course.counted
         problem = data.problem(best.intersample, seen)
         rests = best.fit is course.settled
@@ -161,7 +176,7 @@ def _is_needlessly_coloured(problem: Problem, fit: Fit) -> bool:
     """
     if problem.noise is None or problem.begins is None:
         return False
-    plain = replace(problem, noise=None, told=None)
+    plain = problem.plain
     return is_white(plain.counting(refit(plain, fit).residual))
 
 
@@ -260,34 +275,22 @@ def _grown_from(
 
     return grow(
         trial,
-        hidden=lambda one: hidden_pole(problem, one.fit),
+        hidden=lambda one: course.data.hidden_pole(problem, one.fit),
         refit=lambda structure, theta: trial_of(
             trial.intersample, fit_structure(problem, structure, theta), count
         ),
         count=seen,
         names=structures,
-        white=lambda one: is_white(one.fit.residual),
+        white=lambda one: one.fit.is_white,
         otherwise=otherwise,
     )
 
 
 def give_up(course: Course, fitted: list[tuple[Intersample, Fit]]) -> JointFit:
     """The plain fits, of an output that no model explains."""
-    share = effective_share(min((fit for _, fit in fitted), key=lambda f: f.objective).residual)
-    count = course.problem.counted * share
-    trials = [trial_of(mode, fit, count) for mode, fit in fitted]
-    best = likeliest_of(trials, course.natural)
-    weighed = course.data.problem(best.intersample, course.counted)
-    return JointFit(
-        problem=replace(weighed, noise=None, told=None),
-        weighed=weighed,
-        best=best,
-        trials=tuple(trials),
-        forgotten=course.counted.begins or 0,
-        effective_share=share,
-        related=False,
-        silent=True,
-    )
+    share = min((fit for _, fit in fitted), key=lambda f: f.objective).share
+    trials = [trial_of(mode, fit, course.problem.counted * share) for mode, fit in fitted]
+    return settle(course, trials, likeliest_of(trials, course.natural), share, silent=True)
 
 
 def _weigh(
@@ -296,7 +299,7 @@ def _weigh(
     """Weigh all fits under one noise model: it, the trials, the best, independent samples each."""
     data, seen = course.data, course.counted
     mode, leading = min(fitted, key=lambda item: item[1].objective)
-    share = effective_share(leading.residual)
+    share = leading.share
     noise = noise_of(data.problem(mode, seen), leading, data) if share < 1.0 else None
     if noise is not None or data.noise is not None:
         course = replace(course, data=replace(data, noise=noise))

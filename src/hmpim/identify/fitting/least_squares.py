@@ -5,7 +5,7 @@ import scipy
 
 from hmpim.identify.arrays import Real
 
-__all__ = ["solved", "solved_exactly", "without"]
+__all__ = ["inverted", "solved", "solved_exactly", "without"]
 
 _UNSEEN = 1e-13
 """Share of the greatest eigenvalue below which the record does not see a direction."""
@@ -56,6 +56,19 @@ def solved(gram: Real, moment: Real, damping: float = 0.0) -> Real:
     seen = vectors[:, keep] / scale[:, None]
     projected = (moment.T @ seen) / (values[keep] + damping)
     return np.asarray(seen @ projected.T)
+
+
+def inverted(gram: Real) -> Real:
+    """Inverse of normal equations, very large along a direction that is not seen.
+
+    Where they are not definite, the size of each curvature counts.
+    """
+    diagonal = np.abs(np.diag(gram))
+    scale = np.sqrt(np.where(diagonal > 1e-200 * diagonal.max(), diagonal, 1.0))
+    values, vectors = np.linalg.eigh(gram / np.outer(scale, scale))
+    values = np.abs(values)
+    values = np.maximum(values, _EXACTLY * values.max())
+    return np.asarray((vectors / values) @ vectors.T / np.outer(scale, scale))
 
 
 def without(rows: Real, others: Real) -> Real:

@@ -15,8 +15,7 @@ import numpy as np
 from hmpim.identify.arrays import Complex, Real
 from hmpim.identify.fitting.data import Data
 from hmpim.identify.fitting.fit import Fit, Problem, fit_structure
-from hmpim.identify.fitting.start import RoughResponse, rough_response
-from hmpim.identify.noise.whiteness import is_white
+from hmpim.identify.fitting.start import RoughResponse
 from hmpim.identify.worth import PART, PAST
 from hmpim.model.dynamics import Structure
 
@@ -59,7 +58,7 @@ def grown_modes(problem: Problem, data: Data, best: Fit, structures: list[Struct
     found: list[Fit] = []
     for again in (False, True) if structures else ():
         found += _grown(problem, data, best.delay, structures, known=again)
-        if not found or (is_white(found[-1].residual) and _is_inside(found[-1], data)):
+        if not found or (found[-1].is_white and _is_inside(found[-1], data)):
             break
         best = min(found, key=lambda fit: fit.objective)
     return [
@@ -99,10 +98,10 @@ def _grown(
         found += [fit] if count in named else []
         if not known and fit.objective < leading.objective:
             leading = fit
-        if is_white(fit.residual) or leading.objective > (1.0 - PART) * least:
+        if fit.is_white or leading.objective > (1.0 - PART) * least:
             break
         theta, least = leading.theta, leading.objective
-        rough = rough_response(data.u, leading.residual, longest_delay=0, lag=data.rough.lag)
+        rough = data.rough_left(leading)
     return found
 
 

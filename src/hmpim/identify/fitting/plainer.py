@@ -2,12 +2,9 @@
 
 from dataclasses import replace
 
-import numpy as np
-
 from hmpim.identify.fitting.enrich import PLAIN
 from hmpim.identify.fitting.fit import Fit, fit_structure
-from hmpim.identify.fitting.trial import JointFit, Trial
-from hmpim.identify.noise.whiteness import effective_share
+from hmpim.identify.fitting.trial import JointFit, trial_of
 
 __all__ = ["plainer", "taking"]
 
@@ -48,11 +45,7 @@ def taking(joint: JointFit, fit: Fit) -> JointFit:
     if fit is joint.best.fit:
         return joint
     mode = joint.best.intersample
-    share = effective_share(fit.residual)
-    count = joint.problem.counted * joint.effective_share
-    criterion = count * float(np.log(max(fit.cost, np.finfo(float).tiny) / count))
-    criterion += fit.structure.parameters * float(np.log(count))
-    best = Trial(intersample=mode, fit=fit, criterion=criterion)
+    best = trial_of(mode, fit, joint.problem.counted * joint.effective_share)
     others = [
         trial
         for trial in joint.trials
@@ -62,7 +55,7 @@ def taking(joint: JointFit, fit: Fit) -> JointFit:
         joint,
         best=best,
         trials=(*others, best),
-        effective_share=share,
+        effective_share=fit.share,
         rivals=(),
         hidden=None,
     )

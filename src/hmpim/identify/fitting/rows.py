@@ -8,6 +8,7 @@ begin at rest, the free response of the state it begins with.
 from copy import copy
 from dataclasses import dataclass, replace
 from math import ceil
+from typing import ClassVar
 
 import numpy as np
 import scipy
@@ -23,6 +24,9 @@ __all__ = ["STAMPED_LATE", "Driven", "Part", "Problem"]
 STAMPED_LATE = -4.0
 """Least delay in samples that is tried where an output follows its input: stamps may be late."""
 
+
+_FINAL = 1e-6
+"""Precision of the chosen fit, see `hmpim.identify.fitting.fit.fit_structure`."""
 
 _NOTHING = 50.0
 """Time constants after which a free response is less than rounding."""
@@ -68,11 +72,22 @@ class Problem:
     told: Mask | None = None
     nuisance: Real | None = None
     begins: int | None = None
+    final: ClassVar[float] = _FINAL
 
     @property
     def counted(self) -> int:
         """How many samples count."""
         return self.y.size if self.counts is None else int(np.count_nonzero(self.counts))
+
+    @property
+    def spread(self) -> float:
+        """Sum of squares of the output about its mean."""
+        return float(np.sum((self.masked(self.y - self.y.mean())) ** 2))
+
+    @property
+    def plain(self) -> "Problem":
+        """The same, its noise taken for white."""
+        return replace(self, noise=None, told=None)
 
     @property
     def counts(self) -> Mask | None:

@@ -59,7 +59,7 @@ def noise_of(problem: Problem, fit: Fit, data: Data) -> Real | None:
     """
     if follows(data, fit):
         return None
-    noise = autoregression(fit.residual, problem.valid)
+    noise = data.noise_left(problem, fit)
     return noise if noise.size > 1 else None
 
 
@@ -81,7 +81,10 @@ def is_contradicted(data: Data, best: Trial, seen: Seen) -> bool:
 
     A right model is estimated without bias with the noise whitened or not; where the two part,
     what is left over is no noise but what the model lacks (J. A. Hausman, Econometrica 46, 1978).
+    The products of a compressed record do not tell how far coloured noise moves an estimate.
     """
+    if not data.keeps_samples:
+        return False
     problem = replace(data, noise=None).problem(best.intersample, seen)
     plain = polished(problem, best.fit)
     rows = jacobian(problem, plain)

@@ -8,7 +8,11 @@ import scipy
 from hmpim.identify.arrays import Complex, Real
 from hmpim.identify.kept import kept
 
-__all__ = ["Misfit", "misfit", "misfits"]
+__all__ = ["Misfit", "misfit", "misfits", "unexplained_response"]
+
+
+_GROUPS = 24
+"""Groups of neighbouring bins that the band is cut into, at most."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -28,9 +32,7 @@ class Misfit:
     probability: float
 
 
-def misfit(
-    u: Real, residual: Real, *, delay: float, band: tuple[float, float], groups: int = 24
-) -> Misfit:
+def misfit(u: Real, residual: Real, *, delay: float, band: tuple[float, float]) -> Misfit:
     """Test whether the residual is still coherent with the input.
 
     The residual's spectrum is divided into groups of neighbouring bins; in each, one
@@ -45,8 +47,6 @@ def misfit(
         Delay in samples; the input is moved by it so that the gain is smooth over a group.
     band : tuple of float
         Excited band, in cycles per sample.
-    groups : int
-        How many groups to cut the band into, at most.
     """
     share, probability = misfits(
         _transform(u),
@@ -54,7 +54,6 @@ def misfit(
         samples=u.size,
         delays=np.array([delay]),
         band=band,
-        groups=groups,
     )
     return Misfit(share=float(share[0]), probability=float(probability[0]))
 
@@ -72,7 +71,6 @@ def misfits(
     samples: int,
     delays: Real,
     band: tuple[float, float],
-    groups: int = 24,
 ) -> tuple[Real, Real]:
     """Test many residuals of one input as `misfit` does one; shares and probabilities.
 
@@ -86,26 +84,14 @@ def misfits(
         Length of each record.
     delays : ndarray, shape (k,)
         In samples.
-    band, groups
+    band
         As for `misfit`.
     """
-    count, n = residuals.shape[0], samples
-    first = max(int(np.ceil(band[0] * n)), 1)
-    last = min(int(band[1] * n), stimulus.size - 1)
-    width = max((last + 1 - first) // groups, 4)
-    groups = max(last + 1 - first, 0) // width
-    if groups == 0:
-        return np.zeros(count), np.ones(count)
-    bins = np.arange(first, first + groups * width)
-    U = stimulus[bins].reshape(groups, width)
-    E = (residuals[:, bins] * np.exp((2j * np.pi / n) * np.outer(delays, bins))).reshape(
-        count, groups, width
+    power, taken, total, width = _followed(
+        stimulus, residuals, samples=samples, delays=delays, band=band
     )
-    power = np.sum(np.abs(U) ** 2, axis=1)
-    power = np.where(power > 0, power, 1.0)
-    along = np.sum(U.conj() * E, axis=2) / np.sqrt(power)
-    taken = along.real**2 + along.imag**2  # of any unit
-    total = np.sum(E.real**2 + E.imag**2, axis=2)
+    if not power.size:
+        return np.zeros(delays.size), np.ones(delays.size)
     noise = (total - taken) / (width - 1)
     told = np.all(noise > 0, axis=1)
     noise, total = np.where(told[:, None], noise, 1.0), np.where(told[:, None], total, 1.0)
@@ -115,5 +101,78 @@ def misfits(
     beyond = np.sum(taken - noise, axis=1) / np.sum(total, axis=1)
     return (
         np.where(told, np.maximum(beyond, 0.0), 0.0),
-        np.where(told, scipy.special.chdtrc(2 * groups, statistic), 1.0),
+        np.where(told, scipy.special.chdtrc(2 * power.size, statistic), 1.0),
     )
+
+
+def _followed(
+    stimulus: Complex,
+    answers: Complex,
+    *,
+    samples: int,
+    delays: Real,
+    band: tuple[float, float],
+) -> tuple[Real, Real, Real, int]:
+    """Power of the input in groups of bins, (g,), of each answer what one gain takes, and all.
+
+    The last is how many bins a group has; where the band has too few there is none.
+    """
+    count, n = answers.shape[0], samples
+    first = max(int(np.ceil(band[0] * n)), 1)
+    last = min(int(band[1] * n), stimulus.size - 1)
+    width = max((last + 1 - first) // _GROUPS, 4)
+    groups = max(last + 1 - first, 0) // width
+    bins = np.arange(first, first + groups * width)
+    U = stimulus[bins].reshape(groups, width)
+    E = (answers[:, bins] * np.exp((2j * np.pi / n) * np.outer(delays, bins))).reshape(
+        count, groups, width
+    )
+    power = np.sum(np.abs(U) ** 2, axis=1)
+    along = np.sum(U.conj() * E, axis=2) / np.sqrt(np.where(power > 0, power, 1.0))
+    taken = along.real**2 + along.imag**2  # of any unit
+    return power, taken, np.sum(E.real**2 + E.imag**2, axis=2), width
+
+
+def unexplained_response(
+    u: Real, y: Real, residual: Real, *, delay: float, band: tuple[float, float]
+) -> float:
+    """Share of the response (r.m.s. over frequency) that the residual still holds.
+
+    A sweep inside limits moves most at its low end, so that a model may leave out two thirds of
+    the response at the high end and still explain 99 % of the output's power. Here every group of
+    bins counts alike. What noise alone would give the residual, twice over, is taken off.
+
+    Parameters
+    ----------
+    u, y, residual : ndarray, shape (n,)
+        Input, output, and what the model leaves of the output.
+    delay, band
+        As for `misfit`.
+
+    Returns
+    -------
+    float
+        0 where nothing follows the input, 1 where all of the response is left over.
+
+    Examples
+    --------
+    >>> rng = np.random.default_rng(0)
+    >>> u = rng.standard_normal(2000)
+    >>> y = 2.0 * u
+    >>> round(unexplained_response(u, y, 0.1 * y, delay=0.0, band=(0.0, 0.5)), 3)
+    0.1
+    """
+    power, taken, total, width = _followed(
+        _transform(u),
+        np.asarray(scipy.fft.rfft(np.stack([y, residual]))),
+        samples=u.size,
+        delays=np.full(2, delay),
+        band=band,
+    )
+    seen = power > 0.0
+    if not seen.any():
+        return 0.0
+    noise = np.maximum(total - taken, 0.0) / (width - 1)
+    explained, left = taken[0], np.maximum(taken - 2.0 * noise, 0.0)[1]
+    gains = np.sum(explained[seen] / power[seen])
+    return float(np.sqrt(np.sum(left[seen] / power[seen]) / gains)) if gains > 0.0 else 0.0

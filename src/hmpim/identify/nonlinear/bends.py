@@ -17,9 +17,9 @@ import scipy
 
 from hmpim.identify.arrays import Real
 from hmpim.identify.chance import CLEARLY, HALF, searched
-from hmpim.identify.fitting.data import FINAL_PRECISION
+from hmpim.identify.fitting.data import polished
 from hmpim.identify.fitting.enrich import PLAIN
-from hmpim.identify.fitting.fit import Fit, Problem, fit_structure, jacobian
+from hmpim.identify.fitting.fit import Fit, Problem, jacobian
 from hmpim.identify.fitting.least_squares import solved
 from hmpim.identify.fitting.sampled_rows import part_of
 from hmpim.identify.fitting.trial import JointFit
@@ -232,7 +232,7 @@ def plainer_bends(
     best, problem = joint.best, joint.weighed
     if plain is None or plain.structure.parameters >= best.fit.structure.parameters:
         return ()
-    plain = fit_structure(problem, plain.structure, plain.theta, precision=FINAL_PRECISION)
+    plain = polished(problem, plain)
     if best.fit.objective < PART * plain.objective:  # no kind makes that up
         return ()
     count = problem.counted * joint.weighed_share

@@ -14,7 +14,6 @@ import scipy
 
 from hmpim.identify.arrays import Real
 from hmpim.identify.chance import CLEARLY
-from hmpim.identify.fitting.data import FINAL_PRECISION
 from hmpim.identify.fitting.enrich import PLAIN
 from hmpim.identify.fitting.fit import Fit, Problem, fit_structure
 from hmpim.identify.fitting.sampled_rows import part_of
@@ -289,7 +288,7 @@ def beside_speed(joint: JointFit, slope: Real) -> JointFit:
         rows = np.vstack([joint.problem.nuisance, rows])
     weighed = replace(joint.weighed, nuisance=rows)
     structure, theta = joint.best.fit.structure, joint.best.fit.theta
-    fit = fit_structure(weighed, structure, theta, precision=FINAL_PRECISION)
+    fit = fit_structure(weighed, structure, theta, precision=weighed.final)
     best = replace(joint.best, fit=fit)
     return replace(
         joint,

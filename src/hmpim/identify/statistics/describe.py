@@ -3,13 +3,9 @@
 import hashlib
 
 import numpy as np
-import scipy
 
 from hmpim.errors import RecordError
-from hmpim.identify.arrays import Real
-from hmpim.identify.chance import EXCLUDED, FALSE_ALARM
-from hmpim.identify.fitting.nested import stretched
-from hmpim.identify.fitting.rows import Problem
+from hmpim.identify.fitting.nested import widened
 from hmpim.identify.fitting.trial import JointFit
 from hmpim.identify.judgement import Evidence, judge, judged
 from hmpim.identify.judgement.between_samples import other_intersample, wide_span
@@ -42,7 +38,8 @@ from hmpim.identify.result import (
     ResponseBandwidths,
 )
 from hmpim.identify.result.error_bars import estimate, noise_estimate
-from hmpim.identify.statistics.choose import Chosen, choose
+from hmpim.identify.statistics.choose import CompressedData, choose
+from hmpim.identify.statistics.fit import Fitted, told
 from hmpim.identify.statistics.misfit import integrated_share
 from hmpim.identify.statistics.run import Run
 from hmpim.identify.statistics.start import correlations
@@ -104,21 +101,21 @@ def identify_statistics(
         If the channels do not move, too little was read, or the memory is longer than the window.
     """
     _check_moves(statistics)
-    chosen = choose(
+    data, joint = choose(
         statistics,
         intersample=intersample or statistics.intersample,
         structures=structures,
     )
-    nothing = _unrelated(statistics, chosen)
-    if nothing is None:
-        _check_window(statistics, chosen)
-    if integrated_share(chosen.best) > (0.0 if nothing else PART):
+    best = told(joint.best.fit)
+    if joint.related:
+        _check_window(statistics, best)
+    if integrated_share(best) > (PART if joint.related else 0.0):
         raise RecordError(
             f"the output still moves at the end of the window of {statistics.lags} samples, as if "
             "it integrated the input; compress with more lags, or identify the record itself if it "
             "does"
         )
-    pair = nothing or _related(statistics, chosen)
+    pair = (_related if joint.related else _unrelated)(statistics, data, joint)
     digest = hashlib.sha256()
     for run in statistics.runs:
         for name in Run.__dataclass_fields__:
@@ -146,21 +143,18 @@ def _check_moves(statistics: Statistics) -> None:
             )
 
 
-def _read(statistics: Statistics, chosen: Chosen, joint: JointFit) -> Readings:
+def _read(statistics: Statistics, joint: JointFit, highest: float) -> Readings:
     """Every figure of the chosen fit, and the covariance behind it."""
-    best, fs, band = chosen.best, statistics.fs, chosen.band
-    fit, left = best.fit, chosen.left
-    vector = np.concatenate([fit.theta, fit.linear])
-    cov = _covariance(chosen)
-    weighed = best.products.order > 0
-    share = 1.0 if weighed else left.share
+    best, fs, share = told(joint.best.fit), statistics.fs, joint.weighed_share
+    left, vector = best.left, np.concatenate([best.theta, best.linear])
+    cov = widened(joint, best.covariance)
     parameters, system, spread = read_figures(
-        fit.structure,
+        best.structure,
         vector,
         cov if share == 1.0 else cov / share,
         fs=fs,
-        highest=min(band[1], fs / 2),
-        effective=max(best.products.counted - vector.size, 1) * share,
+        highest=highest,
+        effective=max(joint.weighed.counted - vector.size, 1) * share,
         noise=noise_estimate(
             left.power * left.counted,
             freedom=max(left.counted - vector.size, 1),
@@ -170,11 +164,11 @@ def _read(statistics: Statistics, chosen: Chosen, joint: JointFit) -> Readings:
         units=statistics.units,
     )
     return Readings(
-        parameters=spanned(parameters, joint, fs=fs, highest=min(band[1], fs / 2)),
+        parameters=spanned(parameters, joint, fs=fs, highest=highest),
         system=system,
         vector=vector,
         covariance=cov,
-        white=left.noise.size == 1,
+        white=best.is_white,
         rows=np.empty((vector.size, 0)),
         innovations=np.empty(0),
         whitened=True,
@@ -182,21 +176,21 @@ def _read(statistics: Statistics, chosen: Chosen, joint: JointFit) -> Readings:
     )
 
 
-def _related(statistics: Statistics, chosen: Chosen) -> PairIdentification:
+def _related(statistics: Statistics, data: CompressedData, joint: JointFit) -> PairIdentification:
     """Say all that is known of an output that follows its input."""
-    best, fs, band = chosen.best, statistics.fs, chosen.band
-    joint = _joint(statistics, chosen)
-    readings = _read(statistics, chosen, joint)
+    best, fs = told(joint.best.fit), statistics.fs
+    band = (data.band[0] * fs, data.band[1] * fs)
+    readings = _read(statistics, joint, min(band[1], fs / 2))
     system, spread = readings.system, readings.coefficient_covariance
     evidence = Evidence(
         joint=joint,
         readings=readings,
         spanned=readings.parameters,
-        misfit=chosen.misfit,
+        misfit=data.misfit(best),
         u=np.empty(0),
         fs=fs,
         band=band,
-        fit_percent=_fit_percent(statistics, chosen.left.power),
+        fit_percent=_fit_percent(statistics, best.left.power),
         measured=ResponseBandwidths(),
     )
     findings = judge(evidence, checks=_CHECKS)
@@ -205,8 +199,8 @@ def _related(statistics: Statistics, chosen: Chosen) -> PairIdentification:
     return PairIdentification(
         input=statistics.names[0],
         output=statistics.names[1],
-        structure=best.fit.structure.name,
-        intersample=best.intersample,
+        structure=best.structure.name,
+        intersample=joint.best.intersample,
         fit_percent=evidence.fit_percent,
         parameters=readings.parameters,
         paper=_paper(statistics),
@@ -219,19 +213,18 @@ def _related(statistics: Statistics, chosen: Chosen) -> PairIdentification:
         ),
         numerator=numerator,
         denominator=denominator,
-        candidates=_candidates(statistics, chosen),
+        candidates=_candidates(statistics, joint),
         warnings=(*findings, _no_samples(statistics)),
         covariance=highest_first(spread, system),
     )
 
 
-def _check_window(statistics: Statistics, chosen: Chosen) -> None:
+def _check_window(statistics: Statistics, fit: Fitted) -> None:
     """Refuse a model whose memory is longer than the window."""
-    made = np.abs(chosen.best.response)
+    made = np.abs(fit.response)
     end = made[-max(statistics.lags // 20, 2) :].max()
     if end <= _OVER * made.max():
         return
-    fit = chosen.best.fit
     slowest = slowest_time_constant(fit.denominator)
     needed = int(np.ceil(max(fit.delay, 0.0) + _SETTLES * slowest)) + 1
     needed = max(needed, 2 * statistics.lags)
@@ -243,39 +236,6 @@ def _check_window(statistics: Statistics, chosen: Chosen) -> None:
     )
 
 
-def _covariance(chosen: Chosen) -> Real:
-    """The bound, widened where a first-order model is hardly farther away than it says."""
-    cov, best, simple = chosen.best.covariance, chosen.best, chosen.first_order
-    if best.fit.structure.name != "second_order" or simple is None:
-        return cov
-    count = best.products.counted * (1.0 if best.products.order else chosen.left.share)
-    deviance = float(count * np.log(max(simple.fit.objective / best.fit.objective, 1.0)))
-    return cov if deviance > EXCLUDED else stretched(cov, simple.fit, best.fit, deviance)
-
-
-def _joint(statistics: Statistics, chosen: Chosen) -> JointFit:
-    """What the checks look at; it has as many samples as were read, and keeps none."""
-    samples = np.broadcast_to(np.float64(0.0), (statistics.samples,))
-    problem = Problem(
-        source=chosen.problem.source,
-        y=samples,
-        valid=None,
-        longest_delay=chosen.problem.longest_delay,
-    )
-    polished = chosen.best.fit
-    return JointFit(
-        problem=problem,
-        weighed=problem,
-        best=next(trial for trial in chosen.trials if trial.fit is polished),
-        trials=chosen.trials,
-        forgotten=chosen.best.products.skipped,
-        effective_share=chosen.left.share,
-        related=True,
-        rivals=chosen.rivals,
-        hidden=chosen.hidden,
-    )
-
-
 def _fit_percent(statistics: Statistics, power: float) -> float:
     spread = 0.0
     for run in statistics.runs:
@@ -284,20 +244,20 @@ def _fit_percent(statistics: Statistics, power: float) -> float:
     return float(100.0 * (1.0 - np.sqrt(power * statistics.samples / spread)))
 
 
-def _candidates(statistics: Statistics, chosen: Chosen) -> tuple[Candidate, ...]:
+def _candidates(statistics: Statistics, joint: JointFit) -> tuple[Candidate, ...]:
     """All trials; the fit is said of the whitened output where the noise is coloured."""
-    best = chosen.best.fit.objective
+    best = told(joint.best.fit)
     return tuple(
         Candidate(
             structure=trial.fit.structure.name,
             intersample=trial.intersample,
             criterion=trial.criterion,
             fit_percent=_fit_percent(
-                statistics, chosen.left.power * trial.fit.objective / max(best, 1e-300)
+                statistics, best.left.power * trial.fit.objective / max(best.objective, 1e-300)
             ),
-            chosen=trial.fit is chosen.best.fit,
+            chosen=trial.fit is best,
         )
-        for trial in sorted(chosen.trials, key=lambda trial: trial.criterion)
+        for trial in sorted(joint.trials, key=lambda trial: trial.criterion)
     )
 
 
@@ -319,24 +279,19 @@ def _no_samples(statistics: Statistics) -> Finding:
     )
 
 
-def _unrelated(statistics: Statistics, chosen: Chosen) -> PairIdentification | None:
+def _unrelated(statistics: Statistics, data: CompressedData, joint: JointFit) -> PairIdentification:
     """Say what little can be said of an output that a constant explains as well."""
-    best = chosen.best
+    best = told(joint.best.fit)
     products = best.products
-    spread = products.energy
-    share = 1.0 if products.order else chosen.left.share
-    gained = products.counted * share * float(np.log(max(spread / best.fit.objective, 1.0)))
-    if gained > scipy.special.chdtri(best.fit.structure.parameters, FALSE_ALARM):
-        return None
     mean = best.moments.bias
-    variance = spread / max(products.counted - 1, 1)
+    variance = products.energy / max(products.counted - 1, 1)
     name, source = statistics.names[1], statistics.names[0]
-    frequency = np.array([chosen.band[1]])
+    frequency = np.array([data.band[1] * statistics.fs])
     return PairIdentification(
         input=source,
         output=name,
         structure="static",
-        intersample=best.intersample,
+        intersample=joint.best.intersample,
         fit_percent=0.0,
         parameters=Parameters(
             bias=estimate(

@@ -5,25 +5,33 @@ the samples as the input is; its derivatives are known in closed form, since the
 joint fit's rows.
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import ClassVar
 
 import numpy as np
+import scipy
 
 from hmpim.identify.arrays import Real
+from hmpim.identify.chance import DEVIATIONS, FALSE_ALARM
 from hmpim.identify.fitting.climb import climb
-from hmpim.identify.fitting.fit import Fit, within_reach
-from hmpim.identify.fitting.least_squares import solved
+from hmpim.identify.fitting.fit import Fit, bounded_for, evaluating
+from hmpim.identify.fitting.held_steps import steps_through
+from hmpim.identify.fitting.least_squares import inverted, solved
 from hmpim.identify.fitting.rows import Part, Problem
+from hmpim.identify.noise.autoregression import whitening_filter
 from hmpim.identify.statistics.products import Moments, Products
 from hmpim.identify.statistics.reach import AHEAD, Reach
 from hmpim.identify.statistics.residual import Residual
 from hmpim.model.dynamics import Structure
-from hmpim.model.sampled import prepare_input
+from hmpim.model.sampled import SampledInput, prepare_input
 from hmpim.record import Intersample
 
-__all__ = ["Fitted", "fit_products", "follow", "pulse"]
+__all__ = ["Compressed", "Fitted", "LeftOver", "fit_briefly", "follow", "pulse", "told"]
+
+_FINAL = 1e-10
+"""Precision of the chosen fit: 1e-5 standard deviations."""
 
 _NEAR = 0.25
 """What a step may gain, in units of σ², so that where it leads need not be evaluated: a parameter
@@ -32,17 +40,65 @@ then moves by half a standard deviation at most, and the error of that is of the
 _CLOSE = 4.0
 """The same where no other evaluation is to be made: two standard deviations."""
 
+_PRECISION = 1e-2
+"""Of a fit of which evaluations are counted, see `fit_structure`."""
 
-def pulse(reach: Reach, intersample: Intersample) -> Problem:
+_ROUNDED = 1e-13
+"""Share of the output's power below which what is left over is the rounding of sums."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Compressed(Problem):
+    """A pulse for input; for the samples of the output, of which none is kept, their products.
+
+    Parameters
+    ----------
+    products : Products
+        What was read, under a noise model.
+    """
+
+    products: Products
+    final: ClassVar[float] = _FINAL
+
+    @classmethod
+    def of(cls, products: Products, source: SampledInput) -> "Compressed":
+        """From products, and a pulse as `pulse` prepares it."""
+        statistics = products.statistics
+        return cls(
+            source=source,
+            y=_nothing(statistics.samples),
+            valid=None,
+            longest_delay=float(statistics.lags),
+            noise=products.noise if products.order else None,
+            products=products,
+        )
+
+    @property
+    def counted(self) -> int:
+        """How many samples count."""
+        return self.products.counted
+
+    @property
+    def spread(self) -> float:
+        """Sum of squares of the output about its bias."""
+        return self.products.energy
+
+    @property
+    def plain(self) -> "Compressed":
+        """The same, its noise taken for white."""
+        return replace(self, noise=None, products=self.products.plain)
+
+
+def pulse(reach: Reach, intersample: Intersample) -> SampledInput:
     """One sample of 1 among zeros, as an input: what it is answered by is an impulse response."""
     samples = np.zeros(reach.taps)
     samples[AHEAD] = 1.0
-    return Problem(
-        source=prepare_input(samples, intersample),
-        y=np.zeros(reach.taps),
-        valid=None,
-        longest_delay=float(reach.lags),
-    )
+    return prepare_input(samples, intersample)
+
+
+def _nothing(samples: int) -> Real:
+    """As many samples as were read, none of which is kept."""
+    return np.broadcast_to(np.float64(0.0), (samples,))
 
 
 class _SpentError(Exception):
@@ -52,14 +108,12 @@ class _SpentError(Exception):
 class _Evaluation:
     """A structure at given parameters: what is linear solved, and the way down."""
 
-    def __init__(
-        self, products: Products, problem: Problem, structure: Structure, theta: Real
-    ) -> None:
-        self.products, self.problem = products, problem
+    def __init__(self, problem: Compressed, structure: Structure, theta: Real) -> None:
+        self.problem, self.products = problem, problem.products
         self.part = part = Part(problem, structure, theta)
         self.steady = np.zeros(part.rows.shape[0])
         self.steady[0] = 1.0 if part.structure.dc_zeros == 0 else 0.0
-        self.moments = products.moments(part.rows, self.steady)
+        self.moments = self.products.moments(part.rows, self.steady)
         self.linear = solved(self.moments.gram, self.moments.cross)
         floor = np.finfo(float).eps * self.moments.energy
         self.cost = max(self.moments.energy - float(self.linear @ self.moments.cross), floor)
@@ -72,7 +126,10 @@ class _Evaluation:
     @property
     def slopes(self) -> Real:
         """Derivatives of the impulse response, shape (1 + order, taps)."""
-        return self.part.slopes(self.linear, np.empty(0))
+        slopes = self.part.slopes(self.linear, np.empty(0))
+        if self.problem.shortest_delay == self.problem.longest_delay:
+            slopes[0] = 0.0  # a delay that is kept
+        return slopes
 
     @cached_property
     def all_rows(self) -> tuple[Real, Real]:
@@ -91,21 +148,83 @@ class _Evaluation:
         turned, mixed = moments.gram[:unknown, :unknown], moments.gram[:unknown, unknown:]
         inner = moments.gram[unknown:, unknown:]
         left = moments.cross[:unknown] - mixed @ self.linear
-        if inner.size == 1 and inner[0, 0] > 0.0:
-            return turned - mixed @ mixed.T / inner[0, 0], left
-        return turned - mixed @ np.linalg.lstsq(inner, mixed.T, rcond=None)[0], left
+        return turned - mixed @ solved(inner, mixed.T), left
+
+    def fits(self, *, converged: bool) -> "list[Fit]":
+        """Where the way down ended."""
+        return [self.stepped(np.zeros(self.part.theta.size), left=self.cost, converged=converged)]
+
+    def stepped(self, step: Real, *, left: float, converged: bool) -> "Fitted":
+        """A step away from here, as the derivatives foretell it."""
+        (rows, steady), moments, unknown = self.all_rows, self.all_moments, step.size
+        linear = self.linear
+        if step.any():
+            inner, mixed = moments.gram[unknown:, unknown:], moments.gram[unknown:, :unknown]
+            linear = linear - solved(inner, mixed @ step)
+        weights = np.concatenate([step, linear])
+        bias = moments.bias - float(moments.bias_rows @ weights)
+        nothing = np.empty(0)
+        return Fitted(
+            structure=self.part.structure,
+            theta=self.part.theta + step,
+            linear=np.append(linear, bias),
+            prediction=nothing,
+            residual=self.problem.y,
+            cost=left,
+            objective=left,
+            converged=converged,
+            nuisance=nothing,
+            initial=nothing,
+            response=weights @ rows,
+            weights=weights,
+            rows=rows,
+            steady=steady,
+            moments=moments,
+            problem=self.problem,
+        )
+
+
+@evaluating.register
+def _(
+    first: Compressed,
+    problems: Sequence[Problem],
+    structures: Sequence[Structure],
+) -> Callable[[Sequence[Real]], _Evaluation]:
+    """By products of impulse responses."""
+    return lambda thetas: _Evaluation(first, structures[0], thetas[0])
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Fitted:
-    """Where a fit ended.
+class LeftOver:
+    """What a fit leaves over, by samples and not whitened.
 
     Parameters
     ----------
-    fit : Fit
-        As of samples, without prediction and residual; `cost` is that of `objective`.
-    intersample : {'zoh', 'foh', 'bandlimited'}
-        What was assumed.
+    power : float
+        Mean square.
+    counted : int
+        Samples of which it is.
+    innovation : float
+        Mean square of what its past does not foresee.
+    share : float
+        Independent samples per sample.
+    noise : ndarray, shape (order + 1,)
+        Autoregression, 1 first; 1 alone where it is white.
+    """
+
+    power: float
+    counted: int
+    innovation: float
+    share: float
+    noise: Real
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Fitted(Fit):
+    """Where a fit to products ended; no sample is predicted, and `cost` is that of `objective`.
+
+    Parameters
+    ----------
     response : ndarray, shape (taps,)
         Impulse response.
     weights : ndarray, shape (q,)
@@ -114,97 +233,97 @@ class Fitted:
         Derivatives of it by theta, then by the numerator; what each makes of a constant 1.
     moments : Moments
         Products of derivatives by theta, then of the rows.
-    products : Products
+    problem : Compressed
         What was fitted to.
     """
 
-    fit: Fit
-    intersample: Intersample
     response: Real
     weights: Real
     rows: Real
     steady: Real
     moments: Moments
-    products: Products
+    problem: Compressed
+
+    @property
+    def products(self) -> Products:
+        """What was fitted to."""
+        return self.problem.products
+
+    @property
+    def is_white(self) -> bool:
+        """Whether what is left over passes for white."""
+        return self.left.noise.size == 1
+
+    @property
+    def share(self) -> float:
+        """Independent samples per sample of what is left over."""
+        return self.left.share
 
     @property
     def variance(self) -> float:
         """Variance of the white noise."""
         freedom = self.products.counted - self.moments.cross.size - self.moments.fixed.size
-        return self.fit.objective / max(freedom, 1)
+        return self.objective / max(freedom, 1)
 
     @property
     def covariance(self) -> Real:
         """Of theta, the numerator and the mean bias: the Cramér-Rao bound."""
         gram = self.moments.gram
-        if self.fit.structure.name == "static" and self.intersample == "zoh":
-            # It moves in whole samples only: uniform over the one in which the delay ends.
+        static, held = self.structure.name == "static", self.problem.source.degree == 0
+        if (static and held) or steps_through(self.structure, held=held):
+            # It moves in whole samples only: uniform over the one in which the delay ends, where
+            # its ends are not read themselves.
             inverse = np.zeros_like(gram)
-            inverse[1:, 1:] = _inverse(gram[1:, 1:])
-            inverse[0, 0] = 1.0 / (12.0 * self.variance)
+            inverse[1:, 1:] = inverted(gram[1:, 1:])
+            inverse[0, 0] = 1.0 / (12.0 * self.variance) if static else 0.0
         else:
-            inverse = _inverse(gram)
+            inverse = inverted(gram)
         slope = self.moments.bias_rows
         mixed = -inverse @ slope
         last = slope @ inverse @ slope + self.moments.bias_variance
         whole = np.block([[inverse, mixed[:, None]], [mixed[None], np.array([[last]])]])
         return np.asarray(whole * self.variance)
 
-    def residual(self, plain: Products) -> Residual:
-        """What is left over, by products without a noise model."""
+    @property
+    def residual_told(self) -> Residual:
+        """What is left over, not whitened, by its products and its ends."""
         fixed = self.moments.fixed - self.moments.fixed_rows @ self.weights
-        return plain.residual(self.response, fixed)
+        return self.products.plain.residual(self.response, fixed)
+
+    @cached_property
+    def left(self) -> LeftOver:
+        """Power, colour and autoregression of what is left over."""
+        products = self.products
+        gram, count = self.residual_told.gram(products.skipped)
+        if gram[0, 0] <= _ROUNDED * products.plain.energy:
+            least, noise = self.objective / products.counted, np.ones(1)
+            return LeftOver(power=least, counted=count, innovation=least, share=1.0, noise=noise)
+        power = float(gram[0, 0])
+        rho = gram[0, 1 : max(min(gram.shape[0], count // 4), 1)] / power
+        lags = np.arange(1, rho.size + 1)
+        box = count * (count + 2.0) * float(np.sum(rho**2 / (count - lags)))
+        white = rho.size == 0 or scipy.special.chdtrc(rho.size, box) > FALSE_ALARM
+        clear = rho[np.abs(rho) > DEVIATIONS / np.sqrt(count)]
+        noise = np.ones(1) if white else whitening_filter(gram, count)
+        if white and not products.order:
+            power, count = self.objective, products.counted
+        return LeftOver(
+            power=power / count,
+            counted=count,
+            innovation=float(noise @ gram[: noise.size, : noise.size] @ noise) / count,
+            share=1.0 if white else float(1.0 / (1.0 + 2.0 * np.sum(clear**2))),
+            noise=noise,
+        )
 
 
-def _inverse(gram: Real) -> Real:
-    """Inverse of a Gram matrix, very large along a direction that is not seen."""
-    size = np.diag(gram)
-    scale = np.sqrt(np.where(size > 1e-200 * size.max(), size, 1.0))
-    values, vectors = np.linalg.eigh(gram / np.outer(scale, scale))
-    values = np.maximum(values, 1e-14 * values[-1])
-    return np.asarray((vectors / values) @ vectors.T / np.outer(scale, scale))
+def told(fit: Fit) -> Fitted:
+    """A fit to products, as what it is."""
+    if not isinstance(fit, Fitted):
+        raise TypeError("fitted to samples")
+    return fit
 
 
-def fit_products(
-    products: Products,
-    problem: Problem,
-    intersample: Intersample,
-    structure: Structure,
-    theta: Real,
-    *,
-    iterations: int = 40,
-    precision: float = 1e-2,
-    evaluations: int | None = None,
-) -> Fitted:
-    """Fit one structure from one start.
-
-    Parameters
-    ----------
-    products : Products
-        The data.
-    problem : Problem
-        From `pulse`.
-    intersample : {'zoh', 'foh', 'bandlimited'}
-        What that assumes.
-    structure : Structure
-        What to fit; no integrator, whose memory has no end.
-    theta : ndarray, shape (1 + order,)
-        Start: delay in samples, parameters of the denominator's sections.
-    iterations, precision
-        As for `hmpim.identify.fitting.fit.fit_structure`.
-    evaluations : int, optional
-        How often the structure is evaluated at most, steps that lead nowhere included; as often as
-        the steps ask for by default.
-    """
-    here = _Evaluation(products, problem, structure, _within(problem, structure, theta))
-    return _climbed(
-        here, intersample, iterations=iterations, precision=precision, evaluations=evaluations
-    )
-
-
-def follow(
-    products: Products, problem: Problem, intersample: Intersample, fit: Fit, *, evaluations: int
-) -> Fitted:
+def follow(problem: Compressed, fit: Fit, *, evaluations: int) -> Fitted:
     """Take a fit along to more samples of the same run.
 
     Where these move it by a fraction of its error bars, that is one step of Gauss and Newton. Where
@@ -212,43 +331,44 @@ def follow(
 
     Parameters
     ----------
-    products, problem, intersample, evaluations
-        As for `fit_products`.
+    problem : Compressed
+        The samples so far.
     fit : Fit
         Of the samples before.
+    evaluations : int
+        How often the structure is evaluated at most, steps that lead nowhere included.
     """
-    here = _Evaluation(products, problem, fit.structure, fit.theta)
+    structure = fit.structure
+    here = _Evaluation(problem, structure, fit.theta)
     normal, moment = here.normal()
     step = solved(normal, moment)
     gained, theta = float(step @ moment), fit.theta + step
-    freedom = max(products.counted - step.size - here.linear.size, 1)
-    held = (_within(problem, fit.structure, theta) != theta).any()
+    freedom = max(problem.counted - step.size - here.linear.size, 1)
+    held = (bounded_for(problem, structure, theta) != theta).any()
     near = fit.converged and gained * freedom < _NEAR * here.cost
     close = evaluations == 1 and gained * freedom < _CLOSE * here.cost
     if (near or close) and not held:
-        return _ended(here, intersample, step, left=here.cost - gained, converged=near)
-    return _climbed(here, intersample, evaluations=evaluations)
+        return here.stepped(step, left=here.cost - gained, converged=near)
+    return _climbed(here, evaluations)
 
 
-def _climbed(
-    here: _Evaluation,
-    intersample: Intersample,
-    *,
-    iterations: int = 40,
-    precision: float = 1e-2,
-    evaluations: int | None,
+def fit_briefly(
+    problem: Compressed, structure: Structure, theta: Real, *, evaluations: int
 ) -> Fitted:
-    """The way down from the first evaluation, which counts as one."""
-    products, problem, structure = here.products, here.problem, here.part.structure
-    seen: list[_Evaluation] = []
+    """Fit one structure from one start, evaluated so often at most."""
+    here = _Evaluation(problem, structure, bounded_for(problem, structure, theta))
+    return _climbed(here, evaluations)
 
-    def bounded(moved: Sequence[Real]) -> list[Real]:
-        return [_within(problem, structure, t) for t in moved]
+
+def _climbed(here: _Evaluation, evaluations: int) -> Fitted:
+    """The way down from the first evaluation, which counts as one."""
+    problem, structure = here.problem, here.part.structure
+    seen: list[_Evaluation] = []
 
     def evaluated(thetas: Sequence[Real]) -> _Evaluation:
         if len(seen) == evaluations:
             raise _SpentError
-        seen.append(_Evaluation(products, problem, structure, thetas[0]) if seen else here)
+        seen.append(_Evaluation(problem, structure, thetas[0]) if seen else here)
         return seen[-1]
 
     try:
@@ -256,54 +376,11 @@ def _climbed(
             evaluated,
             here.thetas,
             structures=[structure],
-            bounded=bounded,
-            counted=products.counted,
-            iterations=iterations,
-            precision=precision,
+            bounded=lambda thetas: [bounded_for(problem, structure, theta) for theta in thetas],
+            counted=problem.counted,
+            iterations=evaluations,
+            precision=_PRECISION,
         )
     except _SpentError:
         best, converged = min(seen, key=lambda one: one.cost), False
-    still = np.zeros(best.part.theta.size)
-    return _ended(best, intersample, still, left=best.cost, converged=converged)
-
-
-def _within(problem: Problem, structure: Structure, theta: Real) -> Real:
-    """Keep parameters where they can be told."""
-    delays = (problem.shortest_delay, problem.longest_delay)
-    return within_reach(structure, theta, delays=delays, samples=problem.y.size)
-
-
-def _ended(
-    last: _Evaluation, intersample: Intersample, step: Real, *, left: float, converged: bool
-) -> Fitted:
-    """Where a fit ended: a step away from the last evaluation, as the derivatives foretell it."""
-    (rows, steady), moments, unknown = last.all_rows, last.all_moments, step.size
-    linear = last.linear
-    if step.any():
-        inner, mixed = moments.gram[unknown:, unknown:], moments.gram[unknown:, :unknown]
-        linear = linear - solved(inner, mixed @ step)
-    weights = np.concatenate([step, linear])
-    bias = moments.bias - float(moments.bias_rows @ weights)
-    nothing = np.empty(0)
-    fit = Fit(
-        structure=last.part.structure,
-        theta=last.part.theta + step,
-        linear=np.append(linear, bias),
-        prediction=nothing,
-        residual=nothing,
-        cost=left,
-        objective=left,
-        converged=converged,
-        nuisance=nothing,
-        initial=nothing,
-    )
-    return Fitted(
-        fit=fit,
-        intersample=intersample,
-        response=weights @ rows,
-        weights=weights,
-        rows=rows,
-        steady=steady,
-        moments=moments,
-        products=last.products,
-    )
+    return told(best.fits(converged=converged)[0])

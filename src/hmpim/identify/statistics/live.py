@@ -1,6 +1,6 @@
 """The estimate so far, while samples come."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -9,22 +9,28 @@ from hmpim.arguments import check_argument, numbers_of
 from hmpim.errors import ArgumentError
 from hmpim.identify.arrays import Real
 from hmpim.identify.chance import FALSE_ALARM
-from hmpim.identify.fitting.rows import Problem
+from hmpim.identify.fitting.candidates import nested
+from hmpim.identify.fitting.enrich import PLAIN
+from hmpim.identify.fitting.fit import Fit
+from hmpim.identify.fitting.start import starting_values
+from hmpim.identify.fitting.trial import trial_of
 from hmpim.identify.judgement import all_doubted
 from hmpim.identify.result import Estimate, Identification, Parameters
 from hmpim.identify.result.error_bars import estimate, noise_estimate
-from hmpim.identify.statistics.begin import begin
 from hmpim.identify.statistics.describe import identify_statistics
-from hmpim.identify.statistics.fit import Fitted, follow, pulse
+from hmpim.identify.statistics.fit import Compressed, Fitted, fit_briefly, follow, pulse
 from hmpim.identify.statistics.misfit import Asked, asked_of, misfit_of
 from hmpim.identify.statistics.products import Products
 from hmpim.identify.statistics.reach import Reach
+from hmpim.identify.statistics.run import shortened
+from hmpim.identify.statistics.start import rough_of
 from hmpim.identify.statistics.statistics import Statistics
 from hmpim.identify.worth import FEW, PAST
+from hmpim.model.dynamics import STRUCTURES
 from hmpim.record import Intersample
 from hmpim.stimulus import Stimulus
 
-__all__ = ["LiveEstimator", "Look"]
+__all__ = ["LiveEstimator", "Look", "only_told"]
 
 _WINDOW = 1.0
 """Seconds that delay and settling may take."""
@@ -38,6 +44,10 @@ _PAUSE = 1.1
 _EVALUATIONS, _FEWER = 2, 1
 """Of the fit, at each look: where it is and a step from there; at a look that asks whether the
 residual follows the input, where it is alone."""
+
+_TASTE, _FARTHER = 4, 12
+"""At a new start, from each start before the best one is followed, and from there. A structure
+that needs more lies where the record hardly tells it: looks add more."""
 
 _BETWEEN = 1.05
 """Growth of the record before it is asked again whether the residual follows the input."""
@@ -118,7 +128,7 @@ class LiveEstimator:
             band=stimulus.waveform.band,
         )
         self._mode: Intersample = intersample
-        self._problem: Problem = pulse(self._statistics.reach, intersample)
+        self._pulse = pulse(self._statistics.reach, intersample)
         self._fitted: Fitted | None = None
         self._tried = self._asked = self._starts = 0
         self._follows = True
@@ -172,18 +182,18 @@ class LiveEstimator:
         moves = bool(statistics.runs[0].uu[0] and statistics.runs[0].vv[-1, -1, 0])
         if statistics.samples < _FEWEST or not moves:
             return None
-        products = Products(statistics, skipped=0)
+        problem = Compressed.of(Products(statistics, skipped=0), self._pulse)
         due = statistics.samples >= _BETWEEN * self._asked and not self._asked_last
         made = due and self._is_elsewhere(self._fitted)
         asks = due and not made
-        fitted = self._again(products, _FEWER if due else _EVALUATIONS)
+        fitted = self._again(problem, _FEWER if due else _EVALUATIONS)
         if made:  # and asked at the next look, since each takes long enough
             self._asks = self._asked_about(fitted)
         if asks or self._fitted is None:
             self._asked = statistics.samples
             self._follows = self._lacks(fitted)
             if self._follows and statistics.samples >= _PAUSE * self._tried:
-                fitted = self._begin(products)
+                fitted = self._begin(problem)
                 self._asks = self._asked_about(fitted)
                 self._follows = self._lacks(fitted)
         self._asked_last, self._made = asks, made
@@ -195,10 +205,10 @@ class LiveEstimator:
         """Whether a fit's delay has moved away from what is asked for, made before this look."""
         if fitted is None or self._asks is None or self._made:
             return False
-        return abs(self._asks.delay - fitted.fit.delay) * self._band()[1] > FEW
+        return abs(self._asks.delay - fitted.delay) * self._band()[1] > FEW
 
     def _asked_about(self, fitted: Fitted) -> Asked:
-        return asked_of(fitted.fit.delay, self._band(), fitted.products)
+        return asked_of(fitted.delay, self._band(), fitted.products)
 
     def _band(self) -> tuple[float, float]:
         """Cycles a sample that are excited."""
@@ -216,20 +226,18 @@ class LiveEstimator:
         """The whole identification of what was read, with every structure and every check."""
         return identify_statistics(self._statistics, intersample=self._mode)
 
-    def _again(self, products: Products, evaluations: int) -> Fitted:
+    def _again(self, problem: Compressed, evaluations: int) -> Fitted:
         """The same structure, a step from where it was."""
         if self._fitted is None:
-            return self._begin(products)
-        return follow(
-            products, self._problem, self._mode, self._fitted.fit, evaluations=evaluations
-        )
+            return self._begin(problem)
+        return follow(problem, self._fitted, evaluations=evaluations)
 
-    def _begin(self, products: Products) -> Fitted:
+    def _begin(self, problem: Compressed) -> Fitted:
         """A new start: every plain structure from the data alone."""
         self._tried = self._statistics.samples
         self._starts += 1
-        fit = begin(self._statistics, self._mode)
-        return follow(products, self._problem, self._mode, fit, evaluations=_EVALUATIONS)
+        fit = _begun(self._statistics, self._mode)
+        return follow(problem, fit, evaluations=_EVALUATIONS)
 
     def _excited(self) -> tuple[float, float]:
         statistics = self._statistics
@@ -237,20 +245,20 @@ class LiveEstimator:
         return (0.0, statistics.fs / 2) if stated is None else stated
 
     def _read(self, fitted: Fitted) -> Look:
-        statistics, fit = self._statistics, fitted.fit
+        statistics = self._statistics
         time = statistics.samples / statistics.fs
         parameters = _figures(fitted, statistics)
         return Look(
             time=time,
-            structure=fit.structure.name,
+            structure=fitted.structure.name,
             parameters=_doubted(parameters, time, self._excited()[1], follows=self._follows),
         )
 
 
 def _figures(fitted: Fitted, statistics: Statistics) -> Parameters:
     """The parameters themselves; what is read off the response costs more than a look may take."""
-    fit, fs, cov = fitted.fit, statistics.fs, fitted.covariance
-    order, unit = fit.structure.order, statistics.units[1]
+    fs, cov, theta = statistics.fs, fitted.covariance, fitted.theta
+    order, unit = fitted.structure.order, statistics.units[1]
     freedom = max(fitted.products.counted - cov.shape[0], 1)
     axis = np.eye(cov.shape[0])
 
@@ -259,19 +267,19 @@ def _figures(fitted: Fitted, statistics: Statistics) -> Parameters:
 
     natural = damping = lag = None
     if order == 2:
-        zeta = 0.5 / float(np.sqrt(fit.theta[2]))  # it holds 1 / (4ζ²)
-        hertz = 2 * zeta * float(np.exp(-fit.theta[1])) * fs / (2 * np.pi)
-        bent = axis[2] / (2 * fit.theta[2])
+        zeta = 0.5 / float(np.sqrt(theta[2]))  # it holds 1 / (4ζ²)
+        hertz = 2 * zeta * float(np.exp(-theta[1])) * fs / (2 * np.pi)
+        bent = axis[2] / (2 * theta[2])
         natural = linear(hertz, -hertz * (axis[1] + bent), "Hz")
         damping = linear(zeta, -zeta * bent, "")
     elif order == 1:
-        seconds = float(np.exp(fit.theta[1])) / fs
+        seconds = float(np.exp(theta[1])) / fs
         lag = linear(seconds, seconds * axis[1], "s")
     return Parameters(
-        delay=linear(fit.delay / fs, axis[0] / fs, "s"),
-        scale_factor=linear(float(fit.linear[0]), axis[1 + order], ""),
-        bias=linear(float(fit.linear[-1]), axis[-1], unit),
-        noise_std=noise_estimate(fit.objective, freedom=freedom, share=1.0, unit=unit),
+        delay=linear(fitted.delay / fs, axis[0] / fs, "s"),
+        scale_factor=linear(float(fitted.linear[0]), axis[1 + order], ""),
+        bias=linear(float(fitted.linear[-1]), axis[-1], unit),
+        noise_std=noise_estimate(fitted.objective, freedom=freedom, share=1.0, unit=unit),
         natural_frequency=natural,
         damping_ratio=damping,
         time_constant=lag,
@@ -285,3 +293,34 @@ def _doubted(parameters: Parameters, time: float, highest: float, *, follows: bo
     if not (follows or outside):
         return parameters
     return all_doubted(parameters)
+
+
+def _begun(statistics: Statistics, intersample: Intersample) -> Fit:
+    """The likeliest plain structure, of one run from rest; its noise is taken for white.
+
+    What the joint fit does with all the time there is, done with little of it: a few steps from
+    each start, and a few more from the best one of each structure. What is not at its end then goes
+    on at the looks that follow.
+    """
+    short = only_told(statistics)
+    problem = Compressed.of(Products(short, skipped=0), pulse(short.reach, intersample))
+    rough = rough_of(short)
+    fits: list[Fitted] = []
+    for structure in (STRUCTURES[name] for name in PLAIN):
+        starts = starting_values(rough, structure)
+        if structure.order == 2:  # it is a first-order one too
+            starts.append(nested(fits[-1]))
+        tried = [fit_briefly(problem, structure, one, evaluations=_TASTE) for one in starts]
+        best = min(tried, key=lambda fit: fit.objective)
+        if not best.converged:
+            best = fit_briefly(problem, structure, best.theta, evaluations=_FARTHER)
+        fits.append(best)
+    count = problem.counted * min(fits, key=lambda fit: fit.objective).share
+    return min(fits, key=lambda fit: trial_of(intersample, fit, count).criterion)
+
+
+def only_told(statistics: Statistics) -> Statistics:
+    """The same, without lags that are longer than the run: it tells nothing about them."""
+    reach = replace(statistics.reach, lags=min(statistics.lags, statistics.samples))
+    runs = tuple(shortened(run, reach) for run in statistics.runs)
+    return replace(statistics, reach=reach, runs=runs)

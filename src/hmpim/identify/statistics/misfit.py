@@ -14,7 +14,6 @@ from hmpim.identify.arrays import Complex, Real
 from hmpim.identify.chance import SEARCHED
 from hmpim.identify.fitting.growth import HiddenPole, response_to_square
 from hmpim.identify.fitting.least_squares import solved
-from hmpim.identify.fitting.rows import Problem
 from hmpim.identify.noise.misfit import Misfit
 from hmpim.identify.statistics.fit import Fitted
 from hmpim.identify.statistics.products import Products
@@ -74,8 +73,8 @@ def misfit_of(
         What is asked for, where it is known already: about the fit's own delay by default.
     """
     if asked is None:
-        asked = asked_of(fitted.fit.delay, band, products)
-    gain, left, cost = _beside(fitted, products, asked.rows, asked.transforms)
+        asked = asked_of(fitted.delay, band, products)
+    gain, left, cost, _ = _beside(fitted, products, asked.rows, asked.transforms)
     variance = cost / max(products.counted - fitted.rows.shape[0] - 1, 1)
     power_left = np.diag(left)
     size = np.sqrt(np.where(power_left > 1e-200 * power_left.max(), power_left, 1.0))
@@ -90,7 +89,7 @@ def misfit_of(
     )
 
 
-def hidden_pole_of(fitted: Fitted, problem: Problem) -> HiddenPole:
+def hidden_pole_of(fitted: Fitted) -> HiddenPole:
     """Test a fit for one more pole, the delay shortened by as much.
 
     As `hmpim.identify.fitting.growth.hidden_pole`, from statistics.
@@ -99,28 +98,17 @@ def hidden_pole_of(fitted: Fitted, problem: Problem) -> HiddenPole:
     ----------
     fitted : Fitted
         The fit.
-    problem : Problem
-        From `hmpim.identify.statistics.fit.pulse`.
     """
-    fit = fitted.fit
-    row = response_to_square(problem, fit)
-    gain, left, _ = _beside(fitted, fitted.products, row[None])
+    row = response_to_square(fitted.problem, fitted)
+    gain, left, _, shift = _beside(fitted, fitted.products, row[None])
     size = max(float(left[0, 0]), np.finfo(float).tiny)
-    shift = _moved_by(fitted, row)
     return HiddenPole(
         squared=float(gain[0]) / size,
         std=float(np.sqrt(fitted.variance / size)),
-        shift=np.append(shift, 0.0),  # the bias is solved apart
-        fit=fit,
+        shift=np.append(shift[:, 0], 0.0),  # the bias is solved apart
+        fit=fitted,
         rows=fitted.rows,
     )
-
-
-def _moved_by(fitted: Fitted, row: Real) -> Real:
-    """Change of theta and numerator with what multiplies one more response."""
-    steady = np.concatenate([[row.sum()], fitted.steady])
-    gram = fitted.products.moments(np.vstack([row[None], fitted.rows]), steady).gram
-    return np.asarray(-solved(gram[1:, 1:], gram[1:, 0]))
 
 
 def integrated_share(fitted: Fitted) -> float:
@@ -135,10 +123,10 @@ def integrated_share(fitted: Fitted) -> float:
         The fit.
     """
     products = fitted.products
-    steps = Products(products.statistics, skipped=products.skipped, noise=np.array([1.0, -1.0]))
+    steps = products.whitened(np.array([1.0, -1.0]))
     taps = np.arange(fitted.response.size)
     begins = np.linspace(AHEAD, taps.size // 2, _STEPS).astype(int)
-    gain, left, cost = _beside(fitted, steps, (taps >= begins[:, None]).astype(np.float64))
+    gain, left, cost, _ = _beside(fitted, steps, (taps >= begins[:, None]).astype(np.float64))
     power = gain**2 / np.maximum(np.diag(left), np.finfo(float).tiny * np.diag(left).max())
     clear = power > 2 * SEARCHED * cost / steps.counted
     return float(np.max(np.where(clear, power, 0.0)) / cost) if cost > 0.0 else 0.0
@@ -146,23 +134,22 @@ def integrated_share(fitted: Fitted) -> float:
 
 def _beside(
     fitted: Fitted, products: Products, asked: Real, known: Complex | None = None
-) -> tuple[Real, Real, float]:
-    """Products of the residual and more responses, of these without the model's own, its power."""
+) -> tuple[Real, Real, float, Real]:
+    """Products of the residual and more responses, of these without the model's own, its power.
+
+    And how theta and the numerator change with what multiplies them.
+    """
     count = asked.shape[0]
     own = fitted.rows
     steady = np.concatenate([asked.sum(axis=1), fitted.steady])
     moments = products.moments(np.vstack([asked, own]), steady, known=known)
-    linear = fitted.weights
-    mixed, inner = moments.gram[:count, count:], moments.gram[count:, count:]
-    own_size = np.diag(inner)
-    size = np.sqrt(np.where(own_size > 1e-200 * own_size.max(), own_size, 1.0))
-    scaled = mixed / size
-    told = np.linalg.pinv(inner / np.outer(size, size), rcond=1e-12, hermitian=True)
-    left = moments.gram[:count, :count] - scaled @ told @ scaled.T
+    linear, mixed = fitted.weights, moments.gram[:count, count:]
+    shift = -solved(moments.gram[count:, count:], mixed.T)
+    left = moments.gram[:count, :count] + mixed @ shift
     residual = moments.cross - moments.gram[:, count:] @ linear
-    gain = residual[:count] - scaled @ told @ (residual[count:] / size)
+    gain = residual[:count] + shift.T @ residual[count:]
     cost = moments.energy - linear @ (moments.cross[count:] + residual[count:])
-    return gain, left, max(float(cost), np.finfo(float).eps * moments.energy)
+    return gain, left, max(float(cost), np.finfo(float).eps * moments.energy), shift
 
 
 def _responses(delay: float, band: tuple[float, float], taps: int) -> Real:

@@ -6,8 +6,10 @@ count lie at the two ends of each run, where the input itself is kept: they are 
 The bias is solved for each run, or for all, and taken off too.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
+from weakref import ref
 
 import numpy as np
 import scipy
@@ -75,6 +77,8 @@ class Products:
     def __init__(self, statistics: Statistics, *, skipped: int, noise: Real | None = None) -> None:
         self.statistics, self.skipped = statistics, skipped
         self.noise = np.ones(1) if noise is None else noise
+        self._plain: Products | None = None
+        self._last: Callable[[], Products | None] = lambda: None
         reach = statistics.reach
         self.order = self.noise.size - 1
         self.first = self.order + skipped
@@ -101,6 +105,21 @@ class Products:
         self._out = np.concatenate(parts, axis=2)
         self._inner = np.stack([self._outputs(run) for run in runs])
         self._inner -= self._out @ self._out.transpose(0, 2, 1)
+
+    @property
+    def plain(self) -> "Products":
+        """The same, the noise taken for white."""
+        return self if self._plain is None else self._plain
+
+    def whitened(self, noise: Real) -> "Products":
+        """The same samples under another noise model; the last is found again while it is used."""
+        if noise.size == 1:
+            return self.plain
+        last = self.plain._last()
+        if last is None or not np.array_equal(last.noise, noise):
+            last = Products(self.statistics, skipped=self.skipped, noise=noise)
+            last._plain, self.plain._last = self.plain, ref(last)
+        return last
 
     @property
     def counted(self) -> int:

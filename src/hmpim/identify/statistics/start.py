@@ -72,8 +72,20 @@ def excited(statistics: Statistics) -> tuple[float, float]:
     return band_of_levels(level, statistics.fs / length)
 
 
-def rough_of(statistics: Statistics) -> RoughResponse:
-    """Divide what the output has of the input by the input, without a model."""
+def rough_of(
+    statistics: Statistics, *, known: Real | None = None, lag: int | None = None
+) -> RoughResponse:
+    """Divide what the output has of the input by the input, without a model.
+
+    Parameters
+    ----------
+    statistics : Statistics
+        What was read.
+    known : ndarray, shape (taps,), optional
+        Impulse response of what is already explained, and taken off.
+    lag : int, optional
+        Delay in samples to begin from; by default the longest lag at which the output follows.
+    """
     reach = statistics.reach
     uu, yu = correlations(statistics)
     cross = yu[reach.forth - AHEAD :][: reach.taps]
@@ -82,6 +94,9 @@ def rough_of(statistics: Statistics) -> RoughResponse:
     around[: uu.size] = uu
     around[length - uu.size + 1 :] += uu[:0:-1]
     spectrum = scipy.fft.rfft(around).real
+    if known is not None:
+        made = scipy.fft.irfft(scipy.fft.rfft(known, length) * spectrum, length)
+        cross = cross - made[: cross.size]
     power = power_of(statistics, length)
     ridge = _RIDGE * float(power.max())
     answer = _solved(spectrum, ridge, cross, length)
@@ -91,8 +106,8 @@ def rough_of(statistics: Statistics) -> RoughResponse:
     power[0] = 0.0
     bins = np.flatnonzero(power > DEEPEST * power.max())
     omega = 2 * np.pi * bins / length
-    # The longest lag at which the output follows counts as the delay to begin from.
-    lag = int(np.argmax(np.abs(cross[AHEAD:])))
+    if lag is None:
+        lag = int(np.argmax(np.abs(cross[AHEAD:])))
     response = moved[bins] * (1.0 + ridge / power[bins]) * np.exp(1j * omega * lag)
     return RoughResponse(
         lag=lag,

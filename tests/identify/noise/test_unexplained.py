@@ -5,7 +5,7 @@ import pytest
 
 from hmpim.experiment import run
 from hmpim.identify import identify
-from hmpim.identify.fitting.unexplained import unexplained_response
+from hmpim.identify.noise.misfit import unexplained_response
 from hmpim.rigs import FunctionRig
 from hmpim.stimulus import Limits, design
 
