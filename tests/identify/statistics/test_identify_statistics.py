@@ -171,6 +171,18 @@ def test_a_drifting_bias_on_knots_is_no_response():
     assert pair.bias.value == pytest.approx(0.6 + drift.mean(), abs=4 * pair.bias.std)
 
 
+def test_any_unit_will_do():
+    record = chirped(6)
+    u, y = (1e80 * signal.values for signal in (record.inputs[0], record.outputs[0]))
+    scaled = Record.from_arrays(
+        {"u": u}, {"y": y}, fs=FS, intersample="bandlimited", band=(0.1, 20)
+    )
+    plain, found = (identify(compress(one))["y", "u"] for one in (record, scaled))
+    assert found.structure == "second_order"
+    assert found.delay.value == pytest.approx(plain.delay.value, abs=1e-3 * plain.delay.std)
+    assert found.bias.value == pytest.approx(1e80 * plain.bias.value, rel=1e-6)
+
+
 def test_noise_alone_is_unrelated():
     rng = np.random.default_rng(0)
     record = Record.from_arrays(

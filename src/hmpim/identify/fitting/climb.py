@@ -189,7 +189,7 @@ def _left(decrement: float, fell: float) -> float:
     Where the curvature is off by a share ρ, the step gains ρ of the decrement less and leaves ρ²
     of it; where it is the third derivative that bends the way, 9/4 as much.
     """
-    return 2.25 * (decrement - fell) ** 2 / decrement
+    return 2.25 * (decrement - fell) * ((decrement - fell) / decrement)  # of any unit
 
 
 def _limited(structure: Structure, theta: Real, step: Real) -> float:

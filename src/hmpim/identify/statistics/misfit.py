@@ -127,7 +127,7 @@ def integrated_share(fitted: Fitted) -> float:
     taps = np.arange(fitted.response.size)
     begins = np.linspace(AHEAD, taps.size // 2, _STEPS).astype(int)
     gain, left, cost, _ = _beside(fitted, steps, (taps >= begins[:, None]).astype(np.float64))
-    power = gain**2 / np.maximum(np.diag(left), np.finfo(float).tiny * np.diag(left).max())
+    power = gain / np.maximum(np.diag(left), np.finfo(float).tiny * np.diag(left).max()) * gain
     clear = power > 2 * SEARCHED * cost / steps.counted
     return float(np.max(np.where(clear, power, 0.0)) / cost) if cost > 0.0 else 0.0
 

@@ -127,7 +127,9 @@ def _solved(spectrum: Real, ridge: float, right: Real, length: int) -> Real:
             scipy.fft.irfft(scipy.fft.rfft(x, length) * spectrum, length)[: x.size] + ridge * x
         )
 
-    x, left = np.zeros_like(right), right.copy()
+    power, most = float(spectrum.max()), float(np.abs(right).max())
+    spectrum, ridge = spectrum / power, ridge / power  # of any unit
+    x, left = np.zeros_like(right), right / (most or 1.0)
     way, size = left.copy(), float(left @ left)
     least = 1e-12 * size
     for _ in range(_STEPS):
@@ -141,4 +143,4 @@ def _solved(spectrum: Real, ridge: float, right: Real, length: int) -> Real:
         x, left = x + step * way, left - step * turned
         before, size = size, float(left @ left)
         way = left + size / before * way
-    return x
+    return x * (most / power)
