@@ -5,12 +5,7 @@ import pytest
 
 from hmpim.model.discrete import discretise
 from hmpim.model.dynamics import STRUCTURES, denominator_of, numerator_of
-from hmpim.model.poles import (
-    PoleResponses,
-    input_responses,
-    partial_fractions,
-    rational_response,
-)
+from hmpim.model.poles import PoleResponses, partial_fractions, rational_response
 from hmpim.model.response import RationalDelay, response
 from hmpim.model.sampled import delayed_response, prepare_input
 
@@ -28,29 +23,49 @@ def test_a_sum_of_poles_is_the_rational_system(sweep, mode, delay, denominator):
     source, a = prepare_input(sweep, mode), np.array(denominator)
     exact = delayed_response(source, delay=delay, denominator=a, powers=a.size)
     poles = np.roots(a[::-1]).astype(complex)
-    answers = PoleResponses(source, delay, poles)
-    fed = input_responses(source, delay, slopes=False)[0]
-    for i, row in enumerate(exact):
-        simple, constant, _ = partial_fractions(np.eye(a.size)[i : i + 1], poles, a[-1])
-        found = answers.summed(simple, answers.waves)[0] + constant[0] * fed
-        np.testing.assert_allclose(found, row, atol=1e-9 * np.abs(row).max())
+    simple, constants, _ = partial_fractions(np.eye(a.size), poles, a[-1])
+    found = PoleResponses(source, delay, poles).summed(simple, direct=constants)
+    for own, row in zip(found, exact, strict=True):
+        np.testing.assert_allclose(own, row, atol=1e-9 * np.abs(row).max())
 
 
 @pytest.mark.parametrize("mode", ["zoh", "foh", "bandlimited"])
 @pytest.mark.parametrize("pole", [-0.1 + 0.3j, -0.02 + 0j, -9.0 + 0j, -1e-7 + 0j])
 def test_slopes_are_derivatives_by_the_pole(sweep, mode, pole):
     source, step = prepare_input(sweep, mode), 1e-6 * max(abs(pole), 1e-3)
-    up, down = (PoleResponses(source, 3.3, np.array([pole + s * step])).waves for s in (1.0, -1.0))
-    slope = PoleResponses(source, 3.3, np.array([pole])).slopes
+    both = np.array([[1.0], [-1.0j]])  # real and imaginary part
+    up, down = (
+        PoleResponses(source, 3.3, np.array([pole + s * step])).summed(both) for s in (1.0, -1.0)
+    )
+    slope = PoleResponses(source, 3.3, np.array([pole])).summed(0.0 * both, double=both)
     np.testing.assert_allclose((up - down) / (2 * step), slope, atol=2e-6 * np.abs(slope).max())
 
 
 @pytest.mark.parametrize("mode", ["foh", "bandlimited"])
 def test_the_rate_of_a_delayed_input_is_its_derivative(sweep, mode):
     source, step = prepare_input(sweep, mode), 1e-6
-    up, down = (input_responses(source, 3.3 + s * step, slopes=False)[0] for s in (-1.0, 1.0))
-    rate = input_responses(source, 3.3, slopes=True)[1]
+    none, one = np.zeros((1, 0)), np.ones(1)
+
+    def input_at(delay, **kinds):
+        return PoleResponses(source, delay, np.zeros(0, dtype=complex)).summed(none, **kinds)
+
+    up, down = (input_at(3.3 + s * step, direct=one) for s in (-1.0, 1.0))
+    rate = input_at(3.3, rate=one)
     np.testing.assert_allclose((up - down) / (2 * step), rate, atol=1e-6 * np.abs(rate).max())
+
+
+@pytest.mark.parametrize("precision", [3e-5, 1e-7])
+@pytest.mark.parametrize("delay", [-19.3, 0.0, 55.7, 700.0])
+def test_a_record_of_any_length_is_answered_block_by_block(sweep, precision, delay):
+    """Lengths about a multiple of a block's; 17 000 samples take two turns of blocks."""
+    for samples in (4, 15, 16, 17, 600, 17_000):
+        u = np.resize(sweep, samples)
+        source, a = prepare_input(u, "bandlimited", precision=precision), np.array([1.0, 3.0, 20.0])
+        exact = delayed_response(source, delay=delay, denominator=a)
+        poles = np.roots(a[::-1]).astype(complex)
+        simple, _, _ = partial_fractions(np.ones((1, 1)), poles, a[-1])
+        found = PoleResponses(source, delay, poles).summed(simple)
+        np.testing.assert_allclose(found, exact, atol=1e-11 * max(np.abs(exact).max(), 1.0))
 
 
 def test_several_numerators_are_expanded_at_once():

@@ -36,7 +36,6 @@ __all__ = [
     "PoleResponses",
     "distances",
     "fractions",
-    "input_responses",
     "modal_form",
     "parted",
     "partial_fractions",
@@ -58,6 +57,12 @@ _AGREES = 1e-8
 
 _COMPANION = 6
 """Poles up to which a companion matrix, and powers of z, keep them apart."""
+
+_BLOCK = 16
+"""Samples of a block; a longer one costs more products, a shorter one more steps between blocks."""
+
+_AT_ONCE = 1024
+"""Blocks that are multiplied at once: as many as a processor's cache holds."""
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -159,7 +164,11 @@ def placed(source: SampledInput, delay: float) -> tuple[int, float]:
 
 
 class PoleResponses:
-    """Responses of e^(-sτ)/(s - p) to an input's deviation from its first sample, from rest.
+    """Sums of responses of e^(-sτ)/(s - p) to what an input departs from its first sample, at rest.
+
+    Within a block of samples a sum is one convolution of a few coefficients. What came before the
+    block is known by one state of each pole, and a recursion leads from block to block. So a sum
+    is one product of matrices, however many poles it has.
 
     Parameters
     ----------
@@ -174,152 +183,165 @@ class PoleResponses:
     --------
     >>> from hmpim.model.sampled import prepare_input
     >>> held = prepare_input(np.array([0.0, 1.0, 1.0, 1.0]), "zoh")
-    >>> PoleResponses(held, 0.0, np.array([-0.5 + 0j])).waves.round(6).tolist()
+    >>> PoleResponses(held, 0.0, np.array([-0.5 + 0j])).summed(np.ones((1, 1))).round(6).tolist()
     [[0.0, 0.0, 0.786939, 1.264241]]
     """
 
     def __init__(self, source: SampledInput, delay: float, poles: Complex) -> None:
         factor = source.oversampling
-        begin, lag = placed(source, delay)
-        self._source, self._turning = source, np.flatnonzero(poles.imag)
-        self._c, self._first = _reaching(source, begin)
-        self._taps, self._turned = pole_taps(poles / factor, lag, source.degree)
-        self._powers = np.exp(poles[:, None] / factor * np.arange(factor + 1))
-        self._answers = self._recursive(_products(self._taps, self._powers) / factor)
-        self.waves = self._kept(self._answers)
-        """Real parts, then the imaginary parts of those that have one, shape (waves, n)."""
+        begin, self._lag = placed(source, delay)
+        self._source, self._poles = source, poles
+        self._tail = source.degree + 2  # age from which on a coefficient is answered by e^(pt)
+        self._ages = np.arange(factor * _BLOCK + self._tail)
+        self._powers: Complex = np.exp(poles[:, None] / factor * self._ages)
+        self._taps, self._turned = pole_taps(poles / factor, self._lag, source.degree)
+        self._answers = _followed(self._taps, self._powers) / factor
+        self._fine, self._before = _in_blocks(source, begin, self._tail)
 
     @cached_property
-    def slopes(self) -> Real:
-        """Derivatives by p, the responses of e^(-sτ)/(s - p)², as `waves` are."""
-        powers = self._powers
-        factor = powers.shape[1] - 1
-        weights = _products(self._turned, powers)
-        weights += _products(self._taps, powers * np.arange(factor + 1))
-        return self._kept(self._recursive(weights / factor**2, again=True))
+    def _slopes(self) -> Complex:
+        """Derivatives of the answers by the poles."""
+        late = _followed(self._taps, self._powers * self._ages)
+        return (_followed(self._turned, self._powers) + late) / self._source.oversampling**2
 
-    def summed(self, weights: Complex, waves: Real) -> Real:
-        """Real parts of sums over poles, shape (rows, n), of `waves` or their slopes.
+    @cached_property
+    def _states(self) -> Complex:
+        """What each pole remembers when a block begins, shape (k, blocks)."""
+        return self._carried(self._answers[:, self._tail, None], None)
+
+    @cached_property
+    def _state_slopes(self) -> Complex:
+        """Derivatives of the states by the poles."""
+        late = self._answers[:, self._tail, None] * self._ages[: -self._tail]
+        weights = self._slopes[:, self._tail, None] + late / self._source.oversampling
+        return self._carried(weights, _BLOCK * self._states)
+
+    def _carried(self, weights: Complex, driving: Complex | None) -> Complex:
+        """Sums over all before each block, weighted by what each age leaves of a coefficient."""
+        count, left = self._poles.size, (weights * self._powers[:, : -self._tail])[:, ::-1]
+        parts = np.concatenate([left.real, left.imag]) @ self._fine[:-1].T
+        new = parts[:count] + 1j * parts[count:]
+        out = np.zeros_like(new)
+        for k, q in enumerate(np.exp(self._poles * _BLOCK).tolist()):
+            own = new[k] if driving is None else new[k] + q * driving[k]
+            out[k, 1:] = scipy.signal.lfilter(_ONE, [1.0, -q], own)[:-1]
+        return out
+
+    def summed(
+        self,
+        simple: Complex,
+        *,
+        double: Complex | None = None,
+        direct: Real | None = None,
+        rate: Real | None = None,
+        here: slice = slice(None),
+    ) -> Real:
+        """Real parts of weighted sums, shape (rows, n).
 
         Parameters
         ----------
-        weights : complex ndarray, shape (rows, k)
-        waves : ndarray, shape (waves, n)
+        simple, double : complex ndarray, shape (rows, k)
+            Of the responses of 1/(s - p), and of their derivatives by p, those of 1/(s - p)².
+        direct, rate : ndarray, shape (rows,)
+            Of the delayed input itself, and of its rate per sample.
+        here : slice
+            Samples that are asked for, instead of all n.
         """
-        return np.asarray(self.parts(weights.conj().T).T @ waves)
-
-    def parts(self, each: Complex) -> Real:
-        """Values of each pole, shape (k, n), as `waves` are."""
-        return np.concatenate([each.real, each.imag[self._turning]])
-
-    def _recursive(self, weights: Complex, *, again: bool = False) -> Real:
-        """Weighted sums of coefficients, over 1 - q/z for each pole; z is a sample of the record.
-
-        Where it is `again`, the answers one sample before are driven by too, times q.
-        """
-        start = self._first % self._source.oversampling
-        count = self._first // self._source.oversampling + self._source.samples
-        answers = np.empty((weights.shape[0] + self._turning.size, count))
-        imaginary = dict(
-            zip(self._turning.tolist(), range(weights.shape[0], len(answers)), strict=True)
+        source, lag = self._source, self._lag
+        waves = self._powers[:, : -self._tail : source.oversampling]
+        answers = (simple @ self._answers).real
+        weights, states = [simple[:, :, None] * waves], [self._states]
+        if double is not None:
+            answers += (double @ self._slopes).real
+            weights[0] += double[:, :, None] * (waves * np.arange(_BLOCK))
+            weights.append(double[:, :, None] * waves)
+            states.append(self._state_slopes)
+        if direct is not None:
+            answers[:, : self._tail] += np.outer(direct, spline_at(lag, source.degree))
+        if rate is not None:
+            slope = source.oversampling * _spline_slope(lag, source.degree)
+            answers[:, : self._tail] += np.outer(rate, slope)
+        short = _padded(answers).take(_ages(self._tail, source.oversampling), axis=1)
+        parts = [part for each in weights for part in (each.real, -each.imag)]
+        start, stop, _ = here.indices(source.samples)
+        first = start // _BLOCK
+        out = self._multiplied(
+            np.concatenate([short, *parts], axis=1), states, first, -(-stop // _BLOCK) - first
         )
-        for k, q in enumerate(self._powers[:, -1].tolist()):
-            at = imaginary.get(k)
-            driven = self._filtered(weights[k].real, start, count)
-            if at is None:
-                if again:
-                    driven[1:] += q.real * self._answers[k, :-1]
-                answers[k] = scipy.signal.lfilter(_ONE, [1.0, -q.real], driven)
-                continue
-            both = np.empty(count, dtype=np.complex128)
-            both.real, both.imag = driven, self._filtered(weights[k].imag, start, count)
-            if again:
-                real, imag = self._answers[k, :-1], self._answers[at, :-1]
-                both.real[1:] += q.real * real - q.imag * imag
-                both.imag[1:] += q.real * imag + q.imag * real
-            both = scipy.signal.lfilter(_ONE, [1.0, -q], both)
-            answers[k], answers[at] = both.real, both.imag
-        return answers
+        return out[:, start - first * _BLOCK : stop - first * _BLOCK]
 
-    def _filtered(self, weights: Real, start: int, count: int) -> Real:
-        """Weighted sums of the coefficients up to each sample of the record and before it."""
-        factor = self._source.oversampling
-        if factor == 1:
-            return np.convolve(self._c, weights)[:count]
-        out = np.zeros(count)
-        for phase in range(factor):
-            late = phase > start  # the sample before holds it
-            c = self._c[start - phase + factor * late :: factor]
-            part = np.convolve(c, weights[phase::factor])[: count - late]
-            out[late : late + part.size] += part
-        return out
-
-    def _kept(self, answers: Real) -> Real:
-        return np.asarray(answers[:, self._first // self._source.oversampling :])
+    def _multiplied(self, matrices: Real, states: list[Complex], start: int, blocks: int) -> Real:
+        """Coefficients about some blocks and the states there, times a matrix for each row."""
+        step = self._fine.shape[1]
+        out = np.empty((matrices.shape[0], blocks, _BLOCK))
+        some = np.empty((min(blocks, _AT_ONCE), matrices.shape[1]))
+        for first in range(0, blocks, _AT_ONCE):
+            here = slice(first, min(first + _AT_ONCE, blocks))
+            at = slice(here.start + start + self._before, here.stop + start + self._before)
+            rows, column = some[: here.stop - here.start], step + self._tail
+            rows[:, :step] = self._fine[at]
+            rows[:, step:column] = self._fine[at.start + 1 : at.stop + 1, : self._tail]
+            for state in states:
+                for part in (state.real, state.imag):
+                    rows[:, column : column + len(part)] = part[:, at].T
+                    column += len(part)
+            for own, matrix in zip(out, matrices, strict=True):
+                np.matmul(rows, matrix, out=own[here])
+        return out.reshape(len(out), -1)
 
 
 _ONE = np.ones(1)
 
 
-def _products(taps: Complex, powers: Complex) -> Complex:
-    """Taps of each row times its powers q^j z^-j, j below the oversampling.
+def _padded(rows: NDArray[Any]) -> NDArray[Any]:
+    """Rows with a zero behind them, which index -1 takes."""
+    return np.concatenate([rows, np.zeros((rows.shape[0], 1))], axis=1)
 
-    The recursion over 1 - q/z then needs one step per sample of the record: 1/(1 - q/z) is
-    Σ q^j z^-j / (1 - q^f z^-f).
+
+def _followed(taps: Complex, powers: Complex) -> Complex:
+    """Convolutions of taps, (k, m), with powers, (k, size): shape (k, size)."""
+    late = _padded(powers).take(_late(powers.shape[1], taps.shape[1]), axis=1)
+    return np.asarray((late @ taps[:, :, None])[:, :, 0])
+
+
+@cache
+def _late(size: int, taps: int) -> NDArray[np.intp]:
+    """Index j - l of a convolution, -1 where it is below 0."""
+    return np.asarray(np.maximum(np.arange(size)[:, None] - np.arange(taps), -1))
+
+
+@cache
+def _ages(tail: int, factor: int) -> NDArray[np.intp]:
+    """Age of each coefficient about a block at each of its samples; -1 where it is later."""
+    latest = tail - 1 + factor * np.arange(_BLOCK)
+    return np.asarray(np.maximum(latest - np.arange(factor * _BLOCK + tail)[:, None], -1))
+
+
+def _in_blocks(source: SampledInput, begin: int, tail: int) -> tuple[Real, int]:
+    """Coefficients in blocks, shape (blocks + 1, m), and how many lie before the record.
+
+    A block begins with the first coefficient that is younger than `tail` at its first sample.
     """
-    factor = powers.shape[1] - 1
-    out = np.zeros((taps.shape[0], taps.shape[1] + factor - 1), dtype=np.complex128)
-    for j in range(factor):
-        out[:, j : j + taps.shape[1]] += powers[:, j : j + 1] * taps
-    return out
+    step = source.oversampling * _BLOCK
+    before = -(-max(begin, 0) // source.oversampling // _BLOCK)
+    blocks = before - (-source.samples // _BLOCK)
+    fine = np.zeros((blocks + 1, step))
+    c, flat = source.coefficients, fine.reshape(-1)
+    start = tail - 1 + before * step - begin
+    stop = begin + source.oversampling * (source.samples - 1) + 1
+    used = min(max(stop, 0), c.size)
+    if used:
+        flat[start : start + used] = c[:used]
+    flat[start + c.size : start + max(stop, c.size)] = c[-1]
+    return fine, before
 
 
-def input_responses(source: SampledInput, delay: float, *, slopes: bool) -> Real:
-    """The delayed input's deviation from its first sample, and its rate per sample.
-
-    A held input has no rate; 0 stands for it.
-
-    Parameters
-    ----------
-    source, delay, slopes
-        As for `PoleResponses`; whether to give the rate too.
-
-    Returns
-    -------
-    ndarray, shape (1, n) or (2, n)
-
-    Examples
-    --------
-    >>> from hmpim.model.sampled import prepare_input
-    >>> ramp = prepare_input(np.arange(5.0), "foh")
-    >>> input_responses(ramp, 0.5, slopes=True).tolist()
-    [[0.0, 0.5, 1.5, 2.5, 3.5], [0.0, 1.0, 1.0, 1.0, 1.0]]
-    """
-    begin, lag = placed(source, delay)
-    c, first = _reaching(source, begin)
-    rows = np.zeros((2 if slopes else 1, source.samples))
-    rows[0] = _kept(np.convolve(c, spline_at(lag, source.degree)), source, first)
-    if slopes and source.degree > 0:
-        lower = spline_at(lag, source.degree - 1)
-        taps = np.append(lower, 0.0) - np.concatenate([[0.0], lower])
-        rows[1] = source.oversampling * _kept(np.convolve(c, taps), source, first)
-    return rows
-
-
-def _reaching(source: SampledInput, begin: int) -> tuple[Real, int]:
-    """Coefficients up to the record's last sample, and where the record begins in them."""
-    before = max(-begin, 0)
-    last = begin + source.oversampling * (source.samples - 1)
-    c = source.coefficients[: max(last + 1, 0)]
-    after = max(last + 1 - source.coefficients.size, 0)
-    if before or after:
-        c = np.concatenate([np.zeros(before), c, np.full(after, c[-1] if c.size else 0.0)])
-    return c, begin + before
-
-
-def _kept(fine: NDArray[Any], source: SampledInput, first: int) -> NDArray[Any]:
-    factor = source.oversampling
-    return fine[first : first + factor * (source.samples - 1) + 1 : factor]
+def _spline_slope(lag: float, degree: int) -> Real:
+    """Derivative of one B-spline, sampled as `spline_at`; 0 where it jumps."""
+    if degree == 0:
+        return np.zeros(2)
+    lower = spline_at(lag, degree - 1)
+    return np.asarray(np.append(lower, 0.0) - np.concatenate([[0.0], lower]))
 
 
 def parted(poles: Complex) -> Complex:
@@ -362,10 +384,7 @@ def rational_response(
         return np.asarray(numerator @ rows)
     poles, residues, through = expanded
     answers = PoleResponses(source, delay, poles)
-    out = answers.summed(residues[None], answers.waves)[0]
-    if through:
-        out += through * input_responses(source, delay, slopes=False)[0]
-    return np.asarray(out)
+    return np.asarray(answers.summed(residues[None], direct=np.array([through]))[0])
 
 
 def modal_form(numerator: Real, denominator: Real) -> tuple[Real, Real, Real, float] | None:

@@ -9,8 +9,9 @@ one optimiser.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import singledispatch
+from itertools import pairwise
 from typing import Protocol
 
 import numpy as np
@@ -19,7 +20,7 @@ from hmpim.identify.arrays import Real
 from hmpim.identify.fitting.climb import Evaluated, climb
 from hmpim.identify.fitting.held_steps import kept_in_sample
 from hmpim.identify.fitting.least_squares import solved, solved_exactly, without
-from hmpim.identify.fitting.rows import Part, Problem
+from hmpim.identify.fitting.rows import Part, Problem, spans
 from hmpim.identify.fitting.sampled_rows import SampledPart, part_of
 from hmpim.identify.noise.whiteness import effective_share, is_white
 from hmpim.model.dynamics import Structure, coefficients_of, denominator_of, numerator_of
@@ -32,10 +33,12 @@ __all__ = [
     "Fit",
     "Problem",
     "bounded_for",
+    "combined",
     "evaluating",
     "fit_structure",
     "fit_together",
     "jacobian",
+    "products",
     "within_reach",
 ]
 
@@ -111,6 +114,11 @@ class Fit:
         return numerator_of(self.structure, coefficients, self.linear[:-1])
 
     @property
+    def bare(self) -> "Fit":
+        """The same without what is as long as the record, of a fit that is no more than a start."""
+        return replace(self, prediction=np.empty(0), residual=np.empty(0))
+
+    @property
     def memory(self) -> float:
         """Samples after which a state is forgotten: five times the slowest time constant."""
         return FORGETS * slowest_time_constant(self.denominator)
@@ -169,8 +177,11 @@ class _Evaluation:
         else:
             cross = np.concatenate([self.counted @ known.target, known.cross])
             self.linear = solved(self._gram, cross)
-            self.residual = known.target - self.linear[:own] @ self.counted
-            self.residual -= self.linear[own:] @ known.fixed
+            self.residual = np.empty_like(known.target)
+            for here in spans(0, known.target.size):
+                left = known.target[here] - self.linear[:own] @ self.counted[:, here]
+                left -= self.linear[own:] @ known.fixed[:, here]
+                self.residual[here] = left
         self.cost = float(self.residual @ self.residual)
 
     def weights(self) -> list[Real]:
@@ -178,16 +189,17 @@ class _Evaluation:
         edges = np.cumsum([block.shape[0] for block in self._blocks])
         return np.split(self.linear, edges)
 
-    def slopes(self) -> Real:
-        """Derivatives of the prediction by all delays and denominators, as they count."""
+    def slopes(self, here: slice) -> Real:
+        """Derivatives of the prediction by all delays and denominators, as samples count."""
         weights = self.weights()
         rows = [
-            part.slopes(weights[2 * i], weights[2 * i + 1]) for i, part in enumerate(self.parts)
+            part.slopes(weights[2 * i], weights[2 * i + 1], here)
+            for i, part in enumerate(self.parts)
         ]
         for problem, own in zip(self.problems, rows, strict=True):
             if problem.shortest_delay == problem.longest_delay:
                 own[0] = 0.0  # a delay that is kept
-        return self.problems[0].masked(rows[0] if len(rows) == 1 else np.vstack(rows))
+        return self.problems[0].masked(rows[0] if len(rows) == 1 else np.vstack(rows), here)
 
     @property
     def thetas(self) -> list[Real]:
@@ -196,9 +208,16 @@ class _Evaluation:
 
     def normal(self) -> tuple[Real, Real]:
         """Normal equations of delays and denominators: matrix, and derivative of the cost."""
-        rows = self.slopes()
-        mixed = np.hstack([rows @ self.counted.T, rows @ self._known.fixed.T])
-        return rows @ rows.T - mixed @ solved(self._gram, mixed.T), rows @ self.residual
+        size = sum(part.theta.size for part in self.parts)
+        inner, moment = np.zeros((size, size)), np.zeros(size)
+        mixed, own = np.zeros((size, self.linear.size)), self.counted.shape[0]
+        for here in self.problems[0].stretches(0, self.residual.size):
+            rows = self.slopes(here)
+            inner += rows @ rows.T
+            mixed[:, :own] += rows @ self.counted[:, here].T
+            mixed[:, own:] += rows @ self._known.fixed[:, here].T
+            moment += rows @ self.residual[here]
+        return inner - mixed @ solved(self._gram, mixed.T), moment
 
     def fits(self, *, converged: bool) -> list[Fit]:
         """What each input makes of the output."""
@@ -213,7 +232,8 @@ class _Evaluation:
                 residual = residual * problem.valid
         out = []
         for i, part in enumerate(self.parts):
-            own = weights[2 * i] @ part.rows + (bias + levels[i])
+            own = weights[2 * i] @ part.rows
+            own += bias + levels[i]
             if part.free.shape[0]:
                 own = own + weights[2 * i + 1] @ part.free
             if len(self.parts) == 1 and problem.nuisance is not None:
@@ -261,13 +281,89 @@ def jacobian(
         Zero where a sample does not count.
     """
     part = part_of(problem, fit.structure, fit.theta) if part is None else part
-    free = part.free[: 0 if problem.begins is None else None]
     bias = np.ones((1, problem.y.size))
     rows = np.vstack([part.slopes(fit.linear[:-1], fit.initial), part.rows, bias, *more])
     rows[fit.theta.size] += part.level
+    return _apart(problem, part, rows)
+
+
+def combined(problem: Problem, fit: Fit, weights: Real, row: Real) -> Real:
+    """A row, (n,), and the rows of `jacobian` times weights, (p,), treated as those are."""
+    part, size = part_of(problem, fit.structure, fit.theta), fit.theta.size
+    out = row + part.driven(weights[size:-1]) + weights[-1]
+    for here in problem.stretches(0, row.size):
+        out[here] += weights[:size] @ part.slopes(fit.linear[:-1], fit.initial, here)
+    return np.asarray(_apart(problem, part, out[None])[0])
+
+
+def _apart(problem: Problem, part: Part | SampledPart, rows: Real) -> Real:
+    """Rows as samples count, without what drift and initial state can do."""
+    others = _others(problem, part)
     counted = problem.masked(rows)
-    others = [free] if problem.nuisance is None else [free, problem.nuisance]
-    return without(counted, problem.masked(np.vstack(others)))
+    return without(counted, problem.masked(np.vstack(others))) if others else counted
+
+
+def _others(problem: Problem, part: Part | SampledPart) -> list[Real]:
+    """Rows of the initial state and of the drift, where they are fitted."""
+    free = [] if problem.begins is None else [*part.free]
+    return free if problem.nuisance is None else [*free, *problem.nuisance]
+
+
+def products(
+    problem: Problem,
+    fit: Fit,
+    residual: Real,
+    *more: Real,
+    part: Part | SampledPart | None = None,
+    edges: tuple[int, ...] = (),
+) -> Real:
+    """Products of the rows of `jacobian` and of a residual, which stands last.
+
+    No row is as long as the record: the products are summed stretch by stretch.
+
+    Parameters
+    ----------
+    problem, fit, *more, part
+        As for `jacobian`.
+    residual : ndarray, shape (n,)
+        0 where a sample does not count.
+    edges : tuple of int
+        Samples at which a span begins of which the products are given apart.
+
+    Returns
+    -------
+    ndarray, shape (1 + len(edges), q, q)
+        q = 1 + order + m + 1 + len(more) + 1.
+    """
+    part = part_of(problem, fit.structure, fit.theta) if part is None else part
+    others, size, n = _others(problem, part), fit.theta.size, residual.size
+    count = size + part.rows.shape[0] + 1 + len(more)
+
+    def rows_at(here: slice) -> Real:
+        slopes = part.slopes(fit.linear[:-1], fit.initial, here)
+        rows = np.empty((count + len(others) + 1, slopes.shape[1]))
+        rows[:size], rows[size : count - 1 - len(more)] = slopes, part.rows[:, here]
+        rows[size] += part.level
+        rows[count - 1 - len(more)] = 1.0
+        for own, row in zip(rows[count - len(more) :], (*more, *others), strict=False):
+            own[:] = row[here]
+        rows[:-1] = problem.masked(rows[:-1], here)
+        rows[-1] = residual[here]
+        return rows
+
+    whole = rows_at(slice(0, n)) if problem.filtered else None
+    sums = np.zeros((1 + len(edges), count + len(others) + 1, count + len(others) + 1))
+    for own, (first, last) in zip(sums, pairwise((0, *edges, n)), strict=True):
+        for here in problem.stretches(first, last):
+            rows = rows_at(here) if whole is None else whole[:, here]
+            own += rows @ rows.T
+    if not others:
+        return sums
+    gram, last = sums.sum(axis=0), count + len(others)
+    turn = np.zeros((count + 1, last + 1))
+    turn[:count, :count], turn[count, last] = np.eye(count), 1.0
+    turn[:count, count:last] = -solved(gram[count:last, count:last], gram[count:last, :count]).T
+    return np.asarray(turn @ sums @ turn.T)
 
 
 def bounded_for(problem: Problem, structure: Structure, theta: Real) -> Real:

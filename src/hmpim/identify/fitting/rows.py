@@ -5,6 +5,7 @@ coefficient of B; the bias; whatever else is linear, such as a drift; and, where
 begin at rest, the free response of the state it begins with.
 """
 
+from collections.abc import Iterator
 from copy import copy
 from dataclasses import dataclass, replace
 from math import ceil
@@ -13,13 +14,13 @@ from typing import ClassVar
 import numpy as np
 import scipy
 
-from hmpim.identify.arrays import Mask, Real
+from hmpim.identify.arrays import Complex, Mask, Real
 from hmpim.identify.fitting.sections import Expansion, Parallel, Poles, poles_of
 from hmpim.model.dynamics import Structure
-from hmpim.model.poles import PoleResponses, input_responses
-from hmpim.model.sampled import SampledInput
+from hmpim.model.poles import PoleResponses
+from hmpim.model.sampled import SAMPLES_ALONE, SampledInput
 
-__all__ = ["STAMPED_LATE", "Driven", "Part", "Problem"]
+__all__ = ["STAMPED_LATE", "Driven", "Part", "Problem", "spans"]
 
 STAMPED_LATE = -4.0
 """Least delay in samples that is tried where an output follows its input: stamps may be late."""
@@ -28,8 +29,17 @@ STAMPED_LATE = -4.0
 _FINAL = 1e-6
 """Precision of the chosen fit, see `hmpim.identify.fitting.fit.fit_structure`."""
 
+_STRETCH = 65_536
+"""Samples that are looked at at once: as many as a processor's cache holds."""
+
 _NOTHING = 50.0
 """Time constants after which a free response is less than rounding."""
+
+
+def spans(first: int, last: int) -> Iterator[slice]:
+    """Return spans of samples from one on to another, each near at hand."""
+    for start in range(first, last, _STRETCH):
+        yield slice(start, min(start + _STRETCH, last))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -98,11 +108,28 @@ class Problem:
         """Return the samples of `values`, (n,), that count."""
         return values if self.counts is None else np.asarray(values[self.counts])
 
-    def masked(self, rows: Real) -> Real:
-        """Return `rows`, (k, n) or (n,), samples that do not count set to 0, noise whitened."""
+    @property
+    def filtered(self) -> bool:
+        """Whether samples are whitened, so that none counts by itself."""
+        return self.noise is not None or self.whitening is not None
+
+    def stretches(self, first: int, last: int) -> Iterator[slice]:
+        """Return spans of samples from one on to another, to be looked at one after the other.
+
+        All at once where they are whitened, or answered together.
+        """
+        if self.filtered or self.source.degree == SAMPLES_ALONE:
+            return iter([slice(first, last)])
+        return spans(first, last)
+
+    def masked(self, rows: Real, here: slice = slice(None)) -> Real:
+        """Return `rows`, (k, n) or (n,), samples that do not count set to 0, noise whitened.
+
+        Of a span of samples, `here`, only where they are not `filtered`.
+        """
         if self.noise is not None and self.told is not None and rows.size:
             return np.asarray(scipy.signal.lfilter(self.noise, np.ones(1), rows) * self.told)
-        counted = rows if self.valid is None else rows * self.valid
+        counted = rows if self.valid is None else rows * self.valid[here]
         if self.whitening is None:
             return counted
         return np.asarray(scipy.fft.irfft(scipy.fft.rfft(counted) * self.whitening, rows.shape[-1]))
@@ -159,13 +186,10 @@ class Part(Driven):
 
     def __init__(self, problem: Problem, structure: Structure, theta: Real) -> None:
         self.structure, self.theta = structure, theta
-        self._since_start: Real | None
         self._source = problem.source
         self._delay = float(theta[0])
         self._poles: Poles | Parallel = poles_of(structure, theta[1:])
-        upper = self._poles.upper
-        self._answers = PoleResponses(self._source, self._delay, upper) if upper.size else None
-        self._fed: Real | None = None
+        self._answers = PoleResponses(self._source, self._delay, self._poles.upper)
         self._numerators = _powers(structure)
         self.rows = self._added(self._poles.expand(self._numerators))
         first = self._source.first
@@ -183,22 +207,22 @@ class Part(Driven):
         return other
 
     def _begin(self, begins: int | None) -> None:
-        answers, structure, count = self._answers, self.structure, self._source.samples
-        self._begins, self._since_start = begins, None
+        upper, structure, count = self._poles.upper, self.structure, self._source.samples
+        self._begins, self._lasts = begins, slice(0, 0)
         self.free = np.empty((0, count))
         """Free responses, shape (order, n)."""
-        if begins is None or not structure.order or answers is None:
+        if begins is None or not structure.order:
             return
-        slowest = max(-float(self._poles.upper.real.max()), 1.0 / _NOTHING)
-        lasts = slice(begins, begins + ceil(min(_NOTHING / slowest, count)))
-        self._late = np.maximum(np.arange(count) - float(begins), 0.0)
-        waves = np.exp(self._poles.upper[:, None] * self._late[lasts])
-        self._since_start = np.zeros((len(answers.waves), count))
-        self._since_start[:, lasts] = answers.parts(waves)
+        slowest = max(-float(upper.real.max()), 1.0 / _NOTHING)
+        self._lasts = slice(begins, min(begins + ceil(min(_NOTHING / slowest, count)), count))
+        self._late = np.arange(float(self._lasts.stop - begins))
+        self._since_start = self._parts(np.exp(upper[:, None] * self._late))
         impulses = np.eye(structure.order + structure.integrators)[structure.integrators :]
-        self.free = answers.summed(self._poles.expand(impulses).simple, self._since_start)
+        self.free = np.zeros((structure.order, count))
+        weights = self._freely(self._poles.expand(impulses).simple)
+        self.free[:, self._lasts] = weights @ self._since_start
 
-    def slopes(self, numerator: Real, initial: Real) -> Real:
+    def slopes(self, numerator: Real, initial: Real, here: slice = slice(None)) -> Real:
         """Derivatives of what the input does by theta, shape (1 + order, n).
 
         Parameters
@@ -207,38 +231,43 @@ class Part(Driven):
             What multiplies `rows`.
         initial : ndarray, shape (order,) or (0,)
             What multiplies `free`.
+        here : slice
+            Samples that are asked for, instead of all n.
         """
         structure = self.structure
         full: Real = numerator @ self._numerators
-        slopes, answers = self._poles.slopes(full), self._answers
-        out = self._added(slopes)
+        out = self._added(self._poles.slopes(full), here)
         if structure.integrators and self._source.first:
-            out[0] -= full[0] * self._source.first * (self._since() > 0.0)
-        if answers is None or not structure.order:
-            return out
-        out += answers.summed(slopes.double, answers.slopes)
-        if initial.size and self._since_start is not None:
+            out[0] -= full[0] * self._source.first * (self._since()[here] > 0.0)
+        start, stop, _ = here.indices(self._source.samples)
+        first, last = max(start, self._lasts.start), min(stop, self._lasts.stop)
+        if initial.size and first < last:
             state = np.concatenate([np.zeros(structure.integrators), initial])
-            free = self._poles.slopes(state)
-            out[1:] += answers.summed(free.simple[1:], self._since_start)
-            out[1:] += answers.summed(free.double[1:], self._late * self._since_start)
+            span = slice(first - self._lasts.start, last - self._lasts.start)
+            free, waves = self._poles.slopes(state), self._since_start[:, span]
+            moved = out[1:, first - start : last - start]
+            moved += self._freely(free.simple[1:]) @ waves
+            moved += self._freely(free.double[1:]) @ (self._late[span] * waves)
         return out
 
-    def _added(self, expansion: Expansion) -> Real:
+    def _added(self, expansion: Expansion, here: slice = slice(None)) -> Real:
         """Sum of single poles, the input itself and its rate."""
-        if self._answers is None:
-            out = np.zeros((expansion.direct.size, self._source.samples))
-        else:
-            out = self._answers.summed(expansion.simple, self._answers.waves)
-        rate = expansion.rate
-        rated = rate is not None and bool(rate.any())
-        if rated or expansion.direct.any():
-            if self._fed is None or self._fed.shape[0] < 1 + rated:
-                self._fed = input_responses(self._source, self._delay, slopes=rated)
-            out += np.outer(expansion.direct, self._fed[0])
-            if rate is not None and rated:
-                out += np.outer(rate, self._fed[1])
-        return out
+        direct, rate = expansion.direct, expansion.rate
+        return self._answers.summed(
+            expansion.simple,
+            double=expansion.double if expansion.double.size else None,
+            direct=direct if direct.any() else None,
+            rate=None if rate is None or not rate.any() else rate,
+            here=here,
+        )
+
+    def _parts(self, each: Complex) -> Real:
+        """Values of each pole, (k, m): real parts, then imaginary ones where a pole has one."""
+        return np.concatenate([each.real, each.imag[self._poles.upper.imag != 0.0]])
+
+    def _freely(self, weights: Complex) -> Real:
+        """Weights of `_since_start` for real parts of sums over poles, shape (rows, waves)."""
+        return self._parts(weights.conj().T).T
 
     def _since(self) -> Real:
         return np.asarray(np.maximum(np.arange(self._source.samples) - self._delay, 0.0))

@@ -51,12 +51,12 @@ class SampledPart(Driven):
                 blows[k, problem.begins + k] = 1.0
             self.free = np.asarray(scipy.signal.lfilter(np.ones(1), self._below, blows))
 
-    def slopes(self, numerator: Real, initial: Real) -> Real:
+    def slopes(self, numerator: Real, initial: Real, here: slice = slice(None)) -> Real:
         """Derivatives by theta, shape (1 + order, n); a whole number of samples has none."""
         order = self.structure.order
         out = np.zeros((1 + order, self.rows.shape[1]))
         if not order:
-            return out
+            return out[:, here]
         forced = numerator @ self.rows
         free = initial @ self.free if initial.size else np.zeros(forced.size)
         turned = -scipy.signal.lfilter(np.ones(1), self._below, forced + free)
@@ -73,7 +73,7 @@ class SampledPart(Driven):
             up = _below(self.structure, self.theta[1:] + step)
             down = _below(self.structure, self.theta[1:] - step)
             out[1 + j] = (up - down)[1:] / (2 * _STEP) @ by_coefficient
-        return out
+        return out[:, here]
 
 
 def _below(structure: Structure, theta: Real) -> Real:
