@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import hmpim
-from hmpim.identify.fitting.halves import compare_halves
+from hmpim.identify.fitting.halves import compare_halves, products_of_halves
 from hmpim.model import Model, simulate
 from tests_support import assert_share
 
@@ -52,10 +52,11 @@ def test_friction_in_a_half_that_hardly_moves_is_no_change_of_the_unit():
     slip = 0.001 * np.where(loud, -1e-4, 1.0) * np.sign(u)
     rows = np.vstack([u, np.ones(n)])
     left = slip - np.linalg.lstsq(rows.T, slip, rcond=None)[0] @ rows
-    quiet = compare_halves(rows, left, u, share=1.0)
+    halves = products_of_halves(rows, left)
+    quiet = compare_halves(halves, u, share=1.0)
     assert quiet.probability < 1e-6
     assert quiet.share > 0.2
     own = left[n // 2 :] / u[n // 2 :].std()
     assert own.std() > 0.05
     assert quiet.owed < 0.003
-    assert compare_halves(rows, left, 0.01 * u, share=1.0).owed == pytest.approx(100 * quiet.owed)
+    assert compare_halves(halves, 0.01 * u, share=1.0).owed == pytest.approx(100 * quiet.owed)

@@ -34,6 +34,8 @@ def without_rows(joint: JointFit, which: slice) -> JointFit:
 
     def plain(trial: Trial) -> Trial:
         fit = trial.fit
+        if not fit.prediction.size:  # no more than a start
+            return trial
         part = fit.nuisance[which] @ rows
         return replace(trial, fit=replace(fit, prediction=fit.prediction - part))
 

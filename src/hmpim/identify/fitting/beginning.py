@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import scipy
 
-from hmpim.identify.arrays import Mask, Real
+from hmpim.identify.arrays import Mask, Real, every_of
 from hmpim.identify.chance import FALSE_ALARM
 from hmpim.identify.fitting.data import Data, Seen
-from hmpim.identify.fitting.fit import Fit, Problem, jacobian
+from hmpim.identify.fitting.fit import Fit, Problem, products
 from hmpim.identify.fitting.least_squares import solved
 from hmpim.identify.fitting.sampled_rows import part_of
 from hmpim.identify.fitting.trial import Trial
@@ -85,30 +85,25 @@ def begins_of(problem: Problem, fit: Fit, *, lag: int) -> int | None:
     told = _counts(problem)
     valid = told & late
     innovations = problem.innovations(fit.prediction, fit.residual)
-    residual = (innovations * told)[begins:]
     count = int(np.count_nonzero(valid))
     if count < _LEFT * fit.structure.parameters:
         return None
-    power = float(residual @ residual)
     share = effective_share(innovations[valid])
     if _stands_out(innovations, told & ~late, valid):
         return begins
-    if not fit.structure.order or power <= 0.0:
+    if not fit.structure.order:
         return None
     part = part_of(replace(problem, begins=begins), fit.structure, fit.theta)
     known = part if problem.begins is None else None
-    others = jacobian(problem, fit, part=known)[:, begins:]
-    free = problem.masked(part.free)[:, begins:]
-    if problem.counts is not None:
-        others = others * told[begins:]
-        free = free * told[begins:]
-    mixed = free @ others.T
-    gram = np.block([[others @ others.T, mixed.T], [mixed, free @ free.T]])
-    moment = np.concatenate([others @ residual, free @ residual])
-    gained = float(moment @ solved(gram, moment))
+    counted = innovations if problem.counts is None else innovations * told
+    _, after = products(problem, fit, counted, *part.free, part=known, edges=(begins,))
+    moment, power = after[:-1, -1], float(after[-1, -1])
+    if power <= 0.0:
+        return None
+    gained = float(moment @ solved(after[:-1, :-1], moment))
     left = max(power - gained, np.finfo(float).tiny)
     statistic = share * count * float(np.log(power / left))
-    return begins if statistic > scipy.special.chdtri(free.shape[0], FALSE_ALARM) else None
+    return begins if statistic > scipy.special.chdtri(len(part.free), FALSE_ALARM) else None
 
 
 def look_again(problem: Problem, trial: Trial, seen: Seen, *, lag: int, rests: bool) -> Seen | None:
@@ -215,15 +210,20 @@ def stand_out_of(innovations: Real, some: Mask) -> Mask:
     squares = innovations**2
     counts = np.count_nonzero(some, axis=1)
     told = (counts > 0) & (counts < some.shape[1])
-    level = np.zeros(some.shape[0])
-    for count in np.unique(counts[told]):  # as many others: one array
-        alike = told & (counts == count)
-        others = squares[alike][~some[alike]].reshape(-1, some.shape[1] - count)
+    level, every = np.zeros(some.shape[0]), every_of(some.shape[1])
+    bulk, out_of_it = squares[:, ::every], some[:, ::every]
+    left_out = np.count_nonzero(out_of_it, axis=1)
+    for count in np.unique(left_out[told]):  # as many others: one array
+        alike = told & (left_out == count)
+        others = bulk[alike][~out_of_it[alike]].reshape(-1, bulk.shape[1] - count)
         level[alike] = np.median(others, axis=1) / 0.455  # of a squared Gaussian
+    limit = level * scipy.special.chdtri(np.maximum(counts, 1), FALSE_ALARM)
+    held = np.vecdot(squares, some)
+    out = np.asarray(told & (held > limit))
     # Twice as much where the others are not white: they hold more than noise.
-    spare = np.where(are_white(np.where(some, 0.0, innovations)), 1.0, TWICE)
-    limit = spare * level * scipy.special.chdtri(np.maximum(counts, 1), FALSE_ALARM)
-    return np.asarray(told & (np.sum(squares * some, axis=1) > limit))
+    white = are_white(np.where(some[out], 0.0, innovations[out]))
+    out[out] = white | (held > TWICE * limit)[out]
+    return out
 
 
 def _memory(fits: list[Fit]) -> int:

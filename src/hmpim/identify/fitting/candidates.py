@@ -102,12 +102,13 @@ def fit_plain(
                 rival = fit_structure(problem, fit.structure, nested(other), iterations=_TASTE)
                 fits[i] = min(fits[i], rival, key=lambda f: f.objective)
     least = min(fit.objective for fit in fits)
-    return [
-        fit
-        if fit.converged or fit.objective > TWICE**2 * least
-        else fit_structure(problem, fit.structure, fit.theta)
-        for fit in fits
-    ]
+
+    def ended(fit: Fit) -> Fit:
+        if fit.objective > TWICE**2 * least:  # a start at most
+            return fit.bare
+        return fit if fit.converged else fit_structure(problem, fit.structure, fit.theta)
+
+    return [ended(fit) for fit in fits]
 
 
 def _distinct(starts: Iterable[Real], tried: Iterable[Real] = ()) -> list[Real]:

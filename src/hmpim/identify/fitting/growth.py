@@ -19,7 +19,7 @@ import numpy as np
 
 from hmpim.identify.arrays import Real
 from hmpim.identify.chance import DEVIATIONS, HALF, ONE_SIDED
-from hmpim.identify.fitting.fit import Fit, Problem, jacobian, within_reach
+from hmpim.identify.fitting.fit import Fit, Problem, combined, products, within_reach
 from hmpim.identify.fitting.least_squares import solved
 from hmpim.identify.fitting.sampled_rows import part_of
 from hmpim.identify.noise.covariance import covariance
@@ -43,6 +43,9 @@ __all__ = [
 ]
 
 _TINY = float(np.finfo(float).tiny)
+
+_TOLD = 1e-6
+"""Share of a row's power, beside all other rows, down to which products tell it."""
 
 _PROBE = 0.3
 """Time constant, over the fit's own, by which the derivative with respect to q is taken."""
@@ -73,19 +76,16 @@ class HiddenPole:
         Change of the fit's vector with q.
     fit : Fit
         The fit.
-    rows : ndarray, shape (p, n)
-        Its derivatives, from `hmpim.identify.fitting.fit.jacobian`.
-    own : ndarray, shape (n,), or None
-        The derivative with respect to q, less all that other parameters can do. None of compressed
-        records.
+    halves : ndarray, shape (2, p + 1, p + 1), or None
+        Products of its derivatives and the whitened residual over either half of the record,
+        from `hmpim.identify.fitting.fit.products`. None of compressed records.
     """
 
     squared: float
     std: float
     shift: Real
     fit: Fit
-    rows: Real
-    own: Real | None = None
+    halves: Real | None = None
 
     @property
     def scale(self) -> float:
@@ -207,22 +207,26 @@ def hidden_pole(problem: Problem, fit: Fit) -> HiddenPole:
     fit : Fit
         Any fit to them but a filter in z.
     """
-    every = jacobian(problem, fit, response_to_square(problem, fit))
-    freedom = max(problem.counted - every.shape[0], 1)
+    row = response_to_square(problem, fit)
     left = problem.innovations(fit.prediction, fit.residual)
-    rows, row = every[:-1], every[-1]
-    shift = -solved(rows @ rows.T, rows @ row)
-    own = row + shift @ rows  # what no other parameter can do
-    power = max(float(own @ own), _TINY)
+    halves = products(problem, fit, left, row, edges=(left.size // 2,))
+    gram = halves.sum(axis=0)
+    freedom, told = max(problem.counted - gram.shape[0] + 1, 1), np.delete(np.arange(len(gram)), -2)
+    shift = -solved(gram[:-2, :-2], gram[:-2, -2])
+    # Of what no other parameter can do: its power, and its product with the residual.
+    power, along = (float(gram[-2, k] + shift @ gram[:-2, k]) for k in (-2, -1))
     white = is_white(problem.counting(left))
-    variance = covariance(own[None], left, freedom=freedom, white=white)[0, 0]
+    variance = float(gram[-1, -1]) / freedom / max(power, _TINY)
+    if not white or power <= _TOLD * gram[-2, -2]:  # the difference of products is too small
+        own = combined(problem, fit, shift, row)
+        power, along = max(float(own @ own), _TINY), float(own @ left)
+        variance = float(covariance(own[None], left, freedom=freedom, white=white)[0, 0])
     return HiddenPole(
-        squared=float(own @ left) / power,
+        squared=along / power,
         std=float(np.sqrt(variance)),
         shift=shift,
         fit=fit,
-        rows=rows,
-        own=own,
+        halves=halves[:, told[:, None], told],
     )
 
 
@@ -241,14 +245,15 @@ def seen_by_pole(problem: Problem, hidden: HiddenPole, richer: Fit) -> float | N
     richer : Fit
         The fit that has it.
     """
-    if hidden.own is None:
+    if hidden.halves is None:
         return None
     left = problem.innovations(richer.prediction, richer.residual)
     if is_white(problem.counting(left)):
         return None
-    freedom = max(problem.counted - hidden.rows.shape[0] - 1, 1)
-    variance = float(covariance(hidden.own[None], left, freedom=freedom, white=False)[0, 0])
-    power = max(float(hidden.own @ hidden.own), _TINY)
+    freedom = max(problem.counted - hidden.shift.size - 1, 1)
+    own = combined(problem, hidden.fit, hidden.shift, response_to_square(problem, hidden.fit))
+    variance = float(covariance(own[None], left, freedom=freedom, white=False)[0, 0])
+    power = max(float(own @ own), _TINY)
     if_white = float(left @ left) / freedom / power
     return float(problem.counted * if_white / max(variance, _TINY))
 

@@ -14,7 +14,7 @@ import scipy
 
 from hmpim.identify.arrays import Real
 
-__all__ = ["Halves", "compare_halves", "halves_of"]
+__all__ = ["Halves", "compare_halves", "halves_of", "products_of_halves"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -37,16 +37,15 @@ class Halves:
     owed: float
 
 
-def compare_halves(rows: Real, residual: Real, y: Real, *, share: float) -> Halves:
+def compare_halves(halves: Real, y: Real, *, share: float) -> Halves:
     """Compare the halves of a fit.
 
     Parameters
     ----------
-    rows : ndarray, shape (p, n)
-        Derivatives of the prediction.
-    residual, y : ndarray, shape (n,)
-        What is left over, 0 where a sample does not count; the output about its mean, weighed
-        alike.
+    halves : ndarray, shape (2, p + 1, p + 1)
+        Products over each, of the derivatives of the prediction and of what is left over.
+    y : ndarray, shape (n,)
+        The output about its mean, 0 where a sample does not count, weighed alike.
     share : float
         Independent samples per sample.
 
@@ -54,11 +53,12 @@ def compare_halves(rows: Real, residual: Real, y: Real, *, share: float) -> Halv
     --------
     >>> rows = np.ones((1, 200))
     >>> drifting = np.concatenate([-np.ones(100), np.ones(100)])
-    >>> compare_halves(rows, drifting + 0.1 * rows[0], drifting, share=1.0).probability < 1e-6
+    >>> halves = products_of_halves(rows, drifting + 0.1 * rows[0])
+    >>> compare_halves(halves, drifting, share=1.0).probability < 1e-6
     True
     """
-    chance, gained = halves_of(rows[None], residual[None], share=share)
-    power, size = (float(np.vecdot(x, x)) for x in (residual, y))
+    chance, gained = halves_of(halves[:, None], y.size, share=share)
+    power, size = float(halves[:, -1, -1].sum()), float(np.vecdot(y, y))
     return Halves(
         probability=float(chance[0]),
         share=float(gained[0]) / power if power > 0 else 0.0,
@@ -66,32 +66,43 @@ def compare_halves(rows: Real, residual: Real, y: Real, *, share: float) -> Halv
     )
 
 
-def halves_of(rows: Real, residual: Real, *, share: float) -> tuple[Real, Real]:
+def products_of_halves(rows: Real, residual: Real) -> Real:
+    """Products of rows, (..., p, n), and of residuals, (..., n), over either half of a record.
+
+    Returns
+    -------
+    ndarray, shape (2, ..., p + 1, p + 1)
+        The residual last.
+    """
+    every, middle = np.concatenate([rows, residual[..., None, :]], axis=-2), rows.shape[-1] // 2
+    parts = (every[..., :middle], every[..., middle:])
+    return np.stack([part @ part.swapaxes(-1, -2) for part in parts])
+
+
+def halves_of(halves: Real, samples: int, *, share: float) -> tuple[Real, Real]:
     """Compare the halves of many fits; probabilities and sums of squares gained, shape (k,).
 
     Parameters
     ----------
-    rows : ndarray, shape (k, p, n)
-        Derivatives of the predictions.
-    residual : ndarray, shape (k, n)
-        What is left over.
+    halves : ndarray, shape (2, k, p + 1, p + 1)
+        Products over each, of the derivatives of the predictions and of what is left over.
+    samples : int
+        Of the record.
     share : float
         Independent samples per sample.
     """
-    count, p, n = rows.shape
+    count, p = halves.shape[1], halves.shape[-1] - 1
     tiny = np.finfo(float).tiny
-    variance = np.vecdot(residual, residual) / max(n - p, 1)
+    variance = halves[:, :, p, p].sum(axis=0) / max(samples - p, 1)
     statistic, degrees = np.zeros(count), np.zeros(count)
-    for half in (slice(0, n // 2), slice(n // 2, n)):
-        part, left = rows[:, :, half], residual[:, half]
-        slope = (part @ left[:, :, None])[:, :, 0]
-        gram = part @ part.transpose(0, 2, 1)
+    for half in halves:
+        gram, slope = half[:, :p, :p], half[:, :p, p]
         scale = np.sqrt(np.maximum(np.einsum("iaa->ia", gram), tiny))
         values, vectors = np.linalg.eigh(gram / (scale[:, :, None] * scale[:, None, :]))
         seen = values > 1e-8 * values[:, -1:]
         along = (vectors.transpose(0, 2, 1) @ (slope / scale)[:, :, None])[:, :, 0]
         gained = np.sum(np.where(seen, along**2 / np.where(seen, values, 1.0), 0.0), axis=1)
-        statistic += np.minimum(gained, np.vecdot(left, left))
+        statistic += np.minimum(gained, half[:, p, p])
         degrees += np.count_nonzero(seen, axis=1)
     told = variance > 0
     free = np.maximum(degrees - p, 1)

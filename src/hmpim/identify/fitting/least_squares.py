@@ -73,8 +73,6 @@ def inverted(gram: Real) -> Real:
 
 def without(rows: Real, others: Real) -> Real:
     """Project `others`, (k, n), out of `rows`, (p, n)."""
-    if not others.shape[0]:
-        return rows
     scale = np.sqrt(np.maximum(np.sum(others**2, axis=1), np.finfo(float).tiny))
     q, r = np.linalg.qr((others / scale[:, None]).T)
     told = np.abs(np.diag(r)) > np.sqrt(_UNSEEN)

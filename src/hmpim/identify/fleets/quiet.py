@@ -17,7 +17,7 @@ from hmpim.identify.chance import EXCLUDED, FALSE_ALARM
 from hmpim.identify.effects.lost import stand_out
 from hmpim.identify.fitting.beginning import REACH, ringing_of, stand_out_of
 from hmpim.identify.fitting.fit import FORGETS
-from hmpim.identify.fitting.halves import halves_of
+from hmpim.identify.fitting.halves import halves_of, products_of_halves
 from hmpim.identify.fleets.fleet import Fleet, Group
 from hmpim.identify.judgement.feedback import chances_of_an_answer
 from hmpim.identify.judgement.residual import folded_power
@@ -76,7 +76,8 @@ def are_quiet(
     some = np.flatnonzero(quiet)
     for part, rows in _derivatives(fleet, group, some):
         left = group.residual[part]
-        chance, gained = halves_of(rows, left, share=1.0)
+        halves = products_of_halves(rows, left)
+        chance, gained = halves_of(halves, left.shape[1], share=1.0)
         worth = WORTH**2 * outputs.shape[1] * outputs[part].var(axis=1)
         quiet[part] = (chance >= FALSE_ALARM) | (gained <= worth)
         quiet[part] &= _from_rest(fleet, group, part, rows, lags[part])

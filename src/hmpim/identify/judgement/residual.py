@@ -150,8 +150,7 @@ def halves_disagree(evidence: Evidence) -> tuple[Finding, ...]:
     joint, readings = evidence.joint, evidence.readings
     weighed = joint.weighed
     halves = compare_halves(
-        readings.rows,
-        readings.innovations,
+        readings.halves,
         weighed.masked(weighed.y - weighed.counting(weighed.y).mean()),
         share=joint.weighed_share,
     )
@@ -219,14 +218,15 @@ def unsampled_input(evidence: Evidence) -> tuple[Finding, ...]:
     """
     if evidence.joint.best.intersample != "bandlimited":
         return ()
-    folded = folded_power(evidence.u, evidence.fs)
+    size = evidence.u.size
+    every = 1 + size // 2 // _BINS
+    folded = folded_power(evidence.u, evidence.fs, every=every)
     if not folded.any():
         return ()
-    every = 1 + folded.size // _BINS
-    frequency = np.arange(1, folded.size + 1, every) / evidence.u.size * evidence.fs
+    frequency = np.arange(1, size // 2 + 1, every) / size * evidence.fs
     answered = np.abs(response(evidence.readings.system, frequency)) ** 2
     noise = float(np.mean(_counted(evidence) ** 2))
-    share = every * float(folded[::every] @ answered) / noise if noise > 0.0 else 0.0
+    share = every * float(folded @ answered) / noise if noise > 0.0 else 0.0
     if share <= 2 * FEW:
         return ()
     return (
@@ -241,7 +241,7 @@ def unsampled_input(evidence: Evidence) -> tuple[Finding, ...]:
     )
 
 
-def folded_power(u: Real, fs: float) -> Real:
+def folded_power(u: Real, fs: float, *, every: int = 1) -> Real:
     """Power that an input has beyond half the rate, at the frequencies into which it is folded.
 
     By the fall of its spectrum over the last octave; all 0 where there is none to be told.
@@ -252,15 +252,18 @@ def folded_power(u: Real, fs: float) -> Real:
         The input.
     fs : float
         Rate in Hz.
+    every : int
+        One of so many bins is given.
     """
-    nothing = np.zeros(u.size // 2)
+    bins = np.arange(1, u.size // 2 + 1, every)
+    nothing = np.zeros(bins.size)
     if u.size < _FEWEST:
         return nothing
     lines = lines_of(u)
     steep = float(np.log2(lines.octave / lines.end)) if lines.end > 0.0 else 0.0
     if steep < 1.0:  # as white noise, or none at all
         return nothing
-    frequency = np.arange(1, nothing.size + 1) / u.size * fs
+    frequency = bins / u.size * fs
     return np.asarray(lines.end * (2.0 * (1.0 - frequency / fs)) ** -steep)
 
 

@@ -6,13 +6,18 @@ With white noise the covariance of a maximum-likelihood fit is the Cramér-Rao b
 autoregression fitted to the residual.
 """
 
+from collections.abc import Callable
+
 import numpy as np
 import scipy
 
 from hmpim.identify.arrays import Real
 from hmpim.identify.noise.autoregression import autoregressive_spectrum
 
-__all__ = ["covariance"]
+__all__ = ["covariance", "white_covariance"]
+
+_WELL = 1e-4
+"""Least element of a triangular factor down to which normal equations give it."""
 
 
 def covariance(rows: Real, residual: Real, *, freedom: int, white: bool) -> Real:
@@ -34,23 +39,50 @@ def covariance(rows: Real, residual: Real, *, freedom: int, white: bool) -> Real
     ndarray, shape (p, p)
         Finite but very large along a direction that the record does not see.
     """
-    norm = np.linalg.norm(rows, axis=1)
+    gram = rows @ rows.T
+    norm = np.sqrt(gram.diagonal())
     scale = np.where(norm > 1e-100 * norm.max(), norm, 1.0)  # a row of zeros stays one
-    scaled = rows / scale[:, None]
-    q, r = np.linalg.qr(scaled.T)
-    diagonal = np.abs(np.diag(r))
-    if diagonal.min() <= 1e-10 * diagonal.max():
-        left, values, right = np.linalg.svd(r)
-        inverse = (right.T / np.maximum(values, 1e-10 * max(values[0], 1.0))) @ left.T
-    else:
-        inverse = np.linalg.inv(r)
+    inverse, basis = _orthonormal(gram / np.outer(scale, scale), rows, scale)
     if white:
         inner = np.eye(scale.size) * float(residual @ residual) / freedom
     else:
         length = scipy.fft.next_fast_len(2 * residual.size, real=True)
-        spectra = scipy.fft.rfft(q.T, length)
+        spectra = scipy.fft.rfft(basis(), length)
         omega = 2 * np.pi * np.arange(spectra.shape[1]) / length
         power = autoregressive_spectrum(residual, omega) * residual.size / freedom
         power[1 : (length + 1) // 2] *= 2.0  # both signs of frequency
         inner = ((spectra * power) @ spectra.conj().T).real / length
     return np.asarray(inverse @ inner @ inverse.T / np.outer(scale, scale))
+
+
+def white_covariance(gram: Real, power: float, *, freedom: int) -> Real | None:
+    """Return the same from the rows' products, (p, p), and the sum of squares of a white residual.
+
+    None where products see a direction too badly.
+    """
+    scale = np.sqrt(gram.diagonal())
+    if not scale.all():
+        return None
+    factor, info = scipy.linalg.lapack.dpotrf(gram / np.outer(scale, scale))
+    if info or factor.diagonal().min() <= _WELL:
+        return None
+    inverse = np.linalg.inv(factor)
+    return np.asarray(inverse @ inverse.T * (power / freedom) / np.outer(scale, scale))
+
+
+def _orthonormal(gram: Real, rows: Real, scale: Real) -> tuple[Real, Callable[[], Real]]:
+    """Inverse of the triangle R of scaled rows, (Q R)', and Q' as it is asked for, (p, n).
+
+    By normal equations, unless they see a direction too badly.
+    """
+    factor, info = scipy.linalg.lapack.dpotrf(gram)
+    diagonal = factor.diagonal()
+    if not info and diagonal.min() > _WELL:
+        inverse = np.linalg.inv(factor)
+        return inverse, lambda: (inverse.T / scale) @ rows
+    q, r = np.linalg.qr((rows / scale[:, None]).T)
+    diagonal = np.abs(np.diag(r))
+    if diagonal.min() > 1e-10 * diagonal.max():
+        return np.linalg.inv(r), lambda: q.T
+    left, values, right = np.linalg.svd(r)
+    return (right.T / np.maximum(values, 1e-10 * max(values[0], 1.0))) @ left.T, lambda: q.T

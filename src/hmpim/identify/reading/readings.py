@@ -6,12 +6,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hmpim.identify.arrays import Real
-from hmpim.identify.fitting.fit import jacobian
+from hmpim.identify.fitting.fit import jacobian, products
 from hmpim.identify.fitting.held_steps import steps_through
 from hmpim.identify.fitting.nested import widened
 from hmpim.identify.fitting.trial import JointFit
 from hmpim.identify.noise.autoregression import deviation_of_mean
-from hmpim.identify.noise.covariance import covariance
+from hmpim.identify.noise.covariance import covariance, white_covariance
 from hmpim.identify.noise.whiteness import is_white
 from hmpim.identify.reading.figures import read_figures
 from hmpim.identify.reading.propagation import gradient
@@ -45,8 +45,9 @@ class Readings:
         Of `vector`.
     white : bool
         Whether the residual passed for white.
-    rows : ndarray, shape (p, n)
-        Derivatives of the prediction, from `hmpim.identify.fitting.fit.jacobian`, whitened.
+    halves : ndarray, shape (2, p + 1, p + 1)
+        Products of the derivatives of the prediction and `innovations` over either half of the
+        record, from `hmpim.identify.fitting.fit.products`.
     innovations : ndarray, shape (n,)
         The residual, whitened.
     whitened : bool
@@ -60,7 +61,7 @@ class Readings:
     vector: Real
     covariance: Real
     white: bool
-    rows: Real
+    halves: Real
     innovations: Real
     whitened: bool
     coefficient_covariance: Real
@@ -108,10 +109,13 @@ def read_parameters(
     residual = weighed.innovations(fit.prediction, fit.residual)
     white = is_white(weighed.counting(residual))
     tested = joint.hidden
-    rows = tested.rows if tested is not None and tested.fit is fit else jacobian(weighed, fit)
+    halves = tested.halves if tested is not None and tested.fit is fit else None
+    if halves is None:
+        halves = products(weighed, fit, residual, edges=(residual.size // 2,))
     cov = known_covariance
     if cov is None:
-        cov = widened(joint, _covariance(joint, rows, residual, freedom=freedom, white=white))
+        gram = halves.sum(axis=0)[:-1, :-1]
+        cov = widened(joint, _covariance(joint, gram, residual, freedom=freedom, white=white))
     if weighed.noise is not None:
         cov = _wandering(cov, fit.residual, joint.problem.counted)
     parameters, system, coefficients = read_figures(
@@ -135,30 +139,35 @@ def read_parameters(
         vector=vector,
         covariance=cov,
         white=white and weighed.noise is None,
-        rows=rows,
+        halves=halves,
         innovations=residual,
         whitened=white,
         coefficient_covariance=coefficients,
     )
 
 
-def _covariance(joint: JointFit, rows: Real, residual: Real, *, freedom: int, white: bool) -> Real:
+def _covariance(joint: JointFit, gram: Real, residual: Real, *, freedom: int, white: bool) -> Real:
     """Covariance of theta and linear; a held, static system moves in whole samples only."""
     fit = joint.best.fit
-    if fit.structure.sampled:  # its delay is a whole number of samples
-        inner = covariance(rows[1:], residual, freedom=freedom, white=white)
+    whole = fit.structure.sampled or _in_whole_samples(joint)  # its delay is a number of samples
+    told = slice(int(whole), None)
+    inner = None
+    if white:
+        power = float(residual @ residual)
+        inner = white_covariance(gram[told, told], power, freedom=freedom)
+    if inner is None:
+        rows = jacobian(joint.weighed, fit)[told]
+        inner = covariance(rows, residual, freedom=freedom, white=white)
+    if not whole:
+        return inner
+    full = np.zeros_like(gram)
+    full[1:, 1:] = inner
+    if fit.structure.sampled:
         rounding = _ROUNDING**2 * float(joint.problem.y @ joint.problem.y)
-        full = np.zeros((rows.shape[0], rows.shape[0]))
-        full[1:, 1:] = inner * (1.0 + rounding / max(fit.cost, 1e-3 * rounding))
-        return full
-    if _in_whole_samples(joint):
-        inner = covariance(rows[1:], residual, freedom=freedom, white=white)
-        full = np.zeros((rows.shape[0], rows.shape[0]))
-        full[1:, 1:] = inner
-        if not fit.structure.order:  # else the ends of the sample are read: `spanned`
-            full[0, 0] = 1.0 / 12.0  # uniform over the sample in which the delay ends
-        return full
-    return covariance(rows, residual, freedom=freedom, white=white)
+        full *= 1.0 + rounding / max(fit.cost, 1e-3 * rounding)
+    elif not fit.structure.order:  # else the ends of the sample are read: `spanned`
+        full[0, 0] = 1.0 / 12.0  # uniform over the sample in which the delay ends
+    return full
 
 
 def _in_whole_samples(joint: JointFit) -> bool:

@@ -169,7 +169,7 @@ def _read(statistics: Statistics, joint: JointFit, highest: float) -> Readings:
         vector=vector,
         covariance=cov,
         white=best.is_white,
-        rows=np.empty((vector.size, 0)),
+        halves=np.zeros((2, 0, 0)),
         innovations=np.empty(0),
         whitened=True,
         coefficient_covariance=spread,

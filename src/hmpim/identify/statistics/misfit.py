@@ -107,7 +107,6 @@ def hidden_pole_of(fitted: Fitted) -> HiddenPole:
         std=float(np.sqrt(fitted.variance / size)),
         shift=np.append(shift[:, 0], 0.0),  # the bias is solved apart
         fit=fitted,
-        rows=fitted.rows,
     )
 
 
