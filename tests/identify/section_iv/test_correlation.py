@@ -124,8 +124,9 @@ def test_one_transform_tells_the_papers_peak_and_who_is_ahead(offsets, late):
     rng = np.random.default_rng(late + 100)
     x = np.convolve(rng.standard_normal(601), np.ones(5))
     u, y = x[50:551] + offsets[0], -1.5 * x[50 - late : 551 - late] + offsets[1]
-    seen = likeness(u, y)
+    seen = likeness(u, y, 50)
     wanted = correlation_peak(cross_correlation(y, u))
     assert seen.peak.lag == wanted.lag
     assert seen.peak.value == pytest.approx(wanted.value, rel=1e-9)
     assert seen.is_ahead == (late < 0)
+    assert (seen.lead if late < 0 else seen.lag) == late

@@ -21,6 +21,7 @@ from hmpim.identify.noise.covariance import covariance
 from hmpim.identify.noise.whiteness import is_white
 from hmpim.identify.result.groups import EVERY
 from hmpim.identify.section_iv.correlation import likeness
+from hmpim.identify.signals import longest_lag
 from hmpim.identify.worth import FEW, MATERIAL, PART
 from hmpim.record import Finding
 
@@ -77,7 +78,7 @@ def is_swapped(u: Real, y: Real, valid: Mask) -> bool:
         return False
     if not valid.all():
         u, y = (np.where(valid, x - x[valid].mean(), 0.0) for x in (u, y))
-    if not likeness(u, y).is_ahead:
+    if not likeness(u, y, longest_lag(u.size)).is_ahead:
         return False
     u, y = ((x - x.mean()) / (float(np.abs(x - x.mean()).max()) or 1.0) for x in (u, y))
     u, y, valid = _thinned(u, y, valid)

@@ -18,10 +18,10 @@ from hmpim.identify.arrays import Mask, Real
 from hmpim.identify.fitting.beginning import begins_of
 from hmpim.identify.fitting.fit import Fit, Problem, fit_structure
 from hmpim.identify.fitting.least_squares import solved_exactly
-from hmpim.identify.fitting.start import coarse_lag
 from hmpim.identify.fitting.trial import JointFit, trial_of
 from hmpim.identify.fitting.unrelated import UNDENIED, says_nothing
 from hmpim.identify.noise.whiteness import effective_share
+from hmpim.identify.section_iv.correlation import likeness
 from hmpim.identify.worth import MOST, ROUNDING, TWICE
 from hmpim.model.dynamics import FILTERS, Structure
 from hmpim.model.filters import nyquist_taps, section_parameters
@@ -107,7 +107,7 @@ class _Equations:
 
 def _equations(u: Real, y: Real, valid: Mask | None, *, most: int = _ROWS) -> _Equations:
     """Factor what one output sample may follow from; of masked samples, those that count alone."""
-    lag = coarse_lag(u, y, u.size // 2)
+    lag = likeness(u, y, u.size // 2).lag
     first = max(lag - _EARLIER, 0)
     last = min(lag + 2 + _TAPS, u.size // 2)
     last = max(min(last, (u.size + 2 * first) // 3 - _ORDER), first)  # two equations an unknown

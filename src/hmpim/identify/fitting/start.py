@@ -24,10 +24,11 @@ from numpy.typing import NDArray
 
 from hmpim.identify.arrays import Complex, Real
 from hmpim.identify.kept import kept
+from hmpim.identify.section_iv.correlation import likeness
 from hmpim.identify.worth import MUCH
 from hmpim.model.dynamics import Structure, theta_of
 
-__all__ = ["RoughResponse", "coarse_lag", "rough_response", "searched", "starting_values"]
+__all__ = ["RoughResponse", "rough_response", "searched", "starting_values"]
 
 _STAMPED_LATE = -2
 """Least delay in samples that is looked for where the output follows the input."""
@@ -101,34 +102,14 @@ class RoughResponse:
 
 
 def _tapered(x: Real) -> Real:
-    n = x.size
-    edge = max(int(_TAPER * n), 1)
-    window = np.ones(n)
+    edge = max(int(_TAPER * x.size), 1)
     ramp = np.sin(0.5 * np.pi * (np.arange(edge) + 0.5) / edge) ** 2
-    window[:edge] = ramp
-    window[n - edge :] = ramp[::-1]
-    return np.asarray(window * (x - window @ x / window.sum()))
-
-
-def coarse_lag(u: Real, y: Real, longest: int) -> int:
-    """Lag in samples, 0..longest, of the greatest magnitude of the cross-correlation."""
-    return _lags(u, y, longest)[0]
-
-
-def _lags(u: Real, y: Real, longest: int) -> tuple[int, int | None]:
-    """Lags of greatest likeness: from 0 on, and below 0 if it is greater there."""
-    length = scipy.fft.next_fast_len(u.size + longest + 1, real=True)
-    spectrum = np.conj(_transform(u, length)) * scipy.fft.rfft(y - y.mean(), length)
-    likeness = np.abs(scipy.fft.irfft(spectrum, length))
-    late, ahead = likeness[: longest + 1], likeness[: -longest - 1 : -1]
-    behind = int(np.argmax(late))
-    return behind, -1 - int(np.argmax(ahead)) if ahead.max() > late.max() else None
-
-
-@kept
-def _transform(u: Real, length: int) -> Complex:
-    """Of an input less its mean, padded to a length."""
-    return np.asarray(scipy.fft.rfft(u - u.mean(), length), dtype=np.complex128)
+    inner = x[edge : x.size - edge]
+    total = float(ramp @ x[:edge] + inner.sum() + ramp[::-1] @ x[x.size - edge :])
+    out = x - total / (2.0 * float(ramp.sum()) + inner.size)
+    out[:edge] *= ramp
+    out[x.size - edge :] *= ramp[::-1]
+    return np.asarray(out)
 
 
 @kept
@@ -153,7 +134,8 @@ def rough_response(
     """
     ahead = None
     if lag is None:
-        lag, ahead = _lags(u, y, longest_delay)
+        seen = likeness(u, y, longest_delay)
+        lag, ahead = seen.lag, seen.lead
     overlap = u.size - abs(lag)
     group = max(min(u.size // (_TURNS * (abs(lag) + _LATE)), u.size // _ENOUGH), 1)
     length = scipy.fft.next_fast_len(-(-u.size // group), real=True)

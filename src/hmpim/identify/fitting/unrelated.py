@@ -8,10 +8,10 @@ from hmpim.identify.chance import FALSE_ALARM, SEARCHED
 from hmpim.identify.fitting.fit import Fit, Problem
 from hmpim.identify.fitting.least_squares import solved
 from hmpim.identify.fitting.sampled_rows import part_of
-from hmpim.identify.fitting.start import coarse_lag
 from hmpim.identify.noise.autoregression import autoregression, innovation_gain
 from hmpim.identify.noise.misfit import misfit
 from hmpim.identify.noise.whiteness import effective_share
+from hmpim.identify.section_iv.correlation import likeness
 from hmpim.identify.worth import TWICE
 
 __all__ = ["UNDENIED", "is_unrelated", "says_nothing"]
@@ -53,7 +53,7 @@ def says_nothing(
     if problem.valid is not None:
         seen = seen * problem.coloured(noise).told
     seen[: noise.size] = 0.0
-    lags = (fit.delay, float(coarse_lag(heard, seen, y.size // 2)))
+    lags = (fit.delay, float(likeness(heard, seen, y.size // 2).lag))
     answers = [misfit(heard, seen, delay=lag, band=band) for lag in lags]
     answer = min(answers, key=lambda one: one.probability)
     reachable = -0.5 * problem.counted * float(np.log1p(-min(answer.share, 0.999)))

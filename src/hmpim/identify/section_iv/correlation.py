@@ -60,11 +60,17 @@ class Likeness:
         comes first.
     behind : (float, float)
         The greatest and the least where it comes last, or at once.
+    lag : int
+        Lag in samples, from 0 to the longest asked for, of that of largest magnitude.
+    lead : int or None
+        Lag below 0, as far, at which its magnitude is greater still.
     """
 
     peak: CorrelationPeak
     ahead: float
     behind: tuple[float, float]
+    lag: int
+    lead: int | None
 
     @property
     def is_ahead(self) -> bool:
@@ -122,19 +128,22 @@ def cross_correlation(x: ArrayLike, y: ArrayLike) -> Correlation:
 
 
 @kept
-def likeness(u: Real, y: Real) -> Likeness:
+def likeness(u: Real, y: Real, longest: int) -> Likeness:
     """Return how an input and an output resemble each other, late and early, in one transform.
 
     Parameters
     ----------
     u, y : ndarray, shape (n,)
-        Both move, and are checked.
+        Both are checked.
+    longest : int
+        Greatest of the lags among which `lag` and `lead` are sought.
 
     Examples
     --------
-    >>> seen = likeness(np.array([0.0, 1.0, 0.0, 0.0, 0.0]), np.array([0.0, 0.0, 0.0, 2.0, 0.0]))
-    >>> seen.peak, seen.is_ahead
-    (CorrelationPeak(lag=2, value=0.4...), False)
+    >>> u, y = np.array([0.0, 1.0, 0.0, 0.0, 0.0]), np.array([0.0, 0.0, 0.0, 2.0, 0.0])
+    >>> seen = likeness(u, y, 4)
+    >>> seen.peak, seen.is_ahead, seen.lag
+    (CorrelationPeak(lag=2, value=0.4...), False, 2)
     """
     n, half = u.size, u.size // 2 + 1
     length = int(scipy.fft.next_fast_len(2 * n - 1, real=True))
@@ -147,15 +156,27 @@ def likeness(u: Real, y: Real) -> Likeness:
     value = behind[:half] + (n - np.arange(half)) * (means[0] * means[1])
     value[1:] -= means[0] * np.cumsum(moves[: half - 1])
     value[1:] -= means[1] * np.cumsum(u[: n - half : -1] - means[0])
-    early = (float(ahead.max()), float(ahead.min()))
-    late = (float(behind.max()), float(behind.min()))
-    return Likeness(peak=_peak(value / n), ahead=max(early, key=abs), behind=late)
+    lag, lead = _farthest(behind[: longest + 1]), -1 - _farthest(ahead[: -longest - 1 : -1])
+    return Likeness(
+        peak=_peak(value / n),
+        ahead=float(ahead[_farthest(ahead)]),
+        behind=(float(behind.max()), float(behind.min())),
+        lag=lag,
+        lead=lead if abs(ahead[lead]) > abs(behind[lag]) else None,
+    )
 
 
 @kept
 def _conjugate(u: Real, length: int) -> Complex:
     """Conjugate transform of an input less its mean, zeros behind it."""
-    return np.asarray(np.conj(scipy.fft.rfft(u - u.mean(), length)), dtype=np.complex128)
+    spectrum = np.asarray(scipy.fft.rfft(u - u.mean(), length), dtype=np.complex128)
+    return np.conj(spectrum, out=spectrum)
+
+
+def _farthest(values: Real) -> int:
+    """Where values, (m,), are farthest from zero, and there first."""
+    ends = sorted((int(np.argmax(values)), int(np.argmin(values))))
+    return max(ends, key=lambda k: abs(float(values[k])))
 
 
 def autocorrelation(x: ArrayLike) -> Correlation:
@@ -216,14 +237,15 @@ def correlation_peak(correlation: Correlation) -> CorrelationPeak:
     """
     start = int(np.searchsorted(correlation.lag, 0))
     samples = correlation.lag.size - start
-    return _peak(correlation.value[start : start + samples // 2 + 1])
+    value = correlation.value[start : start + samples // 2 + 1]
+    # What the FFT leaves of an exact zero is rounding, not correlation.
+    if not value.any():
+        raise RecordError("the correlation is zero at every lag; one of the signals is dead")
+    return _peak(value)
 
 
 def _peak(value: Real) -> CorrelationPeak:
     """Peak or trough of a correlation at lags from 0 on."""
     high, low = int(np.argmax(value)), int(np.argmin(value))
-    # What the FFT leaves of an exact zero is rounding, not correlation.
-    if np.max(np.abs(value)) == 0:
-        raise RecordError("the correlation is zero at every lag; one of the signals is dead")
     lag = low if -value[low] > (1 + PART) * max(value[high], 0.0) else high
     return CorrelationPeak(lag=lag, value=float(value[lag]))

@@ -1,7 +1,7 @@
 """Section IV of the paper from end to end: every curve, and every figure read off them."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy
@@ -28,7 +28,7 @@ from hmpim.identify.section_iv.static import (
     time_corrected_error,
 )
 from hmpim.identify.section_iv.windows import WindowName, window_samples
-from hmpim.identify.signals import as_pair, check_band, check_rate
+from hmpim.identify.signals import as_pair, check_band, check_rate, longest_lag
 
 __all__ = ["PaperAnalysis", "estimates_of_many", "paper_analysis", "paper_estimates"]
 
@@ -288,12 +288,15 @@ def estimates_of_many(
     moving = [i for i, y in enumerate(outputs) if np.ptp(y) > 0]
     if not moving:
         return found
-    times = [_time_steps(u, outputs[i], likeness(u, outputs[i]).peak) for i in moving]
-    tapered = np.stack([outputs[i] - outputs[i].mean() for i in moving])
-    tapered *= _taper(n)
-    answered = np.asarray(scipy.fft.rfft(tapered, length), dtype=np.complex128)
-    every = _frequency_steps(_tapered(u, length), answered, fs / length, band, times, fs)
-    frequency = np.asarray(scipy.fft.rfftfreq(length, 1 / fs), dtype=np.float64)[every[0].inside]
+    seen = [likeness(u, outputs[i], longest_lag(n)).peak for i in moving]
+    times = [_time_steps(u, outputs[i], peak) for i, peak in zip(moving, seen, strict=True)]
+    times = [replace(time, error=np.empty(0)) for time in times]  # as long as the record
+    bins, taper = int(band[1] * length / fs) + 2, _taper(n)
+    asked = _asked(u, taper, length, bins)
+    answered = np.stack([_tapered(outputs[i], taper, length, bins) for i in moving])
+    every = _frequency_steps(asked, answered, fs / length, band, times, fs)
+    inside = every[0].inside
+    frequency = np.arange(inside.start, inside.stop) * (1.0 / (length * (1 / fs)))
     for i, time, steps in zip(moving, times, every, strict=True):
         found[i] = _estimates(time, steps, frequency, fs)
     return found
@@ -304,11 +307,16 @@ def _taper(samples: int) -> Real:
     return window_samples("gaussian", samples)
 
 
-@kept
-def _tapered(u: Real, length: int) -> Complex:
-    """Transform of a stimulus without its mean, behind the paper's window, zeros padded."""
-    value = scipy.fft.rfft((u - u.mean()) * _taper(u.size), length)
-    return np.asarray(value, dtype=np.complex128)
+def _tapered(x: Real, taper: Real, length: int, bins: int) -> Complex:
+    """First bins of a signal without its mean, behind the paper's window, zeros padded."""
+    padded = np.zeros(length)
+    np.subtract(x, x.mean(), out=padded[: x.size])
+    padded[: x.size] *= taper
+    return np.array(scipy.fft.rfft(padded)[:bins], dtype=np.complex128)
+
+
+_asked = kept(_tapered)
+"""The same of a stimulus."""
 
 
 def _band(u: Real, fs: float, band: tuple[float, float] | None) -> tuple[float, float]:
