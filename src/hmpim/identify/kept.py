@@ -5,7 +5,8 @@ of its sweep, the regressors of its windows; half a dozen ask whether a residual
 `keeping()` each of these is made once for all samples that are met, and found again by the samples
 themselves; outside nothing is kept. `identify` keeps for itself, a batch for all its records.
 
-Many samples are found again only where they stand, and no result as long as they are is kept.
+Many samples are found again only where they stand, and of results as long as they are at most the
+last one is kept, of functions that ask for it.
 """
 
 from collections import OrderedDict
@@ -29,6 +30,9 @@ _LARGEST = 1 << 18
 
 _Named = dict[int, tuple[ref[np.ndarray], Hashable, Hashable]]
 """By address: an array, what shows that it is still the same, and what it is called."""
+
+_SHOWN = 4096
+"""Samples of a longer array that are looked at to see whether it has changed."""
 
 _FEW = 8
 """Results that `recent` keeps; of larger inputs the last one alone."""
@@ -68,10 +72,11 @@ def keeping() -> Iterator[None]:
         _NAMED.reset(named_before)
 
 
-def kept(function: Callable[P, T]) -> Callable[P, T]:
+def kept(function: Callable[P, T], *, long: bool = False) -> Callable[P, T]:
     """Have a function of arrays and plain values made once for equal arguments, inside `keeping`.
 
-    What it returns is handed out again: nobody may write to it, and arrays are locked.
+    What it returns is handed out again: nobody may write to it, and arrays are locked. A long
+    result is kept only if it is asked for, and until there is another.
     """
 
     @wraps(function)
@@ -85,12 +90,19 @@ def kept(function: Callable[P, T]) -> Callable[P, T]:
         if key in known:
             known.move_to_end(key)
             return cast(T, known[key])
+        last, found = known.get(told, (None, None))
+        if last == key:
+            return cast(T, found)
         found = function(*args, **kwargs)
-        if not _is_short(found):
+        short = _is_short(found)
+        if not short and not long:
             return found
         if isinstance(found, np.ndarray):
             found.flags.writeable = False
-        known[key] = found
+        if short:
+            known[key] = found
+        else:
+            known[told] = key, found
         while len(known) > _MOST:
             known.popitem(last=False)
         return found
@@ -136,7 +148,7 @@ def _name_of(array: np.ndarray) -> Hashable:
     """What stands for an array: its bytes, whose hash is made once; of a long one its address."""
     named = _NAMED.get()
     long = array.nbytes > _LARGEST
-    shown: Hashable = array.sum().item() if long else array.tobytes()
+    shown: Hashable = _some_of(array) if long else array.tobytes()
     known = named.get(id(array))
     if known is not None and known[0]() is array and known[1] == shown:
         return known[2]
@@ -145,6 +157,12 @@ def _name_of(array: np.ndarray) -> Hashable:
     name = object() if long else shown
     named[id(array)] = ref(array), shown, name
     return name
+
+
+def _some_of(array: np.ndarray) -> Hashable:
+    """What shows that a long array is still the same."""
+    shown: Hashable = array.flat[:: 1 + array.size // _SHOWN].sum().item()
+    return shown
 
 
 def _is_short(found: Any) -> bool:

@@ -16,8 +16,8 @@ from hmpim.identify.judgement.reach import (
     natural_frequency_beyond,
     negative_delay,
     short_record,
-    windowed_power,
 )
+from hmpim.identify.noise.spectra import windowed_power
 from hmpim.identify.result import Estimate
 from hmpim.identify.result.groups import MODELLED, PHASE_SPLIT
 from hmpim.model.dynamics import STRUCTURES

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from hmpim.identify.arrays import Complex, Mask, Real
 from hmpim.identify.frf.neighbours import centres_in_band, mirrored, windows_around
+from hmpim.identify.noise.spectra import transform_of
 from hmpim.identify.result.inputs import Alike, InputSet
 from hmpim.identify.section_iv.spectrum import excited_band
 from hmpim.identify.worth import DEEPEST, MATERIAL, MUCH
@@ -53,7 +54,7 @@ def own_band(u: Real, fs: float, stated: tuple[float, float] | None) -> tuple[fl
     low, high = excited_band(u, fs)
     if stated is None:
         return low, high
-    power = np.abs(scipy.fft.rfft(u - u.mean())) ** 2
+    power = np.abs(transform_of(u)) ** 2
     level = np.sqrt(np.convolve(power, np.ones(5) / 5, mode="same"))
     reached = np.flatnonzero(level >= np.sqrt(DEEPEST) * level.max())
     high = max(high, float(reached[-1]) * fs / u.size)

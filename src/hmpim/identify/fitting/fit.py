@@ -116,6 +116,8 @@ class Fit:
     @property
     def bare(self) -> "Fit":
         """The same without what is as long as the record, of a fit that is no more than a start."""
+        if not self.prediction.size:
+            return self
         return replace(self, prediction=np.empty(0), residual=np.empty(0))
 
     @property

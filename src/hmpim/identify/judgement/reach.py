@@ -5,13 +5,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import scipy
 
 from hmpim.identify.arrays import Real
 from hmpim.identify.fitting.enrich import PLAIN
 from hmpim.identify.fitting.growth import scale_of
 from hmpim.identify.judgement.evidence import Evidence, structure_in_words
 from hmpim.identify.kept import kept
+from hmpim.identify.noise.spectra import windowed_power
 from hmpim.identify.result.groups import MODELLED, PHASE_SPLIT, TIMING, in_words
 from hmpim.identify.worth import DEEPEST, FEW, PAST, ROUNDING, TWICE
 from hmpim.model import response
@@ -30,14 +30,10 @@ __all__ = [
     "negative_delay",
     "short_record",
     "unreached",
-    "windowed_power",
 ]
 
 _LOBE = 4
 """Bins from the middle of a Blackman-Harris window's main lobe to its first zero."""
-
-_WEIGHTS = np.array([0.35875, -0.244145, 0.07064, -0.00584])
-"""What a Blackman-Harris window adds to a bin, and to each of three on either side of it."""
 
 _SPARE = 2
 """What lines must tell beyond the figures, for a wrong structure to show."""
@@ -253,24 +249,6 @@ def _at_the_line(evidence: Evidence) -> str:
         f" At {place:.4g} Hz the gain is {abs(value):.4g} and the phase "
         f"{np.degrees(np.angle(value)):.4g}°."
     )
-
-
-def windowed_power(u: Real) -> Real:
-    """Power in each bin behind a Blackman-Harris window, without what a constant has there.
-
-    The window is a sum of four cosines, so that it weighs a bin with three on either side.
-    """
-    n = u.size
-    plain = scipy.fft.rfft(u - u.mean())
-    after = plain[-4:-1] if n % 2 == 0 else plain[-3:]
-    wide = np.concatenate([plain[3:0:-1].conj(), plain, after[::-1].conj()])
-    size = plain.size
-    behind = _WEIGHTS[0] * plain
-    for k, weight in enumerate(_WEIGHTS[1:], 1):
-        behind += weight * (wide[3 - k : 3 - k + size] + wide[3 + k : 3 + k + size])
-    behind[:4] -= behind[0] / _WEIGHTS[0] * _WEIGHTS
-    energy = n * (_WEIGHTS[0] ** 2 + 2.0 * (_WEIGHTS[1:] @ _WEIGHTS[1:]))
-    return np.asarray((behind.real**2 + behind.imag**2) * (2.0 / (energy * n)))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

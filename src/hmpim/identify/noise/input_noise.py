@@ -7,12 +7,12 @@ too, and every gain comes out smaller by the share of the noise in the input's p
 from dataclasses import dataclass
 
 import numpy as np
-import scipy
 from numpy.typing import ArrayLike
 
-from hmpim.identify.arrays import Real
+from hmpim.identify.arrays import Real, every_of, median
 from hmpim.identify.chance import BULK
 from hmpim.identify.kept import kept
+from hmpim.identify.noise.spectra import windowed_power
 from hmpim.identify.signals import as_signal, check_band, check_rate
 from hmpim.identify.worth import NEARLY, PART, PAST, TWICE
 
@@ -81,12 +81,7 @@ def input_noise(u: ArrayLike, fs: float, *, band: tuple[float, float]) -> InputN
     samples = as_signal("u", u)
     if np.mean(np.diff(samples) == 0.0) > PART:  # noise repeats no value
         return None
-    window = np.asarray(
-        scipy.signal.windows.blackmanharris(samples.size, sym=False), dtype=np.float64
-    )
-    power = np.abs(scipy.fft.rfft(window * (samples - samples.mean()))) ** 2 / float(
-        window @ window
-    )
+    power = windowed_power(samples) * (samples.size / 2)
     band = (band[0], min(band[1], _end(power) * fs / samples.size))
     if PAST * band[1] > NEARLY * fs / 2 or band[1] <= band[0]:
         return None
@@ -94,8 +89,8 @@ def input_noise(u: ArrayLike, fs: float, *, band: tuple[float, float]) -> InputN
     floor = power[first:]
     if floor.size < 32:
         return None
-    half = floor.size // 2
-    halves = _level(floor[:half]), _level(floor[half:])
+    half, every = floor.size // 2, every_of(floor.size)
+    halves = _level(floor[:half:every]), _level(floor[half::every])
     variance = _level(floor)
     if variance <= 1e-20 * float(np.ptp(samples)) ** 2 or halves[1] <= 0:
         return None
@@ -121,17 +116,20 @@ def _end(power: Real) -> int:
     width = max(power.size // 50, 5)
     summed = np.cumsum(np.concatenate([[0.0], power]))
     mean = (summed[width:] - summed[:-width]) / width
-    above = np.flatnonzero(mean > TWICE**2 * _level(power[-(power.size // 4) :]))
+    top = power[-(power.size // 4) :: every_of(power.size)]
+    above = np.flatnonzero(mean > TWICE**2 * _level(top))
     return int(above[-1]) + width // 2 if above.size else power.size
 
 
 def _level(power: Real) -> float:
     """Mean of exponentially distributed power, from its median: a line does no harm."""
-    return float(np.median(power) / np.log(2.0))
+    return median(power) / float(np.log(2.0))
 
 
 def _is_rough(samples: Real, variance: float) -> bool:
     """Whether noise shows between jumps as well; a clean square wave stands still there."""
-    third = np.diff(samples, 3)
-    usual = float(np.median(np.abs(third))) / BULK / np.sqrt(20.0)
+    every = every_of(samples.size)
+    first, second, third, last = (samples[k : k - 3 or None : every] for k in range(4))
+    differences = last - first - 3.0 * (third - second)
+    usual = median(np.abs(differences)) / BULK / np.sqrt(20.0)
     return bool(usual > 0.5 * np.sqrt(variance))

@@ -1,12 +1,14 @@
 """Whether what is left over still follows the input."""
 
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 import scipy
 
 from hmpim.identify.arrays import Complex, Real
 from hmpim.identify.kept import kept
+from hmpim.identify.noise.spectra import transform_of
 
 __all__ = ["Misfit", "misfit", "misfits", "unexplained_response"]
 
@@ -48,9 +50,11 @@ def misfit(u: Real, residual: Real, *, delay: float, band: tuple[float, float]) 
     band : tuple of float
         Excited band, in cycles per sample.
     """
+    stimulus = transform_of(u)
+    bins = min(1 << int(band[1] * u.size + 1).bit_length(), stimulus.size)
     share, probability = misfits(
-        _transform(u),
-        scipy.fft.rfft(residual)[None],
+        stimulus[:bins],
+        _transform(residual, bins)[None],
         samples=u.size,
         delays=np.array([delay]),
         band=band,
@@ -58,10 +62,10 @@ def misfit(u: Real, residual: Real, *, delay: float, band: tuple[float, float]) 
     return Misfit(share=float(share[0]), probability=float(probability[0]))
 
 
-@kept
-def _transform(u: Real) -> Complex:
-    """Of an input less its mean."""
-    return np.asarray(scipy.fft.rfft(u - u.mean()), dtype=np.complex128)
+@partial(kept, long=True)
+def _transform(residual: Real, bins: int) -> Complex:
+    """First bins of a residual's transform."""
+    return np.array(scipy.fft.rfft(residual)[:bins], dtype=np.complex128)
 
 
 def misfits(
@@ -163,7 +167,7 @@ def unexplained_response(
     0.1
     """
     power, taken, total, width = _followed(
-        _transform(u),
+        transform_of(u),
         np.asarray(scipy.fft.rfft(np.stack([y, residual]))),
         samples=u.size,
         delays=np.full(2, delay),

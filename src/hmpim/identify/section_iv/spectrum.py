@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 from hmpim.errors import ArgumentError, RecordError
 from hmpim.identify.arrays import Complex, Mask, Real
 from hmpim.identify.kept import kept
+from hmpim.identify.noise.spectra import transform_of
 from hmpim.identify.section_iv.windows import WindowName, window_samples
 from hmpim.identify.signals import as_pair, as_signal, check_rate
 from hmpim.identify.worth import DEEPEST, TOLERATED
@@ -299,7 +300,8 @@ def excited_band(u: ArrayLike, fs: float) -> tuple[float, float]:
         raise RecordError(f"u is constant at {array[0]:g}; a stimulus must move")
     n = array.size
     length = int(scipy.fft.next_fast_len(n, real=True))
-    power = np.abs(scipy.fft.rfft(centred, length)) ** 2
+    value = transform_of(array) if length == n else scipy.fft.rfft(centred, length)
+    power = value.real**2 + value.imag**2
     power[0] = 0.0
     # A running sum of the power, so that lines of a multisine and ripples do not matter.
     running = np.concatenate(([0.0], np.cumsum(np.concatenate(([0, 0], power, [0, 0])))))
