@@ -7,6 +7,7 @@ Y = (B U + T) / A is linear in B and T: columns U x^p and x^p over A. Those of A
 from dataclasses import dataclass
 from functools import cache
 from itertools import combinations_with_replacement
+from typing import Any
 
 import numpy as np
 
@@ -51,22 +52,19 @@ class Columns:
         """Make them of carriers, shape (w, a, s); x from -1 to 1, shape (s,)."""
         most = max(*orders, DENOMINATOR_ORDER)
         powers = np.asarray(x[:, None] ** np.arange(2 * most + 1))
-        each = [carriers[:, a, None] * powers.T[: p + 1] for a, p in enumerate(orders)]
-        products = []
+        parts: list[tuple[Any, int]] = []
         for i, j in combinations_with_replacement(range(len(orders)), 2):
             product, count = np.conj(carriers[:, i]) * carriers[:, j], orders[i] + orders[j] + 1
-            parts = [product.real] if i == j else [product.real, product.imag]
-            products += [part[..., None] * powers[:, :count] for part in parts]
-        mirrored = [
-            np.conj(carriers[:, a, :, None]) * powers[:, : p + DENOMINATOR_ORDER + 1]
-            for a, p in enumerate(orders)
-        ]
+            parts += [(part, count) for part in (product.real, product.imag)[: 1 + (i != j)]]
+        backwards = np.conj(carriers)
+        around = [(backwards[:, a], p + DENOMINATOR_ORDER + 1) for a, p in enumerate(orders)]
+        ahead = [carriers[:, a, None] * powers.T[: p + 1] for a, p in enumerate(orders)]
         return cls(
-            products=np.concatenate(products, axis=-1),
-            mirrored=np.concatenate(mirrored, axis=-1),
+            products=_multiplied(parts, powers, np.float64),
+            mirrored=_multiplied(around, powers, np.complex128),
             orders=orders,
             powers=powers,
-            linear=np.concatenate(each, axis=1),
+            linear=np.concatenate(ahead, axis=1),
         )
 
     def first(self) -> "Columns":
@@ -139,6 +137,15 @@ class Columns:
             gram.view(np.complex128).reshape(windows, records, q, q),
             right.view(np.complex128)[..., None],
         )
+
+
+def _multiplied(parts: list[tuple[Any, int]], powers: Real, kind: type) -> Any:
+    """Each part, (w, s), times as many powers as are asked for, one behind the other."""
+    ends = np.cumsum([0, *(count for _, count in parts)])
+    out = np.empty((*parts[0][0].shape, ends[-1]), dtype=kind)
+    for (part, count), end in zip(parts, ends[1:], strict=True):
+        np.multiply(part[..., None], powers[:, :count], out=out[..., end - count : end])
+    return out
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -16,7 +16,14 @@ from hmpim.errors import ArgumentError, RecordError
 from hmpim.identify.arrays import Complex, Real
 from hmpim.identify.chance import searched
 from hmpim.identify.frf.choice import choose, picked
-from hmpim.identify.frf.neighbours import LocalFit, Spectra, centres_in_band, transform
+from hmpim.identify.frf.neighbours import (
+    WIDEST,
+    LocalFit,
+    Spectra,
+    centres_in_band,
+    reached,
+    transform,
+)
 from hmpim.identify.frf.polynomial import polynomial_fits
 from hmpim.identify.frf.rational import Regressors, rational_fits
 from hmpim.identify.kept import keeping
@@ -28,8 +35,6 @@ __all__ = ["local_response", "local_responses"]
 
 _FEWEST_SAMPLES = 16
 _ORDER = 2
-# Widest window of polynomials, on either side.
-_WIDEST = 1000
 # Each window of polynomials is wider than the last by this.
 _RATIO = 2.0
 # Narrower windows are too short for eight coefficients beside noise.
@@ -199,7 +204,7 @@ def _excited(u: NDArray[np.complex128], centre: NDArray[np.int64]) -> NDArray[np
 
 def _cut(spectra: Spectra, highest: int) -> Spectra:
     """Leave out the bins that no window reaches: most of a long record's."""
-    end = highest + max(highest // 2, _WIDEST) + 1
+    end = reached(highest)
     return Spectra(frequency=spectra.frequency[:end], u=spectra.u[:end], y=spectra.y[..., :end])
 
 
@@ -213,10 +218,11 @@ def _many(
     with keeping():
         for at in range(0, y.shape[0], _AT_ONCE):
             late = delays[at : at + _AT_ONCE]
-            spectra = transform(u, y[at : at + _AT_ONCE], fs, late)
+            spectra = transform(u, y[at : at + _AT_ONCE], fs, late, band[1])
             if at == 0:
                 centre = _centres(spectra, band, points)
-                own = cache(partial(Regressors.around, _cut(spectra, int(centre[-1])).u, centre))
+                around = partial(Regressors.around, _cut(spectra, int(centre[-1])).u, centre)
+                own = cache(around) if y.shape[0] > _AT_ONCE else around
             found += _few(_cut(spectra, int(centre[-1])), centre, late, own)
     return found
 
@@ -294,7 +300,7 @@ def _polynomials(spectra: Spectra, centre: NDArray[np.int64]) -> tuple[list[int]
     # Each polynomial has order + 1 coefficients, and residuals must be left over.
     order = min(_ORDER, max((bins - 2) // 4 - 1, 0))
     least = 2 * (order + 1)
-    top = min(max(int(centre[-1] - centre[0] + 1) // 3, least + 1), _WIDEST)
+    top = min(max(int(centre[-1] - centre[0] + 1) // 3, least + 1), WIDEST)
     count = max(int(np.ceil(np.log(top / least) / np.log(_RATIO))), 1)
     widths = tuple(int(w) for w in np.rint(np.geomspace(least, top, count + 1)))
     most = max((bins - 1) // 2, 1)

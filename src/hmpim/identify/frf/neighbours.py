@@ -18,6 +18,7 @@ from hmpim.identify.kept import kept
 from hmpim.identify.signals import whole_lag
 
 __all__ = [
+    "WIDEST",
     "Integer",
     "LocalFit",
     "Spectra",
@@ -25,12 +26,16 @@ __all__ = [
     "centres_in_band",
     "forms",
     "mirrored",
+    "reached",
     "transform",
     "windows_around",
 ]
 
 # Samples from which the FFT's time at an awkward length is felt.
 _LONG = 100_000
+
+WIDEST = 1000
+"""Bins of the widest window of polynomials, on either side."""
 
 Integer = NDArray[np.int64]
 
@@ -175,7 +180,12 @@ def mirrored(values: Complex, reach: int) -> Complex:
     return np.concatenate((np.conj(values[..., reach:0:-1]), values), axis=-1)
 
 
-def transform(u: Real, y: Real, fs: float, delay: float | Real) -> Spectra:
+def reached(highest: int) -> int:
+    """Bins that windows about others, up to a highest one, may take."""
+    return highest + max(highest // 2, WIDEST) + 1
+
+
+def transform(u: Real, y: Real, fs: float, delay: float | Real, highest: float = np.inf) -> Spectra:
     """Transform a record, the delay taken out; or many of one input, delayed by as many samples.
 
     Its whole samples go by comparing y(n + k) with u(n), so that no response to the stimulus
@@ -192,6 +202,8 @@ def transform(u: Real, y: Real, fs: float, delay: float | Real) -> Spectra:
         Hz.
     delay : float or ndarray, shape (k,)
         Seconds; of many outputs in one and the same sample.
+    highest : float
+        Hz up to which a response is asked for: bins that no window reaches are left out.
 
     Examples
     --------
@@ -206,6 +218,8 @@ def transform(u: Real, y: Real, fs: float, delay: float | Real) -> Spectra:
     if length > _LONG:
         length = int(scipy.fft.prev_fast_len(length, real=True))
     count = (length - 1) // 2 + 1  # without the bin at fs/2, which is real
+    if highest < fs / 2:
+        count = min(count, reached(int(highest * length / fs) + 1))
     frequency = np.asarray(np.arange(count) * (fs / length), dtype=np.float64)
     spectrum_u = _transform(u[max(-lag, 0) :][:length], count)
     spectrum_y = scipy.fft.rfft(y[..., max(lag, 0) :][..., :length])[..., :count]
