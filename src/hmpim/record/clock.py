@@ -106,8 +106,9 @@ def fit_clock(time: NDArray[np.float64], *, nominal: float | None = None) -> Clo
     by_rounding = float(np.ptp(since - every * mean_step)) <= bend and (
         resolution <= 0.6 * mean_step or np.count_nonzero(missing) > max(3, 0.05 * n)
     )
-    index = every if by_rounding else every + np.concatenate(([0], np.cumsum(missing)))
-    step = _step(since, index)
+    steady = by_rounding or not missing.any()
+    index = every if steady else every + np.concatenate(([0], np.cumsum(missing)))
+    step = mean_step if steady else _step(since, index)
     deviation = since - index * step
     rounded = by_rounding or float(np.ptp(deviation)) <= bend
     # Rounding may tilt the fit by what it shows; strayed stamps by 3.5 standard deviations.
@@ -147,9 +148,9 @@ def _missing(since: NDArray[np.float64]) -> NDArray[np.int64]:
     # The mean of the whole intervals is a finer ruler for the long ones than the median is.
     if not sure.all():
         ruler = float(np.mean(steps[~sure]))
+    missing = np.zeros(steps.size, dtype=np.int64)
     with np.errstate(over="ignore"):
-        whole = np.clip(np.rint(steps / ruler) - 1, 1, _MOST_MISSING)
-    missing = np.where(sure, whole, 0).astype(np.int64)
+        missing[sure] = np.clip(np.rint(steps[sure] / ruler) - 1, 1, _MOST_MISSING)
     doubtful = np.flatnonzero((steps > 1.3 * ruler) & ~sure)
     while doubtful.size:
         closed = since - ruler * np.concatenate(([0], np.cumsum(missing)))

@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from hmpim.identify.arrays import every_of, median
 from hmpim.identify.chance import BULK
 from hmpim.identify.fitting.beginning import begin_later, count_in
 from hmpim.identify.fitting.candidates import (
@@ -189,7 +190,7 @@ def interpolated_for(course: Course, fit: Fit) -> Course | None:
     problem = course.data.problem("bandlimited", course.counted)
     residual = fit.residual if problem.valid is None else fit.residual[problem.valid]
     spread = max(float(np.std(fit.prediction)), np.finfo(float).tiny)
-    seen = float(np.median(np.abs(residual))) / BULK / spread
+    seen = median(np.abs(residual[:: every_of(residual.size)])) / BULK / spread
     wanted = PART * seen / float(np.sqrt(residual.size))
     if wanted * TWICE >= course.data.precision:
         return None

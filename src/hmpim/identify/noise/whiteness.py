@@ -42,11 +42,13 @@ def autocovariance(residual: Real, lags: int, spectra: Complex | None = None) ->
         return np.asarray(r / n)
     if lags <= _FEW_LAGS:  # block by block, each near at hand for all lags
         r = np.zeros((*residual.shape[:-1], lags + 1))
-        followed = np.concatenate([residual, np.zeros((*residual.shape[:-1], lags))], axis=-1)
         for row in np.ndindex(residual.shape[:-1]):
             for start in range(0, n, _BLOCK):
-                end = min(start + _BLOCK, n)
-                r[row] += np.correlate(followed[row][start : end + lags], followed[row][start:end])
+                block = residual[row][start : start + _BLOCK]
+                followed = residual[row][start : start + block.size + lags]
+                if followed.size < block.size + lags:  # nothing comes after the last
+                    followed = np.append(followed, np.zeros(block.size + lags - followed.size))
+                r[row] += np.correlate(followed, block)
         return np.asarray(r / n)
     length = scipy.fft.next_fast_len(n + lags + 1, real=True)
     power = np.abs(scipy.fft.rfft(residual, length)) ** 2

@@ -22,6 +22,9 @@ from hmpim.identify.worth import MOST, MUCH, PART, TOLERATED
 
 __all__ = ["Look", "Seen", "are_curved", "look_at", "plainer_of", "thinned"]
 
+_BLOCK = 16_384
+"""Samples whose products are summed at once: as many as a processor's cache holds."""
+
 _GAIN = searched(36)
 """Log-likelihood that a trace must bring; in linear systems the best of all reaches 7."""
 
@@ -189,12 +192,11 @@ def _criterion(look: Look, seen: Seen) -> float:
 
 def _curved(fit: Fit, problem: Problem) -> bool:
     """Whether a white residual follows square, cube or direction of the linear model's output."""
-    counted = slice(None) if problem.valid is None else problem.valid
     x = fit.prediction - fit.linear[-1]
-    return bool(are_curved(x[None], fit.residual[None], counted)[0])
+    return bool(are_curved(x[None], fit.residual[None], problem.valid)[0])
 
 
-def are_curved(models: Real, residuals: Real, counted: Mask | slice = slice(None)) -> Mask:
+def are_curved(models: Real, residuals: Real, counted: Mask | None = None) -> Mask:
     """Which white residuals follow square, cube or direction of what their linear models say.
 
     Parameters
@@ -203,32 +205,36 @@ def are_curved(models: Real, residuals: Real, counted: Mask | slice = slice(None
         Outputs of the models, without bias.
     residuals : ndarray, shape (k, n)
         What they leave over.
-    counted : ndarray of bool, shape (n,), or slice
-        Samples that count.
+    counted : ndarray of bool, shape (n,), optional
+        Samples that count; all if None.
 
     Returns
     -------
     ndarray of bool, shape (k,)
     """
     size = np.std(models, axis=1)
-    told, e = size > 0, residuals[:, counted]
+    told = size > 0
     size = np.where(told, size, 1.0)[:, None]
-    step = np.gradient(models, axis=1)
-    square = models**2
-    traces = np.stack(
-        [np.ones_like(models), models, step, square, square * models / size, np.sign(step) * size],
-        axis=1,
-    )
-    rows = traces[:, :, counted]
-    scale = np.sqrt(np.vecdot(rows, rows))
+    gram = np.zeros((len(models), 7, 7))
+    for first in range(0, models.shape[1], _BLOCK):
+        here = slice(first, first + _BLOCK)
+        x, e, before = models[:, here], residuals[:, here], min(first, 1)
+        near = models[:, first - before : first + _BLOCK + 1]
+        step = np.gradient(near, axis=1)[:, before : before + x.shape[1]]
+        cube, turned = x * x * x / size, np.sign(step) * size
+        rows = np.stack([np.ones_like(x), x, step, x**2, cube, turned, e], axis=1)
+        rows = rows if counted is None else rows[:, :, counted[here]]
+        gram += rows @ rows.transpose(0, 2, 1)
+    count, power = gram[:, 0, 0], gram[:, 6, 6]
+    scale = np.sqrt(np.einsum("kii->ki", gram[:, :6, :6]))
     scale = np.where(scale > 0, scale, 1.0)
-    gram = rows @ rows.transpose(0, 2, 1) / (scale[:, :, None] * scale[:, None, :])
-    moment = (rows @ e[:, :, None])[:, :, 0] / scale
+    moment = gram[:, :6, 6] / scale
+    gram = gram[:, :6, :6] / (scale[:, :, None] * scale[:, None, :])
     # What each gains beside a constant, the output, and its rate.
     mixed = np.linalg.solve(gram[:, :3, :3] + 1e-9 * np.eye(3), gram[:, :3, 3:])
     left = 1.0 - np.einsum("kij,kij->kj", mixed, gram[:, :3, 3:])
     taken = (moment[:, 3:] - np.einsum("kij,ki->kj", mixed, moment[:, :3])) ** 2
-    needed = 2 * np.log(1 / FALSE_ALARM) * np.vecdot(e, e)[:, None] / e.shape[1]
+    needed = 2 * np.log(1 / FALSE_ALARM) * (power / count)[:, None]
     return np.asarray(told & np.any((left > 1e-6) & (taken > needed * left), axis=1))
 
 
