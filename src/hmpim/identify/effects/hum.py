@@ -16,7 +16,7 @@ from hmpim.identify.fitting.enrich import PLAIN
 from hmpim.identify.fitting.least_squares import solved
 from hmpim.identify.fitting.trial import JointFit
 from hmpim.identify.noise.colour import line_of
-from hmpim.identify.worth import MOST
+from hmpim.identify.worth import MOST, ROUNDING
 from hmpim.record import Finding
 
 __all__ = ["Humming", "hum_finding", "with_hum"]
@@ -116,7 +116,9 @@ def _lines(joint: JointFit) -> tuple[list[float], float]:
     told = np.ones(residual.size) if valid is None else valid.astype(np.float64)
     left = np.where(told > 0.0, residual - residual[told > 0.0].mean(), 0.0)
     found: list[float] = []
-    whole = float(left @ left)
+    whole, moves = float(left @ left), joint.problem.y - joint.problem.y.mean()
+    if whole <= ROUNDING**2 * float(moves @ moves):
+        return found, 0.0  # rounding has a period of its own
     while len(found) < _MOST:
         line = line_of(left, 1.0)
         if line is None:
