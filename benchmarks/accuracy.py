@@ -252,7 +252,8 @@ def sensor_effects(count: int, mapped: Callable) -> list[str]:
         "field.md's sensor with noise 0.05. Mean error in its own standard deviations (0 is "
         f"without bias), and the share of {count} stated 95 % intervals that hold the truth. With "
         "a drift the bias is its mean over the record. Noise on the input counts as noise of the "
-        "output, where the response passes it on.",
+        "output, where the response passes it on; so does a bias that wanders at random, where "
+        "its spectrum describes it better than a polynomial.",
     ]
 
 

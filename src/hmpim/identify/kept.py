@@ -5,8 +5,8 @@ of its sweep, the regressors of its windows; half a dozen ask whether a residual
 `keeping()` each of these is made once for all samples that are met, and found again by the samples
 themselves; outside nothing is kept. `identify` keeps for itself, a batch for all its records.
 
-Many samples are found again only where they stand, and of results as long as they are at most the
-last one is kept, of functions that ask for it.
+A long array is recognised by its address and not by its samples: nobody may write to one inside
+`keeping`. Of long results at most the last one is kept, and only for functions that ask for it.
 """
 
 from collections import OrderedDict
@@ -76,7 +76,7 @@ def kept(function: Callable[P, T], *, long: bool = False) -> Callable[P, T]:
     """Have a function of arrays and plain values made once for equal arguments, inside `keeping`.
 
     What it returns is handed out again: nobody may write to it, and arrays are locked. A long
-    result is kept only if it is asked for, and until there is another.
+    result is kept only with `long`, and only until the next one.
     """
 
     @wraps(function)

@@ -62,7 +62,7 @@ _BLOCK = 16
 """Samples of a block; a longer one costs more products, a shorter one more steps between blocks."""
 
 _AT_ONCE = 1024
-"""Blocks that are multiplied at once: as many as a processor's cache holds."""
+"""Blocks that are multiplied at once: as many as fit into a processor's cache."""
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -164,11 +164,11 @@ def placed(source: SampledInput, delay: float) -> tuple[int, float]:
 
 
 class PoleResponses:
-    """Sums of responses of e^(-sτ)/(s - p) to what an input departs from its first sample, at rest.
+    """Sums of responses of e^(-sτ)/(s - p), from rest, to an input less its first sample.
 
-    Within a block of samples a sum is one convolution of a few coefficients. What came before the
-    block is known by one state of each pole, and a recursion leads from block to block. So a sum
-    is one product of matrices, however many poles it has.
+    Within a block of samples, a sum is one convolution with a few coefficients. All that came
+    before the block is held by one state for each pole, and a recursion leads from block to block.
+    So a sum is one product of matrices, however many poles it has.
 
     Parameters
     ----------
@@ -241,9 +241,10 @@ class PoleResponses:
         Parameters
         ----------
         simple, double : complex ndarray, shape (rows, k)
-            Of the responses of 1/(s - p), and of their derivatives by p, those of 1/(s - p)².
+            Weights of the responses of 1/(s - p), and of their derivatives by p, which are the
+            responses of 1/(s - p)².
         direct, rate : ndarray, shape (rows,)
-            Of the delayed input itself, and of its rate per sample.
+            Weights of the delayed input itself, and of its rate per sample.
         here : slice
             Samples that are asked for, instead of all n.
         """

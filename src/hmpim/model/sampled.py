@@ -51,7 +51,7 @@ WINDOW = 1.3e-6
 """Share that a window as long as the margins misses of what is interpolated to a higher rate."""
 
 _STRETCH = 65_536
-"""Samples of a stretch at most, whose spectrum tells how fast an input moves."""
+"""Most samples of a stretch; spectra of stretches show how fast an input moves."""
 
 _DEGREE: dict[Intersample, int] = {"zoh": 0, "foh": 1, "bandlimited": 5, "sampled": SAMPLES_ALONE}
 
@@ -140,7 +140,7 @@ def _continued(deviation: NDArray[np.float64]) -> NDArray[np.float64]:
 def interpolation_error(u: NDArray[np.float64], oversampling: int) -> float:
     """Share of an input's deviation, (n,), that its spline misses (r.m.s.), 2 (f / (F - f))^6.
 
-    The power of a long input is that of stretches of it.
+    The power spectrum of a long input is summed over stretches of it.
     """
     size = u.size // -(-u.size // _STRETCH)
     stretches = (u - u[0])[: u.size // size * size].reshape(-1, size)

@@ -142,14 +142,14 @@ def _write(view: dict[str, Any], path: str | PathLike[str], *, template: str) ->
 def write_page(
     path: str | PathLike[str], *, page: Callable[[], str], paper: Callable[[], bytes]
 ) -> None:
-    """Write a page as a PDF where the file is named so, as HTML elsewhere.
+    """Write a page as a PDF if the file is named .pdf, otherwise as HTML.
 
     Parameters
     ----------
     path : path-like
         The file to write; replaced as a whole, or not at all.
     page, paper : callable
-        Make the HTML, and the PDF.
+        Return the HTML, and the PDF; only the one that is written is called.
 
     Examples
     --------

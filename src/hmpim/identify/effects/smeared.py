@@ -63,7 +63,7 @@ def smeared_plateaus(
     Returns
     -------
     low, high : Side or None
-        Samples are at a level where their prediction lies beyond; None where it is not clipped.
+        None for a side that is not clipped. Samples whose prediction lies beyond a level are at it.
 
     Examples
     --------

@@ -213,7 +213,7 @@ def stand_out_of(innovations: Real, some: Mask) -> Mask:
     level, every = np.zeros(some.shape[0]), every_of(some.shape[1])
     bulk, out_of_it = squares[:, ::every], some[:, ::every]
     left_out = np.count_nonzero(out_of_it, axis=1)
-    for count in np.unique(left_out[told]):  # as many others: one array
+    for count in np.unique(left_out[told]):  # rows with equally many others share one array
         alike = told & (left_out == count)
         others = bulk[alike][~out_of_it[alike]].reshape(-1, bulk.shape[1] - count)
         level[alike] = np.median(others, axis=1) / 0.455  # of a squared Gaussian

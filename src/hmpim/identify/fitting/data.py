@@ -45,7 +45,7 @@ class Seen:
 class Data:
     """What every trial shares; inputs are prepared for an assumption when first asked for.
 
-    What the search asks of a fit it asks here: where samples are not kept, others answer.
+    The search asks it what a fit leaves over, so that `CompressedData` can answer without samples.
     """
 
     u: NDArray[np.float64]
@@ -74,7 +74,7 @@ class Data:
 
     @property
     def keeps_samples(self) -> bool:
-        """Whether the samples are there; of a compressed record they are not."""
+        """Whether there are samples; a compressed record has none."""
         return self.u.size > 0
 
     @property

@@ -115,7 +115,7 @@ class Fit:
 
     @property
     def bare(self) -> "Fit":
-        """The same without what is as long as the record, of a fit that is no more than a start."""
+        """The same without its samples, for a fit that will only serve as a start of another."""
         if not self.prediction.size:
             return self
         return replace(self, prediction=np.empty(0), residual=np.empty(0))
@@ -290,7 +290,7 @@ def jacobian(
 
 
 def combined(problem: Problem, fit: Fit, weights: Real, row: Real) -> Real:
-    """A row, (n,), and the rows of `jacobian` times weights, (p,), treated as those are."""
+    """Return a row, (n,), plus the rows of `jacobian` times weights, (p,), treated as they are."""
     part, size = part_of(problem, fit.structure, fit.theta), fit.theta.size
     out = row + part.driven(weights[size:-1]) + weights[-1]
     for here in problem.stretches(0, row.size):
@@ -319,9 +319,10 @@ def products(
     part: Part | SampledPart | None = None,
     edges: tuple[int, ...] = (),
 ) -> Real:
-    """Products of the rows of `jacobian` and of a residual, which stands last.
+    """Inner products of the rows of `jacobian` and of a residual, which comes last.
 
-    No row is as long as the record: the products are summed stretch by stretch.
+    They are summed stretch by stretch, so that no row is as long as the record unless samples are
+    whitened.
 
     Parameters
     ----------
@@ -330,7 +331,7 @@ def products(
     residual : ndarray, shape (n,)
         0 where a sample does not count.
     edges : tuple of int
-        Samples at which a span begins of which the products are given apart.
+        Samples at which a further span begins; each span's products are returned separately.
 
     Returns
     -------
@@ -378,7 +379,9 @@ def bounded_for(problem: Problem, structure: Structure, theta: Real) -> Real:
 def evaluating(
     first: Problem, problems: Sequence[Problem], structures: Sequence[Structure]
 ) -> Callable[[Sequence[Real]], Evaluation]:
-    """How inputs are evaluated at given parameters: by samples; other kinds of problem register.
+    """Return what evaluates inputs at given parameters, here by samples.
+
+    Other kinds of problem register a function of their own.
 
     Parameters
     ----------

@@ -45,7 +45,7 @@ __all__ = [
 _TINY = float(np.finfo(float).tiny)
 
 _TOLD = 1e-6
-"""Share of a row's power, beside all other rows, down to which products tell it."""
+"""Least share of a row's power, other rows projected out, that products give accurately."""
 
 _PROBE = 0.3
 """Time constant, over the fit's own, by which the derivative with respect to q is taken."""
@@ -78,7 +78,7 @@ class HiddenPole:
         The fit.
     halves : ndarray, shape (2, p + 1, p + 1), or None
         Products of its derivatives and the whitened residual over either half of the record,
-        from `hmpim.identify.fitting.fit.products`. None of compressed records.
+        from `hmpim.identify.fitting.fit.products`. None for compressed records.
     """
 
     squared: float
@@ -370,8 +370,8 @@ def grow(
     white : callable
         Whether a fit leaves white noise, as one of many poles must.
     otherwise : callable
-        Least that is left by fits no richer than one, under other assumptions between the samples:
-        a pole must pay beside them too.
+        Least objective of the fits that are no richer than a given one, under other assumptions
+        between the samples: a fit with one more pole must improve on these too.
     """
     grown: list[F] = []
     while True:

@@ -43,9 +43,9 @@ def compare_halves(halves: Real, y: Real, *, share: float) -> Halves:
     Parameters
     ----------
     halves : ndarray, shape (2, p + 1, p + 1)
-        Products over each, of the derivatives of the prediction and of what is left over.
+        Of each half, the products of the derivatives of the prediction and of the residual.
     y : ndarray, shape (n,)
-        The output about its mean, 0 where a sample does not count, weighed alike.
+        The output about its mean, weighed as the residual is; 0 where a sample does not count.
     share : float
         Independent samples per sample.
 
@@ -85,9 +85,9 @@ def halves_of(halves: Real, samples: int, *, share: float) -> tuple[Real, Real]:
     Parameters
     ----------
     halves : ndarray, shape (2, k, p + 1, p + 1)
-        Products over each, of the derivatives of the predictions and of what is left over.
+        Of each half, the products of the derivatives of the predictions and of the residuals.
     samples : int
-        Of the record.
+        How many the record has.
     share : float
         Independent samples per sample.
     """

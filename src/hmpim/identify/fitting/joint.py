@@ -103,7 +103,7 @@ def joint_fit(
 def chosen_of(
     course: Course, structures: tuple[StructureName, ...], *, growing: bool = True
 ) -> JointFit:
-    """What is chosen once the plain structures are fitted to the samples that count.
+    """Finish the search once the plain structures are fitted to the samples that count.
 
     Parameters
     ----------

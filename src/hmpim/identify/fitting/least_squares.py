@@ -61,7 +61,7 @@ def solved(gram: Real, moment: Real, damping: float = 0.0) -> Real:
 def inverted(gram: Real) -> Real:
     """Inverse of normal equations, very large along a direction that is not seen.
 
-    Where they are not definite, the size of each curvature counts.
+    Where they are not definite, each curvature counts by its absolute value.
     """
     diagonal = np.abs(np.diag(gram))
     scale = np.sqrt(np.where(diagonal > 1e-200 * diagonal.max(), diagonal, 1.0))

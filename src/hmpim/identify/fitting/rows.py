@@ -30,14 +30,14 @@ _FINAL = 1e-6
 """Precision of the chosen fit, see `hmpim.identify.fitting.fit.fit_structure`."""
 
 _STRETCH = 65_536
-"""Samples that are looked at at once: as many as a processor's cache holds."""
+"""Samples that are computed at once: as many as fit into a processor's cache."""
 
 _NOTHING = 50.0
 """Time constants after which a free response is less than rounding."""
 
 
 def spans(first: int, last: int) -> Iterator[slice]:
-    """Return spans of samples from one on to another, each near at hand."""
+    """Return the samples from `first` to `last` in spans that fit into a processor's cache."""
     for start in range(first, last, _STRETCH):
         yield slice(start, min(start + _STRETCH, last))
 
@@ -114,9 +114,9 @@ class Problem:
         return self.noise is not None or self.whitening is not None
 
     def stretches(self, first: int, last: int) -> Iterator[slice]:
-        """Return spans of samples from one on to another, to be looked at one after the other.
+        """Return the samples from `first` to `last` in spans, to be computed one after the other.
 
-        All at once where they are whitened, or answered together.
+        One span where samples are whitened, or where a filter in z needs the whole record.
         """
         if self.filtered or self.source.degree == SAMPLES_ALONE:
             return iter([slice(first, last)])
@@ -125,7 +125,7 @@ class Problem:
     def masked(self, rows: Real, here: slice = slice(None)) -> Real:
         """Return `rows`, (k, n) or (n,), samples that do not count set to 0, noise whitened.
 
-        Of a span of samples, `here`, only where they are not `filtered`.
+        Rows of a span of samples, `here`, are allowed only if the problem is not `filtered`.
         """
         if self.noise is not None and self.told is not None and rows.size:
             return np.asarray(scipy.signal.lfilter(self.noise, np.ones(1), rows) * self.told)

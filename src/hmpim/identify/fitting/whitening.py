@@ -81,7 +81,7 @@ def is_contradicted(data: Data, best: Trial, seen: Seen) -> bool:
 
     A right model is estimated without bias with the noise whitened or not; where the two part,
     what is left over is no noise but what the model lacks (J. A. Hausman, Econometrica 46, 1978).
-    The products of a compressed record do not tell how far coloured noise moves an estimate.
+    The products of a compressed record do not show how far coloured noise moves an estimate.
     """
     if not data.keeps_samples:
         return False

@@ -140,7 +140,7 @@ class Columns:
 
 
 def _multiplied(parts: list[tuple[Any, int]], powers: Real, kind: type) -> Any:
-    """Each part, (w, s), times as many powers as are asked for, one behind the other."""
+    """Concatenate the products of each part, (w, s), and as many powers as it asks for."""
     ends = np.cumsum([0, *(count for _, count in parts)])
     out = np.empty((*parts[0][0].shape, ends[-1]), dtype=kind)
     for (part, count), end in zip(parts, ends[1:], strict=True):

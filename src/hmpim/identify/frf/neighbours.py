@@ -181,7 +181,7 @@ def mirrored(values: Complex, reach: int) -> Complex:
 
 
 def reached(highest: int) -> int:
-    """Bins that windows about others, up to a highest one, may take."""
+    """Count of bins that windows may reach whose centres go up to bin `highest`."""
     return highest + max(highest // 2, WIDEST) + 1
 
 

@@ -253,7 +253,7 @@ def folded_power(u: Real, fs: float, *, every: int = 1) -> Real:
     fs : float
         Rate in Hz.
     every : int
-        One of so many bins is given.
+        Step in bins: only every so many-th one is returned.
     """
     bins = np.arange(1, u.size // 2 + 1, every)
     nothing = np.zeros(bins.size)

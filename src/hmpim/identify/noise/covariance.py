@@ -17,7 +17,7 @@ from hmpim.identify.noise.autoregression import autoregressive_spectrum
 __all__ = ["covariance", "white_covariance"]
 
 _WELL = 1e-4
-"""Least element of a triangular factor down to which normal equations give it."""
+"""Least diagonal element of a triangular factor that normal equations still give accurately."""
 
 
 def covariance(rows: Real, residual: Real, *, freedom: int, white: bool) -> Real:
@@ -56,9 +56,10 @@ def covariance(rows: Real, residual: Real, *, freedom: int, white: bool) -> Real
 
 
 def white_covariance(gram: Real, power: float, *, freedom: int) -> Real | None:
-    """Return the same from the rows' products, (p, p), and the sum of squares of a white residual.
+    """Return `covariance` for white noise, from products instead of rows.
 
-    None where products see a direction too badly.
+    `gram`, (p, p), holds the rows' products, and `power` is the residual's sum of squares. None
+    where the products determine a direction too inaccurately.
     """
     scale = np.sqrt(gram.diagonal())
     if not scale.all():
@@ -71,9 +72,9 @@ def white_covariance(gram: Real, power: float, *, freedom: int) -> Real | None:
 
 
 def _orthonormal(gram: Real, rows: Real, scale: Real) -> tuple[Real, Callable[[], Real]]:
-    """Inverse of the triangle R of scaled rows, (Q R)', and Q' as it is asked for, (p, n).
+    """Return the inverse of R, and a function that makes Q', (p, n): the scaled rows are (Q R)'.
 
-    By normal equations, unless they see a direction too badly.
+    By normal equations, unless they determine a direction too inaccurately.
     """
     factor, info = scipy.linalg.lapack.dpotrf(gram)
     diagonal = factor.diagonal()

@@ -117,9 +117,11 @@ def _followed(
     delays: Real,
     band: tuple[float, float],
 ) -> tuple[Real, Real, Real, int]:
-    """Power of the input in groups of bins, (g,), of each answer what one gain takes, and all.
+    """Return what one gain in each group of neighbouring bins explains of each answer.
 
-    The last is how many bins a group has; where the band has too few there is none.
+    These are the power of the input in each group, (g,), the power of each answer that the gain
+    explains, all of its power, both (k, g), and the number of bins in a group. There are no groups
+    where the band has too few bins.
     """
     count, n = answers.shape[0], samples
     first = max(int(np.ceil(band[0] * n)), 1)

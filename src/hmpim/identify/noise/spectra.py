@@ -1,4 +1,4 @@
-"""Spectra of an input that half a dozen steps look at."""
+"""Spectra of an input that several steps share."""
 
 from functools import partial
 
@@ -11,7 +11,7 @@ from hmpim.identify.kept import kept
 __all__ = ["transform_of", "windowed_power"]
 
 _WEIGHTS = np.array([0.35875, -0.244145, 0.07064, -0.00584])
-"""What a Blackman-Harris window adds to a bin, and to each of three on either side of it."""
+"""Weights that a Blackman-Harris window gives to a bin and to each of three on either side."""
 
 
 @partial(kept, long=True)
@@ -22,9 +22,10 @@ def transform_of(u: Real) -> Complex:
 
 @partial(kept, long=True)
 def windowed_power(u: Real) -> Real:
-    """Power in each bin behind a Blackman-Harris window, without what a constant has there.
+    """Return the power in each bin after a Blackman-Harris window, without that of a constant.
 
-    The window is a sum of four cosines, so that it weighs a bin with three on either side.
+    The window is a sum of four cosines, so a bin becomes a weighted sum of itself and three bins on
+    either side.
     """
     n, plain = u.size, transform_of(u)
     after = plain[-4:-1] if n % 2 == 0 else plain[-3:]

@@ -23,7 +23,7 @@ from hmpim.identify.worth import MOST, MUCH, PART, TOLERATED
 __all__ = ["Look", "Seen", "are_curved", "look_at", "plainer_of", "thinned"]
 
 _BLOCK = 16_384
-"""Samples whose products are summed at once: as many as a processor's cache holds."""
+"""Samples whose products are summed at once: as many as fit into a processor's cache."""
 
 _GAIN = searched(36)
 """Log-likelihood that a trace must bring; in linear systems the best of all reaches 7."""

@@ -167,8 +167,8 @@ def any_harmonics(residuals: Real, sweep: SweepPhase, fs: float, *, delay: float
     fs : float
         Rate in Hz.
     delay : float
-        Delay of the system, s, to the sample: half a one turns the harmonics of a stretch alike,
-        and their size is what is asked for.
+        Delay of the system, s. It is rounded to a sample: this turns the harmonics of a stretch
+        alike, and only their size counts.
 
     Returns
     -------

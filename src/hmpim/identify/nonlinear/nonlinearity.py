@@ -39,8 +39,8 @@ class Inspection:
     Parameters
     ----------
     seen : Seen
-        What the tests gave: harmonics of a sweep whose residual gave reason to look, lines of a
-        periodic input with lines left out, the likeliest kinds.
+        Results of the tests: harmonics, if the input is a sweep and the residual gives reason to
+        look for them; lines, if the input is periodic with lines left out; the likeliest kinds.
     findings : tuple of Finding
         Code 'nonlinear' if it matters; then the code of the kind where it can be named:
         'hardening', 'softening', 'friction', 'backlash', 'rate_limit', 'saturation'.

@@ -42,7 +42,7 @@ _ROUNDING = 1e-12
 """Reach over value that is arithmetic's and not the record's."""
 
 _HEADS = ("parameter", "mean", "repeatability", "chance", "stated errors agree", "verdict")
-"""Of a notebook's table."""
+"""Column heads of a notebook's table."""
 
 # A whole number of samples, which may well be the same every time.
 _COUNTED = "delay_correlation"

@@ -61,9 +61,10 @@ class Likeness:
     behind : (float, float)
         The greatest and the least where it comes last, or at once.
     lag : int
-        Lag in samples, from 0 to the longest asked for, of that of largest magnitude.
+        Lag in samples, from 0 to the longest asked for, at which that correlation has its largest
+        magnitude.
     lead : int or None
-        Lag below 0, as far, at which its magnitude is greater still.
+        Negative lag, as far at most, at which it is larger still; None if there is none.
     """
 
     peak: CorrelationPeak
@@ -134,7 +135,7 @@ def likeness(u: Real, y: Real, longest: int) -> Likeness:
     Parameters
     ----------
     u, y : ndarray, shape (n,)
-        Both are checked.
+        Already checked, as by `as_pair`.
     longest : int
         Greatest of the lags among which `lag` and `lead` are sought.
 

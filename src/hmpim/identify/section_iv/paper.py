@@ -290,7 +290,7 @@ def estimates_of_many(
         return found
     seen = [likeness(u, outputs[i], longest_lag(n)).peak for i in moving]
     times = [_time_steps(u, outputs[i], peak) for i, peak in zip(moving, seen, strict=True)]
-    times = [replace(time, error=np.empty(0)) for time in times]  # as long as the record
+    times = [replace(time, error=np.empty(0)) for time in times]  # long, not needed
     bins, taper = int(band[1] * length / fs) + 2, _taper(n)
     asked = _asked(u, taper, length, bins)
     answered = np.stack([_tapered(outputs[i], taper, length, bins) for i in moving])
@@ -308,7 +308,7 @@ def _taper(samples: int) -> Real:
 
 
 def _tapered(x: Real, taper: Real, length: int, bins: int) -> Complex:
-    """First bins of a signal without its mean, behind the paper's window, zeros padded."""
+    """First bins of the transform of a signal less its mean, after the paper's window, padded."""
     padded = np.zeros(length)
     np.subtract(x, x.mean(), out=padded[: x.size])
     padded[: x.size] *= taper
@@ -316,7 +316,7 @@ def _tapered(x: Real, taper: Real, length: int, bins: int) -> Complex:
 
 
 _asked = kept(_tapered)
-"""The same of a stimulus."""
+"""The same of a stimulus, kept since all its outputs need it."""
 
 
 def _band(u: Real, fs: float, band: tuple[float, float] | None) -> tuple[float, float]:

@@ -6,9 +6,9 @@ statistics  runs of one input and one output: compress, update, join
 products    products of filtered signals over the samples that count
 residual    what a model leaves over: its autocorrelation, and both ends
 start       a response without a model, from which the starts are found
-fit         one structure, by the joint fit's own way down, and what it leaves over
+fit         one structure, by the joint fit's own optimiser, and its residual
 misfit      whether what is left over follows the input; one more pole
-choose      the joint fit's own search: what it asks of samples, products answer
+choose      the joint fit's own search, with products in place of samples
 describe    what is said of the pair
 live        the estimate so far, while samples come
 """

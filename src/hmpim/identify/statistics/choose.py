@@ -1,4 +1,4 @@
-"""The joint fit's own search, on statistics: what it asks of samples, their products answer."""
+"""The joint fit's own search, on statistics: products take the place of the samples."""
 
 from dataclasses import dataclass, replace
 
@@ -37,7 +37,7 @@ _FORGOTTEN = 1e-4
 """Of an impulse response's peak, below which it is over."""
 
 _ALL = Seen(valid=None, begins=None)
-"""What the products say counts is all that there is."""
+"""No selection: the products hold only samples that count."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -57,7 +57,7 @@ class CompressedData(Data):
 
     @classmethod
     def of(cls, statistics: Statistics, *, skipped: int) -> "CompressedData":
-        """From statistics, and how many first outputs of each run do not count."""
+        """Make it from statistics; the first outputs of each run, so many, do not count."""
         low, high = excited(statistics)
         return cls(
             u=np.empty(0),
@@ -133,7 +133,7 @@ def choose(
     CompressedData
         What all trials share.
     JointFit
-        As of samples; its fits are `Fitted`.
+        As from samples, but its fits are `Fitted`.
 
     Raises
     ------

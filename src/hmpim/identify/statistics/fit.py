@@ -41,7 +41,7 @@ _CLOSE = 4.0
 """The same where no other evaluation is to be made: two standard deviations."""
 
 _PRECISION = 1e-2
-"""Of a fit of which evaluations are counted, see `fit_structure`."""
+"""Precision of a fit whose evaluations are limited, see `fit_structure`."""
 
 _ROUNDED = 1e-13
 """Share of the output's power below which what is left over is the rounding of sums."""
@@ -49,7 +49,7 @@ _ROUNDED = 1e-13
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Compressed(Problem):
-    """A pulse for input; for the samples of the output, of which none is kept, their products.
+    """A pulse as input, and products in place of the samples of the output, which are not kept.
 
     Parameters
     ----------
@@ -90,14 +90,14 @@ class Compressed(Problem):
 
 
 def pulse(reach: Reach, intersample: Intersample) -> SampledInput:
-    """One sample of 1 among zeros, as an input: what it is answered by is an impulse response."""
+    """Return a unit pulse as an input, so that the response to it is the impulse response."""
     samples = np.zeros(reach.taps)
     samples[AHEAD] = 1.0
     return prepare_input(samples, intersample)
 
 
 def _nothing(samples: int) -> Real:
-    """As many samples as were read, none of which is kept."""
+    """Return zeros that take no memory, in place of the samples that were read."""
     return np.broadcast_to(np.float64(0.0), (samples,))
 
 
@@ -155,7 +155,7 @@ class _Evaluation:
         return [self.stepped(np.zeros(self.part.theta.size), left=self.cost, converged=converged)]
 
     def stepped(self, step: Real, *, left: float, converged: bool) -> "Fitted":
-        """A step away from here, as the derivatives foretell it."""
+        """Return the fit one step away from here, as the derivatives predict it."""
         (rows, steady), moments, unknown = self.all_rows, self.all_moments, step.size
         linear = self.linear
         if step.any():
@@ -203,9 +203,9 @@ class LeftOver:
     power : float
         Mean square.
     counted : int
-        Samples of which it is.
+        How many samples it is the mean of.
     innovation : float
-        Mean square of what its past does not foresee.
+        Mean square of what its past does not predict.
     share : float
         Independent samples per sample.
     noise : ndarray, shape (order + 1,)
@@ -221,7 +221,7 @@ class LeftOver:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Fitted(Fit):
-    """Where a fit to products ended; no sample is predicted, and `cost` is that of `objective`.
+    """Where a fit to products ended; it predicts no samples, and `cost` equals `objective`.
 
     Parameters
     ----------
@@ -271,8 +271,8 @@ class Fitted(Fit):
         gram = self.moments.gram
         static, held = self.structure.name == "static", self.problem.source.degree == 0
         if (static and held) or steps_through(self.structure, held=held):
-            # It moves in whole samples only: uniform over the one in which the delay ends, where
-            # its ends are not read themselves.
+            # The delay moves in whole samples only. If static, it is uniform over the sample in
+            # which it ends; otherwise figures are read at both ends of that sample.
             inverse = np.zeros_like(gram)
             inverse[1:, 1:] = inverted(gram[1:, 1:])
             inverse[0, 0] = 1.0 / (12.0 * self.variance) if static else 0.0
@@ -317,7 +317,7 @@ class Fitted(Fit):
 
 
 def told(fit: Fit) -> Fitted:
-    """A fit to products, as what it is."""
+    """Return a fit that was made to products as the `Fitted` that it is."""
     if not isinstance(fit, Fitted):
         raise TypeError("fitted to samples")
     return fit
@@ -355,7 +355,7 @@ def follow(problem: Compressed, fit: Fit, *, evaluations: int) -> Fitted:
 def fit_briefly(
     problem: Compressed, structure: Structure, theta: Real, *, evaluations: int
 ) -> Fitted:
-    """Fit one structure from one start, evaluated so often at most."""
+    """Fit one structure from one start with at most so many evaluations."""
     here = _Evaluation(problem, structure, bounded_for(problem, structure, theta))
     return _climbed(here, evaluations)
 

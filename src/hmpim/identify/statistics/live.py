@@ -46,8 +46,8 @@ _EVALUATIONS, _FEWER = 2, 1
 residual follows the input, where it is alone."""
 
 _TASTE, _FARTHER = 4, 12
-"""At a new start, from each start before the best one is followed, and from there. A structure
-that needs more lies where the record hardly tells it: looks add more."""
+"""Evaluations at a new start: from each starting value, and then from the best of them. A structure
+that needs more is hardly determined by the record yet; later looks continue it."""
 
 _BETWEEN = 1.05
 """Growth of the record before it is asked again whether the residual follows the input."""
@@ -298,9 +298,8 @@ def _doubted(parameters: Parameters, time: float, highest: float, *, follows: bo
 def _begun(statistics: Statistics, intersample: Intersample) -> Fit:
     """The likeliest plain structure, of one run from rest; its noise is taken for white.
 
-    What the joint fit does with all the time there is, done with little of it: a few steps from
-    each start, and a few more from the best one of each structure. What is not at its end then goes
-    on at the looks that follow.
+    This is the joint fit's search in little time: a few steps from each start, and a few more from
+    the best one of each structure. A fit that has not converged then continues at later looks.
     """
     short = only_told(statistics)
     problem = Compressed.of(Products(short, skipped=0), pulse(short.reach, intersample))
@@ -320,7 +319,7 @@ def _begun(statistics: Statistics, intersample: Intersample) -> Fit:
 
 
 def only_told(statistics: Statistics) -> Statistics:
-    """The same, without lags that are longer than the run: it tells nothing about them."""
+    """The same without lags longer than the run, which says nothing about them."""
     reach = replace(statistics.reach, lags=min(statistics.lags, statistics.samples))
     runs = tuple(shortened(run, reach) for run in statistics.runs)
     return replace(statistics, reach=reach, runs=runs)

@@ -134,9 +134,10 @@ def integrated_share(fitted: Fitted) -> float:
 def _beside(
     fitted: Fitted, products: Products, asked: Real, known: Complex | None = None
 ) -> tuple[Real, Real, float, Real]:
-    """Products of the residual and more responses, of these without the model's own, its power.
+    """Try more responses in addition to a model.
 
-    And how theta and the numerator change with what multiplies them.
+    Returns their products with the residual, the products among them with the model's own rows
+    projected out, the residual's power, and how theta and the numerator change with their weights.
     """
     count = asked.shape[0]
     own = fitted.rows

@@ -75,16 +75,16 @@ def excited(statistics: Statistics) -> tuple[float, float]:
 def rough_of(
     statistics: Statistics, *, known: Real | None = None, lag: int | None = None
 ) -> RoughResponse:
-    """Divide what the output has of the input by the input, without a model.
+    """Estimate the response without a model, from the correlations of input and output.
 
     Parameters
     ----------
     statistics : Statistics
         What was read.
     known : ndarray, shape (taps,), optional
-        Impulse response of what is already explained, and taken off.
+        Impulse response that is already explained, and is subtracted.
     lag : int, optional
-        Delay in samples to begin from; by default the longest lag at which the output follows.
+        Delay in samples to begin from; by default the lag of their greatest correlation.
     """
     reach = statistics.reach
     uu, yu = correlations(statistics)

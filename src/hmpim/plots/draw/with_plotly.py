@@ -131,7 +131,7 @@ def _axis(axis: Axis, ends: tuple[float, float]) -> dict[str, Any]:
             places = placed(places, "symlog")
         out |= {"tickmode": "array", "tickvals": places, "ticktext": [w for _, w in marks]}
     elif axis.scale == "log":
-        # As many as are written at 1, 2 and 5. Without a format their powers of ten are left out.
+        # As many ticks as 1, 2 and 5 of each decade; without a format, 2 and 5 lack their power.
         out |= {"nticks": max(4, int(abs(np.log10(ends[1] / ends[0])) / 0.31)), "tickformat": "~g"}
     elif axis.degrees:
         marks = ticks(axis, ends)

@@ -147,7 +147,7 @@ def render_study(page: StudyPage) -> str:
 
 
 def unbroken(cell: str, marks: Sequence[str] = ("± ", " +", " ?")) -> str:
-    """Break no line at the blanks of these marks: of an error, and of what is doubtful.
+    """Break no line at the blanks of these marks, which belong to an error or to a doubt.
 
     Examples
     --------

@@ -15,11 +15,11 @@ __all__ = ["study_pdf", "write_study_page"]
 _ACROSS = 261.0  # mm between the margins of a page on its side
 _GUTTER = 8.0  # mm between two pictures
 _HIGHEST = 150.0  # mm of what stands on one page with its captions
-_KEPT = ("± ", " ?")  # where no line breaks; the two sides of an error may stand below each other
+_KEPT = ("± ", " ?")  # where no line breaks; the two sides of an error may stand in two lines
 
 
 def write_study_page(page: StudyPage, path: str | PathLike[str]) -> None:
-    """Write a study as one HTML page, or as a PDF where the file is named so.
+    """Write a study as one HTML page, or as a PDF if the file is named .pdf.
 
     Parameters
     ----------
