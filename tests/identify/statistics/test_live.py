@@ -1,5 +1,7 @@
 """The estimate so far: right as soon as it claims anything, and doubtful where it cannot know."""
 
+import pickle
+
 import numpy as np
 import pytest
 
@@ -153,3 +155,14 @@ def test_what_is_no_stimulus_or_no_window_is_refused():
         LiveEstimator(STIMULUS, window=0.01)
     with pytest.raises(HmpimError, match="u has 2 samples and y 1"):
         LiveEstimator(STIMULUS).update([0.0, 1.0], [0.0])
+
+
+def test_an_estimate_so_far_goes_on_in_another_process():
+    """The workbench looks in a process of its own, and takes the estimator back."""
+    u, y = answered(10.0, 1)
+    here, there = LiveEstimator(STIMULUS), LiveEstimator(STIMULUS)
+    for first in range(0, u.size, 50):
+        block = slice(first, first + 50)
+        one, other = here.update(u[block], y[block]), there.update(u[block], y[block])
+        there = pickle.loads(pickle.dumps(there))
+    assert one.parameters.delay.value == pytest.approx(other.parameters.delay.value, abs=1e-9)

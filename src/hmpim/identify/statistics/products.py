@@ -60,6 +60,10 @@ class Moments:
     bias_variance: float
 
 
+def _not_made() -> None:
+    """In place of what was not made, or is not used any more."""
+
+
 class Products:
     """Products over the samples that count, under one noise model.
 
@@ -78,7 +82,7 @@ class Products:
         self.statistics, self.skipped = statistics, skipped
         self.noise = np.ones(1) if noise is None else noise
         self._plain: Products | None = None
-        self._last: Callable[[], Products | None] = lambda: None
+        self._last: Callable[[], Products | None] = _not_made
         reach = statistics.reach
         self.order = self.noise.size - 1
         self.first = self.order + skipped
@@ -105,6 +109,10 @@ class Products:
         self._out = np.concatenate(parts, axis=2)
         self._inner = np.stack([self._outputs(run) for run in runs])
         self._inner -= self._out @ self._out.transpose(0, 2, 1)
+
+    def __getstate__(self) -> dict[str, object]:
+        """Without the last other noise model: what is only referred to does not go along."""
+        return {**self.__dict__, "_last": _not_made}
 
     @property
     def plain(self) -> "Products":
