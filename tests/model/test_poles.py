@@ -5,7 +5,8 @@ import pytest
 
 from hmpim.model.discrete import discretise
 from hmpim.model.dynamics import STRUCTURES, denominator_of, numerator_of
-from hmpim.model.poles import PoleResponses, partial_fractions, rational_response
+from hmpim.model.fractions import partial_fractions
+from hmpim.model.poles import PoleResponses, rational_response
 from hmpim.model.response import RationalDelay, response
 from hmpim.model.sampled import delayed_response, prepare_input
 

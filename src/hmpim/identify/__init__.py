@@ -12,12 +12,8 @@ from hmpim.identify.records.levels import (
     compare_levels,
     identify_levels,
 )
-from hmpim.identify.records.repeats import (
-    RepeatedPair,
-    RepeatedParameter,
-    Repeats,
-    identify_repeats,
-)
+from hmpim.identify.records.repeated import RepeatedPair, RepeatedParameter, Repeats
+from hmpim.identify.records.repeats import identify_repeats
 from hmpim.identify.result import (
     Alike,
     Candidate,

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from hmpim.errors import ArgumentError
 from hmpim.model.causal import causal_filter
 from hmpim.model.filters import in_z
-from hmpim.model.poles import modal_form
+from hmpim.model.fractions import modal_form
 from hmpim.model.response import RationalDelay, response
 from hmpim.record import Intersample
 

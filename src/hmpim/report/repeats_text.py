@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 from hmpim.identify import Estimate, PairIdentification
 from hmpim.identify.records.levels import LevelComparison, Levels, Trend
-from hmpim.identify.records.repeats import RepeatedPair, Repeats
+from hmpim.identify.records.repeated import RepeatedPair, Repeats
 from hmpim.identify.result.digits import percent
 from hmpim.plots.style import printable
 from hmpim.record import Finding
@@ -38,7 +38,7 @@ def repeats_table(pair: RepeatedPair) -> "Table":
     --------
     >>> import numpy as np
     >>> from hmpim.identify import Estimate, FrequencyResponse
-    >>> from hmpim.identify.records.repeats import RepeatedParameter
+    >>> from hmpim.identify.records.repeated import RepeatedParameter
     >>> none = np.empty(0)
     >>> mean = Estimate(value=0.15, std=0.0001, ci95=(0.1498, 0.1502), unit="s")
     >>> delay = RepeatedParameter(

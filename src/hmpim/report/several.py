@@ -9,7 +9,7 @@ import numpy as np
 
 from hmpim.identify import Estimate, Identification, PairIdentification
 from hmpim.identify.records.levels import LevelComparison, Levels
-from hmpim.identify.records.repeats import RepeatedPair, Repeats
+from hmpim.identify.records.repeated import RepeatedPair, Repeats
 from hmpim.identify.result.digits import percent
 from hmpim.identify.result.groups import in_words
 from hmpim.plots.curves import BodeCurve, measured_curve, model_curve

@@ -8,7 +8,8 @@ from hmpim.identify.effects.censored import fit_censored
 from hmpim.identify.effects.held import rows_at_updates
 from hmpim.identify.effects.hold import Updates, detect_hold, updates
 from hmpim.identify.effects.saturation import Saturation, detect_saturation
-from hmpim.identify.fitting.fit import Fit, Problem, fit_structure, jacobian
+from hmpim.identify.fitting.derivatives import jacobian
+from hmpim.identify.fitting.fit import Fit, Problem, fit_structure
 from hmpim.identify.threads import one_thread
 from hmpim.model import STRUCTURES, prepare_input
 from hmpim.rigs import Sensor

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from hmpim.identify.fitting.fit import Problem, fit_structure, jacobian
+from hmpim.identify.fitting.derivatives import jacobian
+from hmpim.identify.fitting.fit import Problem, fit_structure
 from hmpim.identify.fitting.joint import joint_fit
 from hmpim.identify.fitting.start import rough_response, starting_values
 from hmpim.identify.reading.readings import read_parameters

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hmpim.identify.fitting.fit import jacobian
+from hmpim.identify.fitting.derivatives import jacobian
 from hmpim.identify.fitting.joint import joint_fit
 from hmpim.identify.fitting.nested import widened
 from hmpim.identify.noise.covariance import covariance

@@ -5,7 +5,7 @@ import pytest
 from scipy import signal
 
 import hmpim
-from hmpim.identify.fitting.fit import jacobian
+from hmpim.identify.fitting.derivatives import jacobian
 from hmpim.identify.fitting.rows import Problem
 from hmpim.identify.fitting.sampled_rows import SampledPart
 from hmpim.identify.fitting.software import is_exact, software_fit

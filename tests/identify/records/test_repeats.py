@@ -7,7 +7,8 @@ import pytest
 
 from hmpim.errors import RecordError
 from hmpim.identify import Estimate, Parameters
-from hmpim.identify.records.repeats import Repeats, _doubts, _parameter, identify_repeats
+from hmpim.identify.records.repeated import Repeats
+from hmpim.identify.records.repeats import _doubts, _parameter, identify_repeats
 from hmpim.record import Record
 from tests_support import assert_share, room
 

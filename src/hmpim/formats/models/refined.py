@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hmpim.formats.models.source import Source
-from hmpim.model.poles import modal_form
+from hmpim.model.fractions import modal_form
 
 __all__ = [
     "REFINE",

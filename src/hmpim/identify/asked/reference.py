@@ -16,7 +16,8 @@ import scipy
 
 from hmpim.errors import ArgumentError, RecordError
 from hmpim.identify.arrays import Real
-from hmpim.identify.fitting.fit import Fit, Problem, jacobian, within_reach
+from hmpim.identify.fitting.derivatives import jacobian
+from hmpim.identify.fitting.fit import Fit, Problem, within_reach
 from hmpim.identify.fitting.sampled_rows import part_of
 from hmpim.identify.fitting.trial import JointFit
 from hmpim.identify.frf.local import local_response

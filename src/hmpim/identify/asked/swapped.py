@@ -15,7 +15,7 @@ import scipy
 from numpy.typing import NDArray
 
 from hmpim.identify.arrays import Mask, Real
-from hmpim.identify.fitting.fit import jacobian
+from hmpim.identify.fitting.derivatives import jacobian
 from hmpim.identify.fitting.trial import JointFit
 from hmpim.identify.noise.covariance import covariance
 from hmpim.identify.noise.whiteness import is_white

@@ -19,8 +19,9 @@ from hmpim.identify.coupling.together import gained_by, joint_covariance
 from hmpim.identify.coupling.weak import coupling_fit, whitening_of
 from hmpim.identify.effects.drift import Drifting
 from hmpim.identify.effects.hum import Humming
+from hmpim.identify.fitting.derivatives import jacobian
 from hmpim.identify.fitting.enrich import PLAIN
-from hmpim.identify.fitting.fit import Fit, Problem, jacobian
+from hmpim.identify.fitting.fit import Fit, Problem
 from hmpim.identify.fitting.fit import fit_together as fit_all
 from hmpim.identify.fitting.joint import joint_fit
 from hmpim.identify.fitting.trial import JointFit

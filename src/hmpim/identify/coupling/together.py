@@ -11,7 +11,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from hmpim.identify.arrays import Real
-from hmpim.identify.fitting.fit import Fit, Problem, jacobian
+from hmpim.identify.fitting.derivatives import jacobian
+from hmpim.identify.fitting.fit import Fit, Problem
 from hmpim.identify.noise.covariance import covariance
 
 __all__ = ["gained_by", "joint_covariance"]

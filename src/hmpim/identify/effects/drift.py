@@ -18,8 +18,8 @@ from hmpim.identify.arrays import Real
 from hmpim.identify.chance import FALSE_ALARM
 from hmpim.identify.effects.disturbance import gain_by_rows, without_rows
 from hmpim.identify.fitting.candidates import spans_record
+from hmpim.identify.fitting.derivatives import jacobian
 from hmpim.identify.fitting.enrich import PLAIN
-from hmpim.identify.fitting.fit import jacobian
 from hmpim.identify.fitting.least_squares import solved, without
 from hmpim.identify.fitting.trial import JointFit
 from hmpim.identify.noise.colour import bias_drift

@@ -12,7 +12,8 @@ import numpy as np
 
 from hmpim.identify.arrays import Real
 from hmpim.identify.effects.hold import Updates
-from hmpim.identify.fitting.fit import Fit, Problem, jacobian
+from hmpim.identify.fitting.derivatives import jacobian
+from hmpim.identify.fitting.fit import Fit, Problem
 
 __all__ = ["held_prediction", "rows_at_updates"]
 

@@ -8,7 +8,8 @@ import scipy
 from hmpim.identify.arrays import Mask, Real, every_of
 from hmpim.identify.chance import FALSE_ALARM
 from hmpim.identify.fitting.data import Data, Seen
-from hmpim.identify.fitting.fit import Fit, Problem, products
+from hmpim.identify.fitting.derivatives import products
+from hmpim.identify.fitting.fit import Fit, Problem
 from hmpim.identify.fitting.least_squares import solved
 from hmpim.identify.fitting.sampled_rows import part_of
 from hmpim.identify.fitting.trial import Trial

@@ -11,7 +11,6 @@ one optimiser.
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import singledispatch
-from itertools import pairwise
 from typing import Protocol
 
 import numpy as np
@@ -19,7 +18,7 @@ import numpy as np
 from hmpim.identify.arrays import Real
 from hmpim.identify.fitting.climb import Evaluated, climb
 from hmpim.identify.fitting.held_steps import kept_in_sample
-from hmpim.identify.fitting.least_squares import solved, solved_exactly, without
+from hmpim.identify.fitting.least_squares import solved, solved_exactly
 from hmpim.identify.fitting.rows import Part, Problem, spans
 from hmpim.identify.fitting.sampled_rows import SampledPart, part_of
 from hmpim.identify.noise.whiteness import effective_share, is_white
@@ -33,12 +32,9 @@ __all__ = [
     "Fit",
     "Problem",
     "bounded_for",
-    "combined",
     "evaluating",
     "fit_structure",
     "fit_together",
-    "jacobian",
-    "products",
     "within_reach",
 ]
 
@@ -255,118 +251,6 @@ class _Evaluation:
                 )
             )
         return out
-
-
-def jacobian(
-    problem: Problem, fit: Fit, *more: Real, part: Part | SampledPart | None = None
-) -> Real:
-    """Derivatives of the prediction with respect to theta, then to `fit.linear`.
-
-    Drift and initial state, where they are fitted, are projected out: the inverse of the rows'
-    Gram matrix then is the covariance with them unknown.
-
-    Parameters
-    ----------
-    problem : Problem
-        The data.
-    fit : Fit
-        Where the derivatives are taken.
-    *more : ndarray, shape (n,)
-        Rows of other parameters, treated alike.
-    part : Part or SampledPart, optional
-        What the input does there, where it is known; a free response that it has and the problem
-        has not is left alone.
-
-    Returns
-    -------
-    ndarray, shape (1 + order + m + 1 + len(more), n)
-        Zero where a sample does not count.
-    """
-    part = part_of(problem, fit.structure, fit.theta) if part is None else part
-    bias = np.ones((1, problem.y.size))
-    rows = np.vstack([part.slopes(fit.linear[:-1], fit.initial), part.rows, bias, *more])
-    rows[fit.theta.size] += part.level
-    return _apart(problem, part, rows)
-
-
-def combined(problem: Problem, fit: Fit, weights: Real, row: Real) -> Real:
-    """Return a row, (n,), plus the rows of `jacobian` times weights, (p,), treated as they are."""
-    part, size = part_of(problem, fit.structure, fit.theta), fit.theta.size
-    out = row + part.driven(weights[size:-1]) + weights[-1]
-    for here in problem.stretches(0, row.size):
-        out[here] += weights[:size] @ part.slopes(fit.linear[:-1], fit.initial, here)
-    return np.asarray(_apart(problem, part, out[None])[0])
-
-
-def _apart(problem: Problem, part: Part | SampledPart, rows: Real) -> Real:
-    """Rows as samples count, without what drift and initial state can do."""
-    others = _others(problem, part)
-    counted = problem.masked(rows)
-    return without(counted, problem.masked(np.vstack(others))) if others else counted
-
-
-def _others(problem: Problem, part: Part | SampledPart) -> list[Real]:
-    """Rows of the initial state and of the drift, where they are fitted."""
-    free = [] if problem.begins is None else [*part.free]
-    return free if problem.nuisance is None else [*free, *problem.nuisance]
-
-
-def products(
-    problem: Problem,
-    fit: Fit,
-    residual: Real,
-    *more: Real,
-    part: Part | SampledPart | None = None,
-    edges: tuple[int, ...] = (),
-) -> Real:
-    """Inner products of the rows of `jacobian` and of a residual, which comes last.
-
-    They are summed stretch by stretch, so that no row is as long as the record unless samples are
-    whitened.
-
-    Parameters
-    ----------
-    problem, fit, *more, part
-        As for `jacobian`.
-    residual : ndarray, shape (n,)
-        0 where a sample does not count.
-    edges : tuple of int
-        Samples at which a further span begins; each span's products are returned separately.
-
-    Returns
-    -------
-    ndarray, shape (1 + len(edges), q, q)
-        q = 1 + order + m + 1 + len(more) + 1.
-    """
-    part = part_of(problem, fit.structure, fit.theta) if part is None else part
-    others, size, n = _others(problem, part), fit.theta.size, residual.size
-    count = size + part.rows.shape[0] + 1 + len(more)
-
-    def rows_at(here: slice) -> Real:
-        slopes = part.slopes(fit.linear[:-1], fit.initial, here)
-        rows = np.empty((count + len(others) + 1, slopes.shape[1]))
-        rows[:size], rows[size : count - 1 - len(more)] = slopes, part.rows[:, here]
-        rows[size] += part.level
-        rows[count - 1 - len(more)] = 1.0
-        for own, row in zip(rows[count - len(more) :], (*more, *others), strict=False):
-            own[:] = row[here]
-        rows[:-1] = problem.masked(rows[:-1], here)
-        rows[-1] = residual[here]
-        return rows
-
-    whole = rows_at(slice(0, n)) if problem.filtered else None
-    sums = np.zeros((1 + len(edges), count + len(others) + 1, count + len(others) + 1))
-    for own, (first, last) in zip(sums, pairwise((0, *edges, n)), strict=True):
-        for here in problem.stretches(first, last):
-            rows = rows_at(here) if whole is None else whole[:, here]
-            own += rows @ rows.T
-    if not others:
-        return sums
-    gram, last = sums.sum(axis=0), count + len(others)
-    turn = np.zeros((count + 1, last + 1))
-    turn[:count, :count], turn[count, last] = np.eye(count), 1.0
-    turn[:count, count:last] = -solved(gram[count:last, count:last], gram[count:last, :count]).T
-    return np.asarray(turn @ sums @ turn.T)
 
 
 def bounded_for(problem: Problem, structure: Structure, theta: Real) -> Real:

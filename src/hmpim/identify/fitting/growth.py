@@ -19,7 +19,8 @@ import numpy as np
 
 from hmpim.identify.arrays import Real
 from hmpim.identify.chance import DEVIATIONS, HALF, ONE_SIDED
-from hmpim.identify.fitting.fit import Fit, Problem, combined, products, within_reach
+from hmpim.identify.fitting.derivatives import combined, products
+from hmpim.identify.fitting.fit import Fit, Problem, within_reach
 from hmpim.identify.fitting.least_squares import solved
 from hmpim.identify.fitting.sampled_rows import part_of
 from hmpim.identify.noise.covariance import covariance

@@ -15,7 +15,7 @@ import scipy
 
 from hmpim.identify.arrays import Complex, Real
 from hmpim.model.dynamics import Structure, coefficients_of
-from hmpim.model.poles import APART, distances, fractions, parted
+from hmpim.model.fractions import APART, distances, fractions, parted
 
 __all__ = ["Expansion", "Parallel", "Poles", "poles_of"]
 

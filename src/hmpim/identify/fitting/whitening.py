@@ -13,7 +13,8 @@ from hmpim.identify.fitting.data import (
     follows,
     polished,
 )
-from hmpim.identify.fitting.fit import Fit, Problem, fit_structure, jacobian
+from hmpim.identify.fitting.derivatives import jacobian
+from hmpim.identify.fitting.fit import Fit, Problem, fit_structure
 from hmpim.identify.fitting.start import rough_response
 from hmpim.identify.fitting.trial import Trial
 from hmpim.identify.noise.autoregression import autoregression

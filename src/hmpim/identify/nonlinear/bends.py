@@ -18,8 +18,9 @@ import scipy
 from hmpim.identify.arrays import Real
 from hmpim.identify.chance import CLEARLY, HALF, searched
 from hmpim.identify.fitting.data import polished
+from hmpim.identify.fitting.derivatives import jacobian
 from hmpim.identify.fitting.enrich import PLAIN
-from hmpim.identify.fitting.fit import Fit, Problem, jacobian
+from hmpim.identify.fitting.fit import Fit, Problem
 from hmpim.identify.fitting.least_squares import solved
 from hmpim.identify.fitting.sampled_rows import part_of
 from hmpim.identify.fitting.trial import JointFit

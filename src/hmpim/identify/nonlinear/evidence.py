@@ -11,7 +11,8 @@ import numpy as np
 
 from hmpim.identify.arrays import Mask, Real
 from hmpim.identify.chance import FALSE_ALARM, LIKELIER, searched
-from hmpim.identify.fitting.fit import Fit, Problem, jacobian
+from hmpim.identify.fitting.derivatives import jacobian
+from hmpim.identify.fitting.fit import Fit, Problem
 from hmpim.identify.noise.whiteness import is_white
 from hmpim.identify.nonlinear.harmonic_kinds import compare_harmonics
 from hmpim.identify.nonlinear.harmonics import Harmonics, any_harmonics, sweep_harmonics

@@ -26,7 +26,8 @@ import numpy as np
 import scipy
 
 from hmpim.identify.arrays import Mask, Real
-from hmpim.identify.fitting.fit import Fit, Problem, jacobian
+from hmpim.identify.fitting.derivatives import jacobian
+from hmpim.identify.fitting.fit import Fit, Problem
 from hmpim.identify.noise.autoregression import yule_walker
 from hmpim.model.poles import rational_response
 from hmpim.model.sampled import prepare_input

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hmpim.identify.arrays import Real
-from hmpim.identify.fitting.fit import jacobian, products
+from hmpim.identify.fitting.derivatives import jacobian, products
 from hmpim.identify.fitting.held_steps import steps_through
 from hmpim.identify.fitting.nested import widened
 from hmpim.identify.fitting.trial import JointFit

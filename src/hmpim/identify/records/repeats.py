@@ -5,9 +5,8 @@ noise but dynamics or nonlinearity that it does not describe (Pintelon and Schou
 Identification, 2nd ed., Wiley 2012, section 4.3: averages over periods tell the two apart).
 """
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, fields, replace
-from typing import Any
+from collections.abc import Sequence
+from dataclasses import fields, replace
 
 import numpy as np
 import scipy
@@ -20,211 +19,26 @@ from hmpim.identify.identify import identify
 from hmpim.identify.judgement import judged_together
 from hmpim.identify.noise.whiteness import effective_share
 from hmpim.identify.records.alike import check_alike, check_apart
+from hmpim.identify.records.repeated import RepeatedPair, RepeatedParameter, Repeats
 from hmpim.identify.result import (
     Estimate,
     FrequencyResponse,
-    Identification,
     PairIdentification,
     Parameters,
 )
-from hmpim.identify.result.digits import percent
 from hmpim.identify.result.error_bars import estimate, noise_estimate
 from hmpim.identify.result.groups import EVERY, MODELLED, PHASE_SPLIT, in_words
-from hmpim.identify.result.lookup import find_pair
 from hmpim.record import Finding, Intersample, Record
-from hmpim.tables import html_table, shortened
 
-__all__ = ["RepeatedPair", "RepeatedParameter", "Repeats", "identify_repeats"]
+__all__ = ["identify_repeats"]
 
-SCHEMA = "hmpim/repeats/1"
 
 _ROUNDING = 1e-12
 """Reach over value that is arithmetic's and not the record's."""
 
-_HEADS = ("parameter", "mean", "repeatability", "chance", "stated errors agree", "verdict")
-"""Column heads of a notebook's table."""
 
 # A whole number of samples, which may well be the same every time.
 _COUNTED = "delay_correlation"
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class RepeatedParameter:
-    """One parameter over the repeats that could tell it.
-
-    Parameters
-    ----------
-    name : str
-        As in `Parameters`.
-    mean : Estimate
-        Weighted by 1/std². Its std is that of the weights, or what the scatter says if that is
-        more (R. T. Birge, Phys. Rev. 40, 1932). Where the interval of every repeat reaches to
-        another model, so does that of the mean, and its std is None.
-    values : tuple of float
-        One for each repeat that has one.
-    repeatability : float
-        Standard deviation from repeat to repeat, same unit.
-    chi_squared : float
-        Σ (value - mean)²/std², which has `freedom` degrees if the stated errors are right.
-    freedom : int
-        Number of values less one.
-    probability : float
-        Chance of a larger `chi_squared` if the stated errors are right.
-    agree : bool
-        False if the scatter is larger, or smaller, than the stated errors would give once in
-        200 times. Of `delay_correlation`, a whole number of samples, only a larger one counts.
-    """
-
-    name: str
-    mean: Estimate
-    values: tuple[float, ...]
-    repeatability: float
-    chi_squared: float
-    freedom: int
-    probability: float
-    agree: bool
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return plain JSON values."""
-        return {
-            "mean": self.mean.to_dict(),
-            "values": list(self.values),
-            "repeatability": self.repeatability,
-            "chi_squared": self.chi_squared,
-            "freedom": self.freedom,
-            "probability": self.probability,
-            "agree": self.agree,
-        }
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class RepeatedPair:
-    """What the repeats say of one input and one output.
-
-    Parameters
-    ----------
-    input, output : str
-        Names.
-    structures : tuple of str
-        What each repeat was found to be.
-    parameters : tuple of RepeatedParameter
-        Those that at least two repeats tell.
-    frequency_response : FrequencyResponse
-        Weighted by 1/std² at each frequency; its std is that of the weights, and knows nothing
-        of an error that all repeats have in common.
-    response_scatter : float
-        Scatter of the repeats' responses over their stated errors, root mean square over the
-        frequencies: near 1 if these are right.
-    noise_std : Estimate or None
-        What differs from repeat to repeat; None where no repeat could be identified.
-    unmodelled : float or None
-        Root mean square of what each repeat leaves over alike, in the output's unit, the noise
-        that remains in the average taken off.
-    unmodelled_probability : float or None
-        Chance of seeing so much if there were noise only.
-    findings : tuple of Finding
-        What the repeats disagree on.
-    """
-
-    input: str
-    output: str
-    structures: tuple[str, ...]
-    parameters: tuple[RepeatedParameter, ...]
-    frequency_response: FrequencyResponse
-    response_scatter: float
-    noise_std: Estimate | None
-    unmodelled: float | None
-    unmodelled_probability: float | None
-    findings: tuple[Finding, ...]
-
-    def __getitem__(self, name: str) -> RepeatedParameter:
-        for parameter in self.parameters:
-            if parameter.name == name:
-                return parameter
-        known = ", ".join(p.name for p in self.parameters)
-        raise RecordError(f"the repeats do not determine {name!r}; they determine {known}")
-
-    def __repr__(self) -> str:
-        agree = sum(parameter.agree for parameter in self.parameters)
-        what = f"{len(self.structures)} repeats, {agree} of {len(self.parameters)} parameters agree"
-        return f"RepeatedPair({self._named}: {what})"
-
-    def _repr_html_(self) -> str:
-        """Return a table of the averages, as a notebook shows it."""
-        notes = [finding.message for finding in self.findings]
-        return html_table(f"{self._named}: averages", _HEADS, self._rows, notes=notes)
-
-    @property
-    def _named(self) -> str:
-        return f"{shortened([self.input])} → {shortened([self.output])}"
-
-    @property
-    def _rows(self) -> list[list[str]]:
-        return [
-            [p.name.replace("_", " "), p.mean.text, f"{p.repeatability:.2g} {p.mean.unit}".rstrip(),
-             f"{percent(p.probability)} %", "yes" if p.agree else "no", p.mean.verdict]
-            for p in self.parameters
-        ]  # fmt: skip
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return plain JSON values; what is no number is null."""
-        scatter = self.response_scatter
-        return {
-            "input": self.input,
-            "output": self.output,
-            "structures": list(self.structures),
-            "parameters": {p.name: p.to_dict() for p in self.parameters},
-            "frequency_response": self.frequency_response.to_dict(),
-            "response_scatter": scatter if np.isfinite(scatter) else None,
-            "noise_std": None if self.noise_std is None else self.noise_std.to_dict(),
-            "unmodelled": self.unmodelled,
-            "unmodelled_probability": self.unmodelled_probability,
-            "warnings": [f.to_dict() for f in self.findings],
-        }
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Repeats:
-    """Several records of one stimulus; index it output first: ``repeats["y", "u"]["delay"]``.
-
-    Parameters
-    ----------
-    results : tuple of Identification
-        Each record by itself.
-    pairs : tuple of RepeatedPair
-        All of them together.
-    """
-
-    results: tuple[Identification, ...]
-    pairs: tuple[RepeatedPair, ...]
-
-    def __getitem__(self, key: tuple[str, str] | str) -> RepeatedPair:
-        return find_pair(self.pairs, key, holder="the repeats")
-
-    def __repr__(self) -> str:
-        names = [pair._named for pair in self.pairs]
-        return f"Repeats({len(self.results)} records: {shortened(names)})"
-
-    def _repr_html_(self) -> str:
-        """Return a table of the averages of every pair, as a notebook shows it."""
-        rows = [[pair._named, *row] for pair in self.pairs for row in pair._rows]
-        said = dict.fromkeys(f.message for pair in self.pairs for f in pair.findings)
-        title = f"{len(self.results)} records of one stimulus"
-        return html_table(title, ["from → to", *_HEADS], rows, notes=list(said))
-
-    def __iter__(self) -> Iterator[RepeatedPair]:
-        return iter(self.pairs)
-
-    def __len__(self) -> int:
-        return len(self.pairs)
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return all of it as plain JSON values, `schema` first."""
-        return {
-            "schema": SCHEMA,
-            "results": [result.to_dict() for result in self.results],
-            "pairs": [pair.to_dict() for pair in self.pairs],
-        }
 
 
 @checked
