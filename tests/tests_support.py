@@ -10,7 +10,9 @@ import asyncio
 import os
 import shutil
 import subprocess
+import threading
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
 from typing import NoReturn
@@ -31,6 +33,27 @@ def finished(work):
     """What a coroutine returns; in a thread of its own, since a browser's driver keeps a loop."""
     with ThreadPoolExecutor(1) as thread:
         return thread.submit(asyncio.run, work).result()
+
+
+@contextmanager
+def meanwhile(work):
+    """Do work in a thread of its own until the block ends; it is given an event that says so."""
+    over, faults = threading.Event(), []
+
+    def far():
+        try:
+            work(over)
+        except BaseException as error:
+            faults.append(error)
+
+    thread = threading.Thread(target=far)
+    thread.start()
+    try:
+        yield
+    finally:
+        over.set()
+        thread.join()
+    assert not faults
 
 
 def study_size(usual: int) -> int:

@@ -7,7 +7,6 @@ import signal
 import socket
 import subprocess
 import sys
-import threading
 from contextlib import contextmanager
 from functools import cache
 
@@ -20,7 +19,7 @@ from hmpim.cli.main import app
 from hmpim.formats.stimulus_files import read_stimulus
 from hmpim.rigs import SystemClock, pulse_bytes
 from hmpim.rigs.catalogue import find_rig
-from tests_support import in_studies
+from tests_support import in_studies, meanwhile
 
 HMPIM = (sys.executable, "-m", "hmpim.cli.main")
 
@@ -81,12 +80,11 @@ def played(line, *, apart):
     return False
 
 
-@contextmanager
 def ticking(to, rate):
     """Numbered pulses, one datagram each."""
-    over, clock = threading.Event(), SystemClock()
+    clock = SystemClock()
 
-    def send():
+    def send(over):
         begun = clock.now()
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as out:
             for number in range(10**6):
@@ -95,13 +93,7 @@ def ticking(to, rate):
                 clock.sleep_until(begun + number / rate)
                 out.sendto(pulse_bytes(number), ("127.0.0.1", to))
 
-    thread = threading.Thread(target=send)
-    thread.start()
-    try:
-        yield
-    finally:
-        over.set()
-        thread.join()
+    return meanwhile(send)
 
 
 WHOLE = pytest.mark.parametrize("whole", [False, *in_studies(True)], ids=["small", "printed"])

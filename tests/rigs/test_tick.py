@@ -6,7 +6,6 @@ import re
 import socket
 import subprocess
 import sys
-import threading
 import time
 
 import numpy as np
@@ -24,7 +23,7 @@ from hmpim.rigs import (
     pulse_bytes,
 )
 from hmpim.stimulus import Limits, Ramp, Stimulus
-from tests_support import FALSE_ALARM, in_studies
+from tests_support import FALSE_ALARM, in_studies, meanwhile
 
 RATE = 500.0
 RAMP = Stimulus(waveform=Ramp(duration=1.5), fs=100.0)
@@ -237,25 +236,18 @@ def test_a_tick_that_stops_is_said_and_time_goes_on_so_that_a_rig_can_be_stopped
 
 def test_pulses_over_udp():
     ticks = UdpTicks("127.0.0.1", 0)
-    over = threading.Event()
 
-    def send():  # always the same: no numbers
+    def send(over):  # always the same: no numbers
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as out:
             while not over.is_set():
                 out.sendto(b"tick", ("127.0.0.1", ticks.port))
                 time.sleep(0.01)
 
-    thread = threading.Thread(target=send)
-    thread.start()
-    try:
-        with TickClock(ticks, rate=100.0, patience=20.0) as clock:
-            record = run(FakeRig(answer=paced), RAMP, options=RunOptions(clock=clock))
-            assert clock.now() >= RAMP.time[-1] - 1e-9
-        said = [f.message for f in record.findings if f.code == "tick"]
-        assert said[0].startswith("The run was driven by an external tick of 100 Hz")
-    finally:
-        over.set()
-        thread.join()
+    with meanwhile(send), TickClock(ticks, rate=100.0, patience=20.0) as clock:
+        record = run(FakeRig(answer=paced), RAMP, options=RunOptions(clock=clock))
+        assert clock.now() >= RAMP.time[-1] - 1e-9
+    said = [f.message for f in record.findings if f.code == "tick"]
+    assert said[0].startswith("The run was driven by an external tick of 100 Hz")
 
 
 SENDER = """

@@ -2,7 +2,6 @@
 
 import os
 import select
-import threading
 import time
 from contextlib import ExitStack, contextmanager
 
@@ -15,6 +14,7 @@ from hmpim.rigs import SystemClock
 from hmpim.rigs.catalogue import describe, find_rig
 from hmpim.rigs.wire import CanServer, FarEnd, SerialServer, UdpClient, UdpServer, WireRig, serve
 from hmpim.stimulus import Limits, design
+from tests_support import meanwhile
 from wire_support import Lag, hello
 
 RATE = 100.0
@@ -28,49 +28,34 @@ SWEEP = design(
 @contextmanager
 def cable():
     """Two pseudo-terminals, what goes into one comes out of the other; yields their names."""
-    masters, ends, over = [], [], threading.Event()
+    masters, ends = [], []
     for _ in range(2):
         master, end = os.openpty()
         masters.append(master)
         ends.append(end)
 
-    def carry():
+    def carry(over):
         while not over.is_set():
             for one in select.select(masters, [], [], 0.05)[0]:
                 os.write(masters[1 - masters.index(one)], os.read(one, 4096))
 
-    thread = threading.Thread(target=carry)
-    thread.start()
     try:
-        yield tuple(map(os.ttyname, ends))
+        with meanwhile(carry):
+            yield tuple(map(os.ttyname, ends))
     finally:
-        over.set()
-        thread.join()
         for each in (*masters, *ends):
             os.close(each)
 
 
-@contextmanager
 def serving(server, said):
     """A far end in a thread of its own."""
-    over, faults = threading.Event(), []
 
-    def far():
+    def far(over):
         plant = Lag(1, RATE, late=LATE, time_constant=TIME_CONSTANT, noise_std=0.003)
-        try:
-            with server:
-                serve(server, FarEnd(said), plant, clock=SystemClock(), until=over.is_set)
-        except BaseException as error:
-            faults.append(error)
+        with server:
+            serve(server, FarEnd(said), plant, clock=SystemClock(), until=over.is_set)
 
-    thread = threading.Thread(target=far)
-    thread.start()
-    try:
-        yield
-    finally:
-        over.set()
-        thread.join()
-    assert not faults
+    return meanwhile(far)
 
 
 @pytest.mark.parametrize("kind", ["serial", "can"])
