@@ -19,7 +19,7 @@ from hmpim.identify.fitting.rows import Part
 from hmpim.identify.fitting.start import RoughResponse
 from hmpim.identify.fitting.trial import JointFit
 from hmpim.identify.noise.misfit import Misfit
-from hmpim.identify.statistics.fit import Compressed, Fitted, pulse, told
+from hmpim.identify.statistics.fit import Compressed, Fitted, as_fitted, pulse
 from hmpim.identify.statistics.misfit import hidden_pole_of, misfit_of
 from hmpim.identify.statistics.products import Products
 from hmpim.identify.statistics.reach import AHEAD
@@ -83,7 +83,7 @@ class CompressedData(Data):
 
     def misfit(self, fit: Fit) -> Misfit:
         """How much of what is left over follows the input, whatever its own colour."""
-        fitted = told(fit)
+        fitted = as_fitted(fit)
         products = fitted.products
         if not (products.order or fitted.is_white):
             products = products.whitened(fitted.left.noise)
@@ -91,24 +91,24 @@ class CompressedData(Data):
 
     def noise_left(self, problem: Problem, fit: Fit) -> Real:
         """Autoregression of what a fit leaves over, 1 first; 1 alone where it is white."""
-        return told(fit).left.noise
+        return as_fitted(fit).left.noise
 
     def rough_left(self, fit: Fit) -> RoughResponse:
         """Rough response of what a fit leaves over."""
-        known = told(fit).response
+        known = as_fitted(fit).response
         return rough_of(self.products.statistics, known=known, lag=self.rough.lag)
 
     def says_nothing(self, problem: Problem, fit: Fit, *, least: float = 0.0) -> bool:
         """Whether a constant explains as much, and what is left over does not follow the input."""
-        share = 1.0 if told(fit).products.order else fit.share
-        spread = told(fit).products.energy
+        share = 1.0 if as_fitted(fit).products.order else fit.share
+        spread = as_fitted(fit).products.energy
         gained = problem.counted * share * float(np.log(max(spread / fit.objective, 1.0)))
         limit = float(scipy.special.chdtri(fit.structure.parameters, FALSE_ALARM))
         return gained <= limit and self.misfit(fit).probability >= FALSE_ALARM
 
     def hidden_pole(self, problem: Problem, fit: Fit) -> HiddenPole:
         """What the statistics say of one more pole beside a fit."""
-        return hidden_pole_of(told(fit))
+        return hidden_pole_of(as_fitted(fit))
 
 
 def choose(
@@ -149,7 +149,7 @@ def choose(
     course = begun(data, natural, names, _ALL)
     course = replace(course, alone=intersample is not None or natural == "zoh")
     if conditioned and len(statistics.runs) == 1:
-        best = told(course.best)
+        best = as_fitted(course.best)
         skipped = 0 if _rests(best) else _memory(best)
         data = replace(data, products=Products(statistics, skipped=skipped))
         fits = [refit(data.problem(natural, _ALL), fit) for fit in course.fits]

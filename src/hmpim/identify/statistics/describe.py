@@ -39,7 +39,7 @@ from hmpim.identify.result import (
 )
 from hmpim.identify.result.error_bars import estimate, noise_estimate
 from hmpim.identify.statistics.choose import CompressedData, choose
-from hmpim.identify.statistics.fit import Fitted, told
+from hmpim.identify.statistics.fit import Fitted, as_fitted
 from hmpim.identify.statistics.misfit import integrated_share
 from hmpim.identify.statistics.run import Run
 from hmpim.identify.statistics.start import correlations
@@ -106,7 +106,7 @@ def identify_statistics(
         intersample=intersample or statistics.intersample,
         structures=structures,
     )
-    best = told(joint.best.fit)
+    best = as_fitted(joint.best.fit)
     if joint.related:
         _check_window(statistics, best)
     if integrated_share(best) > (PART if joint.related else 0.0):
@@ -145,7 +145,7 @@ def _check_moves(statistics: Statistics) -> None:
 
 def _read(statistics: Statistics, joint: JointFit, highest: float) -> Readings:
     """Every figure of the chosen fit, and the covariance behind it."""
-    best, fs, share = told(joint.best.fit), statistics.fs, joint.weighed_share
+    best, fs, share = as_fitted(joint.best.fit), statistics.fs, joint.weighed_share
     left, vector = best.left, np.concatenate([best.theta, best.linear])
     cov = widened(joint, best.covariance)
     parameters, system, spread = read_figures(
@@ -178,7 +178,7 @@ def _read(statistics: Statistics, joint: JointFit, highest: float) -> Readings:
 
 def _related(statistics: Statistics, data: CompressedData, joint: JointFit) -> PairIdentification:
     """Say all that is known of an output that follows its input."""
-    best, fs = told(joint.best.fit), statistics.fs
+    best, fs = as_fitted(joint.best.fit), statistics.fs
     band = (data.band[0] * fs, data.band[1] * fs)
     readings = _read(statistics, joint, min(band[1], fs / 2))
     system, spread = readings.system, readings.coefficient_covariance
@@ -246,7 +246,7 @@ def _fit_percent(statistics: Statistics, power: float) -> float:
 
 def _candidates(statistics: Statistics, joint: JointFit) -> tuple[Candidate, ...]:
     """All trials; the fit is said of the whitened output where the noise is coloured."""
-    best = told(joint.best.fit)
+    best = as_fitted(joint.best.fit)
     return tuple(
         Candidate(
             structure=trial.fit.structure.name,
@@ -281,7 +281,7 @@ def _no_samples(statistics: Statistics) -> Finding:
 
 def _unrelated(statistics: Statistics, data: CompressedData, joint: JointFit) -> PairIdentification:
     """Say what little can be said of an output that a constant explains as well."""
-    best = told(joint.best.fit)
+    best = as_fitted(joint.best.fit)
     products = best.products
     mean = best.moments.bias
     variance = products.energy / max(products.counted - 1, 1)

@@ -28,7 +28,7 @@ from hmpim.model.dynamics import Structure
 from hmpim.model.sampled import SampledInput, prepare_input
 from hmpim.record import Intersample
 
-__all__ = ["Compressed", "Fitted", "LeftOver", "fit_briefly", "follow", "pulse", "told"]
+__all__ = ["Compressed", "Fitted", "LeftOver", "as_fitted", "fit_briefly", "follow", "pulse"]
 
 _FINAL = 1e-10
 """Precision of the chosen fit: 1e-5 standard deviations."""
@@ -316,10 +316,10 @@ class Fitted(Fit):
         )
 
 
-def told(fit: Fit) -> Fitted:
+def as_fitted(fit: Fit) -> Fitted:
     """Return a fit that was made to products as the `Fitted` that it is."""
     if not isinstance(fit, Fitted):
-        raise TypeError("fitted to samples")
+        raise TypeError("the fit was made to samples, not to statistics")
     return fit
 
 
@@ -383,4 +383,4 @@ def _climbed(here: _Evaluation, evaluations: int) -> Fitted:
         )
     except _SpentError:
         best, converged = min(seen, key=lambda one: one.cost), False
-    return told(best.fits(converged=converged)[0])
+    return as_fitted(best.fits(converged=converged)[0])
