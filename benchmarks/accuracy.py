@@ -23,7 +23,8 @@ from rich.progress import Progress
 from scipy.signal import lfilter
 
 import hmpim
-from hmpim.identify.fitting.fit import Problem, fit_structure, jacobian
+from hmpim.identify.fitting.derivatives import jacobian
+from hmpim.identify.fitting.fit import Problem, fit_structure
 from hmpim.model import STRUCTURES, prepare_input, response, second_order_coefficients, theta_of
 from hmpim.model.response import RationalDelay
 
