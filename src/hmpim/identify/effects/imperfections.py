@@ -54,8 +54,8 @@ class Imperfections:
     levels: int | None = None
 
     def counts_otherwise_than(self, before: "Imperfections") -> bool:
-        """Whether it is clipped or held and was not, or the other way, or lost more samples."""
-        if (self.saturation is None) != (before.saturation is None):
+        """Whether other levels clip it, it is held and was not or was, or lost more samples."""
+        if _sides(self.saturation) != _sides(before.saturation):
             return True
         if (self.hold is None) != (before.hold is None):
             return True
@@ -145,6 +145,13 @@ def find_imperfections(
         repeated=find_repeated(y) if rounding is None and hold is None else None,
         levels=_few_levels(y, inputs),
     )
+
+
+def _sides(saturation: Saturation | None) -> tuple[bool, bool]:
+    """Whether the range was reached below, and above."""
+    if saturation is None:
+        return False, False
+    return saturation.low is not None, saturation.high is not None
 
 
 def _count_levels(x: Real) -> int:
