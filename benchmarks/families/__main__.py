@@ -1,7 +1,7 @@
 """How right `hmpim.identify` is, family by family of records.
 
 python benchmarks/families [--families NAME,...] [--draws N] [--seed S] [--jobs 2]
-                           [--json OUT] [--against OLD] [--list] [--explain INDEX]
+                           [--samples N] [--json OUT] [--against OLD] [--list] [--explain INDEX]
 """
 
 from __future__ import annotations
@@ -23,6 +23,9 @@ def arguments() -> argparse.Namespace:
     parser.add_argument(
         "--seed", type=int, default=SEED, help=f"another seed, other draws ({SEED})"
     )
+    parser.add_argument(
+        "--samples", type=int, help="of a record, where its family is not about that (600 to 3000)"
+    )
     parser.add_argument("--jobs", type=int, default=2, help="processes (2)")
     parser.add_argument(
         "--json", type=Path, help="write the counts here; families not drawn now stay"
@@ -38,7 +41,7 @@ def arguments() -> argparse.Namespace:
 
 
 def main() -> int:
-    from families import study, table
+    from families import kinds, study, table
     from families.catalogue import FAMILIES, named
 
     given = arguments()
@@ -52,6 +55,8 @@ def main() -> int:
             print(f"{name:32s}{FAMILIES[name].words}")
         return 0
     told = not given.no_options
+    if given.samples:
+        kinds.LENGTHS[:] = [given.samples, given.samples]
     if given.explain is not None:
         for name in names:
             print("\n".join(study.explained(name, given.seed, given.explain, options=told)))

@@ -20,8 +20,8 @@ MakeSystem = Callable[[Rng, Drive], System]
 MakeDrive = Callable[[Rng], Drive]
 
 RATES = (100.0, 200.0, 500.0, 1000.0)
-LENGTHS = (600, 3000)
-"""Samples of a record, unless the family is about its length."""
+LENGTHS = [600, 3000]
+"""Samples of a record, unless the family is about its length; `--samples` sets both."""
 
 
 def log_uniform(rng: Rng, low: float, high: float) -> float:
@@ -29,7 +29,7 @@ def log_uniform(rng: Rng, low: float, high: float) -> float:
 
 
 def length(rng: Rng) -> int:
-    return int(log_uniform(rng, *LENGTHS))
+    return int(log_uniform(rng, *LENGTHS) + 1e-6)
 
 
 # --- systems -----------------------------------------------------------------------------------
