@@ -65,7 +65,7 @@ def test_each_parameter_is_a_property_of_the_pair(result):
     """Explicit, so that a type checker knows a misspelt name."""
     pair = result["y"]
     for field in fields(Parameters):
-        assert isinstance(PairIdentification.__dict__[field.name], property)
+        assert field.name in vars(PairIdentification)
         assert getattr(pair, field.name) is getattr(pair.parameters, field.name)
     assert "__getattr__" not in PairIdentification.__dict__
     with pytest.raises(AttributeError, match="no attribute 'dealy'"):

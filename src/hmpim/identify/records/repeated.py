@@ -10,6 +10,7 @@ from hmpim.errors import RecordError
 from hmpim.identify.result import Estimate, FrequencyResponse, Identification
 from hmpim.identify.result.digits import percent
 from hmpim.identify.result.lookup import find_pair
+from hmpim.identify.result.plain import plain
 from hmpim.record import Finding
 from hmpim.tables import html_table, shortened
 
@@ -59,15 +60,7 @@ class RepeatedParameter:
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain JSON values."""
-        return {
-            "mean": self.mean.to_dict(),
-            "values": list(self.values),
-            "repeatability": self.repeatability,
-            "chi_squared": self.chi_squared,
-            "freedom": self.freedom,
-            "probability": self.probability,
-            "agree": self.agree,
-        }
+        return {name: value for name, value in plain(self).items() if name != "name"}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

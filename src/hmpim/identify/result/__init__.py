@@ -2,6 +2,7 @@
 
 digits          numbers for people: the error to its digits, the value to match
 estimate        one figure, its error, its interval, its verdict
+plain           results as plain JSON values
 parameters      all figures of one pair; the paper's
 measured        frequency response, bandwidths read off it, what is nonlinear
 inputs          several inputs at once, and how well they are told apart

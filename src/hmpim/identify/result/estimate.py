@@ -7,6 +7,7 @@ from typing import Any, Literal
 
 from hmpim.identify.chance import HALF
 from hmpim.identify.result.digits import aside, plus_minus
+from hmpim.identify.result.plain import plain
 
 __all__ = [
     "Estimate",
@@ -127,13 +128,8 @@ class Estimate:
 
     def to_dict(self) -> dict[str, Any]:
         """Return the estimate as plain JSON values."""
-        return {
-            "value": self.value,
-            "std": self.std,
-            "ci95": None if self.ci95 is None else list(self.ci95),
-            "unit": self.unit,
-            "verdict": self.verdict,
-        }
+        said: dict[str, Any] = plain(self)
+        return said
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> "Estimate":

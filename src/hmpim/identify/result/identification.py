@@ -1,7 +1,7 @@
 """The whole result of one record, and its JSON."""
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 from typing import Any
 
 from hmpim.equality import ByValue
@@ -11,6 +11,7 @@ from hmpim.identify.result.first_schema import FIRST_SCHEMA, upgraded
 from hmpim.identify.result.inputs import InputSet
 from hmpim.identify.result.lookup import find_pair
 from hmpim.identify.result.pair import PairIdentification, pair_rows
+from hmpim.identify.result.plain import plain
 from hmpim.record import Record
 from hmpim.tables import html_table, shortened
 
@@ -105,7 +106,7 @@ class Identification(ByValue):
         """Return the result as plain JSON values, `schema` first."""
         return {
             "schema": SCHEMA,
-            "record": {f.name: getattr(self.record, f.name) for f in fields(self.record)},
+            "record": plain(self.record),
             "pairs": [pair.to_dict() for pair in self.pairs],
             "inputs": None if self.inputs is None else self.inputs.to_dict(),
         }

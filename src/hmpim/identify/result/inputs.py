@@ -8,6 +8,7 @@ import numpy as np
 
 from hmpim.equality import ByValue
 from hmpim.identify.arrays import Mask, Real
+from hmpim.identify.result.plain import plain
 from hmpim.identify.worth import MATERIAL
 
 __all__ = ["Alike", "InputSet", "OutputCoherence"]
@@ -103,24 +104,8 @@ class InputSet(ByValue):
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain JSON values; an infinite condition is null."""
-        return {
-            "names": list(self.names),
-            "bands": [list(band) for band in self.bands],
-            "frequency": self.frequency.tolist(),
-            "condition": [c if np.isfinite(c) else None for c in self.condition.tolist()],
-            "alike": [
-                {"names": list(a.names), "bands": [list(b) for b in a.bands], "share": a.share}
-                for a in self.alike
-            ],
-            "coherence": [
-                {
-                    "output": c.output,
-                    "frequency": c.frequency.tolist(),
-                    "multiple": c.multiple.tolist(),
-                }
-                for c in self.coherence
-            ],
-        }
+        condition = [c if np.isfinite(c) else None for c in self.condition.tolist()]
+        return {**plain(self), "condition": condition}
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> "InputSet":

@@ -1,7 +1,7 @@
 """What is measured without a model: the frequency response, bandwidths, what is nonlinear."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -9,6 +9,7 @@ import numpy as np
 from hmpim.equality import ByValue
 from hmpim.identify.arrays import Complex, Real
 from hmpim.identify.result.estimate import Estimate, estimates_from_dict, estimates_to_dict
+from hmpim.identify.result.plain import plain
 
 __all__ = ["FrequencyResponse", "HarmonicCurve", "Nonlinearity", "ResponseBandwidths"]
 
@@ -132,21 +133,8 @@ class Nonlinearity:
 
     def to_dict(self) -> dict[str, Any]:
         """Return the value as plain JSON values."""
-        plain = {f.name: getattr(self, f.name) for f in fields(self)}
-        return {
-            **plain,
-            "kinds": list(self.kinds),
-            "size": None if self.size is None else self.size.to_dict(),
-            "harmonics": [
-                {
-                    "order": h.order,
-                    "frequency": list(h.frequency),
-                    "amplitude": list(h.amplitude),
-                    "std": list(h.std),
-                }
-                for h in self.harmonics
-            ],
-        }
+        said: dict[str, Any] = plain(self)
+        return said
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> "Nonlinearity":
@@ -159,9 +147,7 @@ class Nonlinearity:
             harmonics=tuple(
                 HarmonicCurve(
                     order=h["order"],
-                    frequency=tuple(h["frequency"]),
-                    amplitude=tuple(h["amplitude"]),
-                    std=tuple(h["std"]),
+                    **{name: tuple(h[name]) for name in ("frequency", "amplitude", "std")},
                 )
                 for h in data["harmonics"]
             ),

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
-from typing import Any
+from typing import Any, overload
 
 import numpy as np
 
@@ -12,6 +12,7 @@ from hmpim.identify.result.digits import interval
 from hmpim.identify.result.estimate import Estimate, Verdict
 from hmpim.identify.result.measured import FrequencyResponse, Nonlinearity, ResponseBandwidths
 from hmpim.identify.result.parameters import PaperEstimates, Parameters
+from hmpim.identify.result.plain import plain
 from hmpim.record import Finding, Intersample, Stopping
 from hmpim.tables import html_table, shortened
 
@@ -31,6 +32,25 @@ class Candidate:
     criterion: float
     fit_percent: float
     chosen: bool = False
+
+
+class _Figure:
+    """One of the pair's parameters, by its own name."""
+
+    def __init__(self, said: str) -> None:
+        self.__doc__ = said
+
+    def __set_name__(self, owner: type, name: str) -> None:
+        self._name = name
+
+    @overload
+    def __get__(self, pair: None, owner: type) -> "_Figure": ...
+    @overload
+    def __get__(self, pair: "PairIdentification", owner: type) -> Estimate | None: ...
+    def __get__(
+        self, pair: "PairIdentification | None", owner: type
+    ) -> "_Figure | Estimate | None":
+        return self if pair is None else getattr(pair.parameters, self._name)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -93,7 +113,7 @@ class PairIdentification(ByValue):
             "intersample": self.intersample,
             "fit_percent": self.fit_percent,
             "parameters": self.parameters.to_dict(),
-            "paper": {f.name: getattr(self.paper, f.name) for f in fields(self.paper)},
+            "paper": plain(self.paper),
             "frequency_response": self.frequency_response.to_dict(),
             "bandwidths_from_response": self.from_response.to_dict(),
             "dynamics": {
@@ -101,9 +121,7 @@ class PairIdentification(ByValue):
                 "denominator": list(self.denominator),
                 "covariance": None if self.covariance is None else self.covariance.tolist(),
             },
-            "candidates": [
-                {f.name: getattr(c, f.name) for f in fields(c)} for c in self.candidates
-            ],
+            "candidates": plain(self.candidates),
             "nonlinearity": None if self.nonlinearity is None else self.nonlinearity.to_dict(),
             "verdict": self.verdict,
             "warnings": [warning.to_dict() for warning in self.warnings],
@@ -135,90 +153,25 @@ class PairIdentification(ByValue):
             stopping=Stopping.from_dict(data["stopping"]) if data.get("stopping") else None,
         )
 
-    @property
-    def delay(self) -> Estimate | None:
-        """Pure delay, s."""
-        return self.parameters.delay
-
-    @property
-    def delay_correlation(self) -> Estimate | None:
-        """The paper's delay (equation 8), s."""
-        return self.parameters.delay_correlation
-
-    @property
-    def delay_low_frequency(self) -> Estimate | None:
-        """Slope of the phase at DC, s."""
-        return self.parameters.delay_low_frequency
-
-    @property
-    def scale_factor(self) -> Estimate | None:
-        """Output per input at DC."""
-        return self.parameters.scale_factor
-
-    @property
-    def bias(self) -> Estimate | None:
-        """Output at an input of zero."""
-        return self.parameters.bias
-
-    @property
-    def noise_std(self) -> Estimate | None:
-        """Standard deviation of the noise."""
-        return self.parameters.noise_std
-
-    @property
-    def natural_frequency(self) -> Estimate | None:
-        """Undamped natural frequency, Hz."""
-        return self.parameters.natural_frequency
-
-    @property
-    def damping_ratio(self) -> Estimate | None:
-        """Damping over critical damping."""
-        return self.parameters.damping_ratio
-
-    @property
-    def time_constant(self) -> Estimate | None:
-        """Slowest time constant where the slowest pole is real, s."""
-        return self.parameters.time_constant
-
-    @property
-    def bandwidth_phase90(self) -> Estimate | None:
-        """Frequency at which the phase is -90°, delay included, Hz."""
-        return self.parameters.bandwidth_phase90
-
-    @property
-    def bandwidth_phase90_without_delay(self) -> Estimate | None:
-        """Frequency at which the dynamics alone turn the phase by -90°, Hz."""
-        return self.parameters.bandwidth_phase90_without_delay
-
-    @property
-    def bandwidth_3db(self) -> Estimate | None:
-        """Frequency at which the gain is 3 dB below that at DC, Hz."""
-        return self.parameters.bandwidth_3db
-
-    @property
-    def peak_gain_db(self) -> Estimate | None:
-        """Greatest gain over that at DC, dB."""
-        return self.parameters.peak_gain_db
-
-    @property
-    def hold_period(self) -> Estimate | None:
-        """Interval at which the output is renewed, s."""
-        return self.parameters.hold_period
-
-    @property
-    def saturation_low(self) -> Estimate | None:
-        """Value below which the output does not go."""
-        return self.parameters.saturation_low
-
-    @property
-    def saturation_high(self) -> Estimate | None:
-        """Value above which the output does not go."""
-        return self.parameters.saturation_high
-
-    @property
-    def quantization_step(self) -> Estimate | None:
-        """Smallest step of the output."""
-        return self.parameters.quantization_step
+    delay = _Figure("Pure delay, s.")
+    delay_correlation = _Figure("The paper's delay (equation 8), s.")
+    delay_low_frequency = _Figure("Slope of the phase at DC, s.")
+    scale_factor = _Figure("Output per input at DC.")
+    bias = _Figure("Output at an input of zero.")
+    noise_std = _Figure("Standard deviation of the noise.")
+    natural_frequency = _Figure("Undamped natural frequency, Hz.")
+    damping_ratio = _Figure("Damping over critical damping.")
+    time_constant = _Figure("Slowest time constant where the slowest pole is real, s.")
+    bandwidth_phase90 = _Figure("Frequency at which the phase is -90°, delay included, Hz.")
+    bandwidth_phase90_without_delay = _Figure(
+        "Frequency at which the dynamics alone turn the phase by -90°, Hz."
+    )
+    bandwidth_3db = _Figure("Frequency at which the gain is 3 dB below that at DC, Hz.")
+    peak_gain_db = _Figure("Greatest gain over that at DC, dB.")
+    hold_period = _Figure("Interval at which the output is renewed, s.")
+    saturation_low = _Figure("Value below which the output does not go.")
+    saturation_high = _Figure("Value above which the output does not go.")
+    quantization_step = _Figure("Smallest step of the output.")
 
 
 _FIRST = ("delay", "natural_frequency", "time_constant", "damping_ratio")

@@ -14,6 +14,7 @@ from hmpim.identify.effects.hold import Hold, detect_hold, updates
 from hmpim.identify.noise.misfit import misfit
 from hmpim.identify.noise.whiteness import autocovariance, effective_share
 from hmpim.identify.result import Identification, PairIdentification
+from hmpim.identify.result.plain import plain
 from hmpim.identify.section_iv.spectrum import excited_band
 from hmpim.identify.uses.predict import settling_time, to_model
 from hmpim.identify.worth import MATERIAL
@@ -154,17 +155,7 @@ class Validation:
                     "output": output.output,
                     "inputs": list(output.inputs),
                     "passed": output.passed,
-                    "checks": [
-                        {
-                            "name": check.name,
-                            "value": check.value,
-                            "low": check.low,
-                            "high": check.high,
-                            "passed": check.passed,
-                            "message": check.message,
-                        }
-                        for check in output.checks
-                    ],
+                    "checks": [{**plain(check), "passed": check.passed} for check in output.checks],
                 }
                 for output in self.outputs
             ],
