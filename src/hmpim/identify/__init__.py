@@ -5,7 +5,6 @@ from hmpim.identify.frf.multivariable import ResponseMatrix, response_matrix
 from hmpim.identify.identify import identify
 from hmpim.identify.records.alike import same_at_levels
 from hmpim.identify.records.levels import (
-    Level,
     LevelComparison,
     Levels,
     Trend,
@@ -52,7 +51,6 @@ __all__ = [
     "HarmonicCurve",
     "Identification",
     "InputSet",
-    "Level",
     "LevelComparison",
     "Levels",
     "LiveEstimator",

@@ -14,7 +14,7 @@ identified again, and once more if the correction still moves.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 import scipy
@@ -64,46 +64,27 @@ def settled_between(
     told = tuple(f for f in aligned.findings if f.code != said.code)
     taken = _unfolded(record, aligned, identified(aligned, True))
     for _ in range(_ROUNDS):
-        found = identified(replace(taken.aligned, findings=(*told, said)), False)
+        found = identified(replace(taken, findings=(*told, said)), False)
         before, taken = taken, _unfolded(record, aligned, found)
         if _moved_by(before, taken) < _STILL:
             return found
-    return identified(before.aligned, False)  # with the doubt
+    return identified(before, False)  # with the doubt
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class _Unfolded:
-    """A record on the common clock, as if its inputs had nothing above half the rate.
-
-    Parameters
-    ----------
-    aligned : Aligned
-        The same inputs; outputs without what folds.
-    slopes : tuple of ndarray, shape (n,)
-        By how much each output changes in a sample.
-    """
-
-    aligned: Aligned
-    slopes: tuple[Real, ...]
-
-
-def _unfolded(record: Record, aligned: Aligned, found: Identification) -> _Unfolded:
-    """Take out of each output what folds in it, by the models found so far."""
+def _unfolded(record: Record, aligned: Aligned, found: Identification) -> Aligned:
+    """The record as if its inputs had nothing above half the rate, by the models found so far."""
     outputs = tuple(
         _one(channel, signal, record, aligned, found)
         for channel, signal in zip(record.outputs, aligned.outputs, strict=True)
     )
-    return _Unfolded(
-        aligned=replace(aligned, outputs=outputs),
-        slopes=tuple(np.gradient(signal.values) for signal in outputs),
-    )
+    return replace(aligned, outputs=outputs)
 
 
-def _moved_by(before: _Unfolded, after: _Unfolded) -> float:
+def _moved_by(before: Aligned, after: Aligned) -> float:
     """Return the delay, in samples, by which two corrections differ, the most of all outputs."""
     most = 0.0
-    pairs = zip(before.aligned.outputs, after.aligned.outputs, after.slopes, strict=True)
-    for first, second, slope in pairs:
+    for first, second in zip(before.outputs, after.outputs, strict=True):
+        slope = np.gradient(second.values)
         size = float(slope @ slope)
         if size > 0.0:
             most = max(most, abs(float(slope @ (second.values - first.values))) / size)

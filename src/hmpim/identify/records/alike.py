@@ -13,8 +13,6 @@ __all__ = ["check_alike", "check_apart", "check_channels", "same_at_levels"]
 _SAME_RATE = 1e-3
 """Share by which the rates of two clocks may differ and still be one rate."""
 
-# Inputs of two repeats are the same if their difference is at most this share of their size.
-
 
 def same_at_levels(records: Sequence[Record]) -> bool:
     """Whether records are of one stimulus at several amplitudes, rather than repeats of it.

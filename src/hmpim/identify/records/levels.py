@@ -6,7 +6,7 @@ they move, tell where the linear range ends and what ends it.
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import numpy as np
 import scipy
@@ -16,7 +16,7 @@ from hmpim.errors import ArgumentError
 from hmpim.identify.chance import FALSE_ALARM
 from hmpim.identify.identify import identify
 from hmpim.identify.records.alike import check_channels
-from hmpim.identify.result import Estimate, Identification, PairIdentification, Parameters
+from hmpim.identify.result import Identification, PairIdentification, Parameters
 from hmpim.identify.result.digits import percent, plus_minus
 from hmpim.identify.result.groups import in_words
 from hmpim.identify.worth import MATERIAL, WORTH
@@ -25,7 +25,6 @@ from hmpim.record import Finding, Intersample, Record
 from hmpim.tables import html_table, shortened
 
 __all__ = [
-    "Level",
     "LevelComparison",
     "Levels",
     "Trend",
@@ -45,21 +44,7 @@ _COMPARED = (
 )
 """Parameters that a linear system keeps, the most telling first."""
 
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Level:
-    """One amplitude and what was identified there.
-
-    Parameters
-    ----------
-    amplitude : float
-        Of the stimulus, by any measure that is the same for all: peak, r.m.s., peak acceleration.
-    parameters : Parameters
-        Estimates.
-    """
-
-    amplitude: float
-    parameters: Parameters
+_Level = tuple[float, Parameters]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -278,6 +263,7 @@ def compare_levels(
 
     Examples
     --------
+    >>> from hmpim.identify.result import Estimate
     >>> def at(frequency):
     ...     return Parameters(natural_frequency=Estimate(
     ...         value=frequency, std=0.01, ci95=(frequency - 0.02, frequency + 0.02), unit="Hz"))
@@ -319,7 +305,8 @@ def compare_levels(
 
 def _levels(
     results: Sequence[PairIdentification | Parameters], amplitudes: Sequence[float]
-) -> list[Level]:
+) -> list[_Level]:
+    """Amplitudes, the smallest first, and what was identified there."""
     if len(results) != len(amplitudes):
         raise ArgumentError(
             f"{len(results)} results and {len(amplitudes)} amplitudes do not go together; "
@@ -330,35 +317,24 @@ def _levels(
     for amplitude in amplitudes:
         if not (np.isfinite(amplitude) and amplitude > 0):
             raise ArgumentError(f"amplitude {amplitude!r} is not a positive number")
-    levels = [
-        Level(
-            amplitude=float(amplitude),
-            parameters=r.parameters if isinstance(r, PairIdentification) else r,
-        )
-        for r, amplitude in zip(results, amplitudes, strict=True)
-    ]
-    return sorted(levels, key=lambda level: level.amplitude)
+    parameters = (r.parameters if isinstance(r, PairIdentification) else r for r in results)
+    levels = zip(map(float, amplitudes), parameters, strict=True)
+    return sorted(levels, key=lambda level: level[0])
 
 
-def _linear_range(levels: list[Level], reach: float, unit: str) -> str:
+def _linear_range(levels: list[_Level], reach: float, unit: str) -> str:
     """Up to where a linear model serves, as a sentence."""
-    if reach == levels[0].amplitude:
+    if reach == levels[0][0]:
         return "Use a linear model at the smallest amplitude only."
     end = f"{reach:.4g} {unit}".rstrip()
     same = f"Up to {end}, no parameter clearly changes by more than {100 * MATERIAL:.0f} %"
-    only = "" if reach == levels[-1].amplitude else ": use a linear model up to there only"
+    only = "" if reach == levels[-1][0] else ": use a linear model up to there only"
     return f"{same}{only}."
 
 
-def _estimate(level: Level, name: str) -> Estimate | None:
-    known = {f.name for f in fields(level.parameters)}
-    found: Estimate | None = getattr(level.parameters, name) if name in known else None
-    return found
-
-
-def _trend(levels: list[Level], name: str) -> Trend | None:
+def _trend(levels: list[_Level], name: str) -> Trend | None:
     """Values of one parameter, and a χ² test of their being equal."""
-    pairs = [(level.amplitude, _estimate(level, name)) for level in levels]
+    pairs = [(amplitude, getattr(parameters, name)) for amplitude, parameters in levels]
     known = [(a, e) for a, e in pairs if e is not None and 0 < e.spread < np.inf]
     if len(known) < 2:
         return None
@@ -377,14 +353,14 @@ def _trend(levels: list[Level], name: str) -> Trend | None:
     )
 
 
-def _linear_up_to(levels: list[Level], trends: tuple[Trend, ...]) -> float:
+def _linear_up_to(levels: list[_Level], trends: tuple[Trend, ...]) -> float:
     """Last level before any parameter leaves its first value."""
-    reach = levels[-1].amplitude
+    reach = levels[-1][0]
     for t in trends:
         for a, value, std in zip(t.amplitudes[1:], t.values[1:], t.stds[1:], strict=True):
             moved = abs(value - t.values[0])
             if moved > MATERIAL * abs(t.values[0]) and moved > 3 * float(np.hypot(std, t.stds[0])):
-                before = [level.amplitude for level in levels if level.amplitude < a]
+                before = [amplitude for amplitude, _ in levels if amplitude < a]
                 reach = min(reach, before[-1])
                 break
     return reach

@@ -258,16 +258,14 @@ def _averaged(found: tuple[PairIdentification, ...]) -> tuple[FrequencyResponse,
     """Average the responses on the first one's frequencies; return the relative scatter too."""
     frequency = found[0].frequency_response.frequency
     delay = found[0].parameters.delay
-    turn = np.exp(2j * np.pi * frequency * (0.0 if delay is None else delay.value))
+    late = 0.0 if delay is None else delay.value
     responses, stds = [], []
     known = [pair for pair in found if pair.frequency_response.frequency.size]
     if not known or not frequency.size:
         return found[0].frequency_response, float("nan")
     for pair in known:
         own = pair.frequency_response
-        straight = own.response * np.exp(
-            2j * np.pi * own.frequency * (0.0 if delay is None else delay.value)
-        )
+        straight = own.response * np.exp(2j * np.pi * own.frequency * late)
         responses.append(np.interp(frequency, own.frequency, straight))
         stds.append(np.interp(frequency, own.frequency, own.std))
     values = np.stack(responses)
@@ -278,7 +276,7 @@ def _averaged(found: tuple[PairIdentification, ...]) -> tuple[FrequencyResponse,
     return (
         FrequencyResponse(
             frequency=frequency,
-            response=mean / turn,
+            response=mean * np.exp(-2j * np.pi * frequency * late),
             std=np.sqrt(1.0 / np.sum(weights, axis=0)),
             coherence=None,
         ),

@@ -1,6 +1,5 @@
 """Gain and phase at chosen frequencies, from the measured response and from the model."""
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -10,18 +9,15 @@ from hmpim.arguments import numbers_of
 from hmpim.errors import ArgumentError
 from hmpim.identify.arrays import Real
 from hmpim.identify.reading.bandwidth import ratio_at
+from hmpim.identify.reading.propagation import log_slopes
 from hmpim.identify.result import Estimate, PairIdentification
 from hmpim.identify.result.error_bars import estimate
-from hmpim.identify.uses.predict import to_model
-from hmpim.model import RationalDelay, phase, response
+from hmpim.model import Model, RationalDelay, phase, response
 
 __all__ = ["GainPhase", "gain_and_phase", "measurable"]
 
 _MANY = 1e6
 """Degrees of freedom behind the error bars, in effect."""
-
-_STEP = 1e-6
-"""Relative step of the derivatives by the model's coefficients."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -97,31 +93,24 @@ def gain_and_phase(
             f"{pair.output!r} from {pair.input!r} was not identifiable, so it has no gain and "
             "phase to read off; see its warnings"
         )
-    sampled = pair.intersample == "sampled"
-    integrators = 0 if sampled else int(pair.denominator[-1] == 0.0)
-    above, below = np.array(pair.numerator), np.array(pair.denominator)
-    if sampled:  # in powers of 1 - 1/z, as the covariance is
-        whole = to_model(pair, fs=fs).system
-        above, below = _told(whole.numerator / p.scale_factor.value), _told(whole.denominator)
-    numerator = p.scale_factor.value * above
-    vector = np.concatenate([[p.delay.value], numerator, below[: below.size - 1 - integrators]])
-
-    def system(v: Real) -> RationalDelay:
-        lowest = [0.0] * integrators + [1.0]
-        return RationalDelay(
-            delay=float(v[0]),
-            numerator=v[1 : 1 + numerator.size][::-1],
-            denominator=np.concatenate([lowest, v[1 + numerator.size :][::-1]]),
-            step=1.0 / fs if sampled else None,
-        )
-
-    return tuple(_at(pair, float(f), system, vector, pair.covariance, fs) for f in places)
+    system = Model(
+        delay=p.delay.value,
+        scale_factor=p.scale_factor.value,
+        numerator=pair.numerator,
+        denominator=pair.denominator,
+        intersample=pair.intersample,
+        fs=fs,
+    ).system
+    if system.step is not None:
+        above, below = _shortened(system.numerator), _shortened(system.denominator)
+        system = replace(system, numerator=above, denominator=below)
+    return tuple(_at(pair, float(f), system, pair.covariance, fs) for f in places)
 
 
-def _told(rising: Real) -> Real:
-    """Coefficients, the highest power first, without the powers that only z needs."""
+def _shortened(rising: Real) -> Real:
+    """Coefficients of powers of 1 - 1/z without those that only z needs."""
     seen = np.flatnonzero(np.abs(rising) > 1e-12 * np.abs(rising).max())
-    return rising[: seen[-1] + 1][::-1]
+    return rising[: seen[-1] + 1]
 
 
 def measurable(frequency: ArrayLike, fs: float) -> Real:
@@ -151,30 +140,21 @@ def measurable(frequency: ArrayLike, fs: float) -> Real:
 
 
 def _at(
-    pair: PairIdentification,
-    f: float,
-    system: Callable[[Real], RationalDelay],
-    vector: Real,
-    covariance: Real,
-    fs: float,
+    pair: PairIdentification, f: float, system: RationalDelay, covariance: Real, fs: float
 ) -> GainPhase:
-    here, there = system(vector), np.array([f])
-    value = complex(response(here, there)[0])
-    slope = np.empty(vector.size, dtype=np.complex128)  # of ln G
-    for i in range(vector.size):
-        moved = vector.copy()
-        step = _STEP * (abs(vector[i]) or 1e-3)
-        moved[i] += step
-        slope[i] = (complex(response(system(moved), there)[0]) / value - 1.0) / step
-    poles = np.trim_zeros(here.denominator, "f")  # an integrator turns by -90° everywhere
-    integrators = here.denominator.size - poles.size
-    turned = float(phase(replace(here, denominator=poles), there)[0]) - integrators * np.pi / 2
+    there = np.array([f])
+    value = complex(response(system, there)[0])
+    by_delay, above, below = log_slopes(system, there)
+    slope = np.concatenate([by_delay, above[::-1], below[::-1]])[:, 0]  # as the covariance is
+    poles = np.trim_zeros(system.denominator, "f")  # an integrator turns by -90° everywhere
+    integrators = system.denominator.size - poles.size
+    turned = float(phase(replace(system, denominator=poles), there)[0]) - integrators * np.pi / 2
     if value.real * np.cos(turned) + value.imag * np.sin(turned) < 0:
         turned += np.pi  # the phase counts from DC; a negative scale factor is half a turn
     decibel = 20 / np.log(10)
     gain_db = decibel * float(np.log(abs(value)))
     spread = [float(part @ covariance @ part) for part in (slope.real, slope.imag)]
-    measured = ratio_at(pair.frequency_response, here, f, fs, pair.intersample)
+    measured = ratio_at(pair.frequency_response, system, f, fs, pair.intersample)
     gain = lag = None
     if measured is not None:
         ratio, std = measured

@@ -13,7 +13,7 @@ from hmpim.identify.result import Estimate, PairIdentification
 from hmpim.model import Model, Spread, simulate, slowest_time_constant
 from hmpim.record import Record, uniform
 
-__all__ = ["Prediction", "predict", "rate_of", "settling_time", "to_model"]
+__all__ = ["Prediction", "fit_percent_of", "predict", "rate_of", "settling_time", "to_model"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -79,6 +79,12 @@ def to_model(pair: PairIdentification, *, fs: float | None = None) -> Model:
         band=float(frequency[-1]) if frequency.size else None,
         spread=_spread(pair),
     )
+
+
+def fit_percent_of(y: Real, residual: Real) -> float:
+    """100 (1 - ‖residual‖ / ‖y - mean y‖) of samples that count, shape (n,); 0 of a constant."""
+    spread = float(np.linalg.norm(y - y.mean()))
+    return 100.0 * (1.0 - float(np.linalg.norm(residual)) / spread) if spread else 0.0
 
 
 def rate_of(pair: PairIdentification) -> float | None:
@@ -152,12 +158,10 @@ def predict(pair: PairIdentification, record: Record, *, start: float | None = N
             f"no samples are left to score from {start:.4g} s on; give a longer record"
         )
     measured = y.values[scored]
-    error = measured - predicted[scored]
-    spread = float(np.linalg.norm(measured - measured.mean()))
     return Prediction(
         time=aligned.time,
         measured=y.values,
         predicted=predicted,
         scored=scored,
-        fit_percent=100.0 * (1.0 - float(np.linalg.norm(error)) / spread) if spread else 0.0,
+        fit_percent=fit_percent_of(measured, measured - predicted[scored]),
     )

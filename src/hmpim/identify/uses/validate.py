@@ -10,13 +10,13 @@ from hmpim.arguments import checked
 from hmpim.errors import ArgumentError, RecordError
 from hmpim.identify.arrays import Mask, Real
 from hmpim.identify.chance import DEVIATIONS, FALSE_ALARM, HALF
-from hmpim.identify.effects.hold import Hold, detect_hold, updates
+from hmpim.identify.effects.hold import detect_hold, updates
 from hmpim.identify.noise.misfit import misfit
 from hmpim.identify.noise.whiteness import autocovariance, effective_share
 from hmpim.identify.result import Identification, PairIdentification
 from hmpim.identify.result.plain import plain
 from hmpim.identify.section_iv.spectrum import excited_band
-from hmpim.identify.uses.predict import settling_time, to_model
+from hmpim.identify.uses.predict import fit_percent_of, settling_time, to_model
 from hmpim.identify.worth import MATERIAL
 from hmpim.model import Model, draw_models, simulate
 from hmpim.record import Aligned, Record, uniform
@@ -224,8 +224,11 @@ def _validated(
     """Validate one output, driven by all its inputs."""
     y = aligned.signal(pairs[0].output)
     models = [to_model(pair) for pair in pairs]
-    held = _held(models, y.values, aligned.fs)
-    scored = y.valid & _settled(models, aligned)
+    held = None  # the clock of a held output, whose phase is the record's own
+    if models[0].hold_period is not None:
+        held = detect_hold(y.values, aligned.fs)
+    wait = max(settling_time(model) for model in models)
+    scored = y.valid & (aligned.time >= aligned.start + wait)
     for pair in pairs:
         scored &= aligned.signal(pair.input).valid
     if held is not None:
@@ -266,18 +269,6 @@ def _validated(
     )
 
 
-def _held(models: Sequence[Model], y: Real, fs: float) -> Hold | None:
-    """Find the clock of a held output in this record, whose phase is its own."""
-    if models[0].hold_period is None:
-        return None
-    return detect_hold(y, fs)
-
-
-def _settled(models: Sequence[Model], aligned: Aligned) -> Mask:
-    wait = max(settling_time(model) for model in models)
-    return np.asarray(aligned.time >= aligned.start + wait)
-
-
 def _predicted(
     models: Sequence[Model], pairs: Sequence[PairIdentification], aligned: Aligned
 ) -> Real:
@@ -308,8 +299,7 @@ def _model_std(
 
 
 def _fit(y: Real, residual: Real, bounds: Bounds) -> Check:
-    spread = float(np.linalg.norm(y - y.mean()))
-    fit = 100.0 * (1.0 - float(np.linalg.norm(residual)) / spread) if spread else 0.0
+    fit = fit_percent_of(y, residual)
     return Check(
         name="fit_percent",
         value=fit,
