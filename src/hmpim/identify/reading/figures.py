@@ -21,7 +21,7 @@ from hmpim.model.response import (
 
 __all__ = ["figures_at", "figures_of", "read_figures", "system_of"]
 
-_Marks = tuple[float | None, float | None, float | None, float | None]
+_Marks = tuple[float | None, float | None, float | None]
 
 _UNITS = dict.fromkeys(["delay", "delay_low_frequency", "time_constant"], "s") | dict.fromkeys(
     [
@@ -62,7 +62,7 @@ def read_figures(
     cov: Real,
     *,
     fs: float,
-    highest: float,
+    highest: float | None,
     effective: float,
     noise: Estimate,
     units: tuple[str, str],
@@ -78,7 +78,7 @@ def read_figures(
     cov : ndarray, shape (p, p)
         Of `vector`.
     fs, highest : float
-        As for `read_parameters`.
+        As for `read_parameters`; nothing is read off the response if `highest` is None.
     effective : float
         Independent samples less parameters.
     noise : Estimate
@@ -99,8 +99,8 @@ def read_figures(
     marks, peak = _marks_of(structure, system, highest=highest)
     values = _values(structure, vector, system, marks, peak, fs)
     by_coefficient = _by_coefficient(structure, vector, fs)
-    sensitivity = _Sensitivity(structure, system, by_coefficient)
-    slopes = _slopes(structure, vector, fs, values) | sensitivity.slopes(values, peak)
+    slopes = _slopes(structure, vector, fs, values)
+    slopes |= _slopes_of_marks(structure, system, by_coefficient, values, peak)
     unit_of = _UNITS | {"scale_factor": _gain_unit(structure, *units), "bias": units[1]}
     read: dict[str, Estimate | None] = {
         name: None
@@ -140,20 +140,16 @@ def _slopes(
 
 
 def _marks_of(
-    structure: Structure, system: RationalDelay, *, highest: float
+    structure: Structure, system: RationalDelay, *, highest: float | None
 ) -> tuple[_Marks, PeakGain | None]:
-    """-90° with the delay and without, -3 dB, the peak's frequency; and the peak."""
-    steady = _is_steady(structure)
-    dynamic = structure.order > 0 and steady
-    split = bandwidth_phase(system, highest=highest, delay=False) if dynamic else None
-    peak = peak_gain(system, highest=highest) if dynamic else None
-    marks = (
-        bandwidth_phase(system, highest=highest) if steady else None,
-        split,
-        bandwidth_3db(system, highest=highest) if dynamic else None,
-        peak.frequency if peak is not None else None,
-    )
-    return marks, peak
+    """-90° with the delay and without, and -3 dB; and the peak."""
+    if highest is None or not _is_steady(structure):
+        return (None, None, None), None
+    late = bandwidth_phase(system, highest=highest)
+    if structure.order == 0:
+        return (late, None, None), None
+    split = bandwidth_phase(system, highest=highest, delay=False)
+    return (late, split, bandwidth_3db(system, highest=highest)), peak_gain(system, highest=highest)
 
 
 def figures_of(fit: Fit, *, fs: float, highest: float) -> dict[str, float | None]:
@@ -260,56 +256,56 @@ def _by_coefficient(structure: Structure, vector: Real, fs: float) -> Real:
     return np.stack(rows)
 
 
-class _Sensitivity:
-    """Derivatives of ln(G / G(0)) with respect to the fit's vector, and to the frequency."""
+def _slopes_of_marks(
+    structure: Structure,
+    system: RationalDelay,
+    by_coefficient: Real,
+    values: dict[str, float | None],
+    peak: PeakGain | None,
+) -> dict[str, Real]:
+    """Derivatives of the marks of the response with respect to the fit's vector, each shape (p,).
 
-    def __init__(self, structure: Structure, system: RationalDelay, by_coefficient: Real) -> None:
-        self._structure, self._system, self._by_coefficient = structure, system, by_coefficient
+    A crossing's by the implicit function: the curve's own error over its slope.
+    """
 
-    def slopes(self, values: dict[str, float | None], peak: PeakGain | None) -> dict[str, Real]:
-        """Derivatives of the marks with respect to the vector, each shape (p,).
-
-        A crossing's by the implicit function: the curve's own error over its slope.
-        """
-        delay = self._by_coefficient[:, 0]
-        told: dict[str, Real] = {"delay_low_frequency": delay + self._late_at_dc()}
-        for name, turn in (("bandwidth_phase90", 0.0), ("bandwidth_phase90_without_delay", 1.0)):
-            if (value := values[name]) is not None:
-                change, rate = self._at(value)
-                late = 2 * np.pi * turn
-                steep = rate.imag + late * self._system.delay
-                told[name] = (change.imag + late * value * delay) / steep
-        if (value := values["bandwidth_3db"]) is not None:
-            change, rate = self._at(value)
-            told["bandwidth_3db"] = change.real / rate.real
-        if peak is not None:
-            told["peak_gain_db"] = np.zeros(delay.size)  # 0 dB, where there is no hump
-            if peak.frequency > 0.0:  # at a maximum the frequency's own shift does not count
-                told["peak_gain_db"] = 20 / np.log(10) * self._at(peak.frequency)[0].real
-        return told
-
-    def _late_at_dc(self) -> Real:
-        """Derivative of what the dynamics add to the delay at low frequency, in s."""
-        above, below = self._system.numerator, self._system.denominator
-        slopes, late = self._by_coefficient[:, 1:], np.zeros(self._by_coefficient.shape[0])
-        if not _is_steady(self._structure):
-            return late
-        if below.size > 1:
-            late = late + slopes[:, above.size]
-        if above.size > 1:
-            late = late - (slopes[:, 1] - above[1] / above[0] * slopes[:, 0]) / above[0]
-        return np.asarray(late * (self._system.step or 1.0))
-
-    def _at(self, frequency: float) -> tuple[Complex, complex]:
-        """Derivatives with respect to the vector, shape (p,), and to the frequency in Hz."""
+    def at(frequency: float) -> tuple[Complex, complex]:
+        """Derivatives of ln(G / G(0)) by the vector, shape (p,), and by the frequency in Hz."""
         places = frequency * np.array([1.0 - 1e-5, 1.0, 1.0 + 1e-5])
-        below, here, above = response(self._system, places)
+        below, here, above = response(system, places)
         rate = (above - below) / ((places[2] - places[0]) * here)
-        by_delay, by_above, by_below = log_slopes(self._system, places[1:2])
-        told = self._structure.dc_zeros
-        by_above[told] -= 1.0 / self._system.numerator[told]
-        change = self._by_coefficient @ np.concatenate([by_delay, by_above, by_below])[:, 0]
+        by_delay, by_above, by_below = log_slopes(system, places[1:2])
+        told = structure.dc_zeros
+        by_above[told] -= 1.0 / system.numerator[told]
+        change = by_coefficient @ np.concatenate([by_delay, by_above, by_below])[:, 0]
         return change, complex(rate)
+
+    delay = by_coefficient[:, 0]
+    slopes = {"delay_low_frequency": delay + _late_at_dc(structure, system, by_coefficient[:, 1:])}
+    for name, turn in (("bandwidth_phase90", 0.0), ("bandwidth_phase90_without_delay", 1.0)):
+        if (value := values[name]) is not None:
+            change, rate = at(value)
+            late = 2 * np.pi * turn
+            slopes[name] = (change.imag + late * value * delay) / (rate.imag + late * system.delay)
+    if (value := values["bandwidth_3db"]) is not None:
+        change, rate = at(value)
+        slopes["bandwidth_3db"] = change.real / rate.real
+    if peak is not None:
+        slopes["peak_gain_db"] = np.zeros(delay.size)  # 0 dB, where there is no hump
+        if peak.frequency > 0.0:  # at a maximum the frequency's own shift does not count
+            slopes["peak_gain_db"] = 20 / np.log(10) * at(peak.frequency)[0].real
+    return slopes
+
+
+def _late_at_dc(structure: Structure, system: RationalDelay, slopes: Real) -> Real:
+    """Derivative of what the dynamics add to the delay at low frequency, in s, shape (p,)."""
+    above, late = system.numerator, np.zeros(slopes.shape[0])
+    if not _is_steady(structure):
+        return late
+    if system.denominator.size > 1:
+        late = late + slopes[:, above.size]
+    if above.size > 1:
+        late = late - (slopes[:, 1] - above[1] / above[0] * slopes[:, 0]) / above[0]
+    return np.asarray(late * (system.step or 1.0))
 
 
 def _lowest_mode(structure: Structure, vector: Real) -> int | None:

@@ -7,7 +7,6 @@ from numpy.typing import ArrayLike
 
 from hmpim.arguments import check_argument, numbers_of
 from hmpim.errors import ArgumentError
-from hmpim.identify.arrays import Real
 from hmpim.identify.chance import FALSE_ALARM
 from hmpim.identify.fitting.candidates import nested
 from hmpim.identify.fitting.enrich import PLAIN
@@ -15,8 +14,9 @@ from hmpim.identify.fitting.fit import Fit
 from hmpim.identify.fitting.start import starting_values
 from hmpim.identify.fitting.trial import trial_of
 from hmpim.identify.judgement import all_doubted
-from hmpim.identify.result import Estimate, Identification, Parameters
-from hmpim.identify.result.error_bars import estimate, noise_estimate
+from hmpim.identify.reading.figures import read_figures
+from hmpim.identify.result import Identification, Parameters
+from hmpim.identify.result.error_bars import noise_estimate
 from hmpim.identify.statistics.describe import identify_statistics
 from hmpim.identify.statistics.fit import Compressed, Fitted, fit_briefly, follow, pulse
 from hmpim.identify.statistics.misfit import Asked, asked_of, misfit_of
@@ -257,33 +257,20 @@ class LiveEstimator:
 
 def _figures(fitted: Fitted, statistics: Statistics) -> Parameters:
     """The parameters themselves; what is read off the response costs more than a look may take."""
-    fs, cov, theta = statistics.fs, fitted.covariance, fitted.theta
-    order, unit = fitted.structure.order, statistics.units[1]
-    freedom = max(fitted.products.counted - cov.shape[0], 1)
-    axis = np.eye(cov.shape[0])
-
-    def linear(value: float, slope: Real, unit: str) -> Estimate:
-        return estimate(value, float(slope @ cov @ slope), freedom=freedom, unit=unit)
-
-    natural = damping = lag = None
-    if order == 2:
-        zeta = 0.5 / float(np.sqrt(theta[2]))  # it holds 1 / (4ζ²)
-        hertz = 2 * zeta * float(np.exp(-theta[1])) * fs / (2 * np.pi)
-        bent = axis[2] / (2 * theta[2])
-        natural = linear(hertz, -hertz * (axis[1] + bent), "Hz")
-        damping = linear(zeta, -zeta * bent, "")
-    elif order == 1:
-        seconds = float(np.exp(theta[1])) / fs
-        lag = linear(seconds, seconds * axis[1], "s")
-    return Parameters(
-        delay=linear(fitted.delay / fs, axis[0] / fs, "s"),
-        scale_factor=linear(float(fitted.linear[0]), axis[1 + order], ""),
-        bias=linear(float(fitted.linear[-1]), axis[-1], unit),
-        noise_std=noise_estimate(fitted.objective, freedom=freedom, share=1.0, unit=unit),
-        natural_frequency=natural,
-        damping_ratio=damping,
-        time_constant=lag,
+    vector = np.concatenate([fitted.theta, fitted.linear])
+    freedom = max(fitted.products.counted - vector.size, 1)
+    unit = statistics.units[1]
+    parameters, _, _ = read_figures(
+        fitted.structure,
+        vector,
+        fitted.covariance,
+        fs=statistics.fs,
+        highest=None,
+        effective=freedom,
+        noise=noise_estimate(fitted.objective, freedom=freedom, share=1.0, unit=unit),
+        units=statistics.units,
     )
+    return parameters
 
 
 def _doubted(parameters: Parameters, time: float, highest: float, *, follows: bool) -> Parameters:
