@@ -77,13 +77,12 @@ def test_what_is_left_over_is_that_of_the_samples(skipped):
     response[AHEAD + 2 :] = 0.3 * 0.8 ** np.arange(response.size - AHEAD - 2)
     u, y = record.inputs[0].values, record.outputs[0].values
     left = y - y[0] - np.convolve(u - u[0], response)[AHEAD : AHEAD + u.size] - 0.2
-    residual = plain.residual(response, np.array([[0.2]]))
-    gram, count = residual.gram(skipped)
+    gram, count, heads = plain.left_over(response, np.array([[0.2]]))
     order = gram.shape[0] - 1
     past = np.stack([left[skipped + order - k : left.size - k] for k in range(order + 1)])
     assert count == past.shape[1]
     assert gram == pytest.approx(past @ past.T, rel=1e-8)
-    assert residual.head(0, 50) == pytest.approx(left[:50], rel=1e-9)
+    assert heads[0, :50] == pytest.approx(left[:50], rel=1e-9)
 
 
 def arrays(statistics: Statistics) -> dict[str, np.ndarray]:

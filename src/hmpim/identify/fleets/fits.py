@@ -33,7 +33,6 @@ class Fits:
     member: Member
     theta: Real
     gain: Real
-    bias: Real
     cost: Real
     left: Real
     """What the fit leaves inside the basis."""
@@ -80,7 +79,6 @@ def _fitted(fleet: Fleet, member: Member, z: Real, means: Real, power: Real, sta
         member=member,
         theta=theta,
         gain=gain,
-        bias=means - gain * value[:, -1],
         cost=outside + _dots(left, left),
         left=left,
         figures={

@@ -32,6 +32,7 @@ from hmpim.identify.judgement.between_samples import SIZES
 from hmpim.identify.judgement.structure import ALMOST
 from hmpim.identify.noise.misfit import misfits
 from hmpim.identify.noise.whiteness import are_white
+from hmpim.identify.reading.figures import units_of
 from hmpim.identify.result import Estimate, Parameters
 from hmpim.identify.result.error_bars import noise_estimate
 from hmpim.identify.worth import FEW, PART
@@ -188,12 +189,6 @@ class FleetFit:
     fit_percent: Real
     groups: tuple[Group, ...]
 
-    def parameters(self, i: int) -> Parameters | None:
-        """Return those of one record; None if it is not sound."""
-        if not self.sound[i]:
-            return None
-        return parameters_of(self.columns, i)
-
 
 def fit_fleet(fleet: Fleet, outputs: Real, *, units: tuple[str, str] = ("", "")) -> FleetFit:
     """Fit many outputs of one stimulus at once.
@@ -218,7 +213,8 @@ def fit_fleet(fleet: Fleet, outputs: Real, *, units: tuple[str, str] = ("", ""))
     fits = fitted_all(fleet, centred, means, power)
     behind, chosen = _weighed(fleet, fits, n)
     names = (*fleet.names, "scale_factor", "bias", "noise_std")
-    columns = {name: Column.empty(count, _unit(name, units)) for name in names}
+    told = units_of(fleet.structure, units)
+    columns = {name: Column.empty(count, told[name]) for name in names}
     sound = np.zeros(count, dtype=bool)
     codes: list[tuple[str, ...]] = [()] * count
     groups: list[Group] = []
@@ -231,7 +227,7 @@ def fit_fleet(fleet: Fleet, outputs: Real, *, units: tuple[str, str] = ("", ""))
             for j, rival in enumerate(fits)
             if j != k
         ]
-        group = _told(fleet, fit, some, open_, outputs[some], units)
+        group = _told(fleet, fit, some, open_, outputs[some], told)
         groups.append(group)
         sound[some] = group.sound
         for name, column in group.spanned.items():
@@ -268,7 +264,7 @@ def _told(
     some: NDArray[np.intp],
     others: list[tuple[Fits, Flags]],
     outputs: Real,
-    units: tuple[str, str],
+    units: Mapping[str, str],
 ) -> Group:
     """Parameters of some records under the assumption that is taken; which are sound; what is said.
 
@@ -333,13 +329,13 @@ def _columns(
     some: NDArray[np.intp],
     others: list[tuple[Fits, Flags]],
     errors: Errors,
-    units: tuple[str, str],
+    units: Mapping[str, str],
 ) -> tuple[dict[str, Column], dict[str, Column]]:
     """What some fits tell alone, and with intervals that cover the other assumptions."""
     half = float(scipy.special.stdtrit(errors.freedom, 0.975))
     alone, spanned = {}, {}
     for name, std in errors.deviations.items():
-        value, unit = fit.figures[name][some], _unit(name, units)
+        value, unit = fit.figures[name][some], units[name]
         column = partial(Column, value=value, unit=unit)
         moved = [np.where(stays, rival.figures[name][some] - value, 0.0) for rival, stays in others]
         every = np.array([0.0 * value, *moved])
@@ -360,7 +356,7 @@ def _columns(
         std=size * (single.std or np.nan),
         low=size * (ends[0] or np.nan),
         high=size * (ends[1] or np.nan),
-        unit=_unit("noise_std", units),
+        unit=units["noise_std"],
     )
     return {**alone, "noise_std": noise}, {**spanned, "noise_std": noise}
 
@@ -394,22 +390,6 @@ def _asks_for_a_pole(fit: Fits, some: NDArray[np.intp], errors: Errors) -> Real:
     score = np.einsum("ij,ij->i", own, fit.left[some])
     power = np.einsum("ij,ij->i", own, own) * fit.cost[some] / (errors.freedom - 1)
     return np.asarray(score / np.sqrt(np.maximum(power, np.finfo(float).tiny)))
-
-
-_UNITS = {
-    "damping_ratio": "", "peak_gain_db": "dB", "natural_frequency": "Hz",
-    "bandwidth_phase90": "Hz", "bandwidth_phase90_without_delay": "Hz", "bandwidth_3db": "Hz",
-    "delay": "s", "delay_low_frequency": "s", "time_constant": "s",
-}  # fmt: skip
-
-
-def _unit(name: str, units: tuple[str, str]) -> str:
-    given, got = units
-    if name in ("bias", "noise_std"):
-        return got
-    if name == "scale_factor":
-        return "" if given == got else f"{got or '1'}/{given}" if given else got
-    return _UNITS.get(name, "")
 
 
 def _is_plain(

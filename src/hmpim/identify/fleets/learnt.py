@@ -7,7 +7,7 @@ such surface for each assumption on what the stimulus does between its samples, 
 stated, and beside each the surface of what one more pole would add.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -278,19 +278,16 @@ def _member(
 def _member_of(
     u: Real, structure: Structure, mode: Intersample, low: Real, high: Real, *, degree: int
 ) -> Member:
+    source, richer = prepare_input(u, mode), one_more_pole(structure)
     places = places_in(low, high, degree)
-    source = prepare_input(u, mode)
-    problem = Problem(source=source, y=np.zeros(u.size), valid=None, longest_delay=float(u.size))
     smoother = places_in(low, high, _SMOOTHER)  # the first of the others
-    rows, grown = np.empty((places.shape[0], u.size)), np.empty((smoother.shape[0], u.size))
-    richer, alone = one_more_pole(structure), np.ones(1)
-    for k, place in enumerate(places):
-        theta = theta_at(place)
-        rows[k] = Part(problem, structure, theta).driven(alone)
-        if k < smoother.shape[0]:
-            lag = _PROBE * float(np.exp(-place[1]))  # over 1/ω, the unit's own
-            there = Part(problem, richer, with_pole(structure, theta, lag)).driven(alone)
-            grown[k] = (there - rows[k]) / lag**2
+    rows = _answers(source, structure, [theta_at(place) for place in places])
+    lags = _PROBE * np.exp(-smoother[:, 1])  # over 1/ω, the unit's own
+    poles = [
+        with_pole(structure, theta_at(place), float(lag))
+        for place, lag in zip(smoother, lags, strict=True)
+    ]
+    grown = (_answers(source, richer, poles) - rows[: lags.size]) / lags[:, None] ** 2
     means = rows.mean(axis=1, keepdims=True)
     rows -= means
     grown -= grown.mean(axis=1, keepdims=True)
@@ -313,26 +310,22 @@ def spanning(
 ) -> tuple[Real, Surface]:
     """Basis and surface of what one structure makes of a stimulus, by the fit's own parameters.
 
-    Parameters
-    ----------
-    source : SampledInput
-        The stimulus, prepared.
-    structure : Structure
-        Which.
-    low, high : ndarray, shape (p,)
-        Corners of the box.
-    degree : int
-        Of the polynomial.
+    The box's corners have shape (p,); `degree` is that of the polynomial.
     """
-    size = source.samples
-    problem = Problem(source=source, y=np.zeros(size), valid=None, longest_delay=float(size))
     places = places_in(low, high, degree)
-    rows = np.stack([Part(problem, structure, p).driven(np.ones(1)) for p in places])
+    rows = _answers(source, structure, places)
     means = rows.mean(axis=1, keepdims=True)
     rows -= means
     basis = _basis_of(rows)
     values = np.hstack([rows @ basis.T, means])
     return basis, Surface.fitted(low, high, places, values, degree=degree)
+
+
+def _answers(source: SampledInput, structure: Structure, thetas: Iterable[Real]) -> Real:
+    """What one structure of unit gain makes of a stimulus at some parameters, shape (m, n)."""
+    size = source.samples
+    problem = Problem(source=source, y=np.zeros(size), valid=None, longest_delay=float(size))
+    return np.stack([Part(problem, structure, theta).driven(np.ones(1)) for theta in thetas])
 
 
 def _basis_of(rows: Real) -> Real:

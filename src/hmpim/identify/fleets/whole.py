@@ -14,7 +14,7 @@ import numpy as np
 from hmpim.identify.arrays import Real
 from hmpim.identify.fleets.bent import cover_bends, shapes_of
 from hmpim.identify.fleets.fleet import Fleet, FleetFit, Group, fit_fleet, parameters_of
-from hmpim.identify.fleets.learnt import is_alike
+from hmpim.identify.fleets.learnt import is_alike, theta_at
 from hmpim.identify.fleets.quiet import are_quiet
 from hmpim.identify.fleets.simpler import Simpler, costs_of, learn_simpler
 from hmpim.identify.frf.local import local_responses
@@ -26,6 +26,7 @@ from hmpim.identify.noise.input_noise import input_noise
 from hmpim.identify.nonlinear.lines import find_period
 from hmpim.identify.nonlinear.sweep_phase import SweepPhase, sweep_phase
 from hmpim.identify.reading.bandwidth import disagreeing, response_bandwidths
+from hmpim.identify.reading.figures import system_of
 from hmpim.identify.reading.readings import from_lag
 from hmpim.identify.result import (
     Candidate,
@@ -204,7 +205,7 @@ def whole_pairs(
                 warnings=(*findings, *_findings(fleet, group, k, own, count)),
                 from_response=crossings,
                 nonlinearity=_NOTHING,
-                covariance=_covariance(fleet, group, k),
+                covariance=_covariance(fleet, group, k, system),
             )
             found[i] = judged(pair)
     return found
@@ -213,21 +214,13 @@ def whole_pairs(
 def _system(fleet: Fleet, group: Group, k: int) -> RationalDelay:
     """The model of one record, in s."""
     i = int(group.some[k])
-    delay, omega, zeta = group.fit.theta[i]
-    omega, zeta = float(np.exp(omega)) * fleet.fs, float(np.exp(zeta))
-    return RationalDelay(
-        delay=float(delay) / fleet.fs,
-        numerator=np.array([float(group.fit.gain[i])]),
-        denominator=np.array([1.0, 2 * zeta / omega, omega**-2]),
-    )
+    vector = np.concatenate([theta_at(group.fit.theta[i]), [group.fit.gain[i], 0.0]])
+    return system_of(fleet.structure, vector, fleet.fs)
 
 
-def _covariance(fleet: Fleet, group: Group, k: int) -> Real:
+def _covariance(fleet: Fleet, group: Group, k: int, system: RationalDelay) -> Real:
     """Of delay, scale factor, and the denominator's coefficients, highest power first."""
-    i = int(group.some[k])
-    _, omega, zeta = group.fit.theta[i]
-    second = float(np.exp(-2 * omega)) / fleet.fs**2
-    first = 2 * float(np.exp(zeta - omega)) / fleet.fs
+    _, first, second = system.denominator
     slopes = np.array(
         [
             [1.0 / fleet.fs, 0.0, 0.0, 0.0],

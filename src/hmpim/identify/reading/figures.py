@@ -19,7 +19,7 @@ from hmpim.model.response import (
     response,
 )
 
-__all__ = ["figures_at", "figures_of", "read_figures", "system_of"]
+__all__ = ["figures_at", "figures_of", "read_figures", "system_of", "units_of"]
 
 _Marks = tuple[float | None, float | None, float | None]
 
@@ -32,7 +32,20 @@ _UNITS = dict.fromkeys(["delay", "delay_low_frequency", "time_constant"], "s") |
     ],
     "Hz",
 )
-_UNITS |= {"damping_ratio": "", "peak_gain_db": "dB"}
+
+
+def units_of(structure: Structure, units: tuple[str, str]) -> dict[str, str]:
+    """Return the unit of each figure, from those of input and output."""
+    source, output = units
+    gain = ""
+    if output != source:
+        gain = f"{output or '1'}/{source}" if source else output
+    if structure.integrators:
+        gain = f"{gain or '1'}/s"
+    if structure.dc_zeros:
+        gain = f"{gain}*s" if gain else "s"
+    own = {"scale_factor": gain, "bias": output, "noise_std": output}
+    return {**_UNITS, "damping_ratio": "", "peak_gain_db": "dB", **own}
 
 
 def system_of(structure: Structure, vector: Real, fs: float) -> RationalDelay:
@@ -101,7 +114,7 @@ def read_figures(
     by_coefficient = _by_coefficient(structure, vector, fs)
     slopes = _slopes(structure, vector, fs, values)
     slopes |= _slopes_of_marks(structure, system, by_coefficient, values, peak)
-    unit_of = _UNITS | {"scale_factor": _gain_unit(structure, *units), "bias": units[1]}
+    unit_of = units_of(structure, units)
     read: dict[str, Estimate | None] = {
         name: None
         if value is None
@@ -209,18 +222,6 @@ def _is_steady(structure: Structure) -> bool:
 def _gain_rate(structure: Structure, fs: float) -> float:
     """Scale factor in seconds over that in samples."""
     return float(fs ** (structure.integrators - structure.dc_zeros))
-
-
-def _gain_unit(structure: Structure, input_unit: str, output_unit: str) -> str:
-    """Unit of the scale factor."""
-    unit = ""
-    if output_unit != input_unit:
-        unit = f"{output_unit or '1'}/{input_unit}" if input_unit else output_unit
-    if structure.integrators:
-        unit = f"{unit or '1'}/s"
-    if structure.dc_zeros:
-        unit = f"{unit}*s" if unit else "s"
-    return unit
 
 
 def _slope_at_dc(system: RationalDelay) -> float:

@@ -4,7 +4,6 @@ reach       the lags that are kept, and the rows of the bias
 run         one run: products of its samples, and its two ends
 statistics  runs of one input and one output: compress, update, join
 products    products of filtered signals over the samples that count
-residual    what a model leaves over: its autocorrelation, and both ends
 start       a response without a model, from which the starts are found
 fit         one structure, by the joint fit's own optimiser, and its residual
 misfit      whether what is left over follows the input; one more pole

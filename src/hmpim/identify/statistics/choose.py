@@ -193,7 +193,7 @@ def _rests(best: Fitted) -> bool:
     begins = int(np.ceil(max(best.delay, 0.0))) + 4
     problem = replace(best.problem, begins=begins)
     free = Part(problem, best.structure, best.theta).free[:, :lags]
-    head = best.residual_told.head(0, lags)
+    head = best.left_over[2][0, :lags]
     every = np.vstack([head, free])
     head, *free_rows = scipy.signal.lfilter(left.noise, np.ones(1), every)[:, left.noise.size :]
     if float(head @ head) > 2.0 * left.innovation * scipy.special.chdtri(head.size, FALSE_ALARM):

@@ -23,7 +23,6 @@ from hmpim.identify.fitting.rows import Part, Problem
 from hmpim.identify.noise.autoregression import whitening_filter
 from hmpim.identify.statistics.products import Moments, Products
 from hmpim.identify.statistics.reach import AHEAD, Reach
-from hmpim.identify.statistics.residual import Residual
 from hmpim.model.dynamics import Structure
 from hmpim.model.sampled import SampledInput, prepare_input
 from hmpim.record import Intersample
@@ -285,16 +284,16 @@ class Fitted(Fit):
         return np.asarray(whole * self.variance)
 
     @property
-    def residual_told(self) -> Residual:
-        """What is left over, not whitened, by its products and its ends."""
+    def left_over(self) -> tuple[Real, int, Real]:
+        """What is left over, not whitened, as `Products.left_over` gives it."""
         fixed = self.moments.fixed - self.moments.fixed_rows @ self.weights
-        return self.products.plain.residual(self.response, fixed)
+        return self.products.plain.left_over(self.response, fixed)
 
     @cached_property
     def left(self) -> LeftOver:
         """Power, colour and autoregression of what is left over."""
         products = self.products
-        gram, count = self.residual_told.gram(products.skipped)
+        gram, count, _ = self.left_over
         if gram[0, 0] <= _ROUNDED * products.plain.energy:
             least, noise = self.objective / products.counted, np.ones(1)
             return LeftOver(power=least, counted=count, innovation=least, share=1.0, noise=noise)

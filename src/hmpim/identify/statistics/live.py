@@ -127,6 +127,9 @@ class LiveEstimator:
             intersample=intersample,
             band=stimulus.waveform.band,
         )
+        low, high = self._statistics.band or (0.0, stimulus.fs / 2)
+        self._highest = high
+        self._band = low / stimulus.fs, high / stimulus.fs  # cycles a sample that are excited
         self._mode: Intersample = intersample
         self._pulse = pulse(self._statistics.reach, intersample)
         self._fitted: Fitted | None = None
@@ -186,7 +189,13 @@ class LiveEstimator:
         due = statistics.samples >= _BETWEEN * self._asked and not self._asked_last
         made = due and self._is_elsewhere(self._fitted)
         asks = due and not made
-        fitted = self._again(problem, _FEWER if due else _EVALUATIONS)
+        evaluations = _FEWER if due else _EVALUATIONS
+        before = self._fitted
+        fitted = (
+            self._begin(problem)
+            if before is None
+            else follow(problem, before, evaluations=evaluations)
+        )
         if made:  # and asked at the next look, since each takes long enough
             self._asks = self._asked_about(fitted)
         if asks or self._fitted is None:
@@ -198,39 +207,34 @@ class LiveEstimator:
                 self._follows = self._lacks(fitted)
         self._asked_last, self._made = asks, made
         self._fitted = fitted
-        self._look = self._read(fitted)
+        time = statistics.samples / statistics.fs
+        parameters = _figures(fitted, statistics)
+        self._look = Look(
+            time=time,
+            structure=fitted.structure.name,
+            parameters=_doubted(parameters, time, self._highest, follows=self._follows),
+        )
         return self._look
 
     def _is_elsewhere(self, fitted: Fitted | None) -> bool:
         """Whether a fit's delay has moved away from what is asked for, made before this look."""
         if fitted is None or self._asks is None or self._made:
             return False
-        return abs(self._asks.delay - fitted.delay) * self._band()[1] > FEW
+        return abs(self._asks.delay - fitted.delay) * self._band[1] > FEW
 
     def _asked_about(self, fitted: Fitted) -> Asked:
-        return asked_of(fitted.delay, self._band(), fitted.products)
-
-    def _band(self) -> tuple[float, float]:
-        """Cycles a sample that are excited."""
-        low, high = self._excited()
-        return low / self._statistics.fs, high / self._statistics.fs
+        return asked_of(fitted.delay, self._band, fitted.products)
 
     def _lacks(self, fitted: Fitted) -> bool:
         """Whether what is left over follows the input."""
         if self._asks is None:
             self._asks = self._asked_about(fitted)
-        misfit = misfit_of(fitted, fitted.products, self._band(), asked=self._asks)
+        misfit = misfit_of(fitted, fitted.products, self._band, asked=self._asks)
         return misfit.probability < FALSE_ALARM
 
     def identification(self) -> Identification:
         """The whole identification of what was read, with every structure and every check."""
         return identify_statistics(self._statistics, intersample=self._mode)
-
-    def _again(self, problem: Compressed, evaluations: int) -> Fitted:
-        """The same structure, a step from where it was."""
-        if self._fitted is None:
-            return self._begin(problem)
-        return follow(problem, self._fitted, evaluations=evaluations)
 
     def _begin(self, problem: Compressed) -> Fitted:
         """A new start: every plain structure from the data alone."""
@@ -238,21 +242,6 @@ class LiveEstimator:
         self._starts += 1
         fit = _begun(self._statistics, self._mode)
         return follow(problem, fit, evaluations=_EVALUATIONS)
-
-    def _excited(self) -> tuple[float, float]:
-        statistics = self._statistics
-        stated = statistics.band
-        return (0.0, statistics.fs / 2) if stated is None else stated
-
-    def _read(self, fitted: Fitted) -> Look:
-        statistics = self._statistics
-        time = statistics.samples / statistics.fs
-        parameters = _figures(fitted, statistics)
-        return Look(
-            time=time,
-            structure=fitted.structure.name,
-            parameters=_doubted(parameters, time, self._excited()[1], follows=self._follows),
-        )
 
 
 def _figures(fitted: Fitted, statistics: Statistics) -> Parameters:

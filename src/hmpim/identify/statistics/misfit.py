@@ -51,8 +51,16 @@ class Asked:
 
 
 def asked_of(delay: float, band: tuple[float, float], products: Products) -> Asked:
-    """Responses that are asked for about a delay, in samples; `band` as for `misfit_of`."""
-    rows = _responses(delay, band, products.statistics.reach.taps)
+    """Cosines and sines behind a window about a delay, in samples; `band` as for `misfit_of`."""
+    (low, high), taps = band, products.statistics.reach.taps
+    lag = np.arange(taps) - AHEAD - delay
+    width = _GROUPS / max(high - low, 1e-9)
+    before, after = min(width, AHEAD + delay + 1.0), min(width, taps - AHEAD - delay)
+    edge = np.where(lag < 0, before, max(after, 1.0))
+    window = np.where(np.abs(lag) < edge, 0.5 + 0.5 * np.cos(np.pi * lag / edge), 0.0)
+    centres = low + (high - low) * (np.arange(_GROUPS) + 0.5) / _GROUPS
+    phase = 2 * np.pi * np.outer(centres, lag)
+    rows = np.vstack([np.cos(phase), np.sin(phase)]) * window
     return Asked(delay=delay, rows=rows, transforms=products.transform(rows))
 
 
@@ -150,16 +158,3 @@ def _beside(
     gain = residual[:count] + shift.T @ residual[count:]
     cost = moments.energy - linear @ (moments.cross[count:] + residual[count:])
     return gain, left, max(float(cost), np.finfo(float).eps * moments.energy), shift
-
-
-def _responses(delay: float, band: tuple[float, float], taps: int) -> Real:
-    """Cosines and sines behind a window about the delay, shape (2 groups, taps)."""
-    low, high = band
-    lag = np.arange(taps) - AHEAD - delay
-    width = _GROUPS / max(high - low, 1e-9)
-    before, after = min(width, AHEAD + delay + 1.0), min(width, taps - AHEAD - delay)
-    edge = np.where(lag < 0, before, max(after, 1.0))
-    window = np.where(np.abs(lag) < edge, 0.5 + 0.5 * np.cos(np.pi * lag / edge), 0.0)
-    centres = low + (high - low) * (np.arange(_GROUPS) + 0.5) / _GROUPS
-    phase = 2 * np.pi * np.outer(centres, lag)
-    return np.asarray(np.vstack([np.cos(phase), np.sin(phase)]) * window)

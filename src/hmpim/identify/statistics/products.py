@@ -17,7 +17,6 @@ import scipy
 from hmpim.identify.arrays import Complex, Real
 from hmpim.identify.noise.autoregression import LONGEST
 from hmpim.identify.statistics.reach import AHEAD
-from hmpim.identify.statistics.residual import Residual
 from hmpim.identify.statistics.run import Run, closed
 from hmpim.identify.statistics.statistics import Statistics
 
@@ -232,8 +231,8 @@ class Products:
             early = (first @ self._begun).transpose(1, 0, 2)
         return np.concatenate([early, late], axis=2)
 
-    def residual(self, response: Real, bias: Real) -> Residual:
-        """What a model leaves over; of products without a noise model only.
+    def left_over(self, response: Real, bias: Real) -> tuple[Real, int, Real]:
+        """Return what a model leaves over; of products without a noise model only.
 
         Parameters
         ----------
@@ -241,18 +240,24 @@ class Products:
             Impulse response.
         bias : ndarray, shape (runs, rows)
             What multiplies the rows of each run's bias.
+
+        Returns
+        -------
+        gram : ndarray, shape (LONGEST + 1, LONGEST + 1)
+            Sums of products of a sample and those 1 … LONGEST before, of samples that count.
+        count : int
+            Of how many.
+        heads : ndarray, shape (runs, m)
+            The first samples of each run, as if it had begun at rest.
         """
-        runs = self._runs
+        runs, reach, index = self._runs, self.statistics.reach, np.arange(LONGEST + 1)
         weights = np.hstack([-bias, np.ones((len(runs), 1))])
-        reach, longest = self.statistics.reach, LONGEST
         spectrum = scipy.fft.rfft(response, self._length)
-        made = scipy.fft.irfft(spectrum * spectrum.conj() * self._power, self._length)[
-            : longest + 1
-        ]
-        whole = np.zeros(longest + 1)
+        made = spectrum * spectrum.conj() * self._power
+        whole = np.array(scipy.fft.irfft(made, self._length)[: LONGEST + 1])
         for run, c in zip(runs, weights, strict=True):
             follows = c @ run.vu
-            for k in range(longest + 1):
+            for k in index:
                 start = reach.forth - AHEAD
                 ahead = follows[start + k : start + k + reach.taps]
                 behind = follows[start - k : start - k + reach.taps]
@@ -261,12 +266,13 @@ class Products:
         ends = np.einsum("ec,ect->et", doubled, self._around) - scipy.fft.irfft(
             spectrum * self._inputs, self._length
         )
-        return Residual(
-            whole=whole + made,
-            ends=ends.reshape(len(runs), 2, -1),
-            span=reach.span,
-            counted=sum(run.samples - AHEAD for run in runs),
-        )
+        gram = whole[np.abs(index[:, None] - index)]
+        first = self.skipped + LONGEST
+        for head, tail in zip(ends[0::2], ends[1::2], strict=True):
+            before, after = _shifted(head[: first + AHEAD]), _shifted(tail)[:, reach.span :]
+            gram -= before @ before.T + after @ after.T
+        count = sum(run.samples - AHEAD - first for run in runs)
+        return gram, count, ends[0::2, AHEAD:]
 
     def _without_bias(self, gram: Real, mixed: Real, steady: Real) -> Moments:
         """Solve the biases and take them off."""
@@ -335,3 +341,9 @@ def _products(spectra: Complex, power: Real, length: int) -> Real:
 def _moved(head: Real) -> Real:
     """Matrix that turns an impulse response's first samples into those of its convolution."""
     return np.asarray(scipy.linalg.toeplitz(head, np.zeros(head.size)).T)
+
+
+def _shifted(x: Real) -> Real:
+    """A signal and what came 1 … LONGEST samples before, 0 before it begins."""
+    padded = np.concatenate([np.zeros(LONGEST), x])
+    return np.stack([padded[LONGEST - k : padded.size - k] for k in range(LONGEST + 1)])
