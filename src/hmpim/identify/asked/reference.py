@@ -109,14 +109,7 @@ def aligned_with_reference(record: Record, reference: str) -> tuple[Aligned, Ins
 
 
 def instrument_of(name: str, reference: Real, u: Real) -> Instrument:
-    """Take the part of an input that a reference moves: weights over the past, as Akaike chooses.
-
-    Parameters
-    ----------
-    name : str
-        Of the reference.
-    reference, u : ndarray, shape (n,)
-        Reference and input.
+    """Take the part of an input that a reference moves, (n,): weights over its past, by Akaike.
 
     Raises
     ------
@@ -149,20 +142,8 @@ def instrument_of(name: str, reference: Real, u: Real) -> Instrument:
 def fit_through(joint: JointFit, instrument: Instrument) -> tuple[JointFit, Real]:
     """Move a fit to the instrument to where the input's own residual is orthogonal to it.
 
-    Parameters
-    ----------
-    joint : JointFit
-        Of the output to the part of the input that the reference moves; its structure and its
-        noise model are kept.
-    instrument : Instrument
-        From `instrument_of`.
-
-    Returns
-    -------
-    joint : JointFit
-        Its best fit moved.
-    cov : ndarray, shape (p, p)
-        Of the fit's parameters.
+    The fit is of the output to the part of the input that the reference moves; its structure and
+    its noise model are kept. With it comes the covariance of its parameters, (p, p).
     """
     asked = joint.weighed
     problem = replace(asked, source=prepare_input(instrument.u, joint.best.intersample))
@@ -231,21 +212,8 @@ def response_through(
 ) -> FrequencyResponse:
     """Return the plant's measured response: that from reference to output, over that to input.
 
-    Parameters
-    ----------
-    instrument : Instrument
-        Reference and input.
-    y : ndarray, shape (n,)
-        Output.
-    fs : float
-        Rate in Hz.
-    band : (float, float)
-        Excited band in Hz.
-
-    Returns
-    -------
-    FrequencyResponse
-        Its error is at most the two errors together.
+    Its error is at most the two errors together. The output has shape (n,); rate and band are in
+    Hz.
     """
     into, out = (local_response(instrument.reference, x, fs, band=band) for x in (instrument.u, y))
     ratio = out.response / into.response

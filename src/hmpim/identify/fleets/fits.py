@@ -42,14 +42,7 @@ class Fits:
 def fitted_all(fleet: Fleet, centred: Real, means: Real, power: Real) -> list[Fits]:
     """Fit all records under each assumption of the fleet, in the order of its members.
 
-    Parameters
-    ----------
-    fleet : Fleet
-        What the records share.
-    centred : ndarray, shape (N, n)
-        Outputs less their means.
-    means, power : ndarray, shape (N,)
-        Those means, and the sums of squares of `centred`.
+    Outputs less their means, (N, n), are given with those means and with their own powers, (N,).
     """
     sizes = np.cumsum([member.basis.shape[0] for member in fleet.members])
     inside = centred @ np.concatenate([member.basis for member in fleet.members]).T

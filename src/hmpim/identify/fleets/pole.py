@@ -41,18 +41,10 @@ class Tails:
 
 
 def with_tails(fleet: Fleet, member: Member, place: Real, y: Real, own: Parameters) -> Tails | None:
-    """Fit one more pole to a record; None if the likelihood pays for it.
+    """Fit one more pole to a record, (n,); None if the likelihood pays for it.
 
-    Parameters
-    ----------
-    fleet, member : Fleet, Member
-        What the record shares with others, and the assumption that is taken.
-    place : ndarray, shape (3,)
-        Where it lies on the member's surface.
-    y : ndarray, shape (n,)
-        Its output.
-    own : Parameters
-        What the fit without the pole says.
+    `place`, (3,), is where the record lies on the member's surface, and `own` what the fit without
+    the pole says.
     """
     problem, best = alone_of(fleet, member, place, y)
 
@@ -78,13 +70,7 @@ def with_tails(fleet: Fleet, member: Member, place: Real, y: Real, own: Paramete
 
 
 def alone_of(fleet: Fleet, member: Member, place: Real, y: Real) -> tuple[Problem, Trial]:
-    """Return one record's own data and fit, from where the fit of all together ended.
-
-    Parameters
-    ----------
-    fleet, member, place, y
-        As for `with_tails`.
-    """
+    """Return one record's own data and fit, from where the fit of all together ended."""
     longest = longest_lag(y.size) + 2.0  # as of every record
     problem = Problem(source=member.source, y=y, valid=None, longest_delay=longest)
     fit = fit_structure(problem, fleet.structure, theta_at(place))

@@ -46,24 +46,10 @@ _TOLD = ("scale_factor", "natural_frequency", "damping_ratio", "bandwidth_phase9
 def are_quiet(
     fleet: Fleet, group: Group, outputs: Real, *, behind: Real, sweep: SweepPhase | None
 ) -> Mask:
-    """Return which records of a group give no test of `identify` anything to say.
+    """Return which records of a group give no test of `identify` anything to say, shape (k,).
 
-    Parameters
-    ----------
-    fleet : Fleet
-        What the records share.
-    group : Group
-        Of k records.
-    outputs : ndarray, shape (k, n)
-        Theirs.
-    behind : ndarray, shape (k, s)
-        Least sums of squares that simpler structures leave of each.
-    sweep : SweepPhase or None
-        The stimulus' phase, if it is a sweep.
-
-    Returns
-    -------
-    ndarray of bool, shape (k,)
+    Their outputs have shape (k, n); `behind`, (k, s), holds the least sums of squares that simpler
+    structures leave of each; `sweep` is the stimulus' phase, if it is a sweep.
     """
     quiet = group.sound & _is_told(fleet, group, behind)
     lags, ahead = _lags(fleet.u, outputs)

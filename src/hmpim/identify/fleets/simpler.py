@@ -35,18 +35,9 @@ _LEAST = (0.02, 0.005)
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Simpler:
-    """One structure that is weighed against that of the fleet.
+    """One structure that is weighed against that of the fleet, as a `Member` is held.
 
-    Parameters
-    ----------
-    structure : Structure
-        Which.
-    intersample : {'zoh', 'foh', 'bandlimited'}
-        What the stimulus does between its samples.
-    basis : ndarray, shape (r, n)
-        Orthonormal, each row without mean.
-    surface : Surface
-        As of a `Member`, a function of the fit's own parameters.
+    Its surface is a function of the fit's own parameters.
     """
 
     structure: Structure
@@ -60,14 +51,7 @@ def learn_simpler(
 ) -> tuple[Simpler, ...] | None:
     """Learn where the simpler structures lie; None where most were held against different ones.
 
-    Parameters
-    ----------
-    fleet : Fleet
-        What the records share.
-    pairs : sequence of PairIdentification
-        What `identify` said of some of them.
-    outputs : sequence of ndarray, shape (n,)
-        Of these.
+    From what `identify` said of some records, and from their outputs, (n,).
     """
     tried = [
         frozenset(
@@ -123,16 +107,7 @@ def _learnt(fleet: Fleet, structure: Structure, places: Real) -> Simpler:
 def costs_of(fleet: Fleet, one: Simpler, centred: Real, power: Real) -> Real:
     """Least sum of squares that a simpler structure leaves of each output, shape (k,).
 
-    Parameters
-    ----------
-    fleet : Fleet
-        What the records share.
-    one : Simpler
-        The structure.
-    centred : ndarray, shape (k, n)
-        Outputs less their means.
-    power : ndarray, shape (k,)
-        Sums of their squares.
+    Of outputs less their means, (k, n), and of their sums of squares, (k,).
     """
     z = centred @ one.basis.T
     outside = np.maximum(power - np.vecdot(z, z), 0.0)

@@ -80,15 +80,8 @@ class Whole:
 def learn_whole(fleet: Fleet, pairs: Sequence[PairIdentification]) -> Whole | None:
     """Learn from some units what everything takes; None where each must be asked by itself.
 
-    What is learnt is held against what it is learnt from: where anything is said of these units
-    that `identify` did not say, nothing is learnt.
-
-    Parameters
-    ----------
-    fleet : Fleet
-        From `learn_fleet`.
-    pairs : sequence of PairIdentification
-        What `identify` said of some units.
+    What is learnt is held against what it is learnt from, `pairs` of `identify`: where anything is
+    said of these units that `identify` did not say, nothing is learnt.
     """
     u, fs = fleet.u, fleet.fs
     sweep = sweep_phase(u, fs)

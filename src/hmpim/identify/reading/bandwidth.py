@@ -153,12 +153,7 @@ def less_bias(
 ) -> ResponseBandwidths:
     """Bandwidths of the response without the estimator's bias, which adds to their error.
 
-    Parameters
-    ----------
-    measured, own : ResponseBandwidths
-        From the record, and by the same estimator from the model's output without noise.
-    modelled : Parameters
-        What the second should be.
+    That bias is by how much `own`, from the model's output without noise, is off what is modelled.
     """
 
     def corrected(name: str) -> Estimate | None:

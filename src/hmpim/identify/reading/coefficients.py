@@ -31,14 +31,9 @@ def coefficients_of(system: RationalDelay) -> tuple[tuple[float, ...], tuple[flo
 
 
 def highest_first(covariance: Real, system: RationalDelay) -> Real | None:
-    """Covariance of delay, numerator and denominator by falling powers; None if it is not known.
+    """Covariance of delay, numerator and denominator, (q, q), by falling powers instead of rising.
 
-    Parameters
-    ----------
-    covariance : ndarray, shape (q, q)
-        By rising powers; not finite where the record does not see a direction.
-    system : RationalDelay
-        Whose coefficients they are.
+    None where it is not finite, as the record does not see a direction.
     """
     if not np.isfinite(covariance).all():
         return None

@@ -166,15 +166,7 @@ def _marks_of(
 
 
 def figures_of(fit: Fit, *, fs: float, highest: float) -> dict[str, float | None]:
-    """Values alone of what `read_parameters` gives with error bars, the noise apart.
-
-    Parameters
-    ----------
-    fit : Fit
-        Any fit.
-    fs, highest : float
-        As for `read_parameters`.
-    """
+    """Values alone of what `read_parameters` gives with error bars, the noise apart."""
     vector = np.concatenate([fit.theta, fit.linear])
     return figures_at(fit.structure, vector, fs=fs, highest=highest)
 

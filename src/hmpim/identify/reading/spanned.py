@@ -184,12 +184,7 @@ def _ends(fit: Fit) -> list[Fit]:
 def blurred(parameters: Parameters, share: float) -> Parameters:
     """Widen each interval by a share of its figure on either side.
 
-    Parameters
-    ----------
-    parameters : Parameters
-        As `spanned` gives them.
-    share : float
-        To which no linear model is right where a nonlinearity is known to be there.
+    To so much no linear model is right where a nonlinearity is known to be there.
     """
     moved = {}
     for name in MODELLED:
@@ -207,10 +202,7 @@ def blurred(parameters: Parameters, share: float) -> Parameters:
 def without_noise(parameters: Parameters) -> Parameters:
     """Widen each interval by rounding, and the noise's to 0: the residual need not be noise.
 
-    Parameters
-    ----------
-    parameters : Parameters
-        Of a model whose residual may be the error of interpolation between the samples.
+    It may be the error of interpolation between the samples.
     """
     wide, noise = blurred(parameters, ROUNDING), parameters.noise_std
     if noise is None or noise.ci95 is None:
@@ -219,19 +211,10 @@ def without_noise(parameters: Parameters) -> Parameters:
 
 
 def bent_figures(fit: Fit, moved: Real, *, fs: float, highest: float) -> dict[str, float | None]:
-    """Figures where a nonlinearity adds so much to the parameters, to first order.
+    """Figures where a nonlinearity adds so much, (p,), to `theta` and `linear`, to first order.
 
     What a parameter that the record hardly determines takes up leaves a figure that it does alone:
     the figures' own derivatives along the change say so, and no step as long as the change does.
-
-    Parameters
-    ----------
-    fit : Fit
-        The linear fit.
-    moved : ndarray, shape (p,)
-        What is added to `theta` and `linear`.
-    fs, highest : float
-        As for `spanned`.
     """
     vector, size = np.concatenate([fit.theta, fit.linear]), fit.theta.size
     sides = (

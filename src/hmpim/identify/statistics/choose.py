@@ -119,21 +119,8 @@ def choose(
 ) -> tuple[CompressedData, JointFit]:
     """Fit every structure and keep the one that the statistics support.
 
-    Parameters
-    ----------
-    statistics : Statistics
-        What was read.
-    intersample : {'zoh', 'foh', 'bandlimited'}, optional
-        What the input does between its samples; chosen by likelihood if None.
-    structures : tuple of str, optional
-        Which to try; all but integrators by default.
-
-    Returns
-    -------
-    CompressedData
-        What all trials share.
-    JointFit
-        As from samples, but its fits are `Fitted`.
+    All trials are as from samples, but their fits are `Fitted`. Arguments are those of
+    `identify_statistics`.
 
     Raises
     ------

@@ -101,11 +101,6 @@ def hidden_pole_of(fitted: Fitted) -> HiddenPole:
     """Test a fit for one more pole, the delay shortened by as much.
 
     As `hmpim.identify.fitting.growth.hidden_pole`, from statistics.
-
-    Parameters
-    ----------
-    fitted : Fitted
-        The fit.
     """
     row = response_to_square(fitted.problem, fitted)
     gain, left, _, shift = _beside(fitted, fitted.products, row[None])
@@ -123,11 +118,6 @@ def integrated_share(fitted: Fitted) -> float:
 
     A response that does not end within the window is a step there; the differences of an output
     that integrates do not wander.
-
-    Parameters
-    ----------
-    fitted : Fitted
-        The fit.
     """
     products = fitted.products
     steps = products.whitened(np.array([1.0, -1.0]))

@@ -77,17 +77,7 @@ def begun(reach: Reach, u: float, y: float) -> Run:
 
 
 def continued(run: Run, reach: Reach, u: Real, y: Real) -> Run:
-    """A run and the samples that follow it.
-
-    Parameters
-    ----------
-    run : Run
-        What was read so far.
-    reach : Reach
-        What is kept.
-    u, y : ndarray, shape (n,)
-        The samples that follow.
-    """
+    """A run and the samples that follow it, u and y of shape (n,)."""
     piece = max(_PIECE, 4 * reach.span)
     for first in range(0, u.size, piece):
         some = slice(first, first + piece)
