@@ -43,21 +43,10 @@ class Lag:
 
 
 def lag_of(problem: Problem, fit: Fit, others: Real) -> Lag | None:
-    """Sum the likelihood over lags.
+    """Sum the likelihood over lags of a static or first-order fit; None if no lag gives a delay.
 
-    Parameters
-    ----------
-    problem : Problem
-        With what the other inputs leave over, and the noise's whitening.
-    fit : Fit
-        Static or first-order.
-    others : ndarray, shape (k, n)
-        Derivatives by all other parameters, whitened, which are free to give way.
-
-    Returns
-    -------
-    Lag or None
-        None if no lag gives a delay that can be.
+    The problem's output is what the other inputs leave over; `others`, (k, n), are the derivatives
+    by all other parameters, whitened, which are free to give way.
     """
     basis, _ = np.linalg.qr(others.T)
 

@@ -77,23 +77,11 @@ def whitening_of(residual: Real) -> Real | None:
 def coupling_fit(
     problem: Problem, u: Real, *, intersample: Intersample, structures: tuple[StructureName, ...]
 ) -> JointFit:
-    """Fit the plain structures to what the stronger inputs leave over.
+    """Fit the plain structures to what the stronger inputs leave over of an output.
 
-    Parameters
-    ----------
-    problem : Problem
-        Its `y` is what the others leave over, its `whitening` that of the noise.
-    u : ndarray, shape (n,)
-        The input.
-    intersample : {'zoh', 'foh', 'bandlimited'}
-        As found for the strongest input.
-    structures : tuple of str
-        Which to try.
-
-    Returns
-    -------
-    JointFit
-        `problem` and the fits without whitening, the criteria with it.
+    Criteria are weighed with the problem's whitening, which is that of the noise; the problem that
+    is returned is without it. The input has shape (n,); what it does between its samples is as
+    found for the strongest input.
     """
     index = np.arange(u.size)
     y = problem.y
