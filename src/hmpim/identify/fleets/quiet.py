@@ -58,7 +58,7 @@ def are_quiet(
         some = np.flatnonzero(quiet)
         quiet[some] = test(fleet, group, some)
     some = np.flatnonzero(quiet)
-    quiet[some] = _linear(fleet, group, some, sweep)
+    quiet[some] = _linear(fleet, group, some, outputs[some], sweep)
     some = np.flatnonzero(quiet)
     for part, rows in _derivatives(fleet, group, some):
         left = group.residual[part]
@@ -119,17 +119,17 @@ def _unanswered(fleet: Fleet, group: Group, some: Places) -> Mask:
     return np.asarray(chances_of_an_answer(fleet.u, group.residual[some]) > FALSE_ALARM)
 
 
-def _linear(fleet: Fleet, group: Group, some: Places, sweep: SweepPhase | None) -> Mask:
+def _linear(
+    fleet: Fleet, group: Group, some: Places, outputs: Real, sweep: SweepPhase | None
+) -> Mask:
     """Where nothing of the residual is what a linear system cannot make."""
     quiet = np.ones(some.size, dtype=bool)
     for at in range(0, some.size, _AT_ONCE):
-        part = some[at : at + _AT_ONCE]
-        which = group.some[part]
-        values = group.fit.member.surface.values(group.fit.theta[which])
-        # Without the bias: as the model itself has it, its mean included.
-        models = values[:, :-1] @ group.fit.member.basis + values[:, -1:]
-        models *= group.fit.gain[which, None]
-        quiet[at : at + _AT_ONCE] = ~are_curved(models, group.residual[part])
+        here = slice(at, at + _AT_ONCE)
+        residual = group.residual[some[here]]
+        bias = group.fit.figures["bias"][group.some[some[here]]]
+        models = outputs[here] - residual - bias[:, None]
+        quiet[here] = ~are_curved(models, residual)
     if sweep is not None:
         left = np.flatnonzero(quiet)
         lags = np.rint(group.fit.theta[group.some[some[left]], 0])
@@ -164,57 +164,29 @@ def _from_rest(fleet: Fleet, group: Group, part: Places, rows: Real, lags: Place
     begins = np.ceil(np.maximum(np.maximum(delay, lag), 0.0)).astype(np.intp) + REACH
     at = np.arange(n)
     early = at < begins[:, None]
-    squares = left**2
-    quiet = (begins <= longest_lag(n)) & ~_stand_out(left, squares, early)
+    quiet = (begins <= longest_lag(n)) & ~stand_out_of(left, early)
     if group.fit.member.intersample == "bandlimited":
         away = at - delay[:, None]
         reach = ringing_of(group.fit.member.source)
         ringing = (np.abs(away) <= reach) | (away >= n - 1 - reach)
-        quiet &= ~_stand_out(left, squares, ringing)
+        quiet &= ~stand_out_of(left, ringing)
     free = _free_responses(np.exp(group.fit.theta[which, 1:]), n)
-    # What the rows do on the whole, less what they do before: a free response dies out early.
-    first = int(begins.max())
-    last = min(first + free.shape[2], n)
-    since = at[:last] - begins[:, None]
+    since = at - begins[:, None]
     there = (since >= 0) & (since < free.shape[2])
     free = np.take_along_axis(free, np.where(there, since, 0)[:, None], axis=2) * there[:, None]
-    before, known = rows[:, :, :first] * early[:, None, :first], rows.shape[1]
-    gram = np.empty((part.size, known + 2, known + 2))
-    gram[:, :known, :known] = rows @ rows.transpose(0, 2, 1) - before @ before.transpose(0, 2, 1)
-    gram[:, known:, :known] = free @ rows[:, :, :last].transpose(0, 2, 1)
-    gram[:, :known, known:] = gram[:, known:, :known].transpose(0, 2, 1)
-    gram[:, known:, known:] = free @ free.transpose(0, 2, 1)
-    column = left[:, :, None]
-    slope = np.concatenate(
-        [rows @ column - before @ column[:, :first], free @ column[:, :last]], axis=1
-    )[:, :, 0]
+    every = np.concatenate([rows * ~early[:, None], free], axis=1)
+    gram = every @ every.transpose(0, 2, 1)
+    slope = (every @ left[:, :, None])[:, :, 0]
     scale = np.sqrt(np.maximum(np.einsum("iaa->ia", gram), np.finfo(float).tiny))
     gram /= scale[:, :, None] * scale[:, None, :]
     slope /= scale
     inverse = np.linalg.pinv(gram, rcond=1e-12, hermitian=True)
     gained = np.einsum("ia,iab,ib->i", slope, inverse, slope)
-    power = np.sum(squares, axis=1) - np.sum(squares * early, axis=1)
+    power = np.sum((left * ~early) ** 2, axis=1)
     count = n - begins
     rest = np.maximum(power - gained, np.finfo(float).tiny)
     statistic = count * np.log(np.maximum(power, np.finfo(float).tiny) / rest)
     return np.asarray(quiet & (statistic <= scipy.special.chdtri(2, FALSE_ALARM)))
-
-
-def _stand_out(residual: Real, squares: Real, some: Mask) -> Mask:
-    """`stand_out_of`, asked of those alone that hold more than the least their others may show.
-
-    The median of what is left of a record without c of its samples is no less than that of the
-    whole record c/2 samples below the middle.
-    """
-    counts = np.count_nonzero(some, axis=1)
-    below = (residual.shape[1] - int(counts.max(initial=0)) - 1) // 2
-    if below < 0:
-        return stand_out_of(residual, some)
-    level = np.partition(squares, below, axis=1)[:, below] / 0.455
-    limit = level * scipy.special.chdtri(np.maximum(counts, 1), FALSE_ALARM)
-    out = np.sum(squares * some, axis=1) > limit
-    out[out] = stand_out_of(residual[out], some[out])
-    return np.asarray(out)
 
 
 def _free_responses(modes: Real, samples: int) -> Real:

@@ -21,17 +21,11 @@ from hmpim.model.response import (
 
 __all__ = ["figures_at", "figures_of", "read_figures", "system_of", "units_of"]
 
-_Marks = tuple[float | None, float | None, float | None]
-
-_UNITS = dict.fromkeys(["delay", "delay_low_frequency", "time_constant"], "s") | dict.fromkeys(
-    [
-        "natural_frequency",
-        "bandwidth_phase90",
-        "bandwidth_phase90_without_delay",
-        "bandwidth_3db",
-    ],
-    "Hz",
-)
+_UNITS = {
+    "delay": "s", "delay_low_frequency": "s", "time_constant": "s",
+    "natural_frequency": "Hz", "damping_ratio": "", "peak_gain_db": "dB", "bandwidth_3db": "Hz",
+    "bandwidth_phase90": "Hz", "bandwidth_phase90_without_delay": "Hz",
+}  # fmt: skip
 
 
 def units_of(structure: Structure, units: tuple[str, str]) -> dict[str, str]:
@@ -44,8 +38,7 @@ def units_of(structure: Structure, units: tuple[str, str]) -> dict[str, str]:
         gain = f"{gain or '1'}/s"
     if structure.dc_zeros:
         gain = f"{gain}*s" if gain else "s"
-    own = {"scale_factor": gain, "bias": output, "noise_std": output}
-    return {**_UNITS, "damping_ratio": "", "peak_gain_db": "dB", **own}
+    return {**_UNITS, "scale_factor": gain, "bias": output, "noise_std": output}
 
 
 def system_of(structure: Structure, vector: Real, fs: float) -> RationalDelay:
@@ -109,8 +102,7 @@ def read_figures(
         Covariance of its delay and of the coefficients that may vary.
     """
     system = system_of(structure, vector, fs)
-    marks, peak = _marks_of(structure, system, highest=highest)
-    values = _values(structure, vector, system, marks, peak, fs)
+    values, peak = _values(structure, vector, system, fs=fs, highest=highest)
     by_coefficient = _by_coefficient(structure, vector, fs)
     slopes = _slopes(structure, vector, fs, values)
     slopes |= _slopes_of_marks(structure, system, by_coefficient, values, peak)
@@ -152,19 +144,6 @@ def _slopes(
     return slopes
 
 
-def _marks_of(
-    structure: Structure, system: RationalDelay, *, highest: float | None
-) -> tuple[_Marks, PeakGain | None]:
-    """-90° with the delay and without, and -3 dB; and the peak."""
-    if highest is None or not _is_steady(structure):
-        return (None, None, None), None
-    late = bandwidth_phase(system, highest=highest)
-    if structure.order == 0:
-        return (late, None, None), None
-    split = bandwidth_phase(system, highest=highest, delay=False)
-    return (late, split, bandwidth_3db(system, highest=highest)), peak_gain(system, highest=highest)
-
-
 def figures_of(fit: Fit, *, fs: float, highest: float) -> dict[str, float | None]:
     """Values alone of what `read_parameters` gives with error bars, the noise apart."""
     vector = np.concatenate([fit.theta, fit.linear])
@@ -175,35 +154,38 @@ def figures_at(
     structure: Structure, vector: Real, *, fs: float, highest: float
 ) -> dict[str, float | None]:
     """The same at any parameters, `vector` as `Readings` has it."""
-    system = system_of(structure, vector, fs)
-    marks, peak = _marks_of(structure, system, highest=highest)
-    return _values(structure, vector, system, marks, peak, fs)
+    return _values(structure, vector, system_of(structure, vector, fs), fs=fs, highest=highest)[0]
 
 
 def _values(
-    structure: Structure,
-    vector: Real,
-    system: RationalDelay,
-    marks: _Marks,
-    peak: PeakGain | None,
-    fs: float,
-) -> dict[str, float | None]:
-    """Every figure of a system but the noise."""
-    mode = _lowest_mode(structure, vector)
-    natural, damping = (None, None) if mode is None else _mode_at(vector, mode, fs)
-    return {
+    structure: Structure, vector: Real, system: RationalDelay, *, fs: float, highest: float | None
+) -> tuple[dict[str, float | None], PeakGain | None]:
+    """Every figure of a system but the noise; the peak of its gain."""
+    mode, steady = _lowest_mode(structure, vector), _is_steady(structure)
+    natural = damping = late = split = half = peak = None
+    if mode is not None:  # 1 + c1 s + c2 s²: c2^(-1/2), c1 ω / 2; the vector holds c2 / c1²
+        damping = 0.5 / float(np.sqrt(vector[mode + 1]))
+        natural = 2 * damping * float(np.exp(-vector[mode])) * fs / (2 * np.pi)
+    if steady and highest is not None:
+        late = bandwidth_phase(system, highest=highest)
+        if structure.order:
+            split = bandwidth_phase(system, highest=highest, delay=False)
+            half = bandwidth_3db(system, highest=highest)
+            peak = peak_gain(system, highest=highest)
+    values = {
         "delay": system.delay,
-        "delay_low_frequency": _slope_at_dc(system) if _is_steady(structure) else system.delay,
+        "delay_low_frequency": _slope_at_dc(system) if steady else system.delay,
         "scale_factor": _gain_rate(structure, fs) * float(vector[1 + structure.order]),
         "bias": float(vector[-1]),
         "natural_frequency": natural,
         "damping_ratio": damping,
         "time_constant": dominant_time_constant(system),
-        "bandwidth_phase90": marks[0],
-        "bandwidth_phase90_without_delay": marks[1],
-        "bandwidth_3db": marks[2],
+        "bandwidth_phase90": late,
+        "bandwidth_phase90_without_delay": split,
+        "bandwidth_3db": half,
         "peak_gain_db": None if peak is None else peak.gain_db,
     }
+    return values, peak
 
 
 def _is_steady(structure: Structure) -> bool:
@@ -221,12 +203,6 @@ def _slope_at_dc(system: RationalDelay) -> float:
     first = 0.0 if system.denominator.size < 2 else float(system.denominator[1])
     lead = system.numerator[1] / system.numerator[0] if system.numerator.size > 1 else 0.0
     return float(system.delay + (first - lead) * (system.step or 1.0))
-
-
-def _mode_at(vector: Real, mode: int, fs: float) -> tuple[float, float]:
-    """Natural frequency in Hz and damping ratio of 1 + c1 s + c2 s²: c2^(-1/2), c1 ω / 2."""
-    damping = 0.5 / float(np.sqrt(vector[mode + 1]))  # it holds c2 / c1²
-    return 2 * damping * float(np.exp(-vector[mode])) * fs / (2 * np.pi), damping
 
 
 def _by_coefficient(structure: Structure, vector: Real, fs: float) -> Real:
