@@ -216,13 +216,7 @@ def _by_coefficient(structure: Structure, vector: Real, fs: float) -> Real:
         varied = system.denominator[structure.integrators + 1 :]
         return np.concatenate([[system.delay], system.numerator, varied])
 
-    rows = []
-    for i, step in enumerate(1e-6 * np.maximum(np.abs(vector), 1e-3)):
-        above, below = vector.copy(), vector.copy()
-        above[i] += step
-        below[i] -= step
-        rows.append((coefficients(above) - coefficients(below)) / (2 * step))
-    return np.stack(rows)
+    return gradient(coefficients, vector)
 
 
 def _slopes_of_marks(

@@ -14,16 +14,15 @@ from hmpim.model import RationalDelay, response
 __all__ = ["gradient", "log_slopes", "response_std"]
 
 
-def gradient(function: Callable[[Real], float], at: Real) -> Real:
-    """Derivative of a scalar function by central differences, shape (p,)."""
-    out = np.empty(at.size)
-    for i in range(at.size):
-        step = 1e-6 * max(abs(at[i]), 1e-3)
+def gradient(function: Callable[[Real], float] | Callable[[Real], Real], at: Real) -> Real:
+    """Derivatives by central differences, shape (p,), or (p, q) of a function of q values."""
+    out = []
+    for i, step in enumerate(1e-6 * np.maximum(np.abs(at), 1e-3)):
         up, down = at.copy(), at.copy()
         up[i] += step
         down[i] -= step
-        out[i] = (function(up) - function(down)) / (2 * step)
-    return out
+        out.append((function(up) - function(down)) / (2 * step))
+    return np.array(out)
 
 
 def response_std(system: RationalDelay, covariance: Real, frequency: Real) -> Real:

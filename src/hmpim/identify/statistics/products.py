@@ -20,7 +20,7 @@ from hmpim.identify.statistics.reach import AHEAD
 from hmpim.identify.statistics.run import Run, closed
 from hmpim.identify.statistics.statistics import Statistics
 
-__all__ = ["Moments", "Products"]
+__all__ = ["Moments", "Products", "spectrum_of"]
 
 _FEW = 64
 """Samples at the beginning up to which a convolution is sooner a product with a matrix."""
@@ -90,7 +90,7 @@ class Products:
         self._length = int(scipy.fft.next_fast_len(2 * reach.span + 1, real=True))
         self._runs = runs = tuple(closed(run, reach) for run in statistics.runs)
         self._average = self._averages()
-        self._power = self._spectrum(sum((run.uu for run in runs), np.zeros(reach.span + 1)))
+        self._power = spectrum_of(sum((r.uu for r in runs), np.zeros(reach.span + 1)), self._length)
         self._white = scipy.fft.rfft(self.noise, self._length)
         self._cross = np.stack([self._lagged(run) for run in runs])
         ends = [end for run in runs for end in self._ends_of(run)]
@@ -139,13 +139,6 @@ class Products:
         runs, _, rows = self._inner.shape
         nothing = np.zeros((runs, 0, rows))
         return self._without_bias(np.zeros((0, 0)), nothing, np.zeros(0)).energy
-
-    def _spectrum(self, autocorrelation: Real) -> Real:
-        """Eigenvalues of the circulant that holds the Toeplitz matrix."""
-        around = np.zeros(self._length)
-        around[: autocorrelation.size] = autocorrelation
-        around[-autocorrelation.size + 1 :] += autocorrelation[:0:-1]
-        return np.asarray(scipy.fft.rfft(around).real)
 
     def _lagged(self, run: Run) -> Real:
         """Products of whitened outputs and the whitened input at each tap, (rows + 1, taps)."""
@@ -325,6 +318,14 @@ class Products:
             return np.ones((1 if statistics.bias == "common" else len(statistics.runs), 1))
         sums = [run.vv[:-1, :-1, 0].sum(axis=1) / (run.samples - AHEAD) for run in self._runs]
         return np.stack(sums)
+
+
+def spectrum_of(autocorrelation: Real, length: int) -> Real:
+    """Eigenvalues of the circulant of so many samples that holds a Toeplitz matrix."""
+    around = np.zeros(length)
+    around[: autocorrelation.size] = autocorrelation
+    around[length - autocorrelation.size + 1 :] += autocorrelation[:0:-1]
+    return np.asarray(scipy.fft.rfft(around).real)
 
 
 def _products(spectra: Complex, power: Real, length: int) -> Real:

@@ -11,6 +11,7 @@ import scipy
 from hmpim.identify.arrays import Real
 from hmpim.identify.fitting.start import RoughResponse
 from hmpim.identify.section_iv.spectrum import band_of_levels
+from hmpim.identify.statistics.products import spectrum_of
 from hmpim.identify.statistics.reach import AHEAD
 from hmpim.identify.statistics.statistics import Statistics
 from hmpim.identify.worth import DEEPEST
@@ -56,10 +57,7 @@ def power_of(statistics: Statistics, length: int) -> Real:
     """Power spectrum of the input at length // 2 + 1 frequencies, smoothed by its lag window."""
     uu, _ = correlations(statistics)
     windowed = uu * scipy.signal.windows.blackman(2 * uu.size - 1)[uu.size - 1 :]
-    around = np.zeros(length)
-    around[: uu.size] = windowed
-    around[length - uu.size + 1 :] += windowed[:0:-1]
-    return np.asarray(np.maximum(scipy.fft.rfft(around).real, 0.0))
+    return np.asarray(np.maximum(spectrum_of(windowed, length), 0.0))
 
 
 def excited(statistics: Statistics) -> tuple[float, float]:
@@ -90,10 +88,7 @@ def rough_of(
     uu, yu = correlations(statistics)
     cross = yu[reach.forth - AHEAD :][: reach.taps]
     length = int(scipy.fft.next_fast_len(2 * reach.span + 1, real=True))
-    around = np.zeros(length)
-    around[: uu.size] = uu
-    around[length - uu.size + 1 :] += uu[:0:-1]
-    spectrum = scipy.fft.rfft(around).real
+    spectrum = spectrum_of(uu, length)
     if known is not None:
         made = scipy.fft.irfft(scipy.fft.rfft(known, length) * spectrum, length)
         cross = cross - made[: cross.size]
