@@ -1,7 +1,7 @@
 """Where to begin: a rough response from statistics alone.
 
 The impulse response with the least squared error, of any shape, solves the Toeplitz system of the
-auto- and the cross-correlation; conjugate gradients with FFTs find it, a small ridge keeps it quiet
+auto- and the cross-correlation; least residuals with FFTs find it, a small ridge keeps it quiet
 where nothing is excited. From its transform the starts of the joint fit are found.
 """
 
@@ -21,7 +21,8 @@ __all__ = ["correlations", "excited", "power_of", "rough_of"]
 _RIDGE = 1e-5
 """Of the greatest power of the input; where there is less, the response is pulled to 0."""
 
-_STEPS = 200
+_STEPS, _PRECISION = 200, 1e-7
+"""Of the system's solution, which is a start alone."""
 
 
 def correlations(statistics: Statistics) -> tuple[Real, Real]:
@@ -115,27 +116,14 @@ def rough_of(
 
 
 def _solved(spectrum: Real, ridge: float, right: Real, length: int) -> Real:
-    """Conjugate gradients on a Toeplitz matrix and a ridge."""
+    """Solution of a Toeplitz system, made not quite definite by the ends of a run, and a ridge."""
+    power, most = float(spectrum.max()), float(np.abs(right).max()) or 1.0  # of any unit
+    spectrum, ridge = spectrum / power, ridge / power
 
     def times(x: Real) -> Real:
-        return np.asarray(
-            scipy.fft.irfft(scipy.fft.rfft(x, length) * spectrum, length)[: x.size] + ridge * x
-        )
+        made = scipy.fft.irfft(scipy.fft.rfft(x, length) * spectrum, length)
+        return np.asarray(made[: x.size] + ridge * x)
 
-    power, most = float(spectrum.max()), float(np.abs(right).max())
-    spectrum, ridge = spectrum / power, ridge / power  # of any unit
-    x, left = np.zeros_like(right), right / (most or 1.0)
-    way, size = left.copy(), float(left @ left)
-    least = 1e-12 * size
-    for _ in range(_STEPS):
-        if size <= least:
-            break
-        turned = times(way)
-        slope = float(way @ turned)
-        if slope <= 0.0:  # ends of a run make the matrix not quite definite
-            break
-        step = size / slope
-        x, left = x + step * way, left - step * turned
-        before, size = size, float(left @ left)
-        way = left + size / before * way
-    return x * (most / power)
+    matrix = scipy.sparse.linalg.LinearOperator((right.size,) * 2, matvec=times, dtype=float)
+    x, _ = scipy.sparse.linalg.minres(matrix, right / most, rtol=_PRECISION, maxiter=_STEPS)
+    return np.asarray(x * (most / power))
