@@ -18,8 +18,6 @@ from hmpim.identify.worth import FEW
 
 __all__ = ["Errors", "Fits", "descended", "errors_of", "fitted_all"]
 
-Flags = Mask
-
 _STEPS = 12
 
 _NEGLIGIBLE = 1e-6
@@ -61,18 +59,18 @@ def fitted_all(fleet: Fleet, centred: Real, means: Real, power: Real) -> list[Fi
 
 def _fitted(fleet: Fleet, member: Member, z: Real, means: Real, power: Real, start: Real) -> Fits:
     """Fit all records under one assumption."""
-    outside = np.maximum(power - _dots(z, z), 0.0)
+    outside = np.maximum(power - np.vecdot(z, z), 0.0)
     theta = descended(member.surface, z, outside, start, samples=fleet.u.size)
     value = member.surface.values(theta)
     g = value[:, :-1]
-    gain = _dots(z, g) / _dots(g, g)
+    gain = np.vecdot(z, g) / np.vecdot(g, g)
     left = z - gain[:, None] * g
     values = fleet.figures.values(theta)
     return Fits(
         member=member,
         theta=theta,
         gain=gain,
-        cost=outside + _dots(left, left),
+        cost=outside + np.vecdot(left, left),
         left=left,
         figures={
             **dict(zip(fleet.names, values.T, strict=True)),
@@ -80,11 +78,6 @@ def _fitted(fleet: Fleet, member: Member, z: Real, means: Real, power: Real, sta
             "bias": means - gain * value[:, -1],
         },
     )
-
-
-def _dots(a: Real, b: Real) -> Real:
-    """Product of each row of one with the row of the other."""
-    return np.asarray(np.einsum("ij,ij->i", a, b))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -98,7 +91,7 @@ class Errors:
     variance: Real
     freedom: int
     deviations: Mapping[str, Real]
-    exact: Flags
+    exact: Mask
     """Whether the polynomials of what is read off are exact enough."""
 
 
@@ -117,7 +110,7 @@ def errors_of(fleet: Fleet, fit: Fits, some: NDArray[np.intp]) -> Errors:
     deviations = np.sqrt(np.maximum(spread, 0.0))
     # The bias is the mean less what the model makes of it; the mean's own error is apart.
     by_mean = -np.concatenate([gain[:, None] * slope[:, :, -1], value[:, -1:]], axis=1)
-    of_bias = _dots(by_mean, (covariance @ by_mean[:, :, None])[:, :, 0]) + variance / n
+    of_bias = np.vecdot(by_mean, (covariance @ by_mean[:, :, None])[:, :, 0]) + variance / n
     return Errors(
         rows=rows,
         inner=inner,
@@ -172,8 +165,8 @@ def _step(surface: Surface, theta: Real, z: Real, outside: Real) -> tuple[Real, 
     """Cost of each record, the step from there, and by how much it lowers the cost."""
     value, slope = surface.at(theta)
     g, dg = value[:, :-1], slope[:, :, :-1]
-    square = _dots(g, g)
-    gain = _dots(z, g) / square
+    square = np.vecdot(g, g)
+    gain = np.vecdot(z, g) / square
     left = z - gain[:, None] * g
     # The slopes less what the gain does; that has no part in what is left.
     moment = gain[:, None] * (dg @ left[:, :, None])[:, :, 0]
@@ -182,4 +175,4 @@ def _step(surface: Surface, theta: Real, z: Real, outside: Real) -> tuple[Real, 
     gram *= (gain**2)[:, None, None]
     gram += 1e-9 * np.einsum("iaa->ia", gram)[:, :, None] * np.eye(gram.shape[1])
     fresh = np.asarray(np.linalg.solve(gram, moment[:, :, None])[:, :, 0], dtype=np.float64)
-    return outside + _dots(left, left), fresh, _dots(fresh, moment)
+    return outside + np.vecdot(left, left), fresh, np.vecdot(fresh, moment)

@@ -49,8 +49,6 @@ __all__ = [
     "widen",
 ]
 
-Flags = Mask
-
 _ASKS = 0.98 * ONE_SIDED
 """Standard deviations from which one more pole is asked for: a little early, as the basis is not
 exact; the fit to the record itself then decides."""
@@ -101,7 +99,7 @@ class Column:
         """Another to write to."""
         return Column(**{end: getattr(self, end).copy() for end in _ENDS}, unit=self.unit)
 
-    def put(self, some: NDArray[np.intp], other: "Column", kept: Flags) -> None:
+    def put(self, some: NDArray[np.intp], other: "Column", kept: Mask) -> None:
         """Take those records of another that are kept."""
         for end in _ENDS:
             getattr(self, end)[some[kept]] = getattr(other, end)[kept]
@@ -143,13 +141,13 @@ class Group:
 
     fit: Fits
     some: NDArray[np.intp]
-    others: list[tuple[Fits, Flags]]
+    others: list[tuple[Fits, Mask]]
     errors: Errors
     residual: Real
     alone: dict[str, Column]
     spanned: dict[str, Column]
     tails: dict[int, Tails]
-    sound: Flags
+    sound: Mask
     codes: list[tuple[str, ...]]
 
     def has_tail(self, k: int) -> bool:
@@ -183,7 +181,7 @@ class FleetFit:
     """
 
     columns: Mapping[str, Column]
-    sound: Flags
+    sound: Mask
     intersample: tuple[Intersample, ...]
     codes: tuple[tuple[str, ...], ...]
     fit_percent: Real
@@ -209,7 +207,7 @@ def fit_fleet(fleet: Fleet, outputs: Real, *, units: tuple[str, str] = ("", ""))
     count, n = outputs.shape
     means = outputs.mean(axis=1)
     centred = outputs - means[:, None]
-    power = np.einsum("ij,ij->i", centred, centred)
+    power = np.vecdot(centred, centred)
     fits = fitted_all(fleet, centred, means, power)
     behind, chosen = _weighed(fleet, fits, n)
     names = (*fleet.names, "scale_factor", "bias", "noise_std")
@@ -262,7 +260,7 @@ def _told(
     fleet: Fleet,
     fit: Fits,
     some: NDArray[np.intp],
-    others: list[tuple[Fits, Flags]],
+    others: list[tuple[Fits, Mask]],
     outputs: Real,
     units: Mapping[str, str],
 ) -> Group:
@@ -280,8 +278,7 @@ def _told(
             rival.member, there, rival.gain[some], errors.variance, off=PART
         )
         apart |= stays & (np.abs(there[:, 0] - theta[:, 0]) > FEW)
-    if "natural_frequency" in fleet.names:  # beyond the band no peak is told
-        sound &= fit.figures["natural_frequency"][some] < fleet.highest
+    sound &= fit.figures["natural_frequency"][some] < fleet.highest  # beyond it no peak is told
     asked = _asks_for_a_pole(fit, some, errors)
     sound &= asked > -_CLOSE
     model = fit.gain[some, None] * fit.member.surface.values(theta)[:, :-1] @ fit.member.basis
@@ -327,7 +324,7 @@ def _columns(
     fleet: Fleet,
     fit: Fits,
     some: NDArray[np.intp],
-    others: list[tuple[Fits, Flags]],
+    others: list[tuple[Fits, Mask]],
     errors: Errors,
     units: Mapping[str, str],
 ) -> tuple[dict[str, Column], dict[str, Column]]:
@@ -375,7 +372,7 @@ def widen(columns: dict[str, Column], i: int, own: Parameters, tails: Parameters
         column.low[i], column.high[i] = low, high
 
 
-def _is_wide(column: Column) -> Flags:
+def _is_wide(column: Column) -> Mask:
     """Whether what several models allow is no figure any more."""
     return np.asarray(
         np.isnan(column.std) & (column.high - column.low > PART * np.abs(column.value))
@@ -387,20 +384,18 @@ def _asks_for_a_pole(fit: Fits, some: NDArray[np.intp], errors: Errors) -> Real:
     row = fit.gain[some, None] * fit.member.grown.values(fit.theta[some])
     along = (errors.inner @ (errors.rows @ row[:, :, None]))[:, :, 0]
     own = row - np.einsum("ia,iaj->ij", along, errors.rows)  # what no other parameter can do
-    score = np.einsum("ij,ij->i", own, fit.left[some])
-    power = np.einsum("ij,ij->i", own, own) * fit.cost[some] / (errors.freedom - 1)
+    score = np.vecdot(own, fit.left[some])
+    power = np.vecdot(own, own) * fit.cost[some] / (errors.freedom - 1)
     return np.asarray(score / np.sqrt(np.maximum(power, np.finfo(float).tiny)))
 
 
-def _is_plain(
-    member: Member, theta: Real, gain: Real, variance: Real, *, off: float = FEW
-) -> Flags:
+def _is_plain(member: Member, theta: Real, gain: Real, variance: Real, *, off: float = FEW) -> Mask:
     """Whether each unit lies inside the box, and the surface is exact enough for its noise."""
     inside = member.surface.holds(theta) & np.isfinite(theta).all(axis=1)
     return np.asarray(inside & (np.abs(gain) * member.lost <= off * np.sqrt(variance)))
 
 
-def _leaves_noise(fleet: Fleet, theta: Real, residual: Real) -> Flags:
+def _leaves_noise(fleet: Fleet, theta: Real, residual: Real) -> Mask:
     """Which residuals are white noise that does not follow the stimulus."""
     if residual.shape[0] == 0:
         return np.zeros(0, dtype=bool)
@@ -415,7 +410,7 @@ def _leaves_noise(fleet: Fleet, theta: Real, residual: Real) -> Flags:
     return np.asarray(are_white(residual, spectra) & (probability > FALSE_ALARM))
 
 
-def _is_continuous(outputs: Real, fs: float) -> Flags:
+def _is_continuous(outputs: Real, fs: float) -> Mask:
     """Which outputs show no rounding, hold, level or repetition: most take no value twice."""
     ordered = np.sort(outputs, axis=1)
     plain = (ordered[:, 1:] != ordered[:, :-1]).all(axis=1)
