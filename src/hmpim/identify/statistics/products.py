@@ -6,10 +6,8 @@ count lie at the two ends of each run, where the input itself is kept: they are 
 The bias is solved for each run, or for all, and taken off too.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from weakref import ref
 
 import numpy as np
 import scipy
@@ -59,10 +57,6 @@ class Moments:
     bias_variance: float
 
 
-def _not_made() -> None:
-    """In place of what was not made, or is not used any more."""
-
-
 class Products:
     """Products over the samples that count, under one noise model.
 
@@ -81,7 +75,6 @@ class Products:
         self.statistics, self.skipped = statistics, skipped
         self.noise = np.ones(1) if noise is None else noise
         self._plain: Products | None = None
-        self._last: Callable[[], Products | None] = _not_made
         reach = statistics.reach
         self.order = self.noise.size - 1
         self.first = self.order + skipped
@@ -109,24 +102,18 @@ class Products:
         self._inner = np.stack([self._outputs(run) for run in runs])
         self._inner -= self._out @ self._out.transpose(0, 2, 1)
 
-    def __getstate__(self) -> dict[str, object]:
-        """Without the last other noise model: what is only referred to does not go along."""
-        return {**self.__dict__, "_last": _not_made}
-
     @property
     def plain(self) -> "Products":
         """The same, the noise taken for white."""
         return self if self._plain is None else self._plain
 
     def whitened(self, noise: Real) -> "Products":
-        """The same samples under another noise model; the last is found again while it is used."""
+        """The same samples under another noise model."""
         if noise.size == 1:
             return self.plain
-        last = self.plain._last()
-        if last is None or not np.array_equal(last.noise, noise):
-            last = Products(self.statistics, skipped=self.skipped, noise=noise)
-            last._plain, self.plain._last = self.plain, ref(last)
-        return last
+        other = Products(self.statistics, skipped=self.skipped, noise=noise)
+        other._plain = self.plain
+        return other
 
     @property
     def counted(self) -> int:
