@@ -50,14 +50,8 @@ def settled_between(
 ) -> Identification:
     """Identify, what folds between the clocks taken out by the models found, until it stays.
 
-    Parameters
-    ----------
-    record : Record
-        With the outputs at their own stamps.
-    aligned : Aligned
-        As `uniform` gives it, with waveforms.
-    identified : callable
-        Identifies an aligned record; by plain structures only if the second argument is true.
+    The record has the outputs at their own stamps; `identified` identifies an aligned record, by
+    plain structures only if its second argument is true.
     """
     names = ", ".join(repr(signal.name) for signal in aligned.inputs)
     said = _settled_finding(names, _STILL / aligned.fs)

@@ -26,15 +26,7 @@ _EARLIEST = -1.0
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Lag:
-    """What the record says of delay and lag together, in samples.
-
-    Parameters
-    ----------
-    delay, delay_std : float
-        Mean and standard deviation over all lags.
-    time_constant, time_constant_std : float
-        Likewise.
-    """
+    """What the record says of delay and lag together, in samples: mean and deviation over lags."""
 
     delay: float
     delay_std: float

@@ -43,24 +43,10 @@ def cover_bends(
 ) -> Mask:
     """Let intervals cover a nonlinearity that may be there; return where no more is to be said.
 
-    Parameters
-    ----------
-    fleet, group : Fleet, Group
-        What the records share, and their fits.
-    some : integer ndarray, shape (k,)
-        Which records of the group.
-    outputs : ndarray, shape (k, n)
-        Theirs.
-    shapes : ndarray, shape (m, n)
-        From `shapes_of`.
-    columns : mapping of str to Column
-        Of all records, those of the group among them; what is widened is written there.
-
-    Returns
-    -------
-    ndarray of bool, shape (k,)
-        False where a nonlinearity brings more than chance would, or comes beside one more pole or
-        zero: such a record is for `identify`.
+    Of `some` k records of the group, with outputs (k, n), and `shapes`, (m, n), from `shapes_of`.
+    What is widened is written to `columns`, which are of all records. False where a nonlinearity
+    brings more than chance would, or comes beside one more pole or zero: such a record is for
+    `identify`.
     """
     member = group.fit.member
     found = group.residual[some] @ shapes.T / np.sqrt(group.errors.variance[some, None])

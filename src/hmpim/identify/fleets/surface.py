@@ -79,19 +79,7 @@ class Surface:
 
     @classmethod
     def fitted(cls, low: Real, high: Real, places: Real, values: Real, *, degree: int) -> "Surface":
-        """Fit the polynomial.
-
-        Parameters
-        ----------
-        low, high : ndarray, shape (p,)
-            The box.
-        places : ndarray, shape (m, p)
-            From `places_in`.
-        values : ndarray, shape (m, k)
-            The function there.
-        degree : int
-            The total degree.
-        """
+        """Fit the polynomial to a function's values, (m, k), at places from `places_in`, (m, p)."""
         powers = _powers(low.size, degree)
         rows, _ = _products(_scaled(places, low, high), powers)
         weights = np.linalg.lstsq(rows[:-_CHECKS], values[:-_CHECKS], rcond=None)[0]

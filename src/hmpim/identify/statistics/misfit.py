@@ -33,16 +33,9 @@ _STEPS = 48
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Asked:
-    """Responses that are asked for, made once for several looks at a run.
+    """Responses that are asked for about a delay, in samples, made once for several looks at a run.
 
-    Parameters
-    ----------
-    delay : float
-        About which, in samples.
-    rows : ndarray, shape (2 groups, taps)
-        The responses.
-    transforms : complex ndarray
-        Theirs, for products without a noise model.
+    `rows` has shape (2 groups, taps); `transforms` are theirs, for products without a noise model.
     """
 
     delay: float
