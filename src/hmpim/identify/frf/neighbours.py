@@ -113,16 +113,6 @@ class Windows:
         at = np.arange(self.near.size) - first[self.near]
         return slot, self.near * most + at
 
-    def forms(self, vectors: Complex, inverse: Complex) -> Real:
-        """Return v V vᴴ, (c, k), for vectors of each centre, (c, k, q).
-
-        V, (w, q, q), is that of its window.
-        """
-        slot, centres = self.slots()
-        kinds, q = vectors.shape[1:]
-        told = forms(vectors[slot].reshape(slot.shape[0], -1, q), inverse)
-        return told.reshape(-1, kinds)[centres]
-
     def without_dc(self) -> Real:
         """Return 1 for bins that count and 0 at DC, shape (w, s)."""
         return np.asarray((self.start[:, None] + np.arange(self.size)) != 0, dtype=np.float64)
@@ -282,7 +272,7 @@ def windows_around(centre: Integer, bins: int, width: int) -> Windows:
     crosses = (start <= 0) & (start + size > 0)
     return Windows(
         start=start,
-        x=np.linspace(-1.0, 1.0, size),
+        x=np.arange(1 - size, size, 2) / (size - 1.0),
         counted=size - crosses.astype(np.int64),
         near=near,
         place=centre - start[near],

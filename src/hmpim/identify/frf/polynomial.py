@@ -5,13 +5,20 @@ Vandersteen, Barbé and Pintelon, "Nonparametric preprocessing in system identif
 """
 
 from dataclasses import dataclass
+from functools import cache, partial
 
 import numpy as np
-from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from hmpim.identify.arrays import Complex, Real
-from hmpim.identify.frf.neighbours import LocalFit, Spectra, Windows, mirrored, windows_around
+from hmpim.identify.frf.neighbours import (
+    Integer,
+    LocalFit,
+    Spectra,
+    Windows,
+    mirrored,
+    windows_around,
+)
 from hmpim.identify.kept import kept
 
 __all__ = ["polynomial_fits"]
@@ -22,44 +29,56 @@ _NOTHING = 1e-24
 # Products of bins held at once, about 80 MB.
 _CHUNK = 1_000_000
 
-_Way = tuple[Complex, Real, Real]
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Way:
+    """What the input says of all windows with T, or without: the columns of G, then those of T.
+
+    Parameters
+    ----------
+    inverse : ndarray, shape (w, q, q)
+        Of the normal equations.
+    spread, leverage : ndarray, shape (k, c)
+        Variance of G where the noise of a bin is 1, and what a centre's own bin weighs in its fit.
+    freedom : integer ndarray, shape (w,)
+        Bins of a window less coefficients.
+    """
+
+    inverse: NDArray[np.inexact]
+    spread: Real
+    leverage: Real
+    freedom: Integer
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class _Solver:
-    """What the input says of one window width: first the columns of G, then those of T.
+    """What the input says of windows of k widths, those of each width after the last's.
 
     Parameters
     ----------
-    windows : Windows
-        Of this width.
-    powers : ndarray, shape (s, order + 1)
+    windows : tuple of Windows
+        Of each width.
+    powers : tuple of ndarray, shape (s, order + 1)
         x^p on a window's bins.
-    here : ndarray, shape (c, order + 1)
+    near : integer ndarray, shape (k, c)
+        Window of each centre.
+    here : ndarray, shape (k, c, order + 1)
         x^p at each centre.
     size : ndarray, shape (w,)
         By what G's columns are scaled.
-    row : complex ndarray, shape (c, q)
+    row : complex ndarray, shape (k, c, q)
         Conjugates of the columns at each centre.
-    ways : tuple of (inverse, spread, leverage)
-        With T, and without: inverse of the normal equations, (w, q, q), variance of G where the
-        noise of a bin is 1, and what a centre's own bin weighs in its fit, both (c,).
+    ways : tuple of _Way
+        With T, and without.
     """
 
-    windows: Windows
-    powers: Real
+    windows: tuple[Windows, ...]
+    powers: tuple[Real, ...]
+    near: Integer
     here: Real
     size: Real
     row: Complex
     ways: tuple[_Way, ...]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class _Right:
-    """What the outputs say of each window: right sides, (..., w, q), and power, (..., w)."""
-
-    right: Complex
-    power: Real
 
 
 def polynomial_fits(
@@ -95,97 +114,122 @@ def polynomial_fits(
     >>> [abs(fit.response[0] - 3).round(6).item() for fit in fits]
     [0.0, 0.0]
     """
-    fits: list[LocalFit] = []
     reach = min(max(widths), spectra.u.size - 1)
     power = spectra.y.real**2 + spectra.y.imag**2
     products = mirrored(np.stack((np.conj(spectra.u) * spectra.y, spectra.y, power)), reach)
-    for width in widths:
-        solver = _solver(spectra.u, centre, width, order)
-        right = _right_of(products, solver, reach)
-        fits.extend(_solve(solver, way, right, spectra.y[..., centre]) for way in solver.ways)
-    return fits
+    solver = _solver(spectra.u, centre, widths, order)
+    sums = [
+        _moments(products, windows, reach, powers)
+        for windows, powers in zip(solver.windows, solver.powers, strict=True)
+    ]
+    both, alone, total = np.concatenate(sums, axis=-2)
+    right = np.concatenate((both / solver.size[:, None], alone), axis=-1)
+    pairs = [
+        _solve(solver, way, right, total[..., 0].real, spectra.y[..., None, centre])
+        for way in solver.ways
+    ]
+    return [fit for pair in zip(*pairs, strict=True) for fit in pair]
 
 
-@kept
-def _solver(u: Complex, centre: NDArray[np.int64], width: int, order: int) -> _Solver:
-    windows, terms = windows_around(centre, u.size, width), order + 1
-    reach, size = min(width, u.size - 1), windows.size
-    powers = windows.powers(2 * order)
+@partial(kept, long=True)
+def _solver(u: Complex, centre: NDArray[np.int64], widths: tuple[int, ...], order: int) -> _Solver:
+    windows, terms = tuple(windows_around(centre, u.size, width) for width in widths), order + 1
+    powers = [own.powers(2 * order) for own in windows]
+    reach = min(max(widths), u.size - 1)
     folded = mirrored(u, reach)
-    squares, own = _moments(
-        np.stack((np.abs(folded) ** 2 + 0j, np.conj(folded))), windows, reach, powers
-    )
-    pair = np.add.outer(np.arange(terms), np.arange(terms))
-    ones = np.repeat(powers.sum(axis=0)[None], windows.start.size, axis=0)
-    crosses = windows.counted < size
-    ones[crosses] -= powers[-windows.start[crosses]]
+    power = np.abs(folded) ** 2
+    # What all bins but that at DC say of T.
+    products = np.stack((power + 0j, np.conj(folded), (np.arange(folded.size) != reach) + 0j))
+    sums = [_moments(products, own, reach, x) for own, x in zip(windows, powers, strict=True)]
+    squares, own, ones = np.concatenate(sums, axis=-2)
+    counted = np.concatenate([one.counted for one in windows])
     # G's columns are scaled to the size of T's, whatever the unit of U; where there is no U at
     # all, G comes out as zero with a huge error.
-    floor = _NOTHING * float(np.max(np.abs(folded) ** 2))
-    scale = np.sqrt(np.maximum(squares[:, 0].real / windows.counted, floor))
-    gram = np.empty((windows.start.size, 2 * terms, 2 * terms), dtype=np.complex128)
-    gram[:, :terms, :terms] = squares[:, pair] / (scale**2)[:, None, None]
-    cross = own[:, pair] / scale[:, None, None]
+    size = np.sqrt(np.maximum(squares[:, 0].real / counted, _NOTHING * float(np.max(power))))
+    pair = np.add.outer(np.arange(terms), np.arange(terms))
+    gram = np.empty((size.size, 2 * terms, 2 * terms), dtype=np.complex128)
+    gram[:, :terms, :terms] = squares[:, pair] / (size**2)[:, None, None]
+    cross = own[:, pair] / size[:, None, None]
     gram[:, :terms, terms:] = cross
     gram[:, terms:, :terms] = np.conj(cross.swapaxes(1, 2))
     gram[:, terms:, terms:] = ones[:, pair]
-    gram[:, np.arange(2 * terms), np.arange(2 * terms)] += _RIDGE * size
-    here = windows.x[windows.place][:, None] ** np.arange(terms)
-    row = np.concatenate((here * (u[centre] / scale[windows.near])[:, None], here + 0j), axis=1)
+    bins = np.repeat([one.size for one in windows], [one.start.size for one in windows])
+    gram.reshape(bins.size, -1)[:, :: 2 * terms + 1] += _RIDGE * bins[:, None]
+    first = np.cumsum([0, *(one.start.size for one in windows[:-1])])
+    near = np.stack([one.near for one in windows]) + first[:, None]
+    here = np.stack([x[one.place] for one, x in zip(windows, powers, strict=True)])
+    seen = u[centre] / size[near]
+    inverse = np.linalg.inv(gram)
+    plain = np.linalg.inv(gram[:, :terms, :terms].real)
+    mixed = inverse[:, :terms, terms:]
+    kinds = (inverse[:, :terms, :terms], mixed, mixed.imag, inverse[:, terms:, terms:], plain)
+    blocks = np.stack([kind.real.reshape(bins.size, -1) for kind in kinds], axis=1)
+    told = np.einsum("kcij,kcj->ikc", (blocks @ _collected(order))[near], here)
+    alone, real, imaginary, rest, lone = told
+    squared = seen.real**2 + seen.imag**2
     return _Solver(
         windows=windows,
-        powers=np.ascontiguousarray(powers[:, :terms]),
-        here=here,
-        size=scale,
-        row=np.conj(row),
-        ways=tuple(_way(windows, gram, here, row, columns) for columns in (2 * terms, terms)),
+        powers=tuple(np.ascontiguousarray(x[:, :terms]) for x in powers),
+        near=near,
+        here=here[..., :terms],
+        size=size,
+        row=np.conj(np.concatenate((here[..., :terms] * seen[..., None], here[..., :terms]), -1)),
+        ways=(
+            _Way(
+                inverse=inverse,
+                spread=np.maximum(alone, 0.0),
+                leverage=squared * alone + 2 * (seen.real * real - seen.imag * imaginary) + rest,
+                freedom=counted - 2 * terms,
+            ),
+            _Way(
+                inverse=plain,
+                spread=np.maximum(lone, 0.0),
+                leverage=squared * lone,
+                freedom=counted - terms,
+            ),
+        ),
     )
 
 
-def _way(windows: Windows, gram: Complex, here: Real, row: Complex, columns: int) -> _Way:
-    """Inverse, spread and leverage with the first `columns` columns."""
-    inverse = np.asarray(np.linalg.inv(gram[:, :columns, :columns]), dtype=np.complex128)
-    pair = np.zeros((windows.near.size, 2, columns), dtype=np.complex128)
-    pair[:, 0, : here.shape[1]] = here
-    pair[:, 1] = row[:, :columns]
-    forms = windows.forms(pair, inverse)
-    return inverse, np.maximum(forms[:, 0], 0.0), forms[:, 1]
+@cache
+def _collected(order: int) -> Real:
+    """Sums the coefficients of x^p x^r in a matrix by powers of x, ((order + 1)², 2 order + 1)."""
+    index = np.arange(order + 1)
+    return np.asarray(np.add.outer(index, index).reshape(-1, 1) == np.arange(2 * order + 1)) * 1.0
 
 
 def _moments(products: Complex, windows: Windows, reach: int, powers: Real) -> Complex:
     """Σ A x^p over each window, (..., w, p), of products A, (..., b), that `mirrored` made."""
-    views = sliding_window_view(products, windows.size, axis=-1)
     start = windows.start + reach
-    chunk = max(_CHUNK // windows.size, 1)
-    some = [views[..., start[k : k + chunk], :] @ powers for k in range(0, start.size, chunk)]
-    return np.concatenate(some, axis=-2)
+    chunk, index = max(_CHUNK // windows.size, 1), np.arange(windows.size)
+    some = (start[k : k + chunk, None] + index for k in range(0, start.size, chunk))
+    parts = [products.take(here, axis=-1) @ powers for here in some]
+    return parts[0] if len(parts) == 1 else np.concatenate(parts, axis=-2)
 
 
-def _right_of(products: Complex, solver: _Solver, reach: int) -> _Right:
-    both, alone, power = _moments(products, solver.windows, reach, solver.powers)
-    return _Right(
-        right=np.concatenate((both / solver.size[:, None], alone), axis=-1),
-        power=power[..., 0].real,
-    )
+def _solve(solver: _Solver, way: _Way, right: Complex, power: Real, y: Complex) -> list[LocalFit]:
+    """Solve the normal equations of one way, and read off each centre; a fit of each width.
 
-
-def _solve(solver: _Solver, way: _Way, of_output: _Right, y: Complex) -> LocalFit:
-    """Solve the normal equations of one way, and read off each centre."""
-    inverse, spread, leverage = way
-    columns, terms = inverse.shape[1], solver.here.shape[1]
-    windows, near, row = solver.windows, solver.windows.near, solver.row
-    right = of_output.right[..., :columns]
-    theta = (inverse @ right[..., None])[..., 0]
-    left = of_output.power - np.vecdot(right, theta).real
+    `right` are right sides with T, (..., w, q), and `power` is that of the output, (..., w).
+    """
+    columns, terms = way.inverse.shape[-1], solver.here.shape[-1]
+    near, right = solver.near, right[..., :columns]
+    theta = (way.inverse @ right[..., None])[..., 0]
+    left = power - np.vecdot(right, theta).real
     # The difference of two nearly equal sums is never less than its rounding.
-    left = np.maximum(left, 1e-15 * of_output.power)
-    noise = left / np.maximum(windows.counted - columns, 1)
+    noise = np.maximum(left, 1e-15 * power) / np.maximum(way.freedom, 1)
     theta, size = theta.take(near, axis=-2), solver.size[near]
-    missed = y - np.vecdot(row[:, :columns], theta)
-    return LocalFit(
-        response=np.vecdot(solver.here, theta[..., :terms]) / size,
-        spread=spread / size**2,
-        noise=noise.take(near, axis=-1),
-        power=size**2,
-        prediction_error=(missed.real**2 + missed.imag**2) / np.maximum(1.0 - leverage, 1e-6) ** 2,
-    )
+    missed = y - np.vecdot(solver.row[..., :columns], theta)
+    response = np.vecdot(solver.here, theta[..., :terms]) / size
+    noise, spread, weight = noise.take(near, axis=-1), way.spread / size**2, size**2
+    error = (missed.real**2 + missed.imag**2) / np.maximum(1.0 - way.leverage, 1e-6) ** 2
+    return [
+        LocalFit(
+            response=response[..., k, :],
+            spread=spread[k],
+            noise=noise[..., k, :],
+            power=weight[k],
+            prediction_error=error[..., k, :],
+        )
+        for k in range(near.shape[0])
+    ]

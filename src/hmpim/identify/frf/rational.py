@@ -108,8 +108,8 @@ class RationalSolution:
 
 def _at(values: NDArray[Any], place: Integer) -> NDArray[Any]:
     """Values on windows, (w, r, s), at places of each, (w, k); shape (w, r, k)."""
-    windows, records = np.ogrid[: values.shape[0], : values.shape[1]]
-    return np.asarray(values[windows[..., None], records[..., None], place[:, None]])
+    # The two indices stand apart, so that what they choose comes first.
+    return np.asarray(values[np.arange(place.shape[0])[:, None], :, place].swapaxes(1, 2))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -238,49 +238,24 @@ def solved(gram: Complex, right: Complex) -> tuple[Complex, Complex]:
     >>> x.real.round(9).tolist()
     [[0.5]]
     """
-    a, scale = _scaled(gram)
-    q = a.shape[0]
-    # Gauss and Jordan, of all systems at once; positive definite ones need no pivots.
-    for k in range(q):
-        row, column = a[k] / _pivot(a[k, k]), a[:, k].copy()
-        row[k] = 1.0 / _pivot(a[k, k])
-        column[k] = 0.0
-        a[:, k] = 0.0
-        a -= column[:, None] * row
-        a[k] = row
-    a *= scale[:, None] * scale
-    inverse: Complex = np.ascontiguousarray(np.moveaxis(a, -1, 0)).reshape(gram.shape)
+    scaled, scale = _scaled(gram)
+    inverse = np.linalg.inv(scaled)
+    inverse *= scale[..., :, None] * scale[..., None, :]
     return inverse, (inverse @ right)[..., 0]
 
 
 def _solution(gram: Complex, right: Complex) -> Complex:
-    """Solution alone, in a third of the time."""
+    """Solution alone, in half of the time."""
     scaled, scale = _scaled(gram)
-    q = scaled.shape[0]
-    a = np.concatenate((scaled, (right.reshape(-1, q).T * scale)[:, None]), axis=1)
-    for k in range(q):
-        row = a[k, k + 1 :]
-        row /= _pivot(a[k, k])
-        a[k + 1 :, k + 1 :] -= a[k + 1 :, k, None] * row
-    x = a[:, q]
-    for k in range(q - 1, 0, -1):
-        x[:k] -= a[:k, k] * x[k]
-    return np.ascontiguousarray((x * scale).T).reshape(right.shape[:-1])
-
-
-def _pivot(values: Complex) -> Real:
-    """What rounding has left of a pivot is at least that."""
-    return np.maximum(values.real, _RIDGE)
+    return np.asarray(np.linalg.solve(scaled, right * scale[..., None])[..., 0] * scale)
 
 
 def _scaled(gram: Complex) -> tuple[Complex, Real]:
-    """Normal equations of columns of size 1, (q, q, n), and by what each was multiplied, (q, n)."""
+    """Normal equations of columns of size 1, (..., q, q), and by what each was multiplied."""
     q = gram.shape[-1]
-    scaled = np.moveaxis(gram.reshape(-1, q, q), 0, -1).copy()
-    index = np.arange(q)
-    scale = 1.0 / np.sqrt(np.maximum(scaled[index, index].real, 1e-300))
-    scaled *= scale[:, None] * scale
-    scaled[index, index] += _RIDGE * q
+    scale = 1.0 / np.sqrt(np.maximum(gram.diagonal(axis1=-2, axis2=-1).real, 1e-300))
+    scaled = gram * (scale[..., :, None] * scale[..., None, :])
+    scaled.reshape(-1, q * q)[:, :: q + 1] += _RIDGE * q
     return scaled, scale
 
 
