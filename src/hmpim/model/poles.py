@@ -15,6 +15,7 @@ each checks the other.
 In this module time is counted in samples.
 """
 
+from dataclasses import replace
 from functools import cache, cached_property
 from math import factorial, floor
 from typing import Any
@@ -333,6 +334,8 @@ def rational_response(
 ) -> Real:
     """Response of e^(-sτ) B(s)/A(s) to an input's deviation from its first sample, from rest.
 
+    Or to many inputs at once, from `prepare_input` together.
+
     Parameters
     ----------
     source, delay
@@ -342,7 +345,7 @@ def rational_response(
 
     Returns
     -------
-    ndarray, shape (n,)
+    ndarray, shape (..., n)
 
     Examples
     --------
@@ -356,7 +359,13 @@ def rational_response(
     found = expanded(numerator, denominator)
     if found is None:
         rows = delayed_response(source, delay=delay, denominator=denominator, powers=numerator.size)
-        return np.asarray(numerator @ rows)
+        return np.asarray(np.tensordot(numerator, rows, 1))
     poles, residues, through = found
-    answers = PoleResponses(source, delay, poles)
-    return np.asarray(answers.summed(residues[None], direct=np.array([through]))[0])
+    direct = np.array([through])
+    each = [
+        PoleResponses(replace(source, coefficients=own), delay, poles).summed(
+            residues[None], direct=direct
+        )
+        for own in np.atleast_2d(source.coefficients)
+    ]
+    return np.reshape(each, (*source.coefficients.shape[:-1], source.samples))

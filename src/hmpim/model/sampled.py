@@ -62,7 +62,7 @@ class SampledInput:
 
     Parameters
     ----------
-    coefficients : ndarray, shape (oversampling * (n + 2 * margin),)
+    coefficients : ndarray, shape (..., oversampling * (n + 2 * margin))
         B-spline coefficients of the deviation from the first sample.
     first : float
         First sample; before the record the input stood there.
@@ -92,8 +92,9 @@ def prepare_input(
 
     Parameters
     ----------
-    u : ndarray, shape (n,)
-        Uniform samples.
+    u : ndarray, shape (..., n)
+        Uniform samples. Many inputs at once must begin with the same one, and are not interpolated
+        to a higher rate: the precision of band-limited ones is infinite.
     intersample : {'zoh', 'foh', 'bandlimited', 'sampled'}
         Held, linear, or band-limited; 'sampled' for software, which sees the samples alone.
     rest : bool
@@ -108,13 +109,16 @@ def prepare_input(
     >>> prepare_input(np.array([1.0, 2.0, 4.0]), "zoh").first
     1.0
     """
-    deviation = u - u[0]
+    first = float(u.flat[0])
+    deviation = u - first
     if intersample in ("zoh", "sampled"):
-        before, after = np.zeros(MARGIN), np.full(MARGIN, deviation[-1])
+        after = np.repeat(deviation[..., -1:], MARGIN, axis=-1)
     else:
         after = _continued(deviation)
-        before = np.zeros(MARGIN) if rest else _continued(deviation[::-1])[::-1]
-    extended = np.concatenate([before, deviation, after])
+    before = np.zeros_like(after)
+    if not (rest or intersample in ("zoh", "sampled")):
+        before = _continued(deviation[..., ::-1])[..., ::-1]
+    extended = np.concatenate([before, deviation, after], axis=-1)
     oversampling = 1
     if intersample == "bandlimited":
         oversampling = _oversampling(deviation, precision)
@@ -123,18 +127,19 @@ def prepare_input(
         extended = scipy.ndimage.spline_filter1d(extended, order=5, mode="mirror")
     return SampledInput(
         coefficients=extended,
-        first=float(u[0]),
+        first=first,
         degree=_DEGREE[intersample],
         oversampling=oversampling,
-        samples=u.size,
+        samples=u.shape[-1],
     )
 
 
 def _continued(deviation: NDArray[np.float64]) -> NDArray[np.float64]:
     """What follows a last sample, odd about it: neither value nor slope jumps."""
-    reach = min(MARGIN, deviation.size - 1)
-    after = 2.0 * deviation[-1] - deviation[-2 : -2 - reach : -1]
-    return np.concatenate([after, np.full(MARGIN - reach, after[-1] if reach else 0.0)])
+    reach = min(MARGIN, deviation.shape[-1] - 1)
+    after = 2.0 * deviation[..., -1:] - deviation[..., -2 : -2 - reach : -1]
+    last = after[..., -1:] if reach else np.zeros_like(deviation)
+    return np.concatenate([after, np.repeat(last, MARGIN - reach, axis=-1)], axis=-1)
 
 
 def interpolation_error(u: NDArray[np.float64], oversampling: int) -> float:
@@ -283,7 +288,7 @@ def delayed_response(
 
     Returns
     -------
-    ndarray, shape (powers, samples)
+    ndarray, shape (powers, ..., samples)
 
     Examples
     --------
@@ -301,21 +306,23 @@ def delayed_response(
     n = denominator.size - 1
     begin = factor * MARGIN - whole  # where in the filtered coefficients the record begins
     stop = begin + factor * source.samples
+    c = source.coefficients
+    out = np.zeros((powers, *c.shape[:-1], source.samples))
     if stop <= 0:  # delayed beyond the record's end
-        return np.zeros((powers, source.samples))
-    c = source.coefficients[:stop]
-    if stop > source.coefficients.size:
-        c = np.concatenate([c, np.full(stop - source.coefficients.size, c[-1])])
+        return out
+    if stop > c.shape[-1]:
+        c = np.concatenate([c, np.repeat(c[..., -1:], stop - c.shape[-1], axis=-1)], axis=-1)
+    c = c[..., :stop]
 
     def filtered(
         numerator: NDArray[np.float64], recursion: NDArray[np.float64]
     ) -> NDArray[np.float64]:
         y = scipy.signal.lfilter(numerator, recursion, c)
         if begin < 0:
-            y = np.concatenate([np.zeros(min(-begin, factor * source.samples)), y])
-        return np.asarray(y[max(begin, 0) :: factor][: source.samples])
+            late = np.zeros((*y.shape[:-1], min(-begin, factor * source.samples)))
+            y = np.concatenate([late, y], axis=-1)
+        return np.asarray(y[..., max(begin, 0) :: factor][..., : source.samples])
 
-    out = np.empty((powers, source.samples))
     if n:
         scale = float(factor) ** np.arange(n + 1)
         numerators, recursion = _spline_taps(
@@ -325,5 +332,5 @@ def delayed_response(
             out[i] = filtered(numerators[i] * scale[i], recursion)
     if powers > n:
         fed = filtered(spline_at(lag, source.degree), np.ones(1))
-        out[n] = (fed - denominator[:-1] @ out[:n]) / denominator[-1] if n else fed
+        out[n] = (fed - np.tensordot(denominator[:-1], out[:n], 1)) / denominator[-1] if n else fed
     return out

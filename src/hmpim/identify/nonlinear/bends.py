@@ -22,7 +22,6 @@ from hmpim.identify.fitting.derivatives import jacobian
 from hmpim.identify.fitting.enrich import PLAIN
 from hmpim.identify.fitting.fit import Fit, Problem
 from hmpim.identify.fitting.least_squares import solved
-from hmpim.identify.fitting.sampled_rows import part_of
 from hmpim.identify.fitting.trial import JointFit
 from hmpim.identify.noise.autoregression import yule_walker
 from hmpim.identify.noise.whiteness import is_white
@@ -36,6 +35,7 @@ from hmpim.identify.nonlinear.mechanisms import (
     stretch_of,
 )
 from hmpim.identify.worth import MATERIAL, PART, WORTH
+from hmpim.model.poles import rational_response
 from hmpim.model.sampled import prepare_input
 from hmpim.record import Intersample
 
@@ -145,7 +145,7 @@ def bends(
     u, problem, fit = _shortened(u, problem, fit, intersample)
     if not np.any(fit.residual) or np.ptp(fit.prediction) == 0.0:
         return ()
-    tried = _tried(u, problem, fit, intersample, fs)
+    tried = _tried(u, fit, intersample, fs)
     traces = np.stack([one.trace for one in tried])
     if problem.valid is not None:  # a trace that lies elsewhere is but rounding where they count
         there = traces[:, problem.valid]
@@ -258,7 +258,7 @@ def bent_shapes(
     u, problem, fit, intersample, fs
         As for `bends`.
     """
-    traces = np.stack([one.trace for one in _tried(u, problem, fit, intersample, fs)])
+    traces = np.stack([one.trace for one in _tried(u, fit, intersample, fs)])
     slopes = jacobian(problem, fit)
     beside = traces - traces @ np.linalg.pinv(slopes) @ slopes
     power = np.vecdot(beside, beside)
@@ -266,13 +266,11 @@ def bent_shapes(
     return np.asarray(beside[told] / np.sqrt(power[told, None]))
 
 
-def _tried(
-    u: Real, problem: Problem, fit: Fit, intersample: Intersample, fs: float
-) -> list[Hypothesis]:
+def _tried(u: Real, fit: Fit, intersample: Intersample, fs: float) -> list[Hypothesis]:
     """Every kind with the values that are tried."""
     return [
         *hypotheses(fit.prediction - fit.linear[-1], fit.denominator, fs, every=_EVERY),
-        *_at_the_input(u, problem, fit, intersample, fs),
+        *_at_the_input(u, fit, intersample, fs),
     ]
 
 
@@ -302,24 +300,24 @@ def _shortened(
     return u[here], part if problem.noise is None else part.coloured(problem.noise), own
 
 
-def _at_the_input(
-    u: Real, problem: Problem, fit: Fit, intersample: Intersample, fs: float
-) -> Iterator[Hypothesis]:
+def _at_the_input(u: Real, fit: Fit, intersample: Intersample, fs: float) -> Iterator[Hypothesis]:
     """What a dead zone or a limited speed of the command leaves behind the model."""
-
-    def through(bent: Real) -> Real:
-        # A trace is told from noise, not measured: its spline need be no finer than the samples.
-        source = prepare_input(bent, intersample, precision=np.inf)
-        other = replace(problem, source=source, begins=None)
-        return np.asarray(fit.linear[:-1] @ part_of(other, fit.structure, fit.theta).rows)
-
     largest, fastest = float(np.max(np.abs(u))), float(np.max(np.abs(np.diff(u))))
-    for half in _DEAD:
-        inside = np.clip(u, -half * largest, half * largest)
-        yield Hypothesis(kind="dead_zone", trace=-through(inside))
-    for rate in RATES[_EVERY::2]:
-        late = rate_limited(u, rate * fastest) - u
-        yield Hypothesis(kind="rate_limit", trace=through(late), size=rate * fastest * fs)
+    inside = [-np.clip(u, -half * largest, half * largest) for half in _DEAD]
+    rates = RATES[_EVERY::2]
+    bent = np.stack([*inside, *(rate_limited(u, rate * fastest) - u for rate in rates)])
+    first = bent[:, :1]
+    # A trace is told from noise, not measured: its spline need be no finer than the samples.
+    source = prepare_input(bent - first, intersample, precision=np.inf)
+    traces = rational_response(
+        source, delay=fit.delay, numerator=fit.numerator, denominator=fit.denominator
+    )
+    if fit.structure.integrators:
+        traces += fit.linear[0] * first * np.maximum(np.arange(u.size) - fit.delay, 0.0)
+    for trace in traces[: len(inside)]:
+        yield Hypothesis(kind="dead_zone", trace=trace)
+    for rate, trace in zip(rates, traces[len(inside) :], strict=True):
+        yield Hypothesis(kind="rate_limit", trace=trace, size=rate * fastest * fs)
 
 
 def _scored(slopes: Real, seen: Real, residual: Real) -> tuple[Real, Real, bool]:

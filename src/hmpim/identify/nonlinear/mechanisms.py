@@ -18,6 +18,7 @@ explain, with noise that is an autoregression. The likelihoods say which fits be
 whether the next best is far enough behind to be ruled out.
 """
 
+from bisect import bisect_left
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Literal
@@ -151,13 +152,12 @@ def rate_limited(x: Real, step: float) -> Real:
     >>> rate_limited(np.array([0.0, 3.0, 3.0, 3.0]), 1.0).tolist()
     [0.0, 1.0, 2.0, 3.0]
     """
-    target, reached = x.tolist(), 0
-    out = target.copy()
-    for lost in np.flatnonzero(np.abs(np.diff(x)) > step).tolist():
-        if lost < reached:
-            continue  # behind already
-        now = target[lost]
-        for reached in range(lost + 1, len(target)):  # until it has caught up
+    target, out, reached = x.tolist(), x.copy(), 0
+    lost = np.flatnonzero(np.abs(np.diff(x)) > step).tolist()
+    while (next_lost := bisect_left(lost, reached)) < len(lost):
+        begin = lost[next_lost]
+        now, behind = target[begin], []
+        for reached in range(begin + 1, len(target)):  # until it has caught up
             ahead = target[reached] - now
             if ahead > step:
                 now += step
@@ -165,10 +165,11 @@ def rate_limited(x: Real, step: float) -> Real:
                 now -= step
             else:
                 break
-            out[reached] = now
+            behind.append(now)
         else:
-            break
-    return np.array(out)
+            reached = len(target)
+        out[begin + 1 : reached] = behind
+    return out
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -282,11 +283,12 @@ def hypotheses(x: Real, denominator: Real, fs: float, *, every: int = 1) -> Iter
     step = np.gradient(x)
     fastest = float(np.max(np.abs(step)))
 
-    def through(force: Real) -> Real:
-        """Answer of the dynamics, without delay, to a force given in the output's unit."""
-        source = prepare_input(force, "foh")
+    def through(forces: Real) -> Real:
+        """Answers of the dynamics, without delay, to forces given in the output's unit."""
+        first = forces[:, :1]
+        source = prepare_input(forces - first, "foh")
         answer = rational_response(source, delay=0.0, numerator=np.ones(1), denominator=denominator)
-        return np.asarray(answer + source.first)
+        return np.asarray(answer + first)
 
     share = x / largest
     cube, square = largest * share**3, largest * share**2
@@ -295,12 +297,13 @@ def hypotheses(x: Real, denominator: Real, fs: float, *, every: int = 1) -> Iter
     yield Hypothesis(kind="asymmetry", trace=square)
     yield Hypothesis(kind="asymmetry", trace=-square)
     if denominator[0] > 0 and denominator.size > 1:  # an integrator gives way to any force
-        stiff, uneven = through(cube), through(square)
+        dry = np.tanh(step / (_STICKS * fastest))
+        stiff, uneven, rubbed = through(np.stack((cube, square, dry)))
         yield Hypothesis(kind="hardening", trace=-stiff)
         yield Hypothesis(kind="softening", trace=stiff)
         yield Hypothesis(kind="asymmetry", trace=-uneven)
         yield Hypothesis(kind="asymmetry", trace=uneven)
-        yield Hypothesis(kind="friction", trace=-through(np.tanh(step / (_STICKS * fastest))))
+        yield Hypothesis(kind="friction", trace=-rubbed)
     for gap in _GAPS[every // 2 :: every]:
         half = gap * largest
         trace = (play(x, half) - x) / half
