@@ -3,6 +3,7 @@
 Coefficients here are in seconds: numerator and denominator by rising powers of s.
 """
 
+import cmath
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
@@ -82,8 +83,8 @@ def _roots(coefficients: NDArray[np.float64]) -> NDArray[np.complex128]:
     """Roots of a polynomial by rising powers."""
     trimmed = coefficients if coefficients[-1] else np.trim_zeros(coefficients, "b")
     if trimmed.size == 3:  # in closed form, without loss where one root is much the greater
-        c, b, a = trimmed
-        away = np.sqrt(complex(b * b - 4 * a * c))
+        c, b, a = trimmed.tolist()
+        away = cmath.sqrt(b * b - 4 * a * c)
         q = -0.5 * (b + (away if (b * away.conjugate()).real >= 0 else -away))
         return np.array([q / a, c / q]) if q != 0 else np.zeros(2, dtype=complex)
     return _roots_of(tuple(trimmed.tolist()))
@@ -149,7 +150,7 @@ def _phase_of(
     return at
 
 
-def _first_crossing(frequency: NDArray[np.float64], values: NDArray[np.float64]) -> int | None:
+def _first_crossing(values: NDArray[np.float64]) -> int | None:
     """Index before the first change from positive to not positive."""
     below = np.flatnonzero((values[:-1] > 0) & (values[1:] <= 0))
     return int(below[0]) if below.size else None
@@ -182,31 +183,79 @@ def _grid(highest: float) -> NDArray[np.float64]:
     return grid
 
 
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Curves:
+    """What every figure of a system is read off, at frequencies that show every turn.
+
+    Parameters
+    ----------
+    frequency : ndarray, shape (m,)
+        Hz.
+    turned : ndarray, shape (m,)
+        Phase in radians without the pure delay, zero at DC.
+    gain : ndarray, shape (m,)
+        In the output's unit per the input's.
+    """
+
+    frequency: NDArray[np.float64]
+    turned: NDArray[np.float64]
+    gain: NDArray[np.float64]
+
+
+def _curves(system: RationalDelay, highest: float) -> _Curves:
+    """Of a system up to `highest` Hz; its delay does not matter."""
+    coefficients = (tuple(each.tolist()) for each in (system.numerator, system.denominator))
+    return _curves_of(*coefficients, system.step, highest)
+
+
+@lru_cache(maxsize=8)
+def _curves_of(
+    numerator: tuple[float, ...],
+    denominator: tuple[float, ...],
+    step: float | None,
+    highest: float,
+) -> _Curves:
+    system = RationalDelay(
+        delay=0.0, numerator=np.array(numerator), denominator=np.array(denominator), step=step
+    )
+    frequency = _places(system, highest)
+    return _Curves(
+        frequency=frequency,
+        turned=_phase_of(system, delay=False)(frequency),
+        gain=_gain(system, frequency),
+    )
+
+
+def _gain(system: RationalDelay, frequency: NDArray[np.float64]) -> NDArray[np.float64]:
+    x = system.variable(frequency)
+    return np.abs(_polynomial(system.numerator, x) / _polynomial(system.denominator, x))
+
+
 def bandwidth_phase(
     system: RationalDelay, *, highest: float, lag: float = np.pi / 2, delay: bool = True
 ) -> float | None:
     """Lowest frequency in Hz at which the phase lags by `lag` rad; None beyond `highest` Hz."""
-    turned = _phase_of(system, delay=delay)
+    curves, late = _curves(system, highest), system.delay if delay else 0.0
 
-    def single() -> Callable[[float], float]:
-        phase = _single_phase(system, late=system.delay if delay else 0.0)
-        return lambda f: phase(f) + lag
+    def margin() -> Callable[[float], float]:
+        if system.step is None:
+            phase = _single_phase(system, late=late)
+            return lambda f: phase(f) + lag
+        turned = _phase_of(system, delay=delay)
+        return lambda f: float(turned(np.array([f]))[0]) + lag
 
-    places = _places(system, highest)
-    return _lowest(lambda f: turned(f) + lag, single if system.step is None else None, places)
+    seen = curves.turned - 2 * np.pi * curves.frequency * late + lag
+    return _lowest(seen, margin, curves.frequency)
 
 
 def _lowest(
-    margin: Callable[[NDArray[np.float64]], NDArray[np.float64]],
-    single: Callable[[], Callable[[float], float]] | None,
+    seen: NDArray[np.float64],
+    margin: Callable[[], Callable[[float], float]],
     grid: NDArray[np.float64],
 ) -> float | None:
-    """Lowest frequency in Hz at which a margin falls to 0; `single` makes it for one at a time."""
-    i = _first_crossing(grid, margin(grid))
-    if i is None:
-        return None
-    at = (lambda f: float(margin(np.array([f]))[0])) if single is None else single()
-    return float(scipy.optimize.brentq(at, grid[i], grid[i + 1]))
+    """Lowest frequency in Hz at which a margin, as seen on a grid, falls to 0."""
+    i = _first_crossing(seen)
+    return None if i is None else float(scipy.optimize.brentq(margin(), grid[i], grid[i + 1]))
 
 
 def _single_phase(system: RationalDelay, *, late: float) -> Callable[[float], float]:
@@ -247,14 +296,19 @@ def bandwidth_3db(system: RationalDelay, *, highest: float) -> float | None:
     if system.numerator[0] == 0:
         return None
 
-    def margin(f: NDArray[np.float64]) -> NDArray[np.float64]:
-        return np.asarray(np.abs(response(system, f) / system.numerator[0]) ** 2 - 0.5)
+    curves = _curves(system, highest)
 
-    def single() -> Callable[[float], float]:
-        power = _single_gain(system)
-        return lambda f: power(f) - 0.5
+    def margin() -> Callable[[float], float]:
+        if system.step is None:
+            power = _single_gain(system)
+            return lambda f: power(f) - 0.5
+        return lambda f: float(_gain(system, np.array([f]))[0] / system.numerator[0]) ** 2 - 0.5
 
-    return _lowest(margin, single if system.step is None else None, _places(system, highest))
+    return _lowest((curves.gain / system.numerator[0]) ** 2 - 0.5, margin, curves.frequency)
+
+
+_FINER = np.linspace(0.0, 1.0, 21)
+"""Places in a step of the grid at which a peak is looked for."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -273,17 +327,16 @@ def peak_gain(system: RationalDelay, *, highest: float) -> PeakGain | None:
     For a second-order lag this is -20 lg(2ζ√(1-ζ²)) (paper, Fig. 16; Ogata, Modern Control
     Engineering, 1970, ch. 9).
     """
-    grid = _places(system, highest)
-    gain = np.abs(response(system, grid) / system.numerator[0])
-    i = int(np.argmax(gain))
+    curves = _curves(system, highest)
+    grid, i = curves.frequency, int(np.argmax(curves.gain))
     if i == 0:
         return PeakGain(gain_db=0.0, frequency=0.0)
     if i == grid.size - 1:
         return None
     low, high = grid[max(i - 1, 0)], grid[min(i + 1, grid.size - 1)]
     for _ in range(3):
-        fine = np.linspace(low, high, 21)
-        gain = np.abs(response(system, fine) / system.numerator[0])
+        fine = low + (high - low) * _FINER
+        gain = _gain(system, fine) / abs(system.numerator[0])
         i = int(np.argmax(gain))
         low, high = fine[max(i - 1, 0)], fine[min(i + 1, 20)]
     return PeakGain(gain_db=float(20 * np.log10(gain[i])), frequency=float(fine[i]))
