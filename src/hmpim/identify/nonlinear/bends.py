@@ -156,13 +156,16 @@ def bends(
     if problem.counts is not None:
         rows, residual = rows[:, problem.counts], residual[problem.counts]
     slopes, seen = np.split(rows, [rows.shape[0] - len(tried)])
-    weights, gains, white = _scored(slopes, seen, residual)
+    weights, gains, rest = _scored(slopes, seen, residual)
+    gains = np.where(weights > 0.0, gains, 0.0)
+    if gains.max() <= CLEARLY:
+        return ()
     sizes = np.std(traces, axis=1)
-    told = np.abs(weights) * sizes > floor
-    gains = np.where(told & (weights > 0.0), gains, 0.0)
+    gains = np.where(weights * sizes > floor, gains, 0.0)
     most = float(gains.max())
     if most <= CLEARLY:
         return ()
+    white = is_white(rest)
     spread = float(np.std(problem.y if problem.valid is None else problem.y[problem.valid]))
     gram = slopes @ slopes.T
     return tuple(
@@ -320,8 +323,8 @@ def _at_the_input(u: Real, fit: Fit, intersample: Intersample, fs: float) -> Ite
         yield Hypothesis(kind="rate_limit", trace=trace, size=rate * fastest * fs)
 
 
-def _scored(slopes: Real, seen: Real, residual: Real) -> tuple[Real, Real, bool]:
-    """Weight of each trace beside the slopes, what it gains, and whether the best leaves noise."""
+def _scored(slopes: Real, seen: Real, residual: Real) -> tuple[Real, Real, Real]:
+    """Weight of each trace beside the slopes, what it gains, and what the best leaves."""
     weights, gains, basis = _regressed(slopes, seen, residual, np.ones(1))
     best = int(np.argmax(gains))
     rest = residual - weights[best] * seen[best]
@@ -329,7 +332,7 @@ def _scored(slopes: Real, seen: Real, residual: Real) -> tuple[Real, Real, bool]
     colour, _ = yule_walker(rest, LONGEST_AUTOREGRESSION)
     if colour.size > 1:
         weights, gains, _ = _regressed(slopes, seen, residual, colour)
-    return weights, gains, is_white(rest)
+    return weights, gains, rest
 
 
 def _regressed(slopes: Real, seen: Real, residual: Real, colour: Real) -> tuple[Real, Real, Real]:

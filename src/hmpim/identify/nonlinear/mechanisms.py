@@ -18,7 +18,6 @@ explain, with noise that is an autoregression. The likelihoods say which fits be
 whether the next best is far enough behind to be ruled out.
 """
 
-from bisect import bisect_left
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Literal
@@ -152,12 +151,14 @@ def rate_limited(x: Real, step: float) -> Real:
     >>> rate_limited(np.array([0.0, 3.0, 3.0, 3.0]), 1.0).tolist()
     [0.0, 1.0, 2.0, 3.0]
     """
-    target, out, reached = x.tolist(), x.copy(), 0
-    lost = np.flatnonzero(np.abs(np.diff(x)) > step).tolist()
-    while (next_lost := bisect_left(lost, reached)) < len(lost):
-        begin = lost[next_lost]
-        now, behind = target[begin], []
-        for reached in range(begin + 1, len(target)):  # until it has caught up
+    target, reached = x.tolist(), 0
+    out, late = x.copy(), target.copy()
+    fast = np.flatnonzero(np.abs(np.diff(x)) > step).tolist()
+    for lost in fast:
+        if lost < reached:
+            continue  # behind already
+        now = target[lost]
+        for reached in range(lost + 1, len(target)):  # until it has caught up
             ahead = target[reached] - now
             if ahead > step:
                 now += step
@@ -165,10 +166,11 @@ def rate_limited(x: Real, step: float) -> Real:
                 now -= step
             else:
                 break
-            behind.append(now)
+            late[reached] = now
         else:
-            reached = len(target)
-        out[begin + 1 : reached] = behind
+            break
+    for begin in fast[:1]:
+        out[begin : reached + 1] = late[begin : reached + 1]
     return out
 
 
