@@ -13,7 +13,6 @@ from collections import OrderedDict
 from collections.abc import Callable, Hashable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
-from dataclasses import fields, is_dataclass
 from functools import wraps
 from typing import Any, ParamSpec, TypeVar, cast
 from weakref import ref
@@ -169,6 +168,5 @@ def _is_short(found: Any) -> bool:
     """Whether a result holds no long array."""
     if isinstance(found, np.ndarray):
         return found.nbytes <= _LARGEST
-    if is_dataclass(found):
-        return all(_is_short(getattr(found, field.name)) for field in fields(found))
-    return True
+    names = getattr(type(found), "__dataclass_fields__", ())
+    return all(_is_short(getattr(found, name)) for name in names)

@@ -1,6 +1,7 @@
 """Which local fit to take at each frequency, and how much of its error is bend, not noise."""
 
 from collections.abc import Sequence
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -85,12 +86,14 @@ def choose(
     below = np.where(polynomial, best - 2, best)
     cheap = picked(cost, below) <= TWICE * picked(cost, best)
     chosen = np.asarray(np.where(cheap, below, best), dtype=np.int64)
-    return chosen, np.asarray(picked(bent, chosen[..., None])).reshape(shape)
+    return chosen, picked(bent, chosen).reshape(shape)
 
 
 def picked(values: NDArray[Any], chosen: NDArray[np.int64]) -> NDArray[Any]:
-    """Return at each place the one of the values, shape (k, ...), that is chosen, shape (...)."""
-    return np.asarray(np.take_along_axis(values, chosen[None], axis=0)[0])
+    """Return at each place the one of the values, (k, ..., *), that is chosen, (...)."""
+    flat = values.reshape(values.shape[0], chosen.size, *values.shape[1 + chosen.ndim :])
+    told = flat[chosen.ravel(), np.arange(chosen.size)]
+    return np.asarray(told.reshape(values.shape[1:]))
 
 
 def _beyond(apart: Real, variance: Real, credible: Mask) -> Real:
@@ -105,9 +108,15 @@ def _beyond(apart: Real, variance: Real, credible: Mask) -> Real:
 def _averaged(values: Real) -> Real:
     """Average along the last axis over neighbours on either side, fewer at the ends."""
     count = values.shape[-1]
-    reach = min(_NEIGHBOURS, count // 2)
-    position = np.arange(count)
-    begin, end = np.maximum(position - reach, 0), np.minimum(position + reach + 1, count)
+    begin, end, size = _spans(count)
     total = np.zeros((*values.shape[:-1], count + 1))
     np.cumsum(values, axis=-1, out=total[..., 1:])
-    return np.asarray((total.take(end, axis=-1) - total.take(begin, axis=-1)) / (end - begin))
+    return np.asarray((total.take(end, axis=-1) - total.take(begin, axis=-1)) / size)
+
+
+@lru_cache(maxsize=8)
+def _spans(count: int) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
+    """Where the neighbours of each place begin and end, and how many they are."""
+    reach, position = min(_NEIGHBOURS, count // 2), np.arange(count)
+    begin, end = np.maximum(position - reach, 0), np.minimum(position + reach + 1, count)
+    return begin, end, end - begin

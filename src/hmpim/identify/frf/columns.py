@@ -37,6 +37,8 @@ class Columns:
         Highest power with each.
     powers : ndarray, shape (s, p)
         x^p, p = 0 up to twice the highest power of all.
+    slopes : complex ndarray, shape (d, s)
+        Powers of x that A is made of.
     linear : complex ndarray, shape (w, l, s)
         The columns themselves.
     """
@@ -45,25 +47,27 @@ class Columns:
     mirrored: Complex
     orders: tuple[int, ...]
     powers: Real
+    slopes: Complex
     linear: Complex
 
     @classmethod
     def of(cls, carriers: Complex, orders: tuple[int, ...], x: Real) -> "Columns":
         """Make them of carriers, shape (w, a, s); x from -1 to 1, shape (s,)."""
         most = max(*orders, DENOMINATOR_ORDER)
-        powers = np.asarray(x[:, None] ** np.arange(2 * most + 1))
+        powers = np.asarray(x ** np.arange(2 * most + 1)[:, None])
         parts: list[tuple[Any, int]] = []
         for i, j in combinations_with_replacement(range(len(orders)), 2):
             product, count = np.conj(carriers[:, i]) * carriers[:, j], orders[i] + orders[j] + 1
             parts += [(part, count) for part in (product.real, product.imag)[: 1 + (i != j)]]
         backwards = np.conj(carriers)
         around = [(backwards[:, a], p + DENOMINATOR_ORDER + 1) for a, p in enumerate(orders)]
-        ahead = [carriers[:, a, None] * powers.T[: p + 1] for a, p in enumerate(orders)]
+        ahead = [carriers[:, a, None] * powers[: p + 1] for a, p in enumerate(orders)]
         return cls(
             products=_multiplied(parts, powers, np.float64),
             mirrored=_multiplied(around, powers, np.complex128),
             orders=orders,
-            powers=powers,
+            powers=powers.T,
+            slopes=powers[1 : DENOMINATOR_ORDER + 1].astype(np.complex128),
             linear=np.concatenate(ahead, axis=1),
         )
 
@@ -75,13 +79,9 @@ class Columns:
             mirrored=self.mirrored[..., : order + DENOMINATOR_ORDER + 1],
             orders=self.orders[:1],
             powers=self.powers[:, : 2 * max(order, DENOMINATOR_ORDER) + 1],
+            slopes=self.slopes,
             linear=self.linear[:, : order + 1],
         )
-
-    @property
-    def slopes(self) -> Complex:
-        """Powers of x that A is made of, shape (d, s)."""
-        return np.asarray(self.powers.T[1 : DENOMINATOR_ORDER + 1], dtype=np.complex128)
 
     def at(self, place: Integer) -> Complex:
         """Return the linear columns at places of each window, (w, k); shape (w, k, l)."""
@@ -96,7 +96,7 @@ class Columns:
         ----------
         over : complex ndarray, shape (w, r, s), or None
             1 / A; None for 1.
-        weight : ndarray, broadcast to (w, r, s)
+        weight : ndarray, shape (w, r, s)
             1 / |A|².
         fitted : complex ndarray, shape (w, r, s)
             Y as fitted.
@@ -118,7 +118,7 @@ class Columns:
             np.multiply(np.conj(over), left, out=turned[:, 1])
         moments = np.empty((windows, records, places.ends[-1]))
         ends = places.ends
-        np.matmul(np.broadcast_to(weight, fitted.shape), self.products, out=moments[..., : ends[0]])
+        np.matmul(weight, self.products, out=moments[..., : ends[0]])
         power = fitted.real**2 + fitted.imag**2
         power *= weight
         np.matmul(power, self.powers, out=moments[..., ends[0] : ends[1]])
@@ -140,12 +140,13 @@ class Columns:
 
 
 def _multiplied(parts: list[tuple[Any, int]], powers: Real, kind: type) -> Any:
-    """Concatenate the products of each part, (w, s), and as many powers as it asks for."""
+    """Concatenate the products of each part, (w, s), and as many powers, (p, s), as it asks for."""
+    windows, size = parts[0][0].shape
     ends = np.cumsum([0, *(count for _, count in parts)])
-    out = np.empty((*parts[0][0].shape, ends[-1]), dtype=kind)
+    out = np.empty((windows, ends[-1], size), dtype=kind)
     for (part, count), end in zip(parts, ends[1:], strict=True):
-        np.multiply(part[..., None], powers[:, :count], out=out[..., end - count : end])
-    return out
+        np.multiply(part[:, None], powers[:count], out=out[:, end - count : end])
+    return out.swapaxes(1, 2)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

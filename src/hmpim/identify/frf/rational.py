@@ -270,7 +270,7 @@ def linear_start(columns: Columns, smooth: Complex) -> Complex:
     >>> np.abs(linear_start(one, y)).round(9).tolist()
     [[[2.0, 0.5, 0.0]]]
     """
-    return _solution(*columns.normal(None, np.ones(()), smooth, smooth))
+    return _solution(*columns.normal(None, np.ones(smooth.shape), smooth, smooth))
 
 
 def restricted(found: RationalSolution, kept: int) -> Complex:

@@ -146,11 +146,12 @@ def bends(
     if not np.any(fit.residual) or np.ptp(fit.prediction) == 0.0:
         return ()
     tried = _tried(u, fit, intersample, fs)
-    traces = np.stack([one.trace for one in tried])
+    traces = [one.trace for one in tried]
     if problem.valid is not None:  # a trace that lies elsewhere is but rounding where they count
-        there = traces[:, problem.valid]
-        shown = np.vecdot(there, there) > _ALIKE * np.vecdot(traces, traces)
-        traces = np.where(shown[:, None], traces, 0.0)
+        for k, trace in enumerate(traces):
+            there = trace[problem.valid]
+            if there @ there <= _ALIKE * (trace @ trace):
+                traces[k] = np.zeros(trace.size)
     rows = jacobian(problem, fit, *traces)
     residual = problem.innovations(fit.prediction, fit.residual)
     if problem.counts is not None:
@@ -160,7 +161,7 @@ def bends(
     gains = np.where(weights > 0.0, gains, 0.0)
     if gains.max() <= CLEARLY:
         return ()
-    sizes = np.std(traces, axis=1)
+    sizes = np.std(np.stack(traces), axis=1)
     gains = np.where(weights * sizes > floor, gains, 0.0)
     most = float(gains.max())
     if most <= CLEARLY:

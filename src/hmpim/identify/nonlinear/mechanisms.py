@@ -24,6 +24,7 @@ from typing import Literal
 
 import numpy as np
 import scipy
+from numpy.typing import NDArray
 
 from hmpim.identify.arrays import Mask, Real
 from hmpim.identify.fitting.derivatives import jacobian
@@ -132,15 +133,22 @@ def play(x: Real, half_gap: float) -> Real:
     >>> play(np.array([0.0, 1.0, 2.0, 1.5, 0.0]), 0.5).tolist()
     [0.0, 0.5, 1.5, 1.5, 0.5]
     """
-    low, high = x - half_gap, x + half_gap
-    # From one reversal of x to the next the output moves one way: only there it must be known.
+    return _waiting(x, half_gap, _reversals(x))
+
+
+def _reversals(x: Real) -> NDArray[np.intp]:
+    """Where a signal turns, and its end: only there the output of backlash must be known."""
     way = np.sign(np.diff(x))
-    turns = np.append(np.flatnonzero(way[1:] * way[:-1] <= 0.0) + 1, x.size - 1)
-    before, now = np.empty(turns.size), float(x[0])
-    for k, (least, most) in enumerate(zip(low[turns].tolist(), high[turns].tolist(), strict=True)):
-        before[k] = now
-        now = min(max(now, least), most)
-    return np.clip(np.repeat(before, np.diff(turns, prepend=-1)), low, high)
+    return np.append(np.flatnonzero(way[1:] * way[:-1] <= 0.0) + 1, x.size - 1)
+
+
+def _waiting(x: Real, half_gap: float, turns: NDArray[np.intp]) -> Real:
+    """`play`: from one reversal to the next the output moves one way."""
+    before, now = [], float(x[0])
+    for turn in x[turns].tolist():
+        before.append(now)
+        now = min(max(now, turn - half_gap), turn + half_gap)
+    return np.clip(np.repeat(before, np.diff(turns, prepend=-1)), x - half_gap, x + half_gap)
 
 
 def rate_limited(x: Real, step: float) -> Real:
@@ -306,9 +314,10 @@ def hypotheses(x: Real, denominator: Real, fs: float, *, every: int = 1) -> Iter
         yield Hypothesis(kind="asymmetry", trace=-uneven)
         yield Hypothesis(kind="asymmetry", trace=uneven)
         yield Hypothesis(kind="friction", trace=-rubbed)
+    turns = _reversals(x)
     for gap in _GAPS[every // 2 :: every]:
         half = gap * largest
-        trace = (play(x, half) - x) / half
+        trace = (_waiting(x, half, turns) - x) / half
         yield Hypothesis(kind="backlash", trace=trace, spacing=0.15 * half)
     for level in _LEVELS[every // 2 :: every]:
         size = level * largest
