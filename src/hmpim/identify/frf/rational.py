@@ -239,8 +239,8 @@ def solved(gram: Complex, right: Complex) -> tuple[Complex, Complex]:
     [[0.5]]
     """
     scaled, scale = _scaled(gram)
-    inverse = np.linalg.inv(scaled)
-    inverse *= scale[..., :, None] * scale[..., None, :]
+    by = scale[..., :, None] * scale[..., None, :]
+    inverse = np.asarray(np.linalg.inv(scaled) * by, dtype=np.complex128)
     return inverse, (inverse @ right)[..., 0]
 
 

@@ -139,7 +139,7 @@ def play(x: Real, half_gap: float) -> Real:
 def _reversals(x: Real) -> NDArray[np.intp]:
     """Where a signal turns, and its end: only there the output of backlash must be known."""
     way = np.sign(np.diff(x))
-    return np.append(np.flatnonzero(way[1:] * way[:-1] <= 0.0) + 1, x.size - 1)
+    return np.asarray(np.append(np.flatnonzero(way[1:] * way[:-1] <= 0.0) + 1, x.size - 1))
 
 
 def _waiting(x: Real, half_gap: float, turns: NDArray[np.intp]) -> Real:
@@ -148,7 +148,8 @@ def _waiting(x: Real, half_gap: float, turns: NDArray[np.intp]) -> Real:
     for turn in x[turns].tolist():
         before.append(now)
         now = min(max(now, turn - half_gap), turn + half_gap)
-    return np.clip(np.repeat(before, np.diff(turns, prepend=-1)), x - half_gap, x + half_gap)
+    held = np.repeat(before, np.diff(turns, prepend=-1))
+    return np.asarray(np.clip(held, x - half_gap, x + half_gap))
 
 
 def rate_limited(x: Real, step: float) -> Real:
