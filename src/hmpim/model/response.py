@@ -100,6 +100,8 @@ def _roots_of(coefficients: tuple[float, ...]) -> NDArray[np.complex128]:
 
 def _turn(roots: NDArray[np.complex128], omega: NDArray[np.float64]) -> NDArray[np.float64]:
     """Continuous phase in jω of a polynomial with these roots, zero at ω = 0, in radians."""
+    if not roots.size:
+        return np.zeros(omega.shape)
     away = np.where(roots.real != 0, -roots.real, np.finfo(float).tiny)[:, None]
     aside = roots.imag[:, None]
     turned = np.arctan((omega - aside) / away) - np.arctan(-aside / away)

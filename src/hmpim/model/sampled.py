@@ -155,7 +155,8 @@ def interpolation_error(u: NDArray[np.float64], oversampling: int) -> float:
     if total == 0.0:
         return 0.0
     frequency = np.arange(power.size) / size
-    missed = 2.0 * (frequency / (oversampling - frequency)) ** 6
+    share = frequency / (oversampling - frequency)
+    missed = 2.0 * (share * share**2) ** 2  # a square is multiplied, and a higher power is not
     return float(np.sqrt(power @ missed**2 / total))
 
 

@@ -302,7 +302,8 @@ def hypotheses(x: Real, denominator: Real, fs: float, *, every: int = 1) -> Iter
         return np.asarray(answer + first)
 
     share = x / largest
-    cube, square = largest * share**3, largest * share**2
+    square = largest * share**2
+    cube = square * share
     yield Hypothesis(kind="curvature", trace=cube)
     yield Hypothesis(kind="curvature", trace=-cube)
     yield Hypothesis(kind="asymmetry", trace=square)
