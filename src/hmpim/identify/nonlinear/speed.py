@@ -23,7 +23,7 @@ from hmpim.identify.noise.whiteness import is_white
 from hmpim.identify.nonlinear.bends import bends
 from hmpim.identify.nonlinear.mechanisms import LONGEST_AUTOREGRESSION, RATES, rate_limited
 from hmpim.identify.result.digits import plus_minus
-from hmpim.identify.worth import TWICE
+from hmpim.identify.worth import PART, TWICE
 from hmpim.model.sampled import MARGIN, delayed_response, prepare_input
 from hmpim.record import Finding, Intersample
 
@@ -82,7 +82,8 @@ def limited_command(u: Real, joint: JointFit) -> LimitedCommand | None:
     u : ndarray, shape (n,)
         The command.
     joint : JointFit
-        The linear fit; where it is plain and leaves noise, nothing is asked.
+        The linear fit; where it is plain and leaves noise, or leaves next to nothing of what the
+        plain ones leave, nothing is asked.
 
     Returns
     -------
@@ -106,6 +107,8 @@ def limited_command(u: Real, joint: JointFit) -> LimitedCommand | None:
     if known or not plain or u.size > _LONGEST or best.fit.structure.sampled:
         return None
     start = min(plain, key=lambda trial: trial.criterion)
+    if best.fit.cost < PART**2 * start.fit.cost:
+        return None  # a limit makes harmonics, so that poles make up for no more of it than that
     smooth, joined = _SMOOTH
     command = _Followed.of(u, smooth, problem, start.fit)
     near = _nearest(command, best.fit)
