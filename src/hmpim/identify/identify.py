@@ -162,13 +162,13 @@ def identify_output(question: Question) -> Described:
         return describe_dead(question)
     question = recognise_software(mark_swapped(question))
     seen = look(question)
-    fitted = fit(question, seen)
+    seen, fitted = fit(question, seen)
     seen, fitted = drift_or_levels(question, seen, fitted)
     for _ in range(LOOKS):
         before, seen = seen, look_again(question, seen, fitted)
         if not seen.counts_otherwise_than(before):
             break
-        fitted = fit(question, seen)
+        seen, fitted = fit(question, seen)
     question, fitted = limit_speed(question, seen, fitted)
     fitted = through_reference(question, fitted)
     return describe(question, seen, fitted)

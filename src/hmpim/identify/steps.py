@@ -5,11 +5,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from hmpim.identify.arrays import Real
+from hmpim.identify.arrays import Mask, Real
 from hmpim.identify.asked.question import Question
 from hmpim.identify.asked.reference import fit_through
 from hmpim.identify.asked.swapped import is_swapped, lags_behind, swapped_finding
-from hmpim.identify.coupling.output_fit import OutputFit, fit_together
+from hmpim.identify.coupling.output_fit import OutputFit, begin, fit_together
 from hmpim.identify.effects.disturbance import without_rows
 from hmpim.identify.effects.drift import with_drift
 from hmpim.identify.effects.hum import with_hum
@@ -19,6 +19,12 @@ from hmpim.identify.effects.imperfections import (
     refine,
 )
 from hmpim.identify.effects.lost import stands_out
+from hmpim.identify.fitting.course import (
+    Course,
+    find_beginning,
+    free_from_wander,
+    interpolate_finely,
+)
 from hmpim.identify.fitting.trial import JointFit
 from hmpim.identify.kept import kept
 from hmpim.identify.noise.colour import line_of, tone_of
@@ -61,9 +67,49 @@ def mark_swapped(question: Question) -> Question:
     return replace(question, structures=question.plain, swapped=finding)
 
 
-def fit(question: Question, seen: Imperfections) -> OutputFit:
-    """Fit every structure, with hum and a drift where the residual asks for them."""
-    fitted = _fit_once(question, seen, question.structures)
+def fit(question: Question, seen: Imperfections) -> tuple[Imperfections, OutputFit]:
+    """Fit every structure, with hum and a drift where the residual asks for them.
+
+    Where plain dynamics leave white noise behind levels, no richer ones are asked for, which would
+    follow what the levels do. They may be seen only then.
+    """
+    begun = _begin(question, seen)
+    if begun is None:
+        return seen, _fit_and_look_for_rows(question, seen)
+    levelled = None if begun.best.is_white else _behind_levels(question, seen, begun)
+    if levelled is not None:
+        return levelled
+    course = find_beginning(interpolate_finely(free_from_wander(begun)))
+    return seen, _fit_and_look_for_rows(question, seen, course)
+
+
+def _behind_levels(
+    question: Question, seen: Imperfections, course: Course
+) -> tuple[Imperfections, OutputFit] | None:
+    """Plain dynamics behind levels, where they leave white noise."""
+    levels = seen.saturation
+    if levels is None:
+        levels = _imperfections(question, prediction=course.best.prediction).saturation
+    if levels is None:
+        return None
+    clipped = replace(seen, saturation=levels)
+    fitted = _fit_once(question, clipped, question.plain)
+    (joint,) = fitted.fits
+    if levels.noise == "after" and not is_white(joint.problem.counting(joint.best.fit.residual)):
+        return None
+    refined = refine(joint, clipped, question.aligned.fs) if joint.related else None
+    if refined is None:
+        return None
+    told, _ = refined
+    white = is_white(told.problem.counting(told.best.fit.residual))
+    return (clipped, fitted) if white else None
+
+
+def _fit_and_look_for_rows(
+    question: Question, seen: Imperfections, begun: Course | None = None
+) -> OutputFit:
+    """Fit every structure, and again with hum and a drift where the residual asks for them."""
+    fitted = _fit_once(question, seen, question.structures, begun=begun)
     if len(fitted.fits) > 1 or fitted.fits[0].silent or question.swapped or question.exact:
         return fitted
     (joint,) = fitted.fits
@@ -180,7 +226,7 @@ def limit_speed(
         return question, fitted  # a limit of speed smooths the noise of a measured command
     followed = replace(aligned, inputs=(replace(source, values=limited.values),))
     slower = replace(question, aligned=followed, limited=limited)
-    again = fit(slower, seen)
+    _, again = fit(slower, seen)
     (other,) = again.fits
     if not explains_more(other.problem, other.best.fit, joint.problem, joint.best.fit):
         return question, fitted
@@ -195,25 +241,56 @@ def through_reference(question: Question, fitted: OutputFit) -> OutputFit:
     return replace(fitted, fits=(joint,), covariances=(own,))
 
 
+def _begin(question: Question, seen: Imperfections) -> Course | None:
+    """Plain fits of one input; None where plain structures are all, and of loops and software."""
+    alone = len(question.aligned.inputs) == 1 and question.instrument is None
+    if (
+        not alone
+        or question.swapped
+        or question.exact
+        or question.intersample == "sampled"
+        or question.plain == question.structures
+    ):
+        return None
+    (source,) = question.aligned.inputs
+    return begin(
+        source.values,
+        question.output.values,
+        valid=_counted(question, seen),
+        known=question.measured,
+        intersample=question.intersample,
+        structures=question.structures,
+    )
+
+
+def _counted(question: Question, seen: Imperfections) -> Mask | None:
+    """Samples of the output that tell, (n,); None when all do."""
+    output = question.output
+    valid = None if bool(output.valid.all()) else np.asarray(output.valid)
+    told = seen.telling(output.values.size, question.aligned.fs)
+    if told is not None:
+        valid = told if valid is None else valid & told
+    return valid
+
+
 def _fit_once(
     question: Question,
     seen: Imperfections,
     structures: tuple[StructureName, ...],
     rows: Real | None = None,
+    *,
+    begun: Course | None = None,
 ) -> OutputFit:
     """Fit an output to all inputs, with `rows` beside the bias, on the samples that tell."""
     aligned, output, inputs = question.aligned, question.output, question.inputs
-    valid = None if bool(output.valid.all()) else np.asarray(output.valid)
-    told = seen.telling(output.values.size, aligned.fs)
-    if told is not None:
-        valid = told if valid is None else valid & told
     return fit_together(
         [source.values for source in aligned.inputs],
         output.values,
-        valid=valid,
+        valid=_counted(question, seen),
         known=question.measured,
         intersample=question.intersample,
         structures=structures,
         alike=() if inputs is None else inputs.alike_bins(aligned.samples, aligned.fs),
         nuisance=rows,
+        begun=begun,
     )

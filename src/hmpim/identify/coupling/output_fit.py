@@ -19,11 +19,16 @@ from hmpim.identify.coupling.together import gained_by, joint_covariance
 from hmpim.identify.coupling.weak import coupling_fit, whitening_of
 from hmpim.identify.effects.drift import Drifting
 from hmpim.identify.effects.hum import Humming
+from hmpim.identify.fitting.course import (
+    Course,
+    start,
+    turn_ahead,
+)
 from hmpim.identify.fitting.derivatives import jacobian
 from hmpim.identify.fitting.enrich import PLAIN
 from hmpim.identify.fitting.fit import Fit, Problem
 from hmpim.identify.fitting.fit import fit_together as fit_all
-from hmpim.identify.fitting.joint import joint_fit
+from hmpim.identify.fitting.joint import chosen_of, joint_fit
 from hmpim.identify.fitting.trial import JointFit
 from hmpim.identify.noise.whiteness import effective_share, is_white
 from hmpim.identify.worth import NEARLY, PART, TWICE
@@ -32,7 +37,7 @@ from hmpim.model.response import slowest_time_constant
 from hmpim.model.sampled import prepare_input
 from hmpim.record import Intersample
 
-__all__ = ["OutputFit", "fit_together"]
+__all__ = ["OutputFit", "begin", "fit_together"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -68,6 +73,13 @@ class OutputFit:
     humming: Humming | None = None
     steady: Real | None = None
 
+    @classmethod
+    def alone(cls, fit: JointFit) -> "OutputFit":
+        """Of an output to its one input."""
+        return cls(
+            fits=(fit,), related=(fit.related,), covariances=(), strong=(True,), lags=(None,)
+        )
+
     @property
     def prediction(self) -> Real:
         """What all inputs together predict of the output, bias and drift included, shape (n,)."""
@@ -87,6 +99,25 @@ class OutputFit:
         return self.drifting.trend + self.humming.trend
 
 
+def begin(
+    u: Real,
+    y: Real,
+    *,
+    valid: Mask | None,
+    known: Mask | None,
+    intersample: Intersample | None,
+    structures: tuple[StructureName, ...],
+) -> Course:
+    """Fit the plain structures of one input, before it is asked for more.
+
+    Parameters
+    ----------
+    u, y, valid, known, intersample, structures
+        As for `hmpim.identify.fitting.joint.joint_fit`, but for software.
+    """
+    return turn_ahead(start(u, y, valid, known, intersample, structures, None))
+
+
 def fit_together(
     inputs: list[Real],
     y: Real,
@@ -97,6 +128,7 @@ def fit_together(
     structures: tuple[StructureName, ...],
     alike: Sequence[tuple[frozenset[int], Mask]] = (),
     nuisance: Real | None = None,
+    begun: Course | None = None,
 ) -> OutputFit:
     """Fit one output to several inputs.
 
@@ -113,6 +145,8 @@ def fit_together(
         not told from what the stronger one's model lacks.
     nuisance : ndarray, shape (k, n), optional
         Rows beside the bias that enter linearly, such as a drift's.
+    begun : Course, optional
+        The plain fits to one input, where they are known.
     """
 
     def fitted(
@@ -130,10 +164,9 @@ def fit_together(
         )
 
     if len(inputs) == 1:
-        fit = fitted(inputs[0], y, structures)
-        return OutputFit(
-            fits=(fit,), related=(fit.related,), covariances=(), strong=(True,), lags=(None,)
-        )
+        if begun is None:
+            return OutputFit.alone(fitted(inputs[0], y, structures))
+        return OutputFit.alone(chosen_of(begun, structures))
     plain = tuple(name for name in structures if name in PLAIN) or structures
 
     def plainly(u: Real, rest: Real) -> JointFit:

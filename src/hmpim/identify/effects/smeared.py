@@ -12,6 +12,7 @@ import numpy as np
 
 from hmpim.identify.arrays import Mask, Real
 from hmpim.identify.chance import CLEARLY, SEARCHED, deviations
+from hmpim.identify.fitting.least_squares import solved
 from hmpim.identify.noise.whiteness import effective_share
 from hmpim.identify.worth import FEW, MUCH, WORTH
 
@@ -115,7 +116,7 @@ def smeared_plateaus(
 
 
 def _cost(y: Real, rows: Real) -> float:
-    weights = np.linalg.lstsq(rows.T, y, rcond=None)[0]
+    weights = solved(rows @ rows.T, rows @ y)
     return float(np.sum((y - weights @ rows) ** 2))
 
 
@@ -156,7 +157,8 @@ def _settled(y: Real, rows: Real, low: float, high: float) -> _Split | None:
         free = ~(below | above)
         if np.count_nonzero(free) < max(4 * rows.shape[0], FEW * y.size):
             return None
-        weights = np.linalg.lstsq(rows[:, free].T, y[free], rcond=None)[0]
+        told = rows[:, free]
+        weights = solved(told @ told.T, told @ y[free])
         q = weights @ rows
         if below.any():
             low = float(np.mean(y[below]))
