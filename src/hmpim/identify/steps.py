@@ -9,9 +9,9 @@ from hmpim.identify.arrays import Mask, Real
 from hmpim.identify.asked.question import Question
 from hmpim.identify.asked.reference import fit_through
 from hmpim.identify.asked.swapped import is_swapped, lags_behind, swapped_finding
-from hmpim.identify.coupling.output_fit import OutputFit, begin, fit_together
+from hmpim.identify.coupling.output_fit import OutputFit, begin, continued, fit_together
 from hmpim.identify.effects.disturbance import without_rows
-from hmpim.identify.effects.drift import with_drift
+from hmpim.identify.effects.drift import with_drift, with_plain_drift
 from hmpim.identify.effects.hum import with_hum
 from hmpim.identify.effects.imperfections import (
     Imperfections,
@@ -25,6 +25,7 @@ from hmpim.identify.fitting.course import (
     free_from_wander,
     interpolate_finely,
 )
+from hmpim.identify.fitting.joint import chosen_of
 from hmpim.identify.fitting.trial import JointFit
 from hmpim.identify.kept import kept
 from hmpim.identify.noise.colour import line_of, tone_of
@@ -70,8 +71,8 @@ def mark_swapped(question: Question) -> Question:
 def fit(question: Question, seen: Imperfections) -> tuple[Imperfections, OutputFit]:
     """Fit every structure, with hum and a drift where the residual asks for them.
 
-    Where plain dynamics leave white noise behind levels, no richer ones are asked for, which would
-    follow what the levels do. They may be seen only then.
+    Where plain dynamics and one effect, levels or a drift, leave white noise, no richer ones are
+    asked for, which would follow what the effect does. Levels may be seen only then.
     """
     begun = _begin(question, seen)
     if begun is None:
@@ -79,7 +80,13 @@ def fit(question: Question, seen: Imperfections) -> tuple[Imperfections, OutputF
     levelled = None if begun.best.is_white else _behind_levels(question, seen, begun)
     if levelled is not None:
         return levelled
-    course = find_beginning(interpolate_finely(free_from_wander(begun)))
+    course = find_beginning(interpolate_finely(begun))
+    drifting = None if course.best.is_white else _drifting(question, seen, course)
+    if drifting is not None:
+        return seen, drifting
+    freed = free_from_wander(begun)
+    if freed is not begun:
+        course = find_beginning(interpolate_finely(freed))
     return seen, _fit_and_look_for_rows(question, seen, course)
 
 
@@ -103,6 +110,21 @@ def _behind_levels(
     told, _ = refined
     white = is_white(told.problem.counting(told.best.fit.residual))
     return (clipped, fitted) if white else None
+
+
+def _drifting(question: Question, seen: Imperfections, course: Course) -> OutputFit | None:
+    """Plain dynamics and a drift, where they leave white noise."""
+    valid, former = _counted(question, seen), course
+
+    def with_rows(rows: Real) -> JointFit:
+        nonlocal course
+        course = continued(course, valid=valid, nuisance=rows)
+        return chosen_of(course, question.plain)
+
+    drifting = with_plain_drift(former.problem, former.best, with_rows)
+    if drifting is None or not drifting.joint.related:
+        return None
+    return OutputFit.alone(drifting.joint, drifting)
 
 
 def _fit_and_look_for_rows(

@@ -4,22 +4,24 @@ from dataclasses import replace
 
 import numpy as np
 
+from hmpim.identify.fitting.fit import Fit
 from hmpim.identify.fitting.trial import JointFit, Trial
 from hmpim.identify.noise.autoregression import innovation_gain
 
 __all__ = ["gain_by_rows", "without_rows"]
 
 
-def gain_by_rows(one: JointFit, count: int, other: JointFit) -> float:
+def gain_by_rows(one: JointFit, count: int, former: Fit, forgotten: int = 0) -> float:
     """Schwarz's criterion of a fit without `count` rows less that of one with them.
 
-    Either residual is taken as an autoregression, of the samples that count in both; an initial
-    state that is fitted has its parameters too.
+    Either residual is taken as an autoregression, of the samples that count in both, `forgotten`
+    being those that the former fit has left out at first; an initial state that is fitted has its
+    parameters too.
     """
     size = one.problem.y.size
     counts = np.ones(size, bool) if one.problem.valid is None else one.problem.valid.copy()
-    counts[: max(one.forgotten, other.forgotten)] = False
-    fit, former = one.best.fit, other.best.fit
+    counts[: max(one.forgotten, forgotten)] = False
+    fit = one.best.fit
     gained = 2.0 * innovation_gain(former.residual[counts], fit.residual[counts])
     unknown = fit.structure.parameters + fit.initial.size + count
     unknown -= former.structure.parameters + former.initial.size

@@ -20,6 +20,7 @@ from hmpim.identify.effects.disturbance import gain_by_rows, without_rows
 from hmpim.identify.fitting.candidates import spans_record
 from hmpim.identify.fitting.derivatives import jacobian
 from hmpim.identify.fitting.enrich import PLAIN
+from hmpim.identify.fitting.fit import Fit, Problem
 from hmpim.identify.fitting.least_squares import solved, without
 from hmpim.identify.fitting.trial import JointFit
 from hmpim.identify.noise.colour import bias_drift
@@ -28,7 +29,7 @@ from hmpim.identify.noise.whiteness import is_white
 from hmpim.identify.worth import PART, TWICE
 from hmpim.record import Finding
 
-__all__ = ["Drifting", "drift_finding", "with_drift"]
+__all__ = ["Drifting", "drift_finding", "with_drift", "with_plain_drift"]
 
 _DEGREES = (1, 2, 3, 4, 6, 8, 12, 16)
 """Degrees of the polynomial that are weighed against each other."""
@@ -91,7 +92,39 @@ def with_drift(first: JointFit, fitted: Callable[[Real, bool], JointFit]) -> Dri
     columns = _shape(joint, columns)
     # The structure is chosen once more, now that the drift is known.
     joint = fitted(columns, is_white(joint.best.fit.residual))
-    if gain_by_rows(joint, len(columns), first) < 0.0 and not _passes_for_drift(first, joint):
+    gain = gain_by_rows(joint, len(columns), first.best.fit, first.forgotten)
+    if gain < 0.0 and not _passes_for_drift(first, joint):
+        return None
+    return _described(joint, columns)
+
+
+def with_plain_drift(
+    problem: Problem, fit: Fit, fitted: Callable[[Real], JointFit]
+) -> Drifting | None:
+    """Fit plain dynamics again with a drift, if what they leave is slow and the drift leaves noise.
+
+    Parameters
+    ----------
+    problem, fit
+        The data, and the best plain fit with a constant bias.
+    fitted : callable
+        Makes the joint fit of the plain structures with rows for the drift.
+
+    Returns
+    -------
+    Drifting or None
+        None where a constant bias serves, where the model itself is slow, and where more than
+        white noise is left.
+    """
+    if spans_record(fit) or not _is_slow(problem, fit):
+        return None
+    columns = _polynomials(problem.y.size, _DEGREES[-1])
+    joint = fitted(columns)
+    if not is_white(joint.best.fit.residual):
+        return None
+    columns = _shape(joint, columns)
+    joint = fitted(columns)
+    if spans_record(joint.best.fit) or gain_by_rows(joint, len(columns), fit) < 0.0:
         return None
     return _described(joint, columns)
 
@@ -131,8 +164,11 @@ def _asked_for(joint: JointFit) -> bool:
     if is_white(fit.residual):
         return False
     spread = problem.masked(problem.y - problem.y.mean())
-    if fit.cost > PART * float(spread @ spread):
-        return True
+    return fit.cost > PART * float(spread @ spread) or _is_slow(problem, fit)
+
+
+def _is_slow(problem: Problem, fit: Fit) -> bool:
+    """Whether what a fit leaves over is slow."""
     counted = np.arange(problem.y.size) if problem.valid is None else np.flatnonzero(problem.valid)
     residual = fit.residual[counted]
     if counted.size < _FEWEST:
