@@ -94,9 +94,8 @@ def _behind_levels(
     question: Question, seen: Imperfections, course: Course
 ) -> tuple[Imperfections, OutputFit] | None:
     """Plain dynamics behind levels, where they leave white noise."""
-    levels = seen.saturation
-    if levels is None:
-        levels = _imperfections(question, prediction=course.best.prediction).saturation
+    shown = _imperfections(question, prediction=course.best.prediction).saturation
+    levels = seen.saturation if shown is None else shown
     if levels is None:
         return None
     clipped = replace(seen, saturation=levels)
