@@ -1,18 +1,19 @@
 """Fits of every structure: plain ones, richer ones where asked for, each between the samples."""
 
-from collections.abc import Iterable
+from collections.abc import Iterator
 
 import numpy as np
 
 from hmpim.identify.arrays import Real
 from hmpim.identify.chance import CLEARLY, FALSE_ALARM
 from hmpim.identify.fitting.beginning import in_motion
-from hmpim.identify.fitting.data import Data, Seen, shifted
+from hmpim.identify.fitting.data import RETURNS, Data, Seen, hopeless_beside, shifted
 from hmpim.identify.fitting.enrich import (
     INTEGRATING,
     MODES,
     PLAIN,
     RICH,
+    Proposal,
     integrator_starts,
     members,
     proposals,
@@ -22,6 +23,7 @@ from hmpim.identify.fitting.fit import Fit, Problem, fit_structure
 from hmpim.identify.fitting.growth import one_more_pole, scale_of, with_pole
 from hmpim.identify.fitting.held_steps import steps_through
 from hmpim.identify.fitting.modes import grown_modes
+from hmpim.identify.fitting.spectral import condensed, fitted_roughly
 from hmpim.identify.fitting.start import RoughResponse, rough_response, searched, starting_values
 from hmpim.identify.noise.misfit import unexplained_response
 from hmpim.identify.signals import longest_lag
@@ -89,9 +91,10 @@ def fit_plain(
                 fit = min(fit, rival, key=lambda f: f.objective)
         if not white and fit.objective < TWICE**2 * hopeful:
             rivals = starts[1:]
-            if not settled:
-                rivals += starting_values(rough, structure)
-            for theta in _distinct(rivals, [] if settled else starts[:1]):
+            if not settled and structure.order:
+                every = np.stack([*starts, *starting_values(rough, structure)])
+                rivals = list(fitted_roughly(condensed(rough), structure, every).likely)
+            for theta in rivals:
                 rival = fit_structure(problem, structure, theta, iterations=_TASTE)
                 fit = min(fit, rival, key=lambda f: f.objective)
         settled = settled or white
@@ -109,16 +112,6 @@ def fit_plain(
         return fit if fit.converged else fit_structure(problem, fit.structure, fit.theta)
 
     return [ended(fit) for fit in fits]
-
-
-def _distinct(starts: Iterable[Real], tried: Iterable[Real] = ()) -> list[Real]:
-    """Starts that are neither among those already tried nor the same as an earlier one."""
-    known = {start.tobytes() for start in tried}
-    found: dict[bytes, Real] = {}
-    for start in starts:
-        if start.tobytes() not in known:
-            found.setdefault(start.tobytes(), start)
-    return list(found.values())
 
 
 def fit_rich(
@@ -168,19 +161,34 @@ def _climbed(
     # A rough response that takes a free response for an answer proposes nothing that is of use.
     misled = data.keeps_samples and in_motion(data.u) and _is_poor(best, problem.spread)
     proposed = proposals(data.rough, rich, best, all_of_them=all_of_them or misled)
-    for start in range(0, len(proposed), _AT_ONCE):
-        some = proposed[start : start + _AT_ONCE]
+    for some in _batches(proposed):
         for p in some:
-            starts = [*_grown(p.structure, [*fits, *found]), *p.starts]
+            starts = [*p.starts, *_grown(p.structure, [*fits, *found])]
             found.append(_best_of(problem, p.structure, starts, [*fits, *found]))
-        best = min(found, key=lambda fit: fit.objective)
+        if not some:
+            late = min(proposed, key=lambda p: p.error).starts[0][0] if proposed else best.delay
+            modes = members(structures, ("two_modes", *MODES))
+            grown = grown_modes(problem, data, float(late), best.memory, modes)
+            # Two modes that explain part of what follows the input stand for what is not linear.
+            found += [f for f in grown if f.cost < PART * best.cost]
+        best = min([best, *found], key=lambda fit: fit.objective)
         if owed_to_input(problem, best, data) <= MATERIAL and best.is_white:
             break
-    else:
-        grown = grown_modes(problem, data, best, members(structures, ("two_modes", *MODES)))
-        # Two modes that explain part of what follows the input stand for what is not linear.
-        found += [f for f in grown if f.cost < PART * best.cost]
     return found
+
+
+def _batches(proposed: list[Proposal]) -> Iterator[list[Proposal]]:
+    """A few at once: the promising ones, none for modes in parallel, and the others.
+
+    Modes come first where no proposal comes near the rough response.
+    """
+    near = [p for p in proposed if p.promising and p.error < PART**2]
+    far = [p for p in proposed if p not in near]
+    for start in range(0, len(near), _AT_ONCE):
+        yield near[start : start + _AT_ONCE]
+    yield []
+    for start in range(0, len(far), _AT_ONCE):
+        yield far[start : start + _AT_ONCE]
 
 
 def _pruned(problem: Problem, fits: list[Fit], rich: list[Structure]) -> list[Fit]:
@@ -242,7 +250,12 @@ def reduced(problem: Problem, fits: list[Fit], richer: list[Fit]) -> list[Fit]:
         if fit.objective <= TWICE * best.objective:
             return fit
         tried = [
-            fit_structure(problem, fit.structure, np.concatenate([[late - c[0]], theta]))
+            fit_structure(
+                problem,
+                fit.structure,
+                np.concatenate([[late - c[0]], theta]),
+                hopeless=fit.objective,
+            )
             for theta, c in sections
             if fit.structure.sections == (c.size,)
         ]
@@ -277,10 +290,21 @@ def _best_of(problem: Problem, structure: Structure, starts: list[Real], rivals:
     """
     leading = min(rivals, key=lambda fit: fit.objective)
     precision = _PRECISION / leading.share
-    tried = [
-        fit_structure(problem, structure, theta, iterations=_LONG_TASTE, precision=precision)
-        for theta in _distinct(starts)
-    ]
+    hopeless = hopeless_beside(structure, rivals)
+    tried: list[Fit] = []
+    for theta in starts:
+        tried.append(
+            fit_structure(
+                problem,
+                structure,
+                theta,
+                iterations=_LONG_TASTE,
+                precision=precision,
+                hopeless=hopeless,
+            )
+        )
+        if tried[-1].converged and tried[-1].is_white:
+            break
     best = min(tried, key=lambda fit: fit.objective)
     if steps_through(structure, held=problem.source.degree == 0):
         best = _best_sample(problem, best)
@@ -364,9 +388,17 @@ def nested(first_order: Fit) -> Real:
     return np.concatenate([first_order.theta, [0.1875]])  # (1 + 3/4 Ts)(1 + 1/4 Ts)
 
 
-def refit_between(problem: Problem, fit: Fit, origin: Intersample, mode: Intersample) -> Fit:
+def refit_between(
+    problem: Problem,
+    fit: Fit,
+    origin: Intersample,
+    mode: Intersample,
+    *,
+    hopeless: float = np.inf,
+) -> Fit:
     """Fit the same structure under another assumption, from where the first one ended."""
-    return fit_structure(problem, fit.structure, shifted(fit.theta, origin, mode))
+    theta = shifted(fit.theta, origin, mode)
+    return fit_structure(problem, fit.structure, theta, iterations=RETURNS, hopeless=hopeless)
 
 
 def fit_under_each_assumption(
@@ -382,10 +414,11 @@ def fit_under_each_assumption(
         fit for fit in fits if fit.objective >= TWICE * least and fit.structure.name in PLAIN
     ]
     others = [mode for mode in BETWEEN if mode != natural]
+    hopeless = TWICE * least
 
     def moved(some: list[Fit]) -> list[tuple[Intersample, Fit]]:
         return [
-            (mode, refit_between(data.problem(mode, seen), fit, natural, mode))
+            (mode, refit_between(data.problem(mode, seen), fit, natural, mode, hopeless=hopeless))
             for mode in others
             for fit in some
         ]

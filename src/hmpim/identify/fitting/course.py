@@ -16,8 +16,8 @@ from hmpim.identify.fitting.candidates import (
     owed_to_input,
     reduced,
 )
-from hmpim.identify.fitting.data import Data, Seen, follows, polished, refit
-from hmpim.identify.fitting.enrich import PLAIN
+from hmpim.identify.fitting.data import Data, Seen, follows, polished, refit, refit_all
+from hmpim.identify.fitting.enrich import PLAIN, is_response
 from hmpim.identify.fitting.fit import Fit, Problem
 from hmpim.identify.fitting.least_squares import solved
 from hmpim.identify.fitting.start import rough_response
@@ -159,9 +159,14 @@ def turn_ahead(course: Course) -> Course:
 
 
 def free_from_wander(course: Course) -> Course:
-    """The same from starts with the noise whitened, where its colour hides the response."""
+    """The same from starts with the noise whitened, where its colour hides the response.
+
+    What an integrator leaves over wanders too, and is the response.
+    """
+    if almost_integrates(course.best):
+        return course
     whitened = prewhitened_of(course.data, course.natural, course.fits, course.given)
-    if whitened is None:
+    if whitened is None or is_response(course.data.rough, course.best):
         return course
     problem = whitened.problem(course.natural, course.given)
     free = fit_plain(problem, whitened.rough, course.plain or PLAIN)
@@ -175,7 +180,7 @@ def interpolate_finely(course: Course) -> Course:
     finer = interpolated_for(course, course.best)
     if finer is None or course.natural != "bandlimited":
         return finer or course
-    return replace(finer, fits=[refit(finer.problem, fit) for fit in course.fits])
+    return replace(finer, fits=_again(finer, course.fits))
 
 
 def interpolated_for(course: Course, fit: Fit) -> Course | None:
@@ -218,10 +223,16 @@ def find_beginning(course: Course) -> Course:
         ]
         later = count_in(data, natural, fits, seen, course.known)
         counted = counted if later.begins is None else later
-    if counted is not seen:
-        settled = None
-        fits = [refit(data.problem(natural, counted), f) for f in fits]
-    return replace(course, counted=counted, fits=fits, settled=settled)
+    if counted is seen:
+        return replace(course, counted=counted, fits=fits, settled=settled)
+    course = replace(course, counted=counted, settled=None)
+    return replace(course, fits=_again(course, fits))
+
+
+def _again(course: Course, fits: list[Fit]) -> list[Fit]:
+    """Fits to the samples that count now, from where they ended."""
+    natural = [(course.natural, fit) for fit in fits]
+    return [fit for _, fit in refit_all(course.data, natural, course.counted)]
 
 
 def continue_between(course: Course) -> list[tuple[Intersample, Fit]]:
@@ -265,8 +276,8 @@ def enrich(
         counted = resting if rests else begin_later(course.counted, leading)
         if counted is not None:
             course = replace(course, counted=counted)
-            fits = [refit(course.problem, f) for f in fits]
-            richer = [refit(course.problem, f) for f in richer]
+            every = _again(course, [*fits, *richer])
+            fits, richer = every[: len(fits)], every[len(fits) :]
     if richer:
         fits = reduced(course.problem, fits, richer)
     course = replace(course, fits=[*fits, *richer] if plain else richer or fits)

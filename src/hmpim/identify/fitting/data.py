@@ -16,18 +16,26 @@ from hmpim.identify.kept import kept
 from hmpim.identify.noise.autoregression import autoregression
 from hmpim.identify.noise.misfit import Misfit, misfit
 from hmpim.identify.signals import longest_lag
+from hmpim.identify.worth import TWICE
+from hmpim.model.dynamics import Structure
 from hmpim.model.sampled import PRECISION, SampledInput, prepare_input
 from hmpim.record import Intersample
 
 __all__ = [
+    "RETURNS",
     "Data",
     "Seen",
     "follows",
+    "hopeless_beside",
     "polished",
     "prepared",
     "refit",
+    "refit_all",
     "shifted",
 ]
+
+RETURNS = 12
+"""Steps that a fit is taken from where it ended when what it is fitted to has changed."""
 
 prepared = kept(prepare_input)
 """An input prepared under an assumption, as `hmpim.model.sampled.prepare_input` does it."""
@@ -120,6 +128,41 @@ def shifted(
 def polished(problem: Problem, fit: Fit) -> Fit:
     """The same fit at the final precision."""
     return fit_structure(problem, fit.structure, fit.theta, precision=problem.final)
+
+
+def refit_all(
+    data: Data,
+    fitted: list[tuple[Intersample, Fit]],
+    seen: Seen,
+    *,
+    hopeful: float = np.inf,
+) -> list[tuple[Intersample, Fit]]:
+    """Fit all structures to other data, from where they ended, the leading one first.
+
+    What promises to leave much more than that, or no less than a plainer one that leaves white
+    noise, is not followed; what left `hopeful` or more before is only evaluated.
+    """
+    leading = min(range(len(fitted)), key=lambda i: fitted[i][1].objective)
+    by_size = sorted(range(len(fitted)), key=lambda i: fitted[i][1].structure.parameters)
+    done: dict[int, Fit] = {}
+    for i in dict.fromkeys([leading, *by_size]):
+        mode, fit = fitted[i]
+        done[i] = fit_structure(
+            data.problem(mode, seen),
+            fit.structure,
+            fit.theta,
+            iterations=RETURNS if fit.objective < hopeful else 0,
+            hopeless=hopeless_beside(fit.structure, list(done.values())),
+        )
+    return [(mode, done[i]) for i, (mode, _) in enumerate(fitted)]
+
+
+def hopeless_beside(structure: Structure, rivals: list[Fit]) -> float:
+    """Sum of squares from which on a structure has no chance against others."""
+    least = min((fit.objective for fit in rivals), default=np.inf)
+    plainer = [fit for fit in rivals if fit.structure.parameters <= structure.parameters]
+    white = [fit.objective for fit in plainer if fit.objective < TWICE * least and fit.is_white]
+    return min([TWICE * least, *white])
 
 
 def refit(problem: Problem, fit: Fit) -> Fit:

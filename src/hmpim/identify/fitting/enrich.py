@@ -5,14 +5,15 @@ is worth more than a small share of the output: every simulation pays for every 
 enough samples the smallest imperfection of real hardware is "significant".
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from hmpim.identify.arrays import Complex, Real
+from hmpim.identify.arrays import Real
 from hmpim.identify.fitting.fit import Fit
+from hmpim.identify.fitting.spectral import condensed, fitted_roughly, reweighted
 from hmpim.identify.fitting.start import RoughResponse, starting_values
-from hmpim.identify.worth import FEW
+from hmpim.identify.worth import FEW, PART
 from hmpim.model.dynamics import STRUCTURES, Structure, StructureName, theta_of
 
 __all__ = [
@@ -22,6 +23,7 @@ __all__ = [
     "RICH",
     "Proposal",
     "integrator_starts",
+    "is_response",
     "members",
     "proposals",
     "without_fast",
@@ -54,11 +56,6 @@ INTEGRATING: tuple[StructureName, ...] = (
 _DELAYS = 7
 """How many delays to start from, about that of the best fit so far."""
 
-_PROMISING = 1e3
-"""Squared error on the rough response, over the least, up to which a structure is promising."""
-
-_REWEIGHTINGS = 6
-
 
 def integrator_starts(rough: RoughResponse, structure: Structure) -> list[Real]:
     """Starts for an integrator: those of the rest of it, from the input's running sum.
@@ -85,12 +82,15 @@ class Proposal:
     starts : tuple of ndarray, shape (1 + order,)
         Delay in samples, parameters of the denominator's sections; the most promising first.
     error : float
-        Of the best start on the rough response.
+        Share of the rough response's power that the best start misses.
+    promising : bool
+        Whether the least of all is not a small part of it.
     """
 
     structure: Structure
     starts: tuple[Real, ...]
     error: float
+    promising: bool = False
 
 
 def proposals(
@@ -121,38 +121,40 @@ def proposals(
     """
     if not structures:
         return []
+    rough = condensed(rough)
     reach = np.pi / rough.omega[-1]
     near = np.linspace(-1.5, 0.5, _DELAYS)
     late = np.linspace(0.75, 1.5, 4)  # a zero as fast as its pole leads
-    scale = float(np.sqrt(rough.weight @ rough.omega**2 / rough.weight.sum()))
-    s = np.asarray(1j * rough.omega / scale, dtype=np.complex128)
     out = []
     for structure in structures:
-        found: list[tuple[float, Real]] = []
-        turns = [*near, *late] if structure.zeros >= structure.order else near
-        for delay in np.maximum(fit.delay + reach * np.asarray(turns), -1.0):
-            target = rough.response * np.exp(1j * rough.omega * (delay - rough.lag))
-            error, denominator = _reweighted(s, target, rough.weight, structure)
-            coefficients = _sections(denominator, structure)
-            if coefficients is None:
-                continue
-            powers = np.concatenate([np.arange(1, order + 1) for order in structure.sections])
-            theta = theta_of(structure, coefficients / scale**powers)
-            found.append((error, np.concatenate([[delay], theta])))
-        found.sort(key=lambda item: item[0])
-        starts = [theta for _, theta in found[:count]]
-        if structure.dc_zeros == 0:
-            starts = [_from_plain(rough, structure, fit), *starts[: count - 1]]
-        error = found[0][0] if found else float("inf")
-        out.append(Proposal(structure=structure, starts=tuple(starts), error=error))
+        turns = np.append(near, late) if structure.zeros >= structure.order else near
+        delays = np.maximum(fit.delay + reach * turns, -1.0)
+        starts = [] if structure.dc_zeros else [_from_plain(rough, structure, fit)]
+        errors, denominators = reweighted(rough, structure, delays)
+        powers = np.concatenate([np.arange(1, order + 1) for order in structure.sections])
+        for i in np.argsort(errors):
+            coefficients = _sections(denominators[i], structure)
+            if coefficients is not None and len(starts) < count:
+                theta = theta_of(structure, coefficients / rough.omega[-1] ** powers)
+                starts.append(np.append(delays[i], theta))
+        if starts:
+            found = fitted_roughly(rough, structure, np.stack(starts))
+            out.append(Proposal(structure=structure, starts=tuple(found.likely), error=found.error))
     if not all_of_them:
         out = [proposal for proposal in out if proposal.error < (1 - FEW) * _error(rough, fit)]
     least = min((proposal.error for proposal in out), default=0.0)
 
-    def rank(proposal: Proposal) -> tuple[bool, int]:
-        return proposal.error > _PROMISING * least, proposal.structure.parameters
+    out = [replace(p, promising=PART**2 * p.error <= least) for p in out]
+    return sorted(out, key=lambda p: (not p.promising, p.structure.parameters))
 
-    return sorted(out, key=rank)
+
+def is_response(rough: RoughResponse, fit: Fit) -> bool:
+    """Whether what a fit leaves of the rough response is a response for the most part.
+
+    Two modes have poles and zeros enough to follow most of what is no noise.
+    """
+    tried = proposals(rough, [STRUCTURES["two_modes"]], fit)
+    return bool(tried) and tried[0].error < PART * _error(condensed(rough), fit)
 
 
 def without_fast(fit: Fit, structure: Structure) -> Real | None:
@@ -192,11 +194,12 @@ def without_fast(fit: Fit, structure: Structure) -> Real | None:
 
 
 def _error(rough: RoughResponse, fit: Fit) -> float:
-    """Squared error of a fit on the rough response."""
+    """Share of the rough response's power that a fit misses."""
     s = 1j * rough.omega
     b, a = (np.polynomial.polynomial.polyval(s, c) for c in (fit.numerator, fit.denominator))
     response = b / a * np.exp(-1j * rough.omega * (fit.delay - rough.lag))
-    return float(rough.weight @ np.abs(rough.response - response) ** 2)
+    missed, power = (np.abs(r) ** 2 for r in (rough.response - response, rough.response))
+    return float((rough.weight @ missed) / (rough.weight @ power))
 
 
 def _from_plain(rough: RoughResponse, structure: Structure, fit: Fit) -> Real:
@@ -213,30 +216,6 @@ def _from_plain(rough: RoughResponse, structure: Structure, fit: Fit) -> Real:
     for k, order in enumerate(structure.sections[1:]):
         theta += [np.log(0.5 / (k + 1) / rough.omega[-1])] + ([0.5] if order == 2 else [])
     return np.array(theta)
-
-
-def _reweighted(
-    s: Complex, target: Complex, weight: Real, structure: Structure
-) -> tuple[float, Real]:
-    """Fit target A = B; return the output error and A by rising powers, A(0) = 1."""
-    order, zeros = structure.order, structure.zeros
-    below = s[:, None] ** np.arange(1, order + 1)
-    above = s[:, None] ** np.arange(structure.dc_zeros, zeros + 1)
-    columns = np.hstack([target[:, None] * below, -above])
-    root = np.sqrt(weight)
-    best = (np.inf, np.ones(order + 1))
-    for _ in range(_REWEIGHTINGS):
-        rows = np.vstack([(columns * root[:, None]).real, (columns * root[:, None]).imag])
-        right = -np.concatenate([(target * root).real, (target * root).imag])
-        solution = np.linalg.lstsq(rows, right, rcond=None)[0]
-        denominator = np.concatenate([[1.0], solution[:order]])
-        a = np.polynomial.polynomial.polyval(s, denominator)
-        b = above @ solution[order:]
-        error = float(weight @ np.abs(target - b / a) ** 2) if np.all(a != 0) else np.inf
-        if error < best[0]:
-            best = (error, denominator)
-        root = np.sqrt(weight) / np.abs(a)
-    return best
 
 
 def _sections(denominator: Real, structure: Structure) -> Real | None:

@@ -29,7 +29,7 @@ from hmpim.identify.fitting.course import (
     start,
     turn_ahead,
 )
-from hmpim.identify.fitting.data import follows, polished, refit
+from hmpim.identify.fitting.data import follows, polished, refit, refit_all
 from hmpim.identify.fitting.enrich import INTEGRATING, MODES, PLAIN, RICH
 from hmpim.identify.fitting.fit import Fit, Problem, fit_structure
 from hmpim.identify.fitting.growth import (
@@ -163,7 +163,7 @@ def weigh_and_look_again(
             if (mode, fit.structure) != chosen
             and (fit.cost < TWICE**2 * best.fit.cost or fit.structure.name in PLAIN)
         ]
-        fitted = [(mode, refit(course.data.problem(mode, again), fit)) for mode, fit in hopeful]
+        fitted = refit_all(course.data, hopeful, again)
         course, trials, best, share = _weigh(course, fitted)
     return course, trials, best, share
 

@@ -15,8 +15,9 @@ import numpy as np
 from hmpim.identify.arrays import Complex, Real
 from hmpim.identify.fitting.data import Data
 from hmpim.identify.fitting.fit import Fit, Problem, fit_structure
+from hmpim.identify.fitting.spectral import condensed, fitted_roughly, left_roughly
 from hmpim.identify.fitting.start import RoughResponse
-from hmpim.identify.worth import PART, PAST
+from hmpim.identify.worth import FEW, PART, TWICE
 from hmpim.model.dynamics import Structure
 
 __all__ = ["grown_modes"]
@@ -37,78 +38,78 @@ _TASTE = 12
 """Steps from each start before the best is followed to its end."""
 
 
-def grown_modes(problem: Problem, data: Data, best: Fit, structures: list[Structure]) -> list[Fit]:
-    """Fits of sections in parallel, one more each time, until white noise is left.
+def grown_modes(
+    problem: Problem, data: Data, delay: float, memory: float, structures: list[Structure]
+) -> list[Fit]:
+    """Fits of sections in parallel, as many as it takes to leave white noise.
 
-    They are grown at the delay of the best fit so far, and once more at the delay that they come
-    to themselves if that leaves more than noise, or a mode beyond the band: at a wrong delay some
-    modes stand for it.
+    They are grown on the rough response, at a delay that others come to, and if that leaves more
+    than noise once more at the delay that they come to themselves: at a wrong one some modes stand
+    for it. The samples are asked from the fewest modes on that come near the best of them.
 
     Parameters
     ----------
     problem : Problem
         The data.
     data : Data
-        Whose rough response the delay is looked for in.
-    best : Fit
-        The best fit so far, for its delay.
+        Whose rough response they are grown on.
+    delay, memory : float
+        Delay to grow them at, and how much earlier it may be, in samples.
     structures : list of Structure
         Those that may be chosen, each of so many sections of order 2.
     """
-    found: list[Fit] = []
-    for again in (False, True) if structures else ():
-        found += _grown(problem, data, best.delay, structures, known=again)
-        if not found or (found[-1].is_white and _is_inside(found[-1], data)):
+    rough = condensed(data.rough)
+    found: dict[Structure, Fit] = {}
+    for known in (False, True) if structures else ():
+        for structure, start in _grown(rough, delay, memory, structures, known=known).items():
+            fit = fit_structure(problem, structure, start, iterations=_TASTE)
+            least = min((one.objective for one in found.values()), default=np.inf)
+            found[structure] = min(fit, found.get(structure, fit), key=lambda one: one.objective)
+            if fit.is_white or fit.objective > (1.0 - PART) * least:
+                break
+        if not found:
             break
-        best = min(found, key=lambda fit: fit.objective)
-    return [
-        min((fit for fit in found if fit.structure == structure), key=lambda fit: fit.objective)
-        for structure in structures
-        if any(fit.structure == structure for fit in found)
-    ]
-
-
-def _is_inside(fit: Fit, data: Data) -> bool:
-    """Whether all modes are where the record tells them."""
-    c1, shape = np.exp(fit.theta[1::2]), fit.theta[2::2]
-    return bool(np.all(PAST * data.rough.omega[-1] * c1 * np.sqrt(shape) > 1.0))
+        best = min(found.values(), key=lambda one: one.objective)
+        if not best.converged:
+            best = found[best.structure] = fit_structure(problem, best.structure, best.theta)
+        if best.is_white:
+            break
+        delay = best.delay
+    return list(found.values())
 
 
 def _grown(
-    problem: Problem, data: Data, delay: float, structures: list[Structure], *, known: bool
-) -> list[Fit]:
-    """Fits of one more section each time, while one more explains a good part of what is left."""
+    rough: RoughResponse, delay: float, memory: float, structures: list[Structure], *, known: bool
+) -> dict[Structure, Real]:
+    """Parameters with more sections each time, from the fewest on that come near the best.
+
+    One more is added while it explains a good part of what is left, at a delay that is held: free
+    to turn, or each with a gain alone where the delay is known.
+    """
     named = {len(structure.sections): structure for structure in structures}
-    found: list[Fit] = []
-    theta, rough, least = np.array([delay]), data.rough, np.inf
+    found: dict[Structure, tuple[float, Real]] = {}
+    theta, left, least = np.array([delay]), rough, np.inf
     for count in range(1, max(named) + 1):
         sections = (2,) * count
         free = replace(structures[0], sections=sections, zeros=2 * count - 1, parallel=True)
         gains = named.get(count, replace(free, zeros=2 * count - 2))
-        theta = np.concatenate([theta, _peak(rough)])
-        held = replace(problem, shortest_delay=theta[0], longest_delay=theta[0])
-        leading = fit_structure(held, gains if known else free, theta, iterations=_TASTE)
-        starts = [leading.theta] if known else [theta, *_turned_back(data.rough, leading)]
-        fit = min(
-            (fit_structure(problem, gains, start, iterations=_TASTE) for start in starts),
-            key=lambda fit: fit.objective,
-        )
-        if not fit.converged and fit.objective < leading.objective:
-            fit = fit_structure(problem, gains, fit.theta)
-        found += [fit] if count in named else []
-        if not known and fit.objective < leading.objective:
-            leading = fit
-        if fit.is_white or leading.objective > (1.0 - PART) * least:
+        shape = gains if known else free
+        theta = np.concatenate([theta, _peak(left)])
+        leading = fitted_roughly(rough, shape, theta[None], held=True)
+        poles = leading.likely[0][1:]
+        late = [] if known else _delays(rough, poles, memory)
+        starts = [leading.likely[0] if known else theta, *(np.append(one, poles) for one in late)]
+        fit = fitted_roughly(rough, gains, np.stack(starts))
+        if count in named:
+            found[gains] = fit.error, fit.likely[0]
+        if not known and fit.error < TWICE * leading.error:
+            leading, shape = fit, gains
+        if leading.error > (1.0 - FEW) * least:
             break
-        theta, least = leading.theta, leading.objective
-        rough = data.rough_left(leading)
-    return found
-
-
-def _turned_back(rough: RoughResponse, fit: Fit) -> list[Real]:
-    """Starts at a fit's poles and the likeliest delays."""
-    poles = fit.theta[1:]
-    return [np.append(late, poles) for late in _delays(rough, poles, fit.memory)]
+        theta, least = leading.likely[0], leading.error
+        left = left_roughly(rough, shape, theta)
+    least = min((error for error, _ in found.values()), default=0.0)
+    return {one: theta for one, (error, theta) in found.items() if PART**2 * error <= least}
 
 
 def _shapes(omega: Real, theta: Real) -> Complex:

@@ -42,6 +42,9 @@ _TAPER = 0.1
 _PHASE_STEP = 0.3
 """Steps of the delay looked at turn the highest frequency by no more than this, in rad."""
 
+_FINE, _COARSE = 8, 2
+"""Most of them to a sample, of one guess of the corner frequency and of several."""
+
 _CORNERS = (0.08, 0.25, 1.0)
 """Where, over the highest frequency, the first weight begins to roll off as 1/A would: above
 the system's own corner the response is noise, which an unweighted fit takes at face value."""
@@ -187,7 +190,8 @@ def starting_values(
     list of ndarray, shape (1 + order,)
         Delay in samples, parameters of the denominator's sections.
     """
-    finer = int(np.clip(np.ceil(rough.omega[-1] / _PHASE_STEP), 1, 8))
+    most = _COARSE if thorough else _FINE
+    finer = int(np.clip(np.ceil(rough.omega[-1] / _PHASE_STEP), 1, most))
     shifts = np.arange(min(rough.earliest - rough.lag, 0) * finer, 2 * finer + 1)
     order = structure.order
     scale = float(np.sqrt(rough.weight @ rough.omega**2 / rough.weight.sum()))
@@ -236,7 +240,7 @@ def searched(rough: RoughResponse, structure: Structure, *, count: int = 3) -> l
     """
     if structure.sections not in ((1,), (2,)):
         return []
-    finer = int(np.clip(np.ceil(rough.omega[-1] / _PHASE_STEP), 1, 8))
+    finer = int(np.clip(np.ceil(rough.omega[-1] / _PHASE_STEP), 1, _FINE))
     shifts = np.arange(min(rough.earliest - rough.lag, 0) * finer, 2 * finer + 1)
     length = rough.length * finer
     found: list[tuple[float, Real]] = []

@@ -12,9 +12,10 @@ from hmpim.identify.fitting.data import (
     Seen,
     follows,
     polished,
+    refit_all,
 )
 from hmpim.identify.fitting.derivatives import jacobian
-from hmpim.identify.fitting.fit import Fit, Problem, fit_structure
+from hmpim.identify.fitting.fit import Fit, Problem
 from hmpim.identify.fitting.start import rough_response
 from hmpim.identify.fitting.trial import Trial
 from hmpim.identify.noise.autoregression import autoregression
@@ -24,9 +25,6 @@ from hmpim.identify.worth import PART, TWICE
 from hmpim.record import Intersample
 
 __all__ = ["distance_of", "is_contradicted", "noise_of", "prewhitened_of", "refit_whitened"]
-
-_RETURNS = 12
-"""Steps that a fit is taken once more when only the noise model has changed."""
 
 
 def prewhitened_of(data: Data, mode: Intersample, fits: list[Fit], seen: Seen) -> Data | None:
@@ -69,12 +67,7 @@ def refit_whitened(
 ) -> list[tuple[Intersample, Fit]]:
     """All fits once more under one noise model, the hopeless ones as they are."""
     least = min(fit.objective for _, fit in fitted)
-    out = []
-    for mode, fit in fitted:
-        steps = _RETURNS if fit.objective < TWICE * least else 0
-        problem = data.problem(mode, seen)
-        out.append((mode, fit_structure(problem, fit.structure, fit.theta, iterations=steps)))
-    return out
+    return refit_all(data, fitted, seen, hopeful=TWICE * least)
 
 
 def is_contradicted(data: Data, best: Trial, seen: Seen) -> bool:

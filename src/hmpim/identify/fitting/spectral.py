@@ -1,0 +1,267 @@
+"""Fits to the rough response: where a climb on the samples begins, and whether it is worth making.
+
+The samples tell a structure's poles exactly, at the price of a response as long as the record for
+each step. The rough response tells them nearly, bin by bin, and all starts of a structure climb on
+it at once: output error with the numerator solved for (variable projection), by Levenberg and
+Marquardt.
+"""
+
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from hmpim.identify.arrays import Complex, Mask, Real
+from hmpim.identify.fitting.start import RoughResponse
+from hmpim.identify.worth import MUCH, TWICE
+from hmpim.model.dynamics import Structure
+
+__all__ = ["RoughFits", "condensed", "fitted_roughly", "left_roughly", "reweighted"]
+
+_ALONE = 128
+"""Bins that are looked at one by one; beyond, as many to each octave share a half of them."""
+
+_STEPS = 20
+"""Most steps on the rough response."""
+
+_STILL = 1e-3
+"""Share of the squared error below which a step gains nothing any more."""
+
+_LEAST = 1e-12
+"""Share of a diagonal element that is added to normal equations: less is rounding."""
+
+
+_REWEIGHTINGS = 6
+
+
+class RoughFits(NamedTuple):
+    """Fits to a rough response.
+
+    Parameters
+    ----------
+    error : float
+        Least share of its power that is missed.
+    likely : ndarray, shape (k, 1 + order)
+        Parameters of the fits that miss no more than twice as much, the best first.
+    """
+
+    error: float
+    likely: Real
+
+
+def condensed(rough: RoughResponse) -> RoughResponse:
+    """The same response, neighbouring bins taken together where they are many to an octave."""
+    octave = np.maximum(np.floor(np.log2(np.maximum(rough.bins, 1) / _ALONE)) + 1.0, 0.0)
+    group = rough.bins // (2 ** octave.astype(np.int64)) + (_ALONE * octave).astype(np.int64)
+    starts = np.flatnonzero(np.diff(group, prepend=-1))
+    if starts.size == rough.bins.size:
+        return rough
+    weight = np.add.reduceat(rough.weight, starts)
+    return replace(
+        rough,
+        bins=rough.bins[starts],
+        omega=np.add.reduceat(rough.weight * rough.omega, starts) / weight,
+        response=np.add.reduceat(rough.weight * rough.response, starts) / weight,
+        weight=weight,
+    )
+
+
+def fitted_roughly(
+    rough: RoughResponse, structure: Structure, thetas: Real, *, held: bool = False
+) -> RoughFits:
+    """Climb from all starts of a structure at once.
+
+    Parameters
+    ----------
+    rough : RoughResponse
+        Better `condensed`.
+    structure : Structure
+        Without an integrator.
+    thetas : ndarray, shape (k, 1 + order)
+        Starts.
+    held : bool
+        Whether the delay stays.
+    """
+    now = _Rough(rough, structure, thetas)
+    damping = np.full(len(thetas), 1e-3)
+    for _ in range(_STEPS):
+        step = now.steps(damping) * (np.arange(thetas.shape[1]) >= held)
+        then = _Rough(rough, structure, _bounded(structure, now.thetas + step))
+        better = then.errors < now.errors
+        still = ~(now.errors - then.errors > _STILL * now.errors)
+        damping = np.where(better, damping / 10.0, damping * 10.0)
+        now = then.unless(better, now)
+        if np.all(still & (better | (damping > 10.0))):
+            break
+    least = float(now.errors.min())
+    likely: list[Real] = []
+    for i in np.argsort(now.errors):
+        apart = all(np.max(np.abs(now.thetas[i] - other)) > MUCH for other in likely)
+        if now.errors[i] <= TWICE * least and apart:
+            likely.append(now.thetas[i])
+    power = float(rough.weight @ np.abs(rough.response) ** 2)
+    return RoughFits(least / power, np.array(likely))
+
+
+def reweighted(rough: RoughResponse, structure: Structure, delays: Real) -> tuple[Real, Real]:
+    """Sanathanan and Koerner's iteration at many delays at once.
+
+    Parameters
+    ----------
+    rough, structure
+        As for `fitted_roughly`; not of sections in parallel.
+    delays : ndarray, shape (k,)
+        In samples.
+
+    Returns
+    -------
+    errors : ndarray, shape (k,)
+        Least squared output error at each delay.
+    denominators : ndarray, shape (k, order + 1)
+        A by rising powers of s per sample over the highest frequency, A(0) = 1.
+    """
+    order, first, last = structure.order, structure.dc_zeros, structure.zeros
+    above = np.arange(first, last + 1)
+    x = rough.omega / rough.omega[-1]
+    powers = x ** np.arange(2 * max(order, last) + 1)[:, None]
+    target = rough.response * np.exp(1j * rough.omega * (delays[:, None] - rough.lag))
+    size = np.abs(rough.response) ** 2
+    below = np.arange(order + 1)
+    turns = 1j ** np.arange(-8, 9)
+    weight = np.broadcast_to(rough.weight, target.shape)
+    errors, best = np.full(delays.size, np.inf), np.ones((delays.size, order + 1))
+    for _ in range(_REWEIGHTINGS):
+        own = (weight * size) @ powers.T
+        fixed = weight @ powers.T
+        mixed = (weight * target.conj()) @ powers.T
+        grid = below[:, None] + below
+        gram = np.empty((delays.size, order + 1 + above.size, order + 1 + above.size))
+        gram[:, : order + 1, : order + 1] = own[:, grid] * turns[below - below[:, None] + 8].real
+        grid = above[:, None] + above
+        gram[:, order + 1 :, order + 1 :] = fixed[:, grid] * turns[above - above[:, None] + 8].real
+        grid = below[:, None] + above
+        across = -(mixed[:, grid] * turns[above - below[:, None] + 8]).real
+        gram[:, : order + 1, order + 1 :] = across
+        gram[:, order + 1 :, : order + 1] = across.swapaxes(1, 2)
+        scale = np.sqrt(np.maximum(np.einsum("kii->ki", gram), np.finfo(float).tiny))
+        scaled = _ridged(gram / (scale[:, :, None] * scale[:, None, :]))
+        found = np.linalg.solve(scaled[:, 1:, 1:], -scaled[:, 1:, :1])[..., 0]
+        found *= scale[:, :1] / scale[:, 1:]
+        denominators = np.insert(found[:, :order], 0, 1.0, axis=1)
+        a = (denominators * 1j**below) @ powers[: order + 1]
+        b = (found[:, order:] * 1j**above) @ powers[first : last + 1]
+        left = target - b / a
+        error = (left.real**2 + left.imag**2) @ rough.weight
+        better = error < errors
+        errors[better], best[better] = error[better], denominators[better]
+        weight = rough.weight / (a.real**2 + a.imag**2)
+    return errors, best
+
+
+def left_roughly(rough: RoughResponse, structure: Structure, theta: Real) -> RoughResponse:
+    """What of a rough response a structure leaves over at given parameters, (1 + order,)."""
+    left = _Rough(rough, structure, theta[None]).left[0].view(np.complex128)
+    response = np.asarray(left / np.sqrt(rough.weight), dtype=np.complex128)
+    return replace(rough, response=response)
+
+
+class _Rough:
+    """Responses of one structure at several parameters, the numerators solved for."""
+
+    def __init__(self, rough: RoughResponse, structure: Structure, thetas: Real) -> None:
+        self.rough, self.structure, self.thetas = rough, structure, thetas
+        root = np.sqrt(rough.weight)
+        s = self._s = np.asarray(1j * rough.omega, dtype=np.complex128)
+        late = np.exp(-s * (thetas[:, :1] - rough.lag)) * root
+        self._sections = _sections(structure, thetas, s)
+        below = [1.0 / section for section, _ in self._sections]
+        scale = 1.0 / rough.omega[-1]
+        if structure.parallel:
+            self._alone = [late * each for each in below]
+            rows = np.stack(self._alone, axis=1)
+            if structure.zeros == structure.order - 1:
+                rows = np.concatenate([rows, rows * (s * scale)], axis=1)
+        else:
+            whole = late
+            for each in below:
+                whole = whole * each
+            powers = (s * scale) ** np.arange(structure.dc_zeros, structure.zeros + 1)[:, None]
+            rows = whole[:, None, :] * powers
+        self._rows = rows
+        self._real = _real(rows)
+        target = _real(rough.response * root)
+        self._gram = _ridged(self._real @ self._real.swapaxes(1, 2))
+        self.linear = np.linalg.solve(self._gram, self._real @ target[:, None])[..., 0]
+        self.left = target - (self.linear[:, None, :] @ self._real)[:, 0]
+        errors = np.vecdot(self.left, self.left)
+        self.errors = np.where(np.isfinite(errors), errors, np.inf)
+
+    def steps(self, damping: Real) -> Real:
+        """Steps of all parameters, shape (k, 1 + order)."""
+        s, count = self._s, len(self._sections)
+        linear = self.linear[..., None]
+        whole = (linear * self._rows).sum(axis=1)
+        slopes = [-s * whole]
+        for k, (section, factors) in enumerate(self._sections):
+            own = whole
+            if self.structure.parallel:
+                own = (linear * self._rows)[:, k::count].sum(axis=1)
+            slopes += [-own * factor / section for factor in factors]
+        rows = _real(np.stack(slopes, axis=1))
+        mixed = rows @ self._real.swapaxes(1, 2)
+        normal = rows @ rows.swapaxes(1, 2)
+        normal -= mixed @ np.linalg.solve(self._gram, mixed.swapaxes(1, 2))
+        moment = rows @ self.left[..., None]
+        diagonal = np.maximum(np.einsum("kii->ki", normal), np.finfo(float).tiny)
+        scale = np.sqrt(diagonal)
+        scaled = normal / (scale[:, :, None] * scale[:, None, :])
+        scaled += (damping[:, None, None] + _LEAST) * np.eye(scale.shape[1])
+        found = np.linalg.solve(scaled, moment / scale[..., None])[..., 0] / scale
+        return np.asarray(np.where(np.isfinite(found), found, 0.0))
+
+    def unless(self, better: Mask, before: "_Rough") -> "_Rough":
+        """The same, but where it is not better what was before."""
+        if not better.all():
+            for name in ("thetas", "errors", "_rows", "_real", "_gram", "linear", "left"):
+                getattr(self, name)[~better] = getattr(before, name)[~better]
+            self._sections = _sections(self.structure, self.thetas, self._s)
+        return self
+
+
+def _real(rows: Complex) -> Real:
+    """Real and imaginary parts side by side."""
+    return np.ascontiguousarray(rows).view(np.float64)
+
+
+def _ridged(gram: Real) -> Real:
+    """The same with its diagonal raised by what rounding may have made of it."""
+    diagonal = np.maximum(np.einsum("kii->ki", gram), np.finfo(float).tiny)
+    return np.asarray(gram + _LEAST * diagonal[:, :, None] * np.eye(gram.shape[-1]))
+
+
+def _sections(
+    structure: Structure, thetas: Real, s: Complex
+) -> list[tuple[Complex, list[Complex]]]:
+    """Each section at each start, (k, m), and its derivatives by its own parameters."""
+    out, start = [], 1
+    for order in structure.sections:
+        first = np.exp(thetas[:, start, None]) * s
+        if order == 1:
+            out.append((1.0 + first, [first]))
+        else:
+            second = first * first
+            curved = thetas[:, start + 1, None] * second
+            out.append((1.0 + first + curved, [first + 2.0 * curved, second]))
+        start += order
+    return out
+
+
+def _bounded(structure: Structure, thetas: Real) -> Real:
+    """Keep shapes above 0: a pole of the right half plane."""
+    start = 1
+    for order in structure.sections:
+        thetas[:, start] = np.clip(thetas[:, start], -30.0, 30.0)
+        if order == 2:
+            thetas[:, start + 1] = np.clip(thetas[:, start + 1], 1e-4, 1e6)
+        start += order
+    return thetas
