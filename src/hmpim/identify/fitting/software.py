@@ -20,6 +20,7 @@ from hmpim.identify.fitting.fit import Fit, Problem, fit_structure
 from hmpim.identify.fitting.least_squares import solved_exactly
 from hmpim.identify.fitting.trial import JointFit, trial_of
 from hmpim.identify.fitting.unrelated import UNDENIED, says_nothing
+from hmpim.identify.kept import kept
 from hmpim.identify.noise.whiteness import effective_share
 from hmpim.identify.section_iv.correlation import likeness
 from hmpim.identify.worth import MOST, ROUNDING, TWICE
@@ -87,6 +88,20 @@ class _Equations:
         found, left = solved_exactly(np.stack(columns), self.factor[:, -1])
         return left, -found[: structure.order]
 
+    def costs(self, structure: Structure) -> dict[int, tuple[float, Real]]:
+        """The same at every delay; none of a filter whose past outputs do not count."""
+        if structure.order and not self.ar:
+            return {}
+        return {delay: self.cost(structure, delay) for delay in self.delays(structure)}
+
+    def holds(self, structure: Structure, allowed: float) -> bool:
+        """Whether an equation of a structure leaves no more than so much."""
+        return any(left <= allowed for left, _ in self.costs(structure).values())
+
+    def spans(self, allowed: float) -> bool:
+        """Whether all lagged inputs together leave no more than so much."""
+        return self.cost(_transversal(self.count), self.first)[0] <= allowed
+
     @property
     def left(self) -> float:
         """Sum of squares that the equations leave, every sample and all structures taken."""
@@ -139,6 +154,8 @@ def _unknown(u: Real, reach: int) -> int:
 def is_exact(u: Real, y: Real) -> bool:
     """Whether an equation between samples holds to rounding: only software has no noise at all.
 
+    That of all lagged samples is asked first, of a few samples, then those of the filters.
+
     Parameters
     ----------
     u, y : ndarray, shape (n,)
@@ -151,8 +168,15 @@ def is_exact(u: Real, y: Real) -> bool:
     >>> is_exact(u, y), is_exact(u, y + 1e-6 * np.cos(np.arange(400) ** 2))
     (True, False)
     """
-    allowed = ROUNDING**2 * float(y.var()) * min(u.size - _ORDER, _GLANCES[-1])
-    return all(_equations(u, y, None, most=most).left < allowed for most in _GLANCES)
+    for most in _GLANCES:
+        equations = _equations(u, y, None, most=most)
+        allowed = ROUNDING**2 * float(y.var()) * equations.rows
+        if not equations.left < allowed:
+            return False
+    if any(equations.holds(structure, allowed) for structure in FILTERS.values()):
+        return True
+    every = _equations(u, y, None)
+    return every.foreseen >= ROUNDING and every.spans(allowed * every.rows / equations.rows)
 
 
 def software_fit(
@@ -178,6 +202,14 @@ def software_fit(
         A trial for each structure and delay followed to its end.
     """
     names = tuple(name for name in structures if name in FILTERS) or tuple(FILTERS)
+    return _software_fit(u, y, None if valid is None or valid.all() else valid, names, nuisance)
+
+
+@kept
+def _software_fit(
+    u: Real, y: Real, valid: Mask | None, names: tuple[str, ...], nuisance: Real | None
+) -> JointFit:
+    """The same, once for a record: it was asked whether one filter is exact."""
     equations = _equations(u, y, valid)
     problem = Problem(
         source=prepare_input(u, "sampled"),
@@ -215,26 +247,36 @@ def software_fit(
 def _followed(
     problem: Problem, equations: _Equations, u: Real, structures: tuple[str, ...], *, exact: float
 ) -> list[Fit]:
-    """Each structure at its likeliest delays, fitted to the end; none richer than an exact one."""
-    fits: list[Fit] = []
+    """Each structure at its likeliest delays, fitted to the end; none richer than an exact one.
+
+    Where the equation of one holds but for rounding, the plainer ones are only evaluated.
+    """
+    tried: dict[Structure, dict[int, tuple[float, Real]]] = {}
+    allowed = (ROUNDING / _ROUNDING) ** 2 * exact * equations.rows / problem.counted
+    holding: set[Structure] = set()
     for structure in sorted((FILTERS[name] for name in structures), key=lambda s: s.parameters):
-        if structure.order and not equations.ar:
-            continue
-        found = [fit.structure.parameters for fit in fits if fit.cost <= exact]
-        if found and structure.parameters > min(found):
+        if holding and structure.parameters > min(one.parameters for one in holding):
             break  # nothing but rounding is left to explain
-        costs = {delay: equations.cost(structure, delay) for delay in equations.delays(structure)}
-        ranked = sorted(costs, key=lambda delay: costs[delay][0])[:_NEAR]
-        for delay in ranked:
+        tried[structure] = costs = equations.costs(structure)
+        if any(left <= allowed for left, _ in costs.values()):
+            holding.add(structure)
+    fits: list[Fit] = []
+    for structure, costs in tried.items():
+        told = not holding or structure in holding
+        for delay in sorted(costs, key=lambda delay: costs[delay][0])[: _NEAR if told else 1]:
             theta = np.array([float(delay)])
             if structure.order:
                 below = np.concatenate([[1.0], costs[delay][1]])
-                below = _refined(problem, u, structure, delay, below)
+                below = _refined(problem, u, structure, delay, below) if told else below
                 theta = np.append(
                     theta,
                     section_parameters(structure, np.asarray(np.roots(below), dtype=np.complex128)),
                 )
-            fits.append(fit_structure(problem, structure, theta, iterations=_TASTE))
+            hopeless = TWICE * min((fit.cost for fit in fits), default=np.inf)
+            steps = _TASTE if told else 0
+            fits.append(
+                fit_structure(problem, structure, theta, iterations=steps, hopeless=hopeless)
+            )
     least = min(fit.cost for fit in fits)
     return [
         fit
@@ -259,7 +301,7 @@ def _long_filter(
         return equations.cost(_transversal(last - first + 1), first)[0] <= allowed
 
     first, last = equations.first, equations.first + equations.count - 1
-    if equations.foreseen < ROUNDING or not holds(first, last):
+    if equations.foreseen < ROUNDING or not equations.spans(allowed):
         return None
     last = first + bisect_left(range(first, last), True, key=lambda k: holds(first, k))
     first += bisect_left(range(first, last), True, key=lambda k: not holds(k + 1, last))
