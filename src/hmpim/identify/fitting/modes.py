@@ -102,11 +102,12 @@ def _grown(
         fit = fitted_roughly(rough, gains, np.stack(starts))
         if count in named:
             found[gains] = fit.error, fit.likely[0]
+        error = min(fit.error, leading.error)
+        if error > (1.0 - FEW) * least:
+            break
         if not known and fit.error < TWICE * leading.error:
             leading, shape = fit, gains
-        if leading.error > (1.0 - FEW) * least:
-            break
-        theta, least = leading.likely[0], leading.error
+        theta, least = leading.likely[0], error
         left = left_roughly(rough, shape, theta)
     least = min((error for error, _ in found.values()), default=0.0)
     return {one: theta for one, (error, theta) in found.items() if PART**2 * error <= least}
