@@ -10,7 +10,7 @@ from hmpim.identify.fitting.enrich import PLAIN
 from hmpim.identify.fitting.joint import joint_fit
 from hmpim.identify.fitting.software import is_exact, software_fit
 from hmpim.identify.worth import ROUNDING
-from hmpim.model.dynamics import FILTERS, StructureName
+from hmpim.model.dynamics import FILTERS, STRUCTURES, StructureName
 
 __all__ = ["recognise_software"]
 
@@ -30,9 +30,14 @@ def recognise_software(question: Question) -> Question:
         return question
     filters = software_fit(u, y).best.fit
     enough = ROUNDING**2 * float(np.sum((y - y.mean()) ** 2))
-    plain = [trial.fit for trial in joint_fit(u, y, structures=PLAIN).trials]
-    exact = [fit.structure.parameters for fit in plain if fit.cost <= enough]
-    if filters.cost > enough or filters.structure.parameters > min(exact, default=np.inf):
+    if filters.cost > enough:
+        return question
+    fewest = filters.structure.parameters
+    plainer = tuple(name for name in PLAIN if STRUCTURES[name].parameters < fewest)
+    if plainer and any(
+        trial.fit.cost <= enough and trial.fit.structure.parameters < fewest
+        for trial in joint_fit(u, y, structures=plainer).trials
+    ):
         return question
     names = cast(tuple[StructureName, ...], tuple(FILTERS))
     return replace(question, intersample="sampled", structures=names, exact=True)

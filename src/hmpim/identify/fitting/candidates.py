@@ -132,6 +132,9 @@ def fit_rich(
         # Poles without end, or as slow as the record, follow what no linear model describes:
         # friction, rounding.
         found = [f for f in found if f.structure.order <= _SURE and not spans_record(f)]
+        if min(fits, key=lambda fit: fit.objective).is_white:
+            # What is less than white noise is that noise itself, come back through a loop.
+            found = [f for f in found if f.is_white]
     return found
 
 

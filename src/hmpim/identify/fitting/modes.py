@@ -34,6 +34,9 @@ _DELAYS = 3
 _FINE = 0.3
 """Steps of the delay turn the highest frequency by so much, in rad."""
 
+_STEPS = 20
+"""Steps on the rough response each time that a mode is added."""
+
 _TASTE = 12
 """Steps from each start before the best is followed to its end."""
 
@@ -95,11 +98,11 @@ def _grown(
         gains = named.get(count, replace(free, zeros=2 * count - 2))
         shape = gains if known else free
         theta = np.concatenate([theta, _peak(left)])
-        leading = fitted_roughly(rough, shape, theta[None], held=True)
+        leading = fitted_roughly(rough, shape, theta[None], held=True, steps=_STEPS)
         poles = leading.likely[0][1:]
         late = [] if known else _delays(rough, poles, memory)
         starts = [leading.likely[0] if known else theta, *(np.append(one, poles) for one in late)]
-        fit = fitted_roughly(rough, gains, np.stack(starts))
+        fit = fitted_roughly(rough, gains, np.stack(starts), steps=_STEPS)
         if count in named:
             found[gains] = fit.error, fit.likely[0]
         error = min(fit.error, leading.error)

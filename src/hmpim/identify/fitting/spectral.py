@@ -21,10 +21,10 @@ __all__ = ["RoughFits", "condensed", "fitted_roughly", "left_roughly", "reweight
 _ALONE = 128
 """Bins that are looked at one by one; beyond, as many to each octave share a half of them."""
 
-_STEPS = 20
+_STEPS = 10
 """Most steps on the rough response."""
 
-_STILL = 1e-3
+_STILL = 1e-2
 """Share of the squared error below which a step gains nothing any more."""
 
 _LEAST = 1e-12
@@ -67,7 +67,12 @@ def condensed(rough: RoughResponse) -> RoughResponse:
 
 
 def fitted_roughly(
-    rough: RoughResponse, structure: Structure, thetas: Real, *, held: bool = False
+    rough: RoughResponse,
+    structure: Structure,
+    thetas: Real,
+    *,
+    held: bool = False,
+    steps: int = _STEPS,
 ) -> RoughFits:
     """Climb from all starts of a structure at once.
 
@@ -81,10 +86,12 @@ def fitted_roughly(
         Starts.
     held : bool
         Whether the delay stays.
+    steps : int
+        At most so many.
     """
     now = _Rough(rough, structure, thetas)
     damping = np.full(len(thetas), 1e-3)
-    for _ in range(_STEPS):
+    for _ in range(steps):
         step = now.steps(damping) * (np.arange(thetas.shape[1]) >= held)
         then = _Rough(rough, structure, _bounded(structure, now.thetas + step))
         better = then.errors < now.errors
