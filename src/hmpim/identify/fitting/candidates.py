@@ -91,7 +91,10 @@ def fit_plain(
                 fit = min(fit, rival, key=lambda f: f.objective)
         if not white and fit.objective < TWICE**2 * hopeful:
             rivals = starts[1:]
-            if not settled and structure.order:
+            if not settled and structure.order and problem.begins is not None:
+                # What is free of the response leads astray whoever climbs on it.
+                rivals += starting_values(rough, structure)
+            elif not settled and structure.order:
                 every = np.stack([*starts, *starting_values(rough, structure)])
                 rivals = list(fitted_roughly(condensed(rough), structure, every).likely)
             for theta in rivals:
@@ -167,7 +170,8 @@ def _climbed(
     for some in _batches(proposed):
         for p in some:
             starts = [*p.starts, *_grown(p.structure, [*fits, *found])]
-            found.append(_best_of(problem, p.structure, starts, [*fits, *found]))
+            rivals = [*fits, *found]
+            found.append(_best_of(problem, p.structure, starts, rivals, far_off=misled))
         if not some:
             late = min(proposed, key=lambda p: p.error).starts[0][0] if proposed else best.delay
             modes = members(structures, ("two_modes", *MODES))
@@ -285,15 +289,23 @@ def _grown(structure: Structure, fits: list[Fit]) -> list[Real]:
     ]
 
 
-def _best_of(problem: Problem, structure: Structure, starts: list[Real], rivals: list[Fit]) -> Fit:
+def _best_of(
+    problem: Problem,
+    structure: Structure,
+    starts: list[Real],
+    rivals: list[Fit],
+    *,
+    far_off: bool = False,
+) -> Fit:
     """The best of several starts, followed to its end if it may lead.
 
-    What is left over in colour has few independent samples: a step that gains less than one of
-    those could tell is not worth making.
+    Unless they are `far_off`, one whose steps promise no chance against its rivals is left. Of what
+    is left over in colour few samples are independent: a step that gains less than one of those
+    could tell is not worth making.
     """
     leading = min(rivals, key=lambda fit: fit.objective)
     precision = _PRECISION / leading.share
-    hopeless = hopeless_beside(structure, rivals)
+    hopeless = np.inf if far_off else hopeless_beside(structure, rivals)
     tried: list[Fit] = []
     for theta in starts:
         tried.append(

@@ -61,7 +61,9 @@ def condensed(rough: RoughResponse) -> RoughResponse:
         rough,
         bins=rough.bins[starts],
         omega=np.add.reduceat(rough.weight * rough.omega, starts) / weight,
-        response=np.add.reduceat(rough.weight * rough.response, starts) / weight,
+        response=np.asarray(
+            np.add.reduceat(rough.weight * rough.response, starts) / weight, dtype=np.complex128
+        ),
         weight=weight,
     )
 
