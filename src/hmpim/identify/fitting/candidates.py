@@ -112,7 +112,10 @@ def fit_plain(
     def ended(fit: Fit) -> Fit:
         if fit.objective > TWICE**2 * least:  # a start at most
             return fit.bare
-        return fit if fit.converged else fit_structure(problem, fit.structure, fit.theta)
+        if fit.converged:
+            return fit
+        precision = _PRECISION / fit.share
+        return fit_structure(problem, fit.structure, fit.theta, precision=precision)
 
     return [ended(fit) for fit in fits]
 
