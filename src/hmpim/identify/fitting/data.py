@@ -160,7 +160,7 @@ def refit_all(
 def hopeless_beside(structure: Structure, rivals: list[Fit]) -> float:
     """Sum of squares from which on a structure has no chance against others."""
     least = min((fit.objective for fit in rivals), default=np.inf)
-    plainer = [fit for fit in rivals if fit.structure.parameters <= structure.parameters]
+    plainer = [fit for fit in rivals if fit.structure.parameters < structure.parameters]
     white = [fit.objective for fit in plainer if fit.objective < TWICE * least and fit.is_white]
     return min([TWICE * least, *white])
 
