@@ -137,13 +137,10 @@ def begun(
 
 
 def turn_ahead(course: Course) -> Course:
-    """The same with an output that is ahead of its input, where that leaves clearly less.
-
-    What is integrated resembles its input a quarter of a period ahead, or behind.
-    """
+    """The same with an output that is ahead of its input, where that leaves clearly less."""
     data, seen, best = course.data, course.given, course.best
     lag = data.rough.ahead
-    if lag is None or best.is_white or almost_integrates(best):
+    if lag is None or best.is_white:
         return course
     level = _level(data.y, data.nuisance, seen.valid)
     rough = rough_response(data.u, level, longest_delay=longest_lag(level.size), lag=lag)
