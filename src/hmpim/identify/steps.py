@@ -99,16 +99,16 @@ def _behind_levels(
     if levels is None:
         return None
     clipped = replace(seen, saturation=levels)
-    fitted = _fit_once(question, clipped, question.plain)
-    (joint,) = fitted.fits
-    if levels.noise == "after" and not is_white(joint.problem.counting(joint.best.fit.residual)):
+    behind = continued(course, valid=_counted(question, clipped))
+    if levels.noise == "after" and not behind.best.is_white:
         return None
+    joint = chosen_of(behind, question.plain)
     refined = refine(joint, clipped, question.aligned.fs) if joint.related else None
     if refined is None:
         return None
     told, _ = refined
     white = is_white(told.problem.counting(told.best.fit.residual))
-    return (clipped, fitted) if white else None
+    return (clipped, OutputFit.alone(joint)) if white else None
 
 
 def _drifting(question: Question, seen: Imperfections, course: Course) -> OutputFit | None:
