@@ -9,7 +9,7 @@ from hmpim.identify.arrays import Mask, Real
 from hmpim.identify.asked.question import Question
 from hmpim.identify.asked.reference import fit_through
 from hmpim.identify.asked.swapped import is_swapped, lags_behind, swapped_finding
-from hmpim.identify.coupling.output_fit import OutputFit, begin, continued, fit_together
+from hmpim.identify.coupling.output_fit import OutputFit, fit_together
 from hmpim.identify.effects.disturbance import without_rows
 from hmpim.identify.effects.drift import with_drift, with_plain_drift
 from hmpim.identify.effects.hum import with_hum
@@ -21,9 +21,12 @@ from hmpim.identify.effects.imperfections import (
 from hmpim.identify.effects.lost import stands_out
 from hmpim.identify.fitting.course import (
     Course,
+    continued,
     find_beginning,
     free_from_wander,
     interpolate_finely,
+    start,
+    turn_ahead,
 )
 from hmpim.identify.fitting.joint import chosen_of
 from hmpim.identify.fitting.trial import JointFit
@@ -274,13 +277,16 @@ def _begin(question: Question, seen: Imperfections) -> Course | None:
     ):
         return None
     (source,) = question.aligned.inputs
-    return begin(
-        source.values,
-        question.output.values,
-        valid=_counted(question, seen),
-        known=question.measured,
-        intersample=question.intersample,
-        structures=question.structures,
+    return turn_ahead(
+        start(
+            source.values,
+            question.output.values,
+            _counted(question, seen),
+            question.measured,
+            question.intersample,
+            question.structures,
+            None,
+        )
     )
 
 

@@ -142,7 +142,8 @@ def test_a_side_that_only_the_model_shows_is_left_out_of_a_new_fit():
     assert pair.verdict == "ok"
     assert (pair.saturation_low.value, pair.saturation_high.value) == pytest.approx((low, high))
     assert pair.noise_std.value == pytest.approx(0.05, rel=0.1)
-    assert holds(pair.natural_frequency, 10.0) and holds(pair.damping_ratio, 0.4)
+    assert holds(pair.natural_frequency, 10.0)
+    assert holds(pair.damping_ratio, 0.4)
 
 
 def spoiled(y, kept=slice(None)):

@@ -19,14 +19,7 @@ from hmpim.identify.coupling.together import gained_by, joint_covariance
 from hmpim.identify.coupling.weak import coupling_fit, whitening_of
 from hmpim.identify.effects.drift import Drifting
 from hmpim.identify.effects.hum import Humming
-from hmpim.identify.fitting.course import (
-    Course,
-    find_beginning,
-    interpolate_finely,
-    start,
-    turn_ahead,
-)
-from hmpim.identify.fitting.data import Seen, refit
+from hmpim.identify.fitting.course import Course
 from hmpim.identify.fitting.derivatives import jacobian
 from hmpim.identify.fitting.enrich import PLAIN
 from hmpim.identify.fitting.fit import Fit, Problem
@@ -40,7 +33,7 @@ from hmpim.model.response import slowest_time_constant
 from hmpim.model.sampled import prepare_input
 from hmpim.record import Intersample
 
-__all__ = ["OutputFit", "begin", "continued", "fit_together"]
+__all__ = ["OutputFit", "fit_together"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -105,43 +98,6 @@ class OutputFit:
             one = self.drifting or self.humming
             return None if one is None else one.trend
         return self.drifting.trend + self.humming.trend
-
-
-def begin(
-    u: Real,
-    y: Real,
-    *,
-    valid: Mask | None,
-    known: Mask | None,
-    intersample: Intersample | None,
-    structures: tuple[StructureName, ...],
-) -> Course:
-    """Fit the plain structures of one input, before it is asked for more.
-
-    Parameters
-    ----------
-    u, y, valid, known, intersample, structures
-        As for `hmpim.identify.fitting.joint.joint_fit`, but for software.
-    """
-    return turn_ahead(start(u, y, valid, known, intersample, structures, None))
-
-
-def continued(course: Course, *, valid: Mask | None, nuisance: Real | None = None) -> Course:
-    """Fit the plain structures to other samples, or beside other rows, from where they ended.
-
-    Parameters
-    ----------
-    course : Course
-        The plain fits so far.
-    valid, nuisance
-        As for `hmpim.identify.fitting.joint.joint_fit`.
-    """
-    given = Seen(valid=valid, begins=None)
-    data = replace(course.data, nuisance=nuisance, noise=None)
-    problem = data.problem(course.natural, given)
-    fits = [refit(problem, fit) for fit in course.fits]
-    course = replace(course, data=data, others=(), given=given, counted=given, fits=fits)
-    return find_beginning(interpolate_finely(course))
 
 
 def fit_together(

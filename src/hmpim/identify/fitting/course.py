@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from hmpim.identify.arrays import every_of, median
+from hmpim.identify.arrays import Mask, Real, every_of, median
 from hmpim.identify.chance import BULK
 from hmpim.identify.fitting.beginning import begin_later, count_in
 from hmpim.identify.fitting.candidates import (
@@ -32,6 +32,7 @@ __all__ = [
     "Course",
     "begun",
     "continue_between",
+    "continued",
     "enrich",
     "find_beginning",
     "free_from_wander",
@@ -233,6 +234,24 @@ def _again(course: Course, fits: list[Fit]) -> list[Fit]:
     """Fits to the samples that count now, from where they ended."""
     natural = [(course.natural, fit) for fit in fits]
     return [fit for _, fit in refit_all(course.data, natural, course.counted)]
+
+
+def continued(course: Course, *, valid: Mask | None, nuisance: Real | None = None) -> Course:
+    """Fit the plain structures to other samples, or beside other rows, from where they ended.
+
+    Parameters
+    ----------
+    course : Course
+        The plain fits so far.
+    valid, nuisance
+        As for `hmpim.identify.fitting.joint.joint_fit`.
+    """
+    given = Seen(valid=valid, begins=None)
+    data = replace(course.data, nuisance=nuisance, noise=None)
+    problem = data.problem(course.natural, given)
+    fits = [refit(problem, fit) for fit in course.fits]
+    course = replace(course, data=data, others=(), given=given, counted=given, fits=fits)
+    return find_beginning(interpolate_finely(course))
 
 
 def continue_between(course: Course) -> list[tuple[Intersample, Fit]]:
