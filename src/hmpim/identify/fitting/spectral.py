@@ -27,6 +27,10 @@ _STEPS = 10
 _STILL = 1e-2
 """Share of the squared error below which a step gains nothing any more."""
 
+_FACTOR = 10.0
+"""By which the damping of a step falls where it gains, and rises where it does not; a step more
+strongly damped than that leads nowhere."""
+
 _LEAST = 1e-12
 """Share of a diagonal element that is added to normal equations: less is rounding."""
 
@@ -98,9 +102,9 @@ def fitted_roughly(
         then = _Rough(rough, structure, _bounded(structure, now.thetas + step))
         better = then.errors < now.errors
         still = ~(now.errors - then.errors > _STILL * now.errors)
-        damping = np.where(better, damping / 10.0, damping * 10.0)
+        damping = np.where(better, damping / _FACTOR, damping * _FACTOR)
         now = then.unless(better, now)
-        if np.all(still & (better | (damping > 10.0))):
+        if np.all(still & (better | (damping > _FACTOR))):
             break
     least = float(now.errors.min())
     likely: list[Real] = []

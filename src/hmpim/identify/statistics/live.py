@@ -123,7 +123,7 @@ class LiveEstimator:
             fs=stimulus.fs,
             reach=Reach(lags=lags),
             runs=(),
-            units=(stimulus.unit, ""),
+            units=("", ""),  # of the output it is not known, so neither of the scale factor
             intersample=intersample,
             band=stimulus.waveform.band,
         )
