@@ -24,7 +24,9 @@ def arguments() -> argparse.Namespace:
         "--seed", type=int, default=SEED, help=f"another seed, other draws ({SEED})"
     )
     parser.add_argument(
-        "--samples", type=int, help="of a record, where its family is not about that (600 to 3000)"
+        "--samples",
+        type=int,
+        help="samples per record (600 to 3000), except in families about record length",
     )
     parser.add_argument("--jobs", type=int, default=2, help="processes (2)")
     parser.add_argument(
@@ -55,8 +57,10 @@ def main() -> int:
             print(f"{name:32s}{FAMILIES[name].words}")
         return 0
     told = not given.no_options
-    if given.samples:
-        kinds.LENGTHS[:] = [given.samples, given.samples]
+    if given.samples is not None and given.samples < 50:
+        print(f"--samples {given.samples} is too short; 50 or more", file=sys.stderr)
+        return 2
+    kinds.set_samples(given.samples)
     if given.explain is not None:
         for name in names:
             print("\n".join(study.explained(name, given.seed, given.explain, options=told)))
@@ -70,7 +74,13 @@ def main() -> int:
             table.write({name: row}, given.json, seed=given.seed)
 
     scores = study.run(
-        names, draws=given.draws, seed=given.seed, jobs=given.jobs, options=told, tell=tell
+        names,
+        draws=given.draws,
+        seed=given.seed,
+        jobs=given.jobs,
+        options=told,
+        samples=given.samples,
+        tell=tell,
     )
     rows = {name: table.summary(found) for name, found in scores.items()}
     print("\n".join(table.markdown(rows)))

@@ -24,12 +24,17 @@ LENGTHS = [600, 3000]
 """Samples of a record, unless the family is about its length; `--samples` sets both."""
 
 
+def set_samples(samples: int | None) -> None:
+    """Draw records of so many samples from now on, in this process; as ever if None."""
+    LENGTHS[:] = [samples, samples] if samples else [600, 3000]
+
+
 def log_uniform(rng: Rng, low: float, high: float) -> float:
     return float(np.exp(rng.uniform(np.log(low), np.log(high))))
 
 
 def length(rng: Rng) -> int:
-    return int(log_uniform(rng, *LENGTHS) + 1e-6)
+    return int(log_uniform(rng, *LENGTHS) + 1e-6)  # exp(log n) may round below n
 
 
 # --- systems -----------------------------------------------------------------------------------

@@ -16,6 +16,7 @@ import numpy as np
 
 import hmpim
 from families.catalogue import FAMILIES, Family
+from families.kinds import set_samples
 from families.scoring import Score, score
 from families.take import Draw
 
@@ -93,8 +94,9 @@ def model_response(pair: Any, frequency: np.ndarray) -> np.ndarray | None:
     return p.scale_factor.value * top / below * np.exp(-s * late)
 
 
-def one(name: str, seed: int, index: int, options: bool) -> Score:
+def one(name: str, seed: int, index: int, options: bool, samples: int | None = None) -> Score:
     """Draw one record, identify it and hold the result against the truth."""
+    set_samples(samples)  # here, since a worker need not have what its parent was told
     draw = draw_of(FAMILIES[name], seed, index)
 
     def late(_signal: int, _frame: FrameType | None) -> None:
@@ -167,11 +169,17 @@ def run(
     seed: int = SEED,
     jobs: int = 2,
     options: bool = True,
+    samples: int | None = None,
     tell: Callable[[str, list[Score]], None] | None = None,
 ) -> dict[str, list[Score]]:
-    """All draws of the families named; `tell` is called as each family is done."""
+    """All draws of the families named; `tell` is called as each family is done.
+
+    `samples` is the length of each record, except in families about record length.
+    """
     counts = {name: min(draws, FAMILIES[name].most or draws) for name in names}
-    tasks = [(name, seed, k, options) for name, count in counts.items() for k in range(count)]
+    tasks = [
+        (name, seed, k, options, samples) for name, count in counts.items() for k in range(count)
+    ]
     found: dict[str, list[Score]] = {name: [] for name in names}
     scores = (one(*task) for task in tasks) if jobs == 1 else _in_processes(tasks, jobs)
     for (name, *_), score_ in zip(tasks, scores, strict=True):
@@ -181,7 +189,7 @@ def run(
     return found
 
 
-Task = tuple[str, int, int, bool]
+Task = tuple[str, int, int, bool, int | None]
 
 
 def _in_processes(tasks: Sequence[Task], jobs: int) -> Iterator[Score]:
@@ -206,6 +214,6 @@ def _alone(task: Task) -> Score:
             return _died(*task)
 
 
-def _died(name: str, seed: int, index: int, _options: bool) -> Score:
+def _died(name: str, seed: int, index: int, _options: bool, _samples: int | None) -> Score:
     figures = _unanswered(draw_of(FAMILIES[name], seed, index))
     return Score(cell="no_answer", verdict="crash", failure="its process died", figures=figures)

@@ -168,5 +168,7 @@ def _is_short(found: Any) -> bool:
     """Whether a result holds no long array."""
     if isinstance(found, np.ndarray):
         return found.nbytes <= _LARGEST
+    if isinstance(found, tuple):
+        return all(map(_is_short, found))
     names = getattr(type(found), "__dataclass_fields__", ())
     return all(_is_short(getattr(found, name)) for name in names)

@@ -74,8 +74,8 @@ def mark_swapped(question: Question) -> Question:
 def fit(question: Question, seen: Imperfections) -> tuple[Imperfections, OutputFit]:
     """Fit every structure, with hum and a drift where the residual asks for them.
 
-    Where plain dynamics and one effect, levels or a drift, leave white noise, no richer ones are
-    asked for, which would follow what the effect does. Levels may be seen only then.
+    If plain dynamics with levels or with a drift leave white noise, no richer ones are tried: they
+    would only follow the effect. The levels found are returned with the fit.
     """
     begun = _begin(question, seen)
     if begun is None:
@@ -250,8 +250,10 @@ def limit_speed(
         return question, fitted  # a limit of speed smooths the noise of a measured command
     followed = replace(aligned, inputs=(replace(source, values=limited.values),))
     slower = replace(question, aligned=followed, limited=limited)
-    _, again = fit(slower, seen)
+    seen_then, again = fit(slower, seen)
     (other,) = again.fits
+    if seen_then is not seen:
+        return question, fitted  # levels explain the rest: the two are not weighed on other samples
     if not explains_more(other.problem, other.best.fit, joint.problem, joint.best.fit):
         return question, fitted
     return slower, replace(again, fits=(beside_speed(other, limited.slope),))
@@ -308,7 +310,12 @@ def _fit_once(
     *,
     begun: Course | None = None,
 ) -> OutputFit:
-    """Fit an output to all inputs, with `rows` beside the bias, on the samples that tell."""
+    """Fit an output to all inputs, with `rows` beside the bias, on the samples that tell.
+
+    The search goes on from `begun`, where the plain fits to the one input are known.
+    """
+    if begun is not None:
+        return OutputFit.alone(chosen_of(begun, structures))
     aligned, output, inputs = question.aligned, question.output, question.inputs
     return fit_together(
         [source.values for source in aligned.inputs],
@@ -319,5 +326,4 @@ def _fit_once(
         structures=structures,
         alike=() if inputs is None else inputs.alike_bins(aligned.samples, aligned.fs),
         nuisance=rows,
-        begun=begun,
     )

@@ -366,6 +366,6 @@ def rational_response(
         PoleResponses(replace(source, coefficients=own), delay, poles).summed(
             residues[None], direct=direct
         )
-        for own in np.atleast_2d(source.coefficients)
+        for own in source.coefficients.reshape(-1, source.coefficients.shape[-1])
     ]
     return np.reshape(each, (*source.coefficients.shape[:-1], source.samples))

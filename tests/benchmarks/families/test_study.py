@@ -124,7 +124,7 @@ def test_a_draw_that_takes_too_long_is_a_failure(monkeypatch):
     assert one("static", 1, 0, True).failure.startswith("TimeoutError")
 
 
-def dies_at_one(name, seed, index, options):
+def dies_at_one(name, seed, index, options, samples):
     """In a process of its own."""
     if index == 1:
         os._exit(1)

@@ -19,12 +19,11 @@ from hmpim.identify.coupling.together import gained_by, joint_covariance
 from hmpim.identify.coupling.weak import coupling_fit, whitening_of
 from hmpim.identify.effects.drift import Drifting
 from hmpim.identify.effects.hum import Humming
-from hmpim.identify.fitting.course import Course
 from hmpim.identify.fitting.derivatives import jacobian
 from hmpim.identify.fitting.enrich import PLAIN
 from hmpim.identify.fitting.fit import Fit, Problem
 from hmpim.identify.fitting.fit import fit_together as fit_all
-from hmpim.identify.fitting.joint import chosen_of, joint_fit
+from hmpim.identify.fitting.joint import joint_fit
 from hmpim.identify.fitting.trial import JointFit
 from hmpim.identify.noise.whiteness import effective_share, is_white
 from hmpim.identify.worth import NEARLY, PART, TWICE
@@ -110,7 +109,6 @@ def fit_together(
     structures: tuple[StructureName, ...],
     alike: Sequence[tuple[frozenset[int], Mask]] = (),
     nuisance: Real | None = None,
-    begun: Course | None = None,
 ) -> OutputFit:
     """Fit one output to several inputs.
 
@@ -127,8 +125,6 @@ def fit_together(
         not told from what the stronger one's model lacks.
     nuisance : ndarray, shape (k, n), optional
         Rows beside the bias that enter linearly, such as a drift's.
-    begun : Course, optional
-        The plain fits to one input, where they are known.
     """
 
     def fitted(
@@ -146,9 +142,7 @@ def fit_together(
         )
 
     if len(inputs) == 1:
-        if begun is None:
-            return OutputFit.alone(fitted(inputs[0], y, structures))
-        return OutputFit.alone(chosen_of(begun, structures))
+        return OutputFit.alone(fitted(inputs[0], y, structures))
     plain = tuple(name for name in structures if name in PLAIN) or structures
 
     def plainly(u: Real, rest: Real) -> JointFit:

@@ -11,12 +11,11 @@ from hmpim.identify.noise.autoregression import innovation_gain
 __all__ = ["gain_by_rows", "without_rows"]
 
 
-def gain_by_rows(one: JointFit, count: int, former: Fit, forgotten: int = 0) -> float:
-    """Schwarz's criterion of a fit without `count` rows less that of one with them.
+def gain_by_rows(one: JointFit, count: int, former: Fit, forgotten: int) -> float:
+    """Gain in Schwarz's criterion by adding `count` rows; `former` is the fit without them.
 
-    Either residual is taken as an autoregression, of the samples that count in both, `forgotten`
-    being those that the former fit has left out at first; an initial state that is fitted has its
-    parameters too.
+    Each residual is modelled as an autoregression over the samples that count in both; the former
+    fit left out the first `forgotten`. An initial state that is fitted has its parameters too.
     """
     size = one.problem.y.size
     counts = np.ones(size, bool) if one.problem.valid is None else one.problem.valid.copy()

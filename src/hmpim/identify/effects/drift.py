@@ -101,7 +101,7 @@ def with_drift(first: JointFit, fitted: Callable[[Real, bool], JointFit]) -> Dri
 def with_plain_drift(
     problem: Problem, fit: Fit, fitted: Callable[[Real], JointFit]
 ) -> Drifting | None:
-    """Fit plain dynamics again with a drift, if what they leave is slow and the drift leaves noise.
+    """Add a drift to plain dynamics if their residual is slow; keep it if white noise is left.
 
     Parameters
     ----------
@@ -124,7 +124,9 @@ def with_plain_drift(
         return None
     columns = _shape(joint, columns)
     joint = fitted(columns)
-    if spans_record(joint.best.fit) or gain_by_rows(joint, len(columns), fit) < 0.0:
+    if spans_record(joint.best.fit) or not is_white(joint.best.fit.residual):
+        return None
+    if gain_by_rows(joint, len(columns), fit, problem.begins or 0) < 0.0:
         return None
     return _described(joint, columns)
 

@@ -54,7 +54,7 @@ class Imperfections:
     levels: int | None = None
 
     def counts_otherwise_than(self, before: "Imperfections") -> bool:
-        """Whether other levels clip it, it is held and was not or was, or lost more samples."""
+        """Whether clipped sides differ, a hold appeared or vanished, or more samples are lost."""
         if _sides(self.saturation) != _sides(before.saturation):
             return True
         if (self.hold is None) != (before.hold is None):

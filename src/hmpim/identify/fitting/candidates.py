@@ -92,7 +92,7 @@ def fit_plain(
         if not white and fit.objective < TWICE**2 * hopeful:
             rivals = starts[1:]
             if not settled and structure.order and problem.begins is not None:
-                # What is free of the response leads astray whoever climbs on it.
+                # A climb on the rough response would follow the free response.
                 rivals += starting_values(rough, structure)
             elif not settled and structure.order:
                 every = np.stack([*starts, *starting_values(rough, structure)])
@@ -128,7 +128,7 @@ def fit_rich(
     *,
     all_of_them: bool,
 ) -> list[Fit]:
-    """Fits of the richer structures, the plainest first, until nothing is left to explain.
+    """Fits of the richer structures, the most promising first, until nothing is left to explain.
 
     And those that are a richer one without what the record does not need of it.
     """
@@ -139,7 +139,7 @@ def fit_rich(
         # friction, rounding.
         found = [f for f in found if f.structure.order <= _SURE and not spans_record(f)]
         if min(fits, key=lambda fit: fit.objective).is_white:
-            # What is less than white noise is that noise itself, come back through a loop.
+            # In a loop, noise returns through the input and looks like dynamics.
             found = [f for f in found if f.is_white]
     return found
 
@@ -188,9 +188,9 @@ def _climbed(
 
 
 def _batches(proposed: list[Proposal]) -> Iterator[list[Proposal]]:
-    """A few at once: the promising ones, none for modes in parallel, and the others.
+    """Proposals a few at a time: those near the rough response, none for modes, then the rest.
 
-    Modes come first where no proposal comes near the rough response.
+    An empty batch stands for modes in parallel.
     """
     near = [p for p in proposed if p.promising and p.error < PART**2]
     far = [p for p in proposed if p not in near]

@@ -248,9 +248,8 @@ def continued(course: Course, *, valid: Mask | None, nuisance: Real | None = Non
     """
     given = Seen(valid=valid, begins=None)
     data = replace(course.data, nuisance=nuisance, noise=None)
-    problem = data.problem(course.natural, given)
-    fits = [refit(problem, fit) for fit in course.fits]
-    course = replace(course, data=data, others=(), given=given, counted=given, fits=fits)
+    course = replace(course, data=data, others=(), given=given, counted=given)
+    course = replace(course, fits=_again(course, course.fits))
     return find_beginning(interpolate_finely(course))
 
 

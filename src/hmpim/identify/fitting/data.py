@@ -139,8 +139,8 @@ def refit_all(
 ) -> list[tuple[Intersample, Fit]]:
     """Fit all structures to other data, from where they ended, the leading one first.
 
-    What promises to leave much more than that, or no less than a plainer one that leaves white
-    noise, is not followed; what left `hopeful` or more before is only evaluated.
+    A fit that promises to leave much more than that, or no less than a plainer one with a white
+    residual, is given up; one that left `hopeful` or more before is only evaluated.
     """
     leading = min(range(len(fitted)), key=lambda i: fitted[i][1].objective)
     by_size = sorted(range(len(fitted)), key=lambda i: fitted[i][1].structure.parameters)

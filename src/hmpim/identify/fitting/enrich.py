@@ -101,10 +101,11 @@ def proposals(
     count: int = 3,
     all_of_them: bool = False,
 ) -> list[Proposal]:
-    """Structures with zeros or more than two poles: those that the response allows, plainest first.
+    """Structures with zeros or more than two poles that the response allows, promising ones first.
 
-    Sanathanan and Koerner's iteration on the rough response, at several delays about that of
-    the best fit so far; poles in the right half plane are mirrored.
+    Sanathanan and Koerner's iteration on the rough response starts them, at several delays about
+    that of the best fit so far, with poles in the right half plane mirrored; each start then climbs
+    there by output error.
 
     Parameters
     ----------

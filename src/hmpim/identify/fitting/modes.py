@@ -76,9 +76,29 @@ def grown_modes(
         if not best.converged:
             best = found[best.structure] = fit_structure(problem, best.structure, best.theta)
         if best.is_white:
-            break
+            return [*found.values(), *_with_fewer(problem, rough, best, structures)]
         delay = best.delay
     return list(found.values())
+
+
+def _with_fewer(
+    problem: Problem, rough: RoughResponse, fit: Fit, structures: list[Structure]
+) -> list[Fit]:
+    """Fits with a section less each time, the one that is missed least, while they leave noise.
+
+    Sections that were grown one by one may need one more to make up for where they ended.
+    """
+    named = {len(structure.sections): structure for structure in structures}
+    found: list[Fit] = []
+    while fit.is_white and len(fit.structure.sections) - 1 in named:
+        sections = fit.theta[1:].reshape(-1, 2)
+        plainer = named[len(sections) - 1]
+        without = [np.delete(sections, k, axis=0).ravel() for k in range(len(sections))]
+        starts = np.stack([np.append(fit.delay, one) for one in without])
+        start = fitted_roughly(rough, plainer, starts, steps=_STEPS).likely[0]
+        fit = fit_structure(problem, plainer, start)
+        found.append(fit)
+    return found
 
 
 def _grown(

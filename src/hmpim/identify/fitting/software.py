@@ -111,7 +111,10 @@ class _Equations:
     def foreseen(self) -> float:
         """Least singular value of the lagged inputs, each of unit size, over the greatest."""
         lagged = self.factor[:, _ORDER : _ORDER + self.count]
-        found = np.linalg.svd(lagged / np.linalg.norm(lagged, axis=0), compute_uv=False)
+        sizes = np.linalg.norm(lagged, axis=0)
+        if not sizes.all():  # an impulse has left before some lags begin
+            return 0.0
+        found = np.linalg.svd(lagged / sizes, compute_uv=False)
         return float(found[-1] / found[0])
 
     def delays(self, structure: Structure) -> range:

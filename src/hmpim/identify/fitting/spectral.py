@@ -6,8 +6,7 @@ it at once: output error with the numerator solved for (variable projection), by
 Marquardt.
 """
 
-from dataclasses import replace
-from typing import NamedTuple
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -19,26 +18,27 @@ from hmpim.model.dynamics import Structure
 __all__ = ["RoughFits", "condensed", "fitted_roughly", "left_roughly", "reweighted"]
 
 _ALONE = 128
-"""Bins that are looked at one by one; beyond, as many to each octave share a half of them."""
+"""Bins up to this one stay single; each octave above is grouped into half as many."""
 
 _STEPS = 10
 """Most steps on the rough response."""
 
 _STILL = 1e-2
-"""Share of the squared error below which a step gains nothing any more."""
+"""A step that lowers the squared error by less than this share counts as no gain."""
 
 _FACTOR = 10.0
-"""By which the damping of a step falls where it gains, and rises where it does not; a step more
-strongly damped than that leads nowhere."""
+"""The damping is divided by this after a step that gains, and multiplied after one that does not;
+a start stops once its damping exceeds it."""
 
 _LEAST = 1e-12
 """Share of a diagonal element that is added to normal equations: less is rounding."""
 
-
 _REWEIGHTINGS = 6
+"""Times that Sanathanan and Koerner's equations are weighted by the denominator found so far."""
 
 
-class RoughFits(NamedTuple):
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class RoughFits:
     """Fits to a rough response.
 
     Parameters
@@ -113,7 +113,7 @@ def fitted_roughly(
         if now.errors[i] <= TWICE * least and apart:
             likely.append(now.thetas[i])
     power = float(rough.weight @ np.abs(rough.response) ** 2)
-    return RoughFits(least / power, np.array(likely))
+    return RoughFits(error=least / (power or 1.0), likely=np.array(likely))
 
 
 def reweighted(rough: RoughResponse, structure: Structure, delays: Real) -> tuple[Real, Real]:

@@ -43,7 +43,7 @@ _PHASE_STEP = 0.3
 """Steps of the delay looked at turn the highest frequency by no more than this, in rad."""
 
 _FINE, _COARSE = 8, 2
-"""Most of them to a sample, of one guess of the corner frequency and of several."""
+"""Most delay steps per sample, with one guess of the corner frequency and with several."""
 
 _CORNERS = (0.08, 0.25, 1.0)
 """Where, over the highest frequency, the first weight begins to roll off as 1/A would: above

@@ -255,7 +255,8 @@ def _scaled(gram: Complex) -> tuple[Complex, Real]:
     q = gram.shape[-1]
     scale = 1.0 / np.sqrt(np.maximum(gram.diagonal(axis1=-2, axis2=-1).real, 1e-300))
     scaled = gram * (scale[..., :, None] * scale[..., None, :])
-    scaled.reshape(-1, q * q)[:, :: q + 1] += _RIDGE * q
+    diagonal = np.arange(q)
+    scaled[..., diagonal, diagonal] += _RIDGE * q
     return scaled, scale
 
 

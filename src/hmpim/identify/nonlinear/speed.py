@@ -82,8 +82,8 @@ def limited_command(u: Real, joint: JointFit) -> LimitedCommand | None:
     u : ndarray, shape (n,)
         The command.
     joint : JointFit
-        The linear fit; where it is plain and leaves noise, or leaves next to nothing of what the
-        plain ones leave, nothing is asked.
+        The linear fit. Nothing is asked if a plain fit leaves white noise, or a richer one less
+        than 1/25 of what the best plain one leaves.
 
     Returns
     -------
@@ -108,7 +108,7 @@ def limited_command(u: Real, joint: JointFit) -> LimitedCommand | None:
         return None
     start = min(plain, key=lambda trial: trial.criterion)
     if best.fit.cost < PART**2 * start.fit.cost:
-        return None  # a limit makes harmonics, so that poles make up for no more of it than that
+        return None  # a limit makes harmonics, which poles cannot imitate that well
     smooth, joined = _SMOOTH
     command = _Followed.of(u, smooth, problem, start.fit)
     near = _nearest(command, best.fit)

@@ -123,7 +123,7 @@ class LiveEstimator:
             fs=stimulus.fs,
             reach=Reach(lags=lags),
             runs=(),
-            units=("", ""),  # of the output it is not known, so neither of the scale factor
+            units=("", ""),  # that of the output is unknown
             intersample=intersample,
             band=stimulus.waveform.band,
         )
