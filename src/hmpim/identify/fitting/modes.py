@@ -64,12 +64,13 @@ def grown_modes(
     rough = condensed(data.rough)
     found: dict[Structure, Fit] = {}
     for known in (False, True) if structures else ():
+        before = np.inf
         for structure, start in _grown(rough, delay, memory, structures, known=known).items():
             fit = fit_structure(problem, structure, start, iterations=_TASTE)
-            least = min((one.objective for one in found.values()), default=np.inf)
             found[structure] = min(fit, found.get(structure, fit), key=lambda one: one.objective)
-            if fit.is_white or fit.objective > (1.0 - PART) * least:
+            if fit.is_white or fit.objective > (1.0 - PART) * before:
                 break
+            before = fit.objective
         if not found:
             break
         best = min(found.values(), key=lambda one: one.objective)
