@@ -44,7 +44,7 @@ class Promise:
     def cancelled(self):
         return self.status == "cancelled"
 
-    def result(self):
+    def result(self, timeout=None):
         return self._value
 
 
@@ -146,6 +146,29 @@ def test_workers_are_seen_to_while_others_bring_results(monkeypatch):
         scheduler.does(k)
     assert [crew.next().done for _ in range(3)] == ["0", "1", "2"]
     assert seen == [0, 1, 2]
+
+
+def test_a_result_that_went_with_its_worker_is_waited_for_while_workers_are_seen_to(monkeypatch):
+    """A task is done, and its worker dies before the result is fetched: it is done once more."""
+    scheduler, seen = Scheduler(), []
+    crew = pool._Dask(lambda: scheduler, lambda: seen.append(len(seen)), 60.0, lambda text: None)
+    monkeypatch.setattr(pool, "_LOOK", 0.0)
+    crew.submit(Numbered("a"))
+    scheduler.does(0)
+    (_, promise) = scheduler.given[0]
+    promise.status = "pending"
+    fetch, asked = promise.result, []
+
+    def result(timeout=None):
+        asked.append(timeout)
+        if len(asked) < 3:
+            raise TimeoutError
+        promise.status = "finished"
+        return fetch()
+
+    monkeypatch.setattr(promise, "result", result)
+    assert crew.next().done == "a"
+    assert (asked, seen, crew._under_way) == ([0.0] * 3, [0, 1, 2], {})
 
 
 def test_workers_without_hmpim_are_named():

@@ -165,8 +165,13 @@ class _Dask:
             if future.cancelled() or future.status in ("cancelled", "lost"):
                 self._again()
                 continue
-            task, _ = self._under_way.pop(key)
-            return _finished(task, future)
+            task, _ = self._under_way[key]
+            finished = _finished(task, future)
+            if finished is None:  # see to the workers, and ask again
+                self._back.put((key, future))
+                continue
+            del self._under_way[key]
+            return finished
 
     def _look(self) -> None:
         """See to the workers and the scheduler now and then, however quickly tasks come back."""
@@ -205,11 +210,16 @@ class _Dask:
             self._client.close(timeout=5)
 
 
-def _finished(task: Job, future: Any) -> Finished:
+def _finished(task: Job, future: Any) -> Finished | None:
+    """What a task came to; None where its worker died with it, so that it is done again."""
     from distributed.scheduler import KilledWorker
 
     try:
-        done = future.result()
+        done = future.result(timeout=_LOOK)
+    except TimeoutError as error:
+        if future.status != "error":
+            return None
+        raise ArgumentError(f"a worker cannot do its task: {error}") from error
     except KilledWorker as error:
         died = f"its worker died {error.allowed_failures + 1} times"
         return Finished(task=task, done=None, reason=f"{died} (memory, or code that crashes)")
