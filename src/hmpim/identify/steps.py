@@ -21,10 +21,9 @@ from hmpim.identify.effects.imperfections import (
 from hmpim.identify.effects.lost import stands_out
 from hmpim.identify.fitting.course import (
     Course,
+    completed,
     continued,
-    find_beginning,
     free_from_wander,
-    interpolate_finely,
     start,
     turn_ahead,
 )
@@ -83,13 +82,13 @@ def fit(question: Question, seen: Imperfections) -> tuple[Imperfections, OutputF
     levelled = None if begun.best.is_white else _behind_levels(question, seen, begun)
     if levelled is not None:
         return levelled
-    course = find_beginning(interpolate_finely(begun))
+    course = completed(begun)
     drifting = None if course.best.is_white else _drifting(question, seen, course)
     if drifting is not None:
         return seen, drifting
     freed = free_from_wander(begun)
     if freed is not begun:
-        course = find_beginning(interpolate_finely(freed))
+        course = completed(freed)
     return seen, _fit_and_look_for_rows(question, seen, course)
 
 

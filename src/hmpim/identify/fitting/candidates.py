@@ -93,7 +93,8 @@ def fit_plain(
             rivals = starts[1:]
             if not settled and structure.order and problem.begins is not None:
                 # A climb on the rough response would follow the free response.
-                rivals += starting_values(rough, structure)
+                more = starting_values(rough, structure)
+                rivals += [t for t in more if not any(np.array_equal(t, s) for s in starts)]
             elif not settled and structure.order:
                 every = np.stack([*starts, *starting_values(rough, structure)])
                 rivals = list(fitted_roughly(condensed(rough), structure, every).likely)

@@ -31,6 +31,7 @@ from hmpim.record import Intersample
 __all__ = [
     "Course",
     "begun",
+    "completed",
     "continue_between",
     "continued",
     "enrich",
@@ -207,6 +208,11 @@ def interpolated_for(course: Course, fit: Fit) -> Course | None:
     return replace(course, data=replace(course.data, sources={}, precision=wanted))
 
 
+def completed(course: Course) -> Course:
+    """The plain fits with the input interpolated finely, to the samples that count."""
+    return find_beginning(interpolate_finely(course))
+
+
 def find_beginning(course: Course) -> Course:
     """The samples that count, and the fits to them: the record may not begin at rest."""
     data, natural, seen, fits = course.data, course.natural, course.given, course.fits
@@ -250,7 +256,7 @@ def continued(course: Course, *, valid: Mask | None, nuisance: Real | None = Non
     data = replace(course.data, nuisance=nuisance, noise=None)
     course = replace(course, data=data, others=(), given=given, counted=given)
     course = replace(course, fits=_again(course, course.fits))
-    return find_beginning(interpolate_finely(course))
+    return completed(course)
 
 
 def continue_between(course: Course) -> list[tuple[Intersample, Fit]]:

@@ -190,8 +190,7 @@ class _Rough:
         below = [1.0 / section for section, _ in self._sections]
         scale = 1.0 / rough.omega[-1]
         if structure.parallel:
-            self._alone = [late * each for each in below]
-            rows = np.stack(self._alone, axis=1)
+            rows = np.stack([late * each for each in below], axis=1)
             if structure.zeros == structure.order - 1:
                 rows = np.concatenate([rows, rows * (s * scale)], axis=1)
         else:

@@ -283,7 +283,7 @@ class Fitted(Fit):
         whole = np.block([[inverse, mixed[:, None]], [mixed[None], np.array([[last]])]])
         return np.asarray(whole * self.variance)
 
-    @property
+    @cached_property
     def left_over(self) -> tuple[Real, int, Real]:
         """What is left over, not whitened, as `Products.left_over` gives it."""
         fixed = self.moments.fixed - self.moments.fixed_rows @ self.weights
