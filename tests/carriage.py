@@ -65,11 +65,12 @@ class Carriage:
             acceleration=np.array([LIMITS.acceleration]),
         )  # fmt: skip
         begun = time.perf_counter()
-        while self.moved and (since := time.perf_counter() - begun) < brake.duration + 0.01:
+        while self.moved:
+            since = time.perf_counter() - begun
             at, rate, _ = brake.at(since)
             self.file.write(f"{self.now + since:.6f} {at[0]:.6f} {rate[0]:.6f}\n")
+            self.moved = since < brake.duration  # at rest only once a command has said so
             time.sleep(0.005)
-        self.moved = False
         self.file.write("rest\n")
 
 
