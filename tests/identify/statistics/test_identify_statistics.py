@@ -203,6 +203,12 @@ def test_memory_beyond_the_window_is_refused_by_name():
     integrated = Record.from_arrays({"u": u}, {"y": np.cumsum(u)}, fs=100.0, intersample="zoh")
     with pytest.raises(HmpimError, match="as if it integrated the input"):
         identify(compress(integrated, lags=150), structures=["first_order"])
+    for behind in ([1.0], [0.0, 0.2]):  # alone, and behind a lag of some 4 samples
+        y = np.cumsum(lfilter(behind, [1.0, np.sum(behind) - 1.0], chirped(3).inputs[0].values))
+        y += rng.standard_normal(y.size)
+        integrated = Record.from_arrays({"u": chirped(3).inputs[0].values}, {"y": y}, fs=FS)
+        with pytest.raises(HmpimError, match=r"integrate[sd] the input"):
+            identify(compress(integrated))
     with pytest.raises(HmpimError, match="input 'u' is constant at 2"):
         identify(compress(Record.from_arrays({"u": np.full(99, 2.0)}, {"y": u[:99]}, fs=1.0)))
     with pytest.raises(HmpimError, match="40 samples were read; at least 50"):

@@ -5,7 +5,7 @@ import pytest
 from scipy.signal import lfilter
 
 from hmpim import Record, Statistics, compress
-from hmpim.identify.statistics.products import Products
+from hmpim.identify.statistics.products import Products, Responses
 from hmpim.identify.statistics.reach import AHEAD
 
 LAGS = 60
@@ -18,7 +18,7 @@ def recorded(seed: int, size: int) -> Record:
     return Record.from_arrays({"u": u}, {"y": y}, fs=100.0)
 
 
-def stacked(records, statistics, products, rows, steady):
+def stacked(records, statistics, products, responses):
     """Rows, output and bias rows of all runs, sample by sample, whitened and cut."""
     made, outputs, biases = [], [], []
     count, per_run = len(records), statistics.reach.rows
@@ -26,12 +26,13 @@ def stacked(records, statistics, products, rows, steady):
         u, y = record.inputs[0].values, record.outputs[0].values
         moved = u - u[0]
         moved = np.append(moved, 2 * moved[-1] - moved[-2 : -2 - AHEAD : -1])
-        x = np.array([np.convolve(moved, row)[AHEAD : AHEAD + u.size] for row in rows])
+        x = np.array([np.convolve(moved, row)[AHEAD : AHEAD + u.size] for row in responses.rows])
+        x = x + responses.kept[:, None] * np.cumsum(u)
         own = statistics.reach.fixed(0, u.size)
         bias = np.zeros((count * per_run, u.size))
         bias[i * per_run : (i + 1) * per_run] = own
         if statistics.bias == "common":
-            x, bias = x + steady[:, None] * u[0], own
+            x, bias = x + responses.steady[:, None] * u[0], own
         for kept, signal in ((made, x), (outputs, y), (biases, bias)):
             kept.append(lfilter(products.noise, [1.0], signal)[..., products.first :])
     return np.hstack(made), np.hstack(outputs), np.hstack(biases)
@@ -40,7 +41,8 @@ def stacked(records, statistics, products, rows, steady):
 @pytest.mark.parametrize("noise", [[1.0], [1.0, -0.5, 0.3, 0.1]])
 @pytest.mark.parametrize("skipped", [LAGS, 0])
 @pytest.mark.parametrize("kind", ["own", "common", "knots"])
-def test_products_are_those_of_the_samples(kind, skipped, noise):
+@pytest.mark.parametrize("integrates", [False, True])
+def test_products_are_those_of_the_samples(integrates, kind, skipped, noise):
     records = [recorded(1, 700), recorded(2, 900)]
     knots = (0.0, 3.0, 6.0) if kind == "knots" else ()
     bias = "common" if kind == "common" else "own"
@@ -50,12 +52,15 @@ def test_products_are_those_of_the_samples(kind, skipped, noise):
     rng = np.random.default_rng(5)
     decay = np.exp(-np.arange(statistics.reach.taps) / 9.0)
     rows = rng.standard_normal((3, decay.size)) * decay
-    steady = np.array([1.0, 0.0, 0.5])
-    x, y, n = stacked(records, statistics, products, rows, steady)
+    responses = Responses.ending(rows, np.array([1.0, 0.0, 0.5]))
+    if integrates:
+        rows[:, AHEAD:] += np.array([[0.02], [0.0], [-0.3]])
+        responses = Responses.integrating(rows)
+    x, y, n = stacked(records, statistics, products, responses)
     inverse = np.linalg.pinv(n @ n.T)
     x_left = x - (x @ n.T) @ inverse @ n
     y_left = y - (y @ n.T) @ inverse @ n
-    moments = products.moments(rows, steady)
+    moments = products.moments(responses)
     assert products.counted == y.size
     gram = x_left @ x_left.T
     assert moments.gram == pytest.approx(gram, abs=1e-10 * np.abs(gram).max())
@@ -69,7 +74,8 @@ def test_products_are_those_of_the_samples(kind, skipped, noise):
 
 
 @pytest.mark.parametrize("skipped", [LAGS, 0])
-def test_what_is_left_over_is_that_of_the_samples(skipped):
+@pytest.mark.parametrize("kept", [0.0, 0.01])
+def test_what_is_left_over_is_that_of_the_samples(kept, skipped):
     record = recorded(1, 700)
     statistics = compress(record, lags=LAGS)
     plain = Products(statistics, skipped=skipped)
@@ -77,7 +83,8 @@ def test_what_is_left_over_is_that_of_the_samples(skipped):
     response[AHEAD + 2 :] = 0.3 * 0.8 ** np.arange(response.size - AHEAD - 2)
     u, y = record.inputs[0].values, record.outputs[0].values
     left = y - y[0] - np.convolve(u - u[0], response)[AHEAD : AHEAD + u.size] - 0.2
-    gram, count, heads = plain.left_over(response, np.array([[0.2]]))
+    left -= kept * np.cumsum(u)
+    gram, count, heads = plain.left_over(response, kept, np.array([[0.2]]))
     order = gram.shape[0] - 1
     past = np.stack([left[skipped + order - k : left.size - k] for k in range(order + 1)])
     assert count == past.shape[1]

@@ -7,11 +7,18 @@ import scipy
 
 from hmpim.errors import RecordError
 from hmpim.identify.arrays import Real
-from hmpim.identify.chance import FALSE_ALARM
+from hmpim.identify.chance import FALSE_ALARM, LIKELIER, SEARCHED
 from hmpim.identify.fitting.course import begun, looks_held
 from hmpim.identify.fitting.data import Data, Seen, refit
-from hmpim.identify.fitting.enrich import INTEGRATING, MODES, PLAIN, RICH
-from hmpim.identify.fitting.fit import Fit, Problem
+from hmpim.identify.fitting.enrich import (
+    INTEGRATING,
+    MODES,
+    PLAIN,
+    RICH,
+    integrator_starts,
+    members,
+)
+from hmpim.identify.fitting.fit import Fit, Problem, fit_structure
 from hmpim.identify.fitting.growth import HiddenPole
 from hmpim.identify.fitting.joint import chosen_of
 from hmpim.identify.fitting.least_squares import solved
@@ -28,7 +35,7 @@ from hmpim.identify.statistics.statistics import Statistics
 from hmpim.model.dynamics import StructureName
 from hmpim.record import Intersample
 
-__all__ = ["CompressedData", "choose"]
+__all__ = ["CompressedData", "choose", "integrator_of"]
 
 _FEWEST = 50
 """Samples that must count."""
@@ -143,6 +150,41 @@ def choose(
         course = replace(course, data=data, fits=fits)
     joint = chosen_of(course, names)
     return data, replace(joint, forgotten=data.products.skipped)
+
+
+def integrator_of(statistics: Statistics, data: CompressedData, joint: JointFit) -> Fitted | None:
+    """Return an integrator unless what was chosen is clearly likelier, each under its own noise.
+
+    Beside no model at all it must explain more than a search does by chance.
+
+    An integrator is exact here: its response less what it keeps ends within the window, and what it
+    keeps multiplies the running sum of the input.
+    """
+    rough = rough_of(statistics, differenced=True)
+    mode, found = joint.best.intersample, []
+    for structure in members(INTEGRATING, INTEGRATING):
+        problem = data.problem(mode, _ALL)
+        starts = integrator_starts(rough, structure)
+        fits = [fit_structure(problem, structure, theta) for theta in starts]
+        fit = as_fitted(min(fits, key=lambda fit: fit.objective))
+        if not fit.is_white:
+            coloured = replace(data, noise=fit.left.noise).problem(mode, _ALL)
+            fit = as_fitted(refit(coloured, fit))
+        found.append(fit)
+    weighed = [_criterion(fit, data.products.counted) for fit in found]
+    likeliest = found[int(np.argmin(weighed))]
+    if not joint.related:
+        gained = data.products.counted * np.log(likeliest.problem.spread / likeliest.objective)
+        return likeliest if gained > 2 * SEARCHED else None
+    behind = min(weighed) - _criterion(as_fitted(joint.best.fit), data.products.counted)
+    return likeliest if behind < 2 * LIKELIER else None
+
+
+def _criterion(fit: Fitted, count: int) -> float:
+    """Schwarz's criterion of a fit under the autoregression of what it leaves over."""
+    left = fit.left
+    parameters = fit.structure.parameters + left.noise.size - 1
+    return float(count * np.log(left.innovation) + parameters * np.log(count))
 
 
 def _is_conditioned(statistics: Statistics) -> bool:

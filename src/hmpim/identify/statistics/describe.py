@@ -38,13 +38,11 @@ from hmpim.identify.result import (
     ResponseBandwidths,
 )
 from hmpim.identify.result.error_bars import estimate, noise_estimate
-from hmpim.identify.statistics.choose import CompressedData, choose
+from hmpim.identify.statistics.choose import CompressedData, choose, integrator_of
 from hmpim.identify.statistics.fit import Fitted, as_fitted
-from hmpim.identify.statistics.misfit import integrated_share
 from hmpim.identify.statistics.run import Run
 from hmpim.identify.statistics.start import correlations
 from hmpim.identify.statistics.statistics import Statistics
-from hmpim.identify.worth import PART
 from hmpim.model.dynamics import StructureName
 from hmpim.model.response import response, slowest_time_constant
 from hmpim.record import Finding, Intersample
@@ -109,12 +107,7 @@ def identify_statistics(
     best = as_fitted(joint.best.fit)
     if joint.related:
         _check_window(statistics, best)
-    if integrated_share(best) > (PART if joint.related else 0.0):
-        raise RecordError(
-            f"the output still moves at the end of the window of {statistics.lags} samples, as if "
-            "it integrated the input; compress with more lags, or identify the record itself if it "
-            "does"
-        )
+    _check_integrator(statistics, integrator_of(statistics, data, joint))
     pair = (_related if joint.related else _unrelated)(statistics, data, joint)
     digest = hashlib.sha256()
     for run in statistics.runs:
@@ -236,10 +229,20 @@ def _check_window(statistics: Statistics, fit: Fitted) -> None:
     )
 
 
+def _check_integrator(statistics: Statistics, found: Fitted | None) -> None:
+    """Refuse an output that integrates its input."""
+    if found is not None:
+        raise RecordError(
+            f"the output moves as if it integrated the input ({found.structure.name}), so that its "
+            f"memory is longer than any window, here {statistics.lags} samples; identify the "
+            "record itself"
+        )
+
+
 def _fit_percent(statistics: Statistics, power: float) -> float:
     spread = 0.0
     for run in statistics.runs:
-        total = float(run.vv[:-1, -1, 0].sum())
+        total = float(run.vv[: statistics.reach.rows, -1, 0].sum())
         spread += float(run.vv[-1, -1, 0]) - total**2 / run.samples
     return float(100.0 * (1.0 - np.sqrt(power * statistics.samples / spread)))
 

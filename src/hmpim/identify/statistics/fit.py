@@ -21,7 +21,7 @@ from hmpim.identify.fitting.held_steps import steps_through
 from hmpim.identify.fitting.least_squares import inverted, solved
 from hmpim.identify.fitting.rows import Part, Problem
 from hmpim.identify.noise.autoregression import whitening_filter
-from hmpim.identify.statistics.products import Moments, Products
+from hmpim.identify.statistics.products import Moments, Products, Responses
 from hmpim.identify.statistics.reach import AHEAD, Reach
 from hmpim.model.dynamics import Structure
 from hmpim.model.sampled import SampledInput, prepare_input
@@ -110,9 +110,8 @@ class _Evaluation:
     def __init__(self, problem: Compressed, structure: Structure, theta: Real) -> None:
         self.problem, self.products = problem, problem.products
         self.part = part = Part(problem, structure, theta)
-        self.steady = np.zeros(part.rows.shape[0])
-        self.steady[0] = 1.0 if part.structure.dc_zeros == 0 else 0.0
-        self.moments = self.products.moments(part.rows, self.steady)
+        self.own = self._responses(part.rows, constant=part.structure.dc_zeros == 0)
+        self.moments = self.products.moments(self.own)
         self.linear = solved(self.moments.gram, self.moments.cross)
         floor = np.finfo(float).eps * self.moments.energy
         self.cost = max(self.moments.energy - float(self.linear @ self.moments.cross), floor)
@@ -130,16 +129,23 @@ class _Evaluation:
             slopes[0] = 0.0  # a delay that is kept
         return slopes
 
+    def _responses(self, rows: Real, *, constant: bool) -> Responses:
+        """Impulse responses of this structure; `constant` where the first answers 1 with 1."""
+        if self.part.structure.integrators:
+            return Responses.integrating(rows)
+        steady = np.zeros(rows.shape[0])
+        steady[0] = float(constant)
+        return Responses.ending(rows, steady)
+
     @cached_property
-    def all_rows(self) -> tuple[Real, Real]:
-        """Derivatives by theta, then the rows; and what each makes of a constant 1."""
-        steady = np.concatenate([np.zeros(self.part.theta.size), self.steady])
-        return np.vstack([self.slopes, self.part.rows]), steady
+    def all_responses(self) -> Responses:
+        """Derivatives by theta, then the rows."""
+        return self._responses(self.slopes, constant=False).and_also(self.own)
 
     @cached_property
     def all_moments(self) -> Moments:
         """Products of derivatives by theta, then of the rows."""
-        return self.products.moments(*self.all_rows)
+        return self.products.moments(self.all_responses)
 
     def normal(self) -> tuple[Real, Real]:
         """Normal equations of delay and denominator: matrix, and derivative of the cost."""
@@ -155,7 +161,7 @@ class _Evaluation:
 
     def stepped(self, step: Real, *, left: float, converged: bool) -> "Fitted":
         """Return the fit one step away from here, as the derivatives predict it."""
-        (rows, steady), moments, unknown = self.all_rows, self.all_moments, step.size
+        responses, moments, unknown = self.all_responses, self.all_moments, step.size
         linear = self.linear
         if step.any():
             inner, mixed = moments.gram[unknown:, unknown:], moments.gram[unknown:, :unknown]
@@ -174,10 +180,9 @@ class _Evaluation:
             converged=converged,
             nuisance=nothing,
             initial=nothing,
-            response=weights @ rows,
+            response=weights @ responses.rows,
             weights=weights,
-            rows=rows,
-            steady=steady,
+            responses=responses,
             moments=moments,
             problem=self.problem,
         )
@@ -225,11 +230,11 @@ class Fitted(Fit):
     Parameters
     ----------
     response : ndarray, shape (taps,)
-        Impulse response.
+        Impulse response, less what it keeps.
     weights : ndarray, shape (q,)
-        What multiplies `rows` in it: the last step, 0 where it was evaluated; the numerator.
-    rows, steady : ndarray, shape (q, taps) and (q,)
-        Derivatives of it by theta, then by the numerator; what each makes of a constant 1.
+        What multiplies `responses` in it: the last step, 0 where it was evaluated; the numerator.
+    responses : Responses
+        Derivatives of it by theta, then by the numerator.
     moments : Moments
         Products of derivatives by theta, then of the rows.
     problem : Compressed
@@ -238,8 +243,7 @@ class Fitted(Fit):
 
     response: Real
     weights: Real
-    rows: Real
-    steady: Real
+    responses: Responses
     moments: Moments
     problem: Compressed
 
@@ -287,7 +291,8 @@ class Fitted(Fit):
     def left_over(self) -> tuple[Real, int, Real]:
         """What is left over, not whitened, as `Products.left_over` gives it."""
         fixed = self.moments.fixed - self.moments.fixed_rows @ self.weights
-        return self.products.plain.left_over(self.response, fixed)
+        kept = float(self.responses.kept @ self.weights)
+        return self.products.plain.left_over(self.response, kept, fixed)
 
     @cached_property
     def left(self) -> LeftOver:

@@ -11,24 +11,20 @@ import numpy as np
 import scipy
 
 from hmpim.identify.arrays import Complex, Real
-from hmpim.identify.chance import SEARCHED
 from hmpim.identify.fitting.growth import HiddenPole, response_to_square
 from hmpim.identify.fitting.least_squares import solved
 from hmpim.identify.noise.misfit import Misfit
 from hmpim.identify.statistics.fit import Fitted
-from hmpim.identify.statistics.products import Products
+from hmpim.identify.statistics.products import Products, Responses
 from hmpim.identify.statistics.reach import AHEAD
 
-__all__ = ["Asked", "asked_of", "hidden_pole_of", "integrated_share", "misfit_of"]
+__all__ = ["Asked", "asked_of", "hidden_pole_of", "misfit_of"]
 
 _GROUPS = 12
 """Frequencies that are asked for."""
 
 _SEEN = 1e-6
 """Share of a direction that the model's own parameters leave, below which it is not asked for."""
-
-_STEPS = 48
-"""Delays at which a step is looked for."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -76,7 +72,7 @@ def misfit_of(
     if asked is None:
         asked = asked_of(fitted.delay, band, products)
     gain, left, cost, _ = _beside(fitted, products, asked.rows, asked.transforms)
-    variance = cost / max(products.counted - fitted.rows.shape[0] - 1, 1)
+    variance = cost / max(products.counted - fitted.weights.size - 1, 1)
     power_left = np.diag(left)
     size = np.sqrt(np.where(power_left > 1e-200 * power_left.max(), power_left, 1.0))
     values, vectors = np.linalg.eigh(left / np.outer(size, size))
@@ -106,22 +102,6 @@ def hidden_pole_of(fitted: Fitted) -> HiddenPole:
     )
 
 
-def integrated_share(fitted: Fitted) -> float:
-    """Share of what is left over, from one sample to the next, that steps in the response explain.
-
-    A response that does not end within the window is a step there; the differences of an output
-    that integrates do not wander.
-    """
-    products = fitted.products
-    steps = products.whitened(np.array([1.0, -1.0]))
-    taps = np.arange(fitted.response.size)
-    begins = np.linspace(AHEAD, taps.size // 2, _STEPS).astype(int)
-    gain, left, cost, _ = _beside(fitted, steps, (taps >= begins[:, None]).astype(np.float64))
-    power = gain / np.maximum(np.diag(left), np.finfo(float).tiny * np.diag(left).max()) * gain
-    clear = power > 2 * SEARCHED * cost / steps.counted
-    return float(np.max(np.where(clear, power, 0.0)) / cost) if cost > 0.0 else 0.0
-
-
 def _beside(
     fitted: Fitted, products: Products, asked: Real, known: Complex | None = None
 ) -> tuple[Real, Real, float, Real]:
@@ -131,9 +111,8 @@ def _beside(
     projected out, the residual's power, and how theta and the numerator change with their weights.
     """
     count = asked.shape[0]
-    own = fitted.rows
-    steady = np.concatenate([asked.sum(axis=1), fitted.steady])
-    moments = products.moments(np.vstack([asked, own]), steady, known=known)
+    both = Responses.ending(asked, asked.sum(axis=1)).and_also(fitted.responses)
+    moments = products.moments(both, known=known)
     linear, mixed = fitted.weights, moments.gram[:count, count:]
     shift = -solved(moments.gram[count:, count:], mixed.T)
     left = moments.gram[:count, :count] + mixed @ shift

@@ -15,13 +15,52 @@ import scipy
 from hmpim.identify.arrays import Complex, Real
 from hmpim.identify.noise.autoregression import LONGEST
 from hmpim.identify.statistics.reach import AHEAD
-from hmpim.identify.statistics.run import Run, closed
+from hmpim.identify.statistics.run import SUMMED, Run, closed, last_sums
 from hmpim.identify.statistics.statistics import Statistics
 
-__all__ = ["Moments", "Products", "spectrum_of"]
+__all__ = ["Moments", "Products", "Responses", "spectrum_of"]
 
 _FEW = 64
 """Samples at the beginning up to which a convolution is sooner a product with a matrix."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Responses:
+    """Impulse responses that come to rest, at 0 or, of an integrator, at a value that they keep.
+
+    Parameters
+    ----------
+    rows : ndarray, shape (q, taps)
+        From `AHEAD` samples before the input on, from it on less what they keep.
+    steady : ndarray, shape (q,)
+        What `rows` make of a constant input of 1.
+    kept : ndarray, shape (q,)
+        What they keep, which multiplies the running sum of the input.
+    """
+
+    rows: Real
+    steady: Real
+    kept: Real
+
+    @classmethod
+    def integrating(cls, rows: Real) -> "Responses":
+        """Those of an integrator, the last sample of which they keep."""
+        kept, rows = rows[:, -1].copy(), rows.copy()
+        rows[:, AHEAD:] -= kept[:, None]
+        return cls(rows=rows, steady=rows.sum(axis=1), kept=kept)
+
+    @classmethod
+    def ending(cls, rows: Real, steady: Real) -> "Responses":
+        """Those that end at 0."""
+        return cls(rows=rows, steady=steady, kept=np.zeros(steady.size))
+
+    def and_also(self, others: "Responses") -> "Responses":
+        """These, then others."""
+        return Responses(
+            rows=np.vstack([self.rows, others.rows]),
+            steady=np.concatenate([self.steady, others.steady]),
+            kept=np.concatenate([self.kept, others.kept]),
+        )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -86,7 +125,11 @@ class Products:
         self._power = spectrum_of(sum((r.uu for r in runs), np.zeros(reach.span + 1)), self._length)
         self._white = scipy.fft.rfft(self.noise, self._length)
         self._cross = np.stack([self._lagged(run) for run in runs])
-        ends = [end for run in runs for end in self._ends_of(run)]
+        ends = [
+            end
+            for run, whole in zip(statistics.runs, runs, strict=True)
+            for end in self._ends_of(whole, last_sums(run, reach, LONGEST))
+        ]
         self._inputs = scipy.fft.rfft(np.stack([end[0] for end in ends]), self._length)
         self._around = np.stack([end[1] for end in ends])
         self._apart = (
@@ -101,6 +144,7 @@ class Products:
         self._out = np.concatenate(parts, axis=2)
         self._inner = np.stack([self._outputs(run) for run in runs])
         self._inner -= self._out @ self._out.transpose(0, 2, 1)
+        self._others = np.delete(np.arange(reach.rows + 2), SUMMED)
 
     @property
     def plain(self) -> "Products":
@@ -123,12 +167,11 @@ class Products:
     @cached_property
     def energy(self) -> float:
         """Sum of squares of the outputs that count, the bias taken off."""
-        runs, _, rows = self._inner.shape
-        nothing = np.zeros((runs, 0, rows))
+        nothing = np.zeros((len(self._runs), 0, self._others.size))
         return self._without_bias(np.zeros((0, 0)), nothing, np.zeros(0)).energy
 
     def _lagged(self, run: Run) -> Real:
-        """Products of whitened outputs and the whitened input at each tap, (rows + 1, taps)."""
+        """Products of whitened outputs and the whitened input at each tap, (rows + 2, taps)."""
         reach, order = self.statistics.reach, self.order
         once = np.zeros((run.vu.shape[0], reach.taps + order))
         # Σ aᵢ Σ v(t-i) u(t-j), j from -AHEAD to lags + order
@@ -141,23 +184,25 @@ class Products:
         return out
 
     def _outputs(self, run: Run) -> Real:
-        """Products of whitened outputs, of the whole run, (rows + 1)²."""
+        """Products of whitened outputs, of the whole run, (rows + 2)²."""
         weight = np.correlate(self.noise, self.noise, "full")[self.order :]
         later = run.vv[:, :, 1 : weight.size] @ weight[1:]
         return np.asarray(weight[0] * run.vv[:, :, 0] + later + later.T)
 
-    def _ends_of(self, run: Run) -> list[tuple[Real, Real]]:
-        """Input at either end, and whitened outputs there."""
+    def _ends_of(self, run: Run, sums: Real) -> list[tuple[Real, Real]]:
+        """Input at either end of a closed run, and whitened outputs there; its last `sums`."""
         reach = self.statistics.reach
-        n, span, count = run.samples, reach.span, reach.rows + 1
+        n, span, count = run.samples, reach.span, reach.rows + 2
         # Sample c of a convolution with the head is sample c - AHEAD of the run, and of one with
         # the tail n - span - AHEAD + c.
         head, tail = (np.zeros((count, self._length)) for _ in range(2))
         size = min(reach.back, n)
-        early = np.vstack([reach.fixed(0, size), run.head_y[:size]])
+        begins = np.cumsum(run.head_u[:size] + run.level[0])
+        early = np.vstack([reach.fixed(0, size), begins, run.head_y[:size]])
         early[:, max(n - AHEAD, 0) :] = 0.0
         head[:, AHEAD : AHEAD + size] = early
-        late = np.vstack([reach.fixed(n - reach.forth, reach.forth), run.tail_y])
+        ends = np.append(sums, np.zeros(AHEAD))
+        late = np.vstack([reach.fixed(n - reach.forth, reach.forth), ends, run.tail_y])
         late[:, reach.forth - AHEAD :] = 0.0  # of a closed run
         tail[:, span + AHEAD - reach.forth : span + AHEAD] = late
         out = []
@@ -174,18 +219,17 @@ class Products:
         """Transforms of impulse responses, (q, taps), whitened: those that `moments` asks for."""
         return np.asarray(scipy.fft.rfft(rows, self._length) * self._white)
 
-    def moments(self, rows: Real, steady: Real, *, known: Complex | None = None) -> Moments:
+    def moments(self, responses: Responses, *, known: Complex | None = None) -> Moments:
         """Products of what impulse responses make of the input.
 
         Parameters
         ----------
-        rows : ndarray, shape (q, taps)
-            Impulse responses, from `AHEAD` samples before the input on.
-        steady : ndarray, shape (q,)
-            What each makes of a constant input of 1.
+        responses : Responses
+            The impulse responses.
         known : complex ndarray, optional
             Transforms of the first rows, from `transform`.
         """
+        rows, kept = responses.rows, responses.kept
         if known is None:
             spectra = self.transform(rows)
         else:
@@ -195,7 +239,12 @@ class Products:
         gram = _products(spectra, self._power, self._length) - flat @ flat.T
         lost = apart.transpose(1, 0, 2) @ self._out.transpose(0, 2, 1)
         mixed = rows @ self._cross.transpose(0, 2, 1) - lost
-        return self._without_bias(gram, mixed, steady)
+        if kept.any():
+            first = np.outer(kept, mixed[:, :, SUMMED].sum(axis=0))
+            square = float(self._inner[:, SUMMED, SUMMED].sum())
+            gram = gram + first + first.T + square * np.outer(kept, kept)
+            mixed = mixed + kept[None, :, None] * self._inner[:, None, SUMMED]
+        return self._without_bias(gram, mixed[:, :, self._others], responses.steady)
 
     def _not_counted(self, rows: Real, spectra: Complex) -> Real:
         """Samples at the ends of each run that do not count, (q, runs, samples)."""
@@ -211,13 +260,15 @@ class Products:
             early = (first @ self._begun).transpose(1, 0, 2)
         return np.concatenate([early, late], axis=2)
 
-    def left_over(self, response: Real, bias: Real) -> tuple[Real, int, Real]:
+    def left_over(self, response: Real, kept: float, bias: Real) -> tuple[Real, int, Real]:
         """Return what a model leaves over; of products without a noise model only.
 
         Parameters
         ----------
         response : ndarray, shape (taps,)
-            Impulse response.
+            Impulse response, less what it keeps.
+        kept : float
+            What it keeps.
         bias : ndarray, shape (runs, rows)
             What multiplies the rows of each run's bias.
 
@@ -231,7 +282,7 @@ class Products:
             The first samples of each run, as if it had begun at rest.
         """
         runs, reach, index = self._runs, self.statistics.reach, np.arange(LONGEST + 1)
-        weights = np.hstack([-bias, np.ones((len(runs), 1))])
+        weights = np.hstack([-bias, np.tile([-kept, 1.0], (len(runs), 1))])
         spectrum = scipy.fft.rfft(response, self._length)
         made = spectrum * spectrum.conj() * self._power
         whole = np.array(scipy.fft.irfft(made, self._length)[: LONGEST + 1])
@@ -257,7 +308,8 @@ class Products:
     def _without_bias(self, gram: Real, mixed: Real, steady: Real) -> Moments:
         """Solve the biases and take them off."""
         statistics = self.statistics
-        inner, outer = self._inner[:, :-1, :-1], self._inner[:, :-1, -1]
+        own = self._inner[:, self._others][:, :, self._others]
+        inner, outer = own[:, :-1, :-1], own[:, :-1, -1]
         energy = float(self._inner[:, -1, -1].sum())
         beside, cross = mixed[:, :, :-1], mixed[:, :, -1].sum(axis=0)
         if statistics.bias == "common":
@@ -303,7 +355,8 @@ class Products:
         statistics = self.statistics
         if statistics.reach.rows == 1:
             return np.ones((1 if statistics.bias == "common" else len(statistics.runs), 1))
-        sums = [run.vv[:-1, :-1, 0].sum(axis=1) / (run.samples - AHEAD) for run in self._runs]
+        count = statistics.reach.rows
+        sums = [run.vv[:count, :count, 0].sum(axis=1) / (run.samples - AHEAD) for run in self._runs]
         return np.stack(sums)
 
 

@@ -14,7 +14,10 @@ from hmpim.identify.arrays import Complex, Real
 from hmpim.identify.noise.autoregression import LONGEST
 from hmpim.identify.statistics.reach import AHEAD, Reach
 
-__all__ = ["Run", "begun", "closed", "continued", "shortened"]
+__all__ = ["SUMMED", "Run", "begun", "closed", "continued", "last_sums", "shortened"]
+
+SUMMED = -2
+"""Place of the input's running sum among the outputs of a run."""
 
 _PIECE = 16_384
 """Samples that are read at once, at least."""
@@ -25,9 +28,11 @@ _FEW = 64
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Run(ByValue):
-    """Products of one run's input u and outputs v: the bias' rows, then the measured output.
+    """Products of one run's input u and outputs v.
 
-    Both as deviations from their first samples.
+    Outputs are the bias' rows, the running sum of the input, and the measured output. Input and
+    measured output are deviations from their first samples; the sum is not, since an integrator
+    turns a constant input into a ramp.
 
     Parameters
     ----------
@@ -37,9 +42,9 @@ class Run(ByValue):
         First samples of input and output.
     uu : ndarray, shape (span + 1,)
         Σ u(t) u(t-k).
-    vu : ndarray, shape (rows + 1, forth + back + 1)
+    vu : ndarray, shape (rows + 2, forth + back + 1)
         Σ v(t) u(t-k), k from -forth on.
-    vv : ndarray, shape (rows + 1, rows + 1, LONGEST + 1)
+    vv : ndarray, shape (rows + 2, rows + 2, LONGEST + 1)
         Σ v_i(t) v_j(t-k).
     head_u, tail_u : ndarray, shape (span,)
         First and last samples of the input; 0 where there are none.
@@ -59,10 +64,14 @@ class Run(ByValue):
     head_y: Real
     tail_y: Real
 
+    def total(self, reach: Reach) -> float:
+        """Sum of the input, as a deviation: the bias' rows add to 1 at each sample."""
+        return float(self.vu[: reach.rows, reach.forth].sum())
+
 
 def begun(reach: Reach, u: float, y: float) -> Run:
     """An empty run that will begin with these samples."""
-    count = reach.rows + 1
+    count = reach.rows + 2
     return Run(
         samples=0,
         level=np.array([u, y]),
@@ -82,9 +91,18 @@ def continued(run: Run, reach: Reach, u: Real, y: Real) -> Run:
     for first in range(0, u.size, piece):
         some = slice(first, first + piece)
         rows = reach.fixed(run.samples, u[some].size)
-        v = np.vstack([rows, y[some] - run.level[1]])
-        run = _added(run, reach, u[some] - run.level[0], v)
+        moved = u[some] - run.level[0]
+        at = np.arange(run.samples + 1, run.samples + 1 + moved.size)
+        sums = run.total(reach) + np.cumsum(moved) + run.level[0] * at
+        run = _added(run, reach, moved, np.vstack([rows, sums, y[some] - run.level[1]]))
     return run
+
+
+def last_sums(run: Run, reach: Reach, count: int) -> Real:
+    """Running sum of the input at the last samples of a run, 0 before it began, shape (count,)."""
+    at = np.arange(run.samples + 1 - count, run.samples + 1)
+    later = np.append(np.cumsum(run.tail_u[:-count:-1])[::-1], 0.0)
+    return np.asarray((run.total(reach) - later + run.level[0] * at) * (at > 0))
 
 
 def closed(run: Run, reach: Reach) -> Run:
@@ -97,7 +115,7 @@ def closed(run: Run, reach: Reach) -> Run:
     last = run.tail_u[-1]
     after = 2.0 * last - run.tail_u[-2 : -2 - known : -1]
     after = np.concatenate([after, np.full(AHEAD - known, after[-1] if known else last)])
-    return _added(run, reach, after, np.zeros((reach.rows + 1, AHEAD)))
+    return _added(run, reach, after, np.zeros((reach.rows + 2, AHEAD)))
 
 
 def shortened(run: Run, reach: Reach) -> Run:
@@ -141,9 +159,9 @@ def _transformed(
     -------
     uu : ndarray, shape (span + 1,)
         Σ u(t) u(t-k).
-    after, ahead : ndarray, shape (rows + 1, back + 1) and (rows + 1, forth)
+    after, ahead : ndarray, shape (rows + 2, back + 1) and (rows + 2, forth)
         Σ v(t) u(t-k), k from 0 on; Σ u(t) v(t-k), k from 1 on.
-    vv : ndarray, shape (rows + 1, rows + 1, LONGEST + 1)
+    vv : ndarray, shape (rows + 2, rows + 2, LONGEST + 1)
         Σ v_i(t) v_j(t-k).
     """
     length = scipy.fft.next_fast_len(new[0].size + reach.span, real=True)
@@ -170,9 +188,9 @@ def _one_by_one(
 
 
 def _before(run: Run, reach: Reach) -> Real:
-    """The outputs just before what follows, shape (rows + 1, forth)."""
+    """The outputs just before what follows, shape (rows + 2, forth)."""
     fixed = reach.fixed(run.samples - reach.forth, reach.forth)
-    return np.vstack([fixed, run.tail_y])
+    return np.vstack([fixed, last_sums(run, reach, reach.forth), run.tail_y])
 
 
 def _late(x: Real, by: int, length: int) -> Complex:

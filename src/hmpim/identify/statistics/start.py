@@ -30,8 +30,8 @@ def correlations(statistics: Statistics) -> tuple[Real, Real]:
     reach = statistics.reach
     uu, yu = np.zeros(reach.span + 1), np.zeros(reach.forth + reach.back + 1)
     for run in statistics.runs:
-        mean_u = run.vu[:-1, reach.forth].sum() / run.samples
-        mean_y = run.vv[:-1, -1, 0].sum() / run.samples
+        mean_u = run.total(reach) / run.samples
+        mean_y = run.vv[: reach.rows, -1, 0].sum() / run.samples
         # Sums without the first k samples, and without the last k.
         late_u, early_u = (
             _without(run.samples * mean_u, x) for x in (run.head_u, run.tail_u[::-1])
@@ -72,7 +72,11 @@ def excited(statistics: Statistics) -> tuple[float, float]:
 
 
 def rough_of(
-    statistics: Statistics, *, known: Real | None = None, lag: int | None = None
+    statistics: Statistics,
+    *,
+    known: Real | None = None,
+    lag: int | None = None,
+    differenced: bool = False,
 ) -> RoughResponse:
     """Estimate the response without a model, from the correlations of input and output.
 
@@ -84,9 +88,14 @@ def rough_of(
         Impulse response that is already explained, and is subtracted.
     lag : int, optional
         Delay in samples to begin from; by default the lag of their greatest correlation.
+    differenced : bool
+        Whether it is the output's differences that answer the input: the output itself then
+        answers the input's running sum.
     """
     reach = statistics.reach
     uu, yu = correlations(statistics)
+    if differenced:
+        yu = np.diff(yu, prepend=0.0)
     cross = yu[reach.forth - AHEAD :][: reach.taps]
     length = int(scipy.fft.next_fast_len(2 * reach.span + 1, real=True))
     spectrum = spectrum_of(uu, length)
