@@ -11,12 +11,13 @@ import pytest
 from hypothesis import HealthCheck, settings
 
 import collecting
-from tests_support import field_chirp, second_order_lag, study_size
+from tests_support import examples, field_chirp, second_order_lag, study_size
 
 # A busy machine is slow; that is no failure of what is tested. In `make test` the examples are
-# the same every time; new ones are for `make studies` to find.
+# the same every time; new ones are for `make studies` to find, and many more of them.
 settings.register_profile(
     "hmpim",
+    examples(25),
     deadline=None,
     suppress_health_check=[HealthCheck.too_slow],
     derandomize="HMPIM_EXAMPLES" not in os.environ,
@@ -44,7 +45,7 @@ def pytest_xdist_auto_num_workers():
 DATA = Path(__file__).parents[2] / "shared" / "data"
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def measured():
     """Folder of measured records; the test is skipped where it is absent."""
     if not DATA.is_dir():

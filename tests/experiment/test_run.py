@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from hmpim.errors import ArgumentError, LimitsError, RigError, UnitError
@@ -15,6 +15,7 @@ from hmpim.experiment import ManualClock, RunLog, RunOptions, Watch, run
 from hmpim.record import Record
 from hmpim.rigs import ChannelSpec, Layout, Samples, Sensor
 from hmpim.stimulus import Limits, SampledMotion, Sine, Step, Stimulus, design
+from tests_support import examples
 
 SINE = Stimulus(waveform=Sine(amplitude=2.0, frequency=1.0, duration=2.0), fs=100.0, unit="deg")
 RATE, ACCELERATION = 4 * np.pi, 8 * np.pi**2  # peaks of SINE
@@ -94,7 +95,7 @@ def test_a_jerk_limit_is_checked_where_there_is_one():
     assert spy.moved == []
 
 
-@settings(max_examples=64, deadline=None)
+@examples(20)
 @given(
     share=st.floats(0.5, 2.0).filter(lambda s: abs(s - 1) > 1e-6),
     which=st.sampled_from(["position", "velocity", "acceleration"]),
@@ -111,7 +112,7 @@ def test_played_if_and_only_if_every_limit_is_kept_in_any_unit(share, which, uni
     assert len(spy.moved) == (share > 1)
 
 
-@settings(max_examples=64, deadline=None)
+@examples(20)
 @given(limit=st.floats(1e-6, 78.0))
 def test_the_advice_of_the_message_does(limit):
     spy = Spy(limits=Limits(acceleration=limit, unit="deg"))

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import example, given, settings
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from hmpim.errors import ArgumentError, FormatError, RecordError, UnitError
@@ -241,7 +241,7 @@ NAMES = st.text(st.characters(exclude_categories=["Cs"]), max_size=8)
 UNITS = st.sampled_from(["", "deg", "deg/s²", "V", "N*m"])
 
 
-@settings(max_examples=64, deadline=None)
+@examples(20)
 @given(data=st.data(), fs=st.floats(1e-3, 1e6), n=st.integers(2, 20))
 def test_written_and_read_back_is_the_same_bit_for_bit(tmp_path_factory, data, fs, n):
     names = data.draw(st.lists(NAMES, min_size=2, max_size=4, unique=True))

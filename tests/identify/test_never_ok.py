@@ -150,6 +150,8 @@ LONG = {
         "slow sine",
         "polarity flips",
         "delay changes",  # fitting/test_halves.py has it
+        "held for 0.7 s",
+        "rate limit",  # nonlinear/test_speed.py and test_nonlinear_end_to_end.py have it
         "slack",
     ),
 }

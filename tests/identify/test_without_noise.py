@@ -1,6 +1,7 @@
 """A simulation without noise, as a first try of the tool often is: right, and not accused."""
 
 from dataclasses import fields, replace
+from itertools import product
 
 import numpy as np
 import pytest
@@ -8,6 +9,7 @@ from scipy import signal
 
 import hmpim
 from hmpim.identify.result import Parameters
+from tests_support import in_studies
 
 FS = 200.0
 POSSIBLE = [field.name for field in fields(Parameters)]
@@ -56,8 +58,14 @@ def held_record(u, denominator, late):
     return hmpim.Record.from_arrays({"u": u}, {"y": y}, fs=FS)
 
 
-@pytest.mark.parametrize("late", [0, 7])
-@pytest.mark.parametrize("kind", HELD)
+@pytest.mark.parametrize(
+    ("kind", "late"),
+    [
+        *product(["a step"], [0, 7]),
+        *(("PRBS", 7), ("a walk", 0)),
+        *in_studies(("PRBS", 0), ("a walk", 7)),
+    ],
+)
 def test_a_simulation_behind_a_held_input_is_right_without_a_doubt(kind, late):
     """Rounding is neither a misfit nor a colour, and moves no output before its input."""
     omega = 2 * np.pi * 5.0

@@ -4,13 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from hmpim.errors import ArgumentError
 from hmpim.model import Model, frequency_response, second_order_coefficients, simulate
 from hmpim.rigs import Sensor
-from tests_support import in_studies
+from tests_support import examples, in_studies
 
 FS = 200.0
 T = np.arange(600) / FS
@@ -59,7 +59,7 @@ SECOND = second_order(10.0, 0.4, delay=0.0)
 
 @pytest.mark.parametrize("model", [STATIC, FIRST, SECOND])
 @pytest.mark.parametrize("intersample", ["zoh", "foh"])
-@settings(max_examples=12)
+@examples(5)
 @given(
     delay=st.one_of(st.sampled_from([0.0, 0.005, 0.15]), st.floats(0.0, 0.2)),
     period=st.one_of(st.none(), st.sampled_from([0.01, 0.005 * 20 / 3]), st.floats(0.002, 0.1)),

@@ -2,11 +2,12 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from hmpim.model import delayed_response, prepare_input, second_order_coefficients
 from hmpim.model.sampled import interpolation_error
+from tests_support import examples
 
 
 def lag(time_constant: float) -> np.ndarray:
@@ -18,7 +19,7 @@ def lag(time_constant: float) -> np.ndarray:
     time_constant=st.floats(0.3, 50.0),
     levels=st.lists(st.floats(-2, 2), min_size=12, max_size=12),
 )
-@settings(max_examples=60, deadline=None)
+@examples(20)
 def test_held_input_through_a_lag_is_a_sum_of_exponentials(delay, time_constant, levels):
     u = np.array([0.0, *levels])
     y = delayed_response(prepare_input(u, "zoh"), delay=delay, denominator=lag(time_constant))[0]
@@ -33,7 +34,7 @@ def test_held_input_through_a_lag_is_a_sum_of_exponentials(delay, time_constant,
 
 
 @given(delay=st.floats(0.0, 5.0), time_constant=st.floats(0.3, 30.0))
-@settings(max_examples=40, deadline=None)
+@examples(12)
 def test_a_ramp_through_a_lag_trails_by_its_time_constant(delay, time_constant):
     u = np.arange(20.0)
     y = delayed_response(prepare_input(u, "foh"), delay=delay, denominator=lag(time_constant))[0]
@@ -104,7 +105,7 @@ def test_powers_are_derivatives():
 
 
 @given(shift=st.integers(0, 10), delay=st.floats(0, 5))
-@settings(max_examples=30, deadline=None)
+@examples(10)
 def test_a_whole_sample_of_delay_is_a_shift(shift, delay):
     rng = np.random.default_rng(shift)
     u = np.concatenate([np.zeros(30), rng.standard_normal(100)])

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from hmpim.errors import ArgumentError
@@ -11,6 +11,7 @@ from hmpim.optimal import RoughModel, fisher_information, predict_errors, sensit
 from hmpim.optimal.fisher import responses, standard_deviations
 from hmpim.rigs import Sensor
 from hmpim.stimulus import Limits, Stimulus, SumOfSines, design
+from tests_support import examples
 
 FS = 200.0
 FIG_17 = RoughModel(delay=0.15, natural_frequency=10.0, damping_ratio=0.4)
@@ -53,7 +54,7 @@ def test_derivatives_of_the_response_against_differences(model):
         assert np.abs(here - numerical).max() <= 1e-6 * np.abs(row).max()
 
 
-@settings(deadline=None, max_examples=25)
+@examples(8)
 @given(model=roughs)
 def test_the_two_routes_agree(led, model):
     by_fourier = sensitivities(led.position, model=model, fs=FS)

@@ -2,12 +2,13 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from hmpim.errors import RecordError
 from hmpim.record import Channel, Record, Series, uniform
 from hmpim.record.mend import mend, restarts
+from tests_support import examples
 
 
 def sine(time, f=1.0):
@@ -18,7 +19,7 @@ def record_at(time, f=1.0, **options):
     return Record.from_arrays({"u": sine(time, f)}, {"y": 2 * sine(time, f)}, time=time, **options)
 
 
-@settings(max_examples=64, deadline=None)
+@examples(20)
 @given(
     n=st.integers(2, 300),
     fs=st.floats(1e-2, 1e5),
@@ -51,7 +52,7 @@ def test_the_stated_rate_is_kept_digit_for_digit():
     assert uniform(Record.from_arrays({"u": np.ones(7)}, {"y": np.ones(7)}, fs=610.35)).fs == 610.35
 
 
-@settings(max_examples=64, deadline=None)
+@examples(20)
 @given(seed=st.integers(0, 2**32 - 1), lost=st.sets(st.integers(1, 198), min_size=1, max_size=40))
 def test_gaps_are_masked_and_all_else_is_left_alone(seed, lost):
     rng = np.random.default_rng(seed)
@@ -94,7 +95,7 @@ def test_jitter_is_interpolated_to_the_stated_accuracy():
     assert np.std(sine(time, 20.0) - sine(aligned.time, 20.0)) > 5e-2
 
 
-@settings(max_examples=64, deadline=None)
+@examples(20)
 @given(
     seed=st.integers(0, 2**32 - 1),
     offset=st.floats(-50, 50),
@@ -115,7 +116,7 @@ def test_an_offset_of_time_commutes_with_alignment(seed, offset, jitter, lost):
         assert np.allclose(a.values, b.values, rtol=0, atol=1e-6)
 
 
-@settings(max_examples=32, deadline=None)
+@examples(12)
 @given(order=st.permutations(["a", "b", "c"]), seed=st.integers(0, 2**32 - 1))
 def test_the_order_of_channels_does_not_matter(order, seed):
     rng = np.random.default_rng(seed)

@@ -4,10 +4,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from hmpim.record import fit_clock, inspect_timing
+from tests_support import examples
 
 DATA = Path(__file__).resolve().parents[2].parent / "shared" / "data"
 
@@ -83,7 +84,7 @@ def test_stamps_that_run_at_another_rate_than_stated_are_told():
     assert "100 Hz where 200 Hz" in finding.message
 
 
-@settings(max_examples=64, deadline=None)
+@examples(20)
 @given(
     fs=st.floats(1, 5000),
     start=st.floats(-1e4, 1e4),
@@ -100,7 +101,7 @@ def test_places_are_found_through_gaps_from_any_start(fs, start, n, dropped):
     assert clock.fs == pytest.approx(fs, rel=1e-8)
 
 
-@settings(max_examples=64, deadline=None)
+@examples(20)
 @given(
     seed=st.integers(0, 2**32 - 1),
     amount=st.floats(0.05, 0.35),
@@ -117,7 +118,7 @@ def test_an_offset_or_another_unit_of_time_changes_nothing_else(seed, amount, of
     assert b.start == pytest.approx(scale * (a.start + offset), abs=1e-9 * scale)
 
 
-@settings(max_examples=64, deadline=None)
+@examples(20)
 @given(
     seed=st.integers(0, 2**32 - 1),
     dropped=st.sets(st.integers(1, 38).map(lambda k: 5 * k), max_size=4),

@@ -2,10 +2,11 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from hmpim.record import Channel, Record, inspect_record, inspect_values
+from tests_support import examples
 
 T = np.arange(2000) / 200
 U = np.sin(2 * np.pi * 0.7 * T) + 0.3 * np.sin(2 * np.pi * 3.1 * T)
@@ -54,7 +55,7 @@ def test_a_slow_update_shows_as_repeated_samples():
     assert "about every 4 samples" in finding.message
 
 
-@settings(max_examples=64, deadline=None)
+@examples(20)
 @given(scale=st.floats(1e-6, 1e6), offset=st.floats(-10, 10), stuck=st.booleans())
 def test_scale_and_offset_of_the_output_change_no_finding(scale, offset, stuck):
     y = U.copy()

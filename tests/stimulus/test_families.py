@@ -5,7 +5,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy.signal import max_len_seq
 
@@ -33,6 +33,7 @@ from hmpim.stimulus import (
     true_peaks,
 )
 from hmpim.stimulus.limits import QUANTITIES
+from tests_support import examples
 
 LIMITS = Limits(position=10, velocity=500, acceleration=8000, jerk=6e5)
 
@@ -81,7 +82,7 @@ def test_each_derivative_is_that_of_the_one_before(waveform):
     n=st.floats(0.0, 3.0),
     share=st.floats(0.0, 1.0),
 )
-@settings(max_examples=50, deadline=None)
+@examples(16)
 def test_exponential_sweep_is_the_textbook_one(low, ratio, T, n, share):
     sweep = ExponentialSweep(band=(low, ratio * low), duration=T, gain=3.0, extinction=n)
     t = np.array([share * T])
@@ -210,7 +211,7 @@ def test_lines_evenly_spaced_or_not_are_the_same_sum():
     a=st.floats(1.0, 1e5),
     j=st.floats(10.0, 1e7),
 )
-@settings(max_examples=50, deadline=None)
+@examples(16)
 def test_peaks_of_a_transition_are_the_closed_forms(distance, v, a, j):
     limits = Limits(velocity=v, acceleration=a, jerk=j)
     from hmpim.stimulus.profile import shortest_rise

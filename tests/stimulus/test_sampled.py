@@ -2,11 +2,12 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from hmpim.errors import ArgumentError, LimitsError
 from hmpim.stimulus import Limits, SampledMotion, Stimulus, check_inside, design
+from tests_support import examples
 
 LIMITS = Limits(position=10, velocity=300, acceleration=5000, unit="deg")
 SWEEP = design(band=(0.1, 20), duration=4, fs=200, limits=LIMITS)
@@ -32,7 +33,7 @@ def test_samples_come_back_bit_for_bit_and_the_limits_it_was_designed_onto_are_k
         check_inside(again, Limits(position=9.9, unit="deg"), whose="it")
 
 
-@settings(max_examples=30, deadline=None)
+@examples(10)
 @given(seed=st.integers(0, 10_000), fs=st.floats(0.1, 1e4))
 def test_a_polynomial_of_fifth_degree_is_met_everywhere(seed, fs):
     rng = np.random.default_rng(seed)

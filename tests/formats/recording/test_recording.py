@@ -5,7 +5,7 @@ from dataclasses import replace
 import h5py
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 import hmpim
@@ -13,6 +13,7 @@ from hmpim.errors import ArgumentError, FormatError
 from hmpim.formats.recording import read_recording, save_recording
 from hmpim.record import Channel, Finding, Record
 from hmpim.stimulus import Limits, Sine, Stimulus, design
+from tests_support import examples
 
 LIMITS = Limits(position=10, velocity=1000, acceleration=40000, unit="deg")
 GAPS = Finding(code="gaps", message="3 are missing: ±1 %", severity="info", parameters=("delay",))
@@ -48,7 +49,7 @@ NAMES = st.text(st.characters(codec="utf-8", exclude_characters="\0"), min_size=
 VALUES = st.lists(st.floats(allow_nan=False, allow_infinity=False), min_size=2, max_size=9)
 
 
-@settings(max_examples=30, deadline=None)
+@examples(10)
 @given(
     names=st.lists(NAMES, min_size=4, max_size=4, unique=True),
     values=st.lists(VALUES, min_size=4, max_size=4),

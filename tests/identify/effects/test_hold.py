@@ -2,12 +2,13 @@
 
 import numpy as np
 import pytest
-from hypothesis import example, given, settings
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from hmpim.errors import ArgumentError, RecordError
 from hmpim.identify.effects.hold import detect_hold, updates
 from hmpim.rigs import Sensor
+from tests_support import examples
 
 FS = 200.0
 T = np.arange(2000) / FS
@@ -26,7 +27,7 @@ def held(period: float, phase: float = 0.0031, **kind) -> np.ndarray:
     return sensor.respond(CHIRP, fs=FS, rng=3)
 
 
-@settings(max_examples=40, deadline=None)
+@examples(12)
 @given(
     samples=st.one_of(st.floats(1.1, 30.0), st.sampled_from([2.0, 3.0, 20 / 3, 5.5, 5 / 3, 20.0])),
     phase=st.floats(0.0, 1.0),

@@ -5,6 +5,7 @@ import pytest
 
 import hmpim
 from hmpim.identify.effects.lost import find_frozen, find_spikes, find_stuck
+from tests_support import in_studies
 
 FS = 200.0
 T = np.arange(2000) / FS
@@ -86,8 +87,15 @@ def test_an_output_that_is_stuck_to_its_end_is_found_without_a_model():
     assert find_stuck(np.minimum(y, y[600]), [CHIRP]) is None  # clipped
 
 
-@pytest.mark.parametrize("noise", [0.0, 0.1])
-@pytest.mark.parametrize("stuck", [slice(600, None), slice(500, 1500)])
+@pytest.mark.parametrize(
+    ("stuck", "noise"),
+    [
+        (slice(600, None), 0.0),
+        (slice(600, None), 0.1),
+        (slice(500, 1500), 0.1),
+        *in_studies((slice(500, 1500), 0.0)),
+    ],
+)
 def test_a_stuck_sensor_is_identified_from_what_it_said_before_and_after(noise, stuck):
     sensor = hmpim.Sensor(
         delay=0.15, natural_frequency=10.0, damping_ratio=0.4, bias=0.6, noise_std=noise

@@ -2,12 +2,13 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy.signal import lfilter
 
 from hmpim.errors import RecordError
 from hmpim.identify.effects.quantization import detect_quantization
+from tests_support import examples
 
 
 def sweep(amplitude: float = 10.0, samples: int = 2000) -> np.ndarray:
@@ -15,7 +16,7 @@ def sweep(amplitude: float = 10.0, samples: int = 2000) -> np.ndarray:
     return amplitude * np.sin(2 * np.pi * (0.1 * t + 0.995 * t * t))
 
 
-@settings(max_examples=100, deadline=None)
+@examples(30)
 @given(
     levels=st.floats(4, 1e5),
     noise=st.sampled_from([0.0, 0.1, 1.0, 10.0]),

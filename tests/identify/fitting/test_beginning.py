@@ -20,8 +20,9 @@ def short(seed: int) -> hmpim.Record:
     return hmpim.Record.from_arrays({"u": u[::FINE]}, {"y": y[::FINE] + noise}, fs=FS)
 
 
-def test_what_rings_at_the_start_of_a_short_record_is_no_noise():
-    found = [hmpim.identify(short(seed))["y", "u"].noise_std for seed in range(20)]
+@pytest.mark.few(10)
+def test_what_rings_at_the_start_of_a_short_record_is_no_noise(seeds):
+    found = [hmpim.identify(short(seed))["y", "u"].noise_std for seed in range(seeds)]
     held = [one.ci95[0] <= 1e-3 <= one.ci95[1] for one in found]
     assert np.mean([one.value for one in found]) == pytest.approx(1e-3, rel=0.1)
-    assert np.count_nonzero(held) >= 16  # 19 of 20 on average
+    assert np.mean(held) >= 0.8  # 0.95 on average

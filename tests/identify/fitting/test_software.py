@@ -169,7 +169,7 @@ def test_a_filter_that_began_from_zero_in_the_midst_of_motion_is_found_without_a
 
 @pytest.mark.parametrize("kind", ["white", "a walk far from 0", "a step"])
 def test_a_long_filter_without_poles_is_found_with_all_its_taps(kind):
-    u = {**MOVING, "a step": np.repeat([0.0, 1.0], [100, 1900])}[kind]
+    u = {**MOVING, "a step": np.repeat([0.0, 1.0], [100, 900])}[kind][:1000]
     taps = signal.firwin(20, 0.3)
     y = signal.lfilter(taps, [1.0], u)
     pair = hmpim.identify(hmpim.Record.from_arrays({"u": u}, {"y": y}, fs=FS))["y"]

@@ -3,12 +3,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy import signal
 
 from hmpim.errors import ArgumentError, RecordError
 from hmpim.identify.frf.local import local_response, local_responses
+from tests_support import examples
 
 FS, BAND = 200.0, (0.1, 20.0)
 SEEDS = int(os.environ.get("HMPIM_SEEDS", "60"))
@@ -96,7 +97,7 @@ def test_more_noise_more_stated_error_in_proportion() -> None:
     np.testing.assert_allclose(ten.std, 10 * one.std, rtol=1e-3)
 
 
-@settings(max_examples=30)
+@examples(10)
 @given(st.integers(0, 200), st.floats(0.2, 5.0), st.sampled_from([-1, 1]), st.floats(-50, 50))
 def test_a_delayed_scaled_biased_copy_is_exact(
     k: int, scale: float, sign: int, bias: float
@@ -107,7 +108,7 @@ def test_a_delayed_scaled_biased_copy_is_exact(
     np.testing.assert_allclose(found.response, true, rtol=2e-4, atol=0)
 
 
-@settings(max_examples=30)
+@examples(10)
 @given(st.floats(0.01, 100.0), st.floats(0.01, 100.0), st.integers(0, 2**32 - 1))
 def test_units_scale_response_and_error_alike(of_u: float, of_y: float, seed: int) -> None:
     y = CLEAN + 0.1 * np.random.default_rng(seed).standard_normal(CLEAN.size)
@@ -117,7 +118,7 @@ def test_units_scale_response_and_error_alike(of_u: float, of_y: float, seed: in
     np.testing.assert_allclose(other.std, of_y / of_u * one.std, rtol=1e-5)
 
 
-@settings(max_examples=20)
+@examples(8)
 @given(st.floats(-1000, 1000))
 def test_a_bias_makes_no_difference(bias: float) -> None:
     y = CLEAN + 0.1 * np.random.default_rng(1).standard_normal(CLEAN.size)

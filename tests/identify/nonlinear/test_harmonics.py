@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from hmpim import Limits, design
@@ -13,7 +13,7 @@ from hmpim.identify.nonlinear.sweep_phase import sweep_phase
 from hmpim.identify.threads import one_thread
 from hmpim.model import STRUCTURES, prepare_input
 from hmpim.rigs import Sensor
-from tests_support import assert_share
+from tests_support import assert_share, examples
 
 FS = 200.0
 T = np.arange(2000) / FS
@@ -21,7 +21,7 @@ ANGLE = 2 * np.pi * (0.1 * T + 19.9 / 20 * T * T)
 CHIRP = np.sin(ANGLE)
 
 
-@settings(max_examples=60, deadline=None)
+@examples(20)
 @given(
     first=st.floats(0.1, 2.0),
     last=st.floats(8.0, 75.0),

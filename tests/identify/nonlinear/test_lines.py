@@ -2,12 +2,12 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from hmpim.errors import ArgumentError
 from hmpim.identify.nonlinear.lines import detection_lines, find_period
-from tests_support import assert_share
+from tests_support import assert_share, examples
 
 N = 1024
 EXCITED = np.array([k for k in range(1, 120, 2) if k % 8 != 5])
@@ -21,7 +21,7 @@ def multisine(periods: int, seed: int = 0) -> np.ndarray:
     return np.tile(one / np.std(one), periods)
 
 
-@settings(max_examples=40, deadline=None)
+@examples(12)
 @given(period=st.integers(20, 400), times=st.floats(2.1, 6.0), seed=st.integers(0, 50))
 def test_the_period_of_whatever_repeats(period, times, seed):
     one = np.random.default_rng(seed).standard_normal(period)

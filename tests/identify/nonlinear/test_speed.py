@@ -62,7 +62,7 @@ def test_the_paper_s_figures_are_those_of_the_command(pair):
     assert pair.paper.delay == free.paper.delay
 
 
-@pytest.mark.few(5)
+@pytest.mark.few(3)
 def test_the_error_of_the_limit_is_in_the_error_bars(seeds):
     errors = []
     for seed in range(seeds):

@@ -3,7 +3,7 @@ from dataclasses import fields
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy import signal
 
@@ -13,6 +13,7 @@ from hmpim.identify.section_iv.correlation import autocorrelation, cross_correla
 from hmpim.identify.section_iv.paper import PaperAnalysis, paper_analysis, paper_estimates
 from hmpim.identify.section_iv.response import delay_phase, natural_frequency
 from hmpim.identify.section_iv.spectrum import decibel, spectrum, transfer_function
+from tests_support import examples
 
 FS, DURATION, BAND = 200.0, 10.0, (0.1, 20.0)
 Waveform = Callable[[np.ndarray], np.ndarray]
@@ -183,7 +184,7 @@ def test_the_band_is_found_where_none_is_given() -> None:
     assert high == pytest.approx(20.0, abs=1.5)
 
 
-@settings(max_examples=25)
+@examples(8)
 @given(st.floats(0.1, 10.0), st.sampled_from([-1, 1]))
 def test_scaling_the_output_scales_the_response_only(scale: float, sign: int) -> None:
     u, y = figure_17(hmpim_waveform(10.0), 3)
@@ -197,7 +198,7 @@ def test_scaling_the_output_scales_the_response_only(scale: float, sign: int) ->
     assert other.estimates.peak_gain_db == pytest.approx(one.estimates.peak_gain_db)
 
 
-@settings(max_examples=25)
+@examples(8)
 @given(st.integers(0, 100))
 def test_shifting_the_output_adds_to_the_delay(k: int) -> None:
     u, y = figure_17(hmpim_waveform(10.0), 3, noise=0.0)

@@ -1,6 +1,6 @@
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as npst
 
@@ -15,6 +15,7 @@ from hmpim.identify.section_iv.spectrum import (
     well_excited,
 )
 from hmpim.identify.section_iv.windows import gaussian_window
+from tests_support import examples
 
 
 def hmpim_waveform(
@@ -108,7 +109,7 @@ def test_ratio_is_nan_where_there_is_nothing() -> None:
     assert found[1] == 0.5
 
 
-@settings(max_examples=40)
+@examples(12)
 @given(
     st.floats(0.1, 3.0),
     st.floats(8.0, 80.0),

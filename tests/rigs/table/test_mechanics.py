@@ -5,7 +5,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from hmpim.errors import ArgumentError, MissingExtraError
@@ -13,6 +13,7 @@ from hmpim.rigs.table.axes import AXES, FIG_4
 from hmpim.rigs.table.bodies import LOADS, Base, Rigid, load_named
 from hmpim.rigs.table.mjcf import mjcf
 from hmpim.rigs.table.plant import BASE, ORDER, Plant, build, mujoco
+from tests_support import examples
 
 mj = pytest.importorskip("mujoco")
 
@@ -81,7 +82,7 @@ def test_friction_only_takes_energy():
     assert found[-1] < 0.9 * found[0]
 
 
-@settings(max_examples=50, deadline=None)
+@examples(16)
 @given(at=angles)
 def test_mass_matrix_is_symmetric_and_positive(at):
     matrix = plant().mass_matrix(at)
@@ -89,7 +90,7 @@ def test_mass_matrix_is_symmetric_and_positive(at):
     assert np.linalg.eigvalsh(matrix)[0] > 0.1
 
 
-@settings(max_examples=50, deadline=None)
+@examples(16)
 @given(at=angles)
 def test_inner_and_outer_axes_meet_in_the_base_alone(at):
     matrix = plant().mass_matrix(at)[BASE:, BASE:][np.ix_(ORDER, ORDER)]

@@ -2,11 +2,12 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from hmpim.errors import ArgumentError
 from hmpim.rigs.wire import Sequence, fit_clocks
+from tests_support import examples
 
 
 def exchange(*, offset, drift, forth, back, seconds=10.0, rate=1000.0, seed=0, jitter=2e-4):
@@ -23,7 +24,7 @@ def exchange(*, offset, drift, forth, back, seconds=10.0, rate=1000.0, seed=0, j
     return t1, t2, far(t3_near), t4
 
 
-@settings(max_examples=15, deadline=None)
+@examples(6)
 @given(offset=st.floats(-1e6, 1e6), drift=st.floats(-1e-4, 1e-4), seed=st.integers(0, 1000))
 def test_offset_and_drift_are_found(offset, drift, seed):
     stamps = exchange(offset=offset, drift=drift, forth=1e-3, back=1e-3, seed=seed)
@@ -60,7 +61,7 @@ def test_too_few_time_stamps_are_refused():
         fit_clocks([0.0, 1.0], [1.0], [1.0, 2.0], [0.0, 1.0])
 
 
-@settings(max_examples=50)
+@examples(16)
 @given(
     order=st.permutations(range(30)),
     lost=st.sets(st.integers(1, 28), max_size=10),

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from hmpim.errors import RigError
@@ -16,6 +16,7 @@ from hmpim.rigs.wire import (
     pack,
     unpack,
 )
+from tests_support import examples
 from wire_support import LIMITS, hello
 
 RATE = 500.0
@@ -110,7 +111,7 @@ def test_a_lost_command_is_reckoned_and_counted():
     assert np.abs(gap).max() < 1.5 * jerk * (2 * T) ** 3 / 2
 
 
-@settings(max_examples=40, deadline=None)
+@examples(12)
 @given(
     stop_at=st.integers(3, 480),
     frequency=st.floats(0.3, 2.0),
