@@ -8,7 +8,7 @@ import inspect
 import types
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import is_dataclass
-from functools import lru_cache, wraps
+from functools import cache, lru_cache, wraps
 from numbers import Integral, Real
 from typing import Any, Literal, TypeVar, Union, cast, get_args, get_origin, get_type_hints
 
@@ -133,6 +133,8 @@ def fits(value: Any, hint: Any) -> bool:
     >>> fits(np.float32(1.0), float), fits(True, float), fits([1, 2], tuple[float, float])
     (True, False, True)
     """
+    if type(value) is hint:
+        return True  # most are, and a call asks of each number of a list
     origin, inner = get_origin(hint), get_args(hint)
     if hint is Any or isinstance(hint, TypeVar) or _array(hint):
         return True
@@ -177,6 +179,7 @@ def _masked(value: object) -> bool:
     return isinstance(value, np.ma.MaskedArray)
 
 
+@cache
 def _array(hint: Any) -> bool:
     parts = set(get_args(hint)) if get_origin(hint) in (Union, types.UnionType) else {hint}
     return set(get_args(ArrayLike)) <= parts or any(get_origin(p) is np.ndarray for p in parts)
