@@ -124,6 +124,7 @@ peer = None
 while True:
     came = select.select([0, near, far], [], [])[0]
     if 0 in came:
+        print(time.perf_counter(), flush=True)
         break
     if near in came:
         data, peer = near.recvfrom(65507)
@@ -146,7 +147,9 @@ class Cable:
         self.port = int(self.process.stdout.readline())
 
     def pull(self):
+        """Pull it; return when nothing passed any more, s of the clock."""
         self.process.stdin.close()
+        return float(self.process.stdout.readline())
 
     def close(self):
         self.process.kill()

@@ -80,10 +80,20 @@ def hold_responses_together(one, other, *, off):
     )
 
 
-@pytest.mark.parametrize("keep", ["parameters", "results"])
-def test_one_stimulus_is_shared(tmp_path, monkeypatch, keep):
-    path = tmp_path / "fleet.parquet"
+@pytest.fixture(scope="module")
+def fleet(tmp_path_factory):
+    """The records, and what is found of each alone."""
+    folder = tmp_path_factory.mktemp("fleet")
+    path = folder / "fleet.parquet"
     write_fleet(path)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(alike, "fit_fleet", lambda *_, **__: pytest.fail("not alone"))
+        return path, done(path, folder, "results", patch, worth=NEVER)
+
+
+@pytest.mark.parametrize("keep", ["parameters", "results"])
+def test_one_stimulus_is_shared(fleet, tmp_path, monkeypatch, keep):
+    path, alone = fleet
     monkeypatch.setattr(alike, "_LEARNT_FROM", 6)
     together = []
     fit = alike.fit_fleet
@@ -96,8 +106,6 @@ def test_one_stimulus_is_shared(tmp_path, monkeypatch, keep):
     monkeypatch.setattr(alike, "fit_fleet", counted)
     quick = done(path, tmp_path, keep, monkeypatch, worth=UNITS - 2)
     assert len(together) == 1
-    alone = done(path, tmp_path, "results", monkeypatch, worth=NEVER)
-    assert len(together) == 1  # none but those before
     assert len(together[0]) == UNITS - 7  # all but those learnt from and the one with a gap
     assert together[0].count(False) >= 1  # the clipped one, at least
     assert quick.index.tolist() == alone.index.tolist()

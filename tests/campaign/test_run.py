@@ -276,7 +276,7 @@ def test_study_survives_json(finished):
     assert np.isfinite(data["rows"][0]["parameters"]["delay"]["std"])
 
 
-def table_plan(*, level):
+def table_plan(*, level, seconds=3.0):
     """All five axes of the table at once, what they carry heavier than at acceptance."""
     axes = {
         "roll": {"band": [0.5, 60.0], "travel": 1.0},
@@ -287,7 +287,7 @@ def table_plan(*, level):
     }
     test = {"name": "all", "together": True, "levels": [level], "loads": ["bracket+projector"]}
     rig = {"kind": "table"}
-    stimulus = {"duration": 3.0}
+    stimulus = {"duration": seconds}
     return parse_plan(
         {"name": "near", "rig": rig, "stimulus": stimulus, "axes": axes, "test": [test]}
     )
@@ -310,7 +310,7 @@ def test_load_of_all_axes_together_is_predicted_and_refused(tmp_path, monkeypatc
 def test_all_axes_at_once_are_identified_as_their_record_is(tmp_path):
     """One answer to one question: the campaign's, and that of the record it has kept."""
     pytest.importorskip("mujoco")
-    plan = table_plan(level=0.5)
+    plan = table_plan(level=0.5, seconds=2.0)
     both = replace(plan.tests[0], axes=("roll", "yaw"), rates=(500.0,), loads=("acceptance",))
     (case,) = run_campaign(replace(plan, tests=(both,)), tmp_path)
     found = hmpim.identify(hmpim.load(tmp_path / "records" / f"{case['id']}.h5"))

@@ -99,14 +99,3 @@ def test_a_defect_is_not_hidden(tmp_path, monkeypatch):
     monkeypatch.setattr("hmpim.formats.read", broken)
     done = RUNNER.invoke(app, ["identify", str(tmp_path / "a.csv")])
     assert isinstance(done.exception, ZeroDivisionError)
-
-
-def test_help_loads_nothing_that_draws():
-    code = (
-        "import sys\nfrom hmpim.cli.main import app\n"
-        "try:\n    app(['--help'])\nexcept SystemExit: pass\n"
-        "heavy = {'matplotlib', 'jinja2'} & set(sys.modules)\n"
-        "assert not heavy, heavy\n"
-    )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr

@@ -197,7 +197,7 @@ def test_several_records_have_a_pdf(tmp_path):
 
 
 def test_levels_are_named_with_their_unit_and_a_doubtful_figure_is_marked(tmp_path):
-    pages = []
+    pages, data = [], tmp_path / "l.json"
     for bent in (0.0, 0.02):
         records = []
         for k in (1, 2):
@@ -209,12 +209,10 @@ def test_levels_are_named_with_their_unit_and_a_doubtful_figure_is_marked(tmp_pa
         for k, record in enumerate(records):
             hmpim.save(record, tmp_path / f"{k}.h5")
         page = tmp_path / f"{bent}.html"
-        done = run(tmp_path / "0.h5", tmp_path / "1.h5", "--report", page)
+        done = run(tmp_path / "0.h5", tmp_path / "1.h5", "--report", page, "--json", data)
         assert done.exit_code == 0, done.stderr
         pages.append(page.read_text(encoding="utf-8"))
         assert "Parameter, at amplitude (V)" in " ".join(done.stdout.split())
-    data = tmp_path / "l.json"
-    assert run(tmp_path / "0.h5", tmp_path / "1.h5", "--json", data, "-q").exit_code == 0
     (pair,) = json.loads(data.read_text(encoding="utf-8"))["pairs"]
     assert pair["amplitude_unit"] == "V"
     small, large = (f"{np.ptp(k * U) / 2:.4g}" for k in (1, 2))

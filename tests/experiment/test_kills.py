@@ -58,10 +58,10 @@ def ended(table, folder, kind, at, nursery=None):
         if kind == "exception":
             wait_for((folder / "raised.txt").exists)
         elif cable is not None:
-            cable.pull()
+            now = cable.pull()
         else:
             os.kill(process.pid, signal.SIGKILL if kind == "kill" else signal.SIGINT)
-        now = time.perf_counter()
+            now = time.perf_counter()
         _, said = process.communicate(timeout=PATIENCE)
         if kind == "exception":
             now = float((folder / "raised.txt").read_text())

@@ -323,6 +323,7 @@ def test_refusals(more, message):
         search(**more)
 
 
+@pytest.mark.few(10)
 @pytest.mark.parametrize("which", BOTH)
 def test_predicted_and_achieved_errors_agree(which, request, seeds):
     """Simulated tests, each stepped in time and identified with no hint."""

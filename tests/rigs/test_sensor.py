@@ -101,7 +101,7 @@ def test_a_sine_comes_out_with_the_gain_and_phase_of_the_system(f, fn, zeta, del
 def test_the_sweep_agrees_with_a_general_purpose_integrator(lead, extinction):
     limits = Limits(position=10, velocity=1000, acceleration=40000, unit="deg")
     stimulus = design(
-        band=(0.1, 20), duration=2, fs=200, limits=limits, extinction=extinction, lead=lead
+        band=(0.1, 20), duration=1, fs=200, limits=limits, extinction=extinction, lead=lead
     )
     sensor = replace(FIG17, noise_std=0.0, delay=0.0)
     w = 2 * np.pi * 10

@@ -5,6 +5,7 @@ from scipy import signal
 from hmpim.errors import ArgumentError, RecordError
 from hmpim.identify.frf.local import local_response
 from hmpim.identify.frf.multivariable import ResponseMatrix, response_matrix
+from tests_support import in_studies
 
 FS, N, FINE = 200.0, 2000, 32
 BAND = (0.5, 19.5)
@@ -100,7 +101,7 @@ def test_without_noise_couplings_are_nearly_exact(
     assert error[found.usable].max() < 0.003
 
 
-@pytest.mark.parametrize("noise", [0.1, 0.01])
+@pytest.mark.parametrize("noise", [0.1, *in_studies(0.01)])
 def test_stated_errors_agree_with_the_scatter(
     three_axes: tuple[np.ndarray, np.ndarray], noise: float, seeds: int
 ) -> None:
@@ -230,7 +231,7 @@ def test_bad_records_are_refused() -> None:
         response_matrix(U, np.stack((U[0], np.full(N, np.nan))), FS, band=BAND)
 
 
-@pytest.mark.parametrize("modelled", [True, False])
+@pytest.mark.parametrize("modelled", [True, *in_studies(False)])
 def test_gaps_cost_accuracy_and_the_error_says_so(
     three_axes: tuple[np.ndarray, np.ndarray], modelled: bool
 ) -> None:

@@ -20,6 +20,7 @@ TRUTH = RationalDelay(
 )
 
 
+@pytest.mark.few(12)
 def test_intervals_hold_the_truth(field_record, seeds):
     _, u, y = field_record
     gain = 20 * np.log10(np.abs(response(TRUTH, np.array(WANTED))))

@@ -14,11 +14,11 @@ def test_help_shows_an_example():
 
 
 def test_some_figures_only(tmp_path):
-    result = call("--out", str(tmp_path / "new"), "--figures", "3", "8")
+    result = call("--out", str(tmp_path / "new"), "--figures", "13", "8")
     assert result.exit_code == 0, result.output
     assert sorted(path.name for path in (tmp_path / "new").glob("*.png")) == [
-        "fig03.png",
         "fig08.png",
+        "fig13.png",
     ]
     assert str(tmp_path / "new" / "index.html") in result.stdout
 

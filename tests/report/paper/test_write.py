@@ -10,7 +10,7 @@ from hmpim.report.paper.write import render_page
 
 @pytest.fixture(scope="module")
 def study():
-    return make_study([3, 8])
+    return make_study([8, 13])
 
 
 @pytest.fixture(scope="module")
@@ -22,10 +22,10 @@ def folder(study, tmp_path_factory):
 
 def test_files(folder):
     assert sorted(path.name for path in folder.iterdir()) == [
-        "fig03.png",
-        "fig03.svg",
         "fig08.png",
         "fig08.svg",
+        "fig13.png",
+        "fig13.svg",
         "index.html",
         "table.json",
         "table.md",
@@ -58,8 +58,8 @@ def test_tables_hold_the_rows(study, folder):
     data = json.loads((folder / "table.json").read_text(encoding="utf-8"))
     assert [row["quantity"] for row in data["rows"]] == [row.quantity for row in study.rows]
     assert [figure["files"] for figure in data["figures"]] == [
-        ["fig03.png", "fig03.svg"],
         ["fig08.png", "fig08.svg"],
+        ["fig13.png", "fig13.svg"],
     ]
 
 

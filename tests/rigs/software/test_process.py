@@ -24,8 +24,8 @@ READY = START + "print('ready', flush=True)\n"
 ECHO = "for line in iter(input, 'end'):\n    print(line, flush=True)\n"
 
 
-def program(code):
-    return ProcessRig(command=shlex.join([sys.executable, "-c", code]), answer=1.0)
+def program(code, *, answer=60.0):
+    return ProcessRig(command=shlex.join([sys.executable, "-c", code]), answer=answer)
 
 
 def test_the_example_in_python_is_the_same_as_program_class_and_function():
@@ -76,16 +76,24 @@ def test_the_greeting_says_what_comes():
         (READY + "input(); print('error lost', flush=True)", "failed at sample 0.*: lost"),
         (READY + "input(); print('1 2', flush=True)", "answered '1 2' at sample 0"),
         (READY + "input(); print('nan', flush=True)", "answered 'nan' at sample 0"),
-        (READY + "input(); time.sleep(60)", "did not answer sample 0.*within 1 s; it must flush"),
         (START + "print('hello', flush=True)", "answered 'hello' to the greeting"),
         (START + "print('ready speed=3', flush=True)", "says 'speed', which is not known"),
         ("import sys; sys.exit('no licence')", "exit code 1 at the greeting; it said: no licence"),
     ],
 )
 def test_what_goes_wrong_is_told_and_the_program_ended(code, words):
+    check_failure(program(code), words)
+
+
+def test_a_program_that_is_silent_is_not_waited_for():
+    silent = program(READY + "input(); time.sleep(60)", answer=0.2)
+    check_failure(silent, "did not answer sample 0.*within 0.2 s; it must flush")
+
+
+def check_failure(rig, words):
     before = threading.active_count()
     with pytest.raises(RigError, match=words):
-        run(program(code), STIMULUS)
+        run(rig, STIMULUS)
     assert threading.active_count() == before
 
 

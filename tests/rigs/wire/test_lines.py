@@ -61,9 +61,9 @@ def serving(server, said):
 @pytest.mark.parametrize("kind", ["serial", "can"])
 def test_the_rig_is_found_over_the_line(kind):
     pytest.importorskip(kind)
-    said = hello(rate=RATE, watchdog=1.0, axes=("roll",))  # a busy computer is not what is tested
+    said = hello(rate=RATE, watchdog=5.0, axes=("roll",))  # a busy computer is not what is tested
     with ExitStack() as stack:
-        times = {"stale": 5.0, "answer": 20.0}
+        times = {"stale": 10.0, "answer": 20.0}
         if kind == "serial":
             near, far = stack.enter_context(cable())
             stack.enter_context(serving(SerialServer(far), said))
@@ -98,16 +98,15 @@ def test_what_is_not_there_is_said():
 
 
 def test_wait_for_a_datagram_is_not_rounded_to_milliseconds():
-    def shortest(timeout):
-        waits = []
-        for _ in range(30):
-            begun = time.perf_counter()
-            assert client.receive(timeout) is None
-            waits.append(time.perf_counter() - begun)
-        return min(waits)
+    """Rounded, none would end earlier; on a busy machine most end later, but not one in 10 000."""
+
+    def waited(timeout):
+        begun = time.perf_counter()
+        assert client.receive(timeout) is None
+        return time.perf_counter() - begun
 
     with UdpServer("127.0.0.1", 0) as silent:
         client = UdpClient(*silent.address)
         client.open()
-        assert shortest(1e-4) < 0.5 * shortest(1e-3)
+        assert any(waited(1e-4) < 0.5e-3 for _ in range(10_000))
         client.close()

@@ -94,10 +94,10 @@ def limited_command(u: Real, joint: JointFit) -> LimitedCommand | None:
     Examples
     --------
     >>> from hmpim.identify.fitting.joint import joint_fit
-    >>> t = np.arange(2000) / 100
-    >>> u = np.sin(2 * np.pi * (0.1 * t + 0.02 * t**2))
-    >>> y = np.convolve(rate_limited(u, 0.04), np.ones(5) / 5)[:2000]
-    >>> y += 0.01 * np.random.default_rng(0).standard_normal(2000)
+    >>> t = np.arange(600) / 100
+    >>> u = np.sin(2 * np.pi * (0.1 * t + 0.067 * t**2))
+    >>> y = np.convolve(rate_limited(u, 0.04), np.ones(5) / 5)[:600]
+    >>> y += 0.01 * np.random.default_rng(0).standard_normal(600)
     >>> round(limited_command(u, joint_fit(u, y)).speed, 3)
     0.04
     """

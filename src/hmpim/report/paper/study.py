@@ -85,9 +85,9 @@ def make_study(
 
     Examples
     --------
-    >>> study = make_study([3])
+    >>> study = make_study([8])
     >>> list(study.pictures)
-    [3]
+    [8]
     """
     wanted = check_figures(figures)
     pictures: dict[int, Picture] = {}
