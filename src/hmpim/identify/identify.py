@@ -168,7 +168,7 @@ def identify_output(question: Question) -> Described:
         before, seen = seen, look_again(question, seen, fitted)
         if not seen.counts_otherwise_than(before):
             break
-        seen, fitted = fit(question, seen)
+        seen, fitted = fit(question, seen, fitted)
     question, fitted = limit_speed(question, seen, fitted)
     fitted = through_reference(question, fitted)
     return describe(question, seen, fitted)

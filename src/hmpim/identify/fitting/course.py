@@ -1,5 +1,6 @@
 """The way of the joint fit up to the choice: start, climb, begin, enrich."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -104,8 +105,9 @@ def start(
     intersample: Intersample | None,
     structures: tuple[StructureName, ...],
     nuisance: NDArray[np.float64] | None,
+    before: Sequence[Fit] = (),
 ) -> Course:
-    """Start from the spectra, and climb with each plain structure."""
+    """Start from the spectra, or where fits ended `before`; climb with each plain structure."""
     if intersample is None and looks_held(u):
         intersample = "zoh"  # an input that stands still and jumps does nothing else
     natural: Intersample = "bandlimited" if intersample is None else intersample
@@ -116,12 +118,16 @@ def start(
         rough=rough_response(u, _level(y, nuisance, valid), longest_delay=longest_lag(u.size)),
         nuisance=nuisance,
     )
-    course = begun(data, natural, structures, Seen(valid=valid, begins=None))
+    course = begun(data, natural, structures, Seen(valid=valid, begins=None), before)
     return replace(course, alone=intersample is not None, known=known)
 
 
 def begun(
-    data: Data, natural: Intersample, structures: tuple[StructureName, ...], seen: Seen
+    data: Data,
+    natural: Intersample,
+    structures: tuple[StructureName, ...],
+    seen: Seen,
+    before: Sequence[Fit] = (),
 ) -> Course:
     """Climb with each plain structure; other assumptions between the samples are left to try."""
     plain = tuple(name for name in structures if name in PLAIN)
@@ -134,7 +140,7 @@ def begun(
         others=tuple(name for name in structures if name not in PLAIN),
         given=seen,
         counted=seen,
-        fits=fit_plain(data.problem(natural, seen), data.rough, plain or PLAIN),
+        fits=fit_plain(data.problem(natural, seen), data.rough, plain or PLAIN, before),
     )
 
 
@@ -223,11 +229,7 @@ def find_beginning(course: Course) -> Course:
     counted = count_in(data, natural, fits, seen, course.known)
     if counted.begins is not None:  # from rest those fits ended anywhere
         problem = data.problem(natural, counted)
-        before = {fit.structure.name: fit for fit in fits}
-        fits = [
-            min(fit, refit(problem, before[fit.structure.name]), key=lambda f: f.objective)
-            for fit in fit_plain(problem, data.rough, course.plain or PLAIN)
-        ]
+        fits = fit_plain(problem, data.rough, course.plain or PLAIN, fits)
         later = count_in(data, natural, fits, seen, course.known)
         counted = counted if later.begins is None else later
     if counted is seen:

@@ -144,6 +144,7 @@ def weigh_and_look_again(
 ) -> tuple[Course, list[Trial], Trial, float]:
     """Weigh all fits, and again where the best of them shows that other samples count."""
     course, trials, best, share = _weigh(course, fitted)
+    arrived = False
     for _ in range(_LOOKS if course.data.keeps_samples else 0):
         data, seen = course.data, course.counted
         problem = data.problem(best.intersample, seen)
@@ -151,8 +152,10 @@ def weigh_and_look_again(
         again = look_again(problem, best, seen, lag=data.rough.lag, rests=rests)
         natural = best.intersample == "bandlimited"
         finer = interpolated_for(course, best.fit) if natural else None
-        if (again, finer) == (None, None) and not _is_needlessly_coloured(problem, best.fit):
-            break
+        if (again, finer) == (None, None):
+            if arrived or not _is_needlessly_coloured(problem, best.fit):
+                break
+            arrived = True
         again = seen if again is None else again
         data = (finer or course).data
         course = replace(course, counted=again, data=replace(data, noise=None))
@@ -301,13 +304,15 @@ def _weigh(
     mode, leading = min(fitted, key=lambda item: item[1].objective)
     share = leading.share
     noise = noise_of(data.problem(mode, seen), leading, data) if share < 1.0 else None
+    weighed = fitted
     if noise is not None or data.noise is not None:
         course = replace(course, data=replace(data, noise=noise))
-        fitted = refit_whitened(course.data, fitted, seen)
-    trials, best = _decide(course, fitted, share)
+        weighed = refit_whitened(course.data, fitted, seen)
+    trials, best = _decide(course, weighed, share)
     if noise is not None and is_contradicted(course.data, best, seen):
         course = replace(course, data=replace(data, noise=None))
-        trials, best = _decide(course, refit_whitened(course.data, fitted, seen), share)
+        plain = fitted if data.noise is None else refit_whitened(course.data, weighed, seen)
+        trials, best = _decide(course, plain, share)
     return course, trials, best, share
 
 
