@@ -111,7 +111,8 @@ def limited_command(u: Real, joint: JointFit) -> LimitedCommand | None:
         return None  # a limit makes harmonics, which poles cannot imitate that well
     smooth, joined = _SMOOTH
     command = _Followed.of(u, smooth, problem, start.fit)
-    near = _nearest(command, best.fit)
+    linear = fit_structure(problem, best.fit.structure, best.fit.theta)  # as those with a limit are
+    near = _nearest(command, linear)
     if near is None:
         return None
     found = _profiled(u, command, *near)
@@ -120,12 +121,12 @@ def limited_command(u: Real, joint: JointFit) -> LimitedCommand | None:
     if other.fit(speed, least).cost < TWICE * least.cost:
         tried = (found, _profiled(u, other, speed, least))
         found = min((one for one in tried if one), key=lambda one: one[1].cost, default=None)
-    if found is None or not explains_more(problem, found[1], problem, best.fit):
+    if found is None or not explains_more(problem, found[1], problem, linear):
         return None
     limited, fit = found
-    linear = fit_structure(problem, start.fit.structure, start.fit.theta)
-    gained = 0.5 * problem.counted * float(np.log(linear.cost / fit.cost))
-    others = bends(u, problem, linear, intersample=start.intersample, fs=1.0)
+    plainly = fit_structure(problem, start.fit.structure, start.fit.theta)
+    gained = 0.5 * problem.counted * float(np.log(plainly.cost / fit.cost))
+    others = bends(u, problem, plainly, intersample=start.intersample, fs=1.0)
     if any(one.kind != "rate_limit" and one.gain > gained for one in others):
         return None
     return limited
