@@ -187,10 +187,11 @@ def _climbed(
     for some in _batches(proposed):
         if some and stalled:
             continue  # where these gain nothing, neither will richer ones
+        far_off = misled and _is_poor(best, problem.spread)
         for p in some:
             starts = [*p.starts, *_grown(p.structure, [*fits, *found])]
             rivals = [*fits, *found]
-            found.append(_best_of(problem, p.structure, starts, rivals, far_off=misled))
+            found.append(_best_of(problem, p.structure, starts, rivals, far_off=far_off))
         if not some:
             late = min(proposed, key=lambda p: p.error).starts[0][0] if proposed else best.delay
             modes = members(structures, ("two_modes", *MODES))
@@ -241,8 +242,9 @@ def _pruned(problem: Problem, fits: list[Fit], rich: list[Structure]) -> list[Fi
         start = without_fast(min(above, key=lambda f: f.structure.parameters), structure)
         if start is None:
             continue
-        taste = fit_structure(problem, structure, start, iterations=_TASTE)
-        if taste.objective < TWICE * least:
+        hopeless = TWICE * least
+        taste = fit_structure(problem, structure, start, iterations=_TASTE, hopeless=hopeless)
+        if taste.objective < hopeless:
             fit = _best_of(problem, structure, [taste.theta], near)
             if -2 * CLEARLY < behind(fit) < 2 * CLEARLY:  # else it is in another valley
                 found.append(fit)
@@ -330,6 +332,8 @@ def _best_of(
     hopeless = np.inf if far_off else hopeless_beside(structure, rivals, problem)
     tried: list[Fit] = []
     for theta in starts:
+        if tried and not far_off:
+            hopeless = min(hopeless, tried[-1].objective)
         tried.append(
             fit_structure(
                 problem,

@@ -168,6 +168,7 @@ def weigh_and_look_again(
         ]
         fitted = refit_all(course.data, hopeful, again)
         course, trials, best, share = _weigh(course, fitted)
+    trials, best = _followed(course, trials, best, share)
     return course, trials, best, share
 
 
@@ -196,6 +197,7 @@ def ask_for_poles(
     fitted = [(trial.intersample, trial.fit) for trial in joint.trials]
     share = joint.effective_share
     trials, best = _decide(course, refit_whitened(course.data, fitted, course.counted), share)
+    trials, best = _followed(course, trials, best, share)
     return grow_poles(settle(course, trials, best, share), course, structures)
 
 
@@ -319,12 +321,23 @@ def _weigh(
 def _decide(
     course: Course, fitted: list[tuple[Intersample, Fit]], share: float
 ) -> tuple[list[Trial], Trial]:
-    """All trials, and the chosen one among them, polished."""
-    count = course.problem.counted * (share if course.data.noise is None else 1.0)
+    """All trials, and the chosen one among them."""
+    count = _independent(course, share)
     trials = [trial_of(mode, fit, count) for mode, fit in fitted]
-    chosen = likeliest_of(trials, course.natural)
-    fit, problem = chosen.fit, course.data.problem(chosen.intersample, course.counted)
-    best = trial_of(
-        chosen.intersample, fit if fit is course.settled else polished(problem, fit), count
-    )
+    return trials, likeliest_of(trials, course.natural)
+
+
+def _followed(
+    course: Course, trials: list[Trial], chosen: Trial, share: float
+) -> tuple[list[Trial], Trial]:
+    """The same with the chosen one polished."""
+    if chosen.fit is course.settled:
+        return trials, chosen
+    fit = polished(course.data.problem(chosen.intersample, course.counted), chosen.fit)
+    best = trial_of(chosen.intersample, fit, _independent(course, share))
     return [best if trial is chosen else trial for trial in trials], best
+
+
+def _independent(course: Course, share: float) -> float:
+    """Independent samples: all of those that count, once the noise is whitened."""
+    return course.problem.counted * (share if course.data.noise is None else 1.0)
