@@ -172,12 +172,17 @@ def _delays(rough: RoughResponse, theta: Real, memory: float) -> list[float]:
 
     The lag of the greatest correlation is later than the delay, by no more than the memory.
     """
-    shapes = _shapes(rough.omega, theta)
+    omega = rough.omega
+    shapes = _shapes(omega, theta)
     weighted = shapes.conj() * rough.weight
-    step = _FINE / rough.omega[-1]
+    step = _FINE / omega[-1]
     shifts = np.arange(max(rough.earliest - rough.lag, -memory), 2.0 + step, step)
-    turns = np.exp(1j * np.outer(rough.omega, shifts))
-    cross = ((weighted * rough.response) @ turns).real
+    # Every turn is a product of one of few large ones and one of few small ones.
+    few = int(np.ceil(np.sqrt(shifts.size)))
+    large = np.exp(1j * np.outer(shifts[::few], omega))
+    small = np.exp(1j * np.outer(shifts[:few] - shifts[0], omega)).conj().view(np.float64)
+    along = (weighted * rough.response)[:, None, :] * large
+    cross = (along.view(np.float64) @ small.T).reshape(len(along), -1)[:, : shifts.size]
     gains = np.linalg.lstsq((weighted @ shapes.T).real, cross, rcond=None)[0]
     told = np.concatenate([[-np.inf], np.sum(cross * gains, axis=0), [-np.inf]])
     tops = np.flatnonzero((told[1:-1] >= told[:-2]) & (told[1:-1] >= told[2:]))
