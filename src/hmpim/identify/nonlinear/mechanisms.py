@@ -164,7 +164,7 @@ def rate_limited(x: Real, step: float) -> Real:
     [0.0, 1.0, 2.0, 3.0]
     """
     out, caught_up = x.copy(), 0
-    path = step * np.arange(1, x.size)
+    path: Real = step * np.arange(1.0, x.size)
     for lost in np.flatnonzero(np.abs(np.diff(x)) > step).tolist():
         if lost >= caught_up:  # else behind already
             caught_up = _ramp(x, out, lost, path)
