@@ -8,6 +8,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from scipy.stats import beta, binomtest
 
 from families.scoring import CELLS, OFF, Score
@@ -243,4 +244,4 @@ def read(path: Path) -> dict[str, dict[str, Any]]:
 def write_detail(scores: Mapping[str, Sequence[Score]], path: Path) -> None:
     """Every draw as JSON."""
     plain = {name: [asdict(score) for score in found] for name, found in scores.items()}
-    path.write_text(json.dumps(plain) + "\n", encoding="utf-8")
+    path.write_text(json.dumps(plain, default=np.generic.item) + "\n", encoding="utf-8")

@@ -1,5 +1,6 @@
 """Draws, failures, options and the command."""
 
+import json
 import os
 import subprocess
 import sys
@@ -94,15 +95,17 @@ def test_the_response_of_a_result_is_that_of_its_coefficients(monkeypatch):
 
 
 def test_the_command_writes_counts_that_it_can_be_held_against(tmp_path):
-    out = tmp_path / "counts.json"
+    out, detail = tmp_path / "counts.json", tmp_path / "detail.json"
     command = [sys.executable, "benchmarks/families", "--families", "static", "--draws", "1"]
     done = subprocess.run(
-        [*command, "--jobs", "1", "--json", str(out), "--against", str(out)],
+        [*command, "--jobs", "1", "--json", str(out), "--against", str(out),
+         "--detail", str(detail)],
         cwd=ROOT, capture_output=True, text=True, check=False,
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
     assert "Moved since" in done.stdout
     assert out.is_file()
+    assert json.loads(detail.read_text(encoding="utf-8"))["static"][0]["cell"] == "right_ok"
 
 
 def test_the_command_refuses_a_family_that_is_not_there(monkeypatch, capsys):
