@@ -70,9 +70,6 @@ _LEVELS = (0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.88, 0.95)
 _STICKS = 0.01
 """Speed, over the largest, at which friction is fully turned around: below the sampling's reach."""
 
-_SPAN = 64
-"""Samples that are searched at first for the end of a ramp; then ever more at once."""
-
 LONGEST_AUTOREGRESSION = 10
 """Order of the noise that a trace is held against, at most."""
 
@@ -163,29 +160,27 @@ def rate_limited(x: Real, step: float) -> Real:
     >>> rate_limited(np.array([0.0, 3.0, 3.0, 3.0]), 1.0).tolist()
     [0.0, 1.0, 2.0, 3.0]
     """
-    out, caught_up = x.copy(), 0
-    path: Real = step * np.arange(1.0, x.size)
-    for lost in np.flatnonzero(np.abs(np.diff(x)) > step).tolist():
-        if lost >= caught_up:  # else behind already
-            caught_up = _ramp(x, out, lost, path)
+    target, reached = x.tolist(), 0
+    out, late = x.copy(), target.copy()
+    fast = np.flatnonzero(np.abs(np.diff(x)) > step).tolist()
+    for lost in fast:
+        if lost < reached:
+            continue  # behind already
+        now = target[lost]
+        for reached in range(lost + 1, len(target)):  # until it has caught up
+            ahead = target[reached] - now
+            if ahead > step:
+                now += step
+            elif ahead < -step:
+                now -= step
+            else:
+                break
+            late[reached] = now
+        else:
+            break
+    for begin in fast[:1]:
+        out[begin : reached + 1] = late[begin : reached + 1]
     return out
-
-
-def _ramp(x: Real, out: Real, at: int, path: Real) -> int:
-    """Write to `out` how `x` is followed from where it is lost; return where it has caught up."""
-    span, step, now = _SPAN, float(path[0]), float(x[at])
-    while at + 1 < x.size:
-        ahead = float(x[at + 1]) - now
-        if abs(ahead) <= step:
-            return at + 1
-        target, way = x[at + 1 : at + 1 + span], path[: min(span, x.size - at - 1)]
-        line = now + way if ahead > 0.0 else now - way
-        met = target <= line if ahead > 0.0 else target >= line
-        count = int(met.argmax())
-        count = count if met[count] else met.size
-        out[at + 1 : at + 1 + count] = line[:count]
-        at, span, now = at + count, 4 * span, float(line[count - 1])
-    return x.size
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
