@@ -168,7 +168,7 @@ def identify_output(question: Question) -> Described:
         before, seen = seen, look_again(question, seen, fitted)
         if not seen.counts_otherwise_than(before):
             break
-        seen, fitted = fit(question, seen, fitted)
+        seen, fitted = fit(question, seen)
     question, fitted = limit_speed(question, seen, fitted)
     fitted = through_reference(question, fitted)
     return describe(question, seen, fitted)

@@ -70,16 +70,13 @@ def mark_swapped(question: Question) -> Question:
     return replace(question, structures=question.plain, swapped=finding)
 
 
-def fit(
-    question: Question, seen: Imperfections, before: OutputFit | None = None
-) -> tuple[Imperfections, OutputFit]:
+def fit(question: Question, seen: Imperfections) -> tuple[Imperfections, OutputFit]:
     """Fit every structure, with hum and a drift where the residual asks for them.
 
-    If plain dynamics with levels, a drift or hum leave white noise, no richer ones are tried: they
-    would only follow the effect. The levels found are returned with the fit. Plain structures
-    start from where they ended `before`, beside other samples.
+    If plain dynamics with levels or with a drift leave white noise, no richer ones are tried: they
+    would only follow the effect. The levels found are returned with the fit.
     """
-    begun = _begin(question, seen, before)
+    begun = _begin(question, seen)
     if begun is None:
         return seen, _fit_and_look_for_rows(question, seen)
     levelled = None if begun.best.is_white else _behind_levels(question, seen, begun)
@@ -89,9 +86,6 @@ def fit(
     drifting = None if course.best.is_white else _drifting(question, seen, course)
     if drifting is not None:
         return seen, drifting
-    humming = None if course.best.is_white else _humming(question, seen, course)
-    if humming is not None:
-        return seen, humming
     freed = free_from_wander(begun)
     if freed is not begun:
         course = completed(freed)
@@ -132,22 +126,6 @@ def _drifting(question: Question, seen: Imperfections, course: Course) -> Output
     if drifting is None or not drifting.joint.related:
         return None
     return OutputFit.alone(drifting.joint, drifting)
-
-
-def _humming(question: Question, seen: Imperfections, course: Course) -> OutputFit | None:
-    """Plain dynamics and lines that the input has not, where they leave white noise."""
-    left = course.problem.counting(course.best.residual)
-    if line_of(left - left.mean(), 1.0) is None or _has_lines(course.data.u):
-        return None
-    valid, first = _counted(question, seen), chosen_of(replace(course, others=()), question.plain)
-
-    def with_rows(rows: Real, _: bool) -> JointFit:
-        return chosen_of(continued(course, valid=valid, nuisance=rows), question.plain)
-
-    humming = with_hum(first, with_rows)
-    if humming is None or not humming.joint.related or not humming.joint.best.fit.is_white:
-        return None
-    return replace(OutputFit.alone(humming.joint), humming=humming)
 
 
 def _fit_and_look_for_rows(
@@ -271,7 +249,7 @@ def limit_speed(
         return question, fitted  # a limit of speed smooths the noise of a measured command
     followed = replace(aligned, inputs=(replace(source, values=limited.values),))
     slower = replace(question, aligned=followed, limited=limited)
-    seen_then, again = fit(slower, seen, fitted)
+    seen_then, again = fit(slower, seen)
     (other,) = again.fits
     if seen_then is not seen:
         return question, fitted  # levels explain the rest: the two are not weighed on other samples
@@ -288,7 +266,7 @@ def through_reference(question: Question, fitted: OutputFit) -> OutputFit:
     return replace(fitted, fits=(joint,), covariances=(own,))
 
 
-def _begin(question: Question, seen: Imperfections, before: OutputFit | None) -> Course | None:
+def _begin(question: Question, seen: Imperfections) -> Course | None:
     """Plain fits of one input; None where plain structures are all, and of loops and software."""
     alone = len(question.aligned.inputs) == 1 and question.instrument is None
     if (
@@ -300,7 +278,6 @@ def _begin(question: Question, seen: Imperfections, before: OutputFit | None) ->
     ):
         return None
     (source,) = question.aligned.inputs
-    trials = () if before is None else before.fits[0].trials
     return turn_ahead(
         start(
             source.values,
@@ -310,7 +287,6 @@ def _begin(question: Question, seen: Imperfections, before: OutputFit | None) ->
             question.intersample,
             question.structures,
             None,
-            [trial.fit for trial in trials],
         )
     )
 

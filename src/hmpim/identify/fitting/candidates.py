@@ -1,6 +1,6 @@
 """Fits of every structure: plain ones, richer ones where asked for, each between the samples."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 
 import numpy as np
 
@@ -27,7 +27,7 @@ from hmpim.identify.fitting.spectral import condensed, fitted_roughly
 from hmpim.identify.fitting.start import RoughResponse, rough_response, searched, starting_values
 from hmpim.identify.noise.misfit import unexplained_response
 from hmpim.identify.signals import longest_lag
-from hmpim.identify.worth import FEW, MATERIAL, MOST, MUCH, PART, TWICE, WORTH
+from hmpim.identify.worth import FEW, MATERIAL, MOST, MUCH, PART, TWICE
 from hmpim.model.dynamics import STRUCTURES, Structure, StructureName, coefficients_of
 from hmpim.model.response import slowest_time_constant
 from hmpim.record import BETWEEN, Intersample
@@ -64,36 +64,31 @@ _PRECISION = 1e-2
 
 
 def fit_plain(
-    problem: Problem,
-    rough: RoughResponse,
-    structures: tuple[StructureName, ...],
-    before: Sequence[Fit] = (),
+    problem: Problem, rough: RoughResponse, structures: tuple[StructureName, ...]
 ) -> list[Fit]:
     """Fit each structure, the richest first, from its own starts and then from the simpler ones.
 
-    Where it ended `before`, on other samples, is its first start. A residual that is white, or not
-    worth a word, needs no other, and tells which simpler structures are hopeless: those get one
-    start, and no step that does not lead near. A start that promises to leave much more than the
-    best does is not followed.
+    A residual that is white needs no other start, and tells which simpler structures are
+    hopeless: those get one start, and no step that does not lead near.
     """
     fits: list[Fit] = []
-    settled, spread = False, problem.spread
+    settled = False
     for name in sorted(structures, key=lambda name: -STRUCTURES[name].order):
         structure = STRUCTURES[name]
         if settled and name == "first_order":
             starts = [_without_second_pole(fits[0])]
         else:
-            known = [one for one in before if one.structure == structure]
-            starts = [min(known, key=lambda fit: fit.objective).theta] if known else []
-            starts = starts or starting_values(rough, structure, thorough=False)
+            starts = starting_values(rough, structure, thorough=False)
         hopeful = min((f.objective for f in fits), default=np.inf) * TWICE
         hopeless = TWICE * hopeful if settled else np.inf
         fit = fit_structure(problem, structure, starts[0], iterations=_TASTE, hopeless=hopeless)
         # A residual of noise for the most part is white whatever the model misses.
-        noisy = fit.cost > MOST * spread
-        white = fit.objective < hopeful and (fit.cost < WORTH**2 * spread or fit.is_white)
+        noisy = fit.cost > MOST * problem.spread
+        white = fit.objective < hopeful and fit.is_white
         if noisy:
-            fit = _tasted(problem, structure, searched(rough, structure), fit)
+            for theta in searched(rough, structure):
+                rival = fit_structure(problem, structure, theta, iterations=_TASTE)
+                fit = min(fit, rival, key=lambda f: f.objective)
         if not white and fit.objective < TWICE**2 * hopeful:
             rivals = starts[1:]
             if not settled and structure.order and problem.begins is not None:
@@ -103,7 +98,9 @@ def fit_plain(
             elif not settled and structure.order:
                 every = np.stack([*starts, *starting_values(rough, structure)])
                 rivals = list(fitted_roughly(condensed(rough), structure, every).likely)
-            fit = _tasted(problem, structure, rivals, fit)
+            for theta in rivals:
+                rival = fit_structure(problem, structure, theta, iterations=_TASTE)
+                fit = min(fit, rival, key=lambda f: f.objective)
         settled = settled or white
         fits.append(fit)
     for i, fit in enumerate(fits):
@@ -122,15 +119,6 @@ def fit_plain(
         return fit_structure(problem, fit.structure, fit.theta, precision=precision)
 
     return [ended(fit) for fit in fits]
-
-
-def _tasted(problem: Problem, structure: Structure, starts: list[Real], best: Fit) -> Fit:
-    """The best of a fit and of a few steps from each other start."""
-    for theta in starts:
-        hopeless = TWICE * best.objective
-        rival = fit_structure(problem, structure, theta, iterations=_TASTE, hopeless=hopeless)
-        best = min(best, rival, key=lambda fit: fit.objective)
-    return best
 
 
 def fit_rich(
@@ -183,25 +171,18 @@ def _climbed(
     # A rough response that takes a free response for an answer proposes nothing that is of use.
     misled = data.keeps_samples and in_motion(data.u) and _is_poor(best, problem.spread)
     proposed = proposals(data.rough, rich, best, all_of_them=all_of_them or misled)
-    stalled = False
     for some in _batches(proposed):
-        if some and stalled:
-            continue  # where these gain nothing, neither will richer ones
-        far_off = misled and _is_poor(best, problem.spread)
         for p in some:
             starts = [*p.starts, *_grown(p.structure, [*fits, *found])]
             rivals = [*fits, *found]
-            found.append(_best_of(problem, p.structure, starts, rivals, far_off=far_off))
+            found.append(_best_of(problem, p.structure, starts, rivals, far_off=misled))
         if not some:
             late = min(proposed, key=lambda p: p.error).starts[0][0] if proposed else best.delay
             modes = members(structures, ("two_modes", *MODES))
+            grown = grown_modes(problem, data, float(late), best.memory, modes)
             # Two modes that explain part of what follows the input stand for what is not linear.
-            hopeless = PART * best.objective
-            grown = grown_modes(problem, data, float(late), best.memory, modes, hopeless=hopeless)
             found += [f for f in grown if f.cost < PART * best.cost]
-        before, best = best, min([best, *found], key=lambda fit: fit.objective)
-        gained = problem.counted * before.share * float(np.log(before.objective / best.objective))
-        stalled = gained < CLEARLY and (bool(some) or stalled)
+        best = min([best, *found], key=lambda fit: fit.objective)
         if owed_to_input(problem, best, data) <= MATERIAL and best.is_white:
             break
     return found
@@ -242,9 +223,8 @@ def _pruned(problem: Problem, fits: list[Fit], rich: list[Structure]) -> list[Fi
         start = without_fast(min(above, key=lambda f: f.structure.parameters), structure)
         if start is None:
             continue
-        hopeless = TWICE * least
-        taste = fit_structure(problem, structure, start, iterations=_TASTE, hopeless=hopeless)
-        if taste.objective < hopeless:
+        taste = fit_structure(problem, structure, start, iterations=_TASTE)
+        if taste.objective < TWICE * least:
             fit = _best_of(problem, structure, [taste.theta], near)
             if -2 * CLEARLY < behind(fit) < 2 * CLEARLY:  # else it is in another valley
                 found.append(fit)
@@ -329,11 +309,9 @@ def _best_of(
     """
     leading = min(rivals, key=lambda fit: fit.objective)
     precision = _PRECISION / leading.share
-    hopeless = np.inf if far_off else hopeless_beside(structure, rivals, problem)
+    hopeless = np.inf if far_off else hopeless_beside(structure, rivals)
     tried: list[Fit] = []
     for theta in starts:
-        if tried and not far_off:
-            hopeless = min(hopeless, tried[-1].objective)
         tried.append(
             fit_structure(
                 problem,
@@ -351,7 +329,7 @@ def _best_of(
         best = _best_sample(problem, best)
     if best.converged or best.objective > TWICE * leading.objective:
         return best
-    return fit_structure(problem, structure, best.theta, precision=precision, hopeless=hopeless)
+    return fit_structure(problem, structure, best.theta, precision=precision)
 
 
 def _best_sample(problem: Problem, best: Fit) -> Fit:
@@ -359,8 +337,7 @@ def _best_sample(problem: Problem, best: Fit) -> Fit:
     for step in (-1.0, 1.0):
         while True:
             start = np.append(best.theta[0] + step, best.theta[1:])
-            hopeless = TWICE * best.objective
-            other = fit_structure(problem, best.structure, start, hopeless=hopeless)
+            other = fit_structure(problem, best.structure, start)
             if not other.objective < best.objective:
                 break
             best = other

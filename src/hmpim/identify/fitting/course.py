@@ -1,6 +1,5 @@
 """The way of the joint fit up to the choice: start, climb, begin, enrich."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -105,9 +104,8 @@ def start(
     intersample: Intersample | None,
     structures: tuple[StructureName, ...],
     nuisance: NDArray[np.float64] | None,
-    before: Sequence[Fit] = (),
 ) -> Course:
-    """Start from the spectra, or where fits ended `before`; climb with each plain structure."""
+    """Start from the spectra, and climb with each plain structure."""
     if intersample is None and looks_held(u):
         intersample = "zoh"  # an input that stands still and jumps does nothing else
     natural: Intersample = "bandlimited" if intersample is None else intersample
@@ -118,16 +116,12 @@ def start(
         rough=rough_response(u, _level(y, nuisance, valid), longest_delay=longest_lag(u.size)),
         nuisance=nuisance,
     )
-    course = begun(data, natural, structures, Seen(valid=valid, begins=None), before)
+    course = begun(data, natural, structures, Seen(valid=valid, begins=None))
     return replace(course, alone=intersample is not None, known=known)
 
 
 def begun(
-    data: Data,
-    natural: Intersample,
-    structures: tuple[StructureName, ...],
-    seen: Seen,
-    before: Sequence[Fit] = (),
+    data: Data, natural: Intersample, structures: tuple[StructureName, ...], seen: Seen
 ) -> Course:
     """Climb with each plain structure; other assumptions between the samples are left to try."""
     plain = tuple(name for name in structures if name in PLAIN)
@@ -140,7 +134,7 @@ def begun(
         others=tuple(name for name in structures if name not in PLAIN),
         given=seen,
         counted=seen,
-        fits=fit_plain(data.problem(natural, seen), data.rough, plain or PLAIN, before),
+        fits=fit_plain(data.problem(natural, seen), data.rough, plain or PLAIN),
     )
 
 
@@ -229,7 +223,11 @@ def find_beginning(course: Course) -> Course:
     counted = count_in(data, natural, fits, seen, course.known)
     if counted.begins is not None:  # from rest those fits ended anywhere
         problem = data.problem(natural, counted)
-        fits = fit_plain(problem, data.rough, course.plain or PLAIN, fits)
+        before = {fit.structure.name: fit for fit in fits}
+        fits = [
+            min(fit, refit(problem, before[fit.structure.name]), key=lambda f: f.objective)
+            for fit in fit_plain(problem, data.rough, course.plain or PLAIN)
+        ]
         later = count_in(data, natural, fits, seen, course.known)
         counted = counted if later.begins is None else later
     if counted is seen:

@@ -147,32 +147,22 @@ def refit_all(
     done: dict[int, Fit] = {}
     for i in dict.fromkeys([leading, *by_size]):
         mode, fit = fitted[i]
-        problem = data.problem(mode, seen)
         done[i] = fit_structure(
-            problem,
+            data.problem(mode, seen),
             fit.structure,
             fit.theta,
             iterations=RETURNS if fit.objective < hopeful else 0,
-            hopeless=hopeless_beside(fit.structure, list(done.values()), problem),
+            hopeless=hopeless_beside(fit.structure, list(done.values())),
         )
     return [(mode, done[i]) for i, (mode, _) in enumerate(fitted)]
 
 
-def hopeless_beside(structure: Structure, rivals: list[Fit], problem: Problem) -> float:
-    """Sum of squares from which on a structure has no chance against others.
-
-    Beside a plainer one that leaves white noise it must pay for its parameters, by Schwarz's
-    criterion.
-    """
+def hopeless_beside(structure: Structure, rivals: list[Fit]) -> float:
+    """Sum of squares from which on a structure has no chance against others."""
     least = min((fit.objective for fit in rivals), default=np.inf)
-    price = float(np.log(problem.counted)) / problem.counted
-    more = [structure.parameters - fit.structure.parameters for fit in rivals]
-    paid = [
-        fit.objective * float(np.exp(-count * price))
-        for fit, count in zip(rivals, more, strict=True)
-        if count > 0 and fit.objective < TWICE * least and (problem.filtered or fit.is_white)
-    ]
-    return min([TWICE * least, *paid])
+    plainer = [fit for fit in rivals if fit.structure.parameters < structure.parameters]
+    white = [fit.objective for fit in plainer if fit.objective < TWICE * least and fit.is_white]
+    return min([TWICE * least, *white])
 
 
 def refit(problem: Problem, fit: Fit) -> Fit:

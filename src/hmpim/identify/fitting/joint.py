@@ -144,7 +144,6 @@ def weigh_and_look_again(
 ) -> tuple[Course, list[Trial], Trial, float]:
     """Weigh all fits, and again where the best of them shows that other samples count."""
     course, trials, best, share = _weigh(course, fitted)
-    arrived = False
     for _ in range(_LOOKS if course.data.keeps_samples else 0):
         data, seen = course.data, course.counted
         problem = data.problem(best.intersample, seen)
@@ -152,10 +151,8 @@ def weigh_and_look_again(
         again = look_again(problem, best, seen, lag=data.rough.lag, rests=rests)
         natural = best.intersample == "bandlimited"
         finer = interpolated_for(course, best.fit) if natural else None
-        if (again, finer) == (None, None):
-            if arrived or not _is_needlessly_coloured(problem, best.fit):
-                break
-            arrived = True
+        if (again, finer) == (None, None) and not _is_needlessly_coloured(problem, best.fit):
+            break
         again = seen if again is None else again
         data = (finer or course).data
         course = replace(course, counted=again, data=replace(data, noise=None))
@@ -168,7 +165,6 @@ def weigh_and_look_again(
         ]
         fitted = refit_all(course.data, hopeful, again)
         course, trials, best, share = _weigh(course, fitted)
-    trials, best = _followed(course, trials, best, share)
     return course, trials, best, share
 
 
@@ -197,7 +193,6 @@ def ask_for_poles(
     fitted = [(trial.intersample, trial.fit) for trial in joint.trials]
     share = joint.effective_share
     trials, best = _decide(course, refit_whitened(course.data, fitted, course.counted), share)
-    trials, best = _followed(course, trials, best, share)
     return grow_poles(settle(course, trials, best, share), course, structures)
 
 
@@ -306,38 +301,25 @@ def _weigh(
     mode, leading = min(fitted, key=lambda item: item[1].objective)
     share = leading.share
     noise = noise_of(data.problem(mode, seen), leading, data) if share < 1.0 else None
-    weighed = fitted
     if noise is not None or data.noise is not None:
         course = replace(course, data=replace(data, noise=noise))
-        weighed = refit_whitened(course.data, fitted, seen)
-    trials, best = _decide(course, weighed, share)
+        fitted = refit_whitened(course.data, fitted, seen)
+    trials, best = _decide(course, fitted, share)
     if noise is not None and is_contradicted(course.data, best, seen):
         course = replace(course, data=replace(data, noise=None))
-        plain = fitted if data.noise is None else refit_whitened(course.data, weighed, seen)
-        trials, best = _decide(course, plain, share)
+        trials, best = _decide(course, refit_whitened(course.data, fitted, seen), share)
     return course, trials, best, share
 
 
 def _decide(
     course: Course, fitted: list[tuple[Intersample, Fit]], share: float
 ) -> tuple[list[Trial], Trial]:
-    """All trials, and the chosen one among them."""
-    count = _independent(course, share)
+    """All trials, and the chosen one among them, polished."""
+    count = course.problem.counted * (share if course.data.noise is None else 1.0)
     trials = [trial_of(mode, fit, count) for mode, fit in fitted]
-    return trials, likeliest_of(trials, course.natural)
-
-
-def _followed(
-    course: Course, trials: list[Trial], chosen: Trial, share: float
-) -> tuple[list[Trial], Trial]:
-    """The same with the chosen one polished."""
-    if chosen.fit is course.settled:
-        return trials, chosen
-    fit = polished(course.data.problem(chosen.intersample, course.counted), chosen.fit)
-    best = trial_of(chosen.intersample, fit, _independent(course, share))
+    chosen = likeliest_of(trials, course.natural)
+    fit, problem = chosen.fit, course.data.problem(chosen.intersample, course.counted)
+    best = trial_of(
+        chosen.intersample, fit if fit is course.settled else polished(problem, fit), count
+    )
     return [best if trial is chosen else trial for trial in trials], best
-
-
-def _independent(course: Course, share: float) -> float:
-    """Independent samples: all of those that count, once the noise is whitened."""
-    return course.problem.counted * (share if course.data.noise is None else 1.0)
