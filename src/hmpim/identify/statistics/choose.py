@@ -183,9 +183,8 @@ def integrator_of(statistics: Statistics, data: CompressedData, joint: JointFit)
 def _criterion(fit: Fitted, count: int) -> float:
     """Schwarz's criterion of a fit under the autoregression of what it leaves over."""
     left = fit.left
-    least = (
-        np.finfo(float).eps * fit.products.plain.energy / count
-    )  # rounding may leave less than 0
+    # Of sums that cancel, rounding may leave less than 0.
+    least = np.finfo(float).eps * fit.products.plain.energy / count
     parameters = fit.structure.parameters + left.noise.size - 1
     return float(count * np.log(max(left.innovation, least)) + parameters * np.log(count))
 
