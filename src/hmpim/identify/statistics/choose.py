@@ -32,6 +32,7 @@ from hmpim.identify.statistics.products import Products
 from hmpim.identify.statistics.reach import AHEAD
 from hmpim.identify.statistics.start import excited, rough_of
 from hmpim.identify.statistics.statistics import Statistics
+from hmpim.identify.worth import TWICE
 from hmpim.model.dynamics import StructureName
 from hmpim.record import Intersample
 
@@ -42,6 +43,9 @@ _FEWEST = 50
 
 _FORGOTTEN = 1e-4
 """Of an impulse response's peak, below which it is over."""
+
+_TASTE = 5
+"""Steps with an integrator from each start, before the best is followed if it is not hopeless."""
 
 _ALL = Seen(valid=None, begins=None)
 """No selection: the products hold only samples that count."""
@@ -161,13 +165,15 @@ def integrator_of(statistics: Statistics, data: CompressedData, joint: JointFit)
     keeps multiplies the running sum of the input.
     """
     rough = rough_of(statistics, differenced=True)
-    mode, found = joint.best.intersample, []
+    mode, found, best = joint.best.intersample, [], as_fitted(joint.best.fit)
+    hopeless = TWICE * best.left.power * data.products.counted
     for structure in members(INTEGRATING, INTEGRATING):
         problem = data.problem(mode, _ALL)
         starts = integrator_starts(rough, structure)
-        fits = [fit_structure(problem, structure, theta) for theta in starts]
-        fit = as_fitted(min(fits, key=lambda fit: fit.objective))
-        if not fit.is_white:
+        fits = [fit_structure(problem, structure, theta, iterations=_TASTE) for theta in starts]
+        start = min(fits, key=lambda fit: fit.objective).theta
+        fit = as_fitted(fit_structure(problem, structure, start, hopeless=hopeless))
+        if fit.objective < hopeless and not fit.is_white:
             coloured = replace(data, noise=fit.left.noise).problem(mode, _ALL)
             fit = as_fitted(refit(coloured, fit))
         found.append(fit)
@@ -176,7 +182,7 @@ def integrator_of(statistics: Statistics, data: CompressedData, joint: JointFit)
     if not joint.related:
         gained = data.products.counted * np.log(likeliest.problem.spread / likeliest.objective)
         return likeliest if gained > 2 * SEARCHED else None
-    behind = min(weighed) - _criterion(as_fitted(joint.best.fit), data.products.counted)
+    behind = min(weighed) - _criterion(best, data.products.counted)
     return likeliest if behind < 2 * LIKELIER else None
 
 
