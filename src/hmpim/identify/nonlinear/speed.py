@@ -124,7 +124,9 @@ def limited_command(u: Real, joint: JointFit) -> LimitedCommand | None:
     if found is None or not explains_more(problem, found[1], problem, linear):
         return None
     limited, fit = found
-    plainly = fit_structure(problem, start.fit.structure, start.fit.theta)
+    plainly = linear
+    if start is not best:
+        plainly = fit_structure(problem, start.fit.structure, start.fit.theta)
     gained = 0.5 * problem.counted * float(np.log(plainly.cost / fit.cost))
     others = bends(u, problem, plainly, intersample=start.intersample, fs=1.0)
     if any(one.kind != "rate_limit" and one.gain > gained for one in others):

@@ -166,9 +166,9 @@ def integrator_of(statistics: Statistics, data: CompressedData, joint: JointFit)
     """
     rough = rough_of(statistics, differenced=True)
     mode, found, best = joint.best.intersample, [], as_fitted(joint.best.fit)
-    hopeless = TWICE * best.left.power * data.products.counted
+    problem, count = data.problem(mode, _ALL), data.products.counted
+    hopeless = TWICE * best.left.power * count
     for structure in members(INTEGRATING, INTEGRATING):
-        problem = data.problem(mode, _ALL)
         starts = integrator_starts(rough, structure)
         fits = [fit_structure(problem, structure, theta, iterations=_TASTE) for theta in starts]
         start = min(fits, key=lambda fit: fit.objective).theta
@@ -177,12 +177,12 @@ def integrator_of(statistics: Statistics, data: CompressedData, joint: JointFit)
             coloured = replace(data, noise=fit.left.noise).problem(mode, _ALL)
             fit = as_fitted(refit(coloured, fit))
         found.append(fit)
-    weighed = [_criterion(fit, data.products.counted) for fit in found]
+    weighed = [_criterion(fit, count) for fit in found]
     likeliest = found[int(np.argmin(weighed))]
     if not joint.related:
-        gained = data.products.counted * np.log(likeliest.problem.spread / likeliest.objective)
+        gained = count * np.log(likeliest.problem.spread / likeliest.objective)
         return likeliest if gained > 2 * SEARCHED else None
-    behind = min(weighed) - _criterion(best, data.products.counted)
+    behind = min(weighed) - _criterion(best, count)
     return likeliest if behind < 2 * LIKELIER else None
 
 

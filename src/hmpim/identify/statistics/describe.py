@@ -91,12 +91,13 @@ def identify_statistics(
     intersample : {'zoh', 'foh', 'bandlimited'}, optional
         What the input does between its samples; as the statistics say, or the likeliest.
     structures : tuple of str, optional
-        Which to try; all but integrators by default.
+        Which to try; all by default. Integrators are asked for in any case, and refused.
 
     Raises
     ------
     RecordError
-        If the channels do not move, too little was read, or the memory is longer than the window.
+        If the channels do not move, too little was read, or the memory is longer than the window,
+        as that of an integrator is.
     """
     _check_moves(statistics)
     data, joint = choose(

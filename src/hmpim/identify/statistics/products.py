@@ -145,6 +145,8 @@ class Products:
         self._inner = np.stack([self._outputs(run) for run in runs])
         self._inner -= self._out @ self._out.transpose(0, 2, 1)
         self._others = np.delete(np.arange(reach.rows + 2), SUMMED)
+        self._unsummed = self._inner[:, self._others][:, :, self._others]
+        """Products of whitened outputs without the running sum, (runs, rows + 1, rows + 1)."""
 
     @property
     def plain(self) -> "Products":
@@ -308,9 +310,8 @@ class Products:
     def _without_bias(self, gram: Real, mixed: Real, steady: Real) -> Moments:
         """Solve the biases and take them off."""
         statistics = self.statistics
-        own = self._inner[:, self._others][:, :, self._others]
-        inner, outer = own[:, :-1, :-1], own[:, :-1, -1]
-        energy = float(self._inner[:, -1, -1].sum())
+        inner, outer = self._unsummed[:, :-1, :-1], self._unsummed[:, :-1, -1]
+        energy = float(self._unsummed[:, -1, -1].sum())
         beside, cross = mixed[:, :, :-1], mixed[:, :, -1].sum(axis=0)
         if statistics.bias == "common":
             u, y = self._levels.T
