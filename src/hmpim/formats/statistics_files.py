@@ -5,7 +5,6 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
-import h5py
 import numpy as np
 
 from hmpim.errors import FormatError
@@ -36,6 +35,8 @@ def save_statistics(statistics: Statistics, path: str | PathLike[str]) -> None:
     ArgumentError
         If the file cannot be written.
     """
+    import h5py
+
     with replacing(path) as place, h5py.File(place, "w", libver="latest") as file:
         file.attrs["schema"] = SCHEMA
         file.attrs["fs"] = statistics.fs
@@ -65,6 +66,8 @@ def holds_statistics(path: str | PathLike[str]) -> bool:
     """
     if not Path(path).is_file():  # a pipe would be read empty
         return False
+    import h5py
+
     try:
         with h5py.File(Path(path), "r") as file:
             return str(file.attrs.get("schema", "")) == SCHEMA
@@ -80,6 +83,8 @@ def read_statistics(path: str | PathLike[str]) -> Statistics:
     FormatError
         If the file is not whole, or was changed.
     """
+    import h5py
+
     try:
         with h5py.File(Path(path), "r") as file:
             statistics = _read(file)
