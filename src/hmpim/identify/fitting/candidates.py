@@ -1,6 +1,6 @@
 """Fits of every structure: plain ones, richer ones where asked for, each between the samples."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -64,10 +64,15 @@ _PRECISION = 1e-2
 
 
 def fit_plain(
-    problem: Problem, rough: RoughResponse, structures: tuple[StructureName, ...]
+    problem: Problem,
+    rough: RoughResponse,
+    structures: tuple[StructureName, ...],
+    *,
+    before: Sequence[Fit] = (),
 ) -> list[Fit]:
     """Fit each structure, the richest first, from its own starts and then from the simpler ones.
 
+    The first start of a structure is where it ended `before`, on other samples, if it was fitted.
     A residual that is white needs no other start, and tells which simpler structures are
     hopeless: those get one start, and no step that does not lead near.
     """
@@ -78,7 +83,8 @@ def fit_plain(
         if settled and name == "first_order":
             starts = [_without_second_pole(fits[0])]
         else:
-            starts = starting_values(rough, structure, thorough=False)
+            known = [fit.theta for fit in before if fit.structure == structure]
+            starts = known or starting_values(rough, structure, thorough=False)
         hopeful = min((f.objective for f in fits), default=np.inf) * TWICE
         hopeless = TWICE * hopeful if settled else np.inf
         fit = fit_structure(problem, structure, starts[0], iterations=_TASTE, hopeless=hopeless)
@@ -86,9 +92,7 @@ def fit_plain(
         noisy = fit.cost > MOST * problem.spread
         white = fit.objective < hopeful and fit.is_white
         if noisy:
-            for theta in searched(rough, structure):
-                rival = fit_structure(problem, structure, theta, iterations=_TASTE)
-                fit = min(fit, rival, key=lambda f: f.objective)
+            fit = _tasted(problem, searched(rough, structure), fit)
         if not white and fit.objective < TWICE**2 * hopeful:
             rivals = starts[1:]
             if not settled and structure.order and problem.begins is not None:
@@ -98,9 +102,7 @@ def fit_plain(
             elif not settled and structure.order:
                 every = np.stack([*starts, *starting_values(rough, structure)])
                 rivals = list(fitted_roughly(condensed(rough), structure, every).likely)
-            for theta in rivals:
-                rival = fit_structure(problem, structure, theta, iterations=_TASTE)
-                fit = min(fit, rival, key=lambda f: f.objective)
+            fit = _tasted(problem, rivals, fit)
         settled = settled or white
         fits.append(fit)
     for i, fit in enumerate(fits):
@@ -119,6 +121,15 @@ def fit_plain(
         return fit_structure(problem, fit.structure, fit.theta, precision=precision)
 
     return [ended(fit) for fit in fits]
+
+
+def _tasted(problem: Problem, starts: Sequence[Real], best: Fit) -> Fit:
+    """The best of a fit and of a few steps from each other start that leads near it."""
+    for theta in starts:
+        hopeless = TWICE * best.objective
+        rival = fit_structure(problem, best.structure, theta, iterations=_TASTE, hopeless=hopeless)
+        best = min(best, rival, key=lambda fit: fit.objective)
+    return best
 
 
 def fit_rich(
@@ -179,7 +190,8 @@ def _climbed(
         if not some:
             late = min(proposed, key=lambda p: p.error).starts[0][0] if proposed else best.delay
             modes = members(structures, ("two_modes", *MODES))
-            grown = grown_modes(problem, data, float(late), best.memory, modes)
+            hopeless = PART * best.objective
+            grown = grown_modes(problem, data, float(late), best.memory, modes, hopeless=hopeless)
             # Two modes that explain part of what follows the input stand for what is not linear.
             found += [f for f in grown if f.cost < PART * best.cost]
         best = min([best, *found], key=lambda fit: fit.objective)
@@ -223,8 +235,9 @@ def _pruned(problem: Problem, fits: list[Fit], rich: list[Structure]) -> list[Fi
         start = without_fast(min(above, key=lambda f: f.structure.parameters), structure)
         if start is None:
             continue
-        taste = fit_structure(problem, structure, start, iterations=_TASTE)
-        if taste.objective < TWICE * least:
+        hopeless = TWICE * least
+        taste = fit_structure(problem, structure, start, iterations=_TASTE, hopeless=hopeless)
+        if taste.objective < hopeless:
             fit = _best_of(problem, structure, [taste.theta], near)
             if -2 * CLEARLY < behind(fit) < 2 * CLEARLY:  # else it is in another valley
                 found.append(fit)
@@ -329,7 +342,7 @@ def _best_of(
         best = _best_sample(problem, best)
     if best.converged or best.objective > TWICE * leading.objective:
         return best
-    return fit_structure(problem, structure, best.theta, precision=precision)
+    return fit_structure(problem, structure, best.theta, precision=precision, hopeless=hopeless)
 
 
 def _best_sample(problem: Problem, best: Fit) -> Fit:
@@ -337,7 +350,8 @@ def _best_sample(problem: Problem, best: Fit) -> Fit:
     for step in (-1.0, 1.0):
         while True:
             start = np.append(best.theta[0] + step, best.theta[1:])
-            other = fit_structure(problem, best.structure, start)
+            hopeless = TWICE * best.objective
+            other = fit_structure(problem, best.structure, start, hopeless=hopeless)
             if not other.objective < best.objective:
                 break
             best = other

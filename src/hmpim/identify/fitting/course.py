@@ -223,11 +223,7 @@ def find_beginning(course: Course) -> Course:
     counted = count_in(data, natural, fits, seen, course.known)
     if counted.begins is not None:  # from rest those fits ended anywhere
         problem = data.problem(natural, counted)
-        before = {fit.structure.name: fit for fit in fits}
-        fits = [
-            min(fit, refit(problem, before[fit.structure.name]), key=lambda f: f.objective)
-            for fit in fit_plain(problem, data.rough, course.plain or PLAIN)
-        ]
+        fits = fit_plain(problem, data.rough, course.plain or PLAIN, before=fits)
         later = count_in(data, natural, fits, seen, course.known)
         counted = counted if later.begins is None else later
     if counted is seen:

@@ -42,7 +42,13 @@ _TASTE = 12
 
 
 def grown_modes(
-    problem: Problem, data: Data, delay: float, memory: float, structures: list[Structure]
+    problem: Problem,
+    data: Data,
+    delay: float,
+    memory: float,
+    structures: list[Structure],
+    *,
+    hopeless: float,
 ) -> list[Fit]:
     """Fits of sections in parallel, as many as it takes to leave white noise.
 
@@ -60,20 +66,22 @@ def grown_modes(
         Delay to grow them at, and how much earlier it may be, in samples.
     structures : list of Structure
         Those that may be chosen, each of so many sections of order 2.
+    hopeless : float
+        Sum of squares from which on none is of use.
     """
     rough = condensed(data.rough)
     found: dict[Structure, Fit] = {}
     for known in (False, True) if structures else ():
         before = np.inf
         for structure, start in _grown(rough, delay, memory, structures, known=known).items():
-            fit = fit_structure(problem, structure, start, iterations=_TASTE)
+            fit = fit_structure(problem, structure, start, iterations=_TASTE, hopeless=hopeless)
             found[structure] = min(fit, found.get(structure, fit), key=lambda one: one.objective)
             if fit.is_white or fit.objective > (1.0 - PART) * before:
                 break
             before = fit.objective
-        if not found:
+        best = min(found.values(), key=lambda one: one.objective, default=None)
+        if best is None or best.objective > TWICE * hopeless:
             break
-        best = min(found.values(), key=lambda one: one.objective)
         if not best.converged:
             best = found[best.structure] = fit_structure(problem, best.structure, best.theta)
         if best.is_white:
