@@ -35,6 +35,25 @@ def test_a_simulation_without_noise_is_not_doubted(end):
     assert pair.noise_std.ci95[0] == 0.0
 
 
+@pytest.mark.parametrize("samples", [1000, 10_000])
+@pytest.mark.parametrize("seed", range(3))
+def test_statistics_without_noise_say_no_more_than_sums_of_squares_hold(samples, seed):
+    """Half of the digits are lost where sums are subtracted; a window may be two fifths of a run.
+
+    The runs do not begin at rest at their first input.
+    """
+    u = signal.lfilter([0.2], [1.0, -0.8], np.random.default_rng(seed).standard_normal(samples))
+    frequency = 5.0 * (seed + 1)
+    turns = 2 * np.pi * frequency
+    record = held_record(u, [turns**-2, 1.0 / turns, 1.0], late=7)
+    (pair,) = hmpim.identify(hmpim.compress(record, lags=400))
+    assert pair.structure == "second_order"
+    for name, truth in {"delay": 7 / FS, "natural_frequency": frequency, "noise_std": 0.0}.items():
+        low, high = getattr(pair, name).ci95
+        assert low <= truth <= high, name
+        assert high - low < 1e-6 * max(truth, 1.0), name
+
+
 def test_one_sine_is_told_once_that_it_shows_gain_and_phase():
     """Of figures that are not given, no remark says that their intervals cover something."""
     time = np.arange(2000) / FS

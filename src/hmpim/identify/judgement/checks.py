@@ -98,8 +98,8 @@ def judge(evidence: Evidence, *, checks: Sequence[Check] | None = None) -> tuple
     evidence : Evidence
         What there is to look at.
     checks : sequence of callable, optional
-        What to look for; by default `CHECKS`, of software `SAMPLED`, and where all is explained to
-        the last digit without those that ask something of the residual.
+        What to look for; by default `CHECKS`, of software `SAMPLED`. Where all is explained to the
+        last digit, those that ask something of the residual are left out.
 
     Returns
     -------
@@ -108,8 +108,8 @@ def judge(evidence: Evidence, *, checks: Sequence[Check] | None = None) -> tuple
     """
     if checks is None:
         checks = SAMPLED if evidence.joint.best.fit.structure.sampled else CHECKS
-        if evidence.is_without_noise:
-            checks = [check for check in checks if check not in _OF_THE_RESIDUAL]
+    if evidence.is_without_noise:
+        checks = [check for check in checks if check not in _OF_THE_RESIDUAL]
     found: list[Finding] = []
     for check in checks:
         name = getattr(check, "__name__", type(check).__name__)

@@ -83,6 +83,8 @@ class Evidence:
         """
         if self.unexplained >= WORTH:
             return False
+        if not self.u.size:  # from statistics
+            return self.unexplained < INTERPOLATED
         fit, end = self.joint.best.fit, int(FEW * self.u.size) + 1
         inner, moves = fit.residual[end:-end], fit.prediction + fit.residual
         return float(np.sqrt(np.mean(inner**2))) < INTERPOLATED * float(np.std(moves))

@@ -199,12 +199,12 @@ def blurred(parameters: Parameters, share: float) -> Parameters:
     return replace(parameters, **moved)
 
 
-def without_noise(parameters: Parameters) -> Parameters:
+def without_noise(parameters: Parameters, rounding: float = ROUNDING) -> Parameters:
     """Widen each interval by rounding, and the noise's to 0: the residual need not be noise.
 
-    It may be the error of interpolation between the samples.
+    It may be the error of interpolation between the samples. `rounding` is a share of each figure.
     """
-    wide, noise = blurred(parameters, ROUNDING), parameters.noise_std
+    wide, noise = blurred(parameters, rounding), parameters.noise_std
     if noise is None or noise.ci95 is None:
         return wide
     return replace(wide, noise_std=replace(noise, std=None, ci95=(0.0, noise.ci95[1])))

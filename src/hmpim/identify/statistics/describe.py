@@ -26,7 +26,7 @@ from hmpim.identify.reading.coefficients import coefficients_of, highest_first
 from hmpim.identify.reading.figures import read_figures
 from hmpim.identify.reading.propagation import response_std
 from hmpim.identify.reading.readings import Readings
-from hmpim.identify.reading.spanned import spanned
+from hmpim.identify.reading.spanned import spanned, without_noise
 from hmpim.identify.result import (
     Candidate,
     FrequencyResponse,
@@ -72,6 +72,9 @@ _OVER = 1e-3
 
 _SETTLES = 7.0
 """Time constants after which less than that is left."""
+
+_DIGITS = float(np.sqrt(np.finfo(float).eps))
+"""Share of a figure that is lost where sums of squares are subtracted."""
 
 _FREQUENCIES = 200
 
@@ -188,6 +191,9 @@ def _related(statistics: Statistics, data: CompressedData, joint: JointFit) -> P
         measured=ResponseBandwidths(),
     )
     findings = judge(evidence, checks=_CHECKS)
+    parameters = readings.parameters
+    if evidence.is_without_noise:
+        parameters = without_noise(parameters, _DIGITS)
     numerator, denominator = coefficients_of(system)
     frequency = np.geomspace(max(band[0], 1e-3 * band[1]), band[1], _FREQUENCIES)
     return PairIdentification(
@@ -196,7 +202,7 @@ def _related(statistics: Statistics, data: CompressedData, joint: JointFit) -> P
         structure=best.structure.name,
         intersample=joint.best.intersample,
         fit_percent=evidence.fit_percent,
-        parameters=readings.parameters,
+        parameters=parameters,
         paper=_paper(statistics),
         frequency_response=FrequencyResponse(
             frequency=frequency,
