@@ -158,6 +158,7 @@ def test_a_failure_while_writing_leaves_the_old_file(good, tmp_path, monkeypatch
     assert saved.read_text() == "old"
 
 
+@pytest.mark.study
 @pytest.mark.real_data
 def test_a_held_input_of_a_real_circuit_predicts_what_it_has_not_seen(measured, tmp_path):
     files = sorted(measured.glob("rcrc/prbs.csv"))
