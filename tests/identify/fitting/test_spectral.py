@@ -53,3 +53,18 @@ def test_grouped_bins_keep_weight_and_low_frequencies():
 def test_a_response_of_nothing_is_no_error():
     found = fitted_roughly(rough(0.0 * ANSWER), STRUCTURES["second_order"], TRUE[None])
     assert found.error == 0.0
+
+
+def test_a_numerator_that_takes_up_all_leaves_no_step_and_no_warning():
+    """One frequency has two numbers, fewer than the numerator: what is left is rounding."""
+    rng, modes = np.random.default_rng(0), STRUCTURES["eight_modes"]
+    starts = np.column_stack([rng.uniform(0, 50, 2000), rng.uniform(-12, 12, (2000, modes.order))])
+    one = RoughResponse(
+        lag=0,
+        length=4096,
+        bins=np.arange(1, 2),
+        omega=OMEGA[:1],
+        response=1e9 * ANSWER[:1],
+        weight=np.ones(1),
+    )
+    assert fitted_roughly(one, modes, starts).error < 1e-9

@@ -222,9 +222,11 @@ class _Rough:
         rows = _real(np.stack(slopes, axis=1))
         mixed = rows @ self._real.swapaxes(1, 2)
         normal = rows @ rows.swapaxes(1, 2)
+        # Of a direction that the numerator takes up whole, rounding is left, of either sign.
+        least = np.finfo(float).eps * np.einsum("kii->ki", normal) + np.finfo(float).tiny
         normal -= mixed @ np.linalg.solve(self._gram, mixed.swapaxes(1, 2))
         moment = rows @ self.left[..., None]
-        diagonal = np.maximum(np.einsum("kii->ki", normal), np.finfo(float).tiny)
+        diagonal = np.maximum(np.einsum("kii->ki", normal), least)
         scale = np.sqrt(diagonal)
         scaled = normal / (scale[:, :, None] * scale[:, None, :])
         scaled += (damping[:, None, None] + _LEAST) * np.eye(scale.shape[1])
