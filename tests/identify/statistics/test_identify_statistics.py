@@ -21,6 +21,12 @@ MODEL = hmpim.Model(
     noise_std=0.1,
     denominator=(1 / (20 * np.pi) ** 2, 0.8 / (20 * np.pi), 1.0),
 )
+QUICK = hmpim.Model(
+    scale_factor=1.0,
+    delay=0.012,
+    noise_std=0.02,
+    denominator=(1 / (28 * np.pi) ** 2, 1.2 / (28 * np.pi), 1.0),
+)
 FIGURES = ("delay", "scale_factor", "bias", "natural_frequency", "damping_ratio", "bandwidth_3db")
 
 
@@ -189,6 +195,12 @@ def test_noise_alone_is_unrelated():
         {"u": chirped(0).inputs[0].values}, {"y": rng.standard_normal(2000)}, fs=FS
     )
     assert identify(compress(record)).verdict == "not_identifiable"
+
+
+@pytest.mark.parametrize("lags", [1, 5, 10])
+def test_a_window_shorter_than_what_does_not_count_is_refused_by_name(lags):
+    with pytest.raises(HmpimError, match=rf"window of {lags} samples.*compress with lags="):
+        identify(compress(chirped(3, model=QUICK), lags=lags))
 
 
 def test_memory_beyond_the_window_is_refused_by_name():

@@ -138,7 +138,7 @@ class Products:
         )
         """Samples of a full convolution with the head that do not count; with the tail."""
         heads = [run.head_u[: self.first + AHEAD] for run in runs]
-        few = self._apart[0].stop <= _FEW
+        few = self._apart[0].stop <= min(_FEW, reach.taps)
         self._begun = np.stack([_moved(head) for head in heads]) if few else None
         parts = [self._around[i::2, :, apart] for i, apart in enumerate(self._apart)]
         self._out = np.concatenate(parts, axis=2)
