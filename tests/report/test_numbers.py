@@ -137,3 +137,19 @@ def test_an_error_of_arithmetic_is_none_and_a_side_that_does_not_reach_is_0():
     late = Estimate(value=0.02, std=None, ci95=(0.02, 0.03), unit="s")
     assert format_value(late) == "0.020 −0 +0.010"
     assert format_value(replace(late, ci95=(0.0199, 0.03))) == "0.02000 −0.00010 +0.01000"
+
+
+@pytest.mark.parametrize(
+    ("value", "std", "interval", "shown"),
+    [
+        (4.975e7, 4.3e5, (4.8903e7, 5.05935e7), "(4.890 to 5.059)e+07"),
+        (-1e-15, 1e-14, (-2.31161e-14, 2.11161e-14), "(-2.3 to 2.1)e-14"),
+        (1.23e-15, None, (1.05e-15, 1.48e-15), "(1.05 to 1.48)e-15"),
+        (1.23e-15, None, (None, 1.48e-15), "1.48e-15 or less"),
+    ],
+)
+def test_an_interval_has_the_power_of_ten_and_the_places_of_its_value(value, std, interval, shown):
+    estimate = Estimate(value=value, std=std, ci95=interval, unit="V")
+    assert format_interval(estimate) == shown
+    if None not in interval:
+        assert format_value(estimate).partition(")")[2] == shown.partition(")")[2]

@@ -130,12 +130,8 @@ def format_interval(estimate: Estimate, *, positive: bool = False) -> str:
     low, high = estimate.ci95
     if high is not None and _undetermined(estimate, positive):
         low = None
-    if (estimate.std is None or estimate.asymmetric) and low is not None and high is not None:
-        # To as many places as the value beside it.
-        shown = aside(estimate.value, low, high).partition(" ")[0]
-        places = len(shown.partition(".")[2])
-        return f"{low:.{places}f} to {high:.{places}f}"
-    return interval(low, high, value=estimate.value, std=estimate.std)
+    std = None if estimate.asymmetric else estimate.std
+    return interval(low, high, value=estimate.value, std=std)
 
 
 def format_number(value: float | None) -> str:

@@ -1,6 +1,7 @@
 """Numbers for people: the error to its digits, the value to match."""
 
 import math
+from collections.abc import Sequence
 
 __all__ = ["aside", "interval", "percent", "plus_minus"]
 
@@ -80,10 +81,9 @@ def aside(value: float, low: float | None, high: float | None) -> str:
     known = [length for length in reach if length]
     if known and len(known) == len(reach) and max(known) < _ROUNDING * abs(value):
         return plus_minus(value, max(known))
-    places = _places(max(min(known), _ROUGHLY * max(known))) if known else None
+    places, exponent = _digits(value, known)
     if places is None:
         return f"{_plain(value)} ± ?"
-    exponent = _exponent(value, max(known), places)
     lengths = [None if length is None else length / 10.0**exponent for length in reach]
     places += exponent
     down, up = ("?" if length is None else _at(length, places) for length in lengths)
@@ -94,25 +94,40 @@ def aside(value: float, low: float | None, high: float | None) -> str:
 def interval(low: float | None, high: float | None, *, value: float, std: float | None) -> str:
     """Write an interval with as many places as the value has; an open end in words.
 
+    Parameters
+    ----------
+    low, high : float or None
+        The ends; None for an open one.
+    value : float
+        What lies between them.
+    std : float or None
+        Error to whose digits the value is written; None where `aside` writes it.
+
     Examples
     --------
     >>> interval(9.928, 10.046, value=9.987, std=0.03)
     '9.928 to 10.046'
     >>> interval(0.1474, None, value=0.15, std=None), interval(None, None, value=0.15, std=None)
     ('0.1474 or more', 'not known')
+    >>> interval(4.8903e-11, 5.0594e-11, value=4.975e-11, std=4.3e-13)
+    '(4.890 to 5.059)e-11'
+    >>> interval(1.05e-15, 1.48e-15, value=1.23e-15, std=None)  # not symmetric: digits of `aside`
+    '(1.05 to 1.48)e-15'
     """
-    exact = std is None or 0.0 < std < _ROUNDING * abs(value)
-    places = None if exact or std is None else _places(std)
-    plainly = std is None or places is None or _exponent(value, std, places) != 0
-
-    def written(end: float) -> str:
-        return _plain(end) if plainly or places is None else _at(end, places)
-
-    if low is None or high is None:
-        if low is None and high is None:
-            return "not known"
-        return f"{written(low)} or more" if low is not None else f"{written(high or 0.0)} or less"
-    return f"{written(low)} to {written(high)}"
+    ends = [end for end in (low, high) if end is not None]
+    if not ends:
+        return "not known"
+    known = [abs(end - value) for end in ends if end != value] if std is None else [std]
+    places, exponent = _digits(value, known)
+    if places is None or max(known) < _ROUNDING * abs(value):
+        shown, power = [_plain(end) for end in ends], ""
+    else:
+        shown = [_at(end / 10.0**exponent, places + exponent) for end in ends]
+        power = f"e{exponent:+03d}" if exponent else ""
+    if len(shown) == 2:
+        both = " to ".join(shown)
+        return f"({both}){power}" if power else both
+    return f"{shown[0]}{power} or {'less' if low is None else 'more'}"
 
 
 def percent(share: float) -> str:
@@ -134,6 +149,12 @@ def _places(std: float, *, short: bool = False) -> int | None:
     if short and _ONE_DIGIT <= int(digits.replace(".", "")) < 950:
         return -int(exponent)
     return 1 - int(f"{std:.1e}".partition("e")[2])
+
+
+def _digits(value: float, errors: Sequence[float]) -> tuple[int | None, int]:
+    """Decimal places that show the errors to either side, and the power of ten to take out."""
+    places = _places(max(min(errors), _ROUGHLY * max(errors))) if errors else None
+    return places, 0 if places is None else _exponent(value, max(errors), places)
 
 
 def _exponent(value: float, std: float, places: int) -> int:
