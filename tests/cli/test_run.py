@@ -173,3 +173,18 @@ def test_ctrl_c_says_what_there_is_of_the_run(folder, monkeypatch):
     assert out.exit_code == 130
     assert "what was recorded until then is in r.h5" in out.stderr
     assert not read_recording(folder / "r.h5").complete
+
+
+def test_a_run_that_breaks_off_says_in_its_one_line_what_is_kept(folder):
+    (folder / "unit.py").write_text(
+        "from itertools import count\n\nCALLS = count()\n\n\n"
+        "def breaks(u):\n"
+        "    if next(CALLS) == 500:\n"
+        "        raise ValueError('boom')\n"
+        "    return u\n"
+    )
+    out = run("run", "--rig", "python:unit.py:breaks:sample", "s.csv", "-o", "r.h5")
+    assert out.exit_code == 2
+    assert out.stderr.count("\n") == 1
+    assert "boom; what was recorded until then is in r.h5" in out.stderr
+    assert load("r.h5").samples == 500

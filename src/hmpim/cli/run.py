@@ -12,7 +12,7 @@ from hmpim.cli.complete import complete_rig
 from hmpim.cli.files import check_files
 from hmpim.cli.stages import Stages
 from hmpim.cli.terminal import output_console, say, warn, working
-from hmpim.errors import ArgumentError
+from hmpim.errors import ArgumentError, HmpimError
 
 if TYPE_CHECKING:
     from hmpim.cli.strip import Strip
@@ -240,14 +240,19 @@ def _again(text: str, description: "Description | None") -> "Rig":
 
 @contextmanager
 def _kept_is_said(log: "RunLog") -> Iterator[None]:
-    """Say after Ctrl-C what there is of the run."""
+    """Say after Ctrl-C what there is of the run, and with an error that broke it off."""
     try:
         yield
     except KeyboardInterrupt:
-        for event in log.events:
-            if event.kind == "kept":
-                warn(event.message)
+        for message in _kept(log):
+            warn(message)
         raise
+    except HmpimError as error:
+        raise type(error)("; ".join((str(error), *_kept(log)))) from error
+
+
+def _kept(log: "RunLog") -> list[str]:
+    return [event.message for event in log.events if event.kind == "kept"]
 
 
 def _watching(*, live: bool) -> list["Strip"]:
