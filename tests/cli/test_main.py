@@ -46,6 +46,10 @@ def test_help_shows_what_stands_in_brackets(command, words):
         (["identify"], "see hmpim identify --help"),
         (["--nonsense"], "see hmpim --help"),
         (["demo", "--seed", "-1"], "see hmpim demo --help"),
+        (
+            ["design", "--band", "1", "--duration", "10"],
+            "(it is '1 --duration'); see hmpim design --help",
+        ),
     ],
 )
 def test_a_mistake_on_the_command_line_is_one_line(arguments, reason):

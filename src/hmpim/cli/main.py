@@ -100,10 +100,11 @@ def _usage(error: Any, arguments: Sequence[str]) -> str:
 
 def _given(parameter: Any, arguments: Sequence[str]) -> str | None:
     """Return what stands after an option on the command line, if the mistake is in one."""
+    count = max(getattr(parameter, "nargs", 1), 1)
     for option in getattr(parameter, "opts", ()):
         for place, word in enumerate(arguments):
             if word == option and place + 1 < len(arguments):
-                return arguments[place + 1]
+                return " ".join(arguments[place + 1 : place + 1 + count])
             if word.startswith(f"{option}="):
                 return word.removeprefix(f"{option}=")
     return None
