@@ -87,6 +87,7 @@ def test_one_of_several_outputs_is_named(folder, tmp_path):
         (("identify", "small.h5", "a.h5"), "small.h5 holds statistics and a.h5 does not"),
         (("identify", "small.h5", "--from", "3"), "--from is about the samples of a record"),
         (("identify", "small.h5", "--holdout", "0.5"), "--holdout is about the samples"),
+        (("channels", "small.h5"), "'small.h5' holds statistics of a record and not its samples"),
     ],
 )
 def test_what_cannot_be_is_refused_in_one_line(words, said, folder, monkeypatch):

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from hmpim.errors import FormatError
 from hmpim.formats.readers.logs.clock import is_time
 from hmpim.formats.readers.logs.log import Column, Group, Log, list_log, take_series, unit_of
 from hmpim.formats.readers.protocol import Contents, Layout, Reader
@@ -16,6 +17,7 @@ from hmpim.record import Finding, Series
 __all__ = ["HDF5", "channels", "parse", "read", "sniff"]
 
 _MAGIC = b"\x89HDF\r\n\x1a\n"
+_STATISTICS = "hmpim/statistics/"
 _WIDE = 200  # columns that a dataset may open into
 _MANY = 20_000  # datasets that are looked at
 
@@ -49,6 +51,11 @@ def parse(path: Path, layout: Layout) -> Log:
     import h5py
 
     file = h5py.File(path, "r")
+    if str(file.attrs.get("schema", "")).startswith(_STATISTICS):
+        raise FormatError(
+            f"{path.name!r} holds statistics of a record and not its samples; hmpim identify and "
+            "hmpim compress take it, here give the record itself"
+        )
     groups: dict[tuple[str, int], list[Column]] = {}
     elsewhere: list[str] = []
     for name, dataset in _datasets(file):
