@@ -3,7 +3,9 @@
 import json
 from dataclasses import replace
 
+import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 import hmpim
 from hmpim.cli.main import app
@@ -78,3 +80,15 @@ def test_bad_input_is_exit_2_and_one_line(words, said, folder, capsys):
     error = capsys.readouterr().err
     assert said in error
     assert len(error.splitlines()) == 1
+
+
+def test_a_filter_read_back_from_its_file_is_held_against_another_record(tmp_path, capsys):
+    rng = np.random.default_rng(1)
+    for name in ("a.csv", "b.csv"):
+        u = rng.standard_normal(800)
+        y = lfilter([0.0, 0.3], [1.0, -0.7], u)
+        hmpim.save(hmpim.Record.from_arrays({"u": u}, {"y": y}, fs=100.0), tmp_path / name)
+    found = hmpim.identify(hmpim.load(tmp_path / "a.csv"), intersample="sampled")
+    hmpim.save(found, tmp_path / "r.json")
+    assert run("validate", tmp_path / "r.json", tmp_path / "b.csv") != 2
+    assert "fs = None" not in capsys.readouterr().err

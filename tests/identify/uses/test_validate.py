@@ -156,6 +156,20 @@ def test_what_cannot_be_validated_is_refused(result):
         Bounds(chance=2)
 
 
+@pytest.mark.parametrize("units", [("rad", "deg"), ("deg", "rad"), ("rad", "rad")])
+def test_a_record_in_other_units_is_refused_and_not_held_against_the_model(result, units):
+    record = hmpim.run(SENSOR, OTHER, rng=5)
+    u, y = (
+        replace(channel, unit=unit)
+        for channel, unit in zip((*record.inputs, *record.outputs), units, strict=True)
+    )
+    other = replace(record, inputs=(u,), outputs=(y,))
+    with pytest.raises(RecordError, match=rf"record has '{units[0]}' and '{units[1]}'"):
+        hmpim.validate(result, other)
+    unstated = replace(record, inputs=(replace(u, unit=""),))
+    assert hmpim.validate(result, unstated).passed
+
+
 def test_two_results_of_one_unit_differ_by_chance_only(result):
     for seed in range(60, 63):
         again = hmpim.identify(hmpim.run(SENSOR, SWEEP, rng=seed))

@@ -13,12 +13,15 @@ from hmpim.identify.chance import DEVIATIONS, FALSE_ALARM, HALF
 from hmpim.identify.effects.hold import detect_hold, updates
 from hmpim.identify.noise.misfit import misfit
 from hmpim.identify.noise.whiteness import autocovariance, effective_share
+from hmpim.identify.reading.figures import units_of
 from hmpim.identify.result import Identification, PairIdentification
+from hmpim.identify.result.digits import percent
 from hmpim.identify.result.plain import plain
 from hmpim.identify.section_iv.spectrum import excited_band
 from hmpim.identify.uses.predict import fit_percent_of, settling_time, to_model
 from hmpim.identify.worth import MATERIAL
 from hmpim.model import Model, draw_models, simulate
+from hmpim.model.dynamics import FILTERS, STRUCTURES
 from hmpim.record import Aligned, Record, uniform
 
 __all__ = ["Bounds", "Check", "OutputValidation", "Validation", "validate"]
@@ -209,21 +212,51 @@ def validate(result: Identification, record: Record, *, bounds: Bounds | None = 
     known = [pair for pair in result.pairs if pair.parameters.scale_factor is not None]
     if not known:
         raise RecordError("the result has no model to validate: no pair was identifiable")
+    for pair in known:
+        _check_units(pair, aligned)
     outputs = dict.fromkeys(pair.output for pair in known)
     return Validation(
         outputs=tuple(
-            _validated(aligned, [pair for pair in known if pair.output == name], limits)
+            _validated(
+                aligned,
+                [pair for pair in known if pair.output == name],
+                limits,
+                fs=result.record.fs,
+            )
             for name in outputs
         )
     )
 
 
+def _check_units(pair: PairIdentification, aligned: Aligned) -> None:
+    """Refuse a record in other units than the result's, where both state them."""
+    u, y = aligned.signal(pair.input), aligned.signal(pair.output)
+    known = pair.parameters
+    if known.bias is None or known.scale_factor is None or pair.structure is None:
+        return
+    if not (known.bias.unit and u.unit and y.unit):
+        return
+    named = (one for one in STRUCTURES.values() if one.name == pair.structure)
+    structure = next(named, FILTERS["static"])  # a filter's gain is output over input as well
+    scales = {
+        units_of(structure, (unit, y.unit))["scale_factor"]
+        for unit in (u.unit, "")  # the result may not know that of its input
+    }
+    if known.bias.unit != y.unit or known.scale_factor.unit not in scales:
+        raise RecordError(
+            f"{pair.output!r} from {pair.input!r} was identified with an output in "
+            f"{known.bias.unit!r} and a scale factor in {known.scale_factor.unit or '1'!r}; the "
+            f"record has {u.unit!r} and {y.unit!r}, and numbers are not converted: give a record "
+            "in the units of the result"
+        )
+
+
 def _validated(
-    aligned: Aligned, pairs: Sequence[PairIdentification], bounds: Bounds
+    aligned: Aligned, pairs: Sequence[PairIdentification], bounds: Bounds, *, fs: float
 ) -> OutputValidation:
     """Validate one output, driven by all its inputs."""
     y = aligned.signal(pairs[0].output)
-    models = [to_model(pair) for pair in pairs]
+    models = [to_model(pair, fs=fs) for pair in pairs]
     held = None  # the clock of a held output, whose phase is the record's own
     if models[0].hold_period is not None:
         held = detect_hold(y.values, aligned.fs)
@@ -372,7 +405,7 @@ def _tests(
         told = (
             f"The residual is not correlated with {pair.input!r} beyond chance"
             if left.probability >= FALSE_ALARM
-            else f"{100 * left.share:.2g} % of the residual follows {pair.input!r}"
+            else f"{percent(left.share)} % of the residual follows {pair.input!r}"
             + (", which the error bars admit" if admitted else "")
         )
         checks.append(
