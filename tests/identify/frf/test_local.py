@@ -293,3 +293,13 @@ def test_a_record_that_ends_elsewhere_than_it_began_leaks_into_no_bin():
     assert np.abs(twice.response / 2.0 - 1).max() < 1e-6
     alone = local_response(u, y[0], 100.0, band=(0.1, 3.0))
     assert np.array_equal(alone.response, ramp.response)
+
+
+def test_input_that_moves_only_before_what_is_compared_has_a_response() -> None:
+    """It steps down at the second sample: four samples less of it are a constant."""
+    n, decay = np.arange(400), np.exp(-0.1)
+    u, y = np.where(n == 0, 1.0, 0.0), decay**n
+    found = local_response(u, y, FS, band=(0.5, 100.0), delay=-4 / FS)
+    true = (1 - decay) / (1 - decay * np.exp(-2j * np.pi * found.frequency / FS))
+    assert found.frequency.size > 0
+    assert (np.abs(found.response - true) < 5 * found.std).all()

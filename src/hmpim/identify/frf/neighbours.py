@@ -179,8 +179,9 @@ def transform(u: Real, y: Real, fs: float, delay: float | Real, highest: float =
     """Transform a record, the delay taken out; or many of one input, delayed by as many samples.
 
     Its whole samples go by comparing y(n + k) with u(n), so that no response to the stimulus
-    lies beyond the end of the record; the rest goes by its phase. Of a long record the last
-    samples, at most one in forty, are left out for a length that the FFT does fast.
+    lies beyond the end of the record; the rest goes by its phase, and all of it does where those
+    samples are all in which the input moves. Of a long record the last samples, at most one in
+    forty, are left out for a length that the FFT does fast.
 
     Parameters
     ----------
@@ -204,6 +205,8 @@ def transform(u: Real, y: Real, fs: float, delay: float | Real, highest: float =
     """
     late = np.atleast_1d(delay)
     lag = whole_lag(float(late[0]), fs, u.size)
+    if np.ptp(u[max(-lag, 0) :][: u.size - abs(lag)]) == 0.0:
+        lag = 0
     length = u.size - abs(lag)
     if length > _LONG:
         length = int(scipy.fft.prev_fast_len(length, real=True))
