@@ -19,6 +19,7 @@ from hmpim.identify.effects.imperfections import (
     refine,
 )
 from hmpim.identify.effects.lost import stands_out
+from hmpim.identify.effects.saturation import goes_beyond
 from hmpim.identify.fitting.course import (
     Course,
     completed,
@@ -79,10 +80,11 @@ def fit(question: Question, seen: Imperfections) -> tuple[Imperfections, OutputF
     begun = _begin(question, seen)
     if begun is None:
         return seen, _fit_and_look_for_rows(question, seen)
-    levelled = None if begun.best.is_white else _behind_levels(question, seen, begun)
-    if levelled is not None:
-        return levelled
     course = completed(begun)
+    if not begun.best.is_white:
+        levelled = _behind_levels(question, seen, begun, rests=course.counted.begins is None)
+        if levelled is not None:
+            return levelled
     drifting = None if course.best.is_white else _drifting(question, seen, course)
     if drifting is not None:
         return seen, drifting
@@ -93,10 +95,14 @@ def fit(question: Question, seen: Imperfections) -> tuple[Imperfections, OutputF
 
 
 def _behind_levels(
-    question: Question, seen: Imperfections, course: Course
+    question: Question, seen: Imperfections, course: Course, *, rests: bool
 ) -> tuple[Imperfections, OutputFit] | None:
     """Plain dynamics behind levels, where they leave white noise."""
-    shown = _imperfections(question, prediction=course.best.prediction).saturation
+    best, y = course.best, question.output.values
+    # Of what came before the record these fits know nothing.
+    late = 0 if rests else min(int(np.ceil(max(best.delay, 0.0) + best.memory)), y.size // 4)
+    prediction = np.concatenate([y[:late], best.prediction[late:]])
+    shown = _imperfections(question, prediction=prediction).saturation
     levels = seen.saturation if shown is None else shown
     if levels is None:
         return None
@@ -209,8 +215,10 @@ def look_again(question: Question, seen: Imperfections, fitted: OutputFit) -> Im
     if told is not None and np.ptp(question.output.values[told]) == 0.0:
         return seen  # all that moves would be taken for spikes
     plateau = again.saturation
-    if plateau is None and seen.saturation is not None and seen.saturation.noise == "after":
-        return replace(again, saturation=seen.saturation)
+    before = seen.saturation
+    if plateau is None and before is not None and before.noise == "after":
+        kept = goes_beyond(before, question.output.values, prediction)  # else it has settled there
+        return replace(again, saturation=before if kept else None)
     if fitted.drifting is not None and plateau is not None and plateau.noise == "after":
         return replace(again, saturation=None)  # a wander bends the output as a level does
     return again

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy import signal
 
 import hmpim
 from hmpim.identify.effects.imperfections import find_imperfections
@@ -186,3 +187,33 @@ def test_samples_filled_in_are_on_no_level():
     pair = spoiled(lambda y: 0.025 * np.rint(y / 0.025), kept)
     assert "gaps" in codes(pair)
     assert pair.quantization_step.value == pytest.approx(0.025, rel=1e-6)
+
+
+def identified(u, y):
+    return hmpim.identify(hmpim.Record.from_arrays({"u": u}, {"y": y}, fs=200.0))["y", "u"]
+
+
+@pytest.mark.parametrize("seed", [4, 5, 9, 10, 11])
+def test_a_record_that_begins_under_way_is_not_clipped_there(seed):
+    """A binary sequence at full swing from the first sample on, a lag at rest until then."""
+    rng = np.random.default_rng(seed)
+    u = np.repeat(rng.choice([-1.0, 1.0], 400), 5)
+    kept = np.exp(-1 / (200.0 * 0.03))
+    y = signal.lfilter([0.0, 1.0 - kept], [1.0, -kept], u)
+    pair = identified(u, y + 0.01 * rng.standard_normal(u.size))
+    assert pair.saturation_high is None
+    assert pair.saturation_low is None
+    assert holds(pair.time_constant, 0.03)
+
+
+def test_an_output_that_settles_is_not_clipped_where_the_model_expects_no_more():
+    rng = np.random.default_rng(15)
+    u = np.repeat(rng.choice([-2.0, -1.0, 0.0, 1.0, 2.0], 10), 200)
+    omega, damping = 2 * np.pi * rng.uniform(3, 9), rng.uniform(0.3, 0.9)
+    lag = ([omega**2], [1.0, 2 * damping * omega, omega**2])
+    above, below, _ = signal.cont2discrete(lag, 1 / 200.0)
+    y = signal.lfilter(above[0], below, u)
+    y = y + np.std(y) * 10 ** (-rng.uniform(25, 50) / 20) * rng.standard_normal(u.size)
+    pair = identified(u, y)
+    assert pair.saturation_high is None
+    assert holds(pair.damping_ratio, damping)

@@ -20,7 +20,7 @@ from hmpim.identify.effects.smeared import Side, smeared_plateaus
 from hmpim.identify.signals import as_pair, as_signal
 from hmpim.identify.worth import FEW, MATERIAL, MOST, MUCH, NEARLY, TOLERATED, TWICE
 
-__all__ = ["NoiseAt", "Saturation", "detect_saturation"]
+__all__ = ["NoiseAt", "Saturation", "detect_saturation", "goes_beyond"]
 
 NoiseAt = Literal["before", "after"]
 """Whether the noise is clipped with the signal, or added to what was clipped."""
@@ -291,23 +291,65 @@ def _neither_bends_nor_tilts(y: Real, visits: NDArray[np.intp], sigma: float) ->
     return bool(abs(weights[1]) < sigma and abs(weights[2]) < sigma)
 
 
-def _goes_beyond(y: Real, side: Side, prediction: Real, resolution: float, scatter: float) -> bool:
-    """Whether the prediction, set right on the other samples, exceeds the level at the level."""
+def goes_beyond(found: Saturation, y: Real, prediction: Real) -> bool:
+    """Whether a prediction exceeds a level of clipping that was found without it.
+
+    Parameters
+    ----------
+    found : Saturation
+        Clipping of `y`.
+    y, prediction : ndarray, shape (n,)
+        Output, and what a model of its other samples says it would be.
+
+    Examples
+    --------
+    >>> wave = np.sin(np.arange(1000) / 50)
+    >>> y = np.clip(wave, -2.0, 0.8)
+    >>> found = detect_saturation(y)
+    >>> goes_beyond(found, y, wave), goes_beyond(found, y, y)
+    (True, False)
+    """
+    sides = ((found.low, found.clipped_low, -1.0), (found.high, found.clipped_high, 1.0))
+    for level, at, sign in sides:
+        if level is None:
+            continue
+        told = _beyond(sign * y, sign * level, at, sign * prediction, 0.0)
+        if told is not None and _is_passed(*told, at, 0.0):
+            return True
+    return False
+
+
+def _beyond(
+    y: Real, level: float, at: Mask, prediction: Real, resolution: float
+) -> tuple[Real, float] | None:
+    """How far the prediction, set right on the other samples, lies beyond the level; its error."""
     slope = np.gradient(prediction)
     rows = np.stack([np.ones(y.size), prediction, slope, np.gradient(slope)])
-    free = ~side.at
+    free = ~at
     between = free & (y > y.min() + resolution)  # the other end may be clipped too
     if np.count_nonzero(between) > FEW * y.size:
         free = between
     if np.count_nonzero(free) < 4 * rows.shape[0]:
-        return False
+        return None
     weights = np.linalg.lstsq(rows[:, free].T, y[free], rcond=None)[0]
     corrected = weights @ rows
-    error = _spread((y - corrected)[free])
-    beyond = (corrected - side.level)[side.at]
-    runs = int(np.count_nonzero(side.at[1:] & ~side.at[:-1])) + 1
+    return (corrected - level)[at], _spread((y - corrected)[free])
+
+
+def _is_passed(beyond: Real, error: float, at: Mask, resolution: float) -> bool:
+    """Whether most of a prediction lies beyond the level, by more than its error."""
+    runs = int(np.count_nonzero(at[1:] & ~at[:-1])) + 1
     least = max(ONE_SIDED * error / np.sqrt(runs), 0.5 * error, 0.5 * resolution)
-    if np.mean(beyond) > least and np.mean(beyond > 0) > MOST:
+    return bool(np.mean(beyond) > least and np.mean(beyond > 0) > MOST)
+
+
+def _goes_beyond(y: Real, side: Side, prediction: Real, resolution: float, scatter: float) -> bool:
+    """Whether the prediction exceeds the level at the level, or moves where no value does."""
+    told = _beyond(y, side.level, side.at, prediction, resolution)
+    if told is None:
+        return False
+    beyond, error = told
+    if _is_passed(beyond, error, side.at, resolution):
         return True
     # Values that scatter elsewhere and are all alike here, while the prediction moves.
     noise = min(error, scatter)
