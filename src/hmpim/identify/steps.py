@@ -111,6 +111,8 @@ def _behind_levels(
     if levels.noise == "after" and not behind.best.is_white:
         return None
     joint = chosen_of(behind, question.plain)
+    if levels.noise == "after" and not goes_beyond(levels, y, joint.best.fit.prediction):
+        return None
     refined = refine(joint, clipped, question.aligned.fs) if joint.related else None
     if refined is None:
         return None
