@@ -18,6 +18,7 @@ from scipy.signal import lfilter
 
 import hmpim
 from hmpim.identify.nonlinear.mechanisms import play, rate_limited
+from hmpim.identify.nonlinear.words import KIND_WORDS
 
 FS = 200.0
 TIME = np.arange(2000) / FS
@@ -98,7 +99,7 @@ def linear_record(kind: str, seed: int) -> hmpim.Record:
 def one_linear(kind: str, seed: int) -> tuple[bool, bool]:
     """Whether it was called nonlinear, and whether that alone made it doubtful."""
     pair = hmpim.identify(linear_record(kind, seed))["y", "u"]
-    alarm = any(w.code == "nonlinear" for w in pair.warnings)
+    alarm = any(w.code in ("nonlinear", "rate_limit") for w in pair.warnings)
     return alarm, alarm and pair.verdict == "doubtful"
 
 
@@ -142,8 +143,11 @@ def one_nonlinear(case: tuple[str, float, float], seed: int) -> Found:
     kind, size, noise = case
     pair = hmpim.identify(nonlinear_record(kind, size, noise, seed))["y", "u"]
     found = pair.nonlinearity
-    warned = any(w.code == "nonlinear" for w in pair.warnings)
-    kinds = () if found is None else found.kinds
+    texts = [w.message for w in pair.warnings if w.code == "nonlinear"]
+    limited = any(w.code == "rate_limit" for w in pair.warnings)  # found, and part of the model
+    warned = bool(texts) or limited
+    named = {kind for kind, words in KIND_WORDS.items() if any(words in text for text in texts)}
+    kinds = tuple(sorted(named | ({"rate_limit"} if limited else set())))
     if not warned:
         said = "missed"
     elif kinds == (kind,):

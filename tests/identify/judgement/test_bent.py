@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from hmpim.identify.judgement.bent import bent
+from hmpim.identify.noise.misfit import Misfit
 from hmpim.identify.nonlinear.bends import Bend
 from hmpim.identify.reading.spanned import blurred, spanned
 from hmpim.identify.result.groups import MODELLED
@@ -72,6 +73,17 @@ def test_what_neither_a_rich_structure_nor_a_nonlinearity_describes_is_doubted_w
     assert set(found.parameters) == set(MODELLED)
     (found,) = bent(replace(rich, bends=(bend(clean, white=True),)))
     assert found.parameters == ("scale_factor",)
+
+
+def test_dynamics_are_accused_where_a_linear_response_explains_more(clean):
+    follows = replace(clean, misfit=Misfit(share=0.6, probability=1e-30))
+    (found,) = bent(replace(follows, bends=(bend(clean),)))
+    assert (found.code, found.severity) == ("other_dynamics", "doubt")
+    assert found.parameters == ("scale_factor",)
+    assert "60 % follows the input" in found.message
+    for kept in (bend(clean, white=True), replace(bend(clean), share=0.7)):
+        (found,) = bent(replace(follows, bends=(kept,)))
+        assert found.code == "nonlinear"
 
 
 def test_every_interval_has_room_for_what_no_linear_model_is_right_to(clean):

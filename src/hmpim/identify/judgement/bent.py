@@ -23,7 +23,8 @@ def bent(evidence: Evidence) -> tuple[Finding, ...]:
     How far it moves them is known to first order, for traces that are none of them exact: enough
     to tell which figures it leaves alone. What is small or only possible widens the intervals: no
     figure is doubted for less than a model must be right to. Where a rich structure and a
-    nonlinearity that matters leave what is no noise, neither describes the record.
+    nonlinearity that matters leave what is no noise, neither describes the record; the dynamics are
+    accused where a linear response explains more of it.
     """
     sure = [one for one in evidence.bends if one.counts]
     if not sure:
@@ -38,6 +39,19 @@ def bent(evidence: Evidence) -> tuple[Finding, ...]:
     if not parameters:
         return ()
     kinds = " or ".join(dict.fromkeys(KIND_WORDS[one.kind] for one in sure))
+    linear, bend = evidence.misfit.share, sure[0].share
+    if not sure[0].white and linear > bend:  # a linear response explains more, and more is left
+        return (
+            Finding(
+                code="other_dynamics",
+                message="The record requires dynamics other than the model's: of the residual's "
+                f"power {percent(linear)} % follows the input as that of a linear system does, "
+                f"and {kinds} would explain {percent(bend)} %. Sweep higher, or use the measured "
+                "response.",
+                severity="doubt",
+                parameters=parameters,
+            ),
+        )
     sized = [
         f"{in_words(name)} by {percent(moved[name])} %"
         for name in SIZES
