@@ -130,3 +130,10 @@ def test_one_transform_tells_the_papers_peak_and_who_is_ahead(offsets, late):
     assert seen.peak.value == pytest.approx(wanted.value, rel=1e-9)
     assert seen.is_ahead == (late < 0)
     assert (seen.lead if late < 0 else seen.lag) == late
+
+
+@pytest.mark.parametrize("bias", [0.0, 1e3, -1e6])
+def test_a_bias_of_many_times_the_motion_has_no_peak_of_its_own(bias) -> None:
+    u = sweep()
+    y = np.concatenate([np.zeros(30), u[:-30]]) + bias
+    assert likeness(u, y, 200).peak.lag == 30

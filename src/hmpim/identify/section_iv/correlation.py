@@ -10,7 +10,7 @@ from hmpim.errors import RecordError
 from hmpim.identify.arrays import Complex, Real
 from hmpim.identify.kept import kept
 from hmpim.identify.signals import as_pair, as_signal
-from hmpim.identify.worth import NEARLY, PART
+from hmpim.identify.worth import MOST, NEARLY, PART
 
 __all__ = [
     "Correlation",
@@ -54,7 +54,9 @@ class Likeness:
     Parameters
     ----------
     peak : CorrelationPeak
-        The paper's, of the signals as they are.
+        The paper's, of the signals as they are; of the signals less their means where those, at the
+        paper's, resemble each other by less than half of what they do elsewhere: a bias of many
+        times the motion has its own peak.
     ahead : float
         Of the signals less their means, the correlation of largest magnitude where the output
         comes first.
@@ -158,9 +160,12 @@ def likeness(u: Real, y: Real, longest: int) -> Likeness:
     value[1:] -= means[0] * np.cumsum(moves[: half - 1])
     value[1:] -= means[1] * np.cumsum(u[: n - half : -1] - means[0])
     lag, lead = _farthest(behind[: longest + 1]), -1 - _farthest(ahead[: -longest - 1 : -1])
+    peak, late, early = _peak(value / n), _farthest(behind[:half]), float(ahead[_farthest(ahead)])
+    if abs(early) < abs(behind[late]) > abs(behind[peak.lag]) / MOST:
+        peak = CorrelationPeak(lag=late, value=float(behind[late]) / n)
     return Likeness(
-        peak=_peak(value / n),
-        ahead=float(ahead[_farthest(ahead)]),
+        peak=peak,
+        ahead=early,
         behind=(float(behind.max()), float(behind.min())),
         lag=lag,
         lead=lead if abs(ahead[lead]) > abs(behind[lag]) else None,
