@@ -43,6 +43,10 @@ def test_a_residual_that_follows_the_input_casts_doubt_from_three_per_cent_on(
     assert f"about {100 * 0.22 * np.sqrt(share):.2g} % of the output" in found.message
 
 
+def test_what_explains_none_of_the_residual_is_not_said(clean):
+    assert lack_of_fit(replace(clean, misfit=Misfit(share=0.0, probability=1e-9))) == ()
+
+
 def test_a_missing_resonance_is_a_lack_of_fit(field_record, evidence_of):
     """A static model of the field record, in which the resonance is all that matters."""
     _, u, y = field_record

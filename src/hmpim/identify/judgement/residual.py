@@ -47,7 +47,7 @@ def lack_of_fit(evidence: Evidence) -> tuple[Finding, ...]:
     white noise, times the root of what follows the input over the noise (Cauchy and Schwarz).
     """
     misfit = evidence.misfit
-    if misfit.probability >= FALSE_ALARM:
+    if misfit.probability >= FALSE_ALARM or misfit.share == 0.0:
         return ()
     owed = float(np.sqrt(misfit.share)) * evidence.unexplained
     name = structure_in_words(evidence.joint.best.fit.structure.name)
