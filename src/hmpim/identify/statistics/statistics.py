@@ -257,7 +257,8 @@ def compress(
         if not bool(signal.valid.all()):
             raise RecordError(
                 f"channel {signal.name!r} has {int((~signal.valid).sum())} samples missing; "
-                "compress the stretches between the gaps one by one and join them with +"
+                "compress the stretches between the gaps one by one (--from, --to) and join them "
+                "with + (hmpim compress a.h5 b.h5)"
             )
     window = _window(lags, aligned.samples)
     if not all(abs(knot) * aligned.fs < _FARTHEST for knot in knots):
