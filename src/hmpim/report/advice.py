@@ -67,6 +67,7 @@ _ADVICE = {
     "grazed_bandwidth": "Read the Bode plot instead, or lower the noise.",
     "unsampled_input": "Sample faster, or filter the command before it is sampled.",
     "halves_disagree": "Repeat the test: the unit may have changed while it ran.",
+    "feedback": "Identify the unit through what drives its loop: `--reference`.",
     "not_converged": "Repeat the test with a stronger stimulus.",
     "negative_delay": "Read delay and dynamics together: feedforward can make the output lead.",
     "folded": "Sample faster: the unit responds beyond half the sampling rate.",

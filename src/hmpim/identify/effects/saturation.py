@@ -18,7 +18,7 @@ from hmpim.identify.arrays import Mask, Real, every_of, median
 from hmpim.identify.chance import BULK, DEVIATIONS, FALSE_ALARM, ONE_SIDED, deviations
 from hmpim.identify.effects.smeared import Side, smeared_plateaus
 from hmpim.identify.signals import as_pair, as_signal
-from hmpim.identify.worth import FEW, MATERIAL, MOST, MUCH, NEARLY, TOLERATED, TWICE
+from hmpim.identify.worth import FEW, MATERIAL, MOST, MUCH, NEARLY, ROUNDING, TOLERATED, TWICE
 
 __all__ = ["NoiseAt", "Saturation", "detect_saturation", "goes_beyond"]
 
@@ -314,7 +314,7 @@ def goes_beyond(found: Saturation, y: Real, prediction: Real) -> bool:
         if level is None:
             continue
         told = _beyond(sign * y, sign * level, at, sign * prediction, 0.0)
-        if told is not None and _is_passed(*told, at, 0.0):
+        if told is not None and _is_passed(*told, at, ROUNDING * float(np.ptp(y))):
             return True
     return False
 
