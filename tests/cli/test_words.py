@@ -40,7 +40,7 @@ def here(tmp_path, monkeypatch):
         (("identify", "good.csv", "--json", "folder"), "is a folder; name a file in it"),
         (("identify", "good.csv", "--json", "file/r.json"), "is a file, not a folder"),
         (("identify", "good.csv", "--json", "no/r.json"), "does not exist; make it first"),
-        (("identify", "good.csv", "--report", "r.docx"), "pages or PDFs: r.html, r.pdf"),
+        (("identify", "good.csv", "--report", "r.docx"), "name it r.html"),
         (("identify", "folder"), "is a folder; name the file in it"),
         (("identify", "good.csv", "--at", "51"), "beyond the Nyquist frequency 50 Hz"),
         ((*DESIGN, "-o", "folder"), "is a folder; name a file in it"),

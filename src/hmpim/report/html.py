@@ -180,13 +180,13 @@ def check_page(path: str | PathLike[str]) -> None:
     --------
     >>> check_page("r.docx")
     Traceback (most recent call last):
-    hmpim.errors.ArgumentError: 'r.docx' ends in .docx; reports are pages or PDFs: r.html, r.pdf
+    hmpim.errors.ArgumentError: 'r.docx' ends in .docx, no page or PDF; name it r.html or r.pdf
     """
     place = Path(path)
     if place.suffix.lower() not in (*_PAGES, ".pdf"):
         raise ArgumentError(
-            f"{str(place)!r} ends in {place.suffix}; reports are pages or PDFs: "
-            f"{place.with_suffix('.html').name}, {place.with_suffix('.pdf').name}"
+            f"{str(place)!r} ends in {place.suffix}, no page or PDF; name it "
+            f"{place.with_suffix('.html').name} or {place.with_suffix('.pdf').name}"
         )
 
 

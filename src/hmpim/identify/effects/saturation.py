@@ -225,7 +225,7 @@ def _is_clipped(
     if not _is_crowded(count, below, resolution):
         return False
     if prediction is not None:
-        return _goes_beyond(y, side, prediction, resolution, scatter)
+        return _is_confirmed(y, side, prediction, resolution, scatter)
     if below.size < _FEWEST or not _is_even(below, resolution, reach):
         return False
     return _is_flat(y, side, resolution, reach)
@@ -343,7 +343,7 @@ def _is_passed(beyond: Real, error: float, at: Mask, resolution: float) -> bool:
     return bool(np.mean(beyond) > least and np.mean(beyond > 0) > MOST)
 
 
-def _goes_beyond(y: Real, side: Side, prediction: Real, resolution: float, scatter: float) -> bool:
+def _is_confirmed(y: Real, side: Side, prediction: Real, resolution: float, scatter: float) -> bool:
     """Whether the prediction exceeds the level at the level, or moves where no value does."""
     told = _beyond(y, side.level, side.at, prediction, resolution)
     if told is None:

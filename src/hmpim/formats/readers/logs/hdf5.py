@@ -17,7 +17,6 @@ from hmpim.record import Finding, Series
 __all__ = ["HDF5", "channels", "parse", "read", "sniff"]
 
 _MAGIC = b"\x89HDF\r\n\x1a\n"
-_STATISTICS = "hmpim/statistics/"
 _WIDE = 200  # columns that a dataset may open into
 _MANY = 20_000  # datasets that are looked at
 
@@ -50,12 +49,14 @@ def parse(path: Path, layout: Layout) -> Log:
     """
     import h5py
 
-    file = h5py.File(path, "r")
-    if str(file.attrs.get("schema", "")).startswith(_STATISTICS):
+    from hmpim.formats.statistics_files import holds_statistics
+
+    if holds_statistics(path):
         raise FormatError(
             f"{path.name!r} holds statistics of a record and not its samples; hmpim identify and "
             "hmpim compress take it, here give the record itself"
         )
+    file = h5py.File(path, "r")
     groups: dict[tuple[str, int], list[Column]] = {}
     elsewhere: list[str] = []
     for name, dataset in _datasets(file):
