@@ -275,6 +275,7 @@ NOISE = (
     family("spikes", "One sample in two hundred far out", SECOND, SWEEP, c.spikes),
     family("missing", "One row in twenty is not there", SECOND, SWEEP, c.missing),
     family("jitter", "The clock's stamps jitter by 5 %", SECOND, SWEEP, c.jitter),
+    family("stamped on arrival", "Even samples, stamps late by chance", SECOND, SWEEP, c.arrival),
     family("drift", "The bias moves steadily", SECOND, SWEEP, c.drift("steady")),
     family("thermal", "The bias warms up", SECOND, SWEEP, c.drift("thermal")),
     family("noise on the input", "0.3 to 3 %", SECOND, SWEEP, c.input_noise),

@@ -81,6 +81,13 @@ def jitter(take: Take) -> None:
     take.u = take.drive.source(take.stamps)
 
 
+def arrival(take: Take) -> None:
+    """Samples are even; the stamps say when each arrived: late by 0.05 to 1 interval on average."""
+    late = float(np.exp(take.rng.uniform(np.log(0.05), 0.0))) / take.drive.fs
+    stamps = take.time + late * (take.rng.exponential(size=take.y.size) - 1.0)
+    take.stamps = np.maximum.accumulate(stamps) + 1e-6 * late * np.arange(take.y.size)
+
+
 def drift(kind: str) -> Condition:
     """The bias drifts: steadily, warming up, or as a slow wander."""
 

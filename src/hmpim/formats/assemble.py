@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from hmpim.errors import ArgumentError, FormatError, RecordError, UnitError
 from hmpim.formats.readers import Contents, listed
 from hmpim.formats.roles import Roles
-from hmpim.record import Channel, Finding, Record, Series, fit_clock
+from hmpim.record import Channel, Finding, Record, Series, rate_of
 from hmpim.record.mend import check_runs_on, mend, restarts
 from hmpim.units import check_unit
 
@@ -72,7 +72,7 @@ def assemble(
 
     inputs, outputs = of(roles.inputs), of(roles.outputs)
     stated = contents.fs if fs is None else fs
-    rate = float(stated) if stated is not None else fit_clock(outputs[0].time).fs
+    rate = float(stated) if stated is not None else rate_of(outputs[0].time)
     return Record(
         inputs=inputs,
         outputs=outputs,

@@ -2,7 +2,7 @@
 
 from hmpim.record.align import Aligned, Signal, uniform
 from hmpim.record.channel import BETWEEN, Channel, Intersample
-from hmpim.record.clock import Clock, fit_clock
+from hmpim.record.clock import Clock, fit_clock, rate_of
 from hmpim.record.describe import Description, describe
 from hmpim.record.finding import Finding, Severity
 from hmpim.record.held import Waveform
@@ -43,5 +43,6 @@ __all__ = [
     "inspect_values",
     "on_grid",
     "propose",
+    "rate_of",
     "uniform",
 ]

@@ -1,11 +1,11 @@
 """The uniform clock behind a channel's time stamps: its rate, its jitter, its gaps."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["JITTER_THRESHOLD", "Clock", "fit_clock"]
+__all__ = ["JITTER_THRESHOLD", "Clock", "fit_clock", "rate_of"]
 
 JITTER_THRESHOLD = 0.01
 """Largest distance from the uniform clock that is let pass, as a share of the interval.
@@ -60,13 +60,28 @@ class Clock:
         return int(self.index[-1]) + 1
 
     @property
+    def mostly_empty(self) -> bool:
+        """Whether more places miss a sample than hold one, as with samples stamped in packets."""
+        return self.length > 2 * self.index.size
+
+    @property
+    def without_jitter(self) -> "Clock":
+        """The same for samples that were taken evenly, whatever their stamps say."""
+        return replace(self, deviation=np.zeros(self.deviation.size), jittered=False)
+
+    @property
     def rounding(self) -> float:
         """Distance in s below which two instants of this clock cannot be told apart."""
         noise = 8 * float(np.spacing(abs(self.start) + self.length / self.fs))
         return noise if self.jittered else noise + float(np.abs(self.deviation).max())
 
 
-def fit_clock(time: NDArray[np.float64], *, nominal: float | None = None) -> Clock:
+def fit_clock(
+    time: NDArray[np.float64],
+    *,
+    nominal: float | None = None,
+    index: NDArray[np.int64] | None = None,
+) -> Clock:
     """Lay a uniform clock through increasing time stamps.
 
     Stamps that are a uniform clock rounded to a decimal step (0.0016384 k printed with six
@@ -80,6 +95,8 @@ def fit_clock(time: NDArray[np.float64], *, nominal: float | None = None) -> Clo
         Strictly increasing time stamps in s, n >= 2.
     nominal : float, optional
         Stated rate in Hz; it is kept, digit for digit, where the stamps agree with it.
+    index : integer ndarray, shape (n,), optional
+        Place of each stamp, where it is known; found from the intervals if None.
 
     Returns
     -------
@@ -95,7 +112,7 @@ def fit_clock(time: NDArray[np.float64], *, nominal: float | None = None) -> Clo
     n = time.size
     since = time - time[0]
     resolution = _decimal_step(since, float(np.abs(time).max()))
-    missing = _missing(since)
+    missing = _missing(since) if index is None else np.diff(index) - 1
     # A dropped sample bends the stamps by a whole interval; rounding bends them by one
     # decimal step at most. Where the decimal step is nearly an interval, the two look alike,
     # and only many "gaps" speak for rounding.
@@ -130,6 +147,22 @@ def fit_clock(time: NDArray[np.float64], *, nominal: float | None = None) -> Clo
     )
 
 
+def rate_of(time: NDArray[np.float64]) -> float:
+    """Rate (Hz) of increasing stamps (shape (n,), s) of which none is stated.
+
+    Of samples that arrive in packets it is their mean rate, not that within a packet.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> packets = np.repeat(np.arange(1, 6), 10) / 10 + 1e-5 * np.tile(np.arange(10), 5)
+    >>> round(rate_of(np.arange(50) / 100), 9), round(rate_of(packets))
+    (100.0, 122)
+    """
+    clock = fit_clock(time)
+    return float(time.size - 1) / float(time[-1] - time[0]) if clock.mostly_empty else clock.fs
+
+
 def _std(deviation: NDArray[np.float64]) -> float:
     """Standard deviation, of stamps of any size."""
     with np.errstate(over="ignore"):
@@ -153,15 +186,34 @@ def _missing(since: NDArray[np.float64]) -> NDArray[np.int64]:
         missing[sure] = np.clip(np.rint(steps[sure] / ruler) - 1, 1, _MOST_MISSING)
     doubtful = np.flatnonzero((steps > 1.3 * ruler) & ~sure)
     while doubtful.size:
-        closed = since - ruler * np.concatenate(([0], np.cumsum(missing)))
-        late = _lateness(closed, doubtful) / ruler
+        late = _late_now(since, missing, ruler, doubtful)
         # Neighbours see the same gap; the one that sees most of it holds it.
         found = doubtful[(late > 0.5) & (late >= _largest_near(doubtful, late))]
         if not found.size:
             break
         missing[found] += 1
         doubtful = np.setdiff1d(doubtful, found)
+    gaps = np.flatnonzero(missing)
+    while gaps.size:  # one stamp was late by more than an interval, and those after it are not
+        early = -_late_now(since, missing, ruler, gaps)
+        found = gaps[(early > 0.5) & (early >= _largest_near(gaps, early))]
+        if not found.size:
+            break
+        counted = np.maximum(np.rint(early[np.isin(gaps, found)]), 1).astype(np.int64)
+        missing[found] -= np.minimum(counted, missing[found])
+        gaps = np.flatnonzero(missing)
     return missing
+
+
+def _late_now(
+    since: NDArray[np.float64],
+    missing: NDArray[np.int64],
+    ruler: float,
+    at: NDArray[np.int64],
+) -> NDArray[np.float64]:
+    """Intervals by which the stamps after some are later than those before, gaps closed."""
+    closed = since - ruler * np.concatenate(([0], np.cumsum(missing)))
+    return _lateness(closed, at) / ruler
 
 
 _WINDOW = 5  # stamps on either side that say whether a delay stays

@@ -5,6 +5,7 @@ from numpy.typing import NDArray
 
 from hmpim.record.channel import Channel
 from hmpim.record.clock import Clock, fit_clock
+from hmpim.record.even import evenly_sampled
 from hmpim.record.finding import Finding
 from hmpim.record.record import Record
 
@@ -41,9 +42,16 @@ def inspect_timing(time: NDArray[np.float64], fs: float) -> tuple[Finding, ...]:
 
 
 def clock_findings(
-    clock: Clock, time: NDArray[np.float64], *, stated: float | None = None, name: str = ""
+    clock: Clock,
+    time: NDArray[np.float64],
+    *,
+    stated: float | None = None,
+    name: str = "",
+    even: Clock | None = None,
 ) -> tuple[Finding, ...]:
     """Say what is odd about a clock that was laid through `time` (shape (n,), s).
+
+    `even` is the clock of samples that were taken evenly, where only their stamps jitter.
 
     Examples
     --------
@@ -54,6 +62,7 @@ def clock_findings(
     """
     of = f" of {name!r}" if name else ""
     findings = []
+    jittered, clock = clock.jittered or even is not None, even or clock
     gaps = clock.gaps
     if gaps.size:
         missing = np.diff(clock.index)[gaps] - 1
@@ -72,23 +81,8 @@ def clock_findings(
                 parameters=(),
             )
         )
-    if clock.jittered:
-        share = 100 * clock.fs
-        rms = float(np.sqrt(np.mean(clock.deviation**2)))
-        most = float(np.abs(clock.deviation).max())
-        findings.append(
-            Finding(
-                code="jitter",
-                message=(
-                    f"time stamps{of} stray from a uniform clock of {clock.fs:.6g} Hz by "
-                    f"{share * rms:.2g} % of the interval (r.m.s.), {share * most:.2g} % at most; "
-                    "the samples are interpolated; record with a hardware clock if errors "
-                    "at high frequency matter"
-                ),
-                severity="info",
-                parameters=(),
-            )
-        )
+    if jittered:
+        findings.append(_jitter(clock, time, of, evenly=even is not None))
     if stated is not None and abs(clock.fs / stated - 1) > 0.01:
         findings.append(
             Finding(
@@ -102,6 +96,29 @@ def clock_findings(
             )
         )
     return tuple(findings)
+
+
+def _jitter(clock: Clock, time: NDArray[np.float64], of: str, *, evenly: bool) -> Finding:
+    """Say how far stamps stray, and what became of the samples."""
+    deviation = time - clock.start - clock.index / clock.fs
+    share = 100 * clock.fs
+    rms, most = float(np.sqrt(np.mean(deviation**2))), float(np.abs(deviation).max())
+    strayed = (
+        f"time stamps{of} stray from a uniform clock of {clock.fs:.6g} Hz by "
+        f"{share * rms:.2g} % of the interval (r.m.s.), {share * most:.2g} % at most; "
+    )
+    if evenly:
+        what = (
+            "the samples themselves are even, as they form smooth signals at equal intervals and "
+            "not at their stamps: equal intervals are used; stamp the samples where they are taken"
+        )
+    else:
+        what = (
+            "the samples are interpolated; record with a hardware clock if errors at high "
+            "frequency matter"
+        )
+    code = "even_samples" if evenly else "jitter"
+    return Finding(code=code, message=strayed + what, severity="info", parameters=())
 
 
 def inspect_values(record: Record) -> tuple[Finding, ...]:
@@ -180,13 +197,17 @@ def inspect_record(record: Record) -> tuple[Finding, ...]:
     """
     findings: list[Finding] = []
     seen: list[NDArray[np.float64]] = []
-    for channel in (*record.outputs, *record.inputs):
+    channels = (*record.outputs, *record.inputs)
+    shared = all(np.array_equal(c.time, channels[0].time) for c in channels)
+    for channel in channels:
         if any(channel.time is t or np.array_equal(channel.time, t) for t in seen):
             continue
         clock = fit_clock(channel.time, nominal=record.fs)
         stated = record.fs if not seen else None  # the stated rate is that of the first clock
         name = channel.name if seen else ""
-        findings.extend(clock_findings(clock, channel.time, stated=stated, name=name))
+        even = evenly_sampled(channels, clock, nominal=record.fs) if shared else None
+        found = clock_findings(clock, channel.time, stated=stated, name=name, even=even)
+        findings.extend(found)
         seen.append(channel.time)
     return (*record.findings, *findings, *inspect_values(record))
 

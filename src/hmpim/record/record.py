@@ -12,7 +12,7 @@ from hmpim.arguments import checked, shown
 from hmpim.equality import ByValue
 from hmpim.errors import ArgumentError, RecordError
 from hmpim.record.channel import Channel, Intersample, frozen_samples
-from hmpim.record.clock import fit_clock
+from hmpim.record.clock import rate_of
 from hmpim.record.finding import Finding
 from hmpim.record.stopping import Stopping
 from hmpim.tables import html_table, shortened
@@ -204,7 +204,7 @@ class Record(ByValue):
             for part in given
         ]
         if fs is None and made[0]:
-            fs = fit_clock(made[0][0].time).fs
+            fs = rate_of(made[0][0].time)
         return cls(
             inputs=made[0],
             outputs=made[1],

@@ -25,6 +25,7 @@ _ADVICE = {
     "clocks": "Record both channels with one clock.",
     "clock_offset": "State the offset with `--offset`, or record with one clock.",
     "jitter": "Stamp the samples where they are taken.",
+    "even_samples": "Stamp the samples where they are taken.",
     "rate": "State the rate with `--fs`.",
     "tick": "Record finer time stamps.",
     "dropouts": "Find out why samples were lost; the rest was used.",

@@ -53,17 +53,10 @@ def feedback(evidence: Evidence) -> tuple[Finding, ...]:
         return ()
     coloured = not evidence.readings.white
     treated = ", and the fit treats some of the noise as response" if coloured else ""
-    if not evidence.jittered:
-        message = (
-            f"The residual later appears in the input: the unit was in a feedback loop{treated}. "
-            "Identify it through what drives the loop (reference=, --reference)."
-        )
-    else:  # both channels are moved alike where stamps stray and samples do not
-        message = (
-            "The residual later appears in the input, as it does where samples are even and their "
-            f"stamps jitter, and in a feedback loop{treated}. Record with a hardware clock, or "
-            "state a rate instead of stamps; identify a loop through what drives it (reference=)."
-        )
+    message = (
+        f"The residual later appears in the input: the unit was in a feedback loop{treated}. "
+        "Identify it through what drives the loop (reference=, --reference)."
+    )
     return (
         Finding(
             code="feedback",

@@ -1,0 +1,172 @@
+"""Even samples whose stamps jitter: the likelihood of both clocks, read off the samples themselves.
+
+A logger that stamps what arrives says when a sample came, not when it was taken. A signal is
+smooth at the instants where it was taken: there its neighbours predict each sample best, by a
+cubic through two on either side. In each short stretch, half the logarithm of the mean square of
+the errors of prediction, times the number of samples, is the negative log-likelihood under noise of
+the stretch's own size, so that neither a spike nor a jump decides. The stamps are dropped only if
+the sum over all channels speaks against them by more than it scatters from stretch to stretch
+(Q. H. Vuong, Econometrica 57, 1989: a test between models of which neither contains the other).
+"""
+
+from collections.abc import Sequence
+from itertools import combinations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hmpim.record.channel import Channel
+from hmpim.record.clock import Clock, fit_clock
+
+__all__ = ["evenly_sampled"]
+
+_NEIGHBOURS = (-2, -1, 1, 2)
+"""Samples that predict the one between them, by a cubic."""
+
+_STRETCH = 10
+"""Samples of one stretch."""
+
+_FEWEST = 20
+"""Stretches from which their scatter is known well enough."""
+
+_SURE = 4.0
+"""Deviations that decide against the stamps: by chance in one of 30 000 records."""
+
+_LATER = 100
+"""Samples over which lateness is a mean: half of them before, half of them after an interval."""
+
+_ALIKE = 0.05
+"""Relative difference up to which the stated rate is that of the stamps."""
+
+_FAR = 6.0
+"""Deviations of lateness beyond which samples are missing: by chance in one of 10⁹ intervals."""
+
+_BULK = 0.6745
+"""Median of the size of a normal variable, in standard deviations."""
+
+_SECTIONS = 8
+"""Sections of a record in which stamps are as early as one another, unless samples are missing."""
+
+_LASTS = 0.5
+"""Intervals by which the early stamps of sections differ where none is missing."""
+
+
+def evenly_sampled(channels: Sequence[Channel], clock: Clock, *, nominal: float) -> Clock | None:
+    """Find the even clock of samples whose stamps jitter; None where the stamps are right.
+
+    Parameters
+    ----------
+    channels : sequence of Channel
+        All on one clock.
+    clock : Clock
+        The uniform clock laid through these stamps.
+    nominal : float
+        Stated rate in Hz.
+
+    Returns
+    -------
+    Clock or None
+        Without jitter; `index` skips what is missing.
+
+    Examples
+    --------
+    >>> rng = np.random.default_rng(1)
+    >>> taken = np.arange(400) / 100
+    >>> stamps = taken + 0.002 * rng.random(400)
+    >>> y = Channel(name="y", time=stamps, values=np.sin(5 * taken))
+    >>> strayed = fit_clock(stamps, nominal=100.0)
+    >>> clock = evenly_sampled([y], strayed, nominal=100.0)
+    >>> (clock.fs, clock.uniform)
+    (100.0, True)
+    >>> y = Channel(name="y", time=stamps, values=np.sin(5 * stamps))
+    >>> evenly_sampled([y], strayed, nominal=100.0) is None
+    True
+    """
+    time = channels[0].time
+    asked = clock.jittered or clock.mostly_empty
+    if not asked or time.size < _STRETCH * _FEWEST:
+        return None
+    tried = [clock]
+    if clock.gaps.size:
+        complete = fit_clock(time, nominal=nominal, index=np.arange(time.size))
+        places = None if _none_lasts(complete) else _places(time, nominal)
+        tried.append(complete if places is None else fit_clock(time, nominal=nominal, index=places))
+    stamped = [_left(c.values, time) for c in channels]
+    gained = [_gain(channels, one, stamped) for one in tried]
+    best = int(np.argmax([gain.sum() for gain in gained]))
+    gain = gained[best]
+    scatter = float(np.sqrt(gain.size) * gain.std())
+    return tried[best].without_jitter if gain.sum() > _SURE * scatter else None
+
+
+def _gain(
+    channels: Sequence[Channel], clock: Clock, stamped: list[NDArray[np.float64]]
+) -> NDArray[np.float64]:
+    """Log-likelihood of an even clock over that of the stamps, one value for each stretch."""
+    place = clock.index.astype(np.float64)
+    even = [_left(c.values, place) for c in channels]
+    ratio = sum(np.log(before) - np.log(after) for before, after in zip(stamped, even, strict=True))
+    return np.asarray(0.5 * _STRETCH * ratio)
+
+
+def _left(values: NDArray[np.float64], time: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Mean square error of prediction from neighbours, per unit of noise, of each stretch."""
+    reach = max(_NEIGHBOURS)
+    middle = slice(reach, values.size - reach)
+
+    def moved(x: NDArray[np.float64], by: int) -> NDArray[np.float64]:
+        return x[reach + by : x.size - reach + by]
+
+    at = {k: moved(time, k) - time[middle] for k in _NEIGHBOURS}
+    weight = {k: np.ones(at[k].size) for k in _NEIGHBOURS}
+    for i, k in combinations(_NEIGHBOURS, 2):  # Lagrange's polynomials
+        apart = at[i] - at[k]
+        weight[i] *= -at[k] / apart
+        weight[k] *= at[i] / apart
+    left, noise = values[middle].copy(), np.ones(values.size - 2 * reach)
+    for k in _NEIGHBOURS:
+        left -= weight[k] * moved(values, k)
+        noise += weight[k] ** 2
+    power = left**2 / noise
+    whole = power[: power.size // _STRETCH * _STRETCH].reshape(-1, _STRETCH).mean(axis=1)
+    rounding = np.finfo(float).eps * float(np.abs(values).max(initial=0.0))
+    return np.asarray(whole + max(rounding**2, float(np.finfo(float).tiny)))
+
+
+def _places(time: NDArray[np.float64], nominal: float) -> NDArray[np.int64]:
+    """Places of stamps on their clock, counting as missing only what makes all later ones late.
+
+    Stamps of a computer that was busy catch up, and so do those of samples that arrive in packets.
+    """
+    n, half = time.size, _LATER // 2
+    since = time - time[0]
+    every = np.arange(n)
+    ruler = float(np.median(since[_LATER:] - since[:-_LATER])) / _LATER
+    if abs(ruler * nominal - 1.0) < _ALIKE:
+        ruler = 1.0 / nominal
+    total = np.concatenate(([0.0], np.cumsum(since - every * ruler)))
+    # Mean lateness of the stamps after each interval, less that of as many before it.
+    after = total[2 * half :] - total[half:-half]
+    before = total[half:-half] - total[: -2 * half]
+    late = (after - before) / (half * ruler)
+    late -= np.median(late)
+    usual = _FAR * float(np.median(np.abs(late))) / _BULK
+    found: list[int] = []
+    while late.size and float(late.max()) > max(usual, _LASTS):
+        k = int(np.argmax(late))
+        near = slice(max(k - half, 0), k + half + 1)
+        first = near.start + half  # the sample after the interval that is longest there
+        found.append(first + int(np.argmax(np.diff(since)[first - 1 : near.stop + half - 1])))
+        late[near] = 0.0
+    rows = np.stack([np.ones(n), every, *(every >= k for k in found)])
+    # How late all stamps after each gap are tells the samples in it better than those beside it.
+    _, step, *later = np.linalg.lstsq(rows.T, since, rcond=None)[0]
+    missing = np.zeros(n, dtype=np.int64)
+    missing[found] = np.maximum(np.rint(np.array(later) / step), 0)
+    return every + np.cumsum(missing)
+
+
+def _none_lasts(clock: Clock) -> bool:
+    """Whether stamps are as early in all sections of a record, as where no sample is missing."""
+    early = [np.quantile(part, 0.25) for part in np.array_split(clock.deviation, _SECTIONS)]
+    return bool(np.ptp(early) < _LASTS / clock.fs)
