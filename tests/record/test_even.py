@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 import hmpim
-from hmpim.record import Record, inspect_record, rate_of, uniform
+from hmpim.record import Record, Series, inspect_record, rate_of, uniform
+from hmpim.record.mend import mend
 
 FS, N = 200.0, 2000
 TAKEN = np.arange(N) / FS
@@ -100,6 +101,21 @@ def test_figures_are_those_of_even_stamps():
     assert stamped.delay.verdict == even.delay.verdict == "ok"
     assert stamped.delay.value == pytest.approx(even.delay.value, rel=1e-6)
     assert stamped.noise_std.value == pytest.approx(even.noise_std.value, rel=1e-6)
+
+
+def test_samples_that_share_the_stamp_of_their_packet_are_all_used():
+    """A logger that reads ten lines at a time, now and then late, and prints milliseconds."""
+    rng = np.random.default_rng(3)
+    stamps = np.ceil((np.arange(N) + 1) / 10) * 10 / FS
+    stamps = np.round(stamps + np.repeat(rng.exponential(0.004, N // 10), 10), 3)
+    signals = {"u": motion(TAKEN), "y": motion(TAKEN, late=0.05)}
+    mended = mend([Series(name=k, values=v, time=stamps) for k, v in signals.items()])
+    assert "arrive in packets" in mended.findings[0].message
+    u, y = mended.channels
+    aligned = uniform(Record(inputs=(u,), outputs=(y,), fs=rate_of(u.time)))
+    assert [f.code for f in aligned.findings] == ["even_samples"]
+    assert aligned.samples == N
+    assert aligned.fs == pytest.approx(FS, rel=1e-3)
 
 
 def test_the_rate_of_packets_is_that_of_all_samples():

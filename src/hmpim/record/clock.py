@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["JITTER_THRESHOLD", "Clock", "fit_clock", "rate_of"]
+__all__ = ["JITTER_THRESHOLD", "Clock", "fit_clock", "rate_of", "usual_interval"]
 
 JITTER_THRESHOLD = 0.01
 """Largest distance from the uniform clock that is let pass, as a share of the interval.
@@ -14,6 +14,10 @@ At a tenth of the sampling rate, one hundredth of an interval displaces one samp
 2π · 0.1 · 0.01 = 0.6 % of the amplitude at most; the r.m.s. is a third of that or less,
 below the noise of the records that the method is made for.
 """
+
+
+_APART = 100
+"""Samples between two stamps whose distance hardly feels the jitter of either."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -150,17 +154,31 @@ def fit_clock(
 def rate_of(time: NDArray[np.float64]) -> float:
     """Rate (Hz) of increasing stamps (shape (n,), s) of which none is stated.
 
-    Of samples that arrive in packets it is their mean rate, not that within a packet.
+    Of samples that arrive in packets it is the rate of all, not that within a packet.
 
     Examples
     --------
     >>> import numpy as np
-    >>> packets = np.repeat(np.arange(1, 6), 10) / 10 + 1e-5 * np.tile(np.arange(10), 5)
+    >>> packets = np.repeat(np.arange(1, 31), 10) / 10 + 1e-5 * np.tile(np.arange(10), 30)
     >>> round(rate_of(np.arange(50) / 100), 9), round(rate_of(packets))
-    (100.0, 122)
+    (100.0, 100)
     """
     clock = fit_clock(time)
-    return float(time.size - 1) / float(time[-1] - time[0]) if clock.mostly_empty else clock.fs
+    return 1.0 / usual_interval(time) if clock.jittered or clock.mostly_empty else clock.fs
+
+
+def usual_interval(time: NDArray[np.float64]) -> float:
+    """Interval of stamps (shape (n,), s), whatever a few gaps and the jitter of each are.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> time = np.delete(np.arange(1000), np.s_[500:600]) / 100
+    >>> round(usual_interval(time), 9)
+    0.01
+    """
+    apart = min(_APART, (time.size + 1) // 2)
+    return float(np.median(time[apart:] - time[:-apart])) / apart
 
 
 def _std(deviation: NDArray[np.float64]) -> float:

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hmpim.record.channel import Channel
-from hmpim.record.clock import Clock, fit_clock
+from hmpim.record.clock import Clock, fit_clock, usual_interval
 
 __all__ = ["evenly_sampled"]
 
@@ -141,7 +141,7 @@ def _places(time: NDArray[np.float64], nominal: float) -> NDArray[np.int64]:
     n, half = time.size, _LATER // 2
     since = time - time[0]
     every = np.arange(n)
-    ruler = float(np.median(since[_LATER:] - since[:-_LATER])) / _LATER
+    ruler = usual_interval(time)
     if abs(ruler * nominal - 1.0) < _ALIKE:
         ruler = 1.0 / nominal
     total = np.concatenate(([0.0], np.cumsum(since - every * ruler)))

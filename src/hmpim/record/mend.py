@@ -56,7 +56,8 @@ def mend(series: Sequence[Series], *, fs: float | None = None) -> Mended:
     * A sample that is NaN or infinite is dropped, which leaves a gap in its channel alone.
     * Stamps that stand still because the clock is printed too coarsely (2 kHz in whole
       milliseconds): the samples are spread on the uniform clock that the stamps are rounded from.
-      Else the first sample of each stamp is kept.
+      Those of packets, where half of the samples and more share a stamp: over the time since the
+      packet before. Else the first sample of each stamp is kept.
     * Samples out of order, by up to eight places: sorted by stamp.
     * Single stamps a thousand lengths of the record away: left out, as they are damaged.
     * Stamps that start again, or jump so far that nothing can be laid between: refused.
@@ -172,12 +173,18 @@ def _ordered(
         return time[order], order
     differ = any(_differs(s.values[order], first) for s in sharing)
     spread = _spread(time[order]) if differ else None
+    repeat = f"{doubled} of {time.size} stamps of {of} repeat the one before"
     if spread is not None:
         step, rate = spread[1] - spread[0], 1.0 / (spread[1] - spread[0])
         message = (
-            f"{doubled} of {time.size} stamps of {of} repeat the one before, because the clock is "
-            f"printed more coarsely than it runs; the samples are spread evenly, {step:.6g} s "
-            f"apart ({rate:.6g} Hz)"
+            f"{repeat}, because the clock is printed more coarsely than it runs; the samples are "
+            f"spread evenly, {step:.6g} s apart ({rate:.6g} Hz)"
+        )
+    elif differ and 2 * doubled >= order.size >= _ENOUGH and doubled < order.size - 1:
+        spread = _since_packet_before(time[order])
+        message = (
+            f"{repeat}, as of samples that arrive in packets; each packet is spread over the time "
+            "since the one before"
         )
     else:
         order = order[first]
@@ -187,10 +194,7 @@ def _ordered(
                 f"{time[order[0]]:.9g} s; name the column of the time with --time, or give the "
                 "rate with --fs (in Python: time=..., fs=...)"
             )
-        message = (
-            f"{doubled} of {time.size} stamps of {of} repeat the one before; the first sample of "
-            "each is kept"
-        )
+        message = f"{repeat}; the first sample of each is kept"
     findings.append(Finding(code="doubled_stamps", message=message, severity="info", parameters=()))
     return (time[order] if spread is None else spread), order
 
@@ -253,6 +257,16 @@ def _spread(time: NDArray[np.float64]) -> NDArray[np.float64] | None:
     # The least start at which no sample is stamped before it happens: stamps are cut, not rounded,
     # in most loggers; a constant offset of all channels of a clock moves no delay between them.
     return np.asarray(time[0] + even)
+
+
+def _since_packet_before(time: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Stamps of samples that share that of their packet, none longer before it than usual."""
+    stamp, count = np.unique(time, return_counts=True)
+    usual = float(stamp[-1] - stamp[0]) / (time.size - count[0])
+    before = np.maximum(np.append(-np.inf, stamp[:-1]), stamp - count * usual)
+    place = np.arange(time.size) - np.repeat(np.cumsum(count) - count, count)
+    share = (place + 1) / np.repeat(count, count)
+    return np.asarray(np.repeat(before, count) + share * np.repeat(stamp - before, count))
 
 
 def _check_not_restarted(time: NDArray[np.float64], of: str) -> None:
