@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["JITTER_THRESHOLD", "Clock", "fit_clock", "rate_of", "usual_interval"]
+__all__ = ["JITTER_THRESHOLD", "Clock", "fit_clock", "places_of_late", "rate_of", "usual_interval"]
 
 JITTER_THRESHOLD = 0.01
 """Largest distance from the uniform clock that is let pass, as a share of the interval.
@@ -18,6 +18,25 @@ below the noise of the records that the method is made for.
 
 _APART = 100
 """Samples between two stamps whose distance hardly feels the jitter of either."""
+
+
+_LATER = 100
+"""Samples over which lateness is a mean: half of them before, half of them after an interval."""
+
+_ALIKE = 0.05
+"""Relative difference up to which the stated rate is that of the stamps."""
+
+_FAR = 6.0
+"""Deviations of lateness beyond which samples are missing: by chance in one of 10⁹ intervals."""
+
+_BULK = 0.6745
+"""Median of the size of a normal variable, in standard deviations."""
+
+_LASTS = 0.5
+"""Intervals by which stamps after a gap are later at least than those before it."""
+
+_NEAR = 0.3
+"""Relative difference from the median within which most intervals lie, unless jitter is strong."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -181,6 +200,43 @@ def usual_interval(time: NDArray[np.float64]) -> float:
     return float(np.median(time[apart:] - time[:-apart])) / apart
 
 
+def places_of_late(time: NDArray[np.float64], *, nominal: float | None = None) -> NDArray[np.int64]:
+    """Places of stamps on their clock, counting as missing only what makes all later ones late.
+
+    Stamps of a computer that was busy catch up, and so do those of samples that arrive in packets.
+    """
+    n, half = time.size, _LATER // 2
+    since = time - time[0]
+    every = np.arange(n)
+    ruler = usual_interval(time)
+    if nominal is not None and abs(ruler * nominal - 1.0) < _ALIKE:
+        ruler = 1.0 / nominal
+    total = np.concatenate(([0.0], np.cumsum(since - every * ruler)))
+    # Mean lateness of the stamps after each interval, less that of as many before it.
+    after = total[2 * half :] - total[half:-half]
+    before = total[half:-half] - total[: -2 * half]
+    late = (after - before) / (half * ruler)
+    late -= np.median(late)
+    usual = _FAR * float(np.median(np.abs(late))) / _BULK
+    found: list[int] = []
+    while late.size and float(late.max()) > max(usual, _LASTS):
+        k = int(np.argmax(late))
+        near = slice(max(k - half, 0), k + half + 1)
+        first = near.start + half  # the sample after the interval that is longest there
+        found.append(first + int(np.argmax(np.diff(since)[first - 1 : near.stop + half - 1])))
+        late[near] = 0.0
+    # How late all stamps after each gap are tells the samples in it better than those beside it.
+    at = np.unique(np.array(found, dtype=np.int64))
+    run = np.searchsorted(at, every, side="right")
+    size = np.bincount(run, minlength=at.size + 1)
+    place, stamp = (np.bincount(run, x, minlength=size.size) / size for x in (every, since))
+    along, after_mean = every - place[run], since - stamp[run]
+    step = float(along @ after_mean) / float(along @ along)
+    missing = np.zeros(n, dtype=np.int64)
+    missing[at] = np.maximum(np.rint(np.diff(stamp - step * place) / step), 0)
+    return every + np.cumsum(missing)
+
+
 def _std(deviation: NDArray[np.float64]) -> float:
     """Standard deviation, of stamps of any size."""
     with np.errstate(over="ignore"):
@@ -195,6 +251,8 @@ def _missing(since: NDArray[np.float64]) -> NDArray[np.int64]:
     """Number of samples missing in each interval; shape (n - 1,)."""
     steps = np.diff(since)
     ruler = float(np.median(steps))
+    if since.size > 2 * _LATER and np.median(np.abs(steps - ruler)) > _NEAR * ruler:
+        return np.diff(places_of_late(since)) - 1
     sure = steps >= 1.9 * ruler
     # The mean of the whole intervals is a finer ruler for the long ones than the median is.
     if not sure.all():

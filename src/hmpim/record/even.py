@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hmpim.record.channel import Channel
-from hmpim.record.clock import Clock, fit_clock, usual_interval
+from hmpim.record.clock import Clock, fit_clock, places_of_late
 
 __all__ = ["evenly_sampled"]
 
@@ -31,18 +31,6 @@ _FEWEST = 20
 
 _SURE = 4.0
 """Deviations that decide against the stamps: by chance in one of 30 000 records."""
-
-_LATER = 100
-"""Samples over which lateness is a mean: half of them before, half of them after an interval."""
-
-_ALIKE = 0.05
-"""Relative difference up to which the stated rate is that of the stamps."""
-
-_FAR = 6.0
-"""Deviations of lateness beyond which samples are missing: by chance in one of 10⁹ intervals."""
-
-_BULK = 0.6745
-"""Median of the size of a normal variable, in standard deviations."""
 
 _SECTIONS = 8
 """Sections of a record in which stamps are as early as one another, unless samples are missing."""
@@ -89,7 +77,7 @@ def evenly_sampled(channels: Sequence[Channel], clock: Clock, *, nominal: float)
     tried = [clock]
     if clock.gaps.size:
         complete = fit_clock(time, nominal=nominal, index=np.arange(time.size))
-        places = None if _none_lasts(complete) else _places(time, nominal)
+        places = None if _none_lasts(complete) else places_of_late(time, nominal=nominal)
         tried.append(complete if places is None else fit_clock(time, nominal=nominal, index=places))
     stamped = [_left(c.values, time) for c in channels]
     gained = [_gain(channels, one, stamped) for one in tried]
@@ -131,39 +119,6 @@ def _left(values: NDArray[np.float64], time: NDArray[np.float64]) -> NDArray[np.
     whole = power[: power.size // _STRETCH * _STRETCH].reshape(-1, _STRETCH).mean(axis=1)
     rounding = np.finfo(float).eps * float(np.abs(values).max(initial=0.0))
     return np.asarray(whole + max(rounding**2, float(np.finfo(float).tiny)))
-
-
-def _places(time: NDArray[np.float64], nominal: float) -> NDArray[np.int64]:
-    """Places of stamps on their clock, counting as missing only what makes all later ones late.
-
-    Stamps of a computer that was busy catch up, and so do those of samples that arrive in packets.
-    """
-    n, half = time.size, _LATER // 2
-    since = time - time[0]
-    every = np.arange(n)
-    ruler = usual_interval(time)
-    if abs(ruler * nominal - 1.0) < _ALIKE:
-        ruler = 1.0 / nominal
-    total = np.concatenate(([0.0], np.cumsum(since - every * ruler)))
-    # Mean lateness of the stamps after each interval, less that of as many before it.
-    after = total[2 * half :] - total[half:-half]
-    before = total[half:-half] - total[: -2 * half]
-    late = (after - before) / (half * ruler)
-    late -= np.median(late)
-    usual = _FAR * float(np.median(np.abs(late))) / _BULK
-    found: list[int] = []
-    while late.size and float(late.max()) > max(usual, _LASTS):
-        k = int(np.argmax(late))
-        near = slice(max(k - half, 0), k + half + 1)
-        first = near.start + half  # the sample after the interval that is longest there
-        found.append(first + int(np.argmax(np.diff(since)[first - 1 : near.stop + half - 1])))
-        late[near] = 0.0
-    rows = np.stack([np.ones(n), every, *(every >= k for k in found)])
-    # How late all stamps after each gap are tells the samples in it better than those beside it.
-    _, step, *later = np.linalg.lstsq(rows.T, since, rcond=None)[0]
-    missing = np.zeros(n, dtype=np.int64)
-    missing[found] = np.maximum(np.rint(np.array(later) / step), 0)
-    return every + np.cumsum(missing)
 
 
 def _none_lasts(clock: Clock) -> bool:
