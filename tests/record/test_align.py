@@ -84,15 +84,36 @@ def test_a_held_input_is_held_through_a_gap():
     assert uniform(record).inputs[0].values[6:10].tolist() == [1, 1, 1, 5]
 
 
-def test_jitter_is_interpolated_to_the_stated_accuracy():
+@pytest.mark.parametrize(("f", "inside", "near_ends"), [(20.0, 6e-5, 5e-4), (40.0, 9e-4, 7e-3)])
+def test_jitter_is_interpolated_to_the_stated_accuracy(f, inside, near_ends):
     rng = np.random.default_rng(0)
     time = (np.arange(4000) + 0.3 * rng.uniform(-1, 1, 4000)) / 200
-    aligned = uniform(record_at(time, f=20.0))
+    aligned = uniform(record_at(time, f=f))
     assert [f.code for f in aligned.findings] == ["jitter"]
-    error = aligned.outputs[0].values / 2 - sine(aligned.time, 20.0)
-    assert np.sqrt(np.mean(error**2)) < 6e-4  # the docstring says 5e-4; the jitter is random
+    error = aligned.outputs[0].values / 2 - sine(aligned.time, f)
+    # As the docstring says; the jitter is random.
+    assert np.sqrt(np.mean(error[40:-40] ** 2)) < 1.2 * inside
+    ends = np.append(error[2:40], error[-40:-2])
+    assert np.sqrt(np.mean(ends**2)) < 1.5 * near_ends
     # Without interpolation the jitter alone would err a hundred times as much.
-    assert np.std(sine(time, 20.0) - sine(aligned.time, 20.0)) > 5e-2
+    assert np.std(sine(time, f) - sine(aligned.time, f)) > 5e-2
+
+
+def test_the_noise_of_interpolated_samples_is_doubted_where_it_is_raised():
+    """White noise at stamps that jitter: the text states by how much it grows."""
+    rng = np.random.default_rng(5)
+    for size, doubted in ((0.05, False), (0.3, True)):
+        stamps = (np.arange(20_000) + size * rng.uniform(-1, 1, 20_000)) / 200
+        noise = rng.standard_normal(stamps.size)
+        signals = {"u": sine(stamps, 30.0)}, {"y": 1e3 * sine(stamps, 30.0) + noise}
+        aligned = uniform(Record.from_arrays(*signals, time=stamps))
+        (finding,) = aligned.findings
+        assert finding.parameters == (("noise_std",) if doubted else ())
+        left = aligned.outputs[0].values - 1e3 * sine(aligned.time, 30.0)
+        raised = float(np.std(left[50:-50])) - 1.0
+        said = 4.0 * size**2 / 3
+        assert raised == pytest.approx(said, abs=0.02)
+        assert (f"by about {100 * said:.0f} %" in finding.message) == doubted
 
 
 @examples(20)
