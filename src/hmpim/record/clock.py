@@ -35,7 +35,7 @@ _BULK = 0.6745
 _LASTS = 0.5
 """Intervals by which stamps after a gap are later at least than those before it."""
 
-_NEAR = 0.3
+_NEAR = 0.25
 """Relative difference from the median within which most intervals lie, unless jitter is strong."""
 
 
