@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy import signal
 
 import hmpim
 from hmpim.errors import ArgumentError, RecordError
@@ -72,6 +73,25 @@ def test_a_model_that_is_off_within_its_bars_passes_a_long_record():
     for seed in range(3):
         found = hmpim.identify(hmpim.run(noisy, short, rng=seed), structures=["second_order"])
         assert checks(hmpim.validate(found, record))["follows_input"]
+
+
+@pytest.mark.parametrize(
+    ("numerator", "denominator"),
+    [([0.2], [1, -0.8]), ([0.2] * 5, [1]), signal.butter(2, 0.1), signal.butter(4, 0.05)],
+)
+@pytest.mark.parametrize("bias", [0.0, 3.0])
+def test_exact_software_passes_whatever_its_rounding_looks_like(numerator, denominator, bias):
+    def filtered(stimulus, error=0.0):
+        u = np.asarray(stimulus.position)
+        y = signal.lfilter(numerator, denominator, u) + bias + error * u
+        return hmpim.Record.from_arrays({"u": u}, {"y": y}, fs=100.0)
+
+    result = hmpim.identify(filtered(SWEEP))
+    assert result["y"].intersample == "sampled"
+    assert hmpim.validate(result, filtered(OTHER)).passed
+    (output,) = hmpim.validate(result, filtered(OTHER), bounds=Bounds(fit_percent=99)).outputs
+    assert [check.name for check in output.checks if check.low is not None] == ["fit_percent"]
+    assert not hmpim.validate(result, filtered(OTHER, error=1e-6)).passed
 
 
 def test_what_is_bounded_is_what_is_asked(result):

@@ -19,7 +19,7 @@ from hmpim.identify.result.digits import percent
 from hmpim.identify.result.plain import plain
 from hmpim.identify.section_iv.spectrum import excited_band
 from hmpim.identify.uses.predict import fit_percent_of, settling_time, to_model
-from hmpim.identify.worth import MATERIAL
+from hmpim.identify.worth import MATERIAL, ROUNDING
 from hmpim.model import Model, draw_models, simulate
 from hmpim.model.dynamics import FILTERS, STRUCTURES
 from hmpim.record import Aligned, Record, uniform
@@ -194,7 +194,9 @@ def validate(result: Identification, record: Record, *, bounds: Bounds | None = 
     The whole chain is predicted. What came before the record is unknown: scoring begins when the
     model has forgotten it. Clipped samples do not count, of a held output only those in which it
     is read. An integrator's prediction may start anywhere. That a residual follows the input
-    counts against the result only beyond what the error bars admit at the same chance.
+    counts against the result only beyond what the error bars admit at the same chance. Rounding
+    is not noise: it may have any colour and follow the input. A residual of at most 1e-9 of the
+    output (r.m.s.), as exact software leaves, has no bounds.
 
     Examples
     --------
@@ -286,6 +288,8 @@ def _validated(
         predicted = predicted + float(np.mean((y.values - predicted)[scored]))
     residual = np.where(scored, y.values - predicted, 0.0)
     std = np.hypot(noise, model_std)
+    if np.sqrt(np.mean(residual[scored] ** 2)) <= ROUNDING * np.std(y.values[scored]):
+        bounds = Bounds(fit_percent=bounds.fit_percent, noise_ratio=None, chance=None)
     return OutputValidation(
         output=y.name,
         inputs=tuple(pair.input for pair in pairs),
