@@ -6,6 +6,7 @@ from itertools import islice
 import h5py
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
 import hmpim
 from batch_support import FS, SAMPLES, gain_record, rounded
@@ -14,6 +15,7 @@ from hmpim.batch.addresses import addresses_of, find_files
 from hmpim.batch.parts import parts_in
 from hmpim.batch.run import Cluster
 from hmpim.batch.work import Task
+from hmpim.cli.main import app
 
 HERE = Cluster(workers=0, per_task=2)
 
@@ -128,6 +130,24 @@ def test_a_record_that_fails_is_a_row_with_its_reason(folder_of_records, tmp_pat
     names = {name.rpartition("/")[2] for name in failed["record"]}
     assert names == {"unit0.csv", "unit9.h5"}
     assert len(gains(table)) == 5
+
+
+def test_a_batch_of_which_every_record_is_refused_is_bad_input(folder_of_records, tmp_path):
+    for path in sorted(folder_of_records.glob("*"))[2:]:
+        path.unlink()
+    asked = ["batch", str(folder_of_records), "--out", str(tmp_path / "out"), "--workers", "0"]
+    told = CliRunner().invoke(app, [*asked, "--input", "nothing"])
+    assert told.exit_code == 2
+    (line,) = told.stderr.splitlines()
+    assert line.startswith("hmpim: no record could be identified")
+    assert "unit1.h5: " in line
+    assert "'nothing'" in line
+    assert "study.html" in line
+    assert (tmp_path / "out" / "study.html").exists()
+    (folder_of_records / "unit1.h5").unlink()
+    (folder_of_records / "broken.h5").write_text("none")
+    told = CliRunner().invoke(app, [*asked, "--fresh"])
+    assert told.exit_code == 0, told.output
 
 
 def test_what_is_done_is_not_done_again(folder_of_records, tmp_path, gain_alone):

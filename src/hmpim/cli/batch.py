@@ -13,7 +13,7 @@ from hmpim.cli.files import check_files
 from hmpim.cli.identify import Between
 from hmpim.cli.reading import Input, Output, Rate, Time, Unit, units_of
 from hmpim.cli.terminal import output_console, say, stopping, warn
-from hmpim.errors import ArgumentError
+from hmpim.errors import ArgumentError, RecordError
 
 if TYPE_CHECKING:
     from hmpim.batch.run import State
@@ -126,7 +126,7 @@ def batch(
     Writes Parquet parts that pandas, Polars and DuckDB read, and one page.
     A record that fails gets a row with the reason.
     If it is stopped, the same command continues from there.
-    Exit code 1: a record does not meet a bound.
+    Exit code 1: a record does not meet a bound. 2: every record was refused.
     """
     page = out / "study.html" if report is None else report
     check_files(reads={"the metadata": metadata}, writes={"--report": page}, folders={"--out": out})
@@ -174,8 +174,20 @@ def batch(
             )
         say(f"Parts: {out / 'parts'}")
         say(f"Page:  {page}")
+    _check_any(table, page)
     if any(outcome.failed for outcome in outcomes):
         raise typer.Exit(1)
+
+
+def _check_any(table: "BatchTable", page: Path) -> None:
+    """Refuse a batch of which every record was refused, as one such record is."""
+    verdicts = table.to_arrow(["verdict"]).column(0)
+    if verdicts.null_count < len(verdicts):
+        return
+    from hmpim.batch.summary import summary_of
+
+    why = summary_of(table).failures[0]
+    raise RecordError(f"no record could be identified, as {page} shows; {why.first}: {why.reason}")
 
 
 def _print(table: "BatchTable") -> None:
