@@ -9,6 +9,7 @@ import numpy as np
 
 from hmpim.errors import FormatError
 from hmpim.formats.atomic import replacing
+from hmpim.formats.hdf5 import fault_of
 from hmpim.identify import Statistics
 from hmpim.identify.statistics.reach import Reach
 from hmpim.identify.statistics.run import Run
@@ -71,7 +72,7 @@ def holds_statistics(path: str | PathLike[str]) -> bool:
     try:
         with h5py.File(Path(path), "r") as file:
             return str(file.attrs.get("schema", "")) == SCHEMA
-    except OSError:  # no HDF5
+    except Exception:  # no HDF5, or damaged
         return False
 
 
@@ -89,8 +90,8 @@ def read_statistics(path: str | PathLike[str]) -> Statistics:
         with h5py.File(Path(path), "r") as file:
             statistics = _read(file)
             digest = str(file.attrs["sha256"])
-    except Exception as error:  # whatever HDF5 says of a damaged file
-        raise FormatError(f"{str(path)!r} holds no whole statistics: {error}") from error
+    except Exception as error:
+        raise fault_of(Path(path), error) from error
     if digest != _digest(statistics.runs):
         raise FormatError(f"{str(path)!r} was changed after it was written; compress again")
     return statistics

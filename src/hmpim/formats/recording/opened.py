@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hmpim.errors import FormatError, HmpimError
+from hmpim.formats.hdf5 import fault_of
 from hmpim.formats.recording.heading import Heading, State, read_heading, read_state
 from hmpim.formats.recording.layout import GROUPS
 from hmpim.formats.recording.text import text_of
@@ -172,13 +173,8 @@ def _sane(path: Path) -> Iterator[None]:
         raise FormatError(f"{path.name!r} is no record file that can be read: {error}") from None
     except HmpimError:
         raise
-    except FileNotFoundError:
-        raise FormatError(f"there is no file {str(path)!r}; check the path") from None
-    except Exception as error:  # h5py raises a dozen kinds
-        reason = " ".join(str(error).split()) or type(error).__name__
-        raise FormatError(
-            f"{path.name!r} is no record file that can be read, or is damaged: {reason}"
-        ) from error
+    except Exception as error:
+        raise fault_of(path, error) from error
 
 
 _MOST_PACKED = 2**32

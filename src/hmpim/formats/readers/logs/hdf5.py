@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hmpim.errors import FormatError
+from hmpim.formats.hdf5 import fault_of
 from hmpim.formats.readers.logs.clock import is_time
 from hmpim.formats.readers.logs.log import Column, Group, Log, list_log, take_series, unit_of
 from hmpim.formats.readers.protocol import Contents, Layout, Reader
@@ -56,10 +57,14 @@ def parse(path: Path, layout: Layout) -> Log:
             f"{path.name!r} holds statistics of a record and not its samples; hmpim identify and "
             "hmpim compress take it, here give the record itself"
         )
-    file = h5py.File(path, "r")
+    try:
+        file = h5py.File(path, "r")
+        datasets = _datasets(file)
+    except Exception as error:
+        raise fault_of(path, error) from error
     groups: dict[tuple[str, int], list[Column]] = {}
     elsewhere: list[str] = []
-    for name, dataset in _datasets(file):
+    for name, dataset in datasets:
         if dataset.external or dataset.is_virtual:
             elsewhere.append(name)
             continue
@@ -77,7 +82,7 @@ def parse(path: Path, layout: Layout) -> Log:
 HDF5 = Reader(format="HDF5", sniff=sniff, channels=channels, read=read, foreign=True)
 
 
-def _datasets(file: Any) -> Iterator[tuple[str, Any]]:
+def _datasets(file: Any) -> list[tuple[str, Any]]:
     """Datasets with a length, each once; no link is followed."""
     import h5py
 
@@ -89,7 +94,7 @@ def _datasets(file: Any) -> Iterator[tuple[str, Any]]:
         return True if len(found) > _MANY else None
 
     file.visititems(visit)
-    yield from found
+    return found
 
 
 def _columns(name: str, dataset: Any) -> Iterator[Column]:
