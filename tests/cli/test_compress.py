@@ -52,6 +52,21 @@ def test_a_compressed_record_is_identified_from_its_file(folder, tmp_path):
     assert "measured" in pair_bode(hmpim.identify(hmpim.load(folder / "a.h5"))["y", "u"]).alt
 
 
+@pytest.mark.parametrize("command", ["identify", "compress"])
+def test_files_that_do_not_go_together_are_named_with_what_differs(folder, tmp_path, command):
+    record = hmpim.load(folder / "a.h5")
+    channels = [{one.name: one.values for one in side} for side in (record.inputs, record.outputs)]
+    units = {"u": record.inputs[0].unit, "y": "mV"}
+    other = hmpim.Record.from_arrays(*channels, fs=record.fs, units=units)
+    hmpim.save(hmpim.compress(other, lags=hmpim.load(folder / "small.h5").lags), tmp_path / "b.h5")
+    out = ["-o", tmp_path / "c.h5"] if command == "compress" else []
+    done = run(command, folder / "small.h5", folder / "small.h5", tmp_path / "b.h5", *out)
+    assert done.exit_code == 2
+    (line,) = done.stderr.splitlines()
+    assert f"{folder / 'small.h5'} (here) and {tmp_path / 'b.h5'} (there)" in line
+    assert "units are ('', '') here and ('', 'mV') there" in line
+
+
 def test_records_and_files_of_statistics_are_joined_run_by_run(folder, tmp_path):
     joined = tmp_path / "both.h5"
     done = run("compress", folder / "small.h5", folder / "b.h5", "--bias", "common", "-o", joined)

@@ -106,7 +106,7 @@ def compress(
             )
             window = lags if joined is None else joined.lags
             runs = _compressed(given, window, (input_, output), bias)
-        joined = runs if joined is None else joined.join(runs, bias=bias.value)
+        joined = runs if joined is None else _join(joined, runs, (records[0], path), bias)
     if joined is None:  # Typer asks for one record at least
         return
     save(joined, out)
@@ -149,8 +149,23 @@ def statistics_of(
                 f"{option} is about the samples of a record, and {compressed[0]} holds statistics "
                 "of them; leave it out, or give the record"
             )
-    first, *rest = (read_statistics(path) for path in compressed)
-    return first.join(*rest)
+    joined = read_statistics(compressed[0])
+    for path in compressed[1:]:
+        joined = _join(joined, read_statistics(path), (compressed[0], path))
+    return joined
+
+
+def _join(
+    first: "Statistics", other: "Statistics", files: tuple[Path, Path], bias: Bias | None = None
+) -> "Statistics":
+    """Join runs of two files, which are named where they are not of one kind."""
+    try:
+        return first.join(other, bias=None if bias is None else bias.value)
+    except ArgumentError as error:
+        here, there = files
+        raise ArgumentError(
+            f"{here} (here) and {there} (there) do not go together: {error}"
+        ) from None
 
 
 def _compressed(

@@ -182,8 +182,9 @@ class Statistics(ByValue):
             here, there = getattr(self, name), getattr(other, name)
             same = here == there or (name == "fs" and isclose(here, there, rel_tol=_ROUNDING))
             if not same:
+                are = "are" if isinstance(here, tuple) else "is"
                 raise ArgumentError(
-                    f"{name} is {here!r} here and {there!r} there; only runs of one kind can be "
+                    f"{name} {are} {here!r} here and {there!r} there; only runs of one kind can be "
                     "joined, so compress them alike"
                 )
         if self.reach.knots != other.reach.knots:
