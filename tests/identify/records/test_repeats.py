@@ -7,6 +7,7 @@ import pytest
 
 from hmpim.errors import RecordError
 from hmpim.identify import Estimate, Parameters
+from hmpim.identify.records.alike import check_channels
 from hmpim.identify.records.repeated import Repeats
 from hmpim.identify.records.repeats import _doubts, _parameter, identify_repeats
 from hmpim.record import Record
@@ -188,6 +189,13 @@ def test_what_are_no_repeats_is_refused() -> None:
     other = Record.from_arrays({"u": U}, {"z": lagged()}, fs=FS)
     with pytest.raises(RecordError, match="record 1 has channels u, z and record 0 has u, y"):
         identify_repeats([good, other])
+    volts, millivolts, unstated = (
+        Record.from_arrays({"u": U}, {"y": lagged() + 0.01 * k}, fs=FS, units=units)
+        for k, units in enumerate(({"y": "V"}, {"y": "mV"}, {}))
+    )
+    with pytest.raises(RecordError, match="'y' is in 'mV' in record 1 and in 'V' in record 0"):
+        identify_repeats([volts, millivolts])
+    check_channels([volts, unstated])
     fast = Record.from_arrays({"u": U}, {"y": lagged()}, fs=2 * FS)
     with pytest.raises(RecordError, match="record 1 is at 200 Hz"):
         identify_repeats([good, fast])

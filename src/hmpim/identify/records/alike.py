@@ -52,14 +52,21 @@ def same_at_levels(records: Sequence[Record]) -> bool:
 
 
 def check_channels(records: Sequence[Record]) -> None:
-    """Refuse records of which one has other channels than the first."""
-    names = [[c.name for c in (*r.inputs, *r.outputs)] for r in records]
-    for k, own in enumerate(names):
-        if own != names[0]:
+    """Refuse records of which one has other channels than the first, or states other units."""
+    first, *others = [(*r.inputs, *r.outputs) for r in records]
+    for k, own in enumerate(others, start=1):
+        names, known = [c.name for c in own], [c.name for c in first]
+        if names != known:
             raise RecordError(
-                f"record {k} has channels {', '.join(own)} and record 0 has "
-                f"{', '.join(names[0])}; give the same channels in the same order"
+                f"record {k} has channels {', '.join(names)} and record 0 has "
+                f"{', '.join(known)}; give the same channels in the same order"
             )
+        for one, other in zip(first, own, strict=True):
+            if one.unit and other.unit and one.unit != other.unit:
+                raise RecordError(
+                    f"{one.name!r} is in {other.unit!r} in record {k} and in {one.unit!r} in "
+                    "record 0, and numbers are not converted; give records in the same units"
+                )
 
 
 def check_alike(records: tuple[Record, ...]) -> None:
