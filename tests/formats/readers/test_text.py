@@ -205,6 +205,28 @@ def test_every_writing_gives_the_same_numbers(tmp_path, name):
     assert sum(not c.text for c in contents.channels) - len(channels) <= 2
 
 
+@pytest.mark.parametrize("delimiter", [";", "\t", " ", '","'])
+@pytest.mark.parametrize(
+    ("before", "after"), [(1, 0), (1499, 0), (1600, 0), (70_000, 0), (0, 200), (0, 3000)]
+)
+def test_whole_numbers_do_not_hide_a_decimal_comma(tmp_path, delimiter, before, after):
+    """A command that rests at 0 before or after it moves, in any length of file."""
+    values = np.round(np.sin(np.arange(20) / 3), 3)
+    whole = np.concatenate([np.zeros(before), values, np.zeros(after)])
+    quote = delimiter.strip(";\t ")[:1]
+    cells = [f"{k:g}".replace(".", ",") for k in whole]
+    lines = [quote + delimiter.join(("u", "y")) + quote]
+    lines += [quote + cell + delimiter + cell + quote for cell in cells]
+    path = tmp_path / "run.csv"
+    path.write_text("\n".join(lines) + "\n")
+    record = read(path, inputs=["u"], outputs=["y"], fs=100.0)
+    assert np.array_equal(record.outputs[0].values, whole)
+    path.write_text("\n".join([*lines, quote + delimiter.join(("0.5", "1")) + quote]))
+    bad = f"line ({before + 3}|{len(lines) + 1}), column 'u' holds '0[.,]"
+    with pytest.raises(FormatError, match=bad):
+        read(path, inputs=["u"], outputs=["y"], fs=100.0)
+
+
 @pytest.mark.parametrize(
     "coding", ["utf-8", "utf-8-sig", "utf-16", "utf-16-le", "utf-16-be", "utf-32", "cp1252"]
 )

@@ -2,16 +2,16 @@
 
 import re
 from collections import Counter
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
 from math import isnan
 
 from hmpim.errors import FormatError
 from hmpim.formats.readers.protocol import listed
-from hmpim.formats.readers.text.cells import BLANKS, number, split_row
+from hmpim.formats.readers.text.cells import BLANKS, DECIMAL_COMMA, number, split_row
 from hmpim.formats.readers.text.stamps import looks_like_stamp
 
-__all__ = ["Dialect", "find_dialect", "is_comment", "is_row", "uncommented"]
+__all__ = ["Dialect", "decimal_in", "find_dialect", "is_comment", "is_row", "uncommented"]
 
 _DELIMITERS = ("\t", ";", ",", "|", BLANKS)
 _COMMENTS = ("#", "%", "//", "!")
@@ -81,7 +81,8 @@ def find_dialect(lines: Sequence[str], *, name: str) -> Dialect:
     r"""Tell from the first lines of a text how it is written.
 
     Each way of cutting is tried on the last hundred lines that are given; that which makes most
-    of the cells numbers, in rows of one width, is taken.
+    of the cells numbers, in rows of one width, is taken. If those rows have no fractions, the
+    rows above them tell the decimal mark.
 
     Parameters
     ----------
@@ -131,7 +132,37 @@ def find_dialect(lines: Sequence[str], *, name: str) -> Dialect:
             f"{name!r} starts with {words!r} and holds no rows of numbers; give a table with "
             "comma, semicolon, tab or blanks between its columns"
         )
-    return max(trials, key=lambda trial: trial.score).dialect
+    dialect = max(trials, key=lambda trial: trial.score).dialect
+    if dialect.decimal == "." and decimal_in((line for _, line in rows), dialect) == ",":
+        return replace(dialect, decimal=",")
+    return dialect
+
+
+def decimal_in(rows: Iterable[str], dialect: Dialect) -> str | None:
+    """Return the decimal mark of some rows: a point if any number has one; None without fractions.
+
+    Examples
+    --------
+    >>> d = Dialect(delimiter=";", decimal=".", width=2, numeric=(True, True), first=0)
+    >>> decimal_in(["0;1", "0,5;1"], d), decimal_in(["0,5;1", "0.5;1"], d)
+    (',', '.')
+    >>> decimal_in(["u, V;y", "0;1"], d) is None
+    True
+    """
+    found = None
+    comma = '"' if dialect.delimiter == "," else ","  # commas within quotes alone
+    for row in rows:
+        if "." not in row and comma not in row:
+            continue
+        cells = _cells(row, dialect.delimiter)
+        if len(cells) < dialect.width:
+            continue
+        numbers = [cell for cell, good in zip(cells, dialect.numeric, strict=False) if good]
+        if any("." in cell and number(cell, ".") is not None for cell in numbers):
+            return "."
+        if found is None and any(DECIMAL_COMMA.match(cell) for cell in numbers):
+            found = ","
+    return found
 
 
 def _tried(
@@ -200,6 +231,8 @@ def _first_row(rows: Sequence[tuple[int, str]], dialect: Dialect) -> int:
 def is_row(line: str, dialect: Dialect) -> bool:
     """Say whether a line holds samples: every numeric column a number, a stamp or nothing.
 
+    A number with the other decimal mark is one as well: the error then names its row.
+
     Examples
     --------
     >>> d = Dialect(delimiter=",", decimal=".", width=2, numeric=(True, False), first=0)
@@ -217,7 +250,12 @@ def is_row(line: str, dialect: Dialect) -> bool:
         if not numeric:
             continue
         value = number(cell, dialect.decimal)
-        if value is None and not looks_like_stamp(cell):
+        if value is None and not (looks_like_stamp(cell) or _is_fraction(cell)):
             return False
         found = found or value is None or not isnan(value)
     return found
+
+
+def _is_fraction(cell: str) -> bool:
+    """Whether it is a number with either decimal mark."""
+    return DECIMAL_COMMA.match(cell) is not None or number(cell, ".") is not None

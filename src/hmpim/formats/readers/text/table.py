@@ -1,7 +1,7 @@
 """A table of text: its start understood, its samples still on disk."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import chain
 from typing import Protocol
 
@@ -22,6 +22,7 @@ from hmpim.formats.readers.text.cells import (
 )
 from hmpim.formats.readers.text.dialect import (
     Dialect,
+    decimal_in,
     find_dialect,
     is_comment,
     is_row,
@@ -118,8 +119,12 @@ def open_table(text: Lines) -> Table:
         lines.extend(block.removesuffix("\n").split("\n"))
         if len(lines) >= _HEAD:
             break
+    beyond = chain([lines[_HEAD:]], (block.split("\n") for block in blocks))
     del lines[_HEAD:]
     dialect = find_dialect(lines, name=text.name)
+    if dialect.decimal == "." and decimal_in(lines, dialect) is None:
+        marks = (decimal_in(rows, dialect) for rows in beyond)
+        dialect = replace(dialect, decimal=next((mark for mark in marks if mark), "."))
     known = known_headings(lines, dialect)
     headings, printed = (
         (known, True) if known is not None else find_headings(lines, dialect, name=text.name)
