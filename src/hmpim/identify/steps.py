@@ -19,6 +19,7 @@ from hmpim.identify.effects.imperfections import (
     refine,
 )
 from hmpim.identify.effects.lost import stands_out
+from hmpim.identify.effects.quantization import is_predicted
 from hmpim.identify.effects.saturation import goes_beyond
 from hmpim.identify.fitting.course import (
     Course,
@@ -206,13 +207,15 @@ def look_again(question: Question, seen: Imperfections, fitted: OutputFit) -> Im
     if question.exact:
         return seen
     first = fitted.fits[0]
+    seen = _without_clusters(question, seen, fitted)
     residual = first.best.fit.residual
     asked = seen.saturation is not None or seen.hold is not None
     if not asked and is_white(residual) and not stands_out(residual):
         return seen
     prediction = fitted.prediction.copy()  # of what came before the free response it says nothing
     prediction[: first.forgotten] = question.output.values[: first.forgotten]
-    again = replace(_imperfections(question, prediction=prediction), levels=seen.levels)
+    again = _imperfections(question, prediction=prediction)
+    again = replace(again, levels=seen.levels, quantization=seen.quantization)
     told = again.telling(prediction.size, question.aligned.fs)
     if told is not None and np.ptp(question.output.values[told]) == 0.0:
         return seen  # all that moves would be taken for spikes
@@ -224,6 +227,17 @@ def look_again(question: Question, seen: Imperfections, fitted: OutputFit) -> Im
     if fitted.drifting is not None and plateau is not None and plateau.noise == "after":
         return replace(again, saturation=None)  # a wander bends the output as a level does
     return again
+
+
+def _without_clusters(question: Question, seen: Imperfections, fitted: OutputFit) -> Imperfections:
+    """Take no grid for rounding that the model explains: an input of few levels makes one."""
+    if seen.quantization is None:
+        return seen
+    y, told = question.output.values, _counted(question, seen)
+    told = np.ones(y.size, dtype=bool) if told is None else told.copy()
+    told[: fitted.fits[0].forgotten] = False
+    explained = is_predicted(seen.quantization, y[told], fitted.prediction[told])
+    return replace(seen, quantization=None) if explained else seen
 
 
 def _imperfections(

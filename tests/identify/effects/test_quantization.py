@@ -6,8 +6,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.signal import lfilter
 
+import hmpim
 from hmpim.errors import RecordError
-from hmpim.identify.effects.quantization import detect_quantization
+from hmpim.identify.effects.quantization import detect_quantization, is_predicted
 from tests_support import examples
 
 
@@ -98,6 +99,45 @@ def test_continuous_data_give_no_false_alarm(seeds):
             rng.uniform(-1, 1, n // 10 + 1).repeat(10)[:n] + 0.001 * white,
         ):
             assert detect_quantization(y) is None
+
+
+HELD = [(8, 0.0), (16, 0.0), (16, 0.14), (5, 0.5)]
+"""Levels of an input, and the pole of a unit that settles before the next one."""
+
+
+def held(levels: int, pole: float, seed: int) -> tuple[np.ndarray, np.ndarray]:
+    u = np.repeat(np.random.default_rng(seed).integers(0, levels, 100), 20) / levels
+    return u, 0.2 + 1.3 * lfilter([1.0 - pole], [1.0, -pole], np.concatenate([u[:1], u[:-1]]))
+
+
+@pytest.mark.parametrize(("levels", "pole"), HELD)
+def test_levels_of_a_held_input_are_no_rounding_of_the_output(levels, pole):
+    for seed in range(4):
+        u, clean = held(levels, pole, seed)
+        y = clean + 0.004 * np.random.default_rng(seed).standard_normal(u.size)
+        record = hmpim.Record.from_arrays({"u": u}, {"y": y}, fs=100.0)
+        pair = hmpim.identify(record, intersample="zoh")["y"]
+        assert pair.parameters.quantization_step is None
+        assert "quantization" not in [warning.code for warning in pair.warnings]
+
+
+@pytest.mark.parametrize(("levels", "pole"), HELD[1:])
+@pytest.mark.parametrize("before", [0.0, 0.05, 0.6])
+@pytest.mark.parametrize("after", [0.0, 0.05])
+def test_rounding_of_an_answer_to_a_held_input_stays_seen(levels, pole, before, after):
+    """Steps that are not the levels' own, under noise of up to 0.6 of them before rounding."""
+    step, steps = 0.029, []
+    for seed in range(4):
+        _, clean = held(levels, pole, seed)
+        rng = np.random.default_rng([1, seed])
+        y = step * np.rint(clean / step + before * rng.standard_normal(clean.size))
+        y += after * step * rng.standard_normal(clean.size)
+        found = detect_quantization(y)
+        if found is not None:
+            assert not is_predicted(found, y, clean)
+            steps.append(found.step)
+    assert len(steps) >= 3
+    assert steps == pytest.approx([step] * len(steps), rel=0.01)
 
 
 def test_what_is_not_a_signal_is_refused():

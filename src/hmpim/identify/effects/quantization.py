@@ -18,7 +18,7 @@ from hmpim.identify.chance import SEARCHED
 from hmpim.identify.signals import as_signal
 from hmpim.identify.worth import FEW, MOST, NEARLY, PART, TWICE
 
-__all__ = ["Quantization", "detect_quantization"]
+__all__ = ["Quantization", "detect_quantization", "is_predicted"]
 
 _FEWEST_LEVELS = 5
 """A square wave has two levels, with its rest three; that is no rounding."""
@@ -107,6 +107,43 @@ def detect_quantization(y: ArrayLike) -> Quantization | None:
     inner = levels[1:-1]  # a level at which the output is clipped is on no grid
     told = inner if inner.size >= _FEWEST_LEVELS else levels
     return _by_distances(told, largest) or _by_clusters(samples, span)
+
+
+def is_predicted(found: Quantization, y: ArrayLike, prediction: ArrayLike) -> bool:
+    """Whether a prediction and normal noise bring values as near to the grid, without rounding.
+
+    An input of few levels does, through a unit that follows it at once. The characteristic
+    function of a sum is the product of those of its parts. Values that all lie on the grid are
+    rounded, whatever the prediction.
+
+    Parameters
+    ----------
+    found : Quantization
+        What `detect_quantization` found of `y`.
+    y, prediction : array_like, shape (n,)
+        Samples, and what a model says of them without rounding, in one unit.
+
+    Examples
+    --------
+    >>> rng = np.random.default_rng(0)
+    >>> clean = 0.13 * rng.integers(0, 8, 2000)
+    >>> noisy = clean + 0.002 * rng.standard_normal(2000)
+    >>> found = detect_quantization(noisy)
+    >>> round(found.step, 2), is_predicted(found, noisy, clean)
+    (0.13, True)
+    >>> smooth = np.sin(np.arange(2000) / 50)
+    >>> rounded = 0.1 * np.rint(smooth / 0.1) + 0.002 * rng.standard_normal(2000)
+    >>> is_predicted(detect_quantization(rounded), rounded, smooth)
+    False
+    """
+    if found.exact:
+        return False
+    y, prediction = as_signal("y", y), as_signal("prediction", prediction)
+    omega = 2.0 * np.pi / found.step
+    smeared = float(np.exp(-0.5 * omega**2 * np.mean((y - prediction) ** 2)))
+    seen, expected = (abs(np.mean(np.exp(1j * omega * x))) for x in (y, prediction))
+    beyond = max(float(seen - expected * smeared), 0.0)
+    return y.size * beyond**2 <= SEARCHED * (1.0 - smeared**2)
 
 
 def _distinct(samples: Real, tolerance: float) -> Real:
