@@ -28,6 +28,7 @@ from hmpim.identify.statistics.statistics import Statistics
 from hmpim.identify.steps import (
     drift_or_levels,
     fit,
+    let_gain_change,
     limit_speed,
     look,
     look_again,
@@ -169,6 +170,7 @@ def identify_output(question: Question) -> Described:
         if not seen.counts_otherwise_than(before):
             break
         seen, fitted = fit(question, seen)
+    fitted = let_gain_change(question, seen, fitted)
     question, fitted = limit_speed(question, seen, fitted)
     fitted = through_reference(question, fitted)
     return describe(question, seen, fitted)

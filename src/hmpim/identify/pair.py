@@ -12,6 +12,7 @@ from hmpim.identify.coupling.output_fit import OutputFit
 from hmpim.identify.coupling.responses import Responses, responses_of, settled, unrelated
 from hmpim.identify.effects.censored import CensoredFit
 from hmpim.identify.effects.drift import drift_finding
+from hmpim.identify.effects.gain import GainChange
 from hmpim.identify.effects.hum import hum_finding
 from hmpim.identify.effects.imperfections import Imperfections, refine
 from hmpim.identify.effects.said import with_imperfections
@@ -124,7 +125,10 @@ def _pair(
     none: tuple[Bend, ...] = ()
     moves, unmoved = attempt("bends", lambda: _bends(question, found, joint, i, plain, said), none)
     bent = 0.0 if inspection is None or not said else inspection.summary.nonlinear
-    evidence, unmade = _evidence(question, found, readings, joint, response, i, moves, bent)
+    # Nothing is said of the gain beside a fit that a nonlinearity has replaced.
+    gaining = joined.gaining if joint.best.fit is joined.fits[i].best.fit else None
+    evidence, unmade = _evidence(question, found, readings, joint, response, i, moves, gaining)
+    evidence = replace(evidence, nonlinear=max(bent, evidence.nonlinear))
     parameters, seen = with_imperfections(
         evidence.spanned or readings.parameters, found, censored, output.unit
     )
@@ -171,7 +175,7 @@ def _evidence(
     response: FrequencyResponse,
     i: int,
     moves: tuple[Bend, ...],
-    nonlinear: float,
+    gaining: GainChange | None,
 ) -> tuple[Evidence, tuple[Finding, ...]]:
     """What the checks look at, and what of it could not be made."""
     fs, band, fit = question.aligned.fs, question.band(i), joint.best.fit
@@ -186,12 +190,14 @@ def _evidence(
         lambda: misfit(u, fit.residual, delay=fit.delay, band=(band[0] / fs, band[1] / fs)),
         Misfit(share=0.0, probability=1.0),
     )
+    others = () if gaining is None else gaining.others
     whole = spanned(
         readings.parameters,
         joint,
         fs=fs,
         highest=min(band[1], fs / 2),
         bent=[(one.fit, one.farthest) for one in moves],
+        others=others,
     )
     if any(one.matters for one in moves):
         whole = blurred(whole, WORTH)
@@ -205,12 +211,13 @@ def _evidence(
         band=band,
         fit_percent=_fit_percents(joint, [fit.cost])[0],
         bends=moves,
-        nonlinear=max([nonlinear, *(one.share for one in moves if one.certain)]),
+        nonlinear=max((one.share for one in moves if one.certain), default=0.0),
         held=found.hold is not None,
         measured=from_response,
         through=question.instrument is not None,
         jittered=any(finding.code == "jitter" for finding in question.aligned.findings),
         limited=question.limited is not None,
+        gaining=gaining,
     )
     if evidence.is_without_noise and not fit.structure.sampled:
         evidence = replace(evidence, spanned=without_noise(whole))

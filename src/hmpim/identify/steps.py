@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 
@@ -12,6 +13,7 @@ from hmpim.identify.asked.swapped import is_swapped, lags_behind, swapped_findin
 from hmpim.identify.coupling.output_fit import OutputFit, fit_together
 from hmpim.identify.effects.disturbance import without_rows
 from hmpim.identify.effects.drift import with_drift, with_plain_drift
+from hmpim.identify.effects.gain import changing_gain
 from hmpim.identify.effects.hum import with_hum
 from hmpim.identify.effects.imperfections import (
     Imperfections,
@@ -29,12 +31,14 @@ from hmpim.identify.fitting.course import (
     start,
     turn_ahead,
 )
+from hmpim.identify.fitting.fit import Fit, Problem
 from hmpim.identify.fitting.joint import chosen_of
 from hmpim.identify.fitting.trial import JointFit
 from hmpim.identify.kept import kept
 from hmpim.identify.noise.colour import line_of, tone_of
 from hmpim.identify.noise.input_noise import input_noise
 from hmpim.identify.noise.whiteness import is_white
+from hmpim.identify.nonlinear.bends import bends
 from hmpim.identify.nonlinear.lines import find_period
 from hmpim.identify.nonlinear.speed import beside_speed, explains_more, limited_command
 from hmpim.identify.worth import PART, WORTH
@@ -43,6 +47,7 @@ from hmpim.model.dynamics import StructureName
 __all__ = [
     "drift_or_levels",
     "fit",
+    "let_gain_change",
     "limit_speed",
     "look",
     "look_again",
@@ -254,6 +259,44 @@ def _imperfections(
     )
 
 
+def let_gain_change(question: Question, seen: Imperfections, fitted: OutputFit) -> OutputFit:
+    """Let the gain change along the record, where that explains more; plain dynamics may then do.
+
+    Of one input; not asked of a loop, of software, behind levels or holds, and where the output
+    follows nothing. A nonlinearity that explains more is left to the checks.
+    """
+    joint, aligned = fitted.fits[0], question.aligned
+    if len(fitted.fits) > 1 or not joint.related or question.instrument or question.swapped:
+        return fitted
+    if question.exact or seen.saturation is not None or seen.hold is not None:
+        return fitted
+    steady = replace(question, output=replace(question.output, values=joint.problem.y))
+    known, valid = joint.problem.nuisance, _counted(question, seen)
+
+    @cache
+    def begun() -> Course:
+        return turn_ahead(_started(steady, seen, known))
+
+    def with_rows(y: Real, rows: Real, plainly: bool) -> JointFit:
+        rows = rows if known is None else np.vstack([known, rows])
+        course = replace(begun(), data=replace(begun().data, y=y))
+        course = continued(course, valid=valid, nuisance=rows)
+        if plainly:
+            return chosen_of(course, question.plain)
+        return chosen_of(replace(course, others=begun().others), question.structures)
+
+    def bent(problem: Problem, constant: Fit) -> float:
+        u, between = aligned.inputs[0].values, joint.best.intersample
+        kinds = bends(u, problem, constant, intersample=between, fs=aligned.fs)
+        return kinds[0].share if kinds else 0.0
+
+    found = changing_gain(joint, with_rows, bent)
+    if found is None:
+        return fitted
+    fits = (found.joint,) if found.taken else fitted.fits
+    return replace(fitted, fits=fits, gaining=found)
+
+
 def limit_speed(
     question: Question, seen: Imperfections, fitted: OutputFit
 ) -> tuple[Question, OutputFit]:
@@ -301,17 +344,20 @@ def _begin(question: Question, seen: Imperfections) -> Course | None:
         or question.plain == question.structures
     ):
         return None
+    return turn_ahead(_started(question, seen))
+
+
+def _started(question: Question, seen: Imperfections, rows: Real | None = None) -> Course:
+    """Plain fits of one input, as they climb from the spectra, with `rows` beside the bias."""
     (source,) = question.aligned.inputs
-    return turn_ahead(
-        start(
-            source.values,
-            question.output.values,
-            _counted(question, seen),
-            question.measured,
-            question.intersample,
-            question.structures,
-            None,
-        )
+    return start(
+        source.values,
+        question.output.values,
+        _counted(question, seen),
+        question.measured,
+        question.intersample,
+        question.structures,
+        rows,
     )
 
 

@@ -42,6 +42,7 @@ _ADVICE = {
     "quantization": "Raise the level of the stimulus, or use a finer range.",
     "hum": "Look for mains hum or vibration; it was removed.",
     "drift": "Let the unit warm up; the drift was removed.",
+    "gain_change": "Let the unit warm up, and repeat the test with the sweep reversed.",
     "cut_short": "Record until the output has come to rest.",
     "ended_early": "Record until the stimulus is over.",
     "short_record": "Record for longer.",

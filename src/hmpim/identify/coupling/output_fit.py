@@ -18,6 +18,7 @@ from hmpim.identify.coupling.lag import Lag, lag_of
 from hmpim.identify.coupling.together import gained_by, joint_covariance
 from hmpim.identify.coupling.weak import coupling_fit, whitening_of
 from hmpim.identify.effects.drift import Drifting
+from hmpim.identify.effects.gain import GainChange
 from hmpim.identify.effects.hum import Humming
 from hmpim.identify.fitting.derivatives import jacobian
 from hmpim.identify.fitting.enrich import PLAIN
@@ -57,6 +58,8 @@ class OutputFit:
         Its hum, likewise.
     steady : ndarray, shape (n,), or None
         Where it drifts, what a fit with a constant bias predicts.
+    gaining : GainChange or None
+        What is known of a gain that changes, of an output to one input.
     """
 
     fits: tuple[JointFit, ...]
@@ -67,6 +70,7 @@ class OutputFit:
     drifting: Drifting | None = None
     humming: Humming | None = None
     steady: Real | None = None
+    gaining: GainChange | None = None
 
     @classmethod
     def alone(cls, fit: JointFit, drifting: Drifting | None = None) -> "OutputFit":
@@ -92,11 +96,11 @@ class OutputFit:
 
     @property
     def disturbance(self) -> Real | None:
-        """What moves the output apart from the inputs, shape (n,): drift and hum, or None."""
-        if self.drifting is None or self.humming is None:
-            one = self.drifting or self.humming
-            return None if one is None else one.trend
-        return self.drifting.trend + self.humming.trend
+        """What moves the output beside the model, shape (n,): drift, hum, a change of the gain."""
+        trends = [one.trend for one in (self.drifting, self.humming) if one is not None]
+        if self.gaining is not None and self.gaining.taken:
+            trends.append(self.gaining.trend)
+        return np.sum(trends, axis=0) if trends else None
 
 
 def fit_together(

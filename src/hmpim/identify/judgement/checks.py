@@ -9,6 +9,7 @@ from hmpim.identify.judgement.errors import not_converged, weak_delay, weak_exci
 from hmpim.identify.judgement.evidence import Evidence
 from hmpim.identify.judgement.failed import attempt
 from hmpim.identify.judgement.feedback import feedback
+from hmpim.identify.judgement.gain import gain_change
 from hmpim.identify.judgement.reach import (
     beyond_band,
     fast_mode,
@@ -65,6 +66,7 @@ CHECKS: tuple[Check, ...] = (
     feedback,
     bandwidth_disagrees,
     bent,
+    gain_change,
 )
 """All checks of one pair; each one's findings come in this order."""
 

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hmpim.identify.arrays import Real
+from hmpim.identify.effects.gain import GainChange
 from hmpim.identify.fitting.trial import JointFit
 from hmpim.identify.noise.misfit import Misfit
 from hmpim.identify.nonlinear.bends import Bend
@@ -52,6 +53,8 @@ class Evidence:
         Whether the stamps strayed from a uniform clock, so that samples are interpolated.
     limited : bool
         Whether the input is what a unit of limited speed follows, and not what was recorded.
+    gaining : GainChange or None
+        What is known of a gain that changes along the record; None where nothing says so.
     """
 
     joint: JointFit
@@ -69,6 +72,7 @@ class Evidence:
     through: bool = False
     jittered: bool = False
     limited: bool = False
+    gaining: GainChange | None = None
 
     @property
     def unexplained(self) -> float:

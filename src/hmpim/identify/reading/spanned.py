@@ -113,6 +113,7 @@ def spanned(
     fs: float,
     highest: float,
     bent: Iterable[tuple[Fit, Real]] = (),
+    others: Iterable[Fit] = (),
 ) -> Parameters:
     """Widen each interval to what it would be under the other assumptions, or with one more pole.
 
@@ -129,6 +130,8 @@ def spanned(
         Rate, and frequency beyond which no bandwidth is read off, in Hz.
     bent : iterable of (Fit, ndarray), shape (p,)
         A linear fit, and what a nonlinearity that may be there adds to its parameters.
+    others : iterable of Fit
+        Fits beside a gain that may have changed.
     """
 
     def figures(fits: Iterable[Fit]) -> list[dict[str, float | None]]:
@@ -141,6 +144,7 @@ def spanned(
     richer = figures(
         trial.fit for trial in (*joint.rivals, *plainer_rivals(joint), *asked_rivals(joint))
     )
+    richer += figures(others)
     hidden, fit = joint.hidden, joint.best.fit
     if _steps_through(joint.best):
         richer += figures(_ends(fit))
