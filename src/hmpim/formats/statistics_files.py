@@ -16,9 +16,13 @@ from hmpim.identify.statistics.run import Run
 
 __all__ = ["SCHEMA", "holds_statistics", "read_statistics", "save_statistics"]
 
-SCHEMA = "hmpim/statistics/1"
+SCHEMA = "hmpim/statistics/2"
+
+_FIRST = "hmpim/statistics/1"
+"""Without what tells of more than linear systems."""
 
 _ARRAYS = tuple(name for name in Run.__dataclass_fields__ if name != "samples")
+_BEYOND = ("scale", "ww", "wu", "vw", "stood")
 
 
 def save_statistics(statistics: Statistics, path: str | PathLike[str]) -> None:
@@ -42,6 +46,7 @@ def save_statistics(statistics: Statistics, path: str | PathLike[str]) -> None:
         file.attrs["schema"] = SCHEMA
         file.attrs["fs"] = statistics.fs
         file.attrs["lags"] = statistics.reach.lags
+        file.attrs["beyond"] = statistics.reach.beyond
         file.attrs["knots"] = np.array(statistics.reach.knots, dtype=np.int64)
         file.attrs["names"] = list(statistics.names)
         file.attrs["units"] = list(statistics.units)
@@ -71,7 +76,7 @@ def holds_statistics(path: str | PathLike[str]) -> bool:
 
     try:
         with h5py.File(Path(path), "r") as file:
-            return str(file.attrs.get("schema", "")) == SCHEMA
+            return str(file.attrs.get("schema", "")) in (SCHEMA, _FIRST)
     except Exception:  # no HDF5, or damaged
         return False
 
@@ -99,15 +104,21 @@ def read_statistics(path: str | PathLike[str]) -> Statistics:
 
 def _read(file: Any) -> Statistics:
     told = file.attrs
-    runs = []
+    whole = str(told["schema"]) != _FIRST
+    runs, knots = [], tuple(int(knot) for knot in told["knots"])
     for i in range(int(told["runs"])):
         group = file[f"run {i}"]
-        arrays = {name: np.asarray(group[name][()], dtype=np.float64) for name in _ARRAYS}
+        arrays = {
+            name: np.asarray(group[name][()], dtype=np.float64)
+            if whole or name not in _BEYOND
+            else np.zeros((len(knots) + 1, 0) if name == "vw" else 0)
+            for name in _ARRAYS
+        }
         runs.append(Run(samples=int(group.attrs["samples"]), **arrays))
     band = [float(edge) for edge in told["band"]]
     return Statistics(
         fs=float(told["fs"]),
-        reach=Reach(lags=int(told["lags"]), knots=tuple(int(knot) for knot in told["knots"])),
+        reach=Reach(lags=int(told["lags"]), knots=knots, beyond=whole and bool(told["beyond"])),
         runs=tuple(runs),
         names=(str(told["names"][0]), str(told["names"][1])),
         units=(str(told["units"][0]), str(told["units"][1])),

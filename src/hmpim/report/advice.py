@@ -56,6 +56,7 @@ _ADVICE = {
     "extrapolated": "Widen the band of the stimulus to the frequency named.",
     "intersample": "State what the input does between samples: `--intersample`.",
     "held_between": "Record input and output with one clock.",
+    "held_output": "Identify the record itself.",
     "hold": "Nothing to do if the unit is known to hold its output.",
     "friction": "Test at a larger level as well, and compare.",
     "hardening": "Test at several levels, and state the one that each figure is for.",

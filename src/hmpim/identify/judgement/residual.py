@@ -78,7 +78,11 @@ def moved_by(evidence: Evidence, share: float) -> tuple[str, ...]:
     joint = evidence.joint
     count = joint.problem.counted * joint.effective_share
     times = float(np.sqrt(count * share))
-    motion = MATERIAL * float(joint.best.fit.prediction.std())
+    moves = joint.best.fit.prediction
+    if moves.size:
+        motion = MATERIAL * float(moves.std())
+    else:  # from statistics
+        motion = MATERIAL * float(np.sqrt(joint.problem.spread / joint.problem.counted))
     sizes = {"bias": motion, "delay": FEW / evidence.fs, "delay_low_frequency": FEW / evidence.fs}
     known = {name: getattr(evidence.readings.parameters, name) for name in MODELLED}
     return tuple(

@@ -32,6 +32,7 @@ _WITHHELD = frozenset(
         "few_lines",
         "feedback",
         "halves_disagree",
+        "held_output",
         "initial_transient",
         "lack_of_fit",
         "nonlinear",

@@ -7,6 +7,7 @@ products    products of filtered signals over the samples that count
 start       a response without a model, from which the starts are found
 fit         one structure, by the joint fit's own optimiser, and its residual
 misfit      whether what is left over follows the input; one more pole
+beyond      what no linear system does: harmonics, standstills
 choose      the joint fit's own search, with products in place of samples
 describe    what is said of the pair
 live        the estimate so far, while samples come

@@ -26,6 +26,7 @@ from hmpim.identify.fitting.rows import Part
 from hmpim.identify.fitting.start import RoughResponse
 from hmpim.identify.fitting.trial import JointFit
 from hmpim.identify.noise.misfit import Misfit
+from hmpim.identify.statistics.beyond import Beyond, beyond_of, is_told
 from hmpim.identify.statistics.fit import Compressed, Fitted, as_fitted, pulse
 from hmpim.identify.statistics.misfit import hidden_pole_of, misfit_of
 from hmpim.identify.statistics.products import Products
@@ -94,11 +95,13 @@ class CompressedData(Data):
 
     def misfit(self, fit: Fit) -> Misfit:
         """How much of what is left over follows the input, whatever its own colour."""
-        fitted = as_fitted(fit)
-        products = fitted.products
-        if not (products.order or fitted.is_white):
-            products = products.whitened(fitted.left.noise)
-        return misfit_of(fitted, products, self.band)
+        return misfit_of(as_fitted(fit), _whitening(as_fitted(fit)), self.band)
+
+    def beyond(self, fit: Fit) -> Beyond | None:
+        """How much of it follows the cube of the input; None where that is not kept."""
+        if not is_told(self.products.statistics):
+            return None
+        return beyond_of(as_fitted(fit), _whitening(as_fitted(fit)), self.band)
 
     def noise_left(self, problem: Problem, fit: Fit) -> Real:
         """Autoregression of what a fit leaves over, 1 first; 1 alone where it is white."""
@@ -120,6 +123,14 @@ class CompressedData(Data):
     def hidden_pole(self, problem: Problem, fit: Fit) -> HiddenPole:
         """What the statistics say of one more pole beside a fit."""
         return hidden_pole_of(as_fitted(fit))
+
+
+def _whitening(fitted: Fitted) -> Products:
+    """Products with what a fit leaves over whitened."""
+    products = fitted.products
+    if products.order or fitted.is_white:
+        return products
+    return products.whitened(fitted.left.noise)
 
 
 def choose(

@@ -38,6 +38,7 @@ from hmpim.identify.result import (
     ResponseBandwidths,
 )
 from hmpim.identify.result.error_bars import estimate, noise_estimate
+from hmpim.identify.statistics.beyond import is_told, said_beyond
 from hmpim.identify.statistics.choose import CompressedData, choose, integrator_of
 from hmpim.identify.statistics.fit import Fitted, as_fitted
 from hmpim.identify.statistics.run import Run
@@ -191,6 +192,8 @@ def _related(statistics: Statistics, data: CompressedData, joint: JointFit) -> P
         measured=ResponseBandwidths(),
     )
     findings = judge(evidence, checks=_CHECKS)
+    if not evidence.is_without_noise:
+        findings = (*findings, *said_beyond(statistics, data.beyond(best), evidence))
     parameters = readings.parameters
     if evidence.is_without_noise:
         parameters = without_noise(parameters, _DIGITS)
@@ -279,11 +282,17 @@ def _paper(statistics: Statistics) -> PaperEstimates:
 
 
 def _no_samples(statistics: Statistics) -> Finding:
+    left = "clipping, holds, rounding, spikes and harmonics were not looked for"
+    if is_told(statistics):
+        left = (
+            "clipping, rounding, spikes and even harmonics were not looked for, and holds and odd "
+            "harmonics were not modelled"
+        )
     return Finding(
         code="no_samples",
         message=f"This is identified from statistics of {statistics.samples} samples, which are "
-        "not kept: the frequency response is the model's own, and clipping, holds, rounding, "
-        "spikes and harmonics were not looked for. Identify a record to see them.",
+        f"not kept: the frequency response is the model's own, and {left}. "
+        "Identify a record to see them.",
         severity="info",
         parameters=(),
     )

@@ -121,7 +121,7 @@ class LiveEstimator:
             )
         self._statistics = Statistics(
             fs=stimulus.fs,
-            reach=Reach(lags=lags),
+            reach=Reach(lags=lags, beyond=False),  # a look has no time for it
             runs=(),
             units=("", ""),  # that of the output is unknown
             intersample=intersample,

@@ -39,15 +39,17 @@ class Asked:
     transforms: Complex
 
 
-def asked_of(delay: float, band: tuple[float, float], products: Products) -> Asked:
+def asked_of(
+    delay: float, band: tuple[float, float], products: Products, *, groups: int = _GROUPS
+) -> Asked:
     """Cosines and sines behind a window about a delay, in samples; `band` as for `misfit_of`."""
     (low, high), taps = band, products.statistics.reach.taps
     lag = np.arange(taps) - AHEAD - delay
-    width = _GROUPS / max(high - low, 1e-9)
+    width = groups / max(high - low, 1e-9)
     before, after = min(width, AHEAD + delay + 1.0), min(width, taps - AHEAD - delay)
     edge = np.where(lag < 0, before, max(after, 1.0))
     window = np.where(np.abs(lag) < edge, 0.5 + 0.5 * np.cos(np.pi * lag / edge), 0.0)
-    centres = low + (high - low) * (np.arange(_GROUPS) + 0.5) / _GROUPS
+    centres = low + (high - low) * (np.arange(groups) + 0.5) / groups
     phase = 2 * np.pi * np.outer(centres, lag)
     rows = np.vstack([np.cos(phase), np.sin(phase)]) * window
     return Asked(delay=delay, rows=rows, transforms=products.transform(rows))

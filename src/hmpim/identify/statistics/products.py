@@ -248,6 +248,34 @@ class Products:
             mixed = mixed + kept[None, :, None] * self._inner[:, None, SUMMED]
         return self._without_bias(gram, mixed[:, :, self._others], responses.steady)
 
+    def across(
+        self, responses: Responses, other: "Products", others: Responses, lags: Real
+    ) -> Real:
+        """Products with what other responses make of another input of the same runs.
+
+        Each run has a bias of its own, and no response keeps a value.
+
+        Parameters
+        ----------
+        responses, others : Responses
+            To this input, and to the other one.
+        other : Products
+            Of the other input, the same outputs and noise.
+        lags : ndarray, shape (2 span + 1,)
+            Σ x(t) z(t-k), k from -span on, x this input and z the other.
+        """
+        span = self.statistics.reach.span
+        ours, theirs = self.transform(responses.rows), other.transform(others.rows)
+        around = np.zeros(self._length)
+        around[: span + 1], around[self._length - span :] = lags[span:], lags[:span]
+        whole = _products(ours, scipy.fft.rfft(around), self._length, theirs)
+        apart = self._not_counted(responses.rows, ours)
+        beyond = other._not_counted(others.rows, theirs)
+        flat = apart.reshape(len(ours), -1) @ beyond.reshape(len(theirs), -1).T
+        told, beside = self.moments(responses).fixed_rows, other.moments(others).fixed_rows
+        inner = self._unsummed[:, :-1, :-1]
+        return np.asarray(whole - flat - np.sum(told.transpose(0, 2, 1) @ inner @ beside, axis=0))
+
     def _not_counted(self, rows: Real, spectra: Complex) -> Real:
         """Samples at the ends of each run that do not count, (q, runs, samples)."""
         head, tail = self._apart
@@ -369,15 +397,18 @@ def spectrum_of(autocorrelation: Real, length: int) -> Real:
     return np.asarray(scipy.fft.rfft(around).real)
 
 
-def _products(spectra: Complex, power: Real, length: int) -> Real:
-    """F R Fᵀ by Parseval's theorem."""
+def _products(
+    spectra: Complex, power: Real | Complex, length: int, others: Complex | None = None
+) -> Real:
+    """F R Fᵀ, or F R Gᵀ with others, by Parseval's theorem."""
     twice = np.full(power.size, 2.0)
     twice[0] = 1.0
     if length % 2 == 0:
         twice[-1] = 1.0
     weighed = spectra * (power * twice / length)
+    right = spectra if others is None else others
     # Real parts of a product are those of real and imaginary parts, side by side.
-    return np.asarray(weighed.view(np.float64) @ spectra.view(np.float64).T)
+    return np.asarray(weighed.view(np.float64) @ right.view(np.float64).T)
 
 
 def _moved(head: Real) -> Real:

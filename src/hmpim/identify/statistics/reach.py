@@ -24,6 +24,9 @@ class Reach:
     knots : tuple of int
         Samples of a run at which its bias has a value of its own, linear between them and constant
         outside; one knot is a constant bias.
+    beyond : bool
+        Whether products of the input's cube and the output's standstills are kept too: they tell
+        what no linear system does.
 
     Examples
     --------
@@ -34,6 +37,7 @@ class Reach:
 
     lags: int
     knots: tuple[int, ...] = (0,)
+    beyond: bool = True
 
     @property
     def taps(self) -> int:

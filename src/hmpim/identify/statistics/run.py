@@ -14,10 +14,25 @@ from hmpim.identify.arrays import Complex, Real
 from hmpim.identify.noise.autoregression import LONGEST
 from hmpim.identify.statistics.reach import AHEAD, Reach
 
-__all__ = ["SUMMED", "Run", "begun", "closed", "continued", "last_sums", "shortened"]
+__all__ = [
+    "STOOD",
+    "SUMMED",
+    "Run",
+    "begun",
+    "closed",
+    "continued",
+    "cross_closed",
+    "last_sums",
+    "of_cubes",
+    "shortened",
+    "without_cubes",
+]
 
 SUMMED = -2
 """Place of the input's running sum among the outputs of a run."""
+
+STOOD = 64
+"""Longest standstill of an output that is told from longer ones, in samples."""
 
 _PIECE = 16_384
 """Samples that are read at once, at least."""
@@ -52,6 +67,18 @@ class Run(ByValue):
         First samples of the output.
     tail_y : ndarray, shape (forth,)
         Its last ones.
+    scale : ndarray, shape (1,)
+        What the input is divided by before it is cubed: a power of two, which no block changes but
+        exactly. All that follows is empty where it is not kept.
+    ww : ndarray, shape (span + 1,)
+        Σ w(t) w(t-k), w the cube.
+    wu : ndarray, shape (2 span + 1,)
+        Σ w(t) u(t-k), k from -span on.
+    vw : ndarray, shape (rows + 1, forth + back + 1)
+        Σ v(t) w(t-k), without the running sum's.
+    stood : ndarray, shape (STOOD + 1,)
+        Samples since the output last changed, then how often it had kept a value for 1, 2, …
+        samples, the last also for more.
     """
 
     samples: int
@@ -63,6 +90,16 @@ class Run(ByValue):
     tail_u: Real
     head_y: Real
     tail_y: Real
+    scale: Real
+    ww: Real
+    wu: Real
+    vw: Real
+    stood: Real
+
+    @property
+    def cubed(self) -> bool:
+        """Whether products of the cube are kept."""
+        return self.ww.size > 0
 
     def total(self, reach: Reach) -> float:
         """Sum of the input, as a deviation: the bias' rows add to 1 at each sample."""
@@ -71,7 +108,7 @@ class Run(ByValue):
 
 def begun(reach: Reach, u: float, y: float) -> Run:
     """An empty run that will begin with these samples."""
-    count = reach.rows + 2
+    count, kept = reach.rows + 2, int(reach.beyond)
     return Run(
         samples=0,
         level=np.array([u, y]),
@@ -82,6 +119,11 @@ def begun(reach: Reach, u: float, y: float) -> Run:
         tail_u=np.zeros(reach.span),
         head_y=np.zeros(reach.back),
         tail_y=np.zeros(reach.forth),
+        scale=np.zeros(kept),
+        ww=np.zeros(kept * (reach.span + 1)),
+        wu=np.zeros(kept * (2 * reach.span + 1)),
+        vw=np.zeros((count - 1, kept * (reach.forth + reach.back + 1))),
+        stood=np.zeros(kept * (STOOD + 1)),
     )
 
 
@@ -94,8 +136,80 @@ def continued(run: Run, reach: Reach, u: Real, y: Real) -> Run:
         moved = u[some] - run.level[0]
         at = np.arange(run.samples + 1, run.samples + 1 + moved.size)
         sums = run.total(reach) + np.cumsum(moved) + run.level[0] * at
-        run = _added(run, reach, moved, np.vstack([rows, sums, y[some] - run.level[1]]))
+        follows = y[some] - run.level[1]
+        if run.cubed:
+            run = replace(_scaled(run, moved), stood=_stood(run, follows))
+        run = _added(run, reach, moved, np.vstack([rows, sums, follows]))
     return run
+
+
+def cubes(run: Run, u: Real) -> Real:
+    """Cubes of inputs, by the scale of a run."""
+    return np.asarray((u / run.scale[0]) ** 3 if run.scale[0] else np.zeros_like(u))
+
+
+def without_cubes(run: Run) -> Run:
+    """A run without what tells of more than linear systems."""
+    nothing = np.empty(0)
+    empty = run.vw[:, :0]
+    return replace(run, scale=nothing, ww=nothing, wu=nothing, vw=empty, stood=nothing)
+
+
+def of_cubes(run: Run, reach: Reach, scale: float) -> Run:
+    """The run that has the cube, by another scale, for an input; without its running sum."""
+    ratio = (run.scale[0] / scale) ** 3
+    vu = np.insert(run.vw * ratio, reach.rows, 0.0, axis=0)
+    vv = run.vv.copy()
+    vv[SUMMED] = vv[:, SUMMED] = 0.0
+    return replace(
+        without_cubes(run),
+        level=run.level * np.array([0.0, 1.0]),
+        uu=run.ww * ratio**2,
+        vu=vu,
+        vv=vv,
+        head_u=cubes(run, run.head_u) * ratio,
+        tail_u=cubes(run, run.tail_u) * ratio,
+    )
+
+
+def cross_closed(run: Run, reach: Reach, scale: float) -> Real:
+    """Products `wu`, by another scale, of an input and a cube that `closed` continues."""
+    third = of_cubes(run, reach, scale)
+    pair = (run, third)
+    after = [closed(one, reach).tail_u[-AHEAD:] for one in pair]
+    whole = [np.concatenate([x.tail_u, y]) for x, y in zip(pair, after, strict=True)]
+    behind = np.correlate(whole[0], after[1], "valid")[::-1]
+    before = np.correlate(whole[1], after[0], "valid")[:-1]
+    known = run.wu * (run.scale[0] / scale) ** 3
+    return np.asarray(known + np.concatenate([before, behind]))
+
+
+def _scaled(run: Run, u: Real) -> Run:
+    """A run by a scale that no input exceeds."""
+    peak = float(np.abs(u).max())
+    if peak <= run.scale[0]:
+        return run
+    scale = 2.0 ** np.ceil(np.log2(peak))
+    ratio = (run.scale[0] / scale) ** 3
+    return replace(
+        run,
+        scale=np.array([scale]),
+        ww=run.ww * ratio**2,
+        wu=run.wu * ratio,
+        vw=run.vw * ratio,
+    )
+
+
+def _stood(run: Run, y: Real) -> Real:
+    """How long the output kept its values, more of which follow."""
+    begins = run.samples == 0
+    changes = np.flatnonzero(np.diff(y, prepend=y[0] if begins else run.tail_y[-1]))
+    if not changes.size:
+        return np.append(run.stood[0] + y.size, run.stood[1:])
+    lengths = np.diff(changes, prepend=-run.stood[0]).astype(np.intp)
+    out = run.stood + np.bincount(np.minimum(lengths, STOOD), minlength=STOOD + 1)
+    out[0] = y.size - changes[-1]
+    return np.asarray(out)
 
 
 def last_sums(run: Run, reach: Reach, count: int) -> Real:
@@ -115,13 +229,13 @@ def closed(run: Run, reach: Reach) -> Run:
     last = run.tail_u[-1]
     after = 2.0 * last - run.tail_u[-2 : -2 - known : -1]
     after = np.concatenate([after, np.full(AHEAD - known, after[-1] if known else last)])
-    return _added(run, reach, after, np.zeros((reach.rows + 2, AHEAD)))
+    return _added(without_cubes(run), reach, after, np.zeros((reach.rows + 2, AHEAD)))
 
 
 def shortened(run: Run, reach: Reach) -> Run:
     """The same run, of which no more is kept than a shorter reach asks for."""
     return replace(
-        run,
+        without_cubes(run),
         uu=run.uu[: reach.span + 1],
         vu=run.vu[:, : reach.forth + reach.back + 1],
         head_u=run.head_u[: reach.span],
@@ -131,17 +245,28 @@ def shortened(run: Run, reach: Reach) -> Run:
 
 
 def _added(run: Run, reach: Reach, u: Real, v: Real) -> Run:
-    before_u, before_v = run.tail_u, _before(run, reach)
-    whole_u = np.concatenate([before_u, u])
-    whole_v = np.hstack([before_v, v])
+    whole_u = np.concatenate([run.tail_u, u])
+    whole_v = np.hstack([_before(run, reach), v])
+    inputs, whole = u[None], whole_u[None]
+    if run.cubed:
+        whole = np.vstack([whole, cubes(run, whole_u)])
+        inputs = whole[:, reach.span :]
     products = _one_by_one if u.size <= _FEW else _transformed
-    uu, after, ahead, vv = products(reach, (u, v), (whole_u, whole_v))
+    xx, after, ahead, vv = products(reach, (inputs, v), (whole, whole_v))
+    vx = np.concatenate([ahead[..., ::-1], after], axis=2)
     room_u, room_y = reach.span - run.samples, reach.back - run.samples
+    if run.cubed:
+        run = replace(
+            run,
+            ww=run.ww + xx[1, 1],
+            wu=run.wu + np.concatenate([xx[0, 1, :0:-1], xx[1, 0]]),
+            vw=run.vw + np.delete(vx[1], SUMMED, axis=0),
+        )
     return replace(
         run,
         samples=run.samples + u.size,
-        uu=run.uu + uu,
-        vu=run.vu + np.hstack([ahead[:, ::-1], after]),
+        uu=run.uu + xx[0, 0],
+        vu=run.vu + vx[0],
         vv=run.vv + vv,
         head_u=_filled(run.head_u, run.samples, u[: max(room_u, 0)]),
         tail_u=whole_u[-reach.span :],
@@ -155,36 +280,43 @@ def _transformed(
 ) -> tuple[Real, Real, Real, Real]:
     """Products of new inputs and outputs and those `span` and `forth` samples before, by FFT.
 
+    Inputs are the input and, where it is kept, its cube.
+
     Returns
     -------
-    uu : ndarray, shape (span + 1,)
-        Σ u(t) u(t-k).
-    after, ahead : ndarray, shape (rows + 2, back + 1) and (rows + 2, forth)
-        Σ v(t) u(t-k), k from 0 on; Σ u(t) v(t-k), k from 1 on.
+    xx : ndarray, shape (inputs, inputs, span + 1)
+        Σ x_i(t) x_j(t-k).
+    after, ahead : ndarray, shape (inputs, rows + 2, back + 1) and (inputs, rows + 2, forth)
+        Σ v(t) x(t-k), k from 0 on; Σ x(t) v(t-k), k from 1 on.
     vv : ndarray, shape (rows + 2, rows + 2, LONGEST + 1)
         Σ v_i(t) v_j(t-k).
     """
-    length = scipy.fft.next_fast_len(new[0].size + reach.span, real=True)
-    new_u, new_v = (_late(x, reach.span, length) for x in new)
-    all_u = scipy.fft.rfft(whole[0], length)
-    all_v = _late(whole[1], reach.span - reach.forth, length)
-    uu = scipy.fft.irfft(new_u * all_u.conj(), length)[: reach.span + 1]
-    after = scipy.fft.irfft(new_v * all_u.conj(), length)[:, : reach.back + 1]
-    ahead = scipy.fft.irfft(new_u * all_v.conj(), length)[:, 1 : reach.forth + 1]
-    vv = scipy.fft.irfft(new_v[:, None] * all_v.conj()[None], length)[:, :, : LONGEST + 1]
-    return uu, after, ahead, vv
+    length = scipy.fft.next_fast_len(new[0].shape[1] + reach.span, real=True)
+    new_x, new_v = (_late(x, reach.span, length) for x in new)
+    all_x = scipy.fft.rfft(whole[0], length).conj()
+    all_v = _late(whole[1], reach.span - reach.forth, length).conj()
+    xx = scipy.fft.irfft(new_x[:, None] * all_x, length)[..., : reach.span + 1]
+    after = scipy.fft.irfft(new_v * all_x[:, None], length)[..., : reach.back + 1]
+    ahead = scipy.fft.irfft(new_x[:, None] * all_v, length)[..., 1 : reach.forth + 1]
+    vv = scipy.fft.irfft(new_v[:, None] * all_v, length)[..., : LONGEST + 1]
+    return xx, after, ahead, vv
 
 
 def _one_by_one(
     reach: Reach, new: tuple[Real, Real], whole: tuple[Real, Real]
 ) -> tuple[Real, Real, Real, Real]:
     """The same of a few new samples, without transforms."""
-    (u, v), (whole_u, whole_v) = new, whole
+    (x, v), (whole_x, whole_v) = new, whole
     near = whole_v[:, reach.forth - LONGEST :]
-    uu, *after = (np.correlate(whole_u, x, "valid")[::-1] for x in (u, *v))
-    ahead = [np.correlate(x, u, "valid")[-2::-1] for x in whole_v]
-    vv = [[np.correlate(x, row, "valid")[::-1] for x in near] for row in v]
-    return uu, np.array(after)[:, : reach.back + 1], np.array(ahead), np.array(vv)
+    xx = _correlated(x, whole_x)
+    after = _correlated(v, whole_x).transpose(1, 0, 2)[..., : reach.back + 1]
+    ahead = _correlated(x, whole_v)[..., 1:]
+    return xx, after, ahead, _correlated(v, near)
+
+
+def _correlated(new: Real, whole: Real) -> Real:
+    """Σ a(t) b(t-k) of each a that is new and each b, k from 0 on."""
+    return np.array([[np.correlate(b, a, "valid")[::-1] for b in whole] for a in new])
 
 
 def _before(run: Run, reach: Reach) -> Real:

@@ -13,7 +13,7 @@ from hmpim.arguments import checked, numbers_of, shown
 from hmpim.equality import ByValue
 from hmpim.errors import ArgumentError, RecordError
 from hmpim.identify.statistics.reach import Reach
-from hmpim.identify.statistics.run import Run, begun, continued
+from hmpim.identify.statistics.run import Run, begun, continued, without_cubes
 from hmpim.record import Intersample, Record, Signal, uniform
 from hmpim.tables import shortened
 
@@ -164,8 +164,12 @@ class Statistics(ByValue):
                 f"a bias with {self.reach.rows} knots belongs to one run; join with bias='own', or "
                 "compress without knots"
             )
-        runs = (*self.runs, *(run for other in others for run in other.runs))
-        return replace(self, runs=runs, bias=chosen)
+        every = (self, *others)
+        runs = tuple(run for one in every for run in one.runs)
+        reach = replace(self.reach, beyond=all(one.reach.beyond for one in every))
+        if not reach.beyond:
+            runs = tuple(without_cubes(run) for run in runs)
+        return replace(self, reach=reach, runs=runs, bias=chosen)
 
     def __add__(self, other: object) -> "Statistics":
         if not isinstance(other, Statistics):

@@ -1,0 +1,188 @@
+"""What no linear system does, told from statistics: harmonics by a score test, and standstills.
+
+An odd distortion of a sweep (friction, backlash, a dead zone, a limited speed, a cubic spring) puts
+what has three times its frequency into the output, and so does the cube of the input. Short
+responses to the cube are asked for beside all parameters of the model, and beside the same
+responses to the input itself, since a linear system may have those (C. R. Rao, Proc. Camb. Phil.
+Soc. 44, 1948). Under a linear system of any kind what they gain is chi-squared. The cube of a
+binary input is the input: it leaves nothing to ask.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import scipy
+
+from hmpim.identify.arrays import Real
+from hmpim.identify.chance import FALSE_ALARM
+from hmpim.identify.fitting.least_squares import solved
+from hmpim.identify.judgement.evidence import Evidence
+from hmpim.identify.judgement.residual import moved_by
+from hmpim.identify.result.digits import percent
+from hmpim.identify.result.groups import MODELLED
+from hmpim.identify.statistics.fit import Fitted
+from hmpim.identify.statistics.misfit import asked_of
+from hmpim.identify.statistics.products import Products, Responses
+from hmpim.identify.statistics.run import STOOD, cross_closed, of_cubes
+from hmpim.identify.statistics.statistics import Statistics
+from hmpim.identify.worth import FEW
+from hmpim.record import Finding
+
+__all__ = ["Beyond", "beyond_of", "held_for", "is_told", "said_beyond"]
+
+_GROUPS = 5
+"""Frequencies that are asked for, from 0 to the cube's highest."""
+
+_TIMES = 3.0
+"""The cube of a sinusoid has so many times its frequency, and a third of the amplitude there."""
+
+_SEEN = 1e-6
+"""Share of a direction that the input's own responses leave, below which it is not asked for."""
+
+_UNDELAYED = ("scale_factor", "bias")
+"""Figures of slow motion, which an output that is held shows as it is."""
+
+_FEWEST = 10
+"""Values that an output must have kept before it counts as held."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Beyond:
+    """What responses to the cube of the input explain beyond chance.
+
+    Parameters
+    ----------
+    share : float
+        Of the residual's power.
+    probability : float
+        That a linear system does as much.
+    """
+
+    share: float
+    probability: float
+
+
+def is_told(statistics: Statistics) -> bool:
+    """Whether products of the cube are kept of every run."""
+    return statistics.reach.beyond and all(run.cubed for run in statistics.runs)
+
+
+def beyond_of(fitted: Fitted, products: Products, band: tuple[float, float]) -> Beyond:
+    """Test whether the residual of a fit follows the cube of the input.
+
+    Parameters
+    ----------
+    fitted : Fitted
+        The fit.
+    products : Products
+        With what the fit leaves over whitened.
+    band : (float, float)
+        Excited band, in cycles per sample.
+    """
+    statistics = replace(products.statistics, bias="own")
+    reach, runs = statistics.reach, statistics.runs
+    scale = max(float(run.scale[0]) for run in runs)
+    thirds = replace(statistics, runs=tuple(of_cubes(run, reach, scale) for run in runs))
+    inputs, cubes = (
+        Products(one, skipped=products.skipped, noise=products.noise)
+        for one in (statistics, thirds)
+    )
+    highest = min(_TIMES * band[1], 0.5)
+    rows = asked_of(fitted.delay, (0.0, highest), products, groups=_GROUPS).rows
+    asked = _ending(np.vstack([rows, fitted.response]))
+    beside = fitted.responses.and_also(_ending(rows))
+    third, first = cubes.moments(asked), inputs.moments(beside)
+    lags = np.sum([cross_closed(run, reach, scale) for run in runs], axis=0)
+    mixed = cubes.across(asked, inputs, beside, lags)
+    count, linear = fitted.weights.size, fitted.weights
+    cross = third.cross - mixed[:, :count] @ linear
+    left_first = first.cross - first.gram[:, :count] @ linear
+    shift = -solved(first.gram, mixed.T)
+    gain, left = cross + shift.T @ left_first, third.gram + mixed @ shift
+    cost = first.energy - float(linear @ (first.cross[:count] + left_first[:count]))
+    cost -= float(left_first @ solved(first.gram, left_first))
+    size = np.sqrt(np.where(np.diag(third.gram) > 0.0, np.diag(third.gram), 1.0))
+    values, vectors = np.linalg.eigh(left / np.outer(size, size))
+    kept = values > _SEEN
+    freedom = int(kept.sum())
+    if not freedom or cost <= 0.0:
+        return Beyond(share=0.0, probability=1.0)
+    power = float(np.sum((vectors.T @ (gain / size))[kept] ** 2 / values[kept]))
+    variance = cost / max(products.counted - beside.rows.shape[0] - freedom, 1)
+    return Beyond(
+        share=max((power - freedom * variance) / cost, 0.0),
+        probability=float(scipy.special.chdtrc(freedom, power / variance)),
+    )
+
+
+def _ending(rows: Real) -> Responses:
+    return Responses.ending(rows, np.zeros(rows.shape[0]))  # each run has a bias of its own
+
+
+def held_for(statistics: Statistics) -> float | None:
+    """Samples for which an output keeps each of its values, where it is updated by a slower clock.
+
+    By such a clock it changes every second sample at most, after as many samples each time, or one
+    more. Noise repeats no value, and rounding repeats them for as long as the output is slow.
+    """
+    counts = np.sum([run.stood[1:] for run in statistics.runs], axis=0)
+    total = float(counts.sum())
+    if total < _FEWEST:
+        return None
+    shortest = int(np.searchsorted(np.cumsum(counts), FEW * total)) + 1
+    steady = float(counts[shortest - 1 : shortest + 1].sum())
+    if shortest == 1 or shortest == STOOD or steady < (1.0 - FEW) * total:
+        return None
+    lengths = np.arange(1, STOOD + 1)
+    near = slice(shortest - 1, shortest + 1)
+    return float(counts[near] @ lengths[near]) / steady
+
+
+def said_beyond(
+    statistics: Statistics, found: Beyond | None, evidence: Evidence
+) -> tuple[Finding, ...]:
+    """Say what no linear system does.
+
+    A linear fit takes up what of a distortion has the input's own frequency: `_TIMES` its harmonic,
+    of the cube as of friction. Doubted are the figures that so much may move by a hundredth.
+
+    Parameters
+    ----------
+    statistics : Statistics
+        What was read.
+    found : Beyond or None
+        Of the cube of the input; None where it is not kept, and nothing is said.
+    evidence : Evidence
+        Of the fit.
+    """
+    if found is None:
+        return ()
+    findings = []
+    period = held_for(statistics)
+    if period is not None:
+        findings.append(
+            Finding(
+                code="held_output",
+                message=f"The output keeps each of its values for {period:.3g} samples "
+                f"({period / statistics.fs:.3g} s): it is updated by a slower clock. Statistics do "
+                "not keep when, so that delay and dynamics are those of the held output. Identify "
+                "the record itself.",
+                severity="doubt",
+                parameters=tuple(name for name in MODELLED if name not in _UNDELAYED),
+            )
+        )
+    if found.probability < FALSE_ALARM:
+        size = float(np.sqrt(found.share)) * evidence.unexplained
+        moved = moved_by(evidence, _TIMES**2 * found.share)
+        findings.append(
+            Finding(
+                code="nonlinear",
+                message=f"The residual follows the cube of the input, as no linear system lets it: "
+                f"{percent(size)} % of the output (r.m.s.) is odd harmonics, and the linear model "
+                "takes up several times as much. It may be friction, backlash, a dead zone, a "
+                "limited speed or clipping. Identify the record itself to see which.",
+                severity="doubt",
+                parameters=moved,
+            )
+        )
+    return tuple(findings)
