@@ -25,7 +25,7 @@ from hmpim.identify.statistics.misfit import asked_of
 from hmpim.identify.statistics.products import Products, Responses
 from hmpim.identify.statistics.run import STOOD, cross_closed, of_cubes
 from hmpim.identify.statistics.statistics import Statistics
-from hmpim.identify.worth import FEW
+from hmpim.identify.worth import FEW, MUCH
 from hmpim.record import Finding
 
 __all__ = ["Beyond", "beyond_of", "held_for", "is_told", "said_beyond"]
@@ -102,7 +102,10 @@ def beyond_of(fitted: Fitted, products: Products, band: tuple[float, float]) -> 
     cost = first.energy - float(linear @ (first.cross[:count] + left_first[:count]))
     cost -= float(left_first @ solved(first.gram, left_first))
     size = np.sqrt(np.where(np.diag(third.gram) > 0.0, np.diag(third.gram), 1.0))
-    values, vectors = np.linalg.eigh(left / np.outer(size, size))
+    left = left / np.outer(size, size)
+    if float(np.mean(np.diag(left))) < MUCH:  # all but binary: its edges lie between the samples
+        return Beyond(share=0.0, probability=1.0)
+    values, vectors = np.linalg.eigh(left)
     kept = values > _SEEN
     freedom = int(kept.sum())
     if not freedom or cost <= 0.0:
@@ -181,8 +184,8 @@ def said_beyond(
                 f"{percent(size)} % of the output (r.m.s.) is odd harmonics, and the linear model "
                 "takes up several times as much. It may be friction, backlash, a dead zone, a "
                 "limited speed or clipping. Identify the record itself to see which.",
-                severity="doubt",
-                parameters=moved,
+                severity="doubt" if moved else "info",
+                parameters=moved or MODELLED,
             )
         )
     return tuple(findings)

@@ -252,7 +252,7 @@ def compress(
     >>> u = rng.standard_normal(5000)
     >>> y = 2.0 * np.concatenate([np.zeros(3), u[:-3]]) + 0.1 * rng.standard_normal(5000)
     >>> statistics = compress(Record.from_arrays({"u": u}, {"y": y}, fs=100.0), lags=40)
-    >>> statistics.samples, statistics.nbytes < 10_000
+    >>> statistics.samples, statistics.nbytes < 15_000
     (5000, True)
     """
     aligned = uniform(record)
