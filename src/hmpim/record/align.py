@@ -113,10 +113,10 @@ def uniform(record: Record) -> Aligned:
       values are filled in and marked in `Signal.valid`.
     * Jitter of stamps whose samples were taken evenly: the samples are kept as they are
       (`hmpim.record.even`). Jitter of the samples themselves: values are interpolated from their
-      own stamps with a cubic spline (not-a-knot), corrected once by what the result, band-limited,
-      misses of the samples. With stamps strewn by ±30 % of the interval it errs by 6e-5 of the
-      amplitude (r.m.s.) at a tenth of the rate and by 9e-4 at a fifth; within 32 samples of the
-      ends, by 5e-4 and 7e-3. A gap ends one spline and begins the next.
+      own stamps with a cubic spline (not-a-knot), corrected once by the interpolated residual of
+      the band-limited result at the samples. With stamps strewn by ±30 % of the interval it errs
+      by 6e-5 of the amplitude (r.m.s.) at a tenth of the rate and by 9e-4 at a fifth; within 32
+      samples of the ends, by 5e-4 and 7e-3. A gap ends one spline and begins the next.
     * Channels with clocks of their own: interpolated likewise, over the span that all share. One
       that is sampled faster loses what lies above half the lower rate first, by a symmetric
       filter: no path moves the delay (see `hmpim.record.resample`).

@@ -21,7 +21,7 @@ _APART = 100
 
 
 _LATER = 100
-"""Samples over which lateness is a mean: half of them before, half of them after an interval."""
+"""Samples over which delay is averaged: half of them before, half of them after an interval."""
 
 _ALIKE = 0.05
 """Relative difference up to which the stated rate is that of the stamps."""
@@ -135,7 +135,7 @@ def fit_clock(
     n = time.size
     since = time - time[0]
     resolution = _decimal_step(since, float(np.abs(time).max()))
-    missing = _missing(since) if index is None else np.diff(index) - 1
+    missing = _missing(since, nominal) if index is None else np.diff(index) - 1
     # A dropped sample bends the stamps by a whole interval; rounding bends them by one
     # decimal step at most. Where the decimal step is nearly an interval, the two look alike,
     # and only many "gaps" speak for rounding.
@@ -183,7 +183,8 @@ def rate_of(time: NDArray[np.float64]) -> float:
     (100.0, 100)
     """
     clock = fit_clock(time)
-    return 1.0 / usual_interval(time) if clock.jittered or clock.mostly_empty else clock.fs
+    strays = float(np.std(clock.deviation)) * clock.fs > _LASTS
+    return 1.0 / usual_interval(time) if strays or clock.mostly_empty else clock.fs
 
 
 def usual_interval(time: NDArray[np.float64]) -> float:
@@ -201,7 +202,7 @@ def usual_interval(time: NDArray[np.float64]) -> float:
 
 
 def places_of_late(time: NDArray[np.float64], *, nominal: float | None = None) -> NDArray[np.int64]:
-    """Places of stamps on their clock, counting as missing only what makes all later ones late.
+    """Sample numbers of stamps; a gap counts only if all later stamps are delayed by it.
 
     Stamps of a computer that was busy catch up, and so do those of samples that arrive in packets.
     """
@@ -216,10 +217,12 @@ def places_of_late(time: NDArray[np.float64], *, nominal: float | None = None) -
     after = total[2 * half :] - total[half:-half]
     before = total[half:-half] - total[: -2 * half]
     late = (after - before) / (half * ruler)
+    if not late.size:
+        return every
     late -= np.median(late)
     usual = _FAR * float(np.median(np.abs(late))) / _BULK
     found: list[int] = []
-    while late.size and float(late.max()) > max(usual, _LASTS):
+    while float(late.max()) > max(usual, _LASTS):
         k = int(np.argmax(late))
         near = slice(max(k - half, 0), k + half + 1)
         first = near.start + half  # the sample after the interval that is longest there
@@ -233,7 +236,7 @@ def places_of_late(time: NDArray[np.float64], *, nominal: float | None = None) -
     along, after_mean = every - place[run], since - stamp[run]
     step = float(along @ after_mean) / float(along @ along)
     missing = np.zeros(n, dtype=np.int64)
-    missing[at] = np.maximum(np.rint(np.diff(stamp - step * place) / step), 0)
+    missing[at] = np.clip(np.rint(np.diff(stamp - step * place) / step), 0, _MOST_MISSING)
     return every + np.cumsum(missing)
 
 
@@ -247,12 +250,12 @@ _MOST_MISSING = 2.0**40
 """Samples in one gap, beyond which stamps are damaged and the count only says so."""
 
 
-def _missing(since: NDArray[np.float64]) -> NDArray[np.int64]:
+def _missing(since: NDArray[np.float64], nominal: float | None) -> NDArray[np.int64]:
     """Number of samples missing in each interval; shape (n - 1,)."""
     steps = np.diff(since)
     ruler = float(np.median(steps))
     if since.size > 2 * _LATER and np.median(np.abs(steps - ruler)) > _NEAR * ruler:
-        return np.diff(places_of_late(since)) - 1
+        return np.diff(places_of_late(since, nominal=nominal)) - 1
     sure = steps >= 1.9 * ruler
     # The mean of the whole intervals is a finer ruler for the long ones than the median is.
     if not sure.all():

@@ -32,11 +32,14 @@ _FEWEST = 20
 _SURE = 4.0
 """Deviations that decide against the stamps: by chance in one of 30 000 records."""
 
+_MANY = 0.01
+"""Gaps for each sample, from which they are those between packets."""
+
 _SECTIONS = 8
-"""Sections of a record in which stamps are as early as one another, unless samples are missing."""
+"""Sections compared: the earliest stamps of each agree unless samples are missing."""
 
 _LASTS = 0.5
-"""Intervals by which the early stamps of sections differ where none is missing."""
+"""Intervals, or spreads of the stamps within one, by which those of sections may differ."""
 
 
 def evenly_sampled(channels: Sequence[Channel], clock: Clock, *, nominal: float) -> Clock | None:
@@ -71,14 +74,17 @@ def evenly_sampled(channels: Sequence[Channel], clock: Clock, *, nominal: float)
     True
     """
     time = channels[0].time
-    asked = clock.jittered or clock.mostly_empty
-    if not asked or time.size < _STRETCH * _FEWEST:
+    in_packets = clock.mostly_empty and clock.gaps.size > _MANY * time.size
+    if not (clock.jittered or in_packets) or time.size < _STRETCH * (_FEWEST + 1):
         return None
     tried = [clock]
     if clock.gaps.size:
         complete = fit_clock(time, nominal=nominal, index=np.arange(time.size))
         places = None if _none_lasts(complete) else places_of_late(time, nominal=nominal)
         tried.append(complete if places is None else fit_clock(time, nominal=nominal, index=places))
+    tried = [one for one in tried if _none_lasts(one)]
+    if not tried:  # samples are missing that cannot be counted
+        return None
     stamped = [_left(c.values, time) for c in channels]
     gained = [_gain(channels, one, stamped) for one in tried]
     best = int(np.argmax([gain.sum() for gain in gained]))
@@ -122,6 +128,7 @@ def _left(values: NDArray[np.float64], time: NDArray[np.float64]) -> NDArray[np.
 
 
 def _none_lasts(clock: Clock) -> bool:
-    """Whether stamps are as early in all sections of a record, as where no sample is missing."""
-    early = [np.quantile(part, 0.25) for part in np.array_split(clock.deviation, _SECTIONS)]
-    return bool(np.ptp(early) < _LASTS / clock.fs)
+    """Whether no section of a record is delayed against another, as where all gaps are counted."""
+    sections = np.array_split(clock.deviation * clock.fs, _SECTIONS)
+    early, late = np.array([np.quantile(part, [0.25, 0.75]) for part in sections]).T
+    return bool(np.ptp(early) < _LASTS * max(1.0, float(np.median(late - early))))

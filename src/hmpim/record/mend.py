@@ -56,8 +56,8 @@ def mend(series: Sequence[Series], *, fs: float | None = None) -> Mended:
     * A sample that is NaN or infinite is dropped, which leaves a gap in its channel alone.
     * Stamps that stand still because the clock is printed too coarsely (2 kHz in whole
       milliseconds): the samples are spread on the uniform clock that the stamps are rounded from.
-      Those of packets, where half of the samples and more share a stamp: over the time since the
-      packet before. Else the first sample of each stamp is kept.
+      If half of the samples or more share stamps (packets), each packet is spread over the time
+      since the previous one. Else the first sample of each stamp is kept.
     * Samples out of order, by up to eight places: sorted by stamp.
     * Single stamps a thousand lengths of the record away: left out, as they are damaged.
     * Stamps that start again, or jump so far that nothing can be laid between: refused.
@@ -184,7 +184,7 @@ def _ordered(
         spread = _since_packet_before(time[order])
         message = (
             f"{repeat}, as of samples that arrive in packets; each packet is spread over the time "
-            "since the one before"
+            "since the previous one"
         )
     else:
         order = order[first]
@@ -260,7 +260,7 @@ def _spread(time: NDArray[np.float64]) -> NDArray[np.float64] | None:
 
 
 def _since_packet_before(time: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Stamps of samples that share that of their packet, none longer before it than usual."""
+    """Spread each packet over the time since the previous one, at most over its usual duration."""
     stamp, count = np.unique(time, return_counts=True)
     usual = float(stamp[-1] - stamp[0]) / (time.size - count[0])
     before = np.maximum(np.append(-np.inf, stamp[:-1]), stamp - count * usual)

@@ -18,7 +18,7 @@ _NOTHING = 1e-6
 """Share of power above what is passed that is let fold: 10⁻³ of the amplitude."""
 
 _SLOWER = 0.98
-"""Clocks of one kind differ by less."""
+"""Ratio of two rates above which they are taken as equal."""
 
 _AT_ONCE = 0.25
 """Share of an interval within which stamps are of one instant."""
@@ -240,7 +240,7 @@ def _agreeing(
     """Values at even instants that agree, band-limited, with the samples at their own stamps.
 
     What they miss of the samples is interpolated as the samples were, and added, so that the
-    spline errs by its own error of an error (H. G. Feichtinger, K. Gröchenig, Theory and Practice
+    error of the spline is of second order (H. G. Feichtinger, K. Gröchenig, Theory and Practice
     of Irregular Sampling, in Wavelets: Mathematics and Applications, 1994). More such steps
     gain little, and each raises the noise.
     """

@@ -18,10 +18,10 @@ Measured with uniform jitter of 0.09 and 0.17 intervals (r.m.s.): 3.3 % and 12 %
 """
 
 _TOLERATED = 0.02
-"""Share by which a noise may be off without being wrong."""
+"""Relative error of the noise that needs no warning."""
 
-_KNOWN = 0.3
-"""Share beyond which the square no longer describes it."""
+_KNOWN = 0.15
+"""Relative error beyond which the quadratic law no longer holds."""
 
 STUCK_SHARE = 0.05
 """Share of a record over which an output may stand still while the input moves."""
@@ -122,8 +122,8 @@ def _jitter(clock: Clock, time: NDArray[np.float64], of: str, *, evenly: bool) -
     parameters: tuple[str, ...] = ()
     if evenly:
         what = (
-            "the samples themselves are even, as they form smooth signals at equal intervals and "
-            "not at their stamps: equal intervals are used; stamp the samples where they are taken"
+            "the samples were taken at equal intervals, as the signals are smooth there and not at "
+            "the stamps; equal intervals are used: stamp each sample when it is taken"
         )
     else:
         raised = _NOISE_RAISED * (share * rms / 100) ** 2

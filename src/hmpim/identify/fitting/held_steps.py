@@ -36,7 +36,8 @@ def kept_in_sample(problem: Problem, structure: Structure, theta: Real) -> Probl
     stated = problem.shortest_delay == problem.longest_delay
     if stated or not steps_through(structure, held=problem.source.degree == 0):
         return problem
-    middle = float(np.floor(theta[0])) + 0.5
+    within = np.clip(theta[0], problem.shortest_delay, problem.longest_delay)
+    middle = float(np.floor(within)) + 0.5
     return replace(problem, shortest_delay=middle, longest_delay=middle)
 
 
