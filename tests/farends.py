@@ -66,10 +66,11 @@ class Table:
     def rows(self):
         """What it has done since the last call, as far as whole lines are written."""
         with self.trace.open() as file:
-            head = file.readline().strip().split(",")
+            first = file.readline()
+            head = first.strip().split(",")
             if self.read_to:
                 file.seek(self.read_to)
-            text = file.read()
+            text = file.read() if first.endswith("\n") else ""
             whole = text[: text.rfind("\n") + 1]
             self.read_to = (self.read_to or file.tell() - len(text)) + len(whole)
         rows = [line.split(",") for line in whole.splitlines()]

@@ -121,3 +121,22 @@ def test_samples_that_share_the_stamp_of_their_packet_are_all_used():
 def test_the_rate_of_packets_is_that_of_all_samples():
     assert rate_of(in_packets(10)) == pytest.approx(FS, rel=0.01)
     assert rate_of(TAKEN) == pytest.approx(FS, rel=1e-12)
+
+
+def test_losses_that_cannot_be_counted_leave_the_stamps():
+    """One sample in fifty is lost, and stamps jitter: no clock holds all, so no rate is claimed."""
+    kept = np.random.default_rng(2).random(N) > 0.02
+    aligned = uniform(record_at(TAKEN, strayed(1.0), kept=kept))
+    assert "even_samples" not in [f.code for f in aligned.findings]
+
+
+def test_losses_move_no_rate_that_is_read_off_stamps():
+    kept = np.random.default_rng(2).random(N) > 0.05
+    assert rate_of(strayed(0.05)[kept]) == pytest.approx(FS, rel=1e-4)
+
+
+def test_a_long_pause_of_a_good_clock_is_none_of_jitter():
+    stamps = np.append(TAKEN, TAKEN + 40.0) + 1e-6 * np.random.default_rng(1).random(2 * N)
+    u = motion(np.append(TAKEN, TAKEN))
+    aligned = uniform(Record.from_arrays({"u": u}, {"y": u}, time=stamps, fs=FS))
+    assert [f.code for f in aligned.findings] == ["gaps"]

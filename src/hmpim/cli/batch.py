@@ -180,9 +180,9 @@ def batch(
 
 
 def _check_any(table: "BatchTable", page: Path) -> None:
-    """Refuse a batch of which every record was refused, as one such record is."""
+    """Fail if every record was refused, as one such record does."""
     verdicts = table.to_arrow(["verdict"]).column(0)
-    if verdicts.null_count < len(verdicts):
+    if not len(verdicts) or verdicts.null_count < len(verdicts):
         return
     from hmpim.batch.summary import summary_of
 

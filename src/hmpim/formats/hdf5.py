@@ -12,7 +12,7 @@ _CUT = re.compile(r"truncated file: eof = (\d+),.* stored_eof = (\d+)")
 
 
 def fault_of(path: Path, error: Exception) -> FormatError:
-    """Return the error to raise for one of h5py's, which are of a dozen kinds.
+    """Return the FormatError for an error of h5py's, which may be of many types.
 
     Examples
     --------

@@ -16,9 +16,11 @@ from hmpim.identify.statistics.run import Run
 
 __all__ = ["SCHEMA", "holds_statistics", "read_statistics", "save_statistics"]
 
-SCHEMA = "hmpim/statistics/2"
+_FAMILY = "hmpim/statistics/"
 
-_FIRST = "hmpim/statistics/1"
+SCHEMA = f"{_FAMILY}2"
+
+_FIRST = f"{_FAMILY}1"
 """Without what tells of more than linear systems."""
 
 _ARRAYS = tuple(name for name in Run.__dataclass_fields__ if name != "samples")
@@ -76,7 +78,7 @@ def holds_statistics(path: str | PathLike[str]) -> bool:
 
     try:
         with h5py.File(Path(path), "r") as file:
-            return str(file.attrs.get("schema", "")) in (SCHEMA, _FIRST)
+            return str(file.attrs.get("schema", "")).startswith(_FAMILY)
     except Exception:  # no HDF5, or damaged
         return False
 
@@ -93,8 +95,16 @@ def read_statistics(path: str | PathLike[str]) -> Statistics:
 
     try:
         with h5py.File(Path(path), "r") as file:
+            schema = str(file.attrs.get("schema", ""))
+            if schema not in (SCHEMA, _FIRST):
+                raise FormatError(
+                    f"{str(path)!r} holds {schema or 'no schema'}, and statistics are of schema "
+                    f"{SCHEMA} or {_FIRST}; take a newer hmpim, or another file"
+                )
             statistics = _read(file)
             digest = str(file.attrs["sha256"])
+    except FormatError:
+        raise
     except Exception as error:
         raise fault_of(Path(path), error) from error
     if digest != _digest(statistics.runs):

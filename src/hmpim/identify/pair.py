@@ -127,6 +127,7 @@ def _pair(
     bent = 0.0 if inspection is None or not said else inspection.summary.nonlinear
     # Nothing is said of the gain beside a fit that a nonlinearity has replaced.
     gaining = joined.gaining if joint.best.fit is joined.fits[i].best.fit else None
+    course = None if joined.gaining is None or not joined.gaining.taken else joined.gaining.course
     evidence, unmade = _evidence(question, found, readings, joint, response, i, moves, gaining)
     evidence = replace(evidence, nonlinear=max(bent, evidence.nonlinear))
     parameters, seen = with_imperfections(
@@ -161,7 +162,7 @@ def _pair(
         from_response=evidence.measured,
         time=aligned.time,
         prediction=fit.prediction if disturbance is None else fit.prediction + disturbance,
-        residual=fit.residual,
+        residual=fit.residual if course is None else fit.residual * course,
         covariance=highest_first(readings.coefficient_covariance, readings.system),
         nonlinearity=None if inspection is None else inspection.summary,
     )

@@ -167,3 +167,14 @@ def test_a_limit_of_speed_is_no_change_of_the_gain():
     y = steps[::8] + 0.01 * np.random.default_rng(0).standard_normal(2000)
     record = hmpim.Record.from_arrays({"u": u[::8]}, {"y": y}, fs=FS, intersample="bandlimited")
     assert not of_gain(hmpim.identify(record)["y", "u"])
+
+
+def test_the_prediction_has_the_change_and_none_of_the_noise():
+    record = record_of(STEADY, 3)
+    pair = hmpim.identify(record)["y", "u"]
+    assert of_gain(pair)
+    y = record.outputs[0].values
+    assert np.allclose(pair.prediction + pair.residual, y, rtol=0, atol=1e-9)
+    sensor = hmpim.Sensor(delay=0.05, natural_frequency=10.0, damping_ratio=0.4)
+    clean = STEADY * hmpim.run(sensor, SWEEP, rng=3).outputs[0].values + 0.3
+    assert np.std(pair.prediction - clean) < 0.2 * np.std(y - clean)

@@ -5,7 +5,7 @@ import pytest
 
 import hmpim
 from hmpim.identify.fitting.fit import Problem
-from hmpim.identify.fitting.held_steps import at_ends, steps_through
+from hmpim.identify.fitting.held_steps import at_ends, kept_in_sample, steps_through
 from hmpim.identify.fitting.sampled_rows import part_of
 from hmpim.model import STRUCTURES, prepare_input
 
@@ -77,3 +77,11 @@ def test_a_lead_lag_behind_a_converter_is_found(late):
     for name, value in truth.items():
         figure = getattr(pair, name)
         assert figure.ci95[0] <= value <= figure.ci95[1], name
+
+
+def test_a_start_far_outside_the_record_is_brought_inside():
+    """Of a washout that a numerator without weight put two thousand million samples ahead."""
+    u = np.sign(np.sin(0.1 * np.arange(300)))
+    problem = Problem(source=prepare_input(u, "zoh"), y=u, valid=None, longest_delay=50.0)
+    kept = kept_in_sample(problem, STRUCTURES["washout"], np.array([-2e9, 3.0]))
+    assert kept.shortest_delay == kept.longest_delay == np.floor(problem.shortest_delay) + 0.5

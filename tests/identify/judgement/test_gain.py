@@ -16,6 +16,7 @@ def change(evidence, *, taken, share=0.0, others=()):
         joint=joint,
         taken=taken,
         trend=np.zeros(joint.problem.y.size),
+        course=np.ones(joint.problem.y.size),
         change=-0.1,
         std=0.002,
         share=share,

@@ -208,3 +208,15 @@ def test_a_live_estimate_keeps_none_of_it():
     lags = live.statistics.lags
     record = Record.from_arrays({"u": stimulus.position}, {"y": stimulus.position}, fs=FS)
     assert live.statistics.nbytes < compress(record, lags=lags).nbytes
+
+
+def test_statistics_of_a_schema_to_come_are_refused_by_its_name(tmp_path):
+    record = hmpim.Record.from_arrays(
+        {"u": np.sin(np.arange(300) / 9)}, {"y": np.cos(np.arange(300) / 9)}, fs=100.0
+    )
+    path = tmp_path / "later.h5"
+    hmpim.save(hmpim.compress(record, lags=20), path)
+    with h5py.File(path, "r+") as file:
+        file.attrs["schema"] = "hmpim/statistics/9"
+    with pytest.raises(hmpim.HmpimError, match="holds hmpim/statistics/9"):
+        hmpim.load(path)

@@ -3,7 +3,7 @@
 With s(t) zero on average, the output is K (1 + c s(t)) [G u](t) + bias + noise, and K the mean
 gain. Beside a fit, c multiplies one more row, s(t) times the model's answer: a score test of c
 (C. R. Rao, Proc. Cambridge Phil. Soc. 44, 1948) costs a few products. A sweep passes each frequency
-at its own time, so that zeros and further poles imitate such a change, and it them: plain
+at its own time, so that zeros and further poles imitate such a change, and vice versa: plain
 structures whose gain changes are weighed against richer ones by Schwarz's criterion.
 """
 
@@ -29,7 +29,7 @@ from hmpim.model.dynamics import Structure
 __all__ = ["GainChange", "Scored", "changing_gain", "scored"]
 
 _SETTLES = (1.5, 2.0, 2.8, 3.8, 5.2, 7.0, 9.5, 13.0)
-"""Time constants that a record has of a gain that settles; beside them it may change steadily."""
+"""Record lengths, in time constants, tried for a gain that settles; or it changes steadily."""
 
 _STEP = 1.4
 """Ratio of neighbours among them, within which the likeliest is then sought."""
@@ -62,18 +62,21 @@ class GainChange:
     taken : bool
         Whether it is clearly likelier than the fit with a constant gain, and leaves white noise.
     trend : ndarray, shape (n,)
-        What the change does to the output, in its unit.
+        What the change adds to the model's output, in its unit.
+    course : ndarray, shape (n,)
+        The gain over its mean, by which the residual of `joint` is to be multiplied.
     change, std : float
         Change over the record, as a share of the mean gain, and its standard deviation.
     share : float
         Share of the residual's power that it explains beside the fit that was chosen without it.
     others : tuple of Fit
-        Beside changes of another shape, about as likely; of one that is not taken that of `joint`.
+        Fits with other shapes that are about as likely; `joint`'s own if the change is not taken.
     """
 
     joint: JointFit
     taken: bool
     trend: Real
+    course: Real
     change: float
     std: float
     share: float
@@ -89,10 +92,10 @@ class Scored:
     rate : float
         Time constants that the record has of it; 0 if it is steady.
     shape : ndarray, shape (n,)
-        The course of the change: by 1 over the record, zero on average.
+        The course of the change: 1 in total, zero on average.
     rows : ndarray, shape (k, n)
         What the change over the record, as a share of the mean gain, multiplies; and of one that
-        settles the derivative with respect to the logarithm of its rate, to a factor.
+        settles the derivative with respect to the logarithm of its rate, up to a factor.
     change, std : float
         The change and its standard deviation.
     gain : float
@@ -170,7 +173,8 @@ def changing_gain(
     return GainChange(
         joint=lead.joint,
         taken=taken,
-        trend=first.problem.y - lead.joint.problem.y,
+        trend=lead.trend,
+        course=lead.course,
         change=lead.told.change,
         std=lead.told.std,
         share=0.0 if taken else share,
@@ -181,7 +185,7 @@ def changing_gain(
 def _asked(
     first: JointFit, otherwise: Callable[[Problem, Fit], float]
 ) -> tuple[tuple[Scored, ...], float]:
-    """Scores to begin with, none where nothing asks; and the share explained beside the fit."""
+    """Scores to begin with, empty if no test is significant; and the share that they explain."""
     count, best = first.weighed.counted * first.weighed_share, first.best.fit
     own = scored(first.weighed, best, count)
     rich = best.structure.name not in PLAIN
@@ -201,6 +205,13 @@ class _Settled:
     joint: JointFit
     told: Scored
     gained: float
+    course: Real
+    level: float
+
+    @property
+    def trend(self) -> Real:
+        """What the change adds to the model's output."""
+        return np.asarray((self.joint.best.fit.prediction - self.level) * (self.course - 1.0))
 
     @property
     def white(self) -> bool:
@@ -215,7 +226,7 @@ def _tried(
     *,
     hopeless: float,
 ) -> list[_Settled]:
-    """The plain fits beside a steady change and one that settles, less those that cannot lead."""
+    """The plain fits with a steady change and one that settles, without those that cannot win."""
     steady = [told for told in begin if not told.rate]
     settling = sorted((told for told in begin if told.rate), key=lambda told: -told.gain)
     found = []
@@ -270,7 +281,8 @@ def _settled(
         course = 1.0 + told.change * told.shape
         if course.min() < _LEAST:
             return None
-        joint = fitted(rest + (y - rest) / course, told.rows, plainly)
+        level = rest
+        joint = fitted(level + (y - level) / course, told.rows, plainly)
         fit, rest = joint.best.fit, _rest(joint.problem, joint.best.fit)
         if not joint.related or fit.cost >= hopeless:
             return None
@@ -291,6 +303,8 @@ def _settled(
         gained=gain_by_rows(
             replace(joint, best=even), len(told.rows), first.best.fit, first.forgotten
         ),
+        course=course,
+        level=level,
     )
 
 
@@ -300,7 +314,7 @@ def _place(fit: Fit) -> tuple[Structure, Real]:
 
 
 def _rest(problem: Problem, fit: Fit) -> float:
-    """Output from which the input moves it: that of the input's level at the beginning."""
+    """Output at the input's initial level."""
     return float(fit.linear[-1] + fit.linear[0] * part_of(problem, *_place(fit)).level)
 
 

@@ -15,7 +15,7 @@ __all__ = ["gain_change"]
 def gain_change(evidence: Evidence) -> tuple[Finding, ...]:
     """Say that the gain changes; or that it may have, and doubt what would then move.
 
-    What would move by less than a model must be right to is left to the interval, which covers it.
+    A shift smaller than the tolerated error of a model is left to the interval, which covers it.
     """
     gaining = evidence.gaining
     if gaining is None:
@@ -24,7 +24,7 @@ def gain_change(evidence: Evidence) -> tuple[Finding, ...]:
     moved = _moved(evidence, gaining)
     if gaining.taken:
         size = plus_minus(100.0 * abs(gaining.change), 100.0 * gaining.std)
-        other = " A change of another course, with other figures, is about as likely."
+        other = " Another time course of the gain, with different figures, is about as likely."
         message = (
             f"The gain {way} by ({size}) % along the record; the change is removed, and the scale "
             f"factor stated is the mean over the record.{other if moved else ''} Let the unit warm "
@@ -35,8 +35,8 @@ def gain_change(evidence: Evidence) -> tuple[Finding, ...]:
         message = (
             f"The gain may have changed along the record: a {name} model whose gain {way} by about "
             f"{percent(abs(gaining.change))} % explains it as well. A sweep passes each frequency "
-            "at one time only, so that dynamics look like such a change. Let the unit warm up, and "
-            "repeat the test with the sweep reversed."
+            "at one time only, so dynamics and a change of gain look alike. Let the unit warm up, "
+            "and repeat the test with the sweep reversed."
         )
     return (
         Finding(

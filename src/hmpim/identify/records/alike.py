@@ -65,7 +65,7 @@ def check_channels(records: Sequence[Record]) -> None:
             if one.unit and other.unit and one.unit != other.unit:
                 raise RecordError(
                     f"{one.name!r} is in {other.unit!r} in record {k} and in {one.unit!r} in "
-                    "record 0, and numbers are not converted; give records in the same units"
+                    "record 0; units are not converted, give records in the same units"
                 )
 
 

@@ -1,4 +1,4 @@
-"""What no linear system does, told from statistics: harmonics by a score test, and standstills.
+"""Nonlinearity and held outputs, detected from statistics: a score test, and how long values stay.
 
 An odd distortion of a sweep (friction, backlash, a dead zone, a limited speed, a cubic spring) puts
 what has three times its frequency into the output, and so does the cube of the input. Short
@@ -125,8 +125,9 @@ def _ending(rows: Real) -> Responses:
 def held_for(statistics: Statistics) -> float | None:
     """Samples for which an output keeps each of its values, where it is updated by a slower clock.
 
-    By such a clock it changes every second sample at most, after as many samples each time, or one
-    more. Noise repeats no value, and rounding repeats them for as long as the output is slow.
+    Such an output changes at most every second sample, and each value lasts the same number of
+    samples, or one more. Noise repeats no value, and rounding repeats them for as long as the
+    output is slow.
     """
     counts = np.sum([run.stood[1:] for run in statistics.runs], axis=0)
     total = float(counts.sum())
@@ -146,8 +147,9 @@ def said_beyond(
 ) -> tuple[Finding, ...]:
     """Say what no linear system does.
 
-    A linear fit takes up what of a distortion has the input's own frequency: `_TIMES` its harmonic,
-    of the cube as of friction. Doubted are the figures that so much may move by a hundredth.
+    A linear fit absorbs the part of a distortion at the input's own frequency, which is `_TIMES`
+    its harmonic, of the cube as of friction. Doubted are the figures that so much may move by a
+    hundredth.
 
     Parameters
     ----------
@@ -168,7 +170,7 @@ def said_beyond(
                 code="held_output",
                 message=f"The output keeps each of its values for {period:.3g} samples "
                 f"({period / statistics.fs:.3g} s): it is updated by a slower clock. Statistics do "
-                "not keep when, so that delay and dynamics are those of the held output. Identify "
+                "not record the update times, so delay and dynamics include the hold. Identify "
                 "the record itself.",
                 severity="doubt",
                 parameters=tuple(name for name in MODELLED if name not in _UNDELAYED),
@@ -180,10 +182,11 @@ def said_beyond(
         findings.append(
             Finding(
                 code="nonlinear",
-                message=f"The residual follows the cube of the input, as no linear system lets it: "
-                f"{percent(size)} % of the output (r.m.s.) is odd harmonics, and the linear model "
-                "takes up several times as much. It may be friction, backlash, a dead zone, a "
-                "limited speed or clipping. Identify the record itself to see which.",
+                message="The residual is correlated with the cube of the input, which no linear "
+                f"system causes. Odd harmonics are {percent(size)} % of the output (r.m.s.); the "
+                "linear model absorbs several times as much distortion. It may be friction, "
+                "backlash, a dead zone, a limited speed or clipping. Identify the record itself to "
+                "see which.",
                 severity="doubt" if moved else "info",
                 parameters=moved or MODELLED,
             )

@@ -286,7 +286,7 @@ def _no_samples(statistics: Statistics) -> Finding:
     if is_told(statistics):
         left = (
             "clipping, rounding, spikes and even harmonics were not looked for, and holds and odd "
-            "harmonics were not modelled"
+            "harmonics are detected but not modelled"
         )
     return Finding(
         code="no_samples",

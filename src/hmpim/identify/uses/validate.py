@@ -196,7 +196,7 @@ def validate(result: Identification, record: Record, *, bounds: Bounds | None = 
     is read. An integrator's prediction may start anywhere. That a residual follows the input
     counts against the result only beyond what the error bars admit at the same chance. Rounding
     is not noise: it may have any colour and follow the input. A residual of at most 1e-9 of the
-    output (r.m.s.), as exact software leaves, has no bounds.
+    output (r.m.s.), as exact software leaves, has no bounds but that of the fit.
 
     Examples
     --------
