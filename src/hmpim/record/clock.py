@@ -183,7 +183,7 @@ def rate_of(time: NDArray[np.float64]) -> float:
     (100.0, 100)
     """
     clock = fit_clock(time)
-    strays = float(np.std(clock.deviation)) * clock.fs > _LASTS
+    strays = _std(clock.deviation) * clock.fs > _LASTS
     return 1.0 / usual_interval(time) if strays or clock.mostly_empty else clock.fs
 
 

@@ -122,7 +122,7 @@ def open_table(text: Lines) -> Table:
     beyond = chain([lines[_HEAD:]], (block.split("\n") for block in blocks))
     del lines[_HEAD:]
     dialect = find_dialect(lines, name=text.name)
-    if dialect.decimal == "." and dialect.delimiter != "," and decimal_in(lines, dialect) is None:
+    if dialect.decimal == "." and decimal_in(lines, dialect) is None:
         marks = (decimal_in(rows, dialect) for rows in beyond)
         dialect = replace(dialect, decimal=next((mark for mark in marks if mark), "."))
     known = known_headings(lines, dialect)
