@@ -43,6 +43,12 @@ _ROUNDS = 3
 _LEAST = 0.2
 """Gain, over its mean, down to which the output is divided by it."""
 
+_LONG = 20_000
+"""Samples beyond which a change is taken as constant in each of `_SPANS` parts of a record."""
+
+_SPANS = 256
+"""Within one a change of thirteen time constants moves by a twentieth of itself at most."""
+
 _PROBE = 1e-3
 """Logarithm of the rate over which the derivative is taken."""
 
@@ -91,23 +97,36 @@ class Scored:
     ----------
     rate : float
         Time constants that the record has of it; 0 if it is steady.
-    shape : ndarray, shape (n,)
-        The course of the change: 1 in total, zero on average.
-    rows : ndarray, shape (k, n)
-        What the change over the record, as a share of the mean gain, multiplies; and of one that
-        settles the derivative with respect to the logarithm of its rate, up to a factor.
+    motion : ndarray, shape (n,)
+        What the input does to the output with the mean gain.
     change, std : float
-        The change and its standard deviation.
+        Change over the record, as a share of the mean gain, and its standard deviation.
     gain : float
         Log-likelihood that it brings.
     """
 
     rate: float
-    shape: Real
-    rows: Real
+    motion: Real
     change: float
     std: float
     gain: float
+
+    @property
+    def shape(self) -> Real:
+        """The course of the change, shape (n,): 1 in total, zero on average."""
+        return np.asarray(_shapes(self.motion.size, (self.rate,))[0])
+
+    @property
+    def rows(self) -> Real:
+        """What the change multiplies, shape (k, n).
+
+        And of one that settles the derivative with respect to the logarithm of its rate, up to a
+        factor.
+        """
+        row = self.shape * self.motion
+        if not self.rate:
+            return row[None]
+        return np.stack([row, _slope(self.shape, self.rate) * self.motion])
 
 
 def changing_gain(
@@ -338,11 +357,13 @@ def scored(
         One for each shape that can be told from the fit's own parameters.
     """
     part = part_of(problem, fit.structure, fit.theta)
-    shapes, motion = _shapes(problem.y.size, rates), _motion(part, fit)
-    rows = shapes * motion
-    beside, whole = _beside(problem, fit, part, rows)
+    motion = _motion(part, fit)
+    if motion.size > _LONG and problem.begins is None and problem.nuisance is None:
+        beside, whole = _beside_in_spans(problem, fit, part, motion, rates)
+    else:
+        beside, whole = _beside(problem, fit, part, _shapes(motion.size, rates) * motion)
     total, found = float(beside[-1, -1]), []
-    for k, (rate, shape, row) in enumerate(zip(rates, shapes, rows, strict=True)):
+    for k, rate in enumerate(rates):
         power, along = float(beside[k, k]), float(beside[k, -1])
         if total <= 0.0 or power <= _ALIKE * whole[k]:
             continue
@@ -350,14 +371,31 @@ def scored(
         found.append(
             Scored(
                 rate=rate,
-                shape=shape,
-                rows=row[None] if not rate else np.stack([row, _slope(shape, rate) * motion]),
+                motion=motion,
                 change=along / power,
                 std=float(np.sqrt(total * (1.0 - taken) / max(count, 1.0) / power)),
                 gain=-0.5 * count * float(np.log1p(-taken)),
             )
         )
     return tuple(found)
+
+
+def _beside_in_spans(
+    problem: Problem, fit: Fit, part: Part | SampledPart, motion: Real, rates: tuple[float, ...]
+) -> tuple[Real, Real]:
+    """As `_beside`, the change constant in each of many spans, so that no row of it is made."""
+    left, size = problem.innovations(fit.prediction, fit.residual), motion.size
+    edges = tuple(np.linspace(0, size, _SPANS + 1).astype(int)[1:-1].tolist())
+    sums = products(problem, fit, left, motion, part=part, edges=edges)
+    shapes, own = _shapes(_SPANS, rates), sums.shape[1] - 2
+    mixed = sums[:, :own, own].T @ shapes.T
+    along = np.append(shapes @ sums[:, own, -1], sums[:, -1, -1].sum())
+    gram = np.zeros((len(rates) + 1,) * 2)
+    gram[:-1, :-1] = (shapes * sums[:, own, own]) @ shapes.T
+    gram[-1], gram[:, -1] = along, along
+    mixed = np.column_stack([mixed, sums[:, :own, -1].sum(axis=0)])
+    beside = gram - mixed.T @ solved(sums[:, :own, :own].sum(axis=0), mixed)
+    return np.asarray(beside), gram.diagonal()[:-1]
 
 
 def _beside(problem: Problem, fit: Fit, part: Part | SampledPart, rows: Real) -> tuple[Real, Real]:
