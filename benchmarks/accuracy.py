@@ -479,8 +479,8 @@ def field_row(seed: int = 0) -> list[str]:
         "| – | 0.01–0.3 s |",
         "",
         "Our row is from this run, of a record of the same kind (seed 0, white noise 0.1), and its "
-        "delay allows for each assumption between the samples; the others' were measured elsewhere, "
-        "on their own record of it and their own machine.",
+        "delay allows for each assumption between the samples; the others' were measured "
+        "elsewhere, on their own record of it and their own machine.",
     ]
 
 
