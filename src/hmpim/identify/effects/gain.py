@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hmpim.identify.arrays import Real
-from hmpim.identify.chance import CLEARLY, searched
+from hmpim.identify.chance import CLEARLY, DEVIATIONS, searched
 from hmpim.identify.effects.disturbance import gain_by_rows
 from hmpim.identify.fitting.derivatives import products
 from hmpim.identify.fitting.enrich import PLAIN
@@ -66,7 +66,8 @@ class GainChange:
         Fitted to the output divided by the course of the gain, whose size is free to move; the
         gain is its mean.
     taken : bool
-        Whether it is clearly likelier than the fit with a constant gain, and leaves white noise.
+        Whether it is clearly likelier than the fit with a constant gain, beside plain dynamics that
+        leave white noise.
     trend : ndarray, shape (n,)
         What the change adds to the model's output, in its unit.
     course : ndarray, shape (n,)
@@ -181,21 +182,24 @@ def changing_gain(
         return None
     if share and not lead.white and best.structure.name not in PLAIN:
         lead = _settled(first, lead.told, fitted, plainly=False) or lead
-    if lead.gained < -2 * CLEARLY:
+    told = lead.told
+    if lead.gained < -2 * CLEARLY or abs(told.change) <= max(WORTH, DEVIATIONS * told.std):
         return None
     near = tuple(
         one.joint.best.fit
         for one in found
         if one.joint is not lead.joint and one.gained > lead.gained - 2 * CLEARLY
     )
-    taken = lead.gained > 2 * CLEARLY and lead.white
+    # Beside rich dynamics it may stand for a pole that is missing, and is only a doubt.
+    plain = lead.joint.best.fit.structure.name in PLAIN
+    taken = lead.gained > 2 * CLEARLY and lead.white and plain
     return GainChange(
         joint=lead.joint,
         taken=taken,
         trend=lead.trend,
         course=lead.course,
-        change=lead.told.change,
-        std=lead.told.std,
+        change=told.change,
+        std=told.std,
         share=0.0 if taken else share,
         others=near if taken else (lead.joint.best.fit, *near),
     )
