@@ -2,13 +2,26 @@
 
 import os
 import re
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
-from hmpim.errors import FormatError
+from hmpim.errors import FormatError, HmpimError
 
-__all__ = ["fault_of"]
+__all__ = ["fault_of", "faults_named"]
 
 _CUT = re.compile(r"truncated file: eof = (\d+),.* stored_eof = (\d+)")
+
+
+@contextmanager
+def faults_named(path: Path) -> Iterator[None]:
+    """Raise `fault_of` for whatever h5py raises within; our own errors pass."""
+    try:
+        yield
+    except HmpimError:
+        raise
+    except Exception as error:  # OSError, KeyError, RuntimeError, ValueError, TypeError, …
+        raise fault_of(path, error) from error
 
 
 def fault_of(path: Path, error: Exception) -> FormatError:

@@ -18,6 +18,7 @@ from hmpim.formats.csv import write_csv
 from hmpim.formats.files import read
 from hmpim.formats.readers.text import read_text
 from hmpim.formats.recording import read_recording, save_recording
+from hmpim.formats.statistics_files import FAMILY as STATISTICS
 from hmpim.formats.statistics_files import read_statistics, save_statistics
 from hmpim.formats.stimulus_files import STIMULUS_SUFFIXES, save_stimulus
 from hmpim.formats.stimulus_spec import read_stimulus_toml
@@ -158,7 +159,7 @@ def _read_record(path: Path) -> Record:
 
 
 def _knows_statistics(head: bytes) -> bool:
-    return b"hmpim/statistics/" in head
+    return STATISTICS.encode() in head
 
 
 def _write_result(result: Identification, path: str | PathLike[str]) -> None:

@@ -9,18 +9,19 @@ import numpy as np
 
 from hmpim.errors import FormatError
 from hmpim.formats.atomic import replacing
-from hmpim.formats.hdf5 import fault_of
+from hmpim.formats.hdf5 import faults_named
 from hmpim.identify import Statistics
 from hmpim.identify.statistics.reach import Reach
-from hmpim.identify.statistics.run import Run
+from hmpim.identify.statistics.run import Run, begun
 
-__all__ = ["SCHEMA", "holds_statistics", "read_statistics", "save_statistics"]
+__all__ = ["FAMILY", "SCHEMA", "holds_statistics", "read_statistics", "save_statistics"]
 
-_FAMILY = "hmpim/statistics/"
+FAMILY = "hmpim/statistics/"
+"""How the schema of each version begins."""
 
-SCHEMA = f"{_FAMILY}2"
+SCHEMA = f"{FAMILY}2"
 
-_FIRST = f"{_FAMILY}1"
+_FIRST = f"{FAMILY}1"
 """Without what tells of more than linear systems."""
 
 _ARRAYS = tuple(name for name in Run.__dataclass_fields__ if name != "samples")
@@ -77,9 +78,9 @@ def holds_statistics(path: str | PathLike[str]) -> bool:
     import h5py
 
     try:
-        with h5py.File(Path(path), "r") as file:
-            return str(file.attrs.get("schema", "")).startswith(_FAMILY)
-    except Exception:  # no HDF5, or damaged
+        with faults_named(Path(path)), h5py.File(Path(path), "r") as file:
+            return str(file.attrs.get("schema", "")).startswith(FAMILY)
+    except FormatError:  # no HDF5, or damaged
         return False
 
 
@@ -93,20 +94,15 @@ def read_statistics(path: str | PathLike[str]) -> Statistics:
     """
     import h5py
 
-    try:
-        with h5py.File(Path(path), "r") as file:
-            schema = str(file.attrs.get("schema", ""))
-            if schema not in (SCHEMA, _FIRST):
-                raise FormatError(
-                    f"{str(path)!r} holds {schema or 'no schema'}, and statistics are of schema "
-                    f"{SCHEMA} or {_FIRST}; take a newer hmpim, or another file"
-                )
-            statistics = _read(file)
-            digest = str(file.attrs["sha256"])
-    except FormatError:
-        raise
-    except Exception as error:
-        raise fault_of(Path(path), error) from error
+    with faults_named(Path(path)), h5py.File(Path(path), "r") as file:
+        schema = str(file.attrs.get("schema", ""))
+        if schema not in (SCHEMA, _FIRST):
+            raise FormatError(
+                f"{str(path)!r} holds {schema or 'no schema'}, and statistics are of schema "
+                f"{SCHEMA} or {_FIRST}; take a newer hmpim, or another file"
+            )
+        statistics = _read(file)
+        digest = str(file.attrs["sha256"])
     if digest != _digest(statistics.runs):
         raise FormatError(f"{str(path)!r} was changed after it was written; compress again")
     return statistics
@@ -115,20 +111,25 @@ def read_statistics(path: str | PathLike[str]) -> Statistics:
 def _read(file: Any) -> Statistics:
     told = file.attrs
     whole = str(told["schema"]) != _FIRST
-    runs, knots = [], tuple(int(knot) for knot in told["knots"])
+    reach = Reach(
+        lags=int(told["lags"]),
+        knots=tuple(int(knot) for knot in told["knots"]),
+        beyond=whole and bool(told["beyond"]),
+    )
+    runs, empty = [], begun(reach, 0.0, 0.0)
     for i in range(int(told["runs"])):
         group = file[f"run {i}"]
         arrays = {
             name: np.asarray(group[name][()], dtype=np.float64)
             if whole or name not in _BEYOND
-            else np.zeros((len(knots) + 1, 0) if name == "vw" else 0)
+            else getattr(empty, name)
             for name in _ARRAYS
         }
         runs.append(Run(samples=int(group.attrs["samples"]), **arrays))
     band = [float(edge) for edge in told["band"]]
     return Statistics(
         fs=float(told["fs"]),
-        reach=Reach(lags=int(told["lags"]), knots=knots, beyond=whole and bool(told["beyond"])),
+        reach=reach,
         runs=tuple(runs),
         names=(str(told["names"][0]), str(told["names"][1])),
         units=(str(told["units"][0]), str(told["units"][1])),

@@ -14,7 +14,7 @@ import numpy as np
 
 from hmpim.errors import ArgumentError, FormatError
 from hmpim.formats.atomic import replacing, write_text
-from hmpim.formats.hdf5 import fault_of
+from hmpim.formats.hdf5 import faults_named
 from hmpim.formats.realtime import save_stimulus_program
 from hmpim.formats.stimulus import (
     check_together,
@@ -321,10 +321,8 @@ def _joined(played: PlayedStimulus, path: str | PathLike[str]) -> Stimulus:
 def _read_hdf5(path: Path) -> list[PlayedStimulus]:
     import h5py  # type: ignore[import-untyped, unused-ignore]
 
-    try:
+    with faults_named(path):
         file = h5py.File(path)
-    except OSError as error:
-        raise fault_of(path, error) from error
     with file:
         return [
             PlayedStimulus(

@@ -13,7 +13,7 @@ from hmpim.record.clock import Clock, fit_clock
 from hmpim.record.even import evenly_sampled
 from hmpim.record.finding import Finding
 from hmpim.record.held import Waveform, switches_beside, waveform_of
-from hmpim.record.onto import is_reduced, on_grid
+from hmpim.record.onto import FASTER, is_reduced, on_grid
 from hmpim.record.quality import clock_findings
 from hmpim.record.record import Record
 from hmpim.record.resample import share_above
@@ -324,7 +324,7 @@ def _resampled(
 
 def _folded(channel: Channel, own: Clock, first: Channel, clock: Clock) -> list[Finding]:
     """An input that moves faster than the output is sampled comes back folded in the output."""
-    if own.fs < 1.02 * clock.fs:
+    if own.fs < FASTER * clock.fs:
         return []
     share = share_above(channel.values, fs=own.fs, limit=0.5 * clock.fs)
     if share < _FOLDED:

@@ -15,13 +15,9 @@ At a tenth of the sampling rate, one hundredth of an interval displaces one samp
 below the noise of the records that the method is made for.
 """
 
-
-_APART = 100
-"""Samples between two stamps whose distance hardly feels the jitter of either."""
-
-
-_LATER = 100
-"""Samples over which delay is averaged: half of them before, half of them after an interval."""
+_MANY = 100
+"""Samples over which the jitter of each hardly counts: in the distance between two stamps, and in
+the mean delay of as many stamps about an interval, half of them on either side."""
 
 _ALIKE = 0.05
 """Relative difference up to which the stated rate is that of the stamps."""
@@ -197,7 +193,7 @@ def usual_interval(time: NDArray[np.float64]) -> float:
     >>> round(usual_interval(time), 9)
     0.01
     """
-    apart = min(_APART, (time.size + 1) // 2)
+    apart = min(_MANY, (time.size + 1) // 2)
     return float(np.median(time[apart:] - time[:-apart])) / apart
 
 
@@ -206,8 +202,9 @@ def places_of_late(time: NDArray[np.float64], *, nominal: float | None = None) -
 
     Stamps of a computer that was busy catch up, and so do those of samples that arrive in packets.
     """
-    n, half = time.size, _LATER // 2
+    n, half = time.size, _MANY // 2
     since = time - time[0]
+    steps = np.diff(since)
     every = np.arange(n)
     ruler = usual_interval(time)
     if nominal is not None and abs(ruler * nominal - 1.0) < _ALIKE:
@@ -226,7 +223,7 @@ def places_of_late(time: NDArray[np.float64], *, nominal: float | None = None) -
         k = int(np.argmax(late))
         near = slice(max(k - half, 0), k + half + 1)
         first = near.start + half  # the sample after the interval that is longest there
-        found.append(first + int(np.argmax(np.diff(since)[first - 1 : near.stop + half - 1])))
+        found.append(first + int(np.argmax(steps[first - 1 : near.stop + half - 1])))
         late[near] = 0.0
     # How late all stamps after each gap are tells the samples in it better than those beside it.
     at = np.unique(np.array(found, dtype=np.int64))
@@ -254,7 +251,7 @@ def _missing(since: NDArray[np.float64], nominal: float | None) -> NDArray[np.in
     """Number of samples missing in each interval; shape (n - 1,)."""
     steps = np.diff(since)
     ruler = float(np.median(steps))
-    if since.size > 2 * _LATER and np.median(np.abs(steps - ruler)) > _NEAR * ruler:
+    if since.size > 2 * _MANY and np.median(np.abs(steps - ruler)) > _NEAR * ruler:
         return np.diff(places_of_late(since, nominal=nominal)) - 1
     sure = steps >= 1.9 * ruler
     # The mean of the whole intervals is a finer ruler for the long ones than the median is.

@@ -79,9 +79,11 @@ def evenly_sampled(channels: Sequence[Channel], clock: Clock, *, nominal: float)
         return None
     tried = [clock]
     if clock.gaps.size:
-        complete = fit_clock(time, nominal=nominal, index=np.arange(time.size))
-        places = None if _none_lasts(complete) else places_of_late(time, nominal=nominal)
-        tried.append(complete if places is None else fit_clock(time, nominal=nominal, index=places))
+        patient = fit_clock(time, nominal=nominal, index=np.arange(time.size))
+        if not _none_lasts(patient):
+            places = places_of_late(time, nominal=nominal)
+            patient = fit_clock(time, nominal=nominal, index=places)
+        tried.append(patient)
     tried = [one for one in tried if _none_lasts(one)]
     if not tried:  # samples are missing that cannot be counted
         return None

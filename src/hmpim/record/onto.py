@@ -12,13 +12,13 @@ from hmpim.record.channel import Channel, Intersample
 from hmpim.record.clock import Clock
 from hmpim.record.resample import CROSSINGS, PASSED, band_limited, share_above
 
-__all__ = ["is_reduced", "on_grid"]
+__all__ = ["FASTER", "is_reduced", "on_grid"]
 
 _NOTHING = 1e-6
 """Share of power above what is passed that is let fold: 10⁻³ of the amplitude."""
 
-_SLOWER = 0.98
-"""Ratio of two rates above which they are taken as equal."""
+FASTER = 1.02
+"""Ratio from which one rate is higher than another; two clocks of one kind differ by less."""
 
 _AT_ONCE = 0.25
 """Share of an interval within which stamps are of one instant."""
@@ -105,7 +105,7 @@ def is_reduced(channel: Channel, clock: Clock, fs: float) -> bool:
     fs : float
         The new rate in Hz.
     """
-    if clock.fs < 1.02 * fs:  # clocks of one kind differ by less
+    if clock.fs < FASTER * fs:
         return False
     return share_above(channel.values, fs=clock.fs, limit=PASSED * fs) > _NOTHING
 
@@ -247,7 +247,7 @@ def _agreeing(
     time = channel.time[part]
     place = (time - at[0]) * fs
     inner = (place >= CROSSINGS) & (place <= at.size - 1 - CROSSINGS)
-    if fs < _SLOWER * clock.fs or not inner.any():
+    if clock.fs >= FASTER * fs or not inner.any():
         return values
     missed = np.zeros(time.size)
     missed[inner] = channel.values[part][inner] - band_limited(values, place[inner], ratio=1.0)

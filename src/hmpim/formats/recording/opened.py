@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hmpim.errors import FormatError, HmpimError
-from hmpim.formats.hdf5 import fault_of
+from hmpim.errors import FormatError
+from hmpim.formats.hdf5 import faults_named
 from hmpim.formats.recording.heading import Heading, State, read_heading, read_state
 from hmpim.formats.recording.layout import GROUPS
 from hmpim.formats.recording.text import text_of
@@ -167,14 +167,13 @@ def _bytes(values: FloatArray) -> bytes:
 @contextmanager
 def _sane(path: Path) -> Iterator[None]:
     """Whatever a damaged file makes HDF5 say becomes one clear error."""
-    try:
-        yield
-    except FormatError as error:
-        raise FormatError(f"{path.name!r} is no record file that can be read: {error}") from None
-    except HmpimError:
-        raise
-    except Exception as error:
-        raise fault_of(path, error) from error
+    with faults_named(path):
+        try:
+            yield
+        except FormatError as error:
+            raise FormatError(
+                f"{path.name!r} is no record file that can be read: {error}"
+            ) from None
 
 
 _MOST_PACKED = 2**32

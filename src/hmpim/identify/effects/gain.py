@@ -24,7 +24,6 @@ from hmpim.identify.fitting.sampled_rows import SampledPart, part_of
 from hmpim.identify.fitting.trial import JointFit
 from hmpim.identify.noise.whiteness import is_white
 from hmpim.identify.worth import TWICE, WORTH
-from hmpim.model.dynamics import Structure
 
 __all__ = ["GainChange", "Scored", "changing_gain", "scored"]
 
@@ -331,14 +330,9 @@ def _settled(
     )
 
 
-def _place(fit: Fit) -> tuple[Structure, Real]:
-    """Where a fit ended."""
-    return fit.structure, fit.theta
-
-
 def _rest(problem: Problem, fit: Fit) -> float:
     """Output at the input's initial level."""
-    return float(fit.linear[-1] + fit.linear[0] * part_of(problem, *_place(fit)).level)
+    return float(fit.linear[-1] + fit.linear[0] * part_of(problem, fit.structure, fit.theta).level)
 
 
 def scored(
@@ -363,9 +357,10 @@ def scored(
     part = part_of(problem, fit.structure, fit.theta)
     motion = _motion(part, fit)
     if motion.size > _LONG and problem.begins is None and problem.nuisance is None:
-        beside, whole = _beside_in_spans(problem, fit, part, motion, rates)
+        gram = _products_in_spans(problem, fit, part, motion, rates)
     else:
-        beside, whole = _beside(problem, fit, part, _shapes(motion.size, rates) * motion)
+        gram = _products(problem, fit, part, _shapes(motion.size, rates) * motion)
+    beside, whole = _beside(gram, len(rates)), gram.diagonal()[-len(rates) - 1 : -1]
     total, found = float(beside[-1, -1]), []
     for k, rate in enumerate(rates):
         power, along = float(beside[k, k]), float(beside[k, -1])
@@ -384,38 +379,39 @@ def scored(
     return tuple(found)
 
 
-def _beside_in_spans(
-    problem: Problem, fit: Fit, part: Part | SampledPart, motion: Real, rates: tuple[float, ...]
-) -> tuple[Real, Real]:
-    """As `_beside`, the change constant in each of many spans, so that no row of it is made."""
-    left, size = problem.innovations(fit.prediction, fit.residual), motion.size
-    edges = tuple(np.linspace(0, size, _SPANS + 1).astype(int)[1:-1].tolist())
-    sums = products(problem, fit, left, motion, part=part, edges=edges)
-    shapes, own = _shapes(_SPANS, rates), sums.shape[1] - 2
-    mixed = sums[:, :own, own].T @ shapes.T
-    along = np.append(shapes @ sums[:, own, -1], sums[:, -1, -1].sum())
-    gram = np.zeros((len(rates) + 1,) * 2)
-    gram[:-1, :-1] = (shapes * sums[:, own, own]) @ shapes.T
-    gram[-1], gram[:, -1] = along, along
-    mixed = np.column_stack([mixed, sums[:, :own, -1].sum(axis=0)])
-    beside = gram - mixed.T @ solved(sums[:, :own, :own].sum(axis=0), mixed)
-    return np.asarray(beside), gram.diagonal()[:-1]
-
-
-def _beside(problem: Problem, fit: Fit, part: Part | SampledPart, rows: Real) -> tuple[Real, Real]:
-    """Products of rows and residual, the fit's own derivatives taken out; the rows' own power."""
+def _products(problem: Problem, fit: Fit, part: Part | SampledPart, rows: Real) -> Real:
+    """Products of the fit's derivatives, of rows, and of the residual."""
     left = problem.innovations(fit.prediction, fit.residual)
     (gram,) = products(problem, fit, left, *rows, part=part)
-    size = gram.shape[0] - len(rows) - 1
+    return np.asarray(gram)
+
+
+def _products_in_spans(
+    problem: Problem, fit: Fit, part: Part | SampledPart, motion: Real, rates: tuple[float, ...]
+) -> Real:
+    """The same of the rows of changes, each constant in each of many spans: none is made."""
+    left, count = problem.innovations(fit.prediction, fit.residual), len(rates)
+    edges = tuple(np.linspace(0, motion.size, _SPANS + 1).astype(int)[1:-1].tolist())
+    sums = products(problem, fit, left, motion, part=part, edges=edges)
+    own = sums.shape[1] - 2
+    turn = np.zeros((_SPANS, own + count + 1, own + 2))
+    turn[:, :own, :own], turn[:, -1, -1] = np.eye(own), 1.0
+    turn[:, own:-1, own] = _shapes(_SPANS, rates).T
+    return np.asarray(np.sum(turn @ sums @ turn.transpose(0, 2, 1), axis=0))
+
+
+def _beside(gram: Real, count: int) -> Real:
+    """Products of so many rows and the residual, the fit's own derivatives taken out."""
+    size = gram.shape[0] - count - 1
     mixed = gram[:size, size:]
-    beside = gram[size:, size:] - mixed.T @ solved(gram[:size, :size], mixed)
-    return np.asarray(beside), gram.diagonal()[size:-1]
+    return np.asarray(gram[size:, size:] - mixed.T @ solved(gram[:size, :size], mixed))
 
 
 def _deviation(problem: Problem, fit: Fit, told: Scored) -> float:
     """Standard deviation of the change, the rate at which it settles unknown."""
-    part = part_of(problem, *_place(fit))
-    beside, _ = _beside(problem, fit, part, told.rows)
+    part = part_of(problem, fit.structure, fit.theta)
+    rows = told.rows
+    beside = _beside(_products(problem, fit, part, rows), len(rows))
     inverse = inverted(beside[:-1, :-1])
     rest = float(beside[-1, -1] - beside[-1, :-1] @ inverse @ beside[:-1, -1])
     return float(np.sqrt(max(rest, 0.0) / problem.counted * inverse[0, 0]))

@@ -1,6 +1,7 @@
 """HDF5 of any layout: a dataset is called by its path (extra: none, h5py is always there)."""
 
 from collections.abc import Iterator, Sequence
+from contextlib import ExitStack
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -9,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hmpim.errors import FormatError
-from hmpim.formats.hdf5 import fault_of
+from hmpim.formats.hdf5 import faults_named
 from hmpim.formats.readers.logs.clock import is_time
 from hmpim.formats.readers.logs.log import Column, Group, Log, list_log, take_series, unit_of
 from hmpim.formats.readers.protocol import Contents, Layout, Reader
@@ -57,11 +58,9 @@ def parse(path: Path, layout: Layout) -> Log:
             f"{path.name!r} holds statistics of a record and not its samples; hmpim identify and "
             "hmpim compress take it, here give the record itself"
         )
-    try:
-        file = h5py.File(path, "r")
-        datasets = _datasets(file)
-    except Exception as error:
-        raise fault_of(path, error) from error
+    with faults_named(path), ExitStack() as opened:
+        datasets = _datasets(opened.enter_context(h5py.File(path, "r")))
+        opened.pop_all()  # the datasets are read later
     groups: dict[tuple[str, int], list[Column]] = {}
     elsewhere: list[str] = []
     for name, dataset in datasets:

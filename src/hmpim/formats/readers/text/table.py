@@ -119,11 +119,12 @@ def open_table(text: Lines) -> Table:
         lines.extend(block.removesuffix("\n").split("\n"))
         if len(lines) >= _HEAD:
             break
-    beyond = chain([lines[_HEAD:]], (block.split("\n") for block in blocks))
+    beyond = lines[_HEAD:]
     del lines[_HEAD:]
     dialect = find_dialect(lines, name=text.name)
-    if dialect.decimal == "." and decimal_in(lines, dialect) is None:
-        marks = (decimal_in(rows, dialect) for rows in beyond)
+    if dialect.decimal == ".":  # the first row with a fraction decides
+        every = chain([lines, beyond], (block.split("\n") for block in blocks))
+        marks = (decimal_in(rows, dialect) for rows in every)
         dialect = replace(dialect, decimal=next((mark for mark in marks if mark), "."))
     known = known_headings(lines, dialect)
     headings, printed = (
