@@ -334,7 +334,8 @@ def looks_held(u: NDArray[np.float64]) -> bool:
     """Whether an input stands still most of the time and then jumps, as a held one does.
 
     What moves between two samples moves at one instant only if it stood before and stands after;
-    what has three levels at most and goes from one to another again and again is switched.
+    what has three levels at most and goes from one to another again and again is switched. What is
+    rounded stands still too; it then moves by one step, its least.
     """
     jumps = np.abs(np.diff(u))
     moves = jumps > 0
@@ -344,7 +345,10 @@ def looks_held(u: NDArray[np.float64]) -> bool:
     if 2 * count > moves.size + 1:
         return False
     alone = moves & ~np.append(moves[1:], False) & ~np.append(False, moves[:-1])
-    return bool(jumps.max() > FEW * np.ptp(u) and 2 * np.count_nonzero(alone) > count)
+    if 2 * np.count_nonzero(alone) <= count:
+        return False
+    rounded = median(jumps[alone]) <= TWICE * float(jumps[moves].min())
+    return bool(jumps.max() > FEW * np.ptp(u) or not rounded)
 
 
 def _has_few_levels(u: NDArray[np.float64]) -> bool:
