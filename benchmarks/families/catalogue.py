@@ -272,6 +272,13 @@ NOISE = (
         colour=shaking,
         snr=(15, 40),
     ),
+    family(
+        "louder noise",
+        "Over a part of the record, or the faster the output moves",
+        SECOND,
+        SWEEP,
+        c.louder,
+    ),
     family("spikes", "One sample in two hundred far out", SECOND, SWEEP, c.spikes),
     family("missing", "One row in twenty is not there", SECOND, SWEEP, c.missing),
     family("jitter", "The clock's stamps jitter by 5 %", SECOND, SWEEP, c.jitter),

@@ -44,6 +44,23 @@ def mains(take: Take) -> None:
     take.absent.add("noise_std")
 
 
+def louder(take: Take) -> None:
+    """More noise over a fifth to half of the record, or the faster the output moves."""
+    rng, n, std = take.rng, take.y.size, np.sqrt(take.noise.variance)
+    if rng.uniform() < 0.5:
+        long = int(rng.uniform(0.2, 0.5) * n)
+        first = int(rng.integers(0, n - long + 1))
+        level = np.zeros(n)
+        level[first : first + long] = rng.uniform(2, 6)
+    else:
+        rate = np.abs(np.gradient(take.clean))
+        level = rng.uniform(1, 3) * rate / float(np.sqrt(np.mean(rate**2)))
+    added = std * level * rng.standard_normal(n)
+    take.y = take.y + added
+    take.noise = take.noise.plus(float(np.mean((std * level) ** 2)))
+    take.absent.add("noise_std")
+
+
 def spikes(take: Take) -> None:
     """A loose contact: one sample in two hundred far out."""
     rng = take.rng

@@ -1,11 +1,13 @@
 """What the model leaves over: each check is silent on a clean record and speaks on its own."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from hmpim.identify.judgement.residual import (
+    changing_noise,
     coloured_noise,
     halves_disagree,
     lack_of_fit,
@@ -24,7 +26,7 @@ WHITE = 0.1 * np.random.default_rng(3).standard_normal(2000)
     "check",
     [
         *(lack_of_fit, coloured_noise, halves_disagree),
-        *(noise_colour_of, noise_on_the_input, uneven_noise),
+        *(noise_colour_of, noise_on_the_input, uneven_noise, changing_noise),
     ],
 )
 def test_a_clean_record_gives_no_finding(clean, check):
@@ -71,6 +73,20 @@ def test_coloured_noise_is_said_and_doubted_only_where_it_is_most_of_the_output(
 
 def test_a_residual_that_is_not_white_is_never_said_to_be_white(clean):
     assert noise_colour_of(replace(clean, readings=replace(clean.readings, white=False))) == ()
+
+
+def test_noise_that_is_louder_at_the_end_is_no_colour_and_its_time_is_said(
+    field_record, evidence_of
+):
+    _, u, y = field_record
+    level = np.where(np.arange(y.size) < 1600, 1.0, 5.0)
+    evidence = evidence_of(u, y + level * WHITE)
+    assert coloured_noise(evidence) == () == noise_colour_of(evidence)
+    (found,) = changing_noise(evidence)
+    assert (found.severity, found.parameters) == ("info", MODELLED)
+    low, high = map(float, re.findall(r"from (\S+) to (\S+) times", found.message)[0])
+    assert (low, high) == pytest.approx((0.415, 2.08), rel=0.15)  # 1 and 5 over their r.m.s.
+    assert "loudest from 9 to 10 s" in found.message or "loudest from 8 to 9 s" in found.message
 
 
 def test_halves_of_another_delay_cast_doubt(field_record, evidence_of):

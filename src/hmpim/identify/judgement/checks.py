@@ -21,6 +21,7 @@ from hmpim.identify.judgement.reach import (
     short_record,
 )
 from hmpim.identify.judgement.residual import (
+    changing_noise,
     coloured_noise,
     halves_disagree,
     lack_of_fit,
@@ -43,6 +44,7 @@ CHECKS: tuple[Check, ...] = (
     initial_transient,
     lack_of_fit,
     coloured_noise,
+    changing_noise,
     not_converged,
     weak_excitation,
     weak_delay,
@@ -74,6 +76,7 @@ SAMPLED: tuple[Check, ...] = (
     initial_transient,
     lack_of_fit,
     coloured_noise,
+    changing_noise,
     few_lines,
     beyond_band,
     grazed_bandwidth,
@@ -85,8 +88,8 @@ SAMPLED: tuple[Check, ...] = (
 
 _OF_THE_RESIDUAL: frozenset[Check] = frozenset(
     {
-        *(lack_of_fit, coloured_noise, halves_disagree, noise_colour_of, uneven_noise),
-        *(unsampled_input, feedback, other_order, missed_pole),
+        *(lack_of_fit, coloured_noise, changing_noise, halves_disagree, noise_colour_of),
+        *(uneven_noise, unsampled_input, feedback, other_order, missed_pole),
     }
 )
 """Those that ask something of the residual; nothing where that is the error of interpolation."""

@@ -11,6 +11,7 @@ from hmpim.identify.judgement.evidence import Evidence, structure_in_words
 from hmpim.identify.judgement.reach import lines_of
 from hmpim.identify.noise.colour import noise_colour
 from hmpim.identify.noise.input_noise import input_noise
+from hmpim.identify.noise.whiteness import is_steady
 from hmpim.identify.result.digits import percent
 from hmpim.identify.result.groups import GAIN, MODELLED
 from hmpim.identify.worth import FEW, MATERIAL, MOST, PART, TOLERATED, WORTH
@@ -18,6 +19,7 @@ from hmpim.model import response
 from hmpim.record import Finding
 
 __all__ = [
+    "changing_noise",
     "coloured_noise",
     "folded_power",
     "halves_disagree",
@@ -34,6 +36,9 @@ _FEWEST = 256
 
 _BINS = 16_384
 """Frequencies, evenly spread, at which the answer to what is folded is summed."""
+
+_PARTS = 10
+"""Parts of the record, in which the level of its noise is told."""
 
 _FAST = 9
 """Samples over which the size of what is fast in the input is taken."""
@@ -108,6 +113,29 @@ def coloured_noise(evidence: Evidence) -> tuple[Finding, ...]:
             message="The residual is not white (one independent sample in "
             f"{1 / evidence.joint.effective_share:.3g}); the error bars are widened for it.",
             severity="doubt" if evidence.unexplained > MOST and follows else "info",
+            parameters=MODELLED,
+        ),
+    )
+
+
+def changing_noise(evidence: Evidence) -> tuple[Finding, ...]:
+    """Say that the noise is louder at some times than at others."""
+    left, valid = evidence.readings.innovations, evidence.joint.problem.valid
+    if is_steady(left):
+        return ()
+    counted = np.arange(left.size) if valid is None else np.flatnonzero(valid)
+    spans = np.array_split(counted[: left.size], _PARTS)
+    levels = np.array([float(np.sqrt(np.mean(left[span] ** 2))) for span in spans])
+    levels /= float(np.sqrt(np.mean(left[counted] ** 2)))
+    loudest = spans[int(np.argmax(levels))]
+    first, last = (float(k) / evidence.fs for k in (loudest[0], loudest[-1] + 1))
+    return (
+        Finding(
+            code="changing_noise",
+            message=f"The noise is louder at some times than at others: from {levels.min():.2g} to "
+            f"{levels.max():.2g} times its r.m.s. in tenths of the record, loudest from "
+            f"{first:.3g} to {last:.3g} s after its first sample. The error bars allow for it.",
+            severity="info",
             parameters=MODELLED,
         ),
     )

@@ -3,7 +3,9 @@
 With white noise the covariance of a maximum-likelihood fit is the Cramér-Rao bound,
 σ² (JᵀJ)⁻¹. With coloured noise the same fit scatters as the sandwich
 (JᵀJ)⁻¹ JᵀRJ (JᵀJ)⁻¹ (Söderström and Stoica, System Identification, 1989, ch. 7), R from an
-autoregression fitted to the residual.
+autoregression fitted to the residual. Noise whose level changes along the record counts as loud
+as it is where each parameter is seen (H. White, Econometrica 48, 1980; MacKinnon and White,
+J. Econometrics 29, 1985).
 """
 
 from collections.abc import Callable
@@ -12,7 +14,9 @@ import numpy as np
 import scipy
 
 from hmpim.identify.arrays import Real
-from hmpim.identify.noise.autoregression import autoregressive_spectrum
+from hmpim.identify.noise.autoregression import autoregressive_spectrum, yule_walker
+from hmpim.identify.noise.whiteness import is_steady
+from hmpim.identify.worth import PART
 
 __all__ = ["covariance", "white_covariance"]
 
@@ -52,7 +56,30 @@ def covariance(rows: Real, residual: Real, *, freedom: int, white: bool) -> Real
         power = autoregressive_spectrum(residual, omega) * residual.size / freedom
         power[1 : (length + 1) // 2] *= 2.0  # both signs of frequency
         inner = ((spectra * power) @ spectra.conj().T).real / length
+    inner = _as_loud(inner, basis, residual, white=white)
     return np.asarray(inverse @ inner @ inverse.T / np.outer(scale, scale))
+
+
+def _as_loud(inner: Real, basis: Callable[[], Real], residual: Real, *, white: bool) -> Real:
+    """Return the covariance of the whitened slopes for noise as loud as it is at each sample.
+
+    What noise of its mean level gives in the same sum scales it, so that all else of it stays.
+    """
+    noise = np.ones(1) if white else yule_walker(residual)[0]
+    left = residual if white else scipy.signal.lfilter(noise, np.ones(1), residual)
+    if is_steady(left):
+        return inner
+    rows = basis()
+    # What a fit takes from a sample of the noise is not in its residual.
+    loud = left / np.maximum(1.0 - np.sum(rows**2, axis=0), PART)
+    if not white:
+        rows = scipy.signal.lfilter(np.ones(1), noise, rows[:, ::-1])[:, ::-1]
+    counted = max(int(np.count_nonzero(left)), 1)
+    mean, own = rows @ rows.T * float(left @ left) / counted, (rows * loud) @ (rows * loud).T
+    if not (inner.diagonal().all() and mean.diagonal().all()):  # a row that moves nothing
+        return inner
+    turn = np.linalg.cholesky(inner) @ np.linalg.inv(np.linalg.cholesky(mean))
+    return np.asarray(turn @ own @ turn.T)
 
 
 def white_covariance(gram: Real, power: float, *, freedom: int) -> Real | None:

@@ -12,7 +12,7 @@ from hmpim.identify.fitting.nested import widened
 from hmpim.identify.fitting.trial import JointFit
 from hmpim.identify.noise.autoregression import deviation_of_mean
 from hmpim.identify.noise.covariance import covariance, white_covariance
-from hmpim.identify.noise.whiteness import is_white
+from hmpim.identify.noise.whiteness import is_steady, is_white, steadiness
 from hmpim.identify.reading.figures import read_figures
 from hmpim.identify.reading.propagation import gradient
 from hmpim.identify.result import Estimate, Parameters
@@ -128,7 +128,7 @@ def read_parameters(
         noise=noise_estimate(
             fit.cost,
             freedom=max(joint.problem.counted - vector.size, 1),
-            share=joint.effective_share,
+            share=joint.effective_share * steadiness(residual),
             unit=output_unit,
         ),
         units=(input_unit, output_unit),
@@ -152,7 +152,7 @@ def _covariance(joint: JointFit, gram: Real, residual: Real, *, freedom: int, wh
     whole = fit.structure.sampled or _in_whole_samples(joint)  # its delay is a number of samples
     told = slice(int(whole), None)
     inner = None
-    if white:
+    if white and is_steady(residual):
         power = float(residual @ residual)
         inner = white_covariance(gram[told, told], power, freedom=freedom)
     if inner is None:
