@@ -77,10 +77,17 @@ def is_steady(residual: Real) -> bool:
     >>> is_steady(noise), is_steady(noise * np.linspace(0.2, 2.0, 1000))
     (True, False)
     """
-    squares = residual**2
-    counted = squares > 0.0
-    mean = float(squares.sum()) / max(int(np.count_nonzero(counted)), 1)
-    return not _correlated(np.where(counted, squares - mean, 0.0))
+    counted = residual != 0.0
+    squares = _squares(residual)
+    return not _correlated(np.where(counted, squares - 1.0, 0.0))
+
+
+def _squares(residual: Real) -> Real:
+    """Squares over their mean; samples of 0 do not count."""
+    size = float(np.max(np.abs(residual), initial=0.0)) or 1.0
+    squares = (residual / size) ** 2
+    counted = max(int(np.count_nonzero(residual)), 1)
+    return np.asarray(squares * (counted / max(float(squares.sum()), 1.0)))
 
 
 def steadiness(residual: Real) -> float:
@@ -97,8 +104,8 @@ def steadiness(residual: Real) -> float:
     """
     if is_steady(residual):
         return 1.0
-    squares = residual[residual != 0.0] ** 2
-    return float(min(_KURTOSIS * np.mean(squares) ** 2 / np.mean(squares**2), 1.0))
+    counted = residual[residual != 0.0]
+    return float(min(_KURTOSIS / np.mean(_squares(counted) ** 2), 1.0))
 
 
 def are_white(residuals: Real, spectra: Complex | None = None) -> Mask:
@@ -142,8 +149,11 @@ def _correlated(residuals: Real, spectra: Complex | None = None, *, steady: bool
     if lags == 0:
         return np.zeros(residuals.shape[:-1], dtype=bool)
     r = autocovariance(residuals, lags, spectra)
-    variance = r[..., :1] ** 2 if steady else autocovariance(residuals**2, lags)[..., 1:]
-    rho = r[..., 1:] ** 2 / np.where(variance > 0, variance, 1.0)
+    power = np.where(r[..., :1] > 0, r[..., :1], 1.0)
+    rho = (r[..., 1:] / power) ** 2
+    if not steady:
+        scatter = autocovariance(residuals**2 / power, lags)[..., 1:]
+        rho = rho / np.where(scatter > 0, scatter, 1.0)
     statistic = n * (n + 2) * np.sum(rho / (n - np.arange(1, lags + 1)), axis=-1)
     return np.asarray((scipy.special.chdtrc(lags, statistic) <= FALSE_ALARM) & (r[..., 0] > 0))
 
