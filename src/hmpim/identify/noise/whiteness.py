@@ -105,7 +105,7 @@ def steadiness(residual: Real) -> float:
     if is_steady(residual):
         return 1.0
     counted = residual[residual != 0.0]
-    return float(min(_KURTOSIS / np.mean(_squares(counted) ** 2), 1.0))
+    return min(_KURTOSIS / float(np.mean(_squares(counted) ** 2)), 1.0)
 
 
 def are_white(residuals: Real, spectra: Complex | None = None) -> Mask:
