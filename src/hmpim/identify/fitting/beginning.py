@@ -132,10 +132,11 @@ def look_again(problem: Problem, trial: Trial, seen: Seen, *, lag: int, rests: b
     count = problem.y.size
     told = _counts(problem)
     innovations = problem.innovations(trial.fit.prediction, trial.fit.residual)
+    innovations = problem.as_loud(innovations)  # divided by it, the ends would not stand out
     if trial.intersample == "bandlimited":
         reach = ringing_of(problem.source)
         ringing = _ringing(count, trial.fit.delay, reach)
-        if problem.noise is not None and is_white(trial.fit.residual[told & ~ringing]):
+        if problem.is_coloured and is_white(trial.fit.residual[told & ~ringing]):
             innovations = trial.fit.residual  # it is the ends that have the colour
         if _stands_out(innovations, told & ringing, told & ~ringing):
             while reach < FEW * count:
@@ -149,7 +150,7 @@ def look_again(problem: Problem, trial: Trial, seen: Seen, *, lag: int, rests: b
     if rests:
         return None
     begins = begins_of(problem, trial.fit, lag=lag)
-    if begins is None and problem.noise is not None:
+    if begins is None and problem.is_coloured:
         # Noise of the colour of a mode explains its free response, and more of it than there is.
         begins = begins_of(problem.plain, trial.fit, lag=lag)
     return None if begins is None else _from(seen, begins, count)

@@ -14,6 +14,7 @@ from hmpim.identify.fitting.start import RoughResponse, rough_response
 from hmpim.identify.fitting.unrelated import says_nothing
 from hmpim.identify.kept import kept
 from hmpim.identify.noise.autoregression import autoregression
+from hmpim.identify.noise.level import level_of
 from hmpim.identify.noise.misfit import Misfit, misfit
 from hmpim.identify.signals import longest_lag
 from hmpim.identify.worth import TWICE
@@ -62,6 +63,7 @@ class Data:
     rough: RoughResponse
     nuisance: NDArray[np.float64] | None
     noise: NDArray[np.float64] | None = None
+    level: NDArray[np.float64] | None = None
     precision: float = PRECISION
 
     def problem(self, mode: Intersample, seen: Seen) -> Problem:
@@ -78,7 +80,7 @@ class Data:
             nuisance=self.nuisance,
             begins=seen.begins,
         )
-        return problem if self.noise is None else problem.coloured(self.noise)
+        return problem if self.noise is None else problem.coloured(self.noise, self.level)
 
     @property
     def keeps_samples(self) -> bool:
@@ -98,6 +100,10 @@ class Data:
     def noise_left(self, problem: Problem, fit: Fit) -> Real:
         """Autoregression of what a fit leaves over, 1 first; 1 alone where it is white."""
         return autoregression(fit.residual, problem.valid)
+
+    def level_left(self, problem: Problem, fit: Fit, noise: Real) -> Real | None:
+        """How loud at each sample what an autoregression leaves is; None where it is steady."""
+        return level_of(problem.coloured(noise).innovations(fit.prediction, fit.residual))
 
     def rough_left(self, fit: Fit) -> RoughResponse:
         """Rough response of what a fit leaves over."""

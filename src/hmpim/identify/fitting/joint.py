@@ -42,7 +42,7 @@ from hmpim.identify.fitting.growth import (
 from hmpim.identify.fitting.software import software_fit
 from hmpim.identify.fitting.trial import JointFit, Trial, likeliest_of, trial_of
 from hmpim.identify.fitting.unrelated import UNDENIED
-from hmpim.identify.fitting.whitening import is_contradicted, noise_of, refit_whitened
+from hmpim.identify.fitting.whitening import is_contradicted, refit_whitened, weighed_by_noise
 from hmpim.identify.noise.whiteness import is_white
 from hmpim.identify.worth import TWICE
 from hmpim.model.dynamics import StructureName
@@ -174,7 +174,7 @@ def _is_needlessly_coloured(problem: Problem, fit: Fit) -> bool:
     Where the fits that led to it had not arrived, that colour is a mode's, under which the mode's
     free response is no more than noise.
     """
-    if problem.noise is None or problem.begins is None:
+    if not problem.is_coloured or problem.begins is None:
         return False
     plain = problem.plain
     return is_white(plain.counting(refit(plain, fit).residual))
@@ -300,12 +300,12 @@ def _weigh(
     data, seen = course.data, course.counted
     mode, leading = min(fitted, key=lambda item: item[1].objective)
     share = leading.share
-    noise = noise_of(data.problem(mode, seen), leading, data) if share < 1.0 else None
-    if noise is not None or data.noise is not None:
-        course = replace(course, data=replace(data, noise=noise))
+    weighed = weighed_by_noise(data.problem(mode, seen), leading, data)
+    if weighed.noise is not None or data.noise is not None:
+        course = replace(course, data=weighed)
         fitted = refit_whitened(course.data, fitted, seen)
     trials, best = _decide(course, fitted, share)
-    if noise is not None and is_contradicted(course.data, best, seen):
+    if weighed.noise is not None and is_contradicted(course.data, best, seen):
         course = replace(course, data=replace(data, noise=None))
         trials, best = _decide(course, refit_whitened(course.data, fitted, seen), share)
     return course, trials, best, share

@@ -65,6 +65,9 @@ class Problem:
         Autoregression of the noise, 1 first: what it leaves of residual and derivatives is white.
     told : ndarray of bool, shape (n,), or None
         With `noise`, the samples whose whole past, as far as it reaches, counts.
+    level : ndarray, shape (n,), or None
+        With `noise`, how loud what the autoregression leaves is at each sample, over its geometric
+        mean: whitened samples are divided by it. None for noise of one level.
     nuisance : ndarray, shape (k, n), or None
         Rows beside the bias that enter linearly, such as a drift's.
     begins : int or None
@@ -80,6 +83,7 @@ class Problem:
     whitening: Real | None = None
     noise: Real | None = None
     told: Mask | None = None
+    level: Real | None = None
     nuisance: Real | None = None
     begins: int | None = None
     final: ClassVar[float] = _FINAL
@@ -97,7 +101,7 @@ class Problem:
     @property
     def plain(self) -> "Problem":
         """The same, its noise taken for white."""
-        return replace(self, noise=None, told=None)
+        return replace(self, noise=None, told=None, level=None)
 
     @property
     def counts(self) -> Mask | None:
@@ -112,6 +116,11 @@ class Problem:
     def filtered(self) -> bool:
         """Whether samples are whitened, so that none counts by itself."""
         return self.noise is not None or self.whitening is not None
+
+    @property
+    def is_coloured(self) -> bool:
+        """Whether an autoregression whitens the samples; noise of another level is white."""
+        return self.noise is not None and self.noise.size > 1
 
     def stretches(self, first: int, last: int) -> Iterator[slice]:
         """Return the samples from `first` to `last` in spans, to be computed one after the other.
@@ -128,7 +137,8 @@ class Problem:
         Rows of a span of samples, `here`, are allowed only if the problem is not `filtered`.
         """
         if self.noise is not None and self.told is not None and rows.size:
-            return np.asarray(scipy.signal.lfilter(self.noise, np.ones(1), rows) * self.told)
+            weight = self.told if self.level is None else self.told / self.level
+            return np.asarray(scipy.signal.lfilter(self.noise, np.ones(1), rows) * weight)
         counted = rows if self.valid is None else rows * self.valid[here]
         if self.whitening is None:
             return counted
@@ -138,13 +148,17 @@ class Problem:
         """What of the output no past residual foresees; the residual itself of white noise."""
         return residual if self.noise is None else self.masked(self.y - prediction)
 
-    def coloured(self, noise: Real) -> "Problem":
+    def as_loud(self, innovations: Real) -> Real:
+        """Return innovations, (n,), as loud as they are in the record."""
+        return innovations if self.level is None else innovations * self.level
+
+    def coloured(self, noise: Real, level: Real | None = None) -> "Problem":
         """The same with an autoregression for the noise; after a gap it starts anew."""
         order, size = noise.size - 1, self.y.size
         lost = np.zeros(size, dtype=np.int64) if self.valid is None else np.cumsum(~self.valid)
         before = np.concatenate([np.zeros(order + 1, dtype=np.int64), lost])[:size]
         told = (lost == before) & (np.arange(size) >= order)
-        return replace(self, noise=noise, told=told)
+        return replace(self, noise=noise, told=told, level=level)
 
     def fixed(self) -> Real:
         """Bias and nuisance, shape (1 + k, n)."""

@@ -20,11 +20,12 @@ from hmpim.identify.fitting.start import rough_response
 from hmpim.identify.fitting.trial import Trial
 from hmpim.identify.noise.autoregression import autoregression
 from hmpim.identify.noise.covariance import covariance
+from hmpim.identify.noise.whiteness import is_steady
 from hmpim.identify.signals import longest_lag
 from hmpim.identify.worth import PART, TWICE
 from hmpim.record import Intersample
 
-__all__ = ["distance_of", "is_contradicted", "noise_of", "prewhitened_of", "refit_whitened"]
+__all__ = ["distance_of", "is_contradicted", "prewhitened_of", "refit_whitened", "weighed_by_noise"]
 
 
 def prewhitened_of(data: Data, mode: Intersample, fits: list[Fit], seen: Seen) -> Data | None:
@@ -51,15 +52,20 @@ def prewhitened_of(data: Data, mode: Intersample, fits: list[Fit], seen: Seen) -
     return replace(data, noise=noise, rough=rough)
 
 
-def noise_of(problem: Problem, fit: Fit, data: Data) -> Real | None:
-    """Autoregression of what the best fit leaves over; None where that still follows the input.
+def weighed_by_noise(problem: Problem, fit: Fit, data: Data) -> Data:
+    """Data weighed by the colour and the level of what the best fit leaves over.
 
-    What follows the input is no noise, and whitening it would hide what a model lacks.
+    As they come where that still follows the input: it is no noise, and whitening it would hide
+    what a model lacks.
     """
-    if follows(data, fit):
-        return None
-    noise = data.noise_left(problem, fit)
-    return noise if noise.size > 1 else None
+    plain = replace(data, noise=None, level=None)
+    if (fit.is_white and is_steady(fit.residual)) or follows(data, fit):
+        return plain
+    noise = np.ones(1) if fit.is_white else data.noise_left(problem, fit)
+    level = data.level_left(problem, fit, noise)
+    if noise.size == 1 and level is None:
+        return plain
+    return replace(data, noise=noise, level=level)
 
 
 def refit_whitened(
@@ -79,7 +85,7 @@ def is_contradicted(data: Data, best: Trial, seen: Seen) -> bool:
     """
     if not data.keeps_samples:
         return False
-    problem = replace(data, noise=None).problem(best.intersample, seen)
+    problem = replace(data, noise=None, level=None).problem(best.intersample, seen)
     plain = polished(problem, best.fit)
     rows = jacobian(problem, plain)
     freedom = max(problem.counted - rows.shape[0], 1)

@@ -120,7 +120,8 @@ def coloured_noise(evidence: Evidence) -> tuple[Finding, ...]:
 
 def changing_noise(evidence: Evidence) -> tuple[Finding, ...]:
     """Say that the noise is louder at some times than at others."""
-    left, valid = evidence.readings.innovations, evidence.joint.problem.valid
+    weighed, valid = evidence.joint.weighed, evidence.joint.problem.valid
+    left = weighed.as_loud(evidence.readings.innovations)
     if is_steady(left):
         return ()
     counted = np.arange(left.size) if valid is None else np.flatnonzero(valid)

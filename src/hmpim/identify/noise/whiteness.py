@@ -7,7 +7,7 @@ from hmpim.identify.arrays import Complex, Mask, Real
 from hmpim.identify.chance import DEVIATIONS, FALSE_ALARM
 from hmpim.identify.kept import kept
 
-__all__ = ["are_white", "autocovariance", "effective_share", "is_steady", "is_white", "steadiness"]
+__all__ = ["are_white", "autocovariance", "effective_share", "is_steady", "is_white", "squares_of"]
 
 _LAGS = 25
 
@@ -15,9 +15,6 @@ _FEW_LAGS = 60
 """Lags up to which sums of products are faster than a transform."""
 
 _BLOCK = 16_384
-
-_KURTOSIS = 3.0
-"""Of a normal noise."""
 
 
 def autocovariance(residual: Real, lags: int, spectra: Complex | None = None) -> Real:
@@ -78,34 +75,16 @@ def is_steady(residual: Real) -> bool:
     (True, False)
     """
     counted = residual != 0.0
-    squares = _squares(residual)
+    squares = squares_of(residual)
     return not _correlated(np.where(counted, squares - 1.0, 0.0))
 
 
-def _squares(residual: Real) -> Real:
+def squares_of(residual: Real) -> Real:
     """Squares over their mean; samples of 0 do not count."""
     size = float(np.max(np.abs(residual), initial=0.0)) or 1.0
     squares = (residual / size) ** 2
     counted = max(int(np.count_nonzero(residual)), 1)
     return np.asarray(squares * (counted / max(float(squares.sum()), 1.0)))
-
-
-def steadiness(residual: Real) -> float:
-    """Samples of steady normal noise that tell its level as well, per sample of a residual.
-
-    3 times the squared mean of its squares over the mean of their squares; 1 where `is_steady`.
-
-    Examples
-    --------
-    >>> noise = np.random.default_rng(0).standard_normal(4000)
-    >>> loud = np.where(np.arange(4000) < 1000, 3.0, 1.0)
-    >>> steadiness(noise), round(steadiness(loud * noise), 1)
-    (1.0, 0.4)
-    """
-    if is_steady(residual):
-        return 1.0
-    counted = residual[residual != 0.0]
-    return min(_KURTOSIS / float(np.mean(_squares(counted) ** 2)), 1.0)
 
 
 def are_white(residuals: Real, spectra: Complex | None = None) -> Mask:

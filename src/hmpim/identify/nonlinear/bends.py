@@ -293,6 +293,7 @@ def _shortened(
         nuisance=None if problem.nuisance is None else problem.nuisance[:, here],
         noise=None,
         told=None,
+        level=None,
         begins=0,
     )
     own = replace(
@@ -301,7 +302,9 @@ def _shortened(
         residual=fit.residual[here],
         initial=np.zeros(fit.structure.order),
     )
-    return u[here], part if problem.noise is None else part.coloured(problem.noise), own
+    if problem.noise is not None:
+        part = part.coloured(problem.noise, None if problem.level is None else problem.level[here])
+    return u[here], part, own
 
 
 def _at_the_input(u: Real, fit: Fit, intersample: Intersample, fs: float) -> Iterator[Hypothesis]:

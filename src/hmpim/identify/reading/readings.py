@@ -12,7 +12,8 @@ from hmpim.identify.fitting.nested import widened
 from hmpim.identify.fitting.trial import JointFit
 from hmpim.identify.noise.autoregression import deviation_of_mean
 from hmpim.identify.noise.covariance import covariance, white_covariance
-from hmpim.identify.noise.whiteness import is_steady, is_white, steadiness
+from hmpim.identify.noise.level import steadiness
+from hmpim.identify.noise.whiteness import is_steady, is_white
 from hmpim.identify.reading.figures import read_figures
 from hmpim.identify.reading.propagation import gradient
 from hmpim.identify.result import Estimate, Parameters
@@ -116,7 +117,7 @@ def read_parameters(
     if cov is None:
         gram = halves.sum(axis=0)[:-1, :-1]
         cov = widened(joint, _covariance(joint, gram, residual, freedom=freedom, white=white))
-    if weighed.noise is not None:
+    if weighed.is_coloured:
         cov = _wandering(cov, fit.residual, joint.problem.counted)
     parameters, system, coefficients = read_figures(
         structure,
@@ -128,7 +129,7 @@ def read_parameters(
         noise=noise_estimate(
             fit.cost,
             freedom=max(joint.problem.counted - vector.size, 1),
-            share=joint.effective_share * steadiness(residual),
+            share=joint.effective_share * steadiness(weighed.as_loud(residual)),
             unit=output_unit,
         ),
         units=(input_unit, output_unit),
@@ -138,7 +139,7 @@ def read_parameters(
         system=system,
         vector=vector,
         covariance=cov,
-        white=white and weighed.noise is None,
+        white=white and not weighed.is_coloured,
         halves=halves,
         innovations=residual,
         whitened=white,

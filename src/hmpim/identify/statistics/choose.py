@@ -107,6 +107,9 @@ class CompressedData(Data):
         """Autoregression of what a fit leaves over, 1 first; 1 alone where it is white."""
         return as_fitted(fit).left.noise
 
+    def level_left(self, problem: Problem, fit: Fit, noise: Real) -> None:
+        """Of a level that changes products say nothing."""
+
     def rough_left(self, fit: Fit) -> RoughResponse:
         """Rough response of what a fit leaves over."""
         known = as_fitted(fit).response

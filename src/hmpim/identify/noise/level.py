@@ -1,0 +1,78 @@
+"""How loud noise is along a record, where its level changes."""
+
+import numpy as np
+
+from hmpim.identify.arrays import Real
+from hmpim.identify.noise.whiteness import is_steady, squares_of
+from hmpim.identify.worth import PART
+
+__all__ = ["level_of", "steadiness"]
+
+_KURTOSIS = 3.0
+"""Of a normal noise."""
+
+_PARTS = 20
+"""Parts of the record over which a level is told."""
+
+_FEWEST = 50
+"""Samples that tell a level to a tenth."""
+
+
+def level_of(innovations: Real) -> Real | None:
+    """Level of white noise at each sample, over its geometric mean: r.m.s. about each sample.
+
+    Samples divided by it have one level, and their sum of squares is the likelihood's (R. J.
+    Carroll, Annals of Statistics 10, 1982). No level is less than a fifth of the r.m.s. of all.
+
+    Parameters
+    ----------
+    innovations : ndarray, shape (n,)
+        0 where a sample does not count.
+
+    Returns
+    -------
+    ndarray, shape (n,), or None
+        None where the level does not change, or the record is too short to tell.
+
+    Examples
+    --------
+    >>> noise = np.random.default_rng(0).standard_normal(4000)
+    >>> level_of(noise) is None
+    True
+    >>> level = level_of(np.where(np.arange(4000) < 1000, 4.0, 1.0) * noise)
+    >>> round(float(level[500] / level[2500]))
+    4
+    """
+    reach = max(innovations.size // _PARTS, _FEWEST) // 2
+    if innovations.size < 2 * reach * 2 * 2 or is_steady(innovations):
+        return None
+    index = np.arange(innovations.size)
+    last, first = np.minimum(index + reach + 1, index.size), np.maximum(index - reach, 0)
+
+    def summed(values: Real) -> Real:
+        sums = np.concatenate([[0.0], np.cumsum(values)])
+        return np.asarray(sums[last] - sums[first])
+
+    counted = innovations != 0.0
+    about = summed(counted.astype(np.float64))
+    power = np.where(about > 0.0, summed(squares_of(innovations)) / np.maximum(about, 1.0), 1.0)
+    level = np.sqrt(np.maximum(power, PART**2))
+    return np.asarray(level / np.exp(np.mean(np.log(level[counted]))))
+
+
+def steadiness(residual: Real) -> float:
+    """Samples of steady normal noise that tell its level as well, per sample of a residual.
+
+    3 times the squared mean of its squares over the mean of their squares; 1 where `is_steady`.
+
+    Examples
+    --------
+    >>> noise = np.random.default_rng(0).standard_normal(4000)
+    >>> loud = np.where(np.arange(4000) < 1000, 3.0, 1.0)
+    >>> steadiness(noise), round(steadiness(loud * noise), 1)
+    (1.0, 0.4)
+    """
+    if is_steady(residual):
+        return 1.0
+    counted = residual[residual != 0.0]
+    return min(_KURTOSIS / float(np.mean(squares_of(counted) ** 2)), 1.0)
