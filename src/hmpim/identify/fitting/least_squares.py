@@ -5,9 +5,9 @@ import scipy
 
 from hmpim.identify.arrays import Real
 
-__all__ = ["inverted", "solved", "solved_exactly", "without"]
+__all__ = ["UNSEEN", "inverted", "solved", "solved_exactly", "without"]
 
-_UNSEEN = 1e-13
+UNSEEN = 1e-13
 """Share of the greatest eigenvalue below which the record does not see a direction."""
 
 _WELL = 1e-4
@@ -52,7 +52,7 @@ def solved(gram: Real, moment: Real, damping: float = 0.0) -> Real:
     values, vectors, info = scipy.linalg.lapack.dsyevd(scaled, lower=1)
     if info:
         raise np.linalg.LinAlgError("eigenvalues of the normal equations did not converge")
-    keep = values > _UNSEEN * values[-1]
+    keep = values > UNSEEN * values[-1]
     seen = vectors[:, keep] / scale[:, None]
     projected = (moment.T @ seen) / (values[keep] + damping)
     return np.asarray(seen @ projected.T)
@@ -75,6 +75,6 @@ def without(rows: Real, others: Real) -> Real:
     """Project `others`, (k, n), out of `rows`, (p, n)."""
     scale = np.sqrt(np.maximum(np.sum(others**2, axis=1), np.finfo(float).tiny))
     q, r = np.linalg.qr((others / scale[:, None]).T)
-    told = np.abs(np.diag(r)) > np.sqrt(_UNSEEN)
+    told = np.abs(np.diag(r)) > np.sqrt(UNSEEN)
     q = q[:, told]
     return np.asarray(rows - (rows @ q) @ q.T)

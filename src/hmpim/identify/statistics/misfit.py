@@ -12,7 +12,7 @@ import scipy
 
 from hmpim.identify.arrays import Complex, Real
 from hmpim.identify.fitting.growth import HiddenPole, response_to_square
-from hmpim.identify.fitting.least_squares import solved
+from hmpim.identify.fitting.least_squares import UNSEEN, solved
 from hmpim.identify.noise.misfit import Misfit
 from hmpim.identify.statistics.fit import Fitted
 from hmpim.identify.statistics.products import Products, Responses
@@ -73,7 +73,7 @@ def misfit_of(
     """
     if asked is None:
         asked = asked_of(fitted.delay, band, products)
-    gain, left, cost, _ = _beside(fitted, products, asked.rows, asked.transforms)
+    gain, left, cost, *_ = _beside(fitted, products, asked.rows, asked.transforms)
     variance = cost / max(products.counted - fitted.weights.size - 1, 1)
     power_left = np.diag(left)
     size = np.sqrt(np.where(power_left > 1e-200 * power_left.max(), power_left, 1.0))
@@ -91,11 +91,12 @@ def misfit_of(
 def hidden_pole_of(fitted: Fitted) -> HiddenPole:
     """Test a fit for one more pole, the delay shortened by as much.
 
-    As `hmpim.identify.fitting.growth.hidden_pole`, from statistics.
+    As `hmpim.identify.fitting.growth.hidden_pole`, from statistics. Of a pole's response that the
+    model's own parameters imitate, products keep rounding alone.
     """
     row = response_to_square(fitted.problem, fitted)
-    gain, left, _, shift = _beside(fitted, fitted.products, row[None])
-    size = max(float(left[0, 0]), np.finfo(float).tiny)
+    gain, left, _, shift, whole = _beside(fitted, fitted.products, row[None])
+    size = max(float(left[0, 0]), UNSEEN * float(whole[0]), np.finfo(float).tiny)
     return HiddenPole(
         squared=float(gain[0]) / size,
         std=float(np.sqrt(fitted.variance / size)),
@@ -106,11 +107,12 @@ def hidden_pole_of(fitted: Fitted) -> HiddenPole:
 
 def _beside(
     fitted: Fitted, products: Products, asked: Real, known: Complex | None = None
-) -> tuple[Real, Real, float, Real]:
+) -> tuple[Real, Real, float, Real, Real]:
     """Try more responses in addition to a model.
 
     Returns their products with the residual, the products among them with the model's own rows
-    projected out, the residual's power, and how theta and the numerator change with their weights.
+    projected out, the residual's power, how theta and the numerator change with their weights, and
+    their power before anything was projected out.
     """
     count = asked.shape[0]
     both = Responses.ending(asked, asked.sum(axis=1)).and_also(fitted.responses)
@@ -121,4 +123,5 @@ def _beside(
     residual = moments.cross - moments.gram[:, count:] @ linear
     gain = residual[:count] + shift.T @ residual[count:]
     cost = moments.energy - linear @ (moments.cross[count:] + residual[count:])
-    return gain, left, max(float(cost), np.finfo(float).eps * moments.energy), shift
+    cost = max(float(cost), np.finfo(float).eps * moments.energy)
+    return gain, left, cost, shift, np.diag(moments.gram)[:count]
