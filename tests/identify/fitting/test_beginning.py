@@ -1,10 +1,15 @@
-"""What a spline makes of the corner at which a short command starts."""
+"""Where a record begins: in mid-motion, or from rest with a corner that a spline rings about."""
 
 import numpy as np
 import pytest
-from scipy.signal import lsim
+from scipy.signal import lfilter, lsim
 
 import hmpim
+from hmpim.identify.fitting.beginning import begins_of
+from hmpim.identify.fitting.fit import Problem, fit_structure
+from hmpim.model.dynamics import STRUCTURES
+from hmpim.model.sampled import prepare_input
+from tests_support import fewest
 
 FS, FINE = 100.0, 16
 N = 60
@@ -26,3 +31,75 @@ def test_what_rings_at_the_start_of_a_short_record_is_no_noise(seeds):
     held = [one.ci95[0] <= 1e-3 <= one.ci95[1] for one in found]
     assert np.mean([one.value for one in found]) == pytest.approx(1e-3, rel=0.1)
     assert np.mean(held) >= 0.8  # 0.95 on average
+
+
+def washed_out(seed: int, samples: int = 400) -> Problem:
+    """Noise behind a washout, 0.4 s; two samples before the record the input came down by 3."""
+    rng, size, fs = np.random.default_rng(seed), samples + 2000, 200.0
+    lines, at = np.fft.rfft(rng.standard_normal(size)), np.fft.rfftfreq(size, 1 / fs)
+    u = np.fft.irfft(np.where((at > 0) & (at <= 27.5), lines, 0.0), size)
+    u *= 3.0 / u.std()
+    u[: -samples - 2] += 3.0
+    unit = hmpim.Model(
+        delay=0.00784, scale_factor=1.0, bias=-0.34, numerator=(0.52, 0.0), denominator=(0.4, 1.0)
+    )
+    y = np.asarray(hmpim.simulate(unit, u, fs=fs, intersample="bandlimited"))[-samples:]
+    y = y + 0.03 * y.std() * rng.standard_normal(samples)
+    source = prepare_input(u[-samples:], "bandlimited")
+    return Problem(source=source, y=y, valid=None, longest_delay=100.0)
+
+
+def test_a_free_response_is_not_judged_by_the_colour_that_it_lends_the_residual():
+    problem = washed_out(5)
+    fit = fit_structure(problem, STRUCTURES["first_order_zero"], np.array([1.5, np.log(80.0)]))
+    assert fit.share < 0.02  # of 400 samples eight would be independent
+    assert begins_of(problem, fit, lag=2) == 6
+
+
+@pytest.mark.few(20)
+def test_coloured_noise_behind_an_input_from_rest_is_no_free_response(seeds):
+    u = np.concatenate([np.zeros(50), np.random.default_rng(0).standard_normal(550)])
+    unit = hmpim.Model(delay=0.01, scale_factor=1.0, denominator=(0.02, 1.0))
+    clean = np.asarray(hmpim.simulate(unit, u, fs=200.0, intersample="bandlimited"))
+    source, found = prepare_input(u, "bandlimited"), []
+    for seed in range(seeds):
+        noise = lfilter([0.05], [1.0, -0.95], np.random.default_rng(seed).standard_normal(900))
+        problem = Problem(source=source, y=clean + noise[300:], valid=None, longest_delay=100.0)
+        fit = fit_structure(problem, STRUCTURES["first_order"], np.array([2.0, np.log(4.0)]))
+        found.append(begins_of(problem, fit, lag=2))
+    assert found.count(None) >= fewest(seeds, 0.99)
+
+
+def cut(u: np.ndarray, unit: hmpim.Model, samples: int, noise: float, seed: int) -> hmpim.Record:
+    """The last samples of a test at 1 kHz, noise a share of the output's motion."""
+    y = np.asarray(hmpim.simulate(unit, u, fs=1000.0, intersample="bandlimited"))[-samples:]
+    rng = np.random.default_rng(seed)
+    y = y + noise * y.std() * rng.standard_normal(samples)
+    return hmpim.Record.from_arrays({"u": u[-samples:]}, {"y": y}, fs=1000.0)
+
+
+def second_order(frequency: float, damping: float, delay: float, bias: float) -> hmpim.Model:
+    omega = 2 * np.pi * frequency
+    below = (omega**-2, 2 * damping / omega, 1.0)
+    return hmpim.Model(delay=delay, scale_factor=2.6, bias=bias, denominator=below)
+
+
+@pytest.mark.parametrize("seed", [8, 18])
+def test_a_delay_a_period_off_is_left_behind_where_the_output_still_rings(seed):
+    """Three quarters of a sweep, all of it above the resonance, where the phase hardly turns."""
+    t = np.arange(400) / 1000.0
+    u = 3.0 * np.sin(2 * np.pi * (2.5 * t + 273 * t**2))
+    pair = hmpim.identify(cut(u, second_order(41.7, 0.22, 0.0225, -0.4), 300, 0.04, seed))["y", "u"]
+    assert pair.structure == "second_order"
+    assert pair.delay.value == pytest.approx(0.0225, abs=1e-4)
+
+
+def test_sines_that_go_on_are_no_response_from_rest():
+    seed, t = 3, np.arange(-2000, 400) / 1000.0
+    rng = np.random.default_rng(seed)
+    frequency = 1000.0 * np.exp(rng.uniform(np.log(0.01), np.log(0.1), 4))
+    angle = rng.uniform(0, 2 * np.pi, 4)
+    u = np.sin(2 * np.pi * frequency[:, None] * t + angle[:, None]).sum(axis=0)
+    pair = hmpim.identify(cut(u, second_order(5.6, 0.63, 0.001, 2.1), 400, 0.03, seed))["y", "u"]
+    assert pair.structure == "second_order"
+    assert pair.bias.value == pytest.approx(2.1, abs=0.01)

@@ -9,7 +9,7 @@ from hmpim.identify.arrays import Mask, Real, every_of
 from hmpim.identify.chance import FALSE_ALARM
 from hmpim.identify.fitting.data import Data, Seen
 from hmpim.identify.fitting.derivatives import products
-from hmpim.identify.fitting.fit import Fit, Problem
+from hmpim.identify.fitting.fit import Fit, Problem, fit_structure
 from hmpim.identify.fitting.least_squares import solved
 from hmpim.identify.fitting.sampled_rows import part_of
 from hmpim.identify.fitting.trial import Trial
@@ -21,6 +21,7 @@ from hmpim.record import Intersample
 
 __all__ = [
     "REACH",
+    "begin_at",
     "begin_later",
     "begins_of",
     "count_in",
@@ -103,8 +104,19 @@ def begins_of(problem: Problem, fit: Fit, *, lag: int) -> int | None:
         return None
     gained = float(moment @ solved(after[:-1, :-1], moment))
     left = max(power - gained, np.finfo(float).tiny)
+    limit = float(scipy.special.chdtri(len(part.free), FALSE_ALARM))
     statistic = share * count * float(np.log(power / left))
-    return begins if statistic > scipy.special.chdtri(len(part.free), FALSE_ALARM) else None
+    if statistic > limit:
+        return begins
+    if share == 1.0 or problem.noise is not None:
+        return None
+    # What colours the residual may be the free response itself: the noise is what it leaves.
+    begun = replace(problem, valid=valid, begins=begins)
+    free = fit_structure(begun, fit.structure, fit.theta)
+    if free.objective <= 0.0:
+        return begins
+    statistic = free.share * count * float(np.log(power / free.objective))
+    return begins if statistic > limit else None
 
 
 def look_again(problem: Problem, trial: Trial, seen: Seen, *, lag: int, rests: bool) -> Seen | None:
@@ -177,9 +189,14 @@ def begin_later(seen: Seen, fit: Fit) -> Seen | None:
     What comes before the delay answers input before the record, which no free response describes.
     """
     begins, size = int(np.ceil(fit.delay)) + REACH, fit.residual.size
-    if seen.begins is None or begins <= seen.begins or begins > longest_lag(size):
+    if seen.begins is None or begins <= seen.begins:
         return None
-    return _from(seen, begins, size)
+    return begin_at(seen, begins, size)
+
+
+def begin_at(seen: Seen, begins: int, size: int) -> Seen | None:
+    """Samples that counted, from one on; None where no delay is as long."""
+    return None if begins > longest_lag(size) else _from(seen, begins, size)
 
 
 def _from(seen: Seen, begins: int, size: int) -> Seen:

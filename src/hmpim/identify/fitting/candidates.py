@@ -59,6 +59,9 @@ _AT_ONCE = 4
 _TASTE = 4
 """Steps taken from each start before the best one is followed to its end."""
 
+_SLIPS = 4
+"""Half periods by which the delay of a fit in mid-motion is moved either way, to start again."""
+
 _PRECISION = 1e-2
 """Precision of a fit that is weighed against others, see `fit_structure`."""
 
@@ -103,6 +106,8 @@ def fit_plain(
                 every = np.stack([*starts, *starting_values(rough, structure)])
                 rivals = list(fitted_roughly(condensed(rough), structure, every).likely)
             fit = _tasted(problem, rivals, fit)
+            if not settled and structure.order and problem.begins is not None and not fit.is_white:
+                fit = _tasted(problem, _slipped(rough, fit.theta), fit)
         settled = settled or white
         fits.append(fit)
     for i, fit in enumerate(fits):
@@ -130,6 +135,17 @@ def _tasted(problem: Problem, starts: Sequence[Real], best: Fit) -> Fit:
         rival = fit_structure(problem, best.structure, theta, iterations=_TASTE, hopeless=hopeless)
         best = min(best, rival, key=lambda fit: fit.objective)
     return best
+
+
+def _slipped(rough: RoughResponse, theta: Real) -> list[Real]:
+    """Starts whose delay is some half periods of the input's mean frequency earlier or later.
+
+    Beyond a resonance the phase hardly turns: a delay that is a period off leaves a valley of its
+    own, and the free response hides which of them is the deepest.
+    """
+    mean = float(np.sqrt(rough.weight @ rough.omega**2 / rough.weight.sum()))
+    steps = np.pi / mean * np.array([k for k in range(-_SLIPS, _SLIPS + 1) if k])
+    return [np.append(theta[0] + step, theta[1:]) for step in steps]
 
 
 def fit_rich(

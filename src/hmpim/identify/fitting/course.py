@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from hmpim.identify.arrays import Mask, Real, every_of, median
 from hmpim.identify.chance import BULK
-from hmpim.identify.fitting.beginning import begin_later, count_in
+from hmpim.identify.fitting.beginning import REACH, begin_at, begin_later, count_in, in_motion
 from hmpim.identify.fitting.candidates import (
     almost_integrates,
     fit_plain,
@@ -221,6 +221,8 @@ def find_beginning(course: Course) -> Course:
         settled = polished(course.problem, course.best)
         fits = [settled if fit is course.best else fit for fit in fits]
     counted = count_in(data, natural, fits, seen, course.known)
+    if counted.begins is None and settled is None and in_motion(data.u):
+        counted = _in_motion(course) or counted
     if counted.begins is not None:  # from rest those fits ended anywhere
         problem = data.problem(natural, counted)
         fits = fit_plain(problem, data.rough, course.plain or PLAIN, before=fits)
@@ -230,6 +232,21 @@ def find_beginning(course: Course) -> Course:
         return replace(course, counted=counted, fits=fits, settled=settled)
     course = replace(course, counted=counted, settled=None)
     return replace(course, fits=_again(course, fits))
+
+
+def _in_motion(course: Course) -> Seen | None:
+    """Samples that count from a beginning in mid-motion; None unless that leaves clearly less.
+
+    From rest such fits ended so far off that no free response of theirs is of use.
+    """
+    data, seen = course.data, course.given
+    begun = begin_at(seen, max(data.rough.lag, 0) + REACH, data.y.size)
+    if begun is None:
+        return None
+    problem = data.problem(course.natural, begun)
+    free = fit_plain(problem, data.rough, course.plain or PLAIN)
+    least = min(fit.objective for fit in free) / problem.counted
+    return begun if TWICE * least < course.best.objective / course.problem.counted else None
 
 
 def _again(course: Course, fits: list[Fit]) -> list[Fit]:
