@@ -11,6 +11,7 @@ from hmpim.record.bridge import bridged
 from hmpim.record.channel import Channel, Intersample
 from hmpim.record.clock import Clock
 from hmpim.record.resample import CROSSINGS, PASSED, band_limited, share_above
+from hmpim.record.slower import restored
 
 __all__ = ["FASTER", "is_reduced", "on_grid"]
 
@@ -74,8 +75,10 @@ def on_grid(
     if not valid.all():
         own = channel.time if not on_clock else clock.start + clock.index / clock.fs
         values[~valid] = _filled(own, channel.values, grid[~valid], intersample)
-        if smooth:
+        whole, told = restored(values, valid)
+        if smooth and not (valid | told).all():
             values = _bridged(grid, values, valid)
+        values[told] = whole[told]
     return values, valid
 
 
