@@ -28,6 +28,7 @@ from hmpim.identify.fitting.course import (
     completed,
     continued,
     free_from_wander,
+    set_free,
     start,
     turn_ahead,
 )
@@ -159,13 +160,18 @@ def _fit_and_look_for_rows(
         both = _fit_once(question, seen, names, np.vstack([rows, humming.rows]))
         return without_rows(both.fits[0], slice(len(rows), None))
 
+    def steadily(beside: JointFit) -> JointFit | None:
+        if question.intersample == "sampled":
+            return None
+        course = begun or _started(question, seen, None if humming is None else humming.rows)
+        free = set_free(course, beside.best.fit)
+        return None if free is None else chosen_of(free, question.structures)
+
     coloured = not is_white(joint.problem.counting(joint.best.fit.residual))
     if coloured and not _has_lines(question.aligned.inputs[0].values):
         humming = with_hum(joint, with_rows)
     joint = joint if humming is None else humming.joint
-    drifting = with_drift(joint, with_rows)
-    if drifting is not None:
-        joint = drifting.joint
+    joint, drifting = with_drift(joint, with_rows, steadily)
     if drifting is not None and humming is not None:
         taken_off = fitted.fits[0].problem.y - joint.problem.y
         humming = replace(humming, trend=taken_off - drifting.trend)

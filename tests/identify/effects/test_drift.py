@@ -144,3 +144,22 @@ def test_noise_is_not_taken_for_a_drift(seeds, colour):
     plain = {"structures": ["second_order"], "noise_colour": colour}
     alarms = [bool(said(identified(0.0 * T, seed, **plain))) for seed in range(seeds)]
     assert_share(alarms, at_most=0.01)
+
+
+def test_a_free_response_that_a_drift_imitates_is_no_drift():
+    """Four sines that go on, 400 samples; the search beside a drift alone finds the dynamics."""
+    seed, t = 2, np.arange(-2000, 400) / 1000.0
+    rng = np.random.default_rng(seed)
+    frequency = 1000.0 * np.exp(rng.uniform(np.log(0.01), np.log(0.1), 4))
+    angle = rng.uniform(0, 2 * np.pi, 4)
+    u = np.sin(2 * np.pi * frequency[:, None] * t + angle[:, None]).sum(axis=0)
+    omega = 2 * np.pi * 5.6
+    unit = hmpim.Model(
+        delay=0.001, scale_factor=-2.8, bias=2.1, denominator=(omega**-2, 1.26 / omega, 1.0)
+    )
+    y = np.asarray(hmpim.simulate(unit, u, fs=1000.0, intersample="bandlimited"))[-400:]
+    y = y + 0.0316 * y.std() * rng.standard_normal(400)
+    record = hmpim.Record.from_arrays({"u": u[-400:]}, {"y": y}, fs=1000.0)
+    pair = hmpim.identify(record)["y", "u"]
+    assert "drift" not in [finding.code for finding in pair.warnings]
+    assert pair.bias.value == pytest.approx(2.1, abs=0.01)

@@ -69,7 +69,11 @@ class Drifting:
     rate_std: float
 
 
-def with_drift(first: JointFit, fitted: Callable[[Real, bool], JointFit]) -> Drifting | None:
+def with_drift(
+    first: JointFit,
+    fitted: Callable[[Real, bool], JointFit],
+    steadily: Callable[[JointFit], JointFit | None],
+) -> tuple[JointFit, Drifting | None]:
     """Fit again with a drifting bias, where the first fit asks for it and gains by it.
 
     Parameters
@@ -79,14 +83,20 @@ def with_drift(first: JointFit, fitted: Callable[[Real, bool], JointFit]) -> Dri
     fitted : callable
         Makes the joint fit with rows for the drift; of the plain structures only if the second
         argument is true.
+    steadily : callable
+        Makes of a joint fit beside a drift the same with a constant bias, from a state that is
+        free; None if that does not leave white noise.
 
     Returns
     -------
-    Drifting or None
+    joint : JointFit
+        The fit that serves. Beside a drift the search may have found what it had missed without:
+        if a free response is all that drifts, its bias is constant.
+    drifting : Drifting or None
         None where a constant bias serves.
     """
     if not _asked_for(first):
-        return None
+        return first, None
     columns = _polynomials(first.problem.y.size, _DEGREES[-1])
     joint = fitted(columns, True)
     columns = _shape(joint, columns)
@@ -94,8 +104,14 @@ def with_drift(first: JointFit, fitted: Callable[[Real, bool], JointFit]) -> Dri
     joint = fitted(columns, is_white(joint.best.fit.residual))
     gain = gain_by_rows(joint, len(columns), first.best.fit, first.forgotten)
     if gain < 0.0 and not _passes_for_drift(first, joint):
-        return None
-    return _described(joint, columns)
+        return first, None
+    steady = steadily(joint)
+    if steady is not None:
+        gain = gain_by_rows(joint, len(columns), steady.best.fit, steady.forgotten)
+        if gain < 0.0:
+            return steady, None
+    drifting = _described(joint, columns)
+    return drifting.joint, drifting
 
 
 def with_plain_drift(

@@ -39,6 +39,7 @@ __all__ = [
     "free_from_wander",
     "is_unanswered",
     "looks_held",
+    "set_free",
     "start",
     "turn_ahead",
 ]
@@ -270,6 +271,24 @@ def continued(course: Course, *, valid: Mask | None, nuisance: Real | None = Non
     course = replace(course, data=data, others=(), given=given, counted=given)
     course = replace(course, fits=_again(course, course.fits))
     return completed(course)
+
+
+def set_free(course: Course, fit: Fit) -> Course | None:
+    """The samples that count from mid-motion, and a fit to them; None unless white noise is left.
+
+    Parameters
+    ----------
+    course : Course
+        The plain fits so far.
+    fit : Fit
+        Of any structure, as it ended beside other rows.
+    """
+    data, given = course.data, course.given
+    counted = begin_at(given, max(int(np.ceil(fit.delay)), 0) + REACH, data.y.size)
+    if counted is None or not fit.structure.order or fit.structure.integrators:
+        return None
+    free = refit(data.problem(course.natural, counted), fit)
+    return replace(course, counted=counted, fits=[free], settled=None) if free.is_white else None
 
 
 def continue_between(course: Course) -> list[tuple[Intersample, Fit]]:

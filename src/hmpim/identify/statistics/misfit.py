@@ -123,5 +123,5 @@ def _beside(
     residual = moments.cross - moments.gram[:, count:] @ linear
     gain = residual[:count] + shift.T @ residual[count:]
     cost = moments.energy - linear @ (moments.cross[count:] + residual[count:])
-    cost = max(float(cost), np.finfo(float).eps * moments.energy)
-    return gain, left, cost, shift, np.diag(moments.gram)[:count]
+    least = float(np.finfo(float).eps * moments.energy)
+    return gain, left, max(float(cost), least), shift, np.diag(moments.gram)[:count]
