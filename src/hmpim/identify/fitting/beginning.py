@@ -108,7 +108,7 @@ def begins_of(problem: Problem, fit: Fit, *, lag: int) -> int | None:
     statistic = share * count * float(np.log(power / left))
     if statistic > limit:
         return begins
-    if share == 1.0 or problem.noise is not None:
+    if share == 1.0 or fit.objective != fit.cost:  # whitened, it is not the best without a colour
         return None
     # What colours the residual may be the free response itself: the noise is what it leaves.
     begun = replace(problem, valid=valid, begins=begins)
