@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from hmpim.errors import RecordError
+from hmpim.identify.effects import censored
 from hmpim.identify.effects.censored import fit_censored
 from hmpim.identify.effects.held import rows_at_updates
 from hmpim.identify.effects.hold import Updates, detect_hold, updates
@@ -241,3 +242,18 @@ def test_a_record_that_is_all_clipped_is_refused(source, clean):
     )
     with pytest.raises(RecordError, match="0 of 2000 samples are inside the range"):
         fit_censored(problem, fit, full)
+
+
+def test_a_noise_taken_far_too_loud_leads_to_no_endless_step(source, clean, truth):
+    """Under such a noise samples just inside the level bend the likelihood upwards."""
+    levels = detect_saturation(np.clip(clean, None, 0.5))
+    problem = Problem(source=source, y=np.clip(clean, None, 0.5), valid=None, longest_delay=1000.0)
+    data = censored._data(problem, levels, None)
+    loud = next(
+        state
+        for log_sigma in np.arange(0.0, 8.0, 0.25)
+        if (state := censored._evaluated(data, truth, log_sigma)).information[-1, -1] < 0.0
+    )
+    step = censored._step(loud, 1e-4)
+    assert step[-1] < 0.0  # less noise is likelier
+    assert np.all(np.abs(step) < 1e3)

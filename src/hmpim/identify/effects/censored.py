@@ -298,7 +298,8 @@ def _evaluated(data: _Data, fit: Fit, log_sigma: float) -> _State | None:
 
 def _step(state: _State, damping: float) -> Real:
     """Newton's step, damped, on parameters scaled alike."""
-    scale = np.sqrt(np.maximum(np.diag(state.information), np.finfo(float).tiny))
+    diagonal = np.abs(np.diag(state.information))  # far from a maximum some may be below 0
+    scale = np.sqrt(np.where(diagonal > 1e-200 * diagonal.max(), diagonal, 1.0))
     scaled = state.information / np.outer(scale, scale)
     values, vectors = np.linalg.eigh(scaled)
     # Where the curvature is not that of a maximum, its magnitude still sets the step.
