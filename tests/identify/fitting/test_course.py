@@ -1,9 +1,14 @@
-"""Where the joint fit starts: what the input's own samples say of how it was held."""
+"""The way of the joint fit: what the input's own samples say, and where the record begins."""
+
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from hmpim.identify.fitting.course import looks_held
+import hmpim
+from hmpim.identify.fitting.course import find_beginning, looks_held, start
+from hmpim.identify.fitting.fit import fit_structure
+from hmpim.model.dynamics import STRUCTURES
 
 SWEEP = np.sin(2 * np.pi * (0.001 + 0.004 * np.arange(10_000) / 10_000) * np.arange(10_000))
 
@@ -22,3 +27,19 @@ def test_a_slow_sweep_that_was_rounded_is_not():
     assert np.count_nonzero(np.diff(rounded)) < 0.5 * rounded.size  # it mostly stands
     assert not looks_held(rounded)
     assert not looks_held(slow)
+
+
+@pytest.mark.parametrize("steps", [0, 1, 2])
+def test_what_is_left_of_the_way_down_is_no_free_response(steps):
+    t, omega = np.arange(2000) / 200.0, 20 * np.pi
+    u = np.sin(2 * np.pi * (0.1 * t + 0.995 * t**2))
+    unit = hmpim.Model(
+        delay=0.15, scale_factor=1.0, bias=0.6, denominator=(omega**-2, 0.8 / omega, 1.0)
+    )
+    y = np.asarray(hmpim.simulate(unit, u, fs=200.0, intersample="bandlimited"))
+    y = y + 1e-3 * np.random.default_rng(0).standard_normal(t.size)
+    course = start(u, y, None, None, "bandlimited", ("second_order",), None)
+    near, structure = np.array([30.6, 1.0, 1.5]), STRUCTURES["second_order"]
+    fit = fit_structure(course.problem, structure, near, iterations=steps)
+    assert not fit.converged
+    assert find_beginning(replace(course, fits=[fit])).counted.begins is None

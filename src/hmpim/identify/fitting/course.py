@@ -216,8 +216,11 @@ def completed(course: Course) -> Course:
 
 def find_beginning(course: Course) -> Course:
     """The samples that count, and the fits to them: the record may not begin at rest."""
-    data, natural, seen, fits = course.data, course.natural, course.given, course.fits
-    settled = None
+    data, natural, seen = course.data, course.natural, course.given
+    if not course.best.converged:  # what is left of the way down looks like a free response
+        ended = refit(course.problem, course.best)
+        course = replace(course, fits=[ended if f is course.best else f for f in course.fits])
+    fits, settled = course.fits, None
     if course.best.is_white:
         settled = polished(course.problem, course.best)
         fits = [settled if fit is course.best else fit for fit in fits]
