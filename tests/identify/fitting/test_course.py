@@ -1,4 +1,4 @@
-"""The way of the joint fit: what the input's own samples say, and where the record begins."""
+"""The way of the joint fit: how the input was held, what passes for ahead, where it begins."""
 
 from dataclasses import replace
 
@@ -6,7 +6,14 @@ import numpy as np
 import pytest
 
 import hmpim
-from hmpim.identify.fitting.course import find_beginning, looks_held, start
+from hmpim.identify.fitting.course import (
+    find_beginning,
+    free_from_wander,
+    looks_held,
+    start,
+    turn_ahead,
+)
+from hmpim.identify.fitting.enrich import INTEGRATING, PLAIN
 from hmpim.identify.fitting.fit import fit_structure
 from hmpim.model.dynamics import STRUCTURES
 
@@ -43,3 +50,15 @@ def test_what_is_left_of_the_way_down_is_no_free_response(steps):
     fit = fit_structure(course.problem, structure, near, iterations=steps)
     assert not fit.converged
     assert find_beginning(replace(course, fits=[fit])).counted.begins is None
+
+
+@pytest.mark.parametrize(("first", "last", "samples"), [(0.001, 0.1, 2000), (0.003, 0.3, 6000)])
+def test_what_an_integrator_does_is_neither_ahead_of_its_input_nor_wander(first, last, samples):
+    frequency = first * (last / first) ** (np.arange(samples) / samples)
+    sweep = np.sin(2 * np.pi * np.cumsum(frequency)) * np.sqrt(first / frequency)
+    late = np.append(np.zeros(20), np.cumsum(sweep)[:-20]) / 200
+    y = late + 0.002 * np.random.default_rng(1).standard_normal(samples)
+    course = start(sweep, y, None, None, None, (*PLAIN, *INTEGRATING), None)
+    assert course.data.rough.ahead is not None  # it looks like it
+    assert turn_ahead(course) is course
+    assert free_from_wander(course) is course

@@ -28,20 +28,22 @@ from hmpim.identify.fitting.start import RoughResponse, rough_response, searched
 from hmpim.identify.noise.misfit import unexplained_response
 from hmpim.identify.signals import longest_lag
 from hmpim.identify.worth import FEW, MATERIAL, MOST, MUCH, PART, TWICE
-from hmpim.model.dynamics import STRUCTURES, Structure, StructureName, coefficients_of
+from hmpim.model.dynamics import STRUCTURES, Structure, StructureName
 from hmpim.model.response import slowest_time_constant
 from hmpim.record import BETWEEN, Intersample
 
 __all__ = [
     "almost_integrates",
+    "fit_integrating",
     "fit_plain",
     "fit_rich",
     "fit_under_each_assumption",
+    "is_poor",
     "nested",
     "owed_to_input",
-    "reduced",
     "refit_between",
     "spans_record",
+    "sums_to_noise",
 ]
 
 _LONG_TASTE = 12
@@ -181,28 +183,20 @@ def _climbed(
     all_of_them: bool,
 ) -> list[Fit]:
     """Fits of richer structures from the rough response, until nothing is left to explain."""
-    best = min(fits, key=lambda fit: fit.objective)
-    integrating = members(structures, INTEGRATING)
-    found: list[Fit] = []
-    if integrating:
-        added = np.cumsum(data.u - data.u[0])
-        rough = rough_response(added, data.y, longest_delay=longest_lag(data.y.size))
-        for structure in integrating:
-            if found and min(found, key=lambda fit: fit.objective).is_white:
-                return found
-            starts = integrator_starts(rough, structure)
-            found.append(_best_of(problem, structure, starts, [*fits, *found]))
-        if min(found, key=lambda fit: fit.objective).is_white:
-            return found
+    found = fit_integrating(data, problem, fits, structures)
+    if sums_to_noise([*fits, *found]):
+        return found
+    best = min([*fits, *found], key=lambda fit: fit.objective)
     rich = members(structures, RICH)
     # A rough response that takes a free response for an answer proposes nothing that is of use.
-    misled = data.keeps_samples and in_motion(data.u) and _is_poor(best, problem.spread)
+    misled = data.keeps_samples and in_motion(data.u) and is_poor(best, problem.spread)
     proposed = proposals(data.rough, rich, best, all_of_them=all_of_them or misled)
     for some in _batches(proposed):
         for p in some:
-            starts = [*p.starts, *_grown(p.structure, [*fits, *found])]
             rivals = [*fits, *found]
-            found.append(_best_of(problem, p.structure, starts, rivals, far_off=misled))
+            starts = [*p.starts, *_grown(p.structure, rivals)]
+            far_off = misled and is_poor(min(rivals, key=lambda f: f.objective), problem.spread)
+            found.append(_best_of(problem, p.structure, starts, rivals, far_off=far_off))
         if not some:
             late = min(proposed, key=lambda p: p.error).starts[0][0] if proposed else best.delay
             modes = members(structures, ("two_modes", *MODES))
@@ -214,6 +208,34 @@ def _climbed(
         if owed_to_input(problem, best, data) <= MATERIAL and best.is_white:
             break
     return found
+
+
+def fit_integrating(
+    data: Data, problem: Problem, fits: list[Fit], structures: tuple[StructureName, ...]
+) -> list[Fit]:
+    """Fits of the structures that integrate, the plainest first, until one leaves white noise.
+
+    Those among `fits` are not fitted again.
+    """
+    found: list[Fit] = []
+    for structure in members(structures, INTEGRATING):
+        if sums_to_noise([*fits, *found]):
+            break
+        if any(fit.structure == structure for fit in fits):
+            continue
+        if not found:
+            added = np.cumsum(data.u - data.u[0])
+            rough = rough_response(added, data.y, longest_delay=longest_lag(data.y.size))
+        rivals = [*fits, *found]
+        starts = [*_grown(structure, rivals), *integrator_starts(rough, structure)]
+        found.append(_best_of(problem, structure, starts, rivals))
+    return found
+
+
+def sums_to_noise(fits: list[Fit]) -> bool:
+    """Whether the best fit with an integrator leaves white noise."""
+    integrating = [fit for fit in fits if fit.structure.integrators]
+    return bool(integrating) and min(integrating, key=lambda fit: fit.objective).is_white
 
 
 def _batches(proposed: list[Proposal]) -> Iterator[list[Proposal]]:
@@ -274,45 +296,6 @@ def _holds(fit: Fit, plain: Structure) -> bool:
     return few and alike and plain.parameters < rich.parameters
 
 
-def reduced(problem: Problem, fits: list[Fit], richer: list[Fit]) -> list[Fit]:
-    """Fits of plain structures, also tried from what the best of the richer ones has found.
-
-    One section of it is kept; what the others add at low frequencies is delay.
-    """
-    best = min(richer, key=lambda f: f.objective)
-    sections = _sections(best)
-    late = best.delay + sum(float(c[0]) for _, c in sections)
-    above = best.numerator
-    if above.size > 1 and above[0]:
-        late -= float(above[1] / above[0])
-
-    def better(fit: Fit) -> Fit:
-        if fit.objective <= TWICE * best.objective:
-            return fit
-        tried = [
-            fit_structure(
-                problem,
-                fit.structure,
-                np.concatenate([[late - c[0]], theta]),
-                hopeless=fit.objective,
-            )
-            for theta, c in sections
-            if fit.structure.sections == (c.size,)
-        ]
-        return min([fit, *tried], key=lambda f: f.objective)
-
-    return [better(fit) for fit in fits]
-
-
-def _sections(fit: Fit) -> list[tuple[Real, Real]]:
-    """Parameters and coefficients of each section of a denominator."""
-    if not fit.structure.sections:
-        return []
-    edges = np.cumsum(fit.structure.sections)[:-1]
-    flat = coefficients_of(fit.structure, fit.theta[1:])
-    return list(zip(np.split(fit.theta[1:], edges), np.split(flat, edges), strict=True))
-
-
 def _grown(structure: Structure, fits: list[Fit]) -> list[Real]:
     """Starts from fits that have one pole less."""
     return [
@@ -358,6 +341,11 @@ def _best_of(
         best = _best_sample(problem, best)
     if best.converged or best.objective > TWICE * leading.objective:
         return best
+    count = problem.counted * leading.share
+    price = float(np.log(count)) / count
+    for fit in rivals:  # by Schwarz's criterion
+        paid = np.exp(price * (fit.structure.parameters - structure.parameters))
+        hopeless = min(hopeless, float(paid) * fit.objective)
     return fit_structure(problem, structure, best.theta, precision=precision, hopeless=hopeless)
 
 
@@ -385,10 +373,10 @@ def owed_to_input(problem: Problem, fit: Fit, data: Data) -> float:
         owed = float(np.sqrt(left.share * fit.cost / spread)) if spread else 0.0
         if owed <= MATERIAL and data.keeps_samples and _misses_part(problem, fit, data):
             owed = np.inf
-    return np.inf if owed <= MATERIAL and _is_poor(fit, spread) else owed
+    return np.inf if owed <= MATERIAL and is_poor(fit, spread) else owed
 
 
-def _is_poor(fit: Fit, spread: float) -> bool:
+def is_poor(fit: Fit, spread: float) -> bool:
     """Whether much of the output is left over, and it is no white noise."""
     return fit.cost > PART * spread and not fit.is_white
 
@@ -457,11 +445,16 @@ def fit_under_each_assumption(
     fitted = [(natural, fit) for fit in fits]
     if alone:
         return fitted
-    least = min(fit.objective for fit in fits)
-    leading = [fit for fit in fits if fit.objective < TWICE * least]
-    trailing = [
-        fit for fit in fits if fit.objective >= TWICE * least and fit.structure.name in PLAIN
-    ]
+    best = min(fits, key=lambda fit: fit.objective)
+    least, count = best.objective, data.problem(natural, seen).counted * best.share
+    clearly = float(np.expm1(2 * CLEARLY / count)) * least
+    leading, trailing = [], []
+    for fit in fits:
+        plain, hopeful = fit.structure.name in PLAIN, fit.objective < TWICE * least
+        if hopeful and (plain or fit.objective < least + clearly):
+            leading.append(fit)
+        elif hopeful or plain:
+            trailing.append(fit)
     others = [mode for mode in BETWEEN if mode != natural]
     hopeless = TWICE * least
 
@@ -473,7 +466,6 @@ def fit_under_each_assumption(
         ]
 
     fitted += moved(leading)
-    count = data.problem(natural, seen).counted
-    if min(fit.objective for _, fit in fitted) < least * (1.0 - 2 * CLEARLY / count):
-        fitted += moved(trailing)  # hopeless under a wrong assumption, perhaps not under this
+    if min(fit.objective for _, fit in fitted) < least - clearly:
+        fitted += moved(trailing)  # behind under a wrong assumption, perhaps not under this
     return fitted

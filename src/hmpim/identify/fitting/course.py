@@ -10,16 +10,20 @@ from hmpim.identify.chance import BULK
 from hmpim.identify.fitting.beginning import REACH, begin_at, begin_later, count_in, in_motion
 from hmpim.identify.fitting.candidates import (
     almost_integrates,
+    fit_integrating,
     fit_plain,
     fit_rich,
     fit_under_each_assumption,
+    is_poor,
     owed_to_input,
-    reduced,
+    spans_record,
+    sums_to_noise,
 )
 from hmpim.identify.fitting.data import Data, Seen, follows, polished, refit, refit_all
 from hmpim.identify.fitting.enrich import PLAIN, is_response
 from hmpim.identify.fitting.fit import Fit, Problem
 from hmpim.identify.fitting.least_squares import solved
+from hmpim.identify.fitting.plainer import reduced
 from hmpim.identify.fitting.start import rough_response
 from hmpim.identify.fitting.whitening import prewhitened_of
 from hmpim.identify.signals import longest_lag
@@ -106,7 +110,7 @@ def start(
     structures: tuple[StructureName, ...],
     nuisance: NDArray[np.float64] | None,
 ) -> Course:
-    """Start from the spectra, and climb with each plain structure."""
+    """Start from the spectra, and climb with each plain structure, or an integrator that leads."""
     if intersample is None and looks_held(u):
         intersample = "zoh"  # an input that stands still and jumps does nothing else
     natural: Intersample = "bandlimited" if intersample is None else intersample
@@ -118,7 +122,20 @@ def start(
         nuisance=nuisance,
     )
     course = begun(data, natural, structures, Seen(valid=valid, begins=None))
-    return replace(course, alone=intersample is not None, known=known)
+    fits = [*course.fits, *_leading_integrators(course)]
+    return replace(course, alone=intersample is not None, known=known, fits=fits)
+
+
+def _leading_integrators(course: Course) -> list[Fit]:
+    """Fits with an integrator, where plain structures leave much and the best of these white noise.
+
+    A running sum wanders, and resembles its input a quarter of a period ahead or behind: what plain
+    structures make of it would mislead all that follows.
+    """
+    if not is_poor(course.best, course.problem.spread):
+        return []
+    found = fit_integrating(course.data, course.problem, course.fits, course.others)
+    return found if sums_to_noise(found) else []
 
 
 def begun(
@@ -229,7 +246,8 @@ def find_beginning(course: Course) -> Course:
         counted = _in_motion(course) or counted
     if counted.begins is not None:  # from rest those fits ended anywhere
         problem = data.problem(natural, counted)
-        fits = fit_plain(problem, data.rough, course.plain or PLAIN, before=fits)
+        integrating = [refit(problem, fit) for fit in fits if fit.structure.integrators]
+        fits = fit_plain(problem, data.rough, course.plain or PLAIN, before=fits) + integrating
         later = count_in(data, natural, fits, seen, course.known)
         counted = counted if later.begins is None else later
     if counted is seen:
@@ -319,7 +337,7 @@ def enrich(
     data, plain = course.data, course.plain
     mode, best = min(fitted, key=lambda item: item[1].objective)
     owed = owed_to_input(data.problem(mode, course.counted), best, data)
-    asked = not plain or owed > MATERIAL or almost_integrates(best)
+    asked = not plain or owed > MATERIAL or spans_record(best)
     if not asked and owed <= WORTH:
         return course, fitted
     fits = course.fits

@@ -1,12 +1,17 @@
-"""A plainer structure in place of a rich one that was taken for what is not linear."""
+"""Plainer structures from where a richer one ended, and in place of one that is not linear."""
 
 from dataclasses import replace
 
-from hmpim.identify.fitting.enrich import PLAIN
-from hmpim.identify.fitting.fit import Fit, fit_structure
-from hmpim.identify.fitting.trial import JointFit, trial_of
+import numpy as np
 
-__all__ = ["plainer", "taking"]
+from hmpim.identify.arrays import Real
+from hmpim.identify.fitting.enrich import PLAIN
+from hmpim.identify.fitting.fit import Fit, Problem, fit_structure
+from hmpim.identify.fitting.trial import JointFit, trial_of
+from hmpim.identify.worth import TWICE
+from hmpim.model.dynamics import coefficients_of
+
+__all__ = ["plainer", "reduced", "taking"]
 
 _PRECISION = 1e-4
 """Relative fall of the sum of squares at which the fit stops."""
@@ -59,3 +64,42 @@ def taking(joint: JointFit, fit: Fit) -> JointFit:
         rivals=(),
         hidden=None,
     )
+
+
+def reduced(problem: Problem, fits: list[Fit], richer: list[Fit]) -> list[Fit]:
+    """Fits of plain structures, also tried from what the best of the richer ones has found.
+
+    One section of it is kept; what the others add at low frequencies is delay.
+    """
+    best = min(richer, key=lambda f: f.objective)
+    sections = _sections(best)
+    late = best.delay + sum(float(c[0]) for _, c in sections)
+    above = best.numerator
+    if above.size > 1 and above[0]:
+        late -= float(above[1] / above[0])
+
+    def better(fit: Fit) -> Fit:
+        if fit.objective <= TWICE * best.objective:
+            return fit
+        tried = [
+            fit_structure(
+                problem,
+                fit.structure,
+                np.concatenate([[late - c[0]], theta]),
+                hopeless=fit.objective,
+            )
+            for theta, c in sections
+            if fit.structure.sections == (c.size,)
+        ]
+        return min([fit, *tried], key=lambda f: f.objective)
+
+    return [better(fit) for fit in fits]
+
+
+def _sections(fit: Fit) -> list[tuple[Real, Real]]:
+    """Parameters and coefficients of each section of a denominator."""
+    if not fit.structure.sections:
+        return []
+    edges = np.cumsum(fit.structure.sections)[:-1]
+    flat = coefficients_of(fit.structure, fit.theta[1:])
+    return list(zip(np.split(fit.theta[1:], edges), np.split(flat, edges), strict=True))

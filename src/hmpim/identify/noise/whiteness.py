@@ -97,7 +97,7 @@ def are_white(residuals: Real, spectra: Complex | None = None) -> Mask:
     Parameters
     ----------
     residuals : ndarray, shape (..., n)
-        With samples that do not count left out or 0.
+        With samples that do not count left out or 0; only the others tell.
     spectra : complex ndarray, shape (..., n // 2 + 1), optional
         Their transforms, where they are known.
 
@@ -130,10 +130,12 @@ def _correlated(residuals: Real, spectra: Complex | None = None, *, steady: bool
     r = autocovariance(residuals, lags, spectra)
     power = np.where(r[..., :1] > 0, r[..., :1], 1.0)
     rho = (r[..., 1:] / power) ** 2
+    told = np.asarray(np.count_nonzero(residuals, axis=-1))[..., None]
     if not steady:
-        scatter = autocovariance(residuals**2 / power, lags)[..., 1:]
-        rho = rho / np.where(scatter > 0, scatter, 1.0)
-    statistic = n * (n + 2) * np.sum(rho / (n - np.arange(1, lags + 1)), axis=-1)
+        scatter = autocovariance(residuals**2 / power, lags)[..., 1:]  # also of how few are told
+        rho, told = rho / np.where(scatter > 0, scatter, 1.0), np.full_like(told, n)
+    pairs = np.maximum(told - np.arange(1, lags + 1), 1)
+    statistic = np.sum(told * (told + 2) * rho / pairs, axis=-1)
     return np.asarray((scipy.special.chdtrc(lags, statistic) <= FALSE_ALARM) & (r[..., 0] > 0))
 
 
@@ -149,5 +151,5 @@ def effective_share(residual: Real) -> float:
         return 1.0
     r = autocovariance(residual, lags)
     rho = r[1:] / r[0]
-    rho = rho[np.abs(rho) > DEVIATIONS / np.sqrt(residual.size)]
+    rho = rho[np.abs(rho) > DEVIATIONS / np.sqrt(np.count_nonzero(residual))]
     return float(1.0 / (1.0 + 2.0 * np.sum(rho**2)))
