@@ -309,7 +309,9 @@ def set_free(course: Course, fit: Fit) -> Course | None:
     if counted is None or not fit.structure.order or fit.structure.integrators:
         return None
     free = refit(data.problem(course.natural, counted), fit)
-    return replace(course, counted=counted, fits=[free], settled=None) if free.is_white else None
+    if not free.is_white:
+        return None
+    return replace(course, others=(), counted=counted, fits=[free], settled=None)
 
 
 def continue_between(course: Course) -> list[tuple[Intersample, Fit]]:
