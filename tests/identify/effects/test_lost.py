@@ -4,13 +4,16 @@ import numpy as np
 import pytest
 
 import hmpim
-from hmpim.identify.effects.lost import find_frozen, find_spikes, find_stuck
+from hmpim.identify.effects.lost import find_frozen, find_repeated, find_spikes, find_stuck
 from tests_support import in_studies
 
 FS = 200.0
 T = np.arange(2000) / FS
 STIMULUS = hmpim.Stimulus(waveform=hmpim.Chirp(band=(0.1, 20.0), duration=10.0), fs=FS)
 CHIRP = np.sin(2 * np.pi * (0.1 * T + 19.9 / 20 * T * T))
+
+
+LOST = np.array([100, 400, 700, 900, 1100, 1302, 1501])
 
 
 def noisy(seed=0, std=0.05):
@@ -127,3 +130,22 @@ def test_spikes_cost_next_to_nothing():
     for name in ("delay", "scale_factor", "natural_frequency", "damping_ratio"):
         estimate = getattr(pair, name)
         assert estimate.std == pytest.approx(getattr(plain, name).std, rel=0.15), name
+
+
+def test_a_lost_frame_at_a_crest_is_found_beside_others():
+    y = noisy(std=0.02)
+    crest = int(np.argmax(y))
+    lost = np.sort([*LOST, crest + 1])
+    y[lost] = y[lost - 1]
+    assert np.flatnonzero(find_repeated(y)).tolist() == lost.tolist()
+
+
+def test_a_level_that_is_met_again_is_no_lost_frame_nor_are_two_alike_at_a_crest():
+    y = noisy(std=0.02)
+    y[LOST] = y[LOST - 1]
+    clipped = np.minimum(y, 0.99)
+    assert np.flatnonzero(find_repeated(clipped)).tolist() == LOST.tolist()
+    crest = int(np.argmax(y))
+    alone = noisy(std=0.02)
+    alone[crest + 1] = alone[crest]
+    assert find_repeated(alone) is None

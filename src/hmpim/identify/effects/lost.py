@@ -183,8 +183,8 @@ def find_repeated(y: Real) -> Mask | None:
     """Return the samples that repeat the one before to the last digit, while all around moves.
 
     A frame that was lost is often filled by the one before it. An output that is rounded, held or
-    at rest repeats itself too, but not for a sample or two now and then; at a crest two may be
-    alike by chance.
+    at rest repeats itself too, but not for a sample or two now and then. Two alike at the highest
+    or lowest value may be clipped: alone they tell of no lost frame, beside others they are one.
 
     Parameters
     ----------
@@ -204,7 +204,11 @@ def find_repeated(y: Real) -> Mask | None:
     if not copies.any() or np.mean(copies) > PART:
         return None
     first, stop = runs_of(copies)
-    for a, b in zip(first, stop - 1, strict=True):
-        if b - a >= _LONGEST_COPY or y[a] in (y.min(), y.max()):
-            copies[a : b + 1] = False
-    return copies if np.count_nonzero(copies) >= max(3, WORTH * y.size) else None
+    extreme = (y.min(), y.max())
+    inside = 0
+    for a, b in zip(first, stop, strict=True):
+        if b - a > _LONGEST_COPY or (y[a] in extreme and np.count_nonzero(y == y[a]) > b - a + 1):
+            copies[a:b] = False
+        elif y[a] not in extreme:
+            inside += b - a
+    return copies if inside >= max(3, WORTH * y.size) else None
