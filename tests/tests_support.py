@@ -210,3 +210,11 @@ def second_order_lag(
 def field_chirp(time: NDArray[np.float64]) -> NDArray[np.float64]:
     """Linear chirp 0.1 to 20 Hz in 10 s, amplitude 1, at rest before 0."""
     return np.where(time > 0, np.sin(2 * np.pi * (0.1 * time + 19.9 / 20 * time**2)), 0.0)
+
+
+def four_sines(rng: np.random.Generator) -> NDArray[np.float64]:
+    """Four sines of 10 to 100 Hz at 1000 Hz, shape (2400,), the first 2000 before a record."""
+    t = np.arange(-2000, 400) / 1000.0
+    frequency = 1000.0 * np.exp(rng.uniform(np.log(0.01), np.log(0.1), 4))
+    angle = rng.uniform(0, 2 * np.pi, 4)
+    return np.sin(2 * np.pi * frequency[:, None] * t + angle[:, None]).sum(axis=0)

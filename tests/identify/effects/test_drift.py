@@ -7,7 +7,7 @@ import pytest
 import scipy.signal
 
 import hmpim
-from tests_support import assert_share, holds, in_studies, study_size
+from tests_support import assert_share, four_sines, holds, in_studies, study_size
 
 FS = 200.0
 T = np.arange(2000) / FS
@@ -148,11 +148,8 @@ def test_noise_is_not_taken_for_a_drift(seeds, colour):
 
 def test_a_free_response_that_a_drift_imitates_is_no_drift():
     """Four sines that go on, 400 samples; the search beside a drift alone finds the dynamics."""
-    seed, t = 2, np.arange(-2000, 400) / 1000.0
-    rng = np.random.default_rng(seed)
-    frequency = 1000.0 * np.exp(rng.uniform(np.log(0.01), np.log(0.1), 4))
-    angle = rng.uniform(0, 2 * np.pi, 4)
-    u = np.sin(2 * np.pi * frequency[:, None] * t + angle[:, None]).sum(axis=0)
+    rng = np.random.default_rng(2)
+    u = four_sines(rng)
     omega = 2 * np.pi * 5.6
     unit = hmpim.Model(
         delay=0.001, scale_factor=-2.8, bias=2.1, denominator=(omega**-2, 1.26 / omega, 1.0)

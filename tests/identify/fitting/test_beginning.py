@@ -9,7 +9,7 @@ from hmpim.identify.fitting.beginning import begins_of
 from hmpim.identify.fitting.fit import Problem, fit_structure
 from hmpim.model.dynamics import STRUCTURES
 from hmpim.model.sampled import prepare_input
-from tests_support import fewest
+from tests_support import fewest, four_sines
 
 FS, FINE = 100.0, 16
 N = 60
@@ -95,11 +95,8 @@ def test_a_delay_a_period_off_is_left_behind_where_the_output_still_rings(seed):
 
 
 def test_sines_that_go_on_are_no_response_from_rest():
-    seed, t = 3, np.arange(-2000, 400) / 1000.0
-    rng = np.random.default_rng(seed)
-    frequency = 1000.0 * np.exp(rng.uniform(np.log(0.01), np.log(0.1), 4))
-    angle = rng.uniform(0, 2 * np.pi, 4)
-    u = np.sin(2 * np.pi * frequency[:, None] * t + angle[:, None]).sum(axis=0)
+    seed = 3
+    u = four_sines(np.random.default_rng(seed))
     pair = hmpim.identify(cut(u, second_order(5.6, 0.63, 0.001, 2.1), 400, 0.03, seed))["y", "u"]
     assert pair.structure == "second_order"
     assert pair.bias.value == pytest.approx(2.1, abs=0.01)

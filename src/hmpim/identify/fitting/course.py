@@ -288,7 +288,7 @@ def continued(course: Course, *, valid: Mask | None, nuisance: Real | None = Non
         As for `hmpim.identify.fitting.joint.joint_fit`.
     """
     given = Seen(valid=valid, begins=None)
-    data = replace(course.data, nuisance=nuisance, noise=None)
+    data = replace(course.data.plain, nuisance=nuisance)
     course = replace(course, data=data, others=(), given=given, counted=given)
     course = replace(course, fits=_again(course, course.fits))
     return completed(course)

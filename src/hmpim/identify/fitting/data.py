@@ -1,6 +1,7 @@
 """What all trials of one joint fit share."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -81,6 +82,11 @@ class Data:
             begins=seen.begins,
         )
         return problem if self.noise is None else problem.coloured(self.noise, self.level)
+
+    @property
+    def plain(self) -> Self:
+        """The same, the noise taken for white and of one level."""
+        return replace(self, noise=None, level=None)
 
     @property
     def keeps_samples(self) -> bool:

@@ -155,7 +155,7 @@ def weigh_and_look_again(
             break
         again = seen if again is None else again
         data = (finer or course).data
-        course = replace(course, counted=again, data=replace(data, noise=None))
+        course = replace(course, counted=again, data=data.plain)
         chosen = (best.intersample, best.fit.structure)
         hopeful = [(best.intersample, best.fit)] + [
             (mode, fit)
@@ -189,7 +189,7 @@ def ask_for_poles(
         return grown
     if not is_contradicted(data, grown.best, course.counted):
         return grown
-    course = replace(course, data=replace(data, noise=None))
+    course = replace(course, data=data.plain)
     fitted = [(trial.intersample, trial.fit) for trial in joint.trials]
     share = joint.effective_share
     trials, best = _decide(course, refit_whitened(course.data, fitted, course.counted), share)
@@ -306,7 +306,7 @@ def _weigh(
         fitted = refit_whitened(course.data, fitted, seen)
     trials, best = _decide(course, fitted, share)
     if weighed.noise is not None and is_contradicted(course.data, best, seen):
-        course = replace(course, data=replace(data, noise=None))
+        course = replace(course, data=data.plain)
         trials, best = _decide(course, refit_whitened(course.data, fitted, seen), share)
     return course, trials, best, share
 

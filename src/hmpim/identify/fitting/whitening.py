@@ -58,13 +58,12 @@ def weighed_by_noise(problem: Problem, fit: Fit, data: Data) -> Data:
     As they come where that still follows the input: it is no noise, and whitening it would hide
     what a model lacks.
     """
-    plain = replace(data, noise=None, level=None)
     if (fit.is_white and is_steady(fit.residual)) or follows(data, fit):
-        return plain
+        return data.plain
     noise = np.ones(1) if fit.is_white else data.noise_left(problem, fit)
     level = data.level_left(problem, fit, noise)
     if noise.size == 1 and level is None:
-        return plain
+        return data.plain
     return replace(data, noise=noise, level=level)
 
 
@@ -85,7 +84,7 @@ def is_contradicted(data: Data, best: Trial, seen: Seen) -> bool:
     """
     if not data.keeps_samples:
         return False
-    problem = replace(data, noise=None, level=None).problem(best.intersample, seen)
+    problem = data.plain.problem(best.intersample, seen)
     plain = polished(problem, best.fit)
     rows = jacobian(problem, plain)
     freedom = max(problem.counted - rows.shape[0], 1)

@@ -125,7 +125,7 @@ def changing_noise(evidence: Evidence) -> tuple[Finding, ...]:
     if is_steady(left):
         return ()
     counted = np.arange(left.size) if valid is None else np.flatnonzero(valid)
-    spans = np.array_split(counted[: left.size], _PARTS)
+    spans = np.array_split(counted, _PARTS)
     levels = np.array([float(np.sqrt(np.mean(left[span] ** 2))) for span in spans])
     levels /= float(np.sqrt(np.mean(left[counted] ** 2)))
     loudest = spans[int(np.argmax(levels))]

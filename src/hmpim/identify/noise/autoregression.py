@@ -14,6 +14,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 
 from hmpim.identify.arrays import Mask, Real
 from hmpim.identify.chance import COVERAGE, HALF
+from hmpim.identify.kept import kept
 from hmpim.identify.noise.whiteness import autocovariance
 from hmpim.identify.worth import PART
 
@@ -169,6 +170,7 @@ def _innovation(x: Real) -> float:
     return float(gram[0, 0] * _left(gram)[0][-1] / count) if gram[0, 0] > 0.0 else 0.0
 
 
+@kept
 def yule_walker(residual: Real, longest: int = LONGEST) -> tuple[Real, float]:
     """The same filter from the autocovariance, stable always, and the power that it leaves.
 

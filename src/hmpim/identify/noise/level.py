@@ -18,6 +18,10 @@ _FEWEST = 50
 """Samples that tell a level to a tenth."""
 
 
+_WINDOWS = 4
+"""Times that about which a level is told, which a record needs to show that it changes."""
+
+
 def level_of(innovations: Real) -> Real | None:
     """Level of white noise at each sample, over its geometric mean: r.m.s. about each sample.
 
@@ -43,10 +47,10 @@ def level_of(innovations: Real) -> Real | None:
     >>> round(float(level[500] / level[2500]))
     4
     """
-    reach = max(innovations.size // _PARTS, _FEWEST) // 2
-    if innovations.size < 2 * reach * 2 * 2 or is_steady(innovations):
+    window = max(innovations.size // _PARTS, _FEWEST)
+    if innovations.size < _WINDOWS * window or is_steady(innovations):
         return None
-    index = np.arange(innovations.size)
+    index, reach = np.arange(innovations.size), window // 2
     last, first = np.minimum(index + reach + 1, index.size), np.maximum(index - reach, 0)
 
     def summed(values: Real) -> Real:

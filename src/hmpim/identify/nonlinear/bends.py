@@ -286,14 +286,11 @@ def _shortened(
     if here == slice(0, u.size):
         return u, problem, fit
     part = replace(
-        problem,
+        problem.plain,
         source=prepare_input(u[here], intersample, rest=False),
         y=problem.y[here],
         valid=None if problem.valid is None else problem.valid[here],
         nuisance=None if problem.nuisance is None else problem.nuisance[:, here],
-        noise=None,
-        told=None,
-        level=None,
         begins=0,
     )
     own = replace(
