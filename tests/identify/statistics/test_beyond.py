@@ -13,7 +13,7 @@ from hmpim import Record, compress, identify
 from hmpim.identify.statistics.beyond import held_for
 from hmpim.identify.statistics.products import Products, Responses
 from hmpim.identify.statistics.reach import AHEAD
-from hmpim.identify.statistics.run import Run, cross_closed, of_cubes
+from hmpim.identify.statistics.run import Run, cubes_by, of_cubes
 from tests_support import assert_share
 
 FS = 200.0
@@ -116,7 +116,8 @@ def test_block_by_block_gives_the_same():
 
 @pytest.mark.parametrize("skipped", [0, 40])
 @pytest.mark.parametrize("noise", [[1.0], [1.0, -0.6, 0.2]])
-def test_products_of_cube_and_input_are_sums_over_the_samples(skipped, noise):
+@pytest.mark.parametrize("to_the_end", [False, True])
+def test_products_of_cube_and_input_are_sums_over_the_samples(to_the_end, skipped, noise):
     rng = np.random.default_rng(3)
     records = [
         Record.from_arrays({"u": scale * rng.standard_normal(300)}, {"y": rng.random(300)}, fs=FS)
@@ -126,16 +127,18 @@ def test_products_of_cube_and_input_are_sums_over_the_samples(skipped, noise):
     reach, scale = statistics.reach, 8.0
     thirds = replace(statistics, runs=tuple(of_cubes(r, reach, scale) for r in statistics.runs))
     inputs, cubes = (
-        Products(one, skipped=skipped, noise=np.array(noise)) for one in (statistics, thirds)
+        Products(one, skipped=skipped, noise=np.array(noise), to_the_end=to_the_end)
+        for one in (statistics, thirds)
     )
     one, other = rng.standard_normal((2, 3, reach.taps))
-    lags = sum(cross_closed(run, reach, scale) for run in statistics.runs)
+    lags = sum(cubes_by(run, reach, scale, to_the_end=to_the_end) for run in statistics.runs)
     made = cubes.across(ending(one), inputs, ending(other), lags)
     direct = np.zeros((3, 3))
     for record in records:
         u = record.inputs[0].values - record.inputs[0].values[0]
         rows = [
-            counted(rows, x, noise, skipped) for rows, x in ((one, (u / scale) ** 3), (other, u))
+            counted(rows, x, noise, skipped, to_the_end=to_the_end)
+            for rows, x in ((one, (u / scale) ** 3), (other, u))
         ]
         direct += rows[0] @ rows[1].T
     np.testing.assert_allclose(made, direct, rtol=0, atol=1e-9 * np.abs(direct).max())
@@ -145,11 +148,12 @@ def ending(rows):
     return Responses.ending(rows, np.zeros(rows.shape[0]))
 
 
-def counted(rows, x, noise, skipped):
+def counted(rows, x, noise, skipped, *, to_the_end):
     """What responses make of an input, continued as `closed` does, whitened and less its bias."""
     after = 2 * x[-1] - x[-2 : -2 - AHEAD : -1]
     padded = np.concatenate([x, after])
-    made = np.array([np.convolve(row, padded)[AHEAD : AHEAD + x.size] for row in rows])
+    last = AHEAD + x.size - AHEAD * (not to_the_end)
+    made = np.array([np.convolve(row, padded)[AHEAD:last] for row in rows])
     first = len(noise) - 1 + skipped
     white = lfilter(noise, [1.0], made)[:, first:]
     return white - white.mean(axis=1, keepdims=True)

@@ -25,7 +25,11 @@ def stacked(records, statistics, products, responses):
     for i, record in enumerate(records):
         u, y = record.inputs[0].values, record.outputs[0].values
         moved = u - u[0]
-        moved = np.append(moved, 2 * moved[-1] - moved[-2 : -2 - AHEAD : -1])
+        last = u.size
+        if products.to_the_end:
+            moved = np.append(moved, 2 * moved[-1] - moved[-2 : -2 - AHEAD : -1])
+        else:
+            last -= AHEAD
         x = np.array([np.convolve(moved, row)[AHEAD : AHEAD + u.size] for row in responses.rows])
         x = x + responses.kept[:, None] * np.cumsum(u)
         own = statistics.reach.fixed(0, u.size)
@@ -34,7 +38,7 @@ def stacked(records, statistics, products, responses):
         if statistics.bias == "common":
             x, bias = x + responses.steady[:, None] * u[0], own
         for kept, signal in ((made, x), (outputs, y), (biases, bias)):
-            kept.append(lfilter(products.noise, [1.0], signal)[..., products.first :])
+            kept.append(lfilter(products.noise, [1.0], signal)[..., products.first : last])
     return np.hstack(made), np.hstack(outputs), np.hstack(biases)
 
 
@@ -42,13 +46,16 @@ def stacked(records, statistics, products, responses):
 @pytest.mark.parametrize("skipped", [LAGS, 0])
 @pytest.mark.parametrize("kind", ["own", "common", "knots"])
 @pytest.mark.parametrize("integrates", [False, True])
-def test_products_are_those_of_the_samples(integrates, kind, skipped, noise):
+@pytest.mark.parametrize("to_the_end", [False, True])
+def test_products_are_those_of_the_samples(to_the_end, integrates, kind, skipped, noise):
     records = [recorded(1, 700), recorded(2, 900)]
     knots = (0.0, 3.0, 6.0) if kind == "knots" else ()
     bias = "common" if kind == "common" else "own"
     parts = [compress(r, lags=LAGS, knots=knots, bias=bias) for r in records]
     statistics = parts[0] + parts[1]
-    products = Products(statistics, skipped=skipped).whitened(np.array(noise))
+    products = Products(statistics, skipped=skipped, to_the_end=to_the_end).whitened(
+        np.array(noise)
+    )
     rng = np.random.default_rng(5)
     decay = np.exp(-np.arange(statistics.reach.taps) / 9.0)
     rows = rng.standard_normal((3, decay.size)) * decay
@@ -75,17 +82,20 @@ def test_products_are_those_of_the_samples(integrates, kind, skipped, noise):
 
 @pytest.mark.parametrize("skipped", [LAGS, 0])
 @pytest.mark.parametrize("kept", [0.0, 0.01])
-def test_what_is_left_over_is_that_of_the_samples(kept, skipped):
+@pytest.mark.parametrize("to_the_end", [False, True])
+def test_what_is_left_over_is_that_of_the_samples(to_the_end, kept, skipped):
     record = recorded(1, 700)
     statistics = compress(record, lags=LAGS)
-    plain = Products(statistics, skipped=skipped)
+    plain = Products(statistics, skipped=skipped, to_the_end=to_the_end)
     response = np.zeros(statistics.reach.taps)
     response[AHEAD + 2 :] = 0.3 * 0.8 ** np.arange(response.size - AHEAD - 2)
     u, y = record.inputs[0].values, record.outputs[0].values
     left = y - y[0] - np.convolve(u - u[0], response)[AHEAD : AHEAD + u.size] - 0.2
     left -= kept * np.cumsum(u)
-    gram, count, heads = plain.left_over(response, kept, np.array([[0.2]]))
+    gram, count, heads, tails = plain.left_over(response, kept, np.array([[0.2]]))
     order = gram.shape[0] - 1
+    assert tails[0] == pytest.approx(left[-tails.shape[1] :], rel=1e-9)
+    left = left if to_the_end else left[:-AHEAD]
     past = np.stack([left[skipped + order - k : left.size - k] for k in range(order + 1)])
     assert count == past.shape[1]
     assert gram == pytest.approx(past @ past.T, rel=1e-8)

@@ -23,12 +23,12 @@ from hmpim.identify.result.groups import MODELLED
 from hmpim.identify.statistics.fit import Fitted
 from hmpim.identify.statistics.misfit import asked_of
 from hmpim.identify.statistics.products import Products, Responses
-from hmpim.identify.statistics.run import STOOD, cross_closed, of_cubes
+from hmpim.identify.statistics.run import STOOD, cubes_by, of_cubes
 from hmpim.identify.statistics.statistics import Statistics
 from hmpim.identify.worth import FEW, MUCH
 from hmpim.record import Finding
 
-__all__ = ["Beyond", "beyond_of", "held_for", "is_told", "said_beyond"]
+__all__ = ["UNDELAYED", "Beyond", "beyond_of", "held_for", "is_told", "said_beyond"]
 
 _GROUPS = 5
 """Frequencies that are asked for, from 0 to the cube's highest."""
@@ -39,7 +39,7 @@ _TIMES = 3.0
 _SEEN = 1e-6
 """Share of a direction that the input's own responses leave, below which it is not asked for."""
 
-_UNDELAYED = ("scale_factor", "bias")
+UNDELAYED = ("scale_factor", "bias")
 """Figures of slow motion, which an output that is held shows as it is."""
 
 _FEWEST = 10
@@ -84,7 +84,9 @@ def beyond_of(fitted: Fitted, products: Products, band: tuple[float, float]) -> 
     scale = max(float(run.scale[0]) for run in runs)
     thirds = replace(statistics, runs=tuple(of_cubes(run, reach, scale) for run in runs))
     inputs, cubes = (
-        Products(one, skipped=products.skipped, noise=products.noise)
+        Products(
+            one, skipped=products.skipped, noise=products.noise, to_the_end=products.to_the_end
+        )
         for one in (statistics, thirds)
     )
     highest = min(_TIMES * band[1], 0.5)
@@ -92,7 +94,8 @@ def beyond_of(fitted: Fitted, products: Products, band: tuple[float, float]) -> 
     asked = _ending(np.vstack([rows, fitted.response]))
     beside = fitted.responses.and_also(_ending(rows))
     third, first = cubes.moments(asked), inputs.moments(beside)
-    lags = np.sum([cross_closed(run, reach, scale) for run in runs], axis=0)
+    ends = products.to_the_end
+    lags = np.sum([cubes_by(run, reach, scale, to_the_end=ends) for run in runs], axis=0)
     mixed = cubes.across(asked, inputs, beside, lags)
     count, linear = fitted.weights.size, fitted.weights
     cross = third.cross - mixed[:, :count] @ linear
@@ -173,7 +176,7 @@ def said_beyond(
                 "not record the update times, so delay and dynamics include the hold. Identify "
                 "the record itself.",
                 severity="doubt",
-                parameters=tuple(name for name in MODELLED if name not in _UNDELAYED),
+                parameters=tuple(name for name in MODELLED if name not in UNDELAYED),
             )
         )
     if found.probability < FALSE_ALARM:

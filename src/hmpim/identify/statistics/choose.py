@@ -8,7 +8,7 @@ import scipy
 from hmpim.errors import RecordError
 from hmpim.identify.arrays import Real
 from hmpim.identify.chance import FALSE_ALARM, LIKELIER, SEARCHED
-from hmpim.identify.fitting.course import begun, looks_held
+from hmpim.identify.fitting.course import Course, begun, looks_held
 from hmpim.identify.fitting.data import Data, Seen, refit
 from hmpim.identify.fitting.enrich import (
     INTEGRATING,
@@ -47,6 +47,9 @@ _FORGOTTEN = 1e-4
 
 _TASTE = 5
 """Steps with an integrator from each start, before the best is followed if it is not hopeless."""
+
+_LOOKS = 3
+"""How often it is asked which samples at the ends count."""
 
 _ALL = Seen(valid=None, begins=None)
 """No selection: the products hold only samples that count."""
@@ -160,14 +163,35 @@ def choose(
     data = CompressedData.of(statistics, skipped=statistics.lags if conditioned else 0)
     course = begun(data, natural, names, _ALL)
     course = replace(course, alone=intersample is not None or natural == "zoh")
-    if conditioned and len(statistics.runs) == 1:
-        best = as_fitted(course.best)
-        skipped = 0 if _rests(best) else _memory(best)
-        data = replace(data, products=Products(statistics, skipped=skipped))
-        fits = [refit(data.problem(natural, _ALL), fit) for fit in course.fits]
-        course = replace(course, data=data, fits=fits)
-    joint = chosen_of(course, names)
+    data, joint = _look_and_choose(data, course, names, alone=len(statistics.runs) == 1)
     return data, replace(joint, forgotten=data.products.skipped)
+
+
+def _look_and_choose(
+    data: CompressedData, course: Course, names: tuple[StructureName, ...], *, alone: bool
+) -> tuple[CompressedData, JointFit]:
+    """Choose by the samples that count, and again where the chosen fit shows that others do.
+
+    The first ones of several runs never count, and of a run too short to do without them all do.
+    """
+    products, best = data.products, as_fitted(course.best)
+    joint, begins = None, alone and products.skipped > 0
+    for _ in range(_LOOKS):
+        skipped, to_the_end = products.skipped, products.to_the_end and _ends_quietly(best)
+        if begins:
+            needed = 0 if _rests(best) else _memory(best)
+            skipped = needed if joint is None or needed > skipped else min(needed, 1) * skipped
+        if joint is not None and (skipped, to_the_end) == (products.skipped, products.to_the_end):
+            break
+        products = Products(data.products.statistics, skipped=skipped, to_the_end=to_the_end)
+        data = replace(data, products=products)
+        fits = [refit(data.problem(course.natural, _ALL), fit) for fit in course.fits]
+        joint = chosen_of(replace(course, data=data, fits=fits), names)
+        if not joint.related:
+            break
+        best = as_fitted(joint.best.fit)
+    assert joint is not None
+    return data, joint
 
 
 def integrator_of(statistics: Statistics, data: CompressedData, joint: JointFit) -> Fitted | None:
@@ -238,9 +262,12 @@ def _looks_held(statistics: Statistics) -> bool:
 def _rests(best: Fitted) -> bool:
     """Whether a run begins at rest: what its beginning leaves over is noise, if it does.
 
-    Its power is chi-squared, and so is what a free response of the state explains of it.
+    Its power is chi-squared, and so is what a free response of the state explains of it. The noise
+    is told by the samples behind, which a free response does not colour.
     """
-    left, lags = best.left, best.products.statistics.lags
+    products, lags = best.products.plain, best.products.statistics.lags
+    behind = Products(products.statistics, skipped=_memory(best), to_the_end=products.to_the_end)
+    left = replace(best, problem=Compressed.of(behind, best.problem.source)).left
     begins = int(np.ceil(max(best.delay, 0.0))) + 4
     problem = replace(best.problem, begins=begins)
     free = Part(problem, best.structure, best.theta).free[:, :lags]
@@ -257,8 +284,18 @@ def _rests(best: Fitted) -> bool:
     return explained < left.innovation * float(scipy.special.chdtri(free.shape[0], FALSE_ALARM))
 
 
+def _ends_quietly(best: Fitted) -> bool:
+    """Whether what the ends of the runs leave over is noise; a band-limited input rings there."""
+    if best.problem.source.degree <= 1:
+        return True
+    left = best.left
+    tails = scipy.signal.lfilter(left.noise, np.ones(1), best.left_over[3])[:, left.noise.size :]
+    limit = float(scipy.special.chdtri(max(tails.size, 1), FALSE_ALARM))
+    return float(np.sum(tails**2)) <= left.innovation * limit
+
+
 def _memory(fitted: Fitted) -> int:
     """Outputs that answer what came before a run, by the best fit so far and half as many again."""
     size = np.abs(fitted.response)
-    last = int(np.flatnonzero(size > _FORGOTTEN * size.max())[-1]) - AHEAD
+    last = int(np.max(np.flatnonzero(size > _FORGOTTEN * size.max()), initial=AHEAD)) - AHEAD
     return int(np.clip(1.5 * last, 1, fitted.products.statistics.lags))

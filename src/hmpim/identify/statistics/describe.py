@@ -41,6 +41,7 @@ from hmpim.identify.result.error_bars import estimate, noise_estimate
 from hmpim.identify.statistics.beyond import is_told, said_beyond
 from hmpim.identify.statistics.choose import CompressedData, choose, integrator_of
 from hmpim.identify.statistics.fit import Fitted, as_fitted
+from hmpim.identify.statistics.limits import cut_response, drift_or_noise, perhaps_software
 from hmpim.identify.statistics.run import Run
 from hmpim.identify.statistics.start import correlations
 from hmpim.identify.statistics.statistics import Statistics
@@ -65,6 +66,9 @@ _CHECKS: tuple[Check, ...] = (
     other_intersample,
     wide_span,
     negative_delay,
+    drift_or_noise,
+    cut_response,
+    perhaps_software,
 )
 """Those that need no samples."""
 
@@ -282,17 +286,17 @@ def _paper(statistics: Statistics) -> PaperEstimates:
 
 
 def _no_samples(statistics: Statistics) -> Finding:
-    left = "clipping, holds, rounding, spikes and harmonics were not looked for"
+    left = "clipping, holds, rounding and harmonics were not looked for"
     if is_told(statistics):
         left = (
-            "clipping, rounding, spikes and even harmonics were not looked for, and holds and odd "
+            "clipping, rounding and even harmonics were not looked for, and holds and odd "
             "harmonics are detected but not modelled"
         )
     return Finding(
         code="no_samples",
         message=f"This is identified from statistics of {statistics.samples} samples, which are "
         f"not kept: the frequency response is the model's own, and {left}. "
-        "Identify a record to see them.",
+        "Spikes and lost samples count as noise. Identify the record to see them.",
         severity="info",
         parameters=(),
     )

@@ -288,7 +288,7 @@ class Fitted(Fit):
         return np.asarray(whole * self.variance)
 
     @cached_property
-    def left_over(self) -> tuple[Real, int, Real]:
+    def left_over(self) -> tuple[Real, int, Real, Real]:
         """What is left over, not whitened, as `Products.left_over` gives it."""
         fixed = self.moments.fixed - self.moments.fixed_rows @ self.weights
         kept = float(self.responses.kept @ self.weights)
@@ -298,7 +298,7 @@ class Fitted(Fit):
     def left(self) -> LeftOver:
         """Power, colour and autoregression of what is left over."""
         products = self.products
-        gram, count, _ = self.left_over
+        gram, count, *_ = self.left_over
         if gram[0, 0] <= _ROUNDED * products.plain.energy:
             least, noise = self.objective / products.counted, np.ones(1)
             return LeftOver(power=least, counted=count, innovation=least, share=1.0, noise=noise)

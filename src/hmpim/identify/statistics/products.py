@@ -108,10 +108,20 @@ class Products:
         `lags`; 0 where each run begins at rest.
     noise : ndarray, shape (order + 1,)
         Autoregression of the noise, 1 first.
+    to_the_end : bool
+        Whether the last `AHEAD` outputs of each run count. A band-limited input is continued there,
+        odd about its last sample; one that ends in motion rings about it.
     """
 
-    def __init__(self, statistics: Statistics, *, skipped: int, noise: Real | None = None) -> None:
-        self.statistics, self.skipped = statistics, skipped
+    def __init__(
+        self,
+        statistics: Statistics,
+        *,
+        skipped: int,
+        noise: Real | None = None,
+        to_the_end: bool = True,
+    ) -> None:
+        self.statistics, self.skipped, self.to_the_end = statistics, skipped, to_the_end
         self.noise = np.ones(1) if noise is None else noise
         self._plain: Products | None = None
         reach = statistics.reach
@@ -120,15 +130,16 @@ class Products:
         """Sample of a run from which on its whitened outputs count."""
         self._levels = np.array([run.level for run in statistics.runs])
         self._length = int(scipy.fft.next_fast_len(2 * reach.span + 1, real=True))
-        self._runs = runs = tuple(closed(run, reach) for run in statistics.runs)
+        runs = statistics.runs
+        self._runs = runs = tuple(closed(run, reach) for run in runs) if to_the_end else runs
         self._average = self._averages()
         self._power = spectrum_of(sum((r.uu for r in runs), np.zeros(reach.span + 1)), self._length)
         self._white = scipy.fft.rfft(self.noise, self._length)
         self._cross = np.stack([self._lagged(run) for run in runs])
         ends = [
             end
-            for run, whole in zip(statistics.runs, runs, strict=True)
-            for end in self._ends_of(whole, last_sums(run, reach, LONGEST))
+            for run, read in zip(runs, statistics.runs, strict=True)
+            for end in self._ends_of(run, read)
         ]
         self._inputs = scipy.fft.rfft(np.stack([end[0] for end in ends]), self._length)
         self._around = np.stack([end[1] for end in ends])
@@ -157,7 +168,9 @@ class Products:
         """The same samples under another noise model."""
         if noise.size == 1:
             return self.plain
-        other = Products(self.statistics, skipped=self.skipped, noise=noise)
+        other = Products(
+            self.statistics, skipped=self.skipped, noise=noise, to_the_end=self.to_the_end
+        )
         other._plain = self.plain
         return other
 
@@ -191,9 +204,9 @@ class Products:
         later = run.vv[:, :, 1 : weight.size] @ weight[1:]
         return np.asarray(weight[0] * run.vv[:, :, 0] + later + later.T)
 
-    def _ends_of(self, run: Run, sums: Real) -> list[tuple[Real, Real]]:
-        """Input at either end of a closed run, and whitened outputs there; its last `sums`."""
-        reach = self.statistics.reach
+    def _ends_of(self, run: Run, read: Run) -> list[tuple[Real, Real]]:
+        """Input at either end of a run, and whitened outputs there, 0 beyond what was `read`."""
+        reach, beyond = self.statistics.reach, run.samples - read.samples
         n, span, count = run.samples, reach.span, reach.rows + 2
         # Sample c of a convolution with the head is sample c - AHEAD of the run, and of one with
         # the tail n - span - AHEAD + c.
@@ -201,11 +214,12 @@ class Products:
         size = min(reach.back, n)
         begins = np.cumsum(run.head_u[:size] + run.level[0])
         early = np.vstack([reach.fixed(0, size), begins, run.head_y[:size]])
-        early[:, max(n - AHEAD, 0) :] = 0.0
+        early[:, read.samples :] = 0.0
         head[:, AHEAD : AHEAD + size] = early
-        ends = np.append(sums, np.zeros(AHEAD))
-        late = np.vstack([reach.fixed(n - reach.forth, reach.forth), ends, run.tail_y])
-        late[:, reach.forth - AHEAD :] = 0.0  # of a closed run
+        known = reach.forth - beyond
+        sums = np.append(last_sums(read, reach, known), np.zeros(beyond))
+        late = np.vstack([reach.fixed(n - reach.forth, reach.forth), sums, run.tail_y])
+        late[:, known:] = 0.0
         tail[:, span + AHEAD - reach.forth : span + AHEAD] = late
         out = []
         for u, v in ((run.head_u, head), (run.tail_u, tail)):
@@ -290,7 +304,7 @@ class Products:
             early = (first @ self._begun).transpose(1, 0, 2)
         return np.concatenate([early, late], axis=2)
 
-    def left_over(self, response: Real, kept: float, bias: Real) -> tuple[Real, int, Real]:
+    def left_over(self, response: Real, kept: float, bias: Real) -> tuple[Real, int, Real, Real]:
         """Return what a model leaves over; of products without a noise model only.
 
         Parameters
@@ -310,6 +324,8 @@ class Products:
             Of how many.
         heads : ndarray, shape (runs, m)
             The first samples of each run, as if it had begun at rest.
+        tails : ndarray, shape (runs, LONGEST)
+            Its last samples.
         """
         runs, reach, index = self._runs, self.statistics.reach, np.arange(LONGEST + 1)
         weights = np.hstack([-bias, np.tile([-kept, 1.0], (len(runs), 1))])
@@ -333,7 +349,8 @@ class Products:
             before, after = _shifted(head[: first + AHEAD]), _shifted(tail)[:, reach.span :]
             gram -= before @ before.T + after @ after.T
         count = sum(run.samples - AHEAD - first for run in runs)
-        return gram, count, ends[0::2, AHEAD:]
+        last = reach.span + AHEAD * (not self.to_the_end)
+        return gram, count, ends[0::2, AHEAD:], ends[1::2, last - LONGEST : last]
 
     def _without_bias(self, gram: Real, mixed: Real, steady: Real) -> Moments:
         """Solve the biases and take them off."""
@@ -385,8 +402,8 @@ class Products:
         if statistics.reach.rows == 1:
             return np.ones((1 if statistics.bias == "common" else len(statistics.runs), 1))
         count = statistics.reach.rows
-        sums = [run.vv[:count, :count, 0].sum(axis=1) / (run.samples - AHEAD) for run in self._runs]
-        return np.stack(sums)
+        runs = statistics.runs
+        return np.stack([run.vv[:count, :count, 0].sum(axis=1) / run.samples for run in runs])
 
 
 def spectrum_of(autocorrelation: Real, length: int) -> Real:

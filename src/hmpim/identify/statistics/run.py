@@ -21,7 +21,7 @@ __all__ = [
     "begun",
     "closed",
     "continued",
-    "cross_closed",
+    "cubes_by",
     "last_sums",
     "of_cubes",
     "shortened",
@@ -172,15 +172,17 @@ def of_cubes(run: Run, reach: Reach, scale: float) -> Run:
     )
 
 
-def cross_closed(run: Run, reach: Reach, scale: float) -> Real:
-    """Products `wu`, by another scale, of an input and a cube that `closed` continues."""
+def cubes_by(run: Run, reach: Reach, scale: float, *, to_the_end: bool) -> Real:
+    """Products `wu` by another scale, of an input and a cube that `closed` continues if asked."""
+    known = np.asarray(run.wu * (run.scale[0] / scale) ** 3)
+    if not to_the_end:
+        return known
     third = of_cubes(run, reach, scale)
     pair = (run, third)
     after = [closed(one, reach).tail_u[-AHEAD:] for one in pair]
     whole = [np.concatenate([x.tail_u, y]) for x, y in zip(pair, after, strict=True)]
     behind = np.correlate(whole[0], after[1], "valid")[::-1]
     before = np.correlate(whole[1], after[0], "valid")[:-1]
-    known = run.wu * (run.scale[0] / scale) ** 3
     return np.asarray(known + np.concatenate([before, behind]))
 
 
