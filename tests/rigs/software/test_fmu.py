@@ -1,5 +1,8 @@
 """FMUs under test: both versions of FMI, co-simulation and model exchange."""
 
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 from scipy.optimize import brentq
@@ -84,3 +87,25 @@ def test_what_is_no_fmu_is_told(tmp_path):
     (tmp_path / "x.fmu").write_bytes(b"PK no")
     with pytest.raises(RigError, match="is no FMU that FMPy reads"):
         run(FmuRig(path=str(tmp_path / "x.fmu")), STIMULUS)
+
+
+SPEAKS = """
+import gc, sys
+from fmpy.fmi2 import defaultCallbacks
+from hmpim.experiment import run
+from hmpim.rigs.software import FmuRig
+from hmpim.stimulus import Chirp, Stimulus
+
+run(FmuRig(path=sys.argv[1]), Stimulus(waveform=Chirp(band=(1, 5), duration=2), fs=100, unit="deg"))
+gc.collect()
+later = [FmuRig(path=f"{k}.fmu") for k in range(1000)]
+defaultCallbacks.logger(None, b"unit", 3, b"error", b"another FMU speaks")
+print("alive")
+"""
+
+
+def test_what_another_fmu_says_after_a_run_takes_nothing_down(fmu):
+    done = subprocess.run(
+        [sys.executable, "-c", SPEAKS, str(fmu)], capture_output=True, text=True, check=False
+    )
+    assert done.stdout.splitlines()[-1:] == ["alive"], done.stderr

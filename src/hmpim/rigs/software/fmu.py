@@ -27,6 +27,11 @@ Interface = Literal["auto", "cosimulation", "exchange"]
 
 _REAL = ("Real", "Float64")
 
+_LAST: dict[str, Any] = {}
+"""Callbacks of the last FMU. FMPy's proxy hands what any FMU of the process says to the last logger
+it was given, so that one which is gone would take the process down.
+"""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class FmuRig(Simulated):
@@ -248,6 +253,7 @@ class _Opened:
         described = self._described
         try:
             fmu = self._fmu = instantiate_fmu(self._folder, described, kind, logger=_listener(said))
+            _LAST["callbacks"] = getattr(fmu, "callbacks", None)
             left = apply_start_values(
                 fmu, described, dict(self._start), settable=settable_in_instantiated
             )
