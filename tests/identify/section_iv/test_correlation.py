@@ -6,9 +6,7 @@ from hypothesis.extra import numpy as npst
 
 from hmpim.errors import RecordError
 from hmpim.identify.section_iv.correlation import (
-    Correlation,
     autocorrelation,
-    correlation_peak,
     cross_correlation,
     likeness,
 )
@@ -26,7 +24,7 @@ def sweep(samples: int = 2000, top: float = 20.0) -> np.ndarray:
 
 
 def delay(u: np.ndarray, y: np.ndarray) -> float:
-    return correlation_peak(cross_correlation(y, u)).lag / FS
+    return likeness(u, y, u.size // 2).peak.lag / FS
 
 
 def shifted(x: np.ndarray, k: int) -> np.ndarray:
@@ -88,17 +86,18 @@ def test_a_sinusoid_is_delayed_by_its_phase() -> None:
 
 def test_a_device_that_turns_the_sign_is_found_at_the_trough() -> None:
     u = sweep()
-    peak = correlation_peak(cross_correlation(-2 * shifted(u, 25), u))
+    peak = likeness(u, -2 * shifted(u, 25), 200).peak
     assert peak.lag == 25
     assert peak.value < 0
 
 
 def test_a_trough_counts_only_where_it_is_clearly_deeper_than_the_peak_is_high() -> None:
     def lag(depth: float) -> int:
-        value = np.array([0, 0, 0, 1.0, 0, -depth, 0])
-        return correlation_peak(Correlation(lag=np.arange(-3, 4), value=value)).lag
+        u, y = np.zeros(60), np.zeros(60)
+        u[:2], y[10:12], y[20:22] = (1.0, -1.0), (1.0, -1.0), (-depth, depth)
+        return likeness(u, y, 30).peak.lag
 
-    assert (lag(1.2), lag(3.0)) == (0, 2)
+    assert (lag(1.1), lag(3.0)) == (10, 20)
 
 
 def test_an_output_before_its_input_is_not_searched() -> None:
@@ -106,11 +105,6 @@ def test_an_output_before_its_input_is_not_searched() -> None:
     early = np.concatenate((u[50:], np.zeros(50)))
     assert delay(u, early) != 50 / FS
     assert delay(u, early) >= 0
-
-
-def test_dead_signals_are_refused() -> None:
-    with pytest.raises(RecordError, match="zero at every lag"):
-        delay(sweep(), np.zeros(2000))
 
 
 def test_lengths_are_checked() -> None:
@@ -125,9 +119,10 @@ def test_one_transform_tells_the_papers_peak_and_who_is_ahead(offsets, late):
     x = np.convolve(rng.standard_normal(601), np.ones(5))
     u, y = x[50:551] + offsets[0], -1.5 * x[50 - late : 551 - late] + offsets[1]
     seen = likeness(u, y, 50)
-    wanted = correlation_peak(cross_correlation(y, u))
-    assert seen.peak.lag == wanted.lag
-    assert seen.peak.value == pytest.approx(wanted.value, rel=1e-9)
+    printed = cross_correlation(y, u).value[u.size - 1 :][: u.size // 2 + 1]
+    wanted = int(np.argmax(np.where(printed < 0.0, -printed / 1.2, printed)))
+    assert seen.peak.lag == wanted
+    assert seen.peak.value == pytest.approx(printed[wanted], rel=1e-9)
     assert seen.is_ahead == (late < 0)
     assert (seen.lead if late < 0 else seen.lag) == late
 

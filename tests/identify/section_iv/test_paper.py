@@ -11,7 +11,7 @@ from hmpim.errors import ArgumentError, RecordError
 from hmpim.identify.result import PaperEstimates
 from hmpim.identify.section_iv.correlation import autocorrelation, cross_correlation
 from hmpim.identify.section_iv.paper import PaperAnalysis, paper_analysis, paper_estimates
-from hmpim.identify.section_iv.response import delay_phase, natural_frequency
+from hmpim.identify.section_iv.response import delay_phase, falling_crossing
 from hmpim.identify.section_iv.spectrum import decibel, spectrum, transfer_function
 from tests_support import examples
 
@@ -115,7 +115,7 @@ def test_natural_frequency_and_damping_of_dynamics_alone() -> None:
     u, y = figure_17(linear_chirp, 0, noise=0.0)
     # The 30 samples of pure delay taken out by hand, the phase is that of the dynamics.
     found = paper_analysis(u[:-30], y[30:], FS, band=BAND)
-    natural = natural_frequency(found.band_frequency, found.phase)
+    natural = falling_crossing(found.band_frequency, found.phase, -90.0)
     assert natural == pytest.approx(10.0, abs=0.1)
     assert found.estimates.damping_ratio == pytest.approx(0.4, abs=0.01)
 
@@ -149,6 +149,8 @@ def test_curves_are_those_of_the_single_steps(analysis: PaperAnalysis) -> None:
     inside = (g.frequency >= BAND[0] - 1e-9) & (g.frequency <= BAND[1] + 1e-9)
     np.testing.assert_allclose(analysis.response, g.response[inside], rtol=1e-9)
     np.testing.assert_allclose(analysis.band_frequency, g.frequency[inside])
+    parts = analysis.response.real, analysis.response.imag  # equation (24)
+    np.testing.assert_allclose(analysis.magnitude**2, parts[0] ** 2 + parts[1] ** 2, rtol=1e-12)
 
 
 def test_phase_without_delay_is_equation_25(analysis: PaperAnalysis) -> None:

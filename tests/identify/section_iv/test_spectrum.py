@@ -14,7 +14,7 @@ from hmpim.identify.section_iv.spectrum import (
     transfer_function,
     well_excited,
 )
-from hmpim.identify.section_iv.windows import gaussian_window
+from hmpim.identify.section_iv.windows import window_samples
 from tests_support import examples
 
 
@@ -47,7 +47,9 @@ def test_zeros_are_never_windowed(zeros: int) -> None:
     found = spectrum(x, 100.0, pad=zeros)
     k = found.frequency.size // 3
     alone = np.sum(
-        x * gaussian_window(500) * np.exp(-2j * np.pi * found.frequency[k] * np.arange(500) / 100)
+        x
+        * window_samples("gaussian", 500)
+        * np.exp(-2j * np.pi * found.frequency[k] * np.arange(500) / 100)
     )
     assert found.value[k] == pytest.approx(alone, abs=1e-9)
 

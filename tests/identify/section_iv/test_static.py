@@ -3,7 +3,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hmpim.errors import ArgumentError
 from hmpim.identify.section_iv.correlation import autocorrelation
 from hmpim.identify.section_iv.static import (
     bias_by_autocorrelation,
@@ -93,11 +92,3 @@ def test_no_excitation_gives_no_scale_factor() -> None:
 def test_an_excitation_on_one_side_only_is_enough() -> None:
     u = np.abs(np.sin(2 * np.pi * T[:400])) + 0.1
     assert scale_factor_near_dc(u, 3 * u + 1, 0, 1.0) == pytest.approx(3.0)
-
-
-@pytest.mark.parametrize("lag", [-1, 1997])
-def test_lag_must_leave_four_samples(lag: int) -> None:
-    with pytest.raises(ArgumentError, match=rf"lag is {lag} samples; give 0 to 1996"):
-        time_corrected_error(SWEEP, SWEEP, lag)
-    with pytest.raises(ArgumentError, match=rf"lag is {lag} samples"):
-        scale_factor_near_dc(SWEEP, SWEEP, lag, 0.0)

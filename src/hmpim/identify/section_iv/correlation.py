@@ -6,7 +6,6 @@ import numpy as np
 import scipy
 from numpy.typing import ArrayLike, NDArray
 
-from hmpim.errors import RecordError
 from hmpim.identify.arrays import Complex, Real
 from hmpim.identify.kept import kept
 from hmpim.identify.signals import as_pair, as_signal
@@ -17,7 +16,6 @@ __all__ = [
     "CorrelationPeak",
     "Likeness",
     "autocorrelation",
-    "correlation_peak",
     "cross_correlation",
     "likeness",
 ]
@@ -54,9 +52,10 @@ class Likeness:
     Parameters
     ----------
     peak : CorrelationPeak
-        The paper's, of the signals as they are; of the signals less their means where those, at the
-        paper's, resemble each other by less than half of what they do elsewhere: a bias of many
-        times the motion has its own peak.
+        The paper's, of the signals as they are, over the lags at which at least half of the record
+        overlaps; of the signals less their means where those, at the paper's, resemble each other
+        by less than half of what they do elsewhere: a bias of many times the motion has its own
+        peak.
     ahead : float
         Of the signals less their means, the correlation of largest magnitude where the output
         comes first.
@@ -214,44 +213,12 @@ def autocorrelation(x: ArrayLike) -> Correlation:
     return cross_correlation(array, array)
 
 
-def correlation_peak(correlation: Correlation) -> CorrelationPeak:
-    """Return the peak of a correlation over the lags 0 to a quarter of their number.
-
-    Only lags k >= 0 count, since an output cannot come before its cause, and only those at
-    which at least half of the record overlaps. The peak is the highest value, as in the paper,
-    unless the lowest is 1.25 times as far from zero: then the device turns the sign.
-
-    Parameters
-    ----------
-    correlation : Correlation
-        Of the output with the input, in this order.
-
-    Returns
-    -------
-    CorrelationPeak
-        Lag in samples, and R there with its sign.
-
-    Raises
-    ------
-    RecordError
-        If the correlation is zero at each of these lags: a signal is dead.
-
-    Examples
-    --------
-    >>> correlation_peak(cross_correlation([0, 0, 0, 2, 0], [0, 1, 0, 0, 0]))
-    CorrelationPeak(lag=2, value=0.4)
-    """
-    start = int(np.searchsorted(correlation.lag, 0))
-    samples = correlation.lag.size - start
-    value = correlation.value[start : start + samples // 2 + 1]
-    # What the FFT leaves of an exact zero is rounding, not correlation.
-    if not value.any():
-        raise RecordError("the correlation is zero at every lag; one of the signals is dead")
-    return _peak(value)
-
-
 def _peak(value: Real) -> CorrelationPeak:
-    """Peak or trough of a correlation at lags from 0 on."""
+    """Peak of a correlation at lags from 0 on, since an output cannot come before its cause.
+
+    The highest value, as in the paper, unless the lowest is 1.2 times as far from zero: then the
+    device turns the sign.
+    """
     high, low = int(np.argmax(value)), int(np.argmin(value))
     lag = low if -value[low] > (1 + PART) * max(value[high], 0.0) else high
     return CorrelationPeak(lag=lag, value=float(value[lag]))

@@ -1,5 +1,6 @@
 """Section IV of the paper from end to end: every curve, and every figure read off them."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -8,7 +9,7 @@ import scipy
 from numpy.typing import ArrayLike
 
 from hmpim.arguments import checked
-from hmpim.errors import ArgumentError, RecordError
+from hmpim.errors import RecordError
 from hmpim.identify.arrays import Complex, Mask, Real, median
 from hmpim.identify.kept import kept
 from hmpim.identify.result import PaperEstimates
@@ -16,11 +17,17 @@ from hmpim.identify.section_iv import response as reading
 from hmpim.identify.section_iv.correlation import (
     CorrelationPeak,
     autocorrelation,
-    correlation_peak,
     cross_correlation,
     likeness,
 )
-from hmpim.identify.section_iv.spectrum import decibel, excited_band, padding, ratio, well_excited
+from hmpim.identify.section_iv.spectrum import (
+    decibel,
+    excited_band,
+    padding,
+    ratio,
+    spectrum,
+    well_excited,
+)
 from hmpim.identify.section_iv.static import (
     bias_by_autocorrelation,
     noise_by_autocorrelation,
@@ -95,27 +102,16 @@ class PaperAnalysis:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class _TimeSteps:
-    """What sections IV.A to IV.C give."""
+class _Inside:
+    """What section IV.D gives inside a band, (b,), of several outputs, (k, b).
 
-    lag: int
-    inverted: bool
-    error: Real
-    bias: float
-    scale_factor: float | None
-    noise_std: float
+    Figures are read off the bins of `read`, (b,).
+    """
 
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class _FrequencySteps:
-    """What section IV.D gives inside the band; figures are read off the bins of `read`."""
-
-    inside: slice
+    frequency: Real
     read: Mask
     response: Complex
-    magnitude: Real
     phase: Real
-    phase_without_delay: Real
 
 
 @checked
@@ -182,47 +178,43 @@ def paper_analysis(
     check_rate(fs)
     fs = float(fs)
     span = _band(stimulus, fs, band)
+    peak = likeness(stimulus, measured, longest_lag(stimulus.size)).peak
+    if peak.value == 0.0:
+        raise RecordError("the correlation is zero at every lag; one of the signals is dead")
     correlation = cross_correlation(measured, stimulus)
-    time = _time_steps(stimulus, measured, correlation_peak(correlation))
-    n = stimulus.size
-    zeros = padding(n) if pad is None else pad
-    if zeros < 0:
-        raise ArgumentError(f"pad is {zeros}; give the number of zeros to add, 0 or more")
-    length = n + zeros
-    taper = window_samples(window, n, alpha=alpha)
-    # Both signals, without and with the window, in one transform.
+    told, error = _time_steps(stimulus, measured, peak, fs)
     plain = np.stack((stimulus, measured))
     if remove_mean:
         plain -= plain.mean(axis=1, keepdims=True)
-    value = np.asarray(scipy.fft.rfft(np.concatenate((plain, plain * taper)), length, axis=-1))
-    level = decibel(value)
-    frequency = np.asarray(scipy.fft.rfftfreq(length, 1 / fs), dtype=np.float64)
-    (steps,) = _frequency_steps(value[2], value[3:], fs / length, span, [time], fs)
-    inner = autocorrelation(time.error)
+    bare = [spectrum(x, fs, window="rectangular", pad=pad) for x in plain]
+    below, above = (spectrum(x, fs, window=window, alpha=alpha, pad=pad) for x in plain)
+    inside = _frequency_steps(below.value, above.value[None], below.frequency, span, [peak])
+    inner = autocorrelation(error)
+    magnitude, phase = np.abs(inside.response[0]), inside.phase[0]
     return PaperAnalysis(
         fs=fs,
         band=span,
         window=window,
         alpha=alpha,
-        inverted=time.inverted,
+        inverted=peak.value < 0,
         lag=correlation.lag / fs,
         cross_correlation=correlation.value,
-        error_time=np.arange(time.error.size) / fs,
-        error=time.error,
+        error_time=np.arange(error.size) / fs,
+        error=error,
         error_lag=inner.lag / fs,
         error_autocorrelation=inner.value,
-        frequency=frequency,
-        input_db=level[0],
-        output_db=level[1],
-        input_windowed_db=level[2],
-        output_windowed_db=level[3],
-        band_frequency=frequency[steps.inside],
-        response=steps.response,
-        magnitude=steps.magnitude,
-        magnitude_db=decibel(steps.magnitude),
-        phase=steps.phase,
-        phase_without_delay=steps.phase_without_delay,
-        estimates=_estimates(time, steps, frequency[steps.inside], fs),
+        frequency=below.frequency,
+        input_db=decibel(bare[0].value),
+        output_db=decibel(bare[1].value),
+        input_windowed_db=decibel(below.value),
+        output_windowed_db=decibel(above.value),
+        band_frequency=inside.frequency,
+        response=inside.response[0],
+        magnitude=magnitude,
+        magnitude_db=decibel(magnitude),
+        phase=phase,
+        phase_without_delay=phase - reading.delay_phase(inside.frequency, told.delay or 0.0),
+        estimates=_with_band(told, inside, 0),
     )
 
 
@@ -231,26 +223,7 @@ def paper_estimates(
 ) -> PaperEstimates:
     """Return only the figures of `paper_analysis`, at the paper's own settings.
 
-    Parameters
-    ----------
-    u, y : array_like, shape (n,)
-        Stimulus and measured response on one clock.
-    fs : float
-        Sampling rate, Hz.
-    band : tuple of float or None
-        Excited band in Hz; None finds it from `u`.
-
-    Returns
-    -------
-    PaperEstimates
-        None for each figure whose step has no answer; all None if the output is dead.
-
-    Raises
-    ------
-    RecordError
-        For unequal lengths, fewer than four samples, NaN, infinity, or a constant `u`.
-    ArgumentError
-        For a rate or a band that cannot be.
+    None for each figure whose step has no answer; all None if the output is dead.
 
     Examples
     --------
@@ -288,17 +261,15 @@ def estimates_of_many(
     moving = [i for i, y in enumerate(outputs) if np.ptp(y) > 0]
     if not moving:
         return found
-    seen = [likeness(u, outputs[i], longest_lag(n)).peak for i in moving]
-    times = [_time_steps(u, outputs[i], peak) for i, peak in zip(moving, seen, strict=True)]
-    times = [replace(time, error=np.empty(0)) for time in times]  # long, not needed
+    peaks = [likeness(u, outputs[i], longest_lag(n)).peak for i in moving]
     bins, taper = int(band[1] * length / fs) + 2, _taper(n)
     asked = _asked(u, taper, length, bins)
     answered = np.stack([_tapered(outputs[i], taper, length, bins) for i in moving])
-    every = _frequency_steps(asked, answered, fs / length, band, times, fs)
-    inside = every[0].inside
-    frequency = np.arange(inside.start, inside.stop) * (1.0 / (length * (1 / fs)))
-    for i, time, steps in zip(moving, times, every, strict=True):
-        found[i] = _estimates(time, steps, frequency, fs)
+    frequency = np.asarray(np.arange(bins) * (fs / length), dtype=np.float64)
+    inside = _frequency_steps(asked, answered, frequency, band, peaks)
+    for k, (i, peak) in enumerate(zip(moving, peaks, strict=True)):
+        told, _ = _time_steps(u, outputs[i], peak, fs)
+        found[i] = _with_band(told, inside, k)
     return found
 
 
@@ -328,41 +299,34 @@ def _band(u: Real, fs: float, band: tuple[float, float] | None) -> tuple[float, 
     return band
 
 
-def _time_steps(u: Real, y: Real, peak: CorrelationPeak) -> _TimeSteps:
-    """Sections IV.A to IV.C, equations (8) to (14), of the output's correlation with the input.
-
-    The measurement first: a late measurement then peaks at a positive lag.
-    """
-    error = time_corrected_error(u, y, min(peak.lag, u.size - 4))
+def _time_steps(u: Real, y: Real, peak: CorrelationPeak, fs: float) -> tuple[PaperEstimates, Real]:
+    """Figures of sections IV.A to IV.C, equations (8) to (14), and the error of equation (9)."""
+    lag = min(peak.lag, u.size - 4)
+    error = time_corrected_error(u, y, lag)
     bias = bias_by_autocorrelation(error)
-    return _TimeSteps(
-        lag=u.size - error.size,
-        inverted=peak.value < 0,
-        error=error,
+    told = PaperEstimates(
+        delay=lag / fs,
         bias=bias,
-        scale_factor=scale_factor_near_dc(u, y, u.size - error.size, bias),
+        scale_factor=scale_factor_near_dc(u, y, lag, bias),
         noise_std=noise_by_autocorrelation(error),
     )
+    return told, error
 
 
 def _frequency_steps(
-    u: Complex,
-    y: Complex,
-    step: float,
-    band: tuple[float, float],
-    times: Sequence[_TimeSteps],
-    fs: float,
-) -> list[_FrequencySteps]:
+    u: Complex, y: Complex, frequency: Real, band: tuple[float, float], peaks: list[CorrelationPeak]
+) -> _Inside:
     """Section IV.D: equations (18) to (25) on the bins of spectra, y of shape (k, m), in a band."""
+    step = float(frequency[1])
     # The bin at DC holds the bias and no stimulus.
     first = max(int(np.ceil(band[0] / step - 1e-9)), 1)
     last = min(int(np.floor(band[1] / step + 1e-9)), u.size - 1)
-    inside = slice(first, max(last + 1, first))
-    response = ratio(y[:, inside], u[inside])
+    bins = slice(first, max(last + 1, first))
+    frequency = frequency[bins]
+    response = ratio(y[:, bins], u[bins])
     response = np.where(np.isfinite(response), response, 0.0)
-    frequency = np.arange(inside.start, inside.stop) * step
-    read = well_excited(u[inside])
-    inverted = np.array([time.inverted for time in times])
+    read = well_excited(u[bins])
+    inverted = np.array([peak.value < 0 for peak in peaks])
     phase = np.zeros(response.shape)
     phase[:, read] = reading.phase(response[:, read], inverted=inverted)
     if not read.all() and read.any():
@@ -370,36 +334,22 @@ def _frequency_steps(
         near = np.stack([np.interp(frequency, frequency[read], own[read]) for own in phase])
         angle = np.degrees(np.angle(np.where(inverted[:, None], -response, response)))
         phase[:, ~read] = (near + (angle - near + 180.0) % 360.0 - 180.0)[:, ~read]
-    magnitude = reading.magnitude(response)
-    return [
-        _FrequencySteps(
-            inside=inside,
-            read=read,
-            response=response[i],
-            magnitude=magnitude[i],
-            phase=phase[i],
-            phase_without_delay=reading.phase_without_delay(frequency, phase[i], time.lag / fs),
-        )
-        for i, time in enumerate(times)
-    ]
+    return _Inside(frequency=frequency, read=read, response=response, phase=phase)
 
 
-def _estimates(
-    time: _TimeSteps, steps: _FrequencySteps, frequency: Real, fs: float
-) -> PaperEstimates:
-    frequency, magnitude = frequency[steps.read], steps.magnitude[steps.read]
+def _with_band(told: PaperEstimates, inside: _Inside, k: int) -> PaperEstimates:
+    """The figures of one output with those that section IV.D reads off its response."""
+    frequency, phase = inside.frequency[inside.read], inside.phase[k, inside.read]
+    magnitude = np.abs(inside.response[k, inside.read])
     hump = reading.peak_gain(magnitude)
     low = magnitude[: reading.near_dc(magnitude.size)]
     gain = median(low) if low.size else 0.0
-    remaining = steps.phase_without_delay[steps.read]
-    return PaperEstimates(
-        delay=time.lag / fs,
-        bias=time.bias,
-        scale_factor=time.scale_factor,
-        noise_std=time.noise_std,
-        natural_frequency=reading.natural_frequency(frequency, remaining),
+    remaining = phase - reading.delay_phase(frequency, told.delay or 0.0)
+    return replace(
+        told,
+        natural_frequency=reading.falling_crossing(frequency, remaining, -90.0),
         damping_ratio=None if hump is None else reading.damping_from_hump(hump),
-        bandwidth_phase90=reading.bandwidth_phase90(frequency, steps.phase[steps.read]),
-        bandwidth_3db=reading.bandwidth_3db(frequency, magnitude, gain),
+        bandwidth_phase90=reading.falling_crossing(frequency, phase, -90.0),
+        bandwidth_3db=reading.falling_crossing(frequency, magnitude, gain / math.sqrt(2)),
         peak_gain_db=None if hump is None else float(decibel(hump)),
     )

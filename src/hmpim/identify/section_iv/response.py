@@ -1,4 +1,4 @@
-"""Reading a frequency response: magnitude, phase, bandwidths, damping (equations 19-25, Fig. 16).
+"""Reading a frequency response: phase, bandwidths, damping (equations 19-25, Fig. 16).
 
 Phases are in degrees here, as in the paper's figures, and lag is negative.
 """
@@ -13,40 +13,13 @@ from hmpim.identify.arrays import Real, median
 from hmpim.identify.worth import FEW
 
 __all__ = [
-    "bandwidth_3db",
-    "bandwidth_phase90",
     "damping_from_hump",
     "delay_phase",
     "falling_crossing",
-    "magnitude",
-    "natural_frequency",
     "near_dc",
     "peak_gain",
     "phase",
-    "phase_without_delay",
 ]
-
-
-def magnitude(response: ArrayLike) -> Real:
-    """Return |G| by equation (24), |G|² = R² + I², with R and I of equations (19)-(21).
-
-    Parameters
-    ----------
-    response : array_like of complex, shape (m,)
-        G(jω) = R(jω) + jI(jω).
-
-    Returns
-    -------
-    ndarray, shape (m,)
-        Magnitude, in the response's unit.
-
-    Examples
-    --------
-    >>> magnitude([3 + 4j, -2])
-    array([5., 2.])
-    """
-    g = np.asarray(response, dtype=np.complex128)
-    return np.hypot(g.real, g.imag)
 
 
 def phase(response: ArrayLike, *, inverted: ArrayLike = False) -> Real:
@@ -99,19 +72,9 @@ def near_dc(bins: int) -> int:
 
 
 def delay_phase(frequency: ArrayLike, delay: float) -> Real:
-    """Return the phase of a pure delay by equation (25): -ω δ, in degrees.
+    """Return the phase of a pure delay by equation (25): -ω δ, in degrees, shape (m,).
 
-    Parameters
-    ----------
-    frequency : array_like, shape (m,)
-        Hz.
-    delay : float
-        δ in s.
-
-    Returns
-    -------
-    ndarray, shape (m,)
-        Degrees: -360 f δ.
+    Frequencies are in Hz, δ in s. Fig. 16 shows a phase less this.
 
     Examples
     --------
@@ -121,38 +84,19 @@ def delay_phase(frequency: ArrayLike, delay: float) -> Real:
     return -360.0 * np.asarray(frequency, dtype=np.float64) * delay
 
 
-def phase_without_delay(frequency: ArrayLike, phase: ArrayLike, delay: float) -> Real:
-    """Return the phase with the delay's part (25) taken out, as in Fig. 16.
-
-    Parameters
-    ----------
-    frequency, phase : array_like, shape (m,)
-        Hz, and degrees without jumps.
-    delay : float
-        Delay in s; in the paper the one from the cross-correlation.
-
-    Returns
-    -------
-    ndarray, shape (m,)
-        Degrees.
-
-    Examples
-    --------
-    >>> phase_without_delay([1.0, 2.0], [-46.0, -93.0], 0.125)
-    array([-1., -3.])
-    """
-    return np.asarray(phase, dtype=np.float64) - delay_phase(frequency, delay)
-
-
 def falling_crossing(frequency: ArrayLike, curve: ArrayLike, level: float) -> float | None:
     """Return the first frequency at which a curve falls through a level, between the bins too.
+
+    The phase falls through -90° at the effective bandwidth, the paper's basic measure of merit
+    (Fig. 15), and with the delay out at the natural frequency of a quadratic lag (Fig. 16). The
+    magnitude falls through 1/√2 of the gain at DC (-3.01 dB) at the 3 dB bandwidth.
 
     Parameters
     ----------
     frequency : array_like, shape (m,)
         Increasing, in Hz.
     curve : array_like, shape (m,)
-        Finite values.
+        Finite values; a phase without jumps.
     level : float
         In the curve's unit.
 
@@ -186,73 +130,6 @@ def falling_crossing(frequency: ArrayLike, curve: ArrayLike, level: float) -> fl
         return None
     k = int(falls[0])
     return float(f[k] + (f[k + 1] - f[k]) * (c[k] - level) / (c[k] - c[k + 1]))
-
-
-def bandwidth_phase90(frequency: ArrayLike, phase: ArrayLike) -> float | None:
-    """Return the effective bandwidth: where the phase, delay included, falls through -90°.
-
-    The paper's basic measure of merit (Fig. 15).
-
-    Parameters
-    ----------
-    frequency, phase : array_like, shape (m,)
-        Hz, and degrees without jumps, inside the excited band.
-
-    Returns
-    -------
-    float or None
-        Hz; None if the phase does not pass -90° inside the band.
-
-    Examples
-    --------
-    >>> bandwidth_phase90([1.0, 2.0, 3.0], [-45.0, -90.0, -135.0])
-    2.0
-    """
-    return falling_crossing(frequency, phase, -90.0)
-
-
-def bandwidth_3db(frequency: ArrayLike, magnitude: ArrayLike, dc_gain: float) -> float | None:
-    """Return where the magnitude falls to 1/√2 of the gain at DC (-3.01 dB).
-
-    Parameters
-    ----------
-    frequency, magnitude : array_like, shape (m,)
-        Hz, and |G| inside the excited band.
-    dc_gain : float
-        |G| at DC, same unit.
-
-    Returns
-    -------
-    float or None
-        Hz; None if the magnitude does not fall that far inside the band.
-
-    Examples
-    --------
-    >>> round(bandwidth_3db([1.0, 2.0, 3.0], [1.0, 0.8, 0.6], 1.0), 3)
-    2.464
-    """
-    return falling_crossing(frequency, magnitude, dc_gain / math.sqrt(2))
-
-
-def natural_frequency(frequency: ArrayLike, phase_without_delay: ArrayLike) -> float | None:
-    """Return the natural frequency of a quadratic lag: -90° once the delay is out (Fig. 16).
-
-    Parameters
-    ----------
-    frequency, phase_without_delay : array_like, shape (m,)
-        Hz, and degrees, from `phase_without_delay`.
-
-    Returns
-    -------
-    float or None
-        Hz; None if the remaining phase does not pass -90° inside the band.
-
-    Examples
-    --------
-    >>> natural_frequency([8.0, 12.0], [-80.0, -100.0])
-    10.0
-    """
-    return falling_crossing(frequency, phase_without_delay, -90.0)
 
 
 def peak_gain(magnitude: ArrayLike) -> float | None:

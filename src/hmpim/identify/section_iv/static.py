@@ -1,14 +1,12 @@
-"""Scale factor, bias and noise, the paper's way (equations 9 and 11 to 14)."""
+"""Scale factor, bias and noise, the paper's way (equations 9 and 11 to 14), of checked samples."""
 
 import math
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
-from hmpim.errors import ArgumentError
 from hmpim.identify.arrays import Real
 from hmpim.identify.kept import kept
-from hmpim.identify.signals import as_pair, as_signal
 from hmpim.identify.worth import FEW, MOST
 
 __all__ = [
@@ -23,7 +21,7 @@ _BEGINNING = 4096
 """Samples in which the first cycle is looked for, before it is in more."""
 
 
-def time_corrected_error(u: ArrayLike, y: ArrayLike, lag: int) -> Real:
+def time_corrected_error(u: Real, y: Real, lag: int) -> Real:
     """Return the time-corrected measurement error of equation (9): truth minus measurement.
 
     ε_meas(n) = u(n) - y(n + lag), for the n at which both exist. The paper writes n - δ; the
@@ -31,117 +29,68 @@ def time_corrected_error(u: ArrayLike, y: ArrayLike, lag: int) -> Real:
 
     Parameters
     ----------
-    u, y : array_like, shape (n,)
+    u, y : ndarray, shape (n,)
         True and measured signal, in one unit.
     lag : int
-        Processing delay in samples, 0 <= lag <= n - 4.
+        Processing delay in samples, 0 <= lag < n.
 
     Returns
     -------
     ndarray, shape (n - lag,)
         Error, in the unit of `u` and `y`.
 
-    Raises
-    ------
-    RecordError
-        For unequal lengths, fewer than four samples, NaN or infinity.
-    ArgumentError
-        If `lag` is negative or leaves fewer than four samples.
-
     Examples
     --------
-    >>> time_corrected_error([1, 2, 3, 4, 5], [9, 0, 1, 2, 3], lag=1)
-    array([1., 1., 1., 1.])
+    >>> time_corrected_error(np.array([1, 2, 3, 4, 5]), np.array([9, 0, 1, 2, 3]), lag=1)
+    array([1, 1, 1, 1])
     """
-    truth, answer = _answered(u, y, lag)
-    return truth[: answer.size] - answer
+    return u[: u.size - lag] - y[lag:]
 
 
-def _answered(u: ArrayLike, y: ArrayLike, lag: int) -> tuple[Real, Real]:
-    """Return the input, (n,), and the output that answers it `lag` samples later, (n - lag,)."""
-    truth, measured = as_pair(u, y)
-    if not 0 <= lag <= truth.size - 4:
-        raise ArgumentError(f"lag is {lag} samples; give 0 to {truth.size - 4} for this record")
-    return truth, measured[lag:]
-
-
-def bias_by_autocorrelation(error: ArrayLike) -> float:
+def bias_by_autocorrelation(error: Real) -> float:
     """Return the paper's measurement bias K_C of equation (11): the r.m.s. error.
 
-    K_C = √R(0), with R the autocorrelation (10) of the time-corrected error. This is the bias
-    only if there is nothing else in the error; noise, and all that the dynamics leave over,
-    are in it too (0.68 for the true 0.6 of the paper's Fig. 17). The root has two signs: the
+    K_C = √R(0), with R the autocorrelation (10) of the time-corrected error (9), shape (n,). This
+    is the bias only if there is nothing else in the error; noise, and all that the dynamics leave
+    over, are in it too (0.68 for the true 0.6 of the paper's Fig. 17). The root has two signs: the
     one taken is that of the mean of measurement minus truth, as read off Fig. 10.
-
-    Parameters
-    ----------
-    error : array_like, shape (n,)
-        Time-corrected error of equation (9), truth minus measurement.
-
-    Returns
-    -------
-    float
-        Bias of the measurement, in the unit of the error.
-
-    Raises
-    ------
-    RecordError
-        For fewer than four samples, NaN or infinity.
 
     Examples
     --------
-    >>> bias_by_autocorrelation([-0.6, -0.6, -0.6, -0.6])
+    >>> bias_by_autocorrelation(np.array([-0.6, -0.6, -0.6, -0.6]))
     0.6
     """
-    array = as_signal("error", error)
     # R(0) alone needs no transform: it is the mean square, see `autocorrelation`.
-    rms = math.sqrt(float(array @ array) / array.size)
-    return -rms if array.mean() > 0 else rms
+    rms = math.sqrt(float(error @ error) / error.size)
+    return -rms if error.mean() > 0 else rms
 
 
 @kept
-def initial_period(u: ArrayLike) -> int:
-    """Return how many samples the first full cycle of the excitation takes.
+def initial_period(u: Real) -> int:
+    """Return how many samples the first full cycle of the excitation takes, 1 to n.
 
     The sweep begins near DC, so its first cycle is the "initial period" from which the paper
     reads the scale factor. The cycle ends where the excitation crosses zero for the second
     time; crossings within 5 % of the peak are not counted, so that noise on a measured
-    excitation does not end the cycle early. An excitation that never completes a cycle, such
-    as a step, is taken whole.
-
-    Parameters
-    ----------
-    u : array_like, shape (n,)
-        Excitation.
-
-    Returns
-    -------
-    int
-        Number of samples, 1 to n.
-
-    Raises
-    ------
-    RecordError
-        For fewer than four samples, NaN or infinity.
+    excitation does not end the cycle early. An excitation, (n,), that never completes a cycle,
+    such as a step, is taken whole.
 
     Examples
     --------
-    >>> import numpy as np
     >>> initial_period(np.sin(2 * np.pi * np.arange(500) / 100 - 1e-9))
     101
     """
-    excitation = as_signal("u", u)
-    threshold = FEW * float(np.max(np.abs(excitation)))
-    count = min(_BEGINNING, excitation.size)
-    turns = _turns(excitation[:count], threshold)
-    while turns.size < 2 and count < excitation.size:
-        count = min(8 * count, excitation.size)
-        turns = _turns(excitation[:count], threshold)
+    threshold = FEW * float(np.max(np.abs(u)))
+    count = min(_BEGINNING, u.size)
+    turns = _turns(u[:count], threshold)
+    while turns.size < 2 and count < u.size:
+        count = min(8 * count, u.size)
+        turns = _turns(u[:count], threshold)
     if turns.size < 2:
-        return excitation.size
+        return u.size
     # From the sample that proves the second crossing back to the crossing itself.
     proof = int(turns[1])
-    same_side = excitation[: proof + 1] * excitation[proof] > 0
+    same_side = u[: proof + 1] * u[proof] > 0
     return proof - int(np.argmin(same_side[::-1])) + 1
 
 
@@ -151,7 +100,7 @@ def _turns(excitation: Real, threshold: float) -> NDArray[np.intp]:
     return np.asarray(beyond[1:][np.diff(excitation[beyond] > 0.0)])
 
 
-def scale_factor_near_dc(u: ArrayLike, y: ArrayLike, lag: int, bias: float) -> float | None:
+def scale_factor_near_dc(u: Real, y: Real, lag: int, bias: float) -> float | None:
     """Return the paper's scale factor K_ε of equations (12) and (13).
 
     y(n + lag) = u(n) K_ε + K_C (12) is solved for K_ε at the non-zero points of the initial
@@ -161,10 +110,10 @@ def scale_factor_near_dc(u: ArrayLike, y: ArrayLike, lag: int, bias: float) -> f
 
     Parameters
     ----------
-    u, y : array_like, shape (n,)
+    u, y : ndarray, shape (n,)
         Excitation and measurement.
     lag : int
-        Processing delay in samples, 0 <= lag <= n - 4.
+        Processing delay in samples, 0 <= lag < n.
     bias : float
         K_C, in the unit of `y`.
 
@@ -173,23 +122,14 @@ def scale_factor_near_dc(u: ArrayLike, y: ArrayLike, lag: int, bias: float) -> f
     float or None
         Scale factor, unit of `y` per unit of `u`; None if the excitation is zero throughout.
 
-    Raises
-    ------
-    RecordError
-        For unequal lengths, fewer than four samples, NaN or infinity.
-    ArgumentError
-        If `lag` is negative or leaves fewer than four samples.
-
     Examples
     --------
-    >>> import numpy as np
     >>> u = np.sin(2 * np.pi * np.arange(300) / 100)
     >>> round(scale_factor_near_dc(u, 1.02 * u + 0.6, lag=0, bias=0.6), 9)
     1.02
     """
-    truth, answer = _answered(u, y, lag)
-    count = min(initial_period(truth), answer.size)
-    excitation, corrected = truth[:count], answer[:count]
+    count = min(initial_period(u), u.size - lag)
+    excitation, corrected = u[:count], y[lag : lag + count]
     means = []
     for side in (excitation, -excitation):
         top = float(side.max())
@@ -200,25 +140,16 @@ def scale_factor_near_dc(u: ArrayLike, y: ArrayLike, lag: int, bias: float) -> f
     return sum(means) / len(means) if means else None
 
 
-def noise_by_autocorrelation(error: ArrayLike) -> float:
+def noise_by_autocorrelation(error: Real) -> float:
     """Return the standard deviation of the noise by equation (14): σ² = R(0) - R(∞).
 
-    R(0) is the mean square; R(∞) the square of the mean, as the paper's words have it. Whatever
-    the dynamics leave in the error counts as noise too: 0.32 where 0.1 is true in Fig. 17.
-
-    Parameters
-    ----------
-    error : array_like, shape (n,)
-        Time-corrected error of equation (9).
-
-    Raises
-    ------
-    RecordError
-        For fewer than four samples, NaN or infinity.
+    R(0) is the mean square of the time-corrected error, (n,); R(∞) the square of its mean, as the
+    paper's words have it. Whatever the dynamics leave in the error counts as noise too: 0.32 where
+    0.1 is true in Fig. 17.
 
     Examples
     --------
-    >>> round(noise_by_autocorrelation([0.7, 0.5, 0.7, 0.5]), 6)
+    >>> round(noise_by_autocorrelation(np.array([0.7, 0.5, 0.7, 0.5])), 6)
     0.1
     """
-    return float(np.std(as_signal("error", error)))
+    return float(np.std(error))

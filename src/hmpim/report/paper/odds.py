@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from hmpim.experiment import run
 from hmpim.identify import PaperAnalysis, paper_analysis
-from hmpim.identify.section_iv.response import natural_frequency, phase_without_delay
+from hmpim.identify.section_iv.response import delay_phase, falling_crossing
 from hmpim.identify.section_iv.windows import WindowName
 from hmpim.rigs import Sensor
 from hmpim.stimulus import Stimulus
@@ -186,7 +186,7 @@ def read_many(
 def _row(analysis: PaperAnalysis, pure_delay: float) -> dict[str, Any]:
     """One record's figures by name; None, which becomes NaN, where there is none."""
     found, f = analysis.estimates, analysis.band_frequency
-    bare = phase_without_delay(f, analysis.phase, pure_delay)
+    bare = analysis.phase - delay_phase(f, pure_delay)
     level = analysis.magnitude_db
     return {
         "delay": found.delay,
@@ -195,7 +195,7 @@ def _row(analysis: PaperAnalysis, pure_delay: float) -> dict[str, Any]:
         "spike": spike(analysis),
         "scale_factor": found.scale_factor,
         "natural_frequency": found.natural_frequency,
-        "natural_by_pure_delay": natural_frequency(f, bare),
+        "natural_by_pure_delay": falling_crossing(f, bare, -90.0),
         "damping_ratio": found.damping_ratio,
         "peak_gain_db": found.peak_gain_db,
         "bandwidth_phase90": found.bandwidth_phase90,

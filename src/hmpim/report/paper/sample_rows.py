@@ -7,7 +7,7 @@ import numpy as np
 
 from hmpim.experiment import run
 from hmpim.identify import Estimate, PairIdentification, PaperAnalysis
-from hmpim.identify.section_iv.response import natural_frequency, phase_without_delay
+from hmpim.identify.section_iv.response import delay_phase, falling_crossing
 from hmpim.record import Record
 from hmpim.report.paper.bound import Bound, phase90, resonance_db
 from hmpim.report.paper.odds import Readings
@@ -45,8 +45,8 @@ class Sample:
     def natural_by_pure_delay(self) -> float | None:
         """Where the phase lies 90° below the pure delay's lag (Fig. 16), in Hz."""
         f = self.analysis.band_frequency
-        bare = phase_without_delay(f, self.analysis.phase, self.pure_delay)
-        return natural_frequency(f, bare)
+        bare = self.analysis.phase - delay_phase(f, self.pure_delay)
+        return falling_crossing(f, bare, -90.0)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
