@@ -62,7 +62,7 @@ def describe(question: Question, seen: Imperfections, fitted: OutputFit) -> Desc
     aligned, output, inputs = question.aligned, question.output, question.inputs
     if inputs is None:
         (source,) = aligned.inputs
-        if fitted.related[0]:
+        if fitted.fits[0].related:
             pair = _pair(question, seen, fitted, 0, None)
             if question.swapped is not None:
                 pair = replace(pair, warnings=(question.swapped, *pair.warnings))
@@ -72,7 +72,7 @@ def describe(question: Question, seen: Imperfections, fitted: OutputFit) -> Desc
     responses = responses_of(aligned, output, fitted, inputs)
     pairs = []
     for i, source in enumerate(aligned.inputs):
-        if fitted.related[i]:
+        if fitted.fits[i].related:
             pair = _pair(question, seen, fitted, i, responses)
             pairs.append(settled(pair, fitted, i, inputs, aligned.fs))
         else:

@@ -178,7 +178,6 @@ def _fit_and_look_for_rows(
     return replace(
         fitted,
         fits=(joint,),
-        related=(joint.related,),
         drifting=drifting,
         humming=humming,
         steady=None if drifting is None else fitted.prediction,
@@ -333,7 +332,7 @@ def limit_speed(
 
 def through_reference(question: Question, fitted: OutputFit) -> OutputFit:
     """Move a fit to the reference's part of the input to where the input's own residual is."""
-    if question.instrument is None or not fitted.related[0]:
+    if question.instrument is None or not fitted.fits[0].related:
         return fitted
     joint, own = fit_through(fitted.fits[0], question.instrument)
     return replace(fitted, fits=(joint,), covariances=(own,))

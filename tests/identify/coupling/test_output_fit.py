@@ -86,6 +86,20 @@ def test_coupling_is_within_half_a_percent_where_usable(result):
             assert response.coherence is not None
 
 
+def test_an_output_that_follows_no_input_is_said_to_be_unrelated():
+    noise = np.random.default_rng(0).standard_normal(2000)
+    found = hmpim.identify(
+        hmpim.Record.from_arrays(
+            {f"u{j}": u for j, u in enumerate(INPUTS)},
+            {"y0": noise, "y1": INPUTS[0] + 0.01 * noise[::-1]},
+            fs=FS,
+        )
+    )
+    for j in range(3):
+        assert [w.code for w in found["y0", f"u{j}"].warnings] == ["unrelated"]
+    assert found["y1", "u0"].scale_factor.value == pytest.approx(1.0, abs=0.01)
+
+
 def test_an_axis_that_is_not_coupled_is_said_to_be_unrelated():
     coupling = np.zeros((3, 3))
     found = hmpim.identify(record(outputs(coupling, 0.01, 1)))

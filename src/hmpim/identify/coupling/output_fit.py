@@ -6,7 +6,7 @@ Then all pairs are moved at once. The error bars come from all pairs' derivative
 inputs that resemble each other widen them.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -26,7 +26,7 @@ from hmpim.identify.fitting.fit import Fit, Problem
 from hmpim.identify.fitting.fit import fit_together as fit_all
 from hmpim.identify.fitting.joint import joint_fit
 from hmpim.identify.fitting.trial import JointFit
-from hmpim.identify.noise.whiteness import effective_share, is_white
+from hmpim.identify.noise.whiteness import effective_share
 from hmpim.identify.worth import NEARLY, PART, TWICE
 from hmpim.model.dynamics import StructureName
 from hmpim.model.response import slowest_time_constant
@@ -43,9 +43,8 @@ class OutputFit:
     Parameters
     ----------
     fits : tuple of JointFit
-        One for each input; its output is what the other inputs leave over.
-    related : tuple of bool
-        Whether the output follows that input at all.
+        One for each input; its output is what the other inputs leave over. One that the output does
+        not follow at all is not `related`.
     covariances : tuple of ndarray, shape (p_i, p_i)
         Of each fit's parameters, all fits considered together.
     strong : tuple of bool
@@ -63,7 +62,6 @@ class OutputFit:
     """
 
     fits: tuple[JointFit, ...]
-    related: tuple[bool, ...]
     covariances: tuple[Real, ...]
     strong: tuple[bool, ...]
     lags: tuple[Lag | None, ...]
@@ -77,7 +75,6 @@ class OutputFit:
         """Of an output to its one input."""
         return cls(
             fits=(fit,),
-            related=(fit.related,),
             covariances=(),
             strong=(True,),
             lags=(None,),
@@ -89,8 +86,8 @@ class OutputFit:
         """What all inputs together predict of the output, bias and drift included, shape (n,)."""
         first = self.fits[0].best.fit
         total: Real = np.full(first.prediction.size, first.linear[-1])
-        for fit, told in zip(self.fits, self.related, strict=True):
-            if told:
+        for fit in self.fits:
+            if fit.related:
                 total = total + _part(fit)
         return total if self.disturbance is None else total + self.disturbance
 
@@ -153,47 +150,129 @@ def fit_together(
         return fitted(u, rest, plain, growing=False)
 
     fits = _strongest(inputs, y, valid, plainly)
-    strong = tuple(fits)
-    related = {i: fit.related for i, fit in fits.items()}
-    if len(strong) > 1:  # each was fitted with the later ones unknown
-        for i in strong:
-            fits[i] = plainly(inputs[i], y - _others(fits, related, i))
-            related[i] = fits[i].related
-    _fit_couplings(inputs, y, fits, related, strong, plain, alike)
-    before = [fits[i].best.fit.structure for i in strong]
-    for i in strong:  # the couplings known
-        fits[i] = fitted(inputs[i], y - _others(fits, related, i), structures)
-        related[i] = fits[i].related
-    if [fits[i].best.fit.structure for i in strong] != before:
-        _fit_couplings(inputs, y, fits, related, strong, plain, alike)
-    return _moved_at_once(y, fits, related, strong, alike)
+    pairs = _Pairs(y=y, fits=fits, strong=tuple(fits), alike=alike)
+    if len(pairs.strong) > 1:  # each was fitted with the later ones unknown
+        for i in pairs.strong:
+            fits[i] = plainly(inputs[i], pairs.without_others(i))
+    _fit_couplings(inputs, pairs, plain)
+    before = [fits[i].best.fit.structure for i in pairs.strong]
+    for i in pairs.strong:  # the couplings known
+        fits[i] = fitted(inputs[i], pairs.without_others(i), structures)
+    if [fits[i].best.fit.structure for i in pairs.strong] != before:
+        _fit_couplings(inputs, pairs, plain)
+    return _moved_at_once(pairs)
 
 
-def _moved_at_once(
-    y: Real,
-    fits: dict[int, JointFit],
-    related: dict[int, bool],
-    strong: tuple[int, ...],
-    alike: Sequence[tuple[frozenset[int], Mask]],
-) -> OutputFit:
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Pairs:
+    """The pairs of one output, (n,), as far as they are fitted; `fits` is changed in place.
+
+    `strong` are the inputs that move the output most, the strongest first; `alike` is as for
+    `fit_together`.
+    """
+
+    y: Real
+    fits: dict[int, JointFit]
+    strong: tuple[int, ...]
+    alike: Sequence[tuple[frozenset[int], Mask]]
+
+    @property
+    def kept(self) -> list[int]:
+        """The inputs that the output follows, as far as is known."""
+        return [j for j, fit in self.fits.items() if fit.related]
+
+    def without(self, some: Iterable[int]) -> Real:
+        """The output without what some of the inputs move it by."""
+        parts = (_part(self.fits[j]) for j in some if self.fits[j].related)
+        return np.asarray(self.y - sum(parts, np.zeros(self.y.size)))
+
+    def without_others(self, i: int) -> Real:
+        """The output without what all inputs but one move it by."""
+        return self.without(j for j in self.fits if j != i)
+
+    def left(self) -> Real:
+        """What all of them leave over."""
+        best = self.fits[self.strong[0]]
+        rest = self.without(self.fits) - best.best.fit.linear[-1]
+        counts = best.problem.valid
+        return rest if counts is None else np.asarray(rest * counts)
+
+    def refine(
+        self, some: list[int], whitening: Real | None, y: Real | None = None
+    ) -> tuple[list[Problem], list[Fit]]:
+        """Move some of the fits at once to what the output, or another `y`, is but for a bias."""
+        if not some:
+            return [], []
+        y = self.y if y is None else y
+        fits = self.fits
+        valid = _common([fits[j] for j in some])
+        problems = [replace(fits[j].problem, y=y, valid=valid, whitening=whitening) for j in some]
+        begun = [fits[j].best.fit for j in some]
+        found = fit_all(problems, [fit.structure for fit in begun], [fit.theta for fit in begun])
+        parts = {j: fit.prediction - fit.linear[-1] for j, fit in zip(some, found, strict=True)}
+        total = sum(parts.values(), np.zeros(y.size))
+        for j, fit in zip(some, found, strict=True):
+            trial = replace(fits[j].best, fit=fit)
+            own = replace(fits[j].problem, y=y - (total - parts[j]))
+            fits[j] = replace(
+                fits[j],
+                problem=own,
+                weighed=own,
+                best=trial,
+                trials=tuple(trial if t is fits[j].best else t for t in fits[j].trials),
+                effective_share=effective_share(fit.residual),
+            )
+        return problems, found
+
+    def together(self, whitening: Real | None, *, drop: bool = True) -> bool:
+        """Move all couplings at once; leave out the least if it adds nothing and may go.
+
+        Returns
+        -------
+        bool
+            Whether one was left out.
+        """
+        weak = [j for j in self.kept if j not in self.strong]
+        if not weak:
+            return False
+        problems, found = self.refine(weak, whitening, self.without(self.strong))
+        if not drop:
+            return False
+        gains = []
+        for k, j in enumerate(weak):
+            shared = [bins for group, bins in self.alike if j in group and group & {*self.strong}]
+            slow = _too_slow(found[k], self.y.size)
+            gains.append(0.0 if slow else gained_by(_apart(problems, shared), found, k))
+        least = int(np.argmin(gains))
+        if gains[least] > SEARCHED:
+            return False
+        self.fits[weak[least]] = replace(self.fits[weak[least]], related=False)
+        return True
+
+
+def _moved_at_once(pairs: _Pairs) -> OutputFit:
     """All pairs moved together until none is left out, with the errors of all."""
-    _refine(y, fits, [j for j in fits if related[j]], None)
+    pairs.refine(pairs.kept, None)
     # What was not white may have been no noise but what one of them had not given back yet.
-    whitening = whitening_of(_left(y, fits, related, strong))
-    _refine(y, fits, [j for j in fits if related[j]], whitening)
-    while _together(y, fits, related, strong, whitening, alike):
-        _refine(y, fits, [j for j in fits if related[j]], whitening)
-    kept = [j for j in fits if related[j]]
-    pairs = [fits[j] for j in kept]
-    told = dict(zip(kept, _covariances(pairs, whitening), strict=True))
-    weak = [j for j in kept if j not in strong]
-    everyone = range(len(fits))
+    whitening = whitening_of(pairs.left())
+    pairs.refine(pairs.kept, whitening)
+    while pairs.together(whitening):
+        pairs.refine(pairs.kept, whitening)
+    told: dict[int, Real] = {}
+    lags: dict[int, Lag | None] = {}
+    fits = [pairs.fits[j] for j in pairs.kept]
+    if fits:
+        problem, blocks = _derivatives(fits, whitening)
+        told = dict(zip(pairs.kept, _covariances(problem, fits[-1], blocks), strict=True))
+    for k, j in enumerate(pairs.kept):
+        if j not in pairs.strong:
+            lags[j] = _lag(problem, fits[k], [*blocks[:k], *blocks[k + 1 :]])
+    everyone = range(len(pairs.fits))
     return OutputFit(
-        fits=tuple(fits[j] for j in everyone),
-        related=tuple(related[j] for j in everyone),
+        fits=tuple(pairs.fits[j] for j in everyone),
         covariances=tuple(told.get(j, np.zeros((0, 0))) for j in everyone),
-        strong=tuple(j in strong for j in everyone),
-        lags=tuple(_lag(pairs, kept.index(j), whitening) if j in weak else None for j in everyone),
+        strong=tuple(j in pairs.strong for j in everyone),
+        lags=tuple(lags.get(j) for j in everyone),
     )
 
 
@@ -235,22 +314,17 @@ def _follows_at_all(u: Real, y: Real) -> float:
 
 
 def _fit_couplings(
-    inputs: list[Real],
-    y: Real,
-    fits: dict[int, JointFit],
-    related: dict[int, bool],
-    strong: tuple[int, ...],
-    structures: tuple[StructureName, ...],
-    alike: Sequence[tuple[frozenset[int], Mask]],
+    inputs: list[Real], pairs: _Pairs, structures: tuple[StructureName, ...]
 ) -> None:
     """Fit, in place, all that is weak, the strongest first."""
-    best = fits[strong[0]]
+    fits = pairs.fits
+    best = fits[pairs.strong[0]]
     mode = best.best.intersample
-    weak = [j for j in range(len(inputs)) if j not in strong]
+    weak = [j for j in range(len(inputs)) if j not in pairs.strong]
     if not weak:
         return
-    latest = max(PART * y.size, 4.0 * best.best.fit.delay) + 2.0
-    rest = _left(y, fits, related, strong)
+    latest = max(PART * pairs.y.size, 4.0 * best.best.fit.delay) + 2.0
+    rest = pairs.left()
     whitening = whitening_of(rest)
     sources = {j: prepare_input(inputs[j], mode) for j in weak}
     roughly = tuple(name for name in structures if name == "first_order") or structures
@@ -259,91 +333,17 @@ def _fit_couplings(
         for j in sorted(weak, key=lambda j: -_follows_at_all(inputs[j], rest)):
             problem = Problem(
                 source=sources[j],
-                y=y - _others(fits, related, j),
+                y=pairs.without_others(j),
                 valid=best.problem.valid,
                 longest_delay=latest,
                 whitening=whitening,
             )
             fits[j] = coupling_fit(problem, inputs[j], intersample=mode, structures=names)
-            related[j] = True
         # Not before all are right is one of them tested: alike, they take each other's share.
-        while _together(y, fits, related, strong, whitening, alike, drop=names is structures):
+        while pairs.together(whitening, drop=names is structures):
             pass
-        rest = _left(y, fits, related, strong)
+        rest = pairs.left()
         whitening = whitening_of(rest)
-
-
-def _together(
-    y: Real,
-    fits: dict[int, JointFit],
-    related: dict[int, bool],
-    strong: tuple[int, ...],
-    whitening: Real | None,
-    alike: Sequence[tuple[frozenset[int], Mask]],
-    *,
-    drop: bool = True,
-) -> bool:
-    """Move all couplings at once, in place; leave out the least if it adds nothing and may go.
-
-    Returns
-    -------
-    bool
-        Whether one was left out.
-    """
-    weak = [j for j in fits if related[j] and j not in strong]
-    if not weak:
-        return False
-    rest = y - _others({j: fits[j] for j in strong}, related, None)
-    problems, found = _refine(rest, fits, weak, whitening)
-    if not drop:
-        return False
-    gains = []
-    for k, j in enumerate(weak):
-        shared = [bins for group, bins in alike if j in group and group & set(strong)]
-        gains.append(
-            0.0 if _too_slow(found[k], y.size) else gained_by(_apart(problems, shared), found, k)
-        )
-    least = int(np.argmin(gains))
-    if gains[least] > SEARCHED:
-        return False
-    related[weak[least]] = False
-    return True
-
-
-def _refine(
-    y: Real, fits: dict[int, JointFit], some: list[int], whitening: Real | None
-) -> tuple[list[Problem], list[Fit]]:
-    """Move some of the fits at once, in place, to what `y` is but for a bias."""
-    counted = np.logical_and.reduce(
-        [np.ones(y.size, bool) if (v := fits[j].problem.valid) is None else v for j in some]
-    )
-    valid = None if bool(counted.all()) else counted
-    problems = [replace(fits[j].problem, y=y, valid=valid, whitening=whitening) for j in some]
-    begun = [fits[j].best.fit for j in some]
-    found = fit_all(problems, [fit.structure for fit in begun], [fit.theta for fit in begun])
-    parts = {j: fit.prediction - fit.linear[-1] for j, fit in zip(some, found, strict=True)}
-    total = sum(parts.values(), np.zeros(y.size))
-    for j, fit in zip(some, found, strict=True):
-        trial = replace(fits[j].best, fit=fit)
-        fits[j] = replace(
-            fits[j],
-            problem=replace(fits[j].problem, y=y - (total - parts[j])),
-            weighed=replace(fits[j].problem, y=y - (total - parts[j])),
-            best=trial,
-            trials=tuple(trial if t is fits[j].best else t for t in fits[j].trials),
-            effective_share=effective_share(fit.residual),
-        )
-    return problems, found
-
-
-def _left(
-    y: Real, fits: dict[int, JointFit], related: dict[int, bool], strong: tuple[int, ...]
-) -> Real:
-    """What all of them leave over."""
-    best = fits[strong[0]]
-    rest = y - _others(fits, related, None) - best.best.fit.linear[-1]
-    counts = best.problem.valid
-    return rest if counts is None else np.asarray(rest * counts)
 
 
 def _too_slow(fit: Fit, samples: int) -> bool:
@@ -363,56 +363,46 @@ def _apart(problems: list[Problem], shared: list[Mask]) -> list[Problem]:
     return [replace(problem, whitening=gain) for problem in problems]
 
 
-def _others(fits: dict[int, JointFit], related: dict[int, bool], i: int | None) -> Real:
-    """What the inputs other than one move the output by."""
-    total: Real = np.zeros(next(iter(fits.values())).problem.y.size)
-    for j, fit in fits.items():
-        if j != i and related[j]:
-            total = total + _part(fit)
-    return total
-
-
 def _part(fit: JointFit) -> Real:
     """What the input contributes to the output, the bias aside."""
     best = fit.best.fit
     return np.asarray(best.prediction - best.linear[-1])
 
 
-def _lag(pairs: list[JointFit], k: int, whitening: Real | None) -> Lag | None:
-    """Delay and lag of one of the pairs, if it is of no more than first order."""
-    fit = pairs[k].best.fit
-    if fit.structure.name not in ("static", "first_order"):
-        return None
-    problem, blocks = _derivatives([*pairs[:k], *pairs[k + 1 :]], whitening)
-    others = np.vstack([*blocks, problem.masked(np.ones(fit.residual.size))])
-    own = replace(pairs[k].problem, valid=problem.valid, whitening=whitening)
-    return lag_of(own, fit, others)
+def _common(fits: list[JointFit]) -> Mask | None:
+    """Samples that count for all, shape (n,); None where all do."""
+    told = [fit.problem.valid for fit in fits if fit.problem.valid is not None]
+    counted = np.logical_and.reduce(told) if told else np.ones(1, dtype=bool)
+    return None if counted.all() else np.asarray(counted)
 
 
 def _derivatives(fits: list[JointFit], whitening: Real | None) -> tuple[Problem, list[Real]]:
     """Derivatives of each pair but by the bias, on the samples that count for all."""
-    last = fits[-1].problem
-    counted = np.ones(last.y.size, dtype=bool)
-    for fit in fits:
-        counted &= True if fit.problem.valid is None else fit.problem.valid
-    problem = replace(last, valid=None if bool(counted.all()) else counted, whitening=whitening)
+    problem = replace(fits[-1].problem, valid=_common(fits), whitening=whitening)
     return problem, [
         jacobian(replace(problem, source=fit.problem.source), fit.best.fit)[:-1] for fit in fits
     ]
 
 
-def _covariances(fits: list[JointFit], whitening: Real | None) -> list[Real]:
+def _lag(problem: Problem, pair: JointFit, blocks: list[Real]) -> Lag | None:
+    """Delay and lag of one of the pairs, if it is of no more than first order.
+
+    `blocks` are the derivatives of the others.
+    """
+    fit = pair.best.fit
+    if fit.structure.name not in ("static", "first_order"):
+        return None
+    others = np.vstack([*blocks, problem.masked(np.ones(fit.residual.size))])
+    own = replace(pair.problem, valid=problem.valid, whitening=problem.whitening)
+    return lag_of(own, fit, others)
+
+
+def _covariances(problem: Problem, last: JointFit, blocks: list[Real]) -> list[Real]:
     """Covariance of each pair's parameters and the bias, from all derivatives together."""
-    if not fits:
-        return []
-    last = fits[-1]
-    problem, blocks = _derivatives(fits, whitening)
-    counted = np.ones(last.problem.y.size, dtype=bool) if problem.valid is None else problem.valid
-    rows = np.vstack([*blocks, problem.masked(np.ones(counted.size))])
-    residual = problem.masked(last.problem.y - last.best.fit.prediction)
-    freedom = max(int(np.count_nonzero(counted)) - rows.shape[0], 1)
-    white = whitening is not None or is_white(residual[counted])
-    full = joint_covariance(rows, residual, freedom=freedom, white=white)
+    rows = np.vstack([*blocks, problem.masked(np.ones(problem.y.size))])
+    residual = problem.masked(problem.y - last.best.fit.prediction)
+    # What the noise is whitened by is None only where it is white already.
+    full = joint_covariance(rows, residual, freedom=max(problem.counted - rows.shape[0], 1))
     end, start, out = rows.shape[0] - 1, 0, []
     for block in blocks:
         span = [*range(start, start + block.shape[0]), end]

@@ -102,7 +102,7 @@ def responses_of(
         rest = y
         modelled = joined.prediction
         for j, part in enumerate(parts):
-            if j not in active and joined.related[j]:
+            if j not in active and joined.fits[j].related:
                 rest, modelled = rest - part, modelled - part
         pieces.append(
             (
@@ -240,7 +240,7 @@ def settled(
         if pair.input in group.names and group.share >= PART:
             others = [inputs.names.index(name) for name in group.names if name != pair.input]
             # A coupling too weak to be seen may have been taken for this one.
-            hidden = not joined.strong[i] and not all(joined.related[j] for j in others)
+            hidden = not joined.strong[i] and not all(joined.fits[j].related for j in others)
             findings.append(_coupled(group, doubt=group.share >= MOST or hidden))
     return replace(pair, parameters=parameters, warnings=tuple(findings))
 

@@ -13,7 +13,6 @@ import numpy as np
 from hmpim.identify.arrays import Real
 from hmpim.identify.fitting.derivatives import jacobian
 from hmpim.identify.fitting.fit import Fit, Problem
-from hmpim.identify.noise.covariance import covariance
 
 __all__ = ["gained_by", "joint_covariance"]
 
@@ -33,20 +32,22 @@ def gained_by(problems: Sequence[Problem], fits: Sequence[Fit], i: int) -> float
         blocks.append(rows[f.theta.size :] if j == i else rows)
     rows = np.vstack([*blocks, problems[0].masked(np.ones(problems[0].y.size))])
     residual = problems[i].masked(fits[i].residual)
-    full = joint_covariance(rows, residual, freedom=problems[i].counted, white=True)
+    full = joint_covariance(rows, residual, freedom=problems[i].counted)
     start = sum(block.shape[0] for block in blocks[:i])
     span = slice(start, start + blocks[i].shape[0])
     b = fits[i].linear[:-1]
     return float(0.5 * b @ np.linalg.pinv(full[span, span], hermitian=True) @ b)
 
 
-def joint_covariance(rows: Real, residual: Real, *, freedom: int, white: bool) -> Real:
-    """As `covariance`, but a direction that the record does not see spoils no other one.
+def joint_covariance(rows: Real, residual: Real, *, freedom: int) -> Real:
+    """Covariance under white noise; a direction that the record does not see spoils no other one.
+
+    Of the derivatives of the prediction, (p, n), and of what is left over, (n,).
 
     Examples
     --------
     >>> rows = np.array([[1.0, -1.0, 0.0, 0.0], [0.0, 0.0, 0.0, 0.0]])
-    >>> found = joint_covariance(rows, np.ones(4), freedom=4, white=True)
+    >>> found = joint_covariance(rows, np.ones(4), freedom=4)
     >>> bool(np.isclose(found[0, 0], 0.5)), bool(found[1, 1] > 1e6)
     (True, True)
     """
@@ -54,17 +55,5 @@ def joint_covariance(rows: Real, residual: Real, *, freedom: int, white: bool) -
     scaled = rows / scale[:, None]
     values, vectors = np.linalg.eigh(scaled @ scaled.T)
     spread = vectors / np.sqrt(np.maximum(values, _UNSEEN * values[-1]))
-    if white:
-        inner = np.eye(scale.size) * float(residual @ residual) / freedom
-    else:
-        inner = covariance(_orthogonal(spread.T @ scaled), residual, freedom=freedom, white=False)
-    return np.asarray(spread @ inner @ spread.T / np.outer(scale, scale))
-
-
-def _orthogonal(rows: Real) -> Real:
-    """Rows of which none vanishes: one without content is given a sample of its own."""
-    out = rows.copy()
-    for k in np.flatnonzero(np.sum(rows**2, axis=1) < 0.5):
-        out[k] = 0.0
-        out[k, k % rows.shape[1]] = 1.0
-    return out
+    variance = float(residual @ residual) / freedom
+    return np.asarray(variance * (spread @ spread.T) / np.outer(scale, scale))
