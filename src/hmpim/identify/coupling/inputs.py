@@ -124,7 +124,7 @@ def _conditions(spectra: Sequence[Complex], centre: NDArray[np.int64]) -> tuple[
     reach = max(int(centre[-1] - centre[0] + 1) // 8, 4 * (m + 1))
     reach = min(reach, spectra[0].size - 1)
     windows = windows_around(centre, spectra[0].size, reach)
-    block = np.stack([windows.view(mirrored(row, reach), reach) for row in spectra], axis=2)
+    block = windows.views(mirrored(np.stack(spectra), reach), reach).swapaxes(1, 2)
     powers = windows.powers(_TERMS - 1)
     design = (block[:, :, :, None] * powers[:, None, :]).reshape(*block.shape[:2], -1)
     size = np.sqrt(np.maximum(np.sum(np.abs(design) ** 2, axis=1, keepdims=True), 1e-300))

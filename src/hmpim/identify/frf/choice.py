@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hmpim.identify.arrays import Mask, Real
+from hmpim.identify.arrays import Complex, Mask, Real
 from hmpim.identify.frf.neighbours import LocalFit
 from hmpim.identify.worth import PART, TOLERATED, TWICE
 
@@ -19,8 +19,8 @@ _NEIGHBOURS = 30
 
 def choose(
     polynomials: Sequence[LocalFit], rationals: Sequence[LocalFit]
-) -> tuple[NDArray[np.int64], Real]:
-    """Return which fit to take at each frequency, and the square of the error it leaves in.
+) -> tuple[NDArray[np.int64], Complex, Real]:
+    """Return which fit to take at each frequency, and what it says, with the error it leaves in.
 
     Prediction alone does not see that G and T cannot be told apart in a narrow window, nor
     variance that a wide one is bent. So the error of G is weighed: its variance, plus what a
@@ -39,8 +39,10 @@ def choose(
     -------
     chosen : integer ndarray, shape (..., c)
         Place in polynomials and rationals, one after the other.
-    bent : ndarray, shape (..., c) or (c, m)
-        Variance to be added, in the unit of G squared.
+    response : complex ndarray, shape (..., c) or (..., c, m)
+        What is chosen.
+    variance : ndarray, of the same shape
+        Its variance, and the square of what is bent.
 
     Examples
     --------
@@ -48,9 +50,9 @@ def choose(
     ...     response=np.ones(3) + 0j, spread=np.ones(3), noise=np.ones(3), power=np.ones(3),
     ...     prediction_error=np.ones(3),
     ... )
-    >>> chosen, bent = choose([one, one], [])
-    >>> chosen.tolist(), bent.tolist()
-    ([0, 0, 0], [0.0, 0.0, 0.0])
+    >>> chosen, response, variance = choose([one, one], [])
+    >>> chosen.tolist(), variance.tolist()
+    ([0, 0, 0], [1.0, 1.0, 1.0])
     """
     tried = (*polynomials, *rationals)
     shape = tried[0].response.shape
@@ -86,7 +88,8 @@ def choose(
     below = np.where(polynomial, best - 2, best)
     cheap = picked(cost, below) <= TWICE * picked(cost, best)
     chosen = np.asarray(np.where(cheap, below, best), dtype=np.int64)
-    return chosen, picked(bent, chosen).reshape(shape)
+    told = picked(spread * np.stack([fit.noise for fit in tried])[..., None] + bent, chosen)
+    return chosen, picked(response, chosen).reshape(shape), told.reshape(shape)
 
 
 def picked(values: NDArray[Any], chosen: NDArray[np.int64]) -> NDArray[Any]:

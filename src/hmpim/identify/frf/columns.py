@@ -6,7 +6,6 @@ Y = (B U + T) / A is linear in B and T: columns U x^p and x^p over A. Those of A
 
 from dataclasses import dataclass
 from functools import cache
-from itertools import combinations_with_replacement
 from typing import Any
 
 import numpy as np
@@ -56,7 +55,7 @@ class Columns:
         most = max(*orders, DENOMINATOR_ORDER)
         powers = np.asarray(x ** np.arange(2 * most + 1)[:, None])
         parts: list[tuple[Any, int]] = []
-        for i, j in combinations_with_replacement(range(len(orders)), 2):
+        for i, j in _pairs(len(orders)):
             product, count = np.conj(carriers[:, i]) * carriers[:, j], orders[i] + orders[j] + 1
             parts += [(part, count) for part in (product.real, product.imag)[: 1 + (i != j)]]
         backwards = np.conj(carriers)
@@ -71,16 +70,18 @@ class Columns:
             linear=np.concatenate(ahead, axis=1),
         )
 
-    def first(self) -> "Columns":
-        """Those of the first carrier alone."""
-        order = self.orders[0]
+    def without_last(self) -> "Columns":
+        """Those of all carriers but the last."""
+        orders = self.orders[:-1]
+        products = sum((orders[i] + orders[j] + 1) * (1 + (i != j)) for i, j in _pairs(len(orders)))
+        most = max(*orders, DENOMINATOR_ORDER)
         return Columns(
-            products=self.products[..., : 2 * order + 1],
-            mirrored=self.mirrored[..., : order + DENOMINATOR_ORDER + 1],
-            orders=self.orders[:1],
-            powers=self.powers[:, : 2 * max(order, DENOMINATOR_ORDER) + 1],
+            products=self.products[..., :products],
+            mirrored=self.mirrored[..., : sum(p + DENOMINATOR_ORDER + 1 for p in orders)],
+            orders=orders,
+            powers=self.powers[:, : 2 * most + 1],
             slopes=self.slopes,
-            linear=self.linear[:, : order + 1],
+            linear=self.linear[:, : sum(p + 1 for p in orders)],
         )
 
     def at(self, place: Integer) -> Complex:
@@ -139,6 +140,11 @@ class Columns:
         )
 
 
+def _pairs(carriers: int) -> list[tuple[int, int]]:
+    """Each two carriers, those with the last one last."""
+    return [(i, j) for j in range(carriers) for i in range(j + 1)]
+
+
 def _multiplied(parts: list[tuple[Any, int]], powers: Real, kind: type) -> Any:
     """Concatenate the products of each part, (w, s), and as many powers, (p, s), as it asks for."""
     windows, size = parts[0][0].shape
@@ -176,7 +182,7 @@ def _places(orders: tuple[int, ...]) -> _Places:
     inner, last = len(orders), DENOMINATOR_ORDER
     first: dict[tuple[int, int], tuple[int, int]] = {}
     at = 0
-    for i, j in combinations_with_replacement(range(inner), 2):
+    for i, j in _pairs(inner):
         count = orders[i] + orders[j] + 1
         first[i, j] = (at, at if i == j else at + count)
         at += count * (1 + (i != j))

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from hmpim.errors import ArgumentError, RecordError
 from hmpim.identify.arrays import Complex, Real
 from hmpim.identify.chance import searched
-from hmpim.identify.frf.choice import choose, picked
+from hmpim.identify.frf.choice import choose
 from hmpim.identify.frf.neighbours import (
     WIDEST,
     LocalFit,
@@ -223,25 +223,14 @@ def _many(
                 centre = _centres(spectra, band, points)
                 around = partial(Regressors.around, _cut(spectra, int(centre[-1])).u, centre)
                 own = cache(around) if y.shape[0] > _AT_ONCE else around
-            found += _few(_cut(spectra, int(centre[-1])), centre, late, own)
+            response, variance = _chosen(_cut(spectra, int(centre[-1])), centre, own)
+            frequency = spectra.frequency[centre]
+            response = response * np.exp(-2j * np.pi * frequency * late[:, None])
+            found += [
+                FrequencyResponse(frequency=frequency, response=one, std=own_std, coherence=None)
+                for one, own_std in zip(response, np.sqrt(variance), strict=True)
+            ]
     return found
-
-
-def _few(
-    spectra: Spectra,
-    centre: NDArray[np.int64],
-    delays: Real,
-    regressors: Callable[[int], Regressors],
-) -> list[FrequencyResponse]:
-    """Of as many records as are fitted at once; `regressors` are those of a width."""
-    response, variance = _chosen(spectra, centre, regressors)
-    frequency = spectra.frequency[centre]
-    response = response * np.exp(-2j * np.pi * frequency * delays[:, None])
-    std = np.sqrt(variance)
-    return [
-        FrequencyResponse(frequency=frequency, response=one, std=own, coherence=None)
-        for one, own in zip(response, std, strict=True)
-    ]
 
 
 def _chosen(
@@ -255,8 +244,7 @@ def _chosen(
     no chance: the power of noise is exponentially distributed.
     """
     widths, polynomials = _polynomials(spectra, centre)
-    chosen, bent = choose(polynomials, ())
-    response, variance = _picked(polynomials, chosen, bent)
+    _, response, variance = choose(polynomials, ())
     rational = _rational_widths(centre, spectra.u.size)
     if not rational:
         return response, variance
@@ -273,8 +261,7 @@ def _chosen(
         fits = own + fits
         if k == 0 and len(rational) > 1:
             continue  # the widest is judged by the next
-        chosen, bent = choose(polynomials, fits)
-        response[asking], variance[asking] = _picked([*polynomials, *fits], chosen, bent)
+        chosen, response[asking], variance[asking] = choose(polynomials, fits)
         if k + 1 == len(rational):
             break
         below = 2 * sum(w < rational[k + 1] for w in widths)
@@ -286,12 +273,6 @@ def _chosen(
         asking = asking[more]
         polynomials, fits = ([fit.of(more) for fit in kind] for kind in (polynomials, fits))
     return response, variance
-
-
-def _picked(tried: list[LocalFit], chosen: NDArray[np.int64], bent: Real) -> tuple[Complex, Real]:
-    """Response and variance of what is chosen."""
-    variance = picked(np.stack([fit.spread * fit.noise for fit in tried]), chosen)
-    return picked(np.stack([fit.response for fit in tried]), chosen), variance + bent
 
 
 def _polynomials(spectra: Spectra, centre: NDArray[np.int64]) -> tuple[list[int], list[LocalFit]]:

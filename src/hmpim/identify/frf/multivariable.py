@@ -17,24 +17,33 @@ from numpy.typing import ArrayLike, NDArray
 
 from hmpim.errors import ArgumentError, RecordError
 from hmpim.identify.arrays import Complex, Mask, Real
-from hmpim.identify.frf.choice import choose
-from hmpim.identify.frf.columns import DENOMINATOR_ORDER, Columns
+from hmpim.identify.frf.choice import choose, picked
+from hmpim.identify.frf.columns import Columns
 from hmpim.identify.frf.gaps import filled
 from hmpim.identify.frf.neighbours import (
     LocalFit,
-    Windows,
     centres_in_band,
     mirrored,
     windows_around,
 )
-from hmpim.identify.frf.rational import TRANSIENT_ORDER, gauss_newton, linear_start, solved
+from hmpim.identify.frf.rational import (
+    NUMERATOR,
+    TRANSIENT_ORDER,
+    RationalSolution,
+    RationalState,
+    Regressors,
+    gauss_newton,
+    linear_start,
+    read_off,
+    solved,
+)
 from hmpim.identify.signals import as_signal, check_band, check_rate
 from hmpim.identify.worth import PART
 
 __all__ = ["ResponseMatrix", "response_matrix"]
 
-_ORDER = 2
-_TERMS = _ORDER + 1
+_ORDER = 2  # of T beside polynomials
+_TERMS = NUMERATOR + 1
 # Power of U, relative to its greatest, that counts as none.
 _NOTHING = 1e-24
 # Inputs whose normalised spectra depend on one another to this, over the whole band.
@@ -90,8 +99,7 @@ class ResponseMatrix:
 class _Joint:
     """All inputs to one output by one method at one width.
 
-    `local` holds arrays of shape (c, m); `condition` is (c,); `coherence` is (c, m + 1), of
-    each input and, last, of all.
+    `local` holds arrays of shape (1, c, m); `condition` is (1, c); `coherence` (1, c, m + 1).
     """
 
     local: LocalFit
@@ -194,23 +202,19 @@ def response_matrix(
         )
     _refuse_identical(u, low, high, labels_u)
     centre = centres_in_band(low, high, points)
-    chosen = [_chosen(_moved(u, row, fs, base), y[i], base, centre) for i, row in enumerate(late)]
-    frequency = centre * step
-    condition = np.max(
-        np.stack(
-            [_input_condition(_moved(u, late[0], fs, base), centre)]
-            + [fit.condition for fit in chosen]
-        ),
-        axis=0,
+    each = [_chosen(_moved(u, row, fs, base), y[i], base, centre) for i, row in enumerate(late)]
+    response, variance, conditions, coherence = (
+        np.stack(parts, axis=1) for parts in zip(*each, strict=True)
     )
+    frequency = centre * step
+    inputs_alone = _input_condition(_moved(u, late[0], fs, base), centre)
+    condition = np.maximum(inputs_alone, conditions.max(axis=1))
     usable = condition <= worst_condition
-    response = np.stack([fit.local.response for fit in chosen], axis=1)
     response = response * np.exp(-2j * np.pi * frequency[:, None, None] * late)
     # What is filled in has no residual and says nothing new: both raise the error.
-    std = np.sqrt(np.stack([fit.local.spread for fit in chosen], axis=1)) / share[:, None]
+    std = np.sqrt(variance) / share[:, None]
     response[~usable] = complex(np.nan, np.nan)
     std[~usable] = np.nan
-    coherence = np.stack([fit.coherence for fit in chosen], axis=1)
     return ResponseMatrix(
         frequency=frequency,
         response=response,
@@ -289,7 +293,7 @@ def _input_condition(u: Complex, centre: Integer) -> Real:
     reach = max(int(centre[-1] - centre[0] + 1) // 8, 4 * (u.shape[0] + 1))
     reach = min(reach, u.shape[1] - 1)
     windows = windows_around(centre, u.shape[1], reach)
-    block = np.stack([windows.view(mirrored(row, reach), reach) for row in u], axis=1)
+    block = windows.views(mirrored(u, reach), reach)
     size = np.sqrt(np.maximum(np.sum(np.abs(block) ** 2, axis=2), 1e-300))
     singular = np.linalg.svd(block / size[:, :, None], compute_uv=False)
     ratio = singular[:, 0] / np.maximum(singular[:, -1], 1e-300)
@@ -316,8 +320,12 @@ def _moved(u: Real, late: Real, fs: float, base: int) -> Complex:
     return spectra
 
 
-def _chosen(u: Complex, y: Real, base: int, centre: Integer) -> _Joint:
-    """Fit one output at every width, and choose at each centre."""
+def _chosen(u: Complex, y: Real, base: int, centre: Integer) -> tuple[Complex, Real, Real, Real]:
+    """Fit one output at every width, and choose at each centre.
+
+    Returned are the responses and their variances, (c, m), the condition, (c,), and the coherence,
+    (c, m + 1), of each input and, last, of all.
+    """
     spectrum = np.array(scipy.fft.rfft(y[base:]))[: u.shape[1]]
     spectrum[0] = 0.0
     polynomials = [
@@ -325,10 +333,8 @@ def _chosen(u: Complex, y: Real, base: int, centre: Integer) -> _Joint:
         for width in _widths(centre, u, narrowest=(u.shape[0] + 1) * _TERMS, ratio=_RATIO)
         for fit in _fits(u, spectrum, centre, width, None)
     ]
-    best, _ = choose([fit.local for fit in polynomials], [])
-    rows = np.arange(centre.size)
+    _, (g,), _ = choose([fit.local for fit in polynomials], [])
     inside = np.arange(centre[0], centre[-1] + 1)
-    g = np.stack([fit.local.response for fit in polynomials])[best, rows]
     smooth = spectrum.copy()
     smooth[inside] = sum(
         u[j, inside] * np.interp(inside, centre, g[:, j]) for j in range(u.shape[0])
@@ -338,25 +344,15 @@ def _chosen(u: Complex, y: Real, base: int, centre: Integer) -> _Joint:
         for width in _widths(centre, u, narrowest=20 + 8 * u.shape[0], ratio=2.0)
         for fit in _fits(u, spectrum, centre, width, smooth)
     ]
-    tried = (*polynomials, *rationals)
-    best, bent = choose([fit.local for fit in polynomials], [fit.local for fit in rationals])
-
-    def picked(values: list[Real]) -> Real:
-        return np.asarray(np.stack(values)[best, rows])
-
-    response: Complex = np.stack([fit.local.response for fit in tried])[best, rows]
-    variance = picked([fit.local.spread * fit.local.noise[:, None] for fit in tried]) + bent
-    return _Joint(
-        local=LocalFit(
-            response=response,
-            spread=variance,
-            noise=np.ones(centre.size),
-            power=picked([fit.local.power for fit in tried]),
-            prediction_error=picked([fit.local.prediction_error for fit in tried]),
-        ),
-        condition=picked([fit.condition for fit in tried]),
-        coherence=picked([fit.coherence for fit in tried]),
+    best, response, variance = choose(
+        [fit.local for fit in polynomials], [fit.local for fit in rationals]
     )
+    tried = (*polynomials, *rationals)
+    condition, coherence = (
+        picked(np.stack([getattr(fit, name) for fit in tried]), best)[0]
+        for name in ("condition", "coherence")
+    )
+    return response[0], variance[0], condition, coherence
 
 
 def _widths(centre: Integer, u: Complex, *, narrowest: int, ratio: float) -> tuple[int, ...]:
@@ -375,101 +371,70 @@ def _fits(
     u: Complex, y: Complex, centre: Integer, width: int, smooth: Complex | None
 ) -> tuple[_Joint, _Joint]:
     """Fit with T and without: rational functions where `smooth` is given to start from."""
-    windows = windows_around(centre, y.size, width)
-    reach = width
-    block = np.stack([windows.view(mirrored(row, reach), reach) for row in u], axis=2)
-    seen = windows.view(mirrored(y, reach), reach)
-    floor = _NOTHING * float(np.max(np.abs(u)) ** 2)
-    power = np.maximum(np.sum(np.abs(block) ** 2, axis=1) / windows.counted[:, None], floor)
-    block = block / np.sqrt(power)[:, None, :]
-    order = TRANSIENT_ORDER if smooth is not None else _ORDER
-    inputs, terms = block.swapaxes(1, 2), (_ORDER,) * block.shape[2]
-    one = windows.without_dc()[:, None, :].astype(np.complex128)
-    b = Columns.of(inputs, terms, windows.x)
-    both = Columns.of(np.concatenate((inputs, one), axis=1), (*terms, order), windows.x)
-    start = None if smooth is None else windows.view(mirrored(smooth, reach), reach)
-    return (
-        _read_off(windows, both, seen, power, start),
-        _read_off(windows, b, seen, power, start),
-    )
+    order = _ORDER if smooth is None else TRANSIENT_ORDER
+    own = Regressors.around(u, centre, width, transient=order)
+    seen = own.views(y[None])
+    found = []
+    for columns in (own.both, own.plain):
+        if smooth is None:
+            found.append(_joint(own, columns, _polynomial(columns, seen), seen))
+            continue
+        with np.errstate(all="ignore"):  # an iterate may run off to infinity; it is not taken
+            start = linear_start(columns, own.views(smooth[None]))
+            ended = gauss_newton(columns, seen, start, steps=_STEPS)
+            found.append(_joint(own, columns, ended, seen))
+    return found[0], found[1]
 
 
-def _read_off(
-    windows: Windows, columns: Columns, y: Complex, power: Real, smooth: Complex | None
-) -> _Joint:
-    """Solve over each window, and read off each centre."""
-    m, near, place = power.shape[1], windows.near, windows.place
-    if smooth is None:
-        linear = columns.linear
-        left = np.conj(linear)
-        inverse, theta = solved(left @ linear.swapaxes(1, 2), left @ y[:, :, None])
-        row, fitted = linear[near, :, place], (theta[:, None] @ linear)[:, 0]
-        over = np.ones_like(y)
-    else:
-        slot, centres = windows.slots()
-        with np.errstate(all="ignore"):
-            start = linear_start(columns, smooth[:, None])
-            found = gauss_newton(columns, y[:, None], start, steps=_STEPS)
-            rows = found.rows(columns, windows.place[slot])
-        row = rows.reshape(-1, rows.shape[-1])[centres]
-        inverse, theta = found.inverse[:, 0], found.state.theta[:, 0]
-        fitted, over = found.state.fitted[:, 0], found.state.over[:, 0]
-    squares = np.sum(np.abs(y - fitted) ** 2, axis=1)
-    squares = np.maximum(squares, 1e-15 * np.sum(np.abs(y) ** 2, axis=1))
-    freedom = np.maximum(windows.counted - row.shape[1], 1)
-    noise = squares / freedom
-    x = windows.x[place][:, None]
-    a, size = 1.0 / over[near, place], np.sqrt(power[near])
-    b = x ** np.arange(_TERMS)
-    numerator = theta[near, : m * _TERMS].reshape(near.size, m, _TERMS)
-    response = np.sum(numerator * b[:, None], axis=2) / a[:, None]
-    slope = np.zeros((near.size, m, row.shape[1]), dtype=np.complex128)
-    for j in range(m):
-        slope[:, j, j * _TERMS : (j + 1) * _TERMS] = b / a[:, None]
-        if smooth is not None:
-            slope[:, j, -DENOMINATOR_ORDER:] = -(response[:, j] / a)[:, None] * x ** np.arange(
-                1, DENOMINATOR_ORDER + 1
-            )
-    inverse_near = inverse[near]
-    joint = slope @ inverse_near @ np.conj(slope.swapaxes(1, 2))
-    leverage = np.sum(row * (inverse_near @ np.conj(row)[:, :, None])[:, :, 0], axis=1).real
-    missed = (y - fitted)[near, place] / np.maximum(1.0 - leverage, 1e-6)
-    error = np.abs(missed) ** 2
-    failed = ~(np.isfinite(error) & np.isfinite(joint).all(axis=(1, 2)))
-    joint = np.where(failed[:, None, None], np.eye(m), joint)
-    spread = np.maximum(np.diagonal(joint, axis1=1, axis2=2).real, 0.0)
-    condition = np.sqrt(np.maximum(np.linalg.cond(joint), 1.0))
-    coherence = _coherence(inverse, theta, squares, freedom, m)[near]
+def _joint(own: Regressors, columns: Columns, found: RationalSolution, y: Complex) -> _Joint:
+    """What one fit over each window says at each centre, of all inputs together."""
+    m, near = own.power.shape[1], own.windows.near
+    local, moved = read_off(own, columns, found, y)
+    slope = own.at_centres(moved.swapaxes(2, 3))
+    joint = slope @ found.inverse[near].swapaxes(0, 1) @ np.conj(slope.swapaxes(2, 3))
+    failed = np.isinf(local.prediction_error)[..., None]
+    condition = np.linalg.cond(np.where(failed[..., None], np.eye(m), joint))
+    coherence = _coherence(own, found, np.vecdot(y, y).real)[near].swapaxes(0, 1)
     return _Joint(
-        local=LocalFit(
-            response=np.asarray(
-                np.where(failed[:, None], 0j, response) / size, dtype=np.complex128
-            ),
-            spread=spread / size**2,
-            noise=noise[near],
-            power=power[near],
-            prediction_error=np.where(failed, np.inf, error),
-        ),
-        condition=condition,
-        coherence=np.where(failed[:, None], 0.0, coherence),
+        local=local,
+        condition=np.sqrt(np.maximum(condition, 1.0)),
+        coherence=np.where(failed, 0.0, coherence),
     )
 
 
-def _coherence(
-    inverse: Complex, theta: Complex, squares: Real, freedom: NDArray[np.int64], m: int
-) -> Real:
+def _coherence(own: Regressors, found: RationalSolution, total: Real) -> Real:
     """Share of what is left without an input's columns that they explain, adjusted for number.
 
-    What Σ|residual|² grows by without them is θᴴ V⁻¹ θ over their own block. Shape (w, m + 1).
+    What Σ|residual|² grows by without them is θᴴ V⁻¹ θ over their own block. Of outputs of power
+    `total`, (w, r); shape (w, r, m + 1).
     """
+    m = own.power.shape[1]
+    squares = np.maximum(found.state.squares, 1e-15 * total)
+    freedom = np.maximum(own.windows.counted - found.inverse.shape[-1], 1)[:, None]
     blocks = [slice(j * _TERMS, (j + 1) * _TERMS) for j in range(m)]
-    out = np.zeros((squares.size, m + 1))
+    out = np.zeros((*squares.shape, m + 1))
     for k, block in enumerate((*blocks, slice(0, m * _TERMS))):
-        part = theta[:, block]
+        part = found.state.theta[..., block]
         with np.errstate(all="ignore"):
-            against = np.linalg.pinv(inverse[:, block, block], hermitian=True)
-            grown = np.sum(np.conj(part) * (against @ part[:, :, None])[:, :, 0], axis=1).real
-        count = part.shape[1]
-        without = (squares + np.maximum(grown, 0.0)) / (freedom + count)
-        out[:, k] = np.clip(1.0 - squares / freedom / without, 0.0, 1.0)
+            against = np.linalg.pinv(found.inverse[..., block, block], hermitian=True)
+            grown = np.vecdot(part, (against @ part[..., None])[..., 0]).real
+        without = (squares + np.maximum(grown, 0.0)) / (freedom + part.shape[-1])
+        out[..., k] = np.clip(1.0 - squares / freedom / without, 0.0, 1.0)
     return out
+
+
+def _polynomial(columns: Columns, y: Complex) -> RationalSolution:
+    """Fit Y = linear columns · coefficients, A = 1, to a record of shape (w, 1, s)."""
+    linear = columns.linear[:, None]
+    left = np.conj(linear)
+    inverse, theta = solved(left @ linear.swapaxes(2, 3), left @ y[..., None])
+    fitted = (theta[:, :, None] @ linear)[:, :, 0]
+    state = RationalState(
+        theta=theta,
+        over=np.ones_like(y),
+        fitted=fitted,
+        left=y - fitted,
+        weight=np.ones(y.shape),
+        squares=np.sum(np.abs(y - fitted) ** 2, axis=2),
+    )
+    return RationalSolution(state=state, before=state, inverse=inverse)

@@ -24,7 +24,6 @@ __all__ = [
     "Spectra",
     "Windows",
     "centres_in_band",
-    "forms",
     "mirrored",
     "reached",
     "transform",
@@ -90,13 +89,8 @@ class Windows:
         """Return x^p, p = 0 … `order`, shape (s, order + 1)."""
         return np.asarray(self.x[:, None] ** np.arange(order + 1))
 
-    def view(self, values: Complex, reach: int) -> Complex:
-        """Return the windows of values that `mirrored` made, shape (..., w, s)."""
-        # By `take`, whose answer lies in memory as its shape says, which indexing's does not.
-        return np.asarray(values.take(self.start[:, None] + reach + np.arange(self.size), axis=-1))
-
     def views(self, values: Complex, reach: int) -> Complex:
-        """Return the windows of records, (r, b), that `mirrored` made, shape (w, r, s)."""
+        """Return the windows of rows, (r, b), that `mirrored` made, shape (w, r, s)."""
         out = np.empty((self.start.size, values.shape[0], self.size), dtype=values.dtype)
         for own, first in zip(out, (self.start + reach).tolist(), strict=True):
             own[...] = values[:, first : first + self.size]
@@ -148,15 +142,6 @@ class LocalFit:
         """Return what it says of some of many records."""
         each = {f.name: getattr(self, f.name) for f in fields(self)}
         return LocalFit(**{n: v[records] if v.ndim > 1 else v for n, v in each.items()})
-
-
-def forms(vectors: Complex, inverse: Complex) -> Real:
-    """Return v V vᴴ, (..., k), for vectors, (..., k, q), and matrices V, (..., q, q).
-
-    Real parts alone of the products are asked for.
-    """
-    product = vectors @ inverse
-    return np.asarray(np.vecdot(vectors.view(np.float64), product.view(np.float64)))
 
 
 def mirrored(values: Complex, reach: int) -> Complex:

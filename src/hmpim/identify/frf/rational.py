@@ -13,7 +13,7 @@ squares of the true residual. The covariance is that of those least squares, the
 included, so it knows what the denominator costs.
 """
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
@@ -26,12 +26,12 @@ from hmpim.identify.frf.neighbours import (
     LocalFit,
     Spectra,
     Windows,
-    forms,
     mirrored,
     windows_around,
 )
 
 __all__ = [
+    "NUMERATOR",
     "TRANSIENT_ORDER",
     "RationalSolution",
     "RationalState",
@@ -39,11 +39,14 @@ __all__ = [
     "gauss_newton",
     "linear_start",
     "rational_fits",
+    "read_off",
     "restricted",
     "solved",
 ]
 
-_NUMERATOR = 2
+NUMERATOR = 2
+"""Order of B."""
+
 TRANSIENT_ORDER = 3
 """One more than of B: what a sampled transient rings with is a polynomial in z, not in jω."""
 
@@ -88,21 +91,26 @@ class RationalSolution:
         That before the last step, which was small: derivatives are taken there.
     inverse : complex ndarray, shape (w, r, q, q)
         Of the products of the conjugates of the derivatives with them: the covariance of `theta`
-        where the noise of a bin is 1.
+        where the noise of a bin is 1. Of a polynomial, it is that of the linear columns alone.
     """
 
     state: RationalState
     before: RationalState
     inverse: Complex
 
+    def is_rational(self, columns: Columns) -> bool:
+        """Whether there is an A beside the linear columns."""
+        return bool(self.inverse.shape[-1] > columns.linear.shape[1])
+
     def rows(self, columns: Columns, place: Integer) -> Complex:
         """Derivatives of the fitted Y at places of each window, (w, k); shape (w, r, k, q)."""
         linear, over = columns.at(place), _at(self.before.over, place)[..., None]
         count = linear.shape[-1]
-        rows = np.empty((*over.shape[:-1], count + DENOMINATOR_ORDER), dtype=np.complex128)
+        rows = np.empty((*over.shape[:-1], self.inverse.shape[-1]), dtype=np.complex128)
         np.multiply(linear[:, None], over, out=rows[..., :count])
-        bent = -_at(self.before.fitted, place)[..., None] * over
-        np.multiply(bent, columns.slopes.T[place][:, None], out=rows[..., count:])
+        if self.is_rational(columns):
+            bent = -_at(self.before.fitted, place)[..., None] * over
+            np.multiply(bent, columns.slopes.T[place][:, None], out=rows[..., count:])
         return rows
 
 
@@ -120,8 +128,8 @@ class Regressors:
     ----------
     windows : Windows
         Of this width.
-    power : ndarray, shape (w,)
-        Mean |U|² of each, to which its input is scaled.
+    power : ndarray, shape (w, m)
+        Mean |U|² of each, to which its m inputs are scaled.
     both, plain : Columns
         With T, and without.
     place : integer ndarray, shape (w, k)
@@ -138,35 +146,50 @@ class Regressors:
     centres: Integer
 
     @classmethod
-    def around(cls, u: Complex, centre: Integer, width: int) -> "Regressors":
+    def around(
+        cls, u: Complex, centre: Integer, width: int, *, transient: int = TRANSIENT_ORDER
+    ) -> "Regressors":
         """Make them.
 
         Parameters
         ----------
-        u : complex ndarray, shape (b,)
-            Transform of the input.
+        u : complex ndarray, shape (b,) or (m, b)
+            Transform of the input, or of several.
         centre : integer ndarray, shape (c,)
             Bins to answer at.
         width : int
             Neighbours on either side, at least 6.
+        transient : int
+            Order of T.
         """
-        windows = windows_around(centre, u.size, width)
+        u = np.atleast_2d(u)
+        windows = windows_around(centre, u.shape[-1], width)
         floor = _NOTHING * float(np.max(np.abs(u)) ** 2)
-        seen = windows.view(mirrored(u, width), width)
-        power = np.maximum(np.sum(np.abs(seen) ** 2, axis=1) / windows.counted, floor)
-        scaled = (seen / np.sqrt(power)[:, None])[:, None, :]
+        seen = windows.views(mirrored(u, width), width)
+        power = np.sum(np.abs(seen) ** 2, axis=2) / windows.counted[:, None]
+        power = np.maximum(power, floor)
         one = windows.without_dc()[:, None, :].astype(np.complex128)
-        carriers = np.concatenate((scaled, one), axis=1)
+        carriers = np.concatenate((seen / np.sqrt(power)[:, :, None], one), axis=1)
         slot, centres = windows.slots()
-        both = Columns.of(carriers, (_NUMERATOR, TRANSIENT_ORDER), windows.x)
+        both = Columns.of(carriers, (*(NUMERATOR,) * len(u), transient), windows.x)
         return cls(
             windows=windows,
             power=power,
             both=both,
-            plain=both.first(),
+            plain=both.without_last(),
             place=windows.place[slot],
             centres=centres,
         )
+
+    def views(self, values: Complex) -> Complex:
+        """Return the windows of spectra, (r, b), shape (w, r, s)."""
+        reach = self.windows.size // 2
+        return self.windows.views(mirrored(values, reach), reach)
+
+    def at_centres(self, values: NDArray[Any]) -> NDArray[Any]:
+        """Return values at each place of each window, (w, r, k, ...), shape (r, c, ...)."""
+        flat = values.swapaxes(0, 1).reshape(values.shape[1], -1, *values.shape[3:])
+        return flat.take(self.centres, axis=1)
 
 
 def rational_fits(
@@ -180,7 +203,7 @@ def rational_fits(
         With the delay taken out.
     own : Regressors
         Those of `spectra.u`.
-    smooth : complex ndarray, shape (..., b), as that of `spectra.y`
+    smooth : complex ndarray, shape (r, b), as that of `spectra.y`
         Y as a first estimate predicts it, nearly free of noise.
 
     Returns
@@ -188,7 +211,7 @@ def rational_fits(
     fits : list of LocalFit
         Two: with T, and without. `prediction_error` is infinite where the iteration came to
         nothing.
-    peak : ndarray, shape (...,)
+    peak : ndarray, shape (r,)
         Greatest power of a bin that the fit with T leaves, over the mean of its window.
 
     Examples
@@ -198,35 +221,30 @@ def rational_fits(
     >>> u, y = np.sin(n**2 / 1000), np.zeros(400)
     >>> for k in n[2:]:  # poles at 0.9 exp(±0.44 i)
     ...     y[k] = 1.628 * y[k - 1] - 0.81 * y[k - 2] + u[k]
-    >>> s = transform(u, y, 1.0, 0.0)
+    >>> s = transform(u, y[None], 1.0, 0.0)
     >>> (fit, _), _ = rational_fits(s, Regressors.around(s.u, np.arange(20, 40), 16), s.y)
     >>> z = np.exp(2j * np.pi * s.frequency[20])
-    >>> bool(abs(fit.response[0] * (1 - 1.628 / z + 0.81 / z**2) - 1) < 1e-3)
+    >>> bool(abs(fit.response[0, 0] * (1 - 1.628 / z + 0.81 / z**2) - 1) < 1e-3)
     True
     """
-    reach = own.windows.size // 2
-    y, start = (
-        own.windows.views(mirrored(np.atleast_2d(v), reach), reach) for v in (spectra.y, smooth)
-    )
+    y = own.views(spectra.y)
     # An iterate may run off to infinity; it is then not taken.
     with np.errstate(all="ignore"):
-        full = gauss_newton(own.both, y, linear_start(own.both, start), steps=_STEPS)
-        plain = gauss_newton(own.plain, y, restricted(full, _NUMERATOR + 1), steps=1)
-        fits = [_read_off(own, own.both, full, y), _read_off(own, own.plain, plain, y)]
+        full = gauss_newton(own.both, y, linear_start(own.both, own.views(smooth)), steps=_STEPS)
+        plain = gauss_newton(own.plain, y, restricted(full, NUMERATOR + 1), steps=1)
+        fits = [
+            _of_one_input(read_off(own, columns, found, y)[0])
+            for columns, found in ((own.both, full), (own.plain, plain))
+        ]
         left = full.state.left.real**2 + full.state.left.imag**2
         peak = np.max(left.max(axis=-1) / left.mean(axis=-1), axis=0)
-    return (fits, peak) if spectra.y.ndim > 1 else ([_of_one(fit) for fit in fits], peak[0])
+    return fits, peak
 
 
-def _of_one(fit: LocalFit) -> LocalFit:
-    """The only record's."""
-    return LocalFit(
-        response=fit.response[0],
-        spread=fit.spread[0],
-        noise=fit.noise[0],
-        power=fit.power,
-        prediction_error=fit.prediction_error[0],
-    )
+def _of_one_input(fit: LocalFit) -> LocalFit:
+    """The same without the axis of the inputs."""
+    response, spread, power = fit.response[..., 0], fit.spread[..., 0], fit.power[..., 0]
+    return replace(fit, response=response, spread=spread, power=power)
 
 
 def solved(gram: Complex, right: Complex) -> tuple[Complex, Complex]:
@@ -355,39 +373,45 @@ def _better(one: RationalState, other: RationalState) -> RationalState:
     return other
 
 
-def _read_off(
+def read_off(
     regressors: Regressors, columns: Columns, found: RationalSolution, y: Complex
-) -> LocalFit:
-    """Response, its spread and the prediction error at each centre, of each record (r, c)."""
-    windows, power, terms = regressors.windows, regressors.power, _NUMERATOR + 1
-    place, near = regressors.place, regressors.windows.near
+) -> tuple[LocalFit, Complex]:
+    """Read off the responses to all inputs at each centre, (r, c, m).
+
+    With them come their derivatives by the coefficients, (w, r, m, k, q), as `Regressors.place` has
+    the centres, of inputs scaled to a power of 1. `prediction_error` is infinite where the
+    iteration came to nothing.
+    """
+    windows, power, terms = regressors.windows, regressors.power, NUMERATOR + 1
+    place, near, m = regressors.place, regressors.windows.near, regressors.power.shape[1]
     b, x = columns.powers[place, :terms].astype(np.complex128), columns.slopes.T[place]
     row = found.rows(columns, place)
     own = _at(found.state.over, place)
-    over = own / np.sqrt(power)[:, None, None]
-    response = (found.state.theta[..., :terms] @ b.swapaxes(1, 2)) * over
-    pair = np.zeros((*own.shape[:2], 2, *row.shape[2:]), dtype=np.complex128)
-    np.multiply(b[:, None], over[..., None], out=pair[:, :, 0, :, :terms])
-    bent = (-response * own)[..., None]
-    np.multiply(bent, x[:, None], out=pair[:, :, 0, :, -DENOMINATOR_ORDER:])
-    pair[:, :, 1] = row
-    flat = pair.reshape(*own.shape[:2], -1, row.shape[-1])
-    told = forms(flat, found.inverse).reshape(pair.shape[:-1])
-    spread, leverage = told[:, :, 0], told[:, :, 1]
-    missed = _at(found.state.left, place) / np.maximum(1.0 - leverage, 1e-6)
+    coefficients = found.state.theta[..., : m * terms].reshape(*own.shape[:2], m, terms)
+    response = (coefficients @ b[:, None].swapaxes(2, 3)) * own[:, :, None]
+    moved = np.zeros((*own.shape[:2], m + 1, *row.shape[2:]), dtype=np.complex128)
+    upper = b[:, None] * own[..., None]
+    for j in range(m):
+        moved[:, :, j, :, j * terms : (j + 1) * terms] = upper
+    if found.is_rational(columns):
+        bent = (-response * own[:, :, None])[..., None]
+        np.multiply(bent, x[:, None, None], out=moved[:, :, :m, :, -DENOMINATOR_ORDER:])
+    moved[:, :, m] = row
+    flat = moved.reshape(*own.shape[:2], -1, row.shape[-1])
+    product = flat @ found.inverse  # of v V vᴴ, the real part alone is asked for
+    told = np.vecdot(flat.view(np.float64), product.view(np.float64)).reshape(moved.shape[:-1])
+    missed = _at(found.state.left, place) / np.maximum(1.0 - told[:, :, m], 1e-6)
     error = missed.real**2 + missed.imag**2
     squares = np.maximum(found.state.squares, 1e-15 * np.vecdot(y, y).real)
     noise = squares / np.maximum(windows.counted - row.shape[-1], 1)[:, None]
-    failed = ~(np.isfinite(response) & np.isfinite(spread) & np.isfinite(error))
-
-    def answers(values: NDArray[Any]) -> NDArray[Any]:
-        flat = values.swapaxes(0, 1).reshape(values.shape[1], -1)
-        return flat.take(regressors.centres, axis=-1)
-
-    return LocalFit(
-        response=answers(np.where(failed, 0.0, response)),
-        spread=answers(np.where(failed, 1.0 / power[:, None, None], np.maximum(spread, 0.0))),
+    response, spread = response.swapaxes(2, 3), told[:, :, :m].swapaxes(2, 3)
+    failed = ~(np.isfinite(error) & np.isfinite(response + spread).all(axis=-1))
+    lost, size = failed[..., None], power[:, None, None]
+    fit = LocalFit(
+        response=regressors.at_centres(np.where(lost, 0.0, response) / np.sqrt(size)),
+        spread=regressors.at_centres(np.where(lost, 1.0, np.maximum(spread, 0.0)) / size),
         noise=noise.T.take(near, axis=-1),
         power=power[near],
-        prediction_error=answers(np.where(failed, np.inf, error)),
+        prediction_error=regressors.at_centres(np.where(failed, np.inf, error)),
     )
+    return fit, moved[:, :, :m]
