@@ -8,7 +8,7 @@ from dataclasses import replace
 
 from hmpim.arguments import checked
 from hmpim.identify.asked.clocks import settled_between
-from hmpim.identify.asked.question import Question
+from hmpim.identify.asked.question import Question, recognise_software
 from hmpim.identify.asked.reference import aligned_with_reference
 from hmpim.identify.asked.refusals import (
     check_moves,
@@ -17,7 +17,6 @@ from hmpim.identify.asked.refusals import (
     checked_intersample,
     checked_structures,
 )
-from hmpim.identify.asked.software import recognise_software
 from hmpim.identify.coupling.responses import inputs_of
 from hmpim.identify.judgement import judged
 from hmpim.identify.kept import keeping

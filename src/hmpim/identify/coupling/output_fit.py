@@ -2,8 +2,10 @@
 
 The inputs that move the output most are fitted as if alone, each to what the others leave over;
 what is weak beside them (`hmpim.identify.coupling.weak`) follows, with the noise whitened.
-Then all pairs are moved at once. The error bars come from all pairs' derivatives together, so that
-inputs that resemble each other widen them.
+Then all pairs are moved at once, and only then is each coupling tested, the others allowed to take
+over: of two inputs that are alike at some frequencies, the first took a share of the other's
+coupling, which then looked like none. The error bars come from all pairs' derivatives together, so
+that inputs that resemble each other widen them.
 """
 
 from collections.abc import Callable, Iterable, Sequence
@@ -14,9 +16,7 @@ import scipy
 
 from hmpim.identify.arrays import Mask, Real
 from hmpim.identify.chance import SEARCHED
-from hmpim.identify.coupling.lag import Lag, lag_of
-from hmpim.identify.coupling.together import gained_by, joint_covariance
-from hmpim.identify.coupling.weak import coupling_fit, whitening_of
+from hmpim.identify.coupling.weak import Lag, coupling_fit, lag_of, whitening_of
 from hmpim.identify.effects.drift import Drifting
 from hmpim.identify.effects.gain import GainChange
 from hmpim.identify.effects.hum import Humming
@@ -34,6 +34,9 @@ from hmpim.model.sampled import prepare_input
 from hmpim.record import Intersample
 
 __all__ = ["OutputFit", "fit_together"]
+
+_UNSEEN = 1e-13
+"""Share of the greatest eigenvalue below which the record does not see a direction."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -242,7 +245,7 @@ class _Pairs:
         for k, j in enumerate(weak):
             shared = [bins for group, bins in self.alike if j in group and group & {*self.strong}]
             slow = _too_slow(found[k], self.y.size)
-            gains.append(0.0 if slow else gained_by(_apart(problems, shared), found, k))
+            gains.append(0.0 if slow else _gained_by(_apart(problems, shared), found, k))
         least = int(np.argmin(gains))
         if gains[least] > SEARCHED:
             return False
@@ -274,6 +277,38 @@ def _moved_at_once(pairs: _Pairs) -> OutputFit:
         strong=tuple(j in pairs.strong for j in everyone),
         lags=tuple(lags.get(j) for j in everyone),
     )
+
+
+def _gained_by(problems: Sequence[Problem], fits: Sequence[Fit], i: int) -> float:
+    """Log-likelihood that one pair's gain adds, all other parameters free to take over.
+
+    Half of b' C⁻¹ b, b the pair's numerator, C its covariance, the pair's own poles and delay
+    held: without a gain they mean nothing.
+    """
+    blocks = []
+    for j, (p, f) in enumerate(zip(problems, fits, strict=True)):
+        rows = jacobian(p, f)[:-1]
+        blocks.append(rows[f.theta.size :] if j == i else rows)
+    rows = np.vstack([*blocks, problems[0].masked(np.ones(problems[0].y.size))])
+    residual = problems[i].masked(fits[i].residual)
+    full = _joint_covariance(rows, residual, freedom=problems[i].counted)
+    start = sum(block.shape[0] for block in blocks[:i])
+    span = slice(start, start + blocks[i].shape[0])
+    b = fits[i].linear[:-1]
+    return float(0.5 * b @ np.linalg.pinv(full[span, span], hermitian=True) @ b)
+
+
+def _joint_covariance(rows: Real, residual: Real, *, freedom: int) -> Real:
+    """Covariance under white noise; a direction that the record does not see spoils no other one.
+
+    Of the derivatives of the prediction, (p, n), and of what is left over, (n,).
+    """
+    scale = np.sqrt(np.maximum(np.sum(rows**2, axis=1), np.finfo(float).tiny ** 0.5))
+    scaled = rows / scale[:, None]
+    values, vectors = np.linalg.eigh(scaled @ scaled.T)
+    spread = vectors / np.sqrt(np.maximum(values, _UNSEEN * values[-1]))
+    variance = float(residual @ residual) / freedom
+    return np.asarray(variance * (spread @ spread.T) / np.outer(scale, scale))
 
 
 def _strongest(
@@ -402,7 +437,7 @@ def _covariances(problem: Problem, last: JointFit, blocks: list[Real]) -> list[R
     rows = np.vstack([*blocks, problem.masked(np.ones(problem.y.size))])
     residual = problem.masked(problem.y - last.best.fit.prediction)
     # What the noise is whitened by is None only where it is white already.
-    full = joint_covariance(rows, residual, freedom=max(problem.counted - rows.shape[0], 1))
+    full = _joint_covariance(rows, residual, freedom=max(problem.counted - rows.shape[0], 1))
     end, start, out = rows.shape[0] - 1, 0, []
     for block in blocks:
         span = [*range(start, start + block.shape[0]), end]

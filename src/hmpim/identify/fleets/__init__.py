@@ -4,6 +4,5 @@ learnt   what the first records tell: the box in which the units lie, and a surf
 surface  such a surface: an orthonormal basis, and a polynomial that says where on it a model lies
 fits     all records fitted at once, in a few numbers each
 pole     records that ask for one more pole
-bent     records that look bent by chance
 fleet    from outputs to figures, with intervals as `identify` gives them
 """

@@ -10,11 +10,21 @@ from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
-from hmpim.identify.arrays import Real
-from hmpim.identify.fleets.bent import cover_bends, shapes_of
-from hmpim.identify.fleets.fleet import Fleet, FleetFit, Group, fit_fleet, parameters_of
+from hmpim.identify.arrays import Mask, Real
+from hmpim.identify.chance import CLEARLY
+from hmpim.identify.fleets.fleet import (
+    Column,
+    Fleet,
+    FleetFit,
+    Group,
+    fit_fleet,
+    parameters_of,
+    widen,
+)
 from hmpim.identify.fleets.learnt import is_alike, theta_at
+from hmpim.identify.fleets.pole import alone_of, joint_of
 from hmpim.identify.fleets.quiet import are_quiet
 from hmpim.identify.fleets.simpler import Simpler, costs_of, learn_simpler
 from hmpim.identify.frf.local import local_responses
@@ -23,11 +33,13 @@ from hmpim.identify.judgement.reach import lines_of, unreached
 from hmpim.identify.judgement.structure import barely_told
 from hmpim.identify.judgement.verdict import judged
 from hmpim.identify.noise.input_noise import input_noise
+from hmpim.identify.nonlinear.bends import bends, bent_shapes
 from hmpim.identify.nonlinear.lines import find_period
 from hmpim.identify.nonlinear.sweep_phase import SweepPhase, sweep_phase
 from hmpim.identify.reading.bandwidth import disagreeing, response_bandwidths
 from hmpim.identify.reading.figures import system_of
 from hmpim.identify.reading.readings import from_lag
+from hmpim.identify.reading.spanned import spanned
 from hmpim.identify.result import (
     Candidate,
     Nonlinearity,
@@ -49,6 +61,10 @@ _SPARE = 6
 
 _APART = 0.05
 """Standard deviations by which a figure of a unit that was learnt from may be off."""
+
+_ASKED = 0.5 * (np.sqrt(2.0 * CLEARLY) - 0.5) ** 2
+"""Log-likelihood half a deviation below CLEARLY, from which a record is asked for a nonlinearity:
+what one leaves of the unit in the middle is not quite what it leaves of each."""
 
 _BANDWIDTHS = ("bandwidth_phase90", "bandwidth_phase90_without_delay", "bandwidth_3db")
 
@@ -97,7 +113,7 @@ def learn_whole(fleet: Fleet, pairs: Sequence[PairIdentification]) -> Whole | No
     simpler = learn_simpler(fleet, known, outputs)
     if not simpler:
         return None
-    whole = Whole(fleet=fleet, simpler=simpler, sweep=sweep, shapes=shapes_of(fleet))
+    whole = Whole(fleet=fleet, simpler=simpler, sweep=sweep, shapes=_shapes_of(fleet))
     every = np.stack(outputs)
     again = whole_pairs(whole, fit_fleet(fleet, every), every)
     told = [_is_said(own, pair) for own, pair in zip(again, known, strict=True) if own is not None]
@@ -162,7 +178,7 @@ def whole_pairs(
         quiet = are_quiet(fleet, group, outputs[some], behind=behind, sweep=whole.sweep)
         places = np.flatnonzero(quiet)
         measured = outputs[some[places]]
-        covered = cover_bends(fleet, group, places, measured, shapes=whole.shapes, columns=columns)
+        covered = _cover_bends(fleet, group, places, measured, shapes=whole.shapes, columns=columns)
         places, measured = places[covered], measured[covered]
         responses = local_responses(
             fleet.u,
@@ -202,6 +218,60 @@ def whole_pairs(
             )
             found[i] = judged(pair)
     return found
+
+
+def _shapes_of(fleet: Fleet) -> Real:
+    """Return what nonlinearities leave of the unit in the middle of a fleet, shape (m, n)."""
+    usual = (one for one in fleet.members if one.intersample == fleet.natural)
+    member = next(usual, fleet.members[0])
+    place = (member.surface.low + member.surface.high) / 2
+    values = member.surface.values(place[None])[0]
+    problem, best = alone_of(fleet, member, place, values[:-1] @ member.basis + values[-1])
+    return bent_shapes(fleet.u, problem, best.fit, intersample=member.intersample, fs=fleet.fs)
+
+
+def _cover_bends(
+    fleet: Fleet,
+    group: Group,
+    some: NDArray[np.intp],
+    outputs: Real,
+    *,
+    shapes: Real,
+    columns: dict[str, Column],
+) -> Mask:
+    """Let intervals cover a nonlinearity that may be there; return where no more is to be said.
+
+    Units of a fleet are much alike, and so is what a nonlinearity leaves of them. So all residuals
+    are held against what each kind leaves of the unit in the middle, and only where one takes
+    nearly enough is the record asked by itself, by `hmpim.identify.nonlinear.bends`.
+
+    Of `some` k records of the group, with outputs (k, n), and `shapes`, (m, n), from `shapes_of`.
+    What is widened is written to `columns`, which are of all records. False where a nonlinearity
+    brings more than chance would, or comes beside one more pole or zero: such a record is for
+    `identify`.
+    """
+    member = group.fit.member
+    found = group.residual[some] @ shapes.T / np.sqrt(group.errors.variance[some, None])
+    gains = 0.5 * np.maximum(found, 0.0).max(axis=1, initial=0.0) ** 2
+    covered = np.ones(some.size, dtype=bool)
+    for k in np.flatnonzero(gains > _ASKED).tolist():
+        i, j = int(some[k]), int(group.some[some[k]])
+        problem, best = alone_of(fleet, member, group.fit.theta[j], outputs[k])
+        bent = bends(fleet.u, problem, best.fit, intersample=member.intersample, fs=fleet.fs)
+        if not bent:
+            continue
+        covered[k] = not bent[0].certain and not group.has_tail(i)
+        if covered[k]:
+            own = parameters_of(group.alone, i)
+            wide = spanned(
+                own,
+                joint_of(problem, best),
+                fs=fleet.fs,
+                highest=fleet.highest,
+                bent=[(one.fit, one.farthest) for one in bent],
+            )
+            widen(columns, j, own, wide)
+    return covered
 
 
 def _system(fleet: Fleet, group: Group, k: int) -> RationalDelay:

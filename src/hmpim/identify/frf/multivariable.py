@@ -19,7 +19,6 @@ from hmpim.errors import ArgumentError, RecordError
 from hmpim.identify.arrays import Complex, Mask, Real
 from hmpim.identify.frf.choice import choose, picked
 from hmpim.identify.frf.columns import Columns
-from hmpim.identify.frf.gaps import filled
 from hmpim.identify.frf.neighbours import (
     LocalFit,
     centres_in_band,
@@ -52,6 +51,8 @@ _RATIO = 1.6
 _STEPS = 3
 # Bins in all windows of one width, beyond which they cost too much.
 _AFFORDABLE = 60_000
+# Samples of an output that must be valid.
+_FEWEST = 16
 
 Integer = NDArray[np.int64]
 
@@ -186,7 +187,7 @@ def response_matrix(
         raise ArgumentError(f"worst_condition is {worst_condition}; give a number above 1")
     if points < 1:
         raise ArgumentError(f"points is {points}; give at least 1")
-    y, share = filled(y, valid, fill, labels_y)
+    y, share = _filled(y, valid, fill, labels_y)
     for row, label in zip(u, labels_u, strict=True):
         if np.ptp(row) == 0:
             raise RecordError(f"{label} is constant at {row[0]:g}; an input must move")
@@ -226,6 +227,39 @@ def response_matrix(
         inputs=labels_u,
         outputs=labels_y,
     )
+
+
+def _filled(
+    y: Real, valid: ArrayLike | None, fill: ArrayLike | None, labels: tuple[str, ...]
+) -> tuple[Real, Real]:
+    """Outputs without gaps, (p, n), and the share of each that was measured, (p,).
+
+    Gaps are filled by a model where there is one, or by a curve through the neighbours.
+    """
+    if valid is None:
+        return y, np.ones(y.shape[0])
+    mask = np.asarray(valid)
+    if mask.dtype != np.bool_ or mask.shape not in (y.shape, y.shape[1:]):
+        raise ArgumentError(
+            f"valid has shape {mask.shape} and type {mask.dtype}; give booleans of shape {y.shape} "
+            f"or ({y.shape[1]},)"
+        )
+    mask = np.broadcast_to(mask, y.shape)
+    given = None if fill is None else np.asarray(fill, dtype=np.float64)
+    if given is not None and given.shape != y.shape:
+        raise RecordError(f"fill has shape {given.shape} and outputs {y.shape}; give as many")
+    out = y.copy()
+    for i, (row, told, label) in enumerate(zip(out, mask, labels, strict=True)):
+        if np.count_nonzero(told) < _FEWEST:
+            raise RecordError(
+                f"{label} has {np.count_nonzero(told)} valid samples; at least {_FEWEST} are needed"
+            )
+        gaps = np.flatnonzero(~told)
+        if gaps.size and given is None:
+            row[gaps] = scipy.interpolate.PchipInterpolator(np.flatnonzero(told), row[told])(gaps)
+        elif given is not None:
+            row[gaps] = given[i, gaps]
+    return out, np.asarray(mask.mean(axis=1))
 
 
 def _checked_signals(name: str, values: ArrayLike) -> Real:
