@@ -3,7 +3,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hmpim.errors import ArgumentError
 from hmpim.identify.section_iv.response import (
     damping_from_hump,
     delay_phase,
@@ -127,8 +126,3 @@ def test_a_crossing_is_interpolated_between_bins(level: float) -> None:
 
 def test_the_first_of_several_crossings_counts() -> None:
     assert falling_crossing([0, 1, 2, 3], [1.0, -1.0, 1.0, -1.0], 0.0) == 0.5
-
-
-def test_shapes_must_agree() -> None:
-    with pytest.raises(ArgumentError, match=r"frequency has shape \(2,\) and the curve \(3,\)"):
-        falling_crossing([1.0, 2.0], [1.0, 2.0, 3.0], 0.0)

@@ -30,19 +30,9 @@ def choose(
     2011). Then, of polynomials, the next narrower window is taken if it costs little, so that
     what curvature leaves over is small beside the stated error (undersmoothing).
 
-    Parameters
-    ----------
-    polynomials, rationals : sequence of LocalFit
-        In pairs, with T and without, widths increasing; the rational ones may be none.
-
-    Returns
-    -------
-    chosen : integer ndarray, shape (..., c)
-        Place in polynomials and rationals, one after the other.
-    response : complex ndarray, shape (..., c) or (..., c, m)
-        What is chosen.
-    variance : ndarray, of the same shape
-        Its variance, and the square of what is bent.
+    Fits come in pairs, with T and without, widths increasing; the rational ones may be none.
+    Returned are the place in polynomials and rationals, one after the other, (..., c), the response
+    there, (..., c) or (..., c, m), and its variance with the square of what is bent.
 
     Examples
     --------

@@ -93,21 +93,8 @@ class Columns:
     ) -> tuple[Complex, Complex]:
         """Normal equations of the columns over A, and of -fitted / A times the powers of A.
 
-        Parameters
-        ----------
-        over : complex ndarray, shape (w, r, s), or None
-            1 / A; None for 1.
-        weight : ndarray, shape (w, r, s)
-            1 / |A|².
-        fitted : complex ndarray, shape (w, r, s)
-            Y as fitted.
-        left : complex ndarray, shape (w, r, s)
-            The right side.
-
-        Returns
-        -------
-        gram : complex ndarray, shape (w, r, q, q)
-        right : complex ndarray, shape (w, r, q, 1)
+        All arguments have shape (w, r, s): 1 / A, None for 1; 1 / |A|²; Y as fitted; and what the
+        right side, (w, r, q, 1), is made of. The left side has shape (w, r, q, q).
         """
         windows, records, _ = fitted.shape
         places, count = _places(self.orders), self.mirrored.shape[-1]

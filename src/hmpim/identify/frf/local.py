@@ -124,22 +124,7 @@ def local_responses(
     """Return the responses of many outputs to one input, each as `local_response` finds it.
 
     What follows from the input alone is made once, and the fits are made of many records at once.
-
-    Parameters
-    ----------
-    u : ndarray, shape (n,)
-        Input, n >= 16.
-    outputs : ndarray, shape (k, n)
-        One output a row.
-    fs, band, points
-        As for `local_response`.
-    delays : ndarray, shape (k,)
-        Pure delay of each in s.
-
-    Returns
-    -------
-    list of FrequencyResponse
-        One for each output.
+    Outputs have shape (k, n), one a row, and pure delays in s (k,).
 
     Examples
     --------

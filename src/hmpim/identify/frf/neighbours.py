@@ -168,18 +168,8 @@ def transform(u: Real, y: Real, fs: float, delay: float | Real, highest: float =
     samples are all in which the input moves. Of a long record the last samples, at most one in
     forty, are left out for a length that the FFT does fast.
 
-    Parameters
-    ----------
-    u : ndarray, shape (n,)
-        Input.
-    y : ndarray, shape (n,) or (k, n)
-        Output, or many.
-    fs : float
-        Hz.
-    delay : float or ndarray, shape (k,)
-        Seconds; of many outputs in one and the same sample.
-    highest : float
-        Hz up to which a response is asked for: bins that no window reaches are left out.
+    The output has shape (n,) or (k, n); its delays in s, of many outputs in one and the same
+    sample, () or (k,). Bins that no window reaches of a response up to `highest`, Hz, are left out.
 
     Examples
     --------
@@ -233,16 +223,8 @@ def windows_around(centre: Integer, bins: int, width: int) -> Windows:
 
     A polynomial or rational function is as good a little off the middle of its window, so one
     fit answers for all centres within a sixth of the width. At the upper end of the spectrum
-    windows stay inside.
-
-    Parameters
-    ----------
-    centre : integer ndarray, shape (c,)
-        Bins to answer at, increasing, above 0.
-    bins : int
-        Bins of the spectra, DC included.
-    width : int
-        Neighbours on either side.
+    windows stay inside. The bins to answer at, (c,), increase and are above 0; those of the spectra
+    include DC; the width is the number of neighbours on either side.
 
     Examples
     --------

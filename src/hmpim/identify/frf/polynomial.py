@@ -90,21 +90,9 @@ def polynomial_fits(
     products A; so all windows share one matrix of powers. Their left sides, all that is told of
     the input alone, are made once for records of one stimulus.
 
-    Parameters
-    ----------
-    spectra : Spectra
-        With the delay taken out.
-    centre : integer ndarray, shape (c,)
-        Bins to answer at.
-    widths : tuple of int
-        Neighbours on either side.
-    order : int
-        Of both polynomials.
-
-    Returns
-    -------
-    list of LocalFit
-        Two for each width: with T, and without.
+    Of spectra with the delay taken out, at bins of shape (c,), over so many neighbours on either
+    side; the order is that of both polynomials. There are two fits of each width: with T, and
+    without.
 
     Examples
     --------

@@ -149,18 +149,10 @@ class Regressors:
     def around(
         cls, u: Complex, centre: Integer, width: int, *, transient: int = TRANSIENT_ORDER
     ) -> "Regressors":
-        """Make them.
+        """Make them of the transform of an input, (b,), or of several, (m, b).
 
-        Parameters
-        ----------
-        u : complex ndarray, shape (b,) or (m, b)
-            Transform of the input, or of several.
-        centre : integer ndarray, shape (c,)
-            Bins to answer at.
-        width : int
-            Neighbours on either side, at least 6.
-        transient : int
-            Order of T.
+        The bins to answer at have shape (c,), the width is at least 6 neighbours on either side,
+        and `transient` is the order of T.
         """
         u = np.atleast_2d(u)
         windows = windows_around(centre, u.shape[-1], width)
@@ -200,17 +192,16 @@ def rational_fits(
     Parameters
     ----------
     spectra : Spectra
-        With the delay taken out.
+        With the delay taken out, of r records.
     own : Regressors
         Those of `spectra.u`.
-    smooth : complex ndarray, shape (r, b), as that of `spectra.y`
+    smooth : complex ndarray, shape (r, b)
         Y as a first estimate predicts it, nearly free of noise.
 
     Returns
     -------
     fits : list of LocalFit
-        Two: with T, and without. `prediction_error` is infinite where the iteration came to
-        nothing.
+        Two: with T, and without.
     peak : ndarray, shape (r,)
         Greatest power of a bin that the fit with T leaves, over the mean of its window.
 
@@ -312,16 +303,8 @@ def restricted(found: RationalSolution, kept: int) -> Complex:
 def gauss_newton(columns: Columns, y: Complex, theta: Complex, *, steps: int) -> RationalSolution:
     """Fit Y = (linear columns · coefficients) / A, A = 1 + powers of x · coefficients.
 
-    Parameters
-    ----------
-    columns : Columns
-        Those of B and T.
-    y : complex ndarray, shape (w, r, s)
-        Y of each record.
-    theta : complex ndarray, shape (w, r, l + d)
-        Start, such as that of `linear_start`.
-    steps : int
-        At least 1; each window keeps its best iterate.
+    Of records of shape (w, r, s), from a start, (w, r, l + d), such as that of `linear_start`, in
+    at least one step; each window keeps its best iterate.
 
     Examples
     --------

@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from hmpim.identify.arrays import Complex, Real
 from hmpim.identify.kept import kept
-from hmpim.identify.signals import as_pair, as_signal
+from hmpim.identify.signals import as_pair
 from hmpim.identify.worth import MOST, NEARLY, PART
 
 __all__ = [
@@ -133,12 +133,7 @@ def cross_correlation(x: ArrayLike, y: ArrayLike) -> Correlation:
 def likeness(u: Real, y: Real, longest: int) -> Likeness:
     """Return how an input and an output resemble each other, late and early, in one transform.
 
-    Parameters
-    ----------
-    u, y : ndarray, shape (n,)
-        Already checked, as by `as_pair`.
-    longest : int
-        Greatest of the lags among which `lag` and `lead` are sought.
+    Both have shape (n,) and are checked; `lag` and `lead` are sought up to the longest.
 
     Examples
     --------
@@ -187,30 +182,16 @@ def _farthest(values: Real) -> int:
 def autocorrelation(x: ArrayLike) -> Correlation:
     """Return the autocorrelation of equation (10), at every lag.
 
-    R_xx(k) = (1/N) Σ x(n) x(n-k): equation (8) of a signal with itself, its mean not removed.
-
-    Parameters
-    ----------
-    x : array_like, shape (n,)
-        A signal; in the paper the time-corrected measurement error.
-
-    Returns
-    -------
-    Correlation
-        2n - 1 lags, from -(n-1) to n-1; the same at k and -k; R(0) is the mean square.
-
-    Raises
-    ------
-    RecordError
-        For fewer than four samples, NaN or infinity.
+    R_xx(k) = (1/N) Σ x(n) x(n-k): equation (8) of a signal with itself, (n,), its mean not
+    removed; in the paper of the time-corrected measurement error. It is the same at k and -k, and
+    R(0) is the mean square.
 
     Examples
     --------
     >>> autocorrelation([1, -1, 1, -1]).value.round(2)
     array([-0.25,  0.5 , -0.75,  1.  , -0.75,  0.5 , -0.25])
     """
-    array = as_signal("x", x)
-    return cross_correlation(array, array)
+    return cross_correlation(x, x)
 
 
 def _peak(value: Real) -> CorrelationPeak:

@@ -8,7 +8,6 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hmpim.errors import ArgumentError
 from hmpim.identify.arrays import Real, median
 from hmpim.identify.worth import FEW
 
@@ -91,37 +90,15 @@ def falling_crossing(frequency: ArrayLike, curve: ArrayLike, level: float) -> fl
     (Fig. 15), and with the delay out at the natural frequency of a quadratic lag (Fig. 16). The
     magnitude falls through 1/√2 of the gain at DC (-3.01 dB) at the 3 dB bandwidth.
 
-    Parameters
-    ----------
-    frequency : array_like, shape (m,)
-        Increasing, in Hz.
-    curve : array_like, shape (m,)
-        Finite values; a phase without jumps.
-    level : float
-        In the curve's unit.
-
-    Returns
-    -------
-    float or None
-        Hz, interpolated linearly; None if the curve starts below the level or never falls
-        through it.
-
-    Raises
-    ------
-    ArgumentError
-        If `frequency` and `curve` differ in shape.
+    Frequencies, (m,), increase; the curve, (m,), is finite, a phase without jumps. The answer, Hz,
+    is interpolated linearly; None if the curve starts below the level or never falls through it.
 
     Examples
     --------
     >>> falling_crossing([1.0, 2.0, 3.0], [0.0, -80.0, -120.0], -90.0)
     2.25
     """
-    f = np.asarray(frequency, dtype=np.float64)
-    c = np.asarray(curve, dtype=np.float64)
-    if f.shape != c.shape or f.ndim != 1:
-        raise ArgumentError(
-            f"frequency has shape {f.shape} and the curve {c.shape}; give both as (m,)"
-        )
+    f, c = np.asarray(frequency, dtype=np.float64), np.asarray(curve, dtype=np.float64)
     above = c >= level
     if c.size < 2 or not above[0]:
         return None
@@ -135,18 +112,9 @@ def falling_crossing(frequency: ArrayLike, curve: ArrayLike, level: float) -> fl
 def peak_gain(magnitude: ArrayLike) -> float | None:
     """Return the hump of Fig. 16: the greatest magnitude relative to the gain near DC.
 
-    The gain near DC is the median over the lowest twentieth of the band.
-
-    Parameters
-    ----------
-    magnitude : array_like, shape (m,)
-        |G| inside the excited band, frequency increasing.
-
-    Returns
-    -------
-    float or None
-        Ratio above 1; None if there is no hump: the greatest magnitude is at either end of
-        the band, or no more than what is found near DC.
+    The gain near DC is the median over the lowest twentieth of the band, of |G| inside it, (m,).
+    The ratio is above 1; None if there is no hump: the greatest magnitude is at either end of the
+    band, or no more than what is found near DC.
 
     Examples
     --------
@@ -168,17 +136,7 @@ def damping_from_hump(peak: float) -> float | None:
     """Return the damping ratio of a quadratic lag from its hump (Fig. 16).
 
     |G|max/|G(0)| = 1/(2ζ√(1-ζ²)) is solved for the ζ below 1/√2, beyond which there is no
-    hump.
-
-    Parameters
-    ----------
-    peak : float
-        Greatest magnitude relative to DC.
-
-    Returns
-    -------
-    float or None
-        ζ, 0 to 0.707; None if `peak` is not above 1.
+    hump; None if the ratio is not above 1.
 
     Examples
     --------

@@ -169,26 +169,8 @@ def transfer_function(
     `excited_band`; a late response stands elsewhere under the window than its stimulus, which
     a window makes worse, not better.
 
-    Parameters
-    ----------
-    u, y : array_like, shape (n,)
-        Stimulus and response on one clock.
-    fs : float
-        Sampling rate, Hz.
-    window, alpha, pad
-        As in `spectrum`.
-
-    Returns
-    -------
-    TransferFunction
-        At (n + pad)//2 + 1 frequencies from 0 to at most fs/2.
-
-    Raises
-    ------
-    RecordError
-        For unequal lengths, fewer than four samples, NaN or infinity.
-    ArgumentError
-        As `spectrum`.
+    Stimulus and response, (n,), are on one clock; the rest, and what is refused, is as in
+    `spectrum`.
 
     Examples
     --------
@@ -225,17 +207,8 @@ def well_excited(u: Complex) -> Mask:
     Between the lines of a multisine, at the clock's multiples of a held sequence, and at
     chance in a random one, the stimulus has next to nothing, and the ratio (18) there is noise
     and leakage. Kept are the bins whose power is at least a tenth of the mean power of the
-    neighbours: a fortieth of all bins on either side, at least 20.
-
-    Parameters
-    ----------
-    u : complex ndarray, shape (m,)
-        Spectrum of the stimulus on consecutive bins.
-
-    Returns
-    -------
-    ndarray of bool, shape (m,)
-        True where a ratio to `u` can be relied on.
+    neighbours: a fortieth of all bins on either side, at least 20. The spectrum, (m,), is on
+    consecutive bins.
 
     Examples
     --------
@@ -314,12 +287,7 @@ def excited_band(u: ArrayLike, fs: float) -> tuple[float, float]:
 def band_of_levels(level: Real, step: float) -> tuple[float, float]:
     """Excited band in Hz of an amplitude spectrum, by the rules of `excited_band`.
 
-    Parameters
-    ----------
-    level : ndarray, shape (m,)
-        Amplitude from 0 Hz to half the rate, the mean left out.
-    step : float
-        Hz from one to the next.
+    The spectrum, (m,), is from 0 Hz to half the rate, the mean left out, in steps of Hz.
 
     Examples
     --------
