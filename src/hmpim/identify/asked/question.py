@@ -25,39 +25,21 @@ __all__ = ["Question", "recognise_software"]
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Question:
-    """Which model leads from the inputs of a record to one of its outputs.
+    """Which model leads from the inputs of a record to one of its outputs."""
 
-    Parameters
-    ----------
-    record, aligned : Record, Aligned
-        As recorded, and on one clock.
-    output : Signal
-        The output that is asked for.
-    intersample : {'zoh', 'foh', 'bandlimited', 'sampled'} or None
-        What the inputs do between their samples; None where the data are to choose.
-    structures : tuple of str
-        Dynamics to try.
-    inputs : InputSet or None
-        How well several inputs are told apart; None of one.
-    instrument : Instrument or None
-        What a loop's reference moves of the input.
-    swapped : Finding or None
-        Said where the input follows the output: then only plain structures are tried.
-    exact : bool
-        Whether a filter between samples explains all but rounding.
-    limited : LimitedCommand or None
-        Of a unit that follows its command up to some speed: then the input is what it follows.
-    """
-
+    # as recorded, and on one clock
     record: Record
     aligned: Aligned
-    output: Signal
+    output: Signal  # the output that is asked for
+    # what the inputs do between their samples; None where the data are to choose
     intersample: Intersample | None
-    structures: tuple[StructureName, ...]
-    inputs: InputSet | None
-    instrument: Instrument | None
+    structures: tuple[StructureName, ...]  # dynamics to try
+    inputs: InputSet | None  # how well several inputs are told apart; None of one
+    instrument: Instrument | None  # what a loop's reference moves of the input
+    # said where the input follows the output: then only plain structures are tried
     swapped: Finding | None = None
-    exact: bool = False
+    exact: bool = False  # whether a filter between samples explains all but rounding
+    # of a unit that follows its command up to some speed: then the input is what it follows
     limited: LimitedCommand | None = None
 
     @property

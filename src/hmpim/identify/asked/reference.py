@@ -49,22 +49,13 @@ _NEGLIGIBLE = 1e-4
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Instrument:
-    """A reference, and what it moves.
+    """A reference, and what it moves."""
 
-    Parameters
-    ----------
-    name : str
-        Of the reference.
-    reference, u : ndarray, shape (n,)
-        Its samples, and the input's.
-    moved : ndarray, shape (n,)
-        The part of the input that it moves.
-    """
-
-    name: str
+    name: str  # of the reference
+    # (n,): its samples, and the input's
     reference: Real
     u: Real
-    moved: Real
+    moved: Real  # (n,): the part of the input that it moves
 
     def finding(self) -> Finding:
         """Say how the pair was identified."""

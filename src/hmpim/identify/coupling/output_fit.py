@@ -41,36 +41,21 @@ _UNSEEN = 1e-13
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class OutputFit:
-    """Fits of one output to each input.
+    """Fits of one output to each input."""
 
-    Parameters
-    ----------
-    fits : tuple of JointFit
-        One for each input; its output is what the other inputs leave over. One that the output does
-        not follow at all is not `related`.
-    covariances : tuple of ndarray, shape (p_i, p_i)
-        Of each fit's parameters, all fits considered together.
-    strong : tuple of bool
-        Whether the input's contribution is large beside the output, not a coupling.
-    lags : tuple of Lag or None
-        Delay and lag of couplings of no more than first order.
-    drifting : Drifting or None
-        The bias's drift, of an output to one input; the fit's output is without it.
-    humming : Humming or None
-        Its hum, likewise.
-    steady : ndarray, shape (n,), or None
-        Where it drifts, what a fit with a constant bias predicts.
-    gaining : GainChange or None
-        What is known of a gain that changes, of an output to one input.
-    """
-
+    # one for each input; its output is what the other inputs leave over. One that the output does
+    # not follow at all is not `related`.
     fits: tuple[JointFit, ...]
+    # (p_i, p_i): of each fit's parameters, all fits considered together
     covariances: tuple[Real, ...]
+    # whether the input's contribution is large beside the output, not a coupling
     strong: tuple[bool, ...]
-    lags: tuple[Lag | None, ...]
+    lags: tuple[Lag | None, ...]  # delay and lag of couplings of no more than first order
+    # the bias's drift, of an output to one input; the fit's output is without it
     drifting: Drifting | None = None
-    humming: Humming | None = None
-    steady: Real | None = None
+    humming: Humming | None = None  # its hum, likewise
+    steady: Real | None = None  # (n,): where it drifts, what a fit with a constant bias predicts
+    # what is known of a gain that changes, of an output to one input
     gaining: GainChange | None = None
 
     @classmethod

@@ -36,19 +36,12 @@ _MANY = 1e6
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Responses:
-    """Response of one output to each input, and how much of it all inputs explain.
+    """Response of one output to each input, and how much of it all inputs explain."""
 
-    Parameters
-    ----------
-    columns : tuple of FrequencyResponse
-        One for each input, at the frequencies that it excites and is told apart; `coherence`
-        is the partial one.
-    coherence : OutputCoherence
-        The multiple one.
-    """
-
+    # one for each input, at the frequencies that it excites and is told apart; `coherence` is the
+    # partial one
     columns: tuple[FrequencyResponse, ...]
-    coherence: OutputCoherence
+    coherence: OutputCoherence  # the multiple one
 
 
 def inputs_of(aligned: Aligned, record: Record) -> InputSet:

@@ -62,21 +62,14 @@ _CLOSE = 0.98 * ALMOST
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Column:
-    """One parameter of many records, each array of shape (N,); NaN where there is none.
+    """One parameter of many records, each array of shape (N,); NaN where there is none."""
 
-    Parameters
-    ----------
-    value, std, low, high : ndarray, shape (N,)
-        As `Estimate` has them; `std` is NaN where an interval covers several models.
-    unit : str
-        Of all of them.
-    """
-
+    # (N,): as `Estimate` has them; `std` is NaN where an interval covers several models
     value: Real
     std: Real
     low: Real
     high: Real
-    unit: str
+    unit: str  # of all of them
 
     @classmethod
     def empty(cls, count: int, unit: str) -> "Column":
@@ -115,40 +108,20 @@ def parameters_of(columns: Mapping[str, Column], i: int) -> Parameters:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Group:
-    """Records for which one assumption is taken; k of them.
+    """Records for which one assumption is taken; k of them."""
 
-    Parameters
-    ----------
-    fit : Fits
-        All records under that assumption.
-    some : integer ndarray, shape (k,)
-        Which they are.
-    others : sequence of (Fits, ndarray of bool)
-        All records under each other assumption, and of which of these it stays possible.
-    errors : Errors
-        What the fit leaves uncertain.
-    residual : ndarray, shape (k, n)
-        What it leaves over.
-    alone, spanned : mapping of str to Column
-        Figures with intervals of this fit alone, and such as cover all that stays possible.
-    tails : mapping of int to Tails
-        Of those that ask for one more pole, by their place among these.
-    sound : ndarray of bool, shape (k,)
-        As in `FleetFit`.
-    codes : sequence of tuple of str
-        As in `FleetFit`.
-    """
-
-    fit: Fits
-    some: NDArray[np.intp]
+    fit: Fits  # all records under that assumption
+    some: NDArray[np.intp]  # (k,): which they are
+    # all records under each other assumption, and of which of these it stays possible
     others: list[tuple[Fits, Mask]]
-    errors: Errors
-    residual: Real
+    errors: Errors  # what the fit leaves uncertain
+    residual: Real  # (k, n): what it leaves over
+    # figures with intervals of this fit alone, and such as cover all that stays possible
     alone: dict[str, Column]
     spanned: dict[str, Column]
-    tails: dict[int, Tails]
-    sound: Mask
-    codes: list[tuple[str, ...]]
+    tails: dict[int, Tails]  # of those that ask for one more pole, by their place among these
+    sound: Mask  # (k,): as in `FleetFit`
+    codes: list[tuple[str, ...]]  # as in `FleetFit`
 
     def has_tail(self, k: int) -> bool:
         """Whether intervals of one of them cover one more pole or zero."""
@@ -161,30 +134,17 @@ class Group:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class FleetFit:
-    """Parameters of many records.
+    """Parameters of many records."""
 
-    Parameters
-    ----------
-    columns : mapping of str to Column
-        Parameters by name, without the paper's delay; NaN in those of a record that is not sound.
-    sound : ndarray of bool, shape (N,)
-        Whether they are what `identify` would say.
-    intersample : tuple of {'zoh', 'foh', 'bandlimited'}
-        The likeliest assumption for each.
-    codes : tuple of tuple of str
-        Codes of what `identify` would say beside it: 'intersample' where another assumption
-        would move the delay and is not excluded, 'structure' where one more pole is as likely.
-    fit_percent : ndarray, shape (N,)
-        100 (1 - ||y - ŷ|| / ||y - mean y||).
-    groups : tuple of Group
-        The records by the assumption that is taken, and all that was found on the way.
-    """
-
+    # parameters by name, without the paper's delay; NaN in those of a record that is not sound
     columns: Mapping[str, Column]
-    sound: Mask
-    intersample: tuple[Intersample, ...]
+    sound: Mask  # (N,): whether they are what `identify` would say
+    intersample: tuple[Intersample, ...]  # the likeliest assumption for each
+    # codes of what `identify` would say beside it: 'intersample' where another assumption would
+    # move the delay and is not excluded, 'structure' where one more pole is as likely
     codes: tuple[tuple[str, ...], ...]
-    fit_percent: Real
+    fit_percent: Real  # (N,): 100 (1 - ||y - ŷ|| / ||y - mean y||)
+    # the records by the assumption that is taken, and all that was found on the way
     groups: tuple[Group, ...]
 
 

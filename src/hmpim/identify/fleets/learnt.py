@@ -57,65 +57,31 @@ _FEWEST = 5
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Member:
-    """The surface under one assumption.
+    """The surface under one assumption."""
 
-    Parameters
-    ----------
-    intersample : {'zoh', 'foh', 'bandlimited'}
-        What the stimulus does between its samples.
-    basis : ndarray, shape (r, n)
-        Orthonormal, each row without mean.
-    surface : Surface
-        Places in the basis, and the mean in the last column, of the unit-gain response; a function
-        of the delay in samples and of the logarithms of ω and ζ.
-    grown : Surface
-        Places in the basis of what one more pole adds, over the square of its time constant.
-    lost : float
-        Largest root of the sum of squares of what the basis and the surface leave out.
-    source : SampledInput
-        The stimulus, prepared.
-    """
-
-    intersample: Intersample
-    basis: Real
+    intersample: Intersample  # what the stimulus does between its samples
+    basis: Real  # (r, n): orthonormal, each row without mean
+    # places in the basis, and the mean in the last column, of the unit-gain response; a function of
+    # the delay in samples and of the logarithms of ω and ζ
     surface: Surface
+    # places in the basis of what one more pole adds, over the square of its time constant
     grown: Surface
-    lost: float
-    source: SampledInput
+    lost: float  # largest root of the sum of squares of what the basis and the surface leave out
+    source: SampledInput  # the stimulus, prepared
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Fleet:
-    """What records of one stimulus share.
+    """What records of one stimulus share."""
 
-    Parameters
-    ----------
-    u : ndarray, shape (n,)
-        The stimulus.
-    fs : float
-        Rate in Hz.
-    band : (float, float)
-        Excited band in Hz.
-    structure : Structure
-        Of every unit.
-    natural : {'zoh', 'foh', 'bandlimited'}
-        Assumption that stands unless another is likelier at odds of 20.
-    members : tuple of Member
-        One for each assumption that is open.
-    figures : Surface
-        What is read off a model of unit gain, in the order of `names`.
-    names : tuple of str
-        Fields of `Parameters`.
-    """
-
-    u: Real
-    fs: float
-    band: tuple[float, float]
-    structure: Structure
-    natural: Intersample
-    members: tuple[Member, ...]
-    figures: Surface
-    names: tuple[str, ...]
+    u: Real  # (n,): the stimulus
+    fs: float  # rate in Hz
+    band: tuple[float, float]  # excited band in Hz
+    structure: Structure  # of every unit
+    natural: Intersample  # assumption that stands unless another is likelier at odds of 20
+    members: tuple[Member, ...]  # one for each assumption that is open
+    figures: Surface  # what is read off a model of unit gain, in the order of `names`
+    names: tuple[str, ...]  # fields of `Parameters`
 
     @property
     def highest(self) -> float:

@@ -23,21 +23,12 @@ __all__ = ["Tails", "alone_of", "joint_of", "with_tails"]
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Tails:
-    """What one more pole or zero leaves open.
+    """What one more pole or zero leaves open."""
 
-    Parameters
-    ----------
-    parameters : Parameters
-        With intervals that cover it where the record asks for it by more than chance.
-    open : bool
-        Whether one more pole is as likely, but for its price.
-    delay : float
-        The delay with that pole, in s.
-    """
-
+    # with intervals that cover it where the record asks for it by more than chance
     parameters: Parameters
-    open: bool
-    delay: float = 0.0
+    open: bool  # whether one more pole is as likely, but for its price
+    delay: float = 0.0  # the delay with that pole, in s
 
 
 def with_tails(fleet: Fleet, member: Member, place: Real, y: Real, own: Parameters) -> Tails | None:

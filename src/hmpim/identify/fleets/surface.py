@@ -50,17 +50,6 @@ def places_in(low: Real, high: Real, degree: int) -> Real:
 class Surface:
     """A function on a box, with values of k numbers.
 
-    Parameters
-    ----------
-    low, high : ndarray, shape (p,)
-        The box.
-    powers : ndarray of int, shape (c, p)
-        Degrees of each product of Chebyshev polynomials.
-    weights : ndarray, shape (c, k)
-        Their factors.
-    error : ndarray, shape (k,)
-        Largest error at points that took no part in the fit.
-
     Examples
     --------
     >>> low, high = np.array([1.0, 0.0]), np.array([2.0, 0.5])
@@ -71,11 +60,12 @@ class Surface:
     (True, True)
     """
 
+    # (p,): the box
     low: Real
     high: Real
-    powers: NDArray[np.int64]
-    weights: Real
-    error: Real
+    powers: NDArray[np.int64]  # (c, p): degrees of each product of Chebyshev polynomials
+    weights: Real  # (c, k): their factors
+    error: Real  # (k,): largest error at points that took no part in the fit
 
     @classmethod
     def fitted(cls, low: Real, high: Real, places: Real, values: Real, *, degree: int) -> "Surface":

@@ -73,24 +73,12 @@ _NOTHING = Nonlinearity(share=0.0, even=0.0, odd=0.0, noise=1.0, linear=0.0, non
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Whole:
-    """What the records of a fleet share beyond their parameters.
+    """What the records of a fleet share beyond their parameters."""
 
-    Parameters
-    ----------
-    fleet : Fleet
-        The parameters' part.
-    simpler : tuple of Simpler
-        Structures that are weighed against that of the fleet.
-    sweep : SweepPhase or None
-        The stimulus' phase, if it is a sweep.
-    shapes : ndarray, shape (m, n)
-        What nonlinearities leave of the unit in the middle.
-    """
-
-    fleet: Fleet
-    simpler: tuple[Simpler, ...]
-    sweep: SweepPhase | None
-    shapes: Real
+    fleet: Fleet  # the parameters' part
+    simpler: tuple[Simpler, ...]  # structures that are weighed against that of the fleet
+    sweep: SweepPhase | None  # the stimulus' phase, if it is a sweep
+    shapes: Real  # (m, n): what nonlinearities leave of the unit in the middle
 
 
 def learn_whole(fleet: Fleet, pairs: Sequence[PairIdentification]) -> Whole | None:

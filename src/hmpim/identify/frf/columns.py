@@ -25,29 +25,14 @@ class Columns:
 
     The products of all columns are moments Σ conj(C) C' x^p, so that few sums give all of them;
     what the carriers bring to these is multiplied out once, for every record and every step.
-
-    Parameters
-    ----------
-    products : ndarray, shape (w, s, k)
-        Real and imaginary parts of conj(C) C' x^p of each two carriers.
-    mirrored : complex ndarray, shape (w, s, h)
-        conj(C) x^p, p up to the order and that of A.
-    orders : tuple of int
-        Highest power with each.
-    powers : ndarray, shape (s, p)
-        x^p, p = 0 up to twice the highest power of all.
-    slopes : complex ndarray, shape (d, s)
-        Powers of x that A is made of.
-    linear : complex ndarray, shape (w, l, s)
-        The columns themselves.
     """
 
-    products: Real
-    mirrored: Complex
-    orders: tuple[int, ...]
-    powers: Real
-    slopes: Complex
-    linear: Complex
+    products: Real  # (w, s, k): real and imaginary parts of conj(C) C' x^p of each two carriers
+    mirrored: Complex  # (w, s, h): conj(C) x^p, p up to the order and that of A
+    orders: tuple[int, ...]  # highest power with each
+    powers: Real  # (s, p): x^p, p = 0 up to twice the highest power of all
+    slopes: Complex  # (d, s): powers of x that A is made of
+    linear: Complex  # (w, l, s): the columns themselves
 
     @classmethod
     def of(cls, carriers: Complex, orders: tuple[int, ...], x: Real) -> "Columns":
@@ -144,23 +129,15 @@ def _multiplied(parts: list[tuple[Any, int]], powers: Real, kind: type) -> Any:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class _Places:
-    """Where the sums of `Columns.normal` stand, real and imaginary parts in turns.
+    """Where the sums of `Columns.normal` stand, real and imaginary parts in turns."""
 
-    Parameters
-    ----------
-    ends : tuple of int
-        Where the sums of each product of signals end: of 1 / |A|², of |fitted|² / |A|², of
-        fitted / |A|², of the right side over A's conjugate, and of that with fitted.
-    gram, right : integer ndarray, shapes (2 q q,) and (2 q,)
-        Which of them.
-    sign : ndarray, shape (2 q q,)
-        -1 where a sum's mirror or negative is asked for, 0 where a part is none.
-    """
-
+    # Where the sums of each product of signals end: of 1 / |A|², of |fitted|² / |A|², of fitted /
+    # |A|², of the right side over A's conjugate, and of that with fitted
     ends: tuple[int, ...]
+    # (2 q q,), (2 q,): which of them
     gram: Integer
     right: Integer
-    sign: Real
+    sign: Real  # (2 q q,): -1 where a sum's mirror or negative is asked for, 0 where a part is none
 
 
 @cache

@@ -41,44 +41,23 @@ Integer = NDArray[np.int64]
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Spectra:
-    """Transforms of a record whose delay is taken out.
+    """Transforms of a record whose delay is taken out."""
 
-    Parameters
-    ----------
-    frequency : ndarray, shape (b,)
-        Hz, from 0 to below fs/2.
-    u, y : complex ndarray, shape (b,)
-        Input and output; 0 at DC. Of many outputs `y` has shape (..., b).
-    """
-
-    frequency: Real
+    frequency: Real  # (b,): Hz, from 0 to below fs/2
+    # (b,): input and output; 0 at DC. Of many outputs `y` has shape (..., b).
     u: Complex
     y: Complex
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Windows:
-    """Windows of one width, and which of them answers for which centre.
+    """Windows of one width, and which of them answers for which centre."""
 
-    Parameters
-    ----------
-    start : integer ndarray, shape (w,)
-        First bin of each window, negative below DC.
-    x : ndarray, shape (s,)
-        Place of a window's bins, -1 to 1.
-    counted : integer ndarray, shape (w,)
-        Bins without the one at DC.
-    near : integer ndarray, shape (c,)
-        Window of each centre.
-    place : integer ndarray, shape (c,)
-        Place of each centre in its window.
-    """
-
-    start: Integer
-    x: Real
-    counted: Integer
-    near: Integer
-    place: Integer
+    start: Integer  # (w,): first bin of each window, negative below DC
+    x: Real  # (s,): place of a window's bins, -1 to 1
+    counted: Integer  # (w,): bins without the one at DC
+    near: Integer  # (c,): window of each centre
+    place: Integer  # (c,): place of each centre in its window
 
     @property
     def size(self) -> int:
@@ -117,26 +96,13 @@ class LocalFit:
     """What one local method at one width says at every centre; all of shape (c,).
 
     Of many outputs at once they have shape (..., c), or one that is broadcast to it.
-
-    Parameters
-    ----------
-    response : complex ndarray
-        G; with m inputs at once (c, m), as are `spread` and `power`.
-    spread : ndarray
-        Variance of G where the noise of a bin of Y is 1.
-    noise : ndarray
-        Variance of a bin of Y, from the residual over the window.
-    power : ndarray
-        Mean |U|² in the window.
-    prediction_error : ndarray
-        Square of what the fit without a bin misses there.
     """
 
-    response: Complex
-    spread: Real
-    noise: Real
-    power: Real
-    prediction_error: Real
+    response: Complex  # G; with m inputs at once (c, m), as are `spread` and `power`
+    spread: Real  # variance of G where the noise of a bin of Y is 1
+    noise: Real  # variance of a bin of Y, from the residual over the window
+    power: Real  # mean |U|² in the window
+    prediction_error: Real  # square of what the fit without a bin misses there
 
     def of(self, records: NDArray[Any]) -> "LocalFit":
         """Return what it says of some of many records."""

@@ -32,53 +32,27 @@ _CHUNK = 1_000_000
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class _Way:
-    """What the input says of all windows with T, or without: the columns of G, then those of T.
+    """What the input says of all windows with T, or without: the columns of G, then those of T."""
 
-    Parameters
-    ----------
-    inverse : ndarray, shape (w, q, q)
-        Of the normal equations.
-    spread, leverage : ndarray, shape (k, c)
-        Variance of G where the noise of a bin is 1, and what a centre's own bin weighs in its fit.
-    freedom : integer ndarray, shape (w,)
-        Bins of a window less coefficients.
-    """
-
-    inverse: NDArray[np.inexact]
+    inverse: NDArray[np.inexact]  # (w, q, q): of the normal equations
+    # (k, c): variance of G where the noise of a bin is 1, and what a centre's own bin weighs in its
+    # fit
     spread: Real
     leverage: Real
-    freedom: Integer
+    freedom: Integer  # (w,): bins of a window less coefficients
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class _Solver:
-    """What the input says of windows of k widths, those of each width after the last's.
+    """What the input says of windows of k widths, those of each width after the last's."""
 
-    Parameters
-    ----------
-    windows : tuple of Windows
-        Of each width.
-    powers : tuple of ndarray, shape (s, order + 1)
-        x^p on a window's bins.
-    near : integer ndarray, shape (k, c)
-        Window of each centre.
-    here : ndarray, shape (k, c, order + 1)
-        x^p at each centre.
-    size : ndarray, shape (w,)
-        By what G's columns are scaled.
-    row : complex ndarray, shape (k, c, q)
-        Conjugates of the columns at each centre.
-    ways : tuple of _Way
-        With T, and without.
-    """
-
-    windows: tuple[Windows, ...]
-    powers: tuple[Real, ...]
-    near: Integer
-    here: Real
-    size: Real
-    row: Complex
-    ways: tuple[_Way, ...]
+    windows: tuple[Windows, ...]  # of each width
+    powers: tuple[Real, ...]  # (s, order + 1): x^p on a window's bins
+    near: Integer  # (k, c): window of each centre
+    here: Real  # (k, c, order + 1): x^p at each centre
+    size: Real  # (w,): by what G's columns are scaled
+    row: Complex  # (k, c, q): conjugates of the columns at each centre
+    ways: tuple[_Way, ...]  # with T, and without
 
 
 def polynomial_fits(

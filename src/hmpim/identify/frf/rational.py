@@ -57,45 +57,27 @@ _RIDGE = 1e-13
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class RationalState:
-    """An iterate at every window, of each record.
+    """An iterate at every window, of each record."""
 
-    Parameters
-    ----------
-    theta : complex ndarray, shape (w, r, q)
-        Coefficients of the linear columns, then of A without its constant 1.
-    over, fitted, left : complex ndarray, shape (w, r, s)
-        1 / A, Y as fitted, and what that leaves of Y, on the window's bins.
-    weight : ndarray, shape (w, r, s)
-        1 / |A|².
-    squares : ndarray, shape (w, r)
-        Σ |Y - fitted|²; infinite where the iterate ran off.
-    """
-
+    # (w, r, q): coefficients of the linear columns, then of A without its constant 1
     theta: Complex
+    # (w, r, s): 1 / A, Y as fitted, and what that leaves of Y, on the window's bins
     over: Complex
     fitted: Complex
     left: Complex
-    weight: Real
-    squares: Real
+    weight: Real  # (w, r, s): 1 / |A|²
+    squares: Real  # (w, r): Σ |Y - fitted|²; infinite where the iterate ran off
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class RationalSolution:
-    """Where the iteration ended, and the inverse of the products of the derivatives there.
+    """Where the iteration ended, and the inverse of the products of the derivatives there."""
 
-    Parameters
-    ----------
-    state : RationalState
-        The best iterate of each window.
-    before : RationalState
-        That before the last step, which was small: derivatives are taken there.
-    inverse : complex ndarray, shape (w, r, q, q)
-        Of the products of the conjugates of the derivatives with them: the covariance of `theta`
-        where the noise of a bin is 1. Of a polynomial, it is that of the linear columns alone.
-    """
-
-    state: RationalState
-    before: RationalState
+    state: RationalState  # the best iterate of each window
+    before: RationalState  # that before the last step, which was small: derivatives are taken there
+    # (w, r, q, q): of the products of the conjugates of the derivatives with them: the covariance
+    # of `theta` where the noise of a bin is 1. Of a polynomial, it is that of the linear columns
+    # alone.
     inverse: Complex
 
     def is_rational(self, columns: Columns) -> bool:
@@ -122,28 +104,15 @@ def _at(values: NDArray[Any], place: Integer) -> NDArray[Any]:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Regressors:
-    """What the input alone says of windows of one width.
+    """What the input alone says of windows of one width."""
 
-    Parameters
-    ----------
-    windows : Windows
-        Of this width.
-    power : ndarray, shape (w, m)
-        Mean |U|² of each, to which its m inputs are scaled.
-    both, plain : Columns
-        With T, and without.
-    place : integer ndarray, shape (w, k)
-        Centres of each window, the last repeated.
-    centres : integer ndarray, shape (c,)
-        Each centre among these.
-    """
-
-    windows: Windows
-    power: Real
+    windows: Windows  # of this width
+    power: Real  # (w, m): mean |U|² of each, to which its m inputs are scaled
+    # with T, and without
     both: Columns
     plain: Columns
-    place: Integer
-    centres: Integer
+    place: Integer  # (w, k): centres of each window, the last repeated
+    centres: Integer  # (c,): each centre among these
 
     @classmethod
     def around(

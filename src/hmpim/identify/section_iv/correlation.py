@@ -23,18 +23,10 @@ __all__ = [
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Correlation:
-    """A correlation over its lags.
+    """A correlation over its lags."""
 
-    Parameters
-    ----------
-    lag : integer ndarray, shape (m,)
-        Lags k in samples, increasing by one.
-    value : ndarray, shape (m,)
-        R(k), in the product of the two signals' units.
-    """
-
-    lag: NDArray[np.int64]
-    value: Real
+    lag: NDArray[np.int64]  # (m,): lags k in samples, increasing by one
+    value: Real  # (m,): R(k), in the product of the two signals' units
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -47,31 +39,20 @@ class CorrelationPeak:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Likeness:
-    """How far two signals resemble each other when the output is late, and when it is early.
+    """How far two signals resemble each other when the output is late, and when it is early."""
 
-    Parameters
-    ----------
-    peak : CorrelationPeak
-        The paper's, of the signals as they are, over the lags at which at least half of the record
-        overlaps; of the signals less their means where those, at the paper's, resemble each other
-        by less than half of what they do elsewhere: a bias of many times the motion has its own
-        peak.
-    ahead : float
-        Of the signals less their means, the correlation of largest magnitude where the output
-        comes first.
-    behind : (float, float)
-        The greatest and the least where it comes last, or at once.
-    lag : int
-        Lag in samples, from 0 to the longest asked for, at which that correlation has its largest
-        magnitude.
-    lead : int or None
-        Negative lag, as far at most, at which it is larger still; None if there is none.
-    """
-
+    # the paper's, of the signals as they are, over the lags at which at least half of the record
+    # overlaps; of the signals less their means where those, at the paper's, resemble each other by
+    # less than half of what they do elsewhere: a bias of many times the motion has its own peak
     peak: CorrelationPeak
+    # of the signals less their means, the correlation of largest magnitude where the output comes
+    # first
     ahead: float
-    behind: tuple[float, float]
+    behind: tuple[float, float]  # the greatest and the least where it comes last, or at once
+    # lag in samples, from 0 to the longest asked for, at which that correlation has its largest
+    # magnitude
     lag: int
+    # negative lag, as far at most, at which it is larger still; None if there is none
     lead: int | None
 
     @property

@@ -35,33 +35,19 @@ _EDGE = 10 ** (-12 / 20)
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Spectrum:
-    """Discrete Fourier transform of a real signal, its non-negative frequencies.
+    """Discrete Fourier transform of a real signal, its non-negative frequencies."""
 
-    Parameters
-    ----------
-    frequency : ndarray, shape (m,)
-        Hz, from 0 to at most fs/2.
-    value : complex ndarray, shape (m,)
-        X of equation (17), in the signal's unit, not divided by the number of samples.
-    """
-
-    frequency: Real
+    frequency: Real  # (m,): Hz, from 0 to at most fs/2
+    # (m,): X of equation (17), in the signal's unit, not divided by the number of samples
     value: Complex
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class TransferFunction:
-    """Ratio of response to stimulus over frequency.
+    """Ratio of response to stimulus over frequency."""
 
-    Parameters
-    ----------
-    frequency : ndarray, shape (m,)
-        Hz, increasing.
-    response : complex ndarray, shape (m,)
-        G(jω), output unit per input unit; NaN where the stimulus has nothing at all.
-    """
-
-    frequency: Real
+    frequency: Real  # (m,): Hz, increasing
+    # (m,): G(jω), output unit per input unit; NaN where the stimulus has nothing at all
     response: Complex
 
 
