@@ -12,7 +12,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from hmpim.identify.arrays import Complex, Mask, Real
+from hmpim.identify.arrays import Mask, Real
 from hmpim.identify.chance import EXCLUDED, FALSE_ALARM
 from hmpim.identify.effects.lost import stand_out
 from hmpim.identify.fitting.beginning import REACH, ringing_of, stand_out_of
@@ -21,10 +21,10 @@ from hmpim.identify.fitting.halves import halves_of, products_of_halves
 from hmpim.identify.fleets.fleet import Fleet, Group
 from hmpim.identify.judgement.feedback import chances_of_an_answer
 from hmpim.identify.judgement.residual import folded_power
-from hmpim.identify.kept import kept
 from hmpim.identify.nonlinear.evidence import are_curved
 from hmpim.identify.nonlinear.harmonics import any_harmonics
 from hmpim.identify.nonlinear.sweep_phase import SweepPhase
+from hmpim.identify.section_iv.correlation import likeness
 from hmpim.identify.signals import longest_lag
 from hmpim.identify.worth import BLURRED, FEW, MUCH, PART, WORTH
 
@@ -52,8 +52,9 @@ def are_quiet(
     structures leave of each; `sweep` is the stimulus' phase, if it is a sweep.
     """
     quiet = group.sound & _is_told(fleet, group, behind)
-    lags, ahead = _lags(fleet.u, outputs)
-    quiet &= ~ahead & ~stand_out(group.residual)
+    alike = [likeness(fleet.u, output, longest_lag(fleet.u.size)) for output in outputs]
+    lags = np.array([one.lag for one in alike])
+    quiet &= ~stand_out(group.residual) & [one.lead is None for one in alike]
     for test in (_unfolded, _unanswered):
         some = np.flatnonzero(quiet)
         quiet[some] = test(fleet, group, some)
@@ -87,21 +88,6 @@ def _is_told(fleet: Fleet, group: Group, behind: Real) -> Mask:
     slowest = np.where(zeta < 1.0, 1.0 / (zeta * omega), slowest)
     told &= np.maximum(fit.theta[group.some, 0], 0.0) + FORGETS * slowest <= n
     return np.asarray(told & (slowest <= MUCH * n))
-
-
-def _lags(u: Real, outputs: Real) -> tuple[Places, Mask]:
-    """Lag of the greatest likeness of each output, and whether it is greater ahead."""
-    longest = longest_lag(u.size)
-    length = scipy.fft.next_fast_len(u.size + longest + 1, real=True)
-    spectra = scipy.fft.rfft(outputs - outputs.mean(axis=1, keepdims=True), length)
-    likeness = np.abs(scipy.fft.irfft(np.conj(_transform(u, length)) * spectra, length))
-    late, early = likeness[:, : longest + 1], likeness[:, length - longest :]
-    return late.argmax(axis=1), early.max(axis=1) >= late.max(axis=1)
-
-
-@kept
-def _transform(u: Real, length: int) -> Complex:
-    return np.asarray(scipy.fft.rfft(u - u.mean(), length), dtype=np.complex128)
 
 
 def _unfolded(fleet: Fleet, group: Group, some: Places) -> Mask:

@@ -10,6 +10,7 @@ from itertools import product
 
 import numpy as np
 import scipy
+from numpy.polynomial import chebyshev
 from numpy.typing import NDArray
 
 from hmpim.identify.arrays import Mask, Real
@@ -123,11 +124,5 @@ def _multiplied(each: Real, powers: NDArray[np.int64]) -> Real:
 
 def _polynomials(x: Real, degree: int) -> tuple[Real, Real]:
     """Chebyshev polynomials up to a degree, and their slopes, (n, p, degree + 1), at (n, p)."""
-    first = np.ones((*x.shape, degree + 1))
-    rate = np.zeros_like(first)
-    if degree:
-        first[..., 1], rate[..., 1] = x, 1.0
-    for k in range(2, degree + 1):
-        first[..., k] = 2 * x * first[..., k - 1] - first[..., k - 2]
-        rate[..., k] = 2 * first[..., k - 1] + 2 * x * rate[..., k - 1] - rate[..., k - 2]
-    return first, rate
+    first = np.asarray(chebyshev.chebvander(x, degree), dtype=np.float64)
+    return first, first[..., :-1] @ chebyshev.chebder(np.eye(degree + 1))
