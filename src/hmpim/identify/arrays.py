@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Complex", "Mask", "Real", "every_of", "median"]
+__all__ = ["Complex", "Mask", "Real", "averaged", "every_of", "median"]
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -30,6 +30,24 @@ def median(values: Real) -> float:
     if values.size % 2:
         return float(ordered[half])
     return float((ordered[half - 1] + ordered[half]) / 2)
+
+
+def averaged(values: Real, reach: int | NDArray[np.int64]) -> Real:
+    """Average along the last axis over neighbours within reach on either side, fewer at the ends.
+
+    The reach is one for all, or one for each, (m,).
+
+    Examples
+    --------
+    >>> averaged(np.array([1.0, 2.0, 6.0]), 1).tolist()
+    [1.5, 3.0, 4.0]
+    """
+    count = values.shape[-1]
+    position = np.arange(count)
+    begin, end = np.maximum(position - reach, 0), np.minimum(position + reach + 1, count)
+    total = np.zeros((*values.shape[:-1], count + 1))
+    np.cumsum(values, axis=-1, out=total[..., 1:])
+    return np.asarray((total.take(end, axis=-1) - total.take(begin, axis=-1)) / (end - begin))
 
 
 def every_of(samples: int) -> int:

@@ -8,7 +8,15 @@ from numpy.typing import ArrayLike
 from hmpim.errors import ArgumentError, RecordError
 from hmpim.identify.arrays import Real
 
-__all__ = ["as_pair", "as_signal", "check_band", "check_rate", "longest_lag", "whole_lag"]
+__all__ = [
+    "as_pair",
+    "as_signal",
+    "bins_in",
+    "check_band",
+    "check_rate",
+    "longest_lag",
+    "whole_lag",
+]
 
 _FEWEST_SAMPLES = 4
 
@@ -110,6 +118,20 @@ def check_band(band: tuple[float, float], fs: float) -> None:
         raise ArgumentError(
             f"band is ({low}, {high}) Hz; give 0 <= low < high <= fs/2 = {fs / 2:g} Hz"
         )
+
+
+def bins_in(band: tuple[float, float], step: float, bins: int) -> tuple[int, int]:
+    """First and last bin of a band in Hz, that at 0 Hz left out, of so many `step` Hz apart.
+
+    The first is beyond the last where there is none.
+
+    Examples
+    --------
+    >>> bins_in((0.0, 20.0), 0.1, 1000)
+    (1, 200)
+    """
+    first = max(math.ceil(band[0] / step - 1e-9), 1)
+    return first, min(math.floor(band[1] / step + 1e-9), bins - 1)
 
 
 def longest_lag(samples: int) -> int:

@@ -283,7 +283,7 @@ def _told(p: Parameters, band: tuple[float, float]) -> tuple[Parameters, list[st
     gone: set[str] = set()
     for name, bad in (
         ("scale_factor", loose),
-        ("time_constant", lambda e: not e.spread <= MUCH * abs(e.value)),
+        ("time_constant", loose),
         ("damping_ratio", loose),
         ("natural_frequency", beyond),
         ("bandwidth_phase90", beyond),

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy
 
-from hmpim.identify.arrays import Real
+from hmpim.identify.arrays import Real, averaged
 from hmpim.identify.chance import CLEARLY, FALSE_ALARM
 from hmpim.identify.fitting.candidates import nested
 from hmpim.identify.fitting.enrich import PLAIN
@@ -73,10 +73,7 @@ def whitening_of(residual: Real) -> Real | None:
     power = np.abs(scipy.fft.rfft(residual - residual.mean())) ** 2 / residual.size
     power[0] = power[1]
     bins = np.arange(power.size)
-    reach = np.maximum((_SMOOTHED * bins).astype(np.int64), _NARROWEST)
-    below, above = np.maximum(bins - reach, 0), np.minimum(bins + reach + 1, power.size)
-    total = np.concatenate(([0.0], np.cumsum(power)))
-    smooth = (total[above] - total[below]) / (above - below)
+    smooth = averaged(power, np.maximum((_SMOOTHED * bins).astype(np.int64), _NARROWEST))
     return np.asarray(1.0 / np.sqrt(np.maximum(smooth, _FLOOR * power.mean())))
 
 

@@ -1,13 +1,12 @@
 """Which local fit to take at each frequency, and how much of its error is bend, not noise."""
 
 from collections.abc import Sequence
-from functools import lru_cache
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from hmpim.identify.arrays import Complex, Mask, Real
+from hmpim.identify.arrays import Complex, Mask, Real, averaged
 from hmpim.identify.frf.neighbours import LocalFit
 from hmpim.identify.worth import PART, TOLERATED, TWICE
 
@@ -99,17 +98,5 @@ def _beyond(apart: Real, variance: Real, credible: Mask) -> Real:
 
 
 def _averaged(values: Real) -> Real:
-    """Average along the last axis over neighbours on either side, fewer at the ends."""
-    count = values.shape[-1]
-    begin, end, size = _spans(count)
-    total = np.zeros((*values.shape[:-1], count + 1))
-    np.cumsum(values, axis=-1, out=total[..., 1:])
-    return np.asarray((total.take(end, axis=-1) - total.take(begin, axis=-1)) / size)
-
-
-@lru_cache(maxsize=8)
-def _spans(count: int) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
-    """Where the neighbours of each place begin and end, and how many they are."""
-    reach, position = min(_NEIGHBOURS, count // 2), np.arange(count)
-    begin, end = np.maximum(position - reach, 0), np.minimum(position + reach + 1, count)
-    return begin, end, end - begin
+    """Average along the last axis over what is judged together."""
+    return averaged(values, min(_NEIGHBOURS, values.shape[-1] // 2))

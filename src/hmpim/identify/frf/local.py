@@ -28,7 +28,7 @@ from hmpim.identify.frf.polynomial import polynomial_fits
 from hmpim.identify.frf.rational import Regressors, rational_fits
 from hmpim.identify.kept import keeping
 from hmpim.identify.result import FrequencyResponse
-from hmpim.identify.signals import as_pair, check_band, check_rate, whole_lag
+from hmpim.identify.signals import as_pair, bins_in, check_band, check_rate, whole_lag
 from hmpim.identify.worth import DEEPEST, MOST, PART
 
 __all__ = ["local_response", "local_responses"]
@@ -163,8 +163,7 @@ def _checked(
 
 def _centres(spectra: Spectra, band: tuple[float, float], points: int) -> NDArray[np.int64]:
     step = float(spectra.frequency[1])
-    low = max(int(np.ceil(band[0] / step - 1e-9)), 1)
-    high = min(int(np.floor(band[1] / step + 1e-9)), spectra.frequency.size - 1)
+    low, high = bins_in(band, step, spectra.frequency.size)
     if high < low:
         raise ArgumentError(
             f"band is ({band[0]:g}, {band[1]:g}) Hz, and the record has no bin in it, only "

@@ -36,7 +36,7 @@ from hmpim.identify.frf.rational import (
     read_off,
     solved,
 )
-from hmpim.identify.signals import as_signal, check_band, check_rate
+from hmpim.identify.signals import as_signal, bins_in, check_band, check_rate
 from hmpim.identify.worth import PART
 
 __all__ = ["ResponseMatrix", "response_matrix"]
@@ -194,8 +194,7 @@ def response_matrix(
     base = int(np.floor(late.min() * fs + 1e-9))
     step = fs / (u.shape[1] - base)
     bins = (u.shape[1] - base - 1) // 2 + 1
-    low = max(int(np.ceil(band[0] / step - 1e-9)), 1)
-    high = min(int(np.floor(band[1] / step + 1e-9)), bins - 1)
+    low, high = bins_in(band, step, bins)
     if high - low < 8 * (m + 1):
         raise ArgumentError(
             f"band is ({band[0]:g}, {band[1]:g}) Hz and holds {max(high - low + 1, 0)} bins of "

@@ -35,7 +35,7 @@ from hmpim.identify.section_iv.static import (
     time_corrected_error,
 )
 from hmpim.identify.section_iv.windows import WindowName, window_samples
-from hmpim.identify.signals import as_pair, check_band, check_rate, longest_lag
+from hmpim.identify.signals import as_pair, bins_in, check_band, check_rate, longest_lag
 
 __all__ = ["PaperAnalysis", "estimates_of_many", "paper_analysis", "paper_estimates"]
 
@@ -317,10 +317,8 @@ def _frequency_steps(
     u: Complex, y: Complex, frequency: Real, band: tuple[float, float], peaks: list[CorrelationPeak]
 ) -> _Inside:
     """Section IV.D: equations (18) to (25) on the bins of spectra, y of shape (k, m), in a band."""
-    step = float(frequency[1])
     # The bin at DC holds the bias and no stimulus.
-    first = max(int(np.ceil(band[0] / step - 1e-9)), 1)
-    last = min(int(np.floor(band[1] / step + 1e-9)), u.size - 1)
+    first, last = bins_in(band, float(frequency[1]), u.size)
     bins = slice(first, max(last + 1, first))
     frequency = frequency[bins]
     response = ratio(y[:, bins], u[bins])

@@ -7,7 +7,7 @@ import scipy
 from numpy.typing import ArrayLike
 
 from hmpim.errors import ArgumentError, RecordError
-from hmpim.identify.arrays import Complex, Mask, Real
+from hmpim.identify.arrays import Complex, Mask, Real, averaged
 from hmpim.identify.kept import kept
 from hmpim.identify.noise.spectra import transform_of
 from hmpim.identify.section_iv.windows import WindowName, window_samples
@@ -203,12 +203,7 @@ def well_excited(u: Complex) -> Mask:
     array([ True,  True, False,  True,  True])
     """
     power = np.abs(u) ** 2
-    total = np.concatenate(([0.0], np.cumsum(power)))
-    position = np.arange(power.size)
-    reach = max(_NOTCH_REACH, power.size // 40)
-    begin = np.maximum(position - reach, 0)
-    end = np.minimum(position + reach + 1, power.size)
-    mean = (total[end] - total[begin]) / (end - begin)
+    mean = averaged(power, max(_NOTCH_REACH, power.size // 40))
     return np.asarray((power > 0) & (power >= _NOTCH_DEPTH * mean), dtype=np.bool_)
 
 
