@@ -254,13 +254,10 @@ def _member_of(
         for place, lag in zip(smoother, lags, strict=True)
     ]
     grown = (_answers(source, richer, poles) - rows[: lags.size]) / lags[:, None] ** 2
-    means = rows.mean(axis=1, keepdims=True)
-    rows -= means
     grown -= grown.mean(axis=1, keepdims=True)
-    basis = _basis_of(np.concatenate([rows, grown]))
-    inside = rows @ basis.T
-    left = np.linalg.norm(rows - inside @ basis, axis=1).max()
-    surface = Surface.fitted(low, high, places, np.hstack([inside, means]), degree=degree)
+    basis, values = _in_basis(rows, grown)
+    surface = Surface.fitted(low, high, places, values, degree=degree)
+    left = np.linalg.norm(rows - values @ np.vstack([basis, np.ones(source.samples)]), axis=1).max()
     return Member(
         intersample=mode,
         basis=basis,
@@ -279,11 +276,7 @@ def spanning(
     The box's corners have shape (p,); `degree` is that of the polynomial.
     """
     places = places_in(low, high, degree)
-    rows = _answers(source, structure, places)
-    means = rows.mean(axis=1, keepdims=True)
-    rows -= means
-    basis = _basis_of(rows)
-    values = np.hstack([rows @ basis.T, means])
+    basis, values = _in_basis(_answers(source, structure, places))
     return basis, Surface.fitted(low, high, places, values, degree=degree)
 
 
@@ -294,15 +287,21 @@ def _answers(source: SampledInput, structure: Structure, thetas: Iterable[Real])
     return np.stack([Part(problem, structure, theta).driven(np.ones(1)) for theta in thetas])
 
 
-def _basis_of(rows: Real) -> Real:
-    """An orthonormal basis of all rows, (r, n), found from random sums of them.
+def _in_basis(rows: Real, *others: Real) -> tuple[Real, Real]:
+    """An orthonormal basis, (r, n), of rows less their means, (m, n), and of others without mean.
 
-    N. Halko, P. G. Martinsson, J. A. Tropp, SIAM Review 53, 2011: so many sums span the rows as
-    well as all of them do, once they are more than the rows have dimensions.
+    With it come the places of the rows in it, and their means in the last column, (m, r + 1). It is
+    found from random sums of all rows: N. Halko, P. G. Martinsson, J. A. Tropp, SIAM Review 53,
+    2011: so many sums span the rows as well as all of them do, once they are more than the rows
+    have dimensions.
     """
-    sums = np.random.default_rng(0).standard_normal((min(_MOST, *rows.shape), rows.shape[0]))
-    _, sizes, basis = np.linalg.svd(sums @ rows, full_matrices=False)
-    return np.asarray(basis[sizes > _UNSEEN * sizes[0]])
+    means = rows.mean(axis=1, keepdims=True)
+    rows = rows - means
+    every = np.concatenate([rows, *others])
+    sums = np.random.default_rng(0).standard_normal((min(_MOST, *every.shape), every.shape[0]))
+    _, sizes, basis = np.linalg.svd(sums @ every, full_matrices=False)
+    basis = np.asarray(basis[sizes > _UNSEEN * sizes[0]])
+    return basis, np.hstack([rows @ basis.T, means])
 
 
 def _figures_at(theta: Real, structure: Structure, fs: float) -> dict[str, float]:

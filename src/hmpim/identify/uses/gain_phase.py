@@ -19,6 +19,8 @@ __all__ = ["GainPhase", "gain_and_phase", "measurable"]
 _MANY = 1e6
 """Degrees of freedom behind the error bars, in effect."""
 
+_SCALES = {"dB": 20 / np.log(10), "deg": float(np.degrees(1.0))}
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class GainPhase:
@@ -151,30 +153,25 @@ def _at(
     turned = float(phase(replace(system, denominator=poles), there)[0]) - integrators * np.pi / 2
     if value.real * np.cos(turned) + value.imag * np.sin(turned) < 0:
         turned += np.pi  # the phase counts from DC; a negative scale factor is half a turn
-    decibel = 20 / np.log(10)
-    gain_db = decibel * float(np.log(abs(value)))
+    log_gain = float(np.log(abs(value)))
     spread = [float(part @ covariance @ part) for part in (slope.real, slope.imag)]
     measured = ratio_at(pair.frequency_response, system, f, fs, pair.intersample)
     gain = lag = None
     if measured is not None:
         ratio, std = measured
         relative = std / np.sqrt(2) / max(abs(ratio), 1e-12)
-        gain = _decibels(gain_db + decibel * float(np.log(abs(ratio))), relative**2)
-        lag = _degrees(turned + float(np.angle(ratio)), relative**2)
+        gain = _in("dB", log_gain + float(np.log(abs(ratio))), relative**2)
+        lag = _in("deg", turned + float(np.angle(ratio)), relative**2)
     return GainPhase(
         frequency=f,
         gain_db=gain,
         phase=lag,
-        model_gain_db=_decibels(gain_db, spread[0]),
-        model_phase=_degrees(turned, spread[1]),
+        model_gain_db=_in("dB", log_gain, spread[0]),
+        model_phase=_in("deg", turned, spread[1]),
     )
 
 
-def _decibels(value: float, variance: float) -> Estimate:
-    scale = 20 / np.log(10)
-    return estimate(value, scale**2 * variance, freedom=_MANY, unit="dB")
-
-
-def _degrees(value: float, variance: float) -> Estimate:
-    scale = float(np.degrees(1.0))
-    return estimate(scale * value, scale**2 * variance, freedom=_MANY, unit="deg")
+def _in(unit: str, value: float, variance: float) -> Estimate:
+    """Estimate in dB of the logarithm of a gain, or in degrees of a phase in radians."""
+    scale = _SCALES[unit]
+    return estimate(scale * value, scale**2 * variance, freedom=_MANY, unit=unit)

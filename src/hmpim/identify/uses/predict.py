@@ -1,7 +1,7 @@
 """From an identification to a model, and the model against data it has not seen."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 
@@ -112,16 +112,8 @@ def _spread(pair: PairIdentification) -> Spread | None:
     """Errors of a model's figures; None where the record does not tell them."""
     if pair.covariance is None or pair.intersample == "sampled":
         return None
-    p = pair.parameters
-    given = {
-        "bias": p.bias,
-        "noise_std": p.noise_std,
-        "saturation_low": p.saturation_low,
-        "saturation_high": p.saturation_high,
-        "hold_period": p.hold_period,
-        "quantization_step": p.quantization_step,
-    }
-    stds = {name: 0.0 if e is None else e.spread for name, e in given.items()}
+    known = {f.name: getattr(pair.parameters, f.name, None) for f in fields(Spread)}
+    stds = {name: e.spread for name, e in known.items() if e is not None}
     if not all(map(math.isfinite, stds.values())):
         return None
     return Spread(covariance=tuple(tuple(row) for row in pair.covariance.tolist()), **stds)

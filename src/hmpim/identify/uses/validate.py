@@ -288,6 +288,7 @@ def _validated(
         predicted = predicted + float(np.mean((y.values - predicted)[scored]))
     residual = np.where(scored, y.values - predicted, 0.0)
     std = np.hypot(noise, model_std)
+    fit = fit_percent_of(y.values[scored], residual[scored])
     if np.sqrt(np.mean(residual[scored] ** 2)) <= ROUNDING * np.std(y.values[scored]):
         bounds = Bounds(fit_percent=bounds.fit_percent, noise_ratio=None, chance=None)
     return OutputValidation(
@@ -299,7 +300,13 @@ def _validated(
         std=std,
         scored=scored,
         checks=(
-            _fit(y.values[scored], residual[scored], bounds),
+            Check(
+                name="fit_percent",
+                value=fit,
+                low=bounds.fit_percent,
+                high=None,
+                message=f"The model predicts the output with a fit of {fit:.2f} %.",
+            ),
             *_size(residual[scored], noise, model_std[scored], std[scored], bounds),
             *_tests(aligned, pairs, models, residual, scored, model_std, bounds),
         ),
@@ -333,17 +340,6 @@ def _model_std(
     drawn = [draw_models(model, _DRAWS, rng=0) for model in free]
     predictions = [_predicted(some, pairs, aligned) for some in zip(*drawn, strict=True)]
     return np.asarray(np.std(predictions, axis=0))
-
-
-def _fit(y: Real, residual: Real, bounds: Bounds) -> Check:
-    fit = fit_percent_of(y, residual)
-    return Check(
-        name="fit_percent",
-        value=fit,
-        low=bounds.fit_percent,
-        high=None,
-        message=f"The model predicts the output with a fit of {fit:.2f} %.",
-    )
 
 
 def _size(
