@@ -125,7 +125,7 @@ def _behind_levels(
         return None
     told, _ = refined
     white = is_white(told.problem.counting(told.best.fit.residual))
-    return (clipped, OutputFit.alone(joint)) if white else None
+    return (clipped, OutputFit(fits=(joint,))) if white else None
 
 
 def _drifting(question: Question, seen: Imperfections, course: Course) -> OutputFit | None:
@@ -140,7 +140,7 @@ def _drifting(question: Question, seen: Imperfections, course: Course) -> Output
     drifting = with_plain_drift(former.problem, former.best, with_rows)
     if drifting is None or not drifting.joint.related:
         return None
-    return OutputFit.alone(drifting.joint, drifting)
+    return OutputFit(fits=(drifting.joint,), drifting=drifting)
 
 
 def _fit_and_look_for_rows(
@@ -389,7 +389,7 @@ def _fit_once(
     The search goes on from `begun`, where the plain fits to the one input are known.
     """
     if begun is not None:
-        return OutputFit.alone(chosen_of(begun, structures))
+        return OutputFit(fits=(chosen_of(begun, structures),))
     aligned, output, inputs = question.aligned, question.output, question.inputs
     return fit_together(
         [source.values for source in aligned.inputs],

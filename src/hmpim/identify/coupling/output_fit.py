@@ -10,6 +10,7 @@ that inputs that resemble each other widen them.
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 import scipy
@@ -41,33 +42,23 @@ _UNSEEN = 1e-13
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class OutputFit:
-    """Fits of one output to each input."""
+    """Fits of one output to each input; by default of an output to its one input."""
 
     # one for each input; its output is what the other inputs leave over. One that the output does
     # not follow at all is not `related`.
     fits: tuple[JointFit, ...]
     # (p_i, p_i): of each fit's parameters, all fits considered together
-    covariances: tuple[Real, ...]
+    covariances: tuple[Real, ...] = ()
     # whether the input's contribution is large beside the output, not a coupling
-    strong: tuple[bool, ...]
-    lags: tuple[Lag | None, ...]  # delay and lag of couplings of no more than first order
+    strong: tuple[bool, ...] = (True,)
+    # delay and lag of couplings of no more than first order
+    lags: tuple[Lag | None, ...] = (None,)
     # the bias's drift, of an output to one input; the fit's output is without it
     drifting: Drifting | None = None
     humming: Humming | None = None  # its hum, likewise
     steady: Real | None = None  # (n,): where it drifts, what a fit with a constant bias predicts
     # what is known of a gain that changes, of an output to one input
     gaining: GainChange | None = None
-
-    @classmethod
-    def alone(cls, fit: JointFit, drifting: Drifting | None = None) -> "OutputFit":
-        """Of an output to its one input."""
-        return cls(
-            fits=(fit,),
-            covariances=(),
-            strong=(True,),
-            lags=(None,),
-            drifting=drifting,
-        )
 
     @property
     def prediction(self) -> Real:
@@ -115,28 +106,13 @@ def fit_together(
     nuisance : ndarray, shape (k, n), optional
         Rows beside the bias that enter linearly, such as a drift's.
     """
-
-    def fitted(
-        u: Real, rest: Real, names: tuple[StructureName, ...], *, growing: bool = True
-    ) -> JointFit:
-        return joint_fit(
-            u,
-            rest,
-            valid=valid,
-            known=known,
-            intersample=intersample,
-            structures=names,
-            nuisance=nuisance,
-            growing=growing,
-        )
-
+    fitted = partial(
+        joint_fit, valid=valid, known=known, intersample=intersample, nuisance=nuisance
+    )
     if len(inputs) == 1:
-        return OutputFit.alone(fitted(inputs[0], y, structures))
+        return OutputFit(fits=(fitted(inputs[0], y, structures=structures),))
     plain = tuple(name for name in structures if name in PLAIN) or structures
-
-    def plainly(u: Real, rest: Real) -> JointFit:
-        return fitted(u, rest, plain, growing=False)
-
+    plainly = partial(fitted, structures=plain, growing=False)
     fits = _strongest(inputs, y, valid, plainly)
     pairs = _Pairs(y=y, fits=fits, strong=tuple(fits), alike=alike)
     if len(pairs.strong) > 1:  # each was fitted with the later ones unknown
@@ -145,7 +121,7 @@ def fit_together(
     _fit_couplings(inputs, pairs, plain)
     before = [fits[i].best.fit.structure for i in pairs.strong]
     for i in pairs.strong:  # the couplings known
-        fits[i] = fitted(inputs[i], pairs.without_others(i), structures)
+        fits[i] = fitted(inputs[i], pairs.without_others(i), structures=structures)
     if [fits[i].best.fit.structure for i in pairs.strong] != before:
         _fit_couplings(inputs, pairs, plain)
     return _moved_at_once(pairs)
