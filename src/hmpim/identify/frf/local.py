@@ -21,7 +21,6 @@ from hmpim.identify.frf.neighbours import (
     LocalFit,
     Spectra,
     centres_in_band,
-    reached,
     transform,
 )
 from hmpim.identify.frf.polynomial import polynomial_fits
@@ -107,11 +106,23 @@ def local_response(
     >>> bool(np.allclose(np.abs(frf.response), 2.0))
     True
     """
-    first, second = _checked(u, y, fs, band, delay=delay, points=points)
-    (told,) = _many(first, second[None], fs, delays=np.array([delay]), band=band, points=points)
+    first, second = as_pair(u, y)
+    check_rate(fs)
+    check_band(band, fs)
+    if first.size < _FEWEST_SAMPLES:
+        raise RecordError(f"the record has {first.size} samples; give at least {_FEWEST_SAMPLES}")
+    if not np.isfinite(delay):
+        raise ArgumentError(f"delay is {delay} s; give a finite number")
+    if points < 1:
+        raise ArgumentError(f"points is {points}; give at least 1")
+    if np.ptp(first) == 0:
+        raise RecordError(f"u is constant at {first[0]:g}; an input must move")
+    late = np.array([delay])
+    (told,) = local_responses(first, second[None], fs, delays=late, band=band, points=points)
     return told
 
 
+@keeping()
 def local_responses(
     u: Real,
     outputs: Real,
@@ -135,30 +146,29 @@ def local_responses(
     >>> [bool(np.allclose(np.abs(one.response), k)) for one, k in zip(two, (2.0, 3.0))]
     [True, True]
     """
+    if abs(u[-1] - u[0]) > MOST * np.ptp(u):
+        u, outputs = np.diff(u, prepend=u[0]), np.diff(outputs, axis=-1, prepend=outputs[:, :1])
     found: dict[int, FrequencyResponse] = {}
     lags = np.array([whole_lag(float(delay), fs, u.size) for delay in delays])
     for lag in np.unique(lags):
         alike = np.flatnonzero(lags == lag)
-        told = _many(u, outputs[alike], fs, delays=delays[alike], band=band, points=points)
-        found.update(zip(alike.tolist(), told, strict=True))
+        regressors: Callable[[int], Regressors] | None = None
+        for at in range(0, alike.size, _AT_ONCE):
+            some = alike[at : at + _AT_ONCE]
+            spectra = transform(u, outputs[some], fs, delays[some], band[1])
+            if regressors is None:
+                centre = _centres(spectra, band, points)
+                regressors = partial(Regressors.around, spectra.u, centre)
+                if alike.size > _AT_ONCE:
+                    regressors = cache(regressors)
+            response, variance = _chosen(spectra, centre, regressors)
+            frequency = spectra.frequency[centre]
+            response = response * np.exp(-2j * np.pi * frequency * delays[some, None])
+            for i, one, own in zip(some.tolist(), response, np.sqrt(variance), strict=True):
+                found[i] = FrequencyResponse(
+                    frequency=frequency, response=one, std=own, coherence=None
+                )
     return [found[i] for i in range(outputs.shape[0])]
-
-
-def _checked(
-    u: ArrayLike, y: ArrayLike, fs: float, band: tuple[float, float], *, delay: float, points: int
-) -> tuple[Real, Real]:
-    first, second = as_pair(u, y)
-    check_rate(fs)
-    check_band(band, fs)
-    if first.size < _FEWEST_SAMPLES:
-        raise RecordError(f"the record has {first.size} samples; give at least {_FEWEST_SAMPLES}")
-    if not np.isfinite(delay):
-        raise ArgumentError(f"delay is {delay} s; give a finite number")
-    if points < 1:
-        raise ArgumentError(f"points is {points}; give at least 1")
-    if np.ptp(first) == 0:
-        raise RecordError(f"u is constant at {first[0]:g}; an input must move")
-    return first, second
 
 
 def _centres(spectra: Spectra, band: tuple[float, float], points: int) -> NDArray[np.int64]:
@@ -184,37 +194,6 @@ def _excited(u: NDArray[np.complex128], centre: NDArray[np.int64]) -> NDArray[np
     near = scipy.ndimage.maximum_filter1d(power, 4 * (_ORDER + 1) + 1)
     below, above = np.maximum.accumulate(power), np.maximum.accumulate(power[::-1])[::-1]
     return np.asarray(near >= DEEPEST * np.minimum(below, above))[centre]
-
-
-def _cut(spectra: Spectra, highest: int) -> Spectra:
-    """Leave out the bins that no window reaches: most of a long record's."""
-    end = reached(highest)
-    return Spectra(frequency=spectra.frequency[:end], u=spectra.u[:end], y=spectra.y[..., :end])
-
-
-def _many(
-    u: Real, y: Real, fs: float, *, delays: Real, band: tuple[float, float], points: int
-) -> list[FrequencyResponse]:
-    """Of outputs of shape (k, n), delayed by as many whole samples."""
-    if abs(u[-1] - u[0]) > MOST * np.ptp(u):
-        u, y = np.diff(u, prepend=u[0]), np.diff(y, axis=-1, prepend=y[:, :1])
-    found: list[FrequencyResponse] = []
-    with keeping():
-        for at in range(0, y.shape[0], _AT_ONCE):
-            late = delays[at : at + _AT_ONCE]
-            spectra = transform(u, y[at : at + _AT_ONCE], fs, late, band[1])
-            if at == 0:
-                centre = _centres(spectra, band, points)
-                around = partial(Regressors.around, _cut(spectra, int(centre[-1])).u, centre)
-                own = cache(around) if y.shape[0] > _AT_ONCE else around
-            response, variance = _chosen(_cut(spectra, int(centre[-1])), centre, own)
-            frequency = spectra.frequency[centre]
-            response = response * np.exp(-2j * np.pi * frequency * late[:, None])
-            found += [
-                FrequencyResponse(frequency=frequency, response=one, std=own_std, coherence=None)
-                for one, own_std in zip(response, np.sqrt(variance), strict=True)
-            ]
-    return found
 
 
 def _chosen(

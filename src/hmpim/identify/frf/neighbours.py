@@ -25,7 +25,6 @@ __all__ = [
     "Windows",
     "centres_in_band",
     "mirrored",
-    "reached",
     "transform",
     "windows_around",
 ]
@@ -121,11 +120,6 @@ def mirrored(values: Complex, reach: int) -> Complex:
     return np.concatenate((np.conj(values[..., reach:0:-1]), values), axis=-1)
 
 
-def reached(highest: int) -> int:
-    """Count of bins that windows may reach whose centres go up to bin `highest`."""
-    return highest + max(highest // 2, WIDEST) + 1
-
-
 def transform(u: Real, y: Real, fs: float, delay: float | Real, highest: float = np.inf) -> Spectra:
     """Transform a record, the delay taken out; or many of one input, delayed by as many samples.
 
@@ -153,7 +147,8 @@ def transform(u: Real, y: Real, fs: float, delay: float | Real, highest: float =
         length = int(scipy.fft.prev_fast_len(length, real=True))
     count = (length - 1) // 2 + 1  # without the bin at fs/2, which is real
     if highest < fs / 2:
-        count = min(count, reached(int(highest * length / fs) + 1))
+        last = int(highest * length / fs) + 1
+        count = min(count, last + max(last // 2, WIDEST) + 1)
     frequency = np.asarray(np.arange(count) * (fs / length), dtype=np.float64)
     spectrum_u = _transform(u[max(-lag, 0) :][:length], count)
     spectrum_y = scipy.fft.rfft(y[..., max(lag, 0) :][..., :length])[..., :count]
