@@ -1,6 +1,7 @@
 """Several inputs at once: which can be told apart, the response to each, and what is weak."""
 
 from dataclasses import dataclass, fields, replace
+from functools import partial
 from itertools import pairwise
 
 import numpy as np
@@ -198,19 +199,12 @@ def settled(
             scale_factor=_widened(parameters.scale_factor, gain),
         )
         if lag is not None:
+            seconds = partial(estimate, freedom=_MANY, unit="s")
+            time_constant = seconds(lag.time_constant / fs, (lag.time_constant_std / fs) ** 2)
             parameters = replace(
                 parameters,
-                delay=estimate(
-                    lag.delay / fs, (lag.delay_std**2 + late) / fs**2, freedom=_MANY, unit="s"
-                ),
-                time_constant=estimate(
-                    lag.time_constant / fs,
-                    (lag.time_constant_std / fs) ** 2,
-                    freedom=_MANY,
-                    unit="s",
-                )
-                if pair.structure == "first_order"
-                else None,
+                delay=seconds(lag.delay / fs, (lag.delay_std**2 + late) / fs**2),
+                time_constant=time_constant if pair.structure == "first_order" else None,
             )
         parameters, untold = _told(parameters, inputs.bands[i])
     parameters = _finite(parameters)

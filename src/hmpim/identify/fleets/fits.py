@@ -128,20 +128,9 @@ def errors_of(fleet: Fleet, fit: Fits, some: NDArray[np.intp]) -> Errors:
 def descended(surface: Surface, z: Real, outside: Real, start: Real, *, samples: int) -> Real:
     """Gauss-Newton for all records at once, the gain solved exactly at each step.
 
-    A record that has arrived is left out of what follows.
-
-    Parameters
-    ----------
-    surface : Surface
-        Places in a basis, and the mean in the last column, of responses of unit gain.
-    z : ndarray, shape (k, r)
-        The records in that basis.
-    outside : ndarray, shape (k,)
-        Power outside of it.
-    start : ndarray, shape (k, p)
-        Where to begin.
-    samples : int
-        Of a record.
+    A record that has arrived is left out of what follows. The surface has places in a basis, and
+    the mean in the last column, of responses of unit gain; `z`, (k, r), are the records in that
+    basis, `outside`, (k,), is their power outside of it, and `start`, (k, p), where to begin.
     """
     low, high = surface.low, surface.high
     best, least = start.copy(), np.full(z.shape[0], np.inf)

@@ -149,21 +149,7 @@ class FleetFit:
 
 
 def fit_fleet(fleet: Fleet, outputs: Real, *, units: tuple[str, str] = ("", "")) -> FleetFit:
-    """Fit many outputs of one stimulus at once.
-
-    Parameters
-    ----------
-    fleet : Fleet
-        From `learn_fleet`.
-    outputs : ndarray, shape (N, n)
-        One output a row.
-    units : (str, str)
-        Of input and output.
-
-    Returns
-    -------
-    FleetFit
-    """
+    """Fit many outputs, (N, n), of one stimulus at once; units are those of input and output."""
     count, n = outputs.shape
     means = outputs.mean(axis=1)
     centred = outputs - means[:, None]

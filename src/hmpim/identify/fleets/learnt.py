@@ -94,16 +94,8 @@ def learn_fleet(
 ) -> Fleet | None:
     """Learn from some units what a fleet shares; None where most are not of one kind.
 
-    Parameters
-    ----------
-    u : ndarray, shape (n,)
-        The stimulus, common to all.
-    pairs : sequence of PairIdentification
-        What `identify` said of five or more units.
-    fs : float
-        Rate in Hz.
-    band : (float, float)
-        Excited band in Hz.
+    The stimulus, (n,), is common to all; `pairs` are what `identify` said of five units or more;
+    rate and excited band are in Hz.
     """
     structure = STRUCTURES["second_order"]
     plain = [pair for pair in pairs if is_alike(pair)]
@@ -168,12 +160,8 @@ def _box(pairs: Sequence[PairIdentification], fs: float) -> tuple[Real, Real]:
 def box_around(places: Real, least: Real) -> tuple[Real, Real]:
     """Return the corners of a box that holds units like these, all but one in a thousand.
 
-    Parameters
-    ----------
-    places : ndarray, shape (k, d)
-        Where some units lie.
-    least : ndarray, shape (d,)
-        Deviations between units that are allowed for anyway.
+    Some units lie at `places`, (k, d); `least`, (d,), are deviations between units that are allowed
+    for anyway.
 
     Examples
     --------

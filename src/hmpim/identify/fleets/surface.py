@@ -27,19 +27,10 @@ _CHECKS = 40
 
 
 def places_in(low: Real, high: Real, degree: int) -> Real:
-    """Points of a box at which to sample a function, dense towards its faces.
+    """Points, (m, p), of a box at which to sample a function, dense towards its faces.
 
-    Parameters
-    ----------
-    low, high : ndarray, shape (p,)
-        The box.
-    degree : int
-        Total degree of the polynomial that is to be fitted.
-
-    Returns
-    -------
-    ndarray, shape (m, p)
-        Always the same, those of a lower degree first; the last 40 are for the error.
+    The degree is the total one of the polynomial that is to be fitted. They are always the same,
+    those of a lower degree first; the last 40 are for the error.
     """
     size = len(_powers(low.size, degree))
     count = size + max(size, _FEWEST_SPARE) + _CHECKS

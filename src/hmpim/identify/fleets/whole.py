@@ -141,18 +141,8 @@ def whole_pairs(
 ) -> list[PairIdentification | None]:
     """Everything that `identify` says of many records; None for those that it must be asked for.
 
-    Parameters
-    ----------
-    whole : Whole
-        From `learn_whole`.
-    fit : FleetFit
-        From `fit_fleet`.
-    outputs : ndarray, shape (N, n)
-        One output a row.
-    names : (str, str)
-        Of input and output.
-    findings : tuple of Finding
-        What is said of the stimulus and the clock.
+    Outputs have shape (N, n); names are those of input and output; `findings` are what is said of
+    the stimulus and the clock.
     """
     fleet, count = whole.fleet, outputs.shape[1]
     centred = outputs - outputs.mean(axis=1, keepdims=True)
