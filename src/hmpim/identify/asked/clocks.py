@@ -103,15 +103,14 @@ def _one(
     channel: Channel, signal: Signal, record: Record, aligned: Aligned, found: Identification
 ) -> Signal:
     """One output without what folds in it."""
-    models, waveforms, smooth = [], [], []
-    for waveform, source in zip(aligned.waveforms, aligned.inputs, strict=True):
-        model = _linear(found[channel.name, waveform.name])
-        if model is not None:
-            models.append(model)
-            waveforms.append(waveform)
-            smooth.append(source.values)
-    if not models:
+    driven = [
+        (model, waveform, source.values)
+        for waveform, source in zip(aligned.waveforms, aligned.inputs, strict=True)
+        if (model := _linear(found[channel.name, waveform.name])) is not None
+    ]
+    if not driven:
         return signal
+    models, waveforms, smooth = (list(part) for part in zip(*driven, strict=True))
     counted = _counted(channel, aligned)
     models = _refined(models, waveforms, channel, counted)
     rest = channel.values - _answers(models, waveforms, channel.time)
@@ -123,14 +122,10 @@ def _one(
         fs=aligned.fs,
         intersample=None,
     )
-    there = sum(
-        (
-            simulate(model, u, fs=aligned.fs, intersample="bandlimited")
-            for model, u in zip(models, smooth, strict=True)
-        ),
-        np.zeros(aligned.samples),
+    values = left + sum(
+        simulate(model, u, fs=aligned.fs, intersample="bandlimited")
+        for model, u in zip(models, smooth, strict=True)
     )
-    values = left + there
     values.setflags(write=False)
     return replace(signal, values=values)
 

@@ -27,7 +27,7 @@ from hmpim.identify.chance import CLEARLY, FALSE_ALARM, HALF, LIKELIER, ONE_SIDE
 from hmpim.identify.effects.imperfections import find_imperfections
 from hmpim.identify.fleets.fits import Errors, Fits, errors_of, fitted_all
 from hmpim.identify.fleets.learnt import Fleet, Member, learn_fleet
-from hmpim.identify.fleets.pole import Tails, with_tails
+from hmpim.identify.fleets.pole import with_tails
 from hmpim.identify.judgement.between_samples import SIZES
 from hmpim.identify.judgement.structure import ALMOST
 from hmpim.identify.noise.misfit import misfits
@@ -119,7 +119,8 @@ class Group:
     # figures with intervals of this fit alone, and such as cover all that stays possible
     alone: dict[str, Column]
     spanned: dict[str, Column]
-    tails: dict[int, Tails]  # of those that ask for one more pole, by their place among these
+    # delay with one more pole, in s, of those that ask for it, by their place among these
+    tails: dict[int, float]
     sound: Mask  # (k,): as in `FleetFit`
     codes: list[tuple[str, ...]]  # as in `FleetFit`
 
@@ -233,17 +234,18 @@ def _told(
     sound[sound] = _is_continuous(outputs[sound], fleet.fs)
     alone, spanned = _columns(fleet, fit, some, others, errors, units)
     codes = [("intersample",) * moved for moved in apart.tolist()]
-    asking: dict[int, Tails] = {}
+    asking: dict[int, float] = {}
     for i in np.flatnonzero(sound & ((asked > _ASKS) | (asked < -_COVERED))).tolist():
         own = parameters_of(alone, i)
         tails = with_tails(fleet, fit.member, theta[i], outputs[i], own)
-        sound[i] = tails is not None and (tails.open or asked[i] < _CLOSE)
+        sound[i] = tails is not None and (tails[1] is not None or asked[i] < _CLOSE)
         if tails is None:
             continue
-        widen(spanned, i, own, tails.parameters)
-        if tails.open:
+        wide, delay = tails
+        widen(spanned, i, own, wide)
+        if delay is not None:
             codes[i] = ("structure", *codes[i])
-            asking[i] = tails
+            asking[i] = delay
     for name in SIZES:
         if name in spanned:
             sound &= ~_is_wide(spanned[name])

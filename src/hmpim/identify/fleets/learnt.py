@@ -24,7 +24,16 @@ from hmpim.model.dynamics import STRUCTURES, Structure
 from hmpim.model.sampled import SampledInput, prepare_input
 from hmpim.record import BETWEEN, Intersample
 
-__all__ = ["Fleet", "Member", "box_around", "is_alike", "learn_fleet", "spanning", "theta_at"]
+__all__ = [
+    "Fleet",
+    "Member",
+    "answers",
+    "box_around",
+    "in_basis",
+    "is_alike",
+    "learn_fleet",
+    "theta_at",
+]
 
 
 _DEGREES = (9, 12, 15)
@@ -235,15 +244,15 @@ def _member_of(
     source, richer = prepare_input(u, mode), one_more_pole(structure)
     places = places_in(low, high, degree)
     smoother = places_in(low, high, _SMOOTHER)  # the first of the others
-    rows = _answers(source, structure, [theta_at(place) for place in places])
+    rows = answers(source, structure, [theta_at(place) for place in places])
     lags = _PROBE * np.exp(-smoother[:, 1])  # over 1/ω, the unit's own
     poles = [
         with_pole(structure, theta_at(place), float(lag))
         for place, lag in zip(smoother, lags, strict=True)
     ]
-    grown = (_answers(source, richer, poles) - rows[: lags.size]) / lags[:, None] ** 2
+    grown = (answers(source, richer, poles) - rows[: lags.size]) / lags[:, None] ** 2
     grown -= grown.mean(axis=1, keepdims=True)
-    basis, values = _in_basis(rows, grown)
+    basis, values = in_basis(rows, grown)
     surface = Surface.fitted(low, high, places, values, degree=degree)
     left = np.linalg.norm(rows - values @ np.vstack([basis, np.ones(source.samples)]), axis=1).max()
     return Member(
@@ -256,32 +265,20 @@ def _member_of(
     )
 
 
-def spanning(
-    source: SampledInput, structure: Structure, low: Real, high: Real, *, degree: int
-) -> tuple[Real, Surface]:
-    """Basis and surface of what one structure makes of a stimulus, by the fit's own parameters.
-
-    The box's corners have shape (p,); `degree` is that of the polynomial.
-    """
-    places = places_in(low, high, degree)
-    basis, values = _in_basis(_answers(source, structure, places))
-    return basis, Surface.fitted(low, high, places, values, degree=degree)
-
-
-def _answers(source: SampledInput, structure: Structure, thetas: Iterable[Real]) -> Real:
-    """What one structure of unit gain makes of a stimulus at some parameters, shape (m, n)."""
+def answers(source: SampledInput, structure: Structure, thetas: Iterable[Real]) -> Real:
+    """Return what one structure of unit gain makes of a stimulus, (m, n), at some parameters."""
     size = source.samples
     problem = Problem(source=source, y=np.zeros(size), valid=None, longest_delay=float(size))
     return np.stack([Part(problem, structure, theta).driven(np.ones(1)) for theta in thetas])
 
 
-def _in_basis(rows: Real, *others: Real) -> tuple[Real, Real]:
-    """An orthonormal basis, (r, n), of rows less their means, (m, n), and of others without mean.
+def in_basis(rows: Real, *others: Real) -> tuple[Real, Real]:
+    """Return an orthonormal basis, (r, n), of rows less their means and of others without mean.
 
-    With it come the places of the rows in it, and their means in the last column, (m, r + 1). It is
-    found from random sums of all rows: N. Halko, P. G. Martinsson, J. A. Tropp, SIAM Review 53,
-    2011: so many sums span the rows as well as all of them do, once they are more than the rows
-    have dimensions.
+    Rows have shape (m, n). With it come their places in it, and their means in the last column,
+    (m, r + 1). It is found from random sums of all rows: N. Halko, P. G. Martinsson, J. A. Tropp,
+    SIAM Review 53, 2011: so many sums span the rows as well as all of them do, once they are more
+    than the rows have dimensions.
     """
     means = rows.mean(axis=1, keepdims=True)
     rows = rows - means

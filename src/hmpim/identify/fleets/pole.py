@@ -4,7 +4,7 @@ The record itself is fitted here, from where the fit of all ended, grown as
 `hmpim.identify.fitting.joint` grows a fit, and its intervals are widened as those of any record.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from hmpim.identify.arrays import Real
 from hmpim.identify.fitting.fit import fit_structure
@@ -18,24 +18,18 @@ from hmpim.identify.result import Parameters
 from hmpim.identify.signals import longest_lag
 from hmpim.model.dynamics import STRUCTURES, Structure
 
-__all__ = ["Tails", "alone_of", "joint_of", "with_tails"]
+__all__ = ["alone_of", "joint_of", "with_tails"]
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Tails:
-    """What one more pole or zero leaves open."""
-
-    # with intervals that cover it where the record asks for it by more than chance
-    parameters: Parameters
-    open: bool  # whether one more pole is as likely, but for its price
-    delay: float = 0.0  # the delay with that pole, in s
-
-
-def with_tails(fleet: Fleet, member: Member, place: Real, y: Real, own: Parameters) -> Tails | None:
+def with_tails(
+    fleet: Fleet, member: Member, place: Real, y: Real, own: Parameters
+) -> tuple[Parameters, float | None] | None:
     """Fit one more pole to a record, (n,); None if the likelihood pays for it.
 
     `place`, (3,), is where the record lies on the member's surface, and `own` what the fit without
-    the pole says.
+    the pole says. Returned are parameters with intervals that cover one more pole or zero where the
+    record asks for it by more than chance; and the delay, in s, with a pole that is as likely but
+    for its price.
     """
     problem, best = alone_of(fleet, member, place, y)
 
@@ -53,11 +47,8 @@ def with_tails(fleet: Fleet, member: Member, place: Real, y: Real, own: Paramete
     if growth.grown:
         return None
     joint = replace(joint_of(problem, best), rivals=growth.rivals, hidden=growth.hidden)
-    return Tails(
-        parameters=spanned(own, joint, fs=fleet.fs, highest=fleet.highest),
-        open=bool(growth.rivals),
-        delay=growth.rivals[0].fit.delay / fleet.fs if growth.rivals else 0.0,
-    )
+    delay = growth.rivals[0].fit.delay / fleet.fs if growth.rivals else None
+    return spanned(own, joint, fs=fleet.fs, highest=fleet.highest), delay
 
 
 def alone_of(fleet: Fleet, member: Member, place: Real, y: Real) -> tuple[Problem, Trial]:

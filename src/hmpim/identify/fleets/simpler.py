@@ -17,13 +17,12 @@ from hmpim.identify.fitting.fit import fit_structure
 from hmpim.identify.fitting.rows import Problem
 from hmpim.identify.fitting.start import rough_response
 from hmpim.identify.fleets.fits import descended
-from hmpim.identify.fleets.learnt import Fleet, box_around, spanning
-from hmpim.identify.fleets.surface import Surface
+from hmpim.identify.fleets.learnt import Fleet, answers, box_around, in_basis
+from hmpim.identify.fleets.surface import Surface, places_in
 from hmpim.identify.result import PairIdentification
 from hmpim.identify.signals import longest_lag
 from hmpim.model.dynamics import STRUCTURES, Structure, StructureName
 from hmpim.model.sampled import prepare_input
-from hmpim.record import Intersample
 
 __all__ = ["Simpler", "costs_of", "learn_simpler"]
 
@@ -35,13 +34,12 @@ _LEAST = (0.02, 0.005)
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Simpler:
-    """One structure that is weighed against that of the fleet, as a `Member` is held.
+    """One structure that is weighed against that of the fleet, as its natural `Member` is held.
 
     Its surface is a function of the fit's own parameters.
     """
 
     structure: Structure
-    intersample: Intersample
     basis: Real
     surface: Surface
 
@@ -61,8 +59,6 @@ def learn_simpler(
         )
         for pair in pairs
     ]
-    if not tried:
-        return None
     # One whose first climb was not at its end is held against them under other assumptions as well.
     ordinary, count = Counter(tried).most_common(1)[0]
     if 2 * count < len(tried) or any(mode != fleet.natural for _, mode in ordinary):
@@ -97,11 +93,13 @@ def _places(
     return found
 
 
-def _learnt(fleet: Fleet, structure: Structure, places: Real) -> Simpler:
-    low, high = box_around(places, np.array(_LEAST[: places.shape[1]]))
+def _learnt(fleet: Fleet, structure: Structure, found: Real) -> Simpler:
+    low, high = box_around(found, np.array(_LEAST[: found.shape[1]]))
+    places = places_in(low, high, _DEGREE)
     source = prepare_input(fleet.u, fleet.natural)
-    basis, surface = spanning(source, structure, low, high, degree=_DEGREE)
-    return Simpler(structure=structure, intersample=fleet.natural, basis=basis, surface=surface)
+    basis, values = in_basis(answers(source, structure, places))
+    surface = Surface.fitted(low, high, places, values, degree=_DEGREE)
+    return Simpler(structure=structure, basis=basis, surface=surface)
 
 
 def costs_of(fleet: Fleet, one: Simpler, centred: Real, power: Real) -> Real:

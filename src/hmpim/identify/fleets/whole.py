@@ -285,7 +285,7 @@ def _candidates(
         for one in (group.fit, *(other for other, _ in group.others))
     ]
     tried += [
-        (one.structure, one.intersample, float(cost), False)
+        (one.structure, fleet.natural, float(cost), False)
         for one, cost in zip(whole.simpler, behind, strict=True)
     ]
     found = [
@@ -308,10 +308,10 @@ def _findings(fleet: Fleet, group: Group, k: int, own: Parameters, n: int) -> tu
     missing = [name for name in _BANDWIDTHS if getattr(own, name) is None]
     if missing:
         found.append(unreached(missing, band_end=fleet.band[1]))
-    tails = group.tails.get(k)
-    if tails is not None:
+    delay = group.tails.get(k)
+    if delay is not None:
         poles = fleet.structure.order + 1
-        found.append(barely_told(fleet.structure.name, poles=poles, delay=tails.delay))
+        found.append(barely_told(fleet.structure.name, poles=poles, delay=delay))
     rivals = sorted(
         (float(other.cost[i]), other) for other, stays in group.others if bool(stays[k])
     )

@@ -261,12 +261,8 @@ def restricted(found: RationalSolution, kept: int) -> Complex:
     out = np.arange(kept, q - DENOMINATOR_ORDER)
     stay = np.delete(np.arange(q), out)
     part = found.inverse[..., out]
-    scale = 1.0 / np.sqrt(np.maximum(part[..., out, np.arange(out.size)].real, 1e-300))
-    block = part[..., out, :] * (scale[..., :, None] * scale[..., None, :])
-    block[..., np.arange(out.size), np.arange(out.size)] += _RIDGE
-    gone = np.linalg.solve(block, (found.state.theta[..., out] * scale)[..., None])
-    change = (part[..., stay, :] * scale[..., None, :]) @ gone
-    return np.asarray(found.state.theta[..., stay] - change[..., 0])
+    gone = _solution(part[..., out, :], found.state.theta[..., out, None])
+    return np.asarray(found.state.theta[..., stay] - (part[..., stay, :] @ gone[..., None])[..., 0])
 
 
 def gauss_newton(columns: Columns, y: Complex, theta: Complex, *, steps: int) -> RationalSolution:
