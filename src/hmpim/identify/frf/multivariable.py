@@ -425,13 +425,13 @@ def _joint(own: Regressors, columns: Columns, found: RationalSolution, y: Comple
     local, moved = read_off(own, columns, found, y)
     slope = own.at_centres(moved.swapaxes(2, 3))
     joint = slope @ found.inverse[near].swapaxes(0, 1) @ np.conj(slope.swapaxes(2, 3))
-    failed = np.isinf(local.prediction_error)[..., None]
-    condition = np.linalg.cond(np.where(failed[..., None], np.eye(m), joint))
+    failed = np.isinf(local.prediction_error) | ~np.isfinite(joint).all(axis=(2, 3))
+    condition = np.linalg.cond(np.where(failed[..., None, None], np.eye(m), joint))
     coherence = _coherence(own, found, np.vecdot(y, y).real)[near].swapaxes(0, 1)
     return _Joint(
         local=local,
         condition=np.sqrt(np.maximum(condition, 1.0)),
-        coherence=np.where(failed, 0.0, coherence),
+        coherence=np.where(failed[..., None], 0.0, coherence),
     )
 
 
