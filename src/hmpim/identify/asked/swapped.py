@@ -45,6 +45,9 @@ _ROWS = 20_000
 _FEWEST = 200
 """Samples that are looked at, at least."""
 
+_UNSEEN = 1e-11
+"""Share of the greatest eigenvalue below which the source does not have a direction."""
+
 
 def is_swapped(u: Real, y: Real, valid: Mask) -> bool:
     """Whether `u` follows `y` rather than `y` follows `u`.
@@ -165,16 +168,9 @@ def _future_needed(
     if power == 0.0:
         return 0.0
     past, both = slice(_WEIGHTS - lead, 3 * _WEIGHTS + 1 - lead), slice(0, 2 * _WEIGHTS + 1)
-    alone, together = (
-        max(0.0, 1.0 - _told(gram[at, at], product[at]) / power) + MATERIAL**2
+    told = (  # by directions that the source hardly has, nothing is
+        product[at] @ np.linalg.pinv(gram[at, at], rcond=_UNSEEN, hermitian=True) @ product[at]
         for at in (past, both)
     )
+    alone, together = (max(0.0, 1.0 - one / power) + MATERIAL**2 for one in told)
     return 0.5 * float(np.log(alone / together))
-
-
-def _told(gram: Real, product: Real) -> float:
-    """Power that the best weights tell; directions that the source hardly has are left out."""
-    size, direction = np.linalg.eigh(gram)
-    there = size > 1e-11 * size[-1]
-    along = direction[:, there].T @ product
-    return float(np.sum(along**2 / size[there]))
