@@ -19,6 +19,7 @@ from hmpim.identify.noise.spectra import transform_of
 from hmpim.identify.result.inputs import Alike, InputSet
 from hmpim.identify.section_iv.spectrum import excited_band
 from hmpim.identify.worth import DEEPEST, MATERIAL, MUCH
+from hmpim.record.runs import runs_of
 
 __all__ = ["input_set", "own_band"]
 
@@ -159,11 +160,8 @@ def _alike(
     for group in sorted({g for g in involved if g}, key=lambda g: -list(involved).count(g)):
         here = np.array([g == group for g in involved])
         common = np.all(active[[names.index(n) for n in group]], axis=0)
-        spans: list[tuple[float, float]] = []
-        for held, run in groupby(range(here.size), key=lambda k: bool(here[k])):
-            if held:
-                some = list(run)
-                spans.append((float(frequency[some[0]]), float(frequency[some[-1]])))
+        first, stop = runs_of(here)
+        spans = zip(frequency[first].tolist(), frequency[stop - 1].tolist(), strict=True)
         share = float(np.sum(here) / max(int(np.sum(common)), 1))
         found.append(Alike(names=group, bands=tuple(spans), share=share))
     return tuple(found)

@@ -63,6 +63,8 @@ _PROBE = 0.3
 
 _FEWEST = 5
 
+_EFFECTS = ("hold_period", "saturation_low", "saturation_high", "quantization_step")
+
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Member:
@@ -152,10 +154,7 @@ def is_alike(pair: PairIdentification) -> bool:
         pair.verdict == "ok"
         and all(w.severity == "info" for w in pair.warnings)
         and min(rivals, default=np.inf) - chosen > _CLEAR
-        and pair.parameters.hold_period is None
-        and pair.parameters.saturation_low is None
-        and pair.parameters.saturation_high is None
-        and pair.parameters.quantization_step is None
+        and all(getattr(pair.parameters, name) is None for name in _EFFECTS)
     )
 
 
