@@ -100,6 +100,17 @@ def test_an_output_that_follows_no_input_is_said_to_be_unrelated():
     assert found["y1", "u0"].scale_factor.value == pytest.approx(1.0, abs=0.01)
 
 
+def test_an_output_that_is_one_of_the_inputs_leaves_nothing_to_the_others():
+    found = hmpim.identify(
+        hmpim.Record.from_arrays(
+            {f"u{j}": u for j, u in enumerate(INPUTS)}, {"y": INPUTS[1]}, fs=FS
+        )
+    )
+    assert found["y", "u1"].scale_factor.value == pytest.approx(1.0)
+    for j in (0, 2):
+        assert [w.code for w in found["y", f"u{j}"].warnings] == ["unrelated"]
+
+
 def test_an_axis_that_is_not_coupled_is_said_to_be_unrelated():
     coupling = np.zeros((3, 3))
     found = hmpim.identify(record(outputs(coupling, 0.01, 1)))
