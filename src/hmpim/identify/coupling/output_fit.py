@@ -13,7 +13,6 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
-import scipy
 
 from hmpim.identify.arrays import Mask, Real
 from hmpim.identify.chance import SEARCHED
@@ -28,6 +27,7 @@ from hmpim.identify.fitting.fit import fit_together as fit_all
 from hmpim.identify.fitting.joint import joint_fit
 from hmpim.identify.fitting.trial import JointFit
 from hmpim.identify.noise.whiteness import effective_share
+from hmpim.identify.section_iv.correlation import likeness
 from hmpim.identify.worth import NEARLY, PART, TWICE
 from hmpim.model.dynamics import StructureName
 from hmpim.model.response import slowest_time_constant
@@ -300,13 +300,8 @@ def _strongest(
 
 def _follows_at_all(u: Real, y: Real) -> float:
     """Amplitude (r.m.s.) of the output that correlates with the input at the best lag."""
-    first, second = u - u.mean(), y - y.mean()
-    length = scipy.fft.next_fast_len(2 * u.size, real=True)
-    crossed = scipy.fft.irfft(
-        np.conj(scipy.fft.rfft(first, length)) * scipy.fft.rfft(second, length), length
-    )[: u.size // 2]
-    size = float(np.linalg.norm(first))
-    return float(np.max(np.abs(crossed))) / max(size, 1e-300) / float(np.sqrt(u.size))
+    size = max(float(np.linalg.norm(u - u.mean())), 1e-300)
+    return abs(likeness(u, y, u.size // 2 - 1).there) / size / float(np.sqrt(u.size))
 
 
 def _fit_couplings(

@@ -52,6 +52,7 @@ class Likeness:
     # lag in samples, from 0 to the longest asked for, at which that correlation has its largest
     # magnitude
     lag: int
+    there: float  # that correlation, times the number of samples
     # negative lag, as far at most, at which it is larger still; None if there is none
     lead: int | None
 
@@ -143,6 +144,7 @@ def likeness(u: Real, y: Real, longest: int) -> Likeness:
         ahead=early,
         behind=(float(behind.max()), float(behind.min())),
         lag=lag,
+        there=float(behind[lag]),
         lead=lead if abs(ahead[lead]) > abs(behind[lag]) else None,
     )
 
