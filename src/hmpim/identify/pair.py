@@ -387,7 +387,7 @@ def _fit_percents(joint: JointFit, costs: Sequence[float]) -> list[float]:
     problem = joint.problem
     y = problem.y if problem.valid is None else problem.y[problem.valid]
     away = y - y.mean()
-    spread = float(away @ away)
+    spread = max(float(away @ away), np.finfo(float).tiny)
     return [float(100.0 * (1.0 - np.sqrt(cost / spread))) for cost in costs]
 
 

@@ -38,6 +38,9 @@ _MOST_STEPS = 50
 _NEGLIGIBLE = 1e-6
 """Rise of the log-likelihood, Newton's prediction, at which the fit is done."""
 
+_FAR = 1e9
+"""Deviations from a level at which the tail of the normal distribution is still told."""
+
 _LEVELS_MOVE = 10
 """Steps after which levels under noise stay as they are: their scatter is far below the noise."""
 
@@ -269,7 +272,7 @@ def _evaluated(data: _Data, fit: Fit, log_sigma: float) -> _State | None:
         for where, edge, sign in ((data.low, data.low_edge, -1), (data.high, data.high_edge, 1)):
             if not where.any():
                 continue
-            a = sign * (edge[where] - prediction[where]) / sigma
+            a = np.clip(sign * (edge[where] - prediction[where]) / sigma, -_FAR, _FAR)
             tail = scipy.stats.norm.logsf(a)
             hazard = np.exp(scipy.stats.norm.logpdf(a) - tail)
             value[where] = tail + 0.5 * np.log(2 * np.pi)

@@ -20,6 +20,8 @@ def gain_by_rows(one: JointFit, count: int, former: Fit, forgotten: int) -> floa
     size = one.problem.y.size
     counts = np.ones(size, bool) if one.problem.valid is None else one.problem.valid.copy()
     counts[: max(one.forgotten, forgotten)] = False
+    if not counts.any():
+        return -np.inf
     fit = one.best.fit
     gained = 2.0 * innovation_gain(former.residual[counts], fit.residual[counts])
     unknown = fit.structure.parameters + fit.initial.size + count

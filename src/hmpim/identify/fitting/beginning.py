@@ -105,7 +105,7 @@ def begins_of(problem: Problem, fit: Fit, *, lag: int) -> int | None:
     gained = float(moment @ solved(after[:-1, :-1], moment))
     left = max(power - gained, np.finfo(float).tiny)
     limit = float(scipy.special.chdtri(len(part.free), FALSE_ALARM))
-    statistic = share * count * float(np.log(power / left))
+    statistic = share * count * float(np.log(power) - np.log(left))
     if statistic > limit:
         return begins
     if share == 1.0 or fit.objective != fit.cost:  # whitened, it is not the best without a colour
@@ -115,7 +115,7 @@ def begins_of(problem: Problem, fit: Fit, *, lag: int) -> int | None:
     free = fit_structure(begun, fit.structure, fit.theta)
     if free.objective <= 0.0:
         return begins
-    statistic = free.share * count * float(np.log(power / free.objective))
+    statistic = free.share * count * float(np.log(power) - np.log(free.objective))
     return begins if statistic > limit else None
 
 

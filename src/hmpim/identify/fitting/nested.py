@@ -79,4 +79,5 @@ def stretched(cov: Real, simple: Fit, fit: Fit, deviance: float) -> Real:
 def _deviance(simple: Fit, joint: JointFit) -> float:
     """Twice the log-likelihood by which the chosen fit beats a simpler one."""
     count = joint.weighed.counted * joint.weighed_share
-    return float(count * np.log(max(simple.objective / joint.best.fit.objective, 1.0)))
+    least = max(joint.best.fit.objective, np.finfo(float).tiny)
+    return float(count * np.log(max(simple.objective / least, 1.0)))

@@ -147,6 +147,8 @@ def rough_response(
     power = _grouped(spectrum_u.real**2 + spectrum_u.imag**2, group)
     cross = _grouped(np.conj(spectrum_u) * spectrum_y, group)
     power[0] = 0.0
+    if lag and not power.any():  # the input stands still where both are
+        return rough_response(u, y, longest_delay=longest_delay, lag=0)
     bins = np.flatnonzero(power > _FLOOR**2 * power.max())
     weight = power[bins] / power.max()
     return RoughResponse(

@@ -113,5 +113,6 @@ def distance_of(apart: Real, cov: Real) -> float:
     9.0
     """
     spread = np.sqrt(np.diag(cov))
+    spread[spread == 0.0] = 1.0  # of a fit that leaves nothing
     alike = np.linalg.pinv(cov / np.outer(spread, spread), rcond=1e-12, hermitian=True)
     return float(apart / spread @ alike @ (apart / spread))

@@ -280,9 +280,9 @@ def _kinds(residual: Real, noise: Real, left: float, at: Real) -> tuple[Real, Re
     """
     n, bins, at = residual.size, _low_bins(residual), np.maximum(at, 0.5)
     behind = left * spectrum_behind(noise, 2 * np.pi * np.concatenate([bins, at]) / n)
-    if not bins.size or not behind.all():
-        return np.ones(1), behind[None, bins.size :]
     seen = np.abs(scipy.fft.rfft(residual)[1 : bins.size + 1]) ** 2 / n
+    if not seen.any() or not behind.all():
+        return np.ones(1), behind[None, bins.size :]
     rising = np.concatenate([bins, at]) ** -np.array(_SLOPES)[:, None]
     shapes = np.vstack([behind, rising])
     inside, outside = shapes[:, : bins.size], shapes[:, bins.size :]

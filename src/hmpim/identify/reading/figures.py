@@ -201,7 +201,8 @@ def _gain_rate(structure: Structure, fs: float) -> float:
 def _slope_at_dc(system: RationalDelay) -> float:
     """Delay that the phase shows at low frequency, in s."""
     first = 0.0 if system.denominator.size < 2 else float(system.denominator[1])
-    lead = system.numerator[1] / system.numerator[0] if system.numerator.size > 1 else 0.0
+    above = system.numerator
+    lead = above[1] / above[0] if above.size > 1 and above[0] else 0.0
     return float(system.delay + (first - lead) * (system.step or 1.0))
 
 
@@ -266,7 +267,7 @@ def _late_at_dc(structure: Structure, system: RationalDelay, slopes: Real) -> Re
         return late
     if system.denominator.size > 1:
         late = late + slopes[:, above.size]
-    if above.size > 1:
+    if above.size > 1 and above[0]:
         late = late - (slopes[:, 1] - above[1] / above[0] * slopes[:, 0]) / above[0]
     return np.asarray(late * (system.step or 1.0))
 

@@ -90,9 +90,8 @@ def asked_rivals(joint: JointFit) -> tuple[Trial, ...]:
         extra = trial.fit.structure.parameters - best.fit.structure.parameters
         if trial.intersample != best.intersample or trial.fit.structure.name not in PLAIN:
             continue
-        gain = count * float(
-            np.log(max(best.fit.objective, _TINY) / max(trial.fit.objective, _TINY))
-        )
+        here, there = (max(one.fit.objective, _TINY) for one in (best, trial))
+        gain = count * float(np.log(here) - np.log(there))
         if extra > 0 and gain > scipy.special.chdtri(extra, 1.0 - COVERAGE):
             found.append(trial)
     return tuple(found)

@@ -286,9 +286,9 @@ def _rests(best: Fitted) -> bool:
 
 def _ends_quietly(best: Fitted) -> bool:
     """Whether what the ends of the runs leave over is noise; a band-limited input rings there."""
-    if best.problem.source.degree <= 1:
+    left, runs = best.left, len(best.products.statistics.runs)
+    if best.problem.source.degree <= 1 or left.counted < _FEWEST + AHEAD * runs:
         return True
-    left = best.left
     tails = scipy.signal.lfilter(left.noise, np.ones(1), best.left_over[3])[:, left.noise.size :]
     limit = float(scipy.special.chdtri(max(tails.size, 1), FALSE_ALARM))
     return float(np.sum(tails**2)) <= left.innovation * limit

@@ -162,6 +162,7 @@ class _Evaluation:
     def stepped(self, step: Real, *, left: float, converged: bool) -> "Fitted":
         """Return the fit one step away from here, as the derivatives predict it."""
         responses, moments, unknown = self.all_responses, self.all_moments, step.size
+        left = max(left, np.finfo(float).eps * moments.energy)  # it was foretold, not evaluated
         linear = self.linear
         if step.any():
             inner, mixed = moments.gram[unknown:, unknown:], moments.gram[unknown:, :unknown]

@@ -384,11 +384,11 @@ class Products:
         else:
             each, each_rows = fixed, told
             bias, taken = bias + levels[:, 1], taken + levels[:, :1] * steady
-        count = bias.size
+        count, left = bias.size, energy - float((fixed * outer).sum())
         return Moments(
             gram=gram - (told.transpose(0, 2, 1) @ beside).sum(axis=0),
             cross=cross - (fixed[:, None] @ beside)[:, 0].sum(axis=0),
-            energy=energy - float((fixed * outer).sum()),
+            energy=max(left, np.finfo(float).eps * abs(energy)),  # of sums that cancel
             fixed=each,
             fixed_rows=each_rows,
             bias=float(bias.sum()) / count,
