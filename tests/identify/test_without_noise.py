@@ -115,3 +115,4 @@ def test_compressed_records_without_noise_are_identified_too(late):
     assert (pair.structure, pair.verdict) == ("second_order", "ok")
     assert pair.delay.value == pytest.approx(late / FS, abs=1e-6)
     assert pair.natural_frequency.value == pytest.approx(5.0, rel=1e-4)
+    assert pair.noise_std.ci95[0] == 0.0

@@ -248,7 +248,7 @@ def _is_conditioned(statistics: Statistics) -> bool:
             f"{statistics.samples} samples were read; at least {_FEWEST} are needed to tell "
             "dynamics from noise"
         )
-    return len(statistics.runs) > 1 or shortest > max(2 * lags, lags + _FEWEST)
+    return len(statistics.runs) > 1 or shortest > lags + max(lags // 2, _FEWEST)
 
 
 def _looks_held(statistics: Statistics) -> bool:
