@@ -21,7 +21,7 @@ from hmpim.identify.fitting.plainer import plainer, taking
 from hmpim.identify.fitting.trial import JointFit
 from hmpim.identify.frf.local import local_response
 from hmpim.identify.judgement import Evidence, attempt, judge
-from hmpim.identify.judgement.unfollowed import unfollowed
+from hmpim.identify.judgement.verdict import unfollowed
 from hmpim.identify.noise.misfit import Misfit, misfit
 from hmpim.identify.nonlinear.bends import Bend, bends, is_bent_instead, plainer_bends
 from hmpim.identify.nonlinear.nonlinearity import Inspection, inspect_nonlinearity

@@ -34,6 +34,7 @@ def evidence_of():
         return Evidence(
             joint=joint,
             readings=readings,
+            spanned=readings.parameters,
             misfit=misfit(u, fit.residual, delay=fit.delay, band=(band[0] / FS, band[1] / FS)),
             u=u,
             fs=FS,

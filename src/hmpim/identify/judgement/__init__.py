@@ -10,14 +10,13 @@ between_samples  other assumptions on what the input does between its samples
 bent             figures that a nonlinearity has moved
 response         bandwidths that the measured response contradicts
 failed           a check that raises costs itself, and nothing else
-unfollowed       an output that a constant explains as well
 verdict          from findings to a verdict for each parameter and for the pair
 """
 
 from hmpim.identify.judgement.checks import CHECKS, Check, judge
 from hmpim.identify.judgement.evidence import Evidence
 from hmpim.identify.judgement.failed import attempt
-from hmpim.identify.judgement.verdict import all_doubted, judged, judged_together
+from hmpim.identify.judgement.verdict import all_doubted, judged, judged_together, unfollowed
 
 __all__ = [
     "CHECKS",
@@ -28,4 +27,5 @@ __all__ = [
     "judge",
     "judged",
     "judged_together",
+    "unfollowed",
 ]

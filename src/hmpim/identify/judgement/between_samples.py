@@ -1,6 +1,6 @@
 """Other assumptions on what the input does between its samples, and what they would move."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 
 from hmpim.identify.judgement.evidence import Evidence, structure_in_words
 from hmpim.identify.reading.spanned import rivals_of
@@ -27,32 +27,24 @@ _SHIFTED = (*PHASE_SPLIT, "delay_low_frequency", "bandwidth_phase90")
 _WORDS = {"zoh": "held", "foh": "linear", "bandlimited": "band-limited"}
 
 
-def other_intersample(evidence: Evidence) -> tuple[Finding, ...]:
+def other_intersample(evidence: Evidence) -> Iterator[Finding]:
     """Name the assumptions that fit as well: the intervals cover them."""
-    best = evidence.joint.best
+    best, own = evidence.joint.best, evidence.joint.best.fit.structure.name
     rivals = [
-        (
-            trial.intersample,
-            trial.fit.delay - best.fit.delay,
-            trial.fit.structure.name if trial.fit.structure.name != best.fit.structure.name else "",
-        )
-        for trial in rivals_of(evidence.joint)
+        (one.intersample, one.fit.delay - best.fit.delay, name if name != own else "")
+        for one in rivals_of(evidence.joint)
+        for name in (one.fit.structure.name,)
     ]
-    return undetermined_between(best.intersample, rivals)
+    yield from undetermined_between(best.intersample, rivals)
 
 
 def undetermined_between(
     taken: Intersample, rivals: Iterable[tuple[Intersample, float, str]]
-) -> tuple[Finding, ...]:
+) -> Iterator[Finding]:
     """Name the assumptions that fit as well as the one that is taken, if they move the delay.
 
-    Parameters
-    ----------
-    taken : {'zoh', 'foh', 'bandlimited'}
-        The assumption that is taken.
-    rivals : iterable of (intersample, float, str)
-        Each that fits as well, by how many samples it moves the delay, and the structure that
-        goes with it if that is another one, else empty.
+    `rivals` holds each that fits as well, by how many samples it moves the delay, and the structure
+    that goes with it if that is another one, else an empty word.
     """
     moves = []
     for mode, apart, other in rivals:
@@ -60,16 +52,14 @@ def undetermined_between(
             model = f"{_a_model(other)} and " if other else ""
             moves.append(f"{_WORDS[mode]}, with {model}{_delay(apart)}")
     if not moves:
-        return ()
-    return (
-        Finding(
-            code="intersample",
-            message="This record does not determine what the input does between its samples. "
-            f"The input is taken as {_WORDS[taken]}; it may also be {', or '.join(moves)}. "
-            "The intervals cover this. If you know it, state it with intersample=.",
-            severity="info",
-            parameters=_SHIFTED,
-        ),
+        return
+    yield Finding(
+        code="intersample",
+        message="This record does not determine what the input does between its samples. "
+        f"The input is taken as {_WORDS[taken]}; it may also be {', or '.join(moves)}. "
+        "The intervals cover this. If you know it, state it with intersample=.",
+        severity="info",
+        parameters=_SHIFTED,
     )
 
 
@@ -87,10 +77,8 @@ def _delay(apart: float) -> str:
     return f"a delay {size} samples {'longer' if apart > 0.0 else 'shorter'}"
 
 
-def wide_span(evidence: Evidence) -> tuple[Finding, ...]:
+def wide_span(evidence: Evidence) -> Iterator[Finding]:
     """Doubt figures that the models which this record allows put far apart."""
-    if evidence.spanned is None:
-        return ()
     wide: dict[str, tuple[float, float]] = {}
     for name in SIZES:
         estimate, own = getattr(evidence.spanned, name), getattr(evidence.readings.parameters, name)
@@ -102,18 +90,16 @@ def wide_span(evidence: Evidence) -> tuple[Finding, ...]:
         if high - low > PART * abs(estimate.value):
             wide[name] = (low, high)
     if not wide:
-        return ()
+        return
     named = ", ".join(
         f"{in_words(name)} from {low:.4g} to {high:.4g}" for name, (low, high) in wide.items()
     )
     between = bool(rivals_of(evidence.joint))
-    return (
-        Finding(
-            code="intersample" if between else "structure",
-            message=f"Models that this record cannot distinguish differ widely: {named}. "
-            + ("State what the input does between its samples" if between else "Sweep higher")
-            + ", or lower the noise.",
-            severity="doubt",
-            parameters=tuple(wide),
-        ),
+    yield Finding(
+        code="intersample" if between else "structure",
+        message=f"Models that this record cannot distinguish differ widely: {named}. "
+        + ("State what the input does between its samples" if between else "Sweep higher")
+        + ", or lower the noise.",
+        severity="doubt",
+        parameters=tuple(wide),
     )

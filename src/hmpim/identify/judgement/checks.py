@@ -1,6 +1,6 @@
 """The checks in their order, and `judge`, which makes them."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from functools import partial
 
 from hmpim.identify.judgement.bent import bent
@@ -37,7 +37,7 @@ from hmpim.record import Finding
 
 __all__ = ["CHECKS", "Check", "judge"]
 
-Check = Callable[[Evidence], tuple[Finding, ...]]
+Check = Callable[[Evidence], Iterable[Finding]]
 """Looks at the evidence and says what it finds, if anything."""
 
 CHECKS: tuple[Check, ...] = (
@@ -96,30 +96,19 @@ _OF_THE_RESIDUAL: frozenset[Check] = frozenset(
 
 
 def judge(evidence: Evidence, *, checks: Sequence[Check] | None = None) -> tuple[Finding, ...]:
-    """Make every check; one that raises costs itself and is said.
+    """Make every check, by default `CHECKS`, of software `SAMPLED`, and return what they find.
 
-    Parameters
-    ----------
-    evidence : Evidence
-        What there is to look at.
-    checks : sequence of callable, optional
-        What to look for; by default `CHECKS`, of software `SAMPLED`. Where all is explained to the
-        last digit, those that ask something of the residual are left out.
-
-    Returns
-    -------
-    tuple of Finding
-        In the order of the checks; a check that raised stands as 'check_failed'.
+    One that raises costs itself and stands as 'check_failed'. Where all is explained to the last
+    digit, those that ask something of the residual are left out.
     """
     if checks is None:
         checks = SAMPLED if evidence.joint.best.fit.structure.sampled else CHECKS
     if evidence.is_without_noise:
         checks = [check for check in checks if check not in _OF_THE_RESIDUAL]
     found: list[Finding] = []
+    nothing: tuple[Finding, ...] = ()
     for check in checks:
-        name = getattr(check, "__name__", type(check).__name__)
-        nothing: tuple[Finding, ...] = ()
-        said, failure = attempt(name, partial(check, evidence), nothing)
+        said, failure = attempt(check.__name__, partial(_said, check, evidence), nothing)
         found += [*said, *failure]
     # Of figures that are not given there is nothing more to say.
     untold = doubted(one for one in found if one.code in UNTOLD)
@@ -128,3 +117,8 @@ def judge(evidence: Evidence, *, checks: Sequence[Check] | None = None) -> tuple
         for one in found
         if one.severity == "doubt" or not one.parameters or not untold.issuperset(one.parameters)
     )
+
+
+def _said(check: Check, evidence: Evidence) -> tuple[Finding, ...]:
+    """Return all that a check finds, looked for here and now."""
+    return tuple(check(evidence))

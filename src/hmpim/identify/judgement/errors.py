@@ -1,5 +1,8 @@
 """Error bars that are too wide for the figure, and a fit that did not end."""
 
+from collections.abc import Iterator
+
+from hmpim.identify.judgement.between_samples import SIZES
 from hmpim.identify.judgement.evidence import Evidence
 from hmpim.identify.result import Estimate
 from hmpim.identify.result.groups import MODELLED, in_words
@@ -9,53 +12,39 @@ from hmpim.record import Finding
 __all__ = ["not_converged", "weak_delay", "weak_excitation"]
 
 
-def not_converged(evidence: Evidence) -> tuple[Finding, ...]:
+def not_converged(evidence: Evidence) -> Iterator[Finding]:
     """Doubt a fit that stopped on its way."""
     if evidence.joint.best.fit.converged:
-        return ()
-    return (
-        Finding(
-            code="not_converged",
-            message="The fit stopped before it converged. "
-            "Try a longer record, or one with more excitation.",
-            severity="doubt",
-            parameters=MODELLED,
-        ),
+        return
+    yield Finding(
+        code="not_converged",
+        message="The fit stopped before it converged. "
+        "Try a longer record, or one with more excitation.",
+        severity="doubt",
+        parameters=MODELLED,
     )
 
 
-def weak_excitation(evidence: Evidence) -> tuple[Finding, ...]:
+def weak_excitation(evidence: Evidence) -> Iterator[Finding]:
     """Doubt each parameter whose standard deviation is above 30 % of its value.
 
     With the scale factor the bias, where the input is far from zero; with the natural frequency the
     delay, where nothing is known of it: what a pole does that may lie anywhere, a delay does too.
     """
     p = evidence.readings.parameters
-    named: tuple[tuple[str, Estimate | None], ...] = (
-        ("scale_factor", p.scale_factor),
-        ("natural_frequency", p.natural_frequency),
-        ("damping_ratio", p.damping_ratio),
-        ("time_constant", p.time_constant if p.natural_frequency is None else None),
-        ("bandwidth_phase90", p.bandwidth_phase90),
-        ("bandwidth_phase90_without_delay", p.bandwidth_phase90_without_delay),
-        ("bandwidth_3db", p.bandwidth_3db),
-    )
-    findings = []
-    for name, estimate in named:
-        if estimate is None:
+    for name in SIZES:
+        estimate: Estimate | None = getattr(p, name)
+        if estimate is None or estimate.spread <= MUCH * abs(estimate.value):
             continue
-        if estimate.spread <= MUCH * abs(estimate.value):
+        if name == "time_constant" and p.natural_frequency is not None:
             continue
-        findings.append(
-            Finding(
-                code="weak_excitation",
-                message=f"{_how_well(in_words(name), estimate)}. Excite more around the natural "
-                "frequency, or longer.",
-                severity="doubt",
-                parameters=(name, *_along(name, estimate, evidence)),
-            )
+        yield Finding(
+            code="weak_excitation",
+            message=f"{_how_well(in_words(name), estimate)}. Excite more around the natural "
+            "frequency, or longer.",
+            severity="doubt",
+            parameters=(name, *_along(name, estimate, evidence)),
         )
-    return tuple(findings)
 
 
 def _along(name: str, estimate: Estimate, evidence: Evidence) -> tuple[str, ...]:
@@ -85,26 +74,21 @@ def _how_well(words: str, estimate: Estimate) -> str:
     return f"The record does not determine the {words}: its standard deviation exceeds its value"
 
 
-def weak_delay(evidence: Evidence) -> tuple[Finding, ...]:
+def weak_delay(evidence: Evidence) -> Iterator[Finding]:
     """Doubt a delay whose standard deviation is above two samples and 30 % of its value."""
     p = evidence.readings.parameters
+    delays = {"delay": p.delay, "delay_low_frequency": p.delay_low_frequency}
     blurred = tuple(
         name
-        for name, estimate in (
-            ("delay", p.delay),
-            ("delay_low_frequency", p.delay_low_frequency),
-        )
-        if estimate is not None
-        and estimate.spread > max(BLURRED / evidence.fs, MUCH * abs(estimate.value))
+        for name, one in delays.items()
+        if one is not None and one.spread > max(BLURRED / evidence.fs, MUCH * abs(one.value))
     )
     if p.delay is None or "delay" not in blurred:
-        return ()
-    return (
-        Finding(
-            code="weak_excitation",
-            message=f"The record barely determines the delay: its standard deviation is "
-            f"{p.delay.spread:.2g} s. Excite more, or sweep higher.",
-            severity="doubt",
-            parameters=blurred,
-        ),
+        return
+    yield Finding(
+        code="weak_excitation",
+        message=f"The record barely determines the delay: its standard deviation is "
+        f"{p.delay.spread:.2g} s. Excite more, or sweep higher.",
+        severity="doubt",
+        parameters=blurred,
     )

@@ -1,17 +1,20 @@
 """What a check looks at: the fit, what was read off it, and what the record says beside it."""
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from hmpim.identify.arrays import Real
+from hmpim.identify.chance import HALF
 from hmpim.identify.effects.gain import GainChange
 from hmpim.identify.fitting.trial import JointFit
 from hmpim.identify.noise.misfit import Misfit
 from hmpim.identify.nonlinear.bends import Bend
 from hmpim.identify.reading.readings import Readings
 from hmpim.identify.result import Parameters, ResponseBandwidths
-from hmpim.identify.worth import FEW, INTERPOLATED, WORTH
+from hmpim.identify.result.groups import MODELLED
+from hmpim.identify.worth import FEW, INTERPOLATED, TOLERATED, WORTH
 
 __all__ = ["Evidence", "structure_in_words"]
 
@@ -38,9 +41,8 @@ class Evidence:
         100 (1 - ‖residual‖ / ‖deviation of the output‖).
     measured : ResponseBandwidths
         Bandwidths read off the measured response.
-    spanned : Parameters or None
-        What was read off it, with intervals that cover every model the record allows; None where
-        it allows no other.
+    spanned : Parameters
+        What was read off the fit, with intervals that cover every model the record allows.
     bends : tuple of Bend
         Nonlinearities that the record leaves in question; none where figures are doubted anyway.
     nonlinear : float
@@ -65,7 +67,7 @@ class Evidence:
     band: tuple[float, float]
     fit_percent: float
     measured: ResponseBandwidths
-    spanned: Parameters | None = None
+    spanned: Parameters
     bends: tuple[Bend, ...] = ()
     nonlinear: float = 0.0
     held: bool = False
@@ -93,6 +95,35 @@ class Evidence:
         inner, moves = fit.residual[end:-end], fit.prediction + fit.residual
         return float(np.sqrt(np.mean(inner**2))) < INTERPOLATED * float(np.std(moves))
 
+    def moved(self, others: Sequence[Mapping[str, float | None]]) -> dict[str, float]:
+        """Figures that others put farther off than an interval can cover, the noise apart.
+
+        Each with the share of itself by which it moves; 0 where one of the others does not give it.
+        """
+        moved = {}
+        for name in MODELLED:
+            own = getattr(self.readings.parameters, name)
+            if own is None or name == "noise_std":
+                continue
+            values = [other.get(name) for other in others]
+            far = max((abs(v - own.value) for v in values if v is not None), default=0.0)
+            if None in values or far > max(FEW * HALF * own.spread, TOLERATED * abs(own.value)):
+                moved[name] = far / abs(own.value) if own.value else 0.0
+        return moved
+
+
+_WORDS = {
+    "integrator_first_order": "lagging integrator",
+    "integrator_second_order": "second-order lagging integrator",
+    "washout_second_order": "second-order (with a washout)",
+    "band_pass": "band-pass",
+    "_order": "-order",
+    "_modes": "-mode",
+    "_zeros": " (with two zeros)",
+    "_zero": " (with a zero)",
+}
+"""Names of structures, or parts of them, in words."""
+
 
 def structure_in_words(name: str) -> str:
     """Return a structure's name in plain words.
@@ -102,29 +133,8 @@ def structure_in_words(name: str) -> str:
     >>> structure_in_words("second_order_zero"), structure_in_words("static")
     ('second-order (with a zero)', 'static')
     """
-    plain = {
-        "first_order": "first-order",
-        "second_order": "second-order",
-        "third_order": "third-order",
-        "fourth_order": "fourth-order",
-        "first_order_zero": "first-order (with a zero)",
-        "second_order_zero": "second-order (with a zero)",
-        "second_order_zeros": "second-order (with two zeros)",
-        "third_order_zeros": "third-order (with two zeros)",
-        "fifth_order": "fifth-order",
-        "sixth_order": "sixth-order",
-        "three_modes": "three-mode",
-        "four_modes": "four-mode",
-        "five_modes": "five-mode",
-        "six_modes": "six-mode",
-        "seven_modes": "seven-mode",
-        "eight_modes": "eight-mode",
-        "band_pass": "band-pass",
-        "washout_second_order": "second-order (with a washout)",
-        "two_modes": "two-mode",
-        "integrator_first_order": "lagging integrator",
-        "integrator_second_order": "second-order lagging integrator",
-    }
     if name.startswith(("iir", "bilinear")):
         return f"{name.split('_')[1]}-pole filter"
-    return plain.get(name, name.replace("_", " "))
+    for part, words in _WORDS.items():
+        name = name.replace(part, words)
+    return name.replace("_", " ")

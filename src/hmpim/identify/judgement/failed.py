@@ -13,21 +13,6 @@ T = TypeVar("T")
 def attempt(name: str, look: Callable[[], T], otherwise: T) -> tuple[T, tuple[Finding, ...]]:
     """Return what `look` returns; if it raises, `otherwise` and a finding that says so.
 
-    Parameters
-    ----------
-    name : str
-        Of the check, for the sentence.
-    look : callable
-        The check, without arguments.
-    otherwise : object
-        What stands in for its answer.
-
-    Returns
-    -------
-    answer : object
-    findings : tuple of Finding
-        Code 'check_failed', or none.
-
     Examples
     --------
     >>> attempt("half", lambda: 1 / 2, 0.0)

@@ -1,5 +1,6 @@
 """Whether the input answers the noise: a loop around the unit."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -29,7 +30,7 @@ _AT_ONCE = 20_000
 """Samples left out whose lags are held at once."""
 
 
-def feedback(evidence: Evidence) -> tuple[Finding, ...]:
+def feedback(evidence: Evidence) -> Iterator[Finding]:
     """Say that the residual moves the input; a doubt on what it may move where it has a colour.
 
     A score test (Rao 1948): the input's future, beside its past, explains nothing of a residual
@@ -38,61 +39,45 @@ def feedback(evidence: Evidence) -> tuple[Finding, ...]:
     """
     left, u = evidence.readings.innovations, evidence.u
     if evidence.through or left.size != u.size or u.size < 20 * _AHEAD:
-        return ()
+        return
     if evidence.nonlinear > 0.0 and evidence.unexplained < MOST:
-        return ()  # a sweep's harmonics are its future
+        return  # a sweep's harmonics are its future
     counts = evidence.joint.weighed.counts
     if counts is not None and np.count_nonzero(counts[_AHEAD:-_AHEAD]) < 10 * _AHEAD:
-        return ()
+        return
     if float(chances_of_an_answer(u, left[None], counts)[0]) > FALSE_ALARM:
-        return ()
+        return
     if find_period(u) is not None:
-        return ()  # the future of a periodic input is its past
+        return  # the future of a periodic input is its past
     moved = moved_by(evidence, 1.0)
     if moved == ("noise_std",):
-        return ()
+        return
     coloured = not evidence.readings.white
     treated = ", and the fit treats some of the noise as response" if coloured else ""
-    message = (
-        f"The residual later appears in the input: the unit was in a feedback loop{treated}. "
-        "Identify it through what drives the loop (reference=, --reference)."
-    )
-    return (
-        Finding(
-            code="feedback",
-            message=message,
-            severity="doubt" if coloured else "info",
-            parameters=moved,
-        ),
+    yield Finding(
+        code="feedback",
+        message="The residual later appears in the input: the unit was in a feedback loop"
+        f"{treated}. Identify it through what drives the loop (reference=, --reference).",
+        severity="doubt" if coloured else "info",
+        parameters=moved,
     )
 
 
 def chances_of_an_answer(u: Real, left: Real, counts: Mask | None = None) -> Real:
     """Chance, for each of many residuals, that no answer of the input makes what is seen.
 
-    Parameters
-    ----------
-    u : ndarray, shape (n,)
-        The input.
-    left : ndarray, shape (k, n)
-        What models leave over of outputs to it.
-    counts : ndarray of bool, shape (n,), optional
-        Samples that count; all by default.
-
-    Returns
-    -------
-    ndarray, shape (k,)
-        1 where the input's past tells all of its future.
+    `left`, (k, n), is what models leave over of outputs to the input `u`, (n,), of which all
+    samples count or those of `counts`. 1 where the input's past tells all of its future.
     """
-    lost = None if counts is None else np.flatnonzero(~counts[_AHEAD:-_AHEAD])
+    lost = np.flatnonzero([] if counts is None else ~counts[_AHEAD:-_AHEAD])
     own = _future_of(u, lost)
     if not own.size.size or not left.shape[0]:
         return np.ones(left.shape[0])
     inner = left[:, _AHEAD:-_AHEAD]
-    if lost is not None and lost.size:
+    if lost.size:
         inner = inner.copy()
         inner[:, lost] = 0.0
-    count = inner.shape[1] - (0 if lost is None else lost.size)
+    count = inner.shape[1] - lost.size
     mean = inner.sum(axis=1) / count
     variance = np.vecdot(inner, inner) / count - mean**2
     moves = u - u.mean()
@@ -113,12 +98,11 @@ class _Future:
 
 
 @kept
-def _future_of(u: Real, lost: NDArray[np.intp] | None) -> _Future:
+def _future_of(u: Real, lost: NDArray[np.intp]) -> _Future:
     gram = _gram(u - u.mean())
-    if lost is not None:
-        for begin in range(0, lost.size, _AT_ONCE):
-            rows = _lags_at(u - u.mean(), lost[begin : begin + _AT_ONCE])
-            gram -= rows @ rows.T
+    for begin in range(0, lost.size, _AT_ONCE):
+        rows = _lags_at(u - u.mean(), lost[begin : begin + _AT_ONCE])
+        gram -= rows @ rows.T
     # Of the future what the past does not tell (a Schur complement).
     told = solved(gram[_PAST, _PAST], gram[_PAST, _FUTURE])
     size, direction = np.linalg.eigh(gram[_FUTURE, _FUTURE] - gram[_FUTURE, _PAST] @ told)

@@ -1,27 +1,31 @@
 """A gain that changes along the record, or may have changed."""
 
-from hmpim.identify.chance import HALF
-from hmpim.identify.effects.gain import GainChange
+from collections.abc import Iterator
+
 from hmpim.identify.judgement.evidence import Evidence, structure_in_words
 from hmpim.identify.reading.figures import figures_of
 from hmpim.identify.result.digits import percent, plus_minus
-from hmpim.identify.result.groups import MODELLED
-from hmpim.identify.worth import FEW, TOLERATED
+from hmpim.identify.worth import FEW
 from hmpim.record import Finding
 
 __all__ = ["gain_change"]
 
 
-def gain_change(evidence: Evidence) -> tuple[Finding, ...]:
+def gain_change(evidence: Evidence) -> Iterator[Finding]:
     """Say that the gain changes; or that it may have, and doubt what would then move.
 
     A shift smaller than the tolerated error of a model is left to the interval, which covers it.
     """
     gaining = evidence.gaining
     if gaining is None:
-        return ()
+        return
     way = "rises" if gaining.change > 0.0 else "falls"
-    moved = _moved(evidence, gaining)
+    fs = evidence.fs
+    moved = tuple(
+        evidence.moved([figures_of(fit, fs=fs, highest=fs / 2) for fit in gaining.others])
+    )
+    if gaining.share > 2 * FEW:
+        moved = (*moved, "noise_std")
     if gaining.taken:
         size = plus_minus(100.0 * abs(gaining.change), 100.0 * gaining.std)
         other = " Another time course of the gain, with different figures, is about as likely."
@@ -38,26 +42,9 @@ def gain_change(evidence: Evidence) -> tuple[Finding, ...]:
             "at one time only, so dynamics and a change of gain look alike. Let the unit warm up, "
             "and repeat the test with the sweep reversed."
         )
-    return (
-        Finding(
-            code="gain_change",
-            message=message,
-            severity="doubt" if moved else "info",
-            parameters=moved or ("scale_factor",),
-        ),
+    yield Finding(
+        code="gain_change",
+        message=message,
+        severity="doubt" if moved else "info",
+        parameters=moved or ("scale_factor",),
     )
-
-
-def _moved(evidence: Evidence, gaining: GainChange) -> tuple[str, ...]:
-    """Figures that another explanation puts farther off than an interval can cover."""
-    fs, moved = evidence.fs, []
-    others = [figures_of(fit, fs=fs, highest=fs / 2) for fit in gaining.others]
-    for name in MODELLED:
-        own = getattr(evidence.readings.parameters, name)
-        if own is None or name == "noise_std":
-            continue
-        room = max(FEW * HALF * own.spread, TOLERATED * abs(own.value))
-        values = [other.get(name) for other in others]
-        if any(value is None or abs(value - own.value) > room for value in values):
-            moved.append(name)
-    return (*moved, "noise_std") if gaining.share > 2 * FEW else tuple(moved)

@@ -1,7 +1,7 @@
 """What lies outside the band, before the record's start or beyond its end."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -55,73 +55,67 @@ _OF_SLOWEST = ("time_constant", "natural_frequency", "damping_ratio")
 _BANDWIDTHS = ("bandwidth_phase90", "bandwidth_phase90_without_delay", "bandwidth_3db")
 
 
-def initial_transient(evidence: Evidence) -> tuple[Finding, ...]:
+def initial_transient(evidence: Evidence) -> Iterator[Finding]:
     """Say what was left out because the record does not begin at rest.
 
     The free response of a slow pole that a plain model lacks looks as a drift does: there the
     bias is in doubt, and what is read off that pole.
     """
-    joint = evidence.joint
+    joint, fit = evidence.joint, evidence.joint.best.fit
     if not joint.forgotten:
-        return ()
-    memory = joint.best.fit.memory
-    drifts = joint.lingers
-    open_ended = joint.best.fit.structure.integrators > 0
-    doubted = ("bias", *_OF_SLOWEST) if drifts else ("bias",) if open_ended else ()
-    return (
-        Finding(
-            code="initial_transient",
-            message="The record does not begin at rest. The free response of its initial state is "
-            f"fitted too, and its first {joint.forgotten / evidence.fs:.4g} s, which respond to "
-            "input before the record, are left out."
-            + (
-                f" The free response lasts {memory / evidence.fs:.3g} s and may be a drift."
-                if drifts
-                else ""
-            )
-            + (" The integrator's initial value is part of the bias." if open_ended else ""),
-            severity="doubt" if doubted else "info",
-            parameters=doubted,
-        ),
+        return
+    message = (
+        "The record does not begin at rest. The free response of its initial state is fitted too, "
+        f"and its first {joint.forgotten / evidence.fs:.4g} s, which respond to input before the "
+        "record, are left out."
+    )
+    doubted: tuple[str, ...] = ()
+    if joint.lingers:
+        doubted = ("bias", *_OF_SLOWEST)
+        message += f" The free response lasts {fit.memory / evidence.fs:.3g} s and may be a drift."
+    if fit.structure.integrators:
+        doubted = doubted or ("bias",)
+        message += " The integrator's initial value is part of the bias."
+    yield Finding(
+        code="initial_transient",
+        message=message,
+        severity="doubt" if doubted else "info",
+        parameters=doubted,
     )
 
 
-def fast_mode(evidence: Evidence) -> tuple[Finding, ...]:
+def fast_mode(evidence: Evidence) -> Iterator[Finding]:
     """Doubt a richer structure with a mode far beyond what was excited."""
     name = evidence.joint.best.fit.structure.name
     if name in PLAIN:
-        return ()
+        return
     poles = np.roots(evidence.readings.system.denominator[::-1])
     fastest = float(np.max(np.abs(poles), initial=0.0) / (2 * np.pi))
     if fastest <= TWICE * evidence.band[1]:
-        return ()
-    return (
-        Finding(
-            code="extrapolated",
-            message=f"A {structure_in_words(name)} model needs a mode at {fastest:.4g} Hz, beyond "
-            f"the excited band, which ends at {evidence.band[1]:.4g} Hz: the delay may not be "
-            "constant, or the clocks may drift apart. Check the time stamps, or "
-            f"{_sweep_to(fastest, evidence)}.",
-            severity="doubt",
-            parameters=PHASE_SPLIT,
-        ),
+        return
+    yield Finding(
+        code="extrapolated",
+        message=f"A {structure_in_words(name)} model needs a mode at {fastest:.4g} Hz, beyond "
+        f"the excited band, which ends at {evidence.band[1]:.4g} Hz: the delay may not be "
+        "constant, or the clocks may drift apart. Check the time stamps, or "
+        f"{_sweep_to(fastest, evidence)}.",
+        severity="doubt",
+        parameters=PHASE_SPLIT,
     )
 
 
-def natural_frequency_beyond(evidence: Evidence) -> tuple[Finding, ...]:
+def natural_frequency_beyond(evidence: Evidence) -> Iterator[Finding]:
     """Doubt a natural frequency that was not excited, and the delay that goes with it."""
     natural = evidence.readings.parameters.natural_frequency
     if natural is None or natural.value <= PAST * evidence.band[1]:
-        return ()
-    return (
-        Finding(
-            code="extrapolated",
-            message=f"The natural frequency of {natural.value:.4g} Hz lies beyond the excited "
-            f"band, which ends at {evidence.band[1]:.4g} Hz. To see it, "
-            f"{_sweep_to(natural.value, evidence)}.",
-            severity="doubt",
-            parameters=PHASE_SPLIT,
-        ),
+        return
+    yield Finding(
+        code="extrapolated",
+        message=f"The natural frequency of {natural.value:.4g} Hz lies beyond the excited "
+        f"band, which ends at {evidence.band[1]:.4g} Hz. To see it, "
+        f"{_sweep_to(natural.value, evidence)}.",
+        severity="doubt",
+        parameters=PHASE_SPLIT,
     )
 
 
@@ -137,34 +131,28 @@ def _sweep_to(mode: float, evidence: Evidence) -> str:
     return f"sweep to {top:.7g} Hz, sampled at {rate:.7g} Hz or faster"
 
 
-def integrator(evidence: Evidence) -> tuple[Finding, ...]:
+def integrator(evidence: Evidence) -> Iterator[Finding]:
     """Say what an integrating output, or one that forgets a constant input, cannot have."""
     structure = evidence.joint.best.fit.structure
     if structure.dc_zeros:
-        return (
-            Finding(
-                code="zero_at_dc",
-                message="A constant input does not move the output: there is no gain at DC to "
-                "measure bandwidths from, and the scale factor is the output per rate of the "
-                "input.",
-                severity="info",
-                parameters=("scale_factor", *_BANDWIDTHS),
-            ),
+        yield Finding(
+            code="zero_at_dc",
+            message="A constant input does not move the output: there is no gain at DC to measure "
+            "bandwidths from, and the scale factor is the output per rate of the input.",
+            severity="info",
+            parameters=("scale_factor", *_BANDWIDTHS),
         )
-    if not structure.integrators:
-        return ()
-    return (
-        Finding(
+    elif structure.integrators:
+        yield Finding(
             code="integrator",
             message="The output integrates the input: there is no gain at DC to measure bandwidths "
             "from, and the scale factor is the output's rate per input.",
             severity="info",
             parameters=("scale_factor", *_BANDWIDTHS),
-        ),
-    )
+        )
 
 
-def beyond_band(evidence: Evidence) -> tuple[Finding, ...]:
+def beyond_band(evidence: Evidence) -> Iterator[Finding]:
     """Name the bandwidths that the excited band does not reach."""
     structure, p = evidence.joint.best.fit.structure, evidence.readings.parameters
     asked = ["bandwidth_phase90"]
@@ -174,8 +162,8 @@ def beyond_band(evidence: Evidence) -> tuple[Finding, ...]:
         asked.append("bandwidth_3db")
     missing = [name for name in asked if getattr(p, name) is None]
     if structure.integrators or structure.dc_zeros or not missing:
-        return ()
-    return (unreached(missing, band_end=evidence.band[1]),)
+        return
+    yield unreached(missing, band_end=evidence.band[1])
 
 
 def unreached(missing: Sequence[str], *, band_end: float) -> Finding:
@@ -190,46 +178,42 @@ def unreached(missing: Sequence[str], *, band_end: float) -> Finding:
     )
 
 
-def short_record(evidence: Evidence) -> tuple[Finding, ...]:
+def short_record(evidence: Evidence) -> Iterator[Finding]:
     """Doubt what is read off a record that ends before the system has settled."""
     fit = evidence.joint.best.fit
     settle = (max(fit.delay, 0.0) + fit.memory) / evidence.fs
     length = evidence.joint.problem.y.size / evidence.fs
     if settle <= length:
-        return ()
-    return (
-        Finding(
-            code="short_record",
-            message=f"The record of {length:.4g} s is short against the system's settling time of "
-            f"{settle:.4g} s. Record at least {2 * settle:.3g} s.",
-            severity="doubt",
-            parameters=MODELLED,
-        ),
+        return
+    yield Finding(
+        code="short_record",
+        message=f"The record of {length:.4g} s is short against the system's settling time of "
+        f"{settle:.4g} s. Record at least {2 * settle:.3g} s.",
+        severity="doubt",
+        parameters=MODELLED,
     )
 
 
-def negative_delay(evidence: Evidence) -> tuple[Finding, ...]:
+def negative_delay(evidence: Evidence) -> Iterator[Finding]:
     """Doubt an output that moves before its input.
 
     Only where every model that the record allows says so. By as much as its time constants a lead
     that no structure has may move it. Further ahead it is the clock, and the figures are those of
     the record.
     """
-    delay = (evidence.spanned or evidence.readings.parameters).delay
+    delay = evidence.spanned.delay
     latest = None if delay is None or delay.ci95 is None else delay.ci95[1]
     if delay is None or latest is None or latest * evidence.fs >= -ROUNDING:
-        return ()
+        return
     fit = evidence.joint.best.fit
     by_a_lead = -fit.delay < max(TWICE * scale_of(fit), _STAMPED_LATE)
-    return (
-        Finding(
-            code="negative_delay",
-            message=f"The delay is negative ({delay.value:.4g} s): the output moves before the "
-            "input. Check that the input column is not stamped late, and which column is which."
-            + (_COMPUTED if _is_computed(evidence) else ""),
-            severity="doubt" if by_a_lead else "info",
-            parameters=PHASE_SPLIT if by_a_lead else TIMING,
-        ),
+    yield Finding(
+        code="negative_delay",
+        message=f"The delay is negative ({delay.value:.4g} s): the output moves before the "
+        "input. Check that the input column is not stamped late, and which column is which."
+        + (_COMPUTED if _is_computed(evidence) else ""),
+        severity="doubt" if by_a_lead else "info",
+        parameters=PHASE_SPLIT if by_a_lead else TIMING,
     )
 
 
@@ -253,14 +237,9 @@ def _at_the_line(evidence: Evidence) -> str:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class InputLines:
-    """What the spectrum of an input shows.
+    """What the spectrum of an input shows: how many frequencies can be told apart.
 
-    Parameters
-    ----------
-    count : int
-        Frequencies that can be told apart.
-    octave, end : float
-        Mean power of a bin where the last octave begins, and where it ends.
+    `octave` and `end` are the mean power of a bin where the last octave begins, and where it ends.
     """
 
     count: int
@@ -270,12 +249,7 @@ class InputLines:
 
 @kept
 def lines_of(u: Real) -> InputLines:
-    """Count the lines of an input, and take the height of its spectrum over the last octave.
-
-    Parameters
-    ----------
-    u : ndarray, shape (n,)
-        The input.
+    """Count the lines of an input, (n,), and take its spectrum's height over the last octave.
 
     Examples
     --------
@@ -284,16 +258,14 @@ def lines_of(u: Real) -> InputLines:
     (1, True)
     """
     power = windowed_power(u)
-    above = power > DEEPEST * power.max()
-    first, stop = runs_of(above)
-    widths = stop - first
-    count = int(np.sum(1 + np.maximum(widths - (2 * _LOBE - 1), 0) // _LOBE))
+    first, stop = runs_of(power > DEEPEST * power.max())
+    count = int(np.sum(1 + np.maximum(stop - first - (2 * _LOBE - 1), 0) // _LOBE))
     part = max(power.size // 16, 1)
     octave, end = power[7 * part : 8 * part], power[-part:]
     return InputLines(count=count, octave=float(octave.mean()), end=float(end.mean()))
 
 
-def few_lines(evidence: Evidence) -> tuple[Finding, ...]:
+def few_lines(evidence: Evidence) -> Iterator[Finding]:
     """Doubt a model of more figures than the input's lines can tell.
 
     A line tells gain and phase where it is, and nothing else.
@@ -302,15 +274,13 @@ def few_lines(evidence: Evidence) -> tuple[Finding, ...]:
     fit = evidence.joint.best.fit
     unknown = fit.theta.size + fit.linear.size - 1
     if 2 * lines >= unknown + _SPARE:
-        return ()
-    return (
-        Finding(
-            code="few_lines",
-            message=f"The input excites {lines} frequenc{'y' if lines == 1 else 'ies'}, which give "
-            f"gain and phase there and nothing else: {unknown} figures of a "
-            f"{structure_in_words(fit.structure.name)} model cannot be found from them."
-            f"{_at_the_line(evidence) if lines == 1 else ''} Sweep, or add lines.",
-            severity="doubt",
-            parameters=tuple(n for n in MODELLED if n not in ("bias", "noise_std")),
-        ),
+        return
+    yield Finding(
+        code="few_lines",
+        message=f"The input excites {lines} frequenc{'y' if lines == 1 else 'ies'}, which give "
+        f"gain and phase there and nothing else: {unknown} figures of a "
+        f"{structure_in_words(fit.structure.name)} model cannot be found from them."
+        f"{_at_the_line(evidence) if lines == 1 else ''} Sweep, or add lines.",
+        severity="doubt",
+        parameters=tuple(n for n in MODELLED if n not in ("bias", "noise_std")),
     )

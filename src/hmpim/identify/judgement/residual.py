@@ -1,6 +1,6 @@
 """What the model leaves over: lack of fit, colour, halves that disagree, noise on the input."""
 
-from dataclasses import replace
+from collections.abc import Iterator
 
 import numpy as np
 
@@ -44,7 +44,7 @@ _FAST = 9
 """Samples over which the size of what is fast in the input is taken."""
 
 
-def lack_of_fit(evidence: Evidence) -> tuple[Finding, ...]:
+def lack_of_fit(evidence: Evidence) -> Iterator[Finding]:
     """Say that the residual still follows the input.
 
     A doubt on all figures from 3 % of the output on. Where it is a good part of the residual, one
@@ -53,26 +53,22 @@ def lack_of_fit(evidence: Evidence) -> tuple[Finding, ...]:
     """
     misfit = evidence.misfit
     if misfit.probability >= FALSE_ALARM or misfit.share == 0.0:
-        return ()
+        return
     owed = float(np.sqrt(misfit.share)) * evidence.unexplained
     name = structure_in_words(evidence.joint.best.fit.structure.name)
-    message = (
-        f"The residual still follows the input: about {percent(owed)} % of the output "
-        f"(r.m.s.) is not described by the {name} model. "
-        "Look at the Bode plot where model and measurement differ."
-    )
-    large = owed > TOLERATED
-    found = Finding(
+    large, moved = owed > TOLERATED, MODELLED
+    much = misfit.share > 2 * FEW  # else the noise would be off by few per cent
+    if much and not large:
+        some = owed > WORTH and misfit.share > PART
+        moved = moved_by(evidence, misfit.share) if some else ("noise_std",)
+    yield Finding(
         code="lack_of_fit",
-        message=message,
-        severity="doubt" if large else "info",
-        parameters=MODELLED,
+        message=f"The residual still follows the input: about {percent(owed)} % of the output "
+        f"(r.m.s.) is not described by the {name} model. "
+        "Look at the Bode plot where model and measurement differ.",
+        severity="doubt" if large or much else "info",
+        parameters=moved,
     )
-    if large or misfit.share <= 2 * FEW:  # the noise would be off by few per cent
-        return (found,)
-    some = owed > WORTH and misfit.share > PART
-    moved = moved_by(evidence, misfit.share) if some else ("noise_std",)
-    return (replace(found, severity="doubt", parameters=moved),)
 
 
 def moved_by(evidence: Evidence, share: float) -> tuple[str, ...]:
@@ -84,97 +80,88 @@ def moved_by(evidence: Evidence, share: float) -> tuple[str, ...]:
     count = joint.problem.counted * joint.effective_share
     times = float(np.sqrt(count * share))
     moves = joint.best.fit.prediction
-    if moves.size:
-        motion = MATERIAL * float(moves.std())
-    else:  # from statistics
-        motion = MATERIAL * float(np.sqrt(joint.problem.spread / joint.problem.counted))
-    sizes = {"bias": motion, "delay": FEW / evidence.fs, "delay_low_frequency": FEW / evidence.fs}
+    # Of statistics there is no prediction.
+    motion = moves.std() if moves.size else np.sqrt(joint.problem.spread / joint.problem.counted)
+    late = FEW / evidence.fs
+    rooms = {"noise_std": -np.inf, "bias": MATERIAL * float(motion)}
+    rooms |= {"delay": late, "delay_low_frequency": late}
     known = {name: getattr(evidence.readings.parameters, name) for name in MODELLED}
+    if (peak := known["peak_gain_db"]) is not None:
+        rooms["peak_gain_db"] = MATERIAL * max(abs(peak.value), 1.0)
     return tuple(
         name
         for name, e in known.items()
-        if e is not None
-        and (
-            name == "noise_std"
-            or times * e.spread
-            > sizes.get(name, MATERIAL * max(abs(e.value), 1.0 if name == "peak_gain_db" else 0.0))
-        )
+        if e is not None and times * e.spread > rooms.get(name, MATERIAL * abs(e.value))
     )
 
 
-def coloured_noise(evidence: Evidence) -> tuple[Finding, ...]:
+def coloured_noise(evidence: Evidence) -> Iterator[Finding]:
     """Say that the residual is not white; a doubt where it is most of the output and follows u."""
     if evidence.readings.white:
-        return ()
+        return
     follows = evidence.misfit.probability < FALSE_ALARM
-    return (
-        Finding(
-            code="coloured_noise",
-            message="The residual is not white (one independent sample in "
-            f"{1 / evidence.joint.effective_share:.3g}); the error bars are widened for it.",
-            severity="doubt" if evidence.unexplained > MOST and follows else "info",
-            parameters=MODELLED,
-        ),
+    yield Finding(
+        code="coloured_noise",
+        message="The residual is not white (one independent sample in "
+        f"{1 / evidence.joint.effective_share:.3g}); the error bars are widened for it.",
+        severity="doubt" if evidence.unexplained > MOST and follows else "info",
+        parameters=MODELLED,
     )
 
 
-def changing_noise(evidence: Evidence) -> tuple[Finding, ...]:
+def changing_noise(evidence: Evidence) -> Iterator[Finding]:
     """Say that the noise is louder at some times than at others."""
     weighed, valid = evidence.joint.weighed, evidence.joint.problem.valid
     left = weighed.as_loud(evidence.readings.innovations)
     if is_steady(left):
-        return ()
+        return
     counted = np.arange(left.size) if valid is None else np.flatnonzero(valid)
     spans = np.array_split(counted, _PARTS)
     levels = np.array([float(np.sqrt(np.mean(left[span] ** 2))) for span in spans])
     levels /= float(np.sqrt(np.mean(left[counted] ** 2)))
     loudest = spans[int(np.argmax(levels))]
     first, last = (float(k) / evidence.fs for k in (loudest[0], loudest[-1] + 1))
-    return (
-        Finding(
-            code="changing_noise",
-            message=f"The noise is louder at some times than at others: from {levels.min():.2g} to "
-            f"{levels.max():.2g} times its r.m.s. in tenths of the record, loudest from "
-            f"{first:.3g} to {last:.3g} s after its first sample. The error bars allow for it.",
-            severity="info",
-            parameters=MODELLED,
-        ),
+    yield Finding(
+        code="changing_noise",
+        message=f"The noise is louder at some times than at others: from {levels.min():.2g} to "
+        f"{levels.max():.2g} times its r.m.s. in tenths of the record, loudest from "
+        f"{first:.3g} to {last:.3g} s after its first sample. The error bars allow for it.",
+        severity="info",
+        parameters=MODELLED,
     )
 
 
-def uneven_noise(evidence: Evidence) -> tuple[Finding, ...]:
+def uneven_noise(evidence: Evidence) -> Iterator[Finding]:
     """Doubt the noise where it grows with what is fast in the input: stamps that jitter.
 
     A sample taken late by δ is off by δ times the signal's rate, so that the power of what is left
     over is a constant and a share of the fast input's; the constant is the noise's.
     """
     if not evidence.jittered:
-        return ()
+        return
     residual, u = evidence.joint.best.fit.residual, evidence.u
     fast = np.convolve(np.diff(u, 4) ** 2, np.ones(_FAST) / _FAST, mode="full")[2 : 2 + u.size]
     valid = evidence.joint.problem.valid
     told = slice(None) if valid is None else valid
     power, fast = residual[told] ** 2, fast[told]
     if power.size < _FAST or np.ptp(power) == 0.0 or np.ptp(fast) == 0.0:
-        return ()
+        return
     related = float(np.corrcoef(power, fast)[0, 1])
     slope = related * float(power.std() / fast.std())
     share = slope * float(fast.mean() / power.mean())
     if related * np.sqrt(power.size) <= DEVIATIONS or share <= PART:
-        return ()
-    return (
-        Finding(
-            code="uneven_noise",
-            message=f"The residual grows with the speed of the input: about "
-            f"{100 * min(share, 1.0):.0f} % of its power is not the sensor's noise; jittering "
-            "time stamps look like this. Record with a hardware clock.",
-            severity="doubt",
-            parameters=("noise_std",),
-        ),
+        return
+    yield Finding(
+        code="uneven_noise",
+        message=f"The residual grows with the speed of the input: about "
+        f"{100 * min(share, 1.0):.0f} % of its power is not the sensor's noise; jittering "
+        "time stamps look like this. Record with a hardware clock.",
+        severity="doubt",
+        parameters=("noise_std",),
     )
 
 
-def halves_disagree(evidence: Evidence) -> tuple[Finding, ...]:
+def halves_disagree(evidence: Evidence) -> Iterator[Finding]:
     """Say that the halves of the record do not share the model.
 
     Of use as `lack_of_fit` is: what models of their own would explain is held against the whole
@@ -189,113 +176,95 @@ def halves_disagree(evidence: Evidence) -> tuple[Finding, ...]:
     )
     alarm = FALSE_ALARM * joint.weighed_share  # the share of coloured noise is estimated
     if halves.probability >= alarm or halves.owed <= WORTH:
-        return ()
+        return
     moved = MODELLED if halves.owed > TOLERATED else ()
     if not moved and halves.share > PART:
         moved = moved_by(evidence, halves.share)
-    return (
-        Finding(
-            code="halves_disagree",
-            message="The two halves of the record require different models, which describe "
-            f"{percent(halves.owed)} % of the output (r.m.s.) more than one model does: the unit "
-            "changed during the test, or responds differently to large and small motion. Repeat "
-            "it, or lower the amplitude.",
-            severity="doubt" if moved else "info",
-            parameters=moved or MODELLED,
-        ),
+    yield Finding(
+        code="halves_disagree",
+        message="The two halves of the record require different models, which describe "
+        f"{percent(halves.owed)} % of the output (r.m.s.) more than one model does: the unit "
+        "changed during the test, or responds differently to large and small motion. Repeat "
+        "it, or lower the amplitude.",
+        severity="doubt" if moved else "info",
+        parameters=moved or MODELLED,
     )
 
 
-def noise_colour_of(evidence: Evidence) -> tuple[Finding, ...]:
+def noise_colour_of(evidence: Evidence) -> Iterator[Finding]:
     """Say what colours a residual that is not white."""
     if evidence.readings.white:
-        return ()
+        return
     colour = noise_colour(_counted(evidence), evidence.fs)
     if colour.description == "white":  # none of the colours known
-        return ()
-    return (
-        Finding(
-            code="noise_colour",
-            message=f"The residual is {colour.description}. "
-            "Look for hum, drift or motion that the model does not contain.",
-            severity="info",
-            parameters=("noise_std",),
-        ),
+        return
+    yield Finding(
+        code="noise_colour",
+        message=f"The residual is {colour.description}. "
+        "Look for hum, drift or motion that the model does not contain.",
+        severity="info",
+        parameters=("noise_std",),
     )
 
 
-def noise_on_the_input(evidence: Evidence) -> tuple[Finding, ...]:
+def noise_on_the_input(evidence: Evidence) -> Iterator[Finding]:
     """Say that the input is noisy; a doubt where gains come out too small by a hundredth."""
     if evidence.limited:  # the corners of what is followed are no noise
-        return ()
+        return
     noise = input_noise(evidence.u, evidence.fs, band=evidence.band)
     if noise is None or noise.attenuation <= WORTH:
-        return ()
-    return (
-        Finding(
-            code="input_noise",
-            message=f"The input carries noise of {noise.std:.3g} (standard deviation), which "
-            f"lowers the gain found by about {percent(noise.attenuation)} %. Use the "
-            "command instead of its measurement, if you have it.",
-            severity="doubt" if noise.attenuation > MATERIAL else "info",
-            parameters=(*GAIN, "noise_std"),
-        ),
+        return
+    yield Finding(
+        code="input_noise",
+        message=f"The input carries noise of {noise.std:.3g} (standard deviation), which "
+        f"lowers the gain found by about {percent(noise.attenuation)} %. Use the "
+        "command instead of its measurement, if you have it.",
+        severity="doubt" if noise.attenuation > MATERIAL else "info",
+        parameters=(*GAIN, "noise_std"),
     )
 
 
-def unsampled_input(evidence: Evidence) -> tuple[Finding, ...]:
+def unsampled_input(evidence: Evidence) -> Iterator[Finding]:
     """Doubt the noise where the input still moves at half the rate, and so beyond it.
 
     What lies beyond, by the fall of its spectrum over the last octave, is folded into the band and
     answered there; it is no noise of the sensor.
     """
     if evidence.joint.best.intersample != "bandlimited":
-        return ()
+        return
     size = evidence.u.size
     every = 1 + size // 2 // _BINS
     folded = folded_power(evidence.u, evidence.fs, every=every)
     if not folded.any():
-        return ()
+        return
     frequency = np.arange(1, size // 2 + 1, every) / size * evidence.fs
     answered = np.abs(response(evidence.readings.system, frequency)) ** 2
     noise = float(np.mean(_counted(evidence) ** 2))
     share = every * float(folded @ answered) / noise if noise > 0.0 else 0.0
     if share <= 2 * FEW:
-        return ()
-    return (
-        Finding(
-            code="unsampled_input",
-            message="The input moves faster than half the sampling rate: about "
-            f"{percent(min(share, 1.0))} % of what counts as noise is a response to motion "
-            "between its samples. Sample faster, or filter the command before it is sampled.",
-            severity="doubt",
-            parameters=("noise_std",),
-        ),
+        return
+    yield Finding(
+        code="unsampled_input",
+        message="The input moves faster than half the sampling rate: about "
+        f"{percent(min(share, 1.0))} % of what counts as noise is a response to motion "
+        "between its samples. Sample faster, or filter the command before it is sampled.",
+        severity="doubt",
+        parameters=("noise_std",),
     )
 
 
 def folded_power(u: Real, fs: float, *, every: int = 1) -> Real:
     """Power that an input has beyond half the rate, at the frequencies into which it is folded.
 
-    By the fall of its spectrum over the last octave; all 0 where there is none to be told.
-
-    Parameters
-    ----------
-    u : ndarray, shape (n,)
-        The input.
-    fs : float
-        Rate in Hz.
-    every : int
-        Step in bins: only every so many-th one is returned.
+    By the fall of its spectrum over the last octave; all 0 where there is none to be told. Of every
+    so many bins one is returned.
     """
     bins = np.arange(1, u.size // 2 + 1, every)
-    nothing = np.zeros(bins.size)
-    if u.size < _FEWEST:
-        return nothing
     lines = lines_of(u)
-    steep = float(np.log2(lines.octave / lines.end)) if lines.end > 0.0 else 0.0
+    told = u.size >= _FEWEST and lines.end > 0.0
+    steep = float(np.log2(lines.octave / lines.end)) if told else 0.0
     if steep < 1.0:  # as white noise, or none at all
-        return nothing
+        return np.zeros(bins.size)
     frequency = bins / u.size * fs
     return np.asarray(lines.end * (2.0 * (1.0 - frequency / fs)) ** -steep)
 

@@ -1,5 +1,7 @@
 """Bandwidths that measured response and model put apart, and those that a graze leaves open."""
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from hmpim.identify.arrays import Real
@@ -13,8 +15,12 @@ from hmpim.record import Finding
 
 __all__ = ["bandwidth_disagrees", "grazed_bandwidth"]
 
-_GAIN_SHAPE = ("natural_frequency", "damping_ratio", "time_constant", "peak_gain_db")
-"""What shapes the gain about -3 dB."""
+_SHAPED_BY = {
+    "bandwidth_phase90": PHASE_SPLIT,
+    "bandwidth_phase90_without_delay": PHASE_SPLIT,
+    "bandwidth_3db": ("natural_frequency", "damping_ratio", "time_constant", "peak_gain_db"),
+}
+"""Bandwidths, and the figures that shape the response there."""
 
 _POINTS = 400
 """Frequencies at which a curve is looked at for turns."""
@@ -31,41 +37,30 @@ def _heights(system: RationalDelay, frequency: Real) -> dict[str, Real]:
     }
 
 
-def bandwidth_disagrees(evidence: Evidence) -> tuple[Finding, ...]:
+def bandwidth_disagrees(evidence: Evidence) -> Iterator[Finding]:
     """Doubt bandwidths apart beyond their error bars, and what of the model shapes them.
 
     Of an output that is held the measured response shows the hold too: there it says nothing.
     """
     if evidence.held:
-        return ()
-    touched: list[str] = []
-    message = ""
-    for name, shaped_by in (
-        ("bandwidth_phase90", PHASE_SPLIT),
-        ("bandwidth_phase90_without_delay", PHASE_SPLIT),
-        ("bandwidth_3db", _GAIN_SHAPE),
-    ):
-        one = getattr(evidence.measured, name)
-        other = getattr(evidence.readings.parameters, name)
-        if not are_apart(one, other):
-            continue
-        touched += [name, *shaped_by]
-        message = message or (  # one sentence is enough
-            f"The {in_words(name)} is {one.value:.4g} Hz by the measured response and "
-            f"{other.value:.4g} Hz by the model, further apart than their errors allow. Look "
-            "at the Bode plot there before using either."
-        )
-    if not touched:
-        return ()
-    parameters = tuple(dict.fromkeys(touched))
-    return (
-        Finding(
-            code="bandwidth_disagrees", message=message, severity="doubt", parameters=parameters
-        ),
+        return
+    one, other = evidence.measured, evidence.readings.parameters
+    apart = [name for name in _SHAPED_BY if are_apart(getattr(one, name), getattr(other, name))]
+    if not apart:
+        return
+    first = apart[0]  # one sentence is enough
+    touched = [name for each in apart for name in (each, *_SHAPED_BY[each])]
+    yield Finding(
+        code="bandwidth_disagrees",
+        message=f"The {in_words(first)} is {getattr(one, first).value:.4g} Hz by the measured "
+        f"response and {getattr(other, first).value:.4g} Hz by the model, further apart than their "
+        "errors allow. Look at the Bode plot there before using either.",
+        severity="doubt",
+        parameters=tuple(dict.fromkeys(touched)),
     )
 
 
-def grazed_bandwidth(evidence: Evidence) -> tuple[Finding, ...]:
+def grazed_bandwidth(evidence: Evidence) -> Iterator[Finding]:
     """Doubt a bandwidth where the curve turns about its level by less than the error there.
 
     A notch takes the phase to -89° and back: whether it crosses -90° is left to the noise, and
@@ -74,7 +69,7 @@ def grazed_bandwidth(evidence: Evidence) -> tuple[Finding, ...]:
     structure, p = evidence.joint.best.fit.structure, evidence.readings.parameters
     system = evidence.readings.system
     if structure.order < 2 or structure.integrators or structure.dc_zeros or structure.sampled:
-        return ()
+        return
     grid = np.geomspace(evidence.band[1] * 1e-3, evidence.band[1], _POINTS)
     touched = []
     for name, curve in _heights(system, grid).items():
@@ -91,16 +86,14 @@ def grazed_bandwidth(evidence: Evidence) -> tuple[Finding, ...]:
         if abs(height(evidence.readings.vector)) < DEVIATIONS * error:
             touched.append((name, place))
     if not touched:
-        return ()
-    return (
-        Finding(
-            code="grazed_bandwidth",
-            message=f"At {touched[0][1]:.4g} Hz the response comes so close to the level of a "
-            "bandwidth that this record does not show whether it crosses that level. "
-            "Read the Bode plot instead, or lower the noise.",
-            severity="doubt",
-            parameters=tuple(name for name, _ in touched),
-        ),
+        return
+    yield Finding(
+        code="grazed_bandwidth",
+        message=f"At {touched[0][1]:.4g} Hz the response comes so close to the level of a "
+        "bandwidth that this record does not show whether it crosses that level. "
+        "Read the Bode plot instead, or lower the noise.",
+        severity="doubt",
+        parameters=tuple(name for name, _ in touched),
     )
 
 

@@ -1,5 +1,7 @@
 """Other numbers of poles that the record does not exclude, and what would change with them."""
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from hmpim.identify.chance import DEVIATIONS
@@ -15,54 +17,31 @@ ALMOST = DEVIATIONS - 1.0
 """Standard deviations from which on another run may ask for other dynamics."""
 
 
-def other_order(evidence: Evidence) -> tuple[Finding, ...]:
-    """Name a structure with one more pole that is as likely: the intervals cover it."""
-    joint = evidence.joint
-    if not joint.rivals:
-        return _plainer(evidence)
-    rival = joint.rivals[0].fit
-    return (
-        barely_told(
-            joint.best.fit.structure.name,
-            poles=rival.structure.order,
-            delay=rival.delay / evidence.fs,
-        ),
-    )
-
-
-def _plainer(evidence: Evidence) -> tuple[Finding, ...]:
-    """Name the structure that is almost as likely, plainer or richer: the intervals cover it."""
-    joint = evidence.joint
+def other_order(evidence: Evidence) -> Iterator[Finding]:
+    """Name a structure that is as likely, plainer or richer: the intervals cover it."""
+    joint, name = evidence.joint, evidence.joint.best.fit.structure.name
+    if joint.rivals:
+        rival = joint.rivals[0].fit
+        yield barely_told(name, poles=rival.structure.order, delay=rival.delay / evidence.fs)
+        return
     rivals = (*plainer_rivals(joint), *asked_rivals(joint))
     if not rivals:
-        return ()
+        return
     rival = min(rivals, key=lambda trial: trial.criterion).fit
-    return (
-        Finding(
-            code="structure",
-            message="This record barely distinguishes the "
-            f"{structure_in_words(joint.best.fit.structure.name)} model from the "
-            f"{structure_in_words(rival.structure.name)} one, with which the delay would be "
-            f"{rival.delay / evidence.fs:.4g} s. The intervals cover this. Lower the noise, or "
-            "sweep higher, to tell.",
-            severity="info",
-            parameters=PHASE_SPLIT,
-        ),
+    yield Finding(
+        code="structure",
+        message="This record barely distinguishes the "
+        f"{structure_in_words(name)} model from the "
+        f"{structure_in_words(rival.structure.name)} one, with which the delay would be "
+        f"{rival.delay / evidence.fs:.4g} s. The intervals cover this. Lower the noise, or "
+        "sweep higher, to tell.",
+        severity="info",
+        parameters=PHASE_SPLIT,
     )
 
 
 def barely_told(chosen: str, *, poles: int, delay: float) -> Finding:
-    """Say that a structure with one more pole is as likely as the chosen one.
-
-    Parameters
-    ----------
-    chosen : str
-        The structure that is taken.
-    poles : int
-        Of the one with one more.
-    delay : float
-        That it has, in s.
-    """
+    """Say that a structure with one more pole, and a delay in s, is as likely as the chosen one."""
     return Finding(
         code="structure",
         message=f"This record barely distinguishes {poles - 1} from {poles} poles. A "
@@ -74,7 +53,7 @@ def barely_told(chosen: str, *, poles: int, delay: float) -> Finding:
     )
 
 
-def missed_pole(evidence: Evidence) -> tuple[Finding, ...]:
+def missed_pole(evidence: Evidence) -> Iterator[Finding]:
     """Doubt the delay where the record asks for other dynamics, or cannot exclude a slow pole.
 
     A statistic within one deviation of its level may fall on the other side of it in another run:
@@ -83,7 +62,7 @@ def missed_pole(evidence: Evidence) -> tuple[Finding, ...]:
     hidden = evidence.joint.hidden
     bent = evidence.nonlinear > MOST  # that of what is left asks for no pole
     if hidden is None or bent or evidence.joint.rivals:
-        return ()
+        return
     order, fs = evidence.joint.best.fit.structure.order, evidence.fs
     moved = float(np.sqrt(abs(hidden.squared)))
     asked = abs(hidden.squared) / hidden.std if hidden.std > 0.0 else 0.0
@@ -95,35 +74,28 @@ def missed_pole(evidence: Evidence) -> tuple[Finding, ...]:
     poles = f"{order} pole{'s' * (order != 1)}"
     matters = moved > TOLERATED * hidden.scale
     if asked > DEVIATIONS and matters:
-        return (
-            Finding(
-                code="other_dynamics",
-                message=f"The record requires dynamics other than {poles}: {level}. The delay "
-                f"may be off by {moved / fs:.2g} s. {close}Lower the noise, or sweep higher, until "
-                "a richer structure can be distinguished.",
-                severity="doubt",
-                parameters=PHASE_SPLIT,
-            ),
+        yield Finding(
+            code="other_dynamics",
+            message=f"The record requires dynamics other than {poles}: {level}. The delay "
+            f"may be off by {moved / fs:.2g} s. {close}Lower the noise, or sweep higher, until "
+            "a richer structure can be distinguished.",
+            severity="doubt",
+            parameters=PHASE_SPLIT,
         )
-    if close and matters and not hidden.may_hide:
-        return (
-            Finding(
-                code="structure",
-                message=f"The record almost requires dynamics other than {poles}: {level}. {close}"
-                "Lower the noise, or sweep higher.",
-                severity="info",
-                parameters=PHASE_SPLIT,
-            ),
-        )
-    if not hidden.may_hide:
-        return ()
-    return (
-        Finding(
+    elif hidden.may_hide:
+        yield Finding(
             code="structure",
             message=f"A further pole with a time constant of up to {hidden.limit / fs:.3g} s would "
             "not show in this record, and would shorten the delay by as much; the intervals cover "
             "it. Lower the noise, or sweep higher.",
             severity="info",
             parameters=PHASE_SPLIT,
-        ),
-    )
+        )
+    elif close and matters:
+        yield Finding(
+            code="structure",
+            message=f"The record almost requires dynamics other than {poles}: {level}. {close}"
+            "Lower the noise, or sweep higher.",
+            severity="info",
+            parameters=PHASE_SPLIT,
+        )

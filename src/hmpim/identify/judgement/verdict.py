@@ -12,9 +12,10 @@ from hmpim.identify.result import (
     Verdict,
 )
 from hmpim.identify.result.estimate import ParameterVerdict
+from hmpim.identify.result.groups import EVERY
 from hmpim.record import Finding
 
-__all__ = ["UNTOLD", "all_doubted", "doubted", "judged", "judged_together"]
+__all__ = ["UNTOLD", "all_doubted", "doubted", "judged", "judged_together", "unfollowed"]
 
 H = TypeVar("H", Parameters, ResponseBandwidths)
 
@@ -52,15 +53,10 @@ UNTOLD = frozenset({"few_lines"})
 
 
 def judged(pair: PairIdentification) -> PairIdentification:
-    """Return the pair with the verdicts that its findings ask for.
+    """Return the pair with the verdicts that its findings ask for; those it has do not count.
 
     A parameter is doubtful if a doubt names it, or if its interval is withheld. The pair is not
     identifiable if its output does not follow its input; else it is ok if every figure given is.
-
-    Parameters
-    ----------
-    pair : PairIdentification
-        With all its findings; the verdicts that it has do not count.
     """
     names = doubted(pair.warnings)
     unknown = doubted(w for w in pair.warnings if w.code in _WITHHELD)
@@ -78,18 +74,9 @@ def judged(pair: PairIdentification) -> PairIdentification:
 def judged_together(
     mean: Estimate, parts: Iterable[Estimate], *, name: str, findings: Iterable[Finding] = ()
 ) -> Estimate:
-    """Return the mean of several estimates with its verdict: doubtful if any of them is.
+    """Return the mean of estimates of one parameter with its verdict: doubtful if any of them is.
 
-    Parameters
-    ----------
-    mean : Estimate
-        Of all of them.
-    parts : iterable of Estimate
-        What it is the mean of.
-    name : str
-        Of the parameter.
-    findings : iterable of Finding
-        What is said of all of them together.
+    `findings` is what is said of all of them together.
     """
     doubtful = name in doubted(findings) or any(part.verdict == "doubtful" for part in parts)
     return _weighed(mean, doubtful=doubtful)
@@ -97,7 +84,18 @@ def judged_together(
 
 def all_doubted(parameters: Parameters) -> Parameters:
     """Return the parameters with a doubt on each: nothing is claimed yet."""
-    return _all_weighed(parameters, frozenset(field.name for field in fields(parameters)))
+    return _all_weighed(parameters, frozenset(EVERY))
+
+
+def unfollowed(output: str, source: str) -> Finding:
+    """Say that an output does not follow the one input there is."""
+    return Finding(
+        code="unrelated",
+        message=f"Output {output!r} does not follow input {source!r}: a constant explains it as "
+        "well. Check the channels, or excite more.",
+        severity="doubt",
+        parameters=EVERY,
+    )
 
 
 def doubted(findings: Iterable[Finding]) -> frozenset[str]:
@@ -116,26 +114,20 @@ def doubted(findings: Iterable[Finding]) -> frozenset[str]:
 
 def _all_weighed(holder: H, names: frozenset[str]) -> H:
     """Weigh every estimate that is there."""
-    given = {f.name: getattr(holder, f.name) for f in fields(holder)}
+    given = {f.name: e for f in fields(holder) if (e := getattr(holder, f.name)) is not None}
     return replace(
-        holder,
-        **{
-            name: _weighed(estimate, doubtful=name in names)
-            for name, estimate in given.items()
-            if estimate is not None
-        },
+        holder, **{name: _weighed(e, doubtful=name in names) for name, e in given.items()}
     )
 
 
 def _withheld(parameters: Parameters, names: frozenset[str], untold: frozenset[str]) -> Parameters:
     """Take the intervals away whose figures are named, and the deviations of those untold."""
-    given = {name: getattr(parameters, name) for name in names}
-    known = {name: estimate for name, estimate in given.items() if estimate is not None}
+    given = {name: e for name in names if (e := getattr(parameters, name)) is not None}
     return replace(
         parameters,
         **{
             name: replace(e, std=None if name in untold else e.spread, ci95=None)
-            for name, e in known.items()
+            for name, e in given.items()
         },
     )
 
@@ -149,5 +141,5 @@ def _weighed(estimate: Estimate, *, doubtful: bool) -> Estimate:
 def _verdict(parameters: Parameters, findings: Iterable[Finding]) -> Verdict:
     if any(finding.code in _NOTHING for finding in findings):
         return "not_identifiable"
-    given = (getattr(parameters, field.name) for field in fields(Parameters))
+    given = (getattr(parameters, name) for name in EVERY)
     return "ok" if all(e is None or e.verdict == "ok" for e in given) else "doubtful"

@@ -21,7 +21,7 @@ from hmpim.identify.judgement.reach import (
 )
 from hmpim.identify.judgement.residual import lack_of_fit
 from hmpim.identify.judgement.structure import missed_pole, other_order
-from hmpim.identify.judgement.unfollowed import unfollowed
+from hmpim.identify.judgement.verdict import unfollowed
 from hmpim.identify.reading.coefficients import coefficients_of, highest_first
 from hmpim.identify.reading.figures import read_figures
 from hmpim.identify.reading.propagation import response_std
