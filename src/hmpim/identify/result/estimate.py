@@ -1,20 +1,18 @@
 """One figure: its value, its error, its interval, and whether to rely on it."""
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import Any, Literal
 
 from hmpim.identify.chance import HALF
 from hmpim.identify.result.digits import aside, plus_minus
-from hmpim.identify.result.plain import plain
+from hmpim.identify.result.plain import Plain
 
 __all__ = [
     "Estimate",
+    "Estimates",
     "ParameterVerdict",
     "Verdict",
-    "estimates_from_dict",
-    "estimates_to_dict",
 ]
 
 ParameterVerdict = Literal["ok", "doubtful"]
@@ -26,7 +24,7 @@ rounding an error to one digit hides."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
-class Estimate:
+class Estimate(Plain):
     """A value, its standard deviation, and its 95 % interval, all in `unit`.
 
     Parameters
@@ -126,35 +124,18 @@ class Estimate:
     def __float__(self) -> float:
         return float(self.value)
 
+
+class Estimates(Plain):
+    """Base of dataclasses of estimates."""
+
+    __slots__ = ()
+
     def to_dict(self) -> dict[str, Any]:
-        """Return the estimate as plain JSON values."""
-        said: dict[str, Any] = plain(self)
-        return said
-
-    @classmethod
-    def from_dict(cls, data: Mapping[str, Any]) -> "Estimate":
-        """Read back what `to_dict` wrote."""
-        return cls(
-            value=data["value"],
-            std=data["std"],
-            ci95=None if data["ci95"] is None else (data["ci95"][0], data["ci95"][1]),
-            unit=data["unit"],
-            verdict=data["verdict"],
-        )
-
-
-def estimates_to_dict(holder: Any) -> dict[str, Any]:
-    """Name to estimate of a dataclass of estimates; null where there is no number."""
-    named = {field.name: getattr(holder, field.name) for field in fields(holder)}
-    return {
-        name: None if e is None or not math.isfinite(e.value) else e.to_dict()
-        for name, e in named.items()
-    }
-
-
-def estimates_from_dict(data: Mapping[str, Any]) -> dict[str, Estimate | None]:
-    """Read back what `estimates_to_dict` wrote."""
-    return {name: None if d is None else Estimate.from_dict(d) for name, d in data.items()}
+        """Return name to estimate, null where there is no number."""
+        told = super().to_dict()
+        return {
+            n: e if e is not None and math.isfinite(e["value"]) else None for n, e in told.items()
+        }
 
 
 def _finite(number: float | None) -> float | None:

@@ -11,7 +11,7 @@ from hmpim.identify.result.first_schema import FIRST_SCHEMA, upgraded
 from hmpim.identify.result.inputs import InputSet
 from hmpim.identify.result.lookup import find_pair
 from hmpim.identify.result.pair import PairIdentification, pair_rows
-from hmpim.identify.result.plain import plain
+from hmpim.identify.result.plain import Plain, by_fields, plain
 from hmpim.record import Record
 from hmpim.tables import html_table, shortened
 
@@ -21,7 +21,7 @@ SCHEMA = "hmpim/identification/2"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class RecordSummary:
+class RecordSummary(Plain):
     """Which record was identified."""
 
     fs: float
@@ -107,8 +107,8 @@ class Identification(ByValue):
         return {
             "schema": SCHEMA,
             "record": plain(self.record),
-            "pairs": [pair.to_dict() for pair in self.pairs],
-            "inputs": None if self.inputs is None else self.inputs.to_dict(),
+            "pairs": plain(self.pairs),
+            "inputs": plain(self.inputs),
         }
 
     @classmethod
@@ -124,8 +124,4 @@ class Identification(ByValue):
         if schema not in (SCHEMA, FIRST_SCHEMA):
             raise FormatError(f"schema is {schema!r}; {SCHEMA!r} or {FIRST_SCHEMA!r} is needed")
         pairs = data["pairs"] if schema == SCHEMA else [upgraded(p) for p in data["pairs"]]
-        return cls(
-            record=RecordSummary(**data["record"]),
-            pairs=tuple(PairIdentification.from_dict(pair) for pair in pairs),
-            inputs=None if data.get("inputs") is None else InputSet.from_dict(data["inputs"]),
-        )
+        return by_fields(cls, {**data, "pairs": pairs})

@@ -8,14 +8,14 @@ import numpy as np
 
 from hmpim.equality import ByValue
 from hmpim.identify.arrays import Mask, Real
-from hmpim.identify.result.plain import plain
+from hmpim.identify.result.plain import Plain, by_fields
 from hmpim.identify.worth import MATERIAL
 
 __all__ = ["Alike", "InputSet", "OutputCoherence"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Alike:
+class Alike(Plain):
     """Inputs that are not told apart, and where.
 
     Parameters
@@ -40,7 +40,7 @@ class Alike:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class OutputCoherence(ByValue):
+class OutputCoherence(ByValue, Plain):
     """Share of an output that all inputs together explain, over frequency.
 
     Parameters
@@ -59,7 +59,7 @@ class OutputCoherence(ByValue):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class InputSet(ByValue):
+class InputSet(ByValue, Plain):
     """Several inputs driven at once, and how well one record tells them apart.
 
     Parameters
@@ -105,30 +105,10 @@ class InputSet(ByValue):
     def to_dict(self) -> dict[str, Any]:
         """Return plain JSON values; an infinite condition is null."""
         condition = [c if np.isfinite(c) else None for c in self.condition.tolist()]
-        return {**plain(self), "condition": condition}
+        return {**Plain.to_dict(self), "condition": condition}
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> "InputSet":
         """Read back what `to_dict` wrote."""
-        return cls(
-            names=tuple(data["names"]),
-            bands=tuple((low, high) for low, high in data["bands"]),
-            frequency=np.asarray(data["frequency"], dtype=float),
-            condition=np.array([np.inf if c is None else c for c in data["condition"]]),
-            alike=tuple(
-                Alike(
-                    names=tuple(a["names"]),
-                    bands=tuple((low, high) for low, high in a["bands"]),
-                    share=a["share"],
-                )
-                for a in data["alike"]
-            ),
-            coherence=tuple(
-                OutputCoherence(
-                    output=c["output"],
-                    frequency=np.asarray(c["frequency"], dtype=float),
-                    multiple=np.asarray(c["multiple"], dtype=float),
-                )
-                for c in data["coherence"]
-            ),
-        )
+        condition = [np.inf if c is None else c for c in data["condition"]]
+        return by_fields(cls, {**data, "condition": condition})

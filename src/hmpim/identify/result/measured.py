@@ -8,8 +8,8 @@ import numpy as np
 
 from hmpim.equality import ByValue
 from hmpim.identify.arrays import Complex, Real
-from hmpim.identify.result.estimate import Estimate, estimates_from_dict, estimates_to_dict
-from hmpim.identify.result.plain import plain
+from hmpim.identify.result.estimate import Estimate, Estimates
+from hmpim.identify.result.plain import Plain
 
 __all__ = ["FrequencyResponse", "HarmonicCurve", "Nonlinearity", "ResponseBandwidths"]
 
@@ -58,25 +58,16 @@ class FrequencyResponse(ByValue):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class ResponseBandwidths:
+class ResponseBandwidths(Estimates):
     """Bandwidths read off the measured response, in Hz; None where it does not reach them."""
 
     bandwidth_phase90: Estimate | None = None
     bandwidth_phase90_without_delay: Estimate | None = None
     bandwidth_3db: Estimate | None = None
 
-    def to_dict(self) -> dict[str, Any]:
-        """Return name to estimate, null where there is none."""
-        return estimates_to_dict(self)
-
-    @classmethod
-    def from_dict(cls, data: Mapping[str, Any]) -> "ResponseBandwidths":
-        """Read back what `to_dict` wrote."""
-        return cls(**estimates_from_dict(data))
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class HarmonicCurve:
+class HarmonicCurve(Plain):
     """One harmonic along a sweep.
 
     Parameters
@@ -97,7 +88,7 @@ class HarmonicCurve:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Nonlinearity:
+class Nonlinearity(Plain):
     """What no linear system makes of the input, and what it looks like.
 
     Parameters
@@ -130,25 +121,3 @@ class Nonlinearity:
     kinds: tuple[str, ...] = ()
     size: Estimate | None = None
     harmonics: tuple[HarmonicCurve, ...] = ()
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return the value as plain JSON values."""
-        said: dict[str, Any] = plain(self)
-        return said
-
-    @classmethod
-    def from_dict(cls, data: Mapping[str, Any]) -> "Nonlinearity":
-        """Read back what `to_dict` wrote."""
-        return cls(
-            **{name: data[name] for name in ("share", "even", "odd")},
-            **{name: data[name] for name in ("noise", "linear", "nonlinear")},
-            kinds=tuple(data["kinds"]),
-            size=None if data["size"] is None else Estimate.from_dict(data["size"]),
-            harmonics=tuple(
-                HarmonicCurve(
-                    order=h["order"],
-                    **{name: tuple(h[name]) for name in ("frequency", "amplitude", "std")},
-                )
-                for h in data["harmonics"]
-            ),
-        )

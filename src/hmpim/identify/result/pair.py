@@ -4,15 +4,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from typing import Any, overload
 
-import numpy as np
-
 from hmpim.equality import ByValue
 from hmpim.identify.arrays import Real
 from hmpim.identify.result.digits import interval
 from hmpim.identify.result.estimate import Estimate, Verdict
 from hmpim.identify.result.measured import FrequencyResponse, Nonlinearity, ResponseBandwidths
 from hmpim.identify.result.parameters import PaperEstimates, Parameters
-from hmpim.identify.result.plain import plain
+from hmpim.identify.result.plain import Plain, by_fields, plain
 from hmpim.record import Finding, Intersample, Stopping
 from hmpim.tables import html_table, shortened
 
@@ -20,7 +18,7 @@ __all__ = ["Candidate", "PairIdentification", "pair_rows"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Candidate:
+class Candidate(Plain):
     """One structure that was tried: how well it fits and what its fit costs.
 
     `criterion` is the Bayesian information criterion, lower is better; `fit_percent` is
@@ -54,7 +52,7 @@ class _Figure:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class PairIdentification(ByValue):
+class PairIdentification(ByValue, Plain):
     """Everything found between one input and one output.
 
     `dynamics` holds the rational dynamics that were fitted, without delay and with unit
@@ -112,46 +110,27 @@ class PairIdentification(ByValue):
             "structure": self.structure,
             "intersample": self.intersample,
             "fit_percent": self.fit_percent,
-            "parameters": self.parameters.to_dict(),
+            "parameters": plain(self.parameters),
             "paper": plain(self.paper),
-            "frequency_response": self.frequency_response.to_dict(),
-            "bandwidths_from_response": self.from_response.to_dict(),
+            "frequency_response": plain(self.frequency_response),
+            "bandwidths_from_response": plain(self.from_response),
             "dynamics": {
-                "numerator": list(self.numerator),
-                "denominator": list(self.denominator),
-                "covariance": None if self.covariance is None else self.covariance.tolist(),
+                "numerator": plain(self.numerator),
+                "denominator": plain(self.denominator),
+                "covariance": plain(self.covariance),
             },
             "candidates": plain(self.candidates),
-            "nonlinearity": None if self.nonlinearity is None else self.nonlinearity.to_dict(),
+            "nonlinearity": plain(self.nonlinearity),
             "verdict": self.verdict,
-            "warnings": [warning.to_dict() for warning in self.warnings],
-            "stopping": None if self.stopping is None else self.stopping.to_dict(),
+            "warnings": plain(self.warnings),
+            "stopping": plain(self.stopping),
         }
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> "PairIdentification":
         """Read back what `to_dict` wrote."""
-        nonlinearity = data.get("nonlinearity")  # results written before it have none
-        covariance = data["dynamics"].get("covariance")
-        return cls(
-            input=data["input"],
-            output=data["output"],
-            structure=data["structure"],
-            intersample=data["intersample"],
-            fit_percent=data["fit_percent"],
-            parameters=Parameters.from_dict(data["parameters"]),
-            paper=PaperEstimates(**data["paper"]),
-            frequency_response=FrequencyResponse.from_dict(data["frequency_response"]),
-            from_response=ResponseBandwidths.from_dict(data.get("bandwidths_from_response", {})),
-            numerator=tuple(data["dynamics"]["numerator"]),
-            denominator=tuple(data["dynamics"]["denominator"]),
-            candidates=tuple(Candidate(**c) for c in data["candidates"]),
-            verdict=data["verdict"],
-            warnings=tuple(Finding.from_dict(w) for w in data["warnings"]),
-            nonlinearity=None if nonlinearity is None else Nonlinearity.from_dict(nonlinearity),
-            covariance=None if covariance is None else np.array(covariance, dtype=np.float64),
-            stopping=Stopping.from_dict(data["stopping"]) if data.get("stopping") else None,
-        )
+        response = data.get("bandwidths_from_response", {})  # results written before it have none
+        return by_fields(cls, {**data, **data["dynamics"], "from_response": response})
 
     delay = _Figure("Pure delay, s.")
     delay_correlation = _Figure("The paper's delay (equation 8), s.")

@@ -1,16 +1,15 @@
 """All figures of one input and one output: the joint fit's, and the paper's."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
-from hmpim.identify.result.estimate import Estimate, estimates_from_dict, estimates_to_dict
+from hmpim.identify.result.estimate import Estimate, Estimates
+from hmpim.identify.result.plain import Plain
 
 __all__ = ["PaperEstimates", "Parameters"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Parameters:
+class Parameters(Estimates):
     """Every parameter of one input-output pair; None where the record cannot tell.
 
     Frequencies in Hz, times in s, the rest in the channels' own units (`scale_factor`
@@ -35,18 +34,9 @@ class Parameters:
     saturation_high: Estimate | None = None
     quantization_step: Estimate | None = None
 
-    def to_dict(self) -> dict[str, Any]:
-        """Return name to estimate, null where there is none."""
-        return estimates_to_dict(self)
-
-    @classmethod
-    def from_dict(cls, data: Mapping[str, Any]) -> "Parameters":
-        """Read back what `to_dict` wrote."""
-        return cls(**estimates_from_dict(data))
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class PaperEstimates:
+class PaperEstimates(Plain):
     """The figures that section IV of the paper gives when done step by step, as printed.
 
     Times in s, frequencies in Hz, bias and noise in the output's unit; None where the
