@@ -25,7 +25,7 @@ ROWS = {
     )
 }
 ELSEWHERE = {
-    "identify/nonlinear/words.py": "a kind of nonlinearity: docs/nonlinearity.md",
+    "identify/nonlinear/nonlinearity.py": "a kind of nonlinearity: docs/nonlinearity.md",
     "rigs/tracker/rig.py": "asked for below",
 }
 

@@ -11,7 +11,7 @@ import pytest
 
 from hmpim.identify.fitting.joint import chosen_of, joint_fit
 from hmpim.identify.identify import identify_output
-from hmpim.identify.nonlinear.words import KIND_WORDS
+from hmpim.identify.nonlinear.mechanisms import KIND_WORDS
 from hmpim.identify.result import groups
 
 ROOT = Path(__file__).parents[2]

@@ -3,9 +3,8 @@
 import numpy as np
 import pytest
 
-from hmpim.identify.nonlinear.harmonic_kinds import compare_harmonics
 from hmpim.identify.nonlinear.harmonics import any_harmonics, sweep_harmonics
-from hmpim.identify.nonlinear.mechanisms import hypotheses, play, rate_limited
+from hmpim.identify.nonlinear.mechanisms import compare_harmonics, hypotheses, play, rate_limited
 from hmpim.identify.nonlinear.sweep_phase import sweep_phase
 from hmpim.model.sampled import delayed_response, prepare_input
 from tests_support import assert_share
@@ -36,7 +35,7 @@ EFFECTS = {
 
 def compared(e, seed=0):
     noise = 0.002 * np.random.default_rng(seed).standard_normal(T.size)
-    regression = sweep_harmonics(X, e + noise, FS).regression
+    regression = sweep_harmonics(e + noise, sweep_phase(X, FS), FS).regression
     return compare_harmonics(regression, X, LAG, fs=FS), regression
 
 

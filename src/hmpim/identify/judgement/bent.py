@@ -6,7 +6,7 @@ from hmpim.identify.chance import FALSE_ALARM
 from hmpim.identify.fitting.enrich import PLAIN
 from hmpim.identify.judgement.between_samples import SIZES
 from hmpim.identify.judgement.evidence import Evidence
-from hmpim.identify.nonlinear.words import KIND_WORDS
+from hmpim.identify.nonlinear.mechanisms import KIND_WORDS
 from hmpim.identify.reading.spanned import bent_figures
 from hmpim.identify.result.digits import percent
 from hmpim.identify.result.groups import MODELLED, in_words

@@ -6,8 +6,6 @@ sweep_phase           the phase of a sweep, from its samples
 harmonic_regression   the regression behind them
 lines                 lines of a periodic input left out
 mechanisms            friction, backlash, rate limit, hard and soft springs
-harmonic_kinds        what each of them leaves at the harmonics
 evidence              which of them the record speaks for
 bends                 how far a nonlinearity moves a linear fit
-words                 sentences
 """

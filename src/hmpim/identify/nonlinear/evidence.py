@@ -14,10 +14,9 @@ from hmpim.identify.chance import FALSE_ALARM, LIKELIER, searched
 from hmpim.identify.fitting.derivatives import jacobian
 from hmpim.identify.fitting.fit import Fit, Problem
 from hmpim.identify.noise.whiteness import is_white
-from hmpim.identify.nonlinear.harmonic_kinds import compare_harmonics
 from hmpim.identify.nonlinear.harmonics import Harmonics, any_harmonics, sweep_harmonics
-from hmpim.identify.nonlinear.lines import Lines, detection_lines, find_period
-from hmpim.identify.nonlinear.mechanisms import Mechanism, compare_mechanisms
+from hmpim.identify.nonlinear.lines import LineLevel, detection_lines, find_period
+from hmpim.identify.nonlinear.mechanisms import Mechanism, compare_harmonics, compare_mechanisms
 from hmpim.identify.nonlinear.sweep_phase import SweepPhase, sweep_phase
 from hmpim.identify.worth import MOST, MUCH, PART, TOLERATED
 
@@ -48,7 +47,7 @@ class Seen:
 
     fit: Fit
     harmonics: Harmonics | None = None
-    lines: Lines | None = None
+    lines: tuple[LineLevel, ...] = ()
     mechanisms: tuple[Mechanism, ...] = ()
     named: tuple[Mechanism, ...] = ()
     rms: float = 0.0
@@ -88,14 +87,8 @@ def _by_harmonics(look: Look, sweep: SweepPhase, fit: Fit, white: bool) -> Seen:
     ):
         return Seen(fit=fit)
     phases = [sweep_phase(thinned(other, look.block), rate) for other in look.others]
-    harmonics = sweep_harmonics(
-        thinned(look.u, look.block),
-        residual,
-        rate,
-        delay=delay,
-        phase=sweep,
-        others=[phase for phase in phases if phase is not None],
-    )
+    others = [phase for phase in phases if phase is not None]
+    harmonics = sweep_harmonics(residual, sweep, rate, delay=delay, others=others)
     if harmonics is None:
         return Seen(fit=fit)
     harmonics = _within(harmonics, float(np.sqrt(np.mean(residual**2))))
@@ -130,7 +123,7 @@ def _within(harmonics: Harmonics, most: float) -> Harmonics:
 def _by_traces(look: Look, fit: Fit, white: bool) -> Seen:
     """Ask lines left out, if the input repeats, and whether any kind explains the residual."""
     lines = _lines(look.u, look.problem)
-    levels = [] if lines is None else [v for v in lines.levels if v.probability < FALSE_ALARM]
+    levels = [v for v in lines if v.probability < FALSE_ALARM]
     if white and not levels and not _curved(fit, look.problem):
         return Seen(fit=fit, lines=lines)
     power = fit.cost / max(look.problem.counted, 1)
@@ -198,20 +191,9 @@ def _curved(fit: Fit, problem: Problem) -> bool:
 
 
 def are_curved(models: Real, residuals: Real, counted: Mask | None = None) -> Mask:
-    """Which white residuals follow square, cube or direction of what their linear models say.
+    """Which white residuals, (k, n), follow square, cube or direction of what their models say.
 
-    Parameters
-    ----------
-    models : ndarray, shape (k, n)
-        Outputs of the models, without bias.
-    residuals : ndarray, shape (k, n)
-        What they leave over.
-    counted : ndarray of bool, shape (n,), optional
-        Samples that count; all if None.
-
-    Returns
-    -------
-    ndarray of bool, shape (k,)
+    `models` holds the outputs of the linear models, without bias; all samples count, or `counted`.
     """
     size = np.std(models, axis=1)
     told = size > 0
@@ -239,11 +221,9 @@ def are_curved(models: Real, residuals: Real, counted: Mask | None = None) -> Ma
     return np.asarray(told & np.any((left > 1e-6) & (taken > needed * left), axis=1))
 
 
-def _lines(u: Real, problem: Problem) -> Lines | None:
+def _lines(u: Real, problem: Problem) -> tuple[LineLevel, ...]:
     """Distortion at lines left out, if the input repeats; the first period may be transient."""
-    if problem.valid is not None:
-        return None
-    period = find_period(u)
+    period = find_period(u) if problem.valid is None else None
     if period is None or u.size < 3 * period:
-        return None
+        return ()
     return detection_lines(u[period:], problem.y[period:], period=period)

@@ -185,10 +185,9 @@ class HarmonicFit:
         index = np.flatnonzero((place >= 2 * i) & (place < 2 * i + 2))
         return float(np.sum(own * self.covariance[np.ix_(index, index)]))
 
-    def power(self, weights: Real, group: NDArray[np.intp]) -> float:
-        """Mean square of what weights, 0 outside of `group`, stand for."""
-        own = _gram(self.columns, self.view)[np.ix_(group, group)]
-        return float(weights[group] @ own @ weights[group]) / self.rest.size
+    def gram(self, group: NDArray[np.intp]) -> Real:
+        """Mean products of what the weights of a group stand for."""
+        return _gram(self.columns, self.view)[np.ix_(group, group)] / self.rest.size
 
     def weights_of(self, traces: Real) -> Real:
         """Weights that traces, shape (k, n), would have by themselves, shape (k, p c)."""
@@ -200,18 +199,9 @@ class HarmonicFit:
 def fit_harmonics(
     e: Real, view: SweepView, others: Sequence[SweepPhase], late: float
 ) -> HarmonicFit:
-    """Regress `e`, shape (n,), on harmonics of the sweep in `view`.
+    """Regress `e`, shape (n,), on harmonics of the sweep in `view`, so many samples late.
 
-    Parameters
-    ----------
-    e : ndarray, shape (n,)
-        What is regressed.
-    view : SweepView
-        From `view_of`.
-    others : sequence of SweepPhase
-        Sweeps of other inputs, whose own frequency is allowed for.
-    late : float
-        Delay in samples.
+    What follows the frequency of other inputs' sweeps is allowed for.
     """
     columns = columns_of(view, [_turned(other, view.index, late) for other in others])
     e = e[view.index]

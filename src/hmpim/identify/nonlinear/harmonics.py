@@ -15,9 +15,7 @@ from itertools import pairwise
 
 import numpy as np
 import scipy
-from numpy.typing import ArrayLike
 
-from hmpim.errors import RecordError
 from hmpim.identify.arrays import Real
 from hmpim.identify.nonlinear.harmonic_regression import (
     HIGHEST,
@@ -26,8 +24,7 @@ from hmpim.identify.nonlinear.harmonic_regression import (
     fit_harmonics,
     view_of,
 )
-from hmpim.identify.nonlinear.sweep_phase import SweepPhase, sweep_phase
-from hmpim.identify.signals import as_pair, check_rate
+from hmpim.identify.nonlinear.sweep_phase import SweepPhase
 
 __all__ = ["Harmonic", "Harmonics", "any_harmonics", "sweep_harmonics"]
 
@@ -90,92 +87,59 @@ class Harmonics:
 
 
 def sweep_harmonics(
-    u: ArrayLike,
-    residual: ArrayLike,
+    residual: Real,
+    sweep: SweepPhase,
     fs: float,
     *,
     delay: float = 0.0,
-    phase: SweepPhase | None = None,
     others: Sequence[SweepPhase] = (),
 ) -> Harmonics | None:
     """Measure the harmonics of a sweep in the residual of a linear fit.
 
     Parameters
     ----------
-    u : array_like, shape (n,)
-        Input samples.
-    residual : array_like, shape (n,)
+    residual : ndarray, shape (n,)
         Output less prediction; 0 where a sample does not count.
+    sweep : SweepPhase
+        Of the input.
     fs : float
         Rate in Hz.
     delay : float
         Delay of the system, s; the harmonics come as much later.
-    phase : SweepPhase, optional
-        From `hmpim.identify.nonlinear.sweep_phase.sweep_phase` if already known.
     others : sequence of SweepPhase
         Sweeps of other inputs: what follows those is no harmonic of this one.
 
     Returns
     -------
     Harmonics or None
-        None if the input is not a sweep, or has too few turns.
-
-    Raises
-    ------
-    RecordError
-        For the wrong shape, unequal lengths, NaN or infinity.
-    ArgumentError
-        If `fs` is not positive.
+        None if the sweep has too few turns.
 
     Examples
     --------
+    >>> from hmpim.identify.nonlinear.sweep_phase import sweep_phase
     >>> t = np.arange(2000) / 200
     >>> u = np.sin(2 * np.pi * (0.1 * t + t**2))
     >>> noise = 0.01 * np.random.default_rng(0).standard_normal(2000)
-    >>> found = sweep_harmonics(u, 0.1 * (u**3 - 0.75 * u) + noise, 200.0)
+    >>> found = sweep_harmonics(0.1 * (u**3 - 0.75 * u) + noise, sweep_phase(u, 200.0), 200.0)
     >>> [h.order for h in found.orders if h.probability < 1e-4], round(found.rms(1), 3)
     ([3], 0.017)
     """
-    check_rate(fs)
-    source, e = as_pair(u, residual)
-    sweep = phase if phase is not None else sweep_phase(source, fs)
-    if sweep is None:
-        return None
-    if sweep.phase.size != e.size:
-        raise RecordError(
-            f"the sweep's phase has {sweep.phase.size} samples and the residual {e.size}; "
-            "give both of one record"
-        )
-    view = view_of(e, sweep, fs, delay)
+    view = view_of(residual, sweep, fs, delay)
     if view is None:
         return None
-    return _tested(fit_harmonics(e, view, others, delay * fs), fs)
+    return _tested(fit_harmonics(residual, view, others, delay * fs), fs)
 
 
 def any_harmonics(residuals: Real, sweep: SweepPhase, fs: float, *, delay: float) -> Real:
     """Chances that noise alone makes the harmonics seen in white residuals: a quick look.
 
-    A tenth of the work of `sweep_harmonics`, and only as good as the residuals are white: it
-    tells where nothing need be looked for.
-
-    Parameters
-    ----------
-    residuals : ndarray, shape (k, n)
-        Output less prediction; 0 where a sample does not count.
-    sweep : SweepPhase
-        From `hmpim.identify.nonlinear.sweep_phase.sweep_phase`.
-    fs : float
-        Rate in Hz.
-    delay : float
-        Delay of the system, s. It is rounded to a sample: this turns the harmonics of a stretch
-        alike, and only their size counts.
-
-    Returns
-    -------
-    ndarray, shape (k,)
+    A tenth of the work of `sweep_harmonics`, and only as good as the residuals, (k, n), are white:
+    it tells where nothing need be looked for. The delay in s is rounded to a sample: this turns the
+    harmonics of a stretch alike, and only their size counts.
 
     Examples
     --------
+    >>> from hmpim.identify.nonlinear.sweep_phase import sweep_phase
     >>> t = np.arange(2000) / 200
     >>> u = np.sin(2 * np.pi * (0.1 * t + t**2))
     >>> noise = 0.01 * np.random.default_rng(0).standard_normal(2000)

@@ -11,14 +11,11 @@ from typing import Literal
 
 import numpy as np
 import scipy
-from numpy.typing import ArrayLike
 
-from hmpim.errors import ArgumentError
-from hmpim.identify.arrays import Complex, Real
-from hmpim.identify.signals import as_pair, as_signal
+from hmpim.identify.arrays import Complex, Mask, Real
 from hmpim.identify.worth import MATERIAL, PART
 
-__all__ = ["LineLevel", "Lines", "detection_lines", "find_period"]
+__all__ = ["LineLevel", "detection_lines", "find_period"]
 
 Parity = Literal["even", "odd"]
 
@@ -51,41 +48,8 @@ class LineLevel:
     probability: float
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Lines:
-    """Distortion and noise of a periodic test.
-
-    Parameters
-    ----------
-    period : int
-        Samples.
-    levels : tuple of LineLevel
-        For each parity that has lines left out.
-    noise_rms : float
-        R.m.s. amplitude of the noise in one line, after averaging.
-    """
-
-    period: int
-    levels: tuple[LineLevel, ...]
-    noise_rms: float
-
-
-def find_period(u: ArrayLike) -> int | None:
-    """Samples after which the input repeats exactly, at least twice in the record.
-
-    Parameters
-    ----------
-    u : array_like, shape (n,)
-        Input samples.
-
-    Returns
-    -------
-    int or None
-
-    Raises
-    ------
-    RecordError
-        For the wrong shape, NaN or infinity.
+def find_period(u: Real) -> int | None:
+    """Samples after which an input, (n,), repeats exactly, at least twice in the record.
 
     Examples
     --------
@@ -94,8 +58,7 @@ def find_period(u: ArrayLike) -> int | None:
     >>> find_period(np.random.default_rng(0).standard_normal(300)) is None
     True
     """
-    x = as_signal("u", u)
-    x = x - x.mean()
+    x = u - u.mean()
     n = x.size
     power = np.concatenate([[0.0], np.cumsum(x**2)])
     if power[-1] == 0:
@@ -106,37 +69,23 @@ def find_period(u: ArrayLike) -> int | None:
     both = power[n - lag] + (power[n] - power[lag])
     different = (both - 2 * product) / np.maximum(both, np.finfo(float).tiny)
     moved = np.flatnonzero(different > PART)
-    if moved.size == 0:
-        return None
     good = np.flatnonzero(different < MATERIAL**2)
-    good = good[good > moved[0]]
+    good = good[good > moved[0]] if moved.size else moved
     if good.size == 0:
         return None
     run = good[: 1 + int(np.argmax(np.append(np.diff(good), 2) > 1))]
     return int(run[np.argmin(different[run])])
 
 
-def detection_lines(u: ArrayLike, y: ArrayLike, *, period: int) -> Lines | None:
-    """Measure even and odd distortion at the lines that the input leaves out.
+def detection_lines(u: Real, y: Real, *, period: int) -> tuple[LineLevel, ...]:
+    """Measure even and odd distortion at the lines that the input leaves out in the excited band.
 
     Parameters
     ----------
-    u, y : array_like, shape (n,)
+    u, y : ndarray, shape (n,)
         Input and output in the steady state, two periods or more; the last whole ones count.
     period : int
         Samples per period.
-
-    Returns
-    -------
-    Lines or None
-        None where no lines are left out within the excited band.
-
-    Raises
-    ------
-    RecordError
-        For the wrong shape, unequal lengths, NaN or infinity.
-    ArgumentError
-        If the record does not hold two periods.
 
     Examples
     --------
@@ -144,21 +93,13 @@ def detection_lines(u: ArrayLike, y: ArrayLike, *, period: int) -> Lines | None:
     >>> u = np.sum(np.cos(2 * np.pi * k[:, None] * t + k[:, None] ** 2), axis=0)
     >>> y = u + 0.01 * u**2 + 0.01 * np.random.default_rng(0).standard_normal(3000)
     >>> found = detection_lines(u, y, period=1000)
-    >>> [level.parity for level in found.levels if level.probability < 1e-3]
+    >>> [level.parity for level in found if level.probability < 1e-3]
     ['even']
     """
-    source, output = as_pair(u, y)
-    if not isinstance(period, (int, np.integer)) or period < 8:
-        raise ArgumentError(f"period is {period!r}; give a whole number of samples, at least 8")
-    periods = source.size // int(period)
-    if periods < 2:
-        raise ArgumentError(
-            f"a period of {period} samples goes {source.size / period:.2f} times into "
-            f"{source.size}; noise is told from distortion by two periods at least"
-        )
-    start = source.size - periods * int(period)
-    U = scipy.fft.rfft(source[start:].reshape(periods, -1), axis=1) * 2.0 / period
-    Y = scipy.fft.rfft(output[start:].reshape(periods, -1), axis=1) * 2.0 / period
+    periods = u.size // period
+    start = u.size - periods * period
+    U = scipy.fft.rfft(u[start:].reshape(periods, -1), axis=1) * 2.0 / period
+    Y = scipy.fft.rfft(y[start:].reshape(periods, -1), axis=1) * 2.0 / period
     mean_u, mean_y = np.abs(U.mean(axis=0)), Y.mean(axis=0)
     scatter = np.sum(np.abs(Y - mean_y) ** 2, axis=0) / (periods - 1) / periods
     mean_u[0] = 0.0
@@ -166,22 +107,15 @@ def detection_lines(u: ArrayLike, y: ArrayLike, *, period: int) -> Lines | None:
     line = np.arange(mean_u.size)
     within = (line >= max(excited[0], 1)) & (line <= min(excited[-1], mean_u.size - 2))
     silent = within & (mean_u < MATERIAL**2 * mean_u.max())
-    if np.count_nonzero(silent) < _FEWEST:
-        return None
     signal = float(np.sqrt(np.mean(np.abs(mean_y[excited]) ** 2)))
-    levels = []
-    parities: tuple[tuple[Parity, int], ...] = (("even", 0), ("odd", 1))
-    for parity, rest in parities:
-        chosen = silent & (line % 2 == rest)
-        if np.count_nonzero(chosen) < _FEWEST:
-            continue
-        levels.append(_level(parity, mean_y[chosen], scatter[chosen], periods, signal))
-    if not levels:
-        return None
-    return Lines(
-        period=int(period),
-        levels=tuple(levels),
-        noise_rms=float(np.sqrt(np.mean(scatter[silent]))),
+    parities: dict[Parity, Mask] = {
+        "even": silent & (line % 2 == 0),
+        "odd": silent & (line % 2 == 1),
+    }
+    return tuple(
+        _level(parity, mean_y[chosen], scatter[chosen], periods, signal)
+        for parity, chosen in parities.items()
+        if np.count_nonzero(chosen) >= _FEWEST
     )
 
 

@@ -16,6 +16,11 @@ curvature          x³ itself: a scale that changes with the deflection, behind 
 The residual is regressed on each in turn, beside all that a linear change of the model could
 explain, with noise that is an autoregression. The likelihoods say which fits best, and
 whether the next best is far enough behind to be ruled out.
+
+Of a sweep the harmonics alone are held against each kind's: each makes harmonics of its own
+amplitude, phase, and course. What follows the sweep at its own frequency does not count: dynamics
+left out look like nothing here, and what of a nonlinearity the linear fit took up does not lessen
+its size.
 """
 
 from collections.abc import Iterator
@@ -30,15 +35,18 @@ from hmpim.identify.arrays import Mask, Real
 from hmpim.identify.fitting.derivatives import jacobian
 from hmpim.identify.fitting.fit import Fit, Problem
 from hmpim.identify.noise.autoregression import yule_walker
+from hmpim.identify.nonlinear.harmonic_regression import HarmonicFit
 from hmpim.model.poles import rational_response
 from hmpim.model.sampled import prepare_input
 
 __all__ = [
+    "KIND_WORDS",
     "LONGEST_AUTOREGRESSION",
     "RATES",
     "Hypothesis",
     "Kind",
     "Mechanism",
+    "compare_harmonics",
     "compare_mechanisms",
     "hypotheses",
     "play",
@@ -57,6 +65,18 @@ Kind = Literal[
     "curvature",
     "dead_zone",
 ]
+
+KIND_WORDS: dict[Kind, str] = {
+    "hardening": "a hardening spring",
+    "softening": "a softening spring",
+    "friction": "Coulomb friction",
+    "backlash": "backlash",
+    "rate_limit": "a rate limit",
+    "saturation": "clipping",
+    "asymmetry": "an asymmetric response",
+    "dead_zone": "a dead zone of the command",
+    "curvature": "a scale factor that changes with the deflection",
+}
 
 _GAPS = (0.002, 0.005, 0.01, 0.02, 0.04, 0.08, 0.15, 0.25, 0.4)
 """Half gaps tried, over the output's largest deviation."""
@@ -119,14 +139,7 @@ class Mechanism:
 
 
 def play(x: Real, half_gap: float) -> Real:
-    """Output of backlash: follows `x` half a gap behind, and waits at each reversal.
-
-    Parameters
-    ----------
-    x : ndarray, shape (n,)
-        What drives.
-    half_gap : float
-        Half of the gap, in the unit of `x`.
+    """Output of backlash: follows `x`, (n,), half a gap behind, and waits at each reversal.
 
     Examples
     --------
@@ -204,21 +217,33 @@ class Hypothesis:
     size: float | None = None
     spacing: float = 0.0
 
+    def weighed(
+        self,
+        weight: float,
+        error: float,
+        *,
+        gain: float,
+        likelihood: float,
+        rms: float,
+        effect: float,
+    ) -> Mechanism:
+        """The kind as well as it fits, its trace taken so many times, with the error of that."""
+        return Mechanism(
+            kind=self.kind,
+            size=weight if self.size is None else self.size,
+            size_std=float(np.hypot(error if self.size is None else 0.0, self.spacing)),
+            gain=gain,
+            likelihood=likelihood,
+            rms=rms,
+            effect=effect,
+            trace=self.trace,
+        )
+
 
 def compare_mechanisms(problem: Problem, fit: Fit, *, fs: float) -> tuple[Mechanism, ...]:
     """Fit each kind of nonlinearity to the residual of a linear fit, the likeliest first.
 
-    Parameters
-    ----------
-    problem, fit
-        The data and the linear fit.
-    fs : float
-        Rate in Hz.
-
-    Returns
-    -------
-    tuple of Mechanism
-        One of each kind whose weight has the right sign; empty for a fit without residual.
+    One of each kind whose weight has the right sign is returned; `fs` is the rate in Hz.
 
     Examples
     --------
@@ -241,10 +266,63 @@ def compare_mechanisms(problem: Problem, fit: Fit, *, fs: float) -> tuple[Mechan
     best: dict[Kind, Mechanism] = {}
     for hypothesis in hypotheses(x, fit.denominator, fs):
         found = _fitted(hypothesis, fit.residual[here], background, counted[here])
-        if found is None:
-            continue
-        if found.kind not in best or found.likelihood > best[found.kind].likelihood:
+        known = best.get(hypothesis.kind)
+        if found is not None and (known is None or found.likelihood > known.likelihood):
             best[found.kind] = found
+    return tuple(sorted(best.values(), key=lambda m: -m.likelihood))
+
+
+def compare_harmonics(
+    fit: HarmonicFit, x: Real, denominator: Real, *, fs: float
+) -> tuple[Mechanism, ...]:
+    """Hold the harmonics of each kind against those of a residual, the likeliest first.
+
+    Parameters
+    ----------
+    fit : HarmonicFit
+        Regression of the residual; each kind's trace is regressed as it was, and orders 2 and up
+        are compared.
+    x, denominator, fs
+        As for `hypotheses`.
+
+    Returns
+    -------
+    tuple of Mechanism
+        One of each kind whose weight has the right sign. `Mechanism.rms` is that of its harmonics.
+
+    Examples
+    --------
+    >>> from hmpim.identify.nonlinear.harmonics import sweep_harmonics
+    >>> from hmpim.identify.nonlinear.sweep_phase import sweep_phase
+    >>> u = np.sin(np.arange(3000) / 30 * (1 + np.arange(3000) / 3000))
+    >>> y = play(u, 0.1) + 0.01 * np.random.default_rng(0).standard_normal(3000)
+    >>> seen = sweep_harmonics(y - u, sweep_phase(u, 100.0), 100.0)
+    >>> best = compare_harmonics(seen.regression, u, np.ones(1), fs=100.0)[0]
+    >>> best.kind, round(best.size, 2)
+    ('backlash', 0.1)
+    """
+    tried = list(hypotheses(x, denominator, fs))
+    group = fit.group(2, 2 * len(fit.orders))
+    values, vectors = np.linalg.eigh(fit.covariance[np.ix_(group, group)])
+    kept = values > 1e-12 * values[-1]
+    whiten = vectors[:, kept] / np.sqrt(values[kept])  # to unit variance each
+    seen, gram = fit.weights[group] @ whiten, fit.gram(group)
+    best: dict[Kind, Mechanism] = {}
+    for one, weights in zip(tried, fit.weights_of(np.stack([h.trace for h in tried])), strict=True):
+        own = weights[group]
+        made = own @ whiten
+        power, along = float(made @ made), float(made @ seen)
+        gain = 0.5 * along**2 / power if power > 0.0 and along > 0.0 else 0.0
+        if gain > (best[one.kind].gain if one.kind in best else 0.0):
+            weight = along / power
+            best[one.kind] = one.weighed(
+                weight,
+                float(np.linalg.norm(made)) ** -1,
+                gain=gain,
+                likelihood=gain,
+                rms=weight * float(own @ gram @ own) ** 0.5,
+                effect=weight * float(np.std(one.trace[fit.view.index])),
+            )
     return tuple(sorted(best.values(), key=lambda m: -m.likelihood))
 
 
@@ -359,13 +437,11 @@ def _fitted(hypothesis: Hypothesis, e: Real, background: Real, counted: Mask) ->
     n = white.size
     rest = max(float(white @ white - projected @ projected), 1e-30 * float(white @ white))
     error = float(np.sqrt(rest / max(n - rows.shape[0], 1))) / abs(float(r[-1, -1]))
-    return Mechanism(
-        kind=hypothesis.kind,
-        size=weight if hypothesis.size is None else hypothesis.size,
-        size_std=float(np.hypot(error if hypothesis.size is None else 0.0, hypothesis.spacing)),
+    return hypothesis.weighed(
+        weight,
+        error,
         gain=0.5 * n * float(np.log1p(projected[-1] ** 2 / rest)),
         likelihood=-0.5 * n * float(np.log(rest / n)),
         rms=weight * float(np.sqrt(np.mean(alone**2))),
         effect=weight * float(np.std(h[counted])),
-        trace=hypothesis.trace,
     )

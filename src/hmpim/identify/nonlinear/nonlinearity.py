@@ -10,20 +10,18 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from hmpim.identify.arrays import Real
 from hmpim.identify.chance import FALSE_ALARM, HALF
 from hmpim.identify.fitting.fit import Fit, Problem
 from hmpim.identify.nonlinear.evidence import Look, Seen, look_at, plainer_of, thinned
 from hmpim.identify.nonlinear.harmonic_regression import SweepView
-from hmpim.identify.nonlinear.mechanisms import Mechanism
+from hmpim.identify.nonlinear.mechanisms import KIND_WORDS, Mechanism
 from hmpim.identify.nonlinear.sweep_phase import sweep_phase
-from hmpim.identify.nonlinear.words import general, particular
 from hmpim.identify.result import Estimate, HarmonicCurve, Nonlinearity
-from hmpim.identify.result.digits import percent
-from hmpim.identify.signals import as_pair
-from hmpim.identify.worth import MATERIAL, WORTH
+from hmpim.identify.result.digits import percent, plus_minus
+from hmpim.identify.result.groups import MODELLED
+from hmpim.identify.worth import MATERIAL, MOST, WORTH
 from hmpim.record import Finding
 
 __all__ = ["Inspection", "inspect_nonlinearity"]
@@ -39,8 +37,7 @@ class Inspection:
     Parameters
     ----------
     seen : Seen
-        Results of the tests: harmonics, if the input is a sweep and the residual gives reason to
-        look for them; lines, if the input is periodic with lines left out; the likeliest kinds.
+        Results of the tests.
     findings : tuple of Finding
         Code 'nonlinear' if it matters; then the code of the kind where it can be named:
         'hardening', 'softening', 'friction', 'backlash', 'rate_limit', 'saturation'.
@@ -58,7 +55,7 @@ class Inspection:
 
 
 def inspect_nonlinearity(
-    u: ArrayLike,
+    u: Real,
     problem: Problem,
     fit: Fit,
     *,
@@ -72,7 +69,7 @@ def inspect_nonlinearity(
 
     Parameters
     ----------
-    u : array_like, shape (n,)
+    u : ndarray, shape (n,)
         Input samples.
     problem, fit
         The data and the linear fit.
@@ -88,17 +85,6 @@ def inspect_nonlinearity(
     unit : str
         The output's unit, for the sentences.
 
-    Returns
-    -------
-    Inspection
-
-    Raises
-    ------
-    RecordError
-        For the wrong shape, unequal lengths, NaN or infinity.
-    ArgumentError
-        If `fs` is not positive.
-
     Examples
     --------
     >>> from hmpim.identify.fitting.fit import fit_structure
@@ -112,12 +98,11 @@ def inspect_nonlinearity(
     >>> found.seen.mechanisms[0].kind, [finding.code for finding in found.findings]
     ('curvature', ['nonlinear'])
     """
-    source, _ = as_pair(u, problem.y, names=("u", "the output"))
     counted = problem.y if problem.valid is None else problem.y[problem.valid]
     output = float(np.std(counted))
-    block = -(-source.size // _LONGEST)
-    sweep = sweep_phase(thinned(source, block), fs / block)
-    look = Look(u=source, problem=problem, fs=fs, others=tuple(others), sweep=sweep, block=block)
+    block = -(-u.size // _LONGEST)
+    sweep = sweep_phase(thinned(u, block), fs / block)
+    look = Look(u=u, problem=problem, fs=fs, others=tuple(others), sweep=sweep, block=block)
     seen = look_at(look, fit)
     if plain is not None and seen.rms > 0:
         seen = plainer_of(look, seen, look_at(look, plain))
@@ -126,20 +111,8 @@ def inspect_nonlinearity(
     shares = _shares(seen, seen.fit.cost / max(problem.counted, 1))
     findings: list[Finding] = []
     if matters:
-        findings.append(
-            general(
-                share=seen.rms / output,
-                where=_where(seen, output),
-                made_of=shares,
-                kinds=named,
-                effect=seen.effect / output,
-                asked=not others,
-                swept=seen.harmonics is not None,
-                doubt=_is_large(seen, output),
-            )
-        )
-        of_kind = particular(named[0], unit) if len(named) == 1 else None
-        if of_kind is not None:
+        findings.append(_general(seen, output, shares, asked=not others))
+        if len(named) == 1 and (of_kind := _particular(named[0], unit)) is not None:
             findings.append(of_kind)
     return Inspection(
         seen=seen,
@@ -147,11 +120,6 @@ def inspect_nonlinearity(
         fit=seen.fit if matters else fit,
         summary=_summary(look, seen, shares, output, unit=unit, named=named),
     )
-
-
-def _is_large(seen: Seen, output: float) -> bool:
-    """Whether the linear parameters hold at this amplitude only."""
-    return seen.effect > MATERIAL * output
 
 
 def _shares(seen: Seen, power: float) -> tuple[float, float, float]:
@@ -178,13 +146,98 @@ def _where(seen: Seen, output: float) -> list[str]:
     elif seen.mechanisms:
         even = seen.mechanisms[0].kind == "asymmetry"
         where = [f"{'even' if even else 'odd'} in the deflection"]
-    if seen.lines is not None:
-        where += [
-            f"{percent(level.share)} % at {level.parity} lines left out"
-            for level in seen.lines.levels
-            if level.probability < FALSE_ALARM
-        ]
-    return where
+    return where + [
+        f"{percent(level.share)} % at {level.parity} lines left out"
+        for level in seen.lines
+        if level.probability < FALSE_ALARM
+    ]
+
+
+def _general(
+    seen: Seen, output: float, made_of: tuple[float, float, float], *, asked: bool
+) -> Finding:
+    """Say that it is nonlinear, how much, even or odd, and what it may be.
+
+    `made_of` has the shares of the residual's power: noise, linear, nonlinear; `asked` is whether
+    the kinds were compared at all.
+    """
+    noise, linear, nonlinear = (100 * part for part in made_of)
+    share, effect = seen.rms / output, seen.effect / output
+    names = [KIND_WORDS[one.kind] for one in seen.named]
+    if len(names) == 1:
+        guess = f"It looks like {names[0]}."
+    elif names:
+        guess = f"It may be {' or '.join(names)}; this record does not show which."
+    elif asked:
+        guess = "None of the kinds tried fits alone."
+    else:
+        guess = "Drive one input at a time to see which kind it is."
+    if effect > (1 + MOST) * share:
+        guess += f" Its whole effect, most of which a linear model absorbs, is {percent(effect)} %."
+    where = _where(seen, output)
+    at = f": {' and '.join(where)}" if where else ""
+    left = f"Of the residual's power {nonlinear:.0f} % is nonlinear and {noise:.0f} % noise"
+    if seen.harmonics is None:  # a sweep's own frequency tells dynamics left out from noise
+        left += " or dynamics left out"
+    elif linear >= 0.5:
+        left += f"; {linear:.0f} % still follows the input"
+    return Finding(
+        code="nonlinear",
+        message=f"{percent(share)} % of the output (r.m.s.) is nonlinear{at}. {guess} {left}. "
+        "Identify at several amplitudes to see where the linear model holds.",
+        severity="doubt" if seen.effect > MATERIAL * output else "info",
+        parameters=MODELLED,
+    )
+
+
+def _particular(found: Mechanism, unit: str) -> Finding | None:
+    """Say what the kind means, with its number, and what to do about it; None where unnamed.
+
+    Examples
+    --------
+    >>> found = Mechanism(
+    ...     kind="backlash", size=0.1, size_std=0.01, gain=99.0, likelihood=0.0, rms=0.02,
+    ...     effect=0.05, trace=np.zeros(0))
+    >>> _particular(found, "deg").message[:48]
+    'There is play of 0.200 ± 0.020 deg in total. Loo'
+    """
+    of = f" {unit}" if unit else ""
+    share = f"{plus_minus(100 * found.size, 100 * found.size_std)} %"
+    size = f"{plus_minus(found.size, found.size_std)}{of}"
+    match found.kind:
+        case "hardening" | "softening":
+            way, moves = ("above", "higher") if found.kind == "hardening" else ("below", "lower")
+            # Of a cubic force beside a sinusoid three quarters act like a spring; half of a
+            # spring's change goes into the frequency.
+            message = (
+                f"At the largest deflection the restoring force is {share} {way} that of a linear "
+                f"spring, so the natural frequency there is about {percent(0.375 * found.size)} % "
+                f"{moves} than for small motion. Use a smaller amplitude for the linear model."
+            )
+        case "friction":
+            message = (
+                f"Coulomb friction equals the restoring force at a deflection of {size}. "
+                "Motions of that size barely show in the output; use larger ones, or put friction "
+                "into the model."
+            )
+        case "backlash":
+            message = (
+                f"There is play of {plus_minus(2 * found.size, 2 * found.size_std)}{of} in total. "
+                "Look at gears and couplings, or put backlash into the model."
+            )
+        case "rate_limit":
+            message = (
+                f"The speed seems limited to {size}{'/s' if unit else ' per second'}. "
+                "Keep the stimulus's velocity below it."
+            )
+        case "saturation":
+            message = (
+                f"The output seems clipped {size} from its bias. Drive it less hard, or "
+                "look for a stop."
+            )
+        case _:
+            return None
+    return Finding(code=found.kind, message=message, severity="info", parameters=MODELLED)
 
 
 def _summary(
@@ -197,8 +250,6 @@ def _summary(
     named: tuple[Mechanism, ...],
 ) -> Nonlinearity:
     """What the result keeps."""
-    even: float | None
-    odd: float | None
     even = odd = 0.0
     curves: tuple[HarmonicCurve, ...] = ()
     if seen.harmonics is not None:
@@ -221,14 +272,15 @@ def _summary(
         even, odd = (share, 0.0) if seen.mechanisms[0].kind == "asymmetry" else (0.0, share)
     size = None
     if len(named) == 1:
-        value, std = named[0].size, named[0].size_std
+        (one,) = named
         measures = {"friction": unit, "backlash": unit, "saturation": unit}
         measures["rate_limit"] = f"{unit}/s" if unit else "1/s"
+        half = HALF * one.size_std
         size = Estimate(
-            value=value,
-            std=std,
-            ci95=(value - HALF * std, value + HALF * std),
-            unit=measures.get(named[0].kind, ""),
+            value=one.size,
+            std=one.size_std,
+            ci95=(one.size - half, one.size + half),
+            unit=measures.get(one.kind, ""),
         )
     noise, linear, nonlinear = shares
     return Nonlinearity(

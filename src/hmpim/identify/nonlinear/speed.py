@@ -324,8 +324,6 @@ def _followed(fine: Real, step: float) -> Real:
     """What is followed at so much a fine step, below half the rate, at the samples."""
     out = rate_limited(fine, step)
     reach = min(MARGIN * _FINE, out.size - 1)
-    before = 2.0 * out[0] - out[reach:0:-1]
-    after = 2.0 * out[-1] - out[-2 : -2 - reach : -1]
-    longer = np.concatenate([before, out, after])
+    longer = np.pad(out, reach, mode="reflect", reflect_type="odd")
     smooth = scipy.signal.oaconvolve(longer, _below_half_the_rate(), mode="same")
     return np.asarray(smooth[reach : reach + out.size : _FINE])

@@ -9,11 +9,9 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy
-from numpy.typing import ArrayLike
 
 from hmpim.identify.arrays import Mask, Real
 from hmpim.identify.kept import kept
-from hmpim.identify.signals import as_signal, check_rate
 from hmpim.identify.worth import DEEPEST, FEW, MATERIAL, MOST, PART
 
 __all__ = ["SweepPhase", "sweep_phase"]
@@ -52,27 +50,11 @@ class SweepPhase:
 
 
 @kept
-def sweep_phase(u: ArrayLike, fs: float) -> SweepPhase | None:
-    """Find the phase of `u` if it is one sinusoid of varying frequency and amplitude.
+def sweep_phase(u: Real, fs: float) -> SweepPhase | None:
+    """Find the phase of an input, (n,), at a rate in Hz, if it is one sinusoid.
 
-    Parameters
-    ----------
-    u : array_like, shape (n,)
-        Input samples.
-    fs : float
-        Rate in Hz.
-
-    Returns
-    -------
-    SweepPhase or None
-        None for anything else: several sines, noise, steps, a binary sequence.
-
-    Raises
-    ------
-    RecordError
-        For the wrong shape, NaN or infinity.
-    ArgumentError
-        If `fs` is not positive.
+    Its frequency and its amplitude may vary. None for anything else: several sines, noise, steps, a
+    binary sequence.
 
     Examples
     --------
@@ -83,11 +65,9 @@ def sweep_phase(u: ArrayLike, fs: float) -> SweepPhase | None:
     >>> sweep_phase(np.random.default_rng(0).standard_normal(2000), 200.0) is None
     True
     """
-    check_rate(fs)
-    samples = as_signal("u", u)
-    if np.ptp(samples) == 0:
+    if np.ptp(u) == 0:
         return None
-    x = samples - _centre(samples)
+    x = u - _centre(u)
     crossings, peaks, first = _crossings(x)
     if crossings.size < _FEWEST_CROSSINGS:
         return None
@@ -134,11 +114,8 @@ def _locally(error: Real, level: Real, crossings: Real) -> Real:
 def _finer(x: Real) -> Real:
     """Samples at a multiple of the rate, shape ((n - 1) * finer + 1,); ends continued evenly."""
     margin = min(32, x.size - 1)
-    before = 2 * x[0] - x[margin:0:-1]
-    after = 2 * x[-1] - x[-2 : -2 - margin : -1]
-    extended = scipy.signal.resample_poly(
-        np.concatenate([before, x, after]), _FINER, 1, window=("kaiser", 8.0)
-    )
+    longer = np.pad(x, margin, mode="reflect", reflect_type="odd")
+    extended = scipy.signal.resample_poly(longer, _FINER, 1, window=("kaiser", 8.0))
     start = margin * _FINER
     return np.asarray(extended[start : start + (x.size - 1) * _FINER + 1], dtype=np.float64)
 
@@ -150,14 +127,8 @@ def _crossings(x: Real) -> tuple[Real, Real, float]:
     at = np.flatnonzero(np.diff(sign))
     while at.size > _FEWEST_CROSSINGS:
         peaks = np.maximum.reduceat(np.abs(fine), at)[:-1]
-        around = np.minimum(
-            np.concatenate([[np.inf], peaks[:-1]]), np.concatenate([peaks[1:], [np.inf]])
-        )
-        ratio = peaks / np.maximum(around, np.finfo(float).tiny)
-        least = np.minimum(
-            np.concatenate([[np.inf], ratio[:-1]]), np.concatenate([ratio[1:], [np.inf]])
-        )
-        flukes = np.flatnonzero((ratio < PART) & (ratio < least))
+        ratio = peaks / np.maximum(_least_beside(peaks), np.finfo(float).tiny)
+        flukes = np.flatnonzero((ratio < PART) & (ratio < _least_beside(ratio)))
         if flukes.size == 0:
             break
         at = np.delete(at, np.concatenate([flukes, flukes + 1]))  # never two next to each other
@@ -167,6 +138,12 @@ def _crossings(x: Real) -> tuple[Real, Real, float]:
     peaks = np.maximum.reduceat(np.abs(fine), at)[:-1]
     first = -0.5 * np.pi if sign[at[0]] < 0 else 0.5 * np.pi
     return np.asarray(times), np.asarray(peaks), first
+
+
+def _least_beside(values: Real) -> Real:
+    """The lesser neighbour of each value."""
+    wide = np.pad(values, 1, constant_values=np.inf)
+    return np.asarray(np.minimum(wide[:-2], wide[2:]))
 
 
 def _signs(fine: Real) -> Real:
