@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from hmpim.errors import RecordError
 from hmpim.identify.noise.colour import bias_drift, noise_colour
 from hmpim.identify.noise.input_noise import input_noise
 from tests_support import assert_share
@@ -65,7 +64,6 @@ def test_the_drift_scatters_as_stated(coefficient):
         found = bias_drift(0.03 * T + autoregressive(coefficient, seed), T)
         errors.append((found.slope - 0.03) / found.std)
         chances.append(bias_drift(autoregressive(coefficient, seed), T).probability)
-        assert found.total == pytest.approx(found.slope * T[-1])
     assert abs(np.mean(errors)) < 0.3
     assert 0.85 < np.std(errors) < 1.2
     assert_share(np.array(chances) < 0.05, at_most=0.06)
@@ -82,7 +80,8 @@ def test_the_noise_of_the_input_and_what_it_costs():
         )
         for s in range(60)
     ]
-    errors = [(f.std - 0.02) / f.std_std for f in found]
+    # The floor is seen in the bins from 24 to 100 Hz.
+    errors = [(f.std - 0.02) / (0.02 / np.sqrt(760)) for f in found]
     assert abs(np.mean(errors)) < 0.4
     assert 0.75 < np.std(errors) < 1.3
     # Power in the band: the sweep's 1/2 spread over a fifth of the bins, and the noise.
@@ -98,10 +97,3 @@ def test_a_clean_input_has_no_noise(u):
 def test_an_input_that_excites_everything_cannot_tell():
     binary = np.random.default_rng(0).choice([-1.0, 1.0], 2000)
     assert input_noise(binary, FS, band=(0.1, 100.0)) is None
-
-
-def test_bad_arguments_are_refused():
-    with pytest.raises(RecordError, match="2000 samples and time has 1999"):
-        bias_drift(CHIRP, T[1:])
-    with pytest.raises(RecordError, match="does not rise after sample 0"):
-        bias_drift(CHIRP, -T)

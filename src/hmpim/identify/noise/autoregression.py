@@ -46,12 +46,7 @@ _MOST_INNOVATIONS = 100_000
 def autoregression(residual: Real, valid: Mask | None) -> Real:
     """Filter that leaves white noise of a residual, 1 first, shape (order + 1,).
 
-    Parameters
-    ----------
-    residual : ndarray, shape (n,)
-        0 on average.
-    valid : ndarray of bool, shape (n,), optional
-        Samples that count; all if None.
+    The residual, (n,), is 0 on average; samples that are not `valid` do not count.
 
     Examples
     --------
@@ -69,17 +64,8 @@ def autoregression(residual: Real, valid: Mask | None) -> Real:
 def whitening_filter(gram: Real, count: int) -> Real:
     """Filter that leaves white noise, from the products of a sample and its past.
 
-    Parameters
-    ----------
-    gram : ndarray, shape (k + 1, k + 1)
-        Sums of products of a sample and the k before it, the sample itself first.
-    count : int
-        Of samples that were summed.
-
-    Returns
-    -------
-    ndarray, shape (order + 1,)
-        1 first; the order, at most k, is Akaike's.
+    `gram`, (k + 1, k + 1), holds sums over so many samples of products of a sample and the k before
+    it, the sample itself first. The filter is 1 first; its order, at most k, is Akaike's.
 
     Examples
     --------
@@ -138,11 +124,6 @@ def innovation_gain(y: Real, residual: Real) -> float:
     Each is taken as an autoregression of its own (order 12, least squares, so that wander and
     lines are told exactly); what that cannot foresee of the output, the model must explain.
 
-    Parameters
-    ----------
-    y, residual : ndarray, shape (n,)
-        Output, and what a model leaves of it.
-
     Examples
     --------
     A wandering output has nothing that its own past does not tell:
@@ -174,12 +155,8 @@ def _innovation(x: Real) -> float:
 def yule_walker(residual: Real, longest: int = LONGEST) -> tuple[Real, float]:
     """The same filter from the autocovariance, stable always, and the power that it leaves.
 
-    Parameters
-    ----------
-    residual : ndarray, shape (n,)
-        0 where a sample does not count.
-    longest : int
-        Greatest order that is tried; less for fewer than ten times as many samples.
+    The residual, (n,), is 0 where a sample does not count. Orders up to `longest` are tried, less
+    for fewer than ten times as many samples.
 
     Examples
     --------
@@ -200,19 +177,9 @@ def spectrum_behind(noise: Real, omega: Real) -> Real:
 
 
 def autoregressive_spectrum(residual: Real, omega: Real) -> Real:
-    """Power spectrum of the residual from an autoregression fitted to it.
+    """Power spectrum of a residual from an autoregression of it, at radians per sample, (m,).
 
-    Parameters
-    ----------
-    residual : ndarray, shape (n,)
-        White or coloured noise.
-    omega : ndarray, shape (m,)
-        Radians per sample.
-
-    Returns
-    -------
-    ndarray, shape (m,)
-        Equal to the variance at every frequency if the noise is white.
+    Equal to the variance at every frequency if the noise is white.
     """
     noise, left = yule_walker(residual)
     power = left * spectrum_behind(noise, omega)
@@ -224,18 +191,12 @@ def autoregressive_spectrum(residual: Real, omega: Real) -> Real:
 
 
 def deviation_of_mean(residual: Real, counted: int) -> float:
-    """Deviation of the mean of a noise, widened for what the noise does not say of its power at DC.
+    """Deviation of the mean of a noise over `counted` samples, widened for what it does not say.
 
     The variance of a mean is the power at half a bin over the samples. That power is known by the
     lowest bins alone: given the kind of noise, the mean is distributed as Student's t, and the
-    kinds are averaged by how likely they are. 1.96 of these deviations hold with 95 %.
-
-    Parameters
-    ----------
-    residual : ndarray, shape (n,)
-        The noise, its mean taken off.
-    counted : int
-        Samples that the mean was taken of.
+    kinds are averaged by how likely they are. 1.96 of these deviations hold with 95 %. Of the noise
+    its mean is taken off.
 
     Examples
     --------
@@ -268,15 +229,7 @@ def _kinds(residual: Real, noise: Real, left: float, at: Real) -> tuple[Real, Re
 
     An autoregression, or power that rises towards DC as f^-α, which a short one levels off. With
     the level unknown, bins I about a shape s have the likelihood Π s⁻¹ (Σ I/s)^-N (P. Whittle,
-    1953); beforehand all kinds are as likely.
-
-    Parameters
-    ----------
-    residual : ndarray, shape (n,)
-    noise, left
-        Of `yule_walker`.
-    at : ndarray, shape (m,)
-        Bins, from a half on.
+    1953); beforehand all kinds are as likely. `noise` and `left` are `yule_walker`'s.
     """
     n, bins, at = residual.size, _low_bins(residual), np.maximum(at, 0.5)
     behind = left * spectrum_behind(noise, 2 * np.pi * np.concatenate([bins, at]) / n)

@@ -3,19 +3,17 @@
 All of it is read off the residual of a fit, so it is as good as the fit is.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 import scipy
-from numpy.typing import ArrayLike
 
-from hmpim.errors import RecordError
 from hmpim.identify.arrays import Real
 from hmpim.identify.chance import SEARCHED
 from hmpim.identify.noise.covariance import covariance
 from hmpim.identify.noise.whiteness import autocovariance, effective_share, is_white
-from hmpim.identify.signals import as_pair, as_signal, check_rate
 from hmpim.identify.worth import TOLERATED
 
 __all__ = ["Colour", "Drift", "NoiseColour", "bias_drift", "line_of", "noise_colour", "tone_of"]
@@ -75,38 +73,18 @@ class Drift:
         Its standard deviation, the noise's own colour taken into account.
     probability : float
         Chance of a slope so great without any drift.
-    total : float
-        Slope times length of the record, in the residual's unit.
     """
 
     slope: float
     std: float
     probability: float
-    total: float
 
 
-def noise_colour(residual: ArrayLike, fs: float) -> NoiseColour:
+def noise_colour(residual: Real, fs: float) -> NoiseColour:
     """Describe the noise that a fit leaves over.
 
-    Parameters
-    ----------
-    residual : array_like, shape (n,)
-        Output less prediction, samples that do not count left out.
-    fs : float
-        Rate in Hz.
-
-    Returns
-    -------
-    NoiseColour
-        Of AR(1) and a power law, each fitted by Whittle's likelihood (P. Whittle, Arkiv för
-        Matematik 2, 1953), the likelier.
-
-    Raises
-    ------
-    RecordError
-        For the wrong shape, NaN or infinity.
-    ArgumentError
-        If `fs` is not positive.
+    Of AR(1) and a power law, each fitted by Whittle's likelihood (P. Whittle, Arkiv för Matematik
+    2, 1953), the likelier. Samples that do not count are left out of the residual, (m,).
 
     Examples
     --------
@@ -114,9 +92,7 @@ def noise_colour(residual: ArrayLike, fs: float) -> NoiseColour:
     >>> noise_colour(np.random.default_rng(0).standard_normal(2000), 200.0).kind
     'white'
     """
-    check_rate(fs)
-    e = as_signal("residual", residual)
-    e = e - e.mean()
+    e = residual - residual.mean()
     n = e.size
     line = line_of(e, fs)
     if line is not None:
@@ -128,32 +104,13 @@ def noise_colour(residual: ArrayLike, fs: float) -> NoiseColour:
     exponent = 0.0
     if r[0] > 0 and not is_white(e):
         kind, exponent = _likelier(e)
-    return NoiseColour(
-        kind=kind,
-        coefficient=rho,
-        exponent=exponent,
-        line_frequency=line,
-    )
+    return NoiseColour(kind=kind, coefficient=rho, exponent=exponent, line_frequency=line)
 
 
-def bias_drift(residual: ArrayLike, time: ArrayLike) -> Drift:
-    """Slope of the bias, with an error that holds for coloured noise.
+def bias_drift(residual: Real, time: Real) -> Drift:
+    """Slope of the bias that a model with a constant one leaves over, (n,), at rising times.
 
-    Parameters
-    ----------
-    residual : array_like, shape (n,)
-        Output less the prediction of a model with constant bias.
-    time : array_like, shape (n,)
-        Seconds, rising.
-
-    Returns
-    -------
-    Drift
-
-    Raises
-    ------
-    RecordError
-        For the wrong shape, unequal lengths, NaN, infinity, or time that does not rise.
+    Its error holds for coloured noise.
 
     Examples
     --------
@@ -164,25 +121,16 @@ def bias_drift(residual: ArrayLike, time: ArrayLike) -> Drift:
     >>> bool(abs(found.slope - 0.05) < 3 * found.std), found.probability < 1e-4
     (True, True)
     """
-    e, t = as_pair(residual, time, names=("the residual", "time"))
-    if not np.all(np.diff(t) > 0):
-        k = int(np.argmin(np.diff(t) > 0))
-        raise RecordError(f"time does not rise after sample {k} ({t[k]:.9g} s); sort the record")
-    rows = np.stack([np.ones(t.size), t - t.mean()])
-    slope = float(rows[1] @ e / (rows[1] @ rows[1]))
-    left = e - e.mean() - slope * rows[1]
-    length = float(t[-1] - t[0])
+    rows = np.stack([np.ones(time.size), time - time.mean()])
+    slope = float(rows[1] @ residual / (rows[1] @ rows[1]))
+    left = residual - residual.mean() - slope * rows[1]
     if not np.any(left):
-        return Drift(slope=slope, std=0.0, probability=float(slope == 0.0), total=slope * length)
-    variance = covariance(rows, left, freedom=t.size - 2, white=is_white(left))[1, 1]
+        return Drift(slope=slope, std=0.0, probability=float(slope == 0.0))
+    variance = covariance(rows, left, freedom=time.size - 2, white=is_white(left))[1, 1]
     std = float(np.sqrt(max(variance, _wandering_variance(rows[1], left))))
-    freedom = max((t.size - 2) * effective_share(left), 1.0)
-    return Drift(
-        slope=slope,
-        std=std,
-        probability=float(2 * scipy.stats.t.sf(abs(slope) / std, freedom)),
-        total=slope * length,
-    )
+    freedom = max((time.size - 2) * effective_share(left), 1.0)
+    chance = float(2 * scipy.stats.t.sf(abs(slope) / std, freedom))
+    return Drift(slope=slope, std=std, probability=chance)
 
 
 def _wandering_variance(ramp: Real, e: Real) -> float:
@@ -244,18 +192,14 @@ def _likelier(e: Real) -> tuple[Colour, float]:
     power = np.maximum(power, 1e-12 * power.mean())
     omega = 2 * np.pi * np.arange(1, power.size + 1) / n
 
-    def cost(shape: Real) -> float:
-        return float(np.log(np.mean(power / shape)) + np.mean(np.log(shape)))
+    def best(shaped: Callable[[float], Real], low: float, high: float) -> Any:
+        def cost(at: float) -> float:
+            shape = shaped(at)
+            return float(np.log(np.mean(power / shape)) + np.mean(np.log(shape)))
 
-    def autoregressive(rho: float) -> float:
-        return cost(1.0 / (1.0 - 2.0 * rho * np.cos(omega) + rho * rho))
+        return scipy.optimize.minimize_scalar(cost, bounds=(low, high), method="bounded")
 
-    def law(exponent: float) -> float:
-        return cost(omega**-exponent)
-
-    first = scipy.optimize.minimize_scalar(
-        autoregressive, bounds=(-0.999, 0.9999), method="bounded"
-    )
-    second = scipy.optimize.minimize_scalar(law, bounds=(-2.0, 4.0), method="bounded")
+    first = best(lambda rho: 1.0 / (1.0 - 2.0 * rho * np.cos(omega) + rho * rho), -0.999, 0.9999)
+    second = best(lambda exponent: omega**-exponent, -2.0, 4.0)
     kind: Colour = "autoregressive" if first.fun <= second.fun else "power_law"
     return kind, float(second.x)

@@ -25,23 +25,10 @@ _WELL = 1e-4
 
 
 def covariance(rows: Real, residual: Real, *, freedom: int, white: bool) -> Real:
-    """Covariance of the parameters of a least-squares fit.
+    """Covariance of the parameters of a least-squares fit, (p, p).
 
-    Parameters
-    ----------
-    rows : ndarray, shape (p, n)
-        Derivatives of the prediction.
-    residual : ndarray, shape (n,)
-        What is left over.
-    freedom : int
-        Samples that counted less parameters.
-    white : bool
-        Whether the residual is white.
-
-    Returns
-    -------
-    ndarray, shape (p, p)
-        Finite but very large along a direction that the record does not see.
+    `rows`, (p, n), are derivatives of the prediction, `freedom` the samples that counted less the
+    parameters. Finite but very large along a direction that the record does not see.
     """
     gram = rows @ rows.T
     norm = np.sqrt(gram.diagonal())
@@ -89,13 +76,16 @@ def white_covariance(gram: Real, power: float, *, freedom: int) -> Real | None:
     where the products determine a direction too inaccurately.
     """
     scale = np.sqrt(gram.diagonal())
-    if not scale.all():
+    inverse = _inverse_factor(gram / np.outer(scale, scale)) if scale.all() else None
+    if inverse is None:
         return None
-    factor, info = scipy.linalg.lapack.dpotrf(gram / np.outer(scale, scale))
-    if info or factor.diagonal().min() <= _WELL:
-        return None
-    inverse = np.linalg.inv(factor)
     return np.asarray(inverse @ inverse.T * (power / freedom) / np.outer(scale, scale))
+
+
+def _inverse_factor(gram: Real) -> Real | None:
+    """Inverse of a Gram matrix's triangular factor; None where it is too inaccurate."""
+    factor, info = scipy.linalg.lapack.dpotrf(gram)
+    return None if info or factor.diagonal().min() <= _WELL else np.linalg.inv(factor)
 
 
 def _orthonormal(gram: Real, rows: Real, scale: Real) -> tuple[Real, Callable[[], Real]]:
@@ -103,10 +93,8 @@ def _orthonormal(gram: Real, rows: Real, scale: Real) -> tuple[Real, Callable[[]
 
     By normal equations, unless they determine a direction too inaccurately.
     """
-    factor, info = scipy.linalg.lapack.dpotrf(gram)
-    diagonal = factor.diagonal()
-    if not info and diagonal.min() > _WELL:
-        inverse = np.linalg.inv(factor)
+    inverse = _inverse_factor(gram)
+    if inverse is not None:
         return inverse, lambda: (inverse.T / scale) @ rows
     q, r = np.linalg.qr((rows / scale[:, None]).T)
     diagonal = np.abs(np.diag(r))

@@ -7,13 +7,11 @@ too, and every gain comes out smaller by the share of the noise in the input's p
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from hmpim.identify.arrays import Real, every_of, median
 from hmpim.identify.chance import BULK
 from hmpim.identify.kept import kept
 from hmpim.identify.noise.spectra import windowed_power
-from hmpim.identify.signals import as_signal, check_band, check_rate
 from hmpim.identify.worth import NEARLY, PART, PAST, TWICE
 
 __all__ = ["InputNoise", "input_noise"]
@@ -27,43 +25,21 @@ class InputNoise:
     ----------
     std : float
         Standard deviation, in the input's unit.
-    std_std : float
-        Standard deviation of `std`.
     attenuation : float
         Share by which a gain found at an average frequency of the band comes out too small:
         the noise's power in the band over all power there.
     """
 
     std: float
-    std_std: float
     attenuation: float
 
 
 @kept
-def input_noise(u: ArrayLike, fs: float, *, band: tuple[float, float]) -> InputNoise | None:
-    """Estimate the noise on the input from its spectrum above the excited band.
+def input_noise(u: Real, fs: float, *, band: tuple[float, float]) -> InputNoise | None:
+    """Estimate the noise on an input, (n,), from its spectrum above the excited band, in Hz.
 
-    Parameters
-    ----------
-    u : array_like, shape (n,)
-        Input samples.
-    fs : float
-        Rate in Hz.
-    band : tuple of float
-        Excited band, Hz.
-
-    Returns
-    -------
-    InputNoise or None
-        None where there is none to be seen: no flat floor above the arithmetic's own, or an
-        input (steps, PRBS, noise) that excites all frequencies, in which nothing can be told.
-
-    Raises
-    ------
-    RecordError
-        For the wrong shape, NaN or infinity.
-    ArgumentError
-        If `fs` or `band` cannot be.
+    None where there is none to be seen: no flat floor above the arithmetic's own, or an input
+    (steps, PRBS, noise) that excites all frequencies, in which nothing can be told.
 
     Examples
     --------
@@ -76,39 +52,27 @@ def input_noise(u: ArrayLike, fs: float, *, band: tuple[float, float]) -> InputN
     >>> input_noise(u, 400.0, band=(0.1, 20.0)) is None
     True
     """
-    check_rate(fs)
-    check_band(band, fs)
-    samples = as_signal("u", u)
-    if np.mean(np.diff(samples) == 0.0) > PART:  # noise repeats no value
+    if np.mean(np.diff(u) == 0.0) > PART:  # noise repeats no value
         return None
-    power = windowed_power(samples) * (samples.size / 2)
-    band = (band[0], min(band[1], _end(power) * fs / samples.size))
-    if PAST * band[1] > NEARLY * fs / 2 or band[1] <= band[0]:
+    power, bins = windowed_power(u) * (u.size / 2), u.size / fs
+    low, high = band[0], min(band[1], _end(power) / bins)
+    if PAST * high > NEARLY * fs / 2 or high <= low:
         return None
-    first = int(np.ceil(PAST * band[1] * samples.size / fs))
-    floor = power[first:]
+    floor = power[int(np.ceil(PAST * high * bins)) :]
     if floor.size < 32:
         return None
     half, every = floor.size // 2, every_of(floor.size)
     halves = _level(floor[:half:every]), _level(floor[half::every])
     variance = _level(floor)
-    if variance <= 1e-20 * float(np.ptp(samples)) ** 2 or halves[1] <= 0:
+    if variance <= 1e-20 * float(np.ptp(u)) ** 2 or halves[1] <= 0:
         return None
     # Steps and kinks of the stimulus fall off with frequency; noise does not.
-    if not TWICE**-2 < halves[0] / halves[1] < TWICE**2 or not _is_rough(samples, variance):
+    if not TWICE**-2 < halves[0] / halves[1] < TWICE**2 or not _is_rough(u, variance):
         return None
-    inside = slice(
-        max(int(band[0] * samples.size / fs), 1), int(np.ceil(band[1] * samples.size / fs)) + 1
-    )
-    total = float(np.mean(power[inside]))
+    total = float(np.mean(power[max(int(low * bins), 1) : int(np.ceil(high * bins)) + 1]))
     if total < TWICE**2 * variance:  # the band does not stand out: all of it is the stimulus
         return None
-    std = float(np.sqrt(variance))
-    return InputNoise(
-        std=std,
-        std_std=std / float(np.sqrt(floor.size)),
-        attenuation=variance / total,
-    )
+    return InputNoise(std=float(np.sqrt(variance)), attenuation=variance / total)
 
 
 def _end(power: Real) -> int:

@@ -26,17 +26,8 @@ def level_of(innovations: Real) -> Real | None:
     """Level of white noise at each sample, over its geometric mean: r.m.s. about each sample.
 
     Samples divided by it have one level, and their sum of squares is the likelihood's (R. J.
-    Carroll, Annals of Statistics 10, 1982). No level is less than a fifth of the r.m.s. of all.
-
-    Parameters
-    ----------
-    innovations : ndarray, shape (n,)
-        0 where a sample does not count.
-
-    Returns
-    -------
-    ndarray, shape (n,), or None
-        None where the level does not change, or the record is too short to tell.
+    Carroll, Annals of Statistics 10, 1982). No level is less than a fifth of the r.m.s. of all. A
+    sample of 0 does not count. None where the level does not change, or too few samples tell.
 
     Examples
     --------

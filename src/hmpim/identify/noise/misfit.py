@@ -39,16 +39,9 @@ def misfit(u: Real, residual: Real, *, delay: float, band: tuple[float, float]) 
 
     The residual's spectrum is divided into groups of neighbouring bins; in each, one
     complex gain from the input is fitted. Under a right model the power that it takes up
-    is that of two degrees of freedom of the noise of the same group, so colour does no harm.
-
-    Parameters
-    ----------
-    u, residual : ndarray, shape (n,)
-        Input and residual.
-    delay : float
-        Delay in samples; the input is moved by it so that the gain is smooth over a group.
-    band : tuple of float
-        Excited band, in cycles per sample.
+    is that of two degrees of freedom of the noise of the same group, so colour does no harm. The
+    input is moved by the delay, in samples, so that the gain is smooth over a group. The excited
+    band is in cycles per sample.
     """
     stimulus = transform_of(u)
     bins = min(1 << int(band[1] * u.size + 1).bit_length(), stimulus.size)
@@ -76,20 +69,10 @@ def misfits(
     delays: Real,
     band: tuple[float, float],
 ) -> tuple[Real, Real]:
-    """Test many residuals of one input as `misfit` does one; shares and probabilities.
+    """Test many residuals of one input as `misfit` does one; shares and probabilities, (k,).
 
-    Parameters
-    ----------
-    stimulus : complex ndarray, shape (m,)
-        Transform of the input less its mean.
-    residuals : complex ndarray, shape (k, m)
-        Transforms of the residuals.
-    samples : int
-        Length of each record.
-    delays : ndarray, shape (k,)
-        In samples.
-    band
-        As for `misfit`.
+    `stimulus`, (m,), is the transform of the input less its mean, `residuals`, (k, m), those of the
+    residuals, and `delays`, (k,), are in samples.
     """
     power, taken, total, width = _followed(
         stimulus, residuals, samples=samples, delays=delays, band=band
@@ -146,19 +129,9 @@ def unexplained_response(
 
     A sweep inside limits moves most at its low end, so that a model may leave out two thirds of
     the response at the high end and still explain 99 % of the output's power. Here every group of
-    bins counts alike. What noise alone would give the residual, twice over, is taken off.
-
-    Parameters
-    ----------
-    u, y, residual : ndarray, shape (n,)
-        Input, output, and what the model leaves of the output.
-    delay, band
-        As for `misfit`.
-
-    Returns
-    -------
-    float
-        0 where nothing follows the input, 1 where all of the response is left over.
+    bins counts alike. What noise alone would give the residual, twice over, is taken off. 0 where
+    nothing follows the input, 1 where all of the response is left over. Delay and band are as for
+    `misfit`.
 
     Examples
     --------

@@ -18,16 +18,9 @@ _BLOCK = 16_384
 
 
 def autocovariance(residual: Real, lags: int, spectra: Complex | None = None) -> Real:
-    """Biased autocovariance at lags 0..lags, shape (..., lags + 1), the unit of residual squared.
+    """Biased autocovariance of residuals, (..., n), at lags 0..lags, shape (..., lags + 1).
 
-    Parameters
-    ----------
-    residual : ndarray, shape (..., n)
-        One residual, or several of one length.
-    lags : int
-        Longest lag.
-    spectra : complex ndarray, shape (..., n // 2 + 1), optional
-        Their transforms, where they are known.
+    `spectra`, (..., n // 2 + 1), are their transforms, where they are known.
 
     Examples
     --------
@@ -92,19 +85,10 @@ def are_white(residuals: Real, spectra: Complex | None = None) -> Mask:
 
     Each lag's covariance scatters more where loud samples meet loud ones; noise whose level
     changes is white if it passes with that counted (F. X. Diebold, 1986: Testing for serial
-    correlation in the presence of ARCH).
+    correlation in the presence of ARCH). White noise is called coloured at the rate `FALSE_ALARM`.
 
-    Parameters
-    ----------
-    residuals : ndarray, shape (..., n)
-        With samples that do not count left out or 0; only the others tell.
-    spectra : complex ndarray, shape (..., n // 2 + 1), optional
-        Their transforms, where they are known.
-
-    Returns
-    -------
-    ndarray of bool, shape (...)
-        White noise is called coloured at the rate `FALSE_ALARM`.
+    Of the residuals, (..., n), samples that do not count are left out or 0. `spectra`,
+    (..., n // 2 + 1), are their transforms, where they are known.
 
     Examples
     --------
