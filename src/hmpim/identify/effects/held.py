@@ -47,20 +47,8 @@ def _weights(age: Real, *, smooth: bool) -> tuple[Real, ...]:
 def rows_at_updates(problem: Problem, fit: Fit, arrivals: Updates) -> Real:
     """Derivatives of the output at each update, with respect to `theta`, then `linear`.
 
-    The last rows, from `theta.size` on, times `linear` are the output itself.
-
-    Parameters
-    ----------
-    problem : Problem
-        The data; `valid` is not looked at.
-    fit : Fit
-        Its structure, `theta` and `linear`.
-    arrivals : Updates
-        Samples and the age of their values, shape (m,).
-
-    Returns
-    -------
-    ndarray, shape (1 + order + zeros + 2, m)
+    They have shape (1 + order + zeros + 2, m). The last ones, from `theta.size` on, times `linear`
+    are the output itself. `valid` is not looked at.
 
     Examples
     --------

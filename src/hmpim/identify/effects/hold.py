@@ -9,11 +9,10 @@ record leaves open is a small polygon, and its width is the error.
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from hmpim.identify.arrays import Real, every_of, median
 from hmpim.identify.chance import BULK, DEVIATIONS
-from hmpim.identify.signals import as_pair, as_signal, check_rate
 from hmpim.identify.worth import FEW, MOST, NEARLY, PART
 
 __all__ = ["Hold", "Updates", "detect_hold", "updates"]
@@ -69,16 +68,7 @@ class Updates:
 
 
 def updates(hold: Hold, samples: int, fs: float) -> Updates:
-    """Say in which samples of a record a new value arrives.
-
-    Parameters
-    ----------
-    hold : Hold
-        From `detect_hold`.
-    samples : int
-        Length of the record.
-    fs : float
-        Its rate in Hz.
+    """Say in which samples of a record, at a rate in Hz, a new value arrives.
 
     Examples
     --------
@@ -99,52 +89,30 @@ def updates(hold: Hold, samples: int, fs: float) -> Updates:
     )
 
 
-def detect_hold(y: ArrayLike, fs: float, prediction: ArrayLike | None = None) -> Hold | None:
-    """Find the clock by which `y` is updated, if it is slower than `fs`.
+def detect_hold(y: Real, fs: float, prediction: Real | None = None) -> Hold | None:
+    """Find the clock by which an output, (n,), is updated, if it is slower than `fs` in Hz.
 
-    Parameters
-    ----------
-    y : array_like, shape (n,)
-        Output samples as recorded.
-    fs : float
-        Rate in Hz.
-    prediction : array_like, shape (n,), optional
-        What a model without a hold says the output would be. It tells an output that is held
-        from one whose input stands still.
-
-    Returns
-    -------
-    Hold or None
-        None where the output is updated at every sample, changes by no steady clock, or
-        takes fewer than ten different values.
-
-    Raises
-    ------
-    RecordError
-        For the wrong shape, unequal lengths, NaN or infinity.
-    ArgumentError
-        If `fs` is not positive.
+    What a model without a hold says, (n,), tells an output that is held from one whose input stands
+    still. None where the output is updated at every sample, changes by no steady clock, or takes
+    fewer than ten different values.
 
     Examples
     --------
     A sensor of 30 Hz recorded at 200 Hz:
 
-    >>> import numpy as np
     >>> sample = np.arange(2000)
     >>> last = np.floor(sample * 30 / 200 + 1e-9)
     >>> found = detect_hold(np.sin(last / 5), 200.0)
     >>> round(1 / found.period, 3)
     30.0
     """
-    check_rate(fs)
-    samples = as_signal("y", y)
-    change = np.abs(np.diff(samples))
-    changed = _changed(samples, change)
+    change = np.abs(np.diff(y))
+    changed = _changed(y, change)
     runs = np.diff(changed)
-    if np.count_nonzero(runs > 1) < _FEWEST or not _is_rich(samples, change, changed):
+    if np.count_nonzero(runs > 1) < _FEWEST or not _is_rich(y, change, changed):
         return None
     shortest = int(np.quantile(runs, FEW, method="lower"))
-    if prediction is not None and not _moves_within(samples, changed, prediction):
+    if prediction is not None and not _moves_within(changed, prediction):
         return None
     period = _coarse_period(changed, runs, shortest)
     if period is None:
@@ -173,20 +141,16 @@ def _is_rich(samples: Real, change: Real, changed: NDArray[np.intp]) -> bool:
         return False
     levels = np.sort(samples[changed])
     apart = DEVIATIONS / BULK * median(change) if change.min() > 0 else 0.0
-    return bool(
-        1 + np.count_nonzero(np.diff(levels) > apart) >= _FEWEST or _spread_out(levels, apart)
-    )
-
-
-def _spread_out(levels: Real, apart: float) -> bool:
-    """Whether the values fill their range, rather than crowd at a few levels."""
+    if 1 + np.count_nonzero(np.diff(levels) > apart) >= _FEWEST:
+        return True
+    # They may fill their range all the same, rather than crowd at a few levels.
     cells = np.histogram(levels, bins=50)[0]
     return bool(np.count_nonzero(cells) >= _FEWEST and np.ptp(levels) > 2 * _FEWEST * apart)
 
 
-def _moves_within(samples: Real, changed: NDArray[np.intp], prediction: ArrayLike) -> bool:
-    _, model = as_pair(samples, prediction, names=("y", "the prediction"))
-    motion = np.diff(model)
+def _moves_within(changed: NDArray[np.intp], prediction: Real) -> bool:
+    """Whether a prediction moves while the output stands still."""
+    motion = np.diff(prediction)
     standing = np.ones(motion.size, dtype=bool)
     standing[changed - 1] = False
     at_updates = float(np.mean(motion[~standing] ** 2))

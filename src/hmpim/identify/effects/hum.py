@@ -57,21 +57,11 @@ class Humming:
 
 
 def with_hum(first: JointFit, fitted: Callable[[Real, bool], JointFit]) -> Humming | None:
-    """Fit again with the lines of the residual, where that gains more than it costs.
+    """Fit again with the lines of the residual, where that gains more than it costs (Schwarz).
 
-    Parameters
-    ----------
-    first : JointFit
-        Without lines, its residual not white; of an input without lines, whose distortion has
-        none either.
-    fitted : callable
-        Makes the joint fit with rows for the lines; of the plain structures only if the second
-        argument is true.
-
-    Returns
-    -------
-    Humming or None
-        None where there are none, by Schwarz's criterion.
+    `first` is without lines, its residual not white; of an input without lines, whose distortion
+    has none either. `fitted` makes the joint fit with rows for the lines, of the plain structures
+    only if its second argument is true.
     """
     frequencies, share = _lines(first)
     if not frequencies:

@@ -59,10 +59,8 @@ class Imperfections:
             return True
         if (self.hold is None) != (before.hold is None):
             return True
-        lost = self.lost
-        return lost is not None and bool(
-            np.any(lost if before.lost is None else lost & ~before.lost)
-        )
+        lost, known = self.lost, before.lost
+        return lost is not None and bool(np.any(lost if known is None else lost & ~known))
 
     @property
     def lost(self) -> Mask | None:
@@ -73,7 +71,7 @@ class Imperfections:
     @property
     def rounding(self) -> float:
         """R.m.s. of the error of rounding; 0 where none was seen."""
-        return 0.0 if self.quantization is None else self.quantization.step / 12**0.5
+        return 0.0 if self.quantization is None else self.quantization.noise_std
 
     def arrivals(self, samples: int, fs: float) -> Updates | None:
         """Samples in which a held output is updated."""
@@ -104,35 +102,22 @@ def find_imperfections(
     prediction: Real | None = None,
     inputs: Sequence[Real] = (),
 ) -> Imperfections:
-    """Look for saturation, hold, quantisation, spikes and standstill in an output.
+    """Look for saturation, hold, quantisation, spikes and standstill in an output, (n,).
 
-    Parameters
-    ----------
-    y : ndarray, shape (n,)
-        Output samples.
-    fs : float
-        Rate in Hz.
-    valid : ndarray of bool, shape (n,), optional
-        Samples that were recorded; the others are filled in, and on no grid.
-    prediction : ndarray, shape (n,), optional
-        What a first model says; with it a plateau is told from a crest, and spikes and
-        standstill are looked for.
-    inputs : sequence of ndarray, shape (n,)
-        Beside which an output may take few values, or stand still to its end; none where that is
-        not asked for.
+    Samples that are not `valid` were filled in, and are on no grid. With what a first model says a
+    plateau is told from a crest, and spikes and standstill are looked for. Beside `inputs` an
+    output may take few values, or stand still to its end; none are given where that is not asked.
     """
     rounding = detect_quantization(y if valid is None or valid.all() else y[valid])
     step = 0.0 if rounding is None else rounding.step
     clipping: Saturation | None = detect_saturation(y, prediction, step=step)
-    if clipping is not None and (
-        (clipping.low is None and clipping.high is None) or clipping.share > NEARLY
-    ):
+    if not any(_sides(clipping)) or (clipping is not None and clipping.share > NEARLY):
         clipping = None
     hold = detect_hold(y, fs, prediction)
     spikes = frozen = None
-    if prediction is None and hold is None:
+    if hold is None and prediction is None:
         frozen = find_stuck(y, inputs)
-    elif prediction is not None and hold is None:
+    elif hold is None and prediction is not None:
         frozen = find_frozen(y, prediction, step=step)
         beyond = None if clipping is None else clipping.clipped
         spikes = find_spikes(y, prediction, clipped=beyond)
@@ -154,17 +139,12 @@ def _sides(saturation: Saturation | None) -> tuple[bool, bool]:
     return saturation.low is not None, saturation.high is not None
 
 
-def _count_levels(x: Real) -> int:
-    """How many different values `x` takes."""
-    return int(np.unique(x).size)
-
-
 def _few_levels(y: Real, inputs: Sequence[Real]) -> int | None:
     """How many values the output takes, if they are few beside those of the inputs."""
-    if not inputs or _count_levels(y[:_HEAD]) >= _FEWEST_LEVELS:
+    if not inputs or np.unique(y[:_HEAD]).size >= _FEWEST_LEVELS:
         return None
-    levels = _count_levels(y)
-    few = levels < _FEWEST_LEVELS and max(_count_levels(u) for u in inputs) > 2 * levels
+    levels = np.unique(y).size
+    few = levels < _FEWEST_LEVELS and max(np.unique(u).size for u in inputs) > 2 * levels
     return levels if few else None
 
 
@@ -179,8 +159,9 @@ def refine(
         return None
     problem = joint.problem
     whole = None if problem.valid is None else _gaps_only(problem.valid, found, fs)
-    if problem.begins is not None and whole is not None:
-        whole[: problem.begins + _settled(joint)] = False
+    if problem.begins is not None and whole is not None:  # until the first state is forgotten
+        memory = int(np.ceil(joint.best.fit.memory))
+        whole[: problem.begins + min(memory, problem.y.size // 4)] = False
     arrivals = found.arrivals(problem.y.size, fs)
     tried: list[tuple[float, Trial, CensoredFit]] = []
 
@@ -235,11 +216,6 @@ def _spikes(censored: CensoredFit, saturation: Saturation | None) -> Mask | None
     return far if 0 < np.count_nonzero(far) < FEW * counted.size else None
 
 
-def _settled(joint: JointFit) -> int:
-    """Samples after which the state that a record begins with is forgotten."""
-    return min(int(np.ceil(joint.best.fit.memory)), joint.problem.y.size // 4)
-
-
 def _worth_refining(joint: JointFit, found: Imperfections) -> list[Trial]:
     """The chosen trial, and simpler ones where clipping may have made it look too simple.
 
@@ -249,12 +225,8 @@ def _worth_refining(joint: JointFit, found: Imperfections) -> list[Trial]:
     best = joint.best
     if found.saturation is None or best.fit.structure.name in PLAIN:
         return [best]
-    simpler = [
-        trial
-        for trial in joint.trials
-        if trial.intersample == best.intersample and trial.fit.structure.name in PLAIN
-    ]
-    return [best, *simpler]
+    alike = [trial for trial in joint.trials if trial.intersample == best.intersample]
+    return [best, *(trial for trial in alike if trial.fit.structure.name in PLAIN)]
 
 
 def _gaps_only(valid: Mask, found: Imperfections, fs: float) -> Mask:

@@ -56,14 +56,9 @@ def stand_out(residuals: Real) -> Mask:
 
 
 def find_spikes(y: Real, prediction: Real, *, clipped: Mask | None = None) -> Mask | None:
-    """Return the samples that are spikes, or None.
+    """Return the samples of an output that are spikes beside what a first model says, or None.
 
-    Parameters
-    ----------
-    y, prediction : ndarray, shape (n,)
-        Output, and what a first model says.
-    clipped : ndarray of bool, shape (n,), optional
-        Samples that are not looked at.
+    Clipped ones are not looked at.
 
     Examples
     --------
@@ -89,10 +84,9 @@ def find_spikes(y: Real, prediction: Real, *, clipped: Mask | None = None) -> Ma
     # A sample that comes late is off by its motion at most, and is no spike.
     moving = np.clip(TWICE * DEVIATIONS * _spread_by_speed(away, motion), motion, TWICE * motion)
     away = away > np.maximum(TWICE * DEVIATIONS * np.maximum(spread, 0.5 * bulk), moving)
-    first, stop = runs_of(away)
-    for a, b in zip(first, stop - 1, strict=True):
-        if b - a >= _LONGEST_SPIKE:
-            away[a : b + 1] = False
+    for a, b in zip(*runs_of(away), strict=True):
+        if b - a > _LONGEST_SPIKE:
+            away[a:b] = False
     return away if away.any() and np.mean(away) < MUCH else None
 
 
@@ -114,12 +108,7 @@ def _spread_by_speed(away: Real, motion: Real) -> Real:
 def find_frozen(y: Real, prediction: Real, *, step: float = 0.0) -> Mask | None:
     """Return the samples at which the output stands still while the model moves, or None.
 
-    Parameters
-    ----------
-    y, prediction : ndarray, shape (n,)
-        Output, and what a first model says.
-    step : float
-        Step to which `y` is rounded, in its unit; 0 for none.
+    `step` is that to which the output is rounded, in its unit; 0 for none.
 
     Examples
     --------
@@ -131,14 +120,13 @@ def find_frozen(y: Real, prediction: Real, *, step: float = 0.0) -> Mask | None:
     [201, 299]
     """
     repeats = np.concatenate([[False], np.diff(y) == 0.0])
-    first, stop = runs_of(repeats)
     frozen = np.zeros(y.size, dtype=bool)
     least = max(5.0 * step, FEW * float(np.ptp(prediction)))
-    for a, b in zip(first, stop - 1, strict=True):
-        if b - a + 2 < _FEWEST_EQUAL or y[a] in (y.min(), y.max()):
+    for a, b in zip(*runs_of(repeats), strict=True):
+        if b - a + 1 < _FEWEST_EQUAL or y[a] in (y.min(), y.max()):
             continue
-        if float(np.ptp(prediction[a - 1 : b + 1])) > least:
-            frozen[a : b + 1] = True
+        if float(np.ptp(prediction[a - 1 : b])) > least:
+            frozen[a:b] = True
     others = repeats[~frozen]
     if not frozen.any() or others.size == 0 or np.mean(others) > MUCH:
         return None
@@ -150,13 +138,6 @@ def find_stuck(y: Real, inputs: Sequence[Real]) -> Mask | None:
 
     Without a model, and so before there is one: a sensor that is stuck for a good part of its
     record spoils the first fit. What stands at its lowest or highest value is clipped.
-
-    Parameters
-    ----------
-    y : ndarray, shape (n,)
-        Output.
-    inputs : sequence of ndarray, shape (n,)
-        What it should follow.
 
     Examples
     --------
@@ -186,11 +167,6 @@ def find_repeated(y: Real) -> Mask | None:
     at rest repeats itself too, but not for a sample or two now and then. Two alike at the highest
     or lowest value may be clipped: alone they tell of no lost frame, beside others they are one.
 
-    Parameters
-    ----------
-    y : ndarray, shape (n,)
-        Output.
-
     Examples
     --------
     >>> moving = np.random.default_rng(0).standard_normal(1000)
@@ -203,10 +179,8 @@ def find_repeated(y: Real) -> Mask | None:
     copies = np.concatenate([[False], np.diff(y) == 0.0])
     if not copies.any() or np.mean(copies) > PART:
         return None
-    first, stop = runs_of(copies)
-    extreme = (y.min(), y.max())
-    inside = 0
-    for a, b in zip(first, stop, strict=True):
+    extreme, inside = (y.min(), y.max()), 0
+    for a, b in zip(*runs_of(copies), strict=True):
         if b - a > _LONGEST_COPY or (y[a] in extreme and np.count_nonzero(y == y[a]) > b - a + 1):
             copies[a:b] = False
         elif y[a] not in extreme:

@@ -11,11 +11,10 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from hmpim.identify.arrays import Real, median
 from hmpim.identify.chance import SEARCHED
-from hmpim.identify.signals import as_signal
 from hmpim.identify.worth import FEW, MOST, NEARLY, PART, TWICE
 
 __all__ = ["Quantization", "detect_quantization", "is_predicted"]
@@ -64,27 +63,13 @@ class Quantization:
         return float(self.step / np.sqrt(12.0))
 
 
-def detect_quantization(y: ArrayLike) -> Quantization | None:
-    """Return the step to which `y` was rounded, or None.
+def detect_quantization(y: Real) -> Quantization | None:
+    """Return the step to which samples, (n,), were rounded, or None.
 
-    Give the values as recorded: resampling blurs the grid.
-
-    Parameters
-    ----------
-    y : array_like, shape (n,)
-        Samples, in any unit.
-
-    Returns
-    -------
-    Quantization or None
-        None for continuous data, for data rounded to significant digits rather than to a
-        step, for fewer than five levels, and for a step below 2^-22 of the greatest value where
-        all values are single-precision numbers, 2^-44 where they are not.
-
-    Raises
-    ------
-    RecordError
-        For the wrong shape, NaN or infinity.
+    Give the values as recorded: resampling blurs the grid. None for continuous data, for data
+    rounded to significant digits rather than to a step, for fewer than five levels, and for a step
+    below 2^-22 of the greatest value where all values are single-precision numbers, 2^-44 where
+    they are not.
 
     Examples
     --------
@@ -96,32 +81,23 @@ def detect_quantization(y: ArrayLike) -> Quantization | None:
     >>> detect_quantization(angle) is None
     True
     """
-    samples = as_signal("y", y)
-    largest = float(np.max(np.abs(samples)))
-    span = float(np.ptp(samples))
+    largest, span = float(np.max(np.abs(y))), float(np.ptp(y))
     if span == 0.0:
         return None
-    levels = _distinct(samples, 64 * np.finfo(float).eps * largest)
+    levels = _distinct(y, 64 * np.finfo(float).eps * largest)
     if levels.size < _FEWEST_LEVELS:
         return None
     inner = levels[1:-1]  # a level at which the output is clipped is on no grid
     told = inner if inner.size >= _FEWEST_LEVELS else levels
-    return _by_distances(told, largest) or _by_clusters(samples, span)
+    return _by_distances(told, largest) or _by_clusters(y, span)
 
 
-def is_predicted(found: Quantization, y: ArrayLike, prediction: ArrayLike) -> bool:
+def is_predicted(found: Quantization, y: Real, prediction: Real) -> bool:
     """Whether a prediction and normal noise bring values as near to the grid, without rounding.
 
     An input of few levels does, through a unit that follows it at once. The characteristic
     function of a sum is the product of those of its parts. Values that all lie on the grid are
     rounded, whatever the prediction.
-
-    Parameters
-    ----------
-    found : Quantization
-        What `detect_quantization` found of `y`.
-    y, prediction : array_like, shape (n,)
-        Samples, and what a model says of them without rounding, in one unit.
 
     Examples
     --------
@@ -138,7 +114,6 @@ def is_predicted(found: Quantization, y: ArrayLike, prediction: ArrayLike) -> bo
     """
     if found.exact:
         return False
-    y, prediction = as_signal("y", y), as_signal("prediction", prediction)
     omega = 2.0 * np.pi / found.step
     smeared = float(np.exp(-0.5 * omega**2 * np.mean((y - prediction) ** 2)))
     seen, expected = (abs(np.mean(np.exp(1j * omega * x))) for x in (y, prediction))

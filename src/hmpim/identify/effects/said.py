@@ -1,13 +1,12 @@
 """What is said of clipped, held, rounded and lost samples, and the figures read off them."""
 
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
 
 from hmpim.identify.effects.censored import CensoredFit
-from hmpim.identify.effects.hold import Hold
 from hmpim.identify.effects.imperfections import Imperfections
-from hmpim.identify.effects.saturation import Saturation
 from hmpim.identify.result import Estimate, Parameters
 from hmpim.identify.result.digits import percent
 from hmpim.identify.result.error_bars import estimate
@@ -26,12 +25,6 @@ def with_imperfections(
 ) -> tuple[Parameters, tuple[Finding, ...]]:
     """Add levels, hold period and step to the parameters, and say what they are."""
     clipping, hold, rounding = found.saturation, found.hold, found.quantization
-    findings = (
-        *(() if clipping is None else (_of_clipping(clipping, unit),)),
-        *(() if hold is None else (_of_hold(hold),)),
-        *_of_rounding(found, parameters.noise_std, unit),
-        *_lost_findings(found),
-    )
     figures = {}
     if clipping is not None:
         for name, level, std in (
@@ -53,60 +46,51 @@ def with_imperfections(
             freedom=float(censored.index.size),
             unit=unit,
         )
+    findings = (*_of_levels(found, parameters.noise_std, unit), *_of_lost(found))
     return replace(parameters, **figures), findings
 
 
-def _of_clipping(clipping: Saturation, unit: str) -> Finding:
-    """Share and levels; much of it is a doubt."""
-    much = clipping.share > NEARLY * MOST  # a rectifier clips half
-    levels = [
-        f"{name} {level:.6g} {unit}".rstrip()
-        for name, level in (("low", clipping.low), ("high", clipping.high))
-        if level is not None
-    ]
-    return Finding(
-        code="saturation",
-        message=f"{100 * clipping.share:.1f} % of the samples are clipped "
-        f"({', '.join(levels)}); the fit takes them to lie beyond the level. "
-        + (
-            "These are too many to rely on: lower the amplitude, or look for a rectifier."
-            if much
-            else "Lower the amplitude to keep the whole range."
-        ),
-        severity="doubt" if much else "info",
-        parameters=MODELLED if much else ("saturation_low", "saturation_high"),
-    )
-
-
-def _of_hold(hold: Hold) -> Finding:
-    """Period and phase of the updates."""
-    return Finding(
-        code="hold",
-        message=f"The output is updated only every {1e3 * hold.period:.4g} ms, first at "
-        f"{1e3 * hold.phase:.4g} ms into the record; the delay stated excludes the time for "
-        "which each value is held.",
-        severity="info",
-        parameters=("hold_period", "delay"),
-    )
-
-
-def _of_rounding(found: Imperfections, noise: Estimate | None, unit: str) -> list[Finding]:
-    """Few levels, or steps that are coarse beside the noise."""
-    if found.levels is not None:
-        return [
-            Finding(
-                code="quantization",
-                message=f"The output takes only {found.levels} different values, too few to follow "
-                "the motion between them. Measure with a finer resolution, or a larger motion.",
-                severity="doubt",
-                parameters=EVERY,
-            )
+def _of_levels(found: Imperfections, noise: Estimate | None, unit: str) -> Iterator[Finding]:
+    """Clipped, held and rounded: share, levels, period and step."""
+    clipping, hold, rounding = found.saturation, found.hold, found.quantization
+    if clipping is not None:
+        much = clipping.share > NEARLY * MOST  # a rectifier clips half
+        levels = [
+            f"{name} {level:.6g} {unit}".rstrip()
+            for name, level in (("low", clipping.low), ("high", clipping.high))
+            if level is not None
         ]
-    rounding = found.quantization
-    if rounding is None or noise is None or rounding.step / 12**0.5 <= MUCH * noise.value:
-        return []
-    return [
-        Finding(
+        yield Finding(
+            code="saturation",
+            message=f"{100 * clipping.share:.1f} % of the samples are clipped "
+            f"({', '.join(levels)}); the fit takes them to lie beyond the level. "
+            + (
+                "These are too many to rely on: lower the amplitude, or look for a rectifier."
+                if much
+                else "Lower the amplitude to keep the whole range."
+            ),
+            severity="doubt" if much else "info",
+            parameters=MODELLED if much else ("saturation_low", "saturation_high"),
+        )
+    if hold is not None:
+        yield Finding(
+            code="hold",
+            message=f"The output is updated only every {1e3 * hold.period:.4g} ms, first at "
+            f"{1e3 * hold.phase:.4g} ms into the record; the delay stated excludes the time for "
+            "which each value is held.",
+            severity="info",
+            parameters=("hold_period", "delay"),
+        )
+    if found.levels is not None:
+        yield Finding(
+            code="quantization",
+            message=f"The output takes only {found.levels} different values, too few to follow "
+            "the motion between them. Measure with a finer resolution, or a larger motion.",
+            severity="doubt",
+            parameters=EVERY,
+        )
+    elif rounding is not None and noise is not None and rounding.noise_std > MUCH * noise.value:
+        yield Finding(
             code="quantization",
             message=f"The output is rounded to steps of {rounding.step:.4g} {unit}".rstrip()
             + f", {rounding.step / max(noise.value, 1e-300):.2g} times the noise. Rounding "
@@ -114,43 +98,35 @@ def _of_rounding(found: Imperfections, noise: Estimate | None, unit: str) -> lis
             severity="info",
             parameters=MODELLED,
         )
-    ]
 
 
-def _lost_findings(found: Imperfections) -> list[Finding]:
-    findings = []
+def _of_lost(found: Imperfections) -> Iterator[Finding]:
+    """Samples that are left out."""
     if found.repeated is not None:
-        count = int(np.count_nonzero(found.repeated))
-        findings.append(
-            Finding(
-                code="repeated_frames",
-                message=f"{count} samples ({percent(float(np.mean(found.repeated)))} %) repeat "
-                "the one before them to the last digit, as lost frames do; they are left out.",
-                severity="info",
-                parameters=(),
-            )
+        count, share = int(np.count_nonzero(found.repeated)), float(np.mean(found.repeated))
+        yield Finding(
+            code="repeated_frames",
+            message=f"{count} samples ({percent(share)} %) repeat the one before them to the last "
+            "digit, as lost frames do; they are left out.",
+            severity="info",
+            parameters=(),
         )
     if found.spikes is not None:
         count, share = int(np.count_nonzero(found.spikes)), float(np.mean(found.spikes))
         many = share > FEW
-        findings.append(
-            Finding(
-                code="spikes",
-                message=f"{count} samples ({percent(share)} %) lie far from their neighbours "
-                "and are left out. Look for loose contacts, lost bits or impacts.",
-                severity="doubt" if many else "info",
-                parameters=MODELLED if many else (),
-            )
+        yield Finding(
+            code="spikes",
+            message=f"{count} samples ({percent(share)} %) lie far from their neighbours "
+            "and are left out. Look for loose contacts, lost bits or impacts.",
+            severity="doubt" if many else "info",
+            parameters=MODELLED if many else (),
         )
     if found.frozen is not None:
-        findings.append(
-            Finding(
-                code="frozen",
-                message="The output stands still while the model moves, over "
-                f"{percent(float(np.mean(found.frozen)))} % of the record; that part is left out. "
-                "Look for lost updates, a stuck sensor, or friction.",
-                severity="doubt",
-                parameters=MODELLED,
-            )
+        yield Finding(
+            code="frozen",
+            message="The output stands still while the model moves, over "
+            f"{percent(float(np.mean(found.frozen)))} % of the record; that part is left out. "
+            "Look for lost updates, a stuck sensor, or friction.",
+            severity="doubt",
+            parameters=MODELLED,
         )
-    return findings

@@ -52,19 +52,10 @@ class _Split:
 def smeared_plateaus(
     y: Real, prediction: Real, *, step: float = 0.0
 ) -> tuple[Side | None, Side | None]:
-    """Find levels at which `y` was clipped before noise was added.
+    """Find levels at which an output was clipped before noise was added, by a linear model's.
 
-    Parameters
-    ----------
-    y, prediction : ndarray, shape (n,)
-        Output, and what a linear model says it would be.
-    step : float
-        Step to which `y` is rounded, in its unit; 0 for none.
-
-    Returns
-    -------
-    low, high : Side or None
-        None for a side that is not clipped. Samples whose prediction lies beyond a level are at it.
+    `step` is that to which it is rounded, in its unit; 0 for none. None for a side, low or high,
+    that is not clipped. Samples whose prediction lies beyond a level are at it.
 
     Examples
     --------
@@ -91,7 +82,7 @@ def smeared_plateaus(
     if _cost(y, bent) - best.cost < 2 * CLEARLY * variance:
         return None, None
     least = max(MUCH * float(np.sqrt(best.cost / y.size)), step, WORTH * float(np.ptp(y)))
-    excess = np.abs(best.unclipped - np.clip(best.unclipped, best.low, best.high))
+    excess = np.abs(best.unclipped - model)
     kept = tuple(
         bool(np.any(clipped) and np.mean(excess[clipped]) > least)
         and _holds(y, rows, best, clipped, others, variance)
@@ -140,13 +131,12 @@ def _falls_short(y: Real, rows: Real) -> tuple[bool, bool]:
 
 
 def _best_split(y: Real, rows: Real, sides: tuple[bool, bool]) -> _Split | None:
-    best = None
+    """The best of what is found from all starts; None where none is."""
+    found = []
     for quantile in _STARTS:
         low, high = np.quantile(rows[1], [1.0 - quantile, quantile])
-        split = _settled(y, rows, low if sides[0] else -np.inf, high if sides[1] else np.inf)
-        if split is not None and (best is None or split.cost < best.cost):
-            best = split
-    return best
+        found.append(_settled(y, rows, low if sides[0] else -np.inf, high if sides[1] else np.inf))
+    return min((one for one in found if one), key=lambda one: one.cost, default=None)
 
 
 def _settled(y: Real, rows: Real, low: float, high: float) -> _Split | None:
@@ -169,15 +159,9 @@ def _settled(y: Real, rows: Real, low: float, high: float) -> _Split | None:
         below, above = moved
         if done:
             break
-    model = np.clip(q, low, high)
+    cost = float(np.sum((y - np.clip(q, low, high)) ** 2))
     return _Split(
-        cost=float(np.sum((y - model) ** 2)),
-        low=low,
-        high=high,
-        below=below,
-        above=above,
-        unclipped=q,
-        weights=weights,
+        cost=cost, low=low, high=high, below=below, above=above, unclipped=q, weights=weights
     )
 
 
