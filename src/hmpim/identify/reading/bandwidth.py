@@ -27,6 +27,9 @@ _FEWEST = 5
 _BESIDE = 2
 """Of them on either side."""
 
+_NAMES = tuple(field.name for field in fields(ResponseBandwidths))
+"""Bandwidths that are read."""
+
 _MANY = 1e6
 """Degrees of freedom behind a response's error bars, in effect."""
 
@@ -86,22 +89,11 @@ def response_bandwidths(
 ) -> ResponseBandwidths:
     """Where the measured response crosses -90° (with and without the delay) and -3 dB.
 
-    Parameters
-    ----------
-    measured : FrequencyResponse
-        With its error at each frequency.
-    system : RationalDelay
-        The fitted model, scale factor included.
-    modelled : Parameters
-        Its bandwidths, near which the measurement is looked at.
-    fs : float
-        Rate in Hz.
-    intersample : {'zoh', 'foh', 'bandlimited'}
-        What the input does between its samples: a ratio of sampled spectra contains it, the
-        bandwidths of the system behind it do not.
+    It is looked at near the bandwidths `modelled` of the fitted system, scale factor included. A
+    ratio of sampled spectra contains what the input does between its samples, the bandwidths of the
+    system behind it do not.
     """
-    names = [field.name for field in fields(ResponseBandwidths)]
-    near = {name: e.value for name in names if (e := getattr(modelled, name)) is not None}
+    near = {name: e.value for name in _NAMES if (e := getattr(modelled, name)) is not None}
     if not near:
         return ResponseBandwidths()
     steepness = _slopes(replace(system, delay=0.0), np.array([*near.values()]))
@@ -144,8 +136,7 @@ def are_apart(measured: Estimate | None, modelled: Estimate | None) -> bool:
 
 def disagreeing(measured: ResponseBandwidths, modelled: Parameters) -> bool:
     """Whether any bandwidth of the response and the model's are apart."""
-    names = (field.name for field in fields(ResponseBandwidths))
-    return any(are_apart(getattr(measured, name), getattr(modelled, name)) for name in names)
+    return any(are_apart(getattr(measured, name), getattr(modelled, name)) for name in _NAMES)
 
 
 def less_bias(
@@ -164,9 +155,7 @@ def less_bias(
         variance = found.spread**2 + bias**2
         return estimate(found.value - bias, variance, freedom=_MANY, unit="Hz")
 
-    return ResponseBandwidths(
-        **{field.name: corrected(field.name) for field in fields(ResponseBandwidths)}
-    )
+    return ResponseBandwidths(**{name: corrected(name) for name in _NAMES})
 
 
 def _slopes(still: RationalDelay, f: Real) -> Complex:

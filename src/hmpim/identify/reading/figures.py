@@ -73,22 +73,14 @@ def read_figures(
     noise: Estimate,
     units: tuple[str, str],
 ) -> tuple[Parameters, RationalDelay, Real]:
-    """Turn a fit's parameters and their covariance into estimates.
+    """Turn a fit's parameters, `vector` as `Readings` has it, and their covariance into estimates.
 
     Parameters
     ----------
-    structure : Structure
-        What was fitted.
-    vector : ndarray, shape (p,)
-        As `Readings` has it.
-    cov : ndarray, shape (p, p)
-        Of `vector`.
     fs, highest : float
         As for `read_parameters`; nothing is read off the response if `highest` is None.
     effective : float
         Independent samples less parameters.
-    noise : Estimate
-        Of the noise.
     units : (str, str)
         Of input and output.
 
@@ -107,19 +99,14 @@ def read_figures(
     slopes = _slopes(structure, vector, fs, values)
     slopes |= _slopes_of_marks(structure, system, by_coefficient, values, peak)
     unit_of = units_of(structure, units)
-    read: dict[str, Estimate | None] = {
-        name: None
-        if value is None
-        else estimate(
-            value,
-            float(slopes[name] @ cov @ slopes[name]),
-            freedom=effective,
-            unit=unit_of[name],
-        )
-        for name, value in values.items()
-    }
+
+    def read(name: str, value: float) -> Estimate:
+        variance = float(slopes[name] @ cov @ slopes[name])
+        return estimate(value, variance, freedom=effective, unit=unit_of[name])
+
+    given = {name: read(name, value) for name, value in values.items() if value is not None}
     spread = by_coefficient.T @ cov @ by_coefficient
-    return Parameters(noise_std=noise, **read), system, spread
+    return Parameters(noise_std=noise, **given), system, spread
 
 
 def _slopes(
@@ -274,10 +261,6 @@ def _late_at_dc(structure: Structure, system: RationalDelay, slopes: Real) -> Re
 
 def _lowest_mode(structure: Structure, vector: Real) -> int | None:
     """Index in `vector` of the second-order section with the lowest natural frequency."""
-    found, start = [], 1
-    for order in structure.sections:
-        if order == 2:
-            omega = np.exp(-vector[start]) / np.sqrt(vector[start + 1])
-            found.append((float(omega), start))
-        start += order
-    return min(found)[1] if found else None
+    starts = np.cumsum([1, *structure.sections]).tolist()
+    modes = [k for k, order in zip(starts, structure.sections, strict=False) if order == 2]
+    return min(modes, key=lambda k: np.exp(-vector[k]) / np.sqrt(vector[k + 1]), default=None)

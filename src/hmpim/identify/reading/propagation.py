@@ -26,22 +26,10 @@ def gradient(function: Callable[[Real], float] | Callable[[Real], Real], at: Rea
 
 
 def response_std(system: RationalDelay, covariance: Real, frequency: Real) -> Real:
-    """Standard deviation of a model's response, sqrt(E|error|²), to first order.
+    """Standard deviation of a model's response, sqrt(E|error|²), at each frequency in Hz, (m,).
 
-    Parameters
-    ----------
-    system : RationalDelay
-        The model.
-    covariance : ndarray, shape (q, q)
-        Of its delay, its numerator, and its denominator behind the first coefficient that is not
-        zero, by rising powers of s.
-    frequency : ndarray, shape (m,)
-        Hz, above 0.
-
-    Returns
-    -------
-    ndarray, shape (m,)
-        In the response's unit.
+    To first order, in the response's unit. The covariance, (q, q), is that of its delay, its
+    numerator, and its denominator behind the first coefficient that is not zero, by rising powers.
 
     Examples
     --------

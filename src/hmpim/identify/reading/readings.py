@@ -18,9 +18,7 @@ from hmpim.identify.reading.figures import read_figures
 from hmpim.identify.reading.propagation import gradient
 from hmpim.identify.result import Estimate, Parameters
 from hmpim.identify.result.error_bars import noise_estimate
-from hmpim.model.response import (
-    RationalDelay,
-)
+from hmpim.model.response import RationalDelay
 
 __all__ = ["Readings", "from_lag", "read_parameters"]
 
@@ -35,8 +33,6 @@ class Readings:
 
     Parameters
     ----------
-    parameters : Parameters
-        Estimates.
     system : RationalDelay
         In seconds, the scale factor included.
     vector : ndarray, shape (p,)
@@ -87,18 +83,12 @@ def read_parameters(
 
     Parameters
     ----------
-    joint : JointFit
-        From `hmpim.identify.fitting.joint.joint_fit`.
-    fs : float
-        Rate in Hz.
     highest : float
         Frequency in Hz beyond which no bandwidth is read off: the end of the excited band.
     delay_correlation : float or None
         The paper's delay (eq. 8), in s.
     known_covariance : ndarray, shape (p, p), optional
         Of the fit's parameters, where other inputs were fitted with it.
-    input_unit, output_unit : str
-        Units of the channels.
     """
     fit = joint.best.fit
     structure = fit.structure

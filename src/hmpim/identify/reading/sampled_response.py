@@ -4,6 +4,8 @@ A ratio of sampled spectra contains what lies between the input's samples, and i
 of a first-order lag amount to a percent of the response well below a quarter of the rate.
 """
 
+from dataclasses import replace
+
 import numpy as np
 import scipy
 
@@ -18,26 +20,8 @@ __all__ = ["sampled_response"]
 def sampled_response(
     system: RationalDelay, frequency: Real, *, fs: float, intersample: Intersample
 ) -> Complex:
-    """Response from samples of the input to samples of the output.
+    """Response from samples of the input to samples of the output, at frequencies in Hz, (m,).
 
-    Parameters
-    ----------
-    system : RationalDelay
-        From continuous input to continuous output.
-    frequency : ndarray, shape (m,)
-        Hz, above 0 and below fs / 2.
-    fs : float
-        Rate in Hz.
-    intersample : {'zoh', 'foh', 'bandlimited'}
-        What the input does between its samples.
-
-    Returns
-    -------
-    complex ndarray, shape (m,)
-        Output unit per input unit.
-
-    Notes
-    -----
     Held: the modified z-transform, exact, by one matrix exponential for each part of a sample (C.
     Van Loan, IEEE TAC, 1978). Linear: the integral of a slope that is held.
 
@@ -53,11 +37,7 @@ def sampled_response(
     if intersample == "zoh":
         return _held(system, frequency, fs)
     if intersample == "foh":
-        slope = RationalDelay(
-            delay=system.delay,
-            numerator=system.numerator,
-            denominator=np.concatenate([[0.0], system.denominator]),
-        )
+        slope = replace(system, denominator=np.concatenate([[0.0], system.denominator]))
         ahead = np.exp(2j * np.pi * frequency / fs) - 1.0
         return np.asarray(_held(slope, frequency, fs) * ahead * fs)
     return response(system, frequency)

@@ -8,7 +8,7 @@ likely but for its price, or that is slow and would not show.
 """
 
 from collections.abc import Iterable
-from dataclasses import fields, replace
+from dataclasses import replace
 
 import numpy as np
 import scipy
@@ -22,7 +22,7 @@ from hmpim.identify.fitting.held_steps import at_ends, steps_through
 from hmpim.identify.fitting.trial import JointFit, Trial
 from hmpim.identify.reading.figures import figures_at, figures_of
 from hmpim.identify.result import Estimate, Parameters
-from hmpim.identify.result.groups import MODELLED, PHASE_SPLIT
+from hmpim.identify.result.groups import EVERY, MODELLED, PHASE_SPLIT
 from hmpim.identify.worth import FEW, ROUNDING, TWICE
 
 __all__ = [
@@ -85,16 +85,17 @@ def asked_rivals(joint: JointFit) -> tuple[Trial, ...]:
     if best.fit.structure.name not in PLAIN:
         return ()
     count = joint.weighed.counted * joint.weighed_share
-    found = []
-    for trial in joint.trials:
+
+    def is_asked(trial: Trial) -> bool:
         extra = trial.fit.structure.parameters - best.fit.structure.parameters
-        if trial.intersample != best.intersample or trial.fit.structure.name not in PLAIN:
-            continue
+        if extra <= 0 or trial.intersample != best.intersample:
+            return False
         here, there = (max(one.fit.objective, _TINY) for one in (best, trial))
-        gain = count * float(np.log(here) - np.log(there))
-        if extra > 0 and gain > scipy.special.chdtri(extra, 1.0 - COVERAGE):
-            found.append(trial)
-    return tuple(found)
+        gain = count * (np.log(here) - np.log(there))
+        enough = scipy.special.chdtri(extra, 1.0 - COVERAGE)
+        return trial.fit.structure.name in PLAIN and bool(gain > enough)
+
+    return tuple(filter(is_asked, joint.trials))
 
 
 def _is_as_likely(trial: Trial, joint: JointFit) -> bool:
@@ -116,21 +117,10 @@ def spanned(
 ) -> Parameters:
     """Widen each interval to what it would be under the other assumptions, or with one more pole.
 
-    The other fits see the same data with all but the same sensitivity, so that each interval is
-    moved to their value, its width kept.
-
-    Parameters
-    ----------
-    parameters : Parameters
-        Read off the best trial.
-    joint : JointFit
-        With the other trials.
-    fs, highest : float
-        Rate, and frequency beyond which no bandwidth is read off, in Hz.
-    bent : iterable of (Fit, ndarray), shape (p,)
-        A linear fit, and what a nonlinearity that may be there adds to its parameters.
-    others : iterable of Fit
-        Fits beside a gain that may have changed.
+    The other fits see the same data with all but the same sensitivity, so that each interval of the
+    best trial's parameters is moved to their value, its width kept. `bent` holds linear fits, and
+    what a nonlinearity that may be there adds to their parameters, (p,); `others` are fits beside a
+    gain that may have changed. Beyond `highest`, in Hz, no bandwidth is read off.
     """
 
     def figures(fits: Iterable[Fit]) -> list[dict[str, float | None]]:
@@ -160,7 +150,7 @@ def spanned(
             richer += figures([as_if_zero(fit, hidden)])
     richer += [bent_figures(*one, fs=fs, highest=highest) for one in bent]
     moved = {}
-    for name in (field.name for field in fields(parameters)):
+    for name in EVERY:
         own = getattr(parameters, name)
         if own is None:
             continue
