@@ -152,7 +152,7 @@ def test_what_scatters_is_said_once_for_all_parameters() -> None:
     more, less = _doubts([apart[0], *quiet[1:]], "y")
     assert (more.parameters, less.parameters[0]) == ((found[0].name,), found[1].name)
     assert "0.2 times the stated error" in less.message
-    assert _doubts([p for p in found if p.agree], "y") == []
+    assert not [*_doubts([p for p in found if p.agree], "y")]
 
 
 def test_copies_of_one_record_are_not_repeats() -> None:

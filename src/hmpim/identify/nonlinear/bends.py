@@ -146,22 +146,19 @@ def bends(
     if not np.any(fit.residual) or np.ptp(fit.prediction) == 0.0:
         return ()
     tried = _tried(u, fit, intersample, fs)
-    traces = [one.trace for one in tried]
+    traces = np.stack([one.trace for one in tried])
     if problem.valid is not None:  # a trace that lies elsewhere is but rounding where they count
-        for k, trace in enumerate(traces):
-            there = trace[problem.valid]
-            if there @ there <= _ALIKE * (trace @ trace):
-                traces[k] = np.zeros(trace.size)
+        there = traces[:, problem.valid]
+        traces[np.vecdot(there, there) <= _ALIKE * np.vecdot(traces, traces)] = 0.0
     rows = jacobian(problem, fit, *traces)
     residual = problem.innovations(fit.prediction, fit.residual)
     if problem.counts is not None:
         rows, residual = rows[:, problem.counts], residual[problem.counts]
     slopes, seen = np.split(rows, [rows.shape[0] - len(tried)])
     weights, gains, rest = _scored(slopes, seen, residual)
-    gains = np.where(weights > 0.0, gains, 0.0)
-    if gains.max() <= CLEARLY:
+    if not np.any(gains[weights > 0.0] > CLEARLY):
         return ()
-    sizes = np.std(np.stack(traces), axis=1)
+    sizes = np.std(traces, axis=1)
     gains = np.where(weights * sizes > floor, gains, 0.0)
     most = float(gains.max())
     if most <= CLEARLY:
@@ -197,14 +194,8 @@ def is_bent_instead(
 ) -> bool:
     """Whether a plain fit and one nonlinearity explain more than a rich fit, with its own or none.
 
-    A spring that hardens is described better by a second mode than by none.
-
-    Parameters
-    ----------
-    u, problem, fit, intersample, fs, floor
-        As for `bends`; `fit` is the rich one.
-    plain : Fit
-        Of a plain structure, to the same data.
+    A spring that hardens is described better by a second mode than by none. All else is as for
+    `bends`.
     """
     if fit.cost < PART * plain.cost:  # no kind makes that up
         return False
@@ -221,18 +212,9 @@ def is_bent_instead(
 def plainer_bends(
     u: Real, joint: JointFit, plain: Fit | None, *, fs: float, floor: float = 0.0
 ) -> tuple[Bend, ...]:
-    """Find the kinds beside which a plainer structure is about as likely as the rich one chosen.
+    """Find the kinds beside which a plain fit is about as likely as the rich one chosen.
 
-    Parameters
-    ----------
-    u : ndarray, shape (n,)
-        Input samples.
-    joint : JointFit
-        With the rich structure.
-    plain : Fit or None
-        Of the plain structure, to the same data; without one there is nothing to find.
-    fs, floor : float
-        As for `bends`.
+    Both are to the same data; without a plain one there is nothing to find.
     """
     best, problem = joint.best, joint.weighed
     if plain is None or plain.structure.parameters >= best.fit.structure.parameters:
@@ -256,11 +238,6 @@ def bent_shapes(
 
     Each has a sum of squares of 1, so that half the square of its product with a residual of unit
     variance is the log-likelihood that it brings, where the product is above 0.
-
-    Parameters
-    ----------
-    u, problem, fit, intersample, fs
-        As for `bends`.
     """
     traces = np.stack([one.trace for one in _tried(u, fit, intersample, fs)])
     slopes = jacobian(problem, fit)

@@ -75,21 +75,11 @@ class LimitedCommand:
 
 
 def limited_command(u: Real, joint: JointFit) -> LimitedCommand | None:
-    """Find the speed beyond which a command is not followed.
+    """Find the speed beyond which a command, (n,), is not followed.
 
-    Parameters
-    ----------
-    u : ndarray, shape (n,)
-        The command.
-    joint : JointFit
-        The linear fit. Nothing is asked if a plain fit leaves white noise, or a richer one less
-        than 1/25 of what the best plain one leaves.
-
-    Returns
-    -------
-    LimitedCommand or None
-        None where a limit does not explain more than the linear fit (odds of 400 to 1), or than
-        another kind of nonlinearity.
+    Nothing is asked if a plain fit leaves white noise, or a richer one less than 1/25 of what the
+    best plain one leaves. None where a limit does not explain more than the linear fit (odds of 400
+    to 1), or than another kind of nonlinearity.
 
     Examples
     --------
@@ -135,16 +125,10 @@ def limited_command(u: Real, joint: JointFit) -> LimitedCommand | None:
 
 
 def explains_more(limited: Problem, fit: Fit, linear: Problem, best: Fit) -> bool:
-    """Whether a fit with a limit of speed is likelier than a linear one by 400 to 1.
+    """Whether a fit with a limit of speed is likelier than the best linear one by 400 to 1.
 
-    Both in noise that is an autoregression, the limit for the price of a parameter.
-
-    Parameters
-    ----------
-    limited, fit
-        Data with the limited command, and the fit.
-    linear, best
-        Data with the command, and the best linear fit.
+    Each to its own data. Both in noise that is an autoregression, the limit for the price of a
+    parameter.
     """
     return _likelier(limited, fit, linear, best) > CLEARLY
 
@@ -178,16 +162,9 @@ def speed_finding(limited: LimitedCommand, fs: float, unit: str) -> Finding:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class _Followed:
-    """A command on the finer clock, and the plain fit to it.
+    """A command on the finer clock, and the data and the plain fit to it.
 
-    Parameters
-    ----------
-    fine : ndarray
-        The command.
-    fastest : float
-        Its greatest speed, input's unit per fine step.
-    problem, start
-        The data, and the fit.
+    `fastest` is its greatest speed, in the input's unit per fine step.
     """
 
     fine: Real
@@ -241,10 +218,9 @@ def _nearest(command: _Followed, best: Fit) -> tuple[float, Fit] | None:
             break  # slower ones leave still more
     if least.cost > min(TWICE * best.cost, start.cost):
         return None
-    problem, slope = command.at(speed), command.slope(speed, least)[None]
-    known = problem.nuisance
-    rows = slope if known is None else np.vstack([known, slope])
-    beside = fit_structure(replace(problem, nuisance=rows), least.structure, least.theta)
+    problem = command.at(speed)
+    free = _beside(problem, command.slope(speed, least))
+    beside = fit_structure(free, least.structure, least.theta)
     if max(_likelier(problem, one, command.problem, best) for one in (least, beside)) <= 0.0:
         return None
     return speed, least
@@ -282,27 +258,28 @@ def _profiled(
 def beside_speed(joint: JointFit, slope: Real) -> JointFit:
     """The joint fit with the speed free to move too, so that error bars have room for it.
 
-    Parameters
-    ----------
-    joint : JointFit
-        To the command as it is followed.
-    slope : ndarray, shape (n,)
-        Derivative of the output with the speed.
+    It is the fit to the command as it is followed; `slope`, (n,), is the derivative of the output
+    with the speed.
     """
-    rows = slope[None]
-    if joint.problem.nuisance is not None:
-        rows = np.vstack([joint.problem.nuisance, rows])
-    weighed = replace(joint.weighed, nuisance=rows)
+    problem = _beside(joint.problem, slope)
+    weighed = replace(joint.weighed, nuisance=problem.nuisance)
     structure, theta = joint.best.fit.structure, joint.best.fit.theta
     fit = fit_structure(weighed, structure, theta, precision=weighed.final)
     best = replace(joint.best, fit=fit)
     return replace(
         joint,
-        problem=replace(joint.problem, nuisance=rows),
+        problem=problem,
         weighed=weighed,
         best=best,
         trials=tuple(best if trial is joint.best else trial for trial in joint.trials),
     )
+
+
+def _beside(problem: Problem, slope: Real) -> Problem:
+    """The data with one more row that is free to move."""
+    known = problem.nuisance
+    rows = slope[None] if known is None else np.vstack([known, slope])
+    return replace(problem, nuisance=rows)
 
 
 def _finely(u: Real, mode: Intersample) -> Real:

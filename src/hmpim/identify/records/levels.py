@@ -277,29 +277,28 @@ def compare_levels(
         t for t in trends if t.probability * len(trends) < FALSE_ALARM and abs(t.change) > WORTH
     ]
     reach = _linear_up_to(levels, trends)
-    findings = []
-    if changed:
-        most = max(changed, key=lambda t: abs(t.change))
-        findings.append(
-            Finding(
-                code="nonlinear",
-                message=f"From an amplitude of {most.amplitudes[0]:.4g} to one of "
-                f"{f'{most.amplitudes[-1]:.4g} {unit}'.rstrip()}, the {in_words(most.name)} "
-                f"changes by {100 * most.change:+.2g} %, more than its error explains. "
-                + _linear_range(levels, reach, unit),
-                severity="doubt",
-                parameters=tuple(t.name for t in changed),
-            )
-        )
-        kind = _kind({t.name: t for t in changed})
-        if kind is not None:
-            findings.append(kind)
+    kinds = _kind({t.name: t for t in changed})
     return LevelComparison(
         amplitudes=tuple(float(a) for a in amplitudes),
         trends=trends,
         linear_up_to=reach,
-        findings=tuple(findings),
+        findings=(*_changes(changed, _linear_range(levels, reach, unit), unit), *kinds),
         unit=unit,
+    )
+
+
+def _changes(changed: list[Trend], where: str, unit: str) -> Iterator[Finding]:
+    """Say which parameter changes most, and where a linear model serves."""
+    if not changed:
+        return
+    most = max(changed, key=lambda t: abs(t.change))
+    yield Finding(
+        code="nonlinear",
+        message=f"From an amplitude of {most.amplitudes[0]:.4g} to one of "
+        f"{f'{most.amplitudes[-1]:.4g} {unit}'.rstrip()}, the {in_words(most.name)} changes by "
+        f"{100 * most.change:+.2g} %, more than its error explains. {where}",
+        severity="doubt",
+        parameters=tuple(t.name for t in changed),
     )
 
 
@@ -366,11 +365,15 @@ def _linear_up_to(levels: list[_Level], trends: tuple[Trend, ...]) -> float:
     return reach
 
 
-def _kind(changed: dict[str, Trend]) -> Finding | None:
+def _kind(changed: dict[str, Trend]) -> Iterator[Finding]:
     """A spring moves the natural frequency; friction damps small motions the most."""
     frequency, damping = changed.get("natural_frequency"), changed.get("damping_ratio")
-    if damping is not None and damping.change < 0 and _faster_than(damping, frequency):
-        return Finding(
+    if (
+        damping is not None
+        and damping.change < 0
+        and (frequency is None or abs(damping.change) > 4 * abs(frequency.change))
+    ):
+        yield Finding(
             code="friction",
             message=f"The damping ratio falls from {damping.values[0]:.3g} to "
             f"{damping.values[-1]:.3g} as the amplitude grows, as Coulomb friction causes. "
@@ -378,21 +381,15 @@ def _kind(changed: dict[str, Trend]) -> Finding | None:
             severity="info",
             parameters=("damping_ratio",),
         )
-    if frequency is None:
-        return None
-    hardens = frequency.change > 0
-    return Finding(
-        code="hardening" if hardens else "softening",
-        message=f"The natural frequency {'rises' if hardens else 'falls'} from "
-        f"{frequency.values[0]:.5g} to {frequency.values[-1]:.5g} Hz as the amplitude grows, as "
-        f"with a {'hardening' if hardens else 'softening'} spring"
-        f"{'' if hardens else ', or a limit on rate or torque'}. "
-        "Take the value at the smallest amplitude for the linear model.",
-        severity="info",
-        parameters=("natural_frequency",),
-    )
-
-
-def _faster_than(damping: Trend, frequency: Trend | None) -> bool:
-    """Whether the damping changes far more than the frequency does."""
-    return frequency is None or abs(damping.change) > 4 * abs(frequency.change)
+    elif frequency is not None:
+        hardens = frequency.change > 0
+        yield Finding(
+            code="hardening" if hardens else "softening",
+            message=f"The natural frequency {'rises' if hardens else 'falls'} from "
+            f"{frequency.values[0]:.5g} to {frequency.values[-1]:.5g} Hz as the amplitude grows, "
+            f"as with a {'hardening' if hardens else 'softening'} spring"
+            f"{'' if hardens else ', or a limit on rate or torque'}. "
+            "Take the value at the smallest amplitude for the linear model.",
+            severity="info",
+            parameters=("natural_frequency",),
+        )

@@ -5,8 +5,8 @@ noise but dynamics or nonlinearity that it does not describe (Pintelon and Schou
 Identification, 2nd ed., Wiley 2012, section 4.3: averages over periods tell the two apart).
 """
 
-from collections.abc import Sequence
-from dataclasses import fields, replace
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 import scipy
@@ -24,7 +24,6 @@ from hmpim.identify.result import (
     Estimate,
     FrequencyResponse,
     PairIdentification,
-    Parameters,
 )
 from hmpim.identify.result.error_bars import estimate, noise_estimate
 from hmpim.identify.result.groups import EVERY, MODELLED, PHASE_SPLIT, in_words
@@ -103,52 +102,16 @@ def identify_repeats(
 
 
 def _pair(found: tuple[PairIdentification, ...]) -> RepeatedPair:
-    parameters = tuple(
-        repeated
-        for field in fields(Parameters)
-        if (repeated := _parameter(field.name, found)) is not None
-    )
+    parameters = tuple(one for name in EVERY if (one := _parameter(name, found)) is not None)
     response, scatter = _averaged(found)
     told = tuple(pair for pair in found if pair.verdict != "not_identifiable")
-    findings = []
-    structures = tuple(pair.structure for pair in found)
-    if len(told) < len(found):
-        findings.append(
-            Finding(
-                code="not_identifiable",
-                message=f"{len(found) - len(told)} of {len(found)} repeats could not be "
-                "identified. See their own warnings.",
-                severity="doubt",
-                parameters=EVERY,
-            )
-        )
-    if len({pair.structure for pair in told}) > 1:
-        findings.append(
-            Finding(
-                code="structure",
-                message=f"The repeats were found to be {', '.join(structures)}. The "
-                "records barely distinguish them; state one with structures=.",
-                severity="doubt",
-                parameters=PHASE_SPLIT,
-            )
-        )
-    findings.extend(_doubts(parameters, found[0].output))
     noise, unmodelled, probability = _split(told)
-    if probability is not None and unmodelled and probability < FALSE_ALARM:
-        findings.append(
-            Finding(
-                code="unmodelled",
-                message=f"{unmodelled:.3g} (r.m.s.) of the residual recurs in "
-                "every repeat, so it is not noise. Look at the residual beside the stimulus.",
-                severity="doubt",
-                parameters=MODELLED,
-            )
-        )
-    said = tuple(findings)
+    recurs = unmodelled if probability is not None and probability < FALSE_ALARM else None
+    said = (*_unlike(found, told), *_doubts(parameters, found[0].output), *_recurring(recurs))
     return RepeatedPair(
         input=found[0].input,
         output=found[0].output,
-        structures=structures,
+        structures=tuple(pair.structure for pair in found),
         parameters=tuple(
             replace(
                 p, mean=judged_together(p.mean, _told(p.name, found), name=p.name, findings=said)
@@ -162,6 +125,40 @@ def _pair(found: tuple[PairIdentification, ...]) -> RepeatedPair:
         unmodelled_probability=probability,
         findings=said,
     )
+
+
+def _unlike(
+    found: tuple[PairIdentification, ...], told: tuple[PairIdentification, ...]
+) -> Iterator[Finding]:
+    """Say that not all repeats could be identified, or not all as the same structure."""
+    if len(told) < len(found):
+        yield Finding(
+            code="not_identifiable",
+            message=f"{len(found) - len(told)} of {len(found)} repeats could not be "
+            "identified. See their own warnings.",
+            severity="doubt",
+            parameters=EVERY,
+        )
+    if len({pair.structure for pair in told}) > 1:
+        yield Finding(
+            code="structure",
+            message=f"The repeats were found to be {', '.join(pair.structure for pair in found)}. "
+            "The records barely distinguish them; state one with structures=.",
+            severity="doubt",
+            parameters=PHASE_SPLIT,
+        )
+
+
+def _recurring(unmodelled: float | None) -> Iterator[Finding]:
+    """Say that so much of the residual, r.m.s., comes back every time."""
+    if unmodelled:
+        yield Finding(
+            code="unmodelled",
+            message=f"{unmodelled:.3g} (r.m.s.) of the residual recurs in "
+            "every repeat, so it is not noise. Look at the residual beside the stimulus.",
+            severity="doubt",
+            parameters=MODELLED,
+        )
 
 
 def _told(name: str, found: tuple[PairIdentification, ...]) -> list[Estimate]:
@@ -219,34 +216,26 @@ def _parameter(name: str, found: tuple[PairIdentification, ...]) -> RepeatedPara
     )
 
 
-def _doubts(parameters: Sequence[RepeatedParameter], output: str) -> list[Finding]:
+def _doubts(parameters: Sequence[RepeatedParameter], output: str) -> Iterator[Finding]:
     """State once what scatters more than its stated error, and once what scatters less."""
-    more = [p for p in parameters if not p.agree and p.probability < FALSE_ALARM]
-    less = [p for p in parameters if not p.agree and p.probability >= FALSE_ALARM]
-    causes = (
+    apart = [p for p in parameters if not p.agree]
+    for how, cause in (
         (
-            more,
             "more",
             "Something changes between the repeats, or the model lacks something; use the "
             "repeatability as the error.",
         ),
-        (
-            less,
-            "less",
-            "The stated errors are too large, or the repeats are not independent records.",
-        ),
-    )
-    return [
-        Finding(
-            code="scatter",
-            message=f"From repeat to repeat {output!r} scatters {how} than the stated errors "
-            f"allow: {', '.join(map(_times, found))} the stated error. {cause}",
-            severity="doubt",
-            parameters=tuple(p.name for p in found),
-        )
-        for found, how, cause in causes
-        if found
-    ]
+        ("less", "The stated errors are too large, or the repeats are not independent records."),
+    ):
+        found = [p for p in apart if (p.probability < FALSE_ALARM) == (how == "more")]
+        if found:
+            yield Finding(
+                code="scatter",
+                message=f"From repeat to repeat {output!r} scatters {how} than the stated errors "
+                f"allow: {', '.join(map(_times, found))} the stated error. {cause}",
+                severity="doubt",
+                parameters=tuple(p.name for p in found),
+            )
 
 
 def _times(parameter: RepeatedParameter) -> str:
@@ -260,11 +249,10 @@ def _averaged(found: tuple[PairIdentification, ...]) -> tuple[FrequencyResponse,
     delay = found[0].parameters.delay
     late = 0.0 if delay is None else delay.value
     responses, stds = [], []
-    known = [pair for pair in found if pair.frequency_response.frequency.size]
+    known = [one for pair in found if (one := pair.frequency_response).frequency.size]
     if not known or not frequency.size:
         return found[0].frequency_response, float("nan")
-    for pair in known:
-        own = pair.frequency_response
+    for own in known:
         straight = own.response * np.exp(2j * np.pi * own.frequency * late)
         responses.append(np.interp(frequency, own.frequency, straight))
         stds.append(np.interp(frequency, own.frequency, own.std))
