@@ -1,5 +1,6 @@
 """What statistics alone do not tell apart: drift and noise, a window and a memory, software."""
 
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -22,7 +23,7 @@ _SLOWEST = 1e-7
 """Frequencies at which the power of a noise is summed, and the lowest, in radians per sample."""
 
 
-def drift_or_noise(evidence: Evidence) -> tuple[Finding, ...]:
+def drift_or_noise(evidence: Evidence) -> Iterator[Finding]:
     """Doubt a noise most of which is slower than the window: it is no other than a drifting bias.
 
     By the autoregression of what is left over.
@@ -34,20 +35,18 @@ def drift_or_noise(evidence: Evidence) -> tuple[Finding, ...]:
     slow = np.where(omega < 2 * np.pi / lags, power, 0.0)
     share = float(np.trapezoid(slow, omega) / np.trapezoid(power, omega))
     if share <= MOST:
-        return ()
-    return (
-        Finding(
-            code="drift_or_noise",
-            message=f"{100 * share:.0f} % of the noise's power is slower than the window of "
-            f"{lags / evidence.fs:.3g} s: it may be a drifting bias. Compress with knots, at which "
-            "the bias takes values of its own.",
-            severity="doubt",
-            parameters=("noise_std",),
-        ),
+        return
+    yield Finding(
+        code="drift_or_noise",
+        message=f"{100 * share:.0f} % of the noise's power is slower than the window of "
+        f"{lags / evidence.fs:.3g} s: it may be a drifting bias. Compress with knots, at which "
+        "the bias takes values of its own.",
+        severity="doubt",
+        parameters=("noise_std",),
     )
 
 
-def cut_response(evidence: Evidence) -> tuple[Finding, ...]:
+def cut_response(evidence: Evidence) -> Iterator[Finding]:
     """Doubt what the impulse response beyond the window moves: that counts as noise.
 
     The response is continued for a second window, and its power compared with the noise's.
@@ -62,20 +61,18 @@ def cut_response(evidence: Evidence) -> tuple[Finding, ...]:
     cut = float(products.moments(Responses.ending(beyond[None], np.zeros(1))).gram[0, 0])
     share = cut / max(fit.left.power * products.counted, np.finfo(float).tiny)
     if share <= 2 * FEW:  # the noise would be off by few per cent
-        return ()
-    return (
-        Finding(
-            code="cut_response",
-            message=f"The response continues beyond the window of {reach.lags} samples, and that "
-            f"part of it is {100 * min(share, 1.0):.0f} % of what counts as noise. Compress with "
-            f"lags={2 * reach.lags}.",
-            severity="doubt",
-            parameters=moved_by(evidence, min(share, 1.0)),
-        ),
+        return
+    yield Finding(
+        code="cut_response",
+        message=f"The response continues beyond the window of {reach.lags} samples, and that "
+        f"part of it is {100 * min(share, 1.0):.0f} % of what counts as noise. Compress with "
+        f"lags={2 * reach.lags}.",
+        severity="doubt",
+        parameters=moved_by(evidence, min(share, 1.0)),
     )
 
 
-def perhaps_software(evidence: Evidence) -> tuple[Finding, ...]:
+def perhaps_software(evidence: Evidence) -> Iterator[Finding]:
     """Doubt the timing of one pole behind a held input, without noise: it may be a filter.
 
     From samples the plainer of both is chosen; what they leave over differs by rounding, which
@@ -84,14 +81,12 @@ def perhaps_software(evidence: Evidence) -> tuple[Finding, ...]:
     fit = evidence.joint.best.fit
     held = evidence.joint.best.intersample == "zoh"
     if not (evidence.is_without_noise and held and fit.structure.order == 1):
-        return ()
-    return (
-        Finding(
-            code="perhaps_software",
-            message="The output has no noise, so that software may compute it: a filter of samples "
-            "has another delay and other bandwidths than one pole behind a held input. Identify "
-            "the record itself, with intersample='sampled' if it is software.",
-            severity="doubt",
-            parameters=tuple(name for name in MODELLED if name not in UNDELAYED),
-        ),
+        return
+    yield Finding(
+        code="perhaps_software",
+        message="The output has no noise, so that software may compute it: a filter of samples "
+        "has another delay and other bandwidths than one pole behind a held input. Identify "
+        "the record itself, with intersample='sampled' if it is software.",
+        severity="doubt",
+        parameters=tuple(name for name in MODELLED if name not in UNDELAYED),
     )
