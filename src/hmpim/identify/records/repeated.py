@@ -1,7 +1,7 @@
 """What several records of one stimulus say together."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
@@ -60,7 +60,8 @@ class RepeatedParameter:
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain JSON values."""
-        return {name: value for name, value in plain(self).items() if name != "name"}
+        named = (field.name for field in fields(self) if field.name != "name")
+        return {name: plain(getattr(self, name)) for name in named}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
