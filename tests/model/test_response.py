@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import scipy.optimize
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -127,3 +128,38 @@ def test_a_narrow_notch_is_seen_by_the_bandwidth():
     top, below = section(33.0, 1e-4), section(33.0, 0.01)
     system = RationalDelay(delay=0.0, numerator=top, denominator=below)
     assert bandwidth_3db(system, highest=200.0) == pytest.approx(33.0, rel=0.02)
+
+
+def test_a_dip_that_no_grid_shows_is_a_bandwidth():
+    """Five modes in parallel; between those at 36 and 47.5 Hz the gain falls by a little over 3 dB.
+
+    Where it is least is scaled to a thousandth, or a twentieth of a thousandth, below the level.
+    """
+    gains = (-0.93117, -0.74381, -0.21323, -0.86773, 0.40425)
+    places, damping = (
+        (35.958, 47.507, 70.488, 104.129, 171.575),
+        (0.0286, 0.0546, 0.045, 0.031, 0.0553),
+    )
+    polynomial = np.polynomial.polynomial
+    poles = [second_order(f, z).denominator for f, z in zip(places, damping, strict=True)]
+    below, above = np.ones(1), np.zeros(1)
+    for gain, pole in zip(gains, poles, strict=True):
+        above = polynomial.polyadd(polynomial.polymul(above, pole), gain * below)
+        below = polynomial.polymul(below, pole)
+    fine = np.linspace(36.0, 47.5, 20_001)
+
+    def scaled(at_dc):
+        """The same modes, and a constant that sets the gain at DC."""
+        return RationalDelay(
+            delay=0.0, numerator=polynomial.polyadd(above, at_dc * below), denominator=below
+        )
+
+    def depth(at_dc):
+        seen = np.abs(response(scaled(at_dc), fine)) / abs(above[0] + at_dc)
+        return float(seen.min() * np.sqrt(2.0)), float(fine[np.argmin(seen)])
+
+    for wanted in (1.0 - 1e-3, 1.0 - 5e-5):
+        at_dc = scipy.optimize.brentq(lambda x, w=wanted: depth(x)[0] - w, -0.05, 0.05)
+        place = depth(at_dc)[1]
+        found = bandwidth_3db(scaled(at_dc), highest=268.0)
+        assert 0.98 * place < found < place

@@ -11,7 +11,7 @@ from hmpim.identify.asked.reference import response_through
 from hmpim.identify.coupling.output_fit import OutputFit
 from hmpim.identify.coupling.responses import Responses, responses_of, settled, unrelated
 from hmpim.identify.effects.censored import CensoredFit
-from hmpim.identify.effects.drift import drift_finding
+from hmpim.identify.effects.drift import Drifting, drift_finding
 from hmpim.identify.effects.gain import GainChange
 from hmpim.identify.effects.hum import hum_finding
 from hmpim.identify.effects.imperfections import Imperfections, refine
@@ -125,10 +125,8 @@ def _pair(
     none: tuple[Bend, ...] = ()
     moves, unmoved = attempt("bends", lambda: _bends(question, found, joint, i, plain, said), none)
     bent = 0.0 if inspection is None or not said else inspection.summary.nonlinear
-    # Nothing is said of the gain beside a fit that a nonlinearity has replaced.
-    gaining = joined.gaining if joint.best.fit is joined.fits[i].best.fit else None
     course = None if joined.gaining is None or not joined.gaining.taken else joined.gaining.course
-    evidence, unmade = _evidence(question, found, readings, joint, response, i, moves, gaining)
+    evidence, unmade = _evidence(question, found, readings, joint, response, i, moves, joined)
     evidence = replace(evidence, nonlinear=max(bent, evidence.nonlinear))
     parameters, seen = with_imperfections(
         evidence.spanned or readings.parameters, found, censored, output.unit
@@ -176,7 +174,7 @@ def _evidence(
     response: FrequencyResponse,
     i: int,
     moves: tuple[Bend, ...],
-    gaining: GainChange | None,
+    joined: OutputFit,
 ) -> tuple[Evidence, tuple[Finding, ...]]:
     """What the checks look at, and what of it could not be made."""
     fs, band, fit = question.aligned.fs, question.band(i), joint.best.fit
@@ -191,21 +189,12 @@ def _evidence(
         lambda: misfit(u, fit.residual, delay=fit.delay, band=(band[0] / fs, band[1] / fs)),
         Misfit(share=0.0, probability=1.0),
     )
-    others = () if gaining is None else gaining.others
-    whole = spanned(
-        readings.parameters,
-        joint,
-        fs=fs,
-        highest=min(band[1], fs / 2),
-        bent=[(one.fit, one.farthest) for one in moves],
-        others=others,
-    )
-    if any(one.matters for one in moves):
-        whole = blurred(whole, WORTH)
+    # Nothing is said of the gain beside a fit that a nonlinearity has replaced.
+    gaining = joined.gaining if fit is joined.fits[i].best.fit else None
     evidence = Evidence(
         joint=joint,
         readings=readings,
-        spanned=whole,
+        spanned=readings.parameters,
         misfit=left,
         u=u,
         fs=fs,
@@ -220,9 +209,28 @@ def _evidence(
         limited=question.limited is not None,
         gaining=gaining,
     )
+    whole = spanned(
+        readings.parameters,
+        joint,
+        fs=fs,
+        highest=min(band[1], fs / 2),
+        bent=[(one.fit, one.farthest) for one in moves],
+        others=_other_explanations(gaining, joined.drifting),
+        owed=evidence.owed,
+    )
+    if any(one.matters for one in moves):
+        whole = blurred(whole, WORTH)
     if evidence.is_without_noise and not fit.structure.sampled:
-        evidence = replace(evidence, spanned=without_noise(whole))
-    return evidence, (*unread, *untested)
+        whole = without_noise(whole)
+    return replace(evidence, spanned=whole), (*unread, *untested)
+
+
+def _other_explanations(gaining: GainChange | None, drifting: Drifting | None) -> list[Fit]:
+    """Fits without a gain or a bias that changes, or with one, where the record cannot tell."""
+    others = [] if gaining is None else [*gaining.others]
+    if drifting is not None and drifting.rival is not None:
+        others.append(drifting.rival)
+    return others
 
 
 def _bandwidths(
@@ -262,7 +270,9 @@ def _refined(
     software = joint.best.fit.structure.sampled  # it holds what it said at a sample
     if question.inputs is not None or question.instrument is not None or software:
         return joint, None, covariance
-    refined = refine(joint, found, question.aligned.fs, joined.disturbance)
+    refined = refine(
+        joint, found, question.aligned.inputs[i].values, question.aligned.fs, joined.disturbance
+    )
     if refined is None:
         return joint, None, covariance
     return *refined, refined[1].covariance

@@ -14,7 +14,7 @@ from hmpim.identify.coupling.output_fit import OutputFit, fit_together
 from hmpim.identify.effects.disturbance import without_rows
 from hmpim.identify.effects.drift import with_drift, with_plain_drift
 from hmpim.identify.effects.gain import changing_gain
-from hmpim.identify.effects.hum import with_hum
+from hmpim.identify.effects.hum import refined, with_hum
 from hmpim.identify.effects.imperfections import (
     Imperfections,
     find_imperfections,
@@ -32,12 +32,14 @@ from hmpim.identify.fitting.course import (
     start,
     turn_ahead,
 )
+from hmpim.identify.fitting.data import follows
 from hmpim.identify.fitting.fit import Fit, Problem
 from hmpim.identify.fitting.joint import chosen_of
 from hmpim.identify.fitting.trial import JointFit
 from hmpim.identify.kept import kept
-from hmpim.identify.noise.colour import line_of, tone_of
+from hmpim.identify.noise.colour import tone_of
 from hmpim.identify.noise.input_noise import input_noise
+from hmpim.identify.noise.spectra import windowed_power
 from hmpim.identify.noise.whiteness import is_white
 from hmpim.identify.nonlinear.bends import bends
 from hmpim.identify.nonlinear.lines import find_period
@@ -55,6 +57,9 @@ __all__ = [
     "mark_swapped",
     "through_reference",
 ]
+
+_CLEAR = 8
+"""Bins from a constant to a line: in the window's spectrum each is four wide to either side."""
 
 
 def look(question: Question) -> Imperfections:
@@ -120,7 +125,9 @@ def _behind_levels(
     joint = chosen_of(behind, question.plain)
     if levels.noise == "after" and not goes_beyond(levels, y, joint.best.fit.prediction):
         return None
-    refined = refine(joint, clipped, question.aligned.fs) if joint.related else None
+    if not joint.related:
+        return None
+    refined = refine(joint, clipped, question.aligned.inputs[0].values, question.aligned.fs)
     if refined is None:
         return None
     told, _ = refined
@@ -139,6 +146,8 @@ def _drifting(question: Question, seen: Imperfections, course: Course) -> Output
 
     drifting = with_plain_drift(former.problem, former.best, with_rows)
     if drifting is None or not drifting.joint.related:
+        return None
+    if follows(course.data, drifting.joint.best.fit):  # richer dynamics may be what is slow
         return None
     return OutputFit(fits=(drifting.joint,), drifting=drifting)
 
@@ -187,9 +196,9 @@ def _fit_and_look_for_rows(
 @kept
 def _has_lines(u: Real) -> bool:
     """Whether an input repeats, or one line is much of it: its distortion then has lines too."""
-    moves = u - u.mean()
-    line = line_of(moves, 1.0)
-    much = line is not None and float(np.var(tone_of(moves, line))) > PART * float(np.var(moves))
+    moves, power = u - u.mean(), windowed_power(u)[_CLEAR:]
+    line = refined(moves, (_CLEAR + int(np.argmax(power))) / u.size) if power.size else 0.5
+    much = float(np.var(tone_of(moves, line))) > PART * float(np.var(moves))
     return much or find_period(u) is not None
 
 
@@ -204,7 +213,8 @@ def drift_or_levels(
         return seen, fitted
     clipped = replace(seen, saturation=plateau)
     levelled = _fit_once(question, clipped, question.structures)
-    refined = refine(levelled.fits[0], clipped, question.aligned.fs)
+    u = question.aligned.inputs[0].values
+    refined = refine(levelled.fits[0], clipped, u, question.aligned.fs)
     (drifted,) = fitted.fits
     left = drifted.best.fit.cost / drifted.problem.counted
     if refined is None or refined[1].noise_std ** 2 > left:

@@ -255,9 +255,27 @@ def _lowest(
     margin: Callable[[], Callable[[float], float]],
     grid: NDArray[np.float64],
 ) -> float | None:
-    """Lowest frequency in Hz at which a margin, as seen on a grid, falls to 0."""
-    i = _first_crossing(seen)
-    return None if i is None else float(scipy.optimize.brentq(margin(), grid[i], grid[i + 1]))
+    """Lowest frequency in Hz at which a margin, as seen on a grid, falls to 0.
+
+    Between the grid's places it may dip below 0 and come back.
+    """
+    end = _first_crossing(seen)
+    for i in _dips(seen[: None if end is None else end + 1]):
+        curve = margin()
+        bounds, room = (grid[i - 1], grid[i + 1]), 1e-9 * grid[i]
+        turn = scipy.optimize.minimize_scalar(
+            curve, bounds=bounds, method="bounded", options={"xatol": room}
+        )
+        if turn.fun <= 0.0:
+            return float(scipy.optimize.brentq(curve, grid[i - 1], turn.x))
+    return None if end is None else float(scipy.optimize.brentq(margin(), grid[end], grid[end + 1]))
+
+
+def _dips(seen: NDArray[np.float64]) -> list[int]:
+    """Where a positive margin turns, and lies no higher than it fell to there or rises from it."""
+    here, before, after = seen[1:-1], seen[:-2] - seen[1:-1], seen[2:] - seen[1:-1]
+    turns = (here > 0) & (before >= 0) & (after > 0) & (here < np.maximum(before, after))
+    return [int(i) + 1 for i in np.flatnonzero(turns)]
 
 
 def _single_phase(system: RationalDelay, *, late: float) -> Callable[[float], float]:

@@ -257,3 +257,25 @@ def test_a_noise_taken_far_too_loud_leads_to_no_endless_step(source, clean, trut
     step = censored._step(loud, 1e-4)
     assert step[-1] < 0.0  # less noise is likelier
     assert np.all(np.abs(step) < 1e3)
+
+
+def test_an_input_far_from_zero_costs_no_error_bar(clean):
+    """The bias is that at zero input, and far away; the rest is known as well as before."""
+    y = clean + 0.05 * np.random.default_rng(2).standard_normal(clean.size)
+    start = np.array([30.0, np.log(0.8 / (2 * np.pi * 10) * FS), 1 / (4 * 0.16)])
+
+    def stds(offset):
+        raised = np.minimum(y, 0.6) + offset
+        problem = Problem(
+            source=prepare_input(CHIRP + offset, "bandlimited"),
+            y=raised,
+            valid=None,
+            longest_delay=1000.0,
+        )
+        plain = fit_structure(problem, STRUCTURE, start)
+        found = fit_censored(problem, plain, detect_saturation(raised, plain.prediction))
+        return np.sqrt(np.diag(found.covariance))
+
+    near, far = stds(0.0), stds(1e7)
+    assert far[:-1] == pytest.approx(near[:-1], rel=0.01)
+    assert far[-1] == pytest.approx(1e7 * far[-2], rel=0.01)

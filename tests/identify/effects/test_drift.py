@@ -7,6 +7,8 @@ import pytest
 import scipy.signal
 
 import hmpim
+from hmpim.identify.effects import drift
+from hmpim.identify.fitting.joint import joint_fit
 from tests_support import assert_share, four_sines, holds, in_studies, study_size
 
 FS = 200.0
@@ -160,3 +162,33 @@ def test_a_free_response_that_a_drift_imitates_is_no_drift():
     pair = hmpim.identify(record)["y", "u"]
     assert "drift" not in [finding.code for finding in pair.warnings]
     assert pair.bias.value == pytest.approx(2.1, abs=0.01)
+
+
+@pytest.mark.parametrize(
+    ("gain", "passes", "drifts", "rival"),
+    [
+        (20.0, True, True, False),
+        (5.0, True, True, True),
+        (-5.0, True, True, True),
+        (-5.0, False, False, False),
+        (-13.0, True, False, False),
+    ],
+)
+def test_a_constant_bias_stays_an_explanation_unless_it_is_excluded(
+    monkeypatch, gain, passes, drifts, rival
+):
+    """By Schwarz's criterion: -2 log odds of 20 to 1 are 6, of 400 to 1 they are 12."""
+    u = np.sin(2 * np.pi * (0.1 * T + 0.95 * T**2))
+    y = np.convolve(u, np.exp(-np.arange(40) / 8.0) / 8.0)[: T.size] + 0.3 * T
+    y = y + 0.02 * np.random.default_rng(4).standard_normal(T.size)
+    monkeypatch.setattr(drift, "gain_by_rows", lambda *_: gain)
+    monkeypatch.setattr(drift, "_passes_for_drift", lambda *_: passes)
+    plain = ("first_order",)
+    first = joint_fit(u, y, structures=plain)
+    joint, found = drift.with_drift(
+        first,
+        lambda rows, _: joint_fit(u, y, structures=plain, nuisance=rows),
+        lambda _: None,
+    )
+    assert (found is not None, joint is first) == (drifts, not drifts)
+    assert ((found.rival if found else None) is first.best.fit) == rival

@@ -32,10 +32,7 @@ def held(period: float, phase: float = 0.0031, **kind) -> np.ndarray:
     phase=st.floats(0.0, 1.0),
     kind=st.sampled_from([{"noise_std": 0.01}, {"noise_std": 0.3, "saturation_high": 0.7}]),
 )
-@example(samples=2.25, phase=0.0, kind={"noise_std": 0.01}).xfail(
-    reason="updates that fall on every ninth sample: 1.8 samples are found",
-    raises=AssertionError,
-)
+@example(samples=2.25, phase=0.0, kind={"noise_std": 0.01})  # 9/5 samples crowd as 9/4 do
 def test_period_and_phase_lie_within_what_the_record_leaves_open(samples, phase, kind):
     if samples < 3 and "saturation_high" in kind:
         kind = {}  # the clipped updates do not show, and of so few none may be missing

@@ -84,3 +84,16 @@ def test_distortion_of_a_tone_is_no_hum():
     y = u + 0.1 * u**2 + 0.01 * np.random.default_rng(0).standard_normal(t.size)
     record = hmpim.Record.from_arrays({"u": u}, {"y": y}, fs=FS)
     assert said(hmpim.identify(record)["y", "u"]) == []
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_lines_that_the_input_has_are_no_hum(seed):
+    """Sines so near to each other that none stands out, answered as no model here does."""
+    t, rng = np.arange(1332) / FS, np.random.default_rng(seed)
+    lines = (3.998, 5.631, 6.231, 7.77)
+    answers = zip(lines, rng.uniform(0.3, 3.0, 4), rng.uniform(-3.0, 3.0, 4), strict=True)
+    u = sum(np.sin(2 * np.pi * f * t + k) for k, f in enumerate(lines))
+    y = sum(a * np.sin(2 * np.pi * f * t + k + p) for k, (f, a, p) in enumerate(answers))
+    y = y + 0.01 * rng.standard_normal(t.size)
+    record = hmpim.Record.from_arrays({"u": u}, {"y": y}, fs=FS, intersample="bandlimited")
+    assert said(hmpim.identify(record)["y", "u"]) == []

@@ -218,3 +218,19 @@ def test_an_output_that_settles_is_not_clipped_where_the_model_expects_no_more(s
     pair = identified(u, y)
     assert pair.saturation_high is None
     assert holds(pair.damping_ratio, damping)
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_clipping_does_not_speak_against_a_band_limited_input(seed):
+    """The samples inside the range are no fair choice: by those a linear input is likelier."""
+    t = np.arange(2000) / 1000.0
+    u = np.sin(2 * np.pi * (5.0 * t + 36.25 * t**2))
+    sensor = hmpim.Sensor(
+        delay=0.0013, natural_frequency=40, damping_ratio=0.3, scale_factor=1.4, noise_std=0.05
+    )
+    y = sensor.respond(u, fs=1000.0, intersample="bandlimited", rng=seed)
+    record = hmpim.Record.from_arrays({"u": u}, {"y": np.minimum(y, np.quantile(y, 0.65))}, fs=1e3)
+    pair = hmpim.identify(record)["y", "u"]
+    assert pair.intersample == "bandlimited"
+    assert abs(pair.delay.value - 0.0013) < 5e-5
+    assert "saturation" in codes(pair)

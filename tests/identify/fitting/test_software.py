@@ -182,3 +182,27 @@ def test_so_smooth_an_input_that_any_output_follows_it_tells_of_no_long_filter()
     u = np.cos(2 * np.pi * (0.1 * TIME + 0.2 * TIME**2))
     y = signal.lfilter(signal.firwin(21, 0.1), [1.0], u)
     assert software_fit(u, y).best.fit.structure.zeros < 16
+
+
+def test_a_task_at_a_slower_rate_is_found_under_a_fast_sweep():
+    """What it repeats looks more like another part of the sweep than like the one it answers."""
+    u = 3.0 * np.sin(2 * np.pi * (0.1 * TIME + 4.0 * TIME**2))
+    index = np.maximum(np.arange(u.size) - 8, 0)
+    said = index - index % 7
+    noise = 0.005 * np.random.default_rng(1).standard_normal(u.size)
+    y = 0.5 * u[said] + noise[said]
+    record = hmpim.Record.from_arrays({"u": u}, {"y": y}, fs=FS)
+    pair = hmpim.identify(record, intersample="sampled")["y"]
+    assert pair.delay.value == pytest.approx(8 / FS)
+    assert pair.scale_factor.value == pytest.approx(0.5, rel=0.01)
+
+
+def test_a_slow_filter_under_noise_is_found_at_its_own_delay():
+    """Its first taps are far below the noise, and the equations' errors no errors of the output."""
+    rng = np.random.default_rng(23)
+    u = signal.lfilter([0.05], [1.0, -0.95], rng.standard_normal(1800))
+    top, below = signal.butter(4, 0.06)
+    y = signal.lfilter(top, below, np.concatenate([np.zeros(7), u])[: u.size])
+    y = y + 0.005 * y.std() * rng.standard_normal(y.size)
+    joint = software_fit(u, y)
+    assert (joint.best.fit.structure.name, joint.best.fit.delay) == ("bilinear_4", 7.0)

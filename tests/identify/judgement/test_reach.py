@@ -78,6 +78,10 @@ def test_a_mode_far_beyond_the_band_casts_doubt_only_in_a_richer_structure(clean
     assert "sweep to 150 Hz, sampled at 380 Hz or faster" in found.message
     assert (found.code, found.severity, found.parameters) == ("extrapolated", "doubt", PHASE_SPLIT)
     assert "third-order model needs a mode at 100 Hz" in found.message
+    coloured = replace(readings, white=False)  # it stands for something else, and not for all of it
+    evidence = replace(evidence, readings=coloured, joint=replace(clean.joint, best=third))
+    (found,) = fast_mode(evidence)
+    assert found.parameters == MODELLED
 
 
 def test_an_integrating_output_has_no_bandwidth_to_miss(field_record, evidence_of):
@@ -128,8 +132,11 @@ def test_a_few_lines_tell_no_more_than_gain_and_phase_at_each(evidence_of, lines
     frequencies = np.linspace(1.0, 19.0, lines + 2)[1:-1].round(1)
     u = np.sin(2 * np.pi * np.outer(TIME, frequencies) + np.arange(lines) ** 2).sum(axis=1)
     y = np.concatenate([np.zeros(10), u[:-10]])
-    found = few_lines(evidence_of(u, y + 0.01 * WHITE, structures=("second_order",)))
+    evidence = evidence_of(u, y + 0.01 * WHITE, structures=("second_order",))
+    found = [*few_lines(evidence)]
     assert [f.code for f in found] == ["few_lines"] * doubted
+    coloured = replace(evidence, readings=replace(evidence.readings, white=False))
+    assert all("noise_std" in f.parameters for f in few_lines(coloured))
     for finding in found:
         assert finding.severity == "doubt"
         assert set(MODELLED) - set(finding.parameters) == {"bias", "noise_std"}

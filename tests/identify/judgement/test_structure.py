@@ -9,7 +9,7 @@ import pytest
 from hmpim.identify.fitting.trial import Trial
 from hmpim.identify.judgement.between_samples import other_intersample, wide_span
 from hmpim.identify.judgement.structure import missed_pole, other_order
-from hmpim.identify.result.groups import PHASE_SPLIT
+from hmpim.identify.result.groups import MODELLED, PHASE_SPLIT
 from hmpim.model.dynamics import STRUCTURES
 
 TIME = np.arange(2000) / 200.0
@@ -61,7 +61,8 @@ def lagging(poles, noise, evidence_of):
 
 def test_a_second_pole_is_asked_for_or_cannot_be_excluded(evidence_of):
     (asked,) = other_order(lagging((0.05, 0.02), 0.005, evidence_of))
-    assert "barely distinguishes 1 from 2 poles" in asked.message
+    assert (asked.code, asked.severity) == ("other_dynamics", "doubt")  # which it may not be given
+    assert "requires dynamics other than 1 pole:" in asked.message
     (hidden,) = missed_pole(lagging((0.05,), 0.3, evidence_of))
     assert re.search(r"further pole with a time constant of up to .* would not", hidden.message)
     assert (hidden.severity, hidden.parameters) == ("info", PHASE_SPLIT)
@@ -126,3 +127,49 @@ def test_an_assumption_that_the_record_excludes_is_not_named(clean):
     assert not [
         *other_intersample(with_assumption(clean, "second_order", delay=-0.5, criterion=13))
     ]
+
+
+def test_a_pole_that_no_model_here_can_have_and_the_record_requires_is_a_doubt(clean):
+    evidence = with_rival(clean, delay=-3.0)
+    best, (rival,) = evidence.joint.best, evidence.joint.rivals
+
+    def at(ahead, white):
+        likelier = replace(rival, criterion=best.criterion - ahead)
+        joint = replace(evidence.joint, rivals=(likelier,))
+        readings = replace(evidence.readings, white=white)
+        return other_order(replace(evidence, joint=joint, readings=readings))
+
+    (close,), (far,), (coloured,) = at(5.0, True), at(7.0, True), at(7.0, False)
+    assert (close.code, close.severity) == ("structure", "info")
+    assert (far.code, far.severity, far.parameters) == ("other_dynamics", "doubt", PHASE_SPLIT)
+    assert "delay would be 0.135" in far.message
+    assert coloured.parameters == MODELLED
+
+
+def test_dynamics_that_leave_coloured_noise_spare_no_figure(clean):
+    hidden = clean.joint.hidden
+    squared = (0.5 * hidden.scale) ** 2
+    asked = replace(hidden, squared=squared, std=squared / 9.0)
+    evidence = replace(clean, joint=replace(clean.joint, hidden=asked))
+    (white,) = missed_pole(evidence)
+    (coloured,) = missed_pole(replace(evidence, readings=replace(clean.readings, white=False)))
+    assert (white.parameters, coloured.parameters) == (PHASE_SPLIT, MODELLED)
+
+
+def test_a_figure_that_a_model_allowed_does_not_have_is_open_and_doubtful(clean):
+    natural = replace(clean.readings.parameters.natural_frequency, std=None, ci95=(9.0, None))
+    spanned = replace(clean.readings.parameters, natural_frequency=natural)
+    (found,) = wide_span(replace(clean, spanned=spanned))
+    assert found.parameters == ("natural_frequency",)
+    assert "natural frequency above 9" in found.message
+
+
+def test_an_assumption_is_not_excluded_by_less_than_what_follows_the_input(clean):
+    far = with_assumption(clean, "second_order", delay=-0.5, criterion=40.0)
+    worse = far.joint.trials[-1]
+    worse = replace(worse, fit=replace(worse.fit, objective=1.2 * far.joint.best.fit.objective))
+    far = replace(far, joint=replace(far.joint, trials=(*far.joint.trials[:-1], worse)))
+    assert not [*other_intersample(far)]
+    for share, named in ((0.15, 0), (0.25, 1)):
+        left = replace(far.misfit, share=share, probability=1e-9)
+        assert len([*other_intersample(replace(far, misfit=left))]) == named

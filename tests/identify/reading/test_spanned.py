@@ -99,3 +99,18 @@ def test_a_zero_that_hardly_shows_is_covered():
             held.append(delay.ci95[0] <= 0.15 <= delay.ci95[1])
     assert len(held) >= 5
     assert_share(held, at_least=0.95)
+
+
+@pytest.mark.parametrize("seed", [0, 4])
+def test_a_figure_that_a_model_allowed_does_not_have_is_open(seed):
+    """A lag alone is a pair of poles of which one is infinitely fast."""
+    sensor = hmpim.Sensor(delay=0.15, natural_frequency=8, damping_ratio=0.9, noise_std=2.0)
+    y = sensor.respond(SWEEP, fs=FS, intersample="bandlimited", rng=seed)
+    record = hmpim.Record.from_arrays({"u": SWEEP}, {"y": y}, fs=FS, intersample="bandlimited")
+    pair = hmpim.identify(record)["y", "u"]
+    assert pair.structure == "second_order"
+    low, high = pair.natural_frequency.ci95
+    assert low < 8.0
+    assert high is None
+    assert pair.natural_frequency.verdict == "doubtful"
+    assert None not in pair.delay.ci95

@@ -97,14 +97,16 @@ class _State:
     """Parameters, and value and derivatives of the log-likelihood there.
 
     `slope` and `bend` are the derivatives by the prediction, (m,), the second one's sign
-    changed; `rows` those of the prediction by the parameters; `inside` are the samples that
-    say what the output was.
+    changed; `rows` those of the prediction by the parameters less their means `level`, which are
+    the bias's to move: beside an input far from 0 scale factor and bias would look the same.
+    `inside` are the samples that say what the output was.
     """
 
     fit: Fit
     log_sigma: float
     prediction: Real
     rows: Real
+    level: Real
     value: float
     slope: Real
     bend: Real
@@ -256,6 +258,9 @@ def _evaluated(data: _Data, fit: Fit, log_sigma: float) -> _State | None:
     prediction = fit.linear @ rows[fit.theta.size :]
     if not np.all(np.isfinite(prediction)):
         return None
+    level = rows.mean(axis=1)
+    level[-1] = 0.0
+    rows = rows - level[:, None]
     sigma = float(np.exp(log_sigma))
     if data.noise_after:
         z = (data.y - np.clip(prediction, data.low_edge, data.high_edge)) / sigma
@@ -288,6 +293,7 @@ def _evaluated(data: _Data, fit: Fit, log_sigma: float) -> _State | None:
         log_sigma=log_sigma,
         prediction=prediction,
         rows=rows,
+        level=level,
         value=float(np.sum(value)),
         slope=slope,
         bend=bend,
@@ -317,6 +323,7 @@ def _moved(data: _Data, state: _State, step: Real) -> _State | None:
     room[0] = 10.0
     excess = max(float(np.max(np.abs(step[:unknown]) / room)), abs(float(step[-1])) / 2.0, 1.0)
     step = step / excess
+    step[-2] -= float(state.level @ step[:-1])
     moved = replace(fit, theta=fit.theta + step[:unknown], linear=fit.linear + step[unknown:-1])
     denominator = moved.denominator
     if not (np.all(np.isfinite(denominator)) and np.all(denominator >= 0)):
@@ -345,14 +352,16 @@ def _shrink(counted: int, fit: Fit) -> float:
 
 def _covariance(state: _State, *, white: bool) -> Real:
     """Covariance of all parameters and ln σ."""
-    inverse = inverted(state.information)
-    if white:
-        return inverse
     size = state.rows.shape[0]
-    middle = np.zeros(inverse.shape)
-    middle[:size, :size], fewer = _coloured_scores(state)
-    middle[-1, -1] = state.information[-1, -1] * fewer
-    return np.asarray(inverse @ middle @ inverse)
+    own = np.eye(size + 1)
+    own[size - 1, :size] -= state.level
+    inverse = inverted(state.information)
+    if not white:
+        middle = np.zeros(inverse.shape)
+        middle[:size, :size], fewer = _coloured_scores(state)
+        middle[-1, -1] = state.information[-1, -1] * fewer
+        inverse = inverse @ middle @ inverse
+    return np.asarray(own @ inverse @ own.T)
 
 
 def _coloured_scores(state: _State) -> tuple[Real, float]:

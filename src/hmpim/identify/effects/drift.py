@@ -15,7 +15,7 @@ import scipy
 from numpy.polynomial.legendre import legvander
 
 from hmpim.identify.arrays import Real
-from hmpim.identify.chance import FALSE_ALARM
+from hmpim.identify.chance import CLEARLY, FALSE_ALARM, LIKELIER
 from hmpim.identify.effects.disturbance import gain_by_rows, without_rows
 from hmpim.identify.fitting.candidates import spans_record
 from hmpim.identify.fitting.derivatives import jacobian
@@ -60,6 +60,8 @@ class Drifting:
         Whether it is a straight line.
     rate, rate_std : float
         Mean rate over the record and its standard deviation, output's unit per sample.
+    rival : Fit or None
+        The fit with a constant bias, where the odds against it are below 20.
     """
 
     joint: JointFit
@@ -67,6 +69,7 @@ class Drifting:
     steady: bool
     rate: float
     rate_std: float
+    rival: Fit | None
 
 
 def with_drift(
@@ -103,14 +106,12 @@ def with_drift(
     # The structure is chosen once more, now that the drift is known.
     joint = fitted(columns, is_white(joint.best.fit.residual))
     gain = gain_by_rows(joint, len(columns), first.best.fit, first.forgotten)
-    if gain < 0.0 and not _passes_for_drift(first, joint):
+    if gain < (-2 * CLEARLY if _passes_for_drift(first, joint) else 0.0):
         return first, None
-    steady = steadily(joint)
-    if steady is not None:
-        gain = gain_by_rows(joint, len(columns), steady.best.fit, steady.forgotten)
-        if gain < 0.0:
-            return steady, None
-    drifting = _described(joint, columns)
+    steady, rows = steadily(joint), len(columns)
+    if steady and gain_by_rows(joint, rows, steady.best.fit, steady.forgotten) < 0.0:
+        return steady, None
+    drifting = _described(joint, columns, rival=first.best.fit if gain < 2 * LIKELIER else None)
     return drifting.joint, drifting
 
 
@@ -142,9 +143,10 @@ def with_plain_drift(
     joint = fitted(columns)
     if spans_record(joint.best.fit) or not is_white(joint.best.fit.residual):
         return None
-    if gain_by_rows(joint, len(columns), fit, problem.begins or 0) < 0.0:
+    gain = gain_by_rows(joint, len(columns), fit, problem.begins or 0)
+    if gain < 0.0:
         return None
-    return _described(joint, columns)
+    return _described(joint, columns, rival=fit if gain < 2 * LIKELIER else None)
 
 
 def _passes_for_drift(first: JointFit, drifting: JointFit) -> bool:
@@ -254,7 +256,7 @@ def _settling(size: int, slowness: float) -> Real:
     return np.asarray(rows - rows.mean(axis=1, keepdims=True))
 
 
-def _described(joint: JointFit, columns: Real) -> Drifting:
+def _described(joint: JointFit, columns: Real, *, rival: Fit | None) -> Drifting:
     """The fit with the drift taken off the output, its polynomials still free to move."""
     problem, weighed, fit = joint.problem, joint.weighed, joint.best.fit
     own = fit.nuisance[: len(columns)]
@@ -275,4 +277,5 @@ def _described(joint: JointFit, columns: Real) -> Drifting:
         steady=len(columns) == 1,
         rate=float(across @ own),
         rate_std=float(np.sqrt(max(float(across @ weights @ across), 0.0))),
+        rival=rival,
     )

@@ -161,8 +161,9 @@ def _coarse_period(
     changed: NDArray[np.intp], runs: NDArray[np.intp], shortest: int
 ) -> float | None:
     """Period in samples at which the changes crowd on the circle, refined over longer stretches."""
-    # Just below a whole number of samples the odd run is shorter, and rare.
-    low, high = max(0.9 * shortest, 1 + FEW), float(shortest + 1)
+    # Just below a whole number of samples the odd run is shorter, and as rare as it is below. From
+    # further below another period crowds as well: 9/5 as 9/4.
+    low, high = max(shortest - FEW, 1 + FEW), float(shortest + 1)
     if shortest == 1:  # 5/4 and 5/3 crowd alike; but nearly all updates show
         mean = float(np.mean(runs))
         low, high = max(NEARLY * mean, 1 + FEW), 1.01 * mean

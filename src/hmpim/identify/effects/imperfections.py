@@ -24,10 +24,13 @@ from hmpim.identify.effects.lost import (
 )
 from hmpim.identify.effects.quantization import Quantization, detect_quantization
 from hmpim.identify.effects.saturation import Saturation, detect_saturation
+from hmpim.identify.fitting.data import prepared
 from hmpim.identify.fitting.enrich import PLAIN
 from hmpim.identify.fitting.fit import Fit
-from hmpim.identify.fitting.trial import JointFit, Trial
+from hmpim.identify.fitting.trial import JointFit, Trial, likeliest_of
 from hmpim.identify.worth import FEW, NEARLY, TWICE
+from hmpim.model.dynamics import Structure
+from hmpim.record import Intersample
 
 __all__ = ["Imperfections", "find_imperfections", "refine"]
 
@@ -149,11 +152,12 @@ def _few_levels(y: Real, inputs: Sequence[Real]) -> int | None:
 
 
 def refine(
-    joint: JointFit, found: Imperfections, fs: float, disturbance: Real | None = None
+    joint: JointFit, found: Imperfections, u: Real, fs: float, disturbance: Real | None = None
 ) -> tuple[JointFit, CensoredFit] | None:
     """Fit the chosen structure to what was read; None where there is nothing to refine.
 
-    `disturbance`, (n,), is what moves the output apart from its input and has been taken off.
+    `disturbance`, (n,), is what moves the output apart from its input `u`, (n,), and has been taken
+    off.
     """
     if found.saturation is None and found.hold is None:
         return None
@@ -163,42 +167,75 @@ def refine(
         memory = int(np.ceil(joint.best.fit.memory))
         whole[: problem.begins + min(memory, problem.y.size // 4)] = False
     arrivals = found.arrivals(problem.y.size, fs)
-    tried: list[tuple[float, Trial, CensoredFit]] = []
 
-    def censored_fit(start: Fit, counts: Mask | None) -> CensoredFit:
+    def censored_fit(mode: Intersample, start: Fit, counts: Mask | None) -> CensoredFit:
         read = replace(problem, valid=counts, nuisance=None, begins=None)
+        if mode != joint.best.intersample:
+            read = replace(read, source=prepared(u, mode, rest=problem.begins is None))
         return fit_censored(read, start, found.saturation, arrivals=arrivals, drift=disturbance)
 
+    tried: list[tuple[Trial, CensoredFit]] = []
     for trial in _worth_refining(joint, found):
         try:
-            censored = censored_fit(trial.fit, whole)
+            censored = censored_fit(trial.intersample, trial.fit, whole)
         except RecordError:  # fewer samples inside the range than parameters
             continue
         price = trial.fit.structure.parameters * float(np.log(censored.index.size))
-        tried.append((price - 2.0 * censored.log_likelihood, trial, censored))
+        tried.append((replace(trial, criterion=price - 2.0 * censored.log_likelihood), censored))
     if not tried:  # the first fit stands
         return None
-    _, chosen, censored = min(tried, key=lambda item: item[0])
+    chosen = likeliest_of([trial for trial, _ in tried], "bandlimited")
+    censored = next(one for trial, one in tried if trial is chosen)
     for _ in range(_ROUNDS):  # a spike that is clipped has been taken for one of the plateau
         spikes = _spikes(censored, found.saturation)
         if spikes is None:
             break
         whole = ~spikes if whole is None else np.asarray(whole & ~spikes)
-        censored = censored_fit(censored.fit, whole)
+        censored = censored_fit(chosen.intersample, censored.fit, whole)
     counted = np.zeros(problem.y.size, dtype=bool)
     counted[censored.index] = True
     fit = replace(censored.fit, residual=censored.fit.residual * counted)
-    best = Trial(intersample=chosen.intersample, fit=fit, criterion=joint.best.criterion)
+    best = replace(chosen, fit=fit)
+    if chosen.intersample != joint.best.intersample:
+        source = prepared(u, chosen.intersample, rest=problem.begins is None)
+        problem = replace(problem, source=source)
     refined = replace(
         joint,
         problem=replace(problem, valid=counted),
         weighed=replace(problem, valid=counted),
         best=best,
-        trials=tuple(best if trial is chosen else trial for trial in joint.trials),
+        trials=_weighed_again(joint, tried, best),
         rivals=(),
         hidden=None,
     )
     return refined, censored
+
+
+def _weighed_again(
+    joint: JointFit, tried: list[tuple[Trial, CensoredFit]], best: Trial
+) -> tuple[Trial, ...]:
+    """All trials by the likelihood of what was read.
+
+    Those that were not refined move with the one of their assumption that was.
+    """
+    again = {_kind(trial): replace(trial, fit=left.fit) for trial, left in tried}
+    again[_kind(best)] = best
+    moved = {
+        trial.intersample: again[_kind(trial)].criterion - trial.criterion
+        for trial in joint.trials
+        if _kind(trial) in again and trial.fit.structure == joint.best.fit.structure
+    }
+    usual = moved.get(joint.best.intersample, 0.0)
+    return tuple(
+        again.get(_kind(trial))
+        or replace(trial, criterion=trial.criterion + moved.get(trial.intersample, usual))
+        for trial in joint.trials
+    )
+
+
+def _kind(trial: Trial) -> tuple[Intersample, Structure]:
+    """What a trial supposes."""
+    return trial.intersample, trial.fit.structure
 
 
 def _spikes(censored: CensoredFit, saturation: Saturation | None) -> Mask | None:
@@ -217,16 +254,30 @@ def _spikes(censored: CensoredFit, saturation: Saturation | None) -> Mask | None
 
 
 def _worth_refining(joint: JointFit, found: Imperfections) -> list[Trial]:
-    """The chosen trial, and simpler ones where clipping may have made it look too simple.
+    """The chosen trial first, and those that clipping may have put behind it.
 
     The samples inside the range are not a fair choice: noise that would have led out of it is
-    missing. To the first fit that is a misfit, which richer structures take up.
+    missing. To the first fit that is a misfit, which richer structures take up, or another
+    assumption between the samples.
     """
     best = joint.best
-    if found.saturation is None or best.fit.structure.name in PLAIN:
+    if found.saturation is None:
         return [best]
-    alike = [trial for trial in joint.trials if trial.intersample == best.intersample]
-    return [best, *(trial for trial in alike if trial.fit.structure.name in PLAIN)]
+    between = [
+        trial
+        for trial in joint.trials
+        if trial.intersample != best.intersample
+        and trial.fit.structure == best.fit.structure
+        and trial.fit.objective < TWICE * best.fit.objective
+    ]
+    simpler = [
+        trial
+        for trial in joint.trials
+        if trial.intersample == best.intersample
+        and trial.fit.structure.name in PLAIN
+        and best.fit.structure.name not in PLAIN
+    ]
+    return [best, *simpler, *between]
 
 
 def _gaps_only(valid: Mask, found: Imperfections, fs: float) -> Mask:

@@ -125,7 +125,9 @@ class _Equations:
 
 def _equations(u: Real, y: Real, valid: Mask | None, *, most: int = _ROWS) -> _Equations:
     """Factor what one output sample may follow from; of masked samples, those that count alone."""
-    lag = likeness(u, y, u.size // 2).lag
+    # What a slower task repeats looks like its input later, and like another part of it.
+    heard = y if valid is None else np.where(valid, y, y[valid].mean())
+    lag = likeness(u, heard, u.size // 2).lag
     first = max(lag - _EARLIER, 0)
     last = min(lag + 2 + _TAPS, u.size // 2)
     last = max(min(last, (u.size + 2 * first) // 3 - _ORDER), first)  # two equations an unknown
@@ -280,6 +282,8 @@ def _followed(
             fits.append(
                 fit_structure(problem, structure, theta, iterations=steps, hopeless=hopeless)
             )
+    if not holding:
+        fits += [walked for one in tried for walked in _walked(problem, one, fits)]
     least = min(fit.cost for fit in fits)
     return [
         fit
@@ -287,6 +291,28 @@ def _followed(
         else fit_structure(problem, fit.structure, fit.theta, precision=_POLISHED)
         for fit in fits
     ]
+
+
+def _walked(problem: Problem, structure: Structure, fits: list[Fit]) -> list[Fit]:
+    """Better fits at earlier and later delays, one after the other, than the best of a structure.
+
+    Noise in the outputs that an equation reaches back to is no error of the output, and puts the
+    delays in an order of its own.
+    """
+    own = [fit for fit in fits if fit.structure == structure]
+    known, found = {fit.delay for fit in own}, list[Fit]()
+    if not structure.order or not own:
+        return found
+    for step in (-1.0, 1.0):
+        best = min([*own, *found], key=lambda fit: fit.cost)
+        while 0.0 <= best.delay + step <= problem.longest_delay and best.delay + step not in known:
+            start = np.append(best.theta[0] + step, best.theta[1:])
+            other = fit_structure(problem, structure, start)
+            if not other.cost < best.cost:
+                break
+            best = other
+            found.append(other)
+    return found
 
 
 def _long_filter(

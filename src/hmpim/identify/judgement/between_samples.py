@@ -32,7 +32,7 @@ def other_intersample(evidence: Evidence) -> Iterator[Finding]:
     best, own = evidence.joint.best, evidence.joint.best.fit.structure.name
     rivals = [
         (one.intersample, one.fit.delay - best.fit.delay, name if name != own else "")
-        for one in rivals_of(evidence.joint)
+        for one in rivals_of(evidence.joint, evidence.owed)
         for name in (one.fit.structure.name,)
     ]
     yield from undetermined_between(best.intersample, rivals)
@@ -79,7 +79,7 @@ def _delay(apart: float) -> str:
 
 def wide_span(evidence: Evidence) -> Iterator[Finding]:
     """Doubt figures that the models which this record allows put far apart."""
-    wide: dict[str, tuple[float, float]] = {}
+    wide: dict[str, str] = {}
     for name in SIZES:
         estimate, own = getattr(evidence.spanned, name), getattr(evidence.readings.parameters, name)
         if estimate is None or own is None or estimate.ci95 is None or estimate.ci95 == own.ci95:
@@ -87,14 +87,14 @@ def wide_span(evidence: Evidence) -> Iterator[Finding]:
         low, high = estimate.ci95
         if own.spread > abs(own.value):  # it is not determined, which another check says
             continue
-        if high - low > PART * abs(estimate.value):
-            wide[name] = (low, high)
+        if low is None or high is None:  # a model has none
+            wide[name] = f"below {high:.4g}" if low is None else f"above {low:.4g}"
+        elif high - low > PART * abs(estimate.value):
+            wide[name] = f"from {low:.4g} to {high:.4g}"
     if not wide:
         return
-    named = ", ".join(
-        f"{in_words(name)} from {low:.4g} to {high:.4g}" for name, (low, high) in wide.items()
-    )
-    between = bool(rivals_of(evidence.joint))
+    named = ", ".join(f"{in_words(name)} {span}" for name, span in wide.items())
+    between = bool(rivals_of(evidence.joint, evidence.owed))
     yield Finding(
         code="intersample" if between else "structure",
         message=f"Models that this record cannot distinguish differ widely: {named}. "

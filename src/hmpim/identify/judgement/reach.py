@@ -85,7 +85,10 @@ def initial_transient(evidence: Evidence) -> Iterator[Finding]:
 
 
 def fast_mode(evidence: Evidence) -> Iterator[Finding]:
-    """Doubt a richer structure with a mode far beyond what was excited."""
+    """Doubt a richer structure with a mode far beyond what was excited.
+
+    It stands for something else, and has not described that unless it leaves white noise.
+    """
     name = evidence.joint.best.fit.structure.name
     if name in PLAIN:
         return
@@ -100,7 +103,7 @@ def fast_mode(evidence: Evidence) -> Iterator[Finding]:
         "constant, or the clocks may drift apart. Check the time stamps, or "
         f"{_sweep_to(fastest, evidence)}.",
         severity="doubt",
-        parameters=PHASE_SPLIT,
+        parameters=PHASE_SPLIT if evidence.readings.white else MODELLED,
     )
 
 
@@ -268,13 +271,15 @@ def lines_of(u: Real) -> InputLines:
 def few_lines(evidence: Evidence) -> Iterator[Finding]:
     """Doubt a model of more figures than the input's lines can tell.
 
-    A line tells gain and phase where it is, and nothing else.
+    A line tells gain and phase where it is, and nothing else. What such a model leaves over is the
+    noise if it is white.
     """
     lines = lines_of(evidence.u).count
     fit = evidence.joint.best.fit
     unknown = fit.theta.size + fit.linear.size - 1
     if 2 * lines >= unknown + _SPARE:
         return
+    seen = ("bias", "noise_std") if evidence.readings.white else ("bias",)
     yield Finding(
         code="few_lines",
         message=f"The input excites {lines} frequenc{'y' if lines == 1 else 'ies'}, which give "
@@ -282,5 +287,5 @@ def few_lines(evidence: Evidence) -> Iterator[Finding]:
         f"{structure_in_words(fit.structure.name)} model cannot be found from them."
         f"{_at_the_line(evidence) if lines == 1 else ''} Sweep, or add lines.",
         severity="doubt",
-        parameters=tuple(n for n in MODELLED if n not in ("bias", "noise_std")),
+        parameters=tuple(n for n in MODELLED if n not in seen),
     )

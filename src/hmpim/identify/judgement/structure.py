@@ -4,10 +4,10 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from hmpim.identify.chance import DEVIATIONS
+from hmpim.identify.chance import DEVIATIONS, LIKELIER
 from hmpim.identify.judgement.evidence import Evidence, structure_in_words
 from hmpim.identify.reading.spanned import asked_rivals, plainer_rivals
-from hmpim.identify.result.groups import PHASE_SPLIT
+from hmpim.identify.result.groups import MODELLED, PHASE_SPLIT
 from hmpim.identify.worth import MOST, TOLERATED
 from hmpim.record import Finding
 
@@ -18,12 +18,33 @@ ALMOST = DEVIATIONS - 1.0
 
 
 def other_order(evidence: Evidence) -> Iterator[Finding]:
-    """Name a structure that is as likely, plainer or richer: the intervals cover it."""
-    joint, name = evidence.joint, evidence.joint.best.fit.structure.name
-    if joint.rivals:
-        rival = joint.rivals[0].fit
-        yield barely_told(name, poles=rival.structure.order, delay=rival.delay / evidence.fs)
+    """Name a structure with one more pole that is as likely: the intervals cover it.
+
+    One that the record clearly prefers, but that no model here can be, says that none is right.
+    """
+    joint = evidence.joint
+    if not joint.rivals:
+        yield from _plainer(evidence)
         return
+    rival, ahead = joint.rivals[0].fit, joint.best.criterion - joint.rivals[0].criterion
+    best, late = joint.best.fit.structure, rival.delay / evidence.fs
+    if ahead <= 2 * LIKELIER:
+        yield barely_told(best.name, poles=rival.structure.order, delay=late)
+        return
+    yield Finding(
+        code="other_dynamics",
+        message=f"The record requires dynamics other than {_poles(best.order)}: a model with one "
+        "more, which is none of those that may be chosen, is clearly likelier. The delay would "
+        f"be {late:.4g} s with it. Lower the noise, or sweep higher, until a richer structure can "
+        "be distinguished.",
+        severity="doubt",
+        parameters=PHASE_SPLIT if evidence.readings.white else MODELLED,
+    )
+
+
+def _plainer(evidence: Evidence) -> Iterator[Finding]:
+    """Name the structure that is almost as likely, plainer or richer: the intervals cover it."""
+    joint, name = evidence.joint, evidence.joint.best.fit.structure.name
     rivals = (*plainer_rivals(joint), *asked_rivals(joint))
     if not rivals:
         return
@@ -53,9 +74,15 @@ def barely_told(chosen: str, *, poles: int, delay: float) -> Finding:
     )
 
 
+def _poles(order: int) -> str:
+    return f"{order} pole{'s' * (order != 1)}"
+
+
 def missed_pole(evidence: Evidence) -> Iterator[Finding]:
     """Doubt the delay where the record asks for other dynamics, or cannot exclude a slow pole.
 
+    That the response within the band is the same either way is known of a model that leaves white
+    noise; of one that does not, no figure is.
     A statistic within one deviation of its level may fall on the other side of it in another run:
     that is said on both sides.
     """
@@ -71,7 +98,7 @@ def missed_pole(evidence: Evidence) -> Iterator[Finding]:
     level = (
         f"the evidence is {asked:.1f} standard deviations, and a doubt begins at {DEVIATIONS:.1f}"
     )
-    poles = f"{order} pole{'s' * (order != 1)}"
+    poles = _poles(order)
     matters = moved > TOLERATED * hidden.scale
     if asked > DEVIATIONS and matters:
         yield Finding(
@@ -80,7 +107,7 @@ def missed_pole(evidence: Evidence) -> Iterator[Finding]:
             f"may be off by {moved / fs:.2g} s. {close}Lower the noise, or sweep higher, until "
             "a richer structure can be distinguished.",
             severity="doubt",
-            parameters=PHASE_SPLIT,
+            parameters=PHASE_SPLIT if evidence.readings.white else MODELLED,
         )
     elif hidden.may_hide:
         yield Finding(

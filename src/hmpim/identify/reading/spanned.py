@@ -40,11 +40,19 @@ _STEP = 1e-6
 
 _TINY = float(np.finfo(float).tiny)
 
+_FAST = (
+    *("natural_frequency", "damping_ratio"),
+    *("bandwidth_phase90", "bandwidth_phase90_without_delay", "bandwidth_3db"),
+)
+"""Figures that grow beyond all limits as a second pole becomes infinitely fast, bandwidths last."""
 
-def rivals_of(joint: JointFit) -> tuple[Trial, ...]:
+
+def rivals_of(joint: JointFit, owed: float = 0.0) -> tuple[Trial, ...]:
     """The likeliest trial under each other assumption that the record does not exclude.
 
-    Of software there is one assumption: then every filter and delay about as likely.
+    Of software there is one assumption: then every filter and delay about as likely. `owed` is the
+    share of the best trial's residual that still follows the input: what no model here describes is
+    no noise, and a difference that is smaller excludes nothing.
     """
     best = joint.best
     if best.fit.structure.sampled:
@@ -53,7 +61,12 @@ def rivals_of(joint: JointFit) -> tuple[Trial, ...]:
     for trial in sorted(joint.trials, key=lambda trial: trial.criterion):
         if trial.intersample != best.intersample:
             others.setdefault(trial.intersample, trial)
-    return tuple(t for t in others.values() if t.criterion - best.criterion < 2 * CLEARLY)
+    most = (1.0 + owed) * best.fit.objective if owed else 0.0
+    return tuple(
+        t
+        for t in others.values()
+        if t.criterion - best.criterion < 2 * CLEARLY or t.fit.objective < most
+    )
 
 
 def plainer_rivals(joint: JointFit) -> tuple[Trial, ...]:
@@ -114,20 +127,22 @@ def spanned(
     highest: float,
     bent: Iterable[tuple[Fit, Real]] = (),
     others: Iterable[Fit] = (),
+    owed: float = 0.0,
 ) -> Parameters:
     """Widen each interval to what it would be under the other assumptions, or with one more pole.
 
     The other fits see the same data with all but the same sensitivity, so that each interval of the
     best trial's parameters is moved to their value, its width kept. `bent` holds linear fits, and
     what a nonlinearity that may be there adds to their parameters, (p,); `others` are fits beside a
-    gain that may have changed. Beyond `highest`, in Hz, no bandwidth is read off.
+    gain that may have changed, or a bias that may have drifted. Beyond `highest`, in Hz, no
+    bandwidth is read off; `owed` is as for `rivals_of`.
     """
 
     def figures(fits: Iterable[Fit]) -> list[dict[str, float | None]]:
         # Of another model a bandwidth may lie beyond the band.
-        return [figures_of(fit, fs=fs, highest=fs / 2) for fit in fits]
+        return [_or_beyond(figures_of(fit, fs=fs, highest=fs / 2), fit) for fit in fits]
 
-    rivals = rivals_of(joint)
+    rivals = rivals_of(joint, owed)
     between = figures(trial.fit for trial in rivals)
     between += figures(fit for one in rivals if _steps_through(one) for fit in _ends(one.fit))
     richer = figures(
@@ -158,7 +173,7 @@ def spanned(
         if tail is not own and whole is own:  # a tail of one model, not a choice between several
             whole = replace(tail, std=tail.spread)
         elif tail is not own:
-            lows, highs = zip(*(e.ci95 for e in (tail, whole) if e.ci95), strict=True)
+            lows, highs = zip(*(_ends_of(e) for e in (tail, whole)), strict=True)
             whole = replace(whole, ci95=(min(lows), max(highs)))
         moved[name] = whole
     return replace(parameters, **moved)
@@ -223,9 +238,28 @@ def bent_figures(fit: Fit, moved: Real, *, fs: float, highest: float) -> dict[st
     }
 
 
+def _or_beyond(found: dict[str, float | None], fit: Fit) -> dict[str, float | None]:
+    """The figures of a fit, infinite where it has none because what they are of lies beyond.
+
+    A lag alone is a pair of poles of which one is infinitely fast, and no bandwidth is a high one.
+    An integrator and a washout have no gain at DC that a bandwidth could refer to.
+    """
+    structure = fit.structure
+    if structure.integrators or structure.dc_zeros or structure.sampled:
+        return found
+    beyond = _FAST if structure.order < 2 else _FAST[2:]
+    return found | {name: np.inf for name in beyond if found[name] is None}
+
+
 def _given(found: list[dict[str, float | None]], name: str) -> list[float]:
     """What each fit says of one figure."""
     return [float(value) for other in found if (value := other.get(name)) is not None]
+
+
+def _ends_of(one: Estimate) -> tuple[float, float]:
+    """The interval's ends, infinite where it is open."""
+    low, high = one.ci95 or (None, None)
+    return -np.inf if low is None else low, np.inf if high is None else high
 
 
 def _hull(own: Estimate, values: list[float]) -> Estimate:
