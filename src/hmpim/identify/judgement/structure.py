@@ -81,8 +81,9 @@ def _poles(order: int) -> str:
 def missed_pole(evidence: Evidence) -> Iterator[Finding]:
     """Doubt the delay where the record asks for other dynamics, or cannot exclude a slow pole.
 
-    That the response within the band is the same either way is known of a model that leaves white
-    noise; of one that does not, no figure is.
+    The response within the band is the same either way if a model leaves white noise, or little of
+    the output; of one that leaves more, no figure is known.
+
     A statistic within one deviation of its level may fall on the other side of it in another run:
     that is said on both sides.
     """
@@ -101,13 +102,14 @@ def missed_pole(evidence: Evidence) -> Iterator[Finding]:
     poles = _poles(order)
     matters = moved > TOLERATED * hidden.scale
     if asked > DEVIATIONS and matters:
+        described = evidence.readings.white or evidence.unexplained <= TOLERATED
         yield Finding(
             code="other_dynamics",
             message=f"The record requires dynamics other than {poles}: {level}. The delay "
             f"may be off by {moved / fs:.2g} s. {close}Lower the noise, or sweep higher, until "
             "a richer structure can be distinguished.",
             severity="doubt",
-            parameters=PHASE_SPLIT if evidence.readings.white else MODELLED,
+            parameters=PHASE_SPLIT if described else MODELLED,
         )
     elif hidden.may_hide:
         yield Finding(
