@@ -128,9 +128,7 @@ def _pair(
     course = None if joined.gaining is None or not joined.gaining.taken else joined.gaining.course
     evidence, unmade = _evidence(question, found, readings, joint, response, i, moves, joined)
     evidence = replace(evidence, nonlinear=max(bent, evidence.nonlinear))
-    parameters, seen = with_imperfections(
-        evidence.spanned or readings.parameters, found, censored, output.unit
-    )
+    parameters, seen = with_imperfections(evidence.spanned, found, censored, output.unit)
     known = {finding.code for finding in seen}
     findings = (
         *(() if question.instrument is None else (question.instrument.finding(),)),

@@ -14,7 +14,7 @@ from hmpim.identify.coupling.output_fit import OutputFit, fit_together
 from hmpim.identify.effects.disturbance import without_rows
 from hmpim.identify.effects.drift import with_drift, with_plain_drift
 from hmpim.identify.effects.gain import changing_gain
-from hmpim.identify.effects.hum import refined, with_hum
+from hmpim.identify.effects.hum import line_near, with_hum
 from hmpim.identify.effects.imperfections import (
     Imperfections,
     find_imperfections,
@@ -197,7 +197,7 @@ def _fit_and_look_for_rows(
 def _has_lines(u: Real) -> bool:
     """Whether an input repeats, or one line is much of it: its distortion then has lines too."""
     moves, power = u - u.mean(), windowed_power(u)[_CLEAR:]
-    line = refined(moves, (_CLEAR + int(np.argmax(power))) / u.size) if power.size else 0.5
+    line = line_near(moves, (_CLEAR + int(np.argmax(power))) / u.size) if power.size else 0.5
     much = float(np.var(tone_of(moves, line))) > PART * float(np.var(moves))
     return much or find_period(u) is not None
 

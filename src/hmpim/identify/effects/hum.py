@@ -19,7 +19,7 @@ from hmpim.identify.noise.colour import line_of
 from hmpim.identify.worth import MOST, ROUNDING
 from hmpim.record import Finding
 
-__all__ = ["Humming", "hum_finding", "refined", "with_hum"]
+__all__ = ["Humming", "hum_finding", "line_near", "with_hum"]
 
 _MOST = 8
 """Lines that are looked for: the mains and its harmonics."""
@@ -113,14 +113,14 @@ def _lines(joint: JointFit) -> tuple[list[float], float]:
         line = line_of(left, 1.0)
         if line is None:
             break
-        found.append(refined(left, line))
+        found.append(line_near(left, line))
         phase = 2 * np.pi * found[-1] * np.arange(left.size)
         rows = np.stack([np.cos(phase), np.sin(phase)]) * told
         left = left - solved(rows @ rows.T, rows @ left) @ rows
     return found, 1.0 - float(left @ left) / whole if found else 0.0
 
 
-def refined(left: Real, line: float) -> float:
+def line_near(left: Real, line: float) -> float:
     """Frequency near `line` at which the periodogram is greatest, in cycles per sample."""
     at = np.arange(left.size) - left.size // 2
 

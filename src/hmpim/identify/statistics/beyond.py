@@ -83,12 +83,7 @@ def beyond_of(fitted: Fitted, products: Products, band: tuple[float, float]) -> 
     reach, runs = statistics.reach, statistics.runs
     scale = max(float(run.scale[0]) for run in runs)
     thirds = replace(statistics, runs=tuple(of_cubes(run, reach, scale) for run in runs))
-    inputs, cubes = (
-        Products(
-            one, skipped=products.skipped, noise=products.noise, to_the_end=products.to_the_end
-        )
-        for one in (statistics, thirds)
-    )
+    inputs, cubes = (products.alike(one) for one in (statistics, thirds))
     highest = min(_TIMES * band[1], 0.5)
     rows = asked_of(fitted.delay, (0.0, highest), products, groups=_GROUPS).rows
     asked = _ending(np.vstack([rows, fitted.response]))

@@ -180,7 +180,8 @@ def _look_and_choose(
         skipped, to_the_end = products.skipped, products.to_the_end and _ends_quietly(best)
         if begins:
             needed = 0 if _rests(best) else _memory(best)
-            skipped = needed if joint is None or needed > skipped else min(needed, 1) * skipped
+            if joint is None or not needed or needed > skipped:
+                skipped = needed
         if joint is not None and (skipped, to_the_end) == (products.skipped, products.to_the_end):
             break
         products = Products(data.products.statistics, skipped=skipped, to_the_end=to_the_end)
@@ -266,12 +267,12 @@ def _rests(best: Fitted) -> bool:
     is told by the samples behind, which a free response does not colour.
     """
     products, lags = best.products.plain, best.products.statistics.lags
-    behind = Products(products.statistics, skipped=_memory(best), to_the_end=products.to_the_end)
+    behind = products.alike(skipped=_memory(best))
     left = replace(best, problem=Compressed.of(behind, best.problem.source)).left
     begins = int(np.ceil(max(best.delay, 0.0))) + 4
     problem = replace(best.problem, begins=begins)
     free = Part(problem, best.structure, best.theta).free[:, :lags]
-    head = best.left_over[2][0, :lags]
+    head = best.left_over.heads[0, :lags]
     every = np.vstack([head, free])
     head, *free_rows = scipy.signal.lfilter(left.noise, np.ones(1), every)[:, left.noise.size :]
     if float(head @ head) > 2.0 * left.innovation * scipy.special.chdtri(head.size, FALSE_ALARM):
@@ -289,7 +290,7 @@ def _ends_quietly(best: Fitted) -> bool:
     left, runs = best.left, len(best.products.statistics.runs)
     if best.problem.source.degree <= 1 or left.counted < _FEWEST + AHEAD * runs:
         return True
-    tails = scipy.signal.lfilter(left.noise, np.ones(1), best.left_over[3])[:, left.noise.size :]
+    tails = scipy.signal.lfilter(left.noise, np.ones(1), best.left_over.tails)[:, left.noise.size :]
     limit = float(scipy.special.chdtri(max(tails.size, 1), FALSE_ALARM))
     return float(np.sum(tails**2)) <= left.innovation * limit
 

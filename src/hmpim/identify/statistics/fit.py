@@ -21,7 +21,7 @@ from hmpim.identify.fitting.held_steps import steps_through
 from hmpim.identify.fitting.least_squares import inverted, solved
 from hmpim.identify.fitting.rows import Part, Problem
 from hmpim.identify.noise.autoregression import whitening_filter
-from hmpim.identify.statistics.products import Moments, Products, Responses
+from hmpim.identify.statistics.products import Moments, Products, Remainder, Responses
 from hmpim.identify.statistics.reach import AHEAD, Reach
 from hmpim.model.dynamics import Structure
 from hmpim.model.sampled import SampledInput, prepare_input
@@ -289,7 +289,7 @@ class Fitted(Fit):
         return np.asarray(whole * self.variance)
 
     @cached_property
-    def left_over(self) -> tuple[Real, int, Real, Real]:
+    def left_over(self) -> Remainder:
         """What is left over, not whitened, as `Products.left_over` gives it."""
         fixed = self.moments.fixed - self.moments.fixed_rows @ self.weights
         kept = float(self.responses.kept @ self.weights)
@@ -299,7 +299,7 @@ class Fitted(Fit):
     def left(self) -> LeftOver:
         """Power, colour and autoregression of what is left over."""
         products = self.products
-        gram, count, *_ = self.left_over
+        gram, count = self.left_over.gram, self.left_over.counted
         if gram[0, 0] <= _ROUNDED * products.plain.energy:
             least, noise = self.objective / products.counted, np.ones(1)
             return LeftOver(power=least, counted=count, innovation=least, share=1.0, noise=noise)

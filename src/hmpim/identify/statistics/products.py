@@ -8,6 +8,7 @@ The bias is solved for each run, or for all, and taken off too.
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 import scipy
@@ -18,7 +19,7 @@ from hmpim.identify.statistics.reach import AHEAD
 from hmpim.identify.statistics.run import SUMMED, Run, closed, last_sums
 from hmpim.identify.statistics.statistics import Statistics
 
-__all__ = ["Moments", "Products", "Responses", "spectrum_of"]
+__all__ = ["Moments", "Products", "Remainder", "Responses", "spectrum_of"]
 
 _FEW = 64
 """Samples at the beginning up to which a convolution is sooner a product with a matrix."""
@@ -96,6 +97,27 @@ class Moments:
     bias_variance: float
 
 
+class Remainder(NamedTuple):
+    """What a model leaves over, not whitened.
+
+    Parameters
+    ----------
+    gram : ndarray, shape (LONGEST + 1, LONGEST + 1)
+        Sums of products of a sample and those 1 … LONGEST before, of samples that count.
+    counted : int
+        Of how many.
+    heads : ndarray, shape (runs, m)
+        The first samples of each run, as if it had begun at rest.
+    tails : ndarray, shape (runs, LONGEST)
+        Its last samples.
+    """
+
+    gram: Real
+    counted: int
+    heads: Real
+    tails: Real
+
+
 class Products:
     """Products over the samples that count, under one noise model.
 
@@ -168,11 +190,24 @@ class Products:
         """The same samples under another noise model."""
         if noise.size == 1:
             return self.plain
-        other = Products(
-            self.statistics, skipped=self.skipped, noise=noise, to_the_end=self.to_the_end
-        )
+        other = self.alike(noise=noise)
         other._plain = self.plain
         return other
+
+    def alike(
+        self,
+        statistics: Statistics | None = None,
+        *,
+        skipped: int | None = None,
+        noise: Real | None = None,
+    ) -> "Products":
+        """The same but for what is given."""
+        return Products(
+            self.statistics if statistics is None else statistics,
+            skipped=self.skipped if skipped is None else skipped,
+            noise=self.noise if noise is None else noise,
+            to_the_end=self.to_the_end,
+        )
 
     @property
     def counted(self) -> int:
@@ -304,7 +339,7 @@ class Products:
             early = (first @ self._begun).transpose(1, 0, 2)
         return np.concatenate([early, late], axis=2)
 
-    def left_over(self, response: Real, kept: float, bias: Real) -> tuple[Real, int, Real, Real]:
+    def left_over(self, response: Real, kept: float, bias: Real) -> Remainder:
         """Return what a model leaves over; of products without a noise model only.
 
         Parameters
@@ -315,17 +350,6 @@ class Products:
             What it keeps.
         bias : ndarray, shape (runs, rows)
             What multiplies the rows of each run's bias.
-
-        Returns
-        -------
-        gram : ndarray, shape (LONGEST + 1, LONGEST + 1)
-            Sums of products of a sample and those 1 … LONGEST before, of samples that count.
-        count : int
-            Of how many.
-        heads : ndarray, shape (runs, m)
-            The first samples of each run, as if it had begun at rest.
-        tails : ndarray, shape (runs, LONGEST)
-            Its last samples.
         """
         runs, reach, index = self._runs, self.statistics.reach, np.arange(LONGEST + 1)
         weights = np.hstack([-bias, np.tile([-kept, 1.0], (len(runs), 1))])
@@ -350,7 +374,7 @@ class Products:
             gram -= before @ before.T + after @ after.T
         count = sum(run.samples - AHEAD - first for run in runs)
         last = reach.span + AHEAD * (not self.to_the_end)
-        return gram, count, ends[0::2, AHEAD:], ends[1::2, last - LONGEST : last]
+        return Remainder(gram, count, ends[0::2, AHEAD:], ends[1::2, last - LONGEST : last])
 
     def _without_bias(self, gram: Real, mixed: Real, steady: Real) -> Moments:
         """Solve the biases and take them off."""
