@@ -95,6 +95,15 @@ def test_the_bound_is_met(seeds, tmp_path):
         ("system.delay", "system.bias", "is no quantity that is drawn"),
         ('"first_order", ', '"third", ', "'third' is no value"),
         ("[noise]", "[noise", "is no plan"),
+        ("draws = ", "draws = true # ", "draws = True; give a whole number"),
+        ("high = 15", "high = 60", r"high = 60 reaches the Nyquist frequency; stay below 50"),
+        ("high = 15", "high_of_fs = 0.5", r"high_of_fs = 0.5 reaches the Nyquist frequency"),
+        ("{ uniform = [0.0, 0.1] }", "[[0.1]]", r"delay = \[0.1\] is no value"),
+        ("{ uniform = [0.0, 0.1] }", "[0.0, -0.1]", "delay = -0.1 is out of range"),
+        ("{ uniform = [0.0, 0.1] }", "1000", "delay = 1000 s is as long as a record of"),
+        ("[system]", "[system]\nscale_factor = 0", "scale_factor = 0 moves nothing"),
+        ("natural_frequency = 4", "natural_frequency = 0", "natural_frequency = 0 is out of range"),
+        ("[noise]", "[noise]\ncorrelation = 1.5", "correlation = 1.5 is out of range"),
     ],
 )
 def test_plans_that_are_wrong_are_refused(tmp_path, old, new, told):

@@ -45,6 +45,13 @@ KNOWN: Mapping[str, Mapping[str, Any]] = {
 
 _LAWS = ("uniform", "loguniform", "normal")
 
+_ABOVE_ZERO = (
+    *("fs", "duration", "low", "high", "high_of_fs", "high_most"),
+    *("natural_frequency", "frequency_of_band", "damping_ratio"),
+)
+_FROM_ZERO = ("extinction", "delay", "std", "std_of_amplitude")
+_NOT_ZERO = ("amplitude", "scale_factor", "sign")
+
 Value = float | str | None
 
 
@@ -123,16 +130,19 @@ def read_plan(path: Path) -> Plan:
             )
     quantities = {table: _checked(path.name, table, told.get(table, {})) for table in KNOWN}
     seed, draws = told.get("seed", 0), told.get("draws", 100)
-    if not isinstance(seed, int) or seed < 0:
+    if isinstance(seed, bool) or not isinstance(seed, int) or seed < 0:
         raise ArgumentError(f"{path.name}: seed = {seed!r}; give a whole number, 0 or more")
-    if not isinstance(draws, int) or not 1 <= draws <= 10**8:
+    if isinstance(draws, bool) or not isinstance(draws, int) or not 1 <= draws <= 10**8:
         raise ArgumentError(f"{path.name}: draws = {draws!r}; give a whole number from 1 on")
+    regions = told.get("regions", [])
+    if not isinstance(regions, list):
+        raise ArgumentError(f"{path.name}: regions = {regions!r}; give a list of names")
     plan = Plan(
         name=str(told.get("name", path.stem)),
         seed=seed,
         draws=draws,
         quantities=quantities,
-        regions=tuple(told.get("regions", ())),
+        regions=tuple(regions),
     )
     _check_whole(path.name, plan)
     return plan
@@ -167,14 +177,16 @@ def _checked(file: str, table: str, given: Any) -> dict[str, Any]:
         if name not in KNOWN[table]:
             known = ", ".join(KNOWN[table])
             raise ArgumentError(f"{file}: [{table}] has no {name!r}; it may have {known}")
-        _check_law(f"{file}: [{table}] {name}", law, words=name == "structure")
+        what = f"{file}: [{table}] {name}"
+        _check_law(what, law, words=name == "structure")
+        _check_range(what, name, law)
     return {name: given.get(name, default) for name, default in KNOWN[table].items()}
 
 
 def _check_law(what: str, law: Any, *, words: bool) -> None:
-    if isinstance(law, list) and law:
-        for value in law:
-            _check_law(what, value, words=words)
+    values = law if isinstance(law, list) and law else [law]
+    bad = next((value for value in values if not _is_value(value, words=words)), None)
+    if bad is None:
         return
     if isinstance(law, dict):
         kind, ends = next(iter(law.items()), ("", None))
@@ -183,12 +195,32 @@ def _check_law(what: str, law: Any, *, words: bool) -> None:
             low, high = numbers
             if kind == "normal" or (low < high and (kind == "uniform" or low > 0)):
                 return
-    if words and law in ("first_order", "second_order"):
-        return
-    if not words and _is_number(law):
-        return
     example = '"second_order"' if words else "{uniform = [0.1, 0.3]}"
-    raise ArgumentError(f"{what} = {law!r} is no value and no law; write {example}")
+    raise ArgumentError(f"{what} = {bad!r} is no value and no law; write {example}")
+
+
+def _is_value(value: object, *, words: bool) -> bool:
+    return value in ("first_order", "second_order") if words else _is_number(value)
+
+
+def _check_range(what: str, name: str, law: Any) -> None:
+    """Refuse what no draw could be made of."""
+    for value in _ends(law):
+        if name in _ABOVE_ZERO and not value > 0:
+            raise ArgumentError(f"{what} = {value:g} is out of range; it must be more than 0")
+        if name in _FROM_ZERO and not value >= 0:
+            raise ArgumentError(f"{what} = {value:g} is out of range; it must be at least 0")
+        if name in _NOT_ZERO and value == 0:
+            raise ArgumentError(f"{what} = 0 moves nothing; give another number")
+        if name == "correlation" and not abs(value) < 1:
+            raise ArgumentError(f"{what} = {value:g} is out of range; it must lie between -1 and 1")
+
+
+def _ends(law: Any) -> list[float]:
+    """The values of a law between which all others lie; a normal law has none."""
+    if isinstance(law, dict):
+        return [] if "normal" in law else list(next(iter(law.values())))
+    return [value for value in (law if isinstance(law, list) else [law]) if _is_number(value)]
 
 
 def _is_number(value: object) -> bool:
@@ -204,9 +236,29 @@ def _check_whole(file: str, plan: Plan) -> None:
     for table, one, other in either:
         if (plan.quantities[table][one] is None) == (plan.quantities[table][other] is None):
             raise ArgumentError(f"{file}: [{table}] must say one of {one} and {other}")
+    _check_sampling(file, plan)
     for name in plan.regions:
         if name not in plan.varied:
             known = ", ".join(plan.varied) or "none"
             raise ArgumentError(
                 f"{file}: region {name!r} is no quantity that is drawn; those are {known}"
             )
+
+
+def _check_sampling(file: str, plan: Plan) -> None:
+    """Refuse a band that sampling folds, and a delay that no record of the plan shows."""
+    stimulus = plan.quantities["stimulus"]
+    fs, duration = _ends(stimulus["fs"]), _ends(stimulus["duration"])
+    for name, nyquist in (("high", min(fs, default=math.inf) / 2), ("high_of_fs", 0.5)):
+        top = max(_ends(stimulus[name]), default=0.0)
+        if top >= nyquist:
+            raise ArgumentError(
+                f"{file}: [stimulus] {name} = {top:g} reaches the Nyquist frequency; "
+                f"stay below {nyquist:g}"
+            )
+    delay = max(_ends(plan.quantities["system"]["delay"]), default=0.0)
+    if delay >= min(duration, default=math.inf):
+        raise ArgumentError(
+            f"{file}: [system] delay = {delay:g} s is as long as a record of "
+            f"{min(duration):g} s, in which no response would be seen; give a shorter delay"
+        )
