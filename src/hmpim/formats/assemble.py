@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from typing import NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +14,10 @@ from hmpim.record import Channel, Finding, Record, Series, rate_of
 from hmpim.record.mend import check_runs_on, mend, restarts
 from hmpim.units import check_unit
 
-__all__ = ["assemble", "check_units", "cut_runs"]
+__all__ = ["assemble", "check_units", "cut_runs", "timed"]
+
+_APART = 0.05
+"""How far a stated rate may be from the stamps': stamps in whole ms at 100 Hz are up to 5 % off."""
 
 
 def assemble(
@@ -49,17 +53,15 @@ def assemble(
     ------
     FormatError
         If the series have no time and no rate is given.
+    ArgumentError
+        If the rate is given and the file's own time contradicts it.
     RecordError
         If the data cannot be used.
     UnitError
         If a unit is not known.
     """
     if fs is None and any(s.time is None for s in series):
-        names = listed([c.name for c in contents.channels])
-        raise FormatError(
-            f"{file!r} has no column time or t among {names}; give the rate with fs=... or "
-            "--fs, or name the time column with time=... or --time"
-        )
+        _refuse_untimed(series, contents, file)
     if series and series[0].values.size < 2:
         count = "one sample" if series[0].values.size else "no samples"
         raise FormatError(f"{file!r} holds {count}; at least 2 are needed")
@@ -73,6 +75,8 @@ def assemble(
     inputs, outputs = of(roles.inputs), of(roles.outputs)
     stated = contents.fs if fs is None else fs
     rate = float(stated) if stated is not None else rate_of(outputs[0].time)
+    if fs is not None and any(s.time is not None for s in series):
+        _check_rate(fs, mended.channels, file)
     return Record(
         inputs=inputs,
         outputs=outputs,
@@ -85,6 +89,27 @@ def assemble(
         auxiliary=of(roles.auxiliary),
         stopping=contents.stopping,
     )
+
+
+def timed(series: Sequence[Series], *, fs: float | None) -> list[Series]:
+    """Return series whose time, where it stands still and a rate is given, is left out.
+
+    Examples
+    --------
+    >>> still = Series(name="u", values=np.arange(3.0), time=np.zeros(3))
+    >>> timed([still], fs=10.0)[0].time is None, timed([still], fs=None)[0].time is None
+    (True, False)
+    """
+    if fs is None:
+        return list(series)
+    return [
+        replace(s, time=None) if s.time is not None and _stands_still(s.time) else s for s in series
+    ]
+
+
+def _stands_still(time: NDArray[np.float64]) -> bool:
+    there = time[np.isfinite(time)]
+    return there.size == 0 or bool(np.all(there == there[0]))
 
 
 def cut_runs(series: Sequence[Series]) -> list[tuple[Series, ...]]:
@@ -151,6 +176,30 @@ def check_units(units: Mapping[str, str], contents: Contents, file: str) -> None
                 f"it has {listed(names)}"
             )
         check_unit(unit)
+
+
+def _refuse_untimed(series: Sequence[Series], contents: Contents, file: str) -> NoReturn:
+    untimed = next(s for s in series if s.time is None)
+    if contents.time is not None and any(s.time is not None for s in series):
+        raise FormatError(
+            f"{file!r}: {untimed.name!r} has {untimed.values.size} samples and no time of its own: "
+            f"{contents.time!r} has another length; give it its time, or cut both to one length"
+        )
+    names = listed([c.name for c in contents.channels])
+    raise FormatError(
+        f"{file!r} has no column time or t among {names}; give the rate with fs=... or "
+        "--fs, or name the time column with time=... or --time"
+    )
+
+
+def _check_rate(fs: float, channels: Sequence[Channel], file: str) -> None:
+    """Refuse a rate that the file's own time contradicts."""
+    rates = [rate_of(c.time) for c in channels]
+    if all(abs(rate / fs - 1.0) > _APART for rate in rates):
+        raise ArgumentError(
+            f"fs = {fs:g} Hz is given, and by its own time {file!r} was sampled at "
+            f"{rates[0]:.6g} Hz; leave fs out, or name another column as the time"
+        )
 
 
 def _unit(series: Series, units: Mapping[str, str], file: str) -> str:

@@ -9,7 +9,7 @@ import numpy as np
 
 from hmpim.arguments import checked
 from hmpim.errors import ArgumentError, RecordError
-from hmpim.formats.assemble import assemble, check_units, cut_runs
+from hmpim.formats.assemble import assemble, check_units, cut_runs, timed
 from hmpim.formats.options import ReadOptions
 from hmpim.formats.readers import Layout
 from hmpim.formats.roles import assumed_roles, choose_roles
@@ -196,7 +196,7 @@ def _runs(wish: _Wish) -> tuple[list[Record], bool]:
     assumed = assumed_roles(roles, logs.contents, inputs=inputs, outputs=outputs)
     runs = [
         assemble(part, roles, logs.contents, file=file.name, fs=fs, units=wish.units, findings=said)
-        for part in cut_runs(series)
+        for part in cut_runs(timed(series, fs=fs))
     ]
     runs = [replace(run, findings=(*run.findings, *assumed)) for run in runs]
     return _in_span(runs, options, file.name), bool(logs.contents.inputs)

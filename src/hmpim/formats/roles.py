@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from shlex import quote
 
 from hmpim.errors import ArgumentError, FormatError
 from hmpim.formats.readers import ChannelInfo, Contents, listed
@@ -232,5 +233,5 @@ def _choose(
     example = free[0] if free else known[0]
     raise FormatError(
         f"{file!r} does not say which column is the {kind}; its columns are {_listed(contents)}: "
-        f"name it with {kind}s=[{example!r}] or --{kind} {example}"
+        f"name it with {kind}s=[{example!r}] or --{kind} {quote(example)}"
     )

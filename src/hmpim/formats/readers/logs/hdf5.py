@@ -103,11 +103,12 @@ def _columns(name: str, dataset: Any) -> Iterator[Column]:
         return
     if dataset.dtype.names is not None and dataset.ndim == 1:  # a table of one row a sample
         for field in dataset.dtype.names[:_WIDE]:
-            plain = dataset.dtype[field].kind in "biuf" and not dataset.dtype[field].shape
+            kind = dataset.dtype[field]
+            plain = kind.kind in "biuf" and not kind.shape
             load = partial(_field, dataset, field) if plain else None
-            yield Column(name=f"{name}.{field}", load=load, samples=size)
+            yield Column(name=f"{name}.{field}", load=load, samples=size, holds=_held(kind))
     elif dataset.dtype.kind not in "biuf":
-        yield Column(name=name, load=None, samples=size)
+        yield Column(name=name, load=None, samples=size, holds=_held(dataset.dtype))
     elif dataset.ndim == 1:
         yield Column(name=name, unit=unit, load=partial(_whole, dataset), samples=size)
     elif dataset.shape[1] <= _WIDE:
@@ -115,6 +116,16 @@ def _columns(name: str, dataset: Any) -> Iterator[Column]:
             load = partial(_part, dataset, k)
             label = f"{name}[{k}]" if dataset.shape[1] > 1 else name
             yield Column(name=label, unit=unit, load=load, samples=size)
+
+
+def _held(kind: Any) -> str:
+    """What values of a type are that are no real numbers, in words."""
+    if kind.shape:
+        return "an array in each row"
+    if kind.kind == "c":
+        return "complex numbers; write its real part, or its magnitude"
+    of = (kind.metadata or {}).get("vlen")
+    return "words, no numbers" if of in (None, str, bytes) else "a list in each row"
 
 
 def _whole(dataset: Any) -> NDArray[Any]:

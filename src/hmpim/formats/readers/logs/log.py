@@ -36,13 +36,15 @@ class Column:
     name : str
         Name by which it is asked for; unique in its log.
     load : function of () to ndarray, or None
-        Its samples, shape (n,); None if it holds words.
+        Its samples, shape (n,); None if it holds no real numbers.
     unit : str
         Unit as the log states it.
     samples : int or None
         How many, where that is known without loading them.
     scale : str
         How counts become samples where they do, such as 'as 0.01 degC each'; else empty.
+    holds : str
+        What it holds where `load` is None, for messages.
     """
 
     name: str
@@ -50,6 +52,7 @@ class Column:
     unit: str = ""
     samples: int | None = None
     scale: str = ""
+    holds: str = "words, no numbers"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -152,7 +155,7 @@ def take_series(
     for name in names:
         group, column = places[name]
         if column.load is None:
-            raise FormatError(f"{name!r} of {path.name!r} holds words, no numbers")
+            raise FormatError(f"{name!r} of {path.name!r} holds {column.holds}")
         values = numbers(column.load())
         time = group.time
         if time is not None and time.size != values.size:
@@ -229,7 +232,7 @@ def _timed(log: Log, file: str, layout: Layout) -> Log:
         found = clock_column(
             [(c.name, c.unit) for c in group.columns if c.load is not None],
             wanted=wanted,
-            bare=group.time is None and layout.fs is None,
+            bare=group.time is None,
             file=file,
         )
         if found is None:

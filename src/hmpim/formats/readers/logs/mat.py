@@ -17,6 +17,7 @@ __all__ = ["MAT", "channels", "parse", "read", "sniff"]
 
 _DEEP = 8
 _WIDE = 200  # columns that a matrix may open into
+_COMPLEX = "complex numbers; save its real part, or its magnitude"
 
 
 def sniff(head: bytes, path: Path) -> bool:
@@ -49,8 +50,15 @@ def parse(path: Path, layout: Layout) -> Log:
     groups: dict[tuple[str, int], list[Column]] = {}
     for owner, name, values, unit in _vectors(data, "", 0):
         columns = groups.setdefault((owner, values.shape[0]), [])
+        real = values.dtype.kind != "c"
         columns.append(
-            Column(name=name, unit=unit, samples=values.shape[0], load=partial(_values, values))
+            Column(
+                name=name,
+                unit=unit,
+                samples=values.shape[0],
+                load=partial(_values, values) if real else None,
+                holds=_COMPLEX,
+            )
         )
     return Log(format=words[:10].decode("ascii", "replace"), groups=_joined(groups))
 
@@ -99,8 +107,11 @@ def _vectors(data: Any, owner: str, depth: int) -> Iterator[tuple[str, str, Any,
 
 
 def _columns(owner: str, name: str, value: Any, unit: str) -> Iterator[tuple[str, str, Any, str]]:
-    array = np.asarray(value) if isinstance(value, np.ndarray | list) else None
-    if array is None or array.dtype.kind not in "biuf" or array.size < 2:
+    try:
+        array = np.asarray(value) if isinstance(value, np.ndarray | list) else None
+    except ValueError:  # a cell array of things of several sizes
+        return
+    if array is None or array.dtype.kind not in "biufc" or array.size < 2:
         return
     if array.ndim == 2 and 1 in array.shape:
         array = array.ravel()

@@ -35,6 +35,7 @@ _ENDINGS = {
 _NO_UNIT = ("", "-", "--", "1", "none")
 # Letters that are somebody's name of a channel rather than a year, a barn or a day.
 _LETTERS = frozenset("abcdehiklnopqrtuwxyz")
+_INDEX = re.compile(r"[\d:, ]+")  # 3, or MATLAB's :,3
 _UNIT_LINE = re.compile(r"^[\[(]?(?P<unit>[^\[\]()]*)[\])]?$")
 
 
@@ -72,6 +73,8 @@ def named(heading: str) -> tuple[str, str]:
     (('u', 'deg'), ('y', 'V'), ('y (filtered)', ''), ('n', ''))
     >>> named("axisP[0]"), named("C1 in V"), named("gyro_deg_s"), named("in s")
     (('axisP[0]', ''), ('C1', 'V'), ('gyro_deg_s', 'deg/s'), ('time', 's'))
+    >>> named("data(:,1)"), named("data(:,1) [ms]")
+    (('data(:,1)', ''), ('data(:,1)', 'ms'))
     """
     match = _BRACKETS.match(heading)
     if match and match["name"]:
@@ -100,7 +103,7 @@ def named(heading: str) -> tuple[str, str]:
 
 
 def _is_a_name(unit: str) -> bool:
-    return unit in _LETTERS or unit.isdigit()
+    return unit in _LETTERS or _INDEX.fullmatch(unit) is not None
 
 
 def find_headings(
