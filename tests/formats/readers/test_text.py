@@ -347,3 +347,38 @@ def test_two_columns_of_one_name_are_told_apart_by_their_place(tmp_path):
     with pytest.raises(FormatError, match=r"two columns 'y'; say which: 'y \(column 3\)'"):
         read(path)
     assert read(path, outputs=["y (column 4)"]).outputs[0].values.tolist() == [3, 4]
+
+
+@pytest.mark.parametrize(
+    ("cut", "lost"),
+    [("0.99,1.", 1), ("0.99,1.2", 1), ("0.99,1.25e", 1), ("0.99,1.25e-", 1), ("0.99,1.2500", 0)],
+)
+def test_a_last_number_that_is_cut_short_is_left_out(tmp_path, cut, lost):
+    """1.25 of 1.2500e-05 would be a spike; without an end of line it may be all there is."""
+    lines = ["t,y", *(f"{k / 100:.2f},{np.cos(k):.4f}" for k in range(99))]
+    path = tmp_path / "cut.csv"
+    path.write_text("\n".join([*lines, cut]))
+    (series,) = reader_for(path).read(path, ["y"], Layout())
+    assert series.values.size == 100 - lost
+    assert [f.code for f in series.findings] == ["cut_short"] * lost
+    if not lost:  # an end of line says that the row is whole
+        path.write_text("\n".join([*lines, "0.99,1.2", ""]))
+        assert reader_for(path).read(path, ["y"], Layout())[0].values[-1] == 1.2
+
+
+@pytest.mark.parametrize(("delimiter", "mark"), [(",", "."), (";", ",")])
+def test_a_typeset_minus_is_a_minus(tmp_path, delimiter, mark):
+    values = np.round(np.sin(np.arange(60.0)), 3)
+    lines = [f"t{delimiter}y", *(f"{k}{delimiter}{v:.3f}" for k, v in enumerate(values))]
+    text = "\n".join(lines).replace("-", "\N{MINUS SIGN}").replace(".", mark)
+    path = tmp_path / "typeset.csv"
+    path.write_text(text + "\n", encoding="utf-8")
+    (series,) = reader_for(path).read(path, ["y"], Layout())
+    assert np.array_equal(series.values, values)
+
+
+def test_what_is_no_table_is_shown_where_its_numbers_should_be(tmp_path):
+    path = tmp_path / "fortran.csv"
+    path.write_text("t,y\n" + "1.5D+00,2.5D+00\n" * 9)
+    with pytest.raises(FormatError, match=r"no rows of numbers: line 6 is '1.5D\+00,2.5D\+00'"):
+        read(path)

@@ -24,7 +24,9 @@ __all__ = [
 BLANKS = " "
 """Delimiter that stands for any run of blanks and tabs."""
 
-DECIMAL_COMMA = re.compile(r"^\s*[-+]?\d+,\d+([eE][-+]?\d+)?\s*$")
+_MINUS = "\u2212"  # as typesetters and some spreadsheets write it
+
+DECIMAL_COMMA = re.compile(rf"^\s*[-+{_MINUS}]?\d+,\d+([eE][-+{_MINUS}]?\d+)?\s*$")
 
 # Where a comma is the decimal sign, a point may part thousands: it makes no number.
 _COMMA = str.maketrans({",": ".", ".": "_"})
@@ -102,8 +104,10 @@ def number(cell: str, decimal: str) -> float | None:
     --------
     >>> number("1,5", ","), number("n/a", "."), number("OL", ".") is None, number(" 2e3 ", ".")
     (1.5, nan, True, 2000.0)
+    >>> number("\N{MINUS SIGN}2", ".")
+    -2.0
     """
-    cell = cell.strip()
+    cell = cell.strip().replace(_MINUS, "-")
     plain = cell.translate(_COMMA) if decimal == "," else cell
     try:
         # Python reads 1_000 as a number, which nobody writes in a measurement.

@@ -127,10 +127,11 @@ def find_dialect(lines: Sequence[str], *, name: str) -> Dialect:
                 f"{name!r} has column names ({listed(cells)}) and no samples; record again"
             )
     if not trials:
-        words = rows[0][1].strip()[:60]
+        place, row = rows[len(rows) // 2]
         raise FormatError(
-            f"{name!r} starts with {words!r} and holds no rows of numbers; give a table with "
-            "comma, semicolon, tab or blanks between its columns"
+            f"{name!r} holds no rows of numbers: line {place + 1} is {row.strip()[:60]!r}; give a "
+            "table with comma, semicolon, tab or blanks between its columns, and numbers such as "
+            "-1234.5 or 1e-3"
         )
     dialect = max(trials, key=lambda trial: trial.score).dialect
     if dialect.decimal == "." and decimal_in((line for _, line in rows), dialect) == ",":

@@ -88,7 +88,7 @@ class Source:
         return self.path.name
 
     def blocks(self, *, size: int = _BLOCK) -> Iterator[str]:
-        r"""Yield the text in blocks of whole lines, each line ended by ``\n``.
+        r"""Yield the text in blocks of whole lines, each line but the file's last ended by ``\n``.
 
         Raises
         ------
@@ -120,7 +120,7 @@ class Source:
         except OSError as error:
             raise FormatError(f"{str(self.path)!r} cannot be read: {error.strerror}") from None
         if rest:
-            yield _newlines(rest) + ("" if rest.endswith(("\n", "\r")) else "\n")
+            yield _newlines(rest)
 
     def _decoded(
         self,

@@ -30,11 +30,12 @@ from hmpim.formats.readers.text.dialect import (
 )
 from hmpim.formats.readers.text.headings import Heading, find_headings
 from hmpim.formats.readers.text.instruments import Steady, known_headings, steady_time
-from hmpim.formats.readers.text.stamps import StampColumn
+from hmpim.formats.readers.text.stamps import StampColumn, looks_like_stamp
 
 __all__ = ["Columns", "Lines", "Table", "open_table", "read_columns"]
 
 _HEAD = 1500  # lines from which a table is understood
+_ENOUGH = 50  # numbers, of which one of equal length is the shortest with a chance of 2 %
 
 
 class Lines(Protocol):
@@ -46,7 +47,7 @@ class Lines(Protocol):
         ...
 
     def blocks(self) -> Iterator[str]:
-        """Yield the text in blocks of whole lines, from its start."""
+        """Yield the text in blocks of whole lines; the last one may lack its end."""
         ...
 
 
@@ -197,6 +198,9 @@ def read_columns(
                 raise FormatError(_said_width(table, rows[bad], lines[bad]))
             cut_short = lines[bad]
             rows, lines = rows[:bad], lines[:bad]
+        elif rows and not block.ended and _is_cut(rows[-1], table):
+            cut_short = lines[-1]
+            rows, lines = rows[:-1], lines[:-1]
         if not rows:
             continue
         time, arrays = _read_rows(table, rows, lines, wanted, clock, stamps)
@@ -210,11 +214,15 @@ def read_columns(
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Block:
-    """Rows of samples, with the number of each line; `last` if no more follow."""
+    """Rows of samples, with the number of each line; `last` if no more follow.
+
+    `ended` is False if the last row has no end of line.
+    """
 
     rows: list[str]
     lines: Sequence[int]
     last: bool
+    ended: bool
 
 
 def _row_blocks(table: Table) -> Iterator[_Block]:
@@ -241,7 +249,7 @@ def _row_blocks(table: Table) -> Iterator[_Block]:
         if odd:
             kept = [k for k, row in enumerate(rows) if row.strip() and not is_comment(row)]
             rows, lines = [rows[k] for k in kept], [lines[k] for k in kept]
-        yield _Block(rows=rows, lines=lines, last=ahead is None)
+        yield _Block(rows=rows, lines=lines, last=ahead is None, ended=text.endswith("\n"))
 
 
 def _bare(rows: list[str], dialect: Dialect) -> list[str]:
@@ -273,6 +281,26 @@ def _first_bad_width(rows: Sequence[str], dialect: Dialect) -> int | None:
 
 def _is_short(row: str, dialect: Dialect) -> bool:
     return len(split_row(row, dialect.delimiter)) < dialect.width
+
+
+def _is_cut(row: str, table: Table) -> bool:
+    """Whether a row without an end of line stops within its last number.
+
+    It does if that is no number, or has fewer digits after the decimal mark than all others.
+    """
+    dialect = table.dialect
+    cells = split_row(row, dialect.delimiter)
+    if len(cells) != dialect.width or not dialect.numeric[-1]:
+        return False
+    if number(cells[-1], dialect.decimal) is None:
+        return not looks_like_stamp(cells[-1])
+    others = [_after(cell, dialect.decimal) for cell in table.sample(dialect.width - 1)[:-1]]
+    return len(others) >= _ENOUGH and _after(cells[-1], dialect.decimal) < min(others)
+
+
+def _after(cell: str, mark: str) -> int:
+    """How many characters stand after the decimal mark."""
+    return len(cell.partition(mark)[2])
 
 
 def _said_width(table: Table, row: str, line: int) -> str:
