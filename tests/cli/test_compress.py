@@ -113,3 +113,35 @@ def test_what_cannot_be_is_refused_in_one_line(words, said, folder, monkeypatch)
     assert done.stderr.count("\n") == 1
     assert said in done.stderr
     assert not (folder / "x.h5").exists()
+
+
+@pytest.mark.parametrize(
+    "options",
+    [("--lags", "20"), ("--input", "w"), ("--fs", "50"), ("--from", "3"), ("--unit", "u=deg")],
+)
+def test_what_statistics_cannot_be_asked_is_refused(folder, tmp_path, options):
+    done = run("compress", folder / "small.h5", "-o", tmp_path / "new.h5", *options)
+    assert done.exit_code == 2
+    assert f"{options[0]} is about the samples of a record" in done.stderr
+    assert not (tmp_path / "new.h5").exists()
+
+
+def test_a_window_other_than_that_of_statistics_is_refused(folder, tmp_path):
+    done = run(
+        "compress", folder / "b.h5", folder / "small.h5", "-o", tmp_path / "n.h5", "--lags", 9
+    )
+    assert done.exit_code == 2
+    assert "small.h5 has a window of" in done.stderr
+
+
+@pytest.mark.parametrize("second", ["a.h5", "small.h5"])
+def test_a_record_that_would_count_twice_is_refused(folder, tmp_path, second):
+    """Two of one run would make each standard deviation too small by the root of two."""
+    done = run("compress", folder / "a.h5", folder / second, "-o", tmp_path / "twice.h5")
+    assert done.exit_code == 2
+    assert "runs 1 and 2 hold the same samples" in done.stderr
+    done = run("identify", folder / "small.h5", folder / "small.h5")
+    assert done.exit_code == 2
+    assert "runs 1 and 2 hold the same samples" in done.stderr
+    both = run("compress", folder / "a.h5", folder / "b.h5", "-o", tmp_path / "both.h5")
+    assert both.exit_code == 0, both.stderr

@@ -89,11 +89,21 @@ def compress(
 
     from hmpim.formats import save
 
+    about_samples = {
+        **{"--input": input_, "--output": output, "--fs": fs, "--time": time, "--unit": unit},
+        **{"--from": from_, "--to": to, "--sweep": sweep, "--sheet": sheet, "--lags": lags},
+    }
+    _refuse_unused(records, about_samples)
     roles = {"inputs": input_ and [input_], "outputs": output and [output]}
     options = reading(start=from_, stop=to, sweep=sweep, stamps=stamps, sheet=sheet)
     joined: Statistics | None = None
     for path in records:
         runs = statistics_of([path], {})
+        if runs is not None and lags not in (None, runs.lags):
+            raise ArgumentError(
+                f"--lags {lags}: {path} has a window of {runs.lags} samples, and all runs have "
+                "one; leave it out, or give the record"
+            )
         if runs is None:
             given = read_records(
                 [path],
@@ -109,9 +119,30 @@ def compress(
         joined = runs if joined is None else _join(joined, runs, (records[0], path), bias)
     if joined is None:  # Typer asks for one record at least
         return
+    _refuse_twice(joined)
     save(joined, out)
     if not quiet:
         say(_sentence(joined, out))
+
+
+def _refuse_unused(records: Sequence[Path], about_samples: Mapping[str, object]) -> None:
+    """Refuse options about samples where only statistics are given."""
+    from hmpim.formats.statistics_files import holds_statistics
+
+    if all(holds_statistics(path) for path in records):
+        statistics_of(records[:1], about_samples)
+
+
+def _refuse_twice(joined: "Statistics") -> None:
+    """Refuse a run that counts twice, which would make error bars too small."""
+    seen: dict[bytes, int] = {}
+    for place, run in enumerate(joined.runs, start=1):
+        first = seen.setdefault(run.vu.tobytes() + run.level.tobytes(), place)
+        if first != place:
+            raise ArgumentError(
+                f"runs {first} and {place} hold the same samples; one record given twice is not "
+                "two runs, so leave one out"
+            )
 
 
 def statistics_of(
@@ -152,6 +183,7 @@ def statistics_of(
     joined = read_statistics(compressed[0])
     for path in compressed[1:]:
         joined = _join(joined, read_statistics(path), (compressed[0], path))
+    _refuse_twice(joined)
     return joined
 
 
@@ -212,6 +244,17 @@ def _sentence(statistics: "Statistics", out: Path) -> str:
     source, answer = statistics.names
     return (
         f"{out}: {statistics.samples} samples of {source} → {answer} at {statistics.fs:g} Hz in "
-        f"{count} run{'s' if count > 1 else ''}, as statistics of {statistics.nbytes / 1e3:.3g} "
-        f"kB with a window of {statistics.lags / statistics.fs:.3g} s"
+        f"{count} run{'s' if count > 1 else ''}, as statistics of {_size(statistics.nbytes)} "
+        f"with a window of {statistics.lags / statistics.fs:.3g} s"
     )
+
+
+def _size(count: int) -> str:
+    """Return a number of bytes in words.
+
+    Examples
+    --------
+    >>> _size(53_000), _size(9_606_000)
+    ('53 kB', '9.61 MB')
+    """
+    return f"{count / 1e6:.3g} MB" if count >= 1e6 else f"{count / 1e3:.3g} kB"
