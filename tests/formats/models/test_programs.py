@@ -165,6 +165,10 @@ def test_a_delay_of_no_more_than_its_error_below_zero_counts_as_none(tmp_path):
     delay = replace(ahead.pairs[0].delay, std=1e-5)
     pair = replace(ahead.pairs[0], parameters=replace(ahead.pairs[0].parameters, delay=delay))
     (file,) = export(replace(ahead, pairs=(pair,)), to="python", path=tmp_path / "m.py")
+    said = "The delay of -1e-06 s cannot be stepped and is taken as 0: outputs come 1e-06 s late."
+    assert said in file.read_text()
+    (kept,) = export(replace(ahead, pairs=(pair,)), to="csv", path=tmp_path / "m.csv")
+    assert "is taken as 0" not in kept.read_text()
     u = walk(3)
     none = replace(SECOND, delay=0.0)
     assert runpy.run_path(str(file))["simulate"](u) == pytest.approx(none.simulate(u, T))
@@ -192,3 +196,33 @@ def test_what_cannot_be_exported_is_refused(tmp_path):
     nothing = replace(result.pairs[0], parameters=Parameters())
     with pytest.raises(RecordError, match="was not identifiable"):
         export(Identification(record=result.record, pairs=(nothing,)), to="c", path=tmp_path / "x")
+
+
+@pytest.mark.parametrize(
+    ("to", "file", "better"),
+    [
+        ("matlab", "my axis.m", "my_axis.m"),
+        ("matlab", "end.m", "end_model.m"),
+        ("modelica", "model.mo", "model_model.mo"),
+        ("modelica", "roll.y.mo", "roll_y.mo"),
+    ],
+)
+def test_a_file_that_its_language_could_not_call_is_refused(to, file, better, tmp_path):
+    with pytest.raises(ArgumentError, match=rf"cannot be called: .*; name it {better}$"):
+        export(result_of(SECOND), to=to, path=tmp_path / file)
+    (written,) = export(result_of(SECOND), to=to, path=tmp_path / better)
+    assert written.stem in written.read_text()
+
+
+def test_a_folder_gets_a_name_that_can_be_called(tmp_path):
+    result = result_of(SECOND)
+    pair = replace(result.pairs[0], input="roll.command", output="roll.position")
+    (file,) = export(replace(result, pairs=(pair,)), to="matlab", path=f"{tmp_path}/new/")
+    assert file.name == "roll_position_from_roll_command.m"
+
+
+def test_software_beside_a_continuous_pair_does_not_keep_it_from_export(tmp_path):
+    result = result_of(SECOND)
+    other = replace(result.pairs[0], output="z", intersample="sampled")
+    both = replace(result, pairs=(*result.pairs, other))
+    assert export(both, to="scipy", path=tmp_path / "m.py", pair=("y", "u"))

@@ -19,7 +19,7 @@ from hmpim.formats.models.matlab import write_matlab
 from hmpim.formats.models.modelica import write_modelica
 from hmpim.formats.models.mujoco import write_mujoco
 from hmpim.formats.models.python import write_python
-from hmpim.formats.models.source import Source, source_of
+from hmpim.formats.models.source import Source, identifier, source_of
 from hmpim.formats.models.uff58 import write_uff58
 from hmpim.identify import Identification
 from hmpim.record import Intersample
@@ -104,6 +104,22 @@ TARGETS: dict[str, _Writer] = {
 }
 
 
+_RESERVED: dict[str, frozenset[str]] = {
+    "matlab": frozenset(
+        "break case catch classdef continue else elseif end for function global if otherwise "
+        "parfor persistent return spmd switch try while".split()
+    ),
+    "modelica": frozenset(
+        "algorithm and annotation block break class connect connector constant constrainedby der "
+        "discrete each else elseif elsewhen encapsulated end enumeration equation expandable "
+        "extends external false final flow for function if import impure in initial inner input "
+        "loop model not operator or outer output package parameter partial protected public pure "
+        "record redeclare replaceable return stream then true type when while within".split()
+    ),
+}
+"""Words of the languages in which a model is called by the name of its file."""
+
+
 @checked
 def export(
     result: Identification,
@@ -178,11 +194,6 @@ def export(
         raise ArgumentError(
             f"target {to!r} is not known; choose one of {', '.join(get_args(Target))}"
         )
-    if to in _CONTINUOUS and any(pair.intersample == "sampled" for pair in result.pairs):
-        raise ArgumentError(
-            f"target {to!r} takes systems in continuous time, and this result is of software, "
-            "which knows samples alone; export it to c, python, fmu, json or csv"
-        )
     choices = _Choices(pade=pade, fmi=fmi, timestep=timestep)
     for name in ("pade", "fmi", "timestep"):
         if getattr(choices, name) is not None and name not in writer.choices:
@@ -200,7 +211,7 @@ def export(
     if writer.suffix and into_folder:
         name = "_from_".join(pair) if pair else _named(result)
         place.mkdir(parents=True, exist_ok=True)
-        place = place / f"{name}{writer.suffix}"
+        place = place / f"{identifier(name) if to in _RESERVED else name}{writer.suffix}"
     elif not writer.suffix and place.is_file():
         raise ArgumentError(f"{place} is a file; {to} needs a folder, so name another place")
     elif writer.suffix and not place.parent.is_dir():
@@ -209,7 +220,29 @@ def export(
     source = source_of(
         result, name=stem or place.resolve().name, pair=pair, fs=fs, intersample=intersample
     )
+    _check_kind(to, source)
+    if to in _RESERVED:
+        _check_name(to, place, source.name)
     return writer.write(source, place, choices)
+
+
+def _check_kind(to: str, source: Source) -> None:
+    if to in _CONTINUOUS and source.pair.intersample == "sampled":
+        raise ArgumentError(
+            f"target {to!r} takes systems in continuous time, and this result is of software, "
+            "which knows samples alone; export it to c, python, fmu, json or csv"
+        )
+
+
+def _check_name(to: str, place: Path, name: str) -> None:
+    """Refuse a file that its language would not find by its name."""
+    reserved = name in _RESERVED[to]
+    if place.stem != name or reserved:
+        better = f"{name}_model" if reserved else name
+        raise ArgumentError(
+            f"{place.name!r} cannot be called: {to} finds it by the name of its file; name it "
+            f"{better}{place.suffix}"
+        )
 
 
 def _named(result: Identification) -> str:

@@ -18,7 +18,7 @@ def write_matlab(source: Source, path: Path) -> tuple[Path, ...]:
     text = rendered(
         "model.m.jinja",
         name=source.name,
-        lines=source.lines(),
+        lines=source.program_lines(),
         input=_quoted(pair.input),
         output=_quoted(pair.output),
         output_unit=_quoted(model.output_unit),

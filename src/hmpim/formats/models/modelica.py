@@ -29,7 +29,7 @@ def write_modelica(source: Source, path: Path) -> tuple[Path, ...]:
     text = rendered(
         "model.mo.jinja",
         name=source.name,
-        lines=[line.replace('"', "'") for line in source.lines()],
+        lines=[line.replace('"', "'") for line in source.program_lines()],
         input=source.pair.input,
         output=source.pair.output,
         unit=model.output_unit,

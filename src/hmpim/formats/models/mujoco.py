@@ -70,7 +70,7 @@ def write_mujoco(source: Source, path: Path, *, timestep: float | None) -> tuple
         "model.xml.jinja",
         name=source.name,
         # Two dashes end a comment in XML.
-        lines=[line.replace("--", "- -") for line in source.lines()],
+        lines=[line.replace("--", "- -") for line in source.program_lines()],
         stepped=stepped,
         samples=ceil(late / stepped.timestep - _WHOLE) if late else 0,
         sensor_samples=max(ceil(model.delay / stepped.timestep - _WHOLE), 1),

@@ -11,7 +11,7 @@ from hmpim.identify import Estimate, Identification, PairIdentification, RecordS
 from hmpim.model import Chain, Model
 from hmpim.record import Intersample
 
-__all__ = ["Source", "source_of"]
+__all__ = ["Source", "identifier", "source_of"]
 
 _NEGLIGIBLE = 3.0
 """Standard deviations up to which a negative delay counts as none."""
@@ -70,6 +70,17 @@ class Source:
         said += [f"  {name}: {_words(estimate)}" for name, estimate in self.estimates()]
         said += [f"Warning ({w.code}): {w.message}" for w in pair.warnings]
         return [_ascii(line) for line in said]
+
+    def program_lines(self) -> list[str]:
+        """Say what `lines` says, and what a program has in place of a negative delay."""
+        late = -self.model.delay
+        if late <= 0.0:
+            return self.lines()
+        return [
+            *self.lines(),
+            f"The delay of {-late:.6g} s cannot be stepped and is taken as 0: outputs come "
+            f"{late:.6g} s late.",
+        ]
 
     def causal(self) -> Model:
         """Return the model as something that can be stepped: its delay not negative.
@@ -144,7 +155,7 @@ def source_of(
         raise ArgumentError(f"fs = {rate!r} Hz is not a rate; give a positive number")
     model = to_model(chosen, fs=result.record.fs)
     return Source(
-        name=_identifier(name),
+        name=identifier(name),
         model=model,
         pair=chosen,
         record=result.record,
@@ -154,12 +165,12 @@ def source_of(
     )
 
 
-def _identifier(name: str) -> str:
-    """Turn a name into one that every target accepts.
+def identifier(name: str) -> str:
+    """Turn a name into one of letters, digits and underscores.
 
     Examples
     --------
-    >>> _identifier("2nd axis.az")
+    >>> identifier("2nd axis.az")
     'm2nd_axis_az'
     """
     plain = re.sub(r"\W+", "_", name, flags=re.ASCII).strip("_") or "model"
