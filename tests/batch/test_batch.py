@@ -241,6 +241,28 @@ def test_metadata_comes_from_a_table_beside(folder_of_records, tmp_path, gain_al
     assert frame[str(folder_of_records / "unit1.h5")] == "A"
 
 
+def test_metadata_that_cannot_be_told_are_refused(folder_of_records, tmp_path):
+    """Of two rows of one record the second had been taken, without a word."""
+    beside = tmp_path / "units.csv"
+    for text, told in (
+        ("record,serial\na,A\na,B\n", "has 2 rows of 'a'"),
+        (None, "there is no file"),
+    ):
+        if text is None:
+            beside.unlink()
+        else:
+            beside.write_text(text)
+        request = Request(metadata=str(beside))
+        with pytest.raises(hmpim.HmpimError, match=told):
+            hmpim.batch(folder_of_records, out=tmp_path / "out", request=request, cluster=HERE)
+
+
+def test_records_are_not_looked_for_among_the_results(folder_of_records):
+    for out in (folder_of_records, folder_of_records.parent):
+        with pytest.raises(hmpim.HmpimError, match=r"lies in .*, the folder of the results"):
+            hmpim.batch(folder_of_records, out=out, cluster=HERE)
+
+
 def test_polars_reads_it_lazily(rows_file, tmp_path, gain_alone):
     polars = pytest.importorskip("polars")
     table = hmpim.batch(rows_file, out=tmp_path / "out", fs=FS, cluster=HERE)

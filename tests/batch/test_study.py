@@ -98,6 +98,14 @@ def test_records_without_figures_are_named():
     assert grid.rows == (("unit0.csv", "2", "it is empty"), ("unit2.csv", "1", "it is noise"))
 
 
+def test_a_bound_of_another_dimension_is_refused_before_any_work():
+    with pytest.raises(
+        hmpim.HmpimError, match="'delay < 5 mm': unit 'mm' cannot be turned into 's'"
+    ):
+        read_bound("delay < 5 mm")
+    assert read_bound("bias < 5 mm").unit == "mm"  # its unit is that of the output
+
+
 class Told:
     """A table of a few columns."""
 

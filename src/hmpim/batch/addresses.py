@@ -122,6 +122,11 @@ def find_files(paths: Sequence[str], *, without: Path | None = None) -> Iterator
                 seen.add(key)
                 yield file
         if not found:
+            if without is not None and any(_listed(str(path), None)):
+                raise ArgumentError(
+                    f"{str(path)!r} lies in {str(without)!r}, the folder of the results, which is "
+                    "not searched for records; name another folder for the results"
+                )
             raise ArgumentError(f"there are no records at {str(path)!r}; check the path")
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hmpim.batch.rows import PARAMETERS
-from hmpim.batch.summary import column, unit_of
+from hmpim.batch.summary import UNITS, column, unit_of
 from hmpim.batch.table import BatchTable
 from hmpim.errors import ArgumentError, UnitError
 from hmpim.units import conversion_factor
@@ -79,7 +79,7 @@ def read_bound(text: str) -> Bound:
     Raises
     ------
     ArgumentError
-        If it is none.
+        If it is none, or its unit not one of a time or a frequency where the parameter is.
 
     Examples
     --------
@@ -102,9 +102,22 @@ def read_bound(text: str) -> Bound:
             f"{text!r} bounds {match['name']!r}, which is no parameter; choose one of "
             f"{', '.join(PARAMETERS)}"
         )
-    return Bound(
+    bound = Bound(
         text=text.strip(), name=match["name"], sign=match["sign"], number=number, unit=match["unit"]
     )
+    if bound.name in UNITS:  # before any record is identified
+        _factor(bound, UNITS[bound.name])
+    return bound
+
+
+def _factor(bound: Bound, own: str) -> float:
+    """What the bound's number is multiplied by to be in the parameter's own unit."""
+    if not bound.unit:
+        return 1.0
+    try:
+        return conversion_factor(bound.unit, to=own)
+    except UnitError as error:
+        raise ArgumentError(f"{bound.text!r}: {error}") from None
 
 
 def held_against(table: BatchTable, bound: Bound) -> Outcome:
@@ -115,12 +128,8 @@ def held_against(table: BatchTable, bound: Bound) -> Outcome:
     ArgumentError
         If the bound's unit is not one of the parameter's dimension.
     """
-    own = unit_of(table, bound.name)
-    try:
-        factor = conversion_factor(bound.unit, to=own) if bound.unit else 1.0
-    except UnitError as error:
-        raise ArgumentError(f"{bound.text!r}: {error}") from None
-    limit, meets = bound.number * factor, _SIGNS[bound.sign]
+    limit = bound.number * _factor(bound, unit_of(table, bound.name))
+    meets = _SIGNS[bound.sign]
     value, low, high = (column(table, bound.name + end) for end in ("", "_low", "_high"))
     there = np.isfinite(value)
     ends = [np.where(np.isfinite(low), low, -np.inf), np.where(np.isfinite(high), high, np.inf)]

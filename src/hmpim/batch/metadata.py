@@ -1,6 +1,7 @@
 """Metadata of records from a table beside them: one row a record."""
 
 import csv
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path, PurePosixPath
@@ -82,11 +83,19 @@ def read_metadata(path: str, column: str) -> Beside:
                 f"are {', '.join(head)}"
             )
         at = list(head).index(column)
+        names = [line[at] for line in body]
         rows = {line[at]: (*line[:at], *line[at + 1 :]) for line in body}
+    except FileNotFoundError:
+        raise FormatError(f"there is no file {path!r} with metadata; check the path") from None
     except (OSError, ValueError, IndexError) as error:
         if isinstance(error, FormatError):
             raise
         raise FormatError(f"{path!r} is no table of metadata: {error}") from None
+    if twice := [name for name, count in Counter(names).items() if count > 1]:
+        raise FormatError(
+            f"{path!r} has {names.count(twice[0])} rows of {twice[0]!r}; leave one, as each "
+            "record has one"
+        )
     columns = tuple(name for name in head if name != column)
     wrong = next((name for name, values in rows.items() if len(values) != len(columns)), None)
     if wrong is not None:

@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 from hmpim.batch.rows import PARAMETERS
 from hmpim.batch.table import BatchTable
 
-__all__ = ["Failure", "ParameterSummary", "Summary", "column", "summary_of", "unit_of"]
+__all__ = ["UNITS", "Failure", "ParameterSummary", "Summary", "column", "summary_of", "unit_of"]
 
-_UNITS = {
+UNITS = {
     "delay": "s",
     "delay_correlation": "s",
     "delay_low_frequency": "s",
@@ -123,8 +123,8 @@ def column(table: BatchTable, name: str) -> NDArray[np.float64]:
 
 def unit_of(table: BatchTable, name: str) -> str:
     """Unit of a parameter; empty for none, or where the rows differ."""
-    if name in _UNITS:
-        return _UNITS[name]
+    if name in UNITS:
+        return UNITS[name]
     if name == "damping_ratio":
         return ""
     import pyarrow.compute as pc

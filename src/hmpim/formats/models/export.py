@@ -104,17 +104,17 @@ TARGETS: dict[str, _Writer] = {
 }
 
 
-_RESERVED: dict[str, frozenset[str]] = {
-    "matlab": frozenset(
+_RESERVED = {
+    "matlab": (
         "break case catch classdef continue else elseif end for function global if otherwise "
-        "parfor persistent return spmd switch try while".split()
+        "parfor persistent return spmd switch try while"
     ),
-    "modelica": frozenset(
+    "modelica": (
         "algorithm and annotation block break class connect connector constant constrainedby der "
         "discrete each else elseif elsewhen encapsulated end enumeration equation expandable "
         "extends external false final flow for function if import impure in initial inner input "
         "loop model not operator or outer output package parameter partial protected public pure "
-        "record redeclare replaceable return stream then true type when while within".split()
+        "record redeclare replaceable return stream then true type when while within"
     ),
 }
 """Words of the languages in which a model is called by the name of its file."""
@@ -236,7 +236,7 @@ def _check_kind(to: str, source: Source) -> None:
 
 def _check_name(to: str, place: Path, name: str) -> None:
     """Refuse a file that its language would not find by its name."""
-    reserved = name in _RESERVED[to]
+    reserved = name in _RESERVED[to].split()
     if place.stem != name or reserved:
         better = f"{name}_model" if reserved else name
         raise ArgumentError(
