@@ -122,6 +122,15 @@ def test_a_stimulus_of_every_kind(kind, tmp_path):
     assert other != stimulus
 
 
+@pytest.mark.parametrize("suffix", [".csv", ".h5", ".h"])
+def test_the_samples_of_a_stimulus_are_not_the_stimulus(suffix, tmp_path):
+    stimulus = hmpim.Stimulus(waveform=hmpim.Chirp(band=(1.0, 9.0), duration=2.0), fs=50.0)
+    path = tmp_path / f"s{suffix}"
+    hmpim.save(stimulus, path)
+    with pytest.raises(FormatError, match=r"holds the samples of a stimulus.*save it as .toml"):
+        hmpim.load(path)
+
+
 def test_a_record_on_one_clock_as_a_table(tmp_path):
     record = Record.from_arrays({"u": [0, 1 / 3]}, {"y": [1e300, 2]}, fs=10.0, band=(0.1, 2.0))
     hmpim.save(record, tmp_path / "r.csv")

@@ -43,7 +43,8 @@ def save(thing: Saved, path: str | PathLike[str]) -> None:
     path : str or path-like
         The file; replaced as a whole, or not at all. Its suffix says in which form: `.h5` for a
         record, or `.csv` if all its channels have one clock; `.toml` for a
-        stimulus; `.json` for a result; `.h5` for statistics.
+        stimulus; `.json` for a result; `.h5` for statistics. A stimulus is also written for its
+        rig, as `.csv`, `.h5`, `.mat`, `.h` or `.c`; `load` does not take those.
 
     Raises
     ------
@@ -187,11 +188,20 @@ def _read_result(path: Path) -> Identification:
         raise FormatError(f"{str(path)!r} is not a whole result: {error!r}") from error
 
 
+_SAMPLES_OF_STIMULI = (b"# hmpim stimulus", b"/* hmpim stimulus")
+
+
 def _knows_stimulus(head: bytes) -> bool:
-    return b"hmpim/stimulus/" in head
+    return b"hmpim/stimulus/" in head or head.startswith(_SAMPLES_OF_STIMULI)
 
 
 def _read_stimulus(path: Path) -> Stimulus:
+    if path.suffix.lower() != ".toml" and path.suffix.lower() in STIMULUS_SUFFIXES:
+        raise FormatError(
+            f"{str(path)!r} holds the samples of a stimulus, of which the stimulus itself cannot "
+            "be made again; save it as .toml, or read the samples with "
+            "hmpim.formats.stimulus_files.read_stimuli"
+        )
     found = read_stimulus_toml(path)
     if len(found) != 1:
         raise FormatError(
