@@ -148,6 +148,11 @@ def test_what_cannot_be_saved_or_loaded(result, tmp_path):
         ("{", "cannot be read as JSON"),
         ("[]", "holds nothing that hmpim.save writes"),
         ('{"schema": "x/1"}', "schema is 'x/1'"),
+        (
+            '{"schema": "hmpim/repeats/1"}',
+            "holds what repeats have in common, and the result of one",
+        ),
+        ('{"schema": "hmpim/model/1"}', "holds an exported model, and the result of one record is"),
         ('{"schema": "hmpim/identification/2"}', "is not a whole result"),
     ):
         (tmp_path / "r.json").write_text(content)

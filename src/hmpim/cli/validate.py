@@ -65,7 +65,9 @@ def validate(
     from hmpim.identify import validate as check
 
     if record is None and against is None:
-        raise ArgumentError("there is nothing to hold the result against; give a RECORD, --against")
+        raise ArgumentError(
+            "there is nothing to hold the result against; give a RECORD, or --against OLD"
+        )
     check_files(
         reads={"the result": result, "the record": record, "the older result": against},
         writes={"--json": json},

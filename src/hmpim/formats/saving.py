@@ -171,6 +171,24 @@ def _knows_result(head: bytes) -> bool:
     return head.lstrip().startswith(b"{")
 
 
+_OTHER_DOCUMENTS = {
+    "repeats": "what repeats have in common",
+    "levels": "a comparison of levels",
+    "validation": "a validation",
+    "model": "an exported model",
+    "channels": "a list of channels",
+    "study": "a study",
+    "campaign": "a case of a campaign",
+    "batch": "a batch",
+    "montecarlo": "a Monte Carlo study",
+    "gentlest": "a stimulus that was designed for an accuracy",
+    "paper": "figures of the paper",
+    "rigs": "a list of rigs",
+    "runs": "a list of runs",
+}
+"""What other JSON of hmpim holds, by the name in its schema."""
+
+
 def _read_result(path: Path) -> Identification:
     try:
         data = json.loads(read_text(path))
@@ -180,6 +198,12 @@ def _read_result(path: Path) -> Identification:
         raise FormatError(f"{str(path)!r} cannot be read as JSON: {error}") from None
     if not isinstance(data, dict):
         raise FormatError(f"{str(path)!r} holds no result of hmpim")
+    kind = str(data.get("schema")).removeprefix("hmpim/").partition("/")[0]
+    if kind in _OTHER_DOCUMENTS:
+        raise FormatError(
+            f"{str(path)!r} holds {_OTHER_DOCUMENTS[kind]}, and the result of one record is "
+            "needed; give what hmpim identify --json wrote of one"
+        )
     try:
         return Identification.from_dict(data)
     except FormatError as error:
