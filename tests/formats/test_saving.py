@@ -160,3 +160,30 @@ def test_what_cannot_be_saved_or_loaded(result, tmp_path):
             hmpim.load(tmp_path / "r.json")
     with pytest.raises(FormatError, match="there is no file"):
         hmpim.load(tmp_path / "r.docx")
+
+
+@pytest.mark.parametrize(
+    ("place", "value", "told"),
+    [
+        (("input",), None, r"result.pairs\[0\].input = None is not a text"),
+        (("verdict",), "good", r"pairs\[0\].verdict = 'good' is not one of 'ok'"),
+        (
+            ("parameters", "delay", "value"),
+            "fast",
+            r"parameters.delay.value = 'fast' is not a number",
+        ),
+        (("dynamics", "covariance"), [[None]], "no square of finite numbers"),
+    ],
+)
+def test_a_result_that_was_edited_is_refused_when_it_is_read(result, tmp_path, place, value, told):
+    """Not later, by a TypeError of whatever uses it."""
+    path = tmp_path / "r.json"
+    hmpim.save(result, path)
+    data = json.loads(path.read_text())
+    spot = data["pairs"][0]
+    for name in place[:-1]:
+        spot = spot[name]
+    spot[place[-1]] = value
+    path.write_text(json.dumps(data))
+    with pytest.raises(FormatError, match=told):
+        hmpim.load(path)

@@ -5,13 +5,16 @@ holds is told from the file itself.
 """
 
 import json
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, fields, is_dataclass
+from functools import cache
 from os import PathLike
 from pathlib import Path
-from typing import Any
+from typing import Any, cast, get_type_hints
 
-from hmpim.arguments import checked
+import numpy as np
+
+from hmpim.arguments import check_argument, checked
 from hmpim.errors import ArgumentError, FormatError
 from hmpim.formats.atomic import write_text
 from hmpim.formats.csv import write_csv
@@ -22,7 +25,7 @@ from hmpim.formats.statistics_files import FAMILY as STATISTICS
 from hmpim.formats.statistics_files import read_statistics, save_statistics
 from hmpim.formats.stimulus_files import STIMULUS_SUFFIXES, save_stimulus
 from hmpim.formats.stimulus_spec import read_stimulus_toml
-from hmpim.identify import Identification, Statistics
+from hmpim.identify import Identification, PairIdentification, Statistics
 from hmpim.record import Record
 from hmpim.stimulus import Stimulus
 
@@ -205,11 +208,43 @@ def _read_result(path: Path) -> Identification:
             "needed; give what hmpim identify --json wrote of one"
         )
     try:
-        return Identification.from_dict(data)
-    except FormatError as error:
+        result = Identification.from_dict(data)
+        _check_fields(result, "result")
+        for pair in result.pairs:
+            _check_covariance(pair)
+    except (FormatError, ArgumentError) as error:
         raise FormatError(f"{str(path)!r}: {error}") from None
     except (KeyError, TypeError, ValueError, AttributeError) as error:
         raise FormatError(f"{str(path)!r} is not a whole result: {error!r}") from error
+    return result
+
+
+def _check_fields(value: Any, name: str) -> None:
+    """Refuse a value that holds, at any depth, what its annotations exclude."""
+    if isinstance(value, tuple):
+        for place, one in enumerate(value):
+            _check_fields(one, f"{name}[{place}]")
+    elif is_dataclass(value):
+        for field, hint in _hints(value.__class__).items():
+            inner = getattr(value, field)
+            check_argument(f"{name}.{field}", inner, hint)
+            _check_fields(inner, f"{name}.{field}")
+
+
+def _check_covariance(pair: PairIdentification) -> None:
+    found = pair.covariance
+    if found is None:
+        return
+    if found.ndim != 2 or found.shape[0] != found.shape[1] or not np.isfinite(found).all():
+        raise FormatError(
+            f"the covariance of {pair.output!r} from {pair.input!r} is no square of finite numbers"
+        )
+
+
+@cache
+def _hints(kind: type) -> Mapping[str, Any]:
+    known = get_type_hints(kind)
+    return {field.name: known[field.name] for field in fields(cast(Any, kind))}
 
 
 _SAMPLES_OF_STIMULI = (b"# hmpim stimulus", b"/* hmpim stimulus")

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, fields, replace
 from importlib.metadata import version
 
-from hmpim.errors import ArgumentError
+from hmpim.errors import ArgumentError, RecordError
 from hmpim.identify import Estimate, Identification, PairIdentification, RecordSummary, to_model
 from hmpim.model import Chain, Model
 from hmpim.record import Intersample
@@ -149,6 +149,8 @@ def source_of(
                 + ", ".join(f"{p.output} from {p.input}" for p in known)
                 + "); choose one by its output and input"
             )
+        if not result.pairs:
+            raise RecordError("the result has no pair of channels, so there is no model")
         chosen = known[0] if known else result.pairs[0]
     rate = result.record.fs if fs is None else fs
     if not rate > 0:
