@@ -23,7 +23,7 @@ from hmpim.model.discrete import (
 from hmpim.model.response import RationalDelay
 from hmpim.record import Intersample
 
-__all__ = ["Chain", "Readout", "chain_of", "clean_output", "run_chain"]
+__all__ = ["Chain", "Readout", "chain_of", "run_chain"]
 
 _Real = NDArray[np.float64]
 
@@ -208,15 +208,6 @@ def _recursion(transition: _Real, driven: _Real) -> _Real:
         drive[1:] += triangle[i, i + 1 :] @ turned[i + 1 :, :-1]
         turned[i] = scipy.signal.lfilter([1.0], [1.0, -triangle[i, i]], drive)
     return np.asarray((basis @ turned).real)
-
-
-def clean_output(chain: Chain, u: _Real) -> _Real:
-    """Output of the linear part alone, bias and rest included, shape (n,).
-
-    Before the record the input stood at its first sample; in front of an integrator, at 0.
-    """
-    rest = 0.0 if chain.integrates else float(u[0])
-    return _play(chain.step, u - rest).output + chain.level * rest + chain.readout.bias
 
 
 def run_chain(chain: Chain, u: _Real, *, rng: np.random.Generator | None = None) -> _Real:

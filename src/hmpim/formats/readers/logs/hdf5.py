@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 
 from hmpim.errors import FormatError
 from hmpim.formats.hdf5 import faults_named
-from hmpim.formats.readers.logs.clock import is_time
-from hmpim.formats.readers.logs.log import Column, Group, Log, list_log, take_series, unit_of
+from hmpim.formats.readers.logs.log import Column, Log, groups_of, list_log, take_series, unit_of
 from hmpim.formats.readers.protocol import Contents, Layout, Reader
 from hmpim.record import Finding, Series
 
@@ -75,7 +74,7 @@ def parse(path: Path, layout: Layout) -> Log:
         names = ", ".join(elsewhere[:8])
         message = f"{names} keep their numbers in other files, which are not read"
         said = (Finding(code="elsewhere", message=message, severity="info", parameters=()),)
-    return Log(format="HDF5", groups=_joined(groups), findings=said)
+    return Log(format="HDF5", groups=groups_of(groups, separator="/", outermost="/"), findings=said)
 
 
 HDF5 = Reader(format="HDF5", sniff=sniff, channels=channels, read=read, foreign=True)
@@ -145,20 +144,3 @@ def _attribute(dataset: Any, name: str) -> object:
     if isinstance(value, np.ndarray) and value.size == 1:
         value = value.ravel()[0]
     return value.decode("utf-8", "replace") if isinstance(value, bytes) else value
-
-
-def _joined(groups: dict[tuple[str, int], list[Column]]) -> tuple[Group, ...]:
-    """Groups; those without time join one of equal length above that has it."""
-    found: dict[tuple[str, int], list[Column]] = {}
-    for (owner, size), columns in groups.items():
-        home = owner
-        timed = any(is_time(c.name) for c in columns)
-        while not timed and home:
-            home = home.rpartition("/")[0]
-            timed = any(is_time(c.name) for c in groups.get((home, size), []))
-        found.setdefault((home if timed else owner, size), []).extend(columns)
-    return tuple(
-        Group(name=f"{owner or '/'}, {size} samples", columns=tuple(columns))
-        for (owner, size), columns in found.items()
-        if columns
-    )

@@ -1,6 +1,6 @@
 """What every log is once its format is forgotten: groups of columns, each with one clock."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hmpim.errors import FormatError
-from hmpim.formats.readers.logs.clock import clock_column
+from hmpim.formats.readers.logs.clock import clock_column, is_time
 from hmpim.formats.readers.protocol import ChannelInfo, Contents, Layout, listed
 from hmpim.record import Finding, Series
 from hmpim.units import read_unit
@@ -19,6 +19,7 @@ __all__ = [
     "Group",
     "Log",
     "cut_short",
+    "groups_of",
     "list_log",
     "numbers",
     "per_count",
@@ -106,6 +107,42 @@ class Log:
     origin: float | None = None
     fs: float | None = None
     findings: tuple[Finding, ...] = ()
+
+
+def groups_of(
+    columns: Mapping[tuple[str, int], Sequence[Column]], *, separator: str, outermost: str
+) -> tuple[Group, ...]:
+    """Make groups of columns; those without time join the nearest owner of equal length with one.
+
+    Parameters
+    ----------
+    columns : mapping of (str, int) to sequence of Column
+        By the path of what they stand in, and by their number of samples.
+    separator : str
+        What stands between the parts of a path.
+    outermost : str
+        What the empty path is called.
+
+    Examples
+    --------
+    >>> t, u = (Column(name=name, load=None) for name in ("log.t", "log.in.u"))
+    >>> found = groups_of({("log", 9): [t], ("log.in", 9): [u]}, separator=".", outermost="file")
+    >>> [(g.name, [c.name for c in g.columns]) for g in found]
+    [('log, 9 samples', ['log.t', 'log.in.u'])]
+    """
+    timed = {at for at, members in columns.items() if any(is_time(c.name) for c in members)}
+    found: dict[tuple[str, int], list[Column]] = {}
+    for (owner, size), members in columns.items():
+        home = owner
+        while home and (home, size) not in timed:
+            home = home.rpartition(separator)[0]
+        at = (home, size) if (home, size) in timed else (owner, size)
+        found.setdefault(at, []).extend(members)
+    return tuple(
+        Group(name=f"{owner or outermost}, {size} samples", columns=tuple(members))
+        for (owner, size), members in found.items()
+        if members
+    )
 
 
 Parse = Callable[[Path, Layout], Log]

@@ -7,8 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from hmpim.formats.readers.logs.clock import is_time
-from hmpim.formats.readers.logs.log import Column, Group, Log, list_log, take_series, unit_of
+from hmpim.formats.readers.logs.log import Column, Log, groups_of, list_log, take_series, unit_of
 from hmpim.formats.readers.protocol import Contents, Layout, Reader, need
 from hmpim.formats.readers.text import named
 from hmpim.record import Series
@@ -60,7 +59,10 @@ def parse(path: Path, layout: Layout) -> Log:
                 holds=_COMPLEX,
             )
         )
-    return Log(format=words[:10].decode("ascii", "replace"), groups=_joined(groups))
+    return Log(
+        format=words[:10].decode("ascii", "replace"),
+        groups=groups_of(groups, separator=".", outermost="file"),
+    )
 
 
 MAT = Reader(format="MATLAB", sniff=sniff, channels=channels, read=read, extra="mat", foreign=True)
@@ -68,23 +70,6 @@ MAT = Reader(format="MATLAB", sniff=sniff, channels=channels, read=read, extra="
 
 def _values(values: Any) -> Any:
     return values
-
-
-def _joined(groups: dict[tuple[str, int], list[Column]]) -> tuple[Group, ...]:
-    """Groups, those without time beside one of equal length that has it, in one."""
-    found: dict[tuple[str, int], list[Column]] = {}
-    for (owner, size), columns in groups.items():
-        home = owner
-        timed = any(is_time(c.name) for c in columns)
-        while not timed and home:  # the time of the structure around it
-            home = home.rpartition(".")[0]
-            beside = groups.get((home, size), [])
-            timed = any(is_time(c.name) for c in beside)
-        found.setdefault((home if timed else owner, size), []).extend(columns)
-    return tuple(
-        Group(name=f"{owner or 'file'}, {size} samples", columns=tuple(columns))
-        for (owner, size), columns in found.items()
-    )
 
 
 def _vectors(data: Any, owner: str, depth: int) -> Iterator[tuple[str, str, Any, str]]:
