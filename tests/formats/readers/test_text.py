@@ -382,3 +382,13 @@ def test_what_is_no_table_is_shown_where_its_numbers_should_be(tmp_path):
     path.write_text("t,y\n" + "1.5D+00,2.5D+00\n" * 9)
     with pytest.raises(FormatError, match=r"no rows of numbers: line 6 is '1.5D\+00,2.5D\+00'"):
         read(path)
+
+
+def test_a_column_of_numbers_without_a_name_is_called_by_its_place(tmp_path):
+    """Not the first, which is the index of a data frame, nor one that is empty."""
+    path = tmp_path / "frame.csv"
+    path.write_text(",t,,y,\n" + "".join(f"{k},{k / 10},{k % 3},{k % 5},\n" for k in range(60)))
+    contents = reader_for(path).channels(path, Layout())
+    assert [c.name for c in contents.channels] == ["column 3", "y"]
+    record = read(path, inputs=["column 3"])
+    assert record.inputs[0].values[:4].tolist() == [0, 1, 2, 0]

@@ -123,7 +123,8 @@ def find_headings(
     Returns
     -------
     headings : tuple of Heading
-        Columns that have a name. Without a line of names they are called 'column 1', ….
+        Columns that have a name, and others of numbers but the first, called 'column 2', ….
+        Without a line of names all are called so.
     printed : bool
         False if the file has no line of names.
 
@@ -149,6 +150,8 @@ def find_headings(
         ), False
     found = []
     for k, cell in enumerate(cells[: dialect.width]):
+        if not cell and k and dialect.numeric[k]:  # the first one is a table's index
+            cell = f"column {k + 1}"
         if not cell:
             continue
         short, unit = named(cell)
