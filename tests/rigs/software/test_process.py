@@ -79,6 +79,21 @@ def test_the_greeting_says_what_comes():
         (START + "print('hello', flush=True)", "answered 'hello' to the greeting"),
         (START + "print('ready speed=3', flush=True)", "says 'speed', which is not known"),
         ("import sys; sys.exit('no licence')", "exit code 1 at the greeting; it said: no licence"),
+        (
+            READY + "input(); import os, signal; os.kill(os.getpid(), signal.SIGKILL)",
+            "was killed by signal 9 at sample 0",
+        ),
+        (
+            READY + "input(); import os; os.close(1); time.sleep(60)",
+            "closed its standard output at sample 0",
+        ),
+        (
+            READY + "for line in iter(input, 'end'):\n    print('1\\n2', flush=True)\n",
+            "wrote '[12]' (before|after).* without being asked, so its answers do not belong",
+        ),
+        (READY + ECHO + "print('done', flush=True)", "wrote 'done' after the last sample"),
+        ("while True: print('ready')", "wrote 'ready' before|did not answer|answered 'ready'"),
+        ("while True: print('x' * 9999, end='')", "answered 'xxx.*' to the greeting"),
     ],
 )
 def test_what_goes_wrong_is_told_and_the_program_ended(code, words):

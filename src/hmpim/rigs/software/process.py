@@ -20,7 +20,9 @@ import shlex
 import subprocess
 import sys
 import threading
+import time
 from collections import deque
+from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import IO
@@ -43,6 +45,8 @@ FloatArray = NDArray[np.float64]
 
 _GREETING = "hmpim 1"
 _PATIENCE = 2.0  # s for a program to end by itself
+_UNREAD = 16  # answers kept before they are asked for; one is too many already
+_LONGEST = 4096  # characters of a line that are read at once; a double has 24
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -146,7 +150,7 @@ class ProcessRig(Simulated):
         ------
         RigError
             If the program ends, fails, is silent for too long, or answers something else than
-            one finite number; the message says at which sample.
+            one finite number, or more than one; the message says at which sample.
         """
         talk, fed = self._playing.current(self.name)
         values = np.empty(len(block))
@@ -163,7 +167,7 @@ class ProcessRig(Simulated):
                     "number and nothing else on standard output"
                 )
         if block.last:
-            talk.end()
+            talk.finish()
         return {self.output_name: values}
 
     def stop(self) -> None:
@@ -199,13 +203,14 @@ class Talk:
         except OSError as error:
             raise RigError(f"{name!r}: {arguments[0]!r} cannot be started: {error}") from error
         self._lines: queue.Queue[str | None] = queue.Queue()
+        self._leave_at: float | None = None
         self._complaints: deque[str] = deque(maxlen=3)
         assert self._process.stdout is not None
         assert self._process.stderr is not None
         self._threads = (
             threading.Thread(target=self._read, args=(self._process.stdout,), daemon=True),
             threading.Thread(
-                target=self._complaints.extend, args=(self._process.stderr,), daemon=True
+                target=lambda: self._complaints.extend(_pieces(self._process.stderr)), daemon=True
             ),
         )
         for thread in self._threads:
@@ -217,9 +222,11 @@ class Talk:
         Raises
         ------
         RigError
-            If there is none within so many seconds, or the program says ``error``.
+            If there is none within so many seconds, the program says ``error``, or it has said
+            something that was not asked for.
         """
         assert self._process.stdin is not None
+        self._nothing_more(f"before {where}", 0.0)
         with suppress(OSError):  # it has ended: what it said before that is still to be read
             self._process.stdin.write(line + "\n")
             self._process.stdin.flush()
@@ -231,16 +238,47 @@ class Talk:
                 "output after each line" + self._complaint()
             ) from None
         if said is None:
-            code = self._process.wait()
-            raise RigError(
-                f"{self._name!r} ended with exit code {code} at {where}" + self._complaint()
-            )
+            raise RigError(f"{self._name!r} {self._how_it_ended()} at {where}" + self._complaint())
         if said.split(" ", 1)[0] == "error":
             raise RigError(f"{self._name!r} failed at {where}: {said[5:].strip() or 'no reason'}")
         return said
 
+    def finish(self) -> None:
+        """Say that there are no more samples, and see that no answer is left over.
+
+        Raises
+        ------
+        RigError
+            If one is: then the answers do not belong to the samples that they were taken for.
+        """
+        self.end()
+        self._nothing_more("after the last sample", _PATIENCE)
+
+    def _nothing_more(self, where: str, seconds: float) -> None:
+        try:
+            said = self._lines.get(timeout=seconds) if seconds else self._lines.get_nowait()
+        except queue.Empty:
+            return
+        if said is None:
+            self._lines.put(None)
+            return
+        raise RigError(
+            f"{self._name!r} wrote {said[:80]!r} {where} without being asked, so its answers do "
+            "not belong to their samples; it must write one line for each sample, and messages "
+            "to standard error"
+        )
+
+    def _how_it_ended(self) -> str:
+        try:
+            code = self._process.wait(_PATIENCE)
+        except subprocess.TimeoutExpired:
+            return "closed its standard output"
+        return f"was killed by signal {-code}" if code < 0 else f"ended with exit code {code}"
+
     def end(self) -> None:
         """Say that there are no more samples."""
+        if self._leave_at is None:
+            self._leave_at = time.monotonic() + _PATIENCE
         stdin = self._process.stdin
         assert stdin is not None
         if stdin.closed:
@@ -253,12 +291,15 @@ class Talk:
     def close(self) -> None:
         """Have the program end: asked first, then made to."""
         self.end()
+        assert self._leave_at is not None
+        patience = max(0.0, self._leave_at - time.monotonic())
         for last in (self._process.terminate, self._process.kill):
             try:
-                self._process.wait(_PATIENCE)
+                self._process.wait(patience)
                 break
             except subprocess.TimeoutExpired:
                 last()
+            patience = _PATIENCE
         self._process.wait()
         for thread in self._threads:
             thread.join(_PATIENCE)
@@ -267,8 +308,9 @@ class Talk:
                 stream.close()
 
     def _read(self, stream: IO[str]) -> None:
-        for line in stream:
-            self._lines.put(line.strip())
+        for line in _pieces(stream):
+            if self._lines.qsize() < _UNREAD:  # a flood must not fill the memory
+                self._lines.put(line.strip())
         self._lines.put(None)
 
     def _complaint(self) -> str:
@@ -276,6 +318,12 @@ class Talk:
         self._threads[1].join(0.2)
         said = " / ".join(line.strip() for line in self._complaints if line.strip())
         return f"; it said: {said[-300:]}" if said else ""
+
+
+def _pieces(stream: IO[str] | None) -> Iterator[str]:
+    """Lines of a program; one that has no end comes in pieces."""
+    assert stream is not None
+    return iter(lambda: stream.readline(_LONGEST), "")
 
 
 def _unit_of(said: str, *, name: str) -> str | None:
