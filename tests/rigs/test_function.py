@@ -90,6 +90,10 @@ def fails_at_three(u):
             r"returned nan at sample 5, for the input 0.5 \(5 such in all\)",
         ),
         (FunctionRig(function=lambda u: "a", mode="sample"), "failed at sample 0"),
+        (FunctionRig(function=lambda u: None, mode="sample"), "sample 0.*it returned None"),
+        (FunctionRig(function=lambda u: np.complex128(u), mode="sample"), "sample 0.*no real"),
+        (FunctionRig(function=lambda u: 1j * u), "it returned 0j, which is no real number"),
+        (FunctionRig(function=lambda u: [None] * u.size), "it returned None, which is no real"),
     ],
 )
 def test_failures_are_told_with_their_place(rig, words):

@@ -118,21 +118,23 @@ class FunctionRig(Simulated):
 
     def _whole(self, fed: FloatArray) -> FloatArray:
         try:
-            values = np.asarray(self.function(fed.copy()), dtype=np.float64)
+            returned = np.asarray(self.function(fed.copy()))
+            if returned.dtype.kind not in "biuf":  # none of numpy's real types
+                returned = np.vectorize(_real, otypes=[float])(returned.astype(object))
         except Exception as error:  # whatever the software under test raises
             raise RigError(f"{self.name!r} failed: {type(error).__name__}: {error}") from error
-        if values.shape != fed.shape:
+        if returned.shape != fed.shape:
             raise RigError(
-                f"{self.name!r} returned shape {values.shape} for an input of shape {fed.shape}; "
+                f"{self.name!r} returned shape {returned.shape} for an input of shape {fed.shape}; "
                 "make it return one number for each sample, or use mode='sample'"
             )
-        return self._finite(values, fed, first=0)
+        return self._finite(returned.astype(np.float64), fed, first=0)
 
     def _one_by_one(self, fed: FloatArray, *, first: int) -> FloatArray:
         values = np.empty(fed.size)
         for k, sample in enumerate(fed.tolist()):
             try:
-                values[k] = self.function(sample)
+                values[k] = _real(self.function(sample))
             except Exception as error:  # whatever the software under test raises
                 raise RigError(
                     f"{self.name!r} failed at sample {first + k}, for the input {sample:.6g}: "
@@ -148,3 +150,10 @@ class FunctionRig(Simulated):
                 f"input {fed[bad[0]]:.6g} ({bad.size} such in all); make it return finite numbers"
             )
         return values
+
+
+def _real(answer: Any) -> Any:
+    """Return the answer; numpy would take None for nan, and drop an imaginary part."""
+    if answer is None or isinstance(answer, complex):
+        raise TypeError(f"it returned {answer!r}, which is no real number")
+    return answer
