@@ -175,6 +175,14 @@ def test_ctrl_c_says_what_there_is_of_the_run(folder, monkeypatch):
     assert not read_recording(folder / "r.h5").complete
 
 
+@pytest.mark.parametrize("code", ["", "3"])
+def test_software_that_exits_does_not_choose_the_exit_code(folder, code):
+    (folder / "unit.py").write_text(f"import sys\n\n\ndef leaves(u):\n    sys.exit({code})\n")
+    out = run("run", "--rig", "python:unit.py:leaves", "s.csv", "-o", "r.h5")
+    assert out.exit_code == 2
+    assert out.stderr.startswith(f"hmpim: the rig called sys.exit({code or None})")
+
+
 def test_a_run_that_breaks_off_says_in_its_one_line_what_is_kept(folder):
     (folder / "unit.py").write_text(
         "from itertools import count\n\nCALLS = count()\n\n\n"

@@ -12,7 +12,7 @@ from hmpim.cli.complete import complete_rig
 from hmpim.cli.files import check_files
 from hmpim.cli.stages import Stages
 from hmpim.cli.terminal import output_console, say, warn, working
-from hmpim.errors import ArgumentError, HmpimError
+from hmpim.errors import ArgumentError, HmpimError, RigError
 
 if TYPE_CHECKING:
     from hmpim.cli.strip import Strip
@@ -240,13 +240,21 @@ def _again(text: str, description: "Description | None") -> "Rig":
 
 @contextmanager
 def _kept_is_said(log: "RunLog") -> Iterator[None]:
-    """Say after Ctrl-C what there is of the run, and with an error that broke it off."""
+    """Say what there is of a run that was broken off, by a signal or by an error.
+
+    Software under test that calls sys.exit does not choose the exit code: that is an error too.
+    """
+    from hmpim.experiment.interrupt import AskedToEnd
+
     try:
         yield
-    except KeyboardInterrupt:
+    except (KeyboardInterrupt, AskedToEnd):
         for message in _kept(log):
             warn(message)
         raise
+    except SystemExit as error:
+        message = f"the rig called sys.exit({error.code!r}); make it return, or raise an error"
+        raise RigError("; ".join((message, *_kept(log)))) from error
     except HmpimError as error:
         raise type(error)("; ".join((str(error), *_kept(log)))) from error
 

@@ -6,11 +6,18 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from types import FrameType
 
-__all__ = ["ending_politely", "undisturbed"]
+__all__ = ["AskedToEnd", "ending_politely", "undisturbed"]
 
 _POLITE = tuple(
     getattr(signal, name) for name in ("SIGTERM", "SIGHUP", "SIGBREAK") if hasattr(signal, name)
 )
+
+
+class AskedToEnd(SystemExit):
+    """A signal asks the process to end; any other SystemExit is from the software under test."""
+
+    def __init__(self, number: int) -> None:
+        super().__init__(128 + number)
 
 
 def _in_main_thread() -> bool:
@@ -19,7 +26,7 @@ def _in_main_thread() -> bool:
 
 @contextmanager
 def ending_politely() -> Iterator[None]:
-    """Turn the signals that ask a process to end into SystemExit, so that cleanup runs.
+    """Turn the signals that ask a process to end into `AskedToEnd`, so that cleanup runs.
 
     In a thread other than the main one nothing is changed: signals do not come there.
 
@@ -29,7 +36,7 @@ def ending_politely() -> Iterator[None]:
     >>> try:
     ...     with ending_politely():
     ...         os.kill(os.getpid(), signal.SIGTERM)
-    ... except SystemExit as ended:
+    ... except AskedToEnd as ended:
     ...     print(ended.code == 128 + signal.SIGTERM)
     True
     """
@@ -38,7 +45,7 @@ def ending_politely() -> Iterator[None]:
         return
 
     def end(number: int, _frame: FrameType | None) -> None:
-        raise SystemExit(128 + number)
+        raise AskedToEnd(number)
 
     # A signal that is ignored, as with nohup, stays ignored.
     before = {n: signal.getsignal(n) for n in _POLITE if signal.getsignal(n) == signal.SIG_DFL}
@@ -90,4 +97,4 @@ def undisturbed() -> Iterator[None]:
     if came:
         if came[0] == signal.SIGINT:
             raise KeyboardInterrupt
-        raise SystemExit(128 + came[0])
+        raise AskedToEnd(came[0])
