@@ -175,6 +175,13 @@ def test_ctrl_c_says_what_there_is_of_the_run(folder, monkeypatch):
     assert not read_recording(folder / "r.h5").complete
 
 
+def test_a_stimulus_at_another_rate_than_the_rig_states_is_refused(folder):
+    (folder / "unit.toml").write_text('rig = "sensor"\nrate = 123\n')
+    out = run("run", "--rig-file", "unit.toml", "s.csv", "-o", "r.h5")
+    assert out.exit_code == 2
+    assert "states rate = 123 Hz; design the stimulus at this rate" in out.stderr
+
+
 @pytest.mark.parametrize("code", ["", "3"])
 def test_software_that_exits_does_not_choose_the_exit_code(folder, code):
     (folder / "unit.py").write_text(f"import sys\n\n\ndef leaves(u):\n    sys.exit({code})\n")

@@ -63,6 +63,7 @@ def test_a_broken_description_harms_only_itself(project):
         ({"rate": "fast"}, "rate = 'fast': input should be a valid number"),
         ({"limits": {"position": -1}}, "position = -1: input should be greater than 0"),
         ({"limits": {"roll": {"velocty": 1}}}, "'limits.roll.velocty' is not known; known are acc"),
+        ({"axes": "roll"}, r"axes = 'roll': input should be a list \[...\]"),
         ({"axes": ["roll"], "limits": {"yaw": {"position": 1}}}, "limits of 'yaw', which is none"),
         ({"unlimited": True, "limits": {"position": 1}}, "unlimited = true and limits contradict"),
         ({"mode": "VP"}, "mode = 'VP': input should be 'P', 'PV' or 'PVA'"),

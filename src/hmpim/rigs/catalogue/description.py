@@ -152,7 +152,7 @@ def _first(error: ValidationError) -> str:
         model = Description if "." not in place else StatedLimits
         known = ", ".join(sorted(model.model_fields))
         return f"{place!r} is not known; known are {known}"
-    message = wrong["msg"].removeprefix("Value error, ")
+    message = wrong["msg"].removeprefix("Value error, ").replace("valid tuple", "list [...]")
     if not place:
         return message
     return f"{place} = {wrong['input']!r}: {message[0].lower()}{message[1:]}"
