@@ -63,7 +63,7 @@ def slider(page: Page, url: str, desks: Desks) -> None:
     """Time from a slider's step to the redrawn plot that shows it, 10 s at 1 kHz."""
     for label, shows in (
         ("Window α", "Spectra"),
-        ("Extinction n (0: as small as fits)", "Position"),
+        ("Extinction n (0: solved)", "Position"),
         ("Amplitude, share of the limit", "Position"),
     ):
         desk = desks.put(Desk(name="5110e25110e25110", wish=Wish(extinction=0.5)))

@@ -23,6 +23,11 @@ def test_only_what_changes_a_stimulus_designs_it_anew():
     assert stimuli_of(replace(WISH, duration=4.0))[0] is not stimulus
 
 
+def test_a_design_that_would_keep_every_window_waiting_is_refused():
+    with pytest.raises(ArgumentError, match=r"1e.08 samples of all axes; at most 1e.07"):
+        stimuli_of(replace(WISH, duration=1e5, fs=1000.0))
+
+
 def test_what_is_solved_is_what_the_stimulus_has():
     found = designed(WISH)
     stimulus = stimuli_of(WISH)[0]

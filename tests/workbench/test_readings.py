@@ -84,6 +84,50 @@ def test_a_run_of_several_axes_is_analysed_as_a_whole(tmp_path):
     assert (seen.inputs, seen.outputs) == (("a", "b"), ("c", "d"))
 
 
+def test_what_is_known_of_the_input_and_the_loop_is_asked_with_it(folder, tmp_path, monkeypatch):
+    path = folder / "unit1" / "run.h5"
+    asked = Question(file=str(path), inputs=("u",), outputs=("y",), intersample="zoh")
+    assert found(asked, View()).result.pairs[0].intersample == "zoh"
+    assert asked.automatic == asked  # what is known is not set by hand
+    rng = np.random.default_rng(1)
+    r, u, y = np.cumsum(rng.standard_normal((3, 400)), axis=1)
+    loop = tmp_path / "loop.csv"
+    loop.write_text("r,u,y\n" + "".join(f"{a},{b},{c}\n" for a, b, c in zip(r, u, y, strict=True)))
+    given: list[object] = []
+    monkeypatch.setattr(
+        "hmpim.workbench.work.record.identify",
+        lambda record, **named: given.append((record, named)),
+    )
+    monkeypatch.setattr("hmpim.workbench.work.record._slim", lambda result: result)
+    automatic(replace(asked, file=str(loop), fs=100.0, reference="r"))
+    ((record, named),) = given
+    assert [channel.name for channel in record.references] == ["r"]
+    assert named == {"structures": None, "intersample": "zoh", "reference": "r"}
+
+
+def test_a_comparison_says_whose_figures_they_are_and_which_are_doubtful(tmp_path):
+    for k, band in enumerate((20.0, 3.0), start=1):
+        stimulus = designed_once(band=(0.1, band), duration=10, fs=200, limits=LIMITS)
+        sensor = hmpim.Sensor(delay=0.15, natural_frequency=10, damping_ratio=0.4, noise_std=0.1)
+        (tmp_path / "up").mkdir(exist_ok=True)
+        save(hmpim.run(sensor, stimulus, rng=k), tmp_path / "up" / f"{k}.h5")
+    shown = compared(str(tmp_path), ["up/1.h5", "up/2.h5"], "delay", "")
+    table = {row[0]: row[1:] for row in shown.cells}
+    assert shown.columns[1:] == ("up/1.h5", "up/2.h5")
+    assert table["Pair"] == ("y from u", "y from u")
+    assert table["Verdict"] == ("ok", "doubtful")
+    assert [cell.endswith(" (doubtful)") for cell in table["Natural frequency"]] == [False, True]
+
+
+def test_a_figure_of_the_papers_steps_alone_has_its_unit():
+    from hmpim.workbench.parts.table import parameter_cells
+
+    pair = hmpim.identify(recorded()).pairs[0]
+    found = replace(pair, parameters=replace(pair.parameters, peak_gain_db=None))
+    rows = {row[0]: row for row in parameter_cells(found, {})[1]}
+    assert rows["Peak gain"][1:3] == ("–", "dB")
+
+
 def test_a_specification_is_a_line_in_the_trend(folder):
     names = ["unit1/run.h5", "unit2/run.h5"]
     shown = compared(folder, names, "delay", "", "delay < 130ms, bandwidth_phase90 > 1 Hz")

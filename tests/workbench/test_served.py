@@ -296,6 +296,37 @@ NAMES = """() => [...document.querySelectorAll('.hm-picture')].flatMap((plot) =>
 })"""
 
 
+INK = """(button) => {
+    const of = (e) => getComputedStyle(e);
+    return [of(button).color, of(button.closest(".q-uploader__header")).backgroundColor];
+}"""
+
+
+@pytest.mark.browser
+def test_the_button_that_chooses_a_file_is_seen_and_each_doubt_is_said_once(page, served, tmp_path):
+    record = recorded()
+    u, y = record.inputs[0].values, record.outputs[0].values
+    rows = "\n".join(f"{k / 200},{b},{a}" for k, (a, b) in enumerate(zip(u, y, strict=True)))
+    (tmp_path / "swapped.csv").write_text(f"time,u,y\n{rows}\n")
+    go(page, served, "analyse")
+    choose = page.get_by_role("button", name="Choose a file")
+    ink, ground = choose.evaluate(INK)
+    assert ink != ground
+    page.set_input_files("input[type=file]", tmp_path / "swapped.csv")
+    page.get_by_role("combobox", name="Outputs").wait_for()
+    page.locator(".q-uploader__list > *").wait_for(state="detached")
+    page.get_by_role("button", name="Identify").click()
+    verdict = page.get_by_role("region", name="Verdict")
+    verdict.get_by_text("Use with care").wait_for()
+    said = verdict.inner_text()
+    assert said.count("the columns are swapped") == 1
+    pair = hmpim.identify(hmpim.Record.from_arrays({"u": y}, {"y": u}, fs=200.0)).pairs[0]
+    doubts = [w.message for w in pair.warnings if w.severity == "doubt"]
+    assert len(doubts) > 3
+    assert [said.count(doubt) for doubt in doubts] == [1] * len(doubts)
+    page.get_by_text("−90°: no value, drag to set").wait_for()
+
+
 @pytest.mark.browser
 def test_a_narrower_window_keeps_the_height_of_plots_and_paper_has_no_controls(page, served):
     save(recorded(), served.runs / "narrow.h5")
@@ -359,8 +390,11 @@ def test_two_runs_are_compared_and_held_against_a_specification(page, served):
     page.get_by_role("row", name=re.compile("unit1.*fail")).wait_for()  # without looking again
     assert page.get_by_role("row", name=re.compile("unit2.* ok ok ")).count() == 1
     page.get_by_label("Specification").fill("delay < 0.2")
-    page.get_by_role("button", name="Look again").click()
+    page.get_by_role("button", name="Read the folder again").click()
     page.get_by_role("row", name=re.compile("unit1.* ok ok ")).wait_for()
+    page.get_by_label("Only those with").fill("name = *unit9*")
+    page.get_by_role("button", name="Read the folder again").click()
+    page.get_by_text("No run meets this condition.").wait_for()
 
 
 @pytest.mark.browser

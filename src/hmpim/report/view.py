@@ -24,6 +24,7 @@ from hmpim.report.words import (
     GLOSSARY,
     VERDICTS,
     by_weight,
+    fixed_unit,
     headline,
     nonlinear_facts,
     off_by,
@@ -245,7 +246,7 @@ def _rows(pair: PairIdentification, truth: Mapping[str, float]) -> list[dict[str
                 "value": "–"
                 if estimate is None
                 else format_value(estimate, positive=words.positive),
-                "unit": "" if estimate is None else estimate.unit,
+                "unit": fixed_unit(words.name) if estimate is None else estimate.unit,
                 "interval": ""
                 if estimate is None
                 else format_interval(estimate, positive=words.positive),

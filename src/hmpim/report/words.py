@@ -18,6 +18,7 @@ __all__ = [
     "ParameterWords",
     "by_weight",
     "doubtful_and_ok",
+    "fixed_unit",
     "headline",
     "label_of",
     "leading",
@@ -177,6 +178,27 @@ def label_of(name: str) -> str:
     ('Bandwidth, −90°', 'Fit percent')
     """
     return _LABELS.get(name, name.replace("_", " ").capitalize())
+
+
+_FIXED_UNITS = {
+    "delay": "s",
+    "time": "s",
+    "hold": "s",
+    "bandwidth": "Hz",
+    "natural": "Hz",
+    "peak": "dB",
+}
+
+
+def fixed_unit(name: str) -> str:
+    """Return the unit of a parameter that has the same one in every record; '' for any other.
+
+    Examples
+    --------
+    >>> fixed_unit("delay_correlation"), fixed_unit("peak_gain_db"), fixed_unit("bias")
+    ('s', 'dB', '')
+    """
+    return _FIXED_UNITS.get(name.partition("_")[0], "")
 
 
 VERDICTS: dict[Verdict, str] = {

@@ -85,8 +85,8 @@ class Checked:
 class Analysis:
     """What is analysed, and what was set by hand.
 
-    `start`, `stop` in s and `structure` are None for all and any; `hand` holds values set by hand,
-    by parameter.
+    `start`, `stop` in s and `structure` are None for all and any; `intersample` and `reference` are
+    as `hmpim.identify` takes them; `hand` holds values set by hand, by parameter.
     """
 
     file: str = ""
@@ -96,6 +96,8 @@ class Analysis:
     start: float | None = None
     stop: float | None = None
     structure: str | None = None
+    intersample: str = "auto"
+    reference: str | None = None
     window: str = "gaussian"
     alpha: float = 1.5
     pair: int = 0

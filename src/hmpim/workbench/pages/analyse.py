@@ -11,6 +11,7 @@ from nicegui import events, ui
 from hmpim.errors import ArgumentError
 from hmpim.identify import Identification
 from hmpim.model.dynamics import STRUCTURES
+from hmpim.plots.candidates import INTERSAMPLE_WORDS
 from hmpim.report.words import structure_words
 from hmpim.workbench.bench import Window
 from hmpim.workbench.desks import Analysis
@@ -20,6 +21,11 @@ from hmpim.workbench.pages.result import ResultView
 from hmpim.workbench.work.record import Looked, Question, View, automatic, found, look
 
 __all__ = ["analyse"]
+
+_BETWEEN: dict[str, str] = {
+    "auto": "found from the record",
+    **{str(name): words for name, words in INTERSAMPLE_WORDS.items()},
+}
 
 
 def analyse(window: Window) -> Later:
@@ -95,6 +101,7 @@ class AnalysePage:
                 name = str(place.relative_to(self.window.workbench.settings.runs))
                 self.files.set_options(sorted([*self.files.options, name]))
                 self.files.set_value(name)
+            dropped.reset()  # what is read stands in the list of files
 
         def refused() -> None:
             ui.notify(
@@ -102,20 +109,22 @@ class AnalysePage:
                 type="negative",
             )
 
-        ui.upload(
+        dropped = ui.upload(
             label="Drop a file of any format here",
             auto_upload=True,
             max_file_size=largest,
             on_upload=uploaded,
             on_rejected=refused,
-        ).props('flat aria-label="Drop a file of any format"').on("failed", refused)
+        )
+        dropped.props('flat aria-label="Drop a file of any format"').on("failed", refused)
 
     async def _take(self, file: str | None) -> None:
         if not file or file == self.wish.file:
             return
         self.change(
-            file=file, inputs=(), outputs=(), fs=None, start=None, stop=None, pair=0, hand={}
-        )
+            file=file, inputs=(), outputs=(), fs=None, start=None, stop=None, pair=0, hand={},
+            reference=None,
+        )  # fmt: skip
         self.result = None
         self.asked += 1
         self.shown.clear()
@@ -191,6 +200,18 @@ class AnalysePage:
                 value=self.wish.structure or "",
                 on_change=lambda e: self.change(structure=e.value or None),
             )
+            ui.select(
+                _BETWEEN,
+                label="Input between its samples",
+                value=self.wish.intersample,
+                on_change=lambda e: self.change(intersample=e.value),
+            )
+            ui.select(
+                {"": "none", **named},
+                label="Command of the loop (reference)",
+                value=self.wish.reference if self.wish.reference in named else "",
+                on_change=lambda e: self.change(reference=e.value or None),
+            )
             self.button = ui.button("Identify", on_click=self.identify)
 
     async def identify(self) -> None:
@@ -249,6 +270,8 @@ class AnalysePage:
             start=wish.start,
             stop=wish.stop,
             structure=wish.structure,
+            intersample=wish.intersample,
+            reference=wish.reference,
         )
 
 
@@ -263,6 +286,10 @@ def _command(wish: Analysis) -> str:
             words += [option, f"{value:g}"]
     if wish.structure is not None:
         words += ["--structure", wish.structure]
+    if wish.intersample != "auto":
+        words += ["--intersample", wish.intersample]
+    if wish.reference is not None:
+        words += ["--reference", wish.reference]
     for name, value in wish.hand.items():
         words += ["--hand", f"{name}={value:.6g}"]
     return shlex.join([*words, "--report", f"{Path(wish.file).stem}.report.html"])

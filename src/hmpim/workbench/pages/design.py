@@ -71,13 +71,13 @@ class DesignPage:
                         "The largest motion and the smallest extinction inside the limits"
                     )
                     ui.button("Gentlest", on_click=self._gentlest).tooltip(
-                        "The smallest peak acceleration that tells the natural frequency as wanted"
+                        "The smallest peak acceleration that still gives the accuracy wanted"
                     )
             with card("Test"):
                 self._numbers(self.wish, self._set, _TEST)
                 ui.input("Unit", value=self.wish.unit, on_change=lambda e: self._set(unit=e.value))
             self.rows = ui.element("div").classes("hm-side")
-            with card("What is roughly known"):
+            with card("Rough model of the unit"):
                 self._numbers(self.wish.model, self._model, _MODEL)
         with ui.element("div").classes("hm-body"):
             with card("Design"):
@@ -160,10 +160,10 @@ class DesignPage:
             "amplitude", "Amplitude, share of the limit", (0.01, 1.0), row.amplitude / row.position
         )
         self._slider(
-            "extinction", "Extinction n (0: as small as fits)", (0.0, 3.0),
+            "extinction", "Extinction n (0: solved)", (0.0, 3.0),
             self.wish.extinction or 0.0,
         )  # fmt: skip
-        self._slider("lead", "Lead, s (0: as gentle as fits)", (0.0, 2.0), self.wish.lead or 0.0)
+        self._slider("lead", "Lead, s (0: solved)", (0.0, 2.0), self.wish.lead or 0.0)
         self._slider("alpha", "Window α", (0.1, 5.0), self.wish.alpha)
 
     def _slider(self, name: str, words: str, ends: tuple[float, float], value: float) -> None:
@@ -304,7 +304,7 @@ class DesignPage:
         self.bands.set_text(f"Swept: {'; '.join(bands)}")
         self.tables.clear()
         with self.tables:
-            heads = ("Axis", "Quantity", "Peak", "Limit", "")
+            heads = ("Axis", "Quantity", "Peak", "Limit", "Unit")
             plain_table(heads, found.peaks, title="Peaks and limits")
             plain_table(("Axis", "Parameter", "Predicted ± (95 %)"), errors, title="Error bars")
 

@@ -11,7 +11,7 @@ from hmpim.plots import Curve, Figure
 from hmpim.plots.by_hand import with_hand_values
 from hmpim.report.by_hand import reading_at
 from hmpim.report.figures import Picture as Described
-from hmpim.report.words import by_weight, headline, structure_words
+from hmpim.report.words import by_weight, headline, leading, structure_words
 from hmpim.workbench.bench import Window
 from hmpim.workbench.desks import Analysis
 from hmpim.workbench.pages.frame import card, failures_said
@@ -25,6 +25,8 @@ if TYPE_CHECKING:
 __all__ = ["Owner", "ResultView"]
 
 _CLASSES = {"ok": "hm-ok", "doubtful": "hm-doubt"}
+_WEIGHTS = {"doubt": "hm-doubt", "info": "hm-soft"}
+_FEW = 3  # remarks that are shown before a reader asks for more
 _BY_HAND = {
     "bandwidth_phase90": "−90° by hand (Hz)",
     "bandwidth_3db": "−3 dB by hand (Hz)",
@@ -101,9 +103,7 @@ class ResultView:
                     f"{structure_words(self.beside.structure)}, whole record: "
                     f"{headline(self.automatic)}"
                 )
-            for finding in by_weight(self.pair.warnings)[:3]:
-                mark = "hm-doubt" if finding.severity == "doubt" else "hm-soft"
-                ui.label(finding.message).classes(mark)
+            self._findings()
             with ui.element("div").classes("hm-row"):
                 ui.button("Report", icon="download", on_click=self._report)
                 if len(result.pairs) > 1:
@@ -111,6 +111,21 @@ class ResultView:
                     ui.select(
                         named, label="Pair", value=self.owner.wish.pair, on_change=self._other
                     )
+
+    def _findings(self) -> None:
+        """Show what the verdict does not say itself: every doubt, and a few of the remarks."""
+        said = leading(self.pair) if len(self.found.result.pairs) == 1 else None
+        left = [finding for finding in by_weight(self.pair.warnings) if finding is not said]
+        doubts = sum(finding.severity == "doubt" for finding in left)
+        shown, more = left[: max(doubts, _FEW)], left[max(doubts, _FEW) :]
+        for finding in shown:
+            ui.label(finding.message).classes(_WEIGHTS[finding.severity])
+        if more:
+            with ui.element("details").classes("hm-more"):
+                with ui.element("summary"):
+                    ui.label(f"{len(more)} more").style("display: inline")
+                for finding in more:
+                    ui.label(finding.message).classes(_WEIGHTS[finding.severity])
 
     async def _other(self, event: object) -> None:
         self.owner.change(pair=int(getattr(event, "value", 0)), hand={})
@@ -165,11 +180,11 @@ class ResultView:
             middle = float(frequency[frequency.size // 2]) if frequency.size else 1.0
             places = {"bandwidth_phase90": (1, "−90°"), "bandwidth_3db": (0, "−3 dB")}
             return [
-                Cursor(name=name, at=self._value(name, middle), label=label, panel=panel)
+                self._cursor(name, label, middle, panel=panel)
                 for name, (panel, label) in places.items()
             ]
         if key == "correlation":
-            return [Cursor(name="delay", at=self._value("delay", 0.0), label="delay")]
+            return [self._cursor("delay", "delay", 0.0)]
         if key == "signals" and found is not None:
             time = self.described[key].figure.panels[0].of(Curve)[0].x
             ends = {"start": float(time[0]), "stop": float(time[-1])}
@@ -180,10 +195,15 @@ class ResultView:
             ]
         return []
 
-    def _value(self, name: str, otherwise: float) -> float:
-        by_hand = self.owner.wish.hand.get(name)
+    def _cursor(self, name: str, label: str, otherwise: float, *, panel: int = 0) -> Cursor:
+        """A line at a parameter's value; where there is none, its label says so."""
+        at = self.owner.wish.hand.get(name)
         found = getattr(self.pair.parameters, name)
-        return by_hand if by_hand is not None else otherwise if found is None else found.value
+        if at is None and found is not None:
+            at = found.value
+        if at is None:
+            at, label = otherwise, f"{label}: no value, drag to set"
+        return Cursor(name=name, at=at, label=label, panel=panel)
 
     async def _drop(self, name: str, at: float) -> None:
         if name in ("start", "stop"):

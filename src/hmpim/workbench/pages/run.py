@@ -82,7 +82,7 @@ class RunPage:
             with card("Estimate so far"):
                 self.axis = ui.select([], label="Axis", on_change=self._anew)
                 self.axis.props("dense").classes("hm-screen")
-                self.told = ui.label().classes("hm-soft")
+                self.read_so_far = ui.label().classes("hm-soft")
                 self.estimates = ui.element("div").classes("hm-shown")
             with card("Log"):
                 self.log = ui.label().classes("hm-pre hm-shown")
@@ -173,7 +173,7 @@ class RunPage:
 
     def _anew(self) -> None:
         """Take away what was shown of another run or axis until this one's is there."""
-        self.told.set_text("")
+        self.read_so_far.set_text("")
         self.measured, self.looked = ("", -1), ("", -1.0)
         self.pictures.clear()
         for place in (self.estimates, self.bars, self.plot):
@@ -207,7 +207,9 @@ class RunPage:
             return
         looks, count = self.bench.looks(axis), self.bench.count
         if looks is None:
-            self.told.set_text("The stimulus has no band: nothing is estimated until it is played.")
+            self.read_so_far.set_text(
+                "The stimulus has no band: nothing is estimated until it is played."
+            )
             return
         with suppress(HmpimError):  # the samples cannot be put on one clock yet
             await looks.follow(live, axis, self.window.workbench.workers.do)
@@ -218,7 +220,9 @@ class RunPage:
         if (axis, look.time) == self.looked:
             return
         self.looked = (axis, look.time)
-        self.told.set_text(_of_look(look, "" if looks.passed else f"{looks.passed_at:.1f} s"))
+        self.read_so_far.set_text(
+            _of_look(look, "" if looks.passed else f"{looks.passed_at:.1f} s")
+        )
         self.estimates.clear()
         with self.estimates:
             unit = live.of(axis)["output"].unit

@@ -9,7 +9,7 @@ from hmpim.workbench.bench import Window
 from hmpim.workbench.desks import Analysis
 from hmpim.workbench.pages.frame import Command, Later, card, failures_said
 from hmpim.workbench.parts.picture import Picture
-from hmpim.workbench.parts.table import plain_table
+from hmpim.workbench.parts.table import VERDICT_CLASSES, plain_table
 from hmpim.workbench.work.runs import Listed, Row, compared, listed
 
 __all__ = ["runs"]
@@ -38,7 +38,7 @@ class RunsPage:
             with card("Which runs"):
                 self.where = ui.input("Only those with", placeholder="name = *roll*, delay < 3ms")
                 self.wanted = ui.input("Specification", placeholder="bandwidth_phase90 > 9.12")
-                ui.button("Look again", on_click=self.look)
+                ui.button("Read the folder again", on_click=self.look)
             with card("Compare"):
                 self.parameter = ui.select(
                     {w.name: w.label for w in GLOSSARY},
@@ -72,7 +72,10 @@ class RunsPage:
         self.table.clear()
         with self.table:
             if not found.rows:
-                ui.label("There are no runs yet.").classes("hm-soft")
+                filtered = (
+                    "No run meets this condition." if (self.where.value or "").strip() else ""
+                )
+                ui.label(filtered or "There are no runs yet.").classes("hm-soft")
                 return
             whole = ui.element("div").classes("hm-table hm-runs")
             whole.props('tabindex=0 role="region" aria-label="Runs of the folder"')
@@ -104,7 +107,7 @@ class RunsPage:
                 ).props["aria-label"] = f"Choose {row.name}"
             for cell in (row.name, row.date, row.channels, row.length, row.verdict, row.met):
                 with ui.element("td"):
-                    ui.label(cell).classes({"ok": "hm-ok", "fail": "hm-bad"}.get(cell, ""))
+                    ui.label(cell).classes(VERDICT_CLASSES.get(cell, ""))
             with ui.element("td"):
                 if row.file:
                     ui.button("Analyse", on_click=analyse).props("flat dense")
@@ -112,6 +115,10 @@ class RunsPage:
     async def _compare(self) -> None:
         with failures_said():
             self.button.disable()
+            self.shown.clear()
+            with self.shown, ui.row().classes("hm-row"):
+                ui.spinner()
+                ui.label("Comparing; runs without a result are identified first …")
             try:
                 found = await self.window.workbench.workers.do(
                     compared,
@@ -122,11 +129,12 @@ class RunsPage:
                     self.wanted.value or "",
                 )
             finally:
+                if not self.shown.is_deleted:
+                    self.shown.clear()
                 if not self.button.is_deleted:
                     self.button.enable()
             if self.shown.is_deleted:
                 return
-            self.shown.clear()
             with self.shown:
                 with card("Bode plots over each other"):
                     Picture(found.bode)

@@ -59,7 +59,7 @@ export default {
       const axis = { stroke: ink, font, labelFont: `bold ${font}`, size: 50 * grown, grid: { stroke: "rgba(128,128,128,0.25)", width: 1 } };
       const line = (label, stroke, dash) => ({ label, stroke, dash, width: 1.5, spanGaps: true });
       const limits = this.limit
-        ? [line("limit", "#b0417f", [6, 4]), line("−limit", "#b0417f", [6, 4])]
+        ? [line(`limits ±${this.limit} ${this.unit}`, "#b0417f", [6, 4]), line("", "#b0417f", [6, 4])]
         : [];
       this.plot = new this.uPlot(
         {

@@ -6,13 +6,16 @@ from nicegui import ui
 
 from hmpim.identify import Estimate, Look, PairIdentification
 from hmpim.report import format_number, format_value
-from hmpim.report.words import GLOSSARY, paper_value
+from hmpim.report.numbers import typeset
+from hmpim.report.words import GLOSSARY, fixed_unit, paper_value
 
-__all__ = ["look_cells", "parameter_cells", "plain_table"]
+__all__ = ["VERDICT_CLASSES", "look_cells", "parameter_cells", "plain_table"]
 
-_VERDICTS = {"ok": "ok", "doubtful": "doubtful"}
 _OF_OUTPUT = ("bias", "noise_std")
-_CLASSES = {"ok": "hm-ok", "doubtful": "hm-doubt", "not identifiable": "hm-bad", "fail": "hm-bad"}
+VERDICT_CLASSES = {
+    "ok": "hm-ok", "doubtful": "hm-doubt", "not identifiable": "hm-bad", "fail": "hm-bad",
+}  # fmt: skip
+"""The colour of a cell that is a verdict."""
 
 
 def plain_table(columns: Sequence[str], rows: Sequence[Sequence[str]], *, title: str) -> ui.element:
@@ -41,7 +44,7 @@ def plain_table(columns: Sequence[str], rows: Sequence[Sequence[str]], *, title:
                 with ui.element("tr"):
                     for cell in row:
                         with ui.element("td").classes("hm-number"):
-                            ui.label(cell).classes(_CLASSES.get(cell, ""))
+                            ui.label(cell).classes(VERDICT_CLASSES.get(cell, ""))
     return whole
 
 
@@ -87,21 +90,23 @@ def parameter_cells(
         known = other if estimate is None else estimate
         cells = [
             words.label,
-            "–" if estimate is None else format_value(estimate),
-            _unit(words.name) if known is None else known.unit,
+            "–" if estimate is None else typeset(format_value(estimate)),
+            fixed_unit(words.name) if known is None else known.unit,
         ]
         if fitted is not None:
             cells.append("–" if other is None else _marked(other))
         if hand:
             cells.append("" if by_hand is None else f"✎ {by_hand:.5g}, by hand")
-        cells.append("" if estimate is None else _VERDICTS[estimate.verdict])
-        cells.append("" if paper is None else format_number(paper))
+        cells.append("" if estimate is None else estimate.verdict)
+        cells.append("" if paper is None else typeset(format_number(paper)))
         rows.append(tuple(cells))
     return columns, rows
 
 
 def _marked(estimate: Estimate) -> str:
-    return f"✎ {format_value(estimate)}" + ("" if estimate.verdict == "ok" else ", doubtful")
+    return f"✎ {typeset(format_value(estimate))}" + (
+        "" if estimate.verdict == "ok" else ", doubtful"
+    )
 
 
 def look_cells(
@@ -122,21 +127,13 @@ def look_cells(
     for words in GLOSSARY:
         estimate = getattr(look.parameters, words.name)
         if estimate is not None:
-            verdict = _VERDICTS[estimate.verdict]
-            early = verdict == "ok" and not passed
+            early = estimate.verdict == "ok" and not passed
             rows.append(
                 (
                     words.label,
-                    format_value(estimate),
+                    typeset(format_value(estimate)),
                     unit if words.name in _OF_OUTPUT else estimate.unit,
-                    "too early" if early else verdict,
+                    "too early" if early else estimate.verdict,
                 )
             )
     return ("Parameter", "So far", "Unit", "Verdict"), rows
-
-
-def _unit(name: str) -> str:
-    """The unit of a parameter that no estimate states."""
-    if name.startswith(("bandwidth", "natural")):
-        return "Hz"
-    return "s" if name.startswith(("delay", "time", "hold")) else ""

@@ -15,6 +15,7 @@ from hmpim.units import rate_unit
 from hmpim.workbench.desks import AxisRow, Model, Wish
 
 __all__ = [
+    "MOST_SAMPLES",
     "PeakRow",
     "digest",
     "error_rows",
@@ -24,6 +25,10 @@ __all__ = [
     "stimuli_of",
     "stimulus_part",
 ]
+
+
+MOST_SAMPLES = 10_000_000
+"""Samples of a design on a page: about ten seconds of work, for which every window waits."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -77,6 +82,13 @@ def stimuli_of(wish: Wish) -> tuple[Stimulus, ...]:
     HmpimError
         If it cannot be met; the message says what would do.
     """
+    samples = len(wish.rows) * wish.duration * wish.fs
+    if samples > MOST_SAMPLES:
+        raise ArgumentError(
+            f"{wish.duration:g} s at {wish.fs:g} Hz are {samples:.3g} samples of all axes; at most "
+            f"{MOST_SAMPLES:.0e} are designed on a page. Take a shorter time or a lower rate, or "
+            "the command hmpim design"
+        )
     return _designed_once(stimulus_part(wish))
 
 

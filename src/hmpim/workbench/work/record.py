@@ -71,6 +71,8 @@ class Question:
     start: float | None = None
     stop: float | None = None
     structure: str | None = None
+    intersample: str = "auto"
+    reference: str | None = None
 
     @property
     def automatic(self) -> "Question":
@@ -156,6 +158,7 @@ def read_record(question: Question) -> Record:
         Path(question.file),
         inputs=question.inputs or None,
         outputs=question.outputs or None,
+        references=None if question.reference is None else (question.reference,),
         fs=question.fs,
         options=ReadOptions(start=question.start, stop=question.stop),
     )
@@ -197,7 +200,12 @@ def _identified(question: Question) -> Identification:
     only: tuple[StructureName, ...] | None = None
     if question.structure is not None:
         only = (question.structure,)  # type: ignore[assignment]
-    return identify(read_record(question), structures=only)
+    return identify(
+        read_record(question),
+        structures=only,
+        intersample=question.intersample,
+        reference=question.reference,
+    )
 
 
 def windowed(question: Question, view: View, pair: PairIdentification) -> Windowed:
@@ -239,8 +247,7 @@ def write_report(
     """
     result = _identified(question)
     shown = result.pairs[min(pair, len(result.pairs) - 1)]
-    told = shown if automatic is None else automatic
-    notes = hand_notes(told, hand, fs=result.record.fs)
+    notes = hand_notes(shown if automatic is None else automatic, hand, fs=result.record.fs)
     if automatic is not None:
         notes = (fit_note(automatic, set_by_hand=question.set_by_hand), *notes)
     report(result, path, notes=notes)

@@ -1,7 +1,7 @@
 """The folder of the runs: listed, held against each other and against a specification."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 from hmpim.errors import ArgumentError
@@ -15,6 +15,7 @@ from hmpim.plots.overlay import overlaid_bode
 from hmpim.plots.trend import trend
 from hmpim.record import Record
 from hmpim.report import format_estimate
+from hmpim.report.numbers import typeset
 from hmpim.report.words import GLOSSARY, label_of
 
 __all__ = ["Compared", "Listed", "Row", "compared", "listed"]
@@ -135,10 +136,12 @@ def compared(
         if any(getattr(one.parameters, w.name) is not None for _, one in pairs)
     )
     unit = next((value.unit for value in values if value is not None), None)
-    labels = [Path(name).parent.name or name for name, _ in pairs]
+    labels = _labels([name for name, _ in pairs])
+    whose = ("Pair", *(f"{one.output} from {one.input}" for _, one in pairs))
+    verdicts = ("Verdict", *(one.verdict.replace("_", " ") for _, one in pairs))
     return Compared(
         columns=("Parameter", *labels),
-        cells=cells,
+        cells=(whose, verdicts, *cells),
         bode=overlaid_bode(curves),
         trend=trend(
             labels,
@@ -151,8 +154,22 @@ def compared(
     )
 
 
+def _labels(names: Sequence[str]) -> list[str]:
+    """Name each run by its folder; all of them by their files where two are of one folder.
+
+    Examples
+    --------
+    >>> _labels(["mon_bench/run.h5", "tue_bench/run.h5"]), _labels(["up/a.h5", "up/b.h5"])
+    (['mon_bench', 'tue_bench'], ['up/a.h5', 'up/b.h5'])
+    """
+    folders = [Path(name).parent.name or name for name in names]
+    return folders if len(set(folders)) == len(names) else list(names)
+
+
 def _cell(estimate: Estimate | None) -> str:
-    return "–" if estimate is None else format_estimate(estimate)
+    if estimate is None:
+        return "–"
+    return typeset(format_estimate(estimate)) + ("" if estimate.verdict == "ok" else " (doubtful)")
 
 
 def _pair(result: Identification, wanted: str) -> PairIdentification:
@@ -170,5 +187,5 @@ def _result(run: Run) -> Identification:
     loaded = load(run.record)
     record = loaded if isinstance(loaded, Record) else read(run.record)
     result = identify(record)
-    save(replace(result), run.record.with_suffix(".json"))
+    save(result, run.record.with_suffix(".json"))
     return result
