@@ -13,7 +13,14 @@ from hmpim.errors import UnitError
 if TYPE_CHECKING:
     import pint
 
-__all__ = ["check_unit", "conversion_factor", "rate_label", "rate_unit", "read_unit"]
+__all__ = [
+    "check_unit",
+    "conversion_factor",
+    "quotient_unit",
+    "rate_label",
+    "rate_unit",
+    "read_unit",
+]
 
 
 _PLAIN = frozenset({"", "deg", "rad", "m", "mm", "V", "A", "N", "s", "Hz", "N*m"})
@@ -75,6 +82,23 @@ def rate_unit(unit: str, order: int) -> str:
         return unit
     power = {1: "", 2: "²", 3: "³"}[order]
     return f"{unit or '1'}/s{power}"
+
+
+def quotient_unit(above: str, below: str) -> str:
+    """Return a unit over another one, as it is read unambiguously; '' where the two are the same.
+
+    Examples
+    --------
+    >>> quotient_unit("V", "deg"), quotient_unit("deg", "deg/s"), quotient_unit("", "V")
+    ('V/deg', 'deg/(deg/s)', '1/V')
+    """
+    if above == below:
+        return ""
+    return (
+        f"{above or '1'}/({below})"
+        if re.search(r"[/* ]", below)
+        else f"{above or '1'}/{below or '1'}"
+    )
 
 
 def rate_label(unit: str, order: int) -> str:

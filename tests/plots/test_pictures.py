@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 
 from hmpim import plots
-from hmpim.identify import Candidate, HarmonicCurve
+from hmpim.identify import Candidate, Estimate, HarmonicCurve
 from hmpim.plots.draw.frames import frames
 from hmpim.plots.envelope import MOST_POINTS
-from hmpim.plots.style import COLOURS, axis_label, plain
+from hmpim.plots.style import COLOURS, axis_label, plain, with_error
+from hmpim.report import format_value
 from hmpim.stimulus import Limits, design
 
 T = np.arange(2000) / 200.0
@@ -205,3 +206,16 @@ def test_harmonics_within_their_noise_are_not_drawn():
     assert curve.label == "order 3"
     np.testing.assert_allclose(curve.y, [10.0, np.nan])
     assert panel.y.label == "Share of the output (%)"
+    assert panel.y.high is None
+
+
+def test_noise_beyond_the_output_does_not_stretch_the_axis_of_harmonics():
+    own = HarmonicCurve(order=1, frequency=(1.0, 5.0), amplitude=(2.0, 1e-6), std=(0.0, 0.0))
+    third = HarmonicCurve(order=3, frequency=(1.0, 5.0), amplitude=(0.2, 0.0), std=(0.01, 0.01))
+    (panel,) = plots.harmonics([own, third]).panels
+    assert panel.y.high == 100.0
+
+
+def test_an_exact_figure_is_marked_as_the_table_has_it():
+    exact = Estimate(value=7.132537856, std=2e-14, ci95=(7.132537856, 7.132537856), unit="Hz")
+    assert with_error(exact) == format_value(exact) == "7.132537856 ± 0"

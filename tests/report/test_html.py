@@ -244,6 +244,17 @@ def test_units_of_a_gain_are_on_the_bode_plot(field_record):
     record = Record.from_arrays({"u": u}, {"y": noisy}, fs=200.0, units={"u": "deg", "y": "V"})
     result = identify(record, structures=["second_order"])
     assert "Magnitude (dB re 1 V/deg)" in render(result)
+    rate = Record.from_arrays({"u": u}, {"y": noisy}, fs=200.0, units={"u": "deg/s", "y": "deg"})
+    result = identify(rate, structures=["second_order"])
+    assert "Magnitude (dB re 1 deg/(deg/s))" in render(result)
+
+
+def test_a_figure_of_the_papers_steps_alone_has_its_unit(found):
+    pair = found.pairs[0]
+    without = replace(pair, parameters=replace(pair.parameters, peak_gain_db=None))
+    page = render(replace(found, pairs=(without,)))
+    row = page[page.rindex("Peak gain", 0, page.index("What the parameters mean")) :]
+    assert ">dB<" in row[: row.index("</tr>")]
 
 
 def test_a_long_record_makes_a_page_of_few_megabytes(found):
@@ -385,6 +396,8 @@ def test_a_page_says_how_to_read_an_interval_that_is_not_symmetric(found):
     page = table((0.12, 0.152))
     assert told in page
     assert re.search(r'<span class="whole">[\d.]+</span> <span class="whole">−[\d.]+ \+', page)
+    assert "no error bar can be stated" not in page
+    assert "no error bar can be stated" in table(None)
 
 
 def test_a_pdf_holds_the_same_and_a_sheet_is_one_page(found, hostile, tmp_path):

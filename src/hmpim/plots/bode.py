@@ -21,6 +21,7 @@ from hmpim.plots.curves import (
 )
 from hmpim.plots.description import Axis, Band, Curve, Figure, Item, Panel, Points, Rule
 from hmpim.plots.style import Colour, plain
+from hmpim.units import quotient_unit
 
 if TYPE_CHECKING:
     from hmpim.identify import Estimate, Identification, PairIdentification
@@ -294,7 +295,7 @@ def pair_bode(
         if fs is not None and period is not None:
             word += f", output held for {1e3 * period.value:.3g} ms"
         curves.append((word, "model", whole))
-    ratio = "" if input_unit == output_unit else f"{output_unit or '1'}/{input_unit or '1'}"
+    ratio = quotient_unit(output_unit, input_unit)
     scale = pair.parameters.scale_factor
     level = -90.0 if scale is None or scale.value > 0.0 else -270.0  # 90° later than at DC
     figure = bode(curves, marks=_marks(pair), magnitude_unit=ratio, phase_level=level)

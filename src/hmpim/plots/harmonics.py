@@ -19,6 +19,7 @@ LOOKS: dict[int, tuple[Colour, Dashes, Marker]] = {
     4: ("other", ":", "^"),
     5: ("limit", "-.", "v"),
 }
+WHOLE = 100.0  # per cent of the output
 SEEN = 3.0  # standard deviations from which an amplitude is no noise
 
 
@@ -46,7 +47,7 @@ def harmonics(curves: "Sequence[HarmonicCurve]") -> Figure:
     own = next(curve for curve in curves if curve.order == 1)
     items: list[Item] = []
     floor: dict[float, float] = {}
-    lowest = np.inf
+    lowest, highest = np.inf, WHOLE
     for curve in curves:
         if curve.order == 1 or not curve.frequency:
             continue
@@ -61,6 +62,7 @@ def harmonics(curves: "Sequence[HarmonicCurve]") -> Figure:
         if not seen.any():
             continue
         lowest = min(lowest, float(np.min((amplitude / level)[seen])))
+        highest = max(highest, float(np.max((amplitude / level)[seen])))
         items.append(
             Curve(
                 x=frequency[turn],
@@ -76,6 +78,7 @@ def harmonics(curves: "Sequence[HarmonicCurve]") -> Figure:
     lowest = min([lowest, *(level for level in floor.values() if level > 0)])
     bottom = 0.5 * lowest if np.isfinite(lowest) else None
     noise = np.array([floor[at] for at in along])
+    top = highest if noise.size and noise.max() > highest else None  # there is next to no output
     items.append(
         Band(
             x=along,
@@ -90,7 +93,7 @@ def harmonics(curves: "Sequence[HarmonicCurve]") -> Figure:
         panels=(
             Panel(
                 x=Axis(label="Frequency of the sweep (Hz)", scale="log"),
-                y=Axis(label="Share of the output (%)", scale="log", low=bottom),
+                y=Axis(label="Share of the output (%)", scale="log", low=bottom, high=top),
                 items=tuple(items),
             ),
         ),

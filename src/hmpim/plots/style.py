@@ -12,10 +12,14 @@ __all__ = [
     "WIDTH",
     "Colour",
     "axis_label",
+    "is_exact",
     "plain",
     "printable",
     "with_error",
 ]
+
+ROUNDING = 1e-10
+"""Error over value that is arithmetic's and not the record's: a stop's level, seen often."""
 
 Colour = Literal["paper", "ink", "muted", "grid", "input", "output", "model", "limit", "other"]
 
@@ -76,6 +80,12 @@ def axis_label(quantity: str, unit: str) -> str:
     return f"{plain(quantity)} ({plain(unit) or '–'})"
 
 
+def is_exact(estimate: "Estimate") -> bool:
+    """Whether nothing but rounding is left of the error."""
+    known = estimate.std is not None and estimate.ci95 is not None
+    return known and estimate.spread <= ROUNDING * abs(estimate.value)
+
+
 def with_error(estimate: "Estimate") -> str:
     """Write a value with its standard deviation, or with both sides of an asymmetric interval.
 
@@ -88,9 +98,13 @@ def with_error(estimate: "Estimate") -> str:
     '6.922 −0.031 +0.068'
     >>> with_error(Estimate(value=6.9223, std=0.0348, ci95=None, unit="Hz"))
     '6.922 ± 0.035'
+    >>> with_error(Estimate(value=-6.0, std=1e-10, ci95=(-6.0, -6.0), unit="deg"))
+    '-6 ± 0'
     """
     from hmpim.identify.result.digits import aside, plus_minus  # not at the start of a command
 
+    if is_exact(estimate):
+        return f"{estimate.value:.10g} ± 0"
     if estimate.ci95 is not None and (estimate.std is None or estimate.asymmetric):
         return aside(estimate.value, *estimate.ci95)
     return plus_minus(estimate.value, estimate.spread)

@@ -3,13 +3,15 @@
 import re
 
 from hmpim.identify import Estimate
-from hmpim.identify.result.digits import aside, interval, plus_minus
+from hmpim.identify.result.digits import interval, plus_minus
+from hmpim.plots.style import is_exact, with_error
 
 __all__ = [
     "NOT_DETERMINED",
     "format_estimate",
     "format_interval",
     "format_number",
+    "format_scatter",
     "format_value",
     "plus_minus",
     "typeset",
@@ -22,9 +24,6 @@ NOT_DETERMINED = "not determined"
 _MINUS = re.compile(r"(?<![\w./=-])-(?=\d)")
 _POWER = re.compile(r"(?<=[\d)])e([+-])0*(\d+)\b")
 _RAISED = str.maketrans("0123456789-", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻")
-
-_ROUNDING = 1e-10
-"""Error over value that is arithmetic's and not the record's: a stop's level, seen often."""
 
 _ERROR = re.compile(r" (?=± |[−+][\d?])")
 _NO_REACH = re.compile(r"(?<=[−+])0\.0+(?![.\d])")
@@ -66,11 +65,7 @@ def format_value(estimate: Estimate, *, positive: bool = False) -> str:
         return NOT_DETERMINED
     if estimate.ci95 is None:
         return f"{format_number(estimate.value)} ± ?"
-    if _exact(estimate):
-        return f"{estimate.value:.10g} ± 0"
-    if estimate.std is None or estimate.asymmetric:
-        return _NO_REACH.sub("0", aside(estimate.value, *estimate.ci95))
-    return plus_minus(estimate.value, estimate.std)
+    return _NO_REACH.sub("0", with_error(estimate))
 
 
 def format_estimate(estimate: Estimate) -> str:
@@ -96,12 +91,6 @@ def _undetermined(estimate: Estimate, positive: bool) -> bool:
     )
 
 
-def _exact(estimate: Estimate) -> bool:
-    """Whether nothing but rounding is left of the error."""
-    known = estimate.std is not None and estimate.ci95 is not None
-    return known and estimate.spread <= _ROUNDING * abs(estimate.value)
-
-
 def format_interval(estimate: Estimate, *, positive: bool = False) -> str:
     """Write the 95 % interval with as many places as the value has.
 
@@ -125,7 +114,7 @@ def format_interval(estimate: Estimate, *, positive: bool = False) -> str:
     >>> format_interval(Estimate(value=3.0, std=5.0, ci95=(-7.0, 13.0), unit="Hz"))
     '13.0 or less'
     """
-    if _exact(estimate) or estimate.ci95 is None:
+    if is_exact(estimate) or estimate.ci95 is None:
         return "–"
     low, high = estimate.ci95
     if high is not None and _undetermined(estimate, positive):
@@ -143,6 +132,24 @@ def format_number(value: float | None) -> str:
     ('0.17', '1235', '–')
     """
     return "–" if value is None else f"{value:.4g}"
+
+
+def format_scatter(std: float, value: float) -> str:
+    """Write the scatter of a value without an exponent where the value has none, to two digits.
+
+    Parameters
+    ----------
+    std : float
+        Standard deviation from run to run, in the unit of the value.
+    value : float
+        What scatters.
+
+    Examples
+    --------
+    >>> format_scatter(2.864e-5, 0.15)
+    '0.000029'
+    """
+    return plus_minus(value, std).partition("± ")[2].rstrip("?") or "–"
 
 
 def typeset(text: str) -> str:

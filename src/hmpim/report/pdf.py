@@ -135,7 +135,7 @@ def _data(
         pairs.append(
             {
                 "name": printed(pair["name"]),
-                "lopsided": pair["lopsided"],
+                "reading": pair["reading"],
                 "verdict": pair["verdict"],
                 "verdict_words": pair["verdict_words"],
                 "sentence": printed(pair["sentence"]),

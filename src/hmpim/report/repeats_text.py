@@ -9,7 +9,7 @@ from hmpim.identify.records.repeated import RepeatedPair, Repeats
 from hmpim.identify.result.digits import percent
 from hmpim.plots.style import printable
 from hmpim.record import Finding
-from hmpim.report.numbers import format_estimate, format_number, format_value, plus_minus
+from hmpim.report.numbers import format_estimate, format_scatter, format_value, plus_minus
 from hmpim.report.text import finding_line
 from hmpim.report.words import GLOSSARY, by_weight
 
@@ -72,7 +72,7 @@ def repeats_table(pair: RepeatedPair) -> "Table":
             words.label,
             format_value(parameter.mean, positive=words.positive),
             parameter.mean.unit,
-            format_number(parameter.repeatability),
+            format_scatter(parameter.repeatability, parameter.mean.value),
             f"{ratio:.2f}",
             percent_words(parameter.probability),
             "yes" if parameter.agree else "no",

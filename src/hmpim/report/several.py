@@ -20,8 +20,8 @@ from hmpim.report.about import About, made_by
 from hmpim.report.figures import Picture
 from hmpim.report.numbers import (
     format_interval,
+    format_scatter,
     format_value,
-    plus_minus,
 )
 from hmpim.report.repeats_text import level_cells, linear_words, marked_value, percent_words
 from hmpim.report.study import Grid, Section, StudyPage, write_study_page
@@ -219,7 +219,7 @@ def _averages(pair: RepeatedPair, *, several: bool) -> Grid:
                 one.mean.unit or "–",
                 one.mean.verdict,
                 format_interval(one.mean, positive=words.positive),
-                _scatter(one.repeatability, one.mean),
+                format_scatter(one.repeatability, one.mean.value),
                 f"{one.chi_squared:.3g} / {one.freedom}",
                 percent_words(one.probability),
                 "agree" if one.agree else "do not agree",
@@ -238,17 +238,6 @@ def _averages(pair: RepeatedPair, *, several: bool) -> Grid:
         "about as large as its degrees of freedom if the stated errors are right. Chance: of a "
         "larger χ² if they are.",
     )  # fmt: skip
-
-
-def _scatter(repeatability: float, mean: Estimate) -> str:
-    """From run to run, in the parameter's unit, to two digits.
-
-    Examples
-    --------
-    >>> _scatter(2.864e-5, Estimate(value=0.15, std=4.7e-5, ci95=(0.1499, 0.1501), unit="s"))
-    '0.000029'
-    """
-    return plus_minus(mean.value, repeatability).partition("± ")[2].rstrip("?") or "–"
 
 
 def _by_run(
