@@ -15,7 +15,7 @@ from hmpim.record import Finding
 ROOT = Path(__file__).parents[2]
 SOURCE = ROOT / "src" / "hmpim"
 TEXT = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
-WALK = TEXT.partition("## A walk")[2].partition("## Who may ask whom")[0]
+WALK = TEXT.partition("## A walk")[2].partition("## Who may import whom")[0]
 STOPS = re.split(r"^\d+\. ", WALK.partition("On the ground")[0], flags=re.MULTILINE)[1:]
 
 

@@ -32,7 +32,7 @@ def test_every_public_name_has_its_entry():
 @pytest.mark.parametrize(
     ("name", "chapter"),
     [
-        ("Layers of docs/architecture.md", "## Who may ask whom"),
+        ("Layers of docs/architecture.md", "## Who may import whom"),
         ("Rooms of identification in docs/architecture.md", "### The rooms of identification"),
     ],
 )

@@ -24,7 +24,7 @@ def campaign(
         str | None,
         typer.Argument(
             metavar="PLAN.toml",
-            help="A plan, or one that ships: demo, example, section_v, section_v_reduced.",
+            help="A plan file, or a built-in plan: demo, example, section_v, section_v_reduced.",
             show_default=False,
         ),
     ] = None,

@@ -89,7 +89,7 @@ def design(
     wanted_snr: Annotated[
         float | None,
         typer.Option(
-            help="Lowest signal-to-noise ratio at any frequency, dB; a stimulus below is refused."
+            help="Lowest signal-to-noise ratio allowed at any frequency, dB; refuse a worse stimulus."
         ),
     ] = None,
     noise: Annotated[

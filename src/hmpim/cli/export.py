@@ -94,7 +94,9 @@ def export(
     ] = None,
     pade: Annotated[
         int | None,
-        typer.Option("--pade", metavar="N", help="Order of the delay's Padé form, for control."),
+        typer.Option(
+            "--pade", metavar="N", help="Order of the Padé approximation of the delay, for control."
+        ),
     ] = None,
 ) -> None:
     """Write what was identified as a model for another tool, error bars and origin included.

@@ -22,7 +22,7 @@ def montecarlo(
     plan: Annotated[
         str,
         typer.Argument(
-            metavar="PLAN.toml", help="A plan, or one that ships: field, random_systems."
+            metavar="PLAN.toml", help="A plan file, or a built-in plan: field, random_systems."
         ),
     ],
     out: Annotated[

@@ -50,7 +50,7 @@ class CampaignPage:
                 )
                 self.said = ui.label().classes("hm-verdict").props('role="status"')
                 self.links = ui.element("div")
-            with card("Plans that ship", printed=False):
+            with card("Built-in plans", printed=False):
                 for name in PLANS:
                     ui.button(name, on_click=lambda name=name: self._load(name)).props("flat")
                 ui.label("example has every key that a plan may have.").classes("hm-soft")
