@@ -421,6 +421,10 @@ def test_a_campaign_names_no_code_is_stopped_and_resumed(page, served):
     study = json.loads(download.value.path().read_text(encoding="utf-8"))
     assert 0 < len(first) < len(study["rows"]) == 10
     assert all((cases / name).stat().st_mtime_ns == t for name, t in first.items())
+    page.get_by_role("button", name="demo", exact=True).click()
+    wait_until(lambda: desk_text(served, desk.name) != PLAN, page=page)
+    page.get_by_role("button", name="Restore your own plan").click()
+    wait_until(lambda: desk_text(served, desk.name) == PLAN, page=page)
 
 
 def desk_text(served, name):

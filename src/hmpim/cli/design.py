@@ -89,7 +89,7 @@ def design(
     wanted_snr: Annotated[
         float | None,
         typer.Option(
-            help="Lowest signal-to-noise ratio allowed at any frequency, dB; refuse a worse stimulus."
+            help="Lowest signal-to-noise ratio allowed at any frequency, dB; otherwise, exit."
         ),
     ] = None,
     noise: Annotated[

@@ -31,6 +31,7 @@ class CampaignPage:
     def __init__(self, window: Window) -> None:
         self.window, self.campaigns = window, window.workbench.campaigns
         self.shown: object = None
+        self.replaced = ""  # an edited plan that a built-in one was put in place of
         if not self.wish.plan:
             window.change(campaign=replace(self.wish, plan=_shipped("example")))
         with ui.element("div").classes("hm-side"):
@@ -54,6 +55,8 @@ class CampaignPage:
                 for name in PLANS:
                     ui.button(name, on_click=lambda name=name: self._load(name)).props("flat")
                 ui.label("example has every key that a plan may have.").classes("hm-soft")
+                self.restore = ui.button("Restore your own plan", on_click=self._restore)
+                self.restore.set_visibility(False)
         with ui.element("div").classes("hm-body"), card("Plan"):
             self.text = (
                 ui.textarea(
@@ -86,7 +89,15 @@ class CampaignPage:
         self.command.show(f"hmpim campaign plan.toml --out {self.wish.out}")
 
     def _load(self, name: str) -> None:
+        """Show a built-in plan; one that was edited can be had back."""
+        if self.wish.plan.strip() and self.wish.plan not in {_shipped(known) for known in PLANS}:
+            self.replaced = self.wish.plan
         self.text.set_value(_shipped(name))
+        self.restore.set_visibility(bool(self.replaced))
+
+    def _restore(self) -> None:
+        self.text.set_value(self.replaced)
+        self.restore.set_visibility(False)
 
     def _check(self) -> None:
         with failures_said():
