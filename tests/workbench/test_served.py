@@ -12,6 +12,7 @@ import pytest
 import hmpim
 from hmpim.formats import save
 from hmpim.formats.stimulus_files import read_stimulus
+from hmpim.report.numbers import typeset
 from hmpim.workbench.desks import Analysis, Campaign, Desk, Desks, Model, Wish
 from hmpim.workbench.work.designed import five_axes
 from workbench_support import ROLL, checked, desk_of, go, kept, recorded, wait_until
@@ -309,6 +310,7 @@ def test_the_button_that_chooses_a_file_is_seen_and_each_doubt_is_said_once(page
     rows = "\n".join(f"{k / 200},{b},{a}" for k, (a, b) in enumerate(zip(u, y, strict=True)))
     (tmp_path / "swapped.csv").write_text(f"time,u,y\n{rows}\n")
     go(page, served, "analyse")
+    page.get_by_text("To make one, design a test first.").wait_for()
     choose = page.get_by_role("button", name="Choose a file")
     ink, ground = choose.evaluate(INK)
     assert ink != ground
@@ -321,10 +323,11 @@ def test_the_button_that_chooses_a_file_is_seen_and_each_doubt_is_said_once(page
     said = verdict.inner_text()
     assert said.count("the columns are swapped") == 1
     pair = hmpim.identify(hmpim.Record.from_arrays({"u": y}, {"y": u}, fs=200.0)).pairs[0]
-    doubts = [w.message for w in pair.warnings if w.severity == "doubt"]
+    doubts = [typeset(w.message) for w in pair.warnings if w.severity == "doubt"]
     assert len(doubts) > 3
     assert [said.count(doubt) for doubt in doubts] == [1] * len(doubts)
     page.get_by_text("−90°: no value, drag to set").wait_for()
+    page.get_by_text("± ? means that no error bar").wait_for()
 
 
 @pytest.mark.browser

@@ -1,6 +1,7 @@
 """Numbers for people: the error to two digits, the value to match."""
 
 import re
+from collections.abc import Sequence
 
 from hmpim.identify import Estimate
 from hmpim.identify.result.digits import interval, plus_minus
@@ -13,6 +14,7 @@ __all__ = [
     "format_number",
     "format_scatter",
     "format_value",
+    "how_to_read",
     "plus_minus",
     "typeset",
     "value_and_error",
@@ -150,6 +152,30 @@ def format_scatter(std: float, value: float) -> str:
     '0.000029'
     """
     return plus_minus(value, std).partition("± ")[2].rstrip("?") or "–"
+
+
+_LOPSIDED = (
+    "Where the interval is not symmetric, −a +b states how far it reaches to either side, in place "
+    "of the standard deviation."
+)
+_WITHHELD = (
+    "± ? means that no error bar can be stated: the findings say what the record contradicts."
+)
+
+
+def how_to_read(values: Sequence[str]) -> str:
+    """Say how written values without a plain standard deviation are read; '' where all have one.
+
+    Examples
+    --------
+    >>> how_to_read(["0.1499 ± 0.0001", "9.983 ± ?"])[:32]
+    '± ? means that no error bar can '
+    """
+    said = [
+        _LOPSIDED if any(" −" in value for value in values) else "",
+        _WITHHELD if any(value.endswith("?") for value in values) else "",
+    ]
+    return " ".join(filter(None, said))
 
 
 def typeset(text: str) -> str:

@@ -17,6 +17,7 @@ from hmpim.report.numbers import (
     format_interval,
     format_number,
     format_value,
+    how_to_read,
     typeset,
 )
 from hmpim.report.untold import untold
@@ -38,13 +39,6 @@ from hmpim.stimulus import Stimulus
 __all__ = ["report_view"]
 
 _FIRST = ("bode", "deviation")  # pictures that are never folded away
-_LOPSIDED = (
-    "Where the interval is not symmetric, −a +b states how far it reaches to either side, in place "
-    "of the standard deviation."
-)
-_WITHHELD = (
-    "± ? means that no error bar can be stated: the findings say what the record contradicts."
-)
 _SUMMARY = ("bandwidth_phase90", "bandwidth_3db", "delay", "scale_factor")
 
 
@@ -212,7 +206,7 @@ def _pair_view(
         "sentence": pair_sentence(pair),
         "warnings": [_finding_view(w) for w in by_weight(pair.warnings)],
         "rows": rows,
-        "reading": _how_to_read(rows),
+        "reading": how_to_read([row["value"] for row in rows]),
         "untold": untold(pair),
         "modes": mode_rows(pair),
         "modes_said": MODES_SAID,
@@ -231,16 +225,6 @@ def _pair_view(
         "rest": [p for p in drawn if p.key not in (*_FIRST, "candidates", "harmonics")],
         "named": {p.key: p for p in drawn if p.key in ("candidates", "harmonics")},
     }
-
-
-def _how_to_read(rows: Sequence[Mapping[str, str]]) -> str:
-    """Say how values without a plain standard deviation are read, where there are any."""
-    values = [row["value"] for row in rows]
-    said = [
-        _LOPSIDED if any(" −" in value for value in values) else "",
-        _WITHHELD if any(value.endswith("?") for value in values) else "",
-    ]
-    return " ".join(filter(None, said))
 
 
 def _rows(pair: PairIdentification, truth: Mapping[str, float]) -> list[dict[str, str]]:

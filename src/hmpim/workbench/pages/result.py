@@ -11,6 +11,7 @@ from hmpim.plots import Curve, Figure
 from hmpim.plots.by_hand import with_hand_values
 from hmpim.report.by_hand import reading_at
 from hmpim.report.figures import Picture as Described
+from hmpim.report.numbers import how_to_read, typeset
 from hmpim.report.words import by_weight, headline, leading, structure_words
 from hmpim.workbench.bench import Window
 from hmpim.workbench.desks import Analysis
@@ -95,7 +96,7 @@ class ResultView:
         result = self.found.result
         with card("Verdict"):
             classes = _CLASSES.get(str(result.verdict), "hm-bad")
-            ui.label(headline(result)).classes(f"hm-verdict {classes}")
+            ui.label(typeset(headline(result))).classes(f"hm-verdict {classes}")
             ui.label(f"Record: {self.owner.wish.file}").classes("hm-on-paper")
             if self.automatic is not None and self.beside is not None:
                 ui.label(
@@ -119,13 +120,13 @@ class ResultView:
         doubts = sum(finding.severity == "doubt" for finding in left)
         shown, more = left[: max(doubts, _FEW)], left[max(doubts, _FEW) :]
         for finding in shown:
-            ui.label(finding.message).classes(_WEIGHTS[finding.severity])
+            ui.label(typeset(finding.message)).classes(_WEIGHTS[finding.severity])
         if more:
             with ui.element("details").classes("hm-more"):
                 with ui.element("summary"):
-                    ui.label(f"{len(more)} more").style("display: inline")
+                    ui.label(f"{len(more)} more")
                 for finding in more:
-                    ui.label(finding.message).classes(_WEIGHTS[finding.severity])
+                    ui.label(typeset(finding.message)).classes(_WEIGHTS[finding.severity])
 
     async def _other(self, event: object) -> None:
         self.owner.change(pair=int(getattr(event, "value", 0)), hand={})
@@ -235,6 +236,8 @@ class ResultView:
         )  # fmt: skip
         with self.table:
             plain_table(columns, rows, title="Parameters")
+            if reading := how_to_read([row[1] for row in rows]):
+                ui.label(reading).classes("hm-soft")
 
     async def _through(self, **changes: object) -> None:
         if None in changes.values():
