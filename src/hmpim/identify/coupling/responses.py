@@ -32,8 +32,6 @@ __all__ = ["Responses", "inputs_of", "responses_of", "settled", "unrelated"]
 _UPPER = 1.2
 """Standard deviations of |error| that a bound adds: 95 % where the gain is well seen, more else."""
 
-_MANY = 1e6
-
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Responses:
@@ -199,7 +197,7 @@ def settled(
             scale_factor=_widened(parameters.scale_factor, gain),
         )
         if lag is not None:
-            seconds = partial(estimate, freedom=_MANY, unit="s")
+            seconds = partial(estimate, unit="s")
             time_constant = seconds(lag.time_constant / fs, (lag.time_constant_std / fs) ** 2)
             parameters = replace(
                 parameters,
@@ -235,7 +233,7 @@ def settled(
 def _widened(known: Estimate | None, variance: float) -> Estimate | None:
     if known is None or variance == 0.0:
         return known
-    return estimate(known.value, known.spread**2 + variance, freedom=_MANY, unit=known.unit)
+    return estimate(known.value, known.spread**2 + variance, unit=known.unit)
 
 
 def _coupled(group: Alike, *, doubt: bool) -> Finding:

@@ -16,9 +16,6 @@ from hmpim.record import Finding
 
 __all__ = ["with_imperfections"]
 
-_MANY = 1e6
-"""Degrees of freedom behind levels and periods, which are known all but exactly."""
-
 
 def with_imperfections(
     parameters: Parameters, found: Imperfections, censored: CensoredFit | None, unit: str
@@ -32,13 +29,11 @@ def with_imperfections(
             ("saturation_high", clipping.high, clipping.high_std),
         ):
             if level is not None:
-                figures[name] = estimate(level, (std or 0.0) ** 2, freedom=_MANY, unit=unit)
+                figures[name] = estimate(level, (std or 0.0) ** 2, unit=unit)
     if hold is not None:
-        figures["hold_period"] = estimate(hold.period, hold.std**2, freedom=_MANY, unit="s")
+        figures["hold_period"] = estimate(hold.period, hold.std**2, unit="s")
     if rounding is not None:
-        figures["quantization_step"] = estimate(
-            rounding.step, rounding.std**2, freedom=_MANY, unit=unit
-        )
+        figures["quantization_step"] = estimate(rounding.step, rounding.std**2, unit=unit)
     if censored is not None and parameters.noise_std is not None:
         figures["noise_std"] = estimate(
             censored.noise_std,

@@ -7,7 +7,15 @@ from hmpim.identify.arrays import Complex, Mask, Real
 from hmpim.identify.chance import DEVIATIONS, FALSE_ALARM
 from hmpim.identify.kept import kept
 
-__all__ = ["are_white", "autocovariance", "effective_share", "is_steady", "is_white", "squares_of"]
+__all__ = [
+    "are_white",
+    "autocovariance",
+    "effective_share",
+    "is_steady",
+    "is_white",
+    "ljung_box",
+    "squares_of",
+]
 
 _LAGS = 25
 
@@ -106,11 +114,26 @@ def are_white(residuals: Real, spectra: Complex | None = None) -> Mask:
 
 
 def _correlated(residuals: Real, spectra: Complex | None = None, *, steady: bool = True) -> Mask:
-    """Whether residuals, (..., n), are correlated, their level taken for steady or not."""
+    return np.asarray(ljung_box(residuals, spectra, steady=steady) <= FALSE_ALARM)
+
+
+def ljung_box(residuals: Real, spectra: Complex | None = None, *, steady: bool = True) -> Real:
+    """Probability of a Ljung-Box statistic as great over 25 lags, were the residuals white.
+
+    Of the residuals, (..., n), samples that do not count are 0; of one of zeros alone, it is 1.
+    Where the level is not taken for steady, each lag has its own scatter.
+
+    Examples
+    --------
+    >>> noise = np.random.default_rng(0).standard_normal((2, 1000))
+    >>> noise[1] = np.cumsum(noise[1])
+    >>> (ljung_box(noise) > 0.05).tolist()
+    [True, False]
+    """
     n = residuals.shape[-1]
     lags = min(_LAGS, n // 4)
     if lags == 0:
-        return np.zeros(residuals.shape[:-1], dtype=bool)
+        return np.ones(residuals.shape[:-1])
     r = autocovariance(residuals, lags, spectra)
     power = np.where(r[..., :1] > 0, r[..., :1], 1.0)
     rho = (r[..., 1:] / power) ** 2
@@ -120,7 +143,7 @@ def _correlated(residuals: Real, spectra: Complex | None = None, *, steady: bool
         rho, told = rho / np.where(scatter > 0, scatter, 1.0), np.full_like(told, n)
     pairs = np.maximum(told - np.arange(1, lags + 1), 1)
     statistic = np.sum(told * (told + 2) * rho / pairs, axis=-1)
-    return np.asarray((scipy.special.chdtrc(lags, statistic) <= FALSE_ALARM) & (r[..., 0] > 0))
+    return np.where(r[..., 0] > 0, scipy.special.chdtrc(lags, statistic), 1.0)
 
 
 @kept

@@ -30,9 +30,6 @@ _BESIDE = 2
 _NAMES = tuple(field.name for field in fields(ResponseBandwidths))
 """Bandwidths that are read."""
 
-_MANY = 1e6
-"""Degrees of freedom behind a response's error bars, in effect."""
-
 
 def ratio_at(
     measured: FrequencyResponse,
@@ -112,7 +109,7 @@ def response_bandwidths(
             rise = steep.imag - late
             shift = -float(np.angle(ratio)) / rise
         spread = std / np.sqrt(2) / abs(rise)
-        return estimate(value + shift, float(spread) ** 2, freedom=_MANY, unit="Hz")
+        return estimate(value + shift, float(spread) ** 2, unit="Hz")
 
     return ResponseBandwidths(
         **{
@@ -153,7 +150,7 @@ def less_bias(
             return None
         bias = biased.value - true.value
         variance = found.spread**2 + bias**2
-        return estimate(found.value - bias, variance, freedom=_MANY, unit="Hz")
+        return estimate(found.value - bias, variance, unit="Hz")
 
     return ResponseBandwidths(**{name: corrected(name) for name in _NAMES})
 

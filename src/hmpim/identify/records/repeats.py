@@ -197,7 +197,7 @@ def _parameter(name: str, found: tuple[PairIdentification, ...]) -> RepeatedPara
     average = estimate(
         mean,
         widened / float(weights.sum()),
-        freedom=freedom if widened > 1 else 1e9,
+        freedom=freedom if widened > 1 else np.inf,
         unit=estimates[0].unit,
     )
     if alike.max() > _ROUNDING * abs(mean):

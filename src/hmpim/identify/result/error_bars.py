@@ -8,12 +8,14 @@ from hmpim.identify.result.estimate import Estimate
 __all__ = ["estimate", "noise_estimate"]
 
 
-def estimate(value: float, variance: float, *, freedom: float, unit: str = "") -> Estimate:
+def estimate(value: float, variance: float, *, freedom: float = np.inf, unit: str = "") -> Estimate:
     """Value with its standard deviation and 95 % interval (Student's t).
+
+    The interval is that of a normal error where the variance is known and not itself estimated.
 
     Examples
     --------
-    >>> estimate(1.0, 0.01, freedom=1e9).ci95[1].__round__(3)
+    >>> estimate(1.0, 0.01).ci95[1].__round__(3)
     1.196
     """
     std = float(np.sqrt(max(variance, 0.0)))

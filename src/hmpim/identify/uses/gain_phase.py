@@ -16,8 +16,6 @@ from hmpim.model import Model, RationalDelay, phase, response
 
 __all__ = ["GainPhase", "gain_and_phase", "measurable"]
 
-_MANY = 1e6
-"""Degrees of freedom behind the error bars, in effect."""
 
 _SCALES = {"dB": 20 / np.log(10), "deg": float(np.degrees(1.0))}
 
@@ -174,4 +172,4 @@ def _at(
 def _in(unit: str, value: float, variance: float) -> Estimate:
     """Estimate in dB of the logarithm of a gain, or in degrees of a phase in radians."""
     scale = _SCALES[unit]
-    return estimate(scale * value, scale**2 * variance, freedom=_MANY, unit=unit)
+    return estimate(scale * value, scale**2 * variance, unit=unit)

@@ -12,7 +12,7 @@ from hmpim.identify.arrays import Mask, Real
 from hmpim.identify.chance import DEVIATIONS, FALSE_ALARM, HALF
 from hmpim.identify.effects.hold import detect_hold, updates
 from hmpim.identify.noise.misfit import misfit
-from hmpim.identify.noise.whiteness import autocovariance, effective_share
+from hmpim.identify.noise.whiteness import effective_share, ljung_box
 from hmpim.identify.reading.figures import units_of
 from hmpim.identify.result import Identification, PairIdentification
 from hmpim.identify.result.digits import percent
@@ -29,7 +29,8 @@ __all__ = ["Bounds", "Check", "OutputValidation", "Validation", "validate"]
 _DRAWS = 32
 """Models drawn for the prediction band; its width is then known to an eighth."""
 
-_LAGS = 25
+_FEWEST = 50
+"""Samples from which a residual can be judged."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -279,7 +280,7 @@ def _validated(
         if level is not None:  # near a level, noise decides what is clipped
             scored &= side * (level - predicted) > DEVIATIONS * noise
             scored &= side * (level - y.values) > 0
-    if np.count_nonzero(scored) < 2 * _LAGS:
+    if np.count_nonzero(scored) < _FEWEST:
         raise RecordError(
             f"only {np.count_nonzero(scored)} samples of {y.name!r} are left to score, once the "
             "model has settled and without gaps and clipping; give a longer record"
@@ -417,7 +418,7 @@ def _tests(
                 message=f"{told} (probability {left.probability:.2g}).",
             )
         )
-    white = _whiteness(residual[scored])
+    white = float(ljung_box(residual[scored] - residual[scored].mean()))
     coloured = any(
         warning.code in ("coloured_noise", "noise_colour", "quantization", "hum")
         for pair in pairs
@@ -445,14 +446,3 @@ def _power_in(residual: Real, band: tuple[float, float], fs: float) -> float:
     spectrum = np.abs(scipy.fft.rfft(residual)) ** 2
     f = np.arange(spectrum.size) * fs / n
     return float(2.0 * spectrum[(f >= band[0]) & (f <= band[1])].sum() / n**2)
-
-
-def _whiteness(residual: Real) -> float:
-    """Probability of a Ljung-Box statistic as great, over 25 lags, were the residual white."""
-    n, lags = residual.size, min(_LAGS, residual.size // 4)
-    r = autocovariance(residual - residual.mean(), lags)
-    if r[0] <= 0:
-        return 1.0
-    rho = r[1:] / r[0]
-    statistic = n * (n + 2) * float(np.sum(rho**2 / (n - np.arange(1, lags + 1))))
-    return float(scipy.special.chdtrc(lags, statistic))
