@@ -50,6 +50,16 @@ class Seen:
     valid: NDArray[np.bool_] | None
     begins: int | None
 
+    @property
+    def first(self) -> int | None:
+        """The first sample that counts from there; None for a record that begins at rest.
+
+        A free response that began before would grow backwards, without bound.
+        """
+        if self.begins is None or self.valid is None:
+            return self.begins
+        return self.begins + int(np.argmax(self.valid[self.begins :]))
+
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Data:
@@ -79,7 +89,7 @@ class Data:
             longest_delay=longest_lag(self.y.size) + 2.0,
             shortest_delay=min(self.rough.earliest, STAMPED_LATE),
             nuisance=self.nuisance,
-            begins=seen.begins,
+            begins=seen.first,
         )
         return problem if self.noise is None else problem.coloured(self.noise, self.level)
 
