@@ -151,11 +151,7 @@ def look_again(problem: Problem, trial: Trial, seen: Seen, *, lag: int, rests: b
         if problem.is_coloured and is_white(trial.fit.residual[told & ~ringing]):
             innovations = trial.fit.residual  # it is the ends that have the colour
         if _stands_out(innovations, told & ringing, told & ~ringing):
-            while reach < FEW * count:
-                wider = _ringing(count, trial.fit.delay, 2 * reach)
-                if not _stands_out(innovations, told & wider & ~ringing, told & ~wider):
-                    break
-                reach, ringing = 2 * reach, wider
+            ringing = _until_quiet(innovations, told, ringing, trial.fit.delay, reach)
             return replace(seen, valid=~ringing if seen.valid is None else seen.valid & ~ringing)
     if seen.begins is not None:
         return begin_later(seen, trial.fit)
@@ -166,6 +162,22 @@ def look_again(problem: Problem, trial: Trial, seen: Seen, *, lag: int, rests: b
         # Noise of the colour of a mode explains its free response, and more of it than there is.
         begins = begins_of(problem.plain, trial.fit, lag=lag)
     return None if begins is None else _from(seen, begins, count)
+
+
+def _until_quiet(innovations: Real, told: Mask, first: Mask, delay: float, reach: int) -> Mask:
+    """Samples over which the ends ring, as far as they stand out of the noise.
+
+    What has not died away over a twentieth of the record is none of the ends' doing: it is left
+    in, but for the first of them.
+    """
+    ringing, count = first, innovations.size
+    while reach < FEW * count:
+        reach *= 2
+        wider = _ringing(count, delay, reach)
+        if not _stands_out(innovations, told & wider & ~ringing, told & ~wider):
+            return ringing
+        ringing = wider
+    return first
 
 
 def ringing_of(source: SampledInput) -> int:
