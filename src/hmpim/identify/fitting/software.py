@@ -23,7 +23,7 @@ from hmpim.identify.fitting.unrelated import UNDENIED, says_nothing
 from hmpim.identify.kept import kept
 from hmpim.identify.noise.whiteness import effective_share
 from hmpim.identify.section_iv.correlation import likeness
-from hmpim.identify.worth import MOST, ROUNDING, TWICE
+from hmpim.identify.worth import MOST, ROUNDING, TOLERATED, TWICE
 from hmpim.model.dynamics import FILTERS, Structure
 from hmpim.model.filters import nyquist_taps, section_parameters
 from hmpim.model.sampled import prepare_input
@@ -103,14 +103,21 @@ class _Equations:
         return self.cost(_transversal(self.count), self.first)[0] <= allowed
 
     @property
+    def spread(self) -> float:
+        """Sum of squares of the output about its mean."""
+        return self.cost(_transversal(0), self.first)[0]
+
+    @property
     def left(self) -> float:
         """Sum of squares that the equations leave, every sample and all structures taken."""
         return solved_exactly(self.factor[:, :-1].T, self.factor[:, -1])[1]
 
-    @property
-    def foreseen(self) -> float:
-        """Least singular value of the lagged inputs, each of unit size, over the greatest."""
-        lagged = self.factor[:, _ORDER : _ORDER + self.count]
+    def foreseen(self, taps: slice = slice(None)) -> float:
+        """Least singular value of the lagged inputs, each of unit size, over the greatest.
+
+        Of some of them, counted from `first`, or of all.
+        """
+        lagged = self.factor[:, _ORDER : _ORDER + self.count][:, taps]
         sizes = np.linalg.norm(lagged, axis=0)
         if not sizes.all():  # an impulse has left before some lags begin
             return 0.0
@@ -181,7 +188,7 @@ def is_exact(u: Real, y: Real) -> bool:
     if any(equations.holds(structure, allowed) for structure in FILTERS.values()):
         return True
     every = _equations(u, y, None)
-    return every.foreseen >= ROUNDING and every.spans(allowed * every.rows / equations.rows)
+    return every.foreseen() >= ROUNDING and every.spans(allowed * every.rows / equations.rows)
 
 
 def software_fit(
@@ -320,9 +327,9 @@ def _long_filter(
 ) -> tuple[Problem, list[Fit]] | None:
     """The shortest filter without poles that leaves nothing but rounding.
 
-    None where there is none, and where the input is so smooth that its own samples foresee each
-    other: so many explain any output. Else with the data that it explains: what follows from input
-    before the record is left out.
+    None where there is none, and where the input is so smooth that those of its samples foresee
+    each other: so many explain any output, by coefficients that rounding alone would move. Else
+    with the data that it explains: what follows from input before the record is left out.
     """
     allowed = exact * equations.rows / problem.counted
 
@@ -330,11 +337,15 @@ def _long_filter(
         return equations.cost(_transversal(last - first + 1), first)[0] <= allowed
 
     first, last = equations.first, equations.first + equations.count - 1
-    if equations.foreseen < ROUNDING or not equations.spans(allowed):
+    if not equations.spans(allowed):
         return None
     last = first + bisect_left(range(first, last), True, key=lambda k: holds(first, k))
     first += bisect_left(range(first, last), True, key=lambda k: not holds(k + 1, last))
     if last - first >= _LONGEST:
+        return None
+    taken = slice(first - equations.first, last + 1 - equations.first)
+    left = equations.cost(_transversal(last - first + 1), first)[0]
+    if np.sqrt(left / equations.spread) > TOLERATED * equations.foreseen(taken):
         return None
     began = _begun_at(problem, _unknown(u, last))
     return began, [fit_structure(began, _transversal(last - first + 1), np.array([float(first)]))]
