@@ -82,6 +82,36 @@ def test_records_and_files_of_statistics_are_joined_run_by_run(folder, tmp_path)
     assert whole["record"]["source"] == "statistics of 2 runs"
 
 
+def test_records_are_fitted_together_without_a_file_between(folder, tmp_path):
+    files = [folder / "a.h5", folder / "b.h5"]
+    done = run("identify", *files, "--together", "--json", tmp_path / "t.json")
+    assert done.exit_code == 0, done.stderr
+    assert run("compress", *files, "-o", tmp_path / "both.h5", "-q").exit_code == 0
+    joined = hmpim.identify(hmpim.load(tmp_path / "both.h5"))["y", "u"]
+    found = hmpim.load(tmp_path / "t.json")["y", "u"]
+    assert found.delay == joined.delay
+    assert found.delay.ci95[0] < 0.05 < found.delay.ci95[1]
+    alone = hmpim.identify(hmpim.load(files[0]))["y", "u"]
+    assert found.noise_std.std < 0.85 * alone.noise_std.std
+    assert "of each run may respond to input before it" in " ".join(done.stdout.split())
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["a.h5"], "--together fits several records as one, and one is given"),
+        (["a.h5", "b.h5", "--holdout", "0.3"], "--holdout is about one record, and 2 are given"),
+        (["a.h5", "two.h5"], "the record has 2 channels for --output (y, z)"),
+        (["a.h5", "b.h5", "--output", "y", "--output", "z"], "and --output is given 2 times"),
+    ],
+)
+def test_what_cannot_be_fitted_together_is_refused(folder, words, said):
+    files = [folder / word if word.endswith(".h5") else word for word in words]
+    refused = run("identify", *files, "--together")
+    assert (refused.exit_code, len(refused.stderr.splitlines())) == (2, 1)
+    assert said in refused.stderr
+
+
 def test_one_of_several_outputs_is_named(folder, tmp_path):
     refused = run("compress", folder / "two.h5", "-o", tmp_path / "z.h5")
     assert refused.exit_code == 2

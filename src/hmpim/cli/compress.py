@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from hmpim.identify import Statistics
     from hmpim.record import Record
 
-__all__ = ["compress", "statistics_of"]
+__all__ = ["Bias", "compress", "runs_of", "statistics_of"]
 
 
 class Bias(StrEnum):
@@ -115,7 +115,7 @@ def compress(
                 every=sweep == "all",
             )
             window = lags if joined is None else joined.lags
-            runs = _compressed(given, window, (input_, output), bias)
+            runs = runs_of(given, (input_, output), lags=window, bias=bias)
         joined = runs if joined is None else _join(joined, runs, (records[0], path), bias)
     if joined is None:  # Typer asks for one record at least
         return
@@ -200,10 +200,17 @@ def _join(
         ) from None
 
 
-def _compressed(
-    given: "Sequence[Record]", lags: int | None, named: tuple[str | None, str | None], bias: Bias
+def runs_of(
+    given: "Sequence[Record]",
+    named: tuple[str | None, str | None],
+    *,
+    lags: int | None = None,
+    bias: Bias = Bias.OWN,
 ) -> "Statistics":
-    """Each record as a run, with the window of the first."""
+    """Compress each record to a run, with the window of the first; the runs joined.
+
+    `named` are the channels of input and output; None for the only one that there is.
+    """
     from hmpim.identify import compress as compressed
 
     runs: list[Statistics] = []

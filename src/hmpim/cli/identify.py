@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, cast
 
 import typer
 
-from hmpim.cli.compress import statistics_of
+from hmpim.cli.compress import runs_of, statistics_of
 from hmpim.cli.files import check_files
 from hmpim.cli.paging import (
     Date,
@@ -92,6 +92,14 @@ def identify(
     common: Common = None,
     stamps: StampChoice = Stamps.AUTO,
     sheet: Sheet = None,
+    together: Annotated[
+        bool,
+        typer.Option(
+            "--together",
+            help="Fit one model to all records, each a run of its own with its own bias and "
+            "beginning, instead of averaging or comparing them.",
+        ),
+    ] = False,
     intersample: Annotated[
         Between,
         typer.Option(
@@ -159,7 +167,7 @@ def identify(
     """Find every parameter of a measured record, each with its error bar.
 
     Several records of one test are averaged, and their scatter is compared with the stated errors;
-    records at several amplitudes show where the unit is linear.
+    records at several amplitudes show where the unit is linear. With --together all are one fit.
     """
     check_files(
         reads={"the record": [*records, *(beside or [])]},
@@ -175,7 +183,10 @@ def identify(
     single |= {"--structure": structure or None, "--hand": hand or None}
     single["--reference"] = reference
     by_hand = _by_hand(hand or [])
-    _check_single(len(records), single)
+    if together:
+        named = (_once(input_, "--input"), _once(output, "--output"))
+    else:
+        _check_single(len(records), single)
 
     from hmpim.identify import identify as find
     from hmpim.identify import measurable
@@ -215,7 +226,9 @@ def identify(
         )
     )
     about = about_of(title, under_test, test, operator, date)
-    if len(given) > 1:
+    if together and compressed is None:
+        compressed = _joined(given, named, single)
+    elif len(given) > 1:
         _check_single(len(given), single)
         identify_several(
             given,
@@ -250,6 +263,30 @@ def identify(
     notes = [*(note or ()), *said]
     write_result(result, json=json, report=report, notes=notes, about=about)
     write_beside(result, sign=sign, figures=figures, about=about, notes=notes)
+
+
+def _joined(
+    given: "Sequence[Record]",
+    named: tuple[str | None, str | None],
+    options: Mapping[str, object],
+) -> "Statistics":
+    """Records as the runs of one fit, of the input and the output that are named, if any."""
+    if len(given) < 2:
+        raise ArgumentError(
+            "--together fits several records as one, and one is given; leave it out, or give more"
+        )
+    _check_single(len(given), {name: options[name] for name in ("--reference", "--holdout")})
+    return runs_of(given, named)
+
+
+def _once(names: Sequence[str] | None, option: str) -> str | None:
+    """The one name that an option was given, if any."""
+    if names is not None and len(names) > 1:
+        raise ArgumentError(
+            f"--together fits one output to one input, and {option} is given {len(names)} times; "
+            "give it once"
+        )
+    return names[0] if names else None
 
 
 def _structures(given: "Sequence[str] | None") -> "list[StructureName] | None":

@@ -23,6 +23,7 @@ from hmpim.identify.fitting.fit import Fit, Problem, fit_structure
 from hmpim.identify.fitting.growth import one_more_pole, scale_of, with_pole
 from hmpim.identify.fitting.held_steps import steps_through
 from hmpim.identify.fitting.modes import grown_modes
+from hmpim.identify.fitting.rows import STAMPED_LATE
 from hmpim.identify.fitting.spectral import condensed, fitted_roughly
 from hmpim.identify.fitting.start import RoughResponse, rough_response, searched, starting_values
 from hmpim.identify.noise.misfit import unexplained_response
@@ -108,7 +109,9 @@ def fit_plain(
                 every = np.stack([*starts, *starting_values(rough, structure)])
                 rivals = list(fitted_roughly(condensed(rough), structure, every).likely)
             fit = _tasted(problem, rivals, fit)
-            if not settled and structure.order and problem.begins is not None and not fit.is_white:
+            # Of an output that is ahead, the record does not hold the beginning either.
+            underway = problem.begins is not None or fit.delay < STAMPED_LATE
+            if not settled and structure.order and underway and not fit.is_white:
                 fit = _tasted(problem, _slipped(rough, fit.theta), fit)
         settled = settled or white
         fits.append(fit)

@@ -64,10 +64,12 @@ def initial_transient(evidence: Evidence) -> Iterator[Finding]:
     joint, fit = evidence.joint, evidence.joint.best.fit
     if not joint.forgotten:
         return
+    first = f"first {joint.forgotten / evidence.fs:.4g} s"
     message = (
         "The record does not begin at rest. The free response of its initial state is fitted too, "
-        f"and its first {joint.forgotten / evidence.fs:.4g} s, which respond to input before the "
-        "record, are left out."
+        f"and its {first}, which respond to input before the record, are left out."
+        if evidence.u.size
+        else f"The {first} of each run may respond to input before it, and are left out."
     )
     doubted: tuple[str, ...] = ()
     if joint.lingers:
