@@ -131,7 +131,7 @@ def settle(
         weighed=weighed,
         best=best,
         trials=tuple(trials),
-        forgotten=course.counted.begins or 0,
+        forgotten=course.counted.first or 0,
         effective_share=share,
         related=not silent
         and not course.data.says_nothing(weighed.plain, best.fit, least=UNDENIED),
