@@ -8,13 +8,17 @@ import scipy
 
 from hmpim.identify.arrays import Complex, Real
 from hmpim.identify.kept import kept
-from hmpim.identify.noise.spectra import transform_of
+from hmpim.identify.noise.spectra import transform_of, windowed_power
+from hmpim.identify.worth import DEEPEST, PART
 
 __all__ = ["Misfit", "misfit", "misfits", "unexplained_response"]
 
 
 _GROUPS = 24
 """Groups of neighbouring bins that the band is cut into, at most."""
+
+_NEAR = 24
+"""Bins on either side of a line that show the noise there."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -42,7 +46,13 @@ def misfit(u: Real, residual: Real, *, delay: float, band: tuple[float, float]) 
     is that of two degrees of freedom of the noise of the same group, so colour does no harm. The
     input is moved by the delay, in samples, so that the gain is smooth over a group. The excited
     band is in cycles per sample.
+
+    Where the input has a few lines alone, neighbouring bins have no gain in common, and noise whose
+    colour is steep passes for one. There the power at the lines is held against that beside them.
     """
+    lines = _left_at_lines(u, residual, band)
+    if lines is not None:
+        return lines
     stimulus = transform_of(u)
     bins = min(1 << int(band[1] * u.size + 1).bit_length(), stimulus.size)
     share, probability = misfits(
@@ -53,6 +63,34 @@ def misfit(u: Real, residual: Real, *, delay: float, band: tuple[float, float]) 
         band=band,
     )
     return Misfit(share=float(share[0]), probability=float(probability[0]))
+
+
+def _left_at_lines(u: Real, residual: Real, band: tuple[float, float]) -> Misfit | None:
+    """Test whether a residual is stronger at the lines of an input than beside them.
+
+    The powers after a window, of which every other bin is independent: an F test, and the share of
+    the power that lies above the noise. None of an input that leaves no room between lines.
+    """
+    power = windowed_power(u)
+    first = max(int(band[0] * u.size) - _NEAR, 1)
+    inside = slice(first, min(int(band[1] * u.size) + _NEAR, power.size))
+    moved = power[inside] > DEEPEST * power.max()
+    count = int(np.count_nonzero(moved))
+    if not 0 < count < PART * moved.size:
+        return None
+    left = windowed_power(residual)[inside]
+    window = np.ones(2 * _NEAR + 1)
+    others = np.convolve(np.where(moved, 0.0, left), window, mode="same")
+    room = np.convolve(~moved, window, mode="same")
+    if not np.all((others[moved] > 0.0) & (room[moved] >= _NEAR // 2)):
+        return None
+    noise = others[moved] / room[moved]
+    ratio = float(np.mean(left[moved] / noise))
+    above = float(np.sum(left[moved] - noise))
+    return Misfit(
+        share=max(above, 0.0) / float(left.sum()),
+        probability=float(scipy.special.fdtrc(count, float(room[moved].min()), ratio)),
+    )
 
 
 @partial(kept, long=True)
