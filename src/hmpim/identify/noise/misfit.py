@@ -76,10 +76,10 @@ def _left_at_lines(u: Real, residual: Real, band: tuple[float, float]) -> Misfit
     inside = slice(first, min(int(band[1] * u.size) + _NEAR, power.size))
     moved = power[inside] > DEEPEST * power.max()
     count = int(np.count_nonzero(moved))
-    if not 0 < count < PART * moved.size:
+    window = np.ones(2 * _NEAR + 1)
+    if not 0 < count < PART * moved.size or moved.size < window.size:
         return None
     left = windowed_power(residual)[inside]
-    window = np.ones(2 * _NEAR + 1)
     others = np.convolve(np.where(moved, 0.0, left), window, mode="same")
     room = np.convolve(~moved, window, mode="same")
     if not np.all((others[moved] > 0.0) & (room[moved] >= _NEAR // 2)):
