@@ -18,6 +18,7 @@ from hmpim.model.response import (
     peak_gain,
     response,
 )
+from hmpim.units import quotient_unit
 
 __all__ = ["figures_at", "figures_of", "read_figures", "system_of", "units_of"]
 
@@ -31,9 +32,7 @@ _UNITS = {
 def units_of(structure: Structure, units: tuple[str, str]) -> dict[str, str]:
     """Return the unit of each figure, from those of input and output."""
     source, output = units
-    gain = ""
-    if output != source:
-        gain = f"{output or '1'}/{source}" if source else output
+    gain = quotient_unit(output, source) if source else output
     if structure.integrators:
         gain = f"{gain or '1'}/s"
     if structure.dc_zeros:
