@@ -10,6 +10,7 @@ import hmpim
 from hmpim.errors import ArgumentError, FormatError, RecordError
 from hmpim.identify import Identification
 from hmpim.identify.identify import identify
+from hmpim.record import Channel
 from tests_support import field_chirp, in_studies, second_order_lag
 
 FS = 200.0
@@ -176,6 +177,26 @@ def test_a_gap_is_said_and_does_no_harm(field_record):
     for name, value in (("delay", 0.15), ("natural_frequency", 10.0), ("bias", 0.6)):
         estimate = getattr(pair, name)
         assert abs(estimate.value - value) < 5 * estimate.std, name
+
+
+def test_the_measured_response_is_right_where_the_output_has_a_gap(field_record):
+    """What is filled in between the ends of a gap is no answer to the input."""
+    time, u, y = field_record
+    noisy = y + 0.02 * np.random.default_rng(1).standard_normal(y.size)
+    told = (time < 3.0) | (time >= 3.2)
+    record = hmpim.Record(
+        inputs=(Channel(name="u", time=time, values=u),),
+        outputs=(Channel(name="y", time=time[told], values=noisy[told]),),
+        fs=FS,
+        intersample="bandlimited",
+    )
+    pair = identify(record)["y", "u"]
+    assert pair.verdict == "ok"
+    seen = pair.frequency_response
+    s = 2j * np.pi * seen.frequency
+    omega = 2 * np.pi * 10.0
+    truth = pair.scale_factor.value * np.exp(-0.15 * s) / ((s / omega) ** 2 + 0.8 * s / omega + 1)
+    assert np.mean(np.abs(seen.response - truth) > 3 * seen.std) < 0.02
 
 
 def test_jitter_is_said_and_does_no_harm():

@@ -367,6 +367,8 @@ def _measured(
     if question.instrument is not None:
         return response_through(question.instrument, y, fs, band=band)
     told = found.telling(y.size, fs)
+    if not question.output.valid.all():
+        told = question.output.valid if told is None else told & question.output.valid
     if told is None:
         return _local(u, y, fit, fs, band)
     response = _local(u, np.where(told, y, fit.prediction + fit.residual), fit, fs, band)
