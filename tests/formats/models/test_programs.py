@@ -198,20 +198,22 @@ def test_what_cannot_be_exported_is_refused(tmp_path):
         export(Identification(record=result.record, pairs=(nothing,)), to="c", path=tmp_path / "x")
 
 
-@pytest.mark.parametrize(
-    ("to", "file", "better"),
-    [
-        ("matlab", "my axis.m", "my_axis.m"),
-        ("matlab", "end.m", "end_model.m"),
-        ("modelica", "model.mo", "model_model.mo"),
-        ("modelica", "roll.y.mo", "roll_y.mo"),
-    ],
-)
-def test_a_file_that_its_language_could_not_call_is_refused(to, file, better, tmp_path):
+@pytest.mark.parametrize(("file", "better"), [("my axis.m", "my_axis.m"), ("end.m", "end_model.m")])
+def test_a_file_that_matlab_could_not_call_is_refused(file, better, tmp_path):
     with pytest.raises(ArgumentError, match=rf"cannot be called: .*; name it {better}$"):
-        export(result_of(SECOND), to=to, path=tmp_path / file)
-    (written,) = export(result_of(SECOND), to=to, path=tmp_path / better)
+        export(result_of(SECOND), to="matlab", path=tmp_path / file)
+    (written,) = export(result_of(SECOND), to="matlab", path=tmp_path / better)
     assert written.stem in written.read_text()
+
+
+@pytest.mark.parametrize(
+    ("file", "called"), [("model.mo", "model_model"), ("roll.y.mo", "roll_y"), ("m.mo", "m")]
+)
+def test_a_modelica_model_has_a_name_of_its_own_where_the_file_has_none(file, called, tmp_path):
+    (written,) = export(result_of(SECOND), to="modelica", path=tmp_path / file)
+    assert written.name == file
+    assert f'model {called} "' in written.read_text()
+    assert f"end {called};" in written.read_text()
 
 
 def test_a_folder_gets_a_name_that_can_be_called(tmp_path):

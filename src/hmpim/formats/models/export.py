@@ -216,13 +216,13 @@ def export(
         raise ArgumentError(f"{place} is a file; {to} needs a folder, so name another place")
     elif writer.suffix and not place.parent.is_dir():
         raise ArgumentError(f"folder {place.parent} does not exist; make it first")
-    stem = place.name if not writer.suffix else place.stem
-    source = source_of(
-        result, name=stem or place.resolve().name, pair=pair, fs=fs, intersample=intersample
-    )
+    name = (place.name if not writer.suffix else place.stem) or place.resolve().name
+    if to == "modelica" and name in _RESERVED[to].split():
+        name += "_model"  # a Modelica tool opens the file, whatever it is called
+    source = source_of(result, name=name, pair=pair, fs=fs, intersample=intersample)
     _check_kind(to, source)
-    if to in _RESERVED:
-        _check_name(to, place, source.name)
+    if to == "matlab":
+        _check_name(place, source.name)
     return writer.write(source, place, choices)
 
 
@@ -234,13 +234,13 @@ def _check_kind(to: str, source: Source) -> None:
         )
 
 
-def _check_name(to: str, place: Path, name: str) -> None:
-    """Refuse a file that its language would not find by its name."""
-    reserved = name in _RESERVED[to].split()
+def _check_name(place: Path, name: str) -> None:
+    """Refuse a file that MATLAB, which finds a function by its file, could not call."""
+    reserved = name in _RESERVED["matlab"].split()
     if place.stem != name or reserved:
         better = f"{name}_model" if reserved else name
         raise ArgumentError(
-            f"{place.name!r} cannot be called: {to} finds it by the name of its file; name it "
+            f"{place.name!r} cannot be called: MATLAB finds it by the name of its file; name it "
             f"{better}{place.suffix}"
         )
 
