@@ -163,3 +163,9 @@ def test_a_dip_that_no_grid_shows_is_a_bandwidth():
         place = depth(at_dc)[1]
         found = bandwidth_3db(scaled(at_dc), highest=268.0)
         assert 0.98 * place < found < place
+
+
+def test_the_phase_of_an_undamped_mode_turns_by_half_a_turn_without_overflow():
+    mode = RationalDelay(delay=0.0, numerator=np.ones(1), denominator=np.array([1.0, 0.0, 1e-10]))
+    at = np.array([0.0, 0.9e5, 1.1e5]) / (2 * np.pi)
+    assert phase(mode, at) == pytest.approx([0.0, 0.0, -np.pi])

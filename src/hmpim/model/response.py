@@ -102,10 +102,10 @@ def _turn(roots: NDArray[np.complex128], omega: NDArray[np.float64]) -> NDArray[
     """Continuous phase in jω of a polynomial with these roots, zero at ω = 0, in radians."""
     if not roots.size:
         return np.zeros(omega.shape)
-    away = np.where(roots.real != 0, -roots.real, np.finfo(float).tiny)[:, None]
-    aside = roots.imag[:, None]
-    turned = np.arctan((omega - aside) / away) - np.arctan(-aside / away)
-    return np.asarray(turned.sum(axis=0))
+    away, aside = np.abs(roots.real)[:, None], roots.imag[:, None]
+    side = np.where(roots.real > 0.0, -1.0, 1.0)[:, None]  # a root on the axis counts as stable
+    turned = np.arctan2(omega - aside, away) - np.arctan2(-aside, away)
+    return np.asarray((side * turned).sum(axis=0))
 
 
 def _turn_in_z(roots: NDArray[np.complex128], omega: NDArray[np.float64]) -> NDArray[np.float64]:
