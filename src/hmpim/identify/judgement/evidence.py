@@ -13,7 +13,7 @@ from hmpim.identify.noise.misfit import Misfit
 from hmpim.identify.nonlinear.bends import Bend
 from hmpim.identify.reading.readings import Readings
 from hmpim.identify.result import Parameters, ResponseBandwidths
-from hmpim.identify.result.groups import MODELLED
+from hmpim.identify.result.groups import MODELLED, PHASE_SPLIT
 from hmpim.identify.worth import FEW, INTERPOLATED, TOLERATED, WORTH
 
 __all__ = ["Evidence", "structure_in_words"]
@@ -75,6 +75,16 @@ class Evidence:
     jittered: bool = False
     limited: bool = False
     gaining: GainChange | None = None
+
+    @property
+    def of_other_poles(self) -> tuple[str, ...]:
+        """Figures that other poles would move.
+
+        The response within the band is the same with them if the model leaves white noise, or
+        little of the output; of one that leaves more, no figure is known.
+        """
+        described = self.readings.white or self.unexplained <= TOLERATED
+        return PHASE_SPLIT if described else MODELLED
 
     @property
     def unexplained(self) -> float:

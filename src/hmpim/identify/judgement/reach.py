@@ -105,7 +105,7 @@ def fast_mode(evidence: Evidence) -> Iterator[Finding]:
         "constant, or the clocks may drift apart. Check the time stamps, or "
         f"{_sweep_to(fastest, evidence)}.",
         severity="doubt",
-        parameters=PHASE_SPLIT if evidence.readings.white else MODELLED,
+        parameters=evidence.of_other_poles,
     )
 
 

@@ -7,7 +7,7 @@ import numpy as np
 from hmpim.identify.chance import DEVIATIONS, LIKELIER
 from hmpim.identify.judgement.evidence import Evidence, structure_in_words
 from hmpim.identify.reading.spanned import asked_rivals, plainer_rivals
-from hmpim.identify.result.groups import MODELLED, PHASE_SPLIT
+from hmpim.identify.result.groups import PHASE_SPLIT
 from hmpim.identify.worth import MOST, TOLERATED
 from hmpim.record import Finding
 
@@ -38,7 +38,7 @@ def other_order(evidence: Evidence) -> Iterator[Finding]:
         f"be {late:.4g} s with it. Lower the noise, or sweep higher, until a richer structure can "
         "be distinguished.",
         severity="doubt",
-        parameters=PHASE_SPLIT if evidence.readings.white else MODELLED,
+        parameters=evidence.of_other_poles,
     )
 
 
@@ -81,9 +81,6 @@ def _poles(order: int) -> str:
 def missed_pole(evidence: Evidence) -> Iterator[Finding]:
     """Doubt the delay where the record asks for other dynamics, or cannot exclude a slow pole.
 
-    The response within the band is the same either way if a model leaves white noise, or little of
-    the output; of one that leaves more, no figure is known.
-
     A statistic within one deviation of its level may fall on the other side of it in another run:
     that is said on both sides.
     """
@@ -102,14 +99,13 @@ def missed_pole(evidence: Evidence) -> Iterator[Finding]:
     poles = _poles(order)
     matters = moved > TOLERATED * hidden.scale
     if asked > DEVIATIONS and matters:
-        described = evidence.readings.white or evidence.unexplained <= TOLERATED
         yield Finding(
             code="other_dynamics",
             message=f"The record requires dynamics other than {poles}: {level}. The delay "
             f"may be off by {moved / fs:.2g} s. {close}Lower the noise, or sweep higher, until "
             "a richer structure can be distinguished.",
             severity="doubt",
-            parameters=PHASE_SPLIT if described else MODELLED,
+            parameters=evidence.of_other_poles,
         )
     elif hidden.may_hide:
         yield Finding(
