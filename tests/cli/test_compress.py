@@ -101,6 +101,7 @@ def test_records_are_fitted_together_without_a_file_between(folder, tmp_path):
     [
         (["a.h5"], "--together fits several records as one, and one is given"),
         (["a.h5", "b.h5", "--holdout", "0.3"], "--holdout is about one record, and 2 are given"),
+        (["a.h5", "a.h5"], "runs 1 and 2 hold the same samples"),
         (["a.h5", "two.h5"], "the record has 2 channels for --output (y, z)"),
         (["a.h5", "b.h5", "--output", "y", "--output", "z"], "and --output is given 2 times"),
     ],

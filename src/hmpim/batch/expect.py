@@ -9,9 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hmpim.batch.rows import PARAMETERS
-from hmpim.batch.summary import UNITS, column, unit_of
+from hmpim.batch.summary import column, unit_of
 from hmpim.batch.table import BatchTable
 from hmpim.errors import ArgumentError, UnitError
+from hmpim.identify.result.groups import FIXED_UNITS
 from hmpim.units import conversion_factor
 
 __all__ = ["Bound", "Outcome", "held_against", "read_bound"]
@@ -105,8 +106,8 @@ def read_bound(text: str) -> Bound:
     bound = Bound(
         text=text.strip(), name=match["name"], sign=match["sign"], number=number, unit=match["unit"]
     )
-    if bound.name in UNITS:  # before any record is identified
-        _factor(bound, UNITS[bound.name])
+    if bound.name in FIXED_UNITS:  # before any record is identified
+        _factor(bound, FIXED_UNITS[bound.name])
     return bound
 
 

@@ -8,22 +8,9 @@ from numpy.typing import NDArray
 
 from hmpim.batch.rows import PARAMETERS
 from hmpim.batch.table import BatchTable
+from hmpim.identify.result.groups import FIXED_UNITS
 
-__all__ = ["UNITS", "Failure", "ParameterSummary", "Summary", "column", "summary_of", "unit_of"]
-
-UNITS = {
-    "delay": "s",
-    "delay_correlation": "s",
-    "delay_low_frequency": "s",
-    "natural_frequency": "Hz",
-    "time_constant": "s",
-    "bandwidth_phase90": "Hz",
-    "bandwidth_phase90_without_delay": "Hz",
-    "bandwidth_3db": "Hz",
-    "peak_gain_db": "dB",
-    "hold_period": "s",
-}
-"""Units that do not depend on the channels."""
+__all__ = ["Failure", "ParameterSummary", "Summary", "column", "summary_of", "unit_of"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -123,8 +110,8 @@ def column(table: BatchTable, name: str) -> NDArray[np.float64]:
 
 def unit_of(table: BatchTable, name: str) -> str:
     """Unit of a parameter; empty for none, or where the rows differ."""
-    if name in UNITS:
-        return UNITS[name]
+    if name in FIXED_UNITS:
+        return FIXED_UNITS[name]
     if name == "damping_ratio":
         return ""
     import pyarrow.compute as pc

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from hmpim.identify import Statistics
     from hmpim.record import Record
 
-__all__ = ["Bias", "compress", "runs_of", "statistics_of"]
+__all__ = ["compress", "refuse_twice", "runs_of", "statistics_of"]
 
 
 class Bias(StrEnum):
@@ -119,7 +119,7 @@ def compress(
         joined = runs if joined is None else _join(joined, runs, (records[0], path), bias)
     if joined is None:  # Typer asks for one record at least
         return
-    _refuse_twice(joined)
+    refuse_twice(joined)
     save(joined, out)
     if not quiet:
         say(_sentence(joined, out))
@@ -130,10 +130,20 @@ def _refuse_unused(records: Sequence[Path], about_samples: Mapping[str, object])
     from hmpim.formats.statistics_files import holds_statistics
 
     if all(holds_statistics(path) for path in records):
-        statistics_of(records[:1], about_samples)
+        _refuse_options(records[0], about_samples)
 
 
-def _refuse_twice(joined: "Statistics") -> None:
+def _refuse_options(compressed: Path, about_samples: Mapping[str, object]) -> None:
+    """Refuse options that only a record has a use for."""
+    for option, wanted in about_samples.items():
+        if wanted is not None:
+            raise ArgumentError(
+                f"{option} is about the samples of a record, and {compressed} holds statistics "
+                "of them; leave it out, or give the record"
+            )
+
+
+def refuse_twice(joined: "Statistics") -> None:
     """Refuse a run that counts twice, which would make error bars too small."""
     seen: dict[bytes, int] = {}
     for place, run in enumerate(joined.runs, start=1):
@@ -174,16 +184,11 @@ def statistics_of(
             f"{compressed[0]} holds statistics and {others[0]} does not; compress both with hmpim "
             "compress, or give the records themselves"
         )
-    for option, wanted in reading_options.items():
-        if wanted is not None:
-            raise ArgumentError(
-                f"{option} is about the samples of a record, and {compressed[0]} holds statistics "
-                "of them; leave it out, or give the record"
-            )
+    _refuse_options(compressed[0], reading_options)
     joined = read_statistics(compressed[0])
     for path in compressed[1:]:
         joined = _join(joined, read_statistics(path), (compressed[0], path))
-    _refuse_twice(joined)
+    refuse_twice(joined)
     return joined
 
 

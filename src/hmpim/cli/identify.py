@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, cast
 
 import typer
 
-from hmpim.cli.compress import runs_of, statistics_of
+from hmpim.cli.compress import refuse_twice, runs_of, statistics_of
 from hmpim.cli.files import check_files
 from hmpim.cli.paging import (
     Date,
@@ -276,7 +276,9 @@ def _joined(
             "--together fits several records as one, and one is given; leave it out, or give more"
         )
     _check_single(len(given), {name: options[name] for name in ("--reference", "--holdout")})
-    return runs_of(given, named)
+    joined = runs_of(given, named)
+    refuse_twice(joined)
+    return joined
 
 
 def _once(names: Sequence[str] | None, option: str) -> str | None:

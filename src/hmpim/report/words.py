@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from hmpim.identify import Estimate, Identification, PairIdentification, Verdict
 from hmpim.identify.result.digits import percent
-from hmpim.identify.result.groups import in_words
+from hmpim.identify.result.groups import FIXED_UNITS, in_words
 from hmpim.plots.candidates import INTERSAMPLE_WORDS
 from hmpim.record import Finding
 from hmpim.report.numbers import format_estimate, format_number
@@ -180,16 +180,6 @@ def label_of(name: str) -> str:
     return _LABELS.get(name, name.replace("_", " ").capitalize())
 
 
-_FIXED_UNITS = {
-    "delay": "s",
-    "time": "s",
-    "hold": "s",
-    "bandwidth": "Hz",
-    "natural": "Hz",
-    "peak": "dB",
-}
-
-
 def fixed_unit(name: str) -> str:
     """Return the unit of a parameter that has the same one in every record; '' for any other.
 
@@ -198,7 +188,7 @@ def fixed_unit(name: str) -> str:
     >>> fixed_unit("delay_correlation"), fixed_unit("peak_gain_db"), fixed_unit("bias")
     ('s', 'dB', '')
     """
-    return _FIXED_UNITS.get(name.partition("_")[0], "")
+    return FIXED_UNITS.get(name, "")
 
 
 VERDICTS: dict[Verdict, str] = {

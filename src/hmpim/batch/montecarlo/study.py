@@ -4,6 +4,7 @@ import numpy as np
 
 from hmpim.batch.montecarlo.plan import Plan
 from hmpim.batch.montecarlo.summary import FAR, MonteCarlo, Region, Share
+from hmpim.identify.result.groups import FIXED_UNITS
 from hmpim.plots import Axis, Figure, Panel, Points, Rule
 from hmpim.plots.style import axis_label
 from hmpim.report.about import made_by
@@ -28,13 +29,7 @@ _SHORT = {
 }
 """Names that fit below a picture."""
 
-_UNITS = {
-    **dict.fromkeys(("delay", "delay_low_frequency", "delay_correlation", "time_constant"), "s"),
-    **dict.fromkeys(("natural_frequency", "bandwidth_3db", "bandwidth_phase90"), "Hz"),
-    "bandwidth_phase90_without_delay": "Hz",
-    "peak_gain_db": "dB",
-    **dict.fromkeys(("damping_ratio", "scale_factor"), "–"),
-}
+_UNITS = {**FIXED_UNITS, "damping_ratio": "–", "scale_factor": "–"}
 
 
 def montecarlo_page(plan: Plan, found: MonteCarlo) -> StudyPage:

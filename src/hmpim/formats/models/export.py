@@ -117,7 +117,7 @@ _RESERVED = {
         "record redeclare replaceable return stream then true type when while within"
     ),
 }
-"""Words of the languages in which a model is called by the name of its file."""
+"""Words of the languages in which a model has the name of its file, and could not have these."""
 
 
 @checked

@@ -77,6 +77,11 @@ class Evidence:
     gaining: GainChange | None = None
 
     @property
+    def has_samples(self) -> bool:
+        """Whether there are samples; statistics have none."""
+        return self.u.size > 0
+
+    @property
     def of_other_poles(self) -> tuple[str, ...]:
         """Figures that other poles would move.
 
@@ -105,7 +110,7 @@ class Evidence:
         """
         if self.unexplained >= WORTH:
             return False
-        if not self.u.size:  # from statistics
+        if not self.has_samples:
             return self.unexplained < INTERPOLATED
         fit, end = self.joint.best.fit, int(FEW * self.u.size) + 1
         inner, moves = fit.residual[end:-end], fit.prediction + fit.residual

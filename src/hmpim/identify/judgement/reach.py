@@ -68,7 +68,7 @@ def initial_transient(evidence: Evidence) -> Iterator[Finding]:
     message = (
         "The record does not begin at rest. The free response of its initial state is fitted too, "
         f"and its {first}, which respond to input before the record, are left out."
-        if evidence.u.size
+        if evidence.has_samples
         else f"The {first} of each run may respond to input before it, and are left out."
     )
     doubted: tuple[str, ...] = ()

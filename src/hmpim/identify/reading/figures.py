@@ -7,6 +7,7 @@ from hmpim.identify.fitting.fit import Fit
 from hmpim.identify.reading.propagation import gradient, log_slopes
 from hmpim.identify.result import Estimate, Parameters
 from hmpim.identify.result.error_bars import estimate
+from hmpim.identify.result.groups import FIXED_UNITS
 from hmpim.model.dynamics import Structure, coefficients_of, denominator_of, numerator_of
 from hmpim.model.filters import in_delta
 from hmpim.model.response import (
@@ -22,12 +23,6 @@ from hmpim.units import quotient_unit
 
 __all__ = ["figures_at", "figures_of", "read_figures", "system_of", "units_of"]
 
-_UNITS = {
-    "delay": "s", "delay_low_frequency": "s", "time_constant": "s",
-    "natural_frequency": "Hz", "damping_ratio": "", "peak_gain_db": "dB", "bandwidth_3db": "Hz",
-    "bandwidth_phase90": "Hz", "bandwidth_phase90_without_delay": "Hz",
-}  # fmt: skip
-
 
 def units_of(structure: Structure, units: tuple[str, str]) -> dict[str, str]:
     """Return the unit of each figure, from those of input and output."""
@@ -37,7 +32,13 @@ def units_of(structure: Structure, units: tuple[str, str]) -> dict[str, str]:
         gain = f"{gain or '1'}/s"
     if structure.dc_zeros:
         gain = f"{gain}*s" if gain else "s"
-    return {**_UNITS, "scale_factor": gain, "bias": output, "noise_std": output}
+    return {
+        **FIXED_UNITS,
+        "damping_ratio": "",
+        "scale_factor": gain,
+        "bias": output,
+        "noise_std": output,
+    }
 
 
 def system_of(structure: Structure, vector: Real, fs: float) -> RationalDelay:

@@ -4,7 +4,7 @@ from dataclasses import fields
 
 from hmpim.identify.result.parameters import Parameters
 
-__all__ = ["EVERY", "GAIN", "MODELLED", "PHASE_SPLIT", "TIMING", "in_words"]
+__all__ = ["EVERY", "FIXED_UNITS", "GAIN", "MODELLED", "PHASE_SPLIT", "TIMING", "in_words"]
 
 EVERY = tuple(f.name for f in fields(Parameters))
 """Every parameter."""
@@ -46,6 +46,20 @@ GAIN = (
     "peak_gain_db",
 )
 """Those that depend on the size of the response."""
+
+FIXED_UNITS = {
+    "delay": "s",
+    "delay_correlation": "s",
+    "delay_low_frequency": "s",
+    "natural_frequency": "Hz",
+    "time_constant": "s",
+    "bandwidth_phase90": "Hz",
+    "bandwidth_phase90_without_delay": "Hz",
+    "bandwidth_3db": "Hz",
+    "peak_gain_db": "dB",
+    "hold_period": "s",
+}
+"""Units that do not depend on the channels."""
 
 _IN_WORDS = {
     "delay_correlation": "delay by correlation",
