@@ -10,7 +10,7 @@ one optimiser.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import singledispatch
+from functools import lru_cache, singledispatch
 from typing import Protocol
 
 import numpy as np
@@ -295,16 +295,21 @@ def within_reach(
     >>> within_reach(STRUCTURES["first_order"], theta, delays=(-4.0, 50.0), samples=100).tolist()
     [-4.0, 0.0]
     """
-    bounded = theta.copy()
-    bounded[0] = np.clip(theta[0], *delays)
-    longest = np.log(_LONGEST_TIME_CONSTANT * samples)
-    start = 1
-    for order in structure.sections:
-        bounded[start] = np.clip(theta[start], np.log(_SHORTEST_TIME_CONSTANT), longest)
-        if order == 2:
-            bounded[start + 1] = np.clip(theta[start + 1], *_SHAPES)
-        start += order
+    least, most = _reach(structure.sections, samples)
+    bounded = np.minimum(np.maximum(theta, least), most)
+    bounded[0] = min(max(theta[0], delays[0]), delays[1])
     return bounded
+
+
+@lru_cache(maxsize=256)
+def _reach(sections: tuple[int, ...], samples: int) -> tuple[Real, Real]:
+    """Least and greatest parameters, (1 + order,), but for the delay, of which any will do."""
+    span = (np.log(_SHORTEST_TIME_CONSTANT), np.log(_LONGEST_TIME_CONSTANT * samples))
+    each = [(-np.inf, np.inf)]
+    for order in sections:
+        each += [span, _SHAPES][:order]
+    least, most = np.array(each).T
+    return least, most
 
 
 def fit_structure(

@@ -16,6 +16,7 @@ transform: the likelihood itself, of white noise.
 """
 
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -171,6 +172,28 @@ def _grouped(values: NDArray[Any], group: int) -> NDArray[Any]:
     return np.asarray(np.pad(values, (before, after)).reshape(-1, group).sum(axis=1))
 
 
+@lru_cache(maxsize=16)
+def _chirp(bins: int, shifts: int, length: int) -> Any:
+    """The inverse transform of a few neighbouring bins at a few neighbouring samples.
+
+    It costs transforms as long as both together (L. R. Rabiner, R. W. Schafer and C. M. Rader,
+    IEEE Trans. Audio Electroacoust. 17, 1969), and not as long as the record.
+    """
+    return scipy.signal.CZT(bins, shifts, np.exp(2j * np.pi / length))
+
+
+def _at_shifts(
+    rough: RoughResponse, rows: Complex, shifts: NDArray[np.intp], finer: int
+) -> NDArray[np.float64]:
+    """Real parts of Σ rows e^(jω shift/finer) over the bins, at neighbouring shifts, (..., k)."""
+    length, first = rough.length * finer, int(rough.bins[0])
+    dense = np.zeros((*rows.shape[:-1], int(rough.bins[-1]) - first + 1), dtype=complex)
+    dense[..., rough.bins - first] = rows
+    dense *= np.exp(2j * np.pi / length * shifts[0] * np.arange(dense.shape[-1]))
+    sums = _chirp(dense.shape[-1], shifts.size, length)(dense)
+    return np.asarray((sums * np.exp(2j * np.pi / length * first * shifts)).real)
+
+
 def starting_values(
     rough: RoughResponse, structure: Structure, *, count: int = 3, thorough: bool = True
 ) -> list[Real]:
@@ -244,16 +267,13 @@ def searched(rough: RoughResponse, structure: Structure, *, count: int = 3) -> l
         return []
     finer = int(np.clip(np.ceil(rough.omega[-1] / _PHASE_STEP), 1, _FINE))
     shifts = np.arange(min(rough.earliest - rough.lag, 0) * finer, 2 * finer + 1)
-    length = rough.length * finer
     found: list[tuple[float, Real]] = []
     for corner in rough.omega[-1] * np.geomspace(0.03, 1.0, _STEPS):
         for shape in _SHAPES if structure.order == 2 else _SHAPES[-1:]:
             a = np.array([2.0 * shape, 1.0]) if structure.order == 2 else np.ones(1)
             model = 1.0 / _polynomial(np.concatenate([[1.0], a]), rough.omega / corner)
-            spectrum = np.zeros(length // 2 + 1, dtype=complex)
-            spectrum[rough.bins] = rough.weight * model.conj() * rough.response
-            likeness = scipy.fft.irfft(spectrum, length)[shifts % length] * length / 2
-            explained = likeness**2 / (rough.weight @ np.abs(model) ** 2)
+            alike = _at_shifts(rough, rough.weight * model.conj() * rough.response, shifts, finer)
+            explained = alike**2 / (rough.weight @ np.abs(model) ** 2)
             best = int(np.argmax(explained))
             theta = theta_of(structure, a / corner ** np.arange(1, structure.order + 1))
             delay = rough.lag + shifts[best] / finer
@@ -277,11 +297,7 @@ def _levy(
     order = terms.shape[0] - 1
     weighted = terms * weight
     gram = (weighted @ terms.conj().T).real
-    length = rough.length * finer
-    spectrum = np.zeros((order + 1, length // 2 + 1), dtype=complex)
-    spectrum[:, rough.bins] = weighted
-    # irfft adds each bin's mirror and divides by the length.
-    cross = scipy.fft.irfft(spectrum, length, axis=1)[:, shifts % length] * length / 2
+    cross = _at_shifts(rough, weighted, shifts, finer)
     total = weight.sum()
     # Eliminate the constant K = sum_j a_j cross_j / total, a_0 = 1.
     reduced = gram[None, :, :] - cross.T[:, :, None] * cross.T[:, None, :] / total
