@@ -20,11 +20,14 @@ from hmpim.identify.coupling.weak import Lag, coupling_fit, lag_of, whitening_of
 from hmpim.identify.effects.drift import Drifting
 from hmpim.identify.effects.gain import GainChange
 from hmpim.identify.effects.hum import Humming
+from hmpim.identify.fitting.course import bridged
 from hmpim.identify.fitting.derivatives import jacobian
 from hmpim.identify.fitting.enrich import PLAIN
 from hmpim.identify.fitting.fit import Fit, Problem
 from hmpim.identify.fitting.fit import fit_together as fit_all
 from hmpim.identify.fitting.joint import joint_fit
+from hmpim.identify.fitting.least_squares import without
+from hmpim.identify.fitting.sampled_rows import part_of
 from hmpim.identify.fitting.trial import JointFit
 from hmpim.identify.noise.whiteness import effective_share
 from hmpim.identify.section_iv.correlation import likeness
@@ -106,22 +109,21 @@ def fit_together(
     nuisance : ndarray, shape (k, n), optional
         Rows beside the bias that enter linearly, such as a drift's.
     """
-    fitted = partial(
-        joint_fit, valid=valid, known=known, intersample=intersample, nuisance=nuisance
-    )
+    fitted = partial(joint_fit, known=known, intersample=intersample, nuisance=nuisance)
     if len(inputs) == 1:
-        return OutputFit(fits=(fitted(inputs[0], y, structures=structures),))
+        return OutputFit(fits=(fitted(inputs[0], y, valid=valid, structures=structures),))
     plain = tuple(name for name in structures if name in PLAIN) or structures
     plainly = partial(fitted, structures=plain, growing=False)
     fits = _strongest(inputs, y, valid, plainly)
-    pairs = _Pairs(y=y, fits=fits, strong=tuple(fits), alike=alike)
+    pairs = _Pairs(y=y, valid=valid, fits=fits, strong=tuple(fits), alike=alike)
     if len(pairs.strong) > 1:  # each was fitted with the later ones unknown
         for i in pairs.strong:
-            fits[i] = plainly(inputs[i], pairs.without_others(i))
+            fits[i] = plainly(inputs[i], pairs.without_others(i), valid=pairs.counted_by_others(i))
     _fit_couplings(inputs, pairs, plain)
     before = [fits[i].best.fit.structure for i in pairs.strong]
     for i in pairs.strong:  # the couplings known
-        fits[i] = fitted(inputs[i], pairs.without_others(i), structures=structures)
+        rest, counted = pairs.without_others(i), pairs.counted_by_others(i)
+        fits[i] = fitted(inputs[i], rest, valid=counted, structures=structures)
     if [fits[i].best.fit.structure for i in pairs.strong] != before:
         _fit_couplings(inputs, pairs, plain)
     return _moved_at_once(pairs)
@@ -131,11 +133,12 @@ def fit_together(
 class _Pairs:
     """The pairs of one output, (n,), as far as they are fitted; `fits` is changed in place.
 
-    `strong` are the inputs that move the output most, the strongest first; `alike` is as for
-    `fit_together`.
+    `valid` are the samples that count before any fit, `strong` the inputs that move the output
+    most, the strongest first; `alike` is as for `fit_together`.
     """
 
     y: Real
+    valid: Mask | None
     fits: dict[int, JointFit]
     strong: tuple[int, ...]
     alike: Sequence[tuple[frozenset[int], Mask]]
@@ -154,6 +157,10 @@ class _Pairs:
         """The output without what all inputs but one move it by."""
         return self.without(j for j in self.fits if j != i)
 
+    def counted_by_others(self, i: int) -> Mask | None:
+        """Samples that count for all inputs but one: those where what they do is known."""
+        return _common(self.valid, [self.fits[j] for j in self.kept if j != i])
+
     def left(self) -> Real:
         """What all of them leave over."""
         best = self.fits[self.strong[0]]
@@ -169,7 +176,7 @@ class _Pairs:
             return [], []
         y = self.y if y is None else y
         fits = self.fits
-        valid = _common([fits[j] for j in some])
+        valid = _common(None, [fits[j] for j in some])
         problems = [replace(fits[j].problem, y=y, valid=valid, whitening=whitening) for j in some]
         begun = [fits[j].best.fit for j in some]
         found = fit_all(problems, [fit.structure for fit in begun], [fit.theta for fit in begun])
@@ -226,11 +233,11 @@ def _moved_at_once(pairs: _Pairs) -> OutputFit:
     lags: dict[int, Lag | None] = {}
     fits = [pairs.fits[j] for j in pairs.kept]
     if fits:
-        problem, blocks = _derivatives(fits, whitening)
-        told = dict(zip(pairs.kept, _covariances(problem, fits[-1], blocks), strict=True))
+        problem, blocks, bias = _derivatives(fits, whitening)
+        told = dict(zip(pairs.kept, _covariances(problem, fits[-1], blocks, bias), strict=True))
     for k, j in enumerate(pairs.kept):
         if j not in pairs.strong:
-            lags[j] = _lag(problem, fits[k], [*blocks[:k], *blocks[k + 1 :]])
+            lags[j] = _lag(problem, fits[k], [*blocks[:k], *blocks[k + 1 :], bias])
     everyone = range(len(pairs.fits))
     return OutputFit(
         fits=tuple(pairs.fits[j] for j in everyone),
@@ -262,39 +269,49 @@ def _gained_by(problems: Sequence[Problem], fits: Sequence[Fit], i: int) -> floa
 def _joint_covariance(rows: Real, residual: Real, *, freedom: int) -> Real:
     """Covariance under white noise; a direction that the record does not see spoils no other one.
 
-    Of the derivatives of the prediction, (p, n), and of what is left over, (n,).
+    Of the derivatives of the prediction, (p, n), the bias's the last, and of what is left over,
+    (n,). The bias is taken out of the others first: where an input stands far from zero, the
+    derivative by its gain is all but the same.
     """
-    scale = np.sqrt(np.maximum(np.sum(rows**2, axis=1), np.finfo(float).tiny ** 0.5))
-    scaled = rows / scale[:, None]
+    bias, mean = rows[-1], rows[:-1] @ rows[-1]
+    power = max(float(bias @ bias), np.finfo(float).tiny)
+    mean = mean / power
+    moved = rows[:-1] - mean[:, None] * bias
+    scale = np.sqrt(np.maximum(np.sum(moved**2, axis=1), np.finfo(float).tiny ** 0.5))
+    scaled = moved / scale[:, None]
     values, vectors = np.linalg.eigh(scaled @ scaled.T)
     spread = vectors / np.sqrt(np.maximum(values, _UNSEEN * values[-1]))
-    variance = float(residual @ residual) / freedom
-    return np.asarray(variance * (spread @ spread.T) / np.outer(scale, scale))
+    inner = spread @ spread.T / np.outer(scale, scale)
+    mixed = -inner @ mean
+    last = np.array([[1.0 / power - mean @ mixed]])
+    full = np.block([[inner, mixed[:, None]], [mixed[None], last]])
+    return np.asarray(full * float(residual @ residual) / freedom)
 
 
 def _strongest(
-    inputs: list[Real], y: Real, valid: Mask | None, fitted: Callable[[Real, Real], JointFit]
+    inputs: list[Real], y: Real, valid: Mask | None, fitted: Callable[..., JointFit]
 ) -> dict[int, JointFit]:
     """Fit the inputs that move the output most, one after the other; at least one."""
-    rest = y if valid is None else np.interp(np.arange(y.size), np.flatnonzero(valid), y[valid])
-    spread = max(float(np.std(rest)), 1e-300)
     fits: dict[int, JointFit] = {}
     waiting = list(range(len(inputs)))
     while waiting:
+        left = y - sum((_part(f) for f in fits.values()), np.zeros(y.size))
+        counted = _common(valid, fits.values())
+        rest = left if counted is None else bridged(left, counted)
+        spread = max(float(np.std(rest)), 1e-300)
         share = {j: _follows_at_all(inputs[j], rest) / spread for j in waiting}
         most = max(share.values())
         if fits and most < PART:
             break
         # A delayed copy of an input correlates as well; which one it is the fit tells.
-        left = y - sum((_part(f) for f in fits.values()), np.zeros(y.size))
-        tried = {j: fitted(inputs[j], left) for j in waiting if share[j] > NEARLY * most}
+        likely = [j for j in waiting if share[j] > NEARLY * most]
+        tried = {j: fitted(inputs[j], left, valid=counted) for j in likely}
         i = min(tried, key=lambda j: tried[j].best.fit.cost)
         fit = tried[i]
         waiting.remove(i)
         part = _part(fit)
         if not fits or (float(np.std(part)) > PART * spread and fit.related):
             fits[i] = fit
-            rest = rest - part
     return fits
 
 
@@ -360,38 +377,52 @@ def _part(fit: JointFit) -> Real:
     return np.asarray(best.prediction - best.linear[-1])
 
 
-def _common(fits: list[JointFit]) -> Mask | None:
-    """Samples that count for all, shape (n,); None where all do."""
-    told = [fit.problem.valid for fit in fits if fit.problem.valid is not None]
+def _common(valid: Mask | None, fits: Iterable[JointFit]) -> Mask | None:
+    """Samples that count, shape (n,), and do for all of some fits; None where all do."""
+    told = [mask for mask in (valid, *(fit.problem.valid for fit in fits)) if mask is not None]
     counted = np.logical_and.reduce(told) if told else np.ones(1, dtype=bool)
     return None if counted.all() else np.asarray(counted)
 
 
-def _derivatives(fits: list[JointFit], whitening: Real | None) -> tuple[Problem, list[Real]]:
-    """Derivatives of each pair but by the bias, on the samples that count for all."""
-    problem = replace(fits[-1].problem, valid=_common(fits), whitening=whitening)
-    return problem, [
-        jacobian(replace(problem, source=fit.problem.source), fit.best.fit)[:-1] for fit in fits
-    ]
+def _derivatives(fits: list[JointFit], whitening: Real | None) -> tuple[Problem, list[Real], Real]:
+    """Derivatives of each pair but by the bias, on the samples that count for all, and by the bias.
+
+    What is not asked for, drift and the states that the inputs begin with, is projected out of all.
+    """
+    problem = replace(fits[-1].problem, valid=_common(None, fits), whitening=whitening, begins=None)
+    ones, blocks, others = np.ones((1, problem.y.size)), [], []
+    for fit in fits:
+        own = replace(problem, source=fit.problem.source, begins=fit.problem.begins)
+        part = part_of(own, fit.best.fit.structure, fit.best.fit.theta)
+        alone = replace(own, begins=None, nuisance=None)
+        blocks.append(jacobian(alone, fit.best.fit, part=part)[:-1])
+        others.append(part.free)
+    if problem.nuisance is not None:
+        others.append(problem.nuisance)
+    given = problem.masked(np.vstack(others))
+    bias = problem.masked(ones)
+    if given.shape[0]:
+        edges = np.cumsum([block.shape[0] for block in blocks])
+        *blocks, bias = np.split(without(np.vstack([*blocks, bias]), given), edges)
+    return problem, blocks, bias
 
 
-def _lag(problem: Problem, pair: JointFit, blocks: list[Real]) -> Lag | None:
+def _lag(problem: Problem, pair: JointFit, others: list[Real]) -> Lag | None:
     """Delay and lag of one of the pairs, if it is of no more than first order.
 
-    `blocks` are the derivatives of the others.
+    `others` are the derivatives of the other pairs and by the bias.
     """
     fit = pair.best.fit
     if fit.structure.name not in ("static", "first_order"):
         return None
-    others = np.vstack([*blocks, problem.masked(np.ones(fit.residual.size))])
     own = replace(pair.problem, valid=problem.valid, whitening=problem.whitening)
-    return lag_of(own, fit, others)
+    return lag_of(own, fit, np.vstack(others))
 
 
-def _covariances(problem: Problem, last: JointFit, blocks: list[Real]) -> list[Real]:
+def _covariances(problem: Problem, last: JointFit, blocks: list[Real], bias: Real) -> list[Real]:
     """Covariance of each pair's parameters and the bias, from all derivatives together."""
-    rows = np.vstack([*blocks, problem.masked(np.ones(problem.y.size))])
-    residual = problem.masked(problem.y - last.best.fit.prediction)
+    rows = np.vstack([*blocks, bias])
+    residual = problem.masked(last.best.fit.residual)
     # What the noise is whitened by is None only where it is white already.
     full = _joint_covariance(rows, residual, freedom=max(problem.counted - rows.shape[0], 1))
     end, start, out = rows.shape[0] - 1, 0, []

@@ -35,6 +35,7 @@ from hmpim.record import Intersample
 __all__ = [
     "Course",
     "begun",
+    "bridged",
     "completed",
     "continue_between",
     "continued",
@@ -370,7 +371,7 @@ def _level(
 ) -> NDArray[np.float64]:
     """An output for spectra: without what its rows explain, gaps filled."""
     level = y if nuisance is None else y - _regressed(nuisance, y, valid)
-    return level if valid is None else _bridged(level, valid)
+    return level if valid is None else bridged(level, valid)
 
 
 def _regressed(
@@ -383,7 +384,7 @@ def _regressed(
     return np.asarray(weights @ rows)
 
 
-def _bridged(y: NDArray[np.float64], valid: NDArray[np.bool_]) -> NDArray[np.float64]:
+def bridged(y: NDArray[np.float64], valid: NDArray[np.bool_]) -> NDArray[np.float64]:
     """Fill samples that do not count by straight lines, for spectra."""
     index = np.arange(y.size)
     return np.interp(index, index[valid], y[valid])

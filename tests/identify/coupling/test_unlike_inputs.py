@@ -1,0 +1,67 @@
+"""Inputs of one output that differ in size, in level and in what they do between samples."""
+
+import numpy as np
+import pytest
+
+import hmpim
+
+FS, SAMPLES = 100.0, 2000
+NOISE = 0.01
+
+
+def binary(seed, every):
+    values = np.repeat(np.random.default_rng(seed).choice([-1.0, 1.0], SAMPLES // every + 1), every)
+    return np.where(np.arange(SAMPLES) < 40, 0.0, values[:SAMPLES])
+
+
+def sweep():
+    time = np.arange(SAMPLES) / FS
+    return np.sin(2 * np.pi * (0.1 * time + 0.4 * time**2))
+
+
+def model(natural, damping, delay, gain):
+    w = 2 * np.pi * natural
+    denominator = (1 / w**2, 2 * damping / w, 1.0)
+    return hmpim.Model(delay=delay, scale_factor=gain, denominator=denominator)
+
+
+def identified(inputs, models, between):
+    rng = np.random.default_rng(11)
+    y = 0.5 + NOISE * rng.standard_normal(SAMPLES)
+    for u, unit, kind in zip(inputs, models, between, strict=True):
+        y = y + hmpim.simulate(unit, u, fs=FS, intersample=kind)
+    named = {f"u{j}": u for j, u in enumerate(inputs)}
+    return hmpim.identify(hmpim.Record.from_arrays(named, {"y": y}, fs=FS))
+
+
+def test_what_moves_the_output_little_is_found_with_its_dynamics_where_noise_is_less():
+    models = (model(11.0, 0.9, 0.012, 0.7), model(2.1, 0.16, 0.03, 0.03))
+    found = identified((binary(1, 1), binary(2, 5)), models, ("zoh", "zoh"))
+    pair = found["y", "u1"]
+    assert pair.structure == "second_order"
+    assert pair.verdict == "ok"
+    assert pair.natural_frequency.value == pytest.approx(2.1, abs=4 * pair.natural_frequency.std)
+    assert pair.damping_ratio.value == pytest.approx(0.16, abs=4 * pair.damping_ratio.std)
+    assert found["y", "u0"].noise_std.value == pytest.approx(NOISE, rel=0.08)
+
+
+@pytest.mark.parametrize("gains", [(1.0, 0.1), (0.1, 1.0)])
+def test_each_input_is_taken_for_what_it_does_between_its_own_samples(gains):
+    models = (model(6.0, 0.5, 0.021, gains[0]), model(4.0, 0.8, 0.033, gains[1]))
+    found = identified((sweep(), binary(3, 5)), models, ("bandlimited", "zoh"))
+    for pair, delay, between in zip(
+        found.pairs, (0.021, 0.033), ("bandlimited", "zoh"), strict=True
+    ):
+        assert (pair.intersample == "zoh") == (between == "zoh")
+        low, high = pair.delay.ci95
+        assert low - (high - low) / 2 < delay < high + (high - low) / 2
+        assert pair.noise_std.value == pytest.approx(NOISE, rel=0.08)
+
+
+def test_the_error_bar_of_a_bias_knows_how_far_from_zero_an_input_stands():
+    models = (model(6.0, 0.5, 0.02, 1.0), model(4.0, 0.8, 0.03, 0.5))
+    far = 3e7
+    found = identified((sweep() + far, binary(4, 5)), models, ("bandlimited", "zoh"))
+    pair = found["y", "u0"]
+    assert pair.bias.std > 0.5 * far * pair.scale_factor.std
+    assert abs(pair.bias.value - 0.5) < 4 * pair.bias.std
