@@ -157,40 +157,46 @@ def _fit_and_look_for_rows(
 ) -> OutputFit:
     """Fit every structure, and again with hum and a drift where the residual asks for them."""
     fitted = _fit_once(question, seen, question.structures, begun=begun)
-    if len(fitted.fits) > 1 or fitted.fits[0].silent or question.swapped or question.exact:
+    several = len(fitted.fits) > 1
+    if fitted.fits[0].silent or question.swapped or question.exact:
         return fitted
-    (joint,) = fitted.fits
-    humming = None
+    if several and question.intersample == "sampled":
+        return fitted
+    leading = fitted.leading
+    joint, beside, humming = fitted.fits[leading], fitted, None
+    hum = np.zeros(0)
 
     def with_rows(rows: Real, plainly: bool) -> JointFit:
+        nonlocal beside, hum
         names = question.plain if plainly else question.structures
+        every = rows if humming is None else np.vstack([rows, humming.rows])
+        beside = _fit_once(question, seen, names, every)
+        found = beside.fits[leading]
         if humming is None:
-            return _fit_once(question, seen, names, rows).fits[0]
-        both = _fit_once(question, seen, names, np.vstack([rows, humming.rows]))
-        return without_rows(both.fits[0], slice(len(rows), None))
+            return found
+        quiet = without_rows(found, slice(len(rows), None))
+        hum = found.problem.y - quiet.problem.y
+        return quiet
 
     def steadily(beside: JointFit) -> JointFit | None:
-        if question.intersample == "sampled":
+        if several or question.intersample == "sampled":
             return None
         course = begun or _started(question, seen, None if humming is None else humming.rows)
         free = set_free(course, beside.best.fit)
         return None if free is None else chosen_of(free, question.structures)
 
     coloured = not is_white(joint.problem.counting(joint.best.fit.residual))
-    if coloured and not _has_lines(question.aligned.inputs[0].values):
+    if coloured and not any(_has_lines(source.values) for source in question.aligned.inputs):
         humming = with_hum(joint, with_rows)
     joint = joint if humming is None else humming.joint
+    kept = fitted if humming is None else beside
     joint, drifting = with_drift(joint, with_rows, steadily)
     if drifting is not None and humming is not None:
-        taken_off = fitted.fits[0].problem.y - joint.problem.y
-        humming = replace(humming, trend=taken_off - drifting.trend)
-    return replace(
-        fitted,
-        fits=(joint,),
-        drifting=drifting,
-        humming=humming,
-        steady=None if drifting is None else fitted.prediction,
-    )
+        humming = replace(humming, trend=hum)
+    kept = replace(kept if drifting is None else beside, drifting=drifting, humming=humming)
+    if several:
+        return replace(kept, fits=tuple(without_rows(one, slice(None)) for one in kept.fits))
+    return replace(kept, fits=(joint,), steady=None if drifting is None else fitted.prediction)
 
 
 @kept

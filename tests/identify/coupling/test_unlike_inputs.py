@@ -25,9 +25,9 @@ def model(natural, damping, delay, gain):
     return hmpim.Model(delay=delay, scale_factor=gain, denominator=denominator)
 
 
-def identified(inputs, models, between):
+def identified(inputs, models, between, disturbance=0.0):
     rng = np.random.default_rng(11)
-    y = 0.5 + NOISE * rng.standard_normal(SAMPLES)
+    y = 0.5 + disturbance + NOISE * rng.standard_normal(SAMPLES)
     for u, unit, kind in zip(inputs, models, between, strict=True):
         y = y + hmpim.simulate(unit, u, fs=FS, intersample=kind)
     named = {f"u{j}": u for j, u in enumerate(inputs)}
@@ -65,3 +65,30 @@ def test_the_error_bar_of_a_bias_knows_how_far_from_zero_an_input_stands():
     pair = found["y", "u0"]
     assert pair.bias.std > 0.5 * far * pair.scale_factor.std
     assert abs(pair.bias.value - 0.5) < 4 * pair.bias.std
+
+
+TIME = np.arange(SAMPLES) / FS
+WARMING = 0.3 * np.exp(-TIME / 4.0)
+HUM = 0.05 * np.sin(2 * np.pi * 23.3 * TIME + 1.0)
+
+
+@pytest.mark.parametrize(
+    ("disturbance", "codes"),
+    [(WARMING, {"drift"}), (HUM, {"hum"}), (WARMING + HUM, {"drift", "hum"})],
+)
+def test_a_drift_and_a_hum_are_fitted_beside_several_inputs(disturbance, codes):
+    models = (model(6.0, 0.5, 0.021, 1.0), model(4.0, 0.8, 0.033, 0.3))
+    found = identified((sweep(), binary(3, 5)), models, ("bandlimited", "zoh"), disturbance)
+    for pair, unit in zip(found.pairs, models, strict=True):
+        assert codes <= {finding.code for finding in pair.warnings}
+        assert pair.noise_std.value == pytest.approx(NOISE, rel=0.08)
+        mean = 0.5 + float(np.mean(disturbance))
+        assert pair.bias.value == pytest.approx(mean, abs=4 * pair.bias.std)
+        assert pair.bias.std < 0.001
+        assert abs(pair.scale_factor.value - unit.scale_factor) < 4 * pair.scale_factor.std
+    whole = sum(
+        pair.prediction - pair.bias.value - disturbance + np.mean(disturbance)
+        for pair in found.pairs
+    )
+    residual = found.data.outputs[0].values - 0.5 - disturbance - whole
+    assert np.std(residual) == pytest.approx(NOISE, rel=0.1)

@@ -74,6 +74,12 @@ class OutputFit:
         return total if self.disturbance is None else total + self.disturbance
 
     @property
+    def leading(self) -> int:
+        """The input that moves the output most."""
+        parts = [float(np.std(_part(fit))) if fit.related else -1.0 for fit in self.fits]
+        return int(np.argmax(parts))
+
+    @property
     def disturbance(self) -> Real | None:
         """What moves the output beside the model, shape (n,): drift, hum, a change of the gain."""
         trends = [one.trend for one in (self.drifting, self.humming) if one is not None]
@@ -164,7 +170,7 @@ class _Pairs:
     def left(self) -> Real:
         """What all of them leave over."""
         best = self.fits[self.strong[0]]
-        rest = self.without(self.fits) - best.best.fit.linear[-1]
+        rest = self.without(self.fits) - _constant(best)
         counts = best.problem.valid
         return rest if counts is None else np.asarray(rest * counts)
 
@@ -180,7 +186,8 @@ class _Pairs:
         problems = [replace(fits[j].problem, y=y, valid=valid, whitening=whitening) for j in some]
         begun = [fits[j].best.fit for j in some]
         found = fit_all(problems, [fit.structure for fit in begun], [fit.theta for fit in begun])
-        parts = {j: fit.prediction - fit.linear[-1] for j, fit in zip(some, found, strict=True)}
+        beside = found[0].linear[-1] + found[0].nuisance @ problems[0].fixed()[1:]
+        parts = {j: fit.prediction - beside for j, fit in zip(some, found, strict=True)}
         total = sum(parts.values(), np.zeros(y.size))
         for j, fit in zip(some, found, strict=True):
             trial = replace(fits[j].best, fit=fit)
@@ -372,9 +379,14 @@ def _apart(problems: list[Problem], shared: list[Mask]) -> list[Problem]:
 
 
 def _part(fit: JointFit) -> Real:
-    """What the input contributes to the output, the bias aside."""
+    """What the input contributes to the output, the bias and the rows beside it aside."""
+    return np.asarray(fit.best.fit.prediction - _constant(fit))
+
+
+def _constant(fit: JointFit) -> Real:
+    """Bias and the rows beside it, shape (n,)."""
     best = fit.best.fit
-    return np.asarray(best.prediction - best.linear[-1])
+    return np.asarray(best.linear[-1] + best.nuisance @ fit.problem.fixed()[1:])
 
 
 def _common(valid: Mask | None, fits: Iterable[JointFit]) -> Mask | None:

@@ -83,6 +83,9 @@ def responses_of(
     delay = min(max(strongest.delay, 0.0), 0.4 * aligned.samples) / aligned.fs
     parts = [fit.best.fit.prediction - fit.best.fit.linear[-1] for fit in joined.fits]
     y, told = output.values, np.asarray(output.valid)
+    whole = joined.prediction
+    if joined.disturbance is not None:
+        y, whole = y - joined.disturbance, whole - joined.disturbance
     span = aligned.samples / aligned.fs - delay
     edges = sorted({edge for band in inputs.bands for edge in band})
     pieces: list[tuple[list[int], ResponseMatrix]] = []
@@ -92,7 +95,7 @@ def responses_of(
         if not active or bins < 8 * (len(active) + 1) + 2:
             continue
         rest = y
-        modelled = joined.prediction
+        modelled = whole
         for j, part in enumerate(parts):
             if j not in active and joined.fits[j].related:
                 rest, modelled = rest - part, modelled - part

@@ -39,8 +39,10 @@ def without_rows(joint: JointFit, which: slice) -> JointFit:
         fit = trial.fit
         if not fit.prediction.size:  # no more than a start
             return trial
-        part = fit.nuisance[which] @ rows
-        return replace(trial, fit=replace(fit, prediction=fit.prediction - part))
+        part, left = fit.nuisance[which] @ rows, fit.nuisance.copy()
+        left[which] = 0.0
+        moved = replace(fit, prediction=fit.prediction - part, nuisance=left)
+        return replace(trial, fit=moved)
 
     trials = {id(trial): plain(trial) for trial in joint.trials}
     return replace(

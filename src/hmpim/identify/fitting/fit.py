@@ -67,7 +67,7 @@ class Fit:
         `numerator_of` takes instead; bias.
     prediction : ndarray, shape (n,)
         Output of the fitted model, drift and free response included; where there are several
-        inputs, what this one and the bias make of it.
+        inputs, what this one, bias and drift make of it.
     residual : ndarray, shape (n,)
         Output less prediction of all, not whitened; 0 where a sample does not count.
     cost : float
@@ -234,7 +234,7 @@ class _Evaluation:
             own += bias + levels[i]
             if part.free.shape[0]:
                 own = own + weights[2 * i + 1] @ part.free
-            if len(self.parts) == 1 and problem.nuisance is not None:
+            if problem.nuisance is not None:
                 own = own + fixed[1:] @ problem.nuisance
             out.append(
                 Fit(
