@@ -39,6 +39,9 @@ from hmpim.record import Intersample
 
 __all__ = ["OutputFit", "fit_together"]
 
+_TURNS = 3
+"""How often the strong inputs are fitted, each with the others known."""
+
 _UNSEEN = 1e-13
 """Share of the greatest eigenvalue below which the record does not see a direction."""
 
@@ -120,33 +123,37 @@ def fit_together(
         return OutputFit(fits=(fitted(inputs[0], y, valid=valid, structures=structures),))
     plain = tuple(name for name in structures if name in PLAIN) or structures
     plainly = partial(fitted, structures=plain, growing=False)
-    fits = _strongest(inputs, y, valid, plainly)
-    pairs = _Pairs(y=y, valid=valid, fits=fits, strong=tuple(fits), alike=alike)
+    pairs = _Pairs(y=y, valid=valid, fits={}, strong=[], alike=alike)
+    _join(inputs, pairs, plainly)
     if len(pairs.strong) > 1:  # each was fitted with the later ones unknown
-        for i in pairs.strong:
-            fits[i] = plainly(inputs[i], pairs.without_others(i), valid=pairs.counted_by_others(i))
+        _fit_strong(inputs, pairs, plainly)
     _fit_couplings(inputs, pairs, plain)
-    before = [fits[i].best.fit.structure for i in pairs.strong]
-    for i in pairs.strong:  # the couplings known
-        rest, counted = pairs.without_others(i), pairs.counted_by_others(i)
-        fits[i] = fitted(inputs[i], rest, valid=counted, structures=structures)
-    if [fits[i].best.fit.structure for i in pairs.strong] != before:
-        _fit_couplings(inputs, pairs, plain)
+    for _ in range(_TURNS):
+        before = [pairs.fits[i].best.fit.structure for i in pairs.strong]
+        _fit_strong(inputs, pairs, partial(fitted, structures=structures))
+        joined = _join(inputs, pairs, plainly)
+        if joined or [pairs.fits[i].best.fit.structure for i in pairs.strong] != before:
+            _fit_couplings(inputs, pairs, plain)
+        left = pairs.cost
+        pairs.refine(pairs.kept, None)
+        if not joined and pairs.cost * TWICE > left:
+            break  # else each was fitted to the wrong rest
     return _moved_at_once(pairs)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class _Pairs:
-    """The pairs of one output, (n,), as far as they are fitted; `fits` is changed in place.
+    """The pairs of one output, (n,), as far as they are fitted.
 
-    `valid` are the samples that count before any fit, `strong` the inputs that move the output
-    most, the strongest first; `alike` is as for `fit_together`.
+    `valid` are the samples that count before any fit, `strong` the inputs that are no weak
+    couplings, the strongest first; `alike` is as for `fit_together`. `fits` and `strong` are
+    changed in place.
     """
 
     y: Real
     valid: Mask | None
     fits: dict[int, JointFit]
-    strong: tuple[int, ...]
+    strong: list[int]
     alike: Sequence[tuple[frozenset[int], Mask]]
 
     @property
@@ -162,6 +169,12 @@ class _Pairs:
     def without_others(self, i: int) -> Real:
         """The output without what all inputs but one move it by."""
         return self.without(j for j in self.fits if j != i)
+
+    @property
+    def cost(self) -> float:
+        """Mean square of what all of them leave over."""
+        rest, counts = self.left(), _common(self.valid, [self.fits[j] for j in self.kept])
+        return float(np.mean(np.square(rest if counts is None else rest[counts])))
 
     def counted_by_others(self, i: int) -> Mask | None:
         """Samples that count for all inputs but one: those where what they do is known."""
@@ -229,11 +242,10 @@ class _Pairs:
 
 
 def _moved_at_once(pairs: _Pairs) -> OutputFit:
-    """All pairs moved together until none is left out, with the errors of all."""
-    pairs.refine(pairs.kept, None)
-    # What was not white may have been no noise but what one of them had not given back yet.
+    """All pairs moved with the noise whitened until none is left out, with the errors of all."""
     whitening = whitening_of(pairs.left())
-    pairs.refine(pairs.kept, whitening)
+    if whitening is not None:
+        pairs.refine(pairs.kept, whitening)
     while pairs.together(whitening):
         pairs.refine(pairs.kept, whitening)
     told: dict[int, Real] = {}
@@ -295,31 +307,42 @@ def _joint_covariance(rows: Real, residual: Real, *, freedom: int) -> Real:
     return np.asarray(full * float(residual @ residual) / freedom)
 
 
-def _strongest(
-    inputs: list[Real], y: Real, valid: Mask | None, fitted: Callable[..., JointFit]
-) -> dict[int, JointFit]:
-    """Fit the inputs that move the output most, one after the other; at least one."""
-    fits: dict[int, JointFit] = {}
-    waiting = list(range(len(inputs)))
+def _fit_strong(inputs: list[Real], pairs: _Pairs, fitted: Callable[..., JointFit]) -> None:
+    """Fit, in place, each strong input to what all others leave over."""
+    for i in pairs.strong:
+        rest, counted = pairs.without_others(i), pairs.counted_by_others(i)
+        pairs.fits[i] = fitted(inputs[i], rest, valid=counted)
+
+
+def _join(inputs: list[Real], pairs: _Pairs, fitted: Callable[..., JointFit]) -> bool:
+    """Fit, in place, the inputs that what is left over follows, the strongest first; at least one.
+
+    Returns
+    -------
+    bool
+        Whether one joined those that are strong.
+    """
+    fits, begun = pairs.fits, len(pairs.strong)
+    waiting = [j for j in range(len(inputs)) if j not in pairs.strong]
     while waiting:
-        left = y - sum((_part(f) for f in fits.values()), np.zeros(y.size))
-        counted = _common(valid, fits.values())
-        rest = left if counted is None else bridged(left, counted)
-        spread = max(float(np.std(rest)), 1e-300)
-        share = {j: _follows_at_all(inputs[j], rest) / spread for j in waiting}
+        left = {j: pairs.without_others(j) for j in waiting}
+        counted = _common(pairs.valid, [fits[j] for j in pairs.strong])
+        rest = left if counted is None else {j: bridged(one, counted) for j, one in left.items()}
+        spread = {j: max(float(np.std(one)), 1e-300) for j, one in rest.items()}
+        share = {j: _follows_at_all(inputs[j], rest[j]) / spread[j] for j in waiting}
         most = max(share.values())
-        if fits and most < PART:
+        if pairs.strong and most < PART:
             break
         # A delayed copy of an input correlates as well; which one it is the fit tells.
         likely = [j for j in waiting if share[j] > NEARLY * most]
-        tried = {j: fitted(inputs[j], left, valid=counted) for j in likely}
+        tried = {j: fitted(inputs[j], left[j], valid=counted) for j in likely}
         i = min(tried, key=lambda j: tried[j].best.fit.cost)
-        fit = tried[i]
         waiting.remove(i)
-        part = _part(fit)
-        if not fits or (float(np.std(part)) > PART * spread and fit.related):
-            fits[i] = fit
-    return fits
+        part = float(np.std(_part(tried[i])))
+        if not pairs.strong or (part > PART * spread[i] and tried[i].related):
+            fits[i] = tried[i]
+            pairs.strong.append(i)
+    return len(pairs.strong) > begun
 
 
 def _follows_at_all(u: Real, y: Real) -> float:
@@ -352,6 +375,7 @@ def _fit_couplings(
                 valid=best.problem.valid,
                 longest_delay=latest,
                 whitening=whitening,
+                nuisance=best.problem.nuisance,
             )
             fits[j] = coupling_fit(problem, inputs[j], intersample=mode, structures=names)
         # Not before all are right is one of them tested: alike, they take each other's share.
