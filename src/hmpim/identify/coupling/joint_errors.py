@@ -1,0 +1,116 @@
+"""Error bars of several inputs: from the derivatives of all that they make of one output."""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from hmpim.identify.arrays import Mask, Real
+from hmpim.identify.coupling.weak import Lag, lag_of
+from hmpim.identify.fitting.derivatives import jacobian
+from hmpim.identify.fitting.fit import Fit, Problem
+from hmpim.identify.fitting.least_squares import without
+from hmpim.identify.fitting.sampled_rows import part_of
+from hmpim.identify.fitting.trial import JointFit
+
+__all__ = ["common", "covariances", "derivatives", "gained_by", "own_lag"]
+
+_UNSEEN = 1e-13
+"""Share of the greatest eigenvalue below which the record does not see a direction."""
+
+
+def common(valid: Mask | None, fits: Iterable[JointFit]) -> Mask | None:
+    """Samples that count, shape (n,), and do for all of some fits; None where all do."""
+    told = [mask for mask in (valid, *(fit.problem.valid for fit in fits)) if mask is not None]
+    counted = np.logical_and.reduce(told) if told else np.ones(1, dtype=bool)
+    return None if counted.all() else np.asarray(counted)
+
+
+def derivatives(fits: list[JointFit], whitening: Real | None) -> tuple[Problem, list[Real], Real]:
+    """Derivatives of each pair but by the bias, on the samples that count for all, and by the bias.
+
+    What is not asked for, drift and the states that the inputs begin with, is projected out of all.
+    """
+    problem = replace(fits[-1].problem, valid=common(None, fits), whitening=whitening, begins=None)
+    ones, blocks, others = np.ones((1, problem.y.size)), [], []
+    for fit in fits:
+        own = replace(problem, source=fit.problem.source, begins=fit.problem.begins)
+        part = part_of(own, fit.best.fit.structure, fit.best.fit.theta)
+        alone = replace(own, begins=None, nuisance=None)
+        blocks.append(jacobian(alone, fit.best.fit, part=part)[:-1])
+        others.append(part.free)
+    if problem.nuisance is not None:
+        others.append(problem.nuisance)
+    given = problem.masked(np.vstack(others))
+    bias = problem.masked(ones)
+    if given.shape[0]:
+        edges = np.cumsum([block.shape[0] for block in blocks])
+        *blocks, bias = np.split(without(np.vstack([*blocks, bias]), given), edges)
+    return problem, blocks, bias
+
+
+def own_lag(problem: Problem, pair: JointFit, others: list[Real]) -> Lag | None:
+    """Delay and lag of one of the pairs, if it is of no more than first order.
+
+    `others` are the derivatives of the other pairs and by the bias.
+    """
+    fit = pair.best.fit
+    if fit.structure.name not in ("static", "first_order"):
+        return None
+    own = replace(pair.problem, valid=problem.valid, whitening=problem.whitening)
+    return lag_of(own, fit, np.vstack(others))
+
+
+def covariances(problem: Problem, last: JointFit, blocks: list[Real], bias: Real) -> list[Real]:
+    """Covariance of each pair's parameters and the bias, from all derivatives together."""
+    rows = np.vstack([*blocks, bias])
+    residual = problem.masked(last.best.fit.residual)
+    # What the noise is whitened by is None only where it is white already.
+    full = _joint_covariance(rows, residual, freedom=max(problem.counted - rows.shape[0], 1))
+    end, start, out = rows.shape[0] - 1, 0, []
+    for block in blocks:
+        span = [*range(start, start + block.shape[0]), end]
+        out.append(full[np.ix_(span, span)])
+        start += block.shape[0]
+    return out
+
+
+def gained_by(problems: Sequence[Problem], fits: Sequence[Fit], i: int) -> float:
+    """Log-likelihood that one pair's gain adds, all other parameters free to take over.
+
+    Half of b' C⁻¹ b, b the pair's numerator, C its covariance, the pair's own poles and delay
+    held: without a gain they mean nothing.
+    """
+    blocks = []
+    for j, (p, f) in enumerate(zip(problems, fits, strict=True)):
+        rows = jacobian(p, f)[:-1]
+        blocks.append(rows[f.theta.size :] if j == i else rows)
+    rows = np.vstack([*blocks, problems[0].masked(np.ones(problems[0].y.size))])
+    residual = problems[i].masked(fits[i].residual)
+    full = _joint_covariance(rows, residual, freedom=problems[i].counted)
+    start = sum(block.shape[0] for block in blocks[:i])
+    span = slice(start, start + blocks[i].shape[0])
+    b = fits[i].linear[:-1]
+    return float(0.5 * b @ np.linalg.pinv(full[span, span], hermitian=True) @ b)
+
+
+def _joint_covariance(rows: Real, residual: Real, *, freedom: int) -> Real:
+    """Covariance under white noise; a direction that the record does not see spoils no other one.
+
+    Of the derivatives of the prediction, (p, n), the bias's the last, and of what is left over,
+    (n,). The bias is taken out of the others first: where an input stands far from zero, the
+    derivative by its gain is all but the same.
+    """
+    bias, mean = rows[-1], rows[:-1] @ rows[-1]
+    power = max(float(bias @ bias), np.finfo(float).tiny)
+    mean = mean / power
+    moved = rows[:-1] - mean[:, None] * bias
+    scale = np.sqrt(np.maximum(np.sum(moved**2, axis=1), np.finfo(float).tiny ** 0.5))
+    scaled = moved / scale[:, None]
+    values, vectors = np.linalg.eigh(scaled @ scaled.T)
+    spread = vectors / np.sqrt(np.maximum(values, _UNSEEN * values[-1]))
+    inner = spread @ spread.T / np.outer(scale, scale)
+    mixed = -inner @ mean
+    last = np.array([[1.0 / power - mean @ mixed]])
+    full = np.block([[inner, mixed[:, None]], [mixed[None], last]])
+    return np.asarray(full * float(residual @ residual) / freedom)

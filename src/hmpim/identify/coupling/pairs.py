@@ -1,0 +1,204 @@
+"""The pairs of one output while they are fitted: what each input does, and all moved at once."""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from hmpim.identify.arrays import Mask, Real
+from hmpim.identify.chance import SEARCHED
+from hmpim.identify.coupling.joint_errors import common, gained_by
+from hmpim.identify.fitting.fit import Fit, Problem
+from hmpim.identify.fitting.fit import fit_together as fit_all
+from hmpim.identify.fitting.trial import JointFit, Trial
+from hmpim.identify.noise.whiteness import effective_share
+from hmpim.identify.worth import TWICE
+from hmpim.model.response import slowest_time_constant
+
+__all__ = ["Pairs", "constant_of", "contribution"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Pairs:
+    """The pairs of one output, (n,), as far as they are fitted.
+
+    `valid` are the samples that count before any fit, `strong` the inputs that are no weak
+    couplings, the strongest first; `alike` is as for `fit_together`. `fits` and `strong` are
+    changed in place.
+    """
+
+    y: Real
+    valid: Mask | None
+    fits: dict[int, JointFit]
+    strong: list[int]
+    alike: Sequence[tuple[frozenset[int], Mask]]
+
+    @property
+    def kept(self) -> list[int]:
+        """The inputs that the output follows, as far as is known."""
+        return [j for j, fit in self.fits.items() if fit.related]
+
+    def without(self, some: Iterable[int]) -> Real:
+        """The output without what some of the inputs move it by."""
+        parts = (contribution(self.fits[j]) for j in some if self.fits[j].related)
+        return np.asarray(self.y - sum(parts, np.zeros(self.y.size)))
+
+    def without_others(self, i: int) -> Real:
+        """The output without what all inputs but one move it by."""
+        return self.without(j for j in self.fits if j != i)
+
+    @property
+    def cost(self) -> float:
+        """Mean square of what all of them leave over."""
+        rest, counts = self.left(), common(self.valid, [self.fits[j] for j in self.kept])
+        return float(np.mean(np.square(rest if counts is None else rest[counts])))
+
+    def counted_by_others(self, i: int) -> Mask | None:
+        """Samples that count for all inputs but one: those where what they do is known."""
+        return common(self.valid, [self.fits[j] for j in self.kept if j != i])
+
+    def left(self) -> Real:
+        """What all of them leave over."""
+        best = self.fits[self.strong[0]]
+        rest = self.without(self.fits) - constant_of(best)
+        counts = best.problem.valid
+        return rest if counts is None else np.asarray(rest * counts)
+
+    def refine(
+        self, some: list[int], whitening: Real | None, y: Real | None = None
+    ) -> tuple[list[Problem], list[Fit]]:
+        """Move some of the fits at once to what the output, or another `y`, is but for a bias."""
+        if not some:
+            return [], []
+        y = self.y if y is None else y
+        begun = [self.fits[j].best.fit for j in some]
+        problems, found = self._moved(some, begun, whitening=whitening, y=y)
+        for j, trial in zip(some, [self.fits[j].best for j in some], strict=True):
+            self._take(some, found, j, trial, y)
+        return problems, found
+
+    def _moved(
+        self,
+        some: list[int],
+        begun: list[Fit],
+        *,
+        y: Real,
+        whitening: Real | None = None,
+        hopeless: float = np.inf,
+    ) -> tuple[list[Problem], list[Fit]]:
+        """Fits to some of the inputs, all moved at once from where they begin."""
+        fits = [self.fits[j] for j in some]
+        valid = common(None, fits)
+        problems = [replace(fit.problem, y=y, valid=valid, whitening=whitening) for fit in fits]
+        structures, thetas = [fit.structure for fit in begun], [fit.theta for fit in begun]
+        return problems, fit_all(problems, structures, thetas, hopeless=hopeless)
+
+    def _take(self, some: list[int], found: list[Fit], j: int, trial: Trial, y: Real) -> None:
+        """Let one of the inputs have what was found for it in place of a trial of its own."""
+        before, fit = self.fits[j], found[some.index(j)]
+        rows = before.problem.fixed()[1:]
+        others = (one for k, one in zip(some, found, strict=True) if k != j)
+        moved = (one.prediction - one.linear[-1] - one.nuisance @ rows for one in others)
+        own = replace(before.problem, y=y - sum(moved, np.zeros(y.size)))
+        best = replace(trial, fit=fit)
+        if trial is not before.best:  # of another structure, nothing is known of one more pole
+            before = replace(before, rivals=(), hidden=None)
+        self.fits[j] = replace(
+            before,
+            problem=own,
+            weighed=own,
+            best=best,
+            trials=tuple(best if t is trial else t for t in before.trials),
+            effective_share=effective_share(fit.residual),
+        )
+
+    def simplify(self) -> bool:
+        """Take plainer dynamics for a strong input where those of the others make them as likely.
+
+        What another input's fit had missed looked like dynamics. Weighed by Schwarz's criterion,
+        all inputs moved at once.
+
+        Returns
+        -------
+        bool
+            Whether any were taken.
+        """
+        simpler = False
+        for i in sorted(self.strong, key=lambda j: -self.fits[j].best.fit.structure.parameters):
+            some, joint = self.kept, self.fits[i]
+            if i not in some:
+                continue
+            best, at = joint.best, some.index(i)
+            count = joint.problem.counted * joint.effective_share
+            least, chosen = 0.0, None
+            for trial in joint.trials:
+                fewer = best.fit.structure.parameters - trial.fit.structure.parameters
+                if fewer <= 0 or trial.intersample != best.intersample:
+                    continue
+                gained = fewer * float(np.log(count))
+                begun = [self.fits[j].best.fit for j in some]
+                begun[at] = trial.fit
+                hopeless = best.fit.objective * float(np.exp(gained / count))
+                _, found = self._moved(some, begun, y=self.y, hopeless=hopeless)
+                lost = count * float(np.log(found[at].objective / best.fit.objective))
+                if lost - gained < least:
+                    least, chosen = lost - gained, (trial, found)
+            if chosen is not None:
+                trials = [chosen[0] if j == i else self.fits[j].best for j in some]
+                for j, trial in zip(some, trials, strict=True):
+                    self._take(some, chosen[1], j, trial, self.y)
+                simpler = True
+        return simpler
+
+    def together(self, whitening: Real | None, *, drop: bool = True) -> bool:
+        """Move all couplings at once; leave out the least if it adds nothing and may go.
+
+        Returns
+        -------
+        bool
+            Whether one was left out.
+        """
+        weak = [j for j in self.kept if j not in self.strong]
+        if not weak:
+            return False
+        problems, found = self.refine(weak, whitening, self.without(self.strong))
+        if not drop:
+            return False
+        gains = []
+        for k, j in enumerate(weak):
+            shared = [bins for group, bins in self.alike if j in group and group & {*self.strong}]
+            slow = _too_slow(found[k], self.y.size)
+            gains.append(0.0 if slow else gained_by(_apart(problems, shared), found, k))
+        least = int(np.argmin(gains))
+        if gains[least] > SEARCHED:
+            return False
+        self.fits[weak[least]] = replace(self.fits[weak[least]], related=False)
+        return True
+
+
+def contribution(fit: JointFit) -> Real:
+    """What the input contributes to the output, the bias and the rows beside it aside."""
+    return np.asarray(fit.best.fit.prediction - constant_of(fit))
+
+
+def constant_of(fit: JointFit) -> Real:
+    """Bias and the rows beside it, shape (n,)."""
+    best = fit.best.fit
+    return np.asarray(best.linear[-1] + best.nuisance @ fit.problem.fixed()[1:])
+
+
+def _too_slow(fit: Fit, samples: int) -> bool:
+    """Whether a coupling is one of drifts only: its corner below a few periods of the record."""
+    slowest = slowest_time_constant(fit.denominator)
+    return bool(2 * np.pi * slowest * TWICE > samples)
+
+
+def _apart(problems: list[Problem], shared: list[Mask]) -> list[Problem]:
+    """The problems without the bins at which an input is not told from a stronger one."""
+    if not shared:
+        return problems
+    known = problems[0].whitening
+    gain = np.ones(problems[0].y.size // 2 + 1) if known is None else known
+    for bins in shared:
+        gain = gain * ~bins
+    return [replace(problem, whitening=gain) for problem in problems]
