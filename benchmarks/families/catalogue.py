@@ -303,6 +303,43 @@ NOISE = (
     other("unrelated", "Noise beside a sweep: not identifiable", m.unrelated),
 )
 
+BESIDE_ANOTHER = c.another_input(0.1, 1.0)
+BESIDE = (
+    family(
+        "two inputs", "The other moves a tenth as much to as much", SECOND, SWEEP, BESIDE_ANOTHER
+    ),
+    family(
+        "lesser input",
+        "The other moves 3 to 20 times as much",
+        SECOND,
+        SWEEP,
+        c.another_input(3.0, 20.0),
+    ),
+    family("two inputs, PRBS", "The first is held", SECOND, k.sequence("prbs"), BESIDE_ANOTHER),
+    family(
+        "two inputs, Butterworth", "Order 2 to 6", k.low_pass("butterworth"), SWEEP, BESIDE_ANOTHER
+    ),
+    family(
+        "two inputs, mid-sweep",
+        "The record begins in the sweep",
+        SECOND,
+        SWEEP,
+        BESIDE_ANOTHER,
+        start=0.25,
+    ),
+    family(
+        "two inputs, drift", "The bias warms up", SECOND, SWEEP, BESIDE_ANOTHER, c.drift("thermal")
+    ),
+    family("two inputs, mains", "50 or 60 Hz hum", SECOND, SWEEP, BESIDE_ANOTHER, c.mains),
+    family(
+        "two inputs, missing",
+        "One row in twenty is not there",
+        SECOND,
+        SWEEP,
+        BESIDE_ANOTHER,
+        c.missing,
+    ),
+)
 BENT = (
     other("slew", "The servo's speed is limited", m.bent(m.slew, SECOND, SWEEP)),
     other("dead zone", "On the input", m.bent(m.dead, SECOND, SWEEP)),
@@ -395,7 +432,8 @@ CHANCE = (
 )
 
 FAMILIES = {
-    f.name: f for f in (*SYSTEMS, *INPUTS, *BEGINNINGS, *NOISE, *BENT, *LOOPS, *SOFTWARE, *CHANCE)
+    f.name: f
+    for f in (*SYSTEMS, *INPUTS, *BEGINNINGS, *NOISE, *BESIDE, *BENT, *LOOPS, *SOFTWARE, *CHANCE)
 }
 
 

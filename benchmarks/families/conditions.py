@@ -8,10 +8,34 @@ from dataclasses import replace
 import numpy as np
 from scipy.interpolate import CubicSpline
 
+from families.kinds import first_order, lines, log_uniform, second_order, sequence
 from families.simulate import linear_output
 from families.take import Figure, Take
 
 Condition = Callable[[Take], None]
+
+
+def another_input(low: float, high: float) -> Condition:
+    """A second input, held or smooth, that moves the output by so much of what the first does.
+
+    It knows nothing of the first and has a first- or second-order response of its own; it moves
+    before the record begins, or from 2 % of it on.
+    """
+
+    def spoil(take: Take) -> None:
+        rng, fs, samples = take.rng, take.drive.fs, take.u.size
+        makes = (
+            lines("flat", rates=(fs,), samples=samples),
+            sequence("prbs", rates=(fs,), samples=samples),
+        )
+        drive = makes[rng.integers(2)](rng)
+        unit = (first_order, second_order(), second_order())[rng.integers(3)](rng, drive)
+        alone = linear_output(replace(unit, bias=0.0), drive)
+        share = log_uniform(rng, low, high) * take.motion / float(np.std(alone))
+        take.y = take.y + share * alone
+        take.others["v"] = drive.sampled()
+
+    return spoil
 
 
 def operating_point(*, both: bool) -> Condition:

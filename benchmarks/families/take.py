@@ -112,6 +112,7 @@ class Take:
     intersample: str | None = None
     options: dict[str, str] = field(default_factory=dict)
     references: dict[str, np.ndarray] = field(default_factory=dict)
+    others: dict[str, np.ndarray] = field(default_factory=dict)
     simulate: Callable[[System], np.ndarray] | None = None
     y_stamps: np.ndarray | None = None
 
@@ -340,7 +341,7 @@ def _packed(take: Take, found: dict[str, Figure], response: Response) -> Draw:
     seen = channel(take.y) if take.y_stamps is None else (take.y_stamps, take.y)
     return Draw(
         fs=take.drive.fs,
-        inputs={"u": channel(take.u)},
+        inputs={name: channel(values) for name, values in {"u": take.u, **take.others}.items()},
         outputs={"y": seen},
         figures=found,
         response=response,
