@@ -119,17 +119,17 @@ def fit_together(
     pairs = Pairs(y=y, valid=valid, fits={}, strong=[], alike=alike)
     _join(inputs, pairs, plainly)
     if len(pairs.strong) > 1:  # each was fitted with the later ones unknown
-        _fit_strong(inputs, pairs, plainly)
+        pairs.refine(pairs.kept, None)
     _fit_couplings(inputs, pairs, plain)
     for _ in range(_TURNS):
-        before = [pairs.fits[i].best.fit.structure for i in pairs.strong]
+        before, cost = [pairs.fits[i].best.fit.structure for i in pairs.strong], pairs.cost
         _fit_strong(inputs, pairs, partial(fitted, structures=structures))
-        joined = _join(inputs, pairs, plainly)
+        joined = pairs.cost * TWICE < cost and _join(inputs, pairs, plainly)
         if joined or [pairs.fits[i].best.fit.structure for i in pairs.strong] != before:
             _fit_couplings(inputs, pairs, plain)
-        left = pairs.cost
+        cost = pairs.cost
         pairs.refine(pairs.kept, None)
-        if not joined and not pairs.simplify() and pairs.cost * TWICE > left:
+        if not joined and not pairs.simplify() and pairs.cost * TWICE > cost:
             break  # else each was fitted to the wrong rest
     return _moved_at_once(pairs)
 

@@ -12,7 +12,7 @@ from hmpim.identify.fitting.fit import Fit, Problem
 from hmpim.identify.fitting.fit import fit_together as fit_all
 from hmpim.identify.fitting.trial import JointFit, Trial
 from hmpim.identify.noise.whiteness import effective_share
-from hmpim.identify.worth import TWICE
+from hmpim.identify.worth import PART, TWICE
 from hmpim.model.response import slowest_time_constant
 
 __all__ = ["Pairs", "constant_of", "contribution"]
@@ -52,6 +52,12 @@ class Pairs:
         """Mean square of what all of them leave over."""
         rest, counts = self.left(), common(self.valid, [self.fits[j] for j in self.kept])
         return float(np.mean(np.square(rest if counts is None else rest[counts])))
+
+    @property
+    def dominant(self) -> set[int]:
+        """Inputs that move the output so much that what their models lack passes for a coupling."""
+        least = PART * float(np.std(self.y if self.valid is None else self.y[self.valid]))
+        return {j for j in self.strong if float(np.std(contribution(self.fits[j]))) > least}
 
     def counted_by_others(self, i: int) -> Mask | None:
         """Samples that count for all inputs but one: those where what they do is known."""
@@ -161,12 +167,13 @@ class Pairs:
         weak = [j for j in self.kept if j not in self.strong]
         if not weak:
             return False
+        dominant = self.dominant
         problems, found = self.refine(weak, whitening, self.without(self.strong))
         if not drop:
             return False
         gains = []
         for k, j in enumerate(weak):
-            shared = [bins for group, bins in self.alike if j in group and group & {*self.strong}]
+            shared = [bins for group, bins in self.alike if j in group and group & dominant]
             slow = _too_slow(found[k], self.y.size)
             gains.append(0.0 if slow else gained_by(_apart(problems, shared), found, k))
         least = int(np.argmin(gains))
