@@ -122,14 +122,17 @@ def fit_together(
         pairs.refine(pairs.kept, None)
     _fit_couplings(inputs, pairs, plain)
     for _ in range(_TURNS):
-        before, cost = [pairs.fits[i].best.fit.structure for i in pairs.strong], pairs.cost
+        before, cost = pairs.structures, pairs.cost
         _fit_strong(inputs, pairs, partial(fitted, structures=structures))
-        joined = pairs.cost * TWICE < cost and _join(inputs, pairs, plainly)
-        if joined or [pairs.fits[i].best.fit.structure for i in pairs.strong] != before:
+        if pairs.cost * TWICE < cost:
+            _join(inputs, pairs, plainly)
+        others = pairs.structures != before
+        if others:
             _fit_couplings(inputs, pairs, plain)
         cost = pairs.cost
         pairs.refine(pairs.kept, None)
-        if not joined and not pairs.simplify() and pairs.cost * TWICE > cost:
+        simpler = pairs.simplify()
+        if not others and not simpler and pairs.cost * TWICE > cost:
             break  # else each was fitted to the wrong rest
     return _moved_at_once(pairs)
 
@@ -166,15 +169,9 @@ def _fit_strong(inputs: list[Real], pairs: Pairs, fitted: Callable[..., JointFit
         pairs.fits[i] = fitted(inputs[i], rest, valid=counted)
 
 
-def _join(inputs: list[Real], pairs: Pairs, fitted: Callable[..., JointFit]) -> bool:
-    """Fit, in place, the inputs that what is left over follows, the strongest first; at least one.
-
-    Returns
-    -------
-    bool
-        Whether one joined those that are strong.
-    """
-    fits, begun = pairs.fits, len(pairs.strong)
+def _join(inputs: list[Real], pairs: Pairs, fitted: Callable[..., JointFit]) -> None:
+    """Fit, in place, inputs that what is left over follows, the strongest first; at least one."""
+    fits = pairs.fits
     waiting = [j for j in range(len(inputs)) if j not in pairs.strong]
     while waiting:
         left = {j: pairs.without_others(j) for j in waiting}
@@ -199,7 +196,6 @@ def _join(inputs: list[Real], pairs: Pairs, fitted: Callable[..., JointFit]) -> 
         if not pairs.strong or (part > PART * spread[i] and follows):
             fits[i] = tried[i]
             pairs.strong.append(i)
-    return len(pairs.strong) > begun
 
 
 def _follows_at_all(u: Real, y: Real) -> float:

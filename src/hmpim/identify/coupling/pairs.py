@@ -13,6 +13,7 @@ from hmpim.identify.fitting.fit import fit_together as fit_all
 from hmpim.identify.fitting.trial import JointFit, Trial
 from hmpim.identify.noise.whiteness import effective_share
 from hmpim.identify.worth import PART, TWICE
+from hmpim.model.dynamics import Structure
 from hmpim.model.response import slowest_time_constant
 
 __all__ = ["Pairs", "constant_of", "contribution"]
@@ -52,6 +53,11 @@ class Pairs:
         """Mean square of what all of them leave over."""
         rest, counts = self.left(), common(self.valid, [self.fits[j] for j in self.kept])
         return float(np.mean(np.square(rest if counts is None else rest[counts])))
+
+    @property
+    def structures(self) -> list[Structure]:
+        """Of the strong inputs."""
+        return [self.fits[i].best.fit.structure for i in self.strong]
 
     @property
     def dominant(self) -> set[int]:
