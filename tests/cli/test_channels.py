@@ -109,3 +109,39 @@ def test_a_page_over_the_record_is_refused(log):
     done = run("channels", log, "--report", log)
     assert done.exit_code == 2
     assert log.read_text().startswith("time,cmd")
+
+
+def test_complex_numbers_are_no_words(log, tmp_path):
+    rows = [row.split(",") for row in log.read_text().splitlines()[1:]]
+    path = tmp_path / "complex.csv"
+    lines = [f"{t},{u},{u}{float(u):+.6f}i\n" for t, u, *_ in rows]
+    path.write_text("time,u,z\n" + "".join(lines))
+    done = run("channels", path, "--json", tmp_path / "c.json")
+    said = " ".join(done.stdout.split())
+    assert "Holds complex numbers: z; save the real part, or the magnitude." in said
+    assert "words" not in said
+    assert list(json.loads((tmp_path / "c.json").read_text())["unread"]) == ["z"]
+    done = run("identify", path, "--input", "u", "--output", "z")
+    assert done.exit_code == 2
+    assert "i': complex numbers; save the real part" in done.stderr
+    path.write_text("time,z\n" + "".join(f"{t},({u}+1j)\n" for t, u, *_ in rows))
+    done = run("channels", path)
+    assert (done.exit_code, done.stdout) == (2, "")
+    assert "no channel of numbers: 'z' holds complex numbers" in done.stderr
+
+
+def test_rows_whose_newest_sample_comes_first_are_said_to_run_backward(log):
+    head, *rows = log.read_text().splitlines(keepends=True)
+    log.write_text("".join([head, *rows[::-1]]))
+    done = run("channels", log)
+    said = " ".join(done.stdout.split())
+    assert re.search(r"cmd +deg +200 Hz +0 to 11\.995 s", done.stdout)
+    assert (
+        "cmd, n <&>: cannot be used yet: time runs backward from the first sample (11.995 s) to "
+        "the last (0 s); sort the rows by time."
+    ) in said
+    assert "starts again" not in said
+    assert "No channel can be used as it is, so no input and output are proposed." in said
+    done = run("identify", log, "--input", "cmd", "--output", "gyro")
+    assert done.exit_code == 2
+    assert "runs backward from the first sample (11.995 s) to the last (0 s)" in done.stderr

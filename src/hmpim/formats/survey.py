@@ -34,8 +34,8 @@ class Survey:
         One for each channel that holds numbers, in the file's order.
     series : tuple of Series
         Their samples as they were read.
-    words : tuple of str
-        Channels that hold words, and so are no signals.
+    unread : tuple of (str, str)
+        Channels that are no signals, and what each holds instead: words, complex numbers.
     proposal : Proposal
         What may be the input and the outputs, and why.
     motions : tuple of Motion
@@ -46,7 +46,7 @@ class Survey:
     contents: Contents
     descriptions: tuple[Description, ...]
     series: tuple[Series, ...]
-    words: tuple[str, ...]
+    unread: tuple[tuple[str, str], ...]
     proposal: Proposal
     motions: tuple[Motion, ...]
 
@@ -74,15 +74,17 @@ def survey(path: str | PathLike[str], *, layout: Layout | None = None) -> Survey
     ...     rows = "".join(f"{k},{k % 7},x\n" for k in range(50))
     ...     _ = file.write_text("t [ms],u [V],note\n" + rows)
     ...     found = survey(file)
-    >>> found.descriptions[0].name, found.descriptions[0].rate, found.words
-    ('u', 1000.0, ('note',))
+    >>> found.descriptions[0].name, found.descriptions[0].rate, found.unread
+    ('u', 1000.0, (('note', 'words, no numbers'),))
     """
     file, layout = Path(path), layout or Layout()
     reader = reader_for(file)
     contents = reader.channels(file, layout)
-    names = [c.name for c in contents.channels if not c.text]
+    names = [c.name for c in contents.channels if not c.holds]
+    unread = tuple((c.name, c.holds) for c in contents.channels if c.holds)
     if not names:
-        raise FormatError(f"{file.name!r} holds no channel of numbers")
+        why = f": {unread[0][0]!r} holds {unread[0][1]}" if unread else ""
+        raise FormatError(f"{file.name!r} holds no channel of numbers{why}")
     series = reader.read(file, names, layout)
     described = [describe(s, fs=layout.fs or contents.fs) for s in series]
     usable = [channel for _, channel in described if channel is not None]
@@ -93,7 +95,7 @@ def survey(path: str | PathLike[str], *, layout: Layout | None = None) -> Survey
         contents=contents,
         descriptions=tuple(d for d, _ in described),
         series=series,
-        words=tuple(c.name for c in contents.channels if c.text),
+        unread=unread,
         proposal=proposal,
         motions=() if driver is None else find_motions(driver),
     )

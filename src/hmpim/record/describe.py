@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from hmpim.errors import RecordError
 from hmpim.record.channel import Channel
 from hmpim.record.clock import fit_clock
-from hmpim.record.mend import mend, restarts
+from hmpim.record.mend import backward_words, mend, restarts
 from hmpim.record.series import Series
 from hmpim.units import check_unit
 
@@ -93,7 +93,7 @@ def describe(series: Series, *, fs: float | None = None) -> tuple[Description, C
     rate, jitter, gaps, longest = _clock_figures(channel)
     stamped = None if time is None else time[np.isfinite(time)]
     if rate is None and stamped is not None and stamped.size > 1:
-        steps = np.diff(stamped)
+        steps = np.abs(np.diff(stamped))
         rate = 1.0 / float(np.median(steps[steps > 0])) if (steps > 0).any() else None
     return (
         Description(
@@ -121,9 +121,10 @@ def describe(series: Series, *, fs: float | None = None) -> tuple[Description, C
 def _odd_stamps(time: NDArray[np.float64] | None) -> tuple[int, int, int]:
     if time is None:
         return 0, 0, 0
-    again = restarts(time).size
+    starts = restarts(time)
+    again = 0 if backward_words(time, starts) else int(starts.size)
     steps = np.diff(time[np.isfinite(time)])
-    return int(again), int(np.count_nonzero(steps == 0)), int(np.count_nonzero(steps < 0)) - again
+    return again, int(np.count_nonzero(steps == 0)), int(np.count_nonzero(steps < 0)) - again
 
 
 def _channel(
@@ -131,6 +132,9 @@ def _channel(
 ) -> tuple[Channel | None, str]:
     if time is None:
         return None, "it has no time: name it with --time, or give the rate with --fs"
+    backward = backward_words(time, restarts(time))
+    if backward:
+        return None, f"time {backward}"
     unit = series.unit
     try:
         check_unit(unit)

@@ -11,7 +11,7 @@ from hmpim.record.channel import Channel
 from hmpim.record.finding import Finding
 from hmpim.record.series import Series
 
-__all__ = ["Mended", "check_runs_on", "check_span", "mend", "restarts"]
+__all__ = ["Mended", "backward_words", "check_runs_on", "check_span", "mend", "restarts"]
 
 _LATE = 8
 """Samples that may follow a stamp that ran ahead before the stamps count as starting again.
@@ -298,14 +298,41 @@ def check_runs_on(time: NDArray[np.float64], starts: NDArray[np.int64], *, of: s
     RecordError
         If it runs backward.
     """
+    words = backward_words(time, starts)
+    if words:
+        raise RecordError(f"time of {of} {words}")
+
+
+def backward_words(time: NDArray[np.float64], starts: NDArray[np.int64]) -> str:
+    """Say how a clock runs backward; empty for one that runs on between its starts.
+
+    Parameters
+    ----------
+    time : ndarray, shape (n,)
+        Stamps in s.
+    starts : ndarray of int
+        Where it starts again, as `restarts` finds it.
+
+    Examples
+    --------
+    >>> newest_first = np.arange(20.0)[::-1]
+    >>> backward_words(newest_first, restarts(newest_first))
+    'runs backward from the first sample (19 s) to the last (0 s); sort the rows by time'
+    """
     short = np.flatnonzero(np.diff(starts) < 2)
-    if short.size:
-        k = int(starts[short[0]])
-        raise RecordError(
-            f"time of {of} runs backward at {starts.size} of {time.size} samples: "
-            f"{time[k - 1]:.9g} s is followed by {time[k]:.9g} s; sort the rows by time, or cut "
-            "the file there"
+    if not short.size:
+        return ""
+    there = time[np.isfinite(time)]
+    if np.all(np.diff(there) <= 0):
+        return (
+            f"runs backward from the first sample ({there[0]:.9g} s) to the last "
+            f"({there[-1]:.9g} s); sort the rows by time"
         )
+    k = int(starts[short[0]])
+    return (
+        f"runs backward at {starts.size} of {time.size} samples: {time[k - 1]:.9g} s is followed "
+        f"by {time[k]:.9g} s; sort the rows by time, or cut the file there"
+    )
 
 
 def restarts(time: NDArray[np.float64]) -> NDArray[np.int64]:

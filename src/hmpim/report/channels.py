@@ -37,7 +37,7 @@ def survey_to_dict(found: Survey) -> dict[str, Any]:
         "channels": [
             {name: getattr(d, name) for name in Description.__slots__} for d in found.descriptions
         ],
-        "words": list(found.words),
+        "unread": dict(found.unread),
         "findings": [f.to_dict() for f in _findings(found)],
         "proposal": {
             "inputs": list(found.proposal.inputs),
@@ -90,8 +90,7 @@ def _lines(found: Survey, path: str) -> list[str]:
     """What is said below the table."""
     lines = [*_odd(found.descriptions)]
     lines += [f"{f.message[:1].upper()}{f.message[1:]}." for f in _findings(found)]
-    if found.words:
-        lines.append(f"Holds words, no numbers: {', '.join(found.words[:20])}.")
+    lines += _unread(found)
     bare = [d.name for d in found.descriptions if not d.unit]
     if bare:
         more = f" and {len(bare) - 8} others" if len(bare) > 8 else ""
@@ -105,6 +104,8 @@ def _lines(found: Survey, path: str) -> list[str]:
 
 def _proposed(found: Survey, path: str) -> list[str]:
     proposal = found.proposal
+    if all(d.problem and not d.restarts for d in found.descriptions):
+        return ["No channel can be used as it is, so no input and output are proposed."]
     if not proposal.inputs or not proposal.outputs:
         return ["No input and output stand out; name them with --input and --output.", *_why(found)]
     options = [
@@ -195,17 +196,29 @@ def _odd(descriptions: Sequence[Description]) -> list[str]:
             parts.append(f"{d.missing} of {d.samples} samples missing")
         if d.doubled:
             parts.append(f"{d.doubled} stamps doubled")
-        if d.backward:
+        if d.backward and (d.restarts or not d.problem):
             parts.append(f"{d.backward} stamps backward")
         if d.restarts:
             parts.append(f"time starts again {d.restarts} times")
         if d.jitter:
             parts.append(f"stamps stray by {100 * d.jitter:.2g} % of the interval (r.m.s.)")
         if d.problem and not d.restarts:
-            parts.append(f"not usable as it is: {d.problem}")
+            parts.append(f"cannot be used yet: {d.problem}")
         if parts:
             said.setdefault("; ".join(parts), []).append(d.name)
     return [f"{_few(names)}: {words}." for words, names in said.items()]
+
+
+def _unread(found: Survey) -> list[str]:
+    """A sentence for the channels that are no signals, by what they hold."""
+    kinds: dict[str, list[str]] = {}
+    for name, holds in found.unread:
+        kinds.setdefault(holds, []).append(name)
+    said = []
+    for holds, names in kinds.items():
+        kind, _, advice = holds.partition("; ")
+        said.append(f"Holds {kind}: {_few(names)}" + (f"; {advice}." if advice else "."))
+    return said
 
 
 def _few(names: Sequence[str]) -> str:
@@ -255,7 +268,7 @@ def channels_page(found: Survey, path: str | PathLike[str], *, source: str) -> N
             time=_time_words(found),
             rows=rows,
             lines=[*_odd(found.descriptions), *(f.message for f in _findings(found))],
-            words=found.words,
+            unread=_unread(found),
             proposed=_proposed(found, source),
             shown=_PICTURES,
         )

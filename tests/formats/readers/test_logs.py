@@ -113,7 +113,10 @@ def test_a_table_in_hdf5_has_its_fields_as_channels(tmp_path):
         file["log"] = table
     contents = contents_of(path)
     assert contents.time == "/log.time_ms"
-    assert [(c.name, c.text) for c in contents.channels] == [("/log.u", False), ("/log.tag", True)]
+    assert [(c.name, c.holds) for c in contents.channels] == [
+        ("/log.u", ""),
+        ("/log.tag", "words, no numbers"),
+    ]
     (series,) = reader_for(path).read(path, ["/log.u"], Layout())
     assert series.time[1] == 0.005
 

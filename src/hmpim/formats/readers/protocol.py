@@ -10,7 +10,23 @@ from typing import Literal
 from hmpim.errors import MissingExtraError
 from hmpim.record import Finding, Intersample, Series, Stopping
 
-__all__ = ["ChannelInfo", "Contents", "Layout", "Reader", "Stamps", "listed", "need"]
+__all__ = [
+    "COMPLEX",
+    "WORDS",
+    "ChannelInfo",
+    "Contents",
+    "Layout",
+    "Reader",
+    "Stamps",
+    "listed",
+    "need",
+]
+
+WORDS = "words, no numbers"
+"""What a column of text holds, for messages."""
+
+COMPLEX = "complex numbers; save the real part, or the magnitude"
+"""The same of a channel that has two numbers for each sample, with what to do about it."""
 
 Stamps = Literal["auto", "header", "log"]
 """Which stamp counts where a file holds two: the sender's own, or the logger's."""
@@ -59,15 +75,16 @@ class ChannelInfo:
     clock : str
         Name of the channel, message or group whose stamps it has; channels of one clock have
         equal names. Empty where the file has one clock, or none.
-    text : bool
-        True if it holds words rather than numbers, and so cannot be read as a signal.
+    holds : str
+        What it holds in place of real numbers, such as `WORDS`; it then cannot be read as a
+        signal. Empty where it can.
     """
 
     name: str
     unit: str = ""
     samples: int | None = None
     clock: str = ""
-    text: bool = False
+    holds: str = ""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

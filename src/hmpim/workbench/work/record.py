@@ -135,7 +135,7 @@ def look(path: str) -> Looked:
     for d in seen.descriptions:
         if d.problem:
             spoilt.setdefault(d.problem, []).append(d.name)
-    reasons = [f"{shortened(names)}: not usable as it is: {why}" for why, names in spoilt.items()]
+    reasons = [f"{shortened(names)}: cannot be used yet: {why}" for why, names in spoilt.items()]
     reasons += [f"{name!r}: {reason}" for name, reason in seen.proposal.reasons]
     stated = seen.contents.inputs and seen.contents.outputs  # a run's own, all of its axes
     return Looked(

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from hmpim.errors import FormatError
 from hmpim.formats.hdf5 import faults_named
 from hmpim.formats.readers.logs.log import Column, Log, groups_of, list_log, take_series, unit_of
-from hmpim.formats.readers.protocol import Contents, Layout, Reader
+from hmpim.formats.readers.protocol import COMPLEX, WORDS, Contents, Layout, Reader
 from hmpim.record import Finding, Series
 
 __all__ = ["HDF5", "channels", "parse", "read", "sniff"]
@@ -122,9 +122,9 @@ def _held(kind: Any) -> str:
     if kind.shape:
         return "an array in each row"
     if kind.kind == "c":
-        return "complex numbers; write its real part, or its magnitude"
+        return COMPLEX
     of = (kind.metadata or {}).get("vlen")
-    return "words, no numbers" if of in (None, str, bytes) else "a list in each row"
+    return WORDS if of in (None, str, bytes) else "a list in each row"
 
 
 def _whole(dataset: Any) -> NDArray[Any]:

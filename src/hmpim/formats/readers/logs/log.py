@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from hmpim.errors import FormatError
 from hmpim.formats.readers.logs.clock import clock_column, is_time
-from hmpim.formats.readers.protocol import ChannelInfo, Contents, Layout, listed
+from hmpim.formats.readers.protocol import WORDS, ChannelInfo, Contents, Layout, listed
 from hmpim.record import Finding, Series
 from hmpim.units import read_unit
 
@@ -53,7 +53,7 @@ class Column:
     unit: str = ""
     samples: int | None = None
     scale: str = ""
-    holds: str = "words, no numbers"
+    holds: str = WORDS
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -164,7 +164,7 @@ def list_log(parse: Parse, path: Path, layout: Layout) -> Contents:
             unit=column.unit,
             samples=column.samples,
             clock=group.name,
-            text=column.load is None,
+            holds=column.holds if column.load is None else "",
         )
         for group in log.groups
         for column in group.columns

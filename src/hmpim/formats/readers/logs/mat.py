@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from hmpim.formats.readers.logs.log import Column, Log, groups_of, list_log, take_series, unit_of
-from hmpim.formats.readers.protocol import Contents, Layout, Reader, need
+from hmpim.formats.readers.protocol import COMPLEX, Contents, Layout, Reader, need
 from hmpim.formats.readers.text import named
 from hmpim.record import Series
 
@@ -16,7 +16,6 @@ __all__ = ["MAT", "channels", "parse", "read", "sniff"]
 
 _DEEP = 8
 _WIDE = 200  # columns that a matrix may open into
-_COMPLEX = "complex numbers; save its real part, or its magnitude"
 
 
 def sniff(head: bytes, path: Path) -> bool:
@@ -56,7 +55,7 @@ def parse(path: Path, layout: Layout) -> Log:
                 unit=unit,
                 samples=values.shape[0],
                 load=partial(_values, values) if real else None,
-                holds=_COMPLEX,
+                holds=COMPLEX,
             )
         )
     return Log(

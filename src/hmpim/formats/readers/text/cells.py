@@ -14,6 +14,7 @@ __all__ = [
     "BLANKS",
     "DECIMAL_COMMA",
     "column_of",
+    "is_complex",
     "number",
     "numbers",
     "split_row",
@@ -117,6 +118,27 @@ def number(cell: str, decimal: str) -> float | None:
         if lower in _MISSING:
             return math.nan
         return _WORDS.get(lower)
+
+
+def is_complex(cell: str, decimal: str) -> bool:
+    """Say whether a cell holds a complex number, as MATLAB or Python writes it.
+
+    Examples
+    --------
+    >>> is_complex("0.5-1.2i", "."), is_complex("(1e3 + 2j)", "."), is_complex("0,5+1i", ",")
+    (True, True, True)
+    >>> is_complex("1.5", "."), is_complex("i", "."), is_complex("idle", ".")
+    (False, False, False)
+    """
+    plain = cell.translate(_COMMA) if decimal == "," else cell
+    plain = "".join(plain.split()).removeprefix("(").removesuffix(")").casefold()
+    if not plain.endswith(("i", "j")) or not any(map(str.isdigit, plain)):
+        return False
+    try:
+        complex(plain[:-1] + "j")
+    except ValueError:
+        return False
+    return True
 
 
 def numbers(

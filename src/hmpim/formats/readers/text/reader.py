@@ -7,7 +7,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hmpim.errors import FormatError, UnitError
-from hmpim.formats.readers.protocol import ChannelInfo, Contents, Layout, Reader, listed
+from hmpim.formats.readers.protocol import (
+    COMPLEX,
+    WORDS,
+    ChannelInfo,
+    Contents,
+    Layout,
+    Reader,
+    listed,
+)
+from hmpim.formats.readers.text.cells import is_complex
 from hmpim.formats.readers.text.headings import Heading, named
 from hmpim.formats.readers.text.instruments import stated_time_unit
 from hmpim.formats.readers.text.notes import Notes, read_notes
@@ -58,7 +67,7 @@ def list_table(lines: Lines, layout: Layout, *, form: str) -> Contents:
     headings = notes.headings if notes is not None else table.headings
     clock, stamps, findings = _clock(table, headings, layout, own=notes is not None)
     data = tuple(
-        ChannelInfo(name=h.name, unit=h.unit, text=_holds_words(table, h))
+        ChannelInfo(name=h.name, unit=h.unit, holds=_holds(table, h))
         for h in headings
         if h is not clock
     )
@@ -117,8 +126,12 @@ def _cut_short(line: int) -> tuple[Finding, ...]:
     return (Finding(code="cut_short", message=message, severity="info", parameters=()),)
 
 
-def _holds_words(table: Table, heading: Heading) -> bool:
-    return not table.dialect.numeric[heading.position] and any(table.sample(heading.position))
+def _holds(table: Table, heading: Heading) -> str:
+    """What a column holds in place of real numbers; empty for a signal."""
+    cells = [cell for cell in table.sample(heading.position) if cell]
+    if table.dialect.numeric[heading.position] or not cells:
+        return ""
+    return COMPLEX if is_complex(cells[0], table.dialect.decimal) else WORDS
 
 
 def _over_midnight(time: NDArray[np.float64]) -> NDArray[np.float64]:

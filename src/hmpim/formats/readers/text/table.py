@@ -9,11 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hmpim.errors import FormatError
-from hmpim.formats.readers.protocol import listed
+from hmpim.formats.readers.protocol import COMPLEX, listed
 from hmpim.formats.readers.text.cells import (
     BLANKS,
     DECIMAL_COMMA,
     column_of,
+    is_complex,
     number,
     numbers,
     split_row,
@@ -369,4 +370,6 @@ def _said_cell(table: Table, column: Heading, cell: str, line: int) -> str:
         return f"{where} holds {cell!r}, a decimal comma; export the file with decimal points"
     if table.dialect.decimal == "," and number(cell, ".") is not None:
         return f"{where} holds {cell!r}, where a decimal comma is used elsewhere; write one way"
+    if is_complex(cell, table.dialect.decimal):
+        return f"{where} holds {cell[:40]!r}: {COMPLEX}"
     return f"{where} holds {cell[:40]!r}, which is not a number; correct it, or cut that row out"
