@@ -35,13 +35,15 @@ def test_a_record_that_is_predicted_is_exit_0(folder, capsys):
     shown = capsys.readouterr().out
     assert "Passed." in shown
     assert "coverage" in shown
-    assert "at least 90" in shown
+    assert "at least 90 %" in shown
 
 
 def test_a_record_that_is_not_is_exit_1_and_says_why(folder, capsys, tmp_path):
     words = ("--json", tmp_path / "v.json")
     assert run("validate", folder / "old.json", folder / "late.csv", *words) == 1
-    assert "Not passed." in capsys.readouterr().out
+    shown = capsys.readouterr().out
+    assert "Not passed." in shown
+    assert "below 0.0001" in shown
     figures = json.loads((tmp_path / "v.json").read_text())
     failed = {c["name"] for c in figures["outputs"][0]["checks"] if not c["passed"]}
     assert "follows_input" in failed

@@ -46,7 +46,7 @@ def validate(
     chance: Annotated[
         float,
         typer.Option(
-            "--chance", metavar="P", help="Lowest probability of the residual's tests that passes."
+            "--chance", metavar="P", help="Lowest p-value of the residual's tests that passes."
         ),
     ] = 1e-4,
     fs: Annotated[
@@ -123,20 +123,12 @@ def _checks(validation: "Validation") -> "Table":
             table.add_row(
                 output.output,
                 check.name,
-                f"{check.value:.4g}",
-                _bound(check.low, check.high),
+                check.text,
+                check.bound,
                 verdict,
                 check.message,
             )
     return table
-
-
-def _bound(low: float | None, high: float | None) -> str:
-    if low is not None and high is not None:
-        return f"{low:.3g} to {high:.3g}"
-    if low is not None:
-        return f"at least {low:.3g}"
-    return "" if high is None else f"at most {high:.3g}"
 
 
 def _changes(changes: "tuple[Change, ...]") -> "Table":

@@ -111,6 +111,36 @@ def test_what_is_bounded_is_what_is_asked(result):
     }
 
 
+def test_checks_read_as_people_write_numbers(result):
+    record = hmpim.run(replace(SENSOR, noise_std=0.08, noise_colour=0.9), OTHER, rng=5)
+    (output,) = hmpim.validate(result, record).outputs
+    found = {check.name: check for check in output.checks}
+    assert found["whiteness"].value < 1e-10
+    assert (found["whiteness"].text, found["whiteness"].bound) == (
+        "below 0.0001",
+        "at least 0.0001",
+    )
+    assert found["whiteness"].message == "The residual is coloured (p-value below 0.0001)."
+    assert found["fit_percent"].text == f"{found['fit_percent'].value:.2f} %"
+    assert found["coverage"].text == f"{100 * found['coverage'].value:.1f} %"
+    assert found["coverage"].bound.endswith(" %")
+    noise = result["y", "u"].parameters.noise_std.value
+    assert f"noise {noise:.4g} deg, error of the model " in found["noise_ratio"].message
+    assert found["noise_ratio"].message.endswith(" deg.")
+
+
+def test_what_a_check_says_agrees_with_its_bound(result):
+    """A test held to another p-value says what it finds at that one."""
+    record = hmpim.run(replace(SENSOR, noise_colour=0.3), SWEEP, rng=3)
+    (output,) = hmpim.validate(result, record).outputs
+    (white,) = [check for check in output.checks if check.name == "whiteness"]
+    assert white.passed == ("is white" in white.message)
+    for chance in (0.5 * white.value, min(2.0 * white.value, 0.4)):
+        (output,) = hmpim.validate(result, record, bounds=Bounds(chance=chance)).outputs
+        (white,) = [check for check in output.checks if check.name == "whiteness"]
+        assert white.passed == (chance < white.value) == ("is white" in white.message)
+
+
 def test_clipped_and_held_outputs_are_predicted_as_such():
     # A record's hold has a phase of its own: it is found anew in each.
     unit = replace(SENSOR, saturation_high=9.0, hold_period=0.0231, quantization_step=0.02)

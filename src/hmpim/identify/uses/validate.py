@@ -29,6 +29,12 @@ __all__ = ["Bounds", "Check", "OutputValidation", "Validation", "validate"]
 _DRAWS = 32
 """Models drawn for the prediction band; its width is then known to an eighth."""
 
+_SHARES = {"fit_percent": 1.0, "coverage": 100.0}
+"""Checks that people read in per cent, and how many of these their value 1 is."""
+
+_PLACES = {"fit_percent": 2, "coverage": 1}
+"""Decimal places with which they are written."""
+
 _FEWEST = 50
 """Samples from which a residual can be judged."""
 
@@ -46,8 +52,8 @@ class Bounds:
         prediction band must then hold between the shares that noise so much greater or smaller
         would leave in it.
     chance : float or None
-        Least probability of the residual, were the model right: that it does not follow the
-        input, and that it is white where the noise was.
+        Least p-value of the residual's tests: that it does not follow the input, and that it is
+        white where the noise was.
 
     Raises
     ------
@@ -67,7 +73,7 @@ class Bounds:
                 f"noise_ratio = {self.noise_ratio!r} fails right models; give more than 1"
             )
         if self.chance is not None and not 0.0 < self.chance < 0.5:
-            raise ArgumentError(f"chance = {self.chance!r} is no share from 0 to 0.5")
+            raise ArgumentError(f"chance = {self.chance!r} is no p-value between 0 and 0.5")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -97,6 +103,33 @@ class Check:
         """Whether it is inside its bounds."""
         above = self.low is None or self.value >= self.low
         return above and (self.high is None or self.value <= self.high)
+
+    @property
+    def text(self) -> str:
+        """The figure for people: shares in per cent, a p-value no smaller than one that counts.
+
+        Examples
+        --------
+        >>> Check(name="coverage", value=0.9513, low=0.88, high=0.99, message="").text
+        '95.1 %'
+        >>> Check(name="whiteness", value=2e-58, low=1e-4, high=None, message="").text
+        'below 0.0001'
+        """
+        if self.name in _SHARES:
+            return f"{_SHARES[self.name] * self.value:.{_PLACES[self.name]}f} %"
+        if self.name == "noise_ratio":
+            return f"{self.value:.3g}"
+        return _p_value(self.value, FALSE_ALARM if self.low is None else self.low)
+
+    @property
+    def bound(self) -> str:
+        """Its bounds for people; empty where it has none."""
+        size = _SHARES.get(self.name, 1.0)
+        ends = [f"{size * end:.4g}" for end in (self.low, self.high) if end is not None]
+        if not ends:
+            return ""
+        word = "" if len(ends) == 2 else "at most " if self.low is None else "at least "
+        return word + " to ".join(ends) + (" %" if self.name in _SHARES else "")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -178,7 +211,7 @@ def validate(result: Identification, record: Record, *, bounds: Bounds | None = 
         Holds channels of the same names.
     bounds : Bounds, optional
         What must be met; the residual at most 1.2 times the noise by default, and no test of it
-        below a chance of one in a thousand.
+        below a p-value of 0.0001.
 
     Returns
     -------
@@ -308,7 +341,7 @@ def _validated(
                 high=None,
                 message=f"The model predicts the output with a fit of {fit:.2f} %.",
             ),
-            *_size(residual[scored], noise, model_std[scored], std[scored], bounds),
+            *_size(residual[scored], noise, model_std[scored], std[scored], bounds, unit=y.unit),
             *_tests(aligned, pairs, models, residual, scored, model_std, bounds),
         ),
     )
@@ -344,7 +377,7 @@ def _model_std(
 
 
 def _size(
-    residual: Real, noise: float, model_std: Real, std: Real, bounds: Bounds
+    residual: Real, noise: float, model_std: Real, std: Real, bounds: Bounds, *, unit: str
 ) -> tuple[Check, Check]:
     """Size of the residual, and how often it is inside the band."""
     expected = float(np.sqrt(np.mean(std**2))) or np.finfo(float).tiny
@@ -365,8 +398,9 @@ def _size(
             value=ratio,
             low=None,
             high=bounds.noise_ratio,
-            message=f"The residual is {ratio:.3g} times what the result said: noise {noise:.4g}, "
-            f"model {of_model:.2g}.",
+            message=f"The residual (r.m.s.) is {ratio:.3g} times what the result predicts: noise "
+            f"{f'{noise:.4g} {unit}'.rstrip()}, error of the model "
+            f"{f'{of_model:.2g} {unit}'.rstrip()}.",
         ),
         Check(
             name="coverage",
@@ -389,7 +423,8 @@ def _tests(
 ) -> tuple[Check, ...]:
     """Whether the residual follows an input, and is white where the noise was."""
     checks = []
-    worst = float(scipy.special.chdtri(1, bounds.chance or FALSE_ALARM))
+    least = bounds.chance or FALSE_ALARM
+    worst = float(scipy.special.chdtri(1, least))
     for pair, model in zip(pairs, models, strict=True):
         u = aligned.signal(pair.input).values
         band = excited_band(u, aligned.fs)
@@ -404,9 +439,9 @@ def _tests(
         admitted = power <= worst * float(np.mean(model_std[scored] ** 2))
         name = f"follows_{pair.input}" if len(pairs) > 1 else "follows_input"
         told = (
-            f"The residual is not correlated with {pair.input!r} beyond chance"
-            if left.probability >= FALSE_ALARM
-            else f"{percent(left.share)} % of the residual follows {pair.input!r}"
+            f"The residual does not follow {pair.input!r}"
+            if left.probability >= least
+            else f"{percent(left.share)} % of the residual's power follows {pair.input!r}"
             + (", which the error bars admit" if admitted else "")
         )
         checks.append(
@@ -415,7 +450,7 @@ def _tests(
                 value=left.probability,
                 low=None if admitted else bounds.chance,
                 high=None,
-                message=f"{told} (probability {left.probability:.2g}).",
+                message=f"{told} (p-value {_p_value(left.probability, least)}).",
             )
         )
     white = float(ljung_box(residual[scored] - residual[scored].mean()))
@@ -432,12 +467,18 @@ def _tests(
             low=bounds.chance if quiet and not coloured else None,
             high=None,
             message="The residual is "
-            + ("white" if white >= FALSE_ALARM else "coloured")
-            + (", as the noise was" if coloured and white < FALSE_ALARM else "")
-            + f" (probability {white:.2g}).",
+            + ("white" if white >= least else "coloured")
+            + (", as the noise was" if coloured and white < least else "")
+            + f" (p-value {_p_value(white, least)}).",
         )
     )
     return tuple(checks)
+
+
+def _p_value(value: float, least: float) -> str:
+    """A p-value in words: below the least that counts, how far below says nothing."""
+    least = min(least, FALSE_ALARM)
+    return f"{value:.2g}" if value >= least else f"below {least:g}"
 
 
 def _power_in(residual: Real, band: tuple[float, float], fs: float) -> float:
