@@ -358,13 +358,15 @@ def _named(records: Sequence[Path], given: "Sequence[Record]") -> list[Path]:
 
 def _readings(result: "Identification", at: Sequence[float]) -> list[str]:
     """Say gain and phase of each pair at each frequency."""
-    from hmpim.identify import gain_and_phase
+    from hmpim.identify import gain_and_phase, has_model
     from hmpim.plots.curves import is_measured
 
     notes = []
     for pair in result.pairs:
-        if at and pair.verdict == "not_identifiable":
-            notes.append(f"{pair.output} from {pair.input} was not identifiable: no gain, no phase")
+        if at and (not has_model(pair) or pair.covariance is None):
+            notes.append(
+                f"{pair.output} from {pair.input} has no model with error bars: no gain, no phase."
+            )
             continue
         for found in gain_and_phase(pair, at, fs=result.record.fs) if at else ():
             measured = "not measured there"
@@ -395,12 +397,12 @@ def _held_out(data: "Record", share: float | None) -> "tuple[float | None, Recor
 
 def _predictions(result: "Identification", data: "Record", split: float) -> list[str]:
     """Say for each pair how well its model predicts what it was not fitted on."""
-    from hmpim.identify import predict
+    from hmpim.identify import has_model, predict
 
     notes = []
     for pair in result.pairs:
         name = f"Held out, {pair.input} → {pair.output}"
-        if pair.parameters.scale_factor is None:
+        if not has_model(pair):
             notes.append(f"{name}: no model to predict with.")
             continue
         fit = predict(pair, data, start=split).fit_percent

@@ -101,8 +101,9 @@ def validate(
 def _read(record: Path, found: "Identification", fs: float | None) -> Any:
     """Read the channels that the result has models of."""
     from hmpim.formats import read
+    from hmpim.identify import has_model
 
-    known = [pair for pair in found.pairs if pair.parameters.scale_factor is not None]
+    known = [pair for pair in found.pairs if has_model(pair)]
     with working(f"Reading {record}"):
         return read(
             record,

@@ -36,7 +36,7 @@ from hmpim.identify.section_iv.spectrum import excited_band
 from hmpim.identify.statistics import LiveEstimator, Look, Statistics, compress
 from hmpim.identify.uses.compare import Change, compare
 from hmpim.identify.uses.gain_phase import GainPhase, gain_and_phase, measurable
-from hmpim.identify.uses.predict import Prediction, predict, to_model
+from hmpim.identify.uses.predict import Prediction, has_model, predict, to_model
 from hmpim.identify.uses.validate import Bounds, Check, OutputValidation, Validation, validate
 
 __all__ = [
@@ -79,6 +79,7 @@ __all__ = [
     "compress",
     "excited_band",
     "gain_and_phase",
+    "has_model",
     "identify",
     "identify_levels",
     "identify_repeats",

@@ -12,6 +12,7 @@ from hmpim.errors import ArgumentError, RecordError
 from hmpim.formats.models import export
 from hmpim.identify import Identification, Parameters
 from hmpim.model import Model, frequency_response
+from hmpim.record import Finding
 from tests_support import in_studies
 
 from .conftest import FS, compiled_c, result_of
@@ -194,8 +195,36 @@ def test_what_cannot_be_exported_is_refused(tmp_path):
     with pytest.raises(ArgumentError, match="make it first"):
         export(result, to="python", path=tmp_path / "no" / "m.py")
     nothing = replace(result.pairs[0], parameters=Parameters())
-    with pytest.raises(RecordError, match="was not identifiable"):
+    with pytest.raises(
+        RecordError, match=r"has no model, because .* its delay, scale factor, bias"
+    ):
         export(Identification(record=result.record, pairs=(nothing,)), to="c", path=tmp_path / "x")
+
+
+def test_a_doubtful_pair_without_a_figure_says_which_and_why(tmp_path):
+    whole = result_of(SECOND)
+    doubt = Finding(
+        code="weak_coupling",
+        message="The coupling from 'v' to 'y' is too weak here to determine its delay.",
+        severity="doubt",
+        parameters=("delay",),
+    )
+    weak = replace(
+        whole.pairs[0],
+        input="v",
+        verdict="doubtful",
+        parameters=replace(whole.pairs[0].parameters, delay=None),
+        warnings=(*whole.pairs[0].warnings, doubt),
+    )
+    both = replace(whole, pairs=(*whole.pairs, weak))
+    assert export(both, to="python", path=tmp_path / "m.py")  # the other is the only model
+    said = (
+        "'y' from 'v' has no model, because the record does not determine its delay. "
+        "The coupling from 'v' to 'y' is too weak here to determine its delay."
+    )
+    with pytest.raises(RecordError) as refused:
+        export(both, to="python", path=tmp_path / "m.py", pair=("y", "v"))
+    assert str(refused.value) == said
 
 
 @pytest.mark.parametrize(("file", "better"), [("my axis.m", "my_axis.m"), ("end.m", "end_model.m")])

@@ -21,7 +21,7 @@ from hmpim.formats.models.mujoco import write_mujoco
 from hmpim.formats.models.python import write_python
 from hmpim.formats.models.source import Source, identifier, source_of
 from hmpim.formats.models.uff58 import write_uff58
-from hmpim.identify import Identification
+from hmpim.identify import Identification, has_model
 from hmpim.record import Intersample
 
 __all__ = ["TARGETS", "Target", "export"]
@@ -173,7 +173,7 @@ def export(
     ArgumentError
         If the target is not known, a pair must be chosen, or the target cannot hold the model.
     RecordError
-        If the pair was not identifiable: there is no model then.
+        If the record does not determine a figure that the model needs.
 
     Examples
     --------
@@ -246,6 +246,6 @@ def _check_name(place: Path, name: str) -> None:
 
 
 def _named(result: Identification) -> str:
-    known = [p for p in result.pairs if p.parameters.scale_factor is not None]
+    known = [p for p in result.pairs if has_model(p)]
     chosen = (known or list(result.pairs))[0]
     return f"{chosen.output}_from_{chosen.input}"

@@ -7,7 +7,14 @@ from dataclasses import dataclass, fields, replace
 from importlib.metadata import version
 
 from hmpim.errors import ArgumentError, RecordError
-from hmpim.identify import Estimate, Identification, PairIdentification, RecordSummary, to_model
+from hmpim.identify import (
+    Estimate,
+    Identification,
+    PairIdentification,
+    RecordSummary,
+    has_model,
+    to_model,
+)
 from hmpim.model import Chain, Model
 from hmpim.record import Intersample
 
@@ -137,12 +144,12 @@ def source_of(
     ArgumentError
         If several pairs have a model and none is chosen, or the rate is not positive.
     RecordError
-        If the pair chosen was not identifiable.
+        If the record does not determine a figure that the model needs.
     """
     if pair is not None:
         chosen = result[pair]
     else:
-        known = [p for p in result.pairs if p.parameters.scale_factor is not None]
+        known = [p for p in result.pairs if has_model(p)]
         if len(known) > 1:
             raise ArgumentError(
                 f"the result has {len(known)} models ("

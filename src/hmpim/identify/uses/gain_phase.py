@@ -90,8 +90,8 @@ def gain_and_phase(
     p = pair.parameters
     if p.delay is None or p.scale_factor is None or pair.covariance is None:
         raise ArgumentError(
-            f"{pair.output!r} from {pair.input!r} was not identifiable, so it has no gain and "
-            "phase to read off; see its warnings"
+            f"{pair.output!r} from {pair.input!r} has no model with error bars, so no gain and "
+            "phase can be read off; see its warnings"
         )
     system = Model(
         delay=p.delay.value,

@@ -10,10 +10,22 @@ from hmpim.errors import RecordError
 from hmpim.identify.arrays import Mask, Real
 from hmpim.identify.fitting.fit import FORGETS
 from hmpim.identify.result import Estimate, PairIdentification
+from hmpim.identify.result.groups import in_words
 from hmpim.model import Model, Spread, simulate, slowest_time_constant
 from hmpim.record import Record, uniform
 
-__all__ = ["Prediction", "fit_percent_of", "predict", "rate_of", "settling_time", "to_model"]
+__all__ = [
+    "Prediction",
+    "fit_percent_of",
+    "has_model",
+    "predict",
+    "rate_of",
+    "settling_time",
+    "to_model",
+]
+
+_NEEDED = ("delay", "scale_factor", "bias", "noise_std")
+"""Parameters without which there is no model."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -37,6 +49,15 @@ class Prediction:
     fit_percent: float
 
 
+def has_model(pair: PairIdentification) -> bool:
+    """Whether a pair has every figure that a model needs, doubtful or not."""
+    return not _untold(pair)
+
+
+def _untold(pair: PairIdentification) -> list[str]:
+    return [name for name in _NEEDED if getattr(pair.parameters, name) is None]
+
+
 @checked
 def to_model(pair: PairIdentification, *, fs: float | None = None) -> Model:
     """Model that simulates what was identified, the whole sensor chain and its errors included.
@@ -51,13 +72,13 @@ def to_model(pair: PairIdentification, *, fs: float | None = None) -> Model:
     Raises
     ------
     RecordError
-        If the pair was not identifiable: there is no model then.
+        If the record does not determine a figure that a model needs.
     """
     p = pair.parameters
     if p.delay is None or p.scale_factor is None or p.bias is None or p.noise_std is None:
         raise RecordError(
-            f"{pair.output!r} from {pair.input!r} was not identifiable, so there is no model: "
-            + "; ".join(w.message for w in pair.warnings)
+            f"{pair.output!r} from {pair.input!r} has no model, because the record does not "
+            f"determine its {_why(pair)}"
         )
     frequency = pair.frequency_response.frequency
     return Model(
@@ -79,6 +100,16 @@ def to_model(pair: PairIdentification, *, fs: float | None = None) -> Model:
         band=float(frequency[-1]) if frequency.size else None,
         spread=_spread(pair),
     )
+
+
+def _why(pair: PairIdentification) -> str:
+    """Name what a pair without a model lacks, and the doubt that says why."""
+    untold = _untold(pair)
+    *names, last = (in_words(name) for name in untold)
+    words = f"{', '.join(names)} and {last}" if names else last
+    doubts = (w for w in pair.warnings if w.severity == "doubt" and untold[0] in w.parameters)
+    cause = next(doubts, None)
+    return words if cause is None else f"{words}. {cause.message}"
 
 
 def fit_percent_of(y: Real, residual: Real) -> float:

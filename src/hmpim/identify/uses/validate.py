@@ -18,7 +18,7 @@ from hmpim.identify.result import Identification, PairIdentification
 from hmpim.identify.result.digits import percent
 from hmpim.identify.result.plain import plain
 from hmpim.identify.section_iv.spectrum import excited_band
-from hmpim.identify.uses.predict import fit_percent_of, settling_time, to_model
+from hmpim.identify.uses.predict import fit_percent_of, has_model, settling_time, to_model
 from hmpim.identify.worth import MATERIAL, ROUNDING
 from hmpim.model import Model, draw_models, simulate
 from hmpim.model.dynamics import FILTERS, STRUCTURES
@@ -245,9 +245,11 @@ def validate(result: Identification, record: Record, *, bounds: Bounds | None = 
     """
     limits = bounds or Bounds()
     aligned = uniform(record)
-    known = [pair for pair in result.pairs if pair.parameters.scale_factor is not None]
+    known = [pair for pair in result.pairs if has_model(pair)]
     if not known:
-        raise RecordError("the result has no model to validate: no pair was identifiable")
+        raise RecordError(
+            "the result has no model to validate: no pair has all figures that a model needs"
+        )
     for pair in known:
         _check_units(pair, aligned)
     outputs = dict.fromkeys(pair.output for pair in known)
