@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from hmpim.errors import ArgumentError
 from hmpim.model import Model, frequency_response, second_order_coefficients, simulate
+from hmpim.model.chain import run_chain
 from hmpim.rigs import Sensor
 from tests_support import examples, in_studies
 
@@ -154,6 +155,23 @@ def test_clustered_poles_at_a_high_rate_lose_no_digits():
     fine = slow.simulate((t[::4] > 0).astype(float), t[::4])
     assert y[-1] == pytest.approx(1.0, abs=1e-11)
     assert np.abs(y[4::4] - fine[1:]).max() < 2e-3  # the step falls one sample earlier
+
+
+@pytest.mark.parametrize("period", [None, 0.0137])
+@pytest.mark.parametrize("share", [0.999, 0.5, 1e-3])
+@pytest.mark.parametrize("model", [STATIC, FIRST, SECOND])
+def test_a_held_input_that_moves_before_its_sample_is_stepped(model, share, period):
+    """The simulation has the whole input at hand; the program, the samples up to now."""
+    ahead = replace(
+        model, delay=-share / FS, intersample="zoh", hold_period=period, hold_phase=0.0021
+    )
+    u = np.random.default_rng(3).standard_normal(T.size).cumsum()
+    stepped = run_chain(ahead.at_rate(FS), u)
+    assert stepped == pytest.approx(ahead.simulate(u, T), abs=1e-9)
+    until = run_chain(ahead.at_rate(FS), u[:300])
+    assert np.array_equal(until, stepped[:300])
+    with pytest.raises(ArgumentError, match="no program can run ahead"):
+        replace(ahead, delay=-1.0 / FS).at_rate(FS)
 
 
 def test_a_model_ahead_of_its_input_can_be_simulated_but_not_stepped():

@@ -118,8 +118,8 @@ def chain_of(
     Raises
     ------
     ArgumentError
-        If the delay is negative, the rate not positive, or the hold's period shorter than a
-        fiftieth of a sample.
+        If the delay would need input samples that are still to come, the rate is not positive,
+        or the hold's period is shorter than a fiftieth of a sample.
     """
     integrates = bool(system.denominator[0] == 0.0)
     level = 0.0 if integrates else float(system.numerator[0] / system.denominator[0])

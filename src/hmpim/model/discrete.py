@@ -68,6 +68,9 @@ class Discrete:
         Whole samples, those that the prefilter takes left out.
     fraction : float
         Rest of the delay in samples, 0 <= fraction < 1; it is in `drive` and `feed`.
+    early : int
+        Samples by which the whole comes sooner: 1 for a held input that moves less than a sample
+        before it is taken, a delay of fraction - 1; it is in `drive` and `feed`. Else 0.
     transition : ndarray, shape (n, n)
         Of the state over one sample.
     drive : ndarray, shape (n, 3)
@@ -93,6 +96,7 @@ class Discrete:
     prefilter: _Real
     delay: int
     fraction: float
+    early: int = 0
     transition: _Real
     drive: _Real
     output: _Real
@@ -142,7 +146,7 @@ def discretise(
     Parameters
     ----------
     system : RationalDelay
-        The model, in seconds; its delay at least 0.
+        The model, in seconds; its delay at least 0, for a held input above -1 sample.
     fs : float
         Rate in Hz.
     intersample : {'zoh', 'foh', 'bandlimited'}
@@ -154,7 +158,7 @@ def discretise(
     Raises
     ------
     ArgumentError
-        If the delay is negative, or the rate not positive.
+        If the delay would need input samples that are still to come, or the rate is not positive.
 
     Examples
     --------
@@ -165,15 +169,10 @@ def discretise(
     """
     if not (np.isfinite(fs) and fs > 0):
         raise ArgumentError(f"fs = {fs!r} Hz is not a rate; give a positive number")
-    if not system.delay >= 0:
-        raise ArgumentError(
-            f"delay {system.delay:.6g} s is negative; no program can run ahead of its input, so "
-            "take the delay as 0, or add one"
-        )
+    total, early = _samples_late(system, fs, intersample)
     if system.step is not None:
         return _filter(system, fs)
     reach = min(band, 0.45 * fs) if band else 0.2 * fs
-    total = system.delay * fs
     ahead = 0
     if intersample == "bandlimited":
         ahead = min(max(int(total + _WHOLE) - 1, 0), LOOKAHEAD)
@@ -191,10 +190,11 @@ def discretise(
         prefilter=np.ones(1),
         delay=whole,
         fraction=fraction,
+        early=early,
         transition=transition,
-        drive=drive,
+        drive=_sooner(drive, early),
         output=output,
-        feed=row[n:] - output @ drive,
+        feed=_sooner(row[n:] - output @ drive, early),
         generator=generator,
         entry=entry,
         through=through,
@@ -207,6 +207,28 @@ def discretise(
     if not n and fraction == 0.0:  # a gain and whole samples: nothing lies between
         return replace(plain, delay=whole + ahead)
     return _prefiltered(plain, system, ahead)
+
+
+def _samples_late(system: RationalDelay, fs: float, intersample: Intersample) -> tuple[float, int]:
+    """Delay in samples as it is stepped, 0 or more, and the samples by which all comes sooner.
+
+    A held input that moves between two samples is known from the next one on, which is the first
+    that answers it: of a delay above -1 sample no step needs a sample that is still to come.
+    """
+    total = system.delay * fs
+    if total >= -_WHOLE:
+        return max(total, 0.0), 0
+    if intersample == "zoh" and total > _WHOLE - 1.0:
+        return total + 1.0, 1
+    raise ArgumentError(
+        f"delay {system.delay:.6g} s is negative; no program can run ahead of its input, so "
+        "take the delay as 0, or add one"
+    )
+
+
+def _sooner(taps: _Real, early: int) -> _Real:
+    """Taps (newest first, on the last axis) that act a sample sooner; the newest then is 0."""
+    return np.concatenate([taps[..., early:], np.zeros_like(taps[..., :early])], axis=-1)
 
 
 def _filter(system: RationalDelay, fs: float) -> Discrete:
@@ -403,6 +425,7 @@ def rows_between(step: Discrete) -> tuple[RowPiece, ...]:
                 for age in ages
             ]
         )
+        rows[:, -TAPS:] = _sooner(rows[:, -TAPS:], step.early)
         series = np.polynomial.chebyshev.chebfit(nodes, rows, ROW_DEGREE)
         powers = np.zeros_like(series.T)
         for i, one in enumerate(series.T):

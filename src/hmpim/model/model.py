@@ -166,7 +166,8 @@ class Model:
         Raises
         ------
         ArgumentError
-            If the delay is negative or the rate not positive.
+            If the delay would need input samples that are still to come, or the rate is not
+            positive.
         """
         return chain_of(
             self.system,

@@ -177,6 +177,33 @@ def test_a_delay_of_no_more_than_its_error_below_zero_counts_as_none(tmp_path):
         export(result_of(replace(SECOND, delay=-0.1)), to="c", path=tmp_path / "c")
 
 
+@pytest.mark.parametrize("share", [0.5, 0.2, 0.95])
+def test_a_held_input_that_moves_before_its_sample_is_stepped_exactly(share, tmp_path):
+    """A lag driven at t_n - d by what is sampled at t_n: its step response, from before t_n on."""
+    lag, d = 0.03, share / FS
+    model = Model(delay=-d, scale_factor=2.0, denominator=(lag, 1.0), intersample="zoh")
+    result = result_of(model)  # the delay is 500 standard deviations from 0
+    u = np.repeat([0.0, 1.0, -0.5], 40)
+    n = np.arange(u.size)
+    truth = np.zeros(u.size)
+    for at, rise in ((40, 1.0), (80, -1.5)):
+        since = np.maximum((n - at) / FS + d, 0.0)
+        truth += 2.0 * rise * (1.0 - np.exp(-since / lag)) * (n >= at)
+    (file,) = export(result, to="python", path=tmp_path / "m.py")
+    assert f"is kept: the held input moves {d:.6g} s before" in file.read_text()
+    assert runpy.run_path(str(file))["simulate"](u) == pytest.approx(truth, abs=1e-12)
+    (header, _) = export(result, to="c", path=tmp_path / "c")
+    assert "is kept" in header.read_text()
+    with pytest.raises(ArgumentError, match=r"export to c, python, fmu, json, csv or uff58"):
+        export(result, to="scipy", path=tmp_path / "s.py")
+    with pytest.raises(ArgumentError, match=r"export to json, csv or uff58"):
+        export(result, to="c", path=tmp_path / "d", fs=FS / share)  # a whole sample ahead there
+    pair = result.pairs[0]
+    unsure = replace(pair, parameters=replace(pair.parameters, delay=replace(pair.delay, std=d)))
+    (file,) = export(replace(result, pairs=(unsure,)), to="scipy", path=tmp_path / "s.py")
+    assert f"exact for an input that is moved {d:.6g} s before its samples" in file.read_text()
+
+
 def test_what_cannot_be_exported_is_refused(tmp_path):
     result = result_of(SECOND)
     with pytest.raises(ArgumentError, match="target 'fortran' is not known"):

@@ -41,7 +41,7 @@ def c_files(source: Source, chain: Chain) -> dict[str, str]:
     """Return the text of each file by its name."""
     context = {
         "name": source.name,
-        "lines": source.program_lines(),
+        "lines": source.program_lines(stepped=True),
         "said": accuracy(chain),
         **chain_context(chain),
     }

@@ -90,7 +90,7 @@ def _add_libraries(folder: Path, name: str, fmi: int) -> None:
 def _texts(source: Source, fmi: FmiVersion) -> dict[str, str]:
     chain = source.chain()
     program = c_files(source, chain)
-    lines = source.program_lines()
+    lines = source.program_lines(stepped=True)
     estimates = list(source.estimates())
     digest = hashlib.sha256("".join(program.values()).encode()).hexdigest()
     context: dict[str, Any] = {

@@ -78,16 +78,36 @@ class Source:
         said += [f"Warning ({w.code}): {w.message}" for w in pair.warnings]
         return [_ascii(line) for line in said]
 
-    def program_lines(self) -> list[str]:
-        """Say what `lines` says, and what a program has in place of a negative delay."""
+    @property
+    def moved_before(self) -> bool:
+        """Whether the input is held and moves less than a sample before it is taken.
+
+        A program that is stepped then knows what it needs: what is held at a sample has been
+        answered since it moved.
+        """
+        return self.intersample == "zoh" and -1.0 < self.model.delay * self.fs < 0.0
+
+    def program_lines(self, *, stepped: bool = False) -> list[str]:
+        """Say what `lines` says, and what a program has in place of a negative delay.
+
+        Parameters
+        ----------
+        stepped : bool
+            Whether the program runs at the export's rate, from `chain`.
+        """
         late = -self.model.delay
         if late <= 0.0:
             return self.lines()
-        return [
-            *self.lines(),
-            f"The delay of {-late:.6g} s cannot be stepped and is taken as 0: outputs come "
-            f"{late:.6g} s late.",
-        ]
+        if stepped and self.moved_before:
+            words = f"is kept: the held input moves {late:.6g} s before each sample of it is taken."
+        elif self.moved_before:
+            words = (
+                f"is taken as 0: exact for an input that is moved {late:.6g} s before its samples "
+                f"were taken, else outputs come {late:.6g} s late."
+            )
+        else:
+            words = f"cannot be stepped and is taken as 0: outputs come {late:.6g} s late."
+        return [*self.lines(), f"The delay of {-late:.6g} s {words}"]
 
     def causal(self) -> Model:
         """Return the model as something that can be stepped: its delay not negative.
@@ -105,15 +125,21 @@ class Source:
         std = spread if math.isfinite(spread) else 0.0
         if -delay <= _NEGLIGIBLE * std:
             return replace(self.model, delay=0.0)
+        which = f"the delay of {self.pair.output!r} from {self.pair.input!r} is {delay:.6g} s"
+        if self.moved_before:
+            raise ArgumentError(
+                f"{which}: the held input moves before it is sampled, which only what is stepped "
+                "with its samples can follow; export to c, python, fmu, json, csv or uff58"
+            )
         raise ArgumentError(
-            f"the delay of {self.pair.output!r} from {self.pair.input!r} is {delay:.6g} s, so the "
-            "output is ahead of the input and no program can step it; export to json, csv or "
-            "uff58, or identify from a command that comes earlier"
+            f"{which}, so the output is ahead of the input and no program can step it; export to "
+            "json, csv or uff58, or identify from a command that comes earlier"
         )
 
     def chain(self) -> Chain:
         """Return the model at the export's rate."""
-        return self.causal().at_rate(self.fs, intersample=self.intersample)
+        model = self.model if self.moved_before else self.causal()
+        return model.at_rate(self.fs, intersample=self.intersample)
 
 
 def source_of(
