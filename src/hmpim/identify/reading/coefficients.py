@@ -3,6 +3,7 @@
 import numpy as np
 
 from hmpim.identify.arrays import Real
+from hmpim.identify.result.powers import by_falling_powers
 from hmpim.model.filters import in_z
 from hmpim.model.response import RationalDelay
 
@@ -37,6 +38,4 @@ def highest_first(covariance: Real, system: RationalDelay) -> Real | None:
     """
     if not np.isfinite(covariance).all():
         return None
-    above = 1 + system.numerator.size
-    order = [0, *range(1, above)[::-1], *range(above, covariance.shape[0])[::-1]]
-    return covariance[np.ix_(order, order)]
+    return by_falling_powers(covariance, system.numerator.size)

@@ -8,6 +8,7 @@ measured        frequency response, bandwidths read off it, what is nonlinear
 inputs          several inputs at once, and how well they are told apart
 pair            all that is known of one input and one output
 lookup          pairs by their names, output first
+powers          coefficients and their covariance, highest power first
 first_schema    results written by the first version
 identification  the whole result, and its JSON
 """

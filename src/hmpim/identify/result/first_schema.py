@@ -5,6 +5,8 @@ from typing import Any
 
 import numpy as np
 
+from hmpim.identify.result.powers import by_falling_powers
+
 __all__ = ["FIRST_SCHEMA", "upgraded"]
 
 FIRST_SCHEMA = "hmpim/identification/1"
@@ -30,7 +32,7 @@ def upgraded(pair: Mapping[str, Any]) -> dict[str, Any]:
     return {
         **pair,
         "parameters": parameters,
-        "dynamics": {**dynamics, "covariance": _highest_first(dynamics)},
+        "dynamics": {**dynamics, "covariance": _falling(dynamics)},
         "bandwidths_from_response": judged(pair.get("bandwidths_from_response", {})),
         "nonlinearity": None
         if nonlinearity is None
@@ -47,12 +49,10 @@ def upgraded(pair: Mapping[str, Any]) -> dict[str, Any]:
     }
 
 
-def _highest_first(dynamics: Mapping[str, Any]) -> list[list[float]] | None:
-    """Covariance of delay, numerator and denominator by falling powers of s."""
+def _falling(dynamics: Mapping[str, Any]) -> list[list[float]] | None:
     covariance = dynamics.get("covariance")
     if covariance is None:
         return None
-    above = 1 + len(dynamics["numerator"])
-    order = [0, *range(1, above)[::-1], *range(above, len(covariance))[::-1]]
-    turned: list[list[float]] = np.asarray(covariance)[np.ix_(order, order)].tolist()
+    rising = np.asarray(covariance, dtype=np.float64)
+    turned: list[list[float]] = by_falling_powers(rising, len(dynamics["numerator"])).tolist()
     return turned
