@@ -299,56 +299,77 @@ def _section(
     )
     some = values[there]
     title = label_of(row.name)
-    pictures = [
-        Picture(
-            key=f"{row.name}-distribution",
-            title=f"{title}: distribution",
-            caption="Number of records; outliers are counted in the outermost bars.",
-            description=f"Histogram of {row.name}.",
-            figure=distribution(some, name=row.name, unit=row.unit, bounds=bounds),
-        )
-    ]
-    places, along = _order(table, there)
-    order = np.argsort(places, kind="stable")
-    drift = trend(places[order], some[order])
-    pictures.append(
-        Picture(
-            key=f"{row.name}-trend",
-            title=f"{title}: one after the other",
-            caption=(
-                "Each record, by name" if along == _BY_NAME else f"Each record: {along.lower()}"
-            )
-            + (", with the running median." if some.size >= FOR_A_MEDIAN else "."),
-            description=f"{row.name} along {along.lower()}.",
-            figure=sequence(
-                places[order],
-                some[order],
-                name=row.name,
-                unit=row.unit,
-                along=along,
-                bounds=bounds,
-                names=_names(table, there) if along == _BY_NAME else (),
-            ),
-        )
+    shown = Picture(
+        key=f"{row.name}-distribution",
+        title=f"{title}: distribution",
+        caption="Number of records; outliers are counted in the outermost bars.",
+        description=f"Histogram of {row.name}.",
+        figure=distribution(some, name=row.name, unit=row.unit, bounds=bounds),
     )
-    for by, words in labels.items():
-        grouped = _grouped(some, [words[k] for k in there])
-        if len(grouped) < 2:
-            continue
-        pictures.append(
-            Picture(
-                key=f"{row.name}-by-{len(pictures)}",
-                title=f"{title} by {by}",
-                caption="Median of each group, with its range from 5 % to 95 %.",
-                description=f"{row.name} by {by}.",
-                figure=groups(grouped, name=row.name, unit=row.unit, by=by),
-            )
-        )
+    course, drift = _course(table, row, some, there, bounds)
     said, grids = _standing_out(table, row, some, there)
-    if drift is not None:
-        each = "record" if along == _BY_NAME else along.split("s since", 1)[0].lower()
-        said = (*said, _drift(drift, f"{row.unit} a {each}".strip()))
-    return Section(title=title, observed="", found=said, grids=grids, pictures=tuple(pictures))
+    return Section(
+        title=title,
+        observed="",
+        found=(*said, *drift),
+        grids=grids,
+        pictures=(shown, course, *_by_group(row, some, there, labels)),
+    )
+
+
+def _course(
+    table: BatchTable,
+    row: ParameterSummary,
+    some: Real,
+    there: NDArray[np.int64],
+    bounds: tuple[float, ...],
+) -> tuple[Picture, tuple[str, ...]]:
+    """One record after the other, and what is said of a trend, if there is one."""
+    places, along = _order(table, there)
+    named = along == _BY_NAME
+    order = np.argsort(places, kind="stable")
+    picture = Picture(
+        key=f"{row.name}-trend",
+        title=f"{label_of(row.name)}: one after the other",
+        caption=("Each record, by name" if named else f"Each record: {along.lower()}")
+        + (", with the running median." if some.size >= FOR_A_MEDIAN else "."),
+        description=f"{row.name} along {along.lower()}.",
+        figure=sequence(
+            places[order],
+            some[order],
+            name=row.name,
+            unit=row.unit,
+            along=along,
+            bounds=bounds,
+            names=_names(table, there) if named else (),
+        ),
+    )
+    drift = trend(places[order], some[order])
+    if drift is None:
+        return picture, ()
+    each = "record" if named else along.split("s since", 1)[0].lower()
+    return picture, (_drift(drift, f"{row.unit} a {each}".strip()),)
+
+
+def _by_group(
+    row: ParameterSummary,
+    some: Real,
+    there: NDArray[np.int64],
+    labels: dict[str, list[str | None]],
+) -> tuple[Picture, ...]:
+    """A picture for each column of metadata that parts the records into groups."""
+    split = {by: _grouped(some, [words[k] for k in there]) for by, words in labels.items()}
+    told = {by: grouped for by, grouped in split.items() if len(grouped) > 1}
+    return tuple(
+        Picture(
+            key=f"{row.name}-by-{k}",
+            title=f"{label_of(row.name)} by {by}",
+            caption="Median of each group, with its range from 5 % to 95 %.",
+            description=f"{row.name} by {by}.",
+            figure=groups(grouped, name=row.name, unit=row.unit, by=by),
+        )
+        for k, (by, grouped) in enumerate(told.items(), start=2)
+    )
 
 
 def _drift(drift: tuple[float, float, float], unit: str) -> str:
