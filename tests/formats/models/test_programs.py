@@ -154,6 +154,17 @@ def test_another_rate_is_exact_too(tmp_path):
     assert found["simulate"](u) == pytest.approx(model.simulate(u, t), abs=1e-9)
 
 
+@pytest.mark.parametrize("target", ["python", "scipy", "control", "isaac"])
+def test_names_that_python_would_read_otherwise_stand_in_its_text(target, tmp_path):
+    """A backslash and a triple quote in the names of the channels: the file still compiles."""
+    whole = result_of(SECOND)
+    odd = replace(whole.pairs[0], input='u """ \\N{x}', output='C:\\new "y"""')
+    step = {"timestep": 0.005} if target == "isaac" else {}
+    result = replace(whole, pairs=(odd,))
+    (file,) = export(result, to=target, path=tmp_path / "m.py", **step)
+    compile(file.read_text(), file, "exec")
+
+
 def test_files_are_named_as_asked(tmp_path):
     result = result_of(SECOND)
     assert export(result, to="python", path=tmp_path)[0] == tmp_path / "y_from_u.py"

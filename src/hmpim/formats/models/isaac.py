@@ -49,7 +49,7 @@ def write_isaac(source: Source, path: Path, *, timestep: float | None) -> tuple[
     text = rendered(
         "isaac.py.jinja",
         title=f"{source.pair.output} from {source.pair.input}, for Isaac Lab.",
-        lines=[line.replace("\\", "/").replace('"""', "'''") for line in source.program_lines()],
+        lines=source.program_lines(),
         timestep=float(timestep),
         delay=model.delay,
         delay_error=max(model.delay - steps[0] * timestep, steps[1] * timestep - model.delay),

@@ -45,7 +45,7 @@ def _write(source: Source, path: Path, *, control: bool, pade: int | None) -> tu
         control=control,
         name=source.name,
         title=f"{pair.output} from {pair.input}, for {'python-control' if control else 'scipy'}.",
-        lines=[line.replace("\\", "/").replace('"""', "'''") for line in source.program_lines()],
+        lines=source.program_lines(),
         pade=order,
         pade_error=pade_error(order, 2 * np.pi * band * model.delay),
         band=band,

@@ -19,10 +19,7 @@ def python_file(source: Source) -> str:
         "model.py.jinja",
         name=source.name,
         title=f"{source.pair.output} from {source.pair.input}, one sample at a time.",
-        lines=[
-            line.replace("\\", "/").replace('"""', "'''")
-            for line in source.program_lines(stepped=True)
-        ],
+        lines=source.program_lines(stepped=True),
         said=accuracy(chain),
         parameters=literal({k: e.to_dict() for k, e in source.estimates()}),
         covariance=literal(covariance),

@@ -35,6 +35,11 @@ def literal(value: Any) -> str:
     return pformat(json.loads(json.dumps(value)), width=96, sort_dicts=False)
 
 
+def _in_docstring(text: str) -> str:
+    """Text as it may stand between Python's triple quotes."""
+    return text.replace("\\", "/").replace('"""', "'''")
+
+
 def _row(values: ArrayLike) -> str:
     return ", ".join(c_number(v) for v in np.ravel(values))
 
@@ -66,6 +71,7 @@ def rendered(template: str, **context: Any) -> str:
     environment.filters["number"] = c_number
     environment.filters["row"] = _row
     environment.filters["comment"] = _comment
+    environment.filters["docstring"] = _in_docstring
     return environment.get_template(template).render(**context)
 
 
