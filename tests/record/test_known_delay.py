@@ -118,6 +118,35 @@ def test_stamps_printed_too_coarsely_are_spread(stamps, code):
     assert abs(moved) < 0.01 / 2000.0
 
 
+@pytest.mark.parametrize(
+    ("clock", "stamps"),
+    [
+        (every(2000.0), lambda t: np.array([float(f"{x:.4g}") for x in t])),
+        (
+            without(every(2000.0), (5, 5.7), (12, 12.0031)),
+            lambda t: np.floor(t * 1000 + 1e-9) / 1000,
+        ),
+    ],
+    ids=["ever more coarsely", "with pauses"],
+)
+def test_a_coarse_clock_is_seen_through_its_digits_and_pauses(clock, stamps):
+    """Samples that share a stamp are neither dropped nor moved within a packet."""
+    time = stamps(clock)
+    mended = mend(
+        [
+            Series(name="u", values=sweep(clock), time=time),
+            Series(name="y", values=answered(clock), time=time),
+        ]
+    )
+    (finding,) = mended.findings
+    assert "spread evenly, 0.0005 s apart (2000 Hz)" in finding.message
+    found = mended.channels[0].time
+    assert found.size == clock.size
+    assert np.abs(found - clock - np.median(found - clock)).max() < 5e-4
+    steps = np.diff(clock) < 6e-4  # but for the pauses
+    assert np.diff(found)[steps] == pytest.approx(5e-4, abs=2e-7)
+
+
 def test_doubled_late_and_missing_samples_move_no_delay():
     t = every(FS)
     rng = np.random.default_rng(5)

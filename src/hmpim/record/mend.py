@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 
 from hmpim.errors import RecordError
@@ -28,6 +29,15 @@ _STRAYS = 0.01
 
 _LONGEST_CLOCK = 10**7
 """Intervals that a record may span beyond a thousand for each of its samples."""
+
+_NEIGHBOURS = 9
+"""Steps between stamps whose median is the usual one there."""
+
+_PAUSE = 3.0
+"""Usual steps from which one is a pause; those of a coarsely printed clock are one or two."""
+
+_UNEVEN = 0.05
+"""Part of a tick by which a step may miss whole ones."""
 
 _ENOUGH = 20
 """Samples from which stamps that stand still can be told from a coarse clock."""
@@ -175,10 +185,10 @@ def _ordered(
     spread = _spread(time[order]) if differ else None
     repeat = f"{doubled} of {time.size} stamps of {of} repeat the one before"
     if spread is not None:
-        step, rate = spread[1] - spread[0], 1.0 / (spread[1] - spread[0])
+        step = float(np.median(np.diff(spread)))
         message = (
             f"{repeat}, because the clock is printed more coarsely than it runs; the samples are "
-            f"spread evenly, {step:.6g} s apart ({rate:.6g} Hz)"
+            f"spread evenly, {step:.6g} s apart ({1.0 / step:.6g} Hz)"
         )
     elif differ and 2 * doubled >= order.size >= _ENOUGH and doubled < order.size - 1:
         spread = _since_packet_before(time[order])
@@ -244,19 +254,41 @@ def _differs(values: NDArray[np.float64], first: NDArray[np.bool_]) -> bool:
 
 
 def _spread(time: NDArray[np.float64]) -> NDArray[np.float64] | None:
-    """The uniform clock whose stamps, cut or rounded to their printed step, are these; or None."""
-    tick = float(np.min(np.diff(np.unique(time)), initial=np.inf))
-    if not np.isfinite(tick) or time.size < _ENOUGH:
+    """The uniform clock whose stamps, cut or rounded as they are printed, these are; or None.
+
+    A file of six digits prints ever more coarsely as time goes on, so that each stamp is held
+    against the step from it to its neighbours. The clock pauses where samples are missing.
+    """
+    if time.size < _ENOUGH:
         return None
-    # Of a clock cut to ticks the mean error is half a tick at both ends: the slope is free of it.
-    place = np.arange(time.size)
-    step, start = np.polyfit(place, time - time[0], 1)
-    even = start + step * place
-    if step <= 0 or float(np.abs(time - time[0] - even).max()) > 1.05 * tick:
+    stamps, counts = np.unique(time, return_counts=True)
+    steps = np.diff(stamps)
+    if steps.size < 2:
         return None
-    # The least start at which no sample is stamped before it happens: stamps are cut, not rounded,
-    # in most loggers; a constant offset of all channels of a clock moves no delay between them.
-    return np.asarray(time[0] + even)
+    usual = scipy.ndimage.median_filter(steps, _NEIGHBOURS, mode="nearest")
+    pause = steps > _PAUSE * usual
+    if pause.any() and time.size - stamps.size < _ENOUGH:
+        return None  # a logger that stumbled, not a coarse clock
+    steps = np.where(pause, usual, steps)
+    # Stamps that are shared follow each other by whole ticks; packets come when they are ready.
+    whole = steps / scipy.ndimage.minimum_filter(steps, _NEIGHBOURS, mode="nearest")
+    shared = (np.maximum(counts[1:], counts[:-1]) > 1) & ~pause
+    odd = shared & (np.abs(whole - np.round(whole)) > _UNEVEN)
+    if np.count_nonzero(odd) > _STRAYS * np.count_nonzero(shared):
+        return None
+    tick = np.maximum(np.append(steps[0], steps), np.append(steps, steps[-1]))
+    part = np.repeat(np.concatenate(([0], np.cumsum(pause))), counts)
+    place, since = np.arange(time.size, dtype=np.float64), time - time[0]
+    sizes = np.bincount(part)
+    middles = [np.bincount(part, weights=x) / sizes for x in (place, since)]
+    place, since = place - middles[0][part], since - middles[1][part]
+    step = float(place @ since) / float(place @ place)
+    # Of a clock cut to ticks the mean error is half a tick all along: the slope is free of it, and
+    # a constant offset of all channels of a clock moves no delay between them.
+    if step <= 0 or np.any(np.abs(since - step * place) > 1.05 * np.repeat(tick, counts)):
+        return None
+    even = time[0] + middles[1][part] + step * place
+    return even if np.all(np.diff(even) > 0) else None
 
 
 def _since_packet_before(time: NDArray[np.float64]) -> NDArray[np.float64]:
