@@ -30,6 +30,19 @@ def test_each_room_of_the_walk_has_the_files_told_of():
     assert seen == {place.parent.name for place in SOURCE.glob("*/__init__.py")}
 
 
+def test_each_folder_within_a_room_is_told_of():
+    for stop in STOPS:
+        for room in set(re.findall(r"\*\*`(\w+)/`\*\*", stop)) - {"identify"}:
+            folders = {place.parent.name for place in (SOURCE / room).glob("*/[!.]*")}
+            told = {name.split("/")[-1] for name in re.findall(r"`([\w/]+)/`", stop)}
+            assert folders - {"__pycache__"} <= told, (room, folders)
+
+
+def test_each_module_of_identification_beside_its_rooms_is_told_of():
+    modules = {place.name for place in (SOURCE / "identify").glob("[!_]*.py")}
+    assert modules <= set(re.findall(r"`(\w+\.py)`", TEXT))
+
+
 def test_each_room_of_identification_is_told_of():
     chapter = TEXT.partition("### The rooms of identification")[2].partition("```text")[0]
     told = re.findall(r"^\| `(\w+)` \|", chapter, re.MULTILINE)
