@@ -32,7 +32,7 @@ def row(name: str, stimulus: Stimulus) -> str:
         f"{stimulus.duration:.4g}",
         f"{peaks.position:.3g}",
         f"{peaks.velocity:.3g}",
-        f"{peaks.acceleration:.3g}",
+        f"{float(f'{peaks.acceleration:.3g}'):g}",
         f"{1e3 * errors.ci95('delay'):.2g}",
         f"{10.0 * errors.ci95('natural_frequency'):.2g}",  # per cent of 10 Hz
         f"{errors.ci95('damping_ratio'):.2g}",

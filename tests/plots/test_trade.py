@@ -35,7 +35,7 @@ def test_the_wanted_point_and_what_is_beyond_the_limits(found):
     assert list(curve.x) == [1.0, 2.0]
     assert list(curve.y) == [found.value, found.value / 2]
     assert [span.label for span in panel.of(Span)] == ["beyond the limits"]
-    assert panel.x.label == "Errors allowed, in times those wanted (–)"
+    assert panel.x.label == "Errors allowed, relative to those wanted"
 
 
 def test_what_is_not_told_apart_is_shaded():

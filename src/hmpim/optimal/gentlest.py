@@ -79,7 +79,7 @@ class TradePoint:
     Parameters
     ----------
     factor : float
-        The errors allowed, in times those that were wanted.
+        The errors allowed, relative to those wanted.
     value : float or None
         What is to be small; None if the limits do not allow that accuracy.
     """
@@ -245,7 +245,7 @@ def trade(
     found : Gentlest
         A result.
     factors : sequence of float
-        Errors allowed, in times those that were wanted.
+        Errors allowed, relative to those wanted.
     progress : callable, optional
         As in `gentlest`.
 

@@ -78,7 +78,7 @@ def trade_plot(found: "Gentlest", points: "Sequence[TradePoint]") -> Figure:
         panels=(
             Panel(
                 x=Axis(
-                    label="Errors allowed, in times those wanted (–)",
+                    label="Errors allowed, relative to those wanted",
                     scale="log",
                     low=left,
                     high=right,
