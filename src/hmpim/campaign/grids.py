@@ -40,16 +40,19 @@ _LABELS = {words.name: words.label for words in GLOSSARY}
 _INLINE = {words.name: words.inline for words in GLOSSARY}
 
 _READING = (
-    "−90° is that of the fitted model, without the hold where the record states that its input is "
-    "held (mode P, position commands alone), and of the sampled response, hold included, "
-    "elsewhere; −90° of the response is the same frequency, read off the measured response"
+    "−90° is that of the fitted model. Where the record states that its input is held (mode P, "
+    "position commands alone), it is without the hold; elsewhere it is that of the sampled "
+    "response, hold included. −90° of the response is the same frequency, read off the measured "
+    "response"
 )
-_DOUBTFUL = "? marks a doubtful figure; the others of its row are reliable"
+_DOUBTFUL = "A ? marks a doubtful figure; the others of its row are reliable"
 _SIDES = "−a +b states how far a 95 % interval that is not symmetric reaches to either side"
-_EXACT = "exact is the value for the linearised mechanics of the simulated table, without friction"
+_EXACT = (
+    "−90° exact is the value for the linearised mechanics of the simulated table, without friction"
+)
 _NEGATIVE = (
-    "a negative delay belongs to the fit, not to the unit: where feedforward or friction shape "
-    "the response, the fit can trade dynamics for delay"
+    "A negative delay belongs to the fit, not to the unit: where feedforward or friction shape "
+    "the response, the fit can trade delay against dynamics"
 )
 
 
@@ -99,7 +102,7 @@ def case_grid(rows: Sequence[Row], caption: str, *, explained: bool = False) -> 
         caption=caption,
         columns=tuple(columns),
         rows=tuple(tuple(cells[name] for name in columns) for cells in told),
-        note="; ".join(said) + "." if explained else "",
+        note=". ".join(said) + "." if explained else "",
         dense=True,
         beneath=("Verdict", "Load", "At once", *(["Rate (Hz)"] if "Mode" in columns else [])),
     )
