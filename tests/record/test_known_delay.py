@@ -147,6 +147,25 @@ def test_a_coarse_clock_is_seen_through_its_digits_and_pauses(clock, stamps):
     assert np.diff(found)[steps] == pytest.approx(5e-4, abs=2e-7)
 
 
+def test_a_coarse_clock_that_wanders_is_followed():
+    """A loop that runs freely, 1.7 samples to a printed millisecond: none is dropped."""
+    rng = np.random.default_rng(2)
+    clock = np.cumsum(6e-4 + 2e-5 * rng.standard_normal(33_000))
+    time = np.floor(1000 * clock) / 1000
+    assert np.abs(clock - np.linspace(clock[0], clock[-1], clock.size)).max() > 1.05e-3
+    mended = mend(
+        [
+            Series(name="u", values=sweep(clock), time=time),
+            Series(name="y", values=answered(clock), time=time),
+        ]
+    )
+    found = mended.channels[0].time
+    assert found.size == clock.size
+    late = found - clock
+    assert np.std(late) < 1.5e-4
+    assert np.abs(late - np.median(late)).max() < 6e-4
+
+
 def test_doubled_late_and_missing_samples_move_no_delay():
     t = every(FS)
     rng = np.random.default_rng(5)

@@ -36,6 +36,9 @@ _NEIGHBOURS = 9
 _PAUSE = 3.0
 """Usual steps from which one is a pause; those of a coarsely printed clock are one or two."""
 
+_NEARBY = 101
+"""Samples along which a clock that wanders counts as uniform; its ticks then average to 1 %."""
+
 _UNEVEN = 0.05
 """Part of a tick by which a step may miss whole ones."""
 
@@ -65,7 +68,8 @@ def mend(series: Sequence[Series], *, fs: float | None = None) -> Mended:
 
     * A sample that is NaN or infinite is dropped, which leaves a gap in its channel alone.
     * Stamps that stand still because the clock is printed too coarsely (2 kHz in whole
-      milliseconds): the samples are spread on the uniform clock that the stamps are rounded from.
+      milliseconds): the samples are spread on the clock that the stamps are rounded from, which
+      may pause or wander.
       If half of the samples or more share stamps (packets), each packet is spread over the time
       since the previous one. Else the first sample of each stamp is kept.
     * Samples out of order, by up to eight places: sorted by stamp.
@@ -254,7 +258,7 @@ def _differs(values: NDArray[np.float64], first: NDArray[np.bool_]) -> bool:
 
 
 def _spread(time: NDArray[np.float64]) -> NDArray[np.float64] | None:
-    """The uniform clock whose stamps, cut or rounded as they are printed, these are; or None.
+    """The clock whose stamps, cut or rounded as they are printed, these are; or None.
 
     A file of six digits prints ever more coarsely as time goes on, so that each stamp is held
     against the step from it to its neighbours. The clock pauses where samples are missing.
@@ -278,17 +282,33 @@ def _spread(time: NDArray[np.float64]) -> NDArray[np.float64] | None:
         return None
     tick = np.maximum(np.append(steps[0], steps), np.append(steps, steps[-1]))
     part = np.repeat(np.concatenate(([0], np.cumsum(pause))), counts)
-    place, since = np.arange(time.size, dtype=np.float64), time - time[0]
-    sizes = np.bincount(part)
-    middles = [np.bincount(part, weights=x) / sizes for x in (place, since)]
-    place, since = place - middles[0][part], since - middles[1][part]
-    step = float(place @ since) / float(place @ place)
     # Of a clock cut to ticks the mean error is half a tick all along: the slope is free of it, and
     # a constant offset of all channels of a clock moves no delay between them.
-    if step <= 0 or np.any(np.abs(since - step * place) > 1.05 * np.repeat(tick, counts)):
-        return None
-    even = time[0] + middles[1][part] + step * place
-    return even if np.all(np.diff(even) > 0) else None
+    for clock in (_uniform, _wandering):
+        with np.errstate(over="ignore", invalid="ignore"):  # of stamps that are damage
+            even = np.asarray(time[0] + clock(time - time[0], part))
+            near = np.all(np.abs(time - even) <= 1.05 * np.repeat(tick, counts))
+            if near and np.all(np.diff(even) > 0):
+                return even
+    return None
+
+
+def _uniform(since: NDArray[np.float64], part: NDArray[np.int64]) -> NDArray[np.float64]:
+    """The clock of one step that is nearest to the stamps, each part between pauses where it is."""
+    place, sizes = np.arange(since.size, dtype=np.float64), np.bincount(part)
+    middles = [np.bincount(part, weights=x) / sizes for x in (place, since)]
+    place, since = place - middles[0][part], since - middles[1][part]
+    return np.asarray(middles[1][part] + float(place @ since) / float(place @ place) * place)
+
+
+def _wandering(since: NDArray[np.float64], part: NDArray[np.int64]) -> NDArray[np.float64]:
+    """A clock whose step drifts, as of a loop that runs freely: lines along the stamps nearby."""
+    edges = np.flatnonzero(np.diff(part)) + 1
+    runs = []
+    for run in np.split(since, edges):
+        window = min(_NEARBY, (run.size - 1) // 2 * 2 + 1)
+        runs.append(scipy.signal.savgol_filter(run, window, 1) if window > 1 else run)
+    return np.concatenate(runs)
 
 
 def _since_packet_before(time: NDArray[np.float64]) -> NDArray[np.float64]:
