@@ -5,10 +5,12 @@ import math
 import re
 import subprocess
 import sys
+from dataclasses import replace
 
 import pytest
 from typer.testing import CliRunner
 
+import hmpim
 from hmpim.cli.main import app
 from hmpim.identify import Identification
 from tests_support import in_studies
@@ -143,6 +145,26 @@ def test_gain_and_phase_at_chosen_frequencies(good):
     check_refusal(done.exit_code, done.stdout, done.stderr, "-3 Hz is not positive")
     done = run("identify", good, *NAMED, "--at", "900")
     check_refusal(done.exit_code, done.stdout, done.stderr, "beyond the Nyquist frequency 50 Hz")
+
+
+def test_a_doubtful_pair_without_a_model_has_no_gain_and_phase_and_no_prediction(
+    good, tmp_path, monkeypatch
+):
+    """A weak coupling lacks its delay: it is said, and the other pairs are still read."""
+    identified = hmpim.identify
+
+    def weak(*words, **options):
+        found = identified(*words, **options)
+        (pair,) = found.pairs
+        known = replace(pair.parameters, delay=None)
+        return replace(found, pairs=(replace(pair, parameters=known, verdict="doubtful"),))
+
+    monkeypatch.setattr(sys.modules["hmpim.identify"], "identify", weak)
+    done = run("identify", good, *NAMED, "--at", "0.5", "--holdout", "0.4")
+    assert done.exit_code == 0, done.stderr
+    said = " ".join(done.stdout.split())
+    assert "y from u has no model with error bars: no gain, no phase." in said
+    assert "no model to predict with" in said
 
 
 def test_a_failure_while_writing_leaves_the_old_file(good, tmp_path, monkeypatch):
