@@ -1,4 +1,4 @@
-"""What a reader is: four functions and the facts that a person needs about its format."""
+"""What a reader is: three functions and the facts that a person needs about its format."""
 
 import importlib
 from collections.abc import Callable, Sequence
