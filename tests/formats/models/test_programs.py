@@ -213,6 +213,7 @@ def test_a_held_input_that_moves_before_its_sample_is_stepped_exactly(share, tmp
     unsure = replace(pair, parameters=replace(pair.parameters, delay=replace(pair.delay, std=d)))
     (file,) = export(replace(result, pairs=(unsure,)), to="scipy", path=tmp_path / "s.py")
     assert f"exact for an input that is moved {d:.6g} s before its samples" in file.read_text()
+    assert compiled_c(tmp_path / "c")(u) == pytest.approx(truth, abs=1e-12)
 
 
 def test_what_cannot_be_exported_is_refused(tmp_path):
