@@ -120,19 +120,23 @@ def fit_together(
     _join(inputs, pairs, plainly)
     if len(pairs.strong) > 1:  # each was fitted with the later ones unknown
         pairs.refine(pairs.kept, None)
+    asked = pairs.cost
     _fit_couplings(inputs, pairs, plain)
     for _ in range(_TURNS):
-        before, cost = pairs.structures, pairs.cost
+        before = pairs.structures
         _fit_strong(inputs, pairs, partial(fitted, structures=structures))
-        if pairs.cost * TWICE < cost:
-            _join(inputs, pairs, plainly)
-        others = pairs.structures != before
-        if others:
-            _fit_couplings(inputs, pairs, plain)
-        cost = pairs.cost
+        left = pairs.cost
         pairs.refine(pairs.kept, None)
+        clearer = pairs.cost * TWICE < asked
+        if clearer:
+            _join(inputs, pairs, plainly)
+            asked = pairs.cost
+        others = pairs.structures != before
+        if others or clearer:
+            _fit_couplings(inputs, pairs, plain)
+            pairs.refine(pairs.kept, None)
         simpler = pairs.simplify()
-        if not others and not simpler and pairs.cost * TWICE > cost:
+        if not others and not simpler and pairs.cost * TWICE > left:
             break  # else each was fitted to the wrong rest
     return _moved_at_once(pairs)
 
