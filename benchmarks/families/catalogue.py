@@ -315,6 +315,7 @@ BESIDE = (
         SWEEP,
         c.another_input(3.0, 20.0),
     ),
+    family("five inputs", "Four others", SECOND, SWEEP, *(BESIDE_ANOTHER,) * 4),
     family("two inputs, PRBS", "The first is held", SECOND, k.sequence("prbs"), BESIDE_ANOTHER),
     family(
         "two inputs, Butterworth", "Order 2 to 6", k.low_pass("butterworth"), SWEEP, BESIDE_ANOTHER

@@ -16,9 +16,9 @@ Condition = Callable[[Take], None]
 
 
 def another_input(low: float, high: float) -> Condition:
-    """A second input, held or smooth, that moves the output by so much of what the first does.
+    """One more input, held or smooth, that moves the output by so much of what the first does.
 
-    It knows nothing of the first and has a first- or second-order response of its own; it moves
+    It knows nothing of the others and has a first- or second-order response of its own; it moves
     before the record begins, or from 2 % of it on.
     """
 
@@ -33,7 +33,7 @@ def another_input(low: float, high: float) -> Condition:
         alone = linear_output(replace(unit, bias=0.0), drive)
         share = log_uniform(rng, low, high) * take.motion / float(np.std(alone))
         take.y = take.y + share * alone
-        take.others["v"] = drive.sampled()
+        take.others[f"u{len(take.others) + 2}"] = drive.sampled()
 
     return spoil
 
