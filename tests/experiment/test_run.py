@@ -181,6 +181,15 @@ def test_limits_in_a_unit_that_cannot_be_compared_stop_the_run(unit, limits_unit
     assert spy.moved == []
 
 
+def test_limits_stated_without_a_unit_are_not_taken_for_radians():
+    spy = Spy(limits=Limits(position=45.0, unit="deg"))
+    words = "limits stated for 'pitch': limits in no unit cannot be turned into 'deg'; state their"
+    with pytest.raises(UnitError, match=words):
+        run(spy, SINE, limits=Limits(position=1.0))  # SINE goes to 2 deg
+    assert spy.moved == []
+    run(spy, SINE, limits=Limits())  # nothing bounds, so there is nothing to convert
+
+
 def test_a_failing_driver_is_told_as_the_rigs_own_error():
     fault = OSError("port closed")
     with pytest.raises(RigError, match="rig 'pitch' failed: OSError: port closed") as caught:

@@ -55,6 +55,12 @@ def test_what_is_no_number_is_refused(name, value):
 def test_units_must_go_together():
     with pytest.raises(UnitError, match="'deg' cannot be turned into 'm'"):
         Limits(position=1.0, unit="deg").to("m")
+    with pytest.raises(UnitError, match="limits in no unit cannot be turned into 'deg'; state the"):
+        Limits(position=1.0).to("deg")
+    with pytest.raises(UnitError, match="limits in 'rad' cannot be turned into no unit; state a u"):
+        Limits(position=1.0, unit="rad").to("")
+    assert Limits(position=1.0).to("").position == 1.0
+    assert Limits().to("deg") == Limits(unit="deg")
 
 
 @pytest.mark.parametrize("extinction", [0.0, 0.4, 0.9, 1.3, 2.0])

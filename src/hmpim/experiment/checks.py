@@ -6,7 +6,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from hmpim.arguments import shown
-from hmpim.errors import ArgumentError, LimitsError, RigError
+from hmpim.errors import ArgumentError, LimitsError, RigError, UnitError
 from hmpim.experiment.log import RunLog
 from hmpim.rigs import LimitsOfAxes, Rig
 from hmpim.rigs.brake import check_stoppable
@@ -112,6 +112,9 @@ def limits_by_axis(
     ------
     LimitsError
         If something moves and its limits are not stated.
+    UnitError
+        If the limits stated are in no unit, and the rig's own are in one, or their dimensions
+        differ.
 
     Examples
     --------
@@ -122,7 +125,8 @@ def limits_by_axis(
     """
     found: dict[str, Limits | None] = {}
     for axis in stimuli:
-        limits = _tighter(_of_axis(rig.limits, axis), _of_axis(stated, axis))
+        whose = f"{rig.name!r}, axis {axis!r}" if axis else repr(rig.name)
+        limits = _tighter(_of_axis(rig.limits, axis), _of_axis(stated, axis), whose=whose)
         if limits is None and moves(rig):
             about = f"axis {axis!r} of " if axis else ""
             raise LimitsError(
@@ -138,13 +142,16 @@ def _of_axis(limits: LimitsOfAxes, axis: str) -> Limits | None:
     return limits.get(axis) if isinstance(limits, Mapping) else limits
 
 
-def _tighter(own: Limits | None, stated: Limits | None) -> Limits | None:
+def _tighter(own: Limits | None, stated: Limits | None, *, whose: str) -> Limits | None:
     """Return the smaller of two limits in each quantity, in the unit of the first."""
     if own is None or stated is None:
         return stated if own is None else own
     if all(math.isinf(getattr(stated, name)) for name in QUANTITIES):
         return own
-    there = stated.to(own.unit)
+    try:
+        there = stated.to(own.unit)
+    except UnitError as error:
+        raise UnitError(f"the limits stated for {whose}: {error}") from None
     return Limits(
         position=min(there.position, own.position),
         velocity=min(there.velocity, own.velocity),

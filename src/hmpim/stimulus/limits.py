@@ -4,7 +4,7 @@ import math
 from dataclasses import dataclass
 
 from hmpim.arguments import checked
-from hmpim.errors import ArgumentError
+from hmpim.errors import ArgumentError, UnitError
 from hmpim.stimulus.motion import Peaks
 from hmpim.units import check_unit, conversion_factor, rate_label
 
@@ -68,13 +68,26 @@ class Limits:
         Raises
         ------
         UnitError
-            If the unit is unknown or of another dimension.
+            If the unit is unknown or of another dimension, or only one of the two is a unit.
 
         Examples
         --------
         >>> round(Limits(velocity=1.0, unit="rad").to("deg").velocity, 3)
         57.296
+        >>> Limits(position=5.0).to("deg")
+        Traceback (most recent call last):
+        hmpim.errors.UnitError: limits in no unit cannot be turned into 'deg'; state their unit
         """
+        bound = any(math.isfinite(getattr(self, name)) for name in QUANTITIES)
+        # Pint takes no unit for rad; here it means that nobody said.
+        if bound and (self.unit == "") != (unit == ""):
+            has, wants = (f"{u!r}" if u else "no unit" for u in (self.unit, unit))
+            raise UnitError(
+                f"limits in {has} cannot be turned into {wants}; "
+                + ("state their unit" if not self.unit else "state a unit")
+            )
+        if not bound:
+            return Limits(unit=unit)
         factor = conversion_factor(self.unit, to=unit)
         return Limits(
             position=self.position * factor,

@@ -141,6 +141,14 @@ def test_limits_and_axes_come_with_the_hello():
             ),
             "states a velocity limit of 200 for roll, and 500 is expected",
         ),
+        (
+            Hello(axes=("roll",), limits={"roll": Limits(position=0.3)}),
+            "refuses: 'bench' and the limits expected of roll: limits in no unit cannot be turned",
+        ),
+        (
+            Hello(axes=("roll",), limits={"roll": Limits(position=0.3, unit="m")}),
+            "refuses: 'bench' and the limits expected of roll: unit 'm' cannot be turned into 'de",
+        ),
     ],
 )  # fmt: skip
 def test_what_the_ends_do_not_agree_about_is_refused(expected, words):

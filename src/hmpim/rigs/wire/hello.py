@@ -17,11 +17,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, cast, get_args
 
-from hmpim.errors import HmpimError, RigError
+from hmpim.errors import HmpimError, RigError, UnitError
 from hmpim.record import Intersample
 from hmpim.stimulus import Limits
 from hmpim.stimulus.limits import QUANTITIES
-from hmpim.units import check_unit, conversion_factor
+from hmpim.units import check_unit
 
 __all__ = ["PROTOCOL", "Hello", "check_agreement"]
 
@@ -154,7 +154,7 @@ def check_agreement(expected: Hello, stated: Hello) -> None:
     Raises
     ------
     RigError
-        If axes, units, rate or limits differ; the message says both.
+        If axes, units, rate or limits differ, or units cannot be compared; the message says both.
 
     Examples
     --------
@@ -184,8 +184,10 @@ def check_agreement(expected: Hello, stated: Hello) -> None:
         if axis not in stated.axes:
             raise RigError(f"{who} has no axis {axis!r}, for which limits are expected")
         unit = stated.units[stated.axes.index(axis)]
-        conversion_factor(wanted.unit, to=unit)
-        there, here = stated.limits.get(axis, Limits(unit=unit)), wanted.to(unit)
+        try:
+            there, here = stated.limits.get(axis, Limits()).to(unit), wanted.to(unit)
+        except UnitError as error:
+            raise RigError(f"{who} and the limits expected of {axis}: {error}") from None
         for name in QUANTITIES:
             mine, theirs = getattr(here, name), getattr(there, name)
             # Narrower than the rig's is a wish; wider would be a mistake about the rig.
