@@ -175,11 +175,33 @@ def test_ctrl_c_says_what_there_is_of_the_run(folder, monkeypatch):
     assert not read_recording(folder / "r.h5").complete
 
 
-def test_a_stimulus_at_another_rate_than_the_rig_states_is_refused(folder):
-    (folder / "unit.toml").write_text('rig = "sensor"\nrate = 123\n')
+@pytest.mark.parametrize(
+    ("stated", "words"),
+    [
+        ("rate = 123", "states rate = 123 Hz; design the stimulus at this rate"),
+        ('unit = "rad"', "the stimulus is in 'deg', and the rig's description states unit = 'rad'"),
+        ('axes = ["roll", "yaw"]', "the stimulus names no axis, and the rig's description states"),
+        ("[limits.roll]\nposition = 5.0", "limits are stated for roll, and the stimulus names no"),
+    ],
+)
+def test_a_stimulus_that_is_not_what_the_rig_states_is_refused(folder, stated, words):
+    (folder / "unit.toml").write_text(f'rig = "sensor"\n{stated}\n')
     out = run("run", "--rig-file", "unit.toml", "s.csv", "-o", "r.h5")
     assert out.exit_code == 2
-    assert "states rate = 123 Hz; design the stimulus at this rate" in out.stderr
+    assert words in out.stderr
+    assert not (folder / "r.h5").exists()
+
+
+def test_a_stimulus_is_for_one_of_the_axes_that_the_rig_states(folder):
+    (folder / "unit.toml").write_text('rig = "sensor"\nunit = "°"\naxes = ["roll", "yaw"]\n')
+    assert (
+        run("run", "--rig-file", "unit.toml", "s.csv", "--axis", "yaw", "-o", "r.h5").exit_code == 0
+    )
+    out = run("run", "--rig-file", "unit.toml", "s.csv", "--axis", "nod", "-o", "r.h5")
+    assert out.exit_code == 2
+    assert (
+        "the stimulus is for axis 'nod', and the rig's description states axes roll" in out.stderr
+    )
 
 
 @pytest.mark.parametrize("code", ["", "3"])

@@ -190,6 +190,15 @@ def test_limits_stated_without_a_unit_are_not_taken_for_radians():
     run(spy, SINE, limits=Limits())  # nothing bounds, so there is nothing to convert
 
 
+def test_limits_stated_for_an_axis_that_is_not_there_are_refused():
+    spy = Spy(axes=("roll", "yaw"), limits=Limits(position=45.0, unit="deg"))
+    rol = {"rol": Limits(position=1.0, unit="deg")}
+    with pytest.raises(LimitsError, match="stated for axis 'rol', and rig 'pitch' has roll, yaw"):
+        run(spy, {"roll": SINE}, limits=rol)
+    with pytest.raises(LimitsError, match="limits are stated for rol, and the stimulus names no a"):
+        run(Spy(), SINE, limits=rol)
+
+
 def test_a_failing_driver_is_told_as_the_rigs_own_error():
     fault = OSError("port closed")
     with pytest.raises(RigError, match="rig 'pitch' failed: OSError: port closed") as caught:

@@ -143,7 +143,7 @@ def run(
     from hmpim.experiment import run as play
     from hmpim.formats.stimulus_files import read_stimuli
     from hmpim.rigs import TickClock, find_ticks
-    from hmpim.rigs.catalogue import find_rig, read_description
+    from hmpim.rigs.catalogue import check_described, find_rig, read_description
 
     rule = until_of(until, pair=pair) if until else None
     if pair is not None and rule is None:
@@ -151,7 +151,7 @@ def run(
     described = None if rig_file is None else read_description(rig_file)
     found = find_rig(rig, description=described)
     stimuli = _aimed(read_stimuli(stimulus), axis, found.description.axes)
-    _check_rate(stimuli, found.description.rate)
+    check_described(stimuli, found)
     clock = TickClock(find_ticks(tick), rate=tick_rate) if tick else None
     options = RunOptions(
         clock=clock,
@@ -222,16 +222,6 @@ def _aimed(stimuli: "list[Stimulus]", axis: str, axes: tuple[str, ...]) -> "list
         named = ", ".join(one.axis for one in stimuli)
         raise ArgumentError(f"--axis {axis}: the stimulus is for {named} already; leave it out")
     return [replace(stimuli[0], axis=axis)]
-
-
-def _check_rate(stimuli: "list[Stimulus]", rate: float | None) -> None:
-    """Refuse a stimulus at another rate than the rig's description states."""
-    for one in stimuli:
-        if rate is not None and one.fs != rate:
-            raise ArgumentError(
-                f"the stimulus has {one.fs:g} Hz, and the rig's description states rate = "
-                f"{rate:g} Hz; design the stimulus at this rate, or correct the description"
-            )
 
 
 def _driven(found: "Rig", text: str, description: "Description | None") -> "Rig":

@@ -111,7 +111,8 @@ def limits_by_axis(
     Raises
     ------
     LimitsError
-        If something moves and its limits are not stated.
+        If something moves and its limits are not stated, or limits are stated for an axis that is
+        not there.
     UnitError
         If the limits stated are in no unit, and the rig's own are in one, or their dimensions
         differ.
@@ -124,6 +125,7 @@ def limits_by_axis(
     {'': None}
     """
     found: dict[str, Limits | None] = {}
+    _check_named(rig, stimuli, stated)
     for axis in stimuli:
         whose = f"{rig.name!r}, axis {axis!r}" if axis else repr(rig.name)
         limits = _tighter(_of_axis(rig.limits, axis), _of_axis(stated, axis), whose=whose)
@@ -136,6 +138,26 @@ def limits_by_axis(
         free = limits is None or all(math.isinf(getattr(limits, name)) for name in QUANTITIES)
         found[axis] = None if free else limits
     return found
+
+
+def _check_named(rig: Rig, stimuli: Mapping[str, Stimulus], stated: LimitsOfAxes) -> None:
+    """Refuse limits of an axis that is not there, which would bound nothing."""
+    if not isinstance(stated, Mapping):
+        return
+    has = tuple(rig.axes)
+    strange = [axis for axis in stated if axis not in has] if has else []
+    if strange:
+        raise LimitsError(
+            f"limits are stated for axis {strange[0]!r}, and rig {rig.name!r} has "
+            f"{', '.join(has)}; correct the name"
+        )
+    missed = [axis for axis in stimuli if axis not in stated] if not has else []
+    if missed:
+        whose = f"is for axis {missed[0]!r}" if missed[0] else "names no axis"
+        raise LimitsError(
+            f"limits are stated for {', '.join(stated)}, and the stimulus {whose}; name its axis, "
+            "or state limits without an axis"
+        )
 
 
 def _of_axis(limits: LimitsOfAxes, axis: str) -> Limits | None:

@@ -13,8 +13,9 @@ from hmpim.record import Intersample
 from hmpim.rigs.block import Block, Layout, Quantity
 from hmpim.rigs.protocol import Stimuli
 from hmpim.rigs.simulated import Playing, Simulated
-from hmpim.rigs.stimuli import check_feed, feed_of
+from hmpim.rigs.stimuli import feed_of
 from hmpim.stimulus import Limits
+from hmpim.units import check_unit
 
 __all__ = ["FunctionRig"]
 
@@ -71,7 +72,7 @@ class FunctionRig(Simulated):
     _playing: Playing = field(default_factory=Playing, init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
-        check_feed(measures=self.measures, output_unit=self.output_unit)
+        check_unit(self.output_unit or "")
 
     @property
     def axes(self) -> tuple[str, ...]:

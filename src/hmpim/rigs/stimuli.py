@@ -13,12 +13,11 @@ from hmpim.record import Intersample
 from hmpim.rigs.block import Block, ChannelSpec, Layout, Pace, Quantity
 from hmpim.stimulus import Stimulus
 from hmpim.stimulus.command import rounded
-from hmpim.units import check_unit, rate_unit
+from hmpim.units import rate_unit
 
 __all__ = [
     "Commands",
     "Feed",
-    "check_feed",
     "commands_of",
     "feed_of",
     "shared_band",
@@ -226,35 +225,6 @@ class Feed:
         """What will be recorded: this, and what the software makes of it."""
         made = ChannelSpec(name=output, role="output", unit=unit)
         return Layout(channels=(self.channel, made), intersample=intersample, source=source)
-
-
-def check_feed(*, measures: Quantity, output_unit: str | None) -> None:
-    """Check what software is said to take and to give.
-
-    Parameters
-    ----------
-    measures : {'position', 'velocity', 'acceleration'}
-        Which quantity it is fed.
-    output_unit : str or None
-        Unit of what it returns; None for that of what it is fed.
-
-    Raises
-    ------
-    ArgumentError
-        If the quantity is not one of the three.
-    UnitError
-        If the unit cannot be read.
-
-    Examples
-    --------
-    >>> check_feed(measures="position", output_unit="deg")
-    """
-    if measures not in get_args(Quantity):
-        raise ArgumentError(
-            f"measures = {measures!r} is not known; use one of {get_args(Quantity)}"
-        )
-    if output_unit is not None:
-        check_unit(output_unit)
 
 
 def feed_of(

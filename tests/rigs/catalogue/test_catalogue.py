@@ -68,6 +68,9 @@ def test_a_broken_description_harms_only_itself(project):
         ({"unlimited": True, "limits": {"position": 1}}, "unlimited = true and limits contradict"),
         ({"mode": "VP"}, "mode = 'VP': input should be 'P', 'PV' or 'PVA'"),
         ({"watchdog": -0.1}, "watchdog = -0.1: "),
+        ({"unit": "degg"}, "unit 'degg' is not known"),
+        ({"axes": ["roll", "roll"]}, "'roll' is there twice; give each its own name"),
+        ({"axes": ["roll", ""]}, "one has no name; give each its own name"),
         ([], "the description: "),
     ],
 )
@@ -118,6 +121,12 @@ def test_a_rig_file_and_a_name_may_not_contradict(tmp_path):
         ("table", {"options": {"delay": "short"}}, "make no table"),
         ("table", {"axes": ["nod"]}, "axis 'nod' is none of the table's"),
         ("table", {"unlimited": True}, "the table has limits, those of Fig. 4"),
+        ("sensor", {"load": "bracket"}, "load = 'bracket' means nothing to a sensor; leave it out"),
+        ("tracker", {"mode": "PV"}, "mode = 'PV' means nothing to a tracker; leave it out"),
+        ("process:cat", {"load": "bracket"}, "load = 'bracket' means nothing to a program"),
+        ("process:cat", {"options": {"name": 3}}, "name = 3 is not a text"),
+        ("seeker", {"load": "ton"}, "load 'ton' is not known"),
+        ("seeker", {"options": {"name": 3}}, "name = 3 is not a text"),
     ],
 )
 def test_what_a_kind_does_not_take(rig, data, words):
@@ -141,6 +150,13 @@ def test_the_table_takes_load_mode_start_and_limits():
     assert (table.uut_load, table.target_load, table.mode) == ("bracket", "projector", "PV")
     assert (table.start.yaw, table.friction) == (20.0, False)
     assert found.limits == {"roll": Limits(velocity=100.0, unit="deg")}
+
+
+def test_the_seekers_table_takes_load_and_mode():
+    described = describe({"load": "bracket", "mode": "PV", "options": {"table": {"delay": 0.002}}})
+    table = find_rig("seeker", description=described).rig.table
+    assert (table.uut_load, table.mode, table.delay) == ("bracket", "PV", 0.002)
+    assert find_rig("seeker", description=describe({"load": "bracket"})).rig.table.mode == "PVA"
 
 
 def test_kinds_of_other_packages_by_entry_point(monkeypatch, tmp_path):

@@ -53,7 +53,7 @@ def test_what_does_not_fit_is_refused(fmu):
         run(FmuRig(path=str(fmu), output="z"), STIMULUS)
     with pytest.raises(RigError, match="has no variable 'Q' to start from"):
         run(FmuRig(path=str(fmu), start={"Q": 1.0}), STIMULUS)
-    with pytest.raises(ArgumentError, match="interface = 'me' is not known"):
+    with pytest.raises(ArgumentError, match="interface = 'me' is not one of"):
         FmuRig(path=str(fmu), interface="me")
     with pytest.raises(ArgumentError, match=r"tolerance = 2.0"):
         FmuRig(path=str(fmu), tolerance=2.0)

@@ -133,7 +133,7 @@ def test_a_program_that_will_not_end_is_made_to(monkeypatch):
         ({"command": ""}, "the command of the program is empty"),
         ({"command": "a 'b"}, "cannot be split into words"),
         ({"command": "a", "answer": 0.0}, "answer = 0.0 s must be a positive"),
-        ({"command": "a", "measures": "jerk"}, "measures = 'jerk' is not known"),
+        ({"command": "a", "measures": "jerk"}, "measures = 'jerk' is not one of"),
     ],
 )
 def test_what_cannot_be_is_refused(wrong, words):

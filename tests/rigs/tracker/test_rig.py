@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import hmpim
-from hmpim.errors import ArgumentError, FormatError, LimitsError, RigError
+from hmpim.errors import ArgumentError, HmpimError, LimitsError, RigError
 from hmpim.rigs.catalogue import describe, find_rig
 from hmpim.rigs.tracker import Camera, Scene, TrackerRig
 from hmpim.stimulus import Limits, Ramp, Sine, Stimulus, design
@@ -129,7 +129,7 @@ def test_what_cannot_be_is_refused():
     far = Stimulus(waveform=Ramp(duration=1.0), fs=100.0, unit="rad")
     with pytest.raises(LimitsError, match="position"):
         hmpim.run(TrackerRig(), far)
-    with pytest.raises(ArgumentError, match="tracker = 'eye' is not known"):
+    with pytest.raises(ArgumentError, match="tracker = 'eye' is not one of"):
         TrackerRig(tracker="eye")
     for wrong, words in (
         ({"frame_rate": 0.0}, r"frame_rate = 0\.0 Hz"),
@@ -142,6 +142,10 @@ def test_what_cannot_be_is_refused():
     for options, words in (
         ({"camera": {"rate": 1}}, r"camera\.rate is not known; known are dropped"),
         ({"scene": 3}, "'scene' must be a table"),
+        ({"scene": {"width": 160.5}}, r"width = 160\.5 is not a whole number"),
+        ({"camera": {"frame_rate": "fast"}}, "frame_rate = 'fast' is not a number"),
+        ({"name": 3}, "name = 3 is not a text"),
+        ({"input_name": 3}, "input_name = 3 is not a text"),
     ):
-        with pytest.raises(FormatError, match=words):
+        with pytest.raises(HmpimError, match=words):
             find_rig("tracker", description=describe({"options": options}))

@@ -6,7 +6,7 @@ from hmpim.rigs.catalogue.description import (
     describe,
     read_description,
 )
-from hmpim.rigs.catalogue.find import FoundRig, check_rig, find_rig
+from hmpim.rigs.catalogue.find import FoundRig, check_described, check_rig, find_rig
 from hmpim.rigs.catalogue.kinds import KINDS, Builder, Kind, Offered, load_builder, offered_kinds
 from hmpim.rigs.catalogue.named import NamedRig, config_files, named_rigs
 from hmpim.rigs.catalogue.simulated import made_of, take_options
@@ -20,6 +20,7 @@ __all__ = [
     "NamedRig",
     "Offered",
     "StatedLimits",
+    "check_described",
     "check_rig",
     "config_files",
     "describe",

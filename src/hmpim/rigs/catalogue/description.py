@@ -14,6 +14,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_valida
 
 from hmpim.errors import FormatError
 from hmpim.stimulus import Limits
+from hmpim.units import check_unit
 
 __all__ = ["Description", "StatedLimits", "describe", "read_description"]
 
@@ -98,6 +99,11 @@ class Description(BaseModel):
 
     @model_validator(mode="after")
     def _consistent(self) -> "Description":
+        check_unit(self.unit)
+        twice = sorted({axis for axis in self.axes if self.axes.count(axis) > 1})
+        if twice or "" in self.axes:
+            fault = f"{twice[0]!r} is there twice" if twice else "one has no name"
+            raise ValueError(f"axes {self.axes}: {fault}; give each its own name")
         if self.unlimited and self.limits is not None:
             raise ValueError("unlimited = true and limits contradict each other; state one")
         if self.limits is not None and self.axes:

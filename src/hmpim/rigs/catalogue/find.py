@@ -1,16 +1,19 @@
 """From what stands on the command line to a rig: a name, a kind, or an address."""
 
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from hmpim.errors import FormatError, RigError
+from hmpim.errors import ArgumentError, FormatError, RigError
 from hmpim.rigs.catalogue.description import Description
 from hmpim.rigs.catalogue.kinds import KINDS, load_builder, offered_kinds
 from hmpim.rigs.catalogue.named import named_rigs
 from hmpim.rigs.protocol import LimitsOfAxes, Rig
+from hmpim.stimulus import Stimulus
+from hmpim.units import conversion_factor
 
-__all__ = ["FoundRig", "check_rig", "find_rig"]
+__all__ = ["FoundRig", "check_described", "check_rig", "find_rig"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -88,6 +91,59 @@ def find_rig(
     if builder is None:
         raise _unknown(text, start)
     return FoundRig(rig=builder(argument, described), description=described)
+
+
+def check_described(stimuli: Sequence[Stimulus], found: FoundRig) -> None:
+    """Refuse stimuli of another rate, axis or unit than a rig's description states.
+
+    Parameters
+    ----------
+    stimuli : sequence of Stimulus
+        What is to be played.
+    found : FoundRig
+        The rig. One that moves, or has axes, is commanded in units of its own, and what is
+        comparable is converted; software is fed the samples as they are.
+
+    Raises
+    ------
+    ArgumentError
+        If one of the three differs; the message says both.
+    UnitError
+        If the units cannot be compared.
+
+    Examples
+    --------
+    >>> from hmpim.rigs.catalogue import describe
+    >>> from hmpim.stimulus import Ramp
+    >>> found = find_rig("sensor", description=describe({"unit": "rad"}))
+    >>> check_described([Stimulus(waveform=Ramp(), fs=10.0, unit="deg")], found)
+    Traceback (most recent call last):
+    hmpim.errors.ArgumentError: the stimulus is in 'deg', and the rig's description states ...
+    """
+    stated, rig = found.description, found.rig
+    converts = getattr(rig, "moves", True) or bool(rig.axes)
+    correct = "or correct the description"
+    for one in stimuli:
+        if stated.rate is not None and one.fs != stated.rate:
+            raise ArgumentError(
+                f"the stimulus has {one.fs:g} Hz, and the rig's description states rate = "
+                f"{stated.rate:g} Hz; design the stimulus at this rate, {correct}"
+            )
+        if stated.axes and one.axis not in stated.axes:
+            names = f"is for axis {one.axis!r}" if one.axis else "names no axis"
+            raise ArgumentError(
+                f"the stimulus {names}, and the rig's description states axes "
+                f"{', '.join(stated.axes)}; name one of them (--axis, or Stimulus.axis), {correct}"
+            )
+        if not stated.unit:
+            continue
+        alike = one.unit != "" and conversion_factor(one.unit, to=stated.unit) == 1.0
+        if not alike and not (converts and one.unit):
+            has = f"in {one.unit!r}" if one.unit else "in no unit"
+            raise ArgumentError(
+                f"the stimulus is {has}, and the rig's description states unit = "
+                f"{stated.unit!r}; design the stimulus in this unit, {correct}"
+            )
 
 
 def check_rig(text: str, *, start: Path | None = None) -> None:

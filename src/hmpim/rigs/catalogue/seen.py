@@ -49,12 +49,15 @@ def build_seeker(argument: str, description: Description) -> SeekerRig:
     if argument:
         raise FormatError(f"seeker:{argument} says more than there is; write seeker")
     known = {f.name for f in dataclasses.fields(SeekerRig) if f.init} - {"reset"}
-    options = take_options(description, known, kind="seeker", instead={"limits": "limits"})
-    if "table" in options:
-        if not isinstance(options["table"], dict):
-            raise FormatError("option 'table' must be a table of the motion table's options")
-        given = Description(mode=description.mode or "PVA", options=options["table"])
-        options["table"] = build_table("", given)
+    options = take_options(
+        description, known, kind="seeker", instead={"limits": "limits"}, loaded=True
+    )
+    given = options.get("table", {})
+    if not isinstance(given, dict):
+        raise FormatError("option 'table' must be a table of the motion table's options")
+    options["table"] = build_table(
+        "", Description(load=description.load, mode=description.mode or "PVA", options=given)
+    )
     return made_of(SeekerRig, with_camera(options), kind_name="seeker")
 
 

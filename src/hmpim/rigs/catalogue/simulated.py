@@ -41,7 +41,7 @@ def build_table(argument: str, description: Description) -> MotionTable:
     _nothing_behind("table", argument)
     own = {"load": "load", "uut_load": "load", "target_load": "load", "mode": "mode"}
     known = _fields(MotionTable) - {"specs", "base", *own}
-    options = take_options(description, known, kind="table", instead=own)
+    options = take_options(description, known, kind="table", instead=own, loaded=True)
     if "start" in options:
         options["start"] = _start(options["start"])
     if description.load:
@@ -81,6 +81,7 @@ def take_options(
     *,
     kind: str,
     instead: Mapping[str, str] | None = None,
+    loaded: bool = False,
 ) -> dict[str, Any]:
     """Return a description's options, refusing those that this kind does not take.
 
@@ -94,11 +95,13 @@ def take_options(
         For the message.
     instead : mapping of str to str, optional
         Options that stand elsewhere in the description, and the key they have there.
+    loaded : bool
+        Whether the description's `load` and `mode` mean something to this kind.
 
     Raises
     ------
     FormatError
-        If an option is not known.
+        If an option is not known, or a load or mode is stated that means nothing.
 
     Examples
     --------
@@ -107,6 +110,9 @@ def take_options(
     Traceback (most recent call last):
     hmpim.errors.FormatError: option 'dealy' is not known for a sensor; known are delay
     """
+    for name, value in (("load", description.load), ("mode", description.mode)):
+        if value and not loaded:
+            raise FormatError(f"{name} = {value!r} means nothing to a {kind}; leave it out")
     for name in description.options:
         if instead and name in instead:
             raise FormatError(

@@ -9,6 +9,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from hmpim.arguments import checked
 from hmpim.errors import ArgumentError
 from hmpim.rigs.block import Block, ChannelSpec, Layout, RunReport
 from hmpim.rigs.protocol import Stimuli
@@ -17,7 +18,7 @@ from hmpim.rigs.seeker.truth import seeker_bandwidth
 from hmpim.rigs.simulated import Playing, Simulated
 from hmpim.rigs.stimuli import stimuli_by_axis
 from hmpim.rigs.table import MotionTable
-from hmpim.rigs.tracker import TRACKERS, Camera, Scene, TrackedFrame, Tracker, make_tracker
+from hmpim.rigs.tracker import Camera, Scene, TrackedFrame, Tracker, make_tracker
 from hmpim.rigs.tracker.camera import Shot, Watching
 from hmpim.rigs.tracker.rig import findings_of, kept_frames
 from hmpim.rigs.tracker.trackers import TrackerName
@@ -31,6 +32,7 @@ _SIGHT = "line-of-sight rate"
 _BODY = "body rate"
 
 
+@checked
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class SeekerRig(Simulated):
     """A seeker as the unit under test, on the table's inner axes, its target on the outer ones.
@@ -93,11 +95,6 @@ class SeekerRig(Simulated):
                 raise ArgumentError(f"{name} = {value!r} must be positive and finite")
         if not math.isfinite(self.coupling):
             raise ArgumentError(f"coupling = {self.coupling!r} must be finite")
-        if not callable(self.tracker) and self.tracker not in TRACKERS:
-            raise ArgumentError(
-                f"tracker = {self.tracker!r} is not known; use one of {TRACKERS} or a function "
-                "of a frame"
-            )
 
     @property
     def axes(self) -> tuple[str, ...]:

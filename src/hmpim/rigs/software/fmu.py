@@ -4,19 +4,20 @@ import tempfile
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Literal, get_args
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from hmpim.arguments import checked
 from hmpim.errors import ArgumentError, RigError, UnitError
 from hmpim.record import Intersample
 from hmpim.rigs.block import Block, Layout, Quantity
 from hmpim.rigs.protocol import Stimuli
 from hmpim.rigs.simulated import Playing, Simulated
-from hmpim.rigs.stimuli import check_feed, feed_of
+from hmpim.rigs.stimuli import feed_of
 from hmpim.stimulus import Limits
-from hmpim.units import conversion_factor, read_unit
+from hmpim.units import check_unit, conversion_factor, read_unit
 
 __all__ = ["FmuRig", "Interface"]
 
@@ -33,6 +34,7 @@ it was given, so that one which is gone would take the process down.
 """
 
 
+@checked
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class FmuRig(Simulated):
     """An FMU as the unit under test; it is set up anew for each run.
@@ -92,13 +94,9 @@ class FmuRig(Simulated):
     _playing: Playing = field(default_factory=Playing, init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
-        if self.interface not in get_args(Interface):
-            raise ArgumentError(
-                f"interface = {self.interface!r} is not known; use one of {get_args(Interface)}"
-            )
         if not 0.0 < self.tolerance < 1.0:
             raise ArgumentError(f"tolerance = {self.tolerance!r} must be between 0 and 1")
-        check_feed(measures=self.measures, output_unit=self.output_unit)
+        check_unit(self.output_unit or "")
 
     @property
     def axes(self) -> tuple[str, ...]:

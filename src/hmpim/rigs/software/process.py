@@ -30,12 +30,13 @@ from typing import IO
 import numpy as np
 from numpy.typing import NDArray
 
+from hmpim.arguments import checked
 from hmpim.errors import ArgumentError, RigError
 from hmpim.record import Intersample
 from hmpim.rigs.block import Block, Layout, Quantity
 from hmpim.rigs.protocol import Stimuli
 from hmpim.rigs.simulated import Playing, Simulated
-from hmpim.rigs.stimuli import check_feed, feed_of
+from hmpim.rigs.stimuli import feed_of
 from hmpim.stimulus import Limits
 from hmpim.units import check_unit
 
@@ -49,6 +50,7 @@ _UNREAD = 16  # answers kept before they are asked for; one is too many already
 _LONGEST = 4096  # characters of a line that are read at once; a double has 24
 
 
+@checked
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class ProcessRig(Simulated):
     """A program as the unit under test; it is started anew for each run.
@@ -108,9 +110,9 @@ class ProcessRig(Simulated):
         _arguments(self.command)
         for name in ("startup", "answer"):
             value = getattr(self, name)
-            if not (isinstance(value, (int, float)) and 0 < value < math.inf):
+            if not 0 < value < math.inf:
                 raise ArgumentError(f"{name} = {value!r} s must be a positive number of seconds")
-        check_feed(measures=self.measures, output_unit=self.output_unit)
+        check_unit(self.output_unit or "")
 
     @property
     def axes(self) -> tuple[str, ...]:

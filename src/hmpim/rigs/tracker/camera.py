@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from hmpim.arguments import checked
 from hmpim.errors import ArgumentError, RigError
 from hmpim.rigs.tracker.scene import Backdrop, Image
 from hmpim.rigs.tracker.trackers import Tracker
@@ -13,6 +14,7 @@ from hmpim.rigs.tracker.trackers import Tracker
 __all__ = ["Camera", "Shot", "Watching"]
 
 
+@checked
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Camera:
     """When frames are taken, which are lost, and when the tracker's answer is there.

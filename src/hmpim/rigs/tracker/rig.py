@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from hmpim.arguments import checked
 from hmpim.errors import ArgumentError, LimitsError
 from hmpim.record import Finding
 from hmpim.rigs.block import Block, ChannelSpec, Layout, RunReport
@@ -15,7 +16,7 @@ from hmpim.rigs.simulated import Playing, Simulated
 from hmpim.rigs.stimuli import stimuli_by_axis
 from hmpim.rigs.tracker.camera import Camera, Shot, Watching
 from hmpim.rigs.tracker.scene import Image, Scene
-from hmpim.rigs.tracker.trackers import TRACKERS, Tracker, TrackerName, make_tracker
+from hmpim.rigs.tracker.trackers import Tracker, TrackerName, make_tracker
 from hmpim.stimulus import Limits
 from hmpim.units import conversion_factor
 
@@ -48,6 +49,7 @@ class TrackedFrame:
     point: tuple[float, float] | None
 
 
+@checked
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class TrackerRig(Simulated):
     """A camera and a tracker as the unit under test.
@@ -103,11 +105,6 @@ class TrackerRig(Simulated):
     _counts: dict[str, int] = field(default_factory=dict, init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
-        if not callable(self.tracker) and self.tracker not in TRACKERS:
-            raise ArgumentError(
-                f"tracker = {self.tracker!r} is not known; use one of {TRACKERS} or a function "
-                "of a frame"
-            )
         for name in ("scale_factor", "boresight"):
             if not math.isfinite(getattr(self, name)):
                 raise ArgumentError(f"{name} = {getattr(self, name)!r} must be finite")

@@ -7,6 +7,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from hmpim.arguments import checked
 from hmpim.errors import ArgumentError
 
 __all__ = ["Backdrop", "Scene"]
@@ -15,6 +16,7 @@ FloatArray = NDArray[np.float64]
 Image = NDArray[np.uint8]
 
 
+@checked
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Scene:
     """What a camera looks at, in grey levels from 0 to 255.

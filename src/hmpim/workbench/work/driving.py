@@ -31,7 +31,7 @@ from hmpim.experiment.readiness import (
 from hmpim.optimal import RoughModel
 from hmpim.record import Intersample, Record
 from hmpim.rigs import LimitsOfAxes, Rig
-from hmpim.rigs.catalogue import Description, FoundRig, find_rig
+from hmpim.rigs.catalogue import Description, FoundRig, check_described, find_rig
 from hmpim.stimulus import Limits, Stimulus
 
 __all__ = ["Begun", "Block", "Ended", "Order", "Questions", "drive"]
@@ -129,6 +129,7 @@ def drive(pipe: Connection) -> None:
 def _played(order: Order, pipe: Connection, wish: "_Wish") -> None:
     found = find_rig(order.rig, description=order.description)
     stimuli = _aimed(order.stimuli, found.description.axes or found.rig.axes)
+    check_described(stimuli, found)
     rig: Rig = found.rig
     if order.outliving and moves(rig) and found.description.watchdog is None:
         rig = OutlivingRig(_again, order.rig, order.description)
