@@ -1,5 +1,6 @@
 """Programs under test, over standard input and output."""
 
+import re
 import shlex
 import subprocess
 import sys
@@ -149,3 +150,24 @@ def test_a_program_that_is_not_there_is_told():
 def test_options_come_from_the_description():
     rig = find_rig("process:./x", description=describe({"options": {"measures": "velocity"}})).rig
     assert rig.measures == "velocity"
+
+
+@pytest.mark.parametrize(
+    ("at_the_end", "words"),
+    [
+        ("print('disk full', file=sys.stderr); sys.exit(3)", r"ended with exit code 3.*disk full"),
+        ("import os; os.kill(os.getpid(), 9)", "was killed by signal 9"),
+        ("time.sleep(60)", "did not end within 2 s and was stopped"),
+    ],
+)
+def test_a_program_that_does_not_end_well_is_remarked_and_its_record_kept(at_the_end, words):
+    record = run(program(READY + ECHO + at_the_end), STIMULUS)
+    assert record.outputs[0].values == pytest.approx(STIMULUS.position)
+    (finding,) = record.findings
+    assert (finding.code, finding.severity) == ("program_end", "info")
+    assert re.search(f"After the last sample 'process' {words}", finding.message)
+
+
+def test_a_program_that_ends_well_leaves_no_remark():
+    rig = program(READY + ECHO)
+    assert run(rig, STIMULUS).findings == ()

@@ -32,8 +32,8 @@ from numpy.typing import NDArray
 
 from hmpim.arguments import checked
 from hmpim.errors import ArgumentError, RigError
-from hmpim.record import Intersample
-from hmpim.rigs.block import Block, Layout, Quantity
+from hmpim.record import Finding, Intersample
+from hmpim.rigs.block import Block, Layout, Quantity, RunReport
 from hmpim.rigs.protocol import Stimuli
 from hmpim.rigs.simulated import Playing, Simulated
 from hmpim.rigs.stimuli import feed_of
@@ -105,6 +105,7 @@ class ProcessRig(Simulated):
     output_name: str = "y"
     limits: Limits | None = None
     _playing: Playing = field(default_factory=Playing, init=False, repr=False, compare=False)
+    _findings: list[Finding] = field(default_factory=list, init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         _arguments(self.command)
@@ -128,6 +129,7 @@ class ProcessRig(Simulated):
             If it cannot be started, or does not answer ``ready``.
         """
         self.stop()
+        self._findings.clear()
         fed = feed_of(stimulus, measures=self.measures, rig=self.name, name=self.input_name)
         talk = Talk(_arguments(self.command), name=self.name)
         self._playing.state = (talk, fed.values)
@@ -176,7 +178,11 @@ class ProcessRig(Simulated):
         """End the program if it runs."""
         state, self._playing.state = self._playing.state, None
         if state is not None:
-            state[0].close()
+            self._findings[:] = state[0].close()
+
+    def report(self) -> RunReport:
+        """Say how the program ended, if not by itself and with exit code 0."""
+        return RunReport(findings=tuple(self._findings))
 
 
 class Talk:
@@ -290,24 +296,44 @@ class Talk:
         with suppress(OSError):
             stdin.close()
 
-    def close(self) -> None:
-        """Have the program end: asked first, then made to."""
+    def close(self) -> list[Finding]:
+        """Have the program end: asked first, then made to. Return what is wrong with that."""
         self.end()
         assert self._leave_at is not None
         patience = max(0.0, self._leave_at - time.monotonic())
+        stopped = False
         for last in (self._process.terminate, self._process.kill):
             try:
                 self._process.wait(patience)
                 break
             except subprocess.TimeoutExpired:
                 last()
+                stopped = True
             patience = _PATIENCE
         self._process.wait()
         for thread in self._threads:
             thread.join(_PATIENCE)
+        ended = self._ended(stopped=stopped)
         for stream in (self._process.stdout, self._process.stderr):
             if stream is not None:
                 stream.close()
+        return ended
+
+    def _ended(self, *, stopped: bool) -> list[Finding]:
+        if not stopped and self._process.returncode == 0:
+            return []
+        how = f"did not end within {_PATIENCE:g} s and was stopped" if stopped else None
+        return [
+            Finding(
+                code="program_end",
+                message=(
+                    f"After the last sample {self._name!r} {how or self._how_it_ended()}"
+                    f"{self._complaint()}. Its answers are complete."
+                ),
+                severity="info",
+                parameters=(),
+            )
+        ]
 
     def _read(self, stream: IO[str]) -> None:
         for line in _pieces(stream):
