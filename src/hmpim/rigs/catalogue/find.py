@@ -116,7 +116,7 @@ def check_described(stimuli: Sequence[Stimulus], found: FoundRig) -> None:
     >>> from hmpim.rigs.catalogue import describe
     >>> from hmpim.stimulus import Ramp
     >>> found = find_rig("sensor", description=describe({"unit": "rad"}))
-    >>> check_described([Stimulus(waveform=Ramp(), fs=10.0, unit="deg")], found)
+    >>> check_described([Stimulus(waveform=Ramp(duration=1.0), fs=10.0, unit="deg")], found)
     Traceback (most recent call last):
     hmpim.errors.ArgumentError: the stimulus is in 'deg', and the rig's description states ...
     """
